@@ -1,0 +1,1 @@
+//! The SQLite catalog: pairs, jobs, results, verdicts. The only room with SQL.

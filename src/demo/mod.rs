@@ -1,0 +1,1 @@
+//! The built-in dataset: glyphs carved into meshes and printed, with known truth, from one seed.

@@ -1,0 +1,82 @@
+//! Why a stage did not finish, and what that means for the pair.
+
+use serde::{Deserialize, Serialize};
+
+/// Class of a failure; it alone decides between retry and quarantine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FailureClass {
+    /// The file itself is wrong: empty, truncated, not a number, no faces. Quarantined.
+    BadInput,
+    /// The input is sound but the method found no answer, such as a plate without relief. Quarantined.
+    NoSolution,
+    /// Reading or writing failed, or a file is not there. Retried with back-off.
+    Io,
+    /// Too much memory or time. Retried alone, then quarantined.
+    Resource,
+    /// A defect of this program, such as a caught panic. Quarantined.
+    Bug,
+}
+
+impl FailureClass {
+    /// Every class.
+    pub const ALL: [Self; 5] = [
+        Self::BadInput,
+        Self::NoSolution,
+        Self::Io,
+        Self::Resource,
+        Self::Bug,
+    ];
+
+    /// Name in JSON, in the catalog and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::BadInput => "bad_input",
+            Self::NoSolution => "no_solution",
+            Self::Io => "io",
+            Self::Resource => "resource",
+            Self::Bug => "bug",
+        }
+    }
+}
+
+impl std::fmt::Display for FailureClass {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl std::str::FromStr for FailureClass {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::ALL
+            .into_iter()
+            .find(|class| class.name() == text)
+            .ok_or_else(|| {
+                format!(
+                    "{text:?} is not a failure class (bad_input, no_solution, io, resource, bug)"
+                )
+            })
+    }
+}
+
+/// A failure as it is stored and shown: its class and one sentence that names the file and the reason.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
+#[error("{message}")]
+pub struct Failure {
+    /// Decides retry or quarantine.
+    pub class: FailureClass,
+    /// Lower-case fragment with the values in it.
+    pub message: String,
+}
+
+impl Failure {
+    /// A failure of a class with its sentence.
+    pub fn new(class: FailureClass, message: impl Into<String>) -> Self {
+        Self {
+            class,
+            message: message.into(),
+        }
+    }
+}

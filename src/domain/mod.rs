@@ -1,0 +1,27 @@
+//! Nouns of the project: small values without files, SQL, async or image buffers.
+
+mod failure;
+mod hash;
+mod ids;
+mod metric;
+mod outcome;
+mod stage;
+mod transform;
+mod unit;
+mod verdict;
+
+pub use failure::{Failure, FailureClass};
+pub use hash::{ContentHash, ContentHashError};
+pub use ids::{PairId, PairName, PairNameError, WorkerId};
+pub use metric::ThresholdMetric;
+pub use outcome::{
+    Bow, DepthOutcome, DepthScale, FitOutcome, MetricOutcome, NormalizeOutcome, Pose,
+    RegisterOutcome, Scores, SideEvidence, ThresholdChoice,
+};
+pub use stage::Stage;
+pub use transform::{Affine2, PrintFromMesh, Rigid3};
+pub use unit::LengthUnit;
+pub use verdict::{Reason, Verdict};
+
+/// Milliseconds since the Unix epoch. "Now" is always an argument.
+pub type UnixMillis = i64;

@@ -1,0 +1,1 @@
+//! Aligned pairs for other tools.

@@ -1,0 +1,3 @@
+//! The `mocban` program.
+
+fn main() {}

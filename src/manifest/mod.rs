@@ -1,0 +1,1 @@
+//! Lists of pairs: CSV, JSON Lines, two folders by file stem.

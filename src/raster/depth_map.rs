@@ -1,0 +1,23 @@
+//! The depth map: heights over the fitted surface, seen as the print is read.
+
+use super::Grid;
+use crate::domain::DepthScale;
+
+/// A 16-bit depth map. Level 0 holds no data; 1..=65535 are linear in height.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DepthMap {
+    /// Levels by pixel.
+    pub levels: Grid<u16>,
+    /// How levels and pixels are to be read.
+    pub scale: DepthScale,
+}
+
+impl DepthMap {
+    /// Height over the fitted surface at a pixel, mesh units; `None` where there is no data.
+    pub fn height(&self, x: usize, y: usize) -> Option<f64> {
+        match self.levels.at(x, y) {
+            0 => None,
+            level => Some(self.scale.height(level)),
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! A rectangle of values. The pixel convention of the whole project is stated here.
+//!
+//! x runs to the right, y down, and **(0, 0) is the centre of the top-left pixel**: a pixel covers
+//! `x - 0.5 .. x + 0.5`.
+
+/// Values in rows, top row first.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid<T> {
+    width: usize,
+    height: usize,
+    data: Vec<T>,
+}
+
+impl<T: Copy> Grid<T> {
+    /// A grid of one value.
+    pub fn new(width: usize, height: usize, fill: T) -> Self {
+        Self {
+            width,
+            height,
+            data: vec![fill; width * height],
+        }
+    }
+
+    /// A grid from rows laid end to end; `None` when their number does not fit.
+    pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {
+        (data.len() == width * height).then_some(Self {
+            width,
+            height,
+            data,
+        })
+    }
+
+    /// A grid computed from each pixel's x and y.
+    pub fn from_fn(width: usize, height: usize, mut value: impl FnMut(usize, usize) -> T) -> Self {
+        let mut data = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for x in 0..width {
+                data.push(value(x, y));
+            }
+        }
+        Self {
+            width,
+            height,
+            data,
+        }
+    }
+
+    /// Each value replaced.
+    pub fn map<U: Copy>(&self, value: impl FnMut(&T) -> U) -> Grid<U> {
+        Grid {
+            width: self.width,
+            height: self.height,
+            data: self.data.iter().map(value).collect(),
+        }
+    }
+
+    /// Columns.
+    pub const fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub const fn height(&self) -> usize {
+        self.height
+    }
+
+    /// The value at column x, row y.
+    #[inline]
+    pub fn at(&self, x: usize, y: usize) -> T {
+        self.data[y * self.width + x]
+    }
+
+    /// The value there, or `None` outside the grid.
+    #[inline]
+    pub fn get(&self, x: i64, y: i64) -> Option<T> {
+        (x >= 0 && y >= 0 && x < self.width as i64 && y < self.height as i64)
+            .then(|| self.data[y as usize * self.width + x as usize])
+    }
+
+    /// Sets the value at column x, row y.
+    #[inline]
+    pub fn set(&mut self, x: usize, y: usize, value: T) {
+        self.data[y * self.width + x] = value;
+    }
+
+    /// One row.
+    pub fn row(&self, y: usize) -> &[T] {
+        &self.data[y * self.width..(y + 1) * self.width]
+    }
+
+    /// All values, row after row.
+    pub fn data(&self) -> &[T] {
+        &self.data
+    }
+
+    /// All values, to change.
+    pub fn data_mut(&mut self) -> &mut [T] {
+        &mut self.data
+    }
+
+    /// The values themselves.
+    pub fn into_vec(self) -> Vec<T> {
+        self.data
+    }
+}

@@ -1,0 +1,1 @@
+//! Catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX.

@@ -1,0 +1,1 @@
+//! The run: workers, policy, execution of one pair, events.

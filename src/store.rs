@@ -1,0 +1,1 @@
+//! Inputs and artifacts on disk: temporary name, fsync, rename to the content hash.

@@ -1,0 +1,1 @@
+//! The built-in dataset: same seed same bytes, truth true.

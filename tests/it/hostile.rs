@@ -1,0 +1,1 @@
+//! Bad inputs: one clear line each, no harm to others.

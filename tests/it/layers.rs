@@ -1,0 +1,1 @@
+//! The import table holds, and every room is in the code map.

@@ -1,0 +1,10 @@
+//! Integration tests in one binary.
+
+mod cli;
+mod demo;
+mod hostile;
+mod layers;
+mod one_pair;
+mod queue;
+mod report;
+mod resume;

@@ -1,0 +1,1 @@
+//! One pair end to end, as the README tells it.

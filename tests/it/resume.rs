@@ -1,0 +1,1 @@
+//! Killed runs go on where they were.
