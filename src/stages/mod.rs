@@ -6,6 +6,7 @@ pub mod depth;
 pub mod fit;
 pub mod normalize;
 pub mod register;
+pub mod score;
 
 use serde::{Deserialize, Serialize};
 
