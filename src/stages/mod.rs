@@ -7,6 +7,7 @@ pub mod fit;
 pub mod normalize;
 pub mod register;
 pub mod score;
+mod zbuffer;
 
 use serde::{Deserialize, Serialize};
 
