@@ -140,7 +140,12 @@ fn known(picture: &Picture, grey: &Grid<f32>) -> Mask {
     let Some(split) = otsu::split(&mut values) else {
         return all;
     };
-    if split.high < PAPER_TELLABLE {
+    let paper = values
+        .iter()
+        .filter(|v| f64::from(**v) > split.threshold)
+        .count();
+    let enough = paper as f64 >= LEAST_PAPER * all.data().len() as f64;
+    if enough && split.high < PAPER_TELLABLE {
         inside
     } else {
         all
