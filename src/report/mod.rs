@@ -7,6 +7,7 @@ mod compare;
 pub(crate) mod fixture;
 pub mod gate;
 mod model;
+mod render;
 mod standing;
 pub mod stats;
 mod tally;
@@ -16,5 +17,6 @@ mod warnings;
 pub use model::{
     Basis, Comparison, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock,
 };
+pub use render::{Format, render};
 pub use standing::Standing;
 pub use tally::{Tally, TruthFinding};

@@ -13,6 +13,7 @@ pub(super) fn of(progress: Progress, rows: &[Row], truth: &TruthProblems) -> Vec
     for row in rows {
         warnings.extend(impossible_dice(row));
         warnings.extend(uncounted_verdicts(row));
+        warnings.extend(mirrored(row));
     }
     warnings.extend(unusable_truth(truth));
     warnings
@@ -65,6 +66,17 @@ fn uncounted_verdicts(row: &Row) -> Option<String> {
              readers contradict each other on {conflicts}, which count as unsure."
         )),
     }
+}
+
+/// Results whose true map says that they read in mirror writing.
+fn mirrored(row: &Row) -> Option<String> {
+    let mirrored = row.truth.as_ref()?.mirrored;
+    (mirrored > 0).then(|| {
+        format!(
+            "{}: {mirrored} results read in mirror writing; their angle error counts as 180 degrees.",
+            row.metric.title()
+        )
+    })
 }
 
 /// Truths that could not be used.
