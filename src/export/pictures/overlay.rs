@@ -17,7 +17,7 @@ const OVERLAY_SIDE: usize = 480;
 pub struct View {
     width: usize,
     height: usize,
-    view_from_print: Affine2,
+    from_print: Affine2,
 }
 
 impl View {
@@ -42,7 +42,7 @@ impl View {
         Self {
             width,
             height,
-            view_from_print: Affine2::scale_shift(scale, [shift, shift]),
+            from_print: Affine2::scale_shift(scale, [shift, shift]),
         }
     }
 
@@ -53,7 +53,7 @@ impl View {
 
     /// The depth map laid on the print, lit from the side.
     pub fn relief(&self, depth: &DepthMap, print_from_depth: &Affine2) -> Rgb {
-        let view_from_depth = self.view_from_print.after(print_from_depth);
+        let view_from_depth = self.from_print.after(print_from_depth);
         let levels = warp_depth(depth, &view_from_depth, self.width, self.height);
         let side = depth.scale.mesh_unit_per_px / view_from_depth.scale();
         shaded(&levels, depth.scale.height_per_level / side)
@@ -61,7 +61,7 @@ impl View {
 
     /// The print with the edges of the depth mask on it.
     pub fn overlay(&self, print: &Picture, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
-        let view_from_depth = self.view_from_print.after(&outcome.print_from_depth);
+        let view_from_depth = self.from_print.after(&outcome.print_from_depth);
         let mask = depth_mask(depth, outcome.threshold_level);
         let mask = warp_mask(&mask, &view_from_depth, self.width, self.height);
         let reach = (self.width.max(self.height) / SIDE_PER_EDGE_PX).max(1);

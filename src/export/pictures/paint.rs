@@ -36,7 +36,7 @@ fn spans(from: usize, to: usize) -> Vec<Span> {
         .map(|i| {
             let (start, end) = (i as f64 * step, (i + 1) as f64 * step);
             if step < 1.0 {
-                return vec![(((start + end) / 2.0) as usize, 1.0)];
+                return vec![((f64::midpoint(start, end)) as usize, 1.0)];
             }
             (start as usize..(end.ceil() as usize).min(from))
                 .map(|j| (j, end.min((j + 1) as f64) - start.max(j as f64)))
