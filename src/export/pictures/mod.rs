@@ -6,7 +6,7 @@ mod paint;
 mod relief;
 mod sheet;
 
-pub use overlay::{View, depth_mask};
+pub use overlay::View;
 pub use paint::Rgb;
 pub use relief::shaded;
 pub use sheet::{SHEET_WIDTH, SheetCell, contact_sheet, tile_side};

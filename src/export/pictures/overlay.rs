@@ -4,6 +4,7 @@ use super::paint::{Rgb, eight_bits, resized};
 use super::relief::shaded;
 use crate::domain::{Affine2, MetricOutcome};
 use crate::raster::{DepthMap, Grid, Mask, Picture, warp_depth, warp_mask};
+use crate::report::aligned::depth_mask;
 
 /// Vermillion of Okabe and Ito's palette: told from ink and paper with every kind of colour vision.
 const EDGE: [u8; 3] = [213, 94, 0];
@@ -79,11 +80,6 @@ impl View {
     }
 }
 
-/// The strokes of a depth map: levels from `level` up. No data is no stroke.
-pub fn depth_mask(depth: &DepthMap, level: u16) -> Mask {
-    depth.levels.map(|found| *found >= level.max(1))
-}
-
 /// Set pixels with an unset one within `reach` along a row or a column. The end of the picture is no edge.
 fn edges(mask: &Mask, reach: usize) -> Grid<bool> {
     let reach = reach as i64;
@@ -97,7 +93,7 @@ fn edges(mask: &Mask, reach: usize) -> Grid<bool> {
 
 #[cfg(test)]
 mod tests {
-    use super::{EDGE, View, depth_mask, edges};
+    use super::{EDGE, View, edges};
     use crate::domain::{Affine2, DepthScale, ThresholdMetric};
     use crate::raster::{DepthMap, Grid, Mask, Picture};
     use crate::report::fixture;
@@ -159,14 +155,6 @@ mod tests {
         let mask = Mask::from_fn(6, 6, |x, _| x < 3);
         let found = edges(&mask, 1);
         assert_eq!(found.row(0), [false, false, true, false, false, false]);
-    }
-
-    #[test]
-    fn no_data_is_never_stroke() {
-        let mut map = depth();
-        map.levels.set(9, 9, 0);
-        assert!(!depth_mask(&map, 0).at(9, 9));
-        assert_eq!(depth_mask(&map, 50_000).count(), 79);
     }
 
     #[test]
