@@ -1,8 +1,10 @@
 //! Nouns of the project: small values without files, SQL, async or image buffers.
 
+mod artifact;
 mod failure;
 mod hash;
 mod ids;
+mod job;
 mod metric;
 mod outcome;
 mod stage;
@@ -10,9 +12,11 @@ mod transform;
 mod unit;
 mod verdict;
 
+pub use artifact::{ArtifactRef, ArtifactSet};
 pub use failure::{Failure, FailureClass};
 pub use hash::{ContentHash, ContentHashError};
 pub use ids::{PairId, PairName, PairNameError, WorkerId};
+pub use job::{CRASH_LIMIT, Event, JobState, JobStatus, Refused, transition};
 pub use metric::ThresholdMetric;
 pub use outcome::{
     Bow, DepthOutcome, DepthScale, FitOutcome, MetricOutcome, NormalizeOutcome, Pose,
