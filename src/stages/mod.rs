@@ -2,10 +2,16 @@
 //!
 //! No files, no SQL, no async, no clock. Each stage has its `Params`, its `Error` and one entry function.
 
+mod blur;
+mod components;
 pub mod depth;
 pub mod fit;
 pub mod normalize;
+mod otsu;
+mod pose;
 pub mod register;
+pub mod score;
+mod zbuffer;
 
 use serde::{Deserialize, Serialize};
 

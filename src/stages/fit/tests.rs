@@ -1,0 +1,1 @@
+//! Known-answer worlds for both methods.

@@ -1,0 +1,1 @@
+//! Known alignments come back.
