@@ -53,6 +53,12 @@ pub enum CatalogError {
     /// A row that breaks the rules of the schema.
     #[error("the catalog holds a row it must not: {0}")]
     Corrupt(String),
+    /// A write through a catalog that was opened to read.
+    #[error("the catalog was opened to read only")]
+    ReadOnly,
+    /// An error that several callers of one commit share.
+    #[error("{0}")]
+    Shared(std::sync::Arc<CatalogError>),
     /// The writer task has ended.
     #[error("the catalog is closed")]
     Closed,

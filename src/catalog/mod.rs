@@ -3,40 +3,66 @@
 //! One writer task owns the only write connection and commits in groups; readers have their own connections and
 //! work while a run goes on. All times come in as arguments.
 
+mod batch;
+mod checkpoint;
+mod claim;
+mod connect;
+mod counters;
 mod error;
+mod fail;
+mod lease;
 mod pairs;
+mod plan;
+mod query;
 pub mod read;
 mod recipes;
+mod requeue;
+mod results;
+mod rows;
 mod staleness;
+mod status;
+mod truth;
+mod upkeep;
 mod verdicts;
+mod work;
+mod writer;
 
 use std::path::Path;
 
+use sqlx::pool::PoolConnection;
+use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
+use tokio::sync::{mpsc, oneshot};
+
+pub use claim::{ClaimRequest, PairSelection};
+pub use counters::Counts;
 pub use error::{CatalogError, Result};
+pub use lease::{
+    InputSeen, InputsSeen, Kept, Lease, MetricResult, RecipeId, Sentence, StageDone, StageFailed,
+};
 pub use pairs::{ImportRow, ImportSummary, PairChange};
+pub use plan::{FieldChange, Plan, PlanEntry, WorkReason};
 pub use read::{
     AttemptRecord, FailedPair, MetricRecord, PairDetail, PairFacts, PairResults, ReaderVerdict,
     StageCounts, StageRecord, StatusCounts, StoredFailure,
 };
-pub use recipes::{Recipe, Recipes};
-pub use staleness::{FieldChange, Plan, PlanEntry, WorkReason};
+pub use recipes::{Recipe, RecipeIds, Recipes};
+pub use requeue::RetrySelection;
+pub use staleness::Again;
+pub use upkeep::{Dead, LeaseHolder, Outstanding, Rescued, WorkerInfo};
 pub use verdicts::{NewVerdict, VerdictEvent};
+pub use work::{KnownInputs, PairWork};
 
-use crate::domain::{Failure, FailureClass, PairName, UnixMillis};
+use writer::{Message, Work};
 
-/// A catalog, open.
+/// Requests that may wait for the writer before senders do.
+const INBOX: usize = 1024;
+
+/// A catalog, open. Clones share the connections.
 #[derive(Debug, Clone)]
-pub struct Catalog {}
-
-/// Which failed pairs to take up again.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum RetrySelection {
-    /// These pairs, whatever keeps them.
-    Names(Vec<PairName>),
-    /// All that failed with this class.
-    Class(FailureClass),
-    /// All that failed.
-    All,
+pub struct Catalog {
+    readers: SqlitePool,
+    /// `None` when opened to read only.
+    inbox: Option<mpsc::Sender<Message>>,
 }
 
 impl Catalog {
@@ -45,8 +71,7 @@ impl Catalog {
     /// # Errors
     /// When it is no catalog, the disk is a network's, or the database refuses.
     pub async fn create(path: &Path) -> Result<Self> {
-        let _ = path;
-        todo!()
+        Self::with_writer(path, true).await
     }
 
     /// Opens a catalog that is there, to read and write.
@@ -54,8 +79,7 @@ impl Catalog {
     /// # Errors
     /// When there is none, it is no catalog, the disk is a network's, or the database refuses.
     pub async fn open(path: &Path) -> Result<Self> {
-        let _ = path;
-        todo!()
+        Self::with_writer(path, false).await
     }
 
     /// Opens a catalog to read; works while a run goes on.
@@ -63,85 +87,54 @@ impl Catalog {
     /// # Errors
     /// When there is none or it is no catalog.
     pub async fn open_read_only(path: &Path) -> Result<Self> {
-        let _ = path;
-        todo!()
+        Ok(Self {
+            readers: connect::readers(path).await?,
+            inbox: None,
+        })
     }
 
-    /// Ends the writer and closes the connections.
-    pub async fn close(self) {}
-
-    /// Counts for `status`; `recipes` are the current ones, to tell what is stale.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn status(&self, recipes: &Recipes) -> Result<StatusCounts> {
-        let _ = recipes;
-        todo!()
+    async fn with_writer(path: &Path, create: bool) -> Result<Self> {
+        let conn = connect::writer(path, create).await?;
+        let readers = connect::readers(path).await?;
+        let (sender, inbox) = mpsc::channel(INBOX);
+        tokio::spawn(writer::run(conn, inbox));
+        Ok(Self {
+            readers,
+            inbox: Some(sender),
+        })
     }
 
-    /// Everything about one pair; `None` when there is no such pair.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn pair(&self, name: &PairName) -> Result<Option<PairDetail>> {
-        let _ = name;
-        todo!()
+    /// Waits until everything sent is stored, folds the log back and closes the connections.
+    pub async fn close(self) {
+        // Readers first: an open reader keeps the log from being folded back whole.
+        self.readers.close().await;
+        if let Some(inbox) = self.inbox {
+            let (sender, receiver) = oneshot::channel();
+            if inbox.send(Message::Close(sender)).await.is_ok() {
+                // An error means the writer has ended already, which is what we wait for.
+                let _ = receiver.await;
+            }
+        }
     }
 
-    /// The next pairs after a name, in the order of names, at most `limit`; empty at the end.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn results_page(
+    fn writer(&self) -> Result<&mpsc::Sender<Message>> {
+        self.inbox.as_ref().ok_or(CatalogError::ReadOnly)
+    }
+
+    async fn reader(&self) -> Result<PoolConnection<Sqlite>> {
+        Ok(self.readers.acquire().await?)
+    }
+
+    /// A read transaction: everything read in it is of one moment.
+    async fn snapshot(&self) -> Result<Transaction<'static, Sqlite>> {
+        Ok(self.readers.begin().await?)
+    }
+
+    /// Runs `work` in its own write transaction.
+    async fn alone<T: Send + 'static>(
         &self,
-        after: Option<&PairName>,
-        limit: usize,
-    ) -> Result<Vec<PairResults>> {
-        let _ = (after, limit);
-        todo!()
-    }
-
-    /// Failed pairs in the order of names, at most `limit`.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
-        let _ = limit;
-        todo!()
-    }
-
-    /// Failed pairs by class, every class with at least one.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
-        todo!()
-    }
-
-    /// Takes failed pairs up again; says how many.
-    ///
-    /// # Errors
-    /// When a named pair is not there.
-    pub async fn retry(&self, selection: &RetrySelection, now: UnixMillis) -> Result<u64> {
-        let _ = (selection, now);
-        todo!()
-    }
-
-    /// Stores true alignments as given, replacing earlier ones; says how many.
-    ///
-    /// # Errors
-    /// When a pair is not there; then nothing is stored.
-    pub async fn set_truth(&self, rows: Vec<(PairName, serde_json::Value)>) -> Result<u64> {
-        let _ = rows;
-        todo!()
-    }
-
-    /// Whether any pair has a true alignment.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn has_truth(&self) -> Result<bool> {
-        let _: Option<Failure> = None;
-        todo!()
+        work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
+    ) -> Result<T> {
+        writer::alone(self.writer()?, work).await
     }
 }
