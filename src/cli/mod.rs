@@ -6,6 +6,7 @@ mod completions;
 mod config;
 mod context;
 mod exit;
+mod failures;
 mod logging;
 mod man;
 mod progress;

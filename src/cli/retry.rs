@@ -3,7 +3,7 @@
 use clap::Args;
 use serde_json::json;
 
-use super::context::{Context, now};
+use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::count;
@@ -24,7 +24,7 @@ pub(super) struct RetryArgs {
 pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.writer().await?;
     let selection = selection(&args, &catalog).await?;
-    let retried = catalog.retry(&selection, now()).await?;
+    let retried = catalog.retry(&selection).await?;
     catalog.close().await;
     if retried == 0 {
         return Err(Refusal::NothingSelected(nothing(&selection)).into());

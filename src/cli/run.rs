@@ -8,13 +8,13 @@ use serde_json::{Value, json};
 use super::clock::span;
 use super::context::Context;
 use super::exit::ExitCode;
+use super::failures::Failures;
 use super::progress::Progress;
 use super::table::{Align, columns, count};
-use super::talk::Tone;
 use super::{select, signals};
-use crate::catalog::{Catalog, FailedPair, Plan, PlanEntry, WorkReason};
+use crate::catalog::{Catalog, Plan};
 use crate::config::Config;
-use crate::domain::{FailureClass, Stage};
+use crate::domain::Stage;
 use crate::runner::{self, RunOptions, RunSummary, Stop};
 use crate::store::Project;
 
@@ -112,9 +112,6 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
     }
 }
 
-/// How many failed pairs the end of a run and `status` look at.
-pub(super) const FAILURES_SHOWN: usize = 1000;
-
 /// Runs with progress on the screen and signals watched, and closes the catalog.
 ///
 /// # Errors
@@ -125,7 +122,7 @@ pub(super) async fn drive(
     config: &Config,
     options: &RunOptions,
     context: &Context,
-) -> anyhow::Result<(RunSummary, Vec<FailedPair>)> {
+) -> anyhow::Result<(RunSummary, Failures)> {
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;
     let global = &context.global;
@@ -141,7 +138,7 @@ pub(super) async fn drive(
     .await;
     progress.end();
     watch.abort();
-    let failures = catalog.failures(FAILURES_SHOWN).await;
+    let failures = Failures::read(&catalog).await;
     catalog.close().await;
     Ok((ended?, failures?))
 }
@@ -158,16 +155,12 @@ pub(super) const fn code(summary: &RunSummary) -> ExitCode {
 }
 
 /// Says how a run ended, which pairs failed, and what comes next.
-pub(super) fn tell_end(summary: &RunSummary, failures: &[FailedPair], context: &Context) {
+pub(super) fn tell_end(summary: &RunSummary, failures: &Failures, context: &Context) {
     let talk = &context.talk;
     talk.say(&headline(summary));
     if summary.failed_in_all > 0 {
-        let text = failure_lines(failures, 3);
-        talk.say(&format!(
-            "{} failed:\n{}",
-            count(summary.failed_in_all, "pair"),
-            text.trim_end()
-        ));
+        let number = count(summary.failed_in_all, "pair");
+        talk.say(&format!("{number} failed:\n{}", failures.text().trim_end()));
     }
     for command in next_steps(summary, failures) {
         talk.next(&context.command(&command));
@@ -208,38 +201,7 @@ fn headline(summary: &RunSummary) -> String {
     )
 }
 
-/// Failures by class, the most frequent first, with the first few of each.
-pub(super) fn failure_lines(failures: &[FailedPair], shown: usize) -> String {
-    let mut classes: Vec<(FailureClass, Vec<&FailedPair>)> = FailureClass::ALL
-        .into_iter()
-        .map(|class| {
-            let of_class = |pair: &&FailedPair| pair.failure.failure.class == class;
-            (class, failures.iter().filter(of_class).collect())
-        })
-        .filter(|(_, pairs): &(_, Vec<_>)| !pairs.is_empty())
-        .collect();
-    classes.sort_by_key(|(class, pairs)| (std::cmp::Reverse(pairs.len()), *class));
-    let mut rows = Vec::new();
-    for (class, pairs) in &classes {
-        let mut head = format!("  {class} {}", pairs.len());
-        for pair in pairs.iter().take(shown) {
-            let place = format!("at {}", pair.failure.stage);
-            rows.push(vec![
-                std::mem::take(&mut head),
-                pair.name.to_string(),
-                place,
-                pair.failure.failure.message.clone(),
-            ]);
-        }
-        if pairs.len() > shown {
-            let more = format!("and {} more", pairs.len() - shown);
-            rows.push(vec![String::new(), more]);
-        }
-    }
-    columns(&rows, &[Align::Left; 4])
-}
-
-fn next_steps(summary: &RunSummary, failures: &[FailedPair]) -> Vec<String> {
+fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<String> {
     let mut steps = Vec::new();
     if summary.status.pairs == 0 {
         steps.push("import pairs.csv".to_owned());
@@ -292,6 +254,7 @@ fn plan_text(plan: &Plan) -> String {
         (plan.done, "done"),
         (plan.quarantined, "failed and kept back"),
         (plan.held, "set aside"),
+        (plan.leased, "in the hands of another run"),
     ] {
         if number > 0 {
             text += &format!(", {number} {what}");
@@ -304,7 +267,7 @@ fn plan_text(plan: &Plan) -> String {
             vec![
                 format!("  {}", entry.pairs),
                 format!("from {}", entry.from),
-                reason(entry),
+                entry.why.to_string(),
             ]
         })
         .collect();
@@ -314,64 +277,11 @@ fn plan_text(plan: &Plan) -> String {
     )
 }
 
-/// Why pairs have work before them, in words.
-pub(super) fn reason(entry: &PlanEntry) -> String {
-    match &entry.why {
-        WorkReason::New => "new".to_owned(),
-        WorkReason::Unfinished => "an earlier run ended before it was done".to_owned(),
-        WorkReason::BackingOff => "tried again after a failure that may pass".to_owned(),
-        WorkReason::FailedBefore => "failed, but with other settings or files".to_owned(),
-        WorkReason::Settings { stage, changes } if changes.is_empty() => {
-            format!("the program's {stage} stage changed")
-        }
-        WorkReason::Settings { stage: _, changes } => {
-            let changes: Vec<String> = changes.iter().map(ToString::to_string).collect();
-            format!("settings changed: {}", changes.join(", "))
-        }
-        WorkReason::Mesh => "the mesh file changed".to_owned(),
-        WorkReason::Print => "the print file changed".to_owned(),
-        WorkReason::Manifest => "the manifest says otherwise of the mesh".to_owned(),
-        WorkReason::Asked => "asked for".to_owned(),
-    }
-}
-
-/// The tone of a number of failures.
-pub(super) const fn tone_of_failures(failed: u64) -> Tone {
-    if failed == 0 { Tone::Faint } else { Tone::Bad }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Plan, PlanEntry, WorkReason, failure_lines, plan_text};
-    use crate::catalog::{FailedPair, FieldChange, StoredFailure};
-    use crate::domain::{Failure, FailureClass, JobStatus, Stage};
-
-    fn failed(name: &str, class: FailureClass) -> FailedPair {
-        FailedPair {
-            name: name.parse().expect("valid id"),
-            status: JobStatus::Quarantined,
-            failure: StoredFailure {
-                stage: Stage::Fit,
-                failure: Failure::new(class, format!("{name}.stl: reason")),
-                at: 0,
-            },
-        }
-    }
-
-    #[test]
-    fn failures_are_grouped_with_the_most_frequent_class_first() {
-        let failures = [
-            failed("a", FailureClass::BadInput),
-            failed("b", FailureClass::Io),
-            failed("c", FailureClass::Io),
-            failed("d", FailureClass::Io),
-        ];
-        let text = failure_lines(&failures, 2);
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(lines[0], "  io 3         b           at fit  b.stl: reason");
-        assert_eq!(lines[2], "               and 1 more");
-        assert_eq!(lines[3], "  bad_input 1  a           at fit  a.stl: reason");
-    }
+    use super::{Plan, plan_text};
+    use crate::catalog::{FieldChange, PlanEntry, WorkReason};
+    use crate::domain::Stage;
 
     #[test]
     fn plan_names_the_setting_that_changed() {
@@ -393,7 +303,7 @@ mod tests {
         };
         assert_eq!(
             plan_text(&plan),
-            "24 pairs would run, 2 done\n  24  from register  settings changed: register.max_scale: 1.2 -> 1.3\n"
+            "24 pairs would run, 2 done\n  24  from register  register.max_scale: 1.2 -> 1.3\n"
         );
     }
 }

@@ -6,7 +6,6 @@ use serde_json::{Value, json};
 use super::clock::utc;
 use super::context::Context;
 use super::exit::ExitCode;
-use super::run::reason;
 use super::show_text::Page;
 use super::{select, verdict};
 use crate::catalog::{PairDetail, PlanEntry};
@@ -65,7 +64,7 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, context: &Context) -> Stri
     }
     text += &super::show_text::heading("next run", palette);
     text += &match (why, detail.results.status) {
-        (Some(entry), _) => format!("  from {}: {}\n", entry.from, reason(entry)),
+        (Some(entry), _) => format!("  from {}: {}\n", entry.from, entry.why),
         (None, JobStatus::Quarantined) => "  stays failed until it is retried\n".to_owned(),
         (None, JobStatus::Held) => "  set aside until it is retried\n".to_owned(),
         (None, JobStatus::Done | JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff) => {

@@ -7,11 +7,11 @@ use clap::Args;
 
 use super::context::Context;
 use super::exit::ExitCode;
+use super::failures::Failures;
 use super::progress::CLEAR;
-use super::run::{FAILURES_SHOWN, failure_lines, tone_of_failures};
 use super::table::{Align, columns, count};
 use super::talk::{Palette, Tone};
-use crate::catalog::{Catalog, FailedPair, Recipes, StageCounts, StatusCounts};
+use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, Stage, Verdict};
 use crate::runner;
 
@@ -46,17 +46,13 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
 /// What the screen shows.
 struct View {
     counts: StatusCounts,
-    failures: Vec<FailedPair>,
+    failures: Failures,
 }
 
 impl View {
     async fn read(catalog: &Catalog, recipes: &Recipes) -> anyhow::Result<Self> {
         let counts = catalog.status(recipes).await?;
-        let bad = counts.jobs.get(&JobStatus::Quarantined).copied();
-        let failures = match bad {
-            None | Some(0) => Vec::new(),
-            Some(_) => catalog.failures(FAILURES_SHOWN).await?,
-        };
+        let failures = Failures::read(catalog).await?;
         Ok(Self { counts, failures })
     }
 
@@ -103,7 +99,7 @@ fn screen(view: &View, dir: &str, palette: Palette) -> String {
     text += &stage_table(&view.counts, palette);
     if view.failed() > 0 {
         text += &format!("{}\n", label("failed", palette));
-        text += &failure_lines(&view.failures, 3);
+        text += &view.failures.text();
     }
     if view.counts.stale > 0 {
         text += &format!(
@@ -159,7 +155,12 @@ fn stage_table(counts: &StatusCounts, palette: Palette) -> String {
         row("  done", &|stage| stage.done.to_string()),
         row("  pending", &|stage| stage.pending.to_string()),
         row("  failed", &|stage| {
-            palette.paint(tone_of_failures(stage.failed), stage.failed)
+            let tone = if stage.failed == 0 {
+                Tone::Faint
+            } else {
+                Tone::Bad
+            };
+            palette.paint(tone, stage.failed)
         }),
     ];
     columns(
@@ -221,7 +222,7 @@ mod tests {
                 stale: 0,
                 verdicts: std::collections::BTreeMap::new(),
             },
-            failures: Vec::new(),
+            failures: super::Failures::default(),
         }
     }
 
