@@ -2,6 +2,7 @@
 
 mod artifact;
 mod failure;
+mod file_kind;
 mod hash;
 mod ids;
 mod job;
@@ -14,6 +15,7 @@ mod verdict;
 
 pub use artifact::{ArtifactRef, ArtifactSet};
 pub use failure::{Failure, FailureClass};
+pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};
 pub use ids::{PairId, PairName, PairNameError, WorkerId};
 pub use job::{CRASH_LIMIT, Event, JobState, JobStatus, Refused, transition};
