@@ -4,6 +4,8 @@ use serde::{Deserialize, Serialize};
 use toml::Value;
 
 use super::{Change, ConfigError, Origin, Tree};
+use crate::mesh;
+use crate::raster;
 use crate::stages::{Settings, depth, fit, normalize, register};
 
 /// Every setting, checked.
@@ -20,7 +22,12 @@ pub struct Config {
 /// What an input file may ask of the machine before it is refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Limits {}
+pub struct Limits {
+    /// Of mesh files.
+    pub mesh: mesh::Limits,
+    /// Of print images.
+    pub image: raster::Limits,
+}
 
 /// How a run uses the machine.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]

@@ -6,6 +6,11 @@ use super::{ConfigError, Origin, Setting, Tree};
 
 /// Key, smallest and largest value. The reasons stand beside the settings in `config/default.toml`.
 const RANGES: &[(&str, f64, f64)] = &[
+    ("limits.mesh.max_bytes", 1.0, 1e15),
+    ("limits.mesh.max_vertices", 3.0, 4_294_967_295.0),
+    ("limits.mesh.max_triangles", 1.0, 4_294_967_295.0),
+    ("limits.image.max_bytes", 1.0, 1e15),
+    ("limits.image.max_pixels", 1.0, 1e10),
     ("run.workers", 0.0, 1024.0),
     ("run.stage_limit_s", 1.0, 86_400.0),
     ("fit.spaced_points", 3.0, 100_000.0),

@@ -1,0 +1,105 @@
+//! A `truth.jsonl` file: read whole or refused by line number.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::domain::PairName;
+use crate::report::truth::TruthRecord;
+
+/// One true alignment and the line it stands on.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Row {
+    pub(super) line: usize,
+    pub(super) name: PairName,
+    /// The object as given; `tops_mask` is made to be found from anywhere.
+    pub(super) value: Value,
+}
+
+/// Why the file is refused.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: line {line}: {reason}; nothing was imported", file.display())]
+pub(super) struct TruthFileError {
+    file: PathBuf,
+    line: usize,
+    reason: String,
+}
+
+/// Reads all lines. `tops_mask` is relative to the file; `stored` says how a path is kept.
+///
+/// # Errors
+/// At the first line that is no true alignment, or of a pair that was there before.
+pub(super) fn parse(
+    file: &Path,
+    text: &str,
+    stored: impl Fn(&Path) -> anyhow::Result<String>,
+) -> anyhow::Result<Vec<Row>> {
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let mut lines: BTreeMap<PairName, usize> = BTreeMap::new();
+    let mut rows = Vec::new();
+    for (line, text) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
+        if text.trim().is_empty() {
+            continue;
+        }
+        let refuse = |reason: String| refusal(file, line, reason);
+        let mut value: Value =
+            serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
+        let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
+        if let Some(first) = lines.insert(record.id.clone(), line) {
+            return Err(refuse(format!("pair {} is on line {first} already", record.id)).into());
+        }
+        if let Some(mask) = &record.tops_mask {
+            value["tops_mask"] = Value::String(stored(&folder.join(mask))?);
+        }
+        rows.push(Row {
+            line,
+            name: record.id,
+            value,
+        });
+    }
+    Ok(rows)
+}
+
+/// A refusal of one line.
+pub(super) fn refusal(file: &Path, line: usize, reason: String) -> TruthFileError {
+    TruthFileError {
+        file: file.to_owned(),
+        line,
+        reason,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{Row, parse};
+
+    const LINE: &str = r#"{"id":"a","print_from_mesh":[[1,0,0,0],[0,-1,0,0],[0,0,1,0]],"plane":{"n":[0,0,1],"d":0},"landmarks":[[0,0,0]],"char_height_px":10,"tops_mask":"tops/a.png"}"#;
+
+    fn read(text: &str) -> Result<Vec<Row>, String> {
+        let stored = |path: &Path| Ok(path.display().to_string());
+        parse(Path::new("data/truth.jsonl"), text, stored).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn mask_path_is_relative_to_the_file() {
+        let rows = read(&format!("{LINE}\n\n")).expect("valid");
+        assert_eq!(rows.len(), 1);
+        assert_eq!(rows[0].value["tops_mask"], "data/tops/a.png");
+    }
+
+    #[test]
+    fn wrong_line_is_named_by_its_number() {
+        let twice = read(&format!("{LINE}\n{LINE}\n")).expect_err("twice");
+        assert_eq!(
+            twice,
+            "data/truth.jsonl: line 2: pair a is on line 1 already; nothing was imported"
+        );
+        let broken = read("{\"id\":\n").expect_err("cut off");
+        assert!(broken.starts_with("data/truth.jsonl: line 1: not JSON"), "{broken}");
+        let other = read("{\"id\":\"a\"}").expect_err("no truth");
+        assert!(other.contains("line 1: truth is not of the form"), "{other}");
+    }
+}
