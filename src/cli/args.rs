@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
 use super::exit::ExitCode;
-use super::{completions, config, man, retry, run, show, status, verdict};
+use super::{completions, config, import, man, retry, run, show, status, verdict};
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
 ///
@@ -114,6 +114,8 @@ pub(super) enum ProgressMode {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
+    /// Take pairs of meshes and prints into the project
+    Import(import::ImportArgs),
     /// Align the pairs that are left to align
     Run(run::RunArgs),
     /// Show on one screen where the project stands

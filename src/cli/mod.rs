@@ -7,8 +7,10 @@ mod config;
 mod context;
 mod exit;
 mod failures;
+mod import;
 mod logging;
 mod man;
+mod manifest_file;
 mod progress;
 mod retry;
 mod run;
@@ -20,6 +22,7 @@ mod status;
 mod table;
 mod talk;
 mod tally;
+mod truth_file;
 mod verdict;
 mod verdict_file;
 
@@ -36,6 +39,8 @@ use args::{Cli, Command};
 use context::Context;
 pub use exit::ExitCode;
 use exit::Refusal;
+use manifest_file::RefusedManifest;
+use truth_file::TruthFileError;
 use verdict_file::VerdictFileError;
 
 /// Reads the command line, does what it says, and tells the exit code. Errors are shown here, once.
@@ -95,6 +100,7 @@ fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
 
 async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
     match command {
+        Command::Import(args) => import::import(args, context).await,
         Command::Run(args) => run::run(args, context).await,
         Command::Status(args) => status::status(args, context).await,
         Command::Show(args) => show::show(args, context).await,
@@ -151,7 +157,7 @@ fn code_of(error: &anyhow::Error) -> ExitCode {
         if let Some(refusal) = cause.downcast_ref::<Refusal>() {
             return refusal.code();
         }
-        if cause.is::<ConfigError>() || cause.is::<VerdictFileError>() {
+        if is_refused_text(cause) {
             return ExitCode::Usage;
         }
         match cause.downcast_ref::<RunError>() {
@@ -172,6 +178,14 @@ fn code_of(error: &anyhow::Error) -> ExitCode {
         }
     }
     ExitCode::Error
+}
+
+/// Settings and lists that are refused as they stand.
+fn is_refused_text(cause: &(dyn std::error::Error + 'static)) -> bool {
+    cause.is::<ConfigError>()
+        || cause.is::<RefusedManifest>()
+        || cause.is::<TruthFileError>()
+        || cause.is::<VerdictFileError>()
 }
 
 /// `mocban report | head` is no error.

@@ -13,8 +13,10 @@ use crate::report::truth::TruthRecord;
 pub(super) struct Row {
     pub(super) line: usize,
     pub(super) name: PairName,
-    /// The object as given; `tops_mask` is made to be found from anywhere.
+    /// The object as given.
     pub(super) value: Value,
+    /// Its tops mask, as it is reached from the working directory.
+    pub(super) tops_mask: Option<PathBuf>,
 }
 
 /// Why the file is refused.
@@ -26,15 +28,11 @@ pub(super) struct TruthFileError {
     reason: String,
 }
 
-/// Reads all lines. `tops_mask` is relative to the file; `stored` says how a path is kept.
+/// Reads all lines; `tops_mask` is relative to the file.
 ///
 /// # Errors
 /// At the first line that is no true alignment, or of a pair that was there before.
-pub(super) fn parse(
-    file: &Path,
-    text: &str,
-    stored: impl Fn(&Path) -> anyhow::Result<String>,
-) -> anyhow::Result<Vec<Row>> {
+pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<Row>, TruthFileError> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut lines: BTreeMap<PairName, usize> = BTreeMap::new();
     let mut rows = Vec::new();
@@ -43,17 +41,18 @@ pub(super) fn parse(
             continue;
         }
         let refuse = |reason: String| refusal(file, line, reason);
-        let mut value: Value =
+        let value: Value =
             serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
         let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
         if let Some(first) = lines.insert(record.id.clone(), line) {
-            return Err(refuse(format!("pair {} is on line {first} already", record.id)).into());
-        }
-        if let Some(mask) = &record.tops_mask {
-            value["tops_mask"] = Value::String(stored(&folder.join(mask))?);
+            return Err(refuse(format!(
+                "pair {} is on line {first} already",
+                record.id
+            )));
         }
         rows.push(Row {
             line,
+            tops_mask: record.tops_mask.map(|mask| folder.join(mask)),
             name: record.id,
             value,
         });
@@ -79,15 +78,17 @@ mod tests {
     const LINE: &str = r#"{"id":"a","print_from_mesh":[[1,0,0,0],[0,-1,0,0],[0,0,1,0]],"plane":{"n":[0,0,1],"d":0},"landmarks":[[0,0,0]],"char_height_px":10,"tops_mask":"tops/a.png"}"#;
 
     fn read(text: &str) -> Result<Vec<Row>, String> {
-        let stored = |path: &Path| Ok(path.display().to_string());
-        parse(Path::new("data/truth.jsonl"), text, stored).map_err(|error| error.to_string())
+        parse(Path::new("data/truth.jsonl"), text).map_err(|error| error.to_string())
     }
 
     #[test]
     fn mask_path_is_relative_to_the_file() {
         let rows = read(&format!("{LINE}\n\n")).expect("valid");
         assert_eq!(rows.len(), 1);
-        assert_eq!(rows[0].value["tops_mask"], "data/tops/a.png");
+        assert_eq!(
+            rows[0].tops_mask.as_deref(),
+            Some(Path::new("data/tops/a.png"))
+        );
     }
 
     #[test]
@@ -98,8 +99,14 @@ mod tests {
             "data/truth.jsonl: line 2: pair a is on line 1 already; nothing was imported"
         );
         let broken = read("{\"id\":\n").expect_err("cut off");
-        assert!(broken.starts_with("data/truth.jsonl: line 1: not JSON"), "{broken}");
+        assert!(
+            broken.starts_with("data/truth.jsonl: line 1: not JSON"),
+            "{broken}"
+        );
         let other = read("{\"id\":\"a\"}").expect_err("no truth");
-        assert!(other.contains("line 1: truth is not of the form"), "{other}");
+        assert!(
+            other.contains("line 1: truth is not of the form"),
+            "{other}"
+        );
     }
 }
