@@ -2,10 +2,12 @@
 //!
 //! [`gather()`] streams the pairs through a [`Tally`]; everything else is pure.
 
+pub mod aligned;
 mod compare;
 #[cfg(test)]
 pub(crate) mod fixture;
 pub mod gate;
+mod gather;
 mod model;
 mod render;
 mod standing;
@@ -14,6 +16,7 @@ mod tally;
 pub mod truth;
 mod warnings;
 
+pub use gather::{GatherError, PAGE, finding, gather, with_truth};
 pub use model::{
     Basis, Comparison, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock,
 };
