@@ -37,8 +37,14 @@ impl Steps for Pipeline {
 impl Pipeline {
     fn fit(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
         let mesh = self.read_mesh(pair)?;
-        let outcome = fit::fit(&mesh, pair.facts.scanned_face_down, &self.settings.fit)
-            .map_err(|error| in_file(&pair.facts.mesh_path, error.into()))?;
+        let print = self.read_print(pair).ok();
+        let outcome = fit::fit(
+            &mesh,
+            print.as_ref(),
+            pair.facts.scanned_face_down,
+            &self.settings.fit,
+        )
+        .map_err(|error| in_file(&pair.facts.mesh_path, error.into()))?;
         let (outcome, json) = settled(outcome)?;
         pair.mesh = Some(mesh);
         pair.fit = Some(outcome);
