@@ -108,6 +108,8 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
             workers => workers,
         },
         stage_limit: Duration::from_secs(config.run.stage_limit_s),
+        mesh_limits: config.limits.mesh,
+        image_limits: config.limits.image,
         ..plain
     }
 }
