@@ -1,5 +1,6 @@
 //! The protocol, statement by statement, on a real database file.
 
+mod model;
 mod plans;
 mod protocol;
 mod staleness;
