@@ -6,11 +6,14 @@ mod blur;
 mod components;
 pub mod depth;
 pub mod fit;
+mod ink;
 pub mod normalize;
 mod otsu;
 mod pose;
 pub mod register;
 pub mod score;
+#[cfg(test)]
+mod testing;
 mod zbuffer;
 
 use serde::{Deserialize, Serialize};

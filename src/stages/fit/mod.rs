@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::{FailureClass, FitOutcome};
 use crate::mesh::Mesh;
+use crate::raster::Picture;
 
 /// Raised whenever the same inputs and settings may give another result than before.
 pub const REVISION: u32 = 1;
@@ -98,13 +99,15 @@ impl Error {
 /// Finds the plane on which the tops of the strokes lie, and the side of it that is carved.
 ///
 /// `mesh` is in its own frame and unit. `scanned_face_down` says which way the carved face looks along the mesh's z,
-/// where that is known; it decides only when the surface itself does not tell. The outcome's plane frame keeps the
+/// where that is known; it decides only when nothing else tells. `print` helps to tell the carved side from the back
+/// of an open sheet, whose winding cannot be trusted; the plane itself does not depend on it. The outcome's plane frame keeps the
 /// mesh's x direction as far as it can, so an upright scan stays upright.
 ///
 /// # Errors
 /// When the vertices span no surface, nothing is carved, or no plane is found.
 pub fn fit(
     mesh: &Mesh,
+    print: Option<&Picture>,
     scanned_face_down: Option<bool>,
     params: &Params,
 ) -> Result<FitOutcome, Error> {
@@ -114,7 +117,7 @@ pub fn fit(
     }
     match params.method {
         Method::Paper => paper::fit(mesh, params),
-        Method::Tops => tops::fit(mesh, scanned_face_down, params),
+        Method::Tops => tops::fit(mesh, print, scanned_face_down, params),
     }
 }
 

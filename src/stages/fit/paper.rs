@@ -70,24 +70,35 @@ fn distinct(vertices: &[[f64; 3]]) -> Vec<[f64; 3]> {
     points
 }
 
-/// The upper set T: of the two sides of the PCA plane, the one whose heights lie closer to their own mean. Read
-/// along the normal: in the plane the two sides of a carved character spread alike.
+/// The upper set T: of the two sides of the PCA plane, the one whose points lie closer to their own centroid on
+/// average. Ground reaches out to the rim of the cut on all sides; strokes keep to the middle.
 fn upper_set(points: &[[f64; 3]], all: &Axes) -> (Vec<[f64; 3]>, Vector3<f64>, f64) {
     let normal = all.normal();
-    let height = |p: &[f64; 3]| (Vector3::from(*p) - all.centre).dot(&normal);
-    let (above, below): (Vec<_>, Vec<_>) = points.iter().partition(|p| height(p) > 0.0);
-    let spread = |set: &[[f64; 3]]| {
-        let n = set.len().max(1) as f64;
-        let mean = set.iter().map(height).sum::<f64>() / n;
-        set.iter().map(|p| (height(p) - mean).abs()).sum::<f64>() / n
-    };
-    let (up, down) = (spread(&above), spread(&below));
+    let (above, below): (Vec<_>, Vec<_>) = points
+        .iter()
+        .partition(|p| (Vector3::from(**p) - all.centre).dot(&normal) > 0.0);
+    let (up, down) = (mean_distance(&above), mean_distance(&below));
     let sureness = (up - down).abs() / (up + down).max(f64::MIN_POSITIVE);
     if up <= down {
         (above, normal, sureness)
     } else {
         (below, -normal, sureness)
     }
+}
+
+/// Mean distance of points to their own centroid.
+fn mean_distance(points: &[[f64; 3]]) -> f64 {
+    let n = points.len().max(1) as f64;
+    let centroid = points
+        .iter()
+        .map(|p| Vector3::from(*p))
+        .sum::<Vector3<f64>>()
+        / n;
+    points
+        .iter()
+        .map(|p| (Vector3::from(*p) - centroid).norm())
+        .sum::<f64>()
+        / n
 }
 
 /// From the farthest of the plane down, each point farther than `spacing` from all taken ones, until enough.

@@ -6,6 +6,7 @@
 use nalgebra::{Matrix6, Vector6};
 
 use crate::raster::Grid;
+use crate::stages::pose::Soft;
 use crate::stages::zbuffer::{NOTHING, View};
 
 /// Expectile of the first, convex pass: points above weigh this, points below one less it.
@@ -22,6 +23,8 @@ const TOP_SIGMA: f64 = 0.05;
 const TILT_SIGMA: f64 = 0.05;
 /// Second-degree coefficients in units of the extent (one standard deviation): a bow of 2-8 % of the extent.
 const BOW_SIGMA: f64 = 0.15;
+/// Soft tops fade to nothing at this share of the relief under the surface.
+const SOFT_SPAN: f64 = 0.5;
 /// A bow must explain this much more of the tops than the plane does.
 const BOW_GAIN: f64 = 1.04;
 
@@ -29,6 +32,9 @@ const BOW_GAIN: f64 = 1.04;
 #[derive(Debug)]
 pub(super) struct Samples {
     points: Vec<[f64; 3]>,
+    /// Where each point lies in the rendering, and the rendering's size.
+    places: Vec<usize>,
+    size: [usize; 2],
     centre: [f64; 2],
     extent: f64,
     range: f64,
@@ -55,11 +61,12 @@ impl Samples {
             (heights.width() - 1) as f64 / 2.0,
             (heights.height() - 1) as f64 / 2.0,
         ]);
-        let mut points = Vec::new();
+        let (mut points, mut places) = (Vec::new(), Vec::new());
         for y in 0..heights.height() {
             for (x, z) in heights.row(y).iter().enumerate() {
                 if *z != NOTHING {
                     let [u, v] = back.apply([x as f64, y as f64]);
+                    places.push(y * heights.width() + x);
                     points.push([
                         (u - centre[0]) / extent,
                         (v - centre[1]) / extent,
@@ -71,6 +78,8 @@ impl Samples {
         (points.len() >= 16).then(|| {
             let mut samples = Self {
                 points,
+                places,
+                size: [heights.width(), heights.height()],
                 centre,
                 extent,
                 range: 0.0,
@@ -181,9 +190,19 @@ impl Samples {
             .collect()
     }
 
-    /// Central nine tenths of the heights, mesh units.
-    pub(super) fn range(&self) -> f64 {
-        self.range * self.extent
+    /// Nearness to the surface as a picture: 1 on it, 0 from half the relief down.
+    pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> Soft {
+        let [width, height] = self.size;
+        let mut soft = Soft {
+            amount: Grid::new(width, height, 0.0),
+            known: Grid::new(width, height, false),
+        };
+        let span = (SOFT_SPAN * relief).max(f64::MIN_POSITIVE);
+        for (place, r) in self.places.iter().zip(self.residuals(surface)) {
+            soft.amount.data_mut()[*place] = (1.0 + r / span).clamp(0.0, 1.0) as f32;
+            soft.known.data_mut()[*place] = true;
+        }
+        soft
     }
 
     /// The plane through a surface's tops, `z = a + b x + c y` in plane coordinates and mesh units.

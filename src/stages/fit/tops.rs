@@ -4,11 +4,13 @@
 use nalgebra::Vector3;
 
 use super::pca::{Axes, frame};
-use super::side::{self, Face};
-use super::surface::{Samples, Surface, quantile};
+use super::side::{self, Face, Witness, layer_width};
+use super::surface::{Samples, Surface};
 use super::{Error, Params};
 use crate::domain::{Bow, FitOutcome, Rigid3};
 use crate::mesh::Mesh;
+use crate::raster::Picture;
+use crate::stages::otsu;
 use crate::stages::zbuffer::{Projected, View};
 
 /// Longest side of the rendering that the surface is fitted to.
@@ -19,6 +21,7 @@ const MOST_LOOKS: usize = 4;
 
 pub(super) fn fit(
     mesh: &Mesh,
+    print: Option<&Picture>,
     scanned_face_down: Option<bool>,
     params: &Params,
 ) -> Result<FitOutcome, Error> {
@@ -26,8 +29,12 @@ pub(super) fn fit(
     axes.require_surface(mesh.vertices.len())?;
     let normal = axes.normal();
     let faces = [normal, -normal].map(|n| look(mesh, n, axes.centre, params.bow));
-    let (face, side) =
-        side::choose(mesh, faces, scanned_face_down).ok_or(Error::OneLine(mesh.vertices.len()))?;
+    let witness = Witness {
+        mesh,
+        print,
+        scanned_face_down,
+    };
+    let (face, side) = side::choose(faces, witness).ok_or(Error::OneLine(mesh.vertices.len()))?;
     if face.relief < params.min_relief * face.extent {
         return Err(Error::NoRelief {
             relief: face.relief,
@@ -89,15 +96,15 @@ fn face(
     }
     let bent = over_plane[3..].iter().any(|c| *c != 0.0);
     let bow = bent.then_some(Bow(over_plane));
-    let residuals = samples.residuals(&surface);
+    let relief = relief(samples.residuals(&surface));
     Face {
         plane_from_mesh,
         bow,
         bow_height: bow.map_or(0.0, |b| bow_height(&b, view)),
-        relief: relief(&residuals),
+        relief,
+        layer_width: layer_width(samples, &surface, relief),
+        tops: samples.soft_tops(&surface, relief),
         extent: view.unit_per_px * view.width.max(view.height) as f64,
-        range: samples.range(),
-        residuals,
         surface,
     }
 }
@@ -121,25 +128,13 @@ fn bow_height(bow: &Bow, view: &View) -> f64 {
     high - low
 }
 
-/// Depth of the carving: mean of the tops less median of the ground, the two parted where their variance between is
-/// greatest (Otsu 1979, doi:10.1109/TSMC.1979.4310076).
-fn relief(residuals: &[f64]) -> f64 {
-    let mut sorted = residuals.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let cut = sorted.len() / 100;
-    let kept = &sorted[cut..sorted.len() - cut];
-    let total: f64 = kept.iter().sum();
-    let (mut below, mut best, mut split) = (0.0, -1.0, 0);
-    for (k, r) in kept.iter().enumerate().take(kept.len() - 1) {
-        below += r;
-        let n = (k + 1) as f64;
-        let m = (kept.len() - k - 1) as f64;
-        let apart = n * m * (below / n - (total - below) / m).powi(2);
-        if apart > best {
-            (best, split) = (apart, k + 1);
-        }
-    }
-    let mut ground = kept[..split.max(1)].to_vec();
-    let tops = &kept[split.min(kept.len() - 1)..];
-    tops.iter().sum::<f64>() / tops.len() as f64 - quantile(&mut ground, 0.5)
+/// Depth of the carving: between the medians of tops and ground, the hundredth at either end left out.
+fn relief(mut residuals: Vec<f64>) -> f64 {
+    residuals.sort_by(f64::total_cmp);
+    let cut = residuals.len() / 100;
+    let mut kept: Vec<f32> = residuals[cut..residuals.len() - cut]
+        .iter()
+        .map(|r| *r as f32)
+        .collect();
+    otsu::split(&mut kept).map_or(0.0, |split| split.high - split.low)
 }

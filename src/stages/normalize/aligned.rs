@@ -1,14 +1,18 @@
 //! Our method: the pose first, from soft relief and soft ink; thresholds afterwards, in the aligned frame.
 
-use super::print::Print;
 use super::threshold::{self, Canvas};
 use super::{Error, Params, Relief, Search};
 use crate::domain::{Affine2, Pose, ThresholdChoice};
 use crate::raster::DepthMap;
+use crate::stages::ink::Ink;
 use crate::stages::pose::{Found, Layer, Limits, SEARCH_PX, Soft, refine, search};
 
 /// Working size and smoothing, in pixels, of the passes that follow the search, and how many poses go on.
 const PASSES: [(usize, f64, usize); 2] = [(64, 1.2, 4), (128, 1.2, 4)];
+/// The search looks at relief that fades out from the tops to half-way down: it need not know the right cut, nor
+/// that the plane is quite right.
+const SEARCH_CUT: f64 = 0.25;
+const SEARCH_SOFTNESS: f64 = 0.5;
 /// Poses that the search hands on.
 const KEEP: usize = 10;
 /// Largest shift between the middles of print and depth map, as a share of the size.
@@ -23,7 +27,7 @@ const BOUND: f64 = 0.98;
 /// Finds the poses, then the thresholds.
 pub(super) fn choose(
     depth: &DepthMap,
-    print: &Print,
+    print: &Ink,
     canvas_from_print: &Affine2,
     params: &Params,
 ) -> Result<(Search, Vec<ThresholdChoice>), Error> {
@@ -47,11 +51,11 @@ pub(super) fn choose(
 /// Poses as read, best first, at least one.
 fn find_poses(
     depth: &DepthMap,
-    print: &Print,
+    print: &Ink,
     relief: &Relief,
     params: &Params,
 ) -> Result<Search, Error> {
-    let tops = relief.soft_tops(depth);
+    let tops = relief.soft_strokes(depth, SEARCH_CUT, SEARCH_SOFTNESS);
     let layers = |size: usize, sigma: f64| {
         Layer::new(&print.soft, size, sigma).zip(Layer::new(&tops, size, sigma))
     };

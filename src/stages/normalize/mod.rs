@@ -5,7 +5,6 @@
 //! threshold, then choose each threshold in the aligned frame.
 
 mod aligned;
-mod print;
 mod relief;
 mod threshold;
 mod wrap;
@@ -15,15 +14,13 @@ use serde::{Deserialize, Serialize};
 pub use relief::Relief;
 pub(super) use wrap::box_wrap;
 
+use super::ink;
 use super::score::SsimWindow;
 use crate::domain::{Affine2, FailureClass, NormalizeOutcome, Pose};
 use crate::raster::{DepthMap, Mask, Picture};
 
 /// Raised whenever the same inputs and settings may give another result than before.
 pub const REVISION: u32 = 1;
-
-/// A print must have at least this many pixels each way.
-const LEAST_PRINT_PX: usize = 16;
 
 /// When thresholds are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -80,36 +77,9 @@ pub struct Params {
 /// Why the stage found no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// The print image has hardly any pixels.
-    #[error("print of {width} x {height} px is too small, needs {LEAST_PRINT_PX} px each way")]
-    TooSmall {
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-    },
-    /// One grey all over.
-    #[error(
-        "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white"
-    )]
-    NoContrast {
-        /// Difference between the two classes of grey, 0..=1.
-        contrast: f64,
-    },
-    /// Nothing darker than the threshold.
-    #[error("print has no ink: {share:.4} of it is beyond the grey threshold {threshold:.3}")]
-    NoInk {
-        /// Share of ink, 0..=1.
-        share: f64,
-        /// Threshold, 0..=1.
-        threshold: f64,
-    },
-    /// Everything darker than the threshold.
-    #[error("print is ink all over: its lightest grey is {lightest:.3} of full white")]
-    AllInk {
-        /// Lightest grey, 0..=1.
-        lightest: f64,
-    },
+    /// The print shows no ink.
+    #[error(transparent)]
+    Print(#[from] ink::Error),
     /// The depth map has no strokes at any threshold.
     #[error("no threshold gives the depth map any strokes")]
     NoStrokes,
@@ -139,10 +109,7 @@ impl Error {
     /// What the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
-            Self::TooSmall { .. }
-            | Self::NoContrast { .. }
-            | Self::NoInk { .. }
-            | Self::AllInk { .. } => FailureClass::BadInput,
+            Self::Print(_) => FailureClass::BadInput,
             Self::NoStrokes | Self::Mirrored { .. } | Self::NoMatch { .. } => {
                 FailureClass::NoSolution
             }
@@ -177,22 +144,22 @@ struct Search {
 /// # Errors
 /// When the print shows no ink, the depth map no strokes, or no pose fits.
 pub fn normalize(depth: &DepthMap, print: &Picture, params: &Params) -> Result<Normalized, Error> {
-    let print = print::read(print, params)?;
-    let canvas_from_print = canvas_from_print(&print.ink, params).ok_or(Error::NoInk {
-        share: 0.0,
-        threshold: print.threshold / 65_535.0,
-    })?;
+    let ink = match params.print_threshold {
+        PrintThreshold::Levelled => ink::levelled(print, params.speck_share)?,
+        PrintThreshold::Fixed => ink::fixed(print, params.print_grey, params.speck_share)?,
+    };
+    let canvas_from_print = canvas_from_print(&ink.mask, params).ok_or(Error::NoStrokes)?;
     let (search, thresholds) = match params.method {
-        Method::Aligned => aligned::choose(depth, &print, &canvas_from_print, params)?,
+        Method::Aligned => aligned::choose(depth, &ink, &canvas_from_print, params)?,
         Method::Wrap => {
-            let thresholds = wrap::choose(depth, &print, &canvas_from_print, params)?;
+            let thresholds = wrap::choose(depth, &ink, &canvas_from_print, params)?;
             (Search::default(), thresholds)
         }
     };
     Ok(Normalized {
         outcome: NormalizeOutcome {
-            threshold_print: print.threshold,
-            light_on_dark: print.light_on_dark,
+            threshold_print: ink.threshold * 65_535.0,
+            light_on_dark: ink.light_on_dark,
             canvas_px: params.canvas_px,
             canvas_from_print,
             poses: search.poses,
@@ -200,8 +167,8 @@ pub fn normalize(depth: &DepthMap, print: &Picture, params: &Params) -> Result<N
             search_at_bound: search.at_bound,
             thresholds,
         },
-        ink: print.ink,
-        known: print.known,
+        ink: ink.mask,
+        known: ink.soft.known,
     })
 }
 

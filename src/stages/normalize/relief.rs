@@ -1,11 +1,9 @@
 //! How deep the carving is, and soft tops: relief without a threshold.
 
-use crate::raster::{DepthMap, Mask};
+use crate::raster::DepthMap;
 use crate::stages::otsu;
 use crate::stages::pose::Soft;
 
-/// Soft tops fade to nothing at this share of the relief under the surface.
-const FADE: f64 = 0.5;
 /// Every how many pixels the heights are looked at when tops and ground are told apart.
 const STRIDE: usize = 3;
 
@@ -49,20 +47,25 @@ impl Relief {
         (1.0 + steps.round()).clamp(1.0, 65_535.0) as u16
     }
 
-    /// Nearness to the tops, 1 at the tops and 0 from `FADE` of the relief down.
-    pub(in crate::stages) fn soft_tops(&self, depth: &DepthMap) -> Soft {
-        let span = FADE * self.depth();
+    /// Soft strokes cut at a depth under the tops: 1 well above the cut, 0 well below, in between over
+    /// `softness`; both are shares of the relief.
+    pub(in crate::stages) fn soft_strokes(
+        &self,
+        depth: &DepthMap,
+        cut: f64,
+        softness: f64,
+    ) -> Soft {
+        let middle = self.top - cut * self.depth();
+        let span = softness * self.depth();
         Soft {
             amount: depth.levels.map(|level| {
                 if *level == 0 {
                     return 0.0;
                 }
-                let under = self.top - depth.scale.height(*level);
-                (1.0 - under / span).clamp(0.0, 1.0) as f32
+                let over = depth.scale.height(*level) - middle;
+                (0.5 + over / span).clamp(0.0, 1.0) as f32
             }),
-            known: Mask::from_fn(depth.levels.width(), depth.levels.height(), |x, y| {
-                depth.levels.at(x, y) != 0
-            }),
+            known: depth.levels.map(|level| *level != 0),
         }
     }
 }

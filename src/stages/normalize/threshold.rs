@@ -3,10 +3,10 @@
 //! Every level between two depths under the tops is a candidate; its mask is compared with the print's ink where
 //! both print and depth map hold data.
 
-use super::print::Print;
 use super::{Error, Params, Relief};
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Grid, Mask, warp_depth, warp_mask};
+use crate::stages::ink::Ink;
 use crate::stages::score::WindowMeans;
 
 /// Candidate thresholds between the first and the last cut.
@@ -23,7 +23,7 @@ impl Canvas {
     /// Brings print and depth map to the canvas by a pose; only what both hold is kept.
     pub(super) fn new(
         depth: &DepthMap,
-        print: &Print,
+        print: &Ink,
         canvas_from_print: &Affine2,
         print_from_depth: &Affine2,
         params: &Params,
@@ -35,9 +35,9 @@ impl Canvas {
             side,
             side,
         );
-        let paper = warp_mask(&print.known, canvas_from_print, side, side);
+        let paper = warp_mask(&print.soft.known, canvas_from_print, side, side);
         let known = Mask::from_fn(side, side, |x, y| paper.at(x, y) && levels.at(x, y) > 0);
-        let ink = warp_mask(&print.ink, canvas_from_print, side, side);
+        let ink = warp_mask(&print.mask, canvas_from_print, side, side);
         Self {
             ink: Mask::from_fn(side, side, |x, y| ink.at(x, y) && known.at(x, y)),
             known,

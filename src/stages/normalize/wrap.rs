@@ -4,11 +4,11 @@
 //! Where the text is silent the authors' own program decides: greys stretched so that the 1st percentile of
 //! nearness is 49 and the 95th 201, dark is near, each threshold tried at four quarter turns.
 
-use super::print::Print;
 use super::{Error, Params};
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::components::without_specks;
+use crate::stages::ink::Ink;
 use crate::stages::score::{Overlap, WindowMeans};
 
 /// Greys of the two percentiles, and the percentiles.
@@ -67,14 +67,14 @@ struct Tried {
 /// two once they are registered.
 pub(super) fn choose(
     depth: &DepthMap,
-    print: &Print,
+    print: &Ink,
     canvas_from_print: &Affine2,
     params: &Params,
 ) -> Result<Vec<ThresholdChoice>, Error> {
     let greys = Greys::of(depth).ok_or(Error::NoStrokes)?;
     let side = params.canvas_px as usize;
     let canvas = WindowMeans::new(
-        &warp_mask(&print.ink, canvas_from_print, side, side),
+        &warp_mask(&print.mask, canvas_from_print, side, side),
         params.window,
     );
     let first = params.density_greys[0].min(params.structure_greys[0]);

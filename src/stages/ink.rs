@@ -1,11 +1,10 @@
 //! The print's ink: where there is paper at all, which side of the grey threshold is ink, how much ink each pixel has.
 
-use super::{Error, Params, PrintThreshold};
+use super::blur::blur;
+use super::components::{Components, without_specks};
+use super::otsu;
+use super::pose::Soft;
 use crate::raster::{Grid, Mask, Picture};
-use crate::stages::blur::blur;
-use crate::stages::components::{Components, without_specks};
-use crate::stages::otsu;
-use crate::stages::pose::Soft;
 
 /// A pixel is white beyond the cut when its darkest channel is above this share of full white.
 const WHITE: f32 = 0.965;
@@ -24,27 +23,63 @@ const LEAST_INK: f64 = 0.002;
 /// Width of the rim that tells paper from ink, as a share of the shorter side.
 const RIM: f64 = 0.06;
 
-/// What a print image holds.
+/// A print must have at least this many pixels each way.
+const LEAST_PRINT_PX: usize = 16;
+
+/// Why a print shows no ink. None of these can be mended by trying again.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The image has hardly any pixels.
+    #[error("print of {width} x {height} px is too small, needs {LEAST_PRINT_PX} px each way")]
+    TooSmall {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// One grey all over.
+    #[error(
+        "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white"
+    )]
+    NoContrast {
+        /// Difference between the two classes of grey, 0..=1.
+        contrast: f64,
+    },
+    /// Nothing darker than the threshold.
+    #[error("print has no ink: {share:.4} of it is beyond the grey threshold {threshold:.3}")]
+    NoInk {
+        /// Share of ink, 0..=1.
+        share: f64,
+        /// Threshold, 0..=1.
+        threshold: f64,
+    },
+    /// Everything darker than the threshold.
+    #[error("print is ink all over: its lightest grey is {lightest:.3} of full white")]
+    AllInk {
+        /// Lightest grey, 0..=1.
+        lightest: f64,
+    },
+}
+
+/// The ink of a print.
 #[derive(Debug, Clone)]
-pub(super) struct Print {
-    pub(super) ink: Mask,
-    pub(super) known: Mask,
+pub(super) struct Ink {
+    /// Which pixels are ink.
+    pub(super) mask: Mask,
+    /// How much ink, and where the image is paper or ink at all.
     pub(super) soft: Soft,
+    /// Grey between ink and paper, 0..=1.
     pub(super) threshold: f64,
+    /// Whether ink is lighter than paper, as in a rubbing.
     pub(super) light_on_dark: bool,
 }
 
-/// Finds ink and paper.
-pub(super) fn read(picture: &Picture, params: &Params) -> Result<Print, Error> {
+fn grey_of(picture: &Picture) -> Result<Grid<f32>, Error> {
     let (width, height) = (picture.rgb.width(), picture.rgb.height());
-    if width < super::LEAST_PRINT_PX || height < super::LEAST_PRINT_PX {
+    if width < LEAST_PRINT_PX || height < LEAST_PRINT_PX {
         return Err(Error::TooSmall { width, height });
     }
-    let grey = picture.rgb.map(|c| luminance(*c));
-    match params.print_threshold {
-        PrintThreshold::Fixed => fixed(&grey, params),
-        PrintThreshold::Levelled => levelled(picture, &grey, params),
-    }
+    Ok(picture.rgb.map(|c| luminance(*c)))
 }
 
 /// Rec. 601 luma of 0..=1.
@@ -53,25 +88,26 @@ fn luminance(c: [u16; 3]) -> f32 {
 }
 
 /// The paper's mask: darker than a fixed grey is ink, all of the image is known.
-fn fixed(grey: &Grid<f32>, params: &Params) -> Result<Print, Error> {
-    let threshold = f64::from(params.print_grey) / 255.0;
+pub(super) fn fixed(picture: &Picture, grey: u8, speck_share: f64) -> Result<Ink, Error> {
+    let threshold = f64::from(grey) / 255.0;
+    let grey = &grey_of(picture)?;
     let raw = grey.map(|g| f64::from(*g) < threshold);
-    let ink = without_specks(&raw, speck_size(params, raw.data().len()));
+    let ink = without_specks(&raw, speck_size(speck_share, raw.data().len()));
     require_ink(&ink, ink.data().len(), grey, threshold)?;
-    Ok(Print {
+    Ok(Ink {
         soft: Soft {
             amount: ink.map(|set| f32::from(u8::from(*set))),
             known: Mask::new(ink.width(), ink.height(), true),
         },
-        known: Mask::new(ink.width(), ink.height(), true),
-        ink,
-        threshold: threshold * 65_535.0,
+        mask: ink,
+        threshold,
         light_on_dark: false,
     })
 }
 
 /// Our mask: white beyond the cut left out, polarity told from the rim, paper levelled, threshold found.
-fn levelled(picture: &Picture, grey: &Grid<f32>, params: &Params) -> Result<Print, Error> {
+pub(super) fn levelled(picture: &Picture, speck_share: f64) -> Result<Ink, Error> {
+    let grey = &grey_of(picture)?;
     let known = known(picture, grey);
     let mut values = held(grey, &known);
     let split = otsu::split(&mut values).ok_or(Error::NoContrast { contrast: 0.0 })?;
@@ -96,26 +132,25 @@ fn levelled(picture: &Picture, grey: &Grid<f32>, params: &Params) -> Result<Prin
         known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
     });
     let area = known.count();
-    let ink = without_specks(&raw, speck_size(params, area));
+    let ink = without_specks(&raw, speck_size(speck_share, area));
     let ink = Mask::from_fn(ink.width(), ink.height(), |x, y| {
         ink.at(x, y) && known.at(x, y)
     });
     require_ink(&ink, area, grey, split.threshold)?;
-    Ok(Print {
+    Ok(Ink {
         soft: Soft {
             amount: amount(&even, &ink, split),
-            known: known.clone(),
+            known,
         },
-        ink,
-        known,
-        threshold: split.threshold * 65_535.0,
+        mask: ink,
+        threshold: split.threshold,
         light_on_dark,
     })
 }
 
 /// Pixels of a group smaller than this are specks.
-fn speck_size(params: &Params, area: usize) -> usize {
-    (area as f64 * params.speck_share).round() as usize
+fn speck_size(speck_share: f64, area: usize) -> usize {
+    (area as f64 * speck_share).round() as usize
 }
 
 fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
@@ -230,14 +265,17 @@ fn require_ink(ink: &Mask, area: usize, grey: &Grid<f32>, threshold: f64) -> Res
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests_support::params;
-    use super::{Error, read};
+    use super::{Error, Ink, levelled};
     use crate::raster::{Grid, Picture};
 
     fn picture(grey: impl Fn(usize, usize) -> u16) -> Picture {
         Picture {
             rgb: Grid::from_fn(60, 50, |x, y| [grey(x, y) * 257; 3]),
         }
+    }
+
+    fn read(picture: &Picture) -> Result<Ink, Error> {
+        levelled(picture, 1.0 / 1200.0)
     }
 
     fn cross(x: usize, y: usize) -> bool {
@@ -250,14 +288,11 @@ mod tests {
         let shade = |x: usize| 170 + x as u16 / 2;
         let printed = picture(|x, y| if cross(x, y) { 40 } else { shade(x) });
         let rubbed = picture(|x, y| 255 - if cross(x, y) { 40 } else { shade(x) });
-        let (a, b) = (
-            read(&printed, &params()).expect("ink"),
-            read(&rubbed, &params()).expect("ink"),
-        );
+        let (a, b) = (read(&printed).expect("ink"), read(&rubbed).expect("ink"));
         assert!(!a.light_on_dark && b.light_on_dark);
-        assert_eq!(a.ink, b.ink);
+        assert_eq!(a.mask, b.mask);
         assert!(
-            a.ink
+            a.mask
                 .data()
                 .iter()
                 .enumerate()
@@ -272,23 +307,23 @@ mod tests {
             (_, true) => 50,
             _ => 205,
         });
-        let print = read(&cut, &params()).expect("ink");
-        assert!(!print.known.at(2, 2) && print.known.at(50, 40));
+        let print = read(&cut).expect("ink");
+        assert!(!print.soft.known.at(2, 2) && print.soft.known.at(50, 40));
         let plain = picture(|x, y| if cross(x, y) { 50 } else { 255 });
-        assert_eq!(read(&plain, &params()).expect("ink").known.density(), 1.0);
+        assert_eq!(read(&plain).expect("ink").soft.known.density(), 1.0);
     }
 
     #[test]
     fn prints_without_ink_are_refused() {
         for grey in [255, 0, 128] {
-            let refused = read(&picture(|_, _| grey), &params());
+            let refused = read(&picture(|_, _| grey));
             assert!(matches!(refused, Err(Error::NoContrast { .. })), "{grey}");
         }
         let one = Picture {
             rgb: Grid::new(1, 1, [0; 3]),
         };
         assert!(matches!(
-            read(&one, &params()),
+            read(&one),
             Err(Error::TooSmall {
                 width: 1,
                 height: 1
