@@ -9,7 +9,7 @@ use super::damage::Damage;
 use super::field::Field;
 use super::glyph::Glyphs;
 use super::ink::Inking;
-use super::picture_file::{PictureFormat, grey_png};
+use super::picture_file::PictureFormat;
 use super::polygon::Polygon;
 use super::pose::Pose;
 use super::print::{Impression, PrintFrame, print};
@@ -20,6 +20,7 @@ use super::truth::{Known, TruthLine};
 use crate::domain::ContentHash;
 use crate::mesh::Mesh;
 use crate::mesh::write::MeshFormat;
+use crate::raster::png_grey8;
 
 /// Everything about a pair, its files as bytes.
 pub(super) struct Pair {
@@ -106,7 +107,7 @@ pub(super) fn drawn_pair(
         print: format.encode(&picture)?,
         print_extension: format.extension(),
     };
-    finish(relics, tier, rng)
+    Ok(finish(relics, tier, rng))
 }
 
 /// What is fixed once the print is there.
@@ -130,7 +131,7 @@ pub(super) struct Relics<'a> {
 }
 
 /// Carves and scans the block and writes down the truth.
-pub(super) fn finish(relics: Relics, tier: Tier, rng: &mut ChaCha8Rng) -> Result<Pair, ImageError> {
+pub(super) fn finish(relics: Relics, tier: Tier, rng: &mut ChaCha8Rng) -> Pair {
     let remaining = relics.damage.remaining(&relics.artwork.strokes);
     let carving = Carving {
         strokes: &remaining,
@@ -161,7 +162,7 @@ pub(super) fn finish(relics: Relics, tier: Tier, rng: &mut ChaCha8Rng) -> Result
         tops_mask: format!("tops/{}.png", relics.id),
         id: relics.id.clone(),
     };
-    Ok(Pair {
+    Pair {
         id: relics.id,
         character: relics.character.to_string(),
         unit: pose.unit.map(crate::domain::LengthUnit::name),
@@ -171,9 +172,9 @@ pub(super) fn finish(relics: Relics, tier: Tier, rng: &mut ChaCha8Rng) -> Result
         mesh,
         print: relics.print,
         print_extension: relics.print_extension,
-        tops: grey_png(&known.tops_mask(relics.frame))?,
+        tops: png_grey8(&known.tops_mask(relics.frame)),
         truth,
-    })
+    }
 }
 
 /// The polygon along which a scan or a print is cut out.
@@ -185,13 +186,101 @@ fn cut(artwork: &Artwork, rng: &mut ChaCha8Rng) -> Polygon {
 /// Mostly binary STL, as in the field.
 fn draw_format(vertices: usize, rng: &mut ChaCha8Rng) -> MeshFormat {
     match rng.random_range(0..20_u32) {
-        0..=9 => MeshFormat::StlBinary,
         10..=12 => MeshFormat::PlyLittleEndian,
         13..=14 => MeshFormat::PlyBigEndian,
         15..=16 => MeshFormat::PlyAscii,
         // Text triangle by triangle is six times the size: small scans only.
         17 if vertices < 40_000 => MeshFormat::StlAscii,
-        17 => MeshFormat::StlBinary,
-        _ => MeshFormat::Obj,
+        18..=19 => MeshFormat::Obj,
+        _ => MeshFormat::StlBinary,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Pair, drawn_pair};
+    use crate::demo::calligraphy;
+    use crate::demo::glyph::Glyphs;
+    use crate::demo::tier::Tier;
+    use crate::demo::truth::TOP;
+    use crate::raster::{Grid, decode_grey8};
+
+    fn pair(tier: Tier, index: u64) -> Pair {
+        match tier {
+            Tier::Real => calligraphy::pair(11, index),
+            Tier::Upright | Tier::Pose | Tier::Hard => {
+                drawn_pair(&Glyphs::embedded(), tier, 11, index)
+            }
+        }
+        .expect("pictures encode")
+    }
+
+    /// The mask's value where the true map sends a mesh point, and its height in shares of the character's height.
+    fn seen(pair: &Pair, tops: &Grid<u8>, point: [f64; 3]) -> Option<(u8, f64)> {
+        let map = pair.truth.print_from_mesh;
+        let [x, y, height] = map.apply(point);
+        let [a, b, c, _] = map.0[0];
+        let px_per_unit = (a * a + b * b + c * c).sqrt();
+        let value = tops.get(x.round() as i64, y.round() as i64)?;
+        Some((value, height * px_per_unit / pair.truth.char_height_px))
+    }
+
+    #[test]
+    fn landmarks_fall_on_stroke_tops_at_the_plane() {
+        for tier in Tier::ALL {
+            for index in 0..3 {
+                let pair = pair(tier, index);
+                let tops = decode_grey8(&pair.tops).expect("the mask is a PNG");
+                // A bend of 0.8 mm is a tenth of a character of 8 mm.
+                let level = if tier == Tier::Hard { 0.12 } else { 0.025 };
+                assert!((12..=40).contains(&pair.truth.landmarks.len()));
+                for landmark in &pair.truth.landmarks {
+                    let (value, height) = seen(&pair, &tops, *landmark).expect("inside the print");
+                    assert_eq!(value, TOP, "{}", pair.id);
+                    assert!(height.abs() < level, "{}: {height}", pair.id);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn mesh_is_high_where_the_tops_mask_says_so_and_low_elsewhere() {
+        for tier in [Tier::Upright, Tier::Pose, Tier::Real] {
+            let pair = pair(tier, 1);
+            let tops = decode_grey8(&pair.tops).expect("the mask is a PNG");
+            let (mut tops_high, mut tops_all, mut ground_low, mut ground_all) = (0, 0, 0, 0);
+            for vertex in &pair.mesh.vertices {
+                match seen(&pair, &tops, *vertex) {
+                    // Below the ground there are only side walls and foot.
+                    Some((_, height)) if height < -0.175 => {}
+                    Some((TOP, height)) => {
+                        tops_all += 1;
+                        tops_high += i32::from(height > -0.03);
+                    }
+                    Some((0, height)) => {
+                        ground_all += 1;
+                        ground_low += i32::from(height < -0.01);
+                    }
+                    Some(_) | None => {}
+                }
+            }
+            let share = |part: i32, all: i32| f64::from(part) / f64::from(all.max(1));
+            assert!(
+                share(tops_high, tops_all) > 0.97,
+                "{tier}: {tops_high} of {tops_all}"
+            );
+            assert!(
+                share(ground_low, ground_all) > 0.93,
+                "{tier}: {ground_low} of {ground_all}"
+            );
+        }
+    }
+
+    #[test]
+    fn scans_hold_twenty_to_a_hundred_and_fifty_thousand_vertices() {
+        for index in 0..4 {
+            let vertices = pair(Tier::Hard, index).mesh.vertices.len();
+            assert!((18_000..165_000).contains(&vertices), "{vertices}");
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Nouns of the project: small values without files, SQL, async or image buffers.
 
 mod failure;
+mod file_kind;
 mod hash;
 mod ids;
 mod metric;
@@ -11,6 +12,7 @@ mod unit;
 mod verdict;
 
 pub use failure::{Failure, FailureClass};
+pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};
 pub use ids::{PairId, PairName, PairNameError, WorkerId};
 pub use metric::ThresholdMetric;

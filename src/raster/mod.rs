@@ -1,11 +1,22 @@
 //! Pictures and masks in memory, and the pixel convention: see [`Grid`].
 
+mod decode;
 mod depth_map;
+pub mod encode;
 mod grid;
+mod limits;
 mod mask;
 mod picture;
+mod warp;
 
+pub use decode::{DecodeError, decode};
 pub use depth_map::DepthMap;
+pub use encode::{
+    ArtifactError, decode_grey8, decode_grey16, decode_mask, png_grey8, png_grey16, png_mask,
+    png_rgb8,
+};
 pub use grid::Grid;
+pub use limits::Limits;
 pub use mask::{Mask, PixelBox};
 pub use picture::Picture;
+pub use warp::{warp_depth, warp_mask, warp_values};

@@ -1,47 +1,236 @@
-//! Mesh and plane to depth map (paper III-B).
+//! Mesh and plane to depth map (paper III-B): parallel rays along the plane's normal, nearest surface wins.
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::{FailureClass, FitOutcome, LengthUnit};
+use super::zbuffer::{NOTHING, Projected, View};
+use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
 use crate::mesh::Mesh;
-use crate::raster::DepthMap;
+use crate::raster::{DepthMap, Grid};
 
 /// Raised whenever the same inputs and settings may give another result than before.
 pub const REVISION: u32 = 1;
+
+/// A depth map's longest side in pixels may not pass this: 16-bit maps of 268 million pixels help nobody.
+const LONGEST_PX_LIMIT: f64 = 16_384.0;
+
+/// What fixes the size of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ResolutionBy {
+    /// The map's longest side has `longest_px` pixels.
+    LongestSide,
+    /// A millimetre has `px_per_mm` pixels; the mesh's unit must be known.
+    PxPerMm,
+}
 
 /// Settings of the stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Params {
-    /// Seed of the stage's random choices.
-    pub seed: u64,
+    /// What fixes the size of a pixel.
+    pub resolution_by: ResolutionBy,
+    /// Longest side of the map in pixels, 32..=16384.
+    pub longest_px: u32,
+    /// Pixels per millimetre, above 0.
+    pub px_per_mm: f64,
 }
 
 /// Why the stage found no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// Placeholder.
-    #[error("not built yet")]
-    NotBuilt,
+    /// Pixels per mm were asked for a mesh of unknown unit.
+    #[error(
+        "depth.resolution_by is px_per_mm but the unit of the mesh is not known; give it in the manifest"
+    )]
+    UnitUnknown,
+    /// The map would be absurdly large.
+    #[error(
+        "depth map would be {longest_px:.0} px long, more than {LONGEST_PX_LIMIT}; lower depth.px_per_mm or check the unit"
+    )]
+    TooLarge {
+        /// Longest side that was asked for.
+        longest_px: f64,
+    },
+    /// No ray meets the surface.
+    #[error("no ray along the plane's normal meets the mesh")]
+    NothingSeen,
 }
 
 impl Error {
     /// What the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
-        FailureClass::Bug
+        match self {
+            Self::UnitUnknown | Self::TooLarge { .. } => FailureClass::BadInput,
+            Self::NothingSeen => FailureClass::NoSolution,
+        }
     }
 }
 
-/// Makes the depth map.
+/// Renders the heights over the fitted surface, mirrored so that the map reads like the print.
+///
+/// Each pixel whose centre ray meets the mesh is set, exactly once, to the surface nearest to the viewer: the
+/// highest. Level 0 is "no data"; 1..=65535 are linear in height, [`DepthScale`] says how.
 ///
 /// # Errors
-/// When nothing is seen.
+/// When the resolution cannot be had, or nothing is seen.
 pub fn depth(
     mesh: &Mesh,
     fit: &FitOutcome,
     unit: Option<LengthUnit>,
     params: &Params,
 ) -> Result<DepthMap, Error> {
-    let _ = (mesh, fit, unit, params);
-    Err(Error::NotBuilt)
+    let projected = Projected::new(mesh, &fit.plane_from_mesh);
+    let bounds = projected.bounds();
+    let view = View::around(bounds, longest_px(bounds, unit, params)?, true);
+    let plane_from_px = view.px_from_plane.inverse().ok_or(Error::NothingSeen)?;
+    let mut heights = projected.render(&view);
+    if let Some(bow) = &fit.bow {
+        for y in 0..view.height {
+            for x in 0..view.width {
+                let [u, v] = plane_from_px.apply([x as f64, y as f64]);
+                let over_surface = heights.at(x, y) - bow.height(u, v) as f32;
+                heights.set(x, y, over_surface);
+            }
+        }
+    }
+    let (levels, height_min, height_per_level) = quantise(&heights).ok_or(Error::NothingSeen)?;
+    Ok(DepthMap {
+        levels,
+        scale: DepthScale {
+            height_min,
+            height_per_level,
+            mesh_unit_per_px: view.unit_per_px,
+            depth_from_plane: view.px_from_plane,
+            bow: fit.bow,
+            unit,
+        },
+    })
+}
+
+/// Longest side in pixels for bounds in the plane, mesh units.
+fn longest_px(
+    [low, high]: [[f64; 2]; 2],
+    unit: Option<LengthUnit>,
+    params: &Params,
+) -> Result<usize, Error> {
+    let longest_px = match params.resolution_by {
+        ResolutionBy::LongestSide => f64::from(params.longest_px),
+        ResolutionBy::PxPerMm => {
+            let mm = unit.ok_or(Error::UnitUnknown)?.mm();
+            (high[0] - low[0]).max(high[1] - low[1]) * mm * params.px_per_mm + 3.0
+        }
+    };
+    if longest_px > LONGEST_PX_LIMIT {
+        return Err(Error::TooLarge { longest_px });
+    }
+    Ok((longest_px.round() as usize).max(8))
+}
+
+/// Heights to levels 1..=65535 over their whole range; `None` when no pixel holds data.
+fn quantise(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
+    let seen = || heights.data().iter().copied().filter(|z| *z != NOTHING);
+    let low = f64::from(seen().reduce(f32::min)?);
+    let high = f64::from(seen().reduce(f32::max)?);
+    let step = ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE));
+    let levels = heights.map(|z| {
+        if *z == NOTHING {
+            0
+        } else {
+            1 + ((f64::from(*z) - low) / step).round().clamp(0.0, 65_534.0) as u16
+        }
+    });
+    Some((levels, low, step))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Error, Params, ResolutionBy, depth};
+    use crate::domain::{Bow, FitOutcome, LengthUnit, Rigid3, SideEvidence};
+    use crate::mesh::Mesh;
+
+    fn params() -> Params {
+        Params {
+            resolution_by: ResolutionBy::LongestSide,
+            longest_px: 64,
+            px_per_mm: 10.0,
+        }
+    }
+
+    /// A 10 x 6 sheet whose height is `0.1 x`, in a grid of 21 x 13 vertices.
+    fn ramp() -> Mesh {
+        let mut mesh = Mesh::default();
+        for j in 0..13_u32 {
+            for i in 0..21_u32 {
+                let (x, y) = (f64::from(i) * 0.5, f64::from(j) * 0.5);
+                mesh.vertices.push([x, y, 0.1 * x]);
+                if i > 0 && j > 0 {
+                    let k = j * 21 + i;
+                    mesh.triangles.push([k - 22, k - 21, k]);
+                    mesh.triangles.push([k - 22, k, k - 1]);
+                }
+            }
+        }
+        mesh
+    }
+
+    fn flat_fit(bow: Option<Bow>) -> FitOutcome {
+        FitOutcome {
+            plane_from_mesh: Rigid3::to_frame(
+                [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+                [0.0; 3],
+            ),
+            bow,
+            bow_height: 0.0,
+            inlier_ratio: 1.0,
+            rms: 0.0,
+            relief: 1.0,
+            side: SideEvidence {
+                winding: None,
+                flatness: 1.0,
+                confidence: 1.0,
+            },
+            vertices: 0,
+            triangles: 0,
+        }
+    }
+
+    #[test]
+    fn height_is_true_and_the_map_is_mirrored() {
+        let map = depth(&ramp(), &flat_fit(None), None, &params()).expect("the ramp is seen");
+        let to_px = map.scale.depth_from_plane;
+        for (x, y) in [(1.0, 1.0), (5.0, 3.0), (9.0, 5.0)] {
+            let [u, v] = to_px.apply([x, y]);
+            let (column, row) = (u.round() as usize, v.round() as usize);
+            let [px, _] = to_px
+                .inverse()
+                .expect("a view")
+                .apply([column as f64, row as f64]);
+            let height = map.height(column, row).expect("inside the sheet");
+            assert!((height - 0.1 * px).abs() < 1e-4);
+        }
+        assert!(to_px.apply([9.0, 1.0])[0] < to_px.apply([1.0, 1.0])[0]);
+    }
+
+    #[test]
+    fn heights_are_measured_from_the_bow() {
+        let bow = Bow([0.0, 0.1, 0.0, 0.0, 0.0, 0.0]);
+        let map = depth(&ramp(), &flat_fit(Some(bow)), None, &params()).expect("the ramp is seen");
+        for y in 0..map.levels.height() {
+            for x in 0..map.levels.width() {
+                assert!(map.height(x, y).is_none_or(|h| h.abs() < 1e-5));
+            }
+        }
+    }
+
+    #[test]
+    fn pixels_per_mm_need_a_unit() {
+        let per_mm = Params {
+            resolution_by: ResolutionBy::PxPerMm,
+            ..params()
+        };
+        let refused = depth(&ramp(), &flat_fit(None), None, &per_mm);
+        assert_eq!(refused, Err(Error::UnitUnknown));
+        let map = depth(&ramp(), &flat_fit(None), Some(LengthUnit::Cm), &per_mm).expect("a map");
+        assert!((map.scale.mesh_unit_per_px - 0.01).abs() < 1e-9);
+    }
 }

@@ -6,6 +6,8 @@ pub mod depth;
 pub mod fit;
 pub mod normalize;
 pub mod register;
+pub mod score;
+mod zbuffer;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,0 +1,128 @@
+//! What some bytes are, told from their first bytes: for choosing a reader and for saying why there is none.
+
+/// Kind of a file by its content, never by its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileKind {
+    /// Portable Network Graphics.
+    Png,
+    /// JPEG in any wrapping.
+    Jpeg,
+    /// TIFF or `BigTIFF`, either byte order.
+    Tiff,
+    /// An image format that is not read.
+    OtherImage(&'static str),
+    /// A mesh in the Stanford polygon format.
+    Ply,
+    /// A 3D format that is not read.
+    OtherMesh(&'static str),
+    /// Anything else with a known signature.
+    Other(&'static str),
+    /// Printable text without a signature.
+    Text,
+    /// Bytes without a known signature.
+    Binary,
+}
+
+const SIGNATURES: [(&[u8], FileKind); 28] = [
+    (b"\x89PNG\r\n\x1a\n", FileKind::Png),
+    (b"\xff\xd8\xff", FileKind::Jpeg),
+    (b"II*\0", FileKind::Tiff),
+    (b"MM\0*", FileKind::Tiff),
+    (b"II+\0", FileKind::Tiff),
+    (b"MM\0+", FileKind::Tiff),
+    (b"GIF8", FileKind::OtherImage("GIF image")),
+    (b"BM", FileKind::OtherImage("BMP image")),
+    (b"8BPS", FileKind::OtherImage("Photoshop image")),
+    (b"\0\0\0\x0cjP  ", FileKind::OtherImage("JPEG 2000 image")),
+    (b"ply\n", FileKind::Ply),
+    (b"ply\r", FileKind::Ply),
+    (b"glTF", FileKind::OtherMesh("binary glTF scene")),
+    (b"OFF\n", FileKind::OtherMesh("OFF mesh")),
+    (b"OFF\r", FileKind::OtherMesh("OFF mesh")),
+    (b"Kaydara FBX", FileKind::OtherMesh("FBX scene")),
+    (b"#VRML", FileKind::OtherMesh("VRML scene")),
+    (b"# .PCD", FileKind::OtherMesh("PCD point cloud")),
+    (b"LASF", FileKind::OtherMesh("LAS point cloud")),
+    (b"%PDF", FileKind::Other("PDF document")),
+    (b"PK\x03\x04", FileKind::Other("ZIP archive")),
+    (b"\x1f\x8b", FileKind::Other("gzip archive")),
+    (b"7z\xbc\xaf", FileKind::Other("7-Zip archive")),
+    (b"Rar!", FileKind::Other("RAR archive")),
+    (b"SQLite format 3", FileKind::Other("SQLite database")),
+    (b"\xff\xfe", FileKind::Other("UTF-16 text")),
+    (b"\xfe\xff", FileKind::Other("UTF-16 text")),
+    (b"<", FileKind::Other("XML or HTML text")),
+];
+
+impl FileKind {
+    /// Kind of a file that begins with these bytes.
+    pub fn of(bytes: &[u8]) -> Self {
+        if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
+            return Self::OtherImage("WebP image");
+        }
+        if let Some(brand @ (b"avif" | b"heic" | b"mif1" | b"heix")) =
+            bytes.get(8..12).filter(|_| &bytes[4..8] == b"ftyp")
+        {
+            return Self::OtherImage(if brand == b"avif" {
+                "AVIF image"
+            } else {
+                "HEIC image"
+            });
+        }
+        SIGNATURES
+            .iter()
+            .find(|(signature, _)| bytes.starts_with(signature))
+            .map_or_else(|| Self::without_signature(bytes), |(_, kind)| *kind)
+    }
+
+    fn without_signature(bytes: &[u8]) -> Self {
+        let head = &bytes[..bytes.len().min(512)];
+        let control = |byte: &u8| *byte < 0x20 && !b"\t\n\r\x0c".contains(byte);
+        if head.iter().any(control) {
+            Self::Binary
+        } else {
+            Self::Text
+        }
+    }
+
+    /// The kind in words.
+    pub const fn description(self) -> &'static str {
+        match self {
+            Self::Png => "PNG image",
+            Self::Jpeg => "JPEG image",
+            Self::Tiff => "TIFF image",
+            Self::Ply => "PLY mesh",
+            Self::OtherImage(name) | Self::OtherMesh(name) | Self::Other(name) => name,
+            Self::Text => "text",
+            Self::Binary => "binary data of unknown kind",
+        }
+    }
+}
+
+impl std::fmt::Display for FileKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.description())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::FileKind;
+
+    #[test]
+    fn kinds_are_told_by_content() {
+        assert_eq!(FileKind::of(b"\x89PNG\r\n\x1a\n...."), FileKind::Png);
+        assert_eq!(FileKind::of(b"\xff\xd8\xff\xe0"), FileKind::Jpeg);
+        assert_eq!(FileKind::of(b"MM\0*rest"), FileKind::Tiff);
+        assert_eq!(
+            FileKind::of(b"RIFF\0\0\0\0WEBPVP8 "),
+            FileKind::OtherImage("WebP image")
+        );
+        assert_eq!(
+            FileKind::of(b"\0\0\0\x1cftypheic"),
+            FileKind::OtherImage("HEIC image")
+        );
+        assert_eq!(FileKind::of(b"hello there"), FileKind::Text);
+        assert_eq!(FileKind::of(&[0, 1, 2]), FileKind::Binary);
+    }
+}

@@ -1,0 +1,303 @@
+//! CSV lists: comma, semicolon or tab, as the header line has it.
+
+use std::collections::BTreeMap;
+
+use super::draft::{Draft, Rows};
+use super::{COLUMNS, ManifestError, ManifestRow, Problem, REQUIRED};
+
+const BOM: &[u8] = b"\xef\xbb\xbf";
+
+/// Parses a CSV list with a header line. Column names may stand in any order and in capitals; blank lines are
+/// left out.
+///
+/// # Errors
+/// All that is wrong, by the line each row begins at.
+pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
+    let bytes = bytes.strip_prefix(BOM).unwrap_or(bytes);
+    let mut reader = ::csv::ReaderBuilder::new()
+        .delimiter(delimiter(bytes))
+        .trim(::csv::Trim::All)
+        .flexible(true)
+        .has_headers(false)
+        .from_reader(bytes);
+    let mut lines = LineCounter::new(bytes);
+    let mut records = reader.byte_records().map(|record| {
+        let record = record.map_err(|error| Problem::whole(error.to_string()))?;
+        let line = lines.at(&record);
+        Ok::<_, Problem>((line, record))
+    });
+    let header = match records.next() {
+        Some(header) => Header::parse(&header?)?,
+        None => return Err(Problem::whole("the list is empty").into()),
+    };
+    let mut rows = Rows::default();
+    for record in records {
+        let (line, record) = record?;
+        match header.draft(line, &record) {
+            Ok(Some(draft)) => rows.push(draft),
+            Ok(None) => {}
+            Err(problem) => rows.problems.push(problem),
+        }
+    }
+    ManifestError::unless_none(rows.accepted, rows.problems)
+}
+
+/// The separator that the first line holds most of; a comma when in doubt.
+fn delimiter(bytes: &[u8]) -> u8 {
+    let start = bytes.trim_ascii_start();
+    let header = start.split(|byte| *byte == b'\n').next().unwrap_or(start);
+    let count = |delimiter: u8| header.split(|byte| *byte == delimiter).count();
+    [b'\t', b';', b',']
+        .into_iter()
+        .max_by_key(|delimiter| count(*delimiter))
+        .unwrap_or(b',')
+}
+
+/// Tells the line a record begins at. The reader's own count stops at the end of the record before, and blank
+/// lines may follow there.
+struct LineCounter<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    line: usize,
+}
+
+impl<'a> LineCounter<'a> {
+    const fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            bytes,
+            at: 0,
+            line: 1,
+        }
+    }
+
+    fn at(&mut self, record: &::csv::ByteRecord) -> usize {
+        let from = record.position().map_or(0, ::csv::Position::byte) as usize;
+        let blank = self.bytes[from..]
+            .iter()
+            .take_while(|byte| matches!(**byte, b'\r' | b'\n'))
+            .count();
+        let passed = &self.bytes[self.at..from + blank];
+        self.line += passed.split(|byte| *byte == b'\n').count() - 1;
+        self.at = from + blank;
+        self.line
+    }
+}
+
+/// What a column holds.
+#[derive(Debug, Clone)]
+enum Column {
+    Known(&'static str),
+    Meta(String),
+}
+
+#[derive(Debug)]
+struct Header {
+    columns: Vec<Column>,
+}
+
+impl Header {
+    fn parse((line, record): &(usize, ::csv::ByteRecord)) -> Result<Self, ManifestError> {
+        let mut problems = Vec::new();
+        let mut seen = BTreeMap::new();
+        let mut columns = Vec::new();
+        for (number, field) in (1..).zip(record) {
+            let Ok(name) = std::str::from_utf8(field) else {
+                problems.push(Problem::line(
+                    *line,
+                    format!("the name of column {number} is not UTF-8"),
+                ));
+                continue;
+            };
+            let column = column(name);
+            if !name.is_empty()
+                && let Some(first) = seen.insert(column_name(&column).to_owned(), number)
+            {
+                let reason = format!("columns {first} and {number} are both named {name:?}");
+                problems.push(Problem::line(*line, reason));
+            }
+            columns.push(column);
+        }
+        let missing = REQUIRED.iter().filter(|name| !seen.contains_key(**name));
+        problems.extend(missing.map(|name| Problem::line(*line, missing_column(name, record))));
+        if problems.is_empty() {
+            Ok(Self { columns })
+        } else {
+            Err(ManifestError { problems })
+        }
+    }
+
+    /// A row's cells; `None` for a row of empty cells, as spreadsheets leave them at the end.
+    fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<Draft>, Problem> {
+        if record.iter().all(<[u8]>::is_empty) {
+            return Ok(None);
+        }
+        if record.len() != self.columns.len() {
+            return Err(Problem::line(
+                line,
+                format!(
+                    "the row has {} cells, the header {}",
+                    record.len(),
+                    self.columns.len()
+                ),
+            ));
+        }
+        let mut draft = Draft {
+            line,
+            ..Draft::default()
+        };
+        for (column, cell) in self.columns.iter().zip(record) {
+            let Ok(cell) = std::str::from_utf8(cell) else {
+                let name = column_name(column);
+                return Err(Problem::line(
+                    line,
+                    format!("the cell of column {name:?} is not UTF-8"),
+                ));
+            };
+            draft.put(column, cell);
+        }
+        Ok(Some(draft))
+    }
+}
+
+impl Draft {
+    fn put(&mut self, column: &Column, cell: &str) {
+        match column {
+            Column::Known(name) => {
+                self.cells.insert(name, cell.to_owned());
+            }
+            Column::Meta(name) if !cell.is_empty() && !name.is_empty() => {
+                self.meta.insert(name.clone(), cell.into());
+            }
+            Column::Meta(_) => {}
+        }
+    }
+}
+
+fn column(name: &str) -> Column {
+    COLUMNS
+        .into_iter()
+        .find(|known| known.eq_ignore_ascii_case(name))
+        .map_or_else(|| Column::Meta(name.to_owned()), Column::Known)
+}
+
+fn column_name(column: &Column) -> &str {
+    match column {
+        Column::Known(name) => name,
+        Column::Meta(name) => name,
+    }
+}
+
+fn missing_column(name: &str, record: &::csv::ByteRecord) -> String {
+    let found: Vec<_> = record
+        .iter()
+        .take(12)
+        .map(|field| String::from_utf8_lossy(field))
+        .collect();
+    format!(
+        "column {name:?} is missing; the header has: {}",
+        found.join(", ")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{ManifestError, ManifestRow};
+    use crate::domain::LengthUnit;
+
+    fn parse(text: &str) -> Result<Vec<ManifestRow>, ManifestError> {
+        super::parse_csv(text.as_bytes())
+    }
+
+    fn refusal(text: &str) -> String {
+        parse(text).expect_err(text).to_string()
+    }
+
+    #[test]
+    fn all_columns_are_read_and_others_kept() {
+        let rows = parse(
+            "id,mesh,print,character,block,unit,scanned_face_down,folio\n\
+             b1_0001,m/1.stl,p/1.png,天,b1,mm,yes,12r\nb1_0002,m/2.stl,p/2.png,,,,,\n",
+        )
+        .expect("parses");
+        assert_eq!(rows[0].name.as_str(), "b1_0001");
+        assert_eq!(rows[0].mesh.to_str(), Some("m/1.stl"));
+        assert_eq!(rows[0].character.as_deref(), Some("天"));
+        assert_eq!(rows[0].unit, Some(LengthUnit::Mm));
+        assert_eq!(rows[0].scanned_face_down, Some(true));
+        assert_eq!(rows[0].meta["folio"], "12r");
+        assert_eq!(
+            (rows[1].line, rows[1].unit, &rows[1].block),
+            (3, None, &None)
+        );
+        assert!(rows[1].meta.is_empty());
+    }
+
+    #[test]
+    fn order_capitals_spaces_bom_and_separators_do_not_matter() {
+        let plain = parse("id,mesh,print\na,b,c\n").expect("parses");
+        for text in [
+            "\u{feff}id,mesh,print\r\na,b,c\r\n",
+            " Mesh ; ID ; PRINT\nb;a;c",
+            "print\tid\tmesh\nc\ta\tb\n",
+            "id,mesh,print\na,\"b\",c\n,,\n",
+        ] {
+            assert_eq!(parse(text).expect(text), plain, "{text:?}");
+        }
+    }
+
+    #[test]
+    fn lines_are_counted_through_blank_lines_and_long_cells() {
+        let rows =
+            parse("\n\nid,mesh,print,note\n\na,b,c,\"two\nlines\"\r\n\r\n\nd,e,f,\ng,h,i,\n")
+                .expect("parses");
+        let lines: Vec<_> = rows.iter().map(|row| row.line).collect();
+        assert_eq!(lines, [5, 9, 10]);
+    }
+
+    #[test]
+    fn every_problem_is_named_by_its_line() {
+        let text = "id,mesh,print,unit,scanned_face_down\n\
+            a,m,p,,\n\
+            a/b,m,p,,\n\
+            ,m,p,,\n\
+            a,m,p,,\n\
+            c,,,furlong,maybe\n\
+            d,m\n";
+        assert_eq!(
+            refusal(text).lines().collect::<Vec<_>>(),
+            [
+                "line 3: id \"a/b\" holds '/'; an id is made of letters A-Z, digits, _ and -",
+                "line 4: the id is empty",
+                "line 5: id \"a\" was given in line 2 already",
+                "line 6: no mesh is given",
+                "line 6: no print is given",
+                "line 6: \"furlong\" is not a unit (mm, cm, m, in)",
+                "line 6: scanned_face_down is \"maybe\", not true, false, yes, no, 1 or 0",
+                "line 7: the row has 2 cells, the header 5",
+            ]
+        );
+    }
+
+    #[test]
+    fn missing_and_doubled_columns_are_named() {
+        assert_eq!(
+            refusal("id,model,print\na,b,c\n"),
+            "line 1: column \"mesh\" is missing; the header has: id, model, print"
+        );
+        assert_eq!(
+            refusal("id,mesh,print,Mesh\na,b,c,d\n"),
+            "line 1: columns 2 and 4 are both named \"Mesh\""
+        );
+        assert_eq!(refusal(""), "the list is empty");
+        assert_eq!(refusal("id,mesh,print\n"), "the list holds no pairs");
+    }
+
+    #[test]
+    fn bytes_that_are_not_utf8_are_named_by_line_and_column() {
+        let error = super::parse_csv(b"id,mesh,print\na,b,c\nd,\xff\xfe,f\n").expect_err("bytes");
+        assert_eq!(
+            error.to_string(),
+            "line 3: the cell of column \"mesh\" is not UTF-8"
+        );
+    }
+}

@@ -1,0 +1,116 @@
+//! What is wrong with a list of pairs, by line.
+
+use std::fmt;
+use std::path::PathBuf;
+
+/// Problems shown at most; the rest are counted.
+const SHOWN: usize = 20;
+
+/// Where in a list a problem is.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Place {
+    /// A line, counted from 1.
+    Line(usize),
+    /// A file of a folder.
+    File(PathBuf),
+    /// The list as a whole.
+    Whole,
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}: "),
+            Self::File(path) => write!(f, "{}: ", path.display()),
+            Self::Whole => Ok(()),
+        }
+    }
+}
+
+/// One thing that is wrong.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Problem {
+    /// Where.
+    pub place: Place,
+    /// A lower-case fragment with the values in it.
+    pub reason: String,
+}
+
+impl Problem {
+    /// A problem of a line.
+    pub(super) fn line(line: usize, reason: impl Into<String>) -> Self {
+        Self {
+            place: Place::Line(line),
+            reason: reason.into(),
+        }
+    }
+
+    /// A problem of the whole list.
+    pub(super) fn whole(reason: impl Into<String>) -> Self {
+        Self {
+            place: Place::Whole,
+            reason: reason.into(),
+        }
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}{}", self.place, self.reason)
+    }
+}
+
+/// A list that is refused as a whole, and all that is wrong with it; shown a problem a line.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub struct ManifestError {
+    /// In the order of the list; never empty.
+    pub problems: Vec<Problem>,
+}
+
+impl ManifestError {
+    /// The rows when nothing is wrong, or all that is.
+    pub(super) fn unless_none<T>(rows: Vec<T>, problems: Vec<Problem>) -> Result<Vec<T>, Self> {
+        if !problems.is_empty() {
+            return Err(Self { problems });
+        }
+        if rows.is_empty() {
+            return Err(Problem::whole("the list holds no pairs").into());
+        }
+        Ok(rows)
+    }
+}
+
+impl From<Problem> for ManifestError {
+    fn from(problem: Problem) -> Self {
+        Self {
+            problems: vec![problem],
+        }
+    }
+}
+
+impl fmt::Display for ManifestError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (number, problem) in self.problems.iter().take(SHOWN).enumerate() {
+            let separator = if number == 0 { "" } else { "\n" };
+            write!(f, "{separator}{problem}")?;
+        }
+        match self.problems.len().saturating_sub(SHOWN) {
+            0 => Ok(()),
+            more => write!(f, "\nand {more} more"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ManifestError, Problem};
+
+    #[test]
+    fn twenty_problems_are_shown_and_the_rest_counted() {
+        let problems = (1..=23).map(|line| Problem::line(line, "no id")).collect();
+        let text = ManifestError { problems }.to_string();
+        assert_eq!(text.lines().count(), 21);
+        assert!(text.starts_with("line 1: no id\nline 2: no id\n"));
+        assert!(text.ends_with("line 20: no id\nand 3 more"));
+    }
+}

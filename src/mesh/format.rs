@@ -1,0 +1,114 @@
+//! Which format some bytes are, by their content.
+
+use super::{Error, text};
+use crate::domain::FileKind;
+
+/// The formats that are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Wavefront OBJ.
+    Obj,
+    /// Stanford polygon format, ascii or binary of either byte order.
+    Ply,
+    /// Binary STL.
+    StlBinary,
+    /// Ascii STL.
+    StlAscii,
+    /// Lines of numbers, the first three of each a position.
+    Xyz,
+}
+
+/// Lines of a text looked at before it is given up.
+const LINES_TRIED: usize = 1000;
+
+impl Format {
+    /// Name in messages.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Obj => "OBJ",
+            Self::Ply => "PLY",
+            Self::StlBinary => "binary STL",
+            Self::StlAscii => "ascii STL",
+            Self::Xyz => "XYZ",
+        }
+    }
+
+    /// Format of a file with this content; its name decides only between truncated or odd files.
+    ///
+    /// # Errors
+    /// When the content is of no format that is read.
+    pub fn of(bytes: &[u8], name: &str) -> Result<Self, Error> {
+        if bytes.is_empty() {
+            return Err(Error::Empty);
+        }
+        let kind = FileKind::of(bytes);
+        match kind {
+            FileKind::Ply => Ok(Self::Ply),
+            _ if is_whole_binary_stl(bytes) => Ok(Self::StlBinary),
+            FileKind::Text => text_format(bytes, name).ok_or(Error::NotAMesh(kind)),
+            FileKind::Binary if has_extension(name, "stl") => Ok(Self::StlBinary),
+            // Names in another encoding or a stray control character do not make a text binary.
+            FileKind::Binary => first_words(bytes).ok_or(Error::NotAMesh(kind)),
+            FileKind::Png
+            | FileKind::Jpeg
+            | FileKind::Tiff
+            | FileKind::OtherImage(_)
+            | FileKind::OtherMesh(_)
+            | FileKind::Other(_) => Err(Error::NotAMesh(kind)),
+        }
+    }
+}
+
+impl std::fmt::Display for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+fn has_extension(name: &str, wanted: &str) -> bool {
+    std::path::Path::new(name)
+        .extension()
+        .is_some_and(|ext| ext.eq_ignore_ascii_case(wanted))
+}
+
+/// 80 bytes of anything, a count, 50 bytes a triangle and nothing after them: even if it begins with `solid`.
+fn is_whole_binary_stl(bytes: &[u8]) -> bool {
+    super::stl::binary_count(bytes)
+        .is_some_and(|count| bytes.len() as u64 == 84 + 50 * u64::from(count))
+}
+
+fn text_format(bytes: &[u8], name: &str) -> Option<Format> {
+    if let Some(format) = first_words(bytes) {
+        return Some(format);
+    }
+    // The header of a binary STL may be text all through: count and triangles tell, here cut short.
+    (has_extension(name, "stl") && bytes.contains(&0)).then_some(Format::StlBinary)
+}
+
+fn first_words(bytes: &[u8]) -> Option<Format> {
+    for (number, line) in text::lines(bytes).take(LINES_TRIED) {
+        let mut words = text::words(line);
+        let Some(first) = words.next() else { continue };
+        match first {
+            _ if line.starts_with(b"#") || line.starts_with(b"//") => {}
+            b"ply" if number == 1 => return Some(Format::Ply),
+            _ if first.eq_ignore_ascii_case(b"solid") => return Some(stl_after_solid(bytes)),
+            b"v" | b"vn" | b"vt" | b"vp" | b"f" | b"o" | b"g" | b"s" | b"mtllib" | b"usemtl" => {
+                return Some(Format::Obj);
+            }
+            _ if super::points::is_data_or_title(line) => return Some(Format::Xyz),
+            _ => return None,
+        }
+    }
+    None
+}
+
+/// `solid` begins an ascii STL, and the header of some binary ones.
+fn stl_after_solid(bytes: &[u8]) -> Format {
+    let binary = bytes.iter().take(4096).any(|byte| *byte == 0);
+    if binary {
+        Format::StlBinary
+    } else {
+        Format::StlAscii
+    }
+}

@@ -1,0 +1,233 @@
+//! The Stanford polygon format: ascii, binary little and big endian.
+
+mod body;
+mod header;
+mod source;
+
+use header::{Encoding, Header};
+use source::{Ascii, Binary};
+
+use super::{Error, Limits, Mesh};
+
+/// Reads vertices, faces and triangle strips; other elements and properties are stepped over.
+pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
+    let (header, start) = Header::parse(bytes)?;
+    let rest = &bytes[start..];
+    match header.encoding {
+        Encoding::Ascii => body::read(&header, Ascii::new(rest), limits),
+        Encoding::LittleEndian => body::read(&header, Binary::<false>::new(rest), limits),
+        Encoding::BigEndian => body::read(&header, Binary::<true>::new(rest), limits),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::super::{Error, Limits, Mesh};
+
+    fn read(bytes: &[u8]) -> Result<Mesh, Error> {
+        super::read(bytes, &Limits::SUGGESTED)
+    }
+
+    fn ascii(elements: &str, body: &str) -> Vec<u8> {
+        format!("ply\nformat ascii 1.0\n{elements}end_header\n{body}").into_bytes()
+    }
+
+    const XYZ: &str = "property float x\nproperty float y\nproperty float z\n";
+    const CORNERS: &str = "property list uchar int vertex_indices\n";
+
+    #[test]
+    fn unknown_elements_and_properties_are_stepped_over() {
+        let bytes = ascii(
+            "comment made by hand\nobj_info num_cols 2\nelement camera 1\nproperty float f\n\
+             property list uchar float k\nelement vertex 4\nproperty uchar red\nproperty double z\n\
+             property float x\nproperty float y\nproperty list uchar short extra\nelement face 3\n\
+             property uchar flags\nproperty list uint uint vertex_index\n\
+             property list uchar float texcoord\n",
+            "35.0 2 1 2\n9 0.5 1 2 1 7\n9 0 3 4 0\n9 0 5 6 0\n9 0 7 8 2 1 2\n\
+             1 4 0 1 2 3 0\n1 2 0 1 0\n1 3 3 2 1 6 0 0 0 0 0 0\n",
+        );
+        let mesh = read(&bytes).expect("reads");
+        assert_eq!(mesh.vertices[0], [1.0, 2.0, 0.5]);
+        assert_eq!(mesh.vertices[3], [7.0, 8.0, 0.0]);
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [3, 2, 1]]);
+    }
+
+    #[test]
+    fn vertices_without_faces_are_a_point_set() {
+        let mesh = read(&ascii(
+            &format!("element vertex 2\n{XYZ}"),
+            "1 2 3\n4 5 6\n",
+        ));
+        assert_eq!(mesh.expect("reads").vertices.len(), 2);
+    }
+
+    #[test]
+    fn triangle_strips_alternate_their_winding() {
+        let bytes = ascii(
+            &format!(
+                "element vertex 5\n{XYZ}element tristrips 1\nproperty list int int vertex_indices\n"
+            ),
+            "0 0 0 1 0 0 2 0 0 3 0 0 4 0 0 8 0 1 2 3 -1 2 3 4",
+        );
+        let mesh = read(&bytes).expect("reads");
+        assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3], [2, 3, 4]]);
+    }
+
+    #[test]
+    fn absurd_counts_are_refused_without_memory() {
+        let huge = |element: &str| {
+            let text = ascii(
+                &format!("element {element} 99999999999999\n{XYZ}"),
+                "1 2 3\n",
+            );
+            read(&text).expect_err("absurd").to_string()
+        };
+        assert_eq!(
+            huge("vertex"),
+            "the file has 99999999999999 vertices; limits.mesh.max_vertices is 50000000"
+        );
+        assert_eq!(
+            huge("other"),
+            "the ascii PLY is truncated: it holds 1 of 99999999999999 rows of other"
+        );
+        let list = ascii(
+            &format!(
+                "element vertex 1\n{XYZ}element face 1\nproperty list uint int vertex_indices\n"
+            ),
+            "1 2 3\n4000000000 0 0",
+        );
+        assert_eq!(
+            read(&list).expect_err("absurd").to_string(),
+            "the ascii PLY is truncated: it holds 0 of 1 faces"
+        );
+        let nothing = ascii(
+            &format!("element x 18446744073709551615\nelement vertex 1\n{XYZ}"),
+            "1 2 3",
+        );
+        assert!(read(&nothing).is_ok());
+    }
+
+    #[test]
+    fn faults_are_told_by_their_place() {
+        let elements = format!("element vertex 2\n{XYZ}element face 1\n{CORNERS}");
+        let fault = |body: &str| read(&ascii(&elements, body)).expect_err(body).to_string();
+        assert_eq!(
+            fault("0 0 0 0 nan 0 3 0 1 0"),
+            "vertex 2 has the coordinate NaN, which is not a finite number"
+        );
+        assert_eq!(
+            fault("0 0 0 0 zero 0 3 0 1 0"),
+            "vertex 2: \"zero\" is not a number"
+        );
+        assert_eq!(
+            fault("0 0 0 0 0 0 3 0 1 2"),
+            "face 1 refers to vertex 2, but the file has 2 vertices"
+        );
+        assert_eq!(
+            fault("0 0 0 0 0 0 3 0 1 -1"),
+            "face 1 refers to vertex -1, but the file has 2 vertices"
+        );
+        assert_eq!(
+            fault("0 0 0 0 0 0 3 0 1 .5"),
+            "face 1: 0.5 is not a vertex index"
+        );
+        assert_eq!(
+            fault("0 0 0 0 0 0 -3 0 1"),
+            "face 1: -3 is not the length of a list"
+        );
+        assert_eq!(
+            fault("0 0 0"),
+            "the ascii PLY is truncated: it holds 1 of 2 vertices"
+        );
+    }
+
+    #[test]
+    fn wrong_headers_are_explained() {
+        let fault = |text: &str| read(text.as_bytes()).expect_err(text).to_string();
+        assert_eq!(
+            fault("ply\nformat ascii 1.0\nelement vertex 1\n"),
+            "the PLY header is wrong: the file ends before end_header"
+        );
+        assert_eq!(
+            fault("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n"),
+            "the PLY header is wrong: element \"vertex\" has no property \"y\""
+        );
+        for header in [
+            "format morse 1.0",
+            "element vertex -1",
+            "property float x",
+            "element a 1\nproperty half x",
+            "element a 1\nproperty list float int x",
+            "colour blue",
+        ] {
+            let text = fault(&format!("ply\n{header}\nend_header\n"));
+            assert!(text.starts_with("the PLY header is wrong: "), "{text}");
+        }
+    }
+
+    /// The slow way to write any encoding, twin of the reader.
+    fn write(mesh: &Mesh, format: &str, wide: bool) -> Vec<u8> {
+        let kind = if wide { "double" } else { "float" };
+        let mut out = format!(
+            "ply\nformat {format} 1.0\nelement vertex {}\nproperty {kind} x\nproperty {kind} y\n\
+             property {kind} z\nelement face {}\n{CORNERS}end_header\n",
+            mesh.vertices.len(),
+            mesh.triangles.len()
+        )
+        .into_bytes();
+        let big = format == "binary_big_endian";
+        let text = format == "ascii";
+        let mut put = |little: &[u8], word: String| {
+            if text {
+                out.extend(word.into_bytes());
+                out.push(b' ');
+            } else if big {
+                out.extend(little.iter().rev());
+            } else {
+                out.extend(little);
+            }
+        };
+        for value in mesh.vertices.as_flattened() {
+            if wide {
+                put(&value.to_le_bytes(), value.to_string());
+            } else {
+                put(&(*value as f32).to_le_bytes(), value.to_string());
+            }
+        }
+        for triangle in &mesh.triangles {
+            put(&[3], "3".into());
+            for index in triangle {
+                put(&index.to_le_bytes(), index.to_string());
+            }
+        }
+        out
+    }
+
+    proptest! {
+        #[test]
+        fn every_encoding_comes_back_exactly(
+            vertices in prop::collection::vec(prop::array::uniform3(-1e6_f32..1e6), 1..40),
+            corners in prop::collection::vec(prop::array::uniform3(any::<prop::sample::Index>()), 0..40),
+            wide in any::<bool>(),
+        ) {
+            let mesh = Mesh {
+                triangles: corners
+                    .iter()
+                    .map(|t| t.map(|index| index.index(vertices.len()) as u32))
+                    .collect(),
+                vertices: vertices.iter().map(|v| v.map(f64::from)).collect(),
+            };
+            for format in ["ascii", "binary_little_endian", "binary_big_endian"] {
+                let bytes = write(&mesh, format, wide);
+                prop_assert_eq!(&read(&bytes).expect("reads"), &mesh);
+                for cut in [1, 5, 20] {
+                    let cut = &bytes[..bytes.len().saturating_sub(cut)];
+                    let whole = format == "ascii" && cut.len() + 1 >= bytes.len();
+                    prop_assert!(whole || read(cut).map_or(true, |m| m != mesh));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! XYZ point sets: lines of numbers, the first three of each a position.
+
+use super::{Error, Limits, Mesh, error, text};
+
+/// Bytes of the shortest line: three digits, two spaces, an end.
+const SHORTEST_LINE: usize = 6;
+
+/// Reads positions; further columns such as normals and colours are left out. Commas and semicolons may stand
+/// between numbers. The first line may be a count or the columns' names.
+pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
+    let mut vertices = Vec::with_capacity((bytes.len() / SHORTEST_LINE).min(1 << 16));
+    let mut first = true;
+    for (line_number, line) in text::lines(bytes) {
+        if is_comment(line) || (std::mem::take(&mut first) && is_title(line)) {
+            continue;
+        }
+        let position = text::position(cells(line)).map_err(|reason| Error::Line {
+            line: line_number,
+            reason,
+        })?;
+        let count = vertices.len() as u64 + 1;
+        limits.check_vertices(count)?;
+        vertices.push(error::finite(position, count)?);
+    }
+    Ok(Mesh {
+        vertices,
+        triangles: Vec::new(),
+    })
+}
+
+/// Whether a file that begins with this line may be a point set.
+pub(super) fn is_data_or_title(line: &[u8]) -> bool {
+    is_title(line) || text::position(cells(line)).is_ok()
+}
+
+fn is_comment(line: &[u8]) -> bool {
+    line.is_empty() || line.starts_with(b"#") || line.starts_with(b"//")
+}
+
+/// A count of points alone on its line, or columns named x, y, z.
+fn is_title(line: &[u8]) -> bool {
+    let mut words = cells(line);
+    let first = words.next().unwrap_or_default();
+    match (words.next(), words.next()) {
+        (None, _) => !first.is_empty() && first.iter().all(u8::is_ascii_digit),
+        (Some(second), Some(third)) => {
+            first.eq_ignore_ascii_case(b"x")
+                && second.eq_ignore_ascii_case(b"y")
+                && third.eq_ignore_ascii_case(b"z")
+        }
+        (Some(_), None) => false,
+    }
+}
+
+fn cells(line: &[u8]) -> impl Iterator<Item = &[u8]> {
+    line.split(|byte| byte.is_ascii_whitespace() || matches!(byte, b',' | b';'))
+        .filter(|word| !word.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Error, Limits, Mesh, read};
+
+    fn open(text: &str) -> Result<Mesh, Error> {
+        read(text.as_bytes(), "scan.xyz", &Limits::SUGGESTED)
+    }
+
+    #[test]
+    fn titles_counts_comments_and_further_columns_are_left_out() {
+        let plain = open("1 2 3\n4 5 6\n").expect("reads");
+        assert_eq!(plain.vertices, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+        assert!(plain.triangles.is_empty());
+        for text in [
+            "2\n1 2 3 255 0 0\n4 5 6 255 0 0\n",
+            "x,y,z,nx\n1,2,3,0\n4,5,6,0\n",
+            "# scan\n\n1;2;3\n4;5;6",
+            "//X Y Z\n1\t2\t3\n4\t5\t6\n",
+        ] {
+            assert_eq!(open(text).expect(text), plain, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_bad_line_is_named() {
+        assert_eq!(
+            open("1 2 3\n4 5\n").expect_err("short").to_string(),
+            "line 2: 2 of 3 coordinates"
+        );
+        assert_eq!(
+            open("1 2 3\n4 x 6\n").expect_err("word").to_string(),
+            "line 2: \"x\" is not a number"
+        );
+        assert!(matches!(
+            open("1 2 3\n4 inf 6\n"),
+            Err(Error::NotFinite { vertex: 2, .. })
+        ));
+        assert_eq!(open("0\n"), Err(Error::NoVertices));
+    }
+}

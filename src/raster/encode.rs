@@ -1,0 +1,206 @@
+//! PNG files of our own artifacts, written and read back without loss. Same grid, same bytes.
+
+use std::io::Cursor;
+
+use super::{Grid, Mask};
+
+/// Why an artifact could not be read back.
+#[derive(Debug, thiserror::Error)]
+pub enum ArtifactError {
+    /// Not a whole PNG.
+    #[error("the PNG is damaged: {0}")]
+    Damaged(#[from] png::DecodingError),
+    /// A PNG, but not of the kind this program writes there.
+    #[error("the PNG holds {found:?} of {bits:?} bits, not grey of {wanted} bits")]
+    Kind {
+        /// Colours found.
+        found: png::ColorType,
+        /// Bits a channel found.
+        bits: png::BitDepth,
+        /// Bits a channel expected.
+        wanted: u8,
+    },
+    /// A mask with a value that is neither 0 nor 255.
+    #[error("the mask holds the value {0}, which is neither 0 nor 255")]
+    NotAMask(u8),
+}
+
+/// A 16-bit grey PNG.
+///
+/// # Panics
+/// When the grid has no pixels, as for every writer here: no stage makes such a grid.
+pub fn png_grey16(grid: &Grid<u16>) -> Vec<u8> {
+    let samples: Vec<u8> = grid.data().iter().flat_map(|v| v.to_be_bytes()).collect();
+    png_of(
+        (grid.width(), grid.height()),
+        png::ColorType::Grayscale,
+        png::BitDepth::Sixteen,
+        &samples,
+    )
+}
+
+/// An 8-bit grey PNG.
+pub fn png_grey8(grid: &Grid<u8>) -> Vec<u8> {
+    png_of(
+        (grid.width(), grid.height()),
+        png::ColorType::Grayscale,
+        png::BitDepth::Eight,
+        grid.data(),
+    )
+}
+
+/// An 8-bit grey PNG, 255 where the mask is set (stroke) and 0 elsewhere.
+pub fn png_mask(mask: &Mask) -> Vec<u8> {
+    png_grey8(&mask.map(|set| if *set { 255 } else { 0 }))
+}
+
+/// An 8-bit RGB PNG.
+pub fn png_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
+    png_of(
+        (grid.width(), grid.height()),
+        png::ColorType::Rgb,
+        png::BitDepth::Eight,
+        grid.data().as_flattened(),
+    )
+}
+
+fn png_of(
+    (width, height): (usize, usize),
+    color: png::ColorType,
+    depth: png::BitDepth,
+    samples: &[u8],
+) -> Vec<u8> {
+    let mut out = Vec::with_capacity(samples.len() / 2 + 1024);
+    let mut encoder = png::Encoder::new(&mut out, width as u32, height as u32);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_deflate_compression(png::DeflateCompression::Level(1));
+    encoder.set_filter(png::Filter::Up);
+    encoder
+        .write_header()
+        .and_then(|mut writer| {
+            writer.write_image_data(samples)?;
+            writer.finish()
+        })
+        .expect("a grid with pixels is written to memory");
+    out
+}
+
+/// Reads a PNG of [`png_grey16`].
+///
+/// # Errors
+/// When the bytes are damaged or of another kind.
+pub fn decode_grey16(bytes: &[u8]) -> Result<Grid<u16>, ArtifactError> {
+    let (width, height, samples) = grey_samples(bytes, png::BitDepth::Sixteen, 16)?;
+    let (pairs, _) = samples.as_chunks::<2>();
+    let levels = pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
+    Ok(Grid::from_vec(width, height, levels).expect("two bytes for each pixel"))
+}
+
+/// Reads a PNG of [`png_grey8`].
+///
+/// # Errors
+/// When the bytes are damaged or of another kind.
+pub fn decode_grey8(bytes: &[u8]) -> Result<Grid<u8>, ArtifactError> {
+    let (width, height, samples) = grey_samples(bytes, png::BitDepth::Eight, 8)?;
+    Ok(Grid::from_vec(width, height, samples).expect("one byte for each pixel"))
+}
+
+/// Reads a PNG of [`png_mask`].
+///
+/// # Errors
+/// When the bytes are damaged, of another kind, or hold a value other than 0 and 255.
+pub fn decode_mask(bytes: &[u8]) -> Result<Mask, ArtifactError> {
+    let grey = decode_grey8(bytes)?;
+    match grey.data().iter().find(|v| !matches!(**v, 0 | 255)) {
+        Some(value) => Err(ArtifactError::NotAMask(*value)),
+        None => Ok(grey.map(|value| *value == 255)),
+    }
+}
+
+/// Width, height and the bytes of a grey PNG of this depth.
+fn grey_samples(
+    bytes: &[u8],
+    depth: png::BitDepth,
+    wanted: u8,
+) -> Result<(usize, usize, Vec<u8>), ArtifactError> {
+    let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
+    let info = reader.info();
+    let (width, height) = (info.width as usize, info.height as usize);
+    if info.color_type != png::ColorType::Grayscale || info.bit_depth != depth {
+        return Err(ArtifactError::Kind {
+            found: info.color_type,
+            bits: info.bit_depth,
+            wanted,
+        });
+    }
+    let mut samples = vec![0; width * height * usize::from(wanted / 8)];
+    reader.next_frame(&mut samples)?;
+    reader.finish()?;
+    Ok((width, height, samples))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::{
+        ArtifactError, decode_grey8, decode_grey16, decode_mask, png_grey8, png_grey16, png_mask,
+        png_rgb8,
+    };
+    use crate::raster::{Grid, Limits, Mask, decode};
+
+    #[test]
+    fn mask_is_white_where_stroke_is() {
+        let mask = Mask::from_fn(5, 3, |x, y| x == y);
+        let bytes = png_mask(&mask);
+        assert_eq!(decode_grey8(&bytes).expect("reads").at(1, 1), 255);
+        assert_eq!(decode_mask(&bytes).expect("reads"), mask);
+    }
+
+    #[test]
+    fn grey_that_is_no_mask_is_refused() {
+        let bytes = png_grey8(&Grid::new(2, 2, 7));
+        assert!(matches!(
+            decode_mask(&bytes),
+            Err(ArtifactError::NotAMask(7))
+        ));
+        assert!(matches!(
+            decode_grey16(&bytes),
+            Err(ArtifactError::Kind { .. })
+        ));
+    }
+
+    #[test]
+    fn colours_are_read_back_by_the_print_decoder() {
+        let grid = Grid::from_fn(4, 4, |x, y| [x as u8 * 60, y as u8 * 60, 9]);
+        let picture = decode(&png_rgb8(&grid), &Limits::SUGGESTED).expect("reads");
+        assert_eq!(
+            picture.rgb,
+            grid.map(|c| c.map(|value| u16::from(value) * 257))
+        );
+    }
+
+    #[test]
+    fn truncated_artifact_is_damaged() {
+        let bytes = png_grey16(&Grid::from_fn(40, 30, |x, y| (x * y) as u16));
+        for len in 0..bytes.len() {
+            assert!(decode_grey16(&bytes[..len]).is_err(), "{len} bytes");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn grey_comes_back_exactly(
+            width in 1_usize..20, height in 1_usize..20, seed in any::<u32>(),
+        ) {
+            let noise = |x: usize, y: usize| {
+                (seed ^ (x as u32).wrapping_mul(0x9e37_79b1)).wrapping_mul(y as u32 | 1)
+            };
+            let wide = Grid::from_fn(width, height, |x, y| (noise(x, y) >> 16) as u16);
+            prop_assert_eq!(&decode_grey16(&png_grey16(&wide)).expect("reads"), &wide);
+            let narrow = wide.map(|value| (value >> 8) as u8);
+            prop_assert_eq!(&decode_grey8(&png_grey8(&narrow)).expect("reads"), &narrow);
+        }
+    }
+}

@@ -1,0 +1,140 @@
+//! Agreement of two masks on one canvas: SSIM, its structure part, IoU, Dice, bounding-box IoU.
+
+mod ssim;
+
+pub use ssim::{SsimWindow, Structure, WindowMeans, structure_maps};
+
+use crate::domain::Scores;
+use crate::raster::{Mask, PixelBox};
+
+/// Every score of a depth mask against a print mask of the same size.
+///
+/// `ssim` and `nl_ssim` use `window`; masks count as 0 and 1 with data range 1.
+pub fn measure(print: &Mask, depth: &Mask, window: SsimWindow) -> Scores {
+    let structure = structure_maps(print, depth, window);
+    let overlap = Overlap::of(print, depth);
+    Scores {
+        ssim: structure.ssim,
+        nl_ssim: structure.nl_ssim,
+        iou: overlap.iou(),
+        iou_box: box_iou(print.bounding_box(), depth.bounding_box()),
+        dice: overlap.dice(),
+        density_print: print.density(),
+        density_depth: depth.density(),
+    }
+}
+
+/// How many pixels two masks set together and apart.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Overlap {
+    /// Set in both.
+    pub both: usize,
+    /// Set in the first.
+    pub first: usize,
+    /// Set in the second.
+    pub second: usize,
+}
+
+impl Overlap {
+    /// Counts two masks of one size.
+    pub fn of(a: &Mask, b: &Mask) -> Self {
+        Self {
+            both: a
+                .data()
+                .iter()
+                .zip(b.data())
+                .filter(|(p, q)| **p && **q)
+                .count(),
+            first: a.count(),
+            second: b.count(),
+        }
+    }
+
+    /// Intersection over union; 0 for two empty masks, which agree on nothing.
+    pub fn iou(self) -> f64 {
+        ratio(self.both, self.first + self.second - self.both)
+    }
+
+    /// Dice coefficient: twice the intersection over the sum; 0 for two empty masks.
+    pub fn dice(self) -> f64 {
+        ratio(2 * self.both, self.first + self.second)
+    }
+}
+
+fn ratio(part: usize, whole: usize) -> f64 {
+    if whole == 0 {
+        0.0
+    } else {
+        part as f64 / whole as f64
+    }
+}
+
+/// Intersection over union of two boxes of pixels; 0 when one is missing.
+fn box_iou(a: Option<PixelBox>, b: Option<PixelBox>) -> f64 {
+    let (Some(a), Some(b)) = (a, b) else {
+        return 0.0;
+    };
+    let along =
+        |a0: usize, a1: usize, b0: usize, b1: usize| (a1.min(b1) + 1).saturating_sub(a0.max(b0));
+    let both = along(a.x0, a.x1, b.x0, b.x1) * along(a.y0, a.y1, b.y0, b.y1);
+    ratio(both, a.width() * a.height() + b.width() * b.height() - both)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::{Overlap, SsimWindow, box_iou, measure};
+    use crate::raster::Mask;
+
+    fn masks() -> impl Strategy<Value = (Mask, Mask)> {
+        let side = 24_usize;
+        let bits = proptest::collection::vec(any::<bool>(), side * side);
+        (bits.clone(), bits).prop_map(move |(a, b)| {
+            let mask = |bits| Mask::from_vec(side, side, bits).expect("the size is right");
+            (mask(a), mask(b))
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn dice_follows_from_iou((a, b) in masks()) {
+            let overlap = Overlap::of(&a, &b);
+            let j = overlap.iou();
+            prop_assert!((overlap.dice() - 2.0 * j / (1.0 + j)).abs() < 1e-12);
+            prop_assert!((0.0..=1.0).contains(&j));
+        }
+
+        #[test]
+        fn scores_do_not_care_which_mask_is_first((a, b) in masks()) {
+            let (p, q) = (measure(&a, &b, SsimWindow::Gaussian), measure(&b, &a, SsimWindow::Gaussian));
+            prop_assert!((p.ssim - q.ssim).abs() < 1e-12);
+            prop_assert_eq!(p.iou_box, q.iou_box);
+        }
+    }
+
+    #[test]
+    fn a_mask_agrees_wholly_with_itself() {
+        let mask = Mask::from_fn(40, 40, |x, y| (10..30).contains(&x) && (5..20).contains(&y));
+        let scores = measure(&mask, &mask, SsimWindow::Gaussian);
+        for one in [
+            scores.ssim,
+            scores.nl_ssim,
+            scores.iou,
+            scores.iou_box,
+            scores.dice,
+        ] {
+            assert!((one - 1.0).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn boxes_side_by_side_share_nothing() {
+        let left = Mask::from_fn(10, 4, |x, _| x < 5).bounding_box();
+        let right = Mask::from_fn(10, 4, |x, _| x >= 5).bounding_box();
+        let three = Mask::from_fn(10, 4, |x, _| (2..5).contains(&x)).bounding_box();
+        assert_eq!(box_iou(left, right), 0.0);
+        assert_eq!(box_iou(left, three), 0.6);
+        assert_eq!(box_iou(left, None), 0.0);
+    }
+}
