@@ -75,8 +75,8 @@ impl Artwork {
     pub(super) fn surroundings(&self, glyphs: &Glyphs, rng: &mut ChaCha8Rng) -> Field {
         let frame = self.strokes.frame;
         let mut coverage = Grid::new(frame.side, frame.side, 0.0);
-        let pitch = self.size_mm * rng.random_range(1.02..1.1) + 0.3;
-        let column = self.size_mm * rng.random_range(1.06..1.2) + 0.5;
+        let pitch = self.size_mm * rng.random_range(1.0..1.08) + 0.2;
+        let column = self.size_mm * rng.random_range(1.04..1.18) + 0.4;
         for offset in [[0.0, -pitch], [0.0, pitch], [-column, 0.0], [column, 0.0]] {
             if rng.random_bool(0.75) {
                 let characters = glyphs.characters();

@@ -101,10 +101,11 @@ impl Inking {
         let bristle = self.bristles.rough(u / 0.2, v / 0.2);
         let edge = mix(1.4, 0.15, dry);
         let patchy = 0.85 * ramp(edge, edge + 0.45, bristle);
+        let rag_mm = 0.05 * bristle;
         let broken = self
             .gaps
             .iter()
-            .map(|spot| (0.5 + spot.inside_mm(point) / (1.4 * px_mm)).clamp(0.0, 0.9));
+            .map(|spot| (0.5 + (spot.inside_mm(point) + rag_mm) / (1.4 * px_mm)).clamp(0.0, 0.9));
         broken.fold(patchy, f64::max)
     }
 }

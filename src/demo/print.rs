@@ -103,7 +103,8 @@ pub(super) fn print(impression: &Impression, frame: &PrintFrame, rng: &mut ChaCh
         0
     };
     let paper = Paper::draw(stains, 6.0, rng);
-    let ink_colour = [0; 3].map(|_: i32| rng.random_range(22.0..48.0));
+    let ink_grey = rng.random_range(20.0..44.0);
+    let ink_colour = [0; 3].map(|_: i32| ink_grey + rng.random_range(-4.0..4.0));
     let cracks_print = rng.random_bool(0.5);
     let stretch = [Noise::draw(rng), Noise::draw(rng)];
     let is_paper = Grid::from_fn(frame.width, frame.height, |x, y| {
