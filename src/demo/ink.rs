@@ -172,6 +172,9 @@ impl Spot {
     /// About the distance to the rim, positive inside, mm.
     fn inside_mm(&self, [u, v]: [f64; 2]) -> f64 {
         let (du, dv) = (u - self.centre[0], v - self.centre[1]);
+        if du * du + dv * dv > (self.long_mm + 1.0).powi(2) {
+            return -1.0;
+        }
         let along = (du * self.axis[0] + dv * self.axis[1]) / self.long_mm;
         let across = (dv * self.axis[0] - du * self.axis[1]) / self.short_mm;
         self.short_mm * (1.0 - along.hypot(across))
