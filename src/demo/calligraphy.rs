@@ -10,7 +10,7 @@ use rand::RngExt;
 
 use super::artwork::Artwork;
 use super::damage::Damage;
-use super::pair::{Pair, Relics, finish, id_of, rng_of};
+use super::pair::{Pair, Printed, Scene, id_of, rng_of};
 use super::print::PrintFrame;
 use super::tier::Tier;
 use crate::domain::Affine2;
@@ -76,20 +76,22 @@ pub(super) fn pair(seed: u64, index: u64) -> Result<Pair, ImageError> {
         ink_share(&clean, clean_from_uv.apply(point))
     });
     let (width, height) = (photograph.width() as usize, photograph.height() as usize);
-    let frame = PrintFrame::new(width, height, CROP_FROM_CLEAN.after(&clean_from_uv))
-        .expect("a similarity of positive scale has an inverse");
-    let bare = artwork.no_surroundings();
-    let relics = Relics {
-        id: id_of(Tier::Real, index),
-        character: cell.character,
-        artwork: &artwork,
-        around: [&bare, &bare],
-        damage: &Damage::default(),
-        frame: &frame,
-        print: cell.photograph.to_vec(),
-        print_extension: "png",
+    let printed = Printed {
+        frame: PrintFrame::new(width, height, CROP_FROM_CLEAN.after(&clean_from_uv)),
+        bytes: cell.photograph.to_vec(),
+        extension: "png",
     };
-    Ok(finish(relics, Tier::Real, &mut rng))
+    let bare = artwork.no_surroundings();
+    let scene = Scene {
+        id: id_of(Tier::Real, index),
+        tier: Tier::Real,
+        character: cell.character,
+        artwork,
+        block_around: bare.clone(),
+        print_around: bare,
+        damage: Damage::default(),
+    };
+    Ok(scene.carved(printed, &mut rng))
 }
 
 /// Pixels from mm such that the ink box is centred and its longest side is `size_mm`.

@@ -17,7 +17,7 @@ use super::relief::{Carving, relief};
 use super::scan::{ScanStyle, scan};
 use super::tier::Tier;
 use super::truth::{Known, TruthLine};
-use crate::domain::ContentHash;
+use crate::domain::{ContentHash, LengthUnit};
 use crate::mesh::Mesh;
 use crate::mesh::write::MeshFormat;
 use crate::raster::png_grey8;
@@ -59,6 +59,34 @@ pub(super) fn id_of(tier: Tier, index: u64) -> String {
     format!("{tier}-{index:04}")
 }
 
+/// What a pair is made from: a character, what stands around it, what became of the block.
+pub(super) struct Scene {
+    /// Manifest id and file stem.
+    pub id: String,
+    /// How hard.
+    pub tier: Tier,
+    /// The character.
+    pub character: char,
+    /// Its strokes.
+    pub artwork: Artwork,
+    /// Neighbours and rules on the block.
+    pub block_around: Field,
+    /// Neighbours and rules on the print.
+    pub print_around: Field,
+    /// Damage to the block since it was printed.
+    pub damage: Damage,
+}
+
+/// A print and its frame.
+pub(super) struct Printed {
+    /// Size and true map.
+    pub frame: PrintFrame,
+    /// The file's bytes.
+    pub bytes: Vec<u8>,
+    /// The file's ending.
+    pub extension: &'static str,
+}
+
 /// Makes a pair of the tiers that are drawn from the font.
 ///
 /// # Errors
@@ -70,110 +98,96 @@ pub(super) fn drawn_pair(
     index: u64,
 ) -> Result<Pair, ImageError> {
     let mut rng = rng_of(seed, tier, index);
-    let rng = &mut rng;
-    let characters = glyphs.characters();
-    let character = characters[rng.random_range(0..characters.len())];
-    let artwork = Artwork::of_glyph(glyphs, character, rng);
-    let block_around = artwork.surroundings(glyphs, rng);
-    let print_around = if tier.is_damaged() {
-        artwork.surroundings(glyphs, rng)
-    } else {
-        block_around.clone()
-    };
-    let damage = if tier.is_damaged() {
-        Damage::draw(&artwork, rng)
-    } else {
-        Damage::default()
-    };
-    let outline = cut(&artwork, rng);
-    let frame = PrintFrame::draw(&outline, rng);
-    let frame = frame.expect("a similarity of positive scale has an inverse");
-    let inking = Inking::draw(&artwork.strokes, &print_around, tier, rng);
-    let impression = Impression {
-        inking: &inking,
-        damage: &damage,
-        outline: &outline,
-        tier,
-    };
-    let picture = print(&impression, &frame, rng);
-    let format = PictureFormat::draw(rng);
-    let relics = Relics {
-        id: id_of(tier, index),
-        character,
-        artwork: &artwork,
-        around: [&block_around, &print_around],
-        damage: &damage,
-        frame: &frame,
-        print: format.encode(&picture)?,
-        print_extension: format.extension(),
-    };
-    Ok(finish(relics, tier, rng))
+    let scene = Scene::draw(glyphs, tier, id_of(tier, index), &mut rng);
+    let printed = scene.printed(&mut rng)?;
+    Ok(scene.carved(printed, &mut rng))
 }
 
-/// What is fixed once the print is there.
-pub(super) struct Relics<'a> {
-    /// File stem.
-    pub id: String,
-    /// The character.
-    pub character: char,
-    /// Its strokes.
-    pub artwork: &'a Artwork,
-    /// Neighbours on the block and on the print.
-    pub around: [&'a Field; 2],
-    /// Damage to the block.
-    pub damage: &'a Damage,
-    /// The print's frame.
-    pub frame: &'a PrintFrame,
-    /// The print's file.
-    pub print: Vec<u8>,
-    /// Its ending.
-    pub print_extension: &'static str,
-}
-
-/// Carves and scans the block and writes down the truth.
-pub(super) fn finish(relics: Relics, tier: Tier, rng: &mut ChaCha8Rng) -> Pair {
-    let remaining = relics.damage.remaining(&relics.artwork.strokes);
-    let carving = Carving {
-        strokes: &remaining,
-        around: relics.around[0],
-        damage: relics.damage,
-        bow_mm: tier.bow_mm(),
-    };
-    let surface = relief(&carving, rng);
-    let style = ScanStyle::draw(tier.is_damaged(), rng);
-    let outline = cut(relics.artwork, rng);
-    let mut mesh = scan(&surface, &outline, &style, rng);
-    let pose = Pose::draw(tier, rng);
-    for vertex in &mut mesh.vertices {
-        *vertex = pose.mesh_from_block(*vertex);
+impl Scene {
+    fn draw(glyphs: &Glyphs, tier: Tier, id: String, rng: &mut ChaCha8Rng) -> Self {
+        let characters = glyphs.characters();
+        let character = characters[rng.random_range(0..characters.len())];
+        let artwork = Artwork::of_glyph(glyphs, character, rng);
+        let block_around = artwork.surroundings(glyphs, rng);
+        let (print_around, damage) = if tier.is_damaged() {
+            let other = artwork.surroundings(glyphs, rng);
+            (other, Damage::draw(&artwork, rng))
+        } else {
+            (block_around.clone(), Damage::default())
+        };
+        Self {
+            id,
+            tier,
+            character,
+            artwork,
+            block_around,
+            print_around,
+            damage,
+        }
     }
-    let known = Known {
-        strokes: &relics.artwork.strokes,
-        remaining: &remaining,
-        around: relics.around,
-        damage: relics.damage,
-        surface: &surface,
-    };
-    let truth = TruthLine {
-        print_from_mesh: pose.print_from_mesh(&relics.frame.print_from_uv),
-        plane: pose.tops_plane(),
-        landmarks: known.landmarks(&pose, rng),
-        char_height_px: known.height_px(relics.frame),
-        tops_mask: format!("tops/{}.png", relics.id),
-        id: relics.id.clone(),
-    };
-    Pair {
-        id: relics.id,
-        character: relics.character.to_string(),
-        unit: pose.unit.map(crate::domain::LengthUnit::name),
-        scanned_face_down: rng.random_bool(0.3).then(|| pose.is_face_down()),
-        is_closed: style.is_closed,
-        mesh_format: draw_format(mesh.vertices.len(), rng),
-        mesh,
-        print: relics.print,
-        print_extension: relics.print_extension,
-        tops: png_grey8(&known.tops_mask(relics.frame)),
-        truth,
+
+    /// Prints the whole block on paper and cuts the character out.
+    fn printed(&self, rng: &mut ChaCha8Rng) -> Result<Printed, ImageError> {
+        let outline = cut(&self.artwork, rng);
+        let frame = PrintFrame::draw(&outline, rng);
+        let strokes = &self.artwork.strokes;
+        let impression = Impression {
+            inking: &Inking::draw(strokes, &self.print_around, self.tier, rng),
+            damage: &self.damage,
+            outline: &outline,
+            tier: self.tier,
+        };
+        let picture = print(&impression, &frame, rng);
+        let format = PictureFormat::draw(rng);
+        Ok(Printed {
+            frame,
+            bytes: format.encode(&picture)?,
+            extension: format.extension(),
+        })
+    }
+
+    /// Carves and scans the block as it is now, and writes down the truth.
+    pub(super) fn carved(self, printed: Printed, rng: &mut ChaCha8Rng) -> Pair {
+        let remaining = self.damage.remaining(&self.artwork.strokes);
+        let surface = self.surface(&remaining, rng);
+        let style = ScanStyle::draw(self.tier.is_damaged(), rng);
+        let mut mesh = scan(&surface, &cut(&self.artwork, rng), &style, rng);
+        let pose = Pose::draw(self.tier, rng);
+        for vertex in &mut mesh.vertices {
+            *vertex = pose.mesh_from_block(*vertex);
+        }
+        let known = Known {
+            strokes: &self.artwork.strokes,
+            remaining: &remaining,
+            around: [&self.block_around, &self.print_around],
+            damage: &self.damage,
+            surface: &surface,
+        };
+        let frame = &printed.frame;
+        Pair {
+            truth: TruthLine::new(&self.id, &known, &pose, frame, rng),
+            tops: png_grey8(&known.tops_mask(frame)),
+            scanned_face_down: rng.random_bool(0.3).then(|| pose.is_face_down()),
+            mesh_format: draw_format(mesh.vertices.len(), rng),
+            id: self.id,
+            character: self.character.to_string(),
+            unit: pose.unit.map(LengthUnit::name),
+            is_closed: style.is_closed,
+            mesh,
+            print: printed.bytes,
+            print_extension: printed.extension,
+        }
+    }
+
+    /// The carved surface with the strokes that are left.
+    fn surface(&self, remaining: &Field, rng: &mut ChaCha8Rng) -> Field {
+        let carving = Carving {
+            strokes: remaining,
+            around: &self.block_around,
+            damage: &self.damage,
+            bow_mm: self.tier.bow_mm(),
+        };
+        relief(&carving, rng)
     }
 }
 
