@@ -1,1 +1,27 @@
 //! The built-in dataset: glyphs carved into meshes and printed, with known truth, from one seed.
+//!
+//! A pair is a pure function of seed, tier and place: [`artwork`] draws the strokes, [`damage`] breaks some,
+//! [`relief`] carves them, [`scan`] and [`pose`] make the mesh, [`ink`], [`paper`] and [`print`] the print,
+//! [`truth`] writes down the answer, [`dataset`] puts all of it on disk.
+
+mod artwork;
+mod calligraphy;
+mod damage;
+mod dataset;
+mod field;
+mod glyph;
+mod ink;
+mod noise;
+mod pair;
+mod paper;
+mod picture_file;
+mod polygon;
+mod pose;
+mod print;
+mod relief;
+mod scan;
+mod tier;
+mod truth;
+
+pub use dataset::{DatasetFiles, DemoOptions, Error, write_dataset};
+pub use tier::Tier;

@@ -121,13 +121,17 @@ pub struct NormalizeOutcome {
     pub threshold_print: f64,
     /// Whether the print is light on dark, as a rubbing is.
     pub light_on_dark: bool,
+    /// Side of the pair's square canvas in pixels.
+    pub canvas_px: u32,
     /// Print pixels to the pair's canvas.
     pub canvas_from_print: Affine2,
     /// Poses found before thresholds were chosen, best first; empty when the method registers afterwards.
     pub poses: Vec<Pose>,
-    /// Depth-map pixels to the canvas by box and centroid alone, for the method that registers afterwards.
-    pub wrap_canvas_from_depth: Option<Affine2>,
-    /// One choice a metric, in the order of [`ThresholdMetric::ALL`].
+    /// Best score of the mirrored relief, where it was searched for.
+    pub mirrored_score: Option<f64>,
+    /// Whether the pose search ended at a bound of its scale or shift.
+    pub search_at_bound: bool,
+    /// One choice a metric; without the ensemble where that is settled by registering the others.
     pub thresholds: Vec<ThresholdChoice>,
 }
 

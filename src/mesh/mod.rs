@@ -8,6 +8,7 @@ mod ply;
 mod points;
 mod stl;
 mod text;
+pub mod write;
 
 pub use error::Error;
 pub use format::Format;

@@ -2,11 +2,18 @@
 //!
 //! No files, no SQL, no async, no clock. Each stage has its `Params`, its `Error` and one entry function.
 
+mod blur;
+mod components;
 pub mod depth;
 pub mod fit;
+mod ink;
 pub mod normalize;
+mod otsu;
+mod pose;
 pub mod register;
 pub mod score;
+#[cfg(test)]
+mod testing;
 mod zbuffer;
 
 use serde::{Deserialize, Serialize};

@@ -70,6 +70,11 @@ impl WindowMeans {
         }
     }
 
+    /// The mask itself.
+    pub const fn mask(&self) -> &Mask {
+        &self.mask
+    }
+
     /// Structure of this mask against another of the same size.
     pub fn against(&self, other: &Mask) -> Structure {
         let taps = self.window.taps();

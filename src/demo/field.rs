@@ -1,0 +1,237 @@
+//! Values over the character's square, by millimetre: distances to strokes, heights.
+
+use crate::raster::{Grid, Mask};
+
+/// A square of samples around the character's centre. u runs right and v down **as the print reads**, in mm.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Frame {
+    /// Samples a side.
+    pub side: usize,
+    /// Distance of two samples, mm.
+    pub step_mm: f64,
+}
+
+impl Frame {
+    /// A frame that reaches `half_mm` to each side.
+    pub(super) fn covering(half_mm: f64, step_mm: f64) -> Self {
+        Self {
+            side: 2 * (half_mm / step_mm).ceil() as usize + 1,
+            step_mm,
+        }
+    }
+
+    /// Half the side, mm.
+    pub(super) fn half_mm(self) -> f64 {
+        (self.side - 1) as f64 / 2.0 * self.step_mm
+    }
+
+    /// Where a sample lies, mm.
+    pub(super) fn position(self, x: usize, y: usize) -> [f64; 2] {
+        let half = self.half_mm();
+        [
+            x as f64 * self.step_mm - half,
+            y as f64 * self.step_mm - half,
+        ]
+    }
+
+    /// Sample coordinates of a point in mm.
+    pub(super) fn sample(self, [u, v]: [f64; 2]) -> [f64; 2] {
+        let half = self.half_mm();
+        [(u + half) / self.step_mm, (v + half) / self.step_mm]
+    }
+}
+
+/// One value at each sample of a frame, bilinear between.
+#[derive(Debug, Clone)]
+pub(super) struct Field {
+    /// Where the samples lie.
+    pub frame: Frame,
+    /// The values.
+    pub values: Grid<f32>,
+}
+
+impl Field {
+    /// A field computed from each sample's place in mm and its column and row.
+    pub(super) fn from_fn(
+        frame: Frame,
+        mut value: impl FnMut([f64; 2], usize, usize) -> f64,
+    ) -> Self {
+        let values = Grid::from_fn(frame.side, frame.side, |x, y| {
+            value(frame.position(x, y), x, y) as f32
+        });
+        Self { frame, values }
+    }
+
+    /// Signed distance in mm to the rim of the inked part, positive inside. `coverage` is the share of ink in
+    /// each sample's cell, 0..=1; next to the rim it gives the distance finer than the samples do.
+    pub(super) fn distance_to_rim(frame: Frame, coverage: &Grid<f32>) -> Self {
+        let inside = coverage.map(|share| *share > 0.5);
+        let outside = inside.map(|set| !set);
+        let (to_ink, to_ground) = (distance_squared(&inside), distance_squared(&outside));
+        let values = Grid::from_fn(frame.side, frame.side, |x, y| {
+            let (ink, ground) = (to_ink.at(x, y).sqrt(), to_ground.at(x, y).sqrt());
+            let pixels = if ink <= 1.0 && ground <= 1.0 {
+                coverage.at(x, y) - 0.5
+            } else {
+                ground.max(0.5) - ink.max(0.5)
+            };
+            pixels * frame.step_mm as f32
+        });
+        Self { frame, values }
+    }
+
+    /// The value at a sample.
+    pub(super) fn at(&self, x: usize, y: usize) -> f64 {
+        f64::from(self.values.at(x, y))
+    }
+
+    /// The value at a point in mm; outside the frame, that of its border.
+    pub(super) fn value(&self, point: [f64; 2]) -> f64 {
+        let last = (self.frame.side - 1) as f64;
+        let [x, y] = self.frame.sample(point).map(|c| c.clamp(0.0, last));
+        let (x0, y0) = (
+            (x as usize).min(self.frame.side - 2),
+            (y as usize).min(self.frame.side - 2),
+        );
+        let (fx, fy) = (x - x0 as f64, y - y0 as f64);
+        let top = self.at(x0, y0) * (1.0 - fx) + self.at(x0 + 1, y0) * fx;
+        let bottom = self.at(x0, y0 + 1) * (1.0 - fx) + self.at(x0 + 1, y0 + 1) * fx;
+        top * (1.0 - fy) + bottom * fy
+    }
+
+    /// Smoothed by a gaussian of `sigma_mm`.
+    #[must_use]
+    pub(super) fn blurred(&self, sigma_mm: f64) -> Self {
+        let weights = gaussian(sigma_mm / self.frame.step_mm);
+        let across = convolve_rows(&self.values, &weights);
+        let values = transpose(&convolve_rows(&transpose(&across), &weights));
+        Self {
+            frame: self.frame,
+            values,
+        }
+    }
+}
+
+/// Weights of a gaussian of `sigma` samples, cut at three sigma, their sum one.
+fn gaussian(sigma: f64) -> Vec<f32> {
+    let reach = (3.0 * sigma).ceil().max(1.0) as i32;
+    let raw: Vec<f64> = (-reach..=reach)
+        .map(|i| (-f64::from(i * i) / (2.0 * sigma * sigma).max(1e-9)).exp())
+        .collect();
+    let sum: f64 = raw.iter().sum();
+    raw.iter().map(|w| (w / sum) as f32).collect()
+}
+
+fn convolve_rows(grid: &Grid<f32>, weights: &[f32]) -> Grid<f32> {
+    let (width, reach) = (grid.width(), weights.len() / 2);
+    let mut out = Grid::new(width, grid.height(), 0.0_f32);
+    let mut padded = vec![0.0_f32; width + 2 * reach];
+    for y in 0..grid.height() {
+        let row = grid.row(y);
+        padded[..reach].fill(row[0]);
+        padded[reach..reach + width].copy_from_slice(row);
+        padded[reach + width..].fill(row[width - 1]);
+        let target = &mut out.data_mut()[y * width..(y + 1) * width];
+        for (i, weight) in weights.iter().enumerate() {
+            for (sum, value) in target.iter_mut().zip(&padded[i..]) {
+                *sum += weight * value;
+            }
+        }
+    }
+    out
+}
+
+fn transpose(grid: &Grid<f32>) -> Grid<f32> {
+    Grid::from_fn(grid.height(), grid.width(), |x, y| grid.at(y, x))
+}
+
+/// Squared distance in pixels to the nearest set pixel (Felzenszwalb, Huttenlocher 2012,
+/// doi:10.4086/toc.2012.v008a019).
+fn distance_squared(mask: &Mask) -> Grid<f32> {
+    // Farther than any distance inside a frame, yet small enough to stay exact in the parabola arithmetic.
+    let far = (mask.width() + mask.height()).pow(2) as f32;
+    let start = mask.map(|set| if *set { 0.0 } else { far });
+    let down = transpose(&lower_envelopes(&transpose(&start)));
+    lower_envelopes(&down)
+}
+
+fn lower_envelopes(grid: &Grid<f32>) -> Grid<f32> {
+    let width = grid.width();
+    let mut out = grid.clone();
+    let (mut centres, mut ends) = (vec![0_usize; width], vec![0.0_f32; width + 1]);
+    for y in 0..grid.height() {
+        let target = &mut out.data_mut()[y * width..(y + 1) * width];
+        lower_envelope(grid.row(y), target, &mut centres, &mut ends);
+    }
+    out
+}
+
+/// `min over q of (x - q)^2 + heights[q]` at each x.
+fn lower_envelope(heights: &[f32], out: &mut [f32], centres: &mut [usize], ends: &mut [f32]) {
+    let meet = |a: usize, b: usize| {
+        let (p, q) = (a as f32, b as f32);
+        ((heights[b] + q * q) - (heights[a] + p * p)) / (2.0 * (q - p))
+    };
+    let mut last = 0;
+    (centres[0], ends[0], ends[1]) = (0, f32::NEG_INFINITY, f32::INFINITY);
+    for q in 1..heights.len() {
+        let mut cut = meet(centres[last], q);
+        while cut <= ends[last] {
+            last -= 1;
+            cut = meet(centres[last], q);
+        }
+        last += 1;
+        (centres[last], ends[last], ends[last + 1]) = (q, cut, f32::INFINITY);
+    }
+    let mut piece = 0;
+    for (x, value) in out.iter_mut().enumerate() {
+        while ends[piece + 1] < x as f32 {
+            piece += 1;
+        }
+        let offset = x as f32 - centres[piece] as f32;
+        *value = offset * offset + heights[centres[piece]];
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Field, Frame, distance_squared};
+    use crate::raster::{Grid, Mask};
+
+    #[test]
+    fn distances_equal_those_of_a_full_search() {
+        let mask = Mask::from_fn(37, 37, |x, y| (x * 7 + y * 13) % 61 == 0);
+        let found = distance_squared(&mask);
+        for y in 0..37 {
+            for x in 0..37 {
+                let best = (0..37 * 37)
+                    .filter(|i| mask.at(i % 37, i / 37))
+                    .map(|i| (i % 37).abs_diff(x).pow(2) + (i / 37).abs_diff(y).pow(2))
+                    .min()
+                    .expect("the mask has set pixels");
+                assert_eq!(found.at(x, y) as usize, best);
+            }
+        }
+    }
+
+    #[test]
+    fn distance_to_the_rim_of_a_disc_is_its_radius_less_the_distance_to_its_centre() {
+        let frame = Frame::covering(2.0, 0.05);
+        let coverage = Grid::from_fn(frame.side, frame.side, |x, y| {
+            let [u, v] = frame.position(x, y);
+            ((1.0 - u.hypot(v)) / 0.05 + 0.5).clamp(0.0, 1.0) as f32
+        });
+        let field = Field::distance_to_rim(frame, &coverage);
+        for point in [[0.0, 0.0], [0.5, 0.3], [1.0, 0.0], [-1.3, 0.9]] {
+            let truth = 1.0 - f64::hypot(point[0], point[1]);
+            assert!((field.value(point) - truth).abs() < 0.03, "{point:?}");
+        }
+    }
+
+    #[test]
+    fn blur_keeps_a_level_field() {
+        let frame = Frame::covering(1.0, 0.1);
+        let level = Field::from_fn(frame, |_, _, _| 2.5).blurred(0.2);
+        assert!(level.values.data().iter().all(|v| (v - 2.5).abs() < 1e-5));
+    }
+}

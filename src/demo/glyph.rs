@@ -1,0 +1,116 @@
+//! Characters of the embedded font as ink on a frame.
+
+use ab_glyph::{Font, FontRef, GlyphId, OutlinedGlyph, PxScale, point};
+
+use super::field::Frame;
+use crate::raster::Grid;
+
+/// A subset of `HanaMin` A and B: 970 characters frequent in Nôm texts. Its licence lies beside it.
+const FONT: &[u8] = include_bytes!("../../assets/mocban-demo-mincho.ttf");
+
+/// Ink boxes flatter than this are left out: an error told in shares of the character's height means nothing
+/// for a single bar.
+const MIN_HEIGHT_BY_WIDTH: f32 = 0.5;
+
+/// The embedded font.
+pub(super) struct Glyphs {
+    font: FontRef<'static>,
+    characters: Vec<char>,
+}
+
+impl Glyphs {
+    /// Reads the font that is part of the program.
+    pub(super) fn embedded() -> Self {
+        let font = FontRef::try_from_slice(FONT).expect("the font in the program is a font");
+        let mut characters: Vec<char> = font
+            .codepoint_ids()
+            .filter(|(id, character)| !character.is_ascii() && is_usable(&font, *id))
+            .map(|(_, character)| character)
+            .collect();
+        characters.sort_unstable();
+        Self { font, characters }
+    }
+
+    /// The characters to choose from, by code point.
+    pub(super) fn characters(&self) -> &[char] {
+        &self.characters
+    }
+
+    /// Adds a character's ink to `coverage` (share of each sample's cell, 0..=1): its ink box centred on
+    /// `centre_mm`, the box's longest side `size_mm`.
+    pub(super) fn ink(
+        &self,
+        character: char,
+        frame: Frame,
+        centre_mm: [f64; 2],
+        size_mm: f64,
+        coverage: &mut Grid<f32>,
+    ) {
+        let id = self.font.glyph_id(character);
+        let Some(trial) = outlined(&self.font, id, 1000.0, [0.0, 0.0]) else {
+            return;
+        };
+        let bounds = trial.px_bounds();
+        let scale = size_mm / frame.step_mm / f64::from(bounds.width().max(bounds.height()));
+        let middle = [
+            f64::from(bounds.min.x + bounds.max.x) / 2.0,
+            f64::from(bounds.min.y + bounds.max.y) / 2.0,
+        ];
+        let centre = frame.sample(centre_mm);
+        let origin = [0, 1].map(|i| (centre[i] - middle[i] * scale + 0.5) as f32);
+        if let Some(outline) = outlined(&self.font, id, 1000.0 * scale as f32, origin) {
+            draw(&outline, coverage);
+        }
+    }
+}
+
+fn outlined(font: &FontRef, id: GlyphId, scale: f32, at: [f32; 2]) -> Option<OutlinedGlyph> {
+    let glyph = id.with_scale_and_position(PxScale::from(scale), point(at[0], at[1]));
+    font.outline_glyph(glyph)
+}
+
+fn is_usable(font: &FontRef, id: GlyphId) -> bool {
+    outlined(font, id, 100.0, [0.0, 0.0]).is_some_and(|outline| {
+        let bounds = outline.px_bounds();
+        bounds.width() > 0.0 && bounds.height() >= MIN_HEIGHT_BY_WIDTH * bounds.width()
+    })
+}
+
+fn draw(outline: &OutlinedGlyph, coverage: &mut Grid<f32>) {
+    let bounds = outline.px_bounds();
+    let (left, top) = (bounds.min.x as i64, bounds.min.y as i64);
+    outline.draw(|x, y, share| {
+        let (x, y) = (left + i64::from(x), top + i64::from(y));
+        if let Some(old) = coverage.get(x, y) {
+            coverage.set(x as usize, y as usize, (old + share).min(1.0));
+        }
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Glyphs;
+    use crate::demo::field::Frame;
+    use crate::raster::Grid;
+
+    #[test]
+    fn font_holds_nom_characters_beyond_the_basic_plane() {
+        let glyphs = Glyphs::embedded();
+        assert!(glyphs.characters().len() > 900);
+        assert!(glyphs.characters().iter().any(|c| *c as u32 > 0xFFFF));
+        assert!(!glyphs.characters().contains(&'一'));
+    }
+
+    #[test]
+    fn ink_box_has_the_asked_size_and_centre() {
+        let frame = Frame::covering(6.0, 0.05);
+        let mut coverage = Grid::new(frame.side, frame.side, 0.0);
+        Glyphs::embedded().ink('國', frame, [1.0, -0.5], 8.0, &mut coverage);
+        let found = coverage.map(|share| *share > 0.5).bounding_box();
+        let found = found.expect("the glyph has ink");
+        let middle = frame.position((found.x0 + found.x1) / 2, (found.y0 + found.y1) / 2);
+        assert!((middle[0] - 1.0).abs() < 0.1 && (middle[1] + 0.5).abs() < 0.1);
+        let longest = found.width().max(found.height()) as f64 * frame.step_mm;
+        assert!((longest - 8.0).abs() < 0.15, "{longest}");
+    }
+}

@@ -1,0 +1,220 @@
+//! The carved surface: heights in mm over the plane of the stroke tops.
+
+use std::ops::Range;
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::damage::Damage;
+use super::field::{Field, Frame};
+use super::noise::{Noise, ramp};
+
+/// What is carved and what remained of it.
+pub(super) struct Carving<'a> {
+    /// Signed distance to the character's strokes that are left, mm.
+    pub strokes: &'a Field,
+    /// Signed distance to neighbours and rules, mm.
+    pub around: &'a Field,
+    /// Cracks to cut.
+    pub damage: &'a Damage,
+    /// Range of the bow, mm.
+    pub bow_mm: Range<f64>,
+}
+
+/// The surface of a carved, worn and bent block. The plane that fits the character's tops best is at height zero.
+pub(super) fn relief(carving: &Carving, rng: &mut ChaCha8Rng) -> Field {
+    let knife = Knife::draw(carving.strokes.frame, rng);
+    let wear = Wear::draw(rng);
+    let frame = carving.strokes.frame;
+    let cut = Field::from_fn(frame, |point, x, y| {
+        let inside = carving.strokes.at(x, y).max(carving.around.at(x, y));
+        if inside > 0.0 {
+            -wear.at(point, inside)
+        } else {
+            -wear.at(point, 0.0) - knife.depth_mm(point, -inside, x, y)
+        }
+    });
+    let rounded = cut.blurred(rng.random_range(0.03..0.05));
+    let bow = Bow::draw(carving, rng);
+    let bent = Field::from_fn(frame, |point, x, y| {
+        rounded.at(x, y) + bow.at(point) - crack_depth(carving.damage, point)
+    });
+    levelled(&bent, carving.strokes)
+}
+
+/// How the ground was cut away.
+struct Knife {
+    slope: f64,
+    lean: Noise,
+    depth_mm: f64,
+    unevenness: Noise,
+    tool_marks: Noise,
+    gouges: Field,
+}
+
+impl Knife {
+    fn draw(frame: Frame, rng: &mut ChaCha8Rng) -> Self {
+        Self {
+            slope: rng.random_range(1.3..2.6),
+            lean: Noise::draw(rng),
+            depth_mm: rng.random_range(1.0..1.4),
+            unevenness: Noise::draw(rng),
+            tool_marks: Noise::draw(rng),
+            gouges: gouges(frame, rng),
+        }
+    }
+
+    /// Depth below the tops at `outside` mm from the nearest stroke: a sloping wall that runs out into a rough
+    /// floor. Two walls that meet before the floor leave a V.
+    fn depth_mm(&self, [u, v]: [f64; 2], outside: f64, x: usize, y: usize) -> f64 {
+        let wall = outside * self.slope * (1.0 + 0.3 * self.lean.at(u / 1.6, v / 1.6));
+        let floor = self.depth_mm
+            + 0.12 * self.unevenness.at(u / 2.0, v / 2.0)
+            + 0.04 * self.tool_marks.rough(u / 0.3, v / 0.3)
+            + self.gouges.at(x, y);
+        // The wall runs out smoothly: a soft minimum with a rounding of a fifth of a millimetre.
+        let gap = ((wall - floor) / 0.2).clamp(-1.0, 1.0);
+        if wall <= floor {
+            wall - 0.05 * (1.0 + gap).powi(2)
+        } else {
+            floor - 0.05 * (1.0 - gap).powi(2)
+        }
+        .max(0.0)
+    }
+}
+
+/// Hollows the gouge left in the floor, mm deep.
+fn gouges(frame: Frame, rng: &mut ChaCha8Rng) -> Field {
+    let mut field = Field::from_fn(frame, |_, _, _| 0.0);
+    let half = frame.half_mm();
+    let main = rng.random_range(0.0..std::f64::consts::PI);
+    for _ in 0..rng.random_range(60..120_u32) {
+        let angle = main + rng.random_range(-0.5..0.5);
+        let (sin, cos) = angle.sin_cos();
+        let centre = [0; 2].map(|_: i32| rng.random_range(-half..half));
+        let (length, width) = (rng.random_range(0.5..1.6), rng.random_range(0.12..0.35));
+        let depth = rng.random_range(0.05..0.22);
+        let [x0, y0] = frame
+            .sample(centre.map(|c| c - length))
+            .map(|c| c.max(0.0) as usize);
+        let [x1, y1] = frame
+            .sample(centre.map(|c| c + length))
+            .map(|c| (c as usize).min(frame.side - 1));
+        for y in y0..=y1 {
+            for x in x0..=x1 {
+                let [u, v] = frame.position(x, y);
+                let (du, dv) = (u - centre[0], v - centre[1]);
+                let along = (du * cos + dv * sin) / length;
+                let across = (dv * cos - du * sin) / width;
+                let hollow = depth * (1.0 - along * along - across * across).max(0.0);
+                let value = field.at(x, y).max(hollow);
+                field.values.set(x, y, value as f32);
+            }
+        }
+    }
+    field
+}
+
+/// How the tops were worn by printing and time.
+struct Wear {
+    patches: Noise,
+    patch_mm: f64,
+    grain: Noise,
+    grain_axis: [f64; 2],
+    pits: Noise,
+    rim_mm: f64,
+}
+
+impl Wear {
+    fn draw(rng: &mut ChaCha8Rng) -> Self {
+        let angle = rng.random_range(-0.2..0.2);
+        Self {
+            patches: Noise::draw(rng),
+            patch_mm: rng.random_range(0.02..0.07),
+            grain: Noise::draw(rng),
+            grain_axis: [f64::cos(angle), f64::sin(angle)],
+            pits: Noise::draw(rng),
+            rim_mm: rng.random_range(0.02..0.06),
+        }
+    }
+
+    /// Wood gone from a top at `inside` mm from its rim, mm: patches, the open grain, small pits, rounded rims.
+    fn at(&self, [u, v]: [f64; 2], inside: f64) -> f64 {
+        let along = u * self.grain_axis[0] + v * self.grain_axis[1];
+        let across = v * self.grain_axis[0] - u * self.grain_axis[1];
+        let patches = self.patch_mm * (1.0 + self.patches.rough(u / 2.2, v / 2.2));
+        let grain = 0.008 * (1.0 + self.grain.at(along / 2.5, across / 0.12));
+        let pits = 0.06 * ramp(0.72, 0.95, self.pits.at(u / 0.25, v / 0.25));
+        let rim = self.rim_mm * (1.0 - ramp(0.0, 0.18, inside));
+        patches + grain + pits + rim
+    }
+}
+
+/// A bend of the second degree.
+struct Bow {
+    axis: [f64; 2],
+    along: f64,
+    across: f64,
+}
+
+impl Bow {
+    /// A bend whose distance from its chord over the character is in the wanted range.
+    fn draw(carving: &Carving, rng: &mut ChaCha8Rng) -> Self {
+        let range = carving.bow_mm.clone();
+        let sag = if range.is_empty() {
+            0.0
+        } else {
+            rng.random_range(range)
+        };
+        let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
+        let angle = rng.random_range(0.0..std::f64::consts::PI);
+        let reach = super::artwork::reach_mm(carving.strokes);
+        let along = sign * sag / (reach * reach);
+        Self {
+            axis: [angle.cos(), angle.sin()],
+            along,
+            across: along * rng.random_range(-0.2..0.3),
+        }
+    }
+
+    fn at(&self, [u, v]: [f64; 2]) -> f64 {
+        let along = u * self.axis[0] + v * self.axis[1];
+        let across = v * self.axis[0] - u * self.axis[1];
+        self.along * along * along + self.across * across * across
+    }
+}
+
+fn crack_depth(damage: &Damage, point: [f64; 2]) -> f64 {
+    damage
+        .cracks
+        .iter()
+        .map(|crack| {
+            let share = crack.distance_mm(point) / crack.half_width_mm;
+            crack.depth_mm * (1.0 - share).max(0.0)
+        })
+        .fold(0.0, f64::max)
+}
+
+/// The surface less the plane that fits the character's tops best (least squares).
+fn levelled(surface: &Field, strokes: &Field) -> Field {
+    let mut normal = nalgebra::Matrix3::<f64>::zeros();
+    let mut right = nalgebra::Vector3::<f64>::zeros();
+    let frame = surface.frame;
+    for y in (0..frame.side).step_by(2) {
+        for x in (0..frame.side).step_by(2) {
+            if strokes.at(x, y) > 0.05 {
+                let [u, v] = frame.position(x, y);
+                let row = nalgebra::Vector3::new(1.0, u, v);
+                normal += row * row.transpose();
+                right += row * surface.at(x, y);
+            }
+        }
+    }
+    let plane = normal
+        .cholesky()
+        .map(|factor| factor.solve(&right))
+        .unwrap_or_default();
+    Field::from_fn(frame, |[u, v], x, y| {
+        surface.at(x, y) - plane[0] - plane[1] * u - plane[2] * v
+    })
+}

@@ -1,0 +1,338 @@
+//! The scanner: a surface as an uneven triangle mesh, cut along a polygon, in the block frame.
+
+use std::collections::{BTreeMap, HashSet};
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::field::Field;
+use super::noise::{Noise, normal};
+use super::polygon::Polygon;
+use crate::mesh::Mesh;
+
+/// Height of a scan with walls and foot, mm.
+const BODY_MM: f64 = 1.9;
+/// Rows of vertices down a side wall.
+const WALL_ROWS: u32 = 5;
+
+/// How a scan comes out.
+#[derive(Debug, Clone)]
+pub(super) struct ScanStyle {
+    /// Whether side walls and foot were scanned too.
+    pub is_closed: bool,
+    /// Vertices wanted, about.
+    pub vertices: f64,
+    /// Standard deviation of heights, mm.
+    pub noise_mm: f64,
+    /// Single vertices far off.
+    pub spikes: u32,
+    /// Places the scanner did not see.
+    pub holes: u32,
+    /// Faces wound inward.
+    pub is_inside_out: bool,
+}
+
+impl ScanStyle {
+    /// A scan of 20,000 to 150,000 vertices, mostly of the smaller ones.
+    pub(super) fn draw(is_rough: bool, rng: &mut ChaCha8Rng) -> Self {
+        let is_closed = rng.random_bool(0.125);
+        let share: f64 = rng.random_range(0.0..1.0);
+        Self {
+            is_closed,
+            vertices: 22_000.0 * 6.0_f64.powf(share * share),
+            noise_mm: rng.random_range(0.005..0.010),
+            spikes: if is_rough {
+                rng.random_range(0..40)
+            } else {
+                rng.random_range(0..6)
+            },
+            holes: if is_closed { 0 } else { rng.random_range(0..5) },
+            is_inside_out: rng.random_bool(0.15),
+        }
+    }
+}
+
+/// Scans the part of `surface` inside `outline`. Vertices are in the block frame, mm; faces are wound outward
+/// unless the style says otherwise.
+pub(super) fn scan(
+    surface: &Field,
+    outline: &Polygon,
+    style: &ScanStyle,
+    rng: &mut ChaCha8Rng,
+) -> Mesh {
+    let sheet = Sheet::sample(surface, outline, style, rng);
+    let mut mesh = sheet.triangles(outline, &holes(surface, style, rng), rng);
+    add_spikes(&mut mesh, style.spikes, rng);
+    if style.is_closed {
+        close(&mut mesh, style.noise_mm, rng);
+    }
+    if style.is_inside_out {
+        for [_, b, c] in &mut mesh.triangles {
+            std::mem::swap(b, c);
+        }
+    }
+    mesh
+}
+
+/// A grid of surface points, drawn out of shape so that their density is uneven.
+struct Sheet {
+    columns: usize,
+    points: Vec<[f64; 3]>,
+}
+
+impl Sheet {
+    fn sample(surface: &Field, outline: &Polygon, style: &ScanStyle, rng: &mut ChaCha8Rng) -> Self {
+        let bounds = outline.bounds();
+        let [width, height] = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
+        // The polygon fills about five sixths of its box; the foot of a closed scan repeats the face.
+        let wanted = style.vertices * if style.is_closed { 0.5 } else { 1.0 };
+        let spacing = (width * height * 0.84 / wanted).sqrt();
+        let columns = (width / spacing) as usize + 9;
+        let rows = (height / spacing) as usize + 9;
+        let warp = [Noise::draw(rng), Noise::draw(rng)];
+        let mut points = Vec::with_capacity(columns * rows);
+        for row in 0..rows {
+            for column in 0..columns {
+                let u = bounds.min[0] + (column as f64 - 4.0) * spacing;
+                let v = bounds.min[1] + (row as f64 - 4.0) * spacing;
+                let shift = warp.map(|noise| {
+                    0.3 * noise.at(u / 2.0, v / 2.0) + spacing * rng.random_range(-0.22..0.22)
+                });
+                let (u, v) = (u + shift[0], v + shift[1]);
+                let z = surface.value([u, v]) + style.noise_mm * normal(rng);
+                points.push([-u, -v, z]);
+            }
+        }
+        Self { columns, points }
+    }
+
+    /// The triangles inside the outline and outside the holes, on the vertices they use.
+    fn triangles(&self, outline: &Polygon, holes: &[Hole], rng: &mut ChaCha8Rng) -> Mesh {
+        let is_seen: Vec<bool> = self
+            .points
+            .iter()
+            .map(|[x, y, _]| {
+                let point = [-x, -y];
+                outline.contains(point) && !holes.iter().any(|hole| hole.contains(point))
+            })
+            .collect();
+        let mut builder = Builder::new(&self.points);
+        for row in 0..self.points.len() / self.columns - 1 {
+            for column in 0..self.columns - 1 {
+                let a = row * self.columns + column;
+                let (b, c, d) = (a + 1, a + self.columns + 1, a + self.columns);
+                let halves = if rng.random_bool(0.5) {
+                    [[a, b, c], [a, c, d]]
+                } else {
+                    [[a, b, d], [b, c, d]]
+                };
+                for triangle in halves {
+                    if triangle.iter().all(|corner| is_seen[*corner]) {
+                        builder.add(triangle);
+                    }
+                }
+            }
+        }
+        builder.mesh
+    }
+}
+
+/// Collects triangles and the points they use.
+struct Builder<'a> {
+    points: &'a [[f64; 3]],
+    index: Vec<u32>,
+    mesh: Mesh,
+}
+
+impl<'a> Builder<'a> {
+    fn new(points: &'a [[f64; 3]]) -> Self {
+        Self {
+            points,
+            index: vec![u32::MAX; points.len()],
+            mesh: Mesh::default(),
+        }
+    }
+
+    fn add(&mut self, triangle: [usize; 3]) {
+        let corners = triangle.map(|corner| {
+            if self.index[corner] == u32::MAX {
+                self.index[corner] = self.mesh.vertices.len() as u32;
+                self.mesh.vertices.push(self.points[corner]);
+            }
+            self.index[corner]
+        });
+        self.mesh.triangles.push(corners);
+    }
+}
+
+/// A round place without data.
+struct Hole {
+    centre: [f64; 2],
+    radius_mm: f64,
+}
+
+impl Hole {
+    fn contains(&self, [u, v]: [f64; 2]) -> bool {
+        (u - self.centre[0]).hypot(v - self.centre[1]) < self.radius_mm
+    }
+}
+
+/// Holes in deep places, where a scanner sees badly.
+fn holes(surface: &Field, style: &ScanStyle, rng: &mut ChaCha8Rng) -> Vec<Hole> {
+    let half = surface.frame.half_mm();
+    (0..style.holes)
+        .filter_map(|_| {
+            (0..100).find_map(|_| {
+                let centre = [0; 2].map(|_: i32| rng.random_range(-half..half));
+                let radius_mm = rng.random_range(0.05..0.2);
+                (surface.value(centre) < -0.6).then_some(Hole { centre, radius_mm })
+            })
+        })
+        .collect()
+}
+
+fn add_spikes(mesh: &mut Mesh, spikes: u32, rng: &mut ChaCha8Rng) {
+    for _ in 0..spikes {
+        if mesh.vertices.is_empty() {
+            return;
+        }
+        let index = rng.random_range(0..mesh.vertices.len());
+        mesh.vertices[index][2] += rng.random_range(-0.25..0.35);
+    }
+}
+
+/// Adds side walls and a foot.
+fn close(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
+    let top: Vec<[u32; 3]> = mesh.triangles.clone();
+    let rim = rim_edges(&top);
+    let foot_start = mesh.vertices.len() as u32;
+    let foot: Vec<[f64; 3]> = mesh
+        .vertices
+        .iter()
+        .map(|[x, y, _]| [*x, *y, -BODY_MM + noise_mm * normal(rng)])
+        .collect();
+    mesh.vertices.extend(foot);
+    let under = top
+        .iter()
+        .map(|[a, b, c]| [a, c, b].map(|corner| corner + foot_start));
+    mesh.triangles.extend(under);
+    let mut posts = BTreeMap::new();
+    for (a, b) in rim {
+        let from = post(a, foot_start, mesh, &mut posts, noise_mm, rng);
+        let to = post(b, foot_start, mesh, &mut posts, noise_mm, rng);
+        for row in 0..from.len() - 1 {
+            let (p, q, r, s) = (from[row], to[row], to[row + 1], from[row + 1]);
+            mesh.triangles.extend([[q, p, s], [q, s, r]]);
+        }
+    }
+}
+
+/// Directed edges with a triangle on one side only, in the order of the triangles.
+fn rim_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
+    let edges = || {
+        triangles
+            .iter()
+            .flat_map(|[a, b, c]| [(*a, *b), (*b, *c), (*c, *a)])
+    };
+    let known: HashSet<(u32, u32)> = edges().collect();
+    edges()
+        .filter(|(a, b)| !known.contains(&(*b, *a)))
+        .collect()
+}
+
+/// The vertices of the wall below a rim vertex, from the face down to the foot.
+fn post(
+    rim: u32,
+    foot_start: u32,
+    mesh: &mut Mesh,
+    posts: &mut BTreeMap<u32, Vec<u32>>,
+    noise_mm: f64,
+    rng: &mut ChaCha8Rng,
+) -> Vec<u32> {
+    if let Some(known) = posts.get(&rim) {
+        return known.clone();
+    }
+    let [x, y, z] = mesh.vertices[rim as usize];
+    let mut column = vec![rim];
+    for row in 1..WALL_ROWS {
+        let share = f64::from(row) / f64::from(WALL_ROWS);
+        column.push(mesh.vertices.len() as u32);
+        mesh.vertices.push([
+            x + noise_mm * normal(rng),
+            y + noise_mm * normal(rng),
+            z + (-BODY_MM - z) * share,
+        ]);
+    }
+    column.push(rim + foot_start);
+    posts.insert(rim, column.clone());
+    column
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+
+    use super::{ScanStyle, rim_edges, scan};
+    use crate::demo::field::{Field, Frame};
+    use crate::demo::polygon::{BoxMm, Polygon};
+    use crate::mesh::Mesh;
+
+    fn bump(style: &ScanStyle) -> Mesh {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let frame = Frame::covering(4.0, 0.05);
+        let surface = Field::from_fn(frame, |[u, v], _, _| -0.1 * (u * u + v * v));
+        let inner = BoxMm {
+            min: [-2.0; 2],
+            max: [2.0; 2],
+        };
+        let outline = Polygon::around(inner, 0.2, 0.8, &mut rng);
+        scan(&surface, &outline, style, &mut rng)
+    }
+
+    fn style(is_closed: bool) -> ScanStyle {
+        ScanStyle {
+            is_closed,
+            vertices: 5000.0,
+            noise_mm: 0.002,
+            spikes: 0,
+            holes: 0,
+            is_inside_out: false,
+        }
+    }
+
+    /// Six times the signed volume under the faces.
+    fn volume(mesh: &Mesh) -> f64 {
+        mesh.triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|corner| mesh.vertices[corner as usize]);
+                a[0] * (b[1] * c[2] - b[2] * c[1])
+                    + a[1] * (b[2] * c[0] - b[0] * c[2])
+                    + a[2] * (b[0] * c[1] - b[1] * c[0])
+            })
+            .sum()
+    }
+
+    #[test]
+    fn closed_scan_has_no_rim_and_encloses_a_volume() {
+        let mesh = bump(&style(true));
+        assert!(rim_edges(&mesh.triangles).is_empty());
+        assert!(volume(&mesh) > 0.0);
+    }
+
+    #[test]
+    fn open_scan_has_about_the_wanted_vertices_and_looks_out() {
+        let mesh = bump(&style(false));
+        assert!(
+            (4000..6000).contains(&mesh.vertices.len()),
+            "{}",
+            mesh.vertices.len()
+        );
+        let up = mesh.triangles.iter().all(|t| {
+            let [a, b, c] = t.map(|corner| mesh.vertices[corner as usize]);
+            (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
+        });
+        assert!(up);
+    }
+}

@@ -1,0 +1,179 @@
+//! Meshes as files: STL, PLY and OBJ. Coordinates are written as 32-bit floats.
+
+use std::fmt::Write as _;
+
+use super::Mesh;
+
+/// A mesh file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MeshFormat {
+    /// Binary STL: each triangle with its own three vertices.
+    StlBinary,
+    /// STL as text.
+    StlAscii,
+    /// PLY as text.
+    PlyAscii,
+    /// Binary PLY, little end first.
+    PlyLittleEndian,
+    /// Binary PLY, big end first.
+    PlyBigEndian,
+    /// Wavefront OBJ.
+    Obj,
+}
+
+impl MeshFormat {
+    /// Every format.
+    pub const ALL: [Self; 6] = [
+        Self::StlBinary,
+        Self::StlAscii,
+        Self::PlyAscii,
+        Self::PlyLittleEndian,
+        Self::PlyBigEndian,
+        Self::Obj,
+    ];
+
+    /// Ending of the file's name.
+    pub const fn extension(self) -> &'static str {
+        match self {
+            Self::StlBinary | Self::StlAscii => "stl",
+            Self::PlyAscii | Self::PlyLittleEndian | Self::PlyBigEndian => "ply",
+            Self::Obj => "obj",
+        }
+    }
+
+    /// The file's bytes.
+    pub fn encode(self, mesh: &Mesh) -> Vec<u8> {
+        match self {
+            Self::StlBinary => stl_binary(mesh),
+            Self::StlAscii => stl_ascii(mesh),
+            Self::PlyAscii => ply_ascii(mesh),
+            Self::PlyLittleEndian => ply_binary(
+                mesh,
+                "binary_little_endian",
+                f32::to_le_bytes,
+                u32::to_le_bytes,
+            ),
+            Self::PlyBigEndian => ply_binary(
+                mesh,
+                "binary_big_endian",
+                f32::to_be_bytes,
+                u32::to_be_bytes,
+            ),
+            Self::Obj => obj(mesh),
+        }
+    }
+}
+
+fn single(point: [f64; 3]) -> [f32; 3] {
+    point.map(|c| c as f32)
+}
+
+fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [[f32; 3]; 3] {
+    triangle.map(|corner| single(mesh.vertices[corner as usize]))
+}
+
+/// Unit normal by winding; zero for a triangle without area, as STL writers do.
+fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
+    let side = |p: [f32; 3]| [0, 1, 2].map(|i| f64::from(p[i]) - f64::from(a[i]));
+    let (u, v) = (side(b), side(c));
+    let cross = [
+        u[1] * v[2] - u[2] * v[1],
+        u[2] * v[0] - u[0] * v[2],
+        u[0] * v[1] - u[1] * v[0],
+    ];
+    let length = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
+    if length > 0.0 {
+        cross.map(|c| (c / length) as f32)
+    } else {
+        [0.0; 3]
+    }
+}
+
+fn stl_binary(mesh: &Mesh) -> Vec<u8> {
+    let mut out = Vec::with_capacity(84 + 50 * mesh.triangles.len());
+    let mut header = [b' '; 80];
+    header[..12].copy_from_slice(b"scan, binary");
+    out.extend(header);
+    out.extend((mesh.triangles.len() as u32).to_le_bytes());
+    for triangle in &mesh.triangles {
+        let points = corners(mesh, *triangle);
+        for value in [normal(points)].iter().chain(&points).flatten() {
+            out.extend(value.to_le_bytes());
+        }
+        out.extend([0, 0]);
+    }
+    out
+}
+
+fn stl_ascii(mesh: &Mesh) -> Vec<u8> {
+    let mut out = String::from("solid scan\n");
+    for triangle in &mesh.triangles {
+        let points = corners(mesh, *triangle);
+        let [x, y, z] = normal(points);
+        push(
+            &mut out,
+            format_args!("facet normal {x} {y} {z}\n outer loop\n"),
+        );
+        for [x, y, z] in points {
+            push(&mut out, format_args!("  vertex {x} {y} {z}\n"));
+        }
+        out.push_str(" endloop\nendfacet\n");
+    }
+    out.push_str("endsolid scan\n");
+    out.into_bytes()
+}
+
+fn ply_header(mesh: &Mesh, format: &str) -> String {
+    let (vertices, faces) = (mesh.vertices.len(), mesh.triangles.len());
+    format!(
+        "ply\nformat {format} 1.0\ncomment scan\nelement vertex {vertices}\nproperty float x\nproperty float y\n\
+         property float z\nelement face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+}
+
+fn ply_ascii(mesh: &Mesh) -> Vec<u8> {
+    let mut out = ply_header(mesh, "ascii");
+    for [x, y, z] in mesh.vertices.iter().copied().map(single) {
+        push(&mut out, format_args!("{x} {y} {z}\n"));
+    }
+    for [a, b, c] in &mesh.triangles {
+        push(&mut out, format_args!("3 {a} {b} {c}\n"));
+    }
+    out.into_bytes()
+}
+
+fn ply_binary(
+    mesh: &Mesh,
+    format: &str,
+    float: fn(f32) -> [u8; 4],
+    index: fn(u32) -> [u8; 4],
+) -> Vec<u8> {
+    let mut out = ply_header(mesh, format).into_bytes();
+    out.reserve(12 * mesh.vertices.len() + 13 * mesh.triangles.len());
+    for value in mesh.vertices.iter().copied().flat_map(single) {
+        out.extend(float(value));
+    }
+    for triangle in &mesh.triangles {
+        out.push(3);
+        for corner in triangle {
+            out.extend(index(*corner));
+        }
+    }
+    out
+}
+
+fn obj(mesh: &Mesh) -> Vec<u8> {
+    let mut out = String::from("# scan\no scan\n");
+    for [x, y, z] in mesh.vertices.iter().copied().map(single) {
+        push(&mut out, format_args!("v {x} {y} {z}\n"));
+    }
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(|corner| corner + 1);
+        push(&mut out, format_args!("f {a} {b} {c}\n"));
+    }
+    out.into_bytes()
+}
+
+fn push(out: &mut String, text: std::fmt::Arguments) {
+    out.write_fmt(text).expect("a String takes any text");
+}

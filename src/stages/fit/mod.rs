@@ -1,0 +1,125 @@
+//! Mesh to character plane (paper III-A).
+//!
+//! Two methods behind one entry: the paper's ([`Method::Paper`]) and ours ([`Method::Tops`]), which looks at the
+//! surface from both sides and fits a one-sided robust surface to what stands out.
+
+mod paper;
+mod pca;
+mod side;
+mod surface;
+mod tops;
+
+use serde::{Deserialize, Serialize};
+
+use crate::domain::{FailureClass, FitOutcome};
+use crate::mesh::Mesh;
+use crate::raster::Picture;
+
+/// Raised whenever the same inputs and settings may give another result than before.
+pub const REVISION: u32 = 1;
+
+/// How the plane is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// PCA, sides, upper set, spaced selection, RANSAC + PCA: the paper's.
+    Paper,
+    /// One-sided robust surface over the tops, seen from each side.
+    Tops,
+}
+
+/// Settings of the stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Params {
+    /// How the plane is found.
+    pub method: Method,
+    /// Whether `tops` may fit a second-degree surface where the block is bent.
+    pub bow: bool,
+    /// Seed of the random choices of `paper`.
+    pub seed: u64,
+    /// How many points the spaced selection of `paper` takes, 3 or more.
+    pub spaced_points: u32,
+    /// Spacing of that selection as a share of the mesh's extent, above 0.
+    pub spacing: f64,
+    /// RANSAC draws of `paper`, 1 or more.
+    pub ransac_draws: u32,
+    /// Inlier distance of that RANSAC as a share of the mesh's extent, above 0.
+    pub ransac_distance: f64,
+    /// Smallest relief as a share of the mesh's extent; below it there is no carving to align.
+    pub min_relief: f64,
+}
+
+/// Why the stage found no result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// Fewer than three points.
+    #[error("mesh has {0} vertices, a plane needs 3")]
+    TooFewPoints(usize),
+    /// Every vertex at one place.
+    #[error("all {0} vertices lie at one point")]
+    OnePoint(usize),
+    /// Every vertex on one line.
+    #[error("all {0} vertices lie on one line")]
+    OneLine(usize),
+    /// Nothing is carved.
+    #[error(
+        "no carving found: the relief is {relief:.4} of an extent of {extent:.4} (mesh units), below fit.min_relief {min_relief}"
+    )]
+    NoRelief {
+        /// Relief found, mesh units.
+        relief: f64,
+        /// Extent of the mesh, mesh units.
+        extent: f64,
+        /// The setting.
+        min_relief: f64,
+    },
+    /// RANSAC found no plane.
+    #[error("plane fit found {inliers} inliers of {taken} selected points, needs {needs}")]
+    TooFewInliers {
+        /// Points near the best plane.
+        inliers: usize,
+        /// Points that were selected.
+        taken: usize,
+        /// Points needed.
+        needs: usize,
+    },
+}
+
+impl Error {
+    /// What the failure means for the pair.
+    pub const fn class(&self) -> FailureClass {
+        match self {
+            Self::TooFewPoints(_) | Self::OnePoint(_) | Self::OneLine(_) => FailureClass::BadInput,
+            Self::NoRelief { .. } | Self::TooFewInliers { .. } => FailureClass::NoSolution,
+        }
+    }
+}
+
+/// Finds the plane on which the tops of the strokes lie, and the side of it that is carved.
+///
+/// `mesh` is in its own frame and unit. `scanned_face_down` says which way the carved face looks along the mesh's z,
+/// where that is known; it decides only when nothing else tells. `print` helps to tell the carved side from the back
+/// of an open sheet, whose winding cannot be trusted; the plane itself does not depend on it. The outcome's plane frame keeps the
+/// mesh's x direction as far as it can, so an upright scan stays upright.
+///
+/// # Errors
+/// When the vertices span no surface, nothing is carved, or no plane is found.
+pub fn fit(
+    mesh: &Mesh,
+    print: Option<&Picture>,
+    scanned_face_down: Option<bool>,
+    params: &Params,
+) -> Result<FitOutcome, Error> {
+    let count = mesh.vertices.len();
+    if count < 3 {
+        return Err(Error::TooFewPoints(count));
+    }
+    match params.method {
+        Method::Paper => paper::fit(mesh, params),
+        Method::Tops => tops::fit(mesh, print, scanned_face_down, params),
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,169 @@
+//! The paper's fit, step by step (III-A): PCA, sides, upper set, spaced selection, RANSAC, PCA.
+
+use std::collections::HashMap;
+
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use super::pca::{Axes, frame};
+use super::surface::quantile;
+use super::{Error, Params};
+use crate::domain::{FitOutcome, SideEvidence};
+use crate::mesh::Mesh;
+
+pub(super) fn fit(mesh: &Mesh, params: &Params) -> Result<FitOutcome, Error> {
+    let points = distinct(&mesh.vertices);
+    let all = Axes::of_points(points.iter().map(|p| (*p, 1.0)));
+    all.require_surface(mesh.vertices.len())?;
+    let extent = (all.variances.iter().sum::<f64>() * 12.0).sqrt() / std::f64::consts::SQRT_2;
+    let (upper, outward, flatness) = upper_set(&points, &all);
+    let taken = spaced_selection(&upper, &all, params.spacing * extent, params.spaced_points);
+    let distance = params.ransac_distance * extent;
+    let inliers = ransac(&taken, distance, params)?;
+    let plane = Axes::of_points(inliers.iter().map(|p| (*p, 1.0)));
+    let normal = if plane.normal().dot(&outward) < 0.0 {
+        -plane.normal()
+    } else {
+        plane.normal()
+    };
+    let height = |p: &[f64; 3]| (Vector3::from(*p) - plane.centre).dot(&normal);
+    let mut below: Vec<f64> = points.iter().map(|p| -height(p)).collect();
+    let relief = quantile(&mut below, 0.75).max(0.0);
+    if relief < params.min_relief * extent {
+        return Err(Error::NoRelief {
+            relief,
+            extent,
+            min_relief: params.min_relief,
+        });
+    }
+    let squares: f64 = inliers.iter().map(|p| height(p).powi(2)).sum();
+    let middle = all.centre + normal * (plane.centre - all.centre).dot(&normal);
+    Ok(FitOutcome {
+        plane_from_mesh: frame(normal, middle),
+        bow: None,
+        bow_height: 0.0,
+        inlier_ratio: inliers.len() as f64 / taken.len() as f64,
+        rms: (squares / inliers.len() as f64).sqrt(),
+        relief,
+        side: SideEvidence {
+            winding: None,
+            flatness,
+            confidence: flatness,
+        },
+        vertices: mesh.vertices.len() as u64,
+        triangles: mesh.triangles.len() as u64,
+    })
+}
+
+/// Each place once, so that a triangle soup and an indexed mesh give the same plane.
+fn distinct(vertices: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    let mut points = vertices.to_vec();
+    points.sort_by(|a, b| {
+        a.iter()
+            .zip(b)
+            .map(|(p, q)| p.total_cmp(q))
+            .find(|o| o.is_ne())
+            .unwrap_or(std::cmp::Ordering::Equal)
+    });
+    points.dedup();
+    points
+}
+
+/// The upper set T: of the two sides of the PCA plane, the one whose points lie closer to their own centroid on
+/// average. Ground reaches out to the rim of the cut on all sides; strokes keep to the middle.
+fn upper_set(points: &[[f64; 3]], all: &Axes) -> (Vec<[f64; 3]>, Vector3<f64>, f64) {
+    let normal = all.normal();
+    let (above, below): (Vec<_>, Vec<_>) = points
+        .iter()
+        .partition(|p| (Vector3::from(**p) - all.centre).dot(&normal) > 0.0);
+    let (up, down) = (mean_distance(&above), mean_distance(&below));
+    let sureness = (up - down).abs() / (up + down).max(f64::MIN_POSITIVE);
+    if up <= down {
+        (above, normal, sureness)
+    } else {
+        (below, -normal, sureness)
+    }
+}
+
+/// Mean distance of points to their own centroid.
+fn mean_distance(points: &[[f64; 3]]) -> f64 {
+    let n = points.len().max(1) as f64;
+    let centroid = points
+        .iter()
+        .map(|p| Vector3::from(*p))
+        .sum::<Vector3<f64>>()
+        / n;
+    points
+        .iter()
+        .map(|p| (Vector3::from(*p) - centroid).norm())
+        .sum::<f64>()
+        / n
+}
+
+/// From the farthest of the plane down, each point farther than `spacing` from all taken ones, until enough.
+fn spaced_selection(upper: &[[f64; 3]], all: &Axes, spacing: f64, wanted: u32) -> Vec<[f64; 3]> {
+    let normal = all.normal();
+    let height = |p: &[f64; 3]| (Vector3::from(*p) - all.centre).dot(&normal).abs();
+    let mut order: Vec<(f64, [f64; 3])> = upper.iter().map(|p| (height(p), *p)).collect();
+    order.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let cell = |p: &[f64; 3]| p.map(|v| (v / spacing).floor() as i64);
+    let mut near: HashMap<[i64; 3], Vec<[f64; 3]>> = HashMap::new();
+    let mut taken = Vec::new();
+    for (_, p) in order {
+        if taken.len() == wanted as usize {
+            break;
+        }
+        let [i, j, k] = cell(&p);
+        let crowded = (-1..=1)
+            .flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [i + a, j + b, k + c])))
+            .filter_map(|c| near.get(&c))
+            .flatten()
+            .any(|q| (Vector3::from(*q) - Vector3::from(p)).norm() <= spacing);
+        if !crowded {
+            near.entry([i, j, k]).or_default().push(p);
+            taken.push(p);
+        }
+    }
+    taken
+}
+
+/// The points near the plane through three of them that has most points near it.
+fn ransac(taken: &[[f64; 3]], distance: f64, params: &Params) -> Result<Vec<[f64; 3]>, Error> {
+    if taken.len() < 3 {
+        return Err(Error::TooFewInliers {
+            inliers: taken.len(),
+            taken: taken.len(),
+            needs: 3,
+        });
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
+    let point = |i: usize| Vector3::from(taken[i]);
+    let mut best: (usize, Vector3<f64>, Vector3<f64>) = (0, point(0), Vector3::zeros());
+    for _ in 0..params.ransac_draws {
+        let [a, b, c] = [0; 3].map(|_: i32| point(rng.random_range(0..taken.len())));
+        let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-300) else {
+            continue;
+        };
+        let near = taken
+            .iter()
+            .filter(|p| (Vector3::from(**p) - a).dot(&normal).abs() < distance)
+            .count();
+        if near > best.0 {
+            best = (near, a, normal);
+        }
+    }
+    let (count, a, normal) = best;
+    if count < 3 {
+        return Err(Error::TooFewInliers {
+            inliers: count,
+            taken: taken.len(),
+            needs: 3,
+        });
+    }
+    Ok(taken
+        .iter()
+        .copied()
+        .filter(|p| (Vector3::from(*p) - a).dot(&normal).abs() < distance)
+        .collect())
+}

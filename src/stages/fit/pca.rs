@@ -1,0 +1,150 @@
+//! Principal axes of points and of surfaces.
+
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+use super::Error;
+use crate::domain::Rigid3;
+use crate::mesh::Mesh;
+
+/// Centre and principal axes, longest first, with the variance along each.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Axes {
+    pub(super) centre: Vector3<f64>,
+    pub(super) directions: [Vector3<f64>; 3],
+    pub(super) variances: [f64; 3],
+}
+
+impl Axes {
+    /// Of points, each with a weight.
+    pub(super) fn of_points(points: impl Iterator<Item = ([f64; 3], f64)> + Clone) -> Self {
+        let mut total = 0.0;
+        let mut sum = Vector3::zeros();
+        for (p, w) in points.clone() {
+            total += w;
+            sum += Vector3::from(p) * w;
+        }
+        let centre = sum / total;
+        let mut spread = Matrix3::zeros();
+        for (p, w) in points {
+            let d = Vector3::from(p) - centre;
+            spread += d * d.transpose() * w;
+        }
+        Self::from_moments(centre, spread / total)
+    }
+
+    /// Of a surface, each triangle weighing its area (so repeated vertices and uneven density change nothing);
+    /// of the vertices where there is no area.
+    pub(super) fn of_surface(mesh: &Mesh) -> Self {
+        let corner = |i: u32| Vector3::from(mesh.vertices[i as usize]);
+        let area = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(corner);
+            (b - a).cross(&(c - a)).norm() * 0.5
+        };
+        let total: f64 = mesh.triangles.iter().map(area).sum();
+        if total <= 0.0 || !total.is_finite() {
+            return Self::of_points(mesh.vertices.iter().map(|v| (*v, 1.0)));
+        }
+        let mut centre = Vector3::zeros();
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(corner);
+            centre += (a + b + c) / 3.0 * area(t);
+        }
+        centre /= total;
+        let mut spread = Matrix3::zeros();
+        for t in &mesh.triangles {
+            // Second moment of a triangle: (sum of corners' outer products + outer product of their sum) / 12.
+            let [a, b, c] = t.map(|i| corner(i) - centre);
+            let sum = a + b + c;
+            let outer = a * a.transpose() + b * b.transpose() + c * c.transpose();
+            spread += (outer + sum * sum.transpose()) * (area(t) / 12.0);
+        }
+        Self::from_moments(centre, spread / total)
+    }
+
+    fn from_moments(centre: Vector3<f64>, covariance: Matrix3<f64>) -> Self {
+        let eigen = SymmetricEigen::new(covariance);
+        let mut order = [0, 1, 2];
+        order.sort_by(|a, b| eigen.eigenvalues[*b].total_cmp(&eigen.eigenvalues[*a]));
+        Self {
+            centre,
+            directions: order.map(|i| eigen.eigenvectors.column(i).into_owned()),
+            variances: order.map(|i| eigen.eigenvalues[i].max(0.0)),
+        }
+    }
+
+    /// Refuses points that span no surface.
+    pub(super) fn require_surface(&self, count: usize) -> Result<(), Error> {
+        let scale = self.centre.norm_squared().max(1e-300);
+        let [first, second, _] = self.variances;
+        if first <= scale * 1e-24 {
+            return Err(Error::OnePoint(count));
+        }
+        if second <= first * 1e-10 {
+            return Err(Error::OneLine(count));
+        }
+        Ok(())
+    }
+
+    /// Normal of the plane through the centre that leaves the least variance.
+    pub(super) fn normal(&self) -> Vector3<f64> {
+        self.directions[2]
+    }
+}
+
+/// A right-handed plane frame with this normal whose x axis is as close to the mesh's x as it can be, so that an
+/// upright scan stays upright; close to the mesh's y where the normal runs along x.
+pub(super) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
+    let z = normal.normalize();
+    let along = if z.x.abs() < 0.9 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    let x = (along - z * along.dot(&z)).normalize();
+    let y = z.cross(&x);
+    Rigid3::to_frame([x.into(), y.into(), z.into()], origin.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::{Axes, frame};
+    use crate::mesh::Mesh;
+
+    #[test]
+    fn repeated_vertices_and_split_faces_change_nothing() {
+        let corners = vec![
+            [0.0, 0.0, 0.0],
+            [4.0, 0.0, 0.0],
+            [4.0, 2.0, 0.1],
+            [0.0, 2.0, 0.0],
+        ];
+        let shared = Mesh {
+            vertices: corners.clone(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+        };
+        let mut vertices: Vec<[f64; 3]> = [0, 1, 2, 0, 2, 3].iter().map(|i| corners[*i]).collect();
+        vertices.extend([[9.0, 9.0, 9.0]; 0]);
+        let soup = Mesh {
+            vertices,
+            triangles: vec![[0, 1, 2], [3, 4, 5]],
+        };
+        let (a, b) = (Axes::of_surface(&shared), Axes::of_surface(&soup));
+        assert!((a.centre - b.centre).norm() < 1e-12);
+        assert!(a.normal().cross(&b.normal()).norm() < 1e-9);
+    }
+
+    #[test]
+    fn frame_keeps_x_and_puts_the_origin_at_zero() {
+        let motion = frame(Vector3::new(0.1, 0.0, 1.0), Vector3::new(5.0, 6.0, 7.0));
+        assert!(
+            motion
+                .apply([5.0, 6.0, 7.0])
+                .iter()
+                .all(|v| v.abs() < 1e-12)
+        );
+        let [x, y, _] = motion.apply([6.0, 6.0, 7.0]);
+        assert!(x > 0.9 && y.abs() < 1e-12);
+    }
+}

@@ -1,0 +1,164 @@
+//! Which side of the plane is carved: told from evidence, not assumed.
+//!
+//! Three witnesses speak. The winding of the faces is right in most files and wrong in all of some. The tops of
+//! strokes are planed wood, so their heights crowd at one level; ground is gouged. And the relief of the right side
+//! agrees with the print: its witness weighs most, and is the only one that knows the character.
+
+use super::surface::{Samples, Surface, quantile};
+use crate::domain::{Bow, Rigid3, SideEvidence};
+use crate::mesh::Mesh;
+use crate::raster::Picture;
+use crate::stages::ink;
+use crate::stages::pose::{Layer, Limits, SEARCH_PX, Soft, refine, search};
+
+/// A side with less than this share of the other's relief is the back of the block.
+const BACK: f64 = 0.35;
+/// Weights of the witnesses in the log-odds: winding from wholly in to wholly out, ratio of the layers' sharpness,
+/// ratio of the agreement with the print, word of the manifest.
+const WINDING: f64 = 2.0;
+const SHARPNESS: f64 = 0.7;
+const AGREEMENT: f64 = 6.0;
+const MANIFEST: f64 = 0.4;
+/// The search against the print: band of scales, shift, poses, working size, as in normalisation but coarser.
+const LIMITS: Limits = Limits {
+    scale: 1.6,
+    shift: 0.35,
+    keep: 3,
+};
+const CLOSER_PX: usize = 64;
+/// Groups of ink below this share of the print are specks.
+const SPECK_SHARE: f64 = 1.0 / 1200.0;
+
+/// What was seen from one side.
+#[derive(Debug, Clone)]
+pub(super) struct Face {
+    pub(super) plane_from_mesh: Rigid3,
+    pub(super) bow: Option<Bow>,
+    pub(super) bow_height: f64,
+    pub(super) relief: f64,
+    pub(super) extent: f64,
+    pub(super) surface: Surface,
+    /// Width of the heights' crowd at the extreme layer, as a share of the relief.
+    pub(super) layer_width: f64,
+    /// Nearness to the tops as seen from outside, so in mirror writing.
+    pub(super) tops: Soft,
+}
+
+/// What else is known of the side.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Witness<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) print: Option<&'a Picture>,
+    pub(super) scanned_face_down: Option<bool>,
+}
+
+/// The carved one of two faces with the evidence for it; `None` when neither shows a surface.
+pub(super) fn choose(
+    faces: [Option<Face>; 2],
+    witness: Witness<'_>,
+) -> Option<(Face, SideEvidence)> {
+    let (first, second) = match faces {
+        [Some(a), Some(b)] => (a, b),
+        [Some(only), None] | [None, Some(only)] => {
+            let evidence = evidence(&only, 1.0, witness.mesh);
+            return Some((only, evidence));
+        }
+        [None, None] => return None,
+    };
+    let odds = log_odds(&first, &second, witness);
+    let confidence = (odds.abs() / 2.0).tanh();
+    let face = if odds >= 0.0 { first } else { second };
+    let evidence = evidence(&face, confidence, witness.mesh);
+    Some((face, evidence))
+}
+
+fn evidence(face: &Face, confidence: f64, mesh: &Mesh) -> SideEvidence {
+    SideEvidence {
+        winding: outward_share(mesh, &face.plane_from_mesh),
+        flatness: face.surface.tops,
+        confidence,
+    }
+}
+
+/// Log-odds that the first face is the carved one.
+fn log_odds(first: &Face, second: &Face, witness: Witness<'_>) -> f64 {
+    if first.relief < BACK * second.relief {
+        return -10.0;
+    }
+    if second.relief < BACK * first.relief {
+        return 10.0;
+    }
+    let winding =
+        outward_share(witness.mesh, &first.plane_from_mesh).map_or(0.0, |w| 2.0 * w - 1.0);
+    let sharpness = (second.layer_width / first.layer_width)
+        .ln()
+        .clamp(-1.5, 1.5);
+    let up = first.plane_from_mesh.0[2][2];
+    let manifest = witness
+        .scanned_face_down
+        .map_or(0.0, |down| if down { -up } else { up });
+    let agreement = witness
+        .print
+        .map_or(0.0, |print| agreement(first, second, print));
+    WINDING * winding + SHARPNESS * sharpness + MANIFEST * manifest + AGREEMENT * agreement
+}
+
+/// Log of the ratio between the faces' best correlations with the print; 0 when the print shows no ink.
+fn agreement(first: &Face, second: &Face, print: &Picture) -> f64 {
+    let Ok(ink) = ink::levelled(print, SPECK_SHARE) else {
+        return 0.0;
+    };
+    let score = |face: &Face| best_score(&ink.soft, &face.tops).max(0.02);
+    (score(first) / score(second)).ln()
+}
+
+/// Best correlation of a face, read in the mirror, with the ink.
+fn best_score(ink: &Soft, tops: &Soft) -> f64 {
+    let layers = |size, sigma| Layer::new(ink, size, sigma).zip(Layer::new(tops, size, sigma));
+    let Some((print, wood)) = layers(SEARCH_PX, 0.8) else {
+        return 0.0;
+    };
+    let found = search(&print, &wood, LIMITS);
+    let Some((print, wood)) = layers(CLOSER_PX, 1.2) else {
+        return 0.0;
+    };
+    let mirrored = found.iter().filter(|pose| pose.mirrored);
+    mirrored
+        .map(|pose| refine(&print, &wood, pose).score)
+        .fold(0.0, f64::max)
+}
+
+/// How widely the heights spread at their extreme layer: half the heights of the upper part of the relief lie within
+/// this share of it.
+pub(super) fn layer_width(samples: &Samples, surface: &Surface, relief: f64) -> f64 {
+    let mut upper: Vec<f64> = samples
+        .residuals(surface)
+        .into_iter()
+        .filter(|r| *r > -0.4 * relief)
+        .collect();
+    if upper.len() < 8 {
+        return 1.0;
+    }
+    let (low, high) = (quantile(&mut upper, 0.25), quantile(&mut upper, 0.75));
+    ((high - low) / relief.max(f64::MIN_POSITIVE)).max(0.005)
+}
+
+/// Share of the area, as seen along the normal, whose winding looks out on this side; `None` without faces.
+fn outward_share(mesh: &Mesh, plane_from_mesh: &Rigid3) -> Option<f64> {
+    let [x, y, z, _] = plane_from_mesh.0[2];
+    let (mut out, mut all) = (0.0, 0.0);
+    for t in &mesh.triangles {
+        let [a, b, c] = t.map(|i| mesh.vertices[i as usize]);
+        let (p, q) = (minus(b, a), minus(c, a));
+        let facing = x * (p[1] * q[2] - p[2] * q[1])
+            + y * (p[2] * q[0] - p[0] * q[2])
+            + z * (p[0] * q[1] - p[1] * q[0]);
+        all += facing.abs();
+        out += facing.max(0.0);
+    }
+    (all > 0.0).then(|| out / all)
+}
+
+fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}

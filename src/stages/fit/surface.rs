@@ -1,0 +1,310 @@
+//! A one-sided robust surface over what stands highest in a height map.
+//!
+//! Tops of strokes are the original face of the block: much lies below them, nothing above. So a point above the
+//! surface costs much, one far below it nothing at all.
+
+use nalgebra::{Matrix6, Vector6};
+
+use crate::raster::Grid;
+use crate::stages::pose::Soft;
+use crate::stages::zbuffer::{NOTHING, View};
+
+/// Expectile of the first, convex pass: points above weigh this, points below one less it.
+const ENVELOPE: f64 = 0.97;
+/// Weight of a point above the surface in the passes that follow.
+const ABOVE: f64 = 3.0;
+/// How far below the surface a point still counts, as a share of the height range, pass by pass.
+const WINDOWS: [f64; 5] = [0.35, 0.22, 0.14, 0.10, 0.08];
+/// Neighbouring pixels of a top err together: so many of them count as one.
+const CORRELATED_PX: f64 = 40.0;
+/// Standard deviation of the tops' unevenness as a share of the height range.
+const TOP_SIGMA: f64 = 0.05;
+/// The tops' plane is parallel to the carved ground within this slope (one standard deviation).
+const TILT_SIGMA: f64 = 0.05;
+/// Second-degree coefficients in units of the extent (one standard deviation): a bow of 2-8 % of the extent.
+const BOW_SIGMA: f64 = 0.15;
+/// Soft tops fade to nothing at this share of the relief under the surface.
+const SOFT_SPAN: f64 = 0.5;
+/// A bow must explain this much more of the tops than the plane does.
+const BOW_GAIN: f64 = 1.04;
+
+/// Heights of a view as points, scaled by the extent: u, v in about -0.5..0.5.
+#[derive(Debug)]
+pub(super) struct Samples {
+    points: Vec<[f64; 3]>,
+    /// Where each point lies in the rendering, and the rendering's size.
+    places: Vec<usize>,
+    size: [usize; 2],
+    centre: [f64; 2],
+    extent: f64,
+    range: f64,
+}
+
+/// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in scaled units, and how well it holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Surface {
+    coefficients: [f64; 6],
+    /// Share of the seen area that supports it, less what stands above it.
+    pub(super) support: f64,
+    /// Share of the seen area within the last window.
+    pub(super) tops: f64,
+    /// Root mean square of those, mesh units.
+    pub(super) rms: f64,
+}
+
+impl Samples {
+    /// The seen pixels of a rendering; `None` when fewer than 16 are seen.
+    pub(super) fn new(heights: &Grid<f32>, view: &View) -> Option<Self> {
+        let back = view.px_from_plane.inverse()?;
+        let extent = view.unit_per_px * heights.width().max(heights.height()) as f64;
+        let centre = back.apply([
+            (heights.width() - 1) as f64 / 2.0,
+            (heights.height() - 1) as f64 / 2.0,
+        ]);
+        let (mut points, mut places) = (Vec::new(), Vec::new());
+        for y in 0..heights.height() {
+            for (x, z) in heights.row(y).iter().enumerate() {
+                if *z != NOTHING {
+                    let [u, v] = back.apply([x as f64, y as f64]);
+                    places.push(y * heights.width() + x);
+                    points.push([
+                        (u - centre[0]) / extent,
+                        (v - centre[1]) / extent,
+                        f64::from(*z) / extent,
+                    ]);
+                }
+            }
+        }
+        (points.len() >= 16).then(|| {
+            let mut samples = Self {
+                points,
+                places,
+                size: [heights.width(), heights.height()],
+                centre,
+                extent,
+                range: 0.0,
+            };
+            samples.range = samples.height_range();
+            samples
+        })
+    }
+
+    /// Nearly all of the heights over their mean plane, in units of the extent.
+    fn height_range(&self) -> f64 {
+        let plane = self.mean_plane();
+        let mut residuals: Vec<f64> = self
+            .points
+            .iter()
+            .map(|p| p[2] - value(&plane, p))
+            .collect();
+        (quantile(&mut residuals, 0.97) - quantile(&mut residuals, 0.03)).max(1e-9)
+    }
+
+    fn mean_plane(&self) -> [f64; 6] {
+        solve(self.points.iter().map(|p| (*p, 1.0)), 3, None)
+    }
+
+    /// The surface over the tops; second-degree only when allowed and earned.
+    pub(super) fn fit(&self, allow_bow: bool) -> Surface {
+        let ground = self.mean_plane();
+        let envelope = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
+        let mut start = ground;
+        for _ in 0..12 {
+            start = solve(self.weighed(&start, envelope), 3, Some(self.prior(ground)));
+        }
+        let plane = self.narrow(start, ground, 3);
+        if !allow_bow {
+            return plane;
+        }
+        let bent = self.narrow(start, ground, 6);
+        if bent.support > plane.support * BOW_GAIN {
+            bent
+        } else {
+            plane
+        }
+    }
+
+    /// Passes with a shrinking window below the surface.
+    fn narrow(&self, start: [f64; 6], ground: [f64; 6], terms: usize) -> Surface {
+        let mut c = start;
+        for window in WINDOWS.map(|w| w * self.range) {
+            for _ in 0..4 {
+                let points = self.weighed(&c, |r| one_sided_weight(r, window));
+                c = solve(points, terms, Some(self.prior(ground)));
+            }
+        }
+        self.judge(c)
+    }
+
+    /// How well a surface holds at the narrowest window.
+    fn judge(&self, coefficients: [f64; 6]) -> Surface {
+        let w = WINDOWS[WINDOWS.len() - 1] * self.range;
+        let (mut support, mut tops, mut squares) = (0.0, 0.0, 0.0);
+        for p in &self.points {
+            let r = p[2] - value(&coefficients, p);
+            if r.abs() < w {
+                support += 1.0 - (r / w).powi(2);
+                tops += 1.0;
+                squares += r * r;
+            } else if r > 0.0 {
+                support -= ABOVE;
+            }
+        }
+        let n = self.points.len() as f64;
+        Surface {
+            coefficients,
+            support: support / n,
+            tops: tops / n,
+            rms: if tops > 0.0 {
+                (squares / tops).sqrt() * self.extent
+            } else {
+                0.0
+            },
+        }
+    }
+
+    /// Points with the weight that their residual over a surface earns.
+    fn weighed<'a>(
+        &'a self,
+        c: &'a [f64; 6],
+        weight: impl Fn(f64) -> f64 + 'a,
+    ) -> impl Iterator<Item = ([f64; 3], f64)> + 'a {
+        self.points
+            .iter()
+            .map(move |p| (*p, weight(p[2] - value(c, p))))
+    }
+
+    /// The prior: tilt near the ground's, little bow.
+    fn prior(&self, ground: [f64; 6]) -> Prior {
+        Prior {
+            mean: ground,
+            noise: CORRELATED_PX * (TOP_SIGMA * self.range).powi(2),
+        }
+    }
+
+    /// Residual of every seen pixel over a surface, mesh units.
+    pub(super) fn residuals(&self, surface: &Surface) -> Vec<f64> {
+        self.points
+            .iter()
+            .map(|p| (p[2] - value(&surface.coefficients, p)) * self.extent)
+            .collect()
+    }
+
+    /// Nearness to the surface as a picture: 1 on it, 0 from half the relief down.
+    pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> Soft {
+        let [width, height] = self.size;
+        let mut soft = Soft {
+            amount: Grid::new(width, height, 0.0),
+            known: Grid::new(width, height, false),
+        };
+        let span = (SOFT_SPAN * relief).max(f64::MIN_POSITIVE);
+        for (place, r) in self.places.iter().zip(self.residuals(surface)) {
+            soft.amount.data_mut()[*place] = (1.0 + r / span).clamp(0.0, 1.0) as f32;
+            soft.known.data_mut()[*place] = true;
+        }
+        soft
+    }
+
+    /// The plane through a surface's tops, `z = a + b x + c y` in plane coordinates and mesh units.
+    pub(super) fn plane_of_tops(&self, surface: &Surface) -> [f64; 3] {
+        let window = WINDOWS[WINDOWS.len() - 1] * self.range;
+        let c = surface.coefficients;
+        let near = |r: f64| if r.abs() < window { 1.0 } else { 1e-6 };
+        let on_surface = self
+            .weighed(&c, near)
+            .map(|(p, w)| ([p[0], p[1], value(&c, &p)], w));
+        let plane = solve(on_surface, 3, None);
+        let (b, c) = (plane[1], plane[2]);
+        let a = plane[0] * self.extent - b * self.centre[0] - c * self.centre[1];
+        [a, b, c]
+    }
+
+    /// The surface in plane coordinates and mesh units: coefficients of 1, x, y, x^2, xy, y^2.
+    pub(super) fn in_plane_units(&self, surface: &Surface) -> [f64; 6] {
+        let c = surface.coefficients;
+        let e = self.extent;
+        let [p, q] = self.centre;
+        // u = (x - p) / e, z = e * f(u, v).
+        let (a, b, d) = (c[3] / e, c[4] / e, c[5] / e);
+        [
+            c[0] * e - c[1] * p - c[2] * q + a * p * p + b * p * q + d * q * q,
+            c[1] - 2.0 * a * p - b * q,
+            c[2] - 2.0 * d * q - b * p,
+            a,
+            b,
+            d,
+        ]
+    }
+}
+
+/// What a surface is taken to be where the tops say little.
+#[derive(Debug, Clone, Copy)]
+struct Prior {
+    mean: [f64; 6],
+    noise: f64,
+}
+
+/// Weighted least squares over the first `terms` (3 or 6) of the basis.
+fn solve(
+    points: impl Iterator<Item = ([f64; 3], f64)>,
+    terms: usize,
+    prior: Option<Prior>,
+) -> [f64; 6] {
+    let mut normal = Matrix6::<f64>::zeros();
+    let mut right = Vector6::<f64>::zeros();
+    for (p, w) in points.filter(|(_, w)| *w > 0.0) {
+        let basis = basis(&p);
+        for i in 0..terms {
+            right[i] += w * basis[i] * p[2];
+            for j in 0..=i {
+                normal[(i, j)] += w * basis[i] * basis[j];
+            }
+        }
+    }
+    if let Some(prior) = prior {
+        for k in 1..terms {
+            let sigma = if k < 3 { TILT_SIGMA } else { BOW_SIGMA };
+            let precision = prior.noise / (sigma * sigma);
+            normal[(k, k)] += precision;
+            right[k] += precision * prior.mean[k];
+        }
+    }
+    for i in 0..6 {
+        normal[(i, i)] += if i < terms { 1e-12 } else { 1.0 };
+        for j in 0..i {
+            normal[(j, i)] = normal[(i, j)];
+        }
+    }
+    normal
+        .cholesky()
+        .map_or([0.0; 6], |factor| factor.solve(&right).into())
+}
+
+/// The value below which a share of the values lies; reorders them.
+pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
+    let k = ((values.len() - 1) as f64 * share) as usize;
+    *values.select_nth_unstable_by(k, f64::total_cmp).1
+}
+
+fn basis(p: &[f64; 3]) -> [f64; 6] {
+    let [u, v, _] = *p;
+    [1.0, u, v, u * u, u * v, v * v]
+}
+
+fn value(c: &[f64; 6], p: &[f64; 3]) -> f64 {
+    let b = basis(p);
+    (0..6).map(|i| c[i] * b[i]).sum()
+}
+
+/// Full weight just under the surface, fading to none at `window` below; above it heavier, but a spike of more
+/// than three windows is not believed.
+fn one_sided_weight(r: f64, window: f64) -> f64 {
+    if r > 3.0 * window {
+        0.0
+    } else if r > 0.0 {
+        ABOVE
+    } else {
+        let t = r / window;
+        if t > -1.0 { (1.0 - t * t).powi(2) } else { 0.0 }
+    }
+}

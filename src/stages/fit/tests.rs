@@ -1,0 +1,110 @@
+//! Known-answer worlds for both methods.
+
+use nalgebra::Vector3;
+
+use super::{Error, Method, fit};
+use crate::domain::{FailureClass, FitOutcome};
+use crate::mesh::Mesh;
+use crate::stages::testing::{World, print, settings, some_turn};
+
+fn normal_error_deg(world: &World, found: &FitOutcome) -> f64 {
+    let [x, y, z, _] = found.plane_from_mesh.0[2];
+    Vector3::new(x, y, z).angle(&world.normal()).to_degrees()
+}
+
+#[test]
+fn plane_and_side_of_any_pose() {
+    for k in 0..6 {
+        let world = World {
+            turn: some_turn(k),
+            inward: k % 2 == 0,
+            ..World::default()
+        };
+        let found = fit(
+            &world.mesh(),
+            Some(&print(14.0, 2.0).0),
+            None,
+            &settings().fit,
+        )
+        .expect("a plane");
+        let error = normal_error_deg(&world, &found);
+        assert!(error < 0.4, "{error} degrees in pose {k}");
+        let [_, _, height] = found.plane_from_mesh.apply(world.place(-2.7, 1.0, 0.0));
+        assert!(height.abs() < 0.05, "{height} mm");
+    }
+}
+
+#[test]
+fn bow_is_found_only_where_there_is_one() {
+    let bent = World {
+        bow_mm: 0.5,
+        turn: some_turn(4),
+        ..World::default()
+    };
+    let found = fit(
+        &bent.mesh(),
+        Some(&print(14.0, 2.0).0),
+        None,
+        &settings().fit,
+    )
+    .expect("a plane");
+    assert!(
+        found.bow.is_some() && (0.3..1.2).contains(&found.bow_height),
+        "{}",
+        found.bow_height
+    );
+    let flat = World {
+        turn: some_turn(4),
+        ..World::default()
+    };
+    let found = fit(
+        &flat.mesh(),
+        Some(&print(14.0, 2.0).0),
+        None,
+        &settings().fit,
+    )
+    .expect("a plane");
+    assert!(found.bow_height < 0.05, "{}", found.bow_height);
+}
+
+#[test]
+fn the_papers_plane_is_close_on_an_open_mesh() {
+    let mut params = settings().fit;
+    params.method = Method::Paper;
+    for k in 0..4 {
+        let world = World {
+            turn: some_turn(k),
+            ..World::default()
+        };
+        let found = fit(&world.mesh(), Some(&print(14.0, 2.0).0), None, &params).expect("a plane");
+        let error = normal_error_deg(&world, &found);
+        assert!(error < 3.0, "{error} degrees in pose {k}");
+    }
+}
+
+#[test]
+fn points_that_span_no_surface_are_refused() {
+    let mesh = |vertices: Vec<[f64; 3]>| Mesh {
+        vertices,
+        triangles: Vec::new(),
+    };
+    let params = settings().fit;
+    for method in [Method::Paper, Method::Tops] {
+        let params = super::Params {
+            method,
+            ..params.clone()
+        };
+        let fit = |vertices| fit(&mesh(vertices), None, None, &params);
+        assert_eq!(fit(vec![[0.0; 3]; 2]), Err(Error::TooFewPoints(2)));
+        assert_eq!(fit(vec![[1.0, 2.0, 3.0]; 9]), Err(Error::OnePoint(9)));
+        let line = (0..50)
+            .map(|i| [f64::from(i), f64::from(2 * i), 1.0])
+            .collect();
+        assert_eq!(fit(line), Err(Error::OneLine(50)));
+        let plate = (0..900)
+            .map(|i| [f64::from(i % 30), f64::from(i / 30), 0.0])
+            .collect();
+        let refused = fit(plate).expect_err("nothing is carved");
+        assert_eq!(refused.class(), FailureClass::NoSolution, "{method:?}");
+    }
+}

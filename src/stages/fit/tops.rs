@@ -1,0 +1,140 @@
+//! Our fit: look at the surface from both sides, lay a one-sided robust surface over what stands out, take the side
+//! whose extreme layer is worn wood.
+
+use nalgebra::Vector3;
+
+use super::pca::{Axes, frame};
+use super::side::{self, Face, Witness, layer_width};
+use super::surface::{Samples, Surface};
+use super::{Error, Params};
+use crate::domain::{Bow, FitOutcome, Rigid3};
+use crate::mesh::Mesh;
+use crate::raster::Picture;
+use crate::stages::otsu;
+use crate::stages::zbuffer::{Projected, View};
+
+/// Longest side of the rendering that the surface is fitted to.
+const LOOK_PX: usize = 144;
+/// The view is turned to the tops' plane and rendered again until it turns by less than this slope.
+const SETTLED_SLOPE: f64 = 0.003;
+const MOST_LOOKS: usize = 4;
+
+pub(super) fn fit(
+    mesh: &Mesh,
+    print: Option<&Picture>,
+    scanned_face_down: Option<bool>,
+    params: &Params,
+) -> Result<FitOutcome, Error> {
+    let axes = Axes::of_surface(mesh);
+    axes.require_surface(mesh.vertices.len())?;
+    let normal = axes.normal();
+    let faces = [normal, -normal].map(|n| look(mesh, n, axes.centre, params.bow));
+    let witness = Witness {
+        mesh,
+        print,
+        scanned_face_down,
+    };
+    let (face, side) = side::choose(faces, witness).ok_or(Error::OneLine(mesh.vertices.len()))?;
+    if face.relief < params.min_relief * face.extent {
+        return Err(Error::NoRelief {
+            relief: face.relief,
+            extent: face.extent,
+            min_relief: params.min_relief,
+        });
+    }
+    Ok(FitOutcome {
+        plane_from_mesh: face.plane_from_mesh,
+        bow: face.bow,
+        bow_height: face.bow_height,
+        inlier_ratio: face.surface.tops,
+        rms: face.surface.rms,
+        relief: face.relief,
+        side,
+        vertices: mesh.vertices.len() as u64,
+        triangles: mesh.triangles.len() as u64,
+    })
+}
+
+/// Fits the tops as seen from one side, turning the view until it stands square on them.
+fn look(mesh: &Mesh, normal: Vector3<f64>, centre: Vector3<f64>, bow: bool) -> Option<Face> {
+    let mut plane_from_mesh = frame(normal, centre);
+    for round in 1.. {
+        let projected = Projected::new(mesh, &plane_from_mesh);
+        let view = View::around(projected.bounds(), LOOK_PX, false);
+        let heights = projected.render(&view);
+        let samples = Samples::new(&heights, &view)?;
+        let surface = samples.fit(bow);
+        let [a, b, c] = samples.plane_of_tops(&surface);
+        plane_from_mesh = lay_on(&plane_from_mesh, [a, b, c]);
+        if b.hypot(c) < SETTLED_SLOPE || round == MOST_LOOKS {
+            return Some(face(plane_from_mesh, &samples, surface, [a, b, c], &view));
+        }
+    }
+    None
+}
+
+/// The frame turned and raised so that `z = a + b x + c y` becomes its plane.
+fn lay_on(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
+    let mesh_from_plane = plane_from_mesh.inverse();
+    let at = |p: [f64; 3]| Vector3::from(mesh_from_plane.apply(p));
+    let origin = at([0.0, 0.0, a]);
+    let normal = at([-b, -c, 1.0]) - at([0.0; 3]);
+    frame(normal, origin)
+}
+
+/// Gathers what was seen from one side.
+fn face(
+    plane_from_mesh: Rigid3,
+    samples: &Samples,
+    surface: Surface,
+    plane: [f64; 3],
+    view: &View,
+) -> Face {
+    let mut over_plane = samples.in_plane_units(&surface);
+    for (coefficient, flat) in over_plane.iter_mut().zip(plane) {
+        *coefficient -= flat;
+    }
+    let bent = over_plane[3..].iter().any(|c| *c != 0.0);
+    let bow = bent.then_some(Bow(over_plane));
+    let relief = relief(samples.residuals(&surface));
+    Face {
+        plane_from_mesh,
+        bow,
+        bow_height: bow.map_or(0.0, |b| bow_height(&b, view)),
+        relief,
+        layer_width: layer_width(samples, &surface, relief),
+        tops: samples.soft_tops(&surface, relief),
+        extent: view.unit_per_px * view.width.max(view.height) as f64,
+        surface,
+    }
+}
+
+/// Largest less smallest height of the bow over the view.
+fn bow_height(bow: &Bow, view: &View) -> f64 {
+    let Some(back) = view.px_from_plane.inverse() else {
+        return 0.0;
+    };
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for j in 0..=8 {
+        for i in 0..=8 {
+            let px = (view.width - 1) as f64 * f64::from(i) / 8.0;
+            let py = (view.height - 1) as f64 * f64::from(j) / 8.0;
+            let [x, y] = back.apply([px, py]);
+            let z = bow.height(x, y);
+            low = low.min(z);
+            high = high.max(z);
+        }
+    }
+    high - low
+}
+
+/// Depth of the carving: between the medians of tops and ground, the hundredth at either end left out.
+fn relief(mut residuals: Vec<f64>) -> f64 {
+    residuals.sort_by(f64::total_cmp);
+    let cut = residuals.len() / 100;
+    let mut kept: Vec<f32> = residuals[cut..residuals.len() - cut]
+        .iter()
+        .map(|r| *r as f32)
+        .collect();
+    otsu::split(&mut kept).map_or(0.0, |split| split.high - split.low)
+}

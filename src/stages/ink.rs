@@ -1,0 +1,333 @@
+//! The print's ink: where there is paper at all, which side of the grey threshold is ink, how much ink each pixel has.
+
+use super::blur::blur;
+use super::components::{Components, without_specks};
+use super::otsu;
+use super::pose::Soft;
+use crate::raster::{Grid, Mask, Picture};
+
+/// A pixel is white beyond the cut when its darkest channel is above this share of full white.
+const WHITE: f32 = 0.965;
+/// Paper darker than this is told apart from the white beyond the cut.
+const PAPER_TELLABLE: f64 = 0.945;
+/// Coloured paper covers at least this share of the image; less is but the soft edge of ink on white paper.
+const LEAST_PAPER: f64 = 0.2;
+/// White must cover at least this share of the image to count as "beyond the cut".
+const LEAST_WHITE: f64 = 0.004;
+/// Paper brightness is levelled with a gaussian of this share of the longest side.
+const LEVELLING: f64 = 0.16;
+/// Least difference between ink and paper, of full white.
+const LEAST_CONTRAST: f64 = 0.07;
+/// Least share of ink in a print.
+const LEAST_INK: f64 = 0.002;
+/// Width of the rim that tells paper from ink, as a share of the shorter side.
+const RIM: f64 = 0.06;
+
+/// A print must have at least this many pixels each way.
+const LEAST_PRINT_PX: usize = 16;
+
+/// Why a print shows no ink. None of these can be mended by trying again.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// The image has hardly any pixels.
+    #[error("print of {width} x {height} px is too small, needs {LEAST_PRINT_PX} px each way")]
+    TooSmall {
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// One grey all over.
+    #[error(
+        "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white"
+    )]
+    NoContrast {
+        /// Difference between the two classes of grey, 0..=1.
+        contrast: f64,
+    },
+    /// Nothing darker than the threshold.
+    #[error("print has no ink: {share:.4} of it is beyond the grey threshold {threshold:.3}")]
+    NoInk {
+        /// Share of ink, 0..=1.
+        share: f64,
+        /// Threshold, 0..=1.
+        threshold: f64,
+    },
+    /// Everything darker than the threshold.
+    #[error("print is ink all over: its lightest grey is {lightest:.3} of full white")]
+    AllInk {
+        /// Lightest grey, 0..=1.
+        lightest: f64,
+    },
+}
+
+/// The ink of a print.
+#[derive(Debug, Clone)]
+pub(super) struct Ink {
+    /// Which pixels are ink.
+    pub(super) mask: Mask,
+    /// How much ink, and where the image is paper or ink at all.
+    pub(super) soft: Soft,
+    /// Grey between ink and paper, 0..=1.
+    pub(super) threshold: f64,
+    /// Whether ink is lighter than paper, as in a rubbing.
+    pub(super) light_on_dark: bool,
+}
+
+fn grey_of(picture: &Picture) -> Result<Grid<f32>, Error> {
+    let (width, height) = (picture.rgb.width(), picture.rgb.height());
+    if width < LEAST_PRINT_PX || height < LEAST_PRINT_PX {
+        return Err(Error::TooSmall { width, height });
+    }
+    Ok(picture.rgb.map(|c| luminance(*c)))
+}
+
+/// Rec. 601 luma of 0..=1.
+fn luminance(c: [u16; 3]) -> f32 {
+    (0.299 * f32::from(c[0]) + 0.587 * f32::from(c[1]) + 0.114 * f32::from(c[2])) / 65_535.0
+}
+
+/// The paper's mask: darker than a fixed grey is ink, all of the image is known.
+pub(super) fn fixed(picture: &Picture, grey: u8, speck_share: f64) -> Result<Ink, Error> {
+    let threshold = f64::from(grey) / 255.0;
+    let grey = &grey_of(picture)?;
+    let raw = grey.map(|g| f64::from(*g) < threshold);
+    let ink = without_specks(&raw, speck_size(speck_share, raw.data().len()));
+    require_ink(&ink, ink.data().len(), grey, threshold)?;
+    Ok(Ink {
+        soft: Soft {
+            amount: ink.map(|set| f32::from(u8::from(*set))),
+            known: Mask::new(ink.width(), ink.height(), true),
+        },
+        mask: ink,
+        threshold,
+        light_on_dark: false,
+    })
+}
+
+/// Our mask: white beyond the cut left out, polarity told from the rim, paper levelled, threshold found.
+pub(super) fn levelled(picture: &Picture, speck_share: f64) -> Result<Ink, Error> {
+    let grey = &grey_of(picture)?;
+    let known = known(picture, grey);
+    let mut values = held(grey, &known);
+    let split = otsu::split(&mut values).ok_or(Error::NoContrast { contrast: 0.0 })?;
+    if split.high - split.low < LEAST_CONTRAST {
+        return Err(Error::NoContrast {
+            contrast: split.high - split.low,
+        });
+    }
+    let dark = grey.map(|g| f64::from(*g) < split.threshold);
+    let light_on_dark = rim_share(&dark, &known) > 0.5;
+    let darkness = |g: f32| if light_on_dark { 1.0 - g } else { g };
+    let turned = grey.map(|g| darkness(*g));
+    let paper = Mask::from_fn(grey.width(), grey.height(), |x, y| {
+        known.at(x, y) && dark.at(x, y) == light_on_dark
+    });
+    let level = level(&turned, &paper);
+    let even = Grid::from_fn(grey.width(), grey.height(), |x, y| {
+        (turned.at(x, y) / level.at(x, y).max(0.05)).min(1.5)
+    });
+    let split = otsu::split(&mut held(&even, &known)).ok_or(Error::NoContrast { contrast: 0.0 })?;
+    let raw = Mask::from_fn(grey.width(), grey.height(), |x, y| {
+        known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
+    });
+    let area = known.count();
+    let ink = without_specks(&raw, speck_size(speck_share, area));
+    let ink = Mask::from_fn(ink.width(), ink.height(), |x, y| {
+        ink.at(x, y) && known.at(x, y)
+    });
+    require_ink(&ink, area, grey, split.threshold)?;
+    Ok(Ink {
+        soft: Soft {
+            amount: amount(&even, &ink, split),
+            known,
+        },
+        mask: ink,
+        threshold: split.threshold,
+        light_on_dark,
+    })
+}
+
+/// Pixels of a group smaller than this are specks.
+fn speck_size(speck_share: f64, area: usize) -> usize {
+    (area as f64 * speck_share).round() as usize
+}
+
+fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
+    let pairs = grey.data().iter().zip(known.data());
+    pairs.filter(|(_, k)| **k).map(|(g, _)| *g).collect()
+}
+
+/// Where the image is paper or ink: all but the white that reaches the border, if paper is not as white itself.
+fn known(picture: &Picture, grey: &Grid<f32>) -> Mask {
+    let white = picture.rgb.map(|c| {
+        let darkest = c[0].min(c[1]).min(c[2]);
+        f32::from(darkest) / 65_535.0 > WHITE
+    });
+    let beyond = Components::of(&white).at_border();
+    let all = Mask::new(grey.width(), grey.height(), true);
+    if beyond.density() < LEAST_WHITE {
+        return all;
+    }
+    let grown = grown(&beyond);
+    let inside = grown.map(|b| !b);
+    let mut values = held(grey, &inside);
+    let Some(split) = otsu::split(&mut values) else {
+        return all;
+    };
+    let paper = values
+        .iter()
+        .filter(|v| f64::from(**v) > split.threshold)
+        .count();
+    let enough = paper as f64 >= LEAST_PAPER * all.data().len() as f64;
+    if enough && split.high < PAPER_TELLABLE {
+        inside
+    } else {
+        all
+    }
+}
+
+/// The mask with every pixel that touches it: the cut's edge mixes paper with white.
+fn grown(mask: &Mask) -> Mask {
+    Mask::from_fn(mask.width(), mask.height(), |x, y| {
+        let (x, y) = (x as i64, y as i64);
+        (-1..=1).any(|dy| (-1..=1).any(|dx| mask.get(x + dx, y + dy).unwrap_or(false)))
+    })
+}
+
+/// Share of dark pixels in the rim of what is known.
+fn rim_share(dark: &Mask, known: &Mask) -> f64 {
+    let (width, height) = (known.width(), known.height());
+    let reach = ((width.min(height) as f64 * RIM).round() as i64).max(1);
+    let (mut rim, mut of_it) = (0_usize, 0_usize);
+    for y in 0..height {
+        for x in 0..width {
+            let (i, j) = (x as i64, y as i64);
+            let near = [(reach, 0), (-reach, 0), (0, reach), (0, -reach)];
+            let at_rim = near
+                .iter()
+                .any(|(dx, dy)| !known.get(i + dx, j + dy).unwrap_or(false));
+            if known.at(x, y) && at_rim {
+                rim += 1;
+                of_it += usize::from(dark.at(x, y));
+            }
+        }
+    }
+    if rim == 0 {
+        0.0
+    } else {
+        of_it as f64 / rim as f64
+    }
+}
+
+/// Brightness of the paper around each pixel, 0..=1.
+fn level(grey: &Grid<f32>, paper: &Mask) -> Grid<f32> {
+    let sigma = LEVELLING * grey.width().max(grey.height()) as f64;
+    let weight = paper.map(|p| if *p { 1.0 } else { 0.0 });
+    let bright = Grid::from_fn(grey.width(), grey.height(), |x, y| {
+        grey.at(x, y) * weight.at(x, y)
+    });
+    let (sum, near) = (blur(&bright, sigma), blur(&weight, sigma));
+    let count = paper.count().max(1) as f32;
+    let mean = bright.data().iter().sum::<f32>() / count;
+    // Far from any paper the mean stands in.
+    Grid::from_fn(grey.width(), grey.height(), |x, y| {
+        (sum.at(x, y) + 0.02 * mean) / (near.at(x, y) + 0.02)
+    })
+}
+
+/// 0 at paper, 1 at ink, by the classes' medians; nothing but where the cleaned mask, or its rim, has ink.
+fn amount(even: &Grid<f32>, ink: &Mask, split: otsu::Split) -> Grid<f32> {
+    let near = grown(ink);
+    let span = (split.high - split.low).max(1e-6);
+    Grid::from_fn(even.width(), even.height(), |x, y| {
+        if near.at(x, y) {
+            ((split.high - f64::from(even.at(x, y))) / span).clamp(0.0, 1.0) as f32
+        } else {
+            0.0
+        }
+    })
+}
+
+fn require_ink(ink: &Mask, area: usize, grey: &Grid<f32>, threshold: f64) -> Result<(), Error> {
+    let share = ink.count() as f64 / area.max(1) as f64;
+    if share < LEAST_INK {
+        return Err(Error::NoInk { share, threshold });
+    }
+    let lightest = grey.data().iter().copied().fold(0.0, f32::max);
+    if share > 1.0 - LEAST_INK {
+        return Err(Error::AllInk {
+            lightest: f64::from(lightest),
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Error, Ink, levelled};
+    use crate::raster::{Grid, Picture};
+
+    fn picture(grey: impl Fn(usize, usize) -> u16) -> Picture {
+        Picture {
+            rgb: Grid::from_fn(60, 50, |x, y| [grey(x, y) * 257; 3]),
+        }
+    }
+
+    fn read(picture: &Picture) -> Result<Ink, Error> {
+        levelled(picture, 1.0 / 1200.0)
+    }
+
+    fn cross(x: usize, y: usize) -> bool {
+        (26..34).contains(&x) && (8..42).contains(&y)
+            || (10..50).contains(&x) && (20..28).contains(&y)
+    }
+
+    #[test]
+    fn dark_on_light_and_light_on_dark_give_the_same_ink() {
+        let shade = |x: usize| 170 + x as u16 / 2;
+        let printed = picture(|x, y| if cross(x, y) { 40 } else { shade(x) });
+        let rubbed = picture(|x, y| 255 - if cross(x, y) { 40 } else { shade(x) });
+        let (a, b) = (read(&printed).expect("ink"), read(&rubbed).expect("ink"));
+        assert!(!a.light_on_dark && b.light_on_dark);
+        assert_eq!(a.mask, b.mask);
+        assert!(
+            a.mask
+                .data()
+                .iter()
+                .enumerate()
+                .all(|(i, ink)| *ink == cross(i % 60, i / 60))
+        );
+    }
+
+    #[test]
+    fn white_beyond_the_cut_is_unknown() {
+        let cut = picture(|x, y| match (x + y < 30, cross(x, y)) {
+            (true, _) => 255,
+            (_, true) => 50,
+            _ => 205,
+        });
+        let print = read(&cut).expect("ink");
+        assert!(!print.soft.known.at(2, 2) && print.soft.known.at(50, 40));
+        let plain = picture(|x, y| if cross(x, y) { 50 } else { 255 });
+        assert_eq!(read(&plain).expect("ink").soft.known.density(), 1.0);
+    }
+
+    #[test]
+    fn prints_without_ink_are_refused() {
+        for grey in [255, 0, 128] {
+            let refused = read(&picture(|_, _| grey));
+            assert!(matches!(refused, Err(Error::NoContrast { .. })), "{grey}");
+        }
+        let one = Picture {
+            rgb: Grid::new(1, 1, [0; 3]),
+        };
+        assert!(matches!(
+            read(&one),
+            Err(Error::TooSmall {
+                width: 1,
+                height: 1
+            })
+        ));
+    }
+}

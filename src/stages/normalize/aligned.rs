@@ -1,0 +1,137 @@
+//! Our method: the pose first, from soft relief and soft ink; thresholds afterwards, in the aligned frame.
+
+use super::threshold::{self, Canvas};
+use super::{Error, Params, Relief, Search};
+use crate::domain::{Affine2, Pose, ThresholdChoice};
+use crate::raster::DepthMap;
+use crate::stages::ink::Ink;
+use crate::stages::pose::{Found, Layer, Limits, SEARCH_PX, Soft, refine, search};
+
+/// Working size and smoothing, in pixels, of the passes that follow the search, and how many poses go on.
+const PASSES: [(usize, f64, usize); 2] = [(64, 1.2, 4), (128, 1.2, 4)];
+/// The search looks at relief that fades out from the tops to half-way down: it need not know the right cut, nor
+/// that the plane is quite right.
+const SEARCH_CUT: f64 = 0.25;
+const SEARCH_SOFTNESS: f64 = 0.5;
+/// Poses that the search hands on.
+const KEEP: usize = 10;
+/// Largest shift between the middles of print and depth map, as a share of the size.
+const SHIFT: f64 = 0.35;
+/// A relief that correlates less than this matches nothing.
+const LEAST_SCORE: f64 = 0.12;
+/// Mirrored must win by this factor before the pair is refused: symmetric characters score alike both ways.
+const MIRROR_WINS: f64 = 1.12;
+/// A scale within this share of the band's end is at the bound.
+const BOUND: f64 = 0.98;
+
+/// Finds the poses, then the thresholds.
+pub(super) fn choose(
+    depth: &DepthMap,
+    print: &Ink,
+    canvas_from_print: &Affine2,
+    params: &Params,
+) -> Result<(Search, Vec<ThresholdChoice>), Error> {
+    let relief = Relief::of(depth).ok_or(Error::NoStrokes)?;
+    let search = find_poses(depth, print, &relief, params)?;
+    let best = search.poses.first().ok_or(Error::NoMatch {
+        best: 0.0,
+        needs: LEAST_SCORE,
+    })?;
+    let canvas = Canvas::new(
+        depth,
+        print,
+        canvas_from_print,
+        &best.print_from_depth,
+        params,
+    );
+    let thresholds = threshold::choose(depth, &relief, &canvas, params)?;
+    Ok((search, thresholds))
+}
+
+/// Poses as read, best first, at least one.
+fn find_poses(
+    depth: &DepthMap,
+    print: &Ink,
+    relief: &Relief,
+    params: &Params,
+) -> Result<Search, Error> {
+    let tops = relief.soft_strokes(depth, SEARCH_CUT, SEARCH_SOFTNESS);
+    let layers = |size: usize, sigma: f64| {
+        Layer::new(&print.soft, size, sigma).zip(Layer::new(&tops, size, sigma))
+    };
+    let (ink, wood) = layers(SEARCH_PX, 0.8).ok_or(Error::NoStrokes)?;
+    let limits = Limits {
+        scale: params.scale_band,
+        shift: SHIFT,
+        keep: KEEP,
+    };
+    let mut found = search(&ink, &wood, limits);
+    for (size, sigma, keep) in PASSES {
+        let (ink, wood) = layers(size, sigma).ok_or(Error::NoStrokes)?;
+        found = found.iter().map(|pose| refine(&ink, &wood, pose)).collect();
+        found = best_of_each(found, keep);
+    }
+    let ratio = |pose: &Found| {
+        let (ink, wood) = (longest(&print.soft), longest(&tops));
+        pose.fixed_from_moving.scale() * wood / ink
+    };
+    judge(&found, |pose| {
+        let ratio = ratio(pose);
+        ratio.max(1.0 / ratio) > params.scale_band * BOUND
+    })
+}
+
+/// Longest side of what a soft picture knows, pixels.
+fn longest(soft: &Soft) -> f64 {
+    soft.bounds()
+        .map_or(1.0, |b| b.width().max(b.height()) as f64)
+}
+
+/// The best few as read and the best few mirrored, best first.
+fn best_of_each(mut found: Vec<Found>, keep: usize) -> Vec<Found> {
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let (mut upright, mut mirrored) = (0, 0);
+    found.retain(|pose| {
+        let count = if pose.mirrored {
+            &mut mirrored
+        } else {
+            &mut upright
+        };
+        *count += 1;
+        *count
+            <= if pose.mirrored {
+                keep.div_ceil(2)
+            } else {
+                keep
+            }
+    });
+    found
+}
+
+/// Refuses mirror writing and relief that matches nothing.
+fn judge(found: &[Found], at_bound: impl Fn(&Found) -> bool) -> Result<Search, Error> {
+    let best = |mirrored: bool| {
+        let of_kind = found.iter().filter(|pose| pose.mirrored == mirrored);
+        of_kind.map(|pose| pose.score).fold(0.0, f64::max)
+    };
+    let (upright, mirrored) = (best(false), best(true));
+    if mirrored > upright * MIRROR_WINS && mirrored > LEAST_SCORE {
+        return Err(Error::Mirrored { mirrored, upright });
+    }
+    if upright < LEAST_SCORE {
+        return Err(Error::NoMatch {
+            best: upright,
+            needs: LEAST_SCORE,
+        });
+    }
+    let upright: Vec<&Found> = found.iter().filter(|pose| !pose.mirrored).collect();
+    let pose = |found: &&Found| Pose {
+        print_from_depth: found.fixed_from_moving,
+        score: found.score,
+    };
+    Ok(Search {
+        poses: upright.iter().map(pose).collect(),
+        mirrored_score: (mirrored > 0.0).then_some(mirrored),
+        at_bound: upright.first().is_some_and(|best| at_bound(best)),
+    })
+}

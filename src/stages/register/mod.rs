@@ -1,0 +1,185 @@
+//! Masks to alignment and scores (paper III-D).
+//!
+//! [`Method::Turns`] is the paper's: turns of the wrapped mask, the shift of each by climbing. [`Method::Refine`] is
+//! ours: the pose that normalisation found, refined at full size.
+
+mod refined;
+mod turns;
+
+use serde::{Deserialize, Serialize};
+
+use super::normalize::Normalized;
+use super::score::{self, SsimWindow};
+use crate::domain::{
+    Affine2, FailureClass, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric,
+};
+use crate::raster::{DepthMap, Mask, warp_mask};
+
+/// Raised whenever the same inputs and settings may give another result than before.
+pub const REVISION: u32 = 1;
+
+/// How the alignment is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Robust sub-pixel refinement of the pose that normalisation found.
+    Refine,
+    /// Turns of the wrapped mask with climbed shifts: the paper's.
+    Turns,
+}
+
+/// Settings of the stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Params {
+    /// How the alignment is found.
+    pub method: Method,
+    /// `refine`: working size in pixels along the character, 32..=1024.
+    pub working_px: u32,
+    /// `refine`: smoothing in working pixels, 0..=10.
+    pub smoothing_px: f64,
+    /// `turns`: how many angles of a full turn are tried first, 4 or more.
+    pub coarse_angles: u32,
+    /// `turns`: how many angles within three coarse steps each side are tried next, 2 or more.
+    pub fine_angles: u32,
+    /// Window of SSIM in the scores.
+    pub window: SsimWindow,
+}
+
+/// Why the stage found no result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// Normalisation left no pose and the method needs one.
+    #[error(
+        "register.method is refine but normalisation found no pose; set normalize.method to aligned"
+    )]
+    NoPose,
+    /// A threshold was not chosen for a metric.
+    #[error("normalisation chose no threshold for {0}")]
+    NoThreshold(ThresholdMetric),
+    /// The mask of a threshold is empty.
+    #[error("the depth map has no strokes at the threshold of {0}")]
+    NoStrokes(ThresholdMetric),
+}
+
+impl Error {
+    /// What the failure means for the pair.
+    pub const fn class(&self) -> FailureClass {
+        match self {
+            Self::NoPose | Self::NoThreshold(_) | Self::NoStrokes(_) => FailureClass::NoSolution,
+        }
+    }
+}
+
+/// The depth mask of one metric on the pair's canvas.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CanvasMasks {
+    /// Which metric.
+    pub metric: ThresholdMetric,
+    /// The depth mask brought there by the alignment.
+    pub depth: Mask,
+}
+
+/// What the stage gives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Registered {
+    /// The numbers.
+    pub outcome: RegisterOutcome,
+    /// The print mask on the canvas, one for all metrics.
+    pub canvas_print: Mask,
+    /// One canvas a metric, in the order of the outcome.
+    pub canvases: Vec<CanvasMasks>,
+}
+
+/// A pose with what is known of its certainty.
+#[derive(Debug, Clone, Copy)]
+struct Alignment {
+    metric: ThresholdMetric,
+    level: u16,
+    print_from_depth: Affine2,
+    margin: f64,
+    at_bound: bool,
+}
+
+/// Aligns the depth map with the print for each metric's threshold and scores the masks on the canvas.
+///
+/// The canvas is the print character's: see [`super::normalize`]. Every metric is scored on the same print mask.
+///
+/// # Errors
+/// When there is no pose to refine, or a threshold leaves no strokes.
+pub fn register(
+    depth: &DepthMap,
+    normalized: &Normalized,
+    params: &Params,
+) -> Result<Registered, Error> {
+    let side = normalized.outcome.canvas_px as usize;
+    let canvas_from_print = normalized.outcome.canvas_from_print;
+    let canvas_print = warp_mask(&normalized.ink, &canvas_from_print, side, side);
+    let alignments = match params.method {
+        Method::Refine => refined::align(depth, normalized, params)?,
+        Method::Turns => turns::align(depth, &canvas_print, normalized, params)?,
+    };
+    let mut metrics = Vec::new();
+    let mut canvases = Vec::new();
+    for alignment in &alignments {
+        let to_canvas = canvas_from_print.after(&alignment.print_from_depth);
+        let mask = warp_mask(&strokes(depth, alignment.level), &to_canvas, side, side);
+        if mask.count() == 0 {
+            return Err(Error::NoStrokes(alignment.metric));
+        }
+        let scores = score::measure(&canvas_print, &mask, params.window);
+        metrics.push(outcome(depth, normalized, alignment, scores));
+        canvases.push(CanvasMasks {
+            metric: alignment.metric,
+            depth: mask,
+        });
+    }
+    Ok(Registered {
+        outcome: RegisterOutcome { metrics },
+        canvas_print,
+        canvases,
+    })
+}
+
+/// Pixels of the depth map at a level or above.
+fn strokes(depth: &DepthMap, level: u16) -> Mask {
+    depth.levels.map(|l| *l >= level && *l > 0)
+}
+
+fn outcome(
+    depth: &DepthMap,
+    normalized: &Normalized,
+    alignment: &Alignment,
+    scores: Scores,
+) -> MetricOutcome {
+    let middle =
+        |width: usize, height: usize| [(width - 1) as f64 / 2.0, (height - 1) as f64 / 2.0];
+    let [u, v] = middle(normalized.ink.width(), normalized.ink.height());
+    let [x, y] = alignment
+        .print_from_depth
+        .apply(middle(depth.levels.width(), depth.levels.height()));
+    MetricOutcome {
+        metric: alignment.metric,
+        threshold_level: alignment.level,
+        threshold_depth: depth.scale.height(alignment.level),
+        print_from_depth: alignment.print_from_depth,
+        angle_deg: alignment.print_from_depth.angle_deg(),
+        scale: alignment.print_from_depth.scale(),
+        shift_px: [x - u, y - v],
+        scores,
+        margin: alignment.margin,
+        at_bound: alignment.at_bound,
+    }
+}
+
+/// The level that normalisation chose for a metric, and whether it lay at the end of its range.
+fn chosen(normalized: &Normalized, metric: ThresholdMetric) -> Result<(u16, bool), Error> {
+    let mut choices = normalized.outcome.thresholds.iter();
+    choices
+        .find(|choice| choice.metric == metric)
+        .map(|choice| (choice.level, choice.at_bound))
+        .ok_or(Error::NoThreshold(metric))
+}
+
+#[cfg(test)]
+mod tests;

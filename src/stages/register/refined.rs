@@ -1,0 +1,101 @@
+//! Our registration: the poses that normalisation found, refined at full size; the best one serves every metric.
+
+use super::{Alignment, Error, Params, chosen};
+use crate::domain::ThresholdMetric;
+use crate::raster::DepthMap;
+use crate::stages::normalize::{Normalized, Relief};
+use crate::stages::pose::{Found, Layer, Soft, refine};
+
+/// Poses closer in angle than this are one pose when the margin is taken.
+const SAME_POSE_DEG: f64 = 15.0;
+/// How many of the poses are refined.
+const TRIED: usize = 3;
+/// Cuts under the tops that are tried, as shares of the relief, and the softness of each. The ink of a print spreads;
+/// strokes cut too thin or too thick for it would pull the scale.
+const CUTS: [f64; 6] = [0.05, 0.1, 0.17, 0.26, 0.37, 0.5];
+const FIRST_CUT: f64 = 0.17;
+const SOFTNESS: f64 = 0.1;
+
+/// One alignment a metric: thresholds differ, the pose does not, since it is found without one.
+pub(super) fn align(
+    depth: &DepthMap,
+    normalized: &Normalized,
+    params: &Params,
+) -> Result<Vec<Alignment>, Error> {
+    let found = refined(depth, normalized, params).ok_or(Error::NoPose)?;
+    let best = found.first().ok_or(Error::NoPose)?;
+    let margin = best.score - second_best(&found, normalized);
+    ThresholdMetric::ALL
+        .into_iter()
+        .map(|metric| {
+            let (level, at_end) = chosen(normalized, metric)?;
+            Ok(Alignment {
+                metric,
+                level,
+                print_from_depth: best.fixed_from_moving,
+                margin,
+                at_bound: normalized.outcome.search_at_bound || at_end,
+            })
+        })
+        .collect()
+}
+
+/// The first few poses at full size, best first; the best one with the cut that fits the print's strokes.
+fn refined(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Option<Vec<Found>> {
+    let ink = Soft {
+        amount: normalized.ink.map(|set| f32::from(u8::from(*set))),
+        known: normalized.known.clone(),
+    };
+    let relief = Relief::of(depth)?;
+    let size = params.working_px as usize;
+    let ink = Layer::new(&ink, size, params.smoothing_px)?;
+    let cut = |share| {
+        Layer::new(
+            &relief.soft_strokes(depth, share, SOFTNESS),
+            size,
+            params.smoothing_px,
+        )
+    };
+    let wood = cut(FIRST_CUT)?;
+    let starts = normalized
+        .outcome
+        .poses
+        .iter()
+        .take(TRIED)
+        .map(|pose| Found {
+            fixed_from_moving: pose.print_from_depth,
+            score: 0.0,
+            mirrored: false,
+        });
+    let mut found: Vec<Found> = starts.map(|start| refine(&ink, &wood, &start)).collect();
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    if let Some(best) = found.first_mut() {
+        for wood in CUTS.iter().filter_map(|share| cut(*share)) {
+            let start = Found {
+                score: 0.0,
+                ..*best
+            };
+            let tried = refine(&ink, &wood, &start);
+            if tried.score > best.score {
+                *best = tried;
+            }
+        }
+    }
+    Some(found)
+}
+
+/// Best score of any other pose: another angle, or mirrored; 0 when there is none.
+fn second_best(found: &[Found], normalized: &Normalized) -> f64 {
+    let angle = |pose: &Found| pose.fixed_from_moving.angle_deg();
+    let Some(best) = found.first() else {
+        return 0.0;
+    };
+    let other = |pose: &&Found| {
+        let turn = (angle(pose) - angle(best)).rem_euclid(360.0);
+        turn.min(360.0 - turn) > SAME_POSE_DEG
+    };
+    let upright = found.iter().filter(other).map(|pose| pose.score);
+    upright
+        .chain(normalized.outcome.mirrored_score)
+        .fold(0.0, f64::max)
+}
