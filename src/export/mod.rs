@@ -1,1 +1,3 @@
-//! Aligned pairs for other tools.
+//! Aligned pairs and pictures for other tools and for people.
+
+pub mod pictures;
