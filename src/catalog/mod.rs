@@ -48,7 +48,7 @@ pub use read::{
 pub use recipes::{Recipe, RecipeIds, Recipes};
 pub use requeue::RetrySelection;
 pub use staleness::Again;
-pub use upkeep::{Dead, LeaseHolder, Outstanding, Rescued, WorkerInfo};
+pub use upkeep::{Dead, LeaseHolder, Outstanding, Rescued, WorkLeft, WorkerInfo};
 pub use verdicts::{NewVerdict, VerdictEvent};
 pub use work::{KnownInputs, PairWork};
 

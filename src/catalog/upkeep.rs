@@ -50,6 +50,17 @@ pub struct Outstanding {
     pub next_due: Option<UnixMillis>,
 }
 
+/// Stages that are left among some pairs or all.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct WorkLeft {
+    /// Pairs with a stage before them that is not kept back by a failure.
+    pub pairs: u64,
+    /// Those stages by stage.
+    pub by_stage: [u64; 4],
+    /// Pairs that failed for good.
+    pub quarantined: u64,
+}
+
 /// Which leases to take back: those of some workers, or all but one's.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Dead {
@@ -106,6 +117,10 @@ const LEFT_AMONG: &str = "
 SELECT count(*) FILTER (WHERE j.status = 0 AND j.stage <= ?1), count(*) FILTER (WHERE j.status = 1),
     count(*) FILTER (WHERE j.status = 2), min(j.run_at)
 FROM json_each(?2) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value";
+
+const COUNT_AMONG: &str = "
+SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+GROUP BY j.stage, j.status";
 
 impl Catalog {
     /// Enters a process that will work; its number is never used again.
@@ -262,6 +277,44 @@ impl Catalog {
             backoff: count(2)?,
             next_due: row.try_get(3)?,
         })
+    }
+}
+
+impl Catalog {
+    /// What is left to do up to a stage, from the counters, or counted among some pairs.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
+        let mut conn = self.reader().await?;
+        let query = match among {
+            None => sqlx::query("SELECT stage, status, n FROM counter WHERE n > 0"),
+            Some(among) => sqlx::query(COUNT_AMONG).bind(&among.json),
+        };
+        let mut left = WorkLeft::default();
+        for row in query.fetch_all(&mut *conn).await? {
+            let (at, n): (i64, i64) = (row.try_get(0)?, row.try_get(2)?);
+            let n = n.unsigned_abs();
+            match rows::status(row.try_get(1)?)? {
+                JobStatus::Quarantined => left.quarantined += n,
+                JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff
+                    if at <= cursor(until) =>
+                {
+                    left.pairs += n;
+                    for stage in Stage::ALL {
+                        if (at..=cursor(until)).contains(&cursor(stage)) {
+                            left.by_stage[stage.index()] += n;
+                        }
+                    }
+                }
+                JobStatus::Ready
+                | JobStatus::Leased
+                | JobStatus::Backoff
+                | JobStatus::Done
+                | JobStatus::Held => {}
+            }
+        }
+        Ok(left)
     }
 }
 

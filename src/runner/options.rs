@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::domain::{PairName, Stage};
+use crate::{mesh, raster};
 
 /// What to run again besides what is left. Changed settings and inputs are always taken up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,15 +36,10 @@ pub struct RunOptions {
     /// Longest time for one stage of one pair.
     pub stage_limit: Duration,
     /// Limits on mesh files.
-    pub mesh_limits: MeshLimits,
+    pub mesh_limits: mesh::Limits,
     /// Limits on print images.
-    pub image_limits: ImageLimits,
+    pub image_limits: raster::Limits,
 }
-
-/// Placeholder until the mesh reader is here.
-pub type MeshLimits = ();
-/// Placeholder until the image reader is here.
-pub type ImageLimits = ();
 
 impl Default for RunOptions {
     fn default() -> Self {
@@ -56,8 +52,8 @@ impl Default for RunOptions {
             from: Stage::Fit,
             until: Stage::Register,
             stage_limit: Duration::from_mins(10),
-            mesh_limits: MeshLimits::default(),
-            image_limits: ImageLimits::default(),
+            mesh_limits: mesh::Limits::SUGGESTED,
+            image_limits: raster::Limits::SUGGESTED,
         }
     }
 }
