@@ -7,7 +7,7 @@ use crate::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, PrintFromMesh, Stage, ThresholdMetric,
 };
 use crate::raster::{ArtifactError, DepthMap, Grid, Mask, decode_grey8, decode_grey16};
-use crate::store::{Project, StoreError};
+use crate::store::{self, Project};
 
 /// Role of the depth map among the artifacts of the depth stage.
 pub const DEPTH: &str = "depth.png";
@@ -48,7 +48,7 @@ pub enum AlignedError {
     },
     /// The artifact cannot be read.
     #[error(transparent)]
-    Store(#[from] StoreError),
+    Store(#[from] store::ArtifactError),
     /// The artifact is not the picture it should be.
     #[error("{role}: {source}")]
     Picture {

@@ -95,6 +95,16 @@ impl TruthErrors {
             && self.tre_pct <= MAX_TRE_PCT
             && self.mask_iou.is_none_or(|iou| iou >= MIN_MASK_IOU)
     }
+
+    /// How wrong the result is: the worst of its errors as a multiple of what is still right, so that it passes up to 1.
+    pub fn severity(&self) -> f64 {
+        let mask = self
+            .mask_iou
+            .map_or(0.0, |iou| (1.0 - iou) / (1.0 - MIN_MASK_IOU));
+        (self.angle_deg / MAX_ANGLE_DEG)
+            .max(self.tre_pct / MAX_TRE_PCT)
+            .max(mask)
+    }
 }
 
 impl TruthRecord {
@@ -330,6 +340,10 @@ mod tests {
         assert_eq!(pass(Some(0.69)), Ok(false));
         assert_eq!(pass(Some(0.7)), Ok(true));
         assert_eq!(pass(None), Ok(true));
+        let poor = record()
+            .measure(&map, Some(0.4))
+            .expect("the truth is usable");
+        assert!((poor.severity() - 2.0).abs() < 1e-12);
     }
 
     #[test]
