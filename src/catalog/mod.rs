@@ -21,6 +21,8 @@ mod results;
 mod rows;
 mod staleness;
 mod status;
+#[cfg(test)]
+mod tests;
 mod truth;
 mod upkeep;
 mod verdicts;
