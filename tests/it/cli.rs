@@ -15,7 +15,7 @@ pub(crate) struct Call {
 impl Call {
     /// stdout as JSON.
     pub(crate) fn json(&self) -> Value {
-        serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error}: {}", self.out))
+        serde_json::from_str(&self.out).expect("JSON on stdout")
     }
 
     /// The commands after `next:`, ready to be run.
@@ -101,7 +101,7 @@ fn directory_without_project_is_code_10_with_a_way_on() {
     ] {
         let refused = mocban(dir.path(), command).expect(10);
         assert!(
-            refused.err.starts_with("error: no project in ."),
+            refused.err.starts_with("error: no project at ."),
             "{command:?}: {}",
             refused.err
         );
