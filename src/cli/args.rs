@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
 use super::exit::ExitCode;
-use super::{completions, config, demo, import, man, report, retry, run, show, status, verdict};
+use super::{
+    completions, config, demo, export, import, man, report, retry, run, sheet, show, status,
+    verdict,
+};
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
 ///
@@ -131,6 +134,10 @@ pub(super) enum Command {
     Verdict(verdict::VerdictCommand),
     /// Print the table of all results
     Report(report::ReportArgs),
+    /// Write the aligned pairs for other tools
+    Export(export::ExportArgs),
+    /// Lay many overlays on one PNG, worst first
+    Sheet(sheet::SheetArgs),
     /// Show the settings in force
     #[command(subcommand)]
     Config(config::ConfigCommand),

@@ -11,9 +11,11 @@ use super::exit::{ExitCode, Refusal};
 use super::import::{self, ImportArgs};
 use super::report;
 use super::run::{self, drive};
+use super::sheet::{self, SheetArgs};
 use super::talk::Palette;
 use crate::config::{Origin, Tree};
 use crate::demo::{DatasetFiles, DemoOptions, Tier, write_dataset};
+use crate::domain::JobStatus;
 use crate::store::{CATALOG_FILE, SETTINGS_FILE};
 
 /// Arguments of `demo`.
@@ -70,16 +72,24 @@ async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
     let options = run::from_config(&config);
     let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
     run::tell_end(&summary, &failures, context);
-    if summary.stopped {
+    let done = summary.status.jobs.get(&JobStatus::Done).copied();
+    if summary.stopped || done.unwrap_or(0) == 0 {
+        for command in run::next_steps(&summary, &failures) {
+            context.talk.next(&context.command(&command));
+        }
         return Ok(run::code(&summary));
     }
     report::print(context).await?;
-    let picture = dir.join("sheet.png");
+    let (picture, _) = sheet::write(&SheetArgs::default(), context).await?;
     let talk = &context.talk;
-    let shown = |path: PathBuf| path.display().to_string();
-    talk.say(&format!("files    {}", shown(dir.join("data"))));
-    talk.say(&format!("sheet    {}", shown(picture)));
-    talk.next(&context.command("status"));
+    talk.say(&format!(
+        "meshes, prints and truth  {}",
+        dir.join("data").display()
+    ));
+    talk.say(&format!("all pairs on one picture  {}", picture.display()));
+    for command in ["status", "export -o export"] {
+        talk.next(&context.command(command));
+    }
     Ok(run::code(&summary))
 }
 

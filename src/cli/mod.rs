@@ -7,6 +7,7 @@ mod config;
 mod context;
 mod demo;
 mod exit;
+mod export;
 mod failures;
 mod import;
 mod logging;
@@ -17,6 +18,7 @@ mod report;
 mod retry;
 mod run;
 mod select;
+mod sheet;
 mod show;
 mod show_text;
 mod signals;
@@ -110,6 +112,8 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Retry(args) => retry::retry(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
         Command::Report(args) => report::report(args, context).await,
+        Command::Export(args) => export::export(args, context).await,
+        Command::Sheet(args) => sheet::sheet(args, context).await,
         Command::Config(command) => config::config(&command, context),
         Command::Completions(args) => completions::completions(args, context),
         Command::Man(args) => man::man(&args, context),
@@ -171,7 +175,12 @@ fn code_of(error: &anyhow::Error) -> ExitCode {
         }
         match cause.downcast_ref::<CatalogError>() {
             Some(CatalogError::Missing(_)) => return ExitCode::NoProject,
-            Some(CatalogError::UnknownPair(_)) => return ExitCode::NothingSelected,
+            Some(
+                CatalogError::UnknownPair(_)
+                | CatalogError::NoResult(_)
+                | CatalogError::NoMetricResult(..)
+                | CatalogError::NothingToUndo(_),
+            ) => return ExitCode::NothingSelected,
             Some(_) | None => {}
         }
         if matches!(
