@@ -18,11 +18,33 @@ pub(crate) fn project(dir: &Path, name: &str, pairs: &str) -> Project {
     Project::open(&dir.join(name)).expect("a project")
 }
 
+/// The same project again in a folder beside it.
+fn copy(project: &Project, name: &str) -> Project {
+    let to = project.dir().with_file_name(name);
+    let mut open = vec![(project.dir().to_owned(), to.clone())];
+    while let Some((from, to)) = open.pop() {
+        std::fs::create_dir(&to).expect("a folder");
+        for entry in std::fs::read_dir(from).expect("a folder") {
+            let from = entry.expect("an entry").path();
+            let to = to.join(from.file_name().expect("a name"));
+            if from.is_dir() {
+                open.push((from, to));
+            } else {
+                std::fs::copy(from, to).expect("copied");
+            }
+        }
+    }
+    Project::open(&to).expect("a project")
+}
+
 /// `run` with some arguments, ready to be called.
 pub(crate) fn run(project: &Project, args: &[&str]) -> Command {
     let mut command = binary();
-    command.arg("-C").arg(project.dir()).args(FAST);
-    command.args(["--progress", "none", "run"]).args(args);
+    command.arg("-C").arg(project.dir());
+    command
+        .args(["--progress", "none", "run"])
+        .args(FAST)
+        .args(args);
     command
 }
 
@@ -99,10 +121,11 @@ fn stages_done(project: &Project) -> u64 {
 fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let unbroken = project(dir.path(), "unbroken", "2");
+    let broken = copy(&unbroken, "broken");
+    let killed = copy(&unbroken, "killed");
     call(&mut run(&unbroken, &[])).expect(0);
     let wanted = results(&unbroken);
 
-    let broken = project(dir.path(), "broken", "2");
     for point in [
         "fit:claimed",
         "fit:filed:2",
@@ -120,7 +143,6 @@ fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
     assert_eq!(results(&broken), wanted);
     assert_eq!(finished(&broken), [1; 8]);
 
-    let killed = project(dir.path(), "killed", "2");
     let mut child = run(&killed, &[])
         .stderr(Stdio::null())
         .spawn()
