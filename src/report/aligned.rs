@@ -4,7 +4,8 @@ use serde::de::DeserializeOwned;
 
 use crate::catalog::{PairResults, StageRecord};
 use crate::domain::{
-    Affine2, ArtifactRef, DepthOutcome, FitOutcome, PrintFromMesh, Stage, ThresholdMetric,
+    Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, PrintFromMesh, Stage,
+    ThresholdMetric,
 };
 use crate::raster::{ArtifactError, DepthMap, Grid, Mask, decode_grey8, decode_grey16};
 use crate::store::{self, Project};
@@ -161,4 +162,9 @@ impl<'a> Aligned<'a> {
 /// The strokes of a depth map: levels from `level` up. No data is no stroke.
 pub fn depth_mask(depth: &DepthMap, level: u16) -> Mask {
     depth.levels.map(|found| *found >= level.max(1))
+}
+
+/// Whether two metrics came to the same threshold and place, so that all their pictures are the same.
+pub fn same_alignment(a: &MetricOutcome, b: &MetricOutcome) -> bool {
+    a.threshold_level == b.threshold_level && a.print_from_depth == b.print_from_depth
 }

@@ -31,10 +31,7 @@ fn float(table: &Table) -> String {
         body += &line(
             row.iter()
                 .zip(&table.columns)
-                .map(|(cell, column)| match cell {
-                    Some(text) => escape(text),
-                    None => missing(*column).to_owned(),
-                }),
+                .map(|(cell, column)| shown(cell.as_deref(), *column)),
         );
     }
     format!(
@@ -48,7 +45,7 @@ fn float(table: &Table) -> String {
 /// The column type; a number column is as wide as its longest cell.
 fn column(table: &Table, index: usize) -> String {
     match table.columns[index].kind {
-        Kind::Words => "l".to_owned(),
+        Kind::Words | Kind::Interval => "l".to_owned(),
         Kind::Number(decimals) => {
             let whole = |cell: Option<&String>| {
                 cell.map_or(1, |text| text.split('.').next().map_or(1, str::len))
@@ -66,14 +63,22 @@ fn column(table: &Table, index: usize) -> String {
 /// A head; braces keep `siunitx` from reading it as a number.
 fn head(column: &Column) -> String {
     match column.kind {
-        Kind::Words => escape(column.head),
+        Kind::Words | Kind::Interval => escape(column.head),
         Kind::Number(_) => format!("{{{}}}", escape(column.head)),
+    }
+}
+
+fn shown(cell: Option<&str>, column: Column) -> String {
+    match (cell, column.kind) {
+        (None, _) => missing(column).to_owned(),
+        (Some(text), Kind::Interval) => escape(text).replace('-', "--"),
+        (Some(text), Kind::Words | Kind::Number(_)) => escape(text),
     }
 }
 
 const fn missing(column: Column) -> &'static str {
     match column.kind {
-        Kind::Words => "--",
+        Kind::Words | Kind::Interval => "--",
         Kind::Number(_) => "{--}",
     }
 }

@@ -35,7 +35,7 @@ fn piped(table: &Table) -> String {
 
 const fn rule(column: &Column) -> &'static str {
     match column.kind {
-        Kind::Words => "---",
+        Kind::Words | Kind::Interval => "---",
         Kind::Number(_) => "---:",
     }
 }
