@@ -6,14 +6,13 @@ use serde::Serialize;
 
 use super::pictures::View;
 use crate::catalog::PairResults;
+use crate::domain::role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
 use crate::domain::{ContentHash, DepthScale, FileKind, MetricOutcome, Stage, ThresholdMetric};
 use crate::raster::{
     self, DecodeError, DepthMap, Mask, Picture, png_grey16, png_mask, png_rgb8, warp_depth,
     warp_mask,
 };
-use crate::report::aligned::{
-    Aligned, AlignedError, CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, depth_mask,
-};
+use crate::report::aligned::{Aligned, AlignedError, depth_mask};
 use crate::store::Project;
 
 /// Folder of the pairs below the export folder.

@@ -35,7 +35,7 @@ fn float(table: &Table) -> String {
         );
     }
     format!(
-        "\\begin{{table}}\n  \\centering\n  \\caption{{{}}}\n  \\begin{{tabular}}{{{}}}\n    \\toprule\n{body}    \
+        "\\begin{{table}}\n  \\centering\\small\\setlength{{\\tabcolsep}}{{3pt}}\n  \\caption{{{}}}\n  \\begin{{tabular}}{{{}}}\n    \\toprule\n{body}    \
          \\bottomrule\n  \\end{{tabular}}\n\\end{{table}}\n",
         escape(&table.caption),
         columns.join(" "),
@@ -120,7 +120,7 @@ mod tests {
     use crate::report::{Tally, TruthFinding, fixture};
 
     const GOLDEN: &str = r"\begin{table}
-  \centering
+  \centering\small\setlength{\tabcolsep}{3pt}
   \caption{Acc is the share passed of those passed or failed by readers; SSIM, IoU and Dice are means over the n finished pairs, by pixel; IoU box is of bounding boxes.}
   \begin{tabular}{l S[table-format=2.0] S[table-format=1.3] l S[table-format=1.3] S[table-format=1.3] S[table-format=1.3] S[table-format=1.3]}
     \toprule

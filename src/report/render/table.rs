@@ -161,7 +161,7 @@ fn truth_cells(row: &Row) -> Vec<Option<String>> {
     ]
 }
 
-/// The comparisons as a table, for the forms that have room for its words; `None` without any.
+/// The comparisons as a table without their words; `None` when there are none.
 pub(super) fn comparisons(report: &Report) -> Option<Table> {
     let test = report.comparisons.first()?.test;
     let cells = |found: &Comparison| {
@@ -173,7 +173,6 @@ pub(super) fn comparisons(report: &Report) -> Option<Table> {
             Some(count(found.b_only)),
             found.p.map(p_value),
             found.p_holm.map(p_value),
-            Some(found.words.clone()),
         ]
     };
     Some(Table {
@@ -188,10 +187,19 @@ pub(super) fn comparisons(report: &Report) -> Option<Table> {
             number("second only", 0),
             words("p"),
             words("Holm"),
-            words("In words"),
         ],
         rows: report.comparisons.iter().map(cells).collect(),
     })
+}
+
+/// The same with what follows from each comparison.
+pub(super) fn comparisons_in_words(report: &Report) -> Option<Table> {
+    let mut table = comparisons(report)?;
+    table.columns.push(words("In words"));
+    for (row, found) in table.rows.iter_mut().zip(&report.comparisons) {
+        row.push(Some(found.words.clone()));
+    }
+    Some(table)
 }
 
 /// The two metrics of a comparison.
