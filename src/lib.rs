@@ -1,4 +1,34 @@
 //! `mocban` aligns 3D scans of carved woodblock characters with images of their prints.
+//!
+//! # Code map
+//!
+//! A **pair** is one character: a mesh of the carved block and an image of its print. Its **job** is the way
+//! through four **stages**, `fit`, `depth`, `normalize` and `register`. A worker leases the pair, runs the stages
+//! that are left and writes a **checkpoint** after each: files first, then one short transaction. The stages are
+//! pure functions; the catalog is the only place with SQL, the store the only one with artifact files, and the
+//! runner ties the two to the stages.
+//!
+//! To follow one pair: [`manifest`] reads its line, [`catalog`] keeps it, [`runner`] leases it and calls
+//! [`stages`] with what [`mesh`] and [`raster`] decoded, [`store`] and [`catalog`] take the results, and
+//! [`report`] and [`export`] tell them.
+//!
+//! The table below is kept by `tests/it/layers.rs`: a room imports those of its line and no others.
+//!
+//! | room | what it is for | may import |
+//! |---|---|---|
+//! | `domain` | nouns: ids, stages, job states, transforms, outcomes, verdicts | |
+//! | `raster` | grids, masks, depth maps, pictures, warps; readers of PNG, JPEG, TIFF | `domain` |
+//! | `mesh` | triangles and points in their own frame; readers of OBJ, PLY, STL, XYZ | `domain` |
+//! | `manifest` | lists of pairs: CSV, JSON Lines, two folders | `domain` |
+//! | `stages` | fit, depth, normalize, register as pure functions, and the scores | `domain`, `mesh`, `raster` |
+//! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `mesh`, `raster` |
+//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain` |
+//! | `runner` | workers, policy, execution of one pair, events | `domain`, `mesh`, `raster`, `stages`, `store`, `catalog` |
+//! | `report` | catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX | `domain`, `raster`, `store`, `catalog` |
+//! | `export` | aligned pairs for other tools, overlays, contact sheets | `domain`, `raster`, `store`, `catalog`, `report` |
+//! | `demo` | the built-in dataset: carved reliefs and prints with known truth, from one seed | `domain`, `mesh`, `raster` |
+//! | `config` | settings in layers, typed and checked, each with its origin | `domain`, `mesh`, `raster`, `stages`, `runner` |
+//! | `cli` | one thin file a command; exit codes, progress, log | all |
 
 pub mod catalog;
 pub mod cli;

@@ -1,3 +1,5 @@
 //! The `mocban` program.
 
-fn main() {}
+fn main() -> std::process::ExitCode {
+    mocban::cli::main(std::env::args_os()).into()
+}

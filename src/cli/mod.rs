@@ -1,1 +1,248 @@
 //! The command line: one thin file a command.
+
+mod args;
+mod clock;
+mod completions;
+mod config;
+mod context;
+mod demo;
+mod exit;
+mod export;
+mod failures;
+mod import;
+mod logging;
+mod man;
+mod manifest_file;
+mod progress;
+mod report;
+mod retry;
+mod run;
+mod select;
+mod sheet;
+mod show;
+mod show_text;
+mod signals;
+mod status;
+mod table;
+mod talk;
+mod tally;
+mod truth_file;
+mod verdict;
+mod verdict_file;
+
+use std::ffi::OsString;
+
+use clap::{ColorChoice, CommandFactory, FromArgMatches};
+
+use crate::catalog::CatalogError;
+use crate::config::ConfigError;
+use crate::runner::RunError;
+use crate::store::StoreError;
+
+use args::{Cli, Command};
+use context::Context;
+pub use exit::ExitCode;
+use exit::Refusal;
+use manifest_file::RefusedManifest;
+use truth_file::TruthFileError;
+use verdict_file::VerdictFileError;
+
+/// Reads the command line, does what it says, and tells the exit code. Errors are shown here, once.
+pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
+    let args: Vec<OsString> = args.into_iter().collect();
+    let cli = match parse(&args) {
+        Ok(cli) => cli,
+        Err(error) => {
+            // A closed stream is all that can go wrong here, and then nobody reads the reason.
+            let _ = error.print();
+            return match error.exit_code() {
+                0 => ExitCode::Done,
+                _ => ExitCode::Usage,
+            };
+        }
+    };
+    let context = Context::new(cli.global, args.first());
+    match start(cli.command, &context) {
+        Ok(code) => code,
+        Err(error) => conclude(&error, &context),
+    }
+}
+
+fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
+    let command = Cli::command().color(help_color(args));
+    Cli::from_arg_matches(&command.try_get_matches_from(args)?)
+}
+
+/// Help and usage errors come before the flags are read, so `--color` is looked for by hand.
+fn help_color(args: &[OsString]) -> ColorChoice {
+    let mut words = args.iter().filter_map(|arg| arg.to_str());
+    while let Some(word) = words.next() {
+        let value = match word {
+            "--" => break,
+            "--color" => words.next(),
+            _ => word.strip_prefix("--color="),
+        };
+        match value {
+            Some("never") => return ColorChoice::Never,
+            Some("always") => return ColorChoice::Always,
+            Some(_) | None => {}
+        }
+    }
+    ColorChoice::Auto
+}
+
+fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
+    logging::start(&context.global, &context.screen)?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()?;
+    let result = runtime.block_on(dispatch(command, context));
+    runtime.shutdown_background();
+    result
+}
+
+async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
+    match command {
+        Command::Demo(args) => demo::demo(args, context).await,
+        Command::Import(args) => import::import(args, context).await,
+        Command::Run(args) => run::run(args, context).await,
+        Command::Status(args) => status::status(args, context).await,
+        Command::Show(args) => show::show(args, context).await,
+        Command::Retry(args) => retry::retry(args, context).await,
+        Command::Verdict(command) => verdict::verdict(command, context).await,
+        Command::Report(args) => report::report(args, context).await,
+        Command::Export(args) => export::export(args, context).await,
+        Command::Sheet(args) => sheet::sheet(args, context).await,
+        Command::Config(command) => config::config(&command, context),
+        Command::Completions(args) => completions::completions(args, context),
+        Command::Man(args) => man::man(&args, context),
+    }
+}
+
+/// Shows an error with a way on, and finds its exit code.
+fn conclude(error: &anyhow::Error, context: &Context) -> ExitCode {
+    if is_closed_pipe(error) {
+        return ExitCode::Done;
+    }
+    let code = code_of(error);
+    context.talk.error(&sentence(error), code);
+    match code {
+        ExitCode::NoProject => {
+            context.talk.next(&context.command("import pairs.csv"));
+            context.talk.next(&context.program_with("demo"));
+        }
+        ExitCode::InUse => context.talk.next(&context.command("status --watch")),
+        ExitCode::Done
+        | ExitCode::Error
+        | ExitCode::Usage
+        | ExitCode::SomeFailed
+        | ExitCode::NothingSelected
+        | ExitCode::Damaged
+        | ExitCode::BelowFailUnder
+        | ExitCode::Incomplete
+        | ExitCode::Stopped => {}
+    }
+    code
+}
+
+/// The chain of causes as one sentence; a cause that its parent already quotes is not said twice.
+fn sentence(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain() {
+        let part = cause.to_string();
+        if text.is_empty() {
+            text = part;
+        } else if !text.contains(&part) {
+            text = format!("{text}: {part}");
+        }
+    }
+    text
+}
+
+fn code_of(error: &anyhow::Error) -> ExitCode {
+    for cause in error.chain() {
+        if let Some(refusal) = cause.downcast_ref::<Refusal>() {
+            return refusal.code();
+        }
+        if is_refused_text(cause) {
+            return ExitCode::Usage;
+        }
+        match cause.downcast_ref::<RunError>() {
+            Some(RunError::InUse(_)) => return ExitCode::InUse,
+            Some(RunError::NoSuchPair(_)) => return ExitCode::NothingSelected,
+            Some(_) | None => {}
+        }
+        match cause.downcast_ref::<CatalogError>() {
+            Some(CatalogError::Missing(_)) => return ExitCode::NoProject,
+            Some(
+                CatalogError::UnknownPair(_)
+                | CatalogError::NoResult(_)
+                | CatalogError::NoMetricResult(..)
+                | CatalogError::NothingToUndo(_),
+            ) => return ExitCode::NothingSelected,
+            Some(_) | None => {}
+        }
+        if matches!(
+            cause.downcast_ref::<StoreError>(),
+            Some(StoreError::NoProject(_))
+        ) {
+            return ExitCode::NoProject;
+        }
+    }
+    ExitCode::Error
+}
+
+/// Settings and lists that are refused as they stand.
+fn is_refused_text(cause: &(dyn std::error::Error + 'static)) -> bool {
+    cause.is::<ConfigError>()
+        || cause.is::<RefusedManifest>()
+        || cause.is::<TruthFileError>()
+        || cause.is::<VerdictFileError>()
+}
+
+/// `mocban report | head` is no error.
+fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause
+            .downcast_ref::<std::io::Error>()
+            .is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ColorChoice, ExitCode, Refusal, code_of, help_color, sentence};
+
+    #[test]
+    fn color_is_found_before_the_command_line_is_read() {
+        let args = |text: &str| text.split(' ').map(Into::into).collect::<Vec<_>>();
+        assert_eq!(
+            help_color(&args("mocban --color never run")),
+            ColorChoice::Never
+        );
+        assert_eq!(
+            help_color(&args("mocban run --color=always")),
+            ColorChoice::Always
+        );
+        assert_eq!(
+            help_color(&args("mocban -- --color never")),
+            ColorChoice::Auto
+        );
+    }
+
+    #[test]
+    fn refusal_keeps_its_code_under_context() {
+        let error =
+            anyhow::Error::new(Refusal::NothingSelected("no pair".to_owned())).context("run");
+        assert_eq!(code_of(&error), ExitCode::NothingSelected);
+        assert_eq!(sentence(&error), "run: no pair");
+    }
+
+    #[test]
+    fn cause_is_not_said_twice() {
+        let io = std::io::Error::other("disk on fire");
+        let error = anyhow::Error::new(io).context("a.png: disk on fire");
+        assert_eq!(sentence(&error), "a.png: disk on fire");
+    }
+}

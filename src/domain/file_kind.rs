@@ -30,25 +30,25 @@ const SIGNATURES: [(&[u8], FileKind); 28] = [
     (b"MM\0*", FileKind::Tiff),
     (b"II+\0", FileKind::Tiff),
     (b"MM\0+", FileKind::Tiff),
-    (b"GIF8", FileKind::OtherImage("GIF image")),
-    (b"BM", FileKind::OtherImage("BMP image")),
-    (b"8BPS", FileKind::OtherImage("Photoshop image")),
-    (b"\0\0\0\x0cjP  ", FileKind::OtherImage("JPEG 2000 image")),
+    (b"GIF8", FileKind::OtherImage("a GIF image")),
+    (b"BM", FileKind::OtherImage("a BMP image")),
+    (b"8BPS", FileKind::OtherImage("a Photoshop image")),
+    (b"\0\0\0\x0cjP  ", FileKind::OtherImage("a JPEG 2000 image")),
     (b"ply\n", FileKind::Ply),
     (b"ply\r", FileKind::Ply),
-    (b"glTF", FileKind::OtherMesh("binary glTF scene")),
-    (b"OFF\n", FileKind::OtherMesh("OFF mesh")),
-    (b"OFF\r", FileKind::OtherMesh("OFF mesh")),
-    (b"Kaydara FBX", FileKind::OtherMesh("FBX scene")),
-    (b"#VRML", FileKind::OtherMesh("VRML scene")),
-    (b"# .PCD", FileKind::OtherMesh("PCD point cloud")),
-    (b"LASF", FileKind::OtherMesh("LAS point cloud")),
-    (b"%PDF", FileKind::Other("PDF document")),
-    (b"PK\x03\x04", FileKind::Other("ZIP archive")),
-    (b"\x1f\x8b", FileKind::Other("gzip archive")),
-    (b"7z\xbc\xaf", FileKind::Other("7-Zip archive")),
-    (b"Rar!", FileKind::Other("RAR archive")),
-    (b"SQLite format 3", FileKind::Other("SQLite database")),
+    (b"glTF", FileKind::OtherMesh("a binary glTF scene")),
+    (b"OFF\n", FileKind::OtherMesh("an OFF mesh")),
+    (b"OFF\r", FileKind::OtherMesh("an OFF mesh")),
+    (b"Kaydara FBX", FileKind::OtherMesh("an FBX scene")),
+    (b"#VRML", FileKind::OtherMesh("a VRML scene")),
+    (b"# .PCD", FileKind::OtherMesh("a PCD point cloud")),
+    (b"LASF", FileKind::OtherMesh("a LAS point cloud")),
+    (b"%PDF", FileKind::Other("a PDF document")),
+    (b"PK\x03\x04", FileKind::Other("a ZIP archive")),
+    (b"\x1f\x8b", FileKind::Other("a gzip archive")),
+    (b"7z\xbc\xaf", FileKind::Other("a 7-Zip archive")),
+    (b"Rar!", FileKind::Other("a RAR archive")),
+    (b"SQLite format 3", FileKind::Other("an SQLite database")),
     (b"\xff\xfe", FileKind::Other("UTF-16 text")),
     (b"\xfe\xff", FileKind::Other("UTF-16 text")),
     (b"<", FileKind::Other("XML or HTML text")),
@@ -58,15 +58,15 @@ impl FileKind {
     /// Kind of a file that begins with these bytes.
     pub fn of(bytes: &[u8]) -> Self {
         if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
-            return Self::OtherImage("WebP image");
+            return Self::OtherImage("a WebP image");
         }
         if let Some(brand @ (b"avif" | b"heic" | b"mif1" | b"heix")) =
             bytes.get(8..12).filter(|_| &bytes[4..8] == b"ftyp")
         {
             return Self::OtherImage(if brand == b"avif" {
-                "AVIF image"
+                "an AVIF image"
             } else {
-                "HEIC image"
+                "a HEIC image"
             });
         }
         SIGNATURES
@@ -85,17 +85,24 @@ impl FileKind {
         }
     }
 
-    /// The kind in words.
+    /// The kind in words, to stand after "the file is".
     pub const fn description(self) -> &'static str {
         match self {
-            Self::Png => "PNG image",
-            Self::Jpeg => "JPEG image",
-            Self::Tiff => "TIFF image",
-            Self::Ply => "PLY mesh",
+            Self::Png => "a PNG image",
+            Self::Jpeg => "a JPEG image",
+            Self::Tiff => "a TIFF image",
+            Self::Ply => "a PLY mesh",
             Self::OtherImage(name) | Self::OtherMesh(name) | Self::Other(name) => name,
             Self::Text => "text",
             Self::Binary => "binary data of unknown kind",
         }
+    }
+
+    /// The kind in words without an article.
+    pub fn name(self) -> &'static str {
+        let words = self.description();
+        let bare = words.strip_prefix("a ").or(words.strip_prefix("an "));
+        bare.unwrap_or(words)
     }
 }
 
@@ -116,11 +123,11 @@ mod tests {
         assert_eq!(FileKind::of(b"MM\0*rest"), FileKind::Tiff);
         assert_eq!(
             FileKind::of(b"RIFF\0\0\0\0WEBPVP8 "),
-            FileKind::OtherImage("WebP image")
+            FileKind::OtherImage("a WebP image")
         );
         assert_eq!(
             FileKind::of(b"\0\0\0\x1cftypheic"),
-            FileKind::OtherImage("HEIC image")
+            FileKind::OtherImage("a HEIC image")
         );
         assert_eq!(FileKind::of(b"hello there"), FileKind::Text);
         assert_eq!(FileKind::of(&[0, 1, 2]), FileKind::Binary);

@@ -1,9 +1,11 @@
 //! Nouns of the project: small values without files, SQL, async or image buffers.
 
+mod artifact;
 mod failure;
 mod file_kind;
 mod hash;
 mod ids;
+mod job;
 mod metric;
 mod outcome;
 mod stage;
@@ -11,10 +13,12 @@ mod transform;
 mod unit;
 mod verdict;
 
+pub use artifact::{ArtifactRef, ArtifactSet};
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};
 pub use ids::{PairId, PairName, PairNameError, WorkerId};
+pub use job::{CRASH_LIMIT, Event, JobState, JobStatus, Refused, transition};
 pub use metric::ThresholdMetric;
 pub use outcome::{
     Bow, DepthOutcome, DepthScale, FitOutcome, MetricOutcome, NormalizeOutcome, Pose,

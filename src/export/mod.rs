@@ -1,1 +1,14 @@
-//! Aligned pairs for other tools.
+//! Aligned pairs and pictures for other tools and for people.
+
+mod files;
+mod folder;
+mod jsonl;
+mod line;
+pub mod pictures;
+mod sheet;
+
+pub use files::Files;
+pub use folder::FolderError;
+pub use jsonl::{ExportError, ExportSummary, JsonlOptions, to_jsonl};
+pub use line::{Hashes, Line, LineStatus, Maps, Numbers};
+pub use sheet::{Sheet, SheetError, SheetOptions, SheetOrder, draw_sheet};

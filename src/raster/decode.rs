@@ -43,10 +43,10 @@ pub enum DecodeError {
         height: u32,
     },
     /// The file ends before the image does.
-    #[error("the {0} is truncated: it ends before the image does")]
+    #[error("the {} is truncated: it ends before the image does", .0.name())]
     Truncated(FileKind),
     /// The file breaks its own format, or uses a part of it that is not read.
-    #[error("the {kind} cannot be decoded: {reason}")]
+    #[error("the {} cannot be decoded: {reason}", .kind.name())]
     Broken {
         /// What the file claims to be.
         kind: FileKind,
@@ -390,7 +390,7 @@ mod tests {
         let error = decode(b"GIF89a......", &LIMITS).expect_err("not read");
         assert_eq!(
             error.to_string(),
-            "the file is GIF image; PNG, JPEG and TIFF images are read"
+            "the file is a GIF image; PNG, JPEG and TIFF images are read"
         );
     }
 

@@ -1,1 +1,25 @@
-//! Catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX.
+//! From the catalog to a report as plain data, and from there to text, JSON, CSV, Markdown and LaTeX.
+//!
+//! [`gather()`] streams the pairs through a [`Tally`]; everything else is pure.
+
+pub mod aligned;
+mod compare;
+#[cfg(test)]
+pub(crate) mod fixture;
+pub mod gate;
+mod gather;
+mod model;
+mod render;
+mod standing;
+pub mod stats;
+mod tally;
+pub mod truth;
+mod warnings;
+
+pub use gather::{GatherError, PAGE, finding, gather, with_truth};
+pub use model::{
+    Basis, Comparison, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock,
+};
+pub use render::{Format, render};
+pub use standing::Standing;
+pub use tally::{Tally, TruthFinding};

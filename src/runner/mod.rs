@@ -1,1 +1,266 @@
-//! The run: workers, policy, execution of one pair, events.
+//! The run: workers that lease pairs, run the stages that are left, and checkpoint after each.
+//!
+//! [`run`] prepares (lock, dead workers' leases, changed inputs and settings), then `dispatch` keeps the slots filled,
+//! `worker` takes one pair through its stages, and `execute` is the one bridge to the threads that compute.
+
+mod breakpoint;
+mod clock;
+mod dispatch;
+mod events;
+mod execute;
+mod hand;
+mod options;
+mod outputs;
+mod pipeline;
+mod policy;
+mod refresh;
+mod steps;
+mod stop;
+#[cfg(test)]
+mod tests;
+mod worker;
+
+use std::sync::Arc;
+
+use tokio::sync::mpsc;
+
+pub use events::{RunEvent, RunSummary};
+pub use options::{Rerun, RunOptions};
+pub use stop::{Stop, StopLevel};
+
+use crate::catalog::{
+    Again, Catalog, CatalogError, Dead, PairSelection, Plan, Recipes, WorkerInfo,
+};
+use crate::domain::{PairName, WorkerId};
+use crate::stages::Settings;
+use crate::store::{ArtifactError, LockError, Project, RunLock, StoreError};
+use clock::Clock;
+use dispatch::{Dispatch, Tally};
+use pipeline::Pipeline;
+use steps::Steps;
+use worker::Shared;
+
+/// Why a run could not go on. Pairs that fail are no error: they are in the summary.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// Another process runs this project.
+    #[error(transparent)]
+    InUse(LockError),
+    /// The lock files cannot be used.
+    #[error(transparent)]
+    Lock(LockError),
+    /// Pairs were named that are not there.
+    #[error("there is no pair {}", .0.iter().map(PairName::as_str).collect::<Vec<_>>().join(", "))]
+    NoSuchPair(Vec<PairName>),
+    /// The catalog refused.
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    /// The project's directory refused.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// An artifact could not be written.
+    #[error(transparent)]
+    Artifact(#[from] ArtifactError),
+}
+
+impl From<LockError> for RunError {
+    fn from(error: LockError) -> Self {
+        match error {
+            LockError::InUse { .. } => Self::InUse(error),
+            LockError::Io { .. } => Self::Lock(error),
+        }
+    }
+}
+
+/// The recipes of these settings.
+pub fn recipes(settings: &Settings) -> Recipes {
+    Recipes::new(|stage| settings.recipe_fields(stage))
+}
+
+/// What [`run`] would do, for `--dry-run`. Looks at the input files first, and notes what they are now.
+///
+/// # Errors
+/// When a named pair is not there, or catalog or files refuse.
+pub async fn plan(
+    project: &Project,
+    catalog: &Catalog,
+    settings: &Settings,
+    options: &RunOptions,
+) -> Result<Plan, RunError> {
+    let among = selection(catalog, options).await?;
+    refresh::inputs(project, catalog, among.as_ref()).await?;
+    let names = options.pairs.as_deref();
+    Ok(catalog
+        .plan(&recipes(settings), names, options.again())
+        .await?)
+}
+
+/// Runs what is left to run. Events go to `on_event` as they happen, from this future.
+///
+/// # Errors
+/// When the project is in use, a named pair is not there, or catalog or disk refuse for good.
+pub async fn run(
+    project: &Project,
+    catalog: &Catalog,
+    settings: &Settings,
+    options: &RunOptions,
+    stop: &Stop,
+    on_event: impl FnMut(RunEvent) + Send,
+) -> Result<RunSummary, RunError> {
+    let steps = Arc::new(Pipeline {
+        project: project.clone(),
+        settings: settings.clone(),
+        mesh_limits: options.mesh_limits,
+        image_limits: options.image_limits,
+    });
+    let recipes = recipes(settings);
+    run_steps(project, catalog, &recipes, steps, options, stop, on_event).await
+}
+
+/// [`run`] with any steps.
+async fn run_steps(
+    project: &Project,
+    catalog: &Catalog,
+    recipes: &Recipes,
+    steps: Arc<dyn Steps>,
+    options: &RunOptions,
+    stop: &Stop,
+    mut on_event: impl FnMut(RunEvent) + Send,
+) -> Result<RunSummary, RunError> {
+    let clock = Clock::start();
+    let among = selection(catalog, options).await?;
+    let mut lock = RunLock::acquire(project, options.join)?;
+    let worker = catalog.register_worker(this_process(), clock.now()).await?;
+    let rescued = take_over(project, catalog, &mut lock, worker, clock).await?;
+    refresh::inputs(project, catalog, among.as_ref()).await?;
+    let recipe_ids = catalog.register_recipes(recipes).await?;
+    catalog
+        .send_back(recipes, among.as_ref(), options.again())
+        .await?;
+    catalog
+        .stage_due(clock.now(), policy::longest_backoff_ms())
+        .await?;
+    let (events, mut received) = mpsc::unbounded_channel();
+    let shared = Arc::new(Shared {
+        catalog: catalog.clone(),
+        project: project.clone(),
+        steps,
+        recipes: recipe_ids,
+        clock,
+        stop: stop.clone(),
+        drain: Stop::new(),
+        until: options.until,
+        stage_limit: options.stage_limit,
+        events,
+    });
+    let left = catalog.work_left(options.until, among.as_ref()).await?;
+    on_event(RunEvent::Started {
+        pairs: left.pairs,
+        stages: left.by_stage.iter().sum(),
+        by_stage: left.by_stage,
+        workers: options.workers,
+    });
+    if rescued > 0 {
+        on_event(RunEvent::Rescued { pairs: rescued });
+    }
+    let mut dispatch = Dispatch::new(
+        shared,
+        worker,
+        options.workers,
+        among.clone(),
+        options.max_failures,
+    );
+    let outcome = dispatch.run(&mut received, &mut on_event).await;
+    // Said also after an error, so that this worker's end is not taken for a crash.
+    let ended = catalog.end_worker(worker, clock.now()).await;
+    let tally = outcome?;
+    ended?;
+    summary(
+        catalog,
+        recipes,
+        options,
+        among.as_ref(),
+        &tally,
+        clock,
+        stop,
+    )
+    .await
+}
+
+/// Brings back what a dead process left, where the lock proves that no other lives.
+async fn take_over(
+    project: &Project,
+    catalog: &Catalog,
+    lock: &mut RunLock,
+    me: WorkerId,
+    clock: Clock,
+) -> Result<u64, RunError> {
+    if !lock.is_alone() {
+        return Ok(0);
+    }
+    let rescued = catalog.rescue(Dead::AllBut(me), clock.now()).await?;
+    project.clear_temporary()?;
+    lock.admit()?;
+    Ok(rescued.ready)
+}
+
+async fn selection(
+    catalog: &Catalog,
+    options: &RunOptions,
+) -> Result<Option<PairSelection>, RunError> {
+    let Some(names) = &options.pairs else {
+        return Ok(None);
+    };
+    let unknown = catalog.unknown_names(names).await?;
+    if !unknown.is_empty() {
+        return Err(RunError::NoSuchPair(unknown));
+    }
+    Ok(Some(catalog.select(names).await?))
+}
+
+async fn summary(
+    catalog: &Catalog,
+    recipes: &Recipes,
+    options: &RunOptions,
+    among: Option<&PairSelection>,
+    tally: &Tally,
+    clock: Clock,
+    stop: &Stop,
+) -> Result<RunSummary, RunError> {
+    let left = catalog.work_left(options.until, among).await?;
+    Ok(RunSummary {
+        done: tally.done,
+        failed: tally.failed,
+        stages: tally.stages,
+        left: left.pairs,
+        failed_in_all: left.quarantined,
+        stopped: left.pairs > 0 && stop.level() > StopLevel::Go,
+        too_many_failures: tally.too_many_failures,
+        elapsed_ms: clock.elapsed_ms(),
+        status: catalog.status(recipes).await?,
+    })
+}
+
+/// This process as the catalog knows it.
+fn this_process() -> WorkerInfo {
+    let boot_id = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok();
+    WorkerInfo {
+        host: rustix::system::uname()
+            .nodename()
+            .to_string_lossy()
+            .into_owned(),
+        pid: std::process::id(),
+        boot_id: boot_id.map(|id| id.trim().to_owned()),
+    }
+}
+
+impl RunOptions {
+    /// What to take up besides what changed.
+    fn again(&self) -> Again {
+        match self.rerun {
+            None | Some(Rerun::Stale) => Again::Changed,
+            Some(Rerun::Failed) => Again::Failed,
+            Some(Rerun::All) => Again::All(self.from),
+        }
+    }
+}

@@ -1,0 +1,210 @@
+//! Storing a finished stage: the job's step and the results, fenced by the lease.
+
+use std::collections::BTreeSet;
+
+use serde_json::{Value, json};
+use sqlx::SqliteConnection;
+
+use super::batch::Request;
+use super::claim::kept_pairs;
+use super::counters::{DONE, Deltas, cursor};
+use super::lease::{InputsSeen, Kept, Lease, MetricResult, StageDone};
+use super::{Catalog, Result, rows};
+use crate::domain::JobStatus;
+
+/// The job's step; only where the lease still holds.
+pub(super) const STEP: &str = "
+UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
+    worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
+    attempt = 1, crashes = 0
+FROM json_each(?1) AS item
+WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
+    AND job.epoch = item.value ->> 'epoch' AND job.status = 1
+RETURNING pair";
+
+const RESULT: &str = "
+INSERT INTO stage_result
+    (pair, stage, recipe, mesh_hash, print_hash, facts, outcome, files, result_hash, ms, worker, at)
+SELECT value ->> 'pair', value ->> 'stage', value ->> 'recipe', unhex(value ->> 'mesh_hash'),
+    unhex(value ->> 'print_hash'), value ->> 'facts', value ->> 'outcome', value ->> 'files',
+    unhex(value ->> 'result_hash'), value ->> 'ms', value ->> 'worker', value ->> 'at'
+FROM json_each(?1) WHERE true
+ON CONFLICT (pair, stage) DO UPDATE SET recipe = excluded.recipe, mesh_hash = excluded.mesh_hash,
+    print_hash = excluded.print_hash, facts = excluded.facts, outcome = excluded.outcome, files = excluded.files,
+    result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
+
+const METRICS: &str = "
+INSERT INTO metric_result
+    (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
+     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, at_bound, result_hash)
+SELECT value ->> 'pair', value ->> '$.row.metric', value ->> '$.row.threshold_level',
+    value ->> '$.row.threshold_depth', value -> '$.row.print_from_depth', value ->> '$.row.angle_deg',
+    value ->> '$.row.scale', value ->> '$.row.shift_px[0]', value ->> '$.row.shift_px[1]',
+    value ->> '$.row.scores.ssim', value ->> '$.row.scores.nl_ssim', value ->> '$.row.scores.iou',
+    value ->> '$.row.scores.iou_box', value ->> '$.row.scores.dice', value ->> '$.row.scores.density_print',
+    value ->> '$.row.scores.density_depth', value ->> '$.row.margin', value ->> '$.row.at_bound',
+    unhex(value ->> 'result_hash')
+FROM json_each(?1) WHERE true
+ON CONFLICT (pair, metric) DO UPDATE SET threshold_level = excluded.threshold_level,
+    threshold_depth = excluded.threshold_depth, print_from_depth = excluded.print_from_depth,
+    angle_deg = excluded.angle_deg, scale = excluded.scale, shift_x_px = excluded.shift_x_px,
+    shift_y_px = excluded.shift_y_px, ssim = excluded.ssim, nl_ssim = excluded.nl_ssim, iou = excluded.iou,
+    iou_box = excluded.iou_box, dice = excluded.dice, density_print = excluded.density_print,
+    density_depth = excluded.density_depth, margin = excluded.margin, at_bound = excluded.at_bound,
+    result_hash = excluded.result_hash";
+
+const ATTEMPT: &str = "
+INSERT INTO attempt (pair, stage, worker, ms, at)
+SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'ms', value ->> 'at' FROM json_each(?1)";
+
+const SEEN: &str = "
+UPDATE pair SET mesh_hash = coalesce(unhex(item.value ->> 'mesh_hash'), mesh_hash),
+    mesh_stat = coalesce(item.value ->> 'mesh_stat', mesh_stat),
+    print_hash = coalesce(unhex(item.value ->> 'print_hash'), print_hash),
+    print_stat = coalesce(item.value ->> 'print_stat', print_stat)
+FROM json_each(?1) AS item WHERE pair.id = item.value ->> 'pair'";
+
+const CLEAR_FAILURE: &str =
+    "DELETE FROM failure WHERE pair IN (SELECT value ->> 'pair' FROM json_each(?1))";
+
+/// Stores what is done under leases that still hold; says which did.
+pub(super) async fn apply(
+    conn: &mut SqliteConnection,
+    done: &[&(Lease, StageDone)],
+    deltas: &mut Deltas,
+) -> Result<Vec<bool>> {
+    if done.is_empty() {
+        return Ok(Vec::new());
+    }
+    let steps = rows::array(done.iter().map(|item| step(item)));
+    let kept = kept_pairs(conn, STEP, &steps).await?;
+    let stored: Vec<_> = done
+        .iter()
+        .filter(|item| kept.contains(&item.0.pair.0))
+        .collect();
+    if !stored.is_empty() {
+        let results = rows::array(stored.iter().map(|item| result(item))).to_string();
+        for sql in [RESULT, ATTEMPT, CLEAR_FAILURE] {
+            sqlx::query(sql).bind(&results).execute(&mut *conn).await?;
+        }
+        let metrics = rows::array(stored.iter().flat_map(|item| metrics(item)));
+        run_over(conn, METRICS, &metrics).await?;
+        let seen = stored.iter().map(|(lease, done)| (lease, &done.inputs));
+        store_seen(conn, seen).await?;
+    }
+    count(&stored, deltas);
+    Ok(answer(done, &kept))
+}
+
+fn step((lease, done): &(Lease, StageDone)) -> Value {
+    let finished = done.stage.next().is_none();
+    let status = if finished {
+        JobStatus::Done
+    } else {
+        JobStatus::Leased
+    };
+    json!({
+        "pair": lease.pair.0, "worker": lease.worker.0, "epoch": lease.epoch,
+        "next": done.stage.index() + 1, "status": status.code(),
+        "deadline": (!finished).then_some(done.next_deadline),
+    })
+}
+
+fn result((lease, done): &(Lease, StageDone)) -> Value {
+    json!({
+        "pair": lease.pair.0, "stage": done.stage.index(), "recipe": done.recipe.0,
+        "mesh_hash": done.mesh_hash, "print_hash": done.print_hash, "facts": done.facts,
+        "outcome": done.outcome, "files": json!(done.files).to_string(), "result_hash": done.result_hash,
+        "ms": done.ms, "worker": lease.worker.0, "at": done.at,
+    })
+}
+
+fn metrics((lease, done): &(Lease, StageDone)) -> impl Iterator<Item = Value> {
+    done.metrics.iter().map(
+        |MetricResult {
+             outcome,
+             result_hash,
+         }| json!({ "pair": lease.pair.0, "row": outcome, "result_hash": result_hash }),
+    )
+}
+
+/// Stores what is known of the input files of some pairs.
+pub(super) async fn store_seen<'a>(
+    conn: &mut SqliteConnection,
+    seen: impl Iterator<Item = (&'a Lease, &'a InputsSeen)>,
+) -> Result<()> {
+    let items = seen.filter(|(_, seen)| seen.mesh.is_some() || seen.print.is_some());
+    let items = rows::array(items.map(|(lease, seen)| seen_json(lease.pair.0, seen)));
+    run_over(conn, SEEN, &items).await
+}
+
+/// One item of [`SEEN`].
+pub(super) fn seen_json(pair: i64, seen: &InputsSeen) -> Value {
+    let hash = |input: &Option<super::lease::InputSeen>| input.as_ref().map(|seen| seen.hash);
+    let stat =
+        |input: &Option<super::lease::InputSeen>| input.as_ref().map(|seen| seen.stat.clone());
+    json!({
+        "pair": pair, "mesh_hash": hash(&seen.mesh), "mesh_stat": stat(&seen.mesh),
+        "print_hash": hash(&seen.print), "print_stat": stat(&seen.print),
+    })
+}
+
+/// Stores what is known of input files.
+pub(super) async fn run_seen(conn: &mut SqliteConnection, items: &Value) -> Result<()> {
+    run_over(conn, SEEN, items).await
+}
+
+async fn run_over(conn: &mut SqliteConnection, sql: &'static str, items: &Value) -> Result<()> {
+    if items.as_array().is_some_and(|items| !items.is_empty()) {
+        sqlx::query(sql)
+            .bind(items.to_string())
+            .execute(conn)
+            .await?;
+    }
+    Ok(())
+}
+
+fn count(stored: &[&&(Lease, StageDone)], deltas: &mut Deltas) {
+    for (lease, done) in stored.iter().map(|item| &***item) {
+        let to = match done.stage.next() {
+            Some(next) => (cursor(next), JobStatus::Leased),
+            None => (DONE, JobStatus::Done),
+        };
+        deltas.moved((cursor(lease.cursor), JobStatus::Leased), to);
+    }
+}
+
+fn answer(done: &[&(Lease, StageDone)], kept: &BTreeSet<i64>) -> Vec<bool> {
+    done.iter()
+        .map(|item| kept.contains(&item.0.pair.0))
+        .collect()
+}
+
+impl Catalog {
+    /// Stores a finished stage in one transaction and moves the job on. The artifacts must be on disk already.
+    ///
+    /// # Errors
+    /// When the database refuses; then nothing is stored and the lease stands until it is rescued.
+    pub async fn checkpoint(&self, lease: Lease, done: StageDone) -> Result<Kept> {
+        let next = done.stage.next();
+        let moved = next.map(|cursor| Lease {
+            cursor,
+            attempt: 1,
+            crashes: 0,
+            ..copy(&lease)
+        });
+        let kept = self
+            .grouped(|reply| Request::Checkpoint(Box::new((lease, done)), reply))
+            .await?;
+        Ok(match (kept, moved) {
+            (false, _) => Kept::Lost,
+            (true, Some(lease)) => Kept::Lease(lease),
+            (true, None) => Kept::Done,
+        })
+    }
+}
+
+/// The lease as it will be; the one given in is spent by the request.
+const fn copy(lease: &Lease) -> Lease {
+    Lease { ..*lease }
+}

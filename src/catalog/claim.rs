@@ -1,0 +1,210 @@
+//! Leases: taking them, keeping them alive, giving them back.
+
+use serde_json::{Value, json};
+use sqlx::{Row as _, SqliteConnection};
+use tokio::sync::oneshot;
+
+use super::batch::{Beat, Reply, Request};
+use super::counters::{Deltas, cursor};
+use super::lease::Lease;
+use super::writer::Message;
+use super::{Catalog, CatalogError, Result, rows};
+use crate::domain::{JobStatus, PairId, Stage, UnixMillis, WorkerId};
+
+/// What a worker wants to take.
+#[derive(Debug, Clone)]
+pub struct ClaimRequest {
+    /// Who takes it.
+    pub worker: WorkerId,
+    /// At most so many.
+    pub slots: usize,
+    /// Only pairs whose next stage is this one or an earlier one.
+    pub until: Stage,
+    /// Pairs that must run with nothing beside them, or the others.
+    pub alone: bool,
+    /// Only these; `None` for all.
+    pub among: Option<PairSelection>,
+    /// When the first stage should be over.
+    pub deadline: UnixMillis,
+}
+
+/// Some pairs of the catalog.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PairSelection {
+    /// Numbers as a JSON array, for `json_each`.
+    pub(super) json: String,
+    /// How many.
+    pub(super) len: usize,
+}
+
+impl PairSelection {
+    /// How many pairs.
+    pub const fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether it is none at all.
+    pub const fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+}
+
+/// Takes the first ready jobs in the order of the index `job_ready`.
+pub(super) const CLAIM: &str = "
+UPDATE job SET status = 1, worker = ?1, deadline = ?2, epoch = epoch + 1, attempt = attempt + 1
+WHERE pair IN (
+    SELECT pair FROM job WHERE status = 0 AND stage <= ?3 AND mem_class = ?4
+    ORDER BY prio, stage DESC, pair LIMIT ?5)
+RETURNING pair, stage, attempt, epoch, crashes, mem_class";
+
+/// The same among some pairs only.
+pub(super) const CLAIM_AMONG: &str = "
+UPDATE job SET status = 1, worker = ?1, deadline = ?2, epoch = epoch + 1, attempt = attempt + 1
+WHERE pair IN (
+    SELECT j.pair FROM json_each(?6) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+    WHERE j.status = 0 AND j.stage <= ?3 AND j.mem_class = ?4
+    ORDER BY j.prio, j.stage DESC, j.pair LIMIT ?5)
+RETURNING pair, stage, attempt, epoch, crashes, mem_class";
+
+/// Gives leases back as if they had never been taken.
+pub(super) const RELEASE: &str = "
+UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = max(attempt - 1, 0)
+FROM json_each(?1) AS item
+WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.epoch = item.value ->> 2
+    AND job.status = 1
+RETURNING pair";
+
+/// A sign of life; a worker that has ended gives none.
+pub(super) const BEAT: &str = "UPDATE worker SET beat = ?2 WHERE id = ?1 AND ended IS NULL";
+
+pub(super) async fn beat(conn: &mut SqliteConnection, beat: Beat) -> Result<()> {
+    sqlx::query(BEAT)
+        .bind(beat.worker.0)
+        .bind(beat.now)
+        .execute(conn)
+        .await?;
+    Ok(())
+}
+
+pub(super) async fn claim(
+    conn: &mut SqliteConnection,
+    request: &ClaimRequest,
+    deltas: &mut Deltas,
+) -> Result<Vec<Lease>> {
+    let sql = if request.among.is_some() {
+        CLAIM_AMONG
+    } else {
+        CLAIM
+    };
+    let mut query = sqlx::query(sql)
+        .bind(request.worker.0)
+        .bind(request.deadline)
+        .bind(cursor(request.until))
+        .bind(i64::from(request.alone))
+        .bind(request.slots as i64);
+    if let Some(among) = &request.among {
+        query = query.bind(&among.json);
+    }
+    let taken = query.fetch_all(conn).await?;
+    let mut leases = taken
+        .iter()
+        .map(|row| lease(row, request.worker))
+        .collect::<Result<Vec<_>>>()?;
+    // RETURNING promises no order.
+    leases.sort_by_key(|lease| (std::cmp::Reverse(lease.cursor), lease.pair));
+    for lease in &leases {
+        let at = cursor(lease.cursor);
+        deltas.moved((at, JobStatus::Ready), (at, JobStatus::Leased));
+    }
+    Ok(leases)
+}
+
+fn lease(row: &sqlx::sqlite::SqliteRow, worker: WorkerId) -> Result<Lease> {
+    Ok(Lease {
+        pair: PairId(row.try_get("pair")?),
+        worker,
+        epoch: row.try_get("epoch")?,
+        cursor: rows::stage(row.try_get("stage")?)?,
+        attempt: row.try_get("attempt")?,
+        crashes: row.try_get("crashes")?,
+        alone: row.try_get::<i64, _>("mem_class")? == 1,
+    })
+}
+
+pub(super) async fn release(
+    conn: &mut SqliteConnection,
+    leases: &[&Lease],
+    deltas: &mut Deltas,
+) -> Result<Vec<bool>> {
+    if leases.is_empty() {
+        return Ok(Vec::new());
+    }
+    let items = rows::array(leases.iter().map(|lease| fence(lease)));
+    let kept = kept_pairs(conn, RELEASE, &items).await?;
+    Ok(leases
+        .iter()
+        .map(|lease| {
+            let kept = kept.contains(&lease.pair.0);
+            if kept {
+                let at = cursor(lease.cursor);
+                deltas.moved((at, JobStatus::Leased), (at, JobStatus::Ready));
+            }
+            kept
+        })
+        .collect())
+}
+
+/// What a write under a lease must match: pair, worker, epoch.
+fn fence(lease: &Lease) -> Value {
+    json!([lease.pair.0, lease.worker.0, lease.epoch])
+}
+
+/// Runs a fenced update over items; gives the pairs whose lease still held.
+pub(super) async fn kept_pairs(
+    conn: &mut SqliteConnection,
+    sql: &'static str,
+    items: &Value,
+) -> Result<std::collections::BTreeSet<i64>> {
+    let kept = sqlx::query_scalar(sql)
+        .bind(items.to_string())
+        .fetch_all(conn)
+        .await?;
+    Ok(kept.into_iter().collect())
+}
+
+impl Catalog {
+    /// Takes pairs to work on; fewer than asked for, or none, when no more are ready.
+    ///
+    /// # Errors
+    /// When the database refuses; then nothing is taken.
+    pub async fn claim(&self, request: ClaimRequest) -> Result<Vec<Lease>> {
+        self.grouped(|reply| Request::Claim(request, reply)).await
+    }
+
+    /// Gives a lease back as if it had never been taken; `false` when it was lost already.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn release(&self, lease: Lease) -> Result<bool> {
+        self.grouped(|reply| Request::Release(lease, reply)).await
+    }
+
+    /// A sign of life of a worker.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn beat(&self, worker: WorkerId, now: UnixMillis) -> Result<()> {
+        self.grouped(|reply| Request::Beat(Beat { worker, now }, reply))
+            .await
+    }
+
+    /// Sends a request into the next group commit and waits for the answer.
+    pub(super) async fn grouped<T>(&self, request: impl FnOnce(Reply<T>) -> Request) -> Result<T> {
+        let inbox = self.writer()?;
+        let (sender, receiver) = oneshot::channel();
+        if inbox.send(Message::Grouped(request(sender))).await.is_err() {
+            return Err(CatalogError::Closed);
+        }
+        receiver.await.unwrap_or(Err(CatalogError::Closed))
+    }
+}

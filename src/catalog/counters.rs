@@ -1,0 +1,101 @@
+//! Counts of jobs by cursor and status, moved in the same transaction as the jobs.
+
+use std::collections::BTreeMap;
+
+use serde_json::json;
+use sqlx::{Row as _, SqliteConnection};
+
+use super::{Catalog, Result};
+use crate::domain::{JobStatus, Stage};
+
+/// Cursor of a job: its next stage 0..4, or 4 when done.
+pub(super) type Cursor = i64;
+
+/// Cursor of a job that is done.
+pub(super) const DONE: Cursor = Stage::ALL.len() as Cursor;
+
+/// Cursor of a job whose next stage this is.
+pub(super) const fn cursor(stage: Stage) -> Cursor {
+    stage.index() as Cursor
+}
+
+/// How the counts change, gathered over a batch.
+#[derive(Debug, Default)]
+pub(super) struct Deltas(BTreeMap<(Cursor, JobStatus), i64>);
+
+impl Deltas {
+    /// A job goes from one place to another.
+    pub(super) fn moved(&mut self, from: (Cursor, JobStatus), to: (Cursor, JobStatus)) {
+        self.add(from, -1);
+        self.add(to, 1);
+    }
+
+    /// So many jobs appear at a place, or leave it.
+    pub(super) fn add(&mut self, at: (Cursor, JobStatus), n: i64) {
+        *self.0.entry(at).or_default() += n;
+    }
+
+    /// Writes the changes.
+    pub(super) async fn apply(&self, conn: &mut SqliteConnection) -> Result<()> {
+        let rows: Vec<_> = self
+            .0
+            .iter()
+            .filter(|(_, n)| **n != 0)
+            .map(|((stage, status), n)| json!([stage, status.code(), n]))
+            .collect();
+        if rows.is_empty() {
+            return Ok(());
+        }
+        sqlx::query(
+            "UPDATE counter SET n = n + (d.value ->> 2) FROM json_each(?1) AS d
+             WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1",
+        )
+        .bind(serde_json::Value::from(rows).to_string())
+        .execute(conn)
+        .await?;
+        Ok(())
+    }
+}
+
+/// Jobs by cursor and status; only what is not 0.
+pub type Counts = BTreeMap<(i64, JobStatus), u64>;
+
+impl Catalog {
+    /// The counts as kept.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn counters(&self) -> Result<Counts> {
+        let mut conn = self.reader().await?;
+        counts(
+            &mut conn,
+            "SELECT stage, status, n FROM counter WHERE n <> 0",
+        )
+        .await
+    }
+
+    /// The counts as they are when every job is counted: equal to [`Catalog::counters`], or the catalog is damaged.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn recount(&self) -> Result<Counts> {
+        let mut conn = self.reader().await?;
+        counts(
+            &mut conn,
+            "SELECT stage, status, count(*) FROM job GROUP BY stage, status",
+        )
+        .await
+    }
+}
+
+/// Counts from a query of cursor, status and number.
+pub(super) async fn counts(conn: &mut SqliteConnection, sql: &'static str) -> Result<Counts> {
+    let rows = sqlx::query(sql).fetch_all(conn).await?;
+    rows.iter()
+        .map(|row| {
+            let status = super::rows::status(row.try_get(1)?)?;
+            let n: i64 = row.try_get(2)?;
+            Ok(((row.try_get(0)?, status), n.unsigned_abs()))
+        })
+        .collect()
+}

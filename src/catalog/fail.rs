@@ -1,0 +1,119 @@
+//! Storing a failed stage: what it means for the job, why, and the attempt.
+
+use serde_json::{Value, json};
+use sqlx::SqliteConnection;
+
+use super::batch::Request;
+use super::checkpoint::store_seen;
+use super::claim::kept_pairs;
+use super::counters::{Deltas, cursor};
+use super::lease::{Lease, Sentence, StageFailed};
+use super::{Catalog, Result, rows};
+use crate::domain::JobStatus;
+
+/// Attempts that are kept of a pair that fails again and again.
+const ATTEMPTS_KEPT: i64 = 64;
+
+/// The job's new state; only where the lease still holds.
+pub(super) const FAIL: &str = "
+UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.value ->> 'status',
+    run_at = item.value ->> 'run_at', mem_class = max(mem_class, item.value ->> 'mem_class'),
+    worker = NULL, deadline = NULL
+FROM json_each(?1) AS item
+WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
+    AND job.epoch = item.value ->> 'epoch' AND job.status = 1
+RETURNING pair";
+
+const FAILURE: &str = "
+INSERT INTO failure (pair, stage, class, message, recipe, mesh_hash, print_hash, facts, at)
+SELECT value ->> 'pair', value ->> 'stage', value ->> 'class', value ->> 'message', value ->> 'recipe',
+    unhex(value ->> 'mesh_hash'), unhex(value ->> 'print_hash'), value ->> 'facts', value ->> 'at'
+FROM json_each(?1) WHERE value ->> 'status' <> 0
+ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
+    recipe = excluded.recipe, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
+    facts = excluded.facts, at = excluded.at";
+
+const ATTEMPT: &str = "
+INSERT INTO attempt (pair, stage, worker, class, message, ms, at)
+SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'class', value ->> 'message',
+    value ->> 'ms', value ->> 'at'
+FROM json_each(?1)";
+
+const PRUNE: &str = "
+DELETE FROM attempt WHERE id IN (
+    SELECT old.id FROM json_each(?1) AS item JOIN attempt AS old ON old.pair = item.value ->> 'pair'
+    WHERE old.id <= (SELECT id FROM attempt WHERE pair = item.value ->> 'pair' ORDER BY id DESC LIMIT 1 OFFSET ?2))";
+
+/// Stores failures under leases that still hold; says which did.
+pub(super) async fn apply(
+    conn: &mut SqliteConnection,
+    failed: &[&(Lease, StageFailed)],
+    deltas: &mut Deltas,
+) -> Result<Vec<bool>> {
+    if failed.is_empty() {
+        return Ok(Vec::new());
+    }
+    let items = rows::array(failed.iter().map(|item| json_of(item)));
+    let kept = kept_pairs(conn, FAIL, &items).await?;
+    let stored: Vec<_> = failed
+        .iter()
+        .filter(|item| kept.contains(&item.0.pair.0))
+        .collect();
+    if !stored.is_empty() {
+        let items = rows::array(stored.iter().map(|item| json_of(item))).to_string();
+        for sql in [FAILURE, ATTEMPT] {
+            sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
+        }
+        sqlx::query(PRUNE)
+            .bind(&items)
+            .bind(ATTEMPTS_KEPT)
+            .execute(&mut *conn)
+            .await?;
+        let seen = stored.iter().map(|(lease, failed)| (lease, &failed.inputs));
+        store_seen(conn, seen).await?;
+    }
+    for (lease, failed) in stored.iter().map(|item| &***item) {
+        let to = cursor(lease.cursor.min(failed.stage));
+        let from = (cursor(lease.cursor), JobStatus::Leased);
+        deltas.moved(from, (to, status(failed.sentence)));
+    }
+    Ok(failed
+        .iter()
+        .map(|item| kept.contains(&item.0.pair.0))
+        .collect())
+}
+
+const fn status(sentence: Sentence) -> JobStatus {
+    match sentence {
+        Sentence::BackOff { .. } => JobStatus::Backoff,
+        Sentence::Alone => JobStatus::Ready,
+        Sentence::Quarantine => JobStatus::Quarantined,
+    }
+}
+
+fn json_of((lease, failed): &(Lease, StageFailed)) -> Value {
+    let run_at = match failed.sentence {
+        Sentence::BackOff { run_at } => Some(run_at),
+        Sentence::Alone | Sentence::Quarantine => None,
+    };
+    json!({
+        "pair": lease.pair.0, "worker": lease.worker.0, "epoch": lease.epoch, "stage": failed.stage.index(),
+        "status": status(failed.sentence).code(), "run_at": run_at,
+        "mem_class": i64::from(failed.sentence == Sentence::Alone),
+        "class": failed.failure.class, "message": failed.failure.message, "recipe": failed.recipe.0,
+        "mesh_hash": failed.inputs.mesh.as_ref().map(|seen| seen.hash),
+        "print_hash": failed.inputs.print.as_ref().map(|seen| seen.hash),
+        "facts": failed.facts, "ms": failed.ms, "at": failed.at,
+    })
+}
+
+impl Catalog {
+    /// Stores a failed stage; `false` when the lease was lost and nothing was stored.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn fail(&self, lease: Lease, failed: StageFailed) -> Result<bool> {
+        self.grouped(|reply| Request::Fail(Box::new((lease, failed)), reply))
+            .await
+    }
+}

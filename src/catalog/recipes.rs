@@ -1,0 +1,127 @@
+//! Recipes: what the result of a stage depends on besides the inputs.
+
+use serde_json::{Value, json};
+use sqlx::SqliteConnection;
+
+use super::lease::RecipeId;
+use super::{Catalog, CatalogError, Result, rows};
+use crate::domain::{ContentHash, Stage};
+
+/// One stage's recipe.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recipe {
+    /// Hash over the stage, its fields and the recipe before it.
+    pub hash: ContentHash,
+    /// Revision and settings of the stage.
+    pub fields: Value,
+}
+
+/// The current recipes of the four stages.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recipes([Recipe; 4]);
+
+impl Recipes {
+    /// Recipes from each stage's fields. A stage's hash takes in the one before it, so that a changed setting
+    /// changes the recipes of its stage and of all later ones.
+    pub fn new(fields: impl Fn(Stage) -> Value) -> Self {
+        let mut upstream: Option<ContentHash> = None;
+        Self(Stage::ALL.map(|stage| {
+            let fields = fields(stage);
+            let whole = json!({ "stage": stage, "fields": fields, "upstream": upstream });
+            let hash = ContentHash::of(whole.to_string().as_bytes());
+            upstream = Some(hash);
+            Recipe { hash, fields }
+        }))
+    }
+
+    /// The recipe of a stage.
+    pub fn of(&self, stage: Stage) -> &Recipe {
+        &self.0[stage.index()]
+    }
+}
+
+/// Numbers of the current recipes in the catalog.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RecipeIds([RecipeId; 4]);
+
+impl RecipeIds {
+    /// The recipe of a stage.
+    pub const fn of(&self, stage: Stage) -> RecipeId {
+        self.0[stage.index()]
+    }
+}
+
+impl Catalog {
+    /// Enters the current recipes where they are new; gives their numbers.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn register_recipes(&self, recipes: &Recipes) -> Result<RecipeIds> {
+        let recipes = recipes.clone();
+        self.alone(move |conn| {
+            Box::pin(async move {
+                for stage in Stage::ALL {
+                    let recipe = recipes.of(stage);
+                    sqlx::query(
+                        "INSERT OR IGNORE INTO recipe (stage, hash, fields) VALUES (?1, ?2, ?3)",
+                    )
+                    .bind(stage.index() as i64)
+                    .bind(&recipe.hash.as_bytes()[..])
+                    .bind(recipe.fields.to_string())
+                    .execute(&mut *conn)
+                    .await?;
+                }
+                let mut ids = [RecipeId(0); 4];
+                for (id, found) in ids.iter_mut().zip(known(conn, &recipes).await?) {
+                    *id = found.ok_or_else(|| {
+                        CatalogError::Corrupt("a recipe just written is not there".to_owned())
+                    })?;
+                }
+                Ok(RecipeIds(ids))
+            })
+        })
+        .await
+    }
+}
+
+/// Numbers of the recipes that the catalog knows.
+pub(super) async fn known(
+    conn: &mut SqliteConnection,
+    recipes: &Recipes,
+) -> Result<[Option<RecipeId>; 4]> {
+    let mut ids = [None; 4];
+    for (id, stage) in ids.iter_mut().zip(Stage::ALL) {
+        *id = sqlx::query_scalar("SELECT id FROM recipe WHERE hash = ?1")
+            .bind(&recipes.of(stage).hash.as_bytes()[..])
+            .fetch_optional(&mut *conn)
+            .await?
+            .map(RecipeId);
+    }
+    Ok(ids)
+}
+
+/// The recipes as a JSON array of stage and number for `json_each`; a number no result has where it is unknown.
+pub(super) async fn current_json(conn: &mut SqliteConnection, recipes: &Recipes) -> Result<String> {
+    let ids = known(conn, recipes).await?;
+    let ids = ids.iter().map(|id| id.map_or(-1, |RecipeId(id)| id));
+    Ok(rows::array(ids).to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use serde_json::json;
+
+    use super::Recipes;
+    use crate::domain::Stage;
+
+    #[test]
+    fn a_changed_setting_changes_its_stage_and_those_after_it() {
+        let old = Recipes::new(|_| json!({ "revision": 1 }));
+        let new = Recipes::new(|stage| match stage {
+            Stage::Normalize => json!({ "revision": 2 }),
+            Stage::Fit | Stage::Depth | Stage::Register => json!({ "revision": 1 }),
+        });
+        let changed = Stage::ALL.map(|stage| old.of(stage).hash != new.of(stage).hash);
+        assert_eq!(changed, [false, false, true, true]);
+    }
+}

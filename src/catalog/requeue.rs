@@ -1,0 +1,175 @@
+//! Taking pairs up again: after a change of settings or inputs, or because somebody asks.
+
+use serde_json::json;
+use sqlx::{Row as _, SqliteConnection};
+
+use super::claim::PairSelection;
+use super::counters::{Deltas, cursor};
+use super::recipes::{Recipes, current_json};
+use super::staleness::{Again, Cause, decide, look};
+use super::{Catalog, CatalogError, Result, pairs, rows};
+use crate::domain::{FailureClass, JobStatus, PairName, Stage};
+
+/// Which failed pairs to take up again.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum RetrySelection {
+    /// These pairs, whatever keeps them: failed, backing off or held.
+    Names(Vec<PairName>),
+    /// All that failed or back off with this class.
+    Class(FailureClass),
+    /// All that failed or back off.
+    All,
+}
+
+/// Back to a stage, as if newly imported; never a job that somebody works on.
+pub(super) const SEND_BACK: &str = "
+UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, attempt = 0, crashes = 0, mem_class = 0
+FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1";
+
+const FORGET: &str = "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
+
+const KEPT_BACK: &str = "
+SELECT j.pair, j.stage, j.status FROM job AS j JOIN failure AS f ON f.pair = j.pair
+WHERE j.status IN (2, 4) AND (?1 IS NULL OR f.class = ?1)";
+
+const KEPT_BACK_AMONG: &str = "
+SELECT j.pair, j.stage, j.status FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+WHERE j.status IN (2, 4, 5)";
+
+/// A job that goes back.
+struct Moved {
+    pair: i64,
+    from: (i64, JobStatus),
+    to: Stage,
+}
+
+impl Catalog {
+    /// Sends pairs back whose settings or inputs changed, and what is asked for besides; says how many.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn send_back(
+        &self,
+        recipes: &Recipes,
+        among: Option<&PairSelection>,
+        again: Again,
+    ) -> Result<u64> {
+        let mut sent = 0;
+        let mut after = Some(0);
+        // A page is a transaction of its own, so that others' writes are not kept waiting.
+        while let Some(from) = after {
+            let (recipes, among) = (recipes.clone(), among.cloned());
+            let (moved, next) = self
+                .alone(move |conn| {
+                    Box::pin(async move { page(conn, &recipes, among.as_ref(), again, from).await })
+                })
+                .await?;
+            sent += moved;
+            after = next;
+        }
+        Ok(sent)
+    }
+
+    /// Takes failed pairs up again; says how many. Pairs that did not fail are left as they are.
+    ///
+    /// # Errors
+    /// When a named pair is not there; then nothing changes.
+    pub async fn retry(&self, selection: &RetrySelection) -> Result<u64> {
+        let selection = selection.clone();
+        self.alone(move |conn| {
+            Box::pin(async move {
+                let found = kept_back(conn, &selection).await?;
+                apply(conn, &found).await
+            })
+        })
+        .await
+    }
+}
+
+/// One page of [`Catalog::send_back`]: how many moved, and where the next page begins.
+async fn page(
+    conn: &mut SqliteConnection,
+    recipes: &Recipes,
+    among: Option<&PairSelection>,
+    again: Again,
+    after: i64,
+) -> Result<(u64, Option<i64>)> {
+    let current = current_json(conn, recipes).await?;
+    let found = look(conn, &current, after, among).await?;
+    let moved: Vec<_> = found
+        .iter()
+        .filter_map(|seen| {
+            let (to, cause) = decide(seen, again)?;
+            let waits = matches!(cause, Cause::New | Cause::Unfinished | Cause::BackingOff);
+            (!waits).then_some(Moved {
+                pair: seen.pair,
+                from: (seen.cursor, seen.status),
+                to,
+            })
+        })
+        .collect();
+    let sent = apply(conn, &moved).await?;
+    Ok((sent, found.last().map(|seen| seen.pair)))
+}
+
+async fn kept_back(conn: &mut SqliteConnection, selection: &RetrySelection) -> Result<Vec<Moved>> {
+    let found = match selection {
+        RetrySelection::All => {
+            sqlx::query(KEPT_BACK)
+                .bind(None::<&str>)
+                .fetch_all(conn)
+                .await?
+        }
+        RetrySelection::Class(class) => {
+            sqlx::query(KEPT_BACK)
+                .bind(class.name())
+                .fetch_all(conn)
+                .await?
+        }
+        RetrySelection::Names(names) => {
+            for name in names {
+                if pairs::select(conn, std::slice::from_ref(name))
+                    .await?
+                    .is_empty()
+                {
+                    return Err(CatalogError::UnknownPair(name.clone()));
+                }
+            }
+            let among = pairs::select(conn, names).await?;
+            sqlx::query(KEPT_BACK_AMONG)
+                .bind(among.json)
+                .fetch_all(conn)
+                .await?
+        }
+    };
+    found
+        .iter()
+        .map(|row| {
+            let at: i64 = row.try_get("stage")?;
+            Ok(Moved {
+                pair: row.try_get("pair")?,
+                from: (at, rows::status(row.try_get("status")?)?),
+                to: rows::stage(at)?,
+            })
+        })
+        .collect()
+}
+
+async fn apply(conn: &mut SqliteConnection, moved: &[Moved]) -> Result<u64> {
+    if moved.is_empty() {
+        return Ok(0);
+    }
+    let items = moved
+        .iter()
+        .map(|moved| json!([moved.pair, moved.to.index()]));
+    let items = rows::array(items).to_string();
+    for sql in [SEND_BACK, FORGET] {
+        sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
+    }
+    let mut deltas = Deltas::default();
+    for moved in moved {
+        deltas.moved(moved.from, (cursor(moved.to), JobStatus::Ready));
+    }
+    deltas.apply(conn).await?;
+    Ok(moved.len() as u64)
+}

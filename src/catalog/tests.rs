@@ -1,0 +1,180 @@
+//! The protocol, statement by statement, on a real database file.
+
+mod model;
+mod plans;
+mod protocol;
+mod staleness;
+mod verdicts;
+
+use serde_json::{Map, json};
+
+use super::{
+    Catalog, ClaimRequest, ImportRow, InputSeen, InputsSeen, Kept, Lease, MetricResult, RecipeIds,
+    Recipes, StageDone, WorkerInfo,
+};
+use crate::domain::{
+    Affine2, ArtifactSet, ContentHash, MetricOutcome, PairName, RegisterOutcome, Scores, Stage,
+    ThresholdMetric, WorkerId,
+};
+
+/// A catalog in a directory of its own.
+struct World {
+    catalog: Catalog,
+    recipes: RecipeIds,
+    worker: WorkerId,
+    dir: tempfile::TempDir,
+}
+
+fn name(text: &str) -> PairName {
+    PairName::new(text).expect("a pair's name")
+}
+
+fn row(text: &str) -> ImportRow {
+    ImportRow {
+        name: name(text),
+        mesh_path: format!("{text}.stl"),
+        print_path: format!("{text}.png"),
+        unit: None,
+        scanned_face_down: None,
+        character: None,
+        block: None,
+        meta: Map::new(),
+    }
+}
+
+fn recipes(revision: [u32; 4]) -> Recipes {
+    Recipes::new(|stage| json!({ "revision": revision[stage.index()], "settings": { "seed": 0 } }))
+}
+
+impl World {
+    async fn new(pairs: usize) -> Self {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let catalog = Catalog::create(&dir.path().join("catalog.sqlite"))
+            .await
+            .expect("a catalog");
+        let rows = (0..pairs).map(|n| row(&format!("p{n}"))).collect();
+        catalog.import(rows, 1).await.expect("imported");
+        let recipes = catalog
+            .register_recipes(&recipes([1; 4]))
+            .await
+            .expect("recipes");
+        let worker = register(&catalog).await;
+        Self {
+            catalog,
+            recipes,
+            worker,
+            dir,
+        }
+    }
+
+    async fn claim(&self, slots: usize) -> Vec<Lease> {
+        self.claim_as(self.worker, slots).await
+    }
+
+    async fn claim_as(&self, worker: WorkerId, slots: usize) -> Vec<Lease> {
+        let request = ClaimRequest {
+            worker,
+            slots,
+            until: Stage::Register,
+            alone: false,
+            among: None,
+            deadline: 1_000,
+        };
+        self.catalog.claim(request).await.expect("a claim")
+    }
+
+    fn done(&self, stage: Stage) -> StageDone {
+        done(self.recipes, stage)
+    }
+
+    /// Takes the next pair through all stages.
+    async fn finish_one(&self) {
+        let mut lease = self.claim(1).await.pop().expect("a ready pair");
+        loop {
+            let stage = lease.cursor();
+            match self.catalog.checkpoint(lease, self.done(stage)).await {
+                Ok(Kept::Lease(next)) => lease = next,
+                Ok(Kept::Done) => return,
+                other => panic!("the checkpoint was not kept: {other:?}"),
+            }
+        }
+    }
+
+    async fn counters_hold(&self) {
+        let kept = self.catalog.counters().await.expect("counters");
+        assert_eq!(kept, self.catalog.recount().await.expect("a recount"));
+    }
+}
+
+async fn register(catalog: &Catalog) -> WorkerId {
+    let info = WorkerInfo {
+        host: "here".to_owned(),
+        pid: 1,
+        boot_id: None,
+    };
+    catalog.register_worker(info, 1).await.expect("a worker")
+}
+
+fn done(recipes: RecipeIds, stage: Stage) -> StageDone {
+    let register = RegisterOutcome {
+        metrics: ThresholdMetric::ALL.map(metric).to_vec(),
+    };
+    let last = stage == Stage::Register;
+    let metrics = register.metrics.iter().map(|outcome| MetricResult {
+        outcome: *outcome,
+        result_hash: ContentHash::of(outcome.metric.name().as_bytes()),
+    });
+    StageDone {
+        stage,
+        recipe: recipes.of(stage),
+        mesh_hash: ContentHash::of(b"mesh"),
+        print_hash: (stage >= Stage::Normalize).then(|| ContentHash::of(b"print")),
+        facts: json!({ "scanned_face_down": null, "unit": null }).to_string(),
+        outcome: if last {
+            json!(register).to_string()
+        } else {
+            "{}".to_owned()
+        },
+        files: ArtifactSet::new(),
+        result_hash: ContentHash::of(stage.name().as_bytes()),
+        metrics: if last { metrics.collect() } else { Vec::new() },
+        inputs: inputs(stage),
+        ms: 5,
+        at: 100,
+        next_deadline: 2_000,
+    }
+}
+
+fn inputs(stage: Stage) -> InputsSeen {
+    let seen = |text: &str| InputSeen {
+        hash: ContentHash::of(text.as_bytes()),
+        stat: format!("{text} as it was"),
+    };
+    InputsSeen {
+        mesh: Some(seen("mesh")),
+        print: (stage >= Stage::Normalize).then(|| seen("print")),
+    }
+}
+
+fn metric(metric: ThresholdMetric) -> MetricOutcome {
+    MetricOutcome {
+        metric,
+        threshold_level: 700,
+        threshold_depth: 0.1 + 0.2,
+        print_from_depth: Affine2::similarity(1.5, 0.1, [1.0, 2.0]),
+        angle_deg: 0.1_f64.to_degrees(),
+        scale: 1.5,
+        shift_px: [0.25, -0.5],
+        scores: Scores {
+            ssim: 0.8,
+            nl_ssim: 0.81,
+            iou: 0.7,
+            iou_box: 0.9,
+            dice: 0.82,
+            density_print: 0.3,
+            density_depth: 0.31,
+        },
+        margin: 0.2,
+        at_bound: false,
+    }
+}

@@ -1,0 +1,456 @@
+//! Leases, checkpoints, failures, rescue and counters.
+
+use sqlx::Connection as _;
+
+use super::{World, done, name, register, row};
+use crate::catalog::{
+    Catalog, CatalogError, ClaimRequest, Dead, Kept, RetrySelection, Sentence, StageFailed,
+};
+use crate::domain::{
+    CRASH_LIMIT, Failure, FailureClass, JobStatus, LengthUnit, Reason, Stage, ThresholdMetric,
+    Verdict,
+};
+
+fn failed(world: &World, stage: Stage, sentence: Sentence) -> StageFailed {
+    StageFailed {
+        stage,
+        failure: Failure::new(FailureClass::Io, "the disk is slow"),
+        sentence,
+        recipe: world.recipes.of(stage),
+        facts: super::done(world.recipes, stage).facts,
+        inputs: super::inputs(stage),
+        ms: Some(3),
+        at: 50,
+    }
+}
+
+async fn status(world: &World, pair: &str) -> JobStatus {
+    let detail = world.catalog.pair(&name(pair)).await.expect("a read");
+    detail.expect("the pair").results.status
+}
+
+#[tokio::test]
+async fn a_pair_goes_through_four_checkpoints_and_is_read_back_whole() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    let detail = detail.expect("the pair");
+    assert_eq!(detail.results.status, JobStatus::Done);
+    assert_eq!(detail.results.stages.len(), 4);
+    let metrics: Vec<_> = detail.results.metrics.iter().map(|m| m.outcome).collect();
+    assert_eq!(metrics, ThresholdMetric::ALL.map(super::metric));
+    assert_eq!(detail.attempts.len(), 4);
+    assert!(detail.mesh_hash.is_some() && detail.print_hash.is_some());
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn a_claim_takes_the_pair_that_is_furthest() {
+    let world = World::new(3).await;
+    let lease = world.claim(1).await.remove(0);
+    let pair = lease.pair();
+    let Ok(Kept::Lease(lease)) = world
+        .catalog
+        .checkpoint(lease, world.done(Stage::Fit))
+        .await
+    else {
+        panic!("the checkpoint was not kept")
+    };
+    assert!(world.catalog.release(lease).await.expect("given back"));
+    let next = world.claim(1).await.remove(0);
+    assert_eq!((next.pair(), next.cursor()), (pair, Stage::Depth));
+    assert_eq!(next.attempt(), 1);
+}
+
+#[tokio::test]
+async fn two_claims_never_get_the_same_pair() {
+    let world = World::new(40).await;
+    let other = register(&world.catalog).await;
+    let (a, b) = tokio::join!(world.claim(30), world.claim_as(other, 30));
+    let mut pairs: Vec<_> = a.iter().chain(&b).map(super::Lease::pair).collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    assert_eq!((a.len() + b.len(), pairs.len()), (40, 40));
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn a_late_completion_of_a_rescued_job_changes_nothing() {
+    let world = World::new(1).await;
+    let late = world.claim(1).await.remove(0);
+    let other = register(&world.catalog).await;
+    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
+    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let epoch = late.epoch();
+    let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
+    assert!(matches!(kept, Ok(Kept::Lost)));
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    let detail = detail.expect("the pair");
+    assert!(detail.results.stages.is_empty() && detail.attempts.is_empty());
+    assert_eq!(
+        (detail.results.status, detail.crashes),
+        (JobStatus::Ready, 1)
+    );
+    let again = world.catalog.claim(ClaimRequest {
+        worker: other,
+        slots: 1,
+        until: Stage::Register,
+        alone: true,
+        among: None,
+        deadline: 1_000,
+    });
+    let again = again.await.expect("a claim").remove(0);
+    assert!(again.alone() && again.epoch() > epoch);
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn a_late_failure_and_a_late_release_change_nothing() {
+    let world = World::new(2).await;
+    let mut leases = world.claim(2).await;
+    let other = register(&world.catalog).await;
+    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
+    assert_eq!(rescued.expect("a rescue").ready, 2);
+    let (first, second) = (leases.remove(0), leases.remove(0));
+    let kept = failed(&world, Stage::Fit, Sentence::Quarantine);
+    assert!(!world.catalog.fail(first, kept).await.expect("an answer"));
+    assert!(!world.catalog.release(second).await.expect("an answer"));
+    assert_eq!(status(&world, "p0").await, JobStatus::Ready);
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn the_third_crash_is_quarantined_and_says_so() {
+    let world = World::new(1).await;
+    for crash in 1..=CRASH_LIMIT {
+        let worker = register(&world.catalog).await;
+        let request = ClaimRequest {
+            worker,
+            slots: 1,
+            until: Stage::Register,
+            alone: crash > 1,
+            among: None,
+            deadline: 1_000,
+        };
+        assert_eq!(
+            world.catalog.claim(request).await.expect("a claim").len(),
+            1
+        );
+        let rescue = world.catalog.rescue(Dead::Workers(vec![worker]), 60);
+        rescue.await.expect("a rescue");
+        world.counters_hold().await;
+    }
+    let failures = world.catalog.failures(10).await.expect("a read");
+    assert_eq!(failures[0].failure.failure.class, FailureClass::Resource);
+    let text = &failures[0].failure.failure.message;
+    assert!(text.contains("3 workers died"), "{text}");
+}
+
+#[tokio::test]
+async fn leases_of_a_worker_that_ended_in_order_are_no_crash() {
+    let world = World::new(1).await;
+    drop(world.claim(1).await);
+    let ended = world.catalog.end_worker(world.worker, 50).await;
+    ended.expect("ended");
+    let other = register(&world.catalog).await;
+    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
+    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    assert_eq!(detail.expect("the pair").crashes, 0);
+}
+
+#[tokio::test]
+async fn progress_forgives_crashes() {
+    let world = World::new(1).await;
+    drop(world.claim(1).await);
+    let other = register(&world.catalog).await;
+    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
+    rescued.expect("a rescue");
+    let request = ClaimRequest {
+        worker: other,
+        slots: 1,
+        until: Stage::Register,
+        alone: true,
+        among: None,
+        deadline: 1_000,
+    };
+    let lease = world
+        .catalog
+        .claim(request)
+        .await
+        .expect("a claim")
+        .remove(0);
+    assert_eq!(lease.crashes(), 1);
+    let kept = world
+        .catalog
+        .checkpoint(lease, world.done(Stage::Fit))
+        .await;
+    let Ok(Kept::Lease(lease)) = kept else {
+        panic!("the checkpoint was not kept")
+    };
+    assert_eq!(lease.crashes(), 0);
+}
+
+#[tokio::test]
+async fn a_lease_past_its_deadline_by_far_comes_back_to_others() {
+    let world = World::new(1).await;
+    drop(world.claim(1).await);
+    let other = register(&world.catalog).await;
+    let soon = world.catalog.rescue_overdue(other, 999, 1_059).await;
+    assert_eq!(soon.expect("a rescue").ready, 0);
+    let own = world
+        .catalog
+        .rescue_overdue(world.worker, 5_000, 5_000)
+        .await;
+    assert_eq!(own.expect("a rescue").ready, 0);
+    let late = world.catalog.rescue_overdue(other, 1_001, 1_061).await;
+    assert_eq!(late.expect("a rescue").ready, 1);
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn backing_off_ends_when_due_and_after_a_clock_jump_too() {
+    let world = World::new(2).await;
+    for (lease, run_at) in world.claim(2).await.into_iter().zip([2_000, 9_000_000]) {
+        let back_off = failed(&world, Stage::Fit, Sentence::BackOff { run_at });
+        assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
+    }
+    assert!(world.claim(2).await.is_empty());
+    let left = world.catalog.outstanding(Stage::Register, None).await;
+    let left = left.expect("a read");
+    assert_eq!((left.backoff, left.next_due), (2, Some(2_000)));
+    let due = world.catalog.stage_due(1_999, 90_000_000).await;
+    assert_eq!(due.expect("stored"), 0);
+    let due = world.catalog.stage_due(2_000, 60_000).await;
+    assert_eq!(due.expect("stored"), 2);
+    let again = world.claim(2).await;
+    assert!(again.len() == 2 && again.iter().all(|lease| lease.attempt() == 2));
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn a_failure_names_class_and_sentence_and_retry_takes_it_up() {
+    let world = World::new(3).await;
+    for lease in world.claim(2).await {
+        let quarantine = failed(&world, Stage::Fit, Sentence::Quarantine);
+        assert!(world.catalog.fail(lease, quarantine).await.expect("stored"));
+    }
+    assert_eq!(world.claim(5).await.len(), 1);
+    let counts = world.catalog.failure_counts().await.expect("a read");
+    assert_eq!(counts, [(FailureClass::Io, 2)]);
+    let bug = RetrySelection::Class(FailureClass::Bug);
+    assert_eq!(world.catalog.retry(&bug).await.expect("stored"), 0);
+    let unknown = RetrySelection::Names(vec![name("p0"), name("nobody")]);
+    let refused = world.catalog.retry(&unknown).await;
+    assert!(matches!(refused, Err(CatalogError::UnknownPair(_))));
+    let one = RetrySelection::Names(vec![name("p0")]);
+    assert_eq!(world.catalog.retry(&one).await.expect("stored"), 1);
+    assert_eq!(status(&world, "p0").await, JobStatus::Ready);
+    assert_eq!(status(&world, "p1").await, JobStatus::Quarantined);
+    let all = world.catalog.retry(&RetrySelection::All).await;
+    assert_eq!(all.expect("stored"), 1);
+    assert!(world.catalog.failures(9).await.expect("a read").is_empty());
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn too_much_for_the_others_is_claimed_alone_only() {
+    let world = World::new(1).await;
+    let lease = world.claim(1).await.remove(0);
+    let alone = failed(&world, Stage::Fit, Sentence::Alone);
+    assert!(world.catalog.fail(lease, alone).await.expect("stored"));
+    assert!(world.claim(1).await.is_empty());
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    assert!(detail.expect("the pair").results.failure.is_none());
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn a_claim_among_some_pairs_takes_no_other() {
+    let world = World::new(4).await;
+    let wanted = [name("p3"), name("p1")];
+    let among = world.catalog.select(&wanted).await.expect("a read");
+    let request = ClaimRequest {
+        worker: world.worker,
+        slots: 9,
+        until: Stage::Register,
+        alone: false,
+        among: Some(among.clone()),
+        deadline: 1_000,
+    };
+    assert_eq!(
+        world.catalog.claim(request).await.expect("a claim").len(),
+        2
+    );
+    assert_eq!(status(&world, "p0").await, JobStatus::Ready);
+    assert_eq!(status(&world, "p3").await, JobStatus::Leased);
+    let left = world.catalog.work_left(Stage::Depth, Some(&among)).await;
+    assert_eq!(left.expect("a read").by_stage, [2, 2, 0, 0]);
+}
+
+#[tokio::test]
+async fn importing_again_adds_what_is_new_and_tells_what_changed() {
+    let world = World::new(2).await;
+    let mut changed = row("p1");
+    changed.unit = Some(LengthUnit::Cm);
+    changed.print_path = "other.png".to_owned();
+    let rows = vec![row("p0"), changed, row("p2")];
+    let summary = world.catalog.import(rows, 5).await.expect("imported");
+    assert_eq!((summary.added, summary.unchanged), (1, 1));
+    assert_eq!(summary.changed.len(), 1);
+    assert_eq!(summary.changed[0].fields, ["print", "unit"]);
+    let names = world.catalog.pair_names().await.expect("a read");
+    assert_eq!(names, ["p0", "p1", "p2"].map(name));
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn pages_come_in_the_order_of_names_and_end() {
+    let world = World::new(12).await;
+    let first = world.catalog.results_page(None, 5).await.expect("a page");
+    let after = &first[4].facts.name;
+    let second = world.catalog.results_page(Some(after), 50).await;
+    let names: Vec<_> = first
+        .iter()
+        .chain(&second.expect("a page"))
+        .map(|pair| pair.facts.name.clone())
+        .collect();
+    assert_eq!(names.len(), 12);
+    assert!(names.is_sorted());
+    let end = world.catalog.results_page(names.last(), 5).await;
+    assert!(end.expect("a page").is_empty());
+}
+
+#[tokio::test]
+async fn a_reader_works_beside_the_writer_and_cannot_write() {
+    let world = World::new(1).await;
+    let path = world.dir.path().join("catalog.sqlite");
+    let reader = Catalog::open_read_only(&path).await.expect("a reader");
+    world.finish_one().await;
+    let status = reader.status(&super::recipes([1; 4])).await;
+    assert_eq!(status.expect("a read").jobs[&JobStatus::Done], 1);
+    let refused = reader.import(vec![row("p9")], 1).await;
+    assert!(matches!(refused, Err(CatalogError::ReadOnly)));
+    reader.close().await;
+}
+
+#[tokio::test]
+async fn a_missing_catalog_is_told() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let path = dir.path().join("catalog.sqlite");
+    assert!(matches!(
+        Catalog::open(&path).await,
+        Err(CatalogError::Missing(_))
+    ));
+    assert!(!path.exists());
+}
+
+#[tokio::test]
+async fn one_bad_request_does_not_take_its_batch_with_it() {
+    let world = World::new(2).await;
+    let mut leases = world.claim(2).await;
+    let (good, bad) = (leases.remove(0), leases.remove(0));
+    let mut broken = world.done(Stage::Fit);
+    broken.outcome = "no JSON".to_owned();
+    let (good, bad) = tokio::join!(
+        world.catalog.checkpoint(good, world.done(Stage::Fit)),
+        world.catalog.checkpoint(bad, broken),
+    );
+    assert!(matches!(good, Ok(Kept::Lease(_))));
+    assert!(matches!(bad, Err(CatalogError::Shared(_))));
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn everything_sent_is_stored_when_the_catalog_is_closed() {
+    let world = World::new(1).await;
+    let path = world.dir.path().join("catalog.sqlite");
+    let lease = world.claim(1).await.remove(0);
+    let (kept, ()) = tokio::join!(
+        world
+            .catalog
+            .checkpoint(lease, done(world.recipes, Stage::Fit)),
+        world.catalog.clone().close(),
+    );
+    assert!(matches!(kept, Ok(Kept::Lease(_))));
+    assert!(!path.with_extension("sqlite-wal").exists());
+    let again = Catalog::open(&path).await.expect("a catalog");
+    let detail = again.pair(&name("p0")).await.expect("a read");
+    assert_eq!(detail.expect("the pair").results.stages.len(), 1);
+}
+
+/// Every name that the schema's checks allow is one of ours, and the other way round.
+#[tokio::test]
+async fn checks_of_the_schema_and_our_enums_agree() {
+    let world = World::new(1).await;
+    let path = world.dir.path().join("catalog.sqlite");
+    let mut conn = crate::catalog::connect::writer(&path, false)
+        .await
+        .expect("a connection");
+    let mut accepts = async |sql: &'static str, value: &str| {
+        let mut transaction = conn.begin().await.expect("a transaction");
+        let outcome = sqlx::query(sql)
+            .bind(value)
+            .execute(&mut *transaction)
+            .await;
+        outcome.is_ok()
+    };
+    let verdict = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, at)
+        VALUES (1, 1, 'density', zeroblob(32), ?1, 'me', 1)";
+    let reason = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, reason, at)
+        VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', ?1, 1)";
+    let metric = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, at)
+        VALUES (1, 1, ?1, zeroblob(32), 'fail', 'me', 1)";
+    let class = "INSERT INTO failure (pair, stage, class, message, at) VALUES (1, 0, ?1, '', 1)";
+    let unit = "UPDATE pair SET unit = ?1";
+    for (sql, names) in [
+        (verdict, Verdict::ALL.map(Verdict::name).to_vec()),
+        (reason, Reason::ALL.map(Reason::name).to_vec()),
+        (
+            metric,
+            ThresholdMetric::ALL.map(ThresholdMetric::name).to_vec(),
+        ),
+        (class, FailureClass::ALL.map(FailureClass::name).to_vec()),
+        (unit, LengthUnit::ALL.map(LengthUnit::name).to_vec()),
+    ] {
+        for name in names {
+            assert!(accepts(sql, name).await, "{name} is refused");
+        }
+        assert!(!accepts(sql, "other").await, "{sql} takes anything");
+    }
+}
+
+/// Each status is allowed exactly with the columns that belong to it.
+#[tokio::test]
+async fn a_job_row_that_is_no_state_is_refused() {
+    let world = World::new(1).await;
+    let path = world.dir.path().join("catalog.sqlite");
+    let mut conn = crate::catalog::connect::writer(&path, false)
+        .await
+        .expect("a connection");
+    for status in 0..=6 {
+        for bits in 0..16 {
+            let stage = if bits & 1 == 0 { 2 } else { 4 };
+            let [worker, deadline, run_at] = [2, 4, 8].map(|bit| (bits & bit != 0).then_some(1));
+            let mut transaction = conn.begin().await.expect("a transaction");
+            let outcome = sqlx::query(
+                "UPDATE job SET status = ?1, stage = ?2, worker = ?3, deadline = ?4, run_at = ?5",
+            )
+            .bind(status)
+            .bind(stage)
+            .bind(worker)
+            .bind(deadline)
+            .bind(run_at)
+            .execute(&mut *transaction)
+            .await;
+            let is = JobStatus::from_code(status);
+            let allowed = is.is_some_and(|is| {
+                (is == JobStatus::Done) == (stage == 4)
+                    && (is == JobStatus::Leased) == worker.is_some()
+                    && (is == JobStatus::Leased) == deadline.is_some()
+                    && (is == JobStatus::Backoff) == run_at.is_some()
+            });
+            assert_eq!(outcome.is_ok(), allowed, "status {status}, bits {bits:04b}");
+        }
+    }
+}

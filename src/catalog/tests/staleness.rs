@@ -1,0 +1,166 @@
+//! Changed settings and inputs send a pair back to the first stage they touch, and no further.
+
+use super::{World, name, recipes, row};
+use crate::catalog::{
+    Again, InputSeen, InputsSeen, Plan, Recipes, Sentence, StageFailed, WorkReason,
+};
+use crate::domain::{ContentHash, Failure, FailureClass, JobStatus, LengthUnit, Stage};
+
+async fn cursor(world: &World, pair: &str) -> Option<Stage> {
+    let detail = world.catalog.pair(&name(pair)).await.expect("a read");
+    detail.expect("the pair").results.next_stage
+}
+
+async fn send_back(world: &World, recipes: &Recipes) -> u64 {
+    let sent = world.catalog.send_back(recipes, None, Again::Changed);
+    sent.await.expect("sent back")
+}
+
+#[tokio::test]
+async fn a_changed_register_setting_re_runs_register_only() {
+    let world = World::new(2).await;
+    world.finish_one().await;
+    let changed = recipes([1, 1, 1, 2]);
+    let why = world.catalog.why(&name("p0"), &changed).await;
+    let why = why.expect("a read").expect("a reason");
+    assert_eq!(why.from, Stage::Register);
+    assert_eq!(why.why.to_string(), "register.revision: 1 -> 2");
+    let status = world.catalog.status(&changed).await.expect("a read");
+    assert_eq!(status.stale, 1);
+    assert_eq!(send_back(&world, &changed).await, 1);
+    assert_eq!(cursor(&world, "p0").await, Some(Stage::Register));
+    let page = world.catalog.results_page(None, 1).await.expect("a page");
+    assert_eq!(page[0].stages.len(), 3);
+    assert_eq!(send_back(&world, &changed).await, 0);
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn unchanged_settings_send_nothing_back() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    assert_eq!(send_back(&world, &recipes([1; 4])).await, 0);
+    let plan = plan(&world).await;
+    assert_eq!((plan.pairs(), plan.done), (0, 1));
+}
+
+async fn plan(world: &World) -> Plan {
+    let recipes = recipes([1; 4]);
+    let plan = world.catalog.plan(&recipes, None, Again::Changed);
+    plan.await.expect("a plan")
+}
+
+async fn see(world: &World, mesh: &str, print: &str) {
+    let page = world.catalog.known_inputs(None, 10, None).await;
+    let pair = page.expect("a page")[0].pair;
+    let seen = |text: &str| InputSeen {
+        hash: ContentHash::of(text.as_bytes()),
+        stat: format!("{text} touched"),
+    };
+    let inputs = InputsSeen {
+        mesh: Some(seen(mesh)),
+        print: Some(seen(print)),
+    };
+    let stored = world.catalog.store_inputs(vec![(pair, inputs)]).await;
+    stored.expect("stored");
+}
+
+#[tokio::test]
+async fn a_touched_file_re_runs_nothing() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    see(&world, "mesh", "print").await;
+    assert_eq!(send_back(&world, &recipes([1; 4])).await, 0);
+}
+
+#[tokio::test]
+async fn a_changed_print_sends_its_pair_back_to_normalize() {
+    let world = World::new(2).await;
+    world.finish_one().await;
+    world.finish_one().await;
+    see(&world, "mesh", "another print").await;
+    let plan = plan(&world).await;
+    assert_eq!(plan.entries.len(), 1);
+    assert_eq!(plan.entries[0].why, WorkReason::Print);
+    assert_eq!(send_back(&world, &recipes([1; 4])).await, 1);
+    assert_eq!(cursor(&world, "p0").await, Some(Stage::Normalize));
+    assert_eq!(cursor(&world, "p1").await, None);
+}
+
+#[tokio::test]
+async fn a_changed_mesh_sends_its_pair_back_to_fit() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    see(&world, "another mesh", "print").await;
+    assert_eq!(send_back(&world, &recipes([1; 4])).await, 1);
+    assert_eq!(cursor(&world, "p0").await, Some(Stage::Fit));
+}
+
+#[tokio::test]
+async fn another_unit_in_the_manifest_is_a_reason_to_run() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let mut changed = row("p0");
+    changed.unit = Some(LengthUnit::In);
+    world
+        .catalog
+        .import(vec![changed], 9)
+        .await
+        .expect("imported");
+    let why = world.catalog.why(&name("p0"), &recipes([1; 4])).await;
+    let why = why.expect("a read").expect("a reason");
+    assert_eq!((why.from, why.why), (Stage::Fit, WorkReason::Manifest));
+}
+
+#[tokio::test]
+async fn another_path_is_read_again_and_metadata_is_no_reason_to_run() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let mut changed = row("p0");
+    changed.mesh_path = "elsewhere.stl".to_owned();
+    changed.character = Some("字".to_owned());
+    world
+        .catalog
+        .import(vec![changed], 9)
+        .await
+        .expect("imported");
+    let known = world.catalog.known_inputs(None, 10, None).await;
+    let mesh = known.expect("a page")[0].mesh.clone().expect("a mesh");
+    assert_eq!(mesh.stat, "");
+    assert_eq!(send_back(&world, &recipes([1; 4])).await, 0);
+}
+
+#[tokio::test]
+async fn a_failure_is_taken_up_when_its_settings_change() {
+    let world = World::new(1).await;
+    let lease = world.claim(1).await.remove(0);
+    let failed = StageFailed {
+        stage: Stage::Fit,
+        failure: Failure::new(FailureClass::NoSolution, "no relief"),
+        sentence: Sentence::Quarantine,
+        recipe: world.recipes.of(Stage::Fit),
+        facts: super::done(world.recipes, Stage::Fit).facts,
+        inputs: super::inputs(Stage::Fit),
+        ms: None,
+        at: 5,
+    };
+    assert!(world.catalog.fail(lease, failed).await.expect("stored"));
+    assert_eq!(send_back(&world, &recipes([1; 4])).await, 0);
+    assert_eq!(send_back(&world, &recipes([1, 2, 1, 1])).await, 0);
+    assert_eq!(send_back(&world, &recipes([2, 1, 1, 1])).await, 1);
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    let results = detail.expect("the pair").results;
+    assert_eq!((results.status, results.failure), (JobStatus::Ready, None));
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn a_leased_pair_is_never_sent_back() {
+    let world = World::new(1).await;
+    let _lease = world.claim(1).await;
+    let recipes = recipes([2; 4]);
+    let again = Again::All(Stage::Fit);
+    let sent = world.catalog.send_back(&recipes, None, again);
+    assert_eq!(sent.await.expect("sent back"), 0);
+    world.counters_hold().await;
+}

@@ -1,0 +1,172 @@
+//! Verdicts: bound to results, appended, taken back.
+
+use super::{World, name};
+use crate::catalog::{Catalog, CatalogError, Kept, NewVerdict};
+use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
+
+fn verdict(reader: &str, verdict: Verdict) -> NewVerdict {
+    NewVerdict {
+        pair: name("p0"),
+        metric: None,
+        verdict,
+        reader: reader.to_owned(),
+        reason: (verdict == Verdict::Fail).then_some(Reason::Angle),
+        note: None,
+    }
+}
+
+async fn counted(catalog: &Catalog) -> Vec<(String, Verdict)> {
+    let detail = catalog.pair(&name("p0")).await.expect("a read");
+    let metrics = detail.expect("the pair").results.metrics;
+    let of_first = metrics[0].verdicts.iter();
+    of_first.map(|v| (v.reader.clone(), v.verdict)).collect()
+}
+
+#[tokio::test]
+async fn the_newest_verdict_of_each_reader_counts() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    for given in [
+        verdict("ana", Verdict::Pass),
+        verdict("bo", Verdict::Unsure),
+        verdict("ana", Verdict::Fail),
+    ] {
+        world
+            .catalog
+            .verdict_set(vec![given], 5)
+            .await
+            .expect("stored");
+    }
+    let expected = [
+        ("ana".to_owned(), Verdict::Fail),
+        ("bo".to_owned(), Verdict::Unsure),
+    ];
+    assert_eq!(counted(&world.catalog).await, expected);
+    let status = world.catalog.status(&super::recipes([1; 4])).await;
+    let status = status.expect("a read");
+    assert_eq!(status.verdicts[&Verdict::Fail], 3);
+    assert_eq!(status.verdicts[&Verdict::Pass], 0);
+    assert_eq!(
+        world.catalog.verdict_log(None).await.expect("a log").len(),
+        9
+    );
+}
+
+#[tokio::test]
+async fn undo_takes_back_the_newest_act_and_the_log_keeps_both() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    for given in [verdict("ana", Verdict::Pass), verdict("ana", Verdict::Fail)] {
+        world
+            .catalog
+            .verdict_set(vec![given], 5)
+            .await
+            .expect("stored");
+    }
+    let undone = world.catalog.verdict_undo(Some("ana"), 6).await;
+    let undone = undone.expect("taken back");
+    assert_eq!(undone.len(), 3);
+    assert!(undone.iter().all(|event| event.verdict == Verdict::Fail));
+    assert_eq!(
+        counted(&world.catalog).await,
+        [("ana".to_owned(), Verdict::Pass)]
+    );
+    world
+        .catalog
+        .verdict_undo(None, 7)
+        .await
+        .expect("taken back");
+    let nothing = world.catalog.verdict_undo(None, 8).await;
+    assert!(matches!(nothing, Err(CatalogError::NothingToUndo(_))));
+    let log = world.catalog.verdict_log(Some(&name("p0"))).await;
+    let log = log.expect("a log");
+    assert!(log.len() == 6 && log.iter().all(|event| event.undone_at.is_some()));
+}
+
+#[tokio::test]
+async fn a_verdict_without_a_result_or_a_pair_is_refused_whole() {
+    let world = World::new(2).await;
+    world.finish_one().await;
+    let early = NewVerdict {
+        pair: name("p1"),
+        ..verdict("ana", Verdict::Pass)
+    };
+    let both = vec![verdict("ana", Verdict::Pass), early];
+    let refused = world.catalog.verdict_set(both, 5).await;
+    assert!(matches!(refused, Err(CatalogError::NoResult(_))));
+    let unknown = NewVerdict {
+        pair: name("nobody"),
+        ..verdict("ana", Verdict::Pass)
+    };
+    let refused = world.catalog.verdict_set(vec![unknown], 5).await;
+    assert!(matches!(refused, Err(CatalogError::UnknownPair(_))));
+    assert!(
+        world
+            .catalog
+            .verdict_log(None)
+            .await
+            .expect("a log")
+            .is_empty()
+    );
+}
+
+#[tokio::test]
+async fn a_new_result_does_not_inherit_a_verdict_and_the_same_result_keeps_it() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let given = vec![verdict("ana", Verdict::Pass)];
+    world.catalog.verdict_set(given, 5).await.expect("stored");
+    let again = crate::catalog::Again::All(Stage::Register);
+    for changed in [false, true] {
+        let sent = world
+            .catalog
+            .send_back(&super::recipes([1; 4]), None, again)
+            .await;
+        assert_eq!(sent.expect("sent back"), 1);
+        let lease = world.claim(1).await.remove(0);
+        let mut done = world.done(Stage::Register);
+        if changed {
+            done.metrics[0].result_hash = ContentHash::of(b"another");
+        }
+        let kept = world.catalog.checkpoint(lease, done).await;
+        assert!(matches!(kept, Ok(Kept::Done)));
+        assert_eq!(counted(&world.catalog).await.is_empty(), changed);
+    }
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    let results = detail.expect("the pair").results;
+    let first = results.metric(ThresholdMetric::NlSsim).expect("the metric");
+    assert_eq!(first.older_verdicts, 1);
+}
+
+#[tokio::test]
+async fn the_database_itself_refuses_to_change_a_verdict() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let given = vec![verdict("ana", Verdict::Pass)];
+    world.catalog.verdict_set(given, 5).await.expect("stored");
+    let path = world.dir.path().join("catalog.sqlite");
+    let mut conn = crate::catalog::connect::writer(&path, false)
+        .await
+        .expect("a connection");
+    for sql in ["UPDATE verdict SET reader = 'bo'", "DELETE FROM verdict"] {
+        assert!(sqlx::query(sql).execute(&mut conn).await.is_err());
+    }
+}
+
+#[tokio::test]
+async fn truth_is_stored_for_known_pairs_only() {
+    let world = World::new(1).await;
+    let body = serde_json::json!({ "id": "p0", "char_height_px": 100.5 });
+    assert!(!world.catalog.has_truth().await.expect("a read"));
+    let unknown = vec![(name("p0"), body.clone()), (name("nobody"), body.clone())];
+    let refused = world.catalog.set_truth(unknown).await;
+    assert!(matches!(refused, Err(CatalogError::UnknownPair(_))));
+    assert!(!world.catalog.has_truth().await.expect("a read"));
+    let stored = world
+        .catalog
+        .set_truth(vec![(name("p0"), body.clone())])
+        .await;
+    assert_eq!(stored.expect("stored"), 1);
+    let page = world.catalog.results_page(None, 5).await.expect("a page");
+    assert_eq!(page[0].truth, Some(body));
+}

@@ -1,0 +1,267 @@
+//! Verdicts: an append-only log; the newest of each reader on a result counts.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::Value;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row as _, SqliteConnection};
+
+use super::{Catalog, CatalogError, Result, rows};
+use crate::domain::{ContentHash, PairName, Reason, ThresholdMetric, UnixMillis, Verdict};
+
+/// A verdict to store.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewVerdict {
+    /// The pair.
+    pub pair: PairName,
+    /// One metric's result, or those of all metrics.
+    pub metric: Option<ThresholdMetric>,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// Who read it.
+    pub reader: String,
+    /// Why, for a fail.
+    pub reason: Option<Reason>,
+    /// In the reader's words.
+    pub note: Option<String>,
+}
+
+/// One line of the verdict log.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct VerdictEvent {
+    /// Number in the log.
+    pub id: i64,
+    /// Number of the act; one act judges one or all metrics of a pair.
+    pub act: i64,
+    /// The pair.
+    pub pair: PairName,
+    /// The metric.
+    pub metric: ThresholdMetric,
+    /// The result that was judged.
+    pub result_hash: ContentHash,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// Who read it.
+    pub reader: String,
+    /// Why, for a fail.
+    pub reason: Option<Reason>,
+    /// In the reader's words.
+    pub note: Option<String>,
+    /// When.
+    pub at: UnixMillis,
+    /// When it was taken back, if it was.
+    pub undone_at: Option<UnixMillis>,
+    /// Whether the pair's current result is still the one that was judged.
+    pub current: bool,
+}
+
+/// A verdict that counts: the newest of its reader on its result, not taken back.
+#[derive(Debug)]
+pub(super) struct Counted {
+    pub(super) result_hash: ContentHash,
+    pub(super) verdict: Verdict,
+    pub(super) reader: String,
+    pub(super) reason: Option<Reason>,
+}
+
+/// Results that a verdict on a pair judges: those of a job that is done.
+const JUDGED: &str = "
+SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
+    JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
+WHERE p.name = ?1 ORDER BY m.metric";
+
+const INSERT: &str = "
+INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, reason, note, at)
+VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
+
+/// Lines of the log of one act, or of one pair, or all.
+const LOG: &str = "
+SELECT v.id, v.act, p.name, v.metric, v.result_hash, v.verdict, v.reader, v.reason, v.note, v.at,
+    u.at AS undone_at, coalesce(m.result_hash = v.result_hash, 0) AS current
+FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act
+    LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
+WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) ORDER BY v.id";
+
+pub(super) const COUNTED: &str = "
+SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reader, v.reason
+FROM json_each(?1) AS wanted CROSS JOIN verdict AS v ON v.pair = wanted.value
+WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+ORDER BY v.pair, v.metric, v.reader, v.id";
+
+impl Catalog {
+    /// Appends verdicts on the current results, all or none.
+    ///
+    /// # Errors
+    /// When a pair is not there or has no result; then nothing is stored.
+    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<()> {
+        self.alone(move |conn| {
+            Box::pin(async move {
+                for verdict in &verdicts {
+                    append(conn, verdict, now).await?;
+                }
+                Ok(())
+            })
+        })
+        .await
+    }
+
+    /// Takes back the newest act that is not taken back yet, of one reader or of anybody; says which.
+    /// The log keeps both.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub async fn verdict_undo(
+        &self,
+        reader: Option<&str>,
+        now: UnixMillis,
+    ) -> Result<Vec<VerdictEvent>> {
+        let reader = reader.map(str::to_owned);
+        self.alone(move |conn| {
+            Box::pin(async move {
+                let act: Option<i64> = sqlx::query_scalar(
+                    "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reader = ?1)
+                        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)",
+                )
+                .bind(&reader)
+                .fetch_one(&mut *conn)
+                .await?;
+                let Some(act) = act else {
+                    let who = reader.unwrap_or_else(|| "anybody".to_owned());
+                    return Err(CatalogError::NothingToUndo(who));
+                };
+                sqlx::query("INSERT INTO verdict_undo (act, at) VALUES (?1, ?2)")
+                    .bind(act)
+                    .bind(now)
+                    .execute(&mut *conn)
+                    .await?;
+                let found = sqlx::query(LOG)
+                    .bind(act)
+                    .bind(None::<&str>)
+                    .fetch_all(conn)
+                    .await?;
+                found.iter().map(event).collect()
+            })
+        })
+        .await
+    }
+
+    /// The log, oldest first, of one pair or of all.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
+        let mut conn = self.reader().await?;
+        log(&mut conn, pair).await
+    }
+}
+
+async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) -> Result<()> {
+    let judged = sqlx::query(JUDGED)
+        .bind(new.pair.as_str())
+        .fetch_all(&mut *conn)
+        .await?;
+    if judged.is_empty() {
+        return Err(CatalogError::UnknownPair(new.pair.clone()));
+    }
+    let mut act: Option<i64> = None;
+    for row in &judged {
+        let Some(metric) = row.try_get::<Option<String>, _>("metric")? else {
+            return Err(CatalogError::NoResult(new.pair.clone()));
+        };
+        if new.metric.is_some_and(|wanted| wanted.name() != metric) {
+            continue;
+        }
+        let id = insert(conn, new, row, &metric, act, now).await?;
+        act.get_or_insert(id);
+    }
+    match (act, new.metric) {
+        (None, Some(metric)) => Err(CatalogError::NoMetricResult(new.pair.clone(), metric)),
+        _ => Ok(()),
+    }
+}
+
+/// Appends one row; its act is the number of the act's first row.
+async fn insert(
+    conn: &mut SqliteConnection,
+    new: &NewVerdict,
+    judged: &SqliteRow,
+    metric: &str,
+    act: Option<i64>,
+    now: UnixMillis,
+) -> Result<i64> {
+    let next: i64 = sqlx::query_scalar("SELECT coalesce(max(id), 0) + 1 FROM verdict")
+        .fetch_one(&mut *conn)
+        .await?;
+    sqlx::query(INSERT)
+        .bind(act.unwrap_or(next))
+        .bind(judged.try_get::<i64, _>("pair")?)
+        .bind(metric)
+        .bind(judged.try_get::<Vec<u8>, _>("result_hash")?)
+        .bind(new.verdict.name())
+        .bind(&new.reader)
+        .bind(new.reason.map(Reason::name))
+        .bind(&new.note)
+        .bind(now)
+        .execute(conn)
+        .await?;
+    Ok(next)
+}
+
+pub(super) async fn log(
+    conn: &mut SqliteConnection,
+    pair: Option<&PairName>,
+) -> Result<Vec<VerdictEvent>> {
+    let found = sqlx::query(LOG)
+        .bind(None::<i64>)
+        .bind(pair.map(PairName::as_str))
+        .fetch_all(conn)
+        .await?;
+    found.iter().map(event).collect()
+}
+
+fn event(row: &SqliteRow) -> Result<VerdictEvent> {
+    let reason: Option<String> = row.try_get("reason")?;
+    Ok(VerdictEvent {
+        id: row.try_get("id")?,
+        act: row.try_get("act")?,
+        pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
+        metric: rows::name(&row.try_get::<String, _>("metric")?)?,
+        result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
+        verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
+        reader: row.try_get("reader")?,
+        reason: reason.map(|reason| rows::name(&reason)).transpose()?,
+        note: row.try_get("note")?,
+        at: row.try_get("at")?,
+        undone_at: row.try_get("undone_at")?,
+        current: row.try_get("current")?,
+    })
+}
+
+/// The verdicts that count, of some pairs, in the order of readers.
+pub(super) async fn of_pairs(
+    conn: &mut SqliteConnection,
+    pairs: &[i64],
+) -> Result<BTreeMap<(i64, ThresholdMetric), Vec<Counted>>> {
+    let found = sqlx::query(COUNTED)
+        .bind(Value::from(pairs).to_string())
+        .fetch_all(conn)
+        .await?;
+    let mut counted: BTreeMap<_, Vec<Counted>> = BTreeMap::new();
+    for row in &found {
+        let metric = rows::name(&row.try_get::<String, _>("metric")?)?;
+        let reason: Option<String> = row.try_get("reason")?;
+        let newest = Counted {
+            result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
+            verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
+            reader: row.try_get("reader")?,
+            reason: reason.map(|reason| rows::name(&reason)).transpose()?,
+        };
+        let of_metric = counted.entry((row.try_get("pair")?, metric)).or_default();
+        // Rows come oldest first, so a later one of the same reader on the same result takes its place.
+        of_metric
+            .retain(|old| (&old.reader, old.result_hash) != (&newest.reader, newest.result_hash));
+        of_metric.push(newest);
+    }
+    Ok(counted)
+}

@@ -1,0 +1,124 @@
+//! What a worker needs to know of the pair it leased, and of its inputs.
+
+use sqlx::Row as _;
+
+use super::claim::PairSelection;
+use super::lease::{InputSeen, InputsSeen, Lease};
+use super::read::{PairFacts, StageRecord};
+use super::{Catalog, Result, checkpoint, pairs, results, rows};
+use crate::domain::{ContentHash, PairId};
+
+/// A leased pair with what is known of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairWork {
+    /// As imported.
+    pub facts: PairFacts,
+    /// What the manifest says that results depend on; stored with each result.
+    pub facts_text: String,
+    /// Results of the stages behind it, in order; none missing.
+    pub results: Vec<StageRecord>,
+}
+
+/// An input file as last read, to tell whether it changed since.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KnownInputs {
+    /// The pair.
+    pub pair: PairId,
+    /// Path of the mesh as stored.
+    pub mesh_path: String,
+    /// The mesh as last read.
+    pub mesh: Option<InputSeen>,
+    /// Path of the print as stored.
+    pub print_path: String,
+    /// The print as last read.
+    pub print: Option<InputSeen>,
+}
+
+const PAIR: &str = "
+SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, facts FROM pair WHERE id = ?1";
+
+/// Pairs of which at least one file has been read, in pages by number.
+pub(super) const INPUTS: &str = "
+SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat FROM pair
+WHERE id > ?1 ORDER BY id LIMIT ?2";
+
+const INPUTS_AMONG: &str = "
+SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat
+FROM pair WHERE id > ?1 AND id IN (SELECT value FROM json_each(?3)) ORDER BY id LIMIT ?2";
+
+impl Catalog {
+    /// The leased pair with the results it has.
+    ///
+    /// # Errors
+    /// When the database refuses or holds what it must not.
+    pub async fn work(&self, lease: &Lease) -> Result<PairWork> {
+        let mut conn = self.reader().await?;
+        let row = sqlx::query(PAIR)
+            .bind(lease.pair.0)
+            .fetch_one(&mut *conn)
+            .await?;
+        let mut found = results::of_pairs(&mut conn, &[lease.pair.0]).await?;
+        let mut results = found.remove(&lease.pair.0).unwrap_or_default();
+        results.retain(|record| record.stage < lease.cursor);
+        Ok(PairWork {
+            facts: pairs::facts(&row)?,
+            facts_text: row.try_get("facts")?,
+            results,
+        })
+    }
+
+    /// Input files as last read, in pages by the pair's number; empty at the end.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn known_inputs(
+        &self,
+        after: Option<PairId>,
+        limit: usize,
+        among: Option<&PairSelection>,
+    ) -> Result<Vec<KnownInputs>> {
+        let mut conn = self.reader().await?;
+        let after = after.map_or(0, |pair| pair.0);
+        let query = match among {
+            None => sqlx::query(INPUTS).bind(after).bind(limit as i64),
+            Some(among) => sqlx::query(INPUTS_AMONG)
+                .bind(after)
+                .bind(limit as i64)
+                .bind(&among.json),
+        };
+        let found = query.fetch_all(&mut *conn).await?;
+        found.iter().map(known_inputs).collect()
+    }
+
+    /// Stores what input files look like now.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn store_inputs(&self, seen: Vec<(PairId, InputsSeen)>) -> Result<()> {
+        self.alone(move |conn| {
+            Box::pin(async move {
+                let items = seen
+                    .iter()
+                    .map(|(pair, seen)| checkpoint::seen_json(pair.0, seen));
+                checkpoint::run_seen(conn, &rows::array(items)).await
+            })
+        })
+        .await
+    }
+}
+
+fn known_inputs(row: &sqlx::sqlite::SqliteRow) -> Result<KnownInputs> {
+    let seen = |hash: &str, stat: &str| -> Result<Option<InputSeen>> {
+        let hash: Option<Vec<u8>> = row.try_get(hash)?;
+        let hash: Option<ContentHash> = rows::hash_option(hash.as_deref())?;
+        let stat: Option<String> = row.try_get(stat)?;
+        Ok(hash.zip(stat).map(|(hash, stat)| InputSeen { hash, stat }))
+    };
+    Ok(KnownInputs {
+        pair: PairId(row.try_get("id")?),
+        mesh_path: row.try_get("mesh_path")?,
+        mesh: seen("mesh_hash", "mesh_stat")?,
+        print_path: row.try_get("print_path")?,
+        print: seen("print_hash", "print_stat")?,
+    })
+}

@@ -1,0 +1,189 @@
+//! The one task that writes: takes all requests that wait, commits them together, answers after the commit.
+
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Duration;
+
+use sqlx::{Connection as _, SqliteConnection};
+use tokio::sync::{mpsc, oneshot};
+use tokio::time::Instant;
+
+use super::batch::{Answers, Batch, Request};
+use super::{CatalogError, Result};
+
+/// Most requests in one commit.
+const BATCH: usize = 256;
+/// Commits after which the write-ahead log is folded back even while there is work; about 4 MiB of log.
+const COMMITS_PER_CHECKPOINT: u32 = 128;
+/// How long nothing must come in before the log is folded back.
+const IDLE: Duration = Duration::from_millis(250);
+/// How long other processes' writes are waited for, over and above SQLite's own waiting.
+const PATIENCE: Duration = Duration::from_mins(1);
+
+/// A future that borrows the write connection.
+pub(super) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
+/// A transaction of its own; it sends its own answer.
+pub(super) type Alone = Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, ()> + Send>;
+
+/// What the writer is told.
+pub(super) enum Message {
+    /// Goes into the next group commit.
+    Grouped(Request),
+    /// Runs in its own transaction.
+    Alone(Alone),
+    /// Ends the writer when all before it is done.
+    Close(oneshot::Sender<()>),
+}
+
+/// The writer's loop. Ends at `Close` or when nobody can send any more.
+pub(super) async fn run(mut conn: SqliteConnection, mut inbox: mpsc::Receiver<Message>) {
+    let mut commits = 0_u32;
+    let closing = loop {
+        let message = if commits == 0 {
+            inbox.recv().await
+        } else {
+            let Ok(message) = tokio::time::timeout(IDLE, inbox.recv()).await else {
+                fold_log(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
+                commits = 0;
+                continue;
+            };
+            message
+        };
+        match message {
+            None => break None,
+            Some(Message::Close(done)) => break Some(done),
+            Some(Message::Alone(work)) => work(&mut conn).await,
+            Some(Message::Grouped(first)) => {
+                let (batch, after) = gather(first, &mut inbox);
+                commit(&mut conn, batch).await;
+                match after {
+                    Some(Message::Close(done)) => break Some(done),
+                    Some(Message::Alone(work)) => work(&mut conn).await,
+                    Some(Message::Grouped(_)) | None => {}
+                }
+            }
+        }
+        commits += 1;
+        if commits >= COMMITS_PER_CHECKPOINT {
+            fold_log(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
+            commits = 0;
+        }
+    };
+    fold_log(&mut conn, "PRAGMA wal_checkpoint(TRUNCATE)").await;
+    if let Err(error) = conn.close().await {
+        tracing::warn!(%error, "the catalog did not close cleanly");
+    }
+    if let Some(done) = closing {
+        // Whoever asked may have gone; then nobody needs the answer.
+        let _ = done.send(());
+    }
+}
+
+/// All requests that wait, up to the first message that is not one.
+fn gather(first: Request, inbox: &mut mpsc::Receiver<Message>) -> (Batch, Option<Message>) {
+    let mut batch = Batch::default();
+    batch.push(first);
+    while batch.len() < BATCH {
+        match inbox.try_recv() {
+            Ok(Message::Grouped(request)) => batch.push(request),
+            Ok(other) => return (batch, Some(other)),
+            Err(_) => break,
+        }
+    }
+    (batch, None)
+}
+
+/// Commits a batch and answers. When it fails, each request is tried alone, so that one that cannot be stored
+/// does not take the others with it.
+async fn commit(conn: &mut SqliteConnection, batch: Batch) {
+    match attempt(conn, &batch).await {
+        Ok(answers) => batch.answer(answers),
+        Err(error) if batch.len() == 1 => batch.refuse(&Arc::new(error)),
+        Err(_) => {
+            for single in batch.split() {
+                match attempt(conn, &single).await {
+                    Ok(answers) => single.answer(answers),
+                    Err(error) => single.refuse(&Arc::new(error)),
+                }
+            }
+        }
+    }
+}
+
+async fn attempt(conn: &mut SqliteConnection, batch: &Batch) -> Result<Answers> {
+    begin(conn).await?;
+    let outcome = batch.apply(conn).await;
+    end(conn, outcome).await
+}
+
+/// Begins a write transaction. Waits for another process's, so that "busy" never reaches a caller before its time.
+async fn begin(conn: &mut SqliteConnection) -> Result<()> {
+    let until = Instant::now() + PATIENCE;
+    loop {
+        match sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await {
+            Ok(_) => return Ok(()),
+            Err(error) if is_busy(&error) && Instant::now() < until => {
+                tracing::debug!("the catalog is busy, waiting");
+            }
+            Err(error) => return Err(error.into()),
+        }
+    }
+}
+
+/// Commits what went well and takes back what did not.
+async fn end<T>(conn: &mut SqliteConnection, outcome: Result<T>) -> Result<T> {
+    let outcome = match outcome {
+        Ok(value) => match sqlx::query("COMMIT").execute(&mut *conn).await {
+            Ok(_) => return Ok(value),
+            Err(error) => Err(error.into()),
+        },
+        failed => failed,
+    };
+    // Some errors, such as a full disk, have rolled back already; then there is nothing to take back.
+    if let Err(error) = sqlx::query("ROLLBACK").execute(conn).await {
+        tracing::debug!(%error, "nothing to roll back");
+    }
+    outcome
+}
+
+/// Whether another connection holds the lock (`SQLITE_BUSY` and its extended codes).
+fn is_busy(error: &sqlx::Error) -> bool {
+    let code = error
+        .as_database_error()
+        .and_then(sqlx::error::DatabaseError::code)
+        .and_then(|code| code.parse::<i64>().ok());
+    code.is_some_and(|code| code & 0xff == 5)
+}
+
+async fn fold_log(conn: &mut SqliteConnection, pragma: &'static str) {
+    // Readers may hold it back; then the next one does it.
+    if let Err(error) = sqlx::query(pragma).execute(conn).await {
+        tracing::debug!(%error, "the write-ahead log was not folded back");
+    }
+}
+
+/// Runs `work` in its own transaction through the writer.
+pub(super) async fn alone<T: Send + 'static>(
+    inbox: &mpsc::Sender<Message>,
+    work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
+) -> Result<T> {
+    let (sender, receiver) = oneshot::channel();
+    let task: Alone = Box::new(move |conn| {
+        Box::pin(async move {
+            let _ = sender.send(in_transaction(conn, work).await);
+        })
+    });
+    if inbox.send(Message::Alone(task)).await.is_err() {
+        return Err(CatalogError::Closed);
+    }
+    receiver.await.unwrap_or(Err(CatalogError::Closed))
+}
+
+async fn in_transaction<T>(
+    conn: &mut SqliteConnection,
+    work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>>,
+) -> Result<T> {
+    begin(conn).await?;
+    let outcome = work(&mut *conn).await;
+    end(conn, outcome).await
+}

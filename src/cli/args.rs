@@ -1,0 +1,158 @@
+//! The command line as clap reads it: global flags and the list of commands.
+
+use std::path::PathBuf;
+
+use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+
+use super::exit::ExitCode;
+use super::{
+    completions, config, demo, export, import, man, report, retry, run, sheet, show, status,
+    verdict,
+};
+
+/// Aligns 3D scans of carved woodblock characters with images of their prints.
+///
+/// A project is a directory with a catalog and artifacts. `import` makes one from your files, `run` aligns what
+/// is left to align, `report` prints the table. A run that was stopped goes on where it was.
+#[derive(Debug, Parser)]
+#[command(name = "mocban", version, after_help = ExitCode::table(), subcommand_required = true, arg_required_else_help = true)]
+pub(super) struct Cli {
+    /// Flags of every command.
+    #[command(flatten)]
+    pub(super) global: Global,
+    /// What to do.
+    #[command(subcommand)]
+    pub(super) command: Command,
+}
+
+/// Flags of every command.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Global options")]
+pub(super) struct Global {
+    /// The project's directory [default: the current one]
+    #[arg(short = 'C', value_name = "DIR", global = true)]
+    pub(super) directory: Option<PathBuf>,
+    /// Settings from this file in the place of the project's mocban.toml; "default" and "paper" are built in
+    #[arg(long, value_name = "FILE", global = true)]
+    pub(super) config: Option<String>,
+    /// One setting, stronger than any file, such as run.workers=2; may be given many times
+    #[arg(long, value_name = "SECTION.KEY=VALUE", global = true, action = ArgAction::Append)]
+    pub(super) set: Vec<String>,
+    /// Say nothing but warnings and errors
+    #[arg(short, long, global = true)]
+    pub(super) quiet: bool,
+    /// Log more; -vv logs all
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub(super) verbose: u8,
+    /// Answer in JSON on stdout
+    #[arg(long, global = true)]
+    pub(super) json: bool,
+    /// When to colour: auto, always or never
+    #[arg(
+        long,
+        hide_possible_values = true,
+        value_name = "WHEN",
+        global = true,
+        default_value = "auto"
+    )]
+    pub(super) color: ColorWhen,
+    /// Form of the log: text or json
+    #[arg(
+        long,
+        hide_possible_values = true,
+        value_name = "FORM",
+        global = true,
+        default_value = "text"
+    )]
+    pub(super) log_format: LogFormat,
+    /// Log to this file instead of stderr; it is appended to
+    #[arg(long, value_name = "FILE", global = true)]
+    pub(super) log_file: Option<PathBuf>,
+    /// How a run shows its progress on stderr: auto, bar, plain, json or none
+    #[arg(
+        long,
+        hide_possible_values = true,
+        value_name = "HOW",
+        global = true,
+        default_value = "auto"
+    )]
+    pub(super) progress: ProgressMode,
+}
+
+/// When to colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ColorWhen {
+    /// On a terminal, unless `NO_COLOR` is set.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// Form of the log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum LogFormat {
+    /// Lines for people.
+    Text,
+    /// One JSON object a line.
+    Json,
+}
+
+/// How a run shows its progress.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ProgressMode {
+    /// A bar on a terminal, plain lines elsewhere.
+    Auto,
+    /// A bar.
+    Bar,
+    /// A line every ten seconds or five per cent.
+    Plain,
+    /// One JSON object an event.
+    Json,
+    /// Nothing.
+    None,
+}
+
+/// What to do.
+#[derive(Debug, Subcommand)]
+pub(super) enum Command {
+    /// Make the built-in dataset, run it and print the report
+    Demo(demo::DemoArgs),
+    /// Take pairs of meshes and prints into the project
+    Import(import::ImportArgs),
+    /// Align the pairs that are left to align
+    Run(run::RunArgs),
+    /// Show on one screen where the project stands
+    Status(status::StatusArgs),
+    /// Show one pair: numbers, files, history, and why it runs again
+    Show(show::ShowArgs),
+    /// Take failed pairs up again at the next run
+    Retry(retry::RetryArgs),
+    /// Record what people say of the results
+    #[command(subcommand)]
+    Verdict(verdict::VerdictCommand),
+    /// Print the table of all results
+    Report(report::ReportArgs),
+    /// Write the aligned pairs for other tools
+    Export(export::ExportArgs),
+    /// Lay many overlays on one PNG, worst first
+    Sheet(sheet::SheetArgs),
+    /// Show the settings in force
+    #[command(subcommand)]
+    Config(config::ConfigCommand),
+    /// Print a completion script for a shell
+    Completions(completions::CompletionsArgs),
+    /// Write the manual pages
+    Man(man::ManArgs),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Cli;
+
+    #[test]
+    fn command_line_is_sound() {
+        <Cli as clap::CommandFactory>::command().debug_assert();
+    }
+}

@@ -1,0 +1,22 @@
+//! `completions SHELL`: a completion script on stdout.
+
+use clap::{Args, CommandFactory};
+use clap_complete::Shell;
+
+use super::args::Cli;
+use super::context::Context;
+use super::exit::ExitCode;
+
+/// Arguments of `completions`.
+#[derive(Debug, Args)]
+pub(super) struct CompletionsArgs {
+    /// The shell
+    pub(super) shell: Shell,
+}
+
+pub(super) fn completions(args: CompletionsArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let mut script = Vec::new();
+    clap_complete::generate(args.shell, &mut Cli::command(), "mocban", &mut script);
+    context.talk.data(&String::from_utf8(script)?)?;
+    Ok(ExitCode::Done)
+}

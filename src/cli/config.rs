@@ -1,0 +1,109 @@
+//! `config show`: the settings in force, as a file that could be read again.
+
+use clap::{Args, Subcommand};
+use serde_json::{Map, json};
+
+use super::context::Context;
+use super::exit::ExitCode;
+use super::talk::{Palette, Tone};
+use crate::config::{Origin, Setting};
+
+/// What to do with settings.
+#[derive(Debug, Subcommand)]
+pub(super) enum ConfigCommand {
+    /// Print every setting
+    Show(ShowArgs),
+}
+
+/// Arguments of `config show`.
+#[derive(Debug, Args)]
+pub(super) struct ShowArgs {
+    /// Say beside each value where it came from
+    #[arg(long)]
+    pub(super) origin: bool,
+}
+
+pub(super) fn config(command: &ConfigCommand, context: &Context) -> anyhow::Result<ExitCode> {
+    let ConfigCommand::Show(args) = command;
+    let settings = context.settings()?.tree.settings();
+    if context.global.json {
+        context.talk.json(&as_json(&settings))?;
+    } else {
+        context
+            .talk
+            .data(&as_toml(&settings, args.origin, context.talk.out))?;
+    }
+    Ok(ExitCode::Done)
+}
+
+fn as_json(settings: &[Setting]) -> serde_json::Value {
+    let values: Map<String, serde_json::Value> = settings
+        .iter()
+        .map(|setting| {
+            let value = json!({"value": setting.value, "origin": setting.origin.to_string()});
+            (setting.key.clone(), value)
+        })
+        .collect();
+    json!({"schema": 1, "settings": values})
+}
+
+/// Settings as a file that reads back the same, with the origins in comments where they are wanted.
+pub(super) fn as_toml(settings: &[Setting], origins: bool, palette: Palette) -> String {
+    let mut text = String::new();
+    let mut section = "";
+    let longest = settings.iter().map(|setting| line(setting).len()).max();
+    for setting in settings {
+        let (own, _) = setting.key.rsplit_once('.').unwrap_or(("", &setting.key));
+        if own != section {
+            let gap = if text.is_empty() { "" } else { "\n" };
+            let heading = palette.paint(Tone::Strong, format!("[{own}]"));
+            text += &format!("{gap}{heading}\n");
+            section = own;
+        }
+        let line = line(setting);
+        if origins {
+            let blanks = " ".repeat(longest.unwrap_or(0) - line.len());
+            let tone = match setting.origin {
+                Origin::Default => Tone::Faint,
+                Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => Tone::Warn,
+            };
+            let origin = palette.paint(tone, format!("# {}", setting.origin));
+            text += &format!("{line}{blanks}  {origin}\n");
+        } else {
+            text += &format!("{line}\n");
+        }
+    }
+    text
+}
+
+fn line(setting: &Setting) -> String {
+    let key = setting.key.rsplit('.').next().unwrap_or(&setting.key);
+    format!("{key} = {}", setting.value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Palette, as_toml};
+    use crate::config::{Origin, Setting};
+
+    #[test]
+    fn output_is_a_settings_file_again() {
+        let setting = |key: &str, value: toml::Value, origin| Setting {
+            key: key.to_owned(),
+            value,
+            origin,
+        };
+        let settings = [
+            setting("run.workers", 2.into(), Origin::Flag),
+            setting("limits.mesh.max_bytes", 7.into(), Origin::Default),
+            setting("fit.side", "auto".into(), Origin::Preset("paper")),
+        ];
+        let text = as_toml(&settings, true, Palette::PLAIN);
+        let table: toml::Table = text.parse().expect("valid TOML");
+        assert_eq!(table["limits"]["mesh"]["max_bytes"].as_integer(), Some(7));
+        assert_eq!(
+            text.lines().next_back(),
+            Some("side = \"auto\"  # preset paper")
+        );
+    }
+}

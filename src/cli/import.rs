@@ -1,0 +1,214 @@
+//! `import`: takes pairs of meshes and prints into the project, and makes it where there is none.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::context::{Context, now};
+use super::exit::ExitCode;
+use super::manifest_file::Listing;
+use super::table::count;
+use super::truth_file::{self, refusal};
+use crate::catalog::{Catalog, ImportRow, ImportSummary};
+use crate::domain::{LengthUnit, PairName};
+use crate::manifest::ManifestRow;
+use crate::store::Project;
+
+/// Arguments of `import`.
+#[derive(Debug, Default, Args)]
+pub(super) struct ImportArgs {
+    /// A CSV or JSON Lines file with the columns id, mesh, print and if wanted character, block, unit,
+    /// `scanned_face_down`; paths are relative to the file
+    #[arg(required_unless_present = "meshes", conflicts_with = "meshes")]
+    pub(super) file: Option<PathBuf>,
+    /// A folder of meshes, paired with --prints by file stem
+    #[arg(long, value_name = "DIR", requires = "prints")]
+    pub(super) meshes: Option<PathBuf>,
+    /// A folder of prints
+    #[arg(long, value_name = "DIR", requires = "meshes")]
+    pub(super) prints: Option<PathBuf>,
+    /// Unit of the meshes of a folder: mm, cm, m or in
+    #[arg(long, requires = "meshes")]
+    pub(super) unit: Option<LengthUnit>,
+    /// True alignments, one JSON object a line; the report then tells how far results are from them
+    #[arg(long, value_name = "FILE")]
+    pub(super) truth: Option<PathBuf>,
+}
+
+pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let taken = take(&args, context).await?;
+    if context.global.json {
+        context.talk.json(&as_json(&taken))?;
+    }
+    tell(&taken, context);
+    context.talk.next(&context.command("run"));
+    Ok(ExitCode::Done)
+}
+
+/// What an import did.
+#[derive(Debug)]
+pub(super) struct Taken {
+    pub(super) summary: ImportSummary,
+    pub(super) truths: u64,
+    missing: Vec<String>,
+    remarks: Vec<String>,
+}
+
+/// Imports: everything is read and checked before anything is written.
+///
+/// # Errors
+/// When a list is refused, or catalog or disk refuse.
+pub(super) async fn take(args: &ImportArgs, context: &Context) -> anyhow::Result<Taken> {
+    let listing = listing(args)?;
+    let dir = context.dir();
+    let truths = match &args.truth {
+        Some(file) => read_truths(file, &listing.rows, &dir).await?,
+        None => Vec::new(),
+    };
+    let project = Project::create(&dir)?;
+    let catalog = Catalog::create(&project.catalog_path()).await?;
+    let rows = listing
+        .rows
+        .iter()
+        .map(|row| stored_row(row, &project))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let summary = catalog.import(rows, now()).await?;
+    let stored = catalog.set_truth(stored_truths(truths, &project)?).await?;
+    catalog.close().await;
+    Ok(Taken {
+        summary,
+        truths: stored,
+        missing: listing.missing(),
+        remarks: listing.remarks,
+    })
+}
+
+fn listing(args: &ImportArgs) -> anyhow::Result<Listing> {
+    match (&args.file, &args.meshes, &args.prints) {
+        (Some(file), ..) => Listing::from_file(file),
+        (None, Some(meshes), Some(prints)) => Listing::from_folders(meshes, prints, args.unit),
+        (None, ..) => anyhow::bail!("give a manifest, or --meshes and --prints"),
+    }
+}
+
+/// Reads true alignments and refuses those of pairs that are neither in the list nor in the project.
+async fn read_truths(
+    file: &Path,
+    rows: &[ManifestRow],
+    dir: &Path,
+) -> anyhow::Result<Vec<truth_file::Row>> {
+    let shown = file.display();
+    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {shown}"))?;
+    let truths = truth_file::parse(file, &text)?;
+    let listed: std::collections::BTreeSet<&PairName> = rows.iter().map(|row| &row.name).collect();
+    let others: Vec<PairName> = truths
+        .iter()
+        .map(|truth| truth.name.clone())
+        .filter(|name| !listed.contains(name))
+        .collect();
+    if others.is_empty() {
+        return Ok(truths);
+    }
+    let unknown = match Project::open(dir) {
+        Ok(project) => {
+            let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
+            let unknown = catalog.unknown_names(&others).await?;
+            catalog.close().await;
+            unknown
+        }
+        Err(_) => others,
+    };
+    match truths.iter().find(|truth| unknown.contains(&truth.name)) {
+        Some(truth) => {
+            let reason = format!("there is no pair {}", truth.name);
+            Err(refusal(file, truth.line, reason).into())
+        }
+        None => Ok(truths),
+    }
+}
+
+/// `tops_mask` is kept as inputs are: relative to the project when it lies below it.
+fn stored_truths(
+    truths: Vec<truth_file::Row>,
+    project: &Project,
+) -> anyhow::Result<Vec<(PairName, Value)>> {
+    truths
+        .into_iter()
+        .map(|mut truth| {
+            if let Some(mask) = &truth.tops_mask {
+                truth.value["tops_mask"] = json!(project.stored_path(mask)?);
+            }
+            Ok((truth.name, truth.value))
+        })
+        .collect()
+}
+
+fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow> {
+    Ok(ImportRow {
+        name: row.name.clone(),
+        mesh_path: project.stored_path(&row.mesh)?,
+        print_path: project.stored_path(&row.print)?,
+        unit: row.unit,
+        scanned_face_down: row.scanned_face_down,
+        character: row.character.clone(),
+        block: row.block.clone(),
+        meta: row.meta.clone().into_iter().collect(),
+    })
+}
+
+/// Says what an import did; warnings first.
+pub(super) fn tell(taken: &Taken, context: &Context) {
+    const WARNED: usize = 20;
+    let talk = &context.talk;
+    for line in taken.missing.iter().take(WARNED) {
+        talk.warn(line);
+    }
+    if let Some(more) = taken.missing.len().checked_sub(WARNED + 1) {
+        talk.warn(&format!("{} more files are not there", more + 1));
+    }
+    for line in &taken.remarks {
+        talk.warn(line);
+    }
+    let summary = &taken.summary;
+    talk.say(&format!(
+        "{} added, {} changed, {} unchanged{}",
+        count(summary.added, "pair"),
+        summary.changed.len(),
+        summary.unchanged,
+        match taken.truths {
+            0 => String::new(),
+            truths => format!("; {} stored", count(truths, "true alignment")),
+        }
+    ));
+    const NAMED: usize = 10;
+    for change in summary.changed.iter().take(NAMED) {
+        talk.say(&format!(
+            "  {}: {} changed",
+            change.name,
+            change.fields.join(", ")
+        ));
+    }
+    if let Some(more) = summary.changed.len().checked_sub(NAMED + 1) {
+        talk.say(&format!("  and {} more", more + 1));
+    }
+}
+
+fn as_json(taken: &Taken) -> Value {
+    let changed: Vec<Value> = taken
+        .summary
+        .changed
+        .iter()
+        .map(|change| json!({"id": change.name, "fields": change.fields}))
+        .collect();
+    json!({
+        "schema": 1,
+        "added": taken.summary.added,
+        "changed": changed,
+        "unchanged": taken.summary.unchanged,
+        "truths": taken.truths,
+        "missing_files": taken.missing,
+        "left_out": taken.remarks,
+    })
+}

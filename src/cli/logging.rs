@@ -1,0 +1,54 @@
+//! `tracing` to stderr or a file, as text or JSON.
+
+use std::fs::OpenOptions;
+use std::sync::Mutex;
+
+use anyhow::Context as _;
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::fmt::writer::BoxMakeWriter;
+
+use super::args::{Global, LogFormat};
+use super::progress::Screen;
+
+/// Starts the log. `RUST_LOG`, where it is set, wins over `-v` and `-q`.
+///
+/// # Errors
+/// When the log file cannot be opened.
+pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
+    let (writer, to_file) = writer(global, screen)?;
+    let level = level(global, to_file);
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let builder = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_ansi(!to_file && super::talk::Talk::new(global, screen.clone()).err.is_on())
+        .with_writer(writer);
+    // A second start in one process can only be a test's; the first log stays.
+    let _ = match global.log_format {
+        LogFormat::Text => builder.with_target(false).try_init(),
+        LogFormat::Json => builder.json().flatten_event(true).try_init(),
+    };
+    Ok(())
+}
+
+fn writer(global: &Global, screen: &Screen) -> anyhow::Result<(BoxMakeWriter, bool)> {
+    let Some(path) = &global.log_file else {
+        let screen = screen.clone();
+        return Ok((BoxMakeWriter::new(move || screen.clone()), false));
+    };
+    let file = OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(path)
+        .with_context(|| format!("cannot open the log file {}", path.display()))?;
+    Ok((BoxMakeWriter::new(Mutex::new(file)), true))
+}
+
+/// A log file is there to be read later, so it holds more than the screen.
+const fn level(global: &Global, to_file: bool) -> &'static str {
+    match (global.verbose, to_file, global.quiet) {
+        (0, false, true) => "mocban=error",
+        (0, false, false) => "mocban=warn",
+        (0, true, _) | (1, ..) => "mocban=info",
+        (2.., ..) => "mocban=debug,sqlx=info",
+    }
+}

@@ -1,0 +1,58 @@
+//! `retry`: failed pairs are taken up again at the next run.
+
+use clap::Args;
+use serde_json::json;
+
+use super::context::Context;
+use super::exit::{ExitCode, Refusal};
+use super::select;
+use super::table::count;
+use crate::catalog::{Catalog, RetrySelection};
+use crate::domain::FailureClass;
+
+/// Arguments of `retry`.
+#[derive(Debug, Args)]
+pub(super) struct RetryArgs {
+    /// These pairs [default: all that failed]
+    #[arg(conflicts_with = "class")]
+    pub(super) pairs: Vec<String>,
+    /// All that failed with this class: `bad_input`, `no_solution`, io, resource or bug
+    #[arg(long)]
+    pub(super) class: Option<FailureClass>,
+}
+
+pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.writer().await?;
+    let selection = selection(&args, &catalog).await?;
+    let retried = catalog.retry(&selection).await?;
+    catalog.close().await;
+    if retried == 0 {
+        return Err(Refusal::NothingSelected(nothing(&selection)).into());
+    }
+    if context.global.json {
+        context
+            .talk
+            .json(&json!({"schema": 1, "retried": retried}))?;
+    }
+    context
+        .talk
+        .say(&format!("{} will run again", count(retried, "pair")));
+    context.talk.next(&context.command("run"));
+    Ok(ExitCode::Done)
+}
+
+async fn selection(args: &RetryArgs, catalog: &Catalog) -> anyhow::Result<RetrySelection> {
+    Ok(match (args.class, args.pairs.as_slice()) {
+        (Some(class), _) => RetrySelection::Class(class),
+        (None, []) => RetrySelection::All,
+        (None, typed) => RetrySelection::Names(select::pairs(catalog, typed).await?),
+    })
+}
+
+fn nothing(selection: &RetrySelection) -> String {
+    match selection {
+        RetrySelection::All => "no pair has failed".to_owned(),
+        RetrySelection::Class(class) => format!("no pair has failed with class {class}"),
+        RetrySelection::Names(_) => "none of these pairs has failed".to_owned(),
+    }
+}

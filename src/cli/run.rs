@@ -1,0 +1,313 @@
+//! `run`: aligns what is left, shows how it goes, and says how it ended.
+
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+use serde_json::{Value, json};
+
+use super::clock::span;
+use super::context::Context;
+use super::exit::ExitCode;
+use super::failures::Failures;
+use super::progress::Progress;
+use super::table::{Align, columns, count};
+use super::{select, signals};
+use crate::catalog::{Catalog, Plan};
+use crate::config::Config;
+use crate::domain::{JobStatus, Stage};
+use crate::runner::{self, RunOptions, RunSummary, Stop};
+use crate::store::Project;
+
+/// Arguments of `run`.
+#[derive(Debug, Args)]
+pub(super) struct RunArgs {
+    /// Only these pairs
+    pub(super) pairs: Vec<String>,
+    /// Pairs worked on at the same time [default: one a core]
+    #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(super) jobs: Option<u16>,
+    /// Say what would run and why, and run nothing
+    #[arg(short = 'n', long)]
+    pub(super) dry_run: bool,
+    /// Join a run that goes on in another process, as more workers
+    #[arg(long)]
+    pub(super) join: bool,
+    /// Stop after this many pairs failed
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(super) max_failures: Option<u64>,
+    /// Run these again too; what changed is always run again
+    #[arg(long, value_name = "WHICH")]
+    pub(super) rerun: Option<Rerun>,
+    /// This stage only: what it needs is run where it is missing, what follows waits for a later run
+    #[arg(long, value_name = "STAGE")]
+    pub(super) stage: Option<Stage>,
+}
+
+/// What to run again.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Rerun {
+    /// Pairs that failed.
+    Failed,
+    /// Pairs whose settings or files changed: what a run does anyway.
+    Stale,
+    /// Every pair.
+    All,
+}
+
+impl From<Rerun> for runner::Rerun {
+    fn from(rerun: Rerun) -> Self {
+        match rerun {
+            Rerun::Failed => Self::Failed,
+            Rerun::Stale => Self::Stale,
+            Rerun::All => Self::All,
+        }
+    }
+}
+
+pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let config = context.settings()?.config;
+    let (project, catalog) = context.writer().await?;
+    let options = options(&args, &config, &catalog).await?;
+    if args.dry_run {
+        let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;
+        catalog.close().await;
+        return tell_plan(&plan, context);
+    }
+    let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
+    if context.global.json {
+        context.talk.json(&as_json(&summary))?;
+    }
+    tell_end(&summary, &failures, context);
+    for command in next_steps(&summary, &failures) {
+        context.talk.next(&context.command(&command));
+    }
+    Ok(code(&summary))
+}
+
+async fn options(args: &RunArgs, config: &Config, catalog: &Catalog) -> anyhow::Result<RunOptions> {
+    let pairs = match args.pairs.as_slice() {
+        [] => None,
+        typed => Some(select::pairs(catalog, typed).await?),
+    };
+    let plain = from_config(config);
+    Ok(RunOptions {
+        workers: args.jobs.map_or(plain.workers, usize::from),
+        join: args.join,
+        max_failures: args.max_failures,
+        pairs,
+        rerun: args.rerun.map(Into::into),
+        from: args.stage.unwrap_or(plain.from),
+        until: args.stage.unwrap_or(plain.until),
+        ..plain
+    })
+}
+
+/// Options of a run of all pairs, from the settings alone.
+pub(super) fn from_config(config: &Config) -> RunOptions {
+    let plain = RunOptions::default();
+    RunOptions {
+        workers: match config.run.workers {
+            0 => plain.workers,
+            workers => workers,
+        },
+        stage_limit: Duration::from_secs(config.run.stage_limit_s),
+        mesh_limits: config.limits.mesh,
+        image_limits: config.limits.image,
+        ..plain
+    }
+}
+
+/// Runs with progress on the screen and signals watched, and closes the catalog.
+///
+/// # Errors
+/// As [`runner::run`].
+pub(super) async fn drive(
+    project: &Project,
+    catalog: Catalog,
+    config: &Config,
+    options: &RunOptions,
+    context: &Context,
+) -> anyhow::Result<(RunSummary, Failures)> {
+    let stop = Stop::new();
+    let watch = signals::watch(&stop)?;
+    let global = &context.global;
+    let mut progress = Progress::new(
+        global.progress,
+        global.quiet,
+        &context.screen,
+        context.talk.err,
+    );
+    let ended = runner::run(project, &catalog, &config.stages, options, &stop, |event| {
+        progress.event(&event);
+    })
+    .await;
+    progress.end();
+    watch.abort();
+    let failures = Failures::read(&catalog).await;
+    catalog.close().await;
+    Ok((ended?, failures?))
+}
+
+/// The exit code of a run.
+pub(super) const fn code(summary: &RunSummary) -> ExitCode {
+    if summary.stopped {
+        ExitCode::Stopped
+    } else if summary.failed_in_all > 0 || summary.too_many_failures {
+        ExitCode::SomeFailed
+    } else {
+        ExitCode::Done
+    }
+}
+
+/// Says how a run ended and which pairs failed.
+pub(super) fn tell_end(summary: &RunSummary, failures: &Failures, context: &Context) {
+    let talk = &context.talk;
+    talk.say(&headline(summary));
+    if summary.failed_in_all > 0 {
+        let number = count(summary.failed_in_all, "pair");
+        talk.say(&format!("{number} failed:\n{}", failures.text().trim_end()));
+    }
+}
+
+fn headline(summary: &RunSummary) -> String {
+    let took = span(summary.elapsed_ms);
+    if summary.stopped {
+        return format!(
+            "stopped after {took}: {} done, {} left; the state is safe",
+            count(summary.done, "pair"),
+            summary.left
+        );
+    }
+    if summary.too_many_failures {
+        return format!(
+            "stopped after {took} at {} failed in this run: {} done, {} left",
+            summary.failed,
+            count(summary.done, "pair"),
+            summary.left
+        );
+    }
+    if summary.stages == 0 && summary.failed == 0 {
+        return match summary.status.pairs {
+            0 => "nothing to do: the project has no pairs".to_owned(),
+            pairs => format!(
+                "nothing left to do: {} in the project",
+                count(pairs, "pair")
+            ),
+        };
+    }
+    format!(
+        "{} done, {} failed, {} left in {took}",
+        count(summary.done, "pair"),
+        summary.failed,
+        summary.left
+    )
+}
+
+/// What a person may want to do after a run.
+pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<String> {
+    let mut steps = Vec::new();
+    if summary.status.pairs == 0 {
+        steps.push("import pairs.csv".to_owned());
+    }
+    let jobs = |status| summary.status.jobs.get(&status).copied().unwrap_or(0);
+    if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) > 0 {
+        steps.push("run".to_owned());
+    }
+    if let Some(first) = failures.first().filter(|_| summary.failed_in_all > 0) {
+        steps.push(format!("show {}", first.name));
+        steps.push("retry".to_owned());
+    }
+    if jobs(JobStatus::Done) > 0 && !summary.stopped {
+        steps.push("report".to_owned());
+    }
+    steps
+}
+
+fn as_json(summary: &RunSummary) -> Value {
+    json!({
+        "schema": 1,
+        "done": summary.done,
+        "failed": summary.failed,
+        "failed_in_all": summary.failed_in_all,
+        "left": summary.left,
+        "stages": summary.stages,
+        "stopped": summary.stopped,
+        "too_many_failures": summary.too_many_failures,
+        "elapsed_ms": summary.elapsed_ms,
+        "status": summary.status,
+    })
+}
+
+fn tell_plan(plan: &Plan, context: &Context) -> anyhow::Result<ExitCode> {
+    if context.global.json {
+        context
+            .talk
+            .json(&json!({"schema": 1, "pairs": plan.pairs(), "plan": plan}))?;
+        return Ok(ExitCode::Done);
+    }
+    context.talk.data(&plan_text(plan))?;
+    if plan.pairs() > 0 {
+        context.talk.next(&context.command("run"));
+    }
+    Ok(ExitCode::Done)
+}
+
+fn plan_text(plan: &Plan) -> String {
+    let mut text = format!("{} would run", count(plan.pairs(), "pair"));
+    for (number, what) in [
+        (plan.done, "done"),
+        (plan.quarantined, "failed and kept back"),
+        (plan.held, "set aside"),
+        (plan.leased, "in the hands of another run"),
+    ] {
+        if number > 0 {
+            text += &format!(", {number} {what}");
+        }
+    }
+    let rows: Vec<Vec<String>> = plan
+        .entries
+        .iter()
+        .map(|entry| {
+            vec![
+                format!("  {}", entry.pairs),
+                format!("from {}", entry.from),
+                entry.why.to_string(),
+            ]
+        })
+        .collect();
+    format!(
+        "{text}\n{}",
+        columns(&rows, &[Align::Right, Align::Left, Align::Left])
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Plan, plan_text};
+    use crate::catalog::{FieldChange, PlanEntry, WorkReason};
+    use crate::domain::{JobStatus, Stage};
+
+    #[test]
+    fn plan_names_the_setting_that_changed() {
+        let plan = Plan {
+            entries: vec![PlanEntry {
+                from: Stage::Register,
+                why: WorkReason::Settings {
+                    stage: Stage::Register,
+                    changes: vec![FieldChange {
+                        field: "register.max_scale".into(),
+                        old: Some(1.2.into()),
+                        new: Some(1.3.into()),
+                    }],
+                },
+                pairs: 24,
+            }],
+            done: 2,
+            ..Plan::default()
+        };
+        assert_eq!(
+            plan_text(&plan),
+            "24 pairs would run, 2 done\n  24  from register  register.max_scale: 1.2 -> 1.3\n"
+        );
+    }
+}

@@ -1,0 +1,63 @@
+//! Pairs named on the command line.
+
+use crate::catalog::Catalog;
+use crate::config::nearest;
+use crate::domain::PairName;
+
+use super::exit::Refusal;
+
+/// The names as ids of pairs that are there.
+///
+/// # Errors
+/// When one of them is no pair; the nearest ids are told.
+pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result<Vec<PairName>> {
+    let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
+    let unknown = catalog.unknown_names(&names).await?;
+    let is_known = |text: &&String| {
+        text.parse::<PairName>()
+            .is_ok_and(|name| !unknown.contains(&name))
+    };
+    match typed.iter().find(|text| !is_known(text)) {
+        None => Ok(names),
+        Some(text) => {
+            let all = catalog.pair_names().await?;
+            Err(Refusal::NothingSelected(no_such_pair(text, &all)).into())
+        }
+    }
+}
+
+/// One pair.
+///
+/// # Errors
+/// As [`pairs`].
+pub(super) async fn pair(catalog: &Catalog, typed: &str) -> anyhow::Result<PairName> {
+    let names = pairs(catalog, &[typed.to_owned()]).await?;
+    names
+        .into_iter()
+        .next()
+        .ok_or_else(|| Refusal::NothingSelected(no_such_pair(typed, &[])).into())
+}
+
+fn no_such_pair(typed: &str, all: &[PairName]) -> String {
+    let near = nearest(typed, all.iter().map(PairName::as_str), 3);
+    if near.is_empty() {
+        format!("there is no pair {typed}")
+    } else {
+        format!("there is no pair {typed}; near are {}", near.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::no_such_pair;
+
+    #[test]
+    fn near_ids_are_told() {
+        let all = ["0001", "0002", "b04-0117"].map(|id| id.parse().expect("valid id"));
+        assert_eq!(
+            no_such_pair("b4-0117", &all),
+            "there is no pair b4-0117; near are b04-0117"
+        );
+        assert_eq!(no_such_pair("zzz", &all), "there is no pair zzz");
+    }
+}

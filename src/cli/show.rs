@@ -1,0 +1,111 @@
+//! `show PAIR`: numbers, files, history, and why it runs again.
+
+use clap::Args;
+use serde_json::{Value, json};
+
+use super::clock::utc;
+use super::context::Context;
+use super::exit::ExitCode;
+use super::show_text::Page;
+use super::{select, verdict};
+use crate::catalog::{PairDetail, PlanEntry};
+use crate::domain::JobStatus;
+use crate::runner;
+use crate::store::Project;
+
+/// Arguments of `show`.
+#[derive(Debug, Args)]
+pub(super) struct ShowArgs {
+    /// The pair
+    pub(super) pair: String,
+}
+
+pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (project, catalog) = context.reader().await?;
+    let name = select::pair(&catalog, &args.pair).await?;
+    let recipes = runner::recipes(&context.settings()?.config.stages);
+    let why = catalog.why(&name, &recipes).await?;
+    let detail = catalog.pair(&name).await?;
+    catalog.close().await;
+    let Some(detail) = detail else {
+        anyhow::bail!("pair {name} went away while it was looked up");
+    };
+    if context.global.json {
+        context
+            .talk
+            .json(&as_json(&detail, why.as_ref(), &project)?)?;
+        return Ok(ExitCode::Done);
+    }
+    let page = Page {
+        detail: &detail,
+        project: &project,
+        palette: context.talk.out,
+    };
+    context.talk.data(&format!(
+        "{}{}",
+        page.text(),
+        tail(&detail, why.as_ref(), context)
+    ))?;
+    for command in next_steps(&detail, why.is_some()) {
+        context.talk.next(&context.command(&command));
+    }
+    Ok(ExitCode::Done)
+}
+
+/// Verdicts and what comes next.
+fn tail(detail: &PairDetail, why: Option<&PlanEntry>, context: &Context) -> String {
+    let palette = context.talk.out;
+    let mut text = String::new();
+    if !detail.verdict_log.is_empty() {
+        text += &super::show_text::heading("verdicts", palette);
+        for line in verdict::log_text(&detail.verdict_log, palette).lines() {
+            text += &format!("  {line}\n");
+        }
+    }
+    text += &super::show_text::heading("next run", palette);
+    text += &match (why, detail.results.status) {
+        (Some(entry), _) => format!("  from {}: {}\n", entry.from, entry.why),
+        (None, JobStatus::Quarantined) => "  stays failed until it is retried\n".to_owned(),
+        (None, JobStatus::Held) => "  set aside until it is retried\n".to_owned(),
+        (None, JobStatus::Done | JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff) => {
+            "  nothing left to do\n".to_owned()
+        }
+    };
+    if let Some(at) = detail.run_at {
+        text += &format!("  not before {}\n", utc(at));
+    }
+    text
+}
+
+fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
+    let name = &detail.results.facts.name;
+    match detail.results.status {
+        JobStatus::Quarantined | JobStatus::Held => vec![format!("retry {name}")],
+        JobStatus::Leased => vec!["status --watch".to_owned()],
+        JobStatus::Ready | JobStatus::Backoff => vec![format!("run {name}")],
+        JobStatus::Done if has_work => vec![format!("run {name}")],
+        JobStatus::Done => Vec::new(),
+    }
+}
+
+/// The catalog's record with the paths of its files and what a run would do.
+fn as_json(
+    detail: &PairDetail,
+    why: Option<&PlanEntry>,
+    project: &Project,
+) -> anyhow::Result<Value> {
+    let mut value = serde_json::to_value(detail)?;
+    if let Value::Object(fields) = &mut value {
+        let mut paths = serde_json::Map::new();
+        for record in &detail.results.stages {
+            for (role, artifact) in &record.files {
+                let path = project.artifact_path(artifact);
+                paths.insert(role.clone(), json!(path.to_string_lossy()));
+            }
+        }
+        fields.insert("files".to_owned(), Value::Object(paths));
+        fields.insert("next_run".to_owned(), serde_json::to_value(why)?);
+        fields.insert("schema".to_owned(), json!(1));
+    }
+    Ok(value)
+}

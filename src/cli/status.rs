@@ -1,0 +1,248 @@
+//! `status`: where the project stands, on one screen.
+
+use std::io::IsTerminal;
+use std::time::Duration;
+
+use clap::Args;
+
+use super::context::Context;
+use super::exit::ExitCode;
+use super::failures::Failures;
+use super::progress::CLEAR;
+use super::table::{Align, columns, count};
+use super::talk::{Palette, Tone};
+use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
+use crate::domain::{JobStatus, Stage, Verdict};
+use crate::runner;
+
+/// Arguments of `status`.
+#[derive(Debug, Args)]
+pub(super) struct StatusArgs {
+    /// Look again every two seconds until Ctrl-C
+    #[arg(short, long)]
+    pub(super) watch: bool,
+}
+
+const EVERY: Duration = Duration::from_secs(2);
+
+pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.reader().await?;
+    loop {
+        let recipes = runner::recipes(&context.settings()?.config.stages);
+        let view = View::read(&catalog, &recipes).await?;
+        show(&view, args.watch, context)?;
+        if !args.watch {
+            break;
+        }
+        tokio::select! {
+            () = tokio::time::sleep(EVERY) => {}
+            _ = tokio::signal::ctrl_c() => break,
+        }
+    }
+    catalog.close().await;
+    Ok(ExitCode::Done)
+}
+
+/// What the screen shows.
+struct View {
+    counts: StatusCounts,
+    failures: Failures,
+}
+
+impl View {
+    async fn read(catalog: &Catalog, recipes: &Recipes) -> anyhow::Result<Self> {
+        let counts = catalog.status(recipes).await?;
+        let failures = Failures::read(catalog).await?;
+        Ok(Self { counts, failures })
+    }
+
+    fn jobs(&self, status: JobStatus) -> u64 {
+        self.counts.jobs.get(&status).copied().unwrap_or(0)
+    }
+
+    fn waiting(&self) -> u64 {
+        self.jobs(JobStatus::Ready) + self.jobs(JobStatus::Backoff)
+    }
+
+    fn failed(&self) -> u64 {
+        self.jobs(JobStatus::Quarantined)
+    }
+}
+
+fn show(view: &View, watched: bool, context: &Context) -> anyhow::Result<()> {
+    let talk = &context.talk;
+    if context.global.json && watched {
+        talk.data(&serde_json::to_string(&view.counts)?)?;
+    } else if context.global.json {
+        talk.json(&view.counts)?;
+    } else {
+        let clear = if watched && std::io::stdout().is_terminal() {
+            CLEAR
+        } else {
+            ""
+        };
+        let dir = context.dir().display().to_string();
+        talk.data(&format!("{clear}{}", screen(view, &dir, talk.out)))?;
+        for command in next_steps(view) {
+            talk.next(&context.command(&command));
+        }
+    }
+    Ok(())
+}
+
+fn screen(view: &View, dir: &str, palette: Palette) -> String {
+    let mut text = format!(
+        "{}  {}\n",
+        label("project", palette),
+        headline(view, dir, palette)
+    );
+    text += &stage_table(&view.counts, palette);
+    if view.failed() > 0 {
+        text += &format!("{}\n", label("failed", palette));
+        text += &view.failures.text();
+    }
+    if view.counts.stale > 0 {
+        text += &format!(
+            "{}  {} ran with other settings or files than those of now\n",
+            label("stale", palette),
+            count(view.counts.stale, "pair")
+        );
+    }
+    if let Some(line) = verdict_line(&view.counts) {
+        text += &format!("{}  {line}\n", label("verdicts", palette));
+    }
+    text
+}
+
+fn label(word: &str, palette: Palette) -> String {
+    palette.paint(Tone::Strong, format!("{word:<9}"))
+}
+
+/// `demo · 24 pairs · 22 done · 1 failed · 1 waiting · 91.7 %`
+fn headline(view: &View, dir: &str, palette: Palette) -> String {
+    let done = view.jobs(JobStatus::Done);
+    let pairs = view.counts.pairs;
+    let mut parts = vec![
+        dir.to_owned(),
+        count(pairs, "pair"),
+        palette.paint(Tone::Good, format!("{done} done")),
+    ];
+    for (number, word, tone) in [
+        (view.failed(), "failed", Tone::Bad),
+        (view.jobs(JobStatus::Leased), "running", Tone::Strong),
+        (view.waiting(), "waiting", Tone::Warn),
+        (view.jobs(JobStatus::Held), "set aside", Tone::Warn),
+    ] {
+        if number > 0 {
+            parts.push(palette.paint(tone, format!("{number} {word}")));
+        }
+    }
+    if pairs > 0 {
+        parts.push(format!("{:.1} %", done as f64 * 100.0 / pairs as f64));
+    }
+    parts.join(" · ")
+}
+
+fn stage_table(counts: &StatusCounts, palette: Palette) -> String {
+    let of = |stage: Stage| counts.stages.get(&stage).copied().unwrap_or_default();
+    let head = Stage::ALL.map(|stage| palette.paint(Tone::Strong, stage));
+    let row = |name: &str, cell: &dyn Fn(StageCounts) -> String| {
+        let cells = Stage::ALL.map(|stage| cell(of(stage)));
+        [vec![label(name, palette)], cells.to_vec()].concat()
+    };
+    let rows = [
+        [vec![label("stages", palette)], head.to_vec()].concat(),
+        row("  done", &|stage| stage.done.to_string()),
+        row("  pending", &|stage| stage.pending.to_string()),
+        row("  failed", &|stage| {
+            let tone = if stage.failed == 0 {
+                Tone::Faint
+            } else {
+                Tone::Bad
+            };
+            palette.paint(tone, stage.failed)
+        }),
+    ];
+    columns(
+        &rows,
+        &[
+            Align::Left,
+            Align::Right,
+            Align::Right,
+            Align::Right,
+            Align::Right,
+        ],
+    )
+}
+
+fn verdict_line(counts: &StatusCounts) -> Option<String> {
+    let of = |verdict: Verdict| counts.verdicts.get(&verdict).copied().unwrap_or(0);
+    let total: u64 = Verdict::ALL.into_iter().map(of).sum();
+    (total > 0).then(|| {
+        Verdict::ALL
+            .map(|verdict| format!("{} {verdict}", of(verdict)))
+            .join(" · ")
+    })
+}
+
+fn next_steps(view: &View) -> Vec<String> {
+    let mut steps = Vec::new();
+    if view.counts.pairs == 0 {
+        steps.push("import pairs.csv".to_owned());
+    }
+    let running = view.jobs(JobStatus::Leased) > 0;
+    if !running && view.waiting() + view.counts.stale > 0 {
+        steps.push("run".to_owned());
+    }
+    if let Some(first) = view.failures.first() {
+        steps.push(format!("show {}", first.name));
+    }
+    if view.jobs(JobStatus::Done) > 0 && !running {
+        steps.push("report".to_owned());
+    }
+    steps
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{JobStatus, Palette, Stage, StageCounts, StatusCounts, View, next_steps, screen};
+
+    fn view(done: u64, ready: u64) -> View {
+        let stage = StageCounts {
+            done,
+            pending: ready,
+            failed: 0,
+        };
+        View {
+            counts: StatusCounts {
+                schema: 1,
+                pairs: done + ready,
+                jobs: [(JobStatus::Done, done), (JobStatus::Ready, ready)].into(),
+                stages: Stage::ALL.map(|name| (name, stage)).into(),
+                stale: 0,
+                verdicts: std::collections::BTreeMap::new(),
+            },
+            failures: super::Failures::default(),
+        }
+    }
+
+    #[test]
+    fn screen_has_a_headline_and_a_row_for_each_count() {
+        let text = screen(&view(3, 1), "demo", Palette::PLAIN);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(
+            lines[0],
+            "project    demo · 4 pairs · 3 done · 1 waiting · 75.0 %"
+        );
+        assert_eq!(lines[1], "stages     fit  depth  normalize  register");
+        assert_eq!(lines[2], "  done       3      3          3         3");
+        assert_eq!(lines.len(), 5);
+    }
+
+    #[test]
+    fn next_step_follows_from_the_counts() {
+        assert_eq!(next_steps(&view(0, 0)), ["import pairs.csv"]);
+        assert_eq!(next_steps(&view(0, 2)), ["run"]);
+        assert_eq!(next_steps(&view(2, 0)), ["report"]);
+    }
+}

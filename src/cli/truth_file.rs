@@ -1,0 +1,112 @@
+//! A `truth.jsonl` file: read whole or refused by line number.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::domain::PairName;
+use crate::report::truth::TruthRecord;
+
+/// One true alignment and the line it stands on.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Row {
+    pub(super) line: usize,
+    pub(super) name: PairName,
+    /// The object as given.
+    pub(super) value: Value,
+    /// Its tops mask, as it is reached from the working directory.
+    pub(super) tops_mask: Option<PathBuf>,
+}
+
+/// Why the file is refused.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: line {line}: {reason}; nothing was imported", file.display())]
+pub(super) struct TruthFileError {
+    file: PathBuf,
+    line: usize,
+    reason: String,
+}
+
+/// Reads all lines; `tops_mask` is relative to the file.
+///
+/// # Errors
+/// At the first line that is no true alignment, or of a pair that was there before.
+pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<Row>, TruthFileError> {
+    let folder = file.parent().unwrap_or(Path::new(""));
+    let mut lines: BTreeMap<PairName, usize> = BTreeMap::new();
+    let mut rows = Vec::new();
+    for (line, text) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
+        if text.trim().is_empty() {
+            continue;
+        }
+        let refuse = |reason: String| refusal(file, line, reason);
+        let value: Value =
+            serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
+        let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
+        if let Some(first) = lines.insert(record.id.clone(), line) {
+            return Err(refuse(format!(
+                "pair {} is on line {first} already",
+                record.id
+            )));
+        }
+        rows.push(Row {
+            line,
+            tops_mask: record.tops_mask.map(|mask| folder.join(mask)),
+            name: record.id,
+            value,
+        });
+    }
+    Ok(rows)
+}
+
+/// A refusal of one line.
+pub(super) fn refusal(file: &Path, line: usize, reason: String) -> TruthFileError {
+    TruthFileError {
+        file: file.to_owned(),
+        line,
+        reason,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{Row, parse};
+
+    const LINE: &str = r#"{"id":"a","print_from_mesh":[[1,0,0,0],[0,-1,0,0],[0,0,1,0]],"plane":{"n":[0,0,1],"d":0},"landmarks":[[0,0,0]],"char_height_px":10,"tops_mask":"tops/a.png"}"#;
+
+    fn read(text: &str) -> Result<Vec<Row>, String> {
+        parse(Path::new("data/truth.jsonl"), text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn mask_path_is_relative_to_the_file() {
+        let rows = read(&format!("{LINE}\n\n")).expect("valid");
+        assert_eq!(rows.len(), 1);
+        assert_eq!(
+            rows[0].tops_mask.as_deref(),
+            Some(Path::new("data/tops/a.png"))
+        );
+    }
+
+    #[test]
+    fn wrong_line_is_named_by_its_number() {
+        let twice = read(&format!("{LINE}\n{LINE}\n")).expect_err("twice");
+        assert_eq!(
+            twice,
+            "data/truth.jsonl: line 2: pair a is on line 1 already; nothing was imported"
+        );
+        let broken = read("{\"id\":\n").expect_err("cut off");
+        assert!(
+            broken.starts_with("data/truth.jsonl: line 1: not JSON"),
+            "{broken}"
+        );
+        let other = read("{\"id\":\"a\"}").expect_err("no truth");
+        assert!(
+            other.contains("line 1: truth is not of the form"),
+            "{other}"
+        );
+    }
+}

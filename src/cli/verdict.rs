@@ -1,0 +1,206 @@
+//! `verdict`: what people say of the results, in an append-only log.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::{Args, Subcommand};
+use serde_json::json;
+
+use super::clock::utc;
+use super::context::{Context, now};
+use super::exit::ExitCode;
+use super::table::{Align, columns, count};
+use super::talk::Palette;
+use super::{select, verdict_file};
+use crate::catalog::{NewVerdict, VerdictEvent};
+use crate::domain::{Reason, ThresholdMetric, Verdict};
+
+/// What to do with verdicts.
+#[derive(Debug, Subcommand)]
+pub(super) enum VerdictCommand {
+    /// Record one verdict on the current result of a pair
+    Set(SetArgs),
+    /// Record the verdicts of a CSV file: pair, verdict, reader, and if wanted metric, reason, note
+    Import(ImportArgs),
+    /// Print the log, oldest first
+    Log(LogArgs),
+    /// Take back the newest verdict; the log keeps both
+    Undo(UndoArgs),
+}
+
+/// Arguments of `verdict set`.
+#[derive(Debug, Args)]
+pub(super) struct SetArgs {
+    /// The pair
+    pub(super) pair: String,
+    /// pass, fail or unsure
+    pub(super) verdict: Verdict,
+    /// Who read it
+    #[arg(long, value_name = "NAME", value_parser = reader_name)]
+    pub(super) reader: String,
+    /// One metric's result: `nl_ssim`, density or ensemble [default: all three]
+    #[arg(long)]
+    pub(super) metric: Option<ThresholdMetric>,
+    /// Why it failed: angle, `strokes_lost`, `background_in`, `shift_or_scale`, mirrored or `wrong_pair`
+    #[arg(long)]
+    pub(super) reason: Option<Reason>,
+    /// In your own words
+    #[arg(long, value_name = "TEXT")]
+    pub(super) note: Option<String>,
+}
+
+/// Arguments of `verdict import`.
+#[derive(Debug, Args)]
+pub(super) struct ImportArgs {
+    /// The CSV file
+    pub(super) file: PathBuf,
+}
+
+/// Arguments of `verdict log`.
+#[derive(Debug, Args)]
+pub(super) struct LogArgs {
+    /// Only this pair
+    pub(super) pair: Option<String>,
+}
+
+/// Arguments of `verdict undo`.
+#[derive(Debug, Args)]
+pub(super) struct UndoArgs {
+    /// The newest of this reader [default: of anybody]
+    #[arg(long, value_name = "NAME", value_parser = reader_name)]
+    pub(super) reader: Option<String>,
+}
+
+/// A reader's name: not empty, on one line.
+fn reader_name(text: &str) -> Result<String, String> {
+    let name = text.trim();
+    if name.is_empty() || name.chars().any(char::is_control) {
+        return Err("a reader needs a name on one line".to_owned());
+    }
+    Ok(name.to_owned())
+}
+
+pub(super) async fn verdict(
+    command: VerdictCommand,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
+    match command {
+        VerdictCommand::Set(args) => set(args, context).await,
+        VerdictCommand::Import(args) => import(args, context).await,
+        VerdictCommand::Log(args) => log(args, context).await,
+        VerdictCommand::Undo(args) => undo(args, context).await,
+    }
+}
+
+async fn set(args: SetArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.writer().await?;
+    let new = NewVerdict {
+        pair: select::pair(&catalog, &args.pair).await?,
+        metric: args.metric,
+        verdict: args.verdict,
+        reader: args.reader,
+        reason: args.reason,
+        note: args.note,
+    };
+    let said = format!("{} of {}: {}", new.pair, on(new.metric), new.verdict);
+    catalog.verdict_set(vec![new], now()).await?;
+    catalog.close().await;
+    context.talk.say(&said);
+    Ok(ExitCode::Done)
+}
+
+fn on(metric: Option<ThresholdMetric>) -> &'static str {
+    metric.map_or("all metrics", ThresholdMetric::name)
+}
+
+async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let path = args.file.display();
+    let bytes = std::fs::read(&args.file).with_context(|| format!("cannot read {path}"))?;
+    let (_project, catalog) = context.writer().await?;
+    let rows = verdict_file::parse(&bytes).map_err(|error| error.in_file(&args.file))?;
+    let names: Vec<_> = rows.iter().map(|row| row.verdict.pair.clone()).collect();
+    let unknown = catalog.unknown_names(&names).await?;
+    verdict_file::refuse_unknown(&rows, &unknown).map_err(|error| error.in_file(&args.file))?;
+    let number = rows.len() as u64;
+    let verdicts = rows.into_iter().map(|row| row.verdict).collect();
+    catalog.verdict_set(verdicts, now()).await?;
+    catalog.close().await;
+    if context.global.json {
+        context
+            .talk
+            .json(&json!({"schema": 1, "recorded": number}))?;
+    }
+    context
+        .talk
+        .say(&format!("{} recorded", count(number, "verdict")));
+    context.talk.next(&context.command("report"));
+    Ok(ExitCode::Done)
+}
+
+async fn log(args: LogArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.reader().await?;
+    let pair = match &args.pair {
+        Some(typed) => Some(select::pair(&catalog, typed).await?),
+        None => None,
+    };
+    let events = catalog.verdict_log(pair.as_ref()).await?;
+    catalog.close().await;
+    if context.global.json {
+        for event in &events {
+            context.talk.data(&serde_json::to_string(event)?)?;
+        }
+    } else if events.is_empty() {
+        context.talk.say("no verdicts yet");
+    } else {
+        context.talk.data(&log_text(&events, context.talk.out))?;
+    }
+    Ok(ExitCode::Done)
+}
+
+async fn undo(args: UndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.writer().await?;
+    let undone = catalog.verdict_undo(args.reader.as_deref(), now()).await?;
+    catalog.close().await;
+    if context.global.json {
+        context.talk.json(&json!({"schema": 1, "undone": undone}))?;
+    }
+    for event in &undone {
+        context.talk.say(&format!(
+            "taken back: {} of {} {} by {}",
+            event.verdict, event.pair, event.metric, event.reader
+        ));
+    }
+    Ok(ExitCode::Done)
+}
+
+/// The log as lines, one an event.
+pub(super) fn log_text(events: &[VerdictEvent], palette: Palette) -> String {
+    let rows: Vec<Vec<String>> = events.iter().map(|event| log_row(event, palette)).collect();
+    columns(&rows, &[Align::Left; 8])
+}
+
+fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
+    use super::talk::Tone;
+    let tone = match event.verdict {
+        Verdict::Pass => Tone::Good,
+        Verdict::Fail => Tone::Bad,
+        Verdict::Unsure => Tone::Warn,
+    };
+    let standing = match (event.undone_at, event.current) {
+        (Some(at), _) => format!("taken back {}", utc(at)),
+        (None, true) => String::new(),
+        (None, false) => "verdict for an older result".to_owned(),
+    };
+    vec![
+        utc(event.at),
+        event.pair.to_string(),
+        event.metric.to_string(),
+        palette.paint(tone, event.verdict),
+        event.reader.clone(),
+        event
+            .reason
+            .map_or_else(String::new, |reason| reason.to_string()),
+        event.note.clone().unwrap_or_default(),
+        standing,
+    ]
+}

@@ -1,0 +1,185 @@
+//! A CSV file of verdicts: read whole or refused by line number.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use csv::StringRecord;
+
+use crate::catalog::NewVerdict;
+use crate::config::hint;
+use crate::domain::PairName;
+
+const COLUMNS: [&str; 6] = ["pair", "verdict", "reader", "metric", "reason", "note"];
+const NEEDED: usize = 3;
+
+/// One verdict and the line it stands on.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Row {
+    pub(super) line: u64,
+    pub(super) verdict: NewVerdict,
+}
+
+/// Why the file is refused.
+#[derive(Debug, thiserror::Error)]
+#[error("{}line {line}: {reason}; no verdict was recorded", .file.as_ref().map(|file| format!("{}: ", file.display())).unwrap_or_default())]
+pub(super) struct VerdictFileError {
+    file: Option<PathBuf>,
+    line: u64,
+    reason: String,
+}
+
+impl VerdictFileError {
+    const fn new(line: u64, reason: String) -> Self {
+        Self {
+            file: None,
+            line,
+            reason,
+        }
+    }
+
+    /// The same with the file's name.
+    pub(super) fn in_file(mut self, file: &Path) -> Self {
+        self.file = Some(file.to_owned());
+        self
+    }
+}
+
+/// Reads all rows.
+///
+/// # Errors
+/// At the first line that is wrong.
+pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Row>, VerdictFileError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(bytes);
+    let places = places(reader.headers().map_err(|error| csv_error(&error))?)?;
+    let mut rows = Vec::new();
+    for record in reader.records() {
+        rows.push(row(&record.map_err(|error| csv_error(&error))?, &places)?);
+    }
+    Ok(rows)
+}
+
+/// Refuses rows on pairs that are not there.
+///
+/// # Errors
+/// At the first such row.
+pub(super) fn refuse_unknown(rows: &[Row], unknown: &[PairName]) -> Result<(), VerdictFileError> {
+    match rows.iter().find(|row| unknown.contains(&row.verdict.pair)) {
+        Some(row) => {
+            let reason = format!("there is no pair {}", row.verdict.pair);
+            Err(VerdictFileError::new(row.line, reason))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Where each of [`COLUMNS`] stands in the file.
+fn places(headers: &StringRecord) -> Result<[Option<usize>; 6], VerdictFileError> {
+    if let Some(unknown) = headers.iter().find(|name| !COLUMNS.contains(name)) {
+        let reason = format!("there is no column {unknown}{}", hint(unknown, COLUMNS));
+        return Err(VerdictFileError::new(1, reason));
+    }
+    let places = COLUMNS.map(|name| headers.iter().position(|header| header == name));
+    for (name, place) in COLUMNS.iter().zip(places).take(NEEDED) {
+        if place.is_none() {
+            return Err(VerdictFileError::new(
+                1,
+                format!("column {name} is missing"),
+            ));
+        }
+    }
+    Ok(places)
+}
+
+fn row(record: &StringRecord, places: &[Option<usize>; 6]) -> Result<Row, VerdictFileError> {
+    let line = record.position().map_or(0, csv::Position::line);
+    let cell = |column: usize| {
+        places[column]
+            .and_then(|place| record.get(place))
+            .filter(|text| !text.is_empty())
+    };
+    let needed = |column: usize| {
+        cell(column)
+            .ok_or_else(|| VerdictFileError::new(line, format!("{} is empty", COLUMNS[column])))
+    };
+    let verdict = NewVerdict {
+        pair: word(needed(0)?, line)?,
+        verdict: word(needed(1)?, line)?,
+        reader: needed(2)?.to_owned(),
+        metric: cell(3).map(|text| word(text, line)).transpose()?,
+        reason: cell(4).map(|text| word(text, line)).transpose()?,
+        note: cell(5).map(ToOwned::to_owned),
+    };
+    Ok(Row { line, verdict })
+}
+
+fn word<T>(text: &str, line: u64) -> Result<T, VerdictFileError>
+where
+    T: FromStr<Err: std::fmt::Display>,
+{
+    text.parse()
+        .map_err(|error: T::Err| VerdictFileError::new(line, error.to_string()))
+}
+
+fn csv_error(error: &csv::Error) -> VerdictFileError {
+    let line = error.position().map_or(1, csv::Position::line);
+    let reason = match error.kind() {
+        csv::ErrorKind::UnequalLengths {
+            expected_len, len, ..
+        } => format!("{len} cells where the header has {expected_len}"),
+        csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8".to_owned(),
+        _ => error.to_string(),
+    };
+    VerdictFileError::new(line, reason)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{parse, refuse_unknown};
+    use crate::domain::{Reason, ThresholdMetric, Verdict};
+
+    fn error(text: &str) -> String {
+        parse(text.as_bytes()).expect_err("refused").to_string()
+    }
+
+    #[test]
+    fn columns_may_stand_in_any_order_and_be_left_out() {
+        let text = "reader,pair,verdict,metric,reason,note\n\
+                    lan,0001,pass,,,\n\
+                    lan,0002,fail,density,strokes_lost,\"thin, broken\"\n";
+        let rows = parse(text.as_bytes()).expect("valid");
+        assert_eq!(rows[0].verdict.verdict, Verdict::Pass);
+        assert_eq!(rows[0].verdict.metric, None);
+        assert_eq!(rows[1].line, 3);
+        assert_eq!(rows[1].verdict.metric, Some(ThresholdMetric::Density));
+        assert_eq!(rows[1].verdict.reason, Some(Reason::StrokesLost));
+        assert_eq!(rows[1].verdict.note.as_deref(), Some("thin, broken"));
+        assert_eq!(parse(b"pair,verdict,reader\n").expect("valid"), []);
+    }
+
+    #[test]
+    fn wrong_line_is_named_by_its_number() {
+        assert_eq!(
+            error("pair,verdict,reader\n1,pass,lan\n2,maybe,lan\n"),
+            "line 3: \"maybe\" is not a verdict (pass, fail, unsure); no verdict was recorded"
+        );
+        assert!(error("pair,verdict,reader\n1,pass,\n").starts_with("line 2: reader is empty"));
+        assert!(error("pair,verdict\n").starts_with("line 1: column reader is missing"));
+        assert!(error("pair,verdict,raeder\n").contains("did you mean \"reader\"?"));
+        assert!(error("pair,verdict,reader\n1,pass\n").starts_with("line 2: 2 cells"));
+        assert!(error("pair,verdict,reader\na/b,pass,lan\n").starts_with("line 2: id"));
+    }
+
+    #[test]
+    fn pair_that_is_not_there_is_named_by_its_line() {
+        let rows = parse(b"pair,verdict,reader\n1,pass,lan\n2,pass,lan\n").expect("valid");
+        let unknown = ["2".parse().expect("valid id")];
+        let error = refuse_unknown(&rows, &unknown).expect_err("refused");
+        assert!(
+            error.to_string().starts_with("line 3: there is no pair 2"),
+            "{error}"
+        );
+    }
+}

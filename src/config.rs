@@ -1,1 +1,0 @@
-//! Settings: read, merge, validate; unknown keys are errors; each value knows where it came from.

@@ -1,0 +1,201 @@
+//! Settings: read, merge, validate; unknown keys are errors; each value knows where it came from.
+//!
+//! Flags win over the environment, that over the project's file, that over the preset it names, and that over
+//! the embedded `config/default.toml`, which holds every setting there is.
+
+mod document;
+mod error;
+mod nearest;
+mod origin;
+mod ranges;
+mod sources;
+mod tree;
+
+pub use document::{Config, Limits, RunSettings};
+pub use error::ConfigError;
+pub use nearest::{hint, nearest};
+pub use origin::Origin;
+pub use sources::{Preset, Sources, Start};
+pub use tree::{Change, Setting, Tree};
+
+/// Settings ready for use, with the values they were made from.
+#[derive(Debug, Clone)]
+pub struct Loaded {
+    /// Typed and checked.
+    pub config: Config,
+    /// Every value with its origin.
+    pub tree: Tree,
+}
+
+/// Reads every layer, lays them over each other and checks the result.
+///
+/// # Errors
+/// When a layer cannot be read, names a setting that does not exist, or gives one a value it cannot have; the
+/// message names layer and key.
+pub fn load(sources: &Sources) -> Result<Loaded, ConfigError> {
+    let defaults = Preset::Default.table()?;
+    let mut tree = Tree::new(defaults);
+    let mut changes = Vec::new();
+    for (layer, origin) in sources.tables()? {
+        changes.extend(tree.changes(&layer, &origin)?);
+    }
+    for (key, value, origin) in sources.single_values()? {
+        changes.extend(tree.change(&key, value, &origin)?);
+    }
+    for change in &changes {
+        tree.apply(change);
+    }
+    let config = document::typed(&tree, &changes)?;
+    ranges::check(&tree)?;
+    Ok(Loaded { config, tree })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use super::{ConfigError, Loaded, Origin, Preset, Sources, Start, load};
+
+    fn with(sets: &[&str]) -> Result<Loaded, ConfigError> {
+        load(&Sources {
+            sets: sets.iter().map(|text| (*text).to_owned()).collect(),
+            ..Sources::default()
+        })
+    }
+
+    fn project(text: &str) -> (tempfile::TempDir, PathBuf) {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let file = dir.path().join("mocban.toml");
+        std::fs::write(&file, text).expect("a small file");
+        (dir, file)
+    }
+
+    #[test]
+    fn flag_wins_over_environment_and_that_over_the_file() {
+        let (_dir, file) = project("[run]\nworkers = 2\nstage_limit_s = 7");
+        let sources = Sources {
+            start: Start::Project(file.clone()),
+            env: vec![
+                ("MOCBAN_RUN__WORKERS".into(), "3".into()),
+                ("MOCBAN_RUN__STAGE_LIMIT_S".into(), "8".into()),
+            ],
+            sets: vec!["run.workers=4".into()],
+        };
+        let loaded = load(&sources).expect("valid settings");
+        assert_eq!(loaded.config.run.workers, 4);
+        assert_eq!(loaded.config.run.stage_limit_s, 8);
+        assert_eq!(loaded.tree.origin("run.workers"), Origin::Flag);
+        assert_eq!(
+            loaded.tree.origin("run.stage_limit_s"),
+            Origin::Env("MOCBAN_RUN__STAGE_LIMIT_S".into())
+        );
+    }
+
+    #[test]
+    fn project_file_may_start_from_a_preset() {
+        let (_dir, file) = project("preset = \"paper\"\n[run]\nworkers = 2");
+        let loaded = load(&Sources {
+            start: Start::Project(file.clone()),
+            ..Sources::default()
+        })
+        .expect("valid settings");
+        let paper = load(&Sources {
+            start: Start::Preset(Preset::Paper),
+            ..Sources::default()
+        })
+        .expect("valid preset");
+        assert_eq!(loaded.config.stages, paper.config.stages);
+        assert_eq!(loaded.tree.origin("run.workers"), Origin::File(file));
+    }
+
+    #[test]
+    fn project_without_a_file_has_the_defaults() {
+        let missing = Start::Project(PathBuf::from("/nonexistent/mocban.toml"));
+        let loaded = load(&Sources {
+            start: missing,
+            ..Sources::default()
+        })
+        .expect("no file is no error");
+        assert_eq!(loaded.config, with(&[]).expect("defaults").config);
+    }
+
+    #[test]
+    fn file_that_was_asked_for_must_be_there() {
+        let error = load(&Sources {
+            start: Start::File("/nonexistent/x.toml".into()),
+            ..Sources::default()
+        })
+        .expect_err("not there");
+        assert!(error.to_string().contains("/nonexistent/x.toml"), "{error}");
+    }
+
+    #[test]
+    fn wrong_type_names_layer_and_key() {
+        let error = with(&["run.workers=many"]).expect_err("not a number");
+        let text = error.to_string();
+        assert!(
+            text.starts_with("--set: run.workers = \"many\": "),
+            "{text}"
+        );
+        let (_dir, file) = project("[run]\nworkers = -1");
+        let error = load(&Sources {
+            start: Start::Project(file.clone()),
+            ..Sources::default()
+        })
+        .expect_err("negative");
+        let wanted = format!("{}: run.workers = -1: ", file.display());
+        assert!(error.to_string().starts_with(&wanted), "{error}");
+    }
+
+    #[test]
+    fn number_outside_its_range_is_refused() {
+        let error = with(&["run.workers=100000"]).expect_err("too many");
+        assert_eq!(
+            error.to_string(),
+            "--set: run.workers = 100000 is outside 0 to 1024"
+        );
+    }
+
+    #[test]
+    fn bad_toml_names_file_and_line() {
+        let (_dir, file) = project("[run]\nworkers 2\n");
+        let error = load(&Sources {
+            start: Start::Project(file.clone()),
+            ..Sources::default()
+        })
+        .expect_err("no equals sign");
+        let wanted = format!("{}: line 2: ", file.display());
+        assert!(error.to_string().starts_with(&wanted), "{error}");
+    }
+
+    #[test]
+    fn unknown_preset_environment_and_flag_are_refused() {
+        let (_dir, file) = project("preset = \"papr\"");
+        let error = load(&Sources {
+            start: Start::Project(file),
+            ..Sources::default()
+        })
+        .expect_err("no such preset");
+        assert!(
+            error.to_string().ends_with("did you mean \"paper\"?"),
+            "{error}"
+        );
+        let error = load(&Sources {
+            env: vec![("MOCBAN_RUNS__WORKERS".into(), "1".into())],
+            ..Sources::default()
+        })
+        .expect_err("no such section");
+        assert_eq!(
+            error.to_string(),
+            "MOCBAN_RUNS__WORKERS: there is no setting runs; did you mean \"run\"?"
+        );
+        let error = with(&["workers=1"]).expect_err("no section");
+        assert!(matches!(error, ConfigError::SetForm { .. }), "{error}");
+    }
+
+    #[test]
+    fn value_that_is_not_toml_is_taken_as_text() {
+        let error = with(&["run.workers=a b"]).expect_err("not a number");
+        assert!(error.to_string().contains("\"a b\""), "{error}");
+    }
+}

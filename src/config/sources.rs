@@ -1,0 +1,195 @@
+//! The layers above the defaults: preset, file, environment, flags.
+
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+use super::nearest::hint;
+use super::{ConfigError, Origin};
+
+/// Settings that come with the program.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Preset {
+    /// The best that is known; holds every setting.
+    #[default]
+    Default,
+    /// The paper's method to the letter; holds what differs from the default.
+    Paper,
+}
+
+impl Preset {
+    /// Every preset.
+    pub const ALL: [Self; 2] = [Self::Default, Self::Paper];
+
+    /// Name in files and on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Default => "default",
+            Self::Paper => "paper",
+        }
+    }
+
+    /// The preset of a name.
+    pub fn named(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|preset| preset.name() == name)
+    }
+
+    /// Its text, with a comment for each setting.
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Default => include_str!("../../config/default.toml"),
+            Self::Paper => include_str!("../../config/paper.toml"),
+        }
+    }
+
+    pub(super) fn table(self) -> Result<Table, ConfigError> {
+        parse(self.text(), &self.origin())
+    }
+
+    const fn origin(self) -> Origin {
+        match self {
+            Self::Default => Origin::Default,
+            Self::Paper => Origin::Preset("paper"),
+        }
+    }
+}
+
+/// Where the layers between the defaults and the environment come from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Start {
+    /// A preset alone (`--config paper`).
+    Preset(Preset),
+    /// A file that must be there (`--config FILE`), in the place of the project's own.
+    File(PathBuf),
+    /// The project's own file, which need not be there.
+    Project(PathBuf),
+}
+
+impl Default for Start {
+    fn default() -> Self {
+        Self::Preset(Preset::Default)
+    }
+}
+
+/// Everything that settings are read from besides the embedded defaults.
+#[derive(Debug, Clone, Default)]
+pub struct Sources {
+    /// Preset or file.
+    pub start: Start,
+    /// Environment variables; those named `MOCBAN_SECTION__KEY` are settings.
+    pub env: Vec<(String, String)>,
+    /// `section.key=value`, as given to `--set`.
+    pub sets: Vec<String>,
+}
+
+impl Sources {
+    /// Layers that are whole tables, lowest first.
+    pub(super) fn tables(&self) -> Result<Vec<(Table, Origin)>, ConfigError> {
+        match &self.start {
+            Start::Preset(preset) => Ok(preset_layer(*preset)?.into_iter().collect()),
+            Start::File(path) => file_layers(path),
+            Start::Project(path) if path.exists() => file_layers(path),
+            Start::Project(_) => Ok(Vec::new()),
+        }
+    }
+
+    /// Layers of one value each: environment, then flags.
+    pub(super) fn single_values(&self) -> Result<Vec<(String, Value, Origin)>, ConfigError> {
+        let mut values: Vec<_> = self
+            .env
+            .iter()
+            .filter_map(|(name, text)| {
+                let key = env_key(name)?;
+                Some((key, value(text), Origin::Env(name.clone())))
+            })
+            .collect();
+        values.sort_by(|a, b| a.0.cmp(&b.0));
+        for text in &self.sets {
+            let (key, new) = split_set(text)?;
+            values.push((key, new, Origin::Flag));
+        }
+        Ok(values)
+    }
+}
+
+/// `MOCBAN_LIMITS__MESH__MAX_BYTES` is `limits.mesh.max_bytes`; names without `__` are no settings.
+fn env_key(name: &str) -> Option<String> {
+    let rest = name.strip_prefix("MOCBAN_")?;
+    rest.contains("__")
+        .then(|| rest.replace("__", ".").to_ascii_lowercase())
+}
+
+fn split_set(text: &str) -> Result<(String, Value), ConfigError> {
+    match text.split_once('=') {
+        Some((key, new))
+            if key
+                .trim()
+                .split('.')
+                .filter(|part| !part.is_empty())
+                .count()
+                > 1 =>
+        {
+            Ok((key.trim().to_owned(), value(new.trim())))
+        }
+        Some(_) | None => Err(ConfigError::SetForm {
+            text: text.to_owned(),
+        }),
+    }
+}
+
+/// A value as TOML writes it, or else the text itself, so that words need no quotes.
+fn value(text: &str) -> Value {
+    format!("value = {text}")
+        .parse::<Table>()
+        .ok()
+        .and_then(|mut table| table.remove("value"))
+        .unwrap_or_else(|| Value::String(text.to_owned()))
+}
+
+fn preset_layer(preset: Preset) -> Result<Option<(Table, Origin)>, ConfigError> {
+    match preset {
+        Preset::Default => Ok(None),
+        Preset::Paper => Ok(Some((preset.table()?, preset.origin()))),
+    }
+}
+
+fn file_layers(path: &Path) -> Result<Vec<(Table, Origin)>, ConfigError> {
+    let text = std::fs::read_to_string(path).map_err(|source| ConfigError::Read {
+        path: path.to_owned(),
+        source,
+    })?;
+    let origin = Origin::File(path.to_owned());
+    let mut table = parse(&text, &origin)?;
+    let preset = match table.remove("preset") {
+        Some(name) => find_preset(&name, &origin)?,
+        None => Preset::Default,
+    };
+    let mut layers: Vec<_> = preset_layer(preset)?.into_iter().collect();
+    layers.push((table, origin));
+    Ok(layers)
+}
+
+fn find_preset(name: &Value, origin: &Origin) -> Result<Preset, ConfigError> {
+    let name = name
+        .as_str()
+        .map_or_else(|| name.to_string(), ToOwned::to_owned);
+    Preset::named(&name).ok_or_else(|| ConfigError::UnknownPreset {
+        origin: origin.clone(),
+        hint: hint(&name, Preset::ALL.map(Preset::name)),
+        name,
+    })
+}
+
+fn parse(text: &str, origin: &Origin) -> Result<Table, ConfigError> {
+    text.parse::<Table>().map_err(|error| {
+        let before = error.span().map_or(0, |span| span.start.min(text.len()));
+        ConfigError::Syntax {
+            origin: origin.clone(),
+            line: 1 + text.as_bytes()[..before]
+                .iter()
+                .filter(|byte| **byte == b'\n')
+                .count(),
+            reason: error.message().to_owned(),
+        }
+    })
+}

@@ -1,0 +1,250 @@
+//! Layers of settings laid over each other as TOML tables, each value with its origin.
+
+use std::collections::BTreeMap;
+
+use toml::{Table, Value};
+
+use super::nearest::hint;
+use super::{ConfigError, Origin};
+
+/// The merged settings and, for each dotted key that a layer changed, the layer.
+#[derive(Debug, Clone)]
+pub struct Tree {
+    root: Table,
+    changed: BTreeMap<String, Origin>,
+}
+
+/// One value of one layer, by its dotted key.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// Dotted key, such as `run.workers`.
+    pub key: String,
+    /// The new value.
+    pub value: Value,
+    /// The layer it belongs to.
+    pub origin: Origin,
+}
+
+/// One setting as `config show` prints it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Setting {
+    /// Dotted key.
+    pub key: String,
+    /// Its value now.
+    pub value: Value,
+    /// Where the value came from.
+    pub origin: Origin,
+}
+
+impl Tree {
+    /// The lowest layer: it alone says which sections and keys exist.
+    pub const fn new(defaults: Table) -> Self {
+        Self {
+            root: defaults,
+            changed: BTreeMap::new(),
+        }
+    }
+
+    /// The merged table.
+    pub const fn table(&self) -> &Table {
+        &self.root
+    }
+
+    /// What a layer's table changes here, key by key.
+    ///
+    /// A table is walked into where the defaults have a section that holds all of its keys; elsewhere it is one
+    /// value, as a choice with data is (`{ fixed = 127 }`).
+    ///
+    /// # Errors
+    /// When the layer names a section or key that does not exist.
+    pub fn changes(&self, layer: &Table, origin: &Origin) -> Result<Vec<Change>, ConfigError> {
+        let mut changes = Vec::new();
+        collect(&self.root, layer, "", origin, &mut changes)?;
+        Ok(changes)
+    }
+
+    /// The change of one dotted key.
+    ///
+    /// # Errors
+    /// When there is no such key.
+    pub fn change(
+        &self,
+        key: &str,
+        value: Value,
+        origin: &Origin,
+    ) -> Result<Vec<Change>, ConfigError> {
+        let mut layer = value;
+        for part in key.rsplit('.') {
+            layer = Value::Table(Table::from_iter([(part.to_owned(), layer)]));
+        }
+        match layer {
+            Value::Table(table) => self.changes(&table, origin),
+            other => self.changes(&Table::from_iter([(key.to_owned(), other)]), origin),
+        }
+    }
+
+    /// Lays one change over the rest.
+    pub fn apply(&mut self, change: &Change) {
+        let mut parts: Vec<&str> = change.key.split('.').collect();
+        let Some(last) = parts.pop() else { return };
+        let mut table = &mut self.root;
+        for part in parts {
+            match table.get_mut(part) {
+                Some(Value::Table(inner)) => table = inner,
+                Some(_) | None => return,
+            }
+        }
+        table.insert(last.to_owned(), change.value.clone());
+        self.changed
+            .retain(|key, _| !key.starts_with(&format!("{}.", change.key)));
+        self.changed
+            .insert(change.key.clone(), change.origin.clone());
+    }
+
+    /// Every value with its origin, in the order of the defaults.
+    pub fn settings(&self) -> Vec<Setting> {
+        let mut settings = Vec::new();
+        flatten(&self.root, "", &mut |key, value| {
+            settings.push(Setting {
+                origin: self.origin(&key),
+                key,
+                value: value.clone(),
+            });
+        });
+        settings
+    }
+
+    /// The layer that set a key, or the choice that it is a part of.
+    pub fn origin(&self, key: &str) -> Origin {
+        let mut key = key;
+        loop {
+            if let Some(origin) = self.changed.get(key) {
+                return origin.clone();
+            }
+            match key.rsplit_once('.') {
+                Some((parent, _)) => key = parent,
+                None => return Origin::Default,
+            }
+        }
+    }
+}
+
+fn dotted(prefix: &str, key: &str) -> String {
+    if prefix.is_empty() {
+        key.to_owned()
+    } else {
+        format!("{prefix}.{key}")
+    }
+}
+
+fn flatten(table: &Table, prefix: &str, visit: &mut impl FnMut(String, &Value)) {
+    for (key, value) in table {
+        match value {
+            Value::Table(inner) if !inner.is_empty() => flatten(inner, &dotted(prefix, key), visit),
+            _ => visit(dotted(prefix, key), value),
+        }
+    }
+}
+
+fn collect(
+    known: &Table,
+    layer: &Table,
+    prefix: &str,
+    origin: &Origin,
+    changes: &mut Vec<Change>,
+) -> Result<(), ConfigError> {
+    for (key, value) in layer {
+        let path = dotted(prefix, key);
+        let Some(default) = known.get(key) else {
+            return Err(ConfigError::Unknown {
+                origin: origin.clone(),
+                hint: hint(key, known.keys().map(String::as_str)),
+                key: path,
+            });
+        };
+        match (default, value) {
+            (Value::Table(section), Value::Table(inner)) if is_section(prefix, section, inner) => {
+                collect(section, inner, &path, origin, changes)?;
+            }
+            (Value::Table(_), _) if prefix.is_empty() => {
+                return Err(ConfigError::NotASection {
+                    origin: origin.clone(),
+                    key: path,
+                });
+            }
+            _ => changes.push(Change {
+                key: path,
+                value: value.clone(),
+                origin: origin.clone(),
+            }),
+        }
+    }
+    Ok(())
+}
+
+/// Top-level tables are sections whatever they hold, so that a mistyped key is told by its name; deeper ones only
+/// when they know every key.
+fn is_section(prefix: &str, section: &Table, layer: &Table) -> bool {
+    prefix.is_empty() || layer.keys().all(|key| section.contains_key(key))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Origin, Tree};
+
+    fn tree() -> Tree {
+        Tree::new(
+            "[run]\nworkers = 0\n[fit]\nink = { fixed = 100 }\nside = \"auto\""
+                .parse()
+                .expect("valid"),
+        )
+    }
+
+    fn apply(tree: &mut Tree, text: &str, origin: &Origin) {
+        let layer = text.parse().expect("valid");
+        for change in tree.changes(&layer, origin).expect("known keys") {
+            tree.apply(&change);
+        }
+    }
+
+    #[test]
+    fn later_layer_wins_and_its_origin_is_kept() {
+        let mut tree = tree();
+        apply(&mut tree, "run.workers = 2", &Origin::Preset("paper"));
+        apply(&mut tree, "run.workers = 3", &Origin::Flag);
+        assert_eq!(tree.table()["run"]["workers"].as_integer(), Some(3));
+        assert_eq!(tree.origin("run.workers"), Origin::Flag);
+        assert_eq!(tree.origin("fit.side"), Origin::Default);
+    }
+
+    #[test]
+    fn choice_with_data_is_replaced_as_a_whole() {
+        let mut tree = tree();
+        apply(&mut tree, "fit.ink = { otsu = {} }", &Origin::Flag);
+        assert!(tree.table()["fit"]["ink"].get("fixed").is_none());
+        apply(&mut tree, "fit.ink = \"otsu\"", &Origin::Flag);
+        assert_eq!(tree.table()["fit"]["ink"].as_str(), Some("otsu"));
+    }
+
+    #[test]
+    fn unknown_key_names_layer_key_and_the_likely_meaning() {
+        let layer = "[run]\nwrokers = 1".parse().expect("valid");
+        let error = tree()
+            .changes(&layer, &Origin::File("p/mocban.toml".into()))
+            .expect_err("no such key");
+        assert_eq!(
+            error.to_string(),
+            "p/mocban.toml: there is no setting run.wrokers; did you mean \"workers\"?"
+        );
+    }
+
+    #[test]
+    fn value_in_the_place_of_a_section_is_refused() {
+        let layer = "run = 1".parse().expect("valid");
+        let error = tree().changes(&layer, &Origin::Flag).expect_err("refused");
+        assert_eq!(
+            error.to_string(),
+            "--set: run is a section; give its keys one by one"
+        );
+    }
+}

@@ -1,0 +1,233 @@
+//! `export --to jsonl`: a line a pair and metric in `pairs.jsonl`, their files below `pairs/`.
+//!
+//! The same results give the same bytes. Times differ from run to run, so they are left out unless asked for.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::files::{FilesError, PAIRS, PairFiles};
+use super::folder::{Folder, FolderError, LINES};
+use super::line::{Line, LineStatus, Outcomes};
+use crate::catalog::{Catalog, CatalogError, PairResults};
+use crate::domain::{Failure, FailureClass, PairName, ThresholdMetric};
+use crate::raster;
+use crate::store::Project;
+
+/// Pairs in memory at a time.
+const PAGE: usize = 64;
+
+/// What to export.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct JsonlOptions {
+    /// Whether to write computing times; the bytes then differ from run to run.
+    pub with_times: bool,
+    /// Limits on the print images.
+    pub limits: raster::Limits,
+}
+
+/// What was exported.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ExportSummary {
+    /// Pairs with files.
+    pub done: u64,
+    /// Pairs without result: failed or not finished.
+    pub without_result: u64,
+    /// Pairs whose result is there but cannot be read, and why.
+    pub unreadable: Vec<(PairName, String)>,
+}
+
+/// Why nothing was exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The catalog refused.
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    /// The folder cannot be used.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// A file cannot be written.
+    #[error("{path}: {source}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// A thread was lost.
+    #[error("the export stopped: {0}")]
+    Stopped(#[from] tokio::task::JoinError),
+}
+
+/// Exports every pair of a project to a folder, which is new, empty or an earlier export that is replaced.
+///
+/// A pair whose files cannot be read any more is told in its lines and in the summary; the others go on.
+///
+/// # Errors
+/// When the folder cannot be written or the catalog cannot be read; an earlier export then stays as it was.
+pub async fn to_jsonl(
+    catalog: &Catalog,
+    project: &Project,
+    dir: &Path,
+    options: JsonlOptions,
+) -> Result<ExportSummary, ExportError> {
+    let folder = Folder::begin(dir)?;
+    let mut lines = Lines::create(folder.path())?;
+    let mut summary = ExportSummary::default();
+    let mut after = None;
+    loop {
+        let page = catalog.results_page(after.as_ref(), PAGE).await?;
+        let Some(last) = page.last() else {
+            break;
+        };
+        after = Some(last.facts.name.clone());
+        for pair in write_page(project, folder.path(), page, options).await? {
+            lines.write(&pair.lines)?;
+            summary.count(pair);
+        }
+    }
+    lines.finish()?;
+    folder.finish()?;
+    Ok(summary)
+}
+
+/// A pair's lines, and why its files are not there although it is done.
+struct PairLines {
+    name: PairName,
+    lines: Vec<Line>,
+    unreadable: Option<String>,
+}
+
+impl ExportSummary {
+    fn count(&mut self, pair: PairLines) {
+        if let Some(why) = pair.unreadable {
+            self.unreadable.push((pair.name, why));
+        } else if pair
+            .lines
+            .iter()
+            .any(|line| line.status == LineStatus::Done)
+        {
+            self.done += 1;
+        } else {
+            self.without_result += 1;
+        }
+    }
+}
+
+/// Writes the files of a page on all cores.
+async fn write_page(
+    project: &Project,
+    root: &Path,
+    pairs: Vec<PairResults>,
+    options: JsonlOptions,
+) -> Result<Vec<PairLines>, ExportError> {
+    let (project, root) = (project.clone(), root.to_owned());
+    tokio::task::spawn_blocking(move || {
+        pairs
+            .par_iter()
+            .map(|pair| pair_lines(&project, &root, pair, options))
+            .collect()
+    })
+    .await?
+}
+
+fn pair_lines(
+    project: &Project,
+    root: &Path,
+    pair: &PairResults,
+    options: JsonlOptions,
+) -> Result<PairLines, ExportError> {
+    let name = pair.facts.name.clone();
+    if pair.metrics.is_empty() {
+        let lines = all_metrics(|metric| Line::without_result(pair, metric));
+        return Ok(PairLines {
+            name,
+            lines,
+            unreadable: None,
+        });
+    }
+    match finished_lines(project, root, pair, options) {
+        Ok(lines) => Ok(PairLines {
+            name,
+            lines,
+            unreadable: None,
+        }),
+        Err(FilesError::Write { path, source }) => Err(ExportError::Write { path, source }),
+        Err(error) => {
+            // Half of a pair's files would look like all of them.
+            let _ = std::fs::remove_dir_all(root.join(PAIRS).join(name.as_str()));
+            let failure = Failure::new(FailureClass::Io, error.to_string());
+            Ok(PairLines {
+                name,
+                lines: all_metrics(|metric| Line::unreadable(pair, metric, &failure)),
+                unreadable: Some(failure.message),
+            })
+        }
+    }
+}
+
+fn finished_lines(
+    project: &Project,
+    root: &Path,
+    pair: &PairResults,
+    options: JsonlOptions,
+) -> Result<Vec<Line>, FilesError> {
+    let files = PairFiles::read(project, pair, &options.limits)?;
+    let outcomes = Outcomes::read(files.aligned())?;
+    files.write_shared(root)?;
+    pair.metrics
+        .iter()
+        .map(|record| {
+            let written = files.write_metric(root, record)?;
+            Ok(Line {
+                seconds: options.with_times.then(|| pair.seconds()),
+                ..Line::of(pair, record, &outcomes, written)
+            })
+        })
+        .collect()
+}
+
+fn all_metrics(line: impl Fn(ThresholdMetric) -> Line) -> Vec<Line> {
+    ThresholdMetric::ALL.into_iter().map(line).collect()
+}
+
+/// `pairs.jsonl` while it is written.
+struct Lines {
+    path: PathBuf,
+    file: BufWriter<File>,
+}
+
+impl Lines {
+    fn create(root: &Path) -> Result<Self, ExportError> {
+        let path = root.join(LINES);
+        match File::create(&path) {
+            Ok(file) => Ok(Self {
+                path,
+                file: BufWriter::new(file),
+            }),
+            Err(source) => Err(ExportError::Write { path, source }),
+        }
+    }
+
+    fn write(&mut self, lines: &[Line]) -> Result<(), ExportError> {
+        for line in lines {
+            let text = serde_json::to_string(line)
+                .expect("a line holds only strings, finite numbers, lists and fields");
+            writeln!(self.file, "{text}").map_err(|source| self.refused(source))?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self) -> Result<(), ExportError> {
+        self.file.flush().map_err(|source| self.refused(source))
+    }
+
+    fn refused(&self, source: std::io::Error) -> ExportError {
+        ExportError::Write {
+            path: self.path.clone(),
+            source,
+        }
+    }
+}

@@ -1,0 +1,316 @@
+//! One line of `pairs.jsonl`: a pair and a metric.
+
+use serde::Serialize;
+
+use super::files::Files;
+use crate::catalog::{MetricRecord, PairResults};
+use crate::domain::{
+    Affine2, ContentHash, DepthOutcome, Failure, FailureClass, FitOutcome, JobStatus,
+    MetricOutcome, NormalizeOutcome, PairName, PrintFromMesh, Rigid3, Stage, ThresholdMetric,
+    Verdict,
+};
+use crate::report::Standing;
+use crate::report::aligned::{Aligned, AlignedError};
+
+/// How far a pair is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum LineStatus {
+    /// Aligned; every number and file is there.
+    Done,
+    /// It failed, or its files cannot be read any more; `error` says why.
+    Failed,
+    /// Not aligned yet.
+    Pending,
+}
+
+/// A line. What does not exist is null; field names are fixed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Line {
+    /// The pair's id.
+    pub id: PairName,
+    /// How the depth threshold was chosen.
+    pub metric: ThresholdMetric,
+    /// How far the pair is.
+    pub status: LineStatus,
+    /// Class of the failure.
+    pub error_class: Option<FailureClass>,
+    /// Why it failed.
+    pub error: Option<String>,
+    /// The numbers of the alignment.
+    #[serde(flatten)]
+    pub numbers: Numbers,
+    /// The maps between the frames.
+    #[serde(flatten)]
+    pub maps: Maps,
+    /// Files below the export folder.
+    pub files: Option<Files>,
+    /// What the result was made from.
+    #[serde(flatten)]
+    pub hashes: Hashes,
+    /// What readers together say of this result.
+    pub verdict: Option<Verdict>,
+    /// Computing time of the pair's stages, where times were asked for.
+    pub seconds: Option<f64>,
+}
+
+/// Threshold, pose and scores.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Numbers {
+    /// Height over the fitted surface from which on the depth map is stroke, mesh units.
+    pub threshold_depth: Option<f64>,
+    /// Grey level 0..=65535 that parts ink from paper.
+    pub threshold_print: Option<f64>,
+    /// How far the depth map is turned, degrees in (-180, 180], clockwise on the screen.
+    pub angle_deg: Option<f64>,
+    /// Print pixels per depth-map pixel.
+    pub scale: Option<f64>,
+    /// Where the centre of the depth map goes relative to the print's, print pixels.
+    pub shift_px: Option<[f64; 2]>,
+    /// Structural similarity on the canvas.
+    pub ssim: Option<f64>,
+    /// The same without the luminance factor.
+    pub nl_ssim: Option<f64>,
+    /// Intersection over union of the canvas masks by pixel.
+    pub iou: Option<f64>,
+    /// Intersection over union of their bounding boxes.
+    pub iou_box: Option<f64>,
+    /// Dice coefficient of the canvas masks by pixel.
+    pub dice: Option<f64>,
+    /// Share of the canvas that is ink.
+    pub density_print: Option<f64>,
+    /// Share of the canvas that is stroke top.
+    pub density_depth: Option<f64>,
+}
+
+/// Maps between frames, row-major.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Maps {
+    /// 3x4: mesh point to print pixel and height.
+    pub print_from_mesh: Option<PrintFromMesh>,
+    /// 4x4: mesh point to plane frame.
+    pub plane_from_mesh: Option<Rigid3>,
+    /// 2x3: plane x, y to depth-map pixel.
+    pub depth_from_plane: Option<Affine2>,
+    /// 3x3: depth-map pixel to print pixel.
+    pub print_from_depth: Option<[[f64; 3]; 3]>,
+}
+
+/// What a result was made from, and the result itself.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Hashes {
+    /// Content of the mesh file.
+    pub mesh_hash: Option<ContentHash>,
+    /// Content of the print file.
+    pub print_hash: Option<ContentHash>,
+    /// This metric's result.
+    pub result_hash: Option<ContentHash>,
+    /// Settings of all stages.
+    pub config_hash: Option<ContentHash>,
+}
+
+/// The outcomes of a finished pair that its lines share.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Outcomes {
+    fit: FitOutcome,
+    depth: DepthOutcome,
+    normalize: NormalizeOutcome,
+}
+
+impl Outcomes {
+    /// Reads them from the stored results.
+    pub(super) fn read(aligned: &Aligned<'_>) -> Result<Self, AlignedError> {
+        Ok(Self {
+            fit: aligned.outcome(Stage::Fit)?,
+            depth: aligned.outcome(Stage::Depth)?,
+            normalize: aligned.outcome(Stage::Normalize)?,
+        })
+    }
+}
+
+impl Line {
+    /// The line of a pair without result.
+    pub(super) fn without_result(pair: &PairResults, metric: ThresholdMetric) -> Self {
+        let failure = pair.failure.as_ref().map(|stored| &stored.failure);
+        Self {
+            id: pair.facts.name.clone(),
+            metric,
+            status: status(pair.status),
+            error_class: failure.map(|failure| failure.class),
+            error: failure.map(|failure| failure.message.clone()),
+            numbers: Numbers::default(),
+            maps: Maps::default(),
+            files: None,
+            hashes: Hashes {
+                result_hash: None,
+                ..hashes(pair)
+            },
+            verdict: None,
+            seconds: None,
+        }
+    }
+
+    /// The line of a pair whose result cannot be read any more.
+    pub(super) fn unreadable(pair: &PairResults, metric: ThresholdMetric, why: &Failure) -> Self {
+        Self {
+            status: LineStatus::Failed,
+            error_class: Some(why.class),
+            error: Some(why.message.clone()),
+            ..Self::without_result(pair, metric)
+        }
+    }
+
+    /// The line of a result.
+    pub(super) fn of(
+        pair: &PairResults,
+        record: &MetricRecord,
+        outcomes: &Outcomes,
+        files: Files,
+    ) -> Self {
+        Self {
+            numbers: Numbers::of(&record.outcome, &outcomes.normalize),
+            maps: Maps::of(&record.outcome, outcomes),
+            files: Some(files),
+            hashes: Hashes {
+                result_hash: Some(record.result_hash),
+                ..hashes(pair)
+            },
+            verdict: Standing::of(record).verdict(),
+            ..Self::without_result(pair, record.outcome.metric)
+        }
+    }
+}
+
+impl Numbers {
+    fn of(outcome: &MetricOutcome, normalize: &NormalizeOutcome) -> Self {
+        let scores = &outcome.scores;
+        Self {
+            threshold_depth: Some(outcome.threshold_depth),
+            threshold_print: Some(normalize.threshold_print),
+            angle_deg: Some(outcome.angle_deg),
+            scale: Some(outcome.scale),
+            shift_px: Some(outcome.shift_px),
+            ssim: Some(scores.ssim),
+            nl_ssim: Some(scores.nl_ssim),
+            iou: Some(scores.iou),
+            iou_box: Some(scores.iou_box),
+            dice: Some(scores.dice),
+            density_print: Some(scores.density_print),
+            density_depth: Some(scores.density_depth),
+        }
+    }
+}
+
+impl Maps {
+    fn of(outcome: &MetricOutcome, outcomes: &Outcomes) -> Self {
+        let (plane_from_mesh, depth_from_plane) = (
+            outcomes.fit.plane_from_mesh,
+            outcomes.depth.scale.depth_from_plane,
+        );
+        let [first, second] = outcome.print_from_depth.0;
+        Self {
+            print_from_mesh: Some(PrintFromMesh::new(
+                &outcome.print_from_depth,
+                &depth_from_plane,
+                &plane_from_mesh,
+            )),
+            plane_from_mesh: Some(plane_from_mesh),
+            depth_from_plane: Some(depth_from_plane),
+            print_from_depth: Some([first, second, [0.0, 0.0, 1.0]]),
+        }
+    }
+}
+
+/// Hashes that the lines of a pair share.
+fn hashes(pair: &PairResults) -> Hashes {
+    Hashes {
+        mesh_hash: pair.stage(Stage::Fit).map(|record| record.mesh_hash),
+        print_hash: pair
+            .stage(Stage::Normalize)
+            .and_then(|record| record.print_hash),
+        result_hash: None,
+        config_hash: pair.stage(Stage::Register).map(|record| record.recipe_hash),
+    }
+}
+
+const fn status(status: JobStatus) -> LineStatus {
+    match status {
+        JobStatus::Done => LineStatus::Done,
+        JobStatus::Quarantined => LineStatus::Failed,
+        JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff | JobStatus::Held => {
+            LineStatus::Pending
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Line;
+    use crate::domain::{Failure, FailureClass, ThresholdMetric};
+    use crate::report::fixture;
+    use serde_json::{Value, json};
+
+    /// The fields in the order the interface gives them.
+    const FIELDS: [&str; 28] = [
+        "id",
+        "metric",
+        "status",
+        "error_class",
+        "error",
+        "threshold_depth",
+        "threshold_print",
+        "angle_deg",
+        "scale",
+        "shift_px",
+        "ssim",
+        "nl_ssim",
+        "iou",
+        "iou_box",
+        "dice",
+        "density_print",
+        "density_depth",
+        "print_from_mesh",
+        "plane_from_mesh",
+        "depth_from_plane",
+        "print_from_depth",
+        "files",
+        "mesh_hash",
+        "print_hash",
+        "result_hash",
+        "config_hash",
+        "verdict",
+        "seconds",
+    ];
+
+    #[test]
+    fn failed_pair_has_every_field_and_nulls() {
+        let pair = fixture::failed("a", FailureClass::BadInput, "a.stl is empty");
+        let line = Line::without_result(&pair, ThresholdMetric::Density);
+        let text = serde_json::to_string(&line).expect("a line is JSON");
+        let value: Value = serde_json::from_str(&text).expect("a line is JSON");
+        let mut place = 0;
+        for field in FIELDS {
+            let at = text.find(&format!("\"{field}\":")).expect(field);
+            assert!(at >= place, "{field} is out of order");
+            place = at;
+        }
+        assert_eq!(value.as_object().expect("an object").len(), FIELDS.len());
+        assert_eq!(value["status"], "failed");
+        assert_eq!(value["error_class"], "bad_input");
+        assert_eq!(value["error"], "a.stl is empty");
+        assert!(FIELDS[5..].iter().all(|field| value[field] == Value::Null));
+    }
+
+    #[test]
+    fn unfinished_pair_is_pending_and_damaged_one_failed() {
+        let metric = ThresholdMetric::Density;
+        let pending = Line::without_result(&fixture::pending("a"), metric);
+        assert_eq!(json!(pending.status), "pending");
+        let gone = Failure::new(FailureClass::Io, "depth.png is gone");
+        let damaged = Line::unreadable(&fixture::done("a", 0.8, &[]), metric, &gone);
+        assert_eq!(
+            (json!(damaged.status), damaged.error.as_deref()),
+            (json!("failed"), Some("depth.png is gone"))
+        );
+    }
+}

@@ -1,0 +1,167 @@
+//! A print with the edges of the aligned depth mask, the aligned relief, and the print itself, in one frame.
+
+use super::paint::{Rgb, eight_bits, resized};
+use super::relief::shaded;
+use crate::domain::{Affine2, MetricOutcome};
+use crate::raster::{DepthMap, Grid, Mask, Picture, warp_depth, warp_mask};
+use crate::report::aligned::depth_mask;
+
+/// Vermillion of Okabe and Ito's palette: told from ink and paper with every kind of colour vision.
+const EDGE: [u8; 3] = [213, 94, 0];
+/// An edge is one pixel wide for each so many pixels of the longest side.
+const SIDE_PER_EDGE_PX: usize = 360;
+/// Longest side that a saved overlay has at least, pixels.
+const OVERLAY_SIDE: usize = 480;
+
+/// The print image's frame enlarged or shrunk: where pictures for people are drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    width: usize,
+    height: usize,
+    from_print: Affine2,
+}
+
+impl View {
+    /// The print's frame so that its longest side is `side` pixels.
+    pub fn of_side(print: &Picture, side: usize) -> Self {
+        let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
+        let scale = side as f64 / size[0].max(size[1]) as f64;
+        let [width, height] = size.map(|n| ((n as f64 * scale).round() as usize).max(1));
+        Self::new(scale, width, height)
+    }
+
+    /// The print's frame enlarged by a whole number, so that the longest side is large enough to judge by.
+    pub fn to_judge_by(print: &Picture) -> Self {
+        let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
+        let factor = OVERLAY_SIDE.div_ceil(size[0].max(size[1]));
+        Self::new(factor as f64, size[0] * factor, size[1] * factor)
+    }
+
+    /// Pixels cover squares, so that the corner of the image, at -0.5, stays the corner.
+    fn new(scale: f64, width: usize, height: usize) -> Self {
+        let shift = (scale - 1.0) / 2.0;
+        Self {
+            width,
+            height,
+            from_print: Affine2::scale_shift(scale, [shift, shift]),
+        }
+    }
+
+    /// The print as it is.
+    pub fn print(&self, print: &Picture) -> Rgb {
+        resized(&eight_bits(print), self.width, self.height)
+    }
+
+    /// The depth map laid on the print, lit from the side.
+    pub fn relief(&self, depth: &DepthMap, print_from_depth: &Affine2) -> Rgb {
+        let view_from_depth = self.from_print.after(print_from_depth);
+        let levels = warp_depth(depth, &view_from_depth, self.width, self.height);
+        let side = depth.scale.mesh_unit_per_px / view_from_depth.scale();
+        shaded(&levels, depth.scale.height_per_level / side)
+    }
+
+    /// The print with the edges of the depth mask on it.
+    pub fn overlay(&self, print: &Picture, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
+        let view_from_depth = self.from_print.after(&outcome.print_from_depth);
+        let mask = depth_mask(depth, outcome.threshold_level);
+        let mask = warp_mask(&mask, &view_from_depth, self.width, self.height);
+        let reach = (self.width.max(self.height) / SIDE_PER_EDGE_PX).max(1);
+        let mut picture = self.print(print);
+        for (colour, edge) in picture
+            .data_mut()
+            .iter_mut()
+            .zip(edges(&mask, reach).data())
+        {
+            if *edge {
+                *colour = EDGE;
+            }
+        }
+        picture
+    }
+}
+
+/// Set pixels with an unset one within `reach` along a row or a column. The end of the picture is no edge.
+fn edges(mask: &Mask, reach: usize) -> Grid<bool> {
+    let reach = reach as i64;
+    Grid::from_fn(mask.width(), mask.height(), |x, y| {
+        let (x, y) = (x as i64, y as i64);
+        let unset = |dx, dy| mask.get(x + dx, y + dy) == Some(false);
+        mask.get(x, y) == Some(true)
+            && (1..=reach).any(|r| unset(r, 0) || unset(-r, 0) || unset(0, r) || unset(0, -r))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{EDGE, View, edges};
+    use crate::domain::{Affine2, DepthScale, ThresholdMetric};
+    use crate::raster::{DepthMap, Grid, Mask, Picture};
+    use crate::report::fixture;
+
+    /// A bar of 4 x 20 px at (8, 5) over ground in a map of 30 x 30 px.
+    fn depth() -> DepthMap {
+        DepthMap {
+            levels: Grid::from_fn(30, 30, |x, y| {
+                if (8..12).contains(&x) && (5..25).contains(&y) {
+                    60_000
+                } else {
+                    10_000
+                }
+            }),
+            scale: DepthScale {
+                height_min: -1.0,
+                height_per_level: 2e-5,
+                mesh_unit_per_px: 0.1,
+                depth_from_plane: Affine2::IDENTITY,
+                bow: None,
+                unit: None,
+            },
+        }
+    }
+
+    fn paper() -> Picture {
+        Picture {
+            rgb: Grid::new(30, 30, [60_000; 3]),
+        }
+    }
+
+    #[test]
+    fn overlay_draws_the_bar_where_the_alignment_puts_it() {
+        let mut outcome = fixture::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+        outcome.print_from_depth = Affine2::scale_shift(1.0, [10.0, 0.0]);
+        let view = View::of_side(&paper(), 30);
+        let picture = view.overlay(&paper(), &depth(), &outcome);
+        let edge: Vec<_> = (0..30).filter(|x| picture.at(*x, 15) == EDGE).collect();
+        assert_eq!(edge, [18, 21]);
+    }
+
+    #[test]
+    fn enlarged_view_keeps_places() {
+        let mut outcome = fixture::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+        outcome.print_from_depth = Affine2::IDENTITY;
+        let view = View::to_judge_by(&paper());
+        let picture = view.overlay(&paper(), &depth(), &outcome);
+        assert_eq!((picture.width(), picture.height()), (480, 480));
+        let row: Vec<_> = (0..480).filter(|x| picture.at(*x, 240) == EDGE).collect();
+        // The bar covers depth pixels 8..12, that is print 7.5..11.5 in centres: 8 * 16 to 12 * 16 enlarged.
+        assert!(
+            row[0].abs_diff(128) <= 1 && row[row.len() - 1].abs_diff(191) <= 1,
+            "{row:?}"
+        );
+    }
+
+    #[test]
+    fn strokes_cut_by_the_picture_have_no_edge_there() {
+        let mask = Mask::from_fn(6, 6, |x, _| x < 3);
+        let found = edges(&mask, 1);
+        assert_eq!(found.row(0), [false, false, true, false, false, false]);
+    }
+
+    #[test]
+    fn relief_follows_the_alignment() {
+        let view = View::of_side(&paper(), 30);
+        let still = view.relief(&depth(), &Affine2::IDENTITY);
+        let moved = view.relief(&depth(), &Affine2::scale_shift(1.0, [5.0, 0.0]));
+        assert_eq!(still.at(10, 15), moved.at(15, 15));
+    }
+}

@@ -1,0 +1,155 @@
+//! Painting on colour grids: copying, resizing, writing.
+
+use super::font;
+use crate::raster::{Grid, Picture};
+
+/// An 8-bit colour picture.
+pub type Rgb = Grid<[u8; 3]>;
+
+/// Ink of letters.
+pub(super) const TEXT: [u8; 3] = [20, 20, 20];
+/// What lies under everything.
+pub(super) const GROUND: [u8; 3] = [255, 255, 255];
+
+/// A decoded print with 8 bits a channel.
+pub(super) fn eight_bits(print: &Picture) -> Rgb {
+    let narrow = |wide: u16| ((u32::from(wide) + 128) / 257) as u8;
+    print.rgb.map(|colour| colour.map(narrow))
+}
+
+/// A picture in another size: the mean of what each pixel covers when it shrinks, plain enlarged pixels when it grows.
+pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
+    if (image.width(), image.height()) == (width, height) {
+        return image.clone();
+    }
+    let columns = spans(image.width(), width);
+    let rows = spans(image.height(), height);
+    Rgb::from_fn(width, height, |x, y| mean(image, &columns[x], &rows[y]))
+}
+
+/// The source pixels one output pixel covers along a side, with their shares.
+type Span = Vec<(usize, f64)>;
+
+fn spans(from: usize, to: usize) -> Vec<Span> {
+    let step = from as f64 / to as f64;
+    (0..to)
+        .map(|i| {
+            let (start, end) = (i as f64 * step, (i + 1) as f64 * step);
+            if step < 1.0 {
+                return vec![((f64::midpoint(start, end)) as usize, 1.0)];
+            }
+            (start as usize..(end.ceil() as usize).min(from))
+                .map(|j| (j, end.min((j + 1) as f64) - start.max(j as f64)))
+                .collect()
+        })
+        .collect()
+}
+
+fn mean(image: &Rgb, columns: &Span, rows: &Span) -> [u8; 3] {
+    let (mut sum, mut weight) = ([0.0; 3], 0.0);
+    for (y, wy) in rows {
+        for (x, wx) in columns {
+            let colour = image.at(*x, *y);
+            for (total, channel) in sum.iter_mut().zip(colour) {
+                *total += wx * wy * f64::from(channel);
+            }
+            weight += wx * wy;
+        }
+    }
+    sum.map(|total| (total / weight).round() as u8)
+}
+
+/// Copies a picture onto another with its top left corner at (x, y); what lies outside is cut off.
+pub(super) fn copy(onto: &mut Rgb, image: &Rgb, x: usize, y: usize) {
+    for row in 0..image.height().min(onto.height().saturating_sub(y)) {
+        for column in 0..image.width().min(onto.width().saturating_sub(x)) {
+            onto.set(x + column, y + row, image.at(column, row));
+        }
+    }
+}
+
+/// Fills a box with a colour; what lies outside is cut off.
+pub(super) fn fill(onto: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8; 3]) {
+    for y in at[1]..(at[1] + size[1]).min(onto.height()) {
+        for x in at[0]..(at[0] + size[0]).min(onto.width()) {
+            onto.set(x, y, colour);
+        }
+    }
+}
+
+/// Width of a text in pixels with dots of `dot` pixels.
+pub(super) const fn text_width(letters: usize, dot: usize) -> usize {
+    letters * (font::WIDTH + 1) * dot
+}
+
+/// Height of a line of text in pixels with dots of `dot` pixels, its gap below included.
+pub(super) const fn text_height(dot: usize) -> usize {
+    (font::HEIGHT + 2) * dot
+}
+
+/// As much of a text as fits, ending in `..` where it was cut.
+pub(super) fn cut_to(text: &str, width: usize, dot: usize) -> String {
+    let most = width / text_width(1, dot);
+    if text.chars().count() <= most {
+        return text.to_owned();
+    }
+    let kept: String = text.chars().take(most.saturating_sub(2)).collect();
+    kept + ".."
+}
+
+/// Writes a text with its top left corner at (x, y) and dots of `dot` pixels.
+pub(super) fn write(onto: &mut Rgb, text: &str, x: usize, y: usize, dot: usize, colour: [u8; 3]) {
+    for (i, letter) in text.chars().enumerate() {
+        let left = x + text_width(i, dot);
+        for (row, bits) in font::glyph(letter).into_iter().enumerate() {
+            for column in (0..font::WIDTH).filter(|c| bits >> (font::WIDTH - 1 - c) & 1 == 1) {
+                fill(
+                    onto,
+                    [left + column * dot, y + row * dot],
+                    [dot, dot],
+                    colour,
+                );
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Rgb, copy, cut_to, eight_bits, resized, write};
+    use crate::raster::{Grid, Picture};
+
+    #[test]
+    fn shrinking_keeps_the_mean_and_growing_keeps_the_pixels() {
+        let image = Rgb::from_vec(2, 1, vec![[0, 10, 100], [200, 30, 100]]).expect("two pixels");
+        assert_eq!(resized(&image, 1, 1).data(), [[100, 20, 100]]);
+        let grown = resized(&image, 4, 2);
+        assert_eq!(
+            grown.row(1),
+            [[0, 10, 100], [0, 10, 100], [200, 30, 100], [200, 30, 100]]
+        );
+        assert_eq!(resized(&image, 2, 1), image);
+    }
+
+    #[test]
+    fn sixteen_bits_narrow_to_the_eight_they_came_from() {
+        let rgb = Grid::from_fn(256, 1, |x, _| [x as u16 * 257; 3]);
+        let narrow = eight_bits(&Picture { rgb });
+        assert!((0..256).all(|x| narrow.at(x, 0) == [x as u8; 3]));
+    }
+
+    #[test]
+    fn painting_outside_is_cut_off() {
+        let mut sheet = Rgb::new(8, 8, [255; 3]);
+        write(&mut sheet, "W", 6, 3, 2, [0; 3]);
+        copy(&mut sheet, &Rgb::new(5, 5, [9; 3]), 7, 7);
+        assert_eq!(sheet.at(6, 3), [0; 3]);
+        assert_eq!(sheet.at(7, 7), [9; 3]);
+    }
+
+    #[test]
+    fn long_text_ends_in_dots() {
+        assert_eq!(cut_to("b01-0002", 48, 1), "b01-0002");
+        assert_eq!(cut_to("b01-00023", 48, 1), "b01-00..");
+    }
+}

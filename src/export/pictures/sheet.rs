@@ -1,0 +1,172 @@
+//! The contact sheet: many pairs on one picture, so that a person sees fifty results at a glance.
+
+use super::paint::{GROUND, Rgb, TEXT, copy, cut_to, fill, resized, text_height, write};
+
+/// Width of a sheet in pixels.
+pub const SHEET_WIDTH: usize = 2000;
+/// Pictures in a cell: print, relief, overlay.
+const TILES: usize = 3;
+/// Space around cells and between pictures, pixels.
+const GAP: usize = 6;
+/// Cells narrower than this have small letters.
+const WIDE_CELL: usize = 300;
+/// More columns than this leave nothing to see.
+const MAX_COLUMNS: usize = 12;
+/// Frame of a cell that is wrong.
+const WRONG: [u8; 3] = [213, 94, 0];
+/// Frame of any other cell.
+const FRAME: [u8; 3] = [205, 205, 205];
+/// Where a picture is missing.
+const MISSING: [u8; 3] = [240, 240, 240];
+
+/// One pair on the sheet.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SheetCell {
+    /// The pair's id.
+    pub id: String,
+    /// Its numbers, or why it failed, in a few words.
+    pub note: String,
+    /// Whether it is known to be wrong: failed, failed by readers, or off the truth.
+    pub wrong: bool,
+    /// Print, relief turned onto the print, and overlay, where they exist.
+    pub tiles: [Option<Rgb>; TILES],
+}
+
+/// Sizes of a sheet's parts in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Layout {
+    columns: usize,
+    cell: [usize; 2],
+    tile: usize,
+    dot: usize,
+}
+
+impl Layout {
+    fn new(columns: usize) -> Self {
+        let columns = columns.clamp(1, MAX_COLUMNS);
+        let width = SHEET_WIDTH / columns;
+        let tile = (width - GAP * (TILES + 3)) / TILES;
+        let dot = if width < WIDE_CELL { 1 } else { 2 };
+        let height = tile + 2 * text_height(dot) + 4 * GAP;
+        Self {
+            columns,
+            cell: [width, height],
+            tile,
+            dot,
+        }
+    }
+}
+
+/// Longest side of the pictures in the cells of a sheet with so many columns, pixels.
+pub fn tile_side(columns: usize) -> usize {
+    Layout::new(columns).tile
+}
+
+/// Cells in rows of 1 to 12 columns, [`SHEET_WIDTH`] pixels wide; larger pictures are shrunk.
+pub fn contact_sheet(cells: &[SheetCell], columns: usize) -> Rgb {
+    let layout = Layout::new(columns);
+    let height = cells.len().div_ceil(layout.columns).max(1) * layout.cell[1];
+    let mut sheet = Rgb::new(SHEET_WIDTH, height, GROUND);
+    for (i, cell) in cells.iter().enumerate() {
+        let corner = [
+            i % layout.columns * layout.cell[0],
+            i / layout.columns * layout.cell[1],
+        ];
+        paint(&mut sheet, corner, cell, &layout);
+    }
+    sheet
+}
+
+fn paint(sheet: &mut Rgb, [x, y]: [usize; 2], cell: &SheetCell, layout: &Layout) {
+    let colour = if cell.wrong { WRONG } else { FRAME };
+    frame(
+        sheet,
+        [x + 2, y + 2],
+        layout.cell.map(|side| side - 4),
+        colour,
+    );
+    let (left, mut top) = (x + 2 * GAP, y + 2 * GAP);
+    for text in [&cell.id, &cell.note] {
+        let shown = cut_to(text, layout.cell[0] - 4 * GAP, layout.dot);
+        write(sheet, &shown, left, top, layout.dot, TEXT);
+        top += text_height(layout.dot);
+    }
+    for (i, tile) in cell.tiles.iter().enumerate() {
+        let corner = [left + i * (layout.tile + GAP), top];
+        paint_tile(sheet, corner, tile.as_ref(), layout.tile);
+    }
+}
+
+/// A picture in the middle of its square.
+fn paint_tile(sheet: &mut Rgb, [x, y]: [usize; 2], tile: Option<&Rgb>, side: usize) {
+    let Some(tile) = tile else {
+        fill(sheet, [x, y], [side, side], MISSING);
+        return;
+    };
+    let longest = tile.width().max(tile.height()).max(side);
+    let [width, height] = [tile.width(), tile.height()].map(|n| (n * side / longest).max(1));
+    let fitted = resized(tile, width, height);
+    copy(
+        sheet,
+        &fitted,
+        x + (side - width) / 2,
+        y + (side - height) / 2,
+    );
+}
+
+fn frame(sheet: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8; 3]) {
+    let line = 2;
+    fill(sheet, at, [size[0], line], colour);
+    fill(sheet, at, [line, size[1]], colour);
+    fill(
+        sheet,
+        [at[0], at[1] + size[1] - line],
+        [size[0], line],
+        colour,
+    );
+    fill(
+        sheet,
+        [at[0] + size[0] - line, at[1]],
+        [line, size[1]],
+        colour,
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{MISSING, Rgb, SHEET_WIDTH, SheetCell, WRONG, contact_sheet, tile_side};
+
+    fn cell(id: &str, wrong: bool) -> SheetCell {
+        let side = tile_side(5);
+        SheetCell {
+            id: id.to_owned(),
+            note: "IoU 0.812  margin 0.31".to_owned(),
+            wrong,
+            tiles: [Some(Rgb::new(side, side / 2, [10, 20, 30])), None, None],
+        }
+    }
+
+    #[test]
+    fn fifty_cells_fit_on_one_readable_sheet() {
+        let cells: Vec<_> = (0..50).map(|i| cell(&format!("p{i:03}"), false)).collect();
+        let sheet = contact_sheet(&cells, 5);
+        assert_eq!(sheet.width(), SHEET_WIDTH);
+        assert!((1500..2200).contains(&sheet.height()), "{}", sheet.height());
+        assert!(tile_side(5) >= 110);
+    }
+
+    #[test]
+    fn wrong_cells_are_framed_and_missing_pictures_are_blank() {
+        let sheet = contact_sheet(&[cell("a", true), cell("b", false)], 2);
+        assert_eq!(sheet.at(3, 3), WRONG);
+        assert_ne!(sheet.at(SHEET_WIDTH / 2 + 3, 3), WRONG);
+        assert_eq!(sheet.at(500, sheet.height() - 60), MISSING);
+    }
+
+    #[test]
+    fn many_columns_and_no_cells_do_not_break_it() {
+        assert_eq!(contact_sheet(&[], 5).width(), SHEET_WIDTH);
+        assert!(contact_sheet(&[cell("a", false)], 400).height() > 0);
+        assert!(contact_sheet(&[cell("a", false)], 0).height() > 0);
+    }
+}

@@ -1,0 +1,317 @@
+//! The contact sheet of a project: its worst pairs first, on one picture.
+
+use rayon::prelude::*;
+
+use super::files::Print;
+use super::pictures::{Rgb, SheetCell, View, contact_sheet, tile_side};
+use crate::catalog::{Catalog, CatalogError, PairResults};
+use crate::domain::{JobStatus, PairName, ThresholdMetric};
+use crate::raster;
+use crate::report::aligned::Aligned;
+use crate::report::truth::TruthErrors;
+use crate::report::{Standing, TruthFinding, with_truth};
+use crate::store::Project;
+
+/// Pairs in memory at a time while the worst are looked for.
+const PAGE: usize = 256;
+
+/// What comes first on a sheet. Failed pairs come before all others but in the order of names.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SheetOrder {
+    /// The farthest from the truth; without truth, the lowest `IoU`.
+    Worst,
+    /// The lowest `IoU` on the canvas.
+    Score,
+    /// The smallest lead over the next best pose.
+    Margin,
+    /// The first name.
+    Name,
+}
+
+impl SheetOrder {
+    /// Every order.
+    pub const ALL: [Self; 4] = [Self::Worst, Self::Score, Self::Margin, Self::Name];
+
+    /// Name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Worst => "worst",
+            Self::Score => "score",
+            Self::Margin => "margin",
+            Self::Name => "name",
+        }
+    }
+}
+
+impl std::fmt::Display for SheetOrder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl std::str::FromStr for SheetOrder {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::ALL
+            .into_iter()
+            .find(|order| order.name() == text)
+            .ok_or_else(|| format!("{text:?} is not an order (worst, score, margin, name)"))
+    }
+}
+
+/// What to draw.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SheetOptions {
+    /// Whose results.
+    pub metric: ThresholdMetric,
+    /// Only these pairs; all when `None`.
+    pub pairs: Option<Vec<PairName>>,
+    /// What comes first.
+    pub order: SheetOrder,
+    /// Most pairs on the sheet.
+    pub limit: usize,
+    /// Pairs in a row, 1 to 12.
+    pub columns: usize,
+    /// Limits on the print images.
+    pub limits: raster::Limits,
+}
+
+/// A sheet, and how much of the project is on it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sheet {
+    /// The picture.
+    pub picture: Rgb,
+    /// Pairs on it.
+    pub shown: usize,
+    /// Pairs that are finished or failed, of those asked for.
+    pub of: usize,
+}
+
+/// Why there is no sheet.
+#[derive(Debug, thiserror::Error)]
+pub enum SheetError {
+    /// The catalog refused.
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    /// A thread was lost.
+    #[error("drawing stopped: {0}")]
+    Stopped(#[from] tokio::task::JoinError),
+}
+
+/// A pair that may get on the sheet.
+struct Candidate {
+    /// Lowest first.
+    rank: f64,
+    pair: PairResults,
+    truth: Option<TruthErrors>,
+}
+
+/// Draws the contact sheet of a project as its catalog stands. Unfinished pairs are not on it.
+///
+/// A picture that cannot be made is left blank, with the reason in the cell.
+///
+/// # Errors
+/// When the catalog cannot be read.
+pub async fn draw_sheet(
+    catalog: &Catalog,
+    project: &Project,
+    options: SheetOptions,
+) -> Result<Sheet, SheetError> {
+    let (chosen, of) = choose(catalog, project, &options).await?;
+    let project = project.clone();
+    let picture = move || {
+        let draw = |candidate| cell(&project, candidate, &options);
+        let cells: Vec<SheetCell> = chosen.par_iter().map(draw).collect();
+        Sheet {
+            picture: contact_sheet(&cells, options.columns),
+            shown: cells.len(),
+            of,
+        }
+    };
+    Ok(tokio::task::spawn_blocking(picture).await?)
+}
+
+/// The pairs that go on the sheet, in order, and of how many.
+async fn choose(
+    catalog: &Catalog,
+    project: &Project,
+    options: &SheetOptions,
+) -> Result<(Vec<Candidate>, usize), SheetError> {
+    let (mut chosen, mut of, mut after) = (Vec::new(), 0, None);
+    loop {
+        let page = catalog.results_page(after.as_ref(), PAGE).await?;
+        let Some(last) = page.last() else {
+            return Ok((chosen, of));
+        };
+        after = Some(last.facts.name.clone());
+        let wanted = page.into_iter().filter(|pair| wants(options, pair));
+        for (pair, truth) in with_truth(project, wanted.collect()).await? {
+            of += 1;
+            chosen.push(Candidate::new(pair, &truth, options));
+        }
+        // The sort is stable and pairs come by name, so that equal ranks stay in the order of names.
+        chosen.sort_by(|a, b| a.rank.total_cmp(&b.rank));
+        chosen.truncate(options.limit);
+    }
+}
+
+/// Whether a pair was asked for and has something to show.
+fn wants(options: &SheetOptions, pair: &PairResults) -> bool {
+    let asked = |names: &Vec<PairName>| names.contains(&pair.facts.name);
+    options.pairs.as_ref().is_none_or(asked)
+        && (pair.status == JobStatus::Quarantined || pair.metric(options.metric).is_some())
+}
+
+impl Candidate {
+    fn new(pair: PairResults, truth: &TruthFinding, options: &SheetOptions) -> Self {
+        let truth = truth.errors.get(&options.metric).copied();
+        let rank = rank(&pair, truth.as_ref(), options);
+        Self { rank, pair, truth }
+    }
+}
+
+/// Place of a pair on the sheet, lowest first.
+fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &SheetOptions) -> f64 {
+    if options.order == SheetOrder::Name {
+        return 0.0;
+    }
+    let Some(record) = pair.metric(options.metric) else {
+        return f64::NEG_INFINITY;
+    };
+    let score = record.outcome.scores.iou;
+    match options.order {
+        SheetOrder::Worst => truth.map_or(score, |errors| -errors.severity()),
+        SheetOrder::Score => score,
+        SheetOrder::Margin => record.outcome.margin,
+        SheetOrder::Name => 0.0,
+    }
+}
+
+fn cell(project: &Project, candidate: &Candidate, options: &SheetOptions) -> SheetCell {
+    let pair = &candidate.pair;
+    let standing = pair.metric(options.metric).map(Standing::of);
+    let off_truth = candidate.truth.is_some_and(|errors| !errors.pass());
+    let (tiles, trouble) = tiles(project, pair, options);
+    SheetCell {
+        id: title(pair, standing),
+        note: trouble.unwrap_or_else(|| note(candidate, options.metric)),
+        wrong: pair.metric(options.metric).is_none()
+            || off_truth
+            || standing == Some(Standing::Failed),
+        tiles,
+    }
+}
+
+/// The id, and what readers say where anybody has.
+fn title(pair: &PairResults, standing: Option<Standing>) -> String {
+    match standing.and_then(Standing::verdict) {
+        Some(verdict) => format!("{}  {verdict}", pair.facts.name),
+        None => pair.facts.name.to_string(),
+    }
+}
+
+/// The numbers of a pair, or why it failed.
+fn note(candidate: &Candidate, metric: ThresholdMetric) -> String {
+    let pair = &candidate.pair;
+    match (pair.metric(metric), &candidate.truth, &pair.failure) {
+        (Some(record), Some(errors), _) => {
+            let (iou, tops) = (record.outcome.scores.iou, errors.mask_iou);
+            let tops = tops.map_or(String::new(), |tops| format!(" tops {tops:.2}"));
+            let (angle, landmarks) = (errors.angle_deg, errors.tre_pct);
+            format!("IoU {iou:.2}  {angle:.1}\u{b0} {landmarks:.1}%{tops}")
+        }
+        (Some(record), None, _) => format!(
+            "IoU {:.2}  margin {:.2}",
+            record.outcome.scores.iou, record.outcome.margin
+        ),
+        (None, _, Some(stored)) => format!("{}: {}", stored.failure.class, stored.failure.message),
+        (None, _, None) => String::new(),
+    }
+}
+
+/// The three pictures of a pair, and why one of them is missing.
+fn tiles(
+    project: &Project,
+    pair: &PairResults,
+    options: &SheetOptions,
+) -> ([Option<Rgb>; 3], Option<String>) {
+    let Ok(print) = Print::read(project, pair, &options.limits) else {
+        return ([None, None, None], None);
+    };
+    let view = View::of_side(&print.picture, tile_side(options.columns));
+    let plain = Some(view.print(&print.picture));
+    let Some(record) = pair.metric(options.metric) else {
+        return ([plain, None, None], None);
+    };
+    match Aligned::new(project, pair).depth() {
+        Ok(depth) => {
+            let relief = view.relief(&depth, &record.outcome.print_from_depth);
+            let overlay = view.overlay(&print.picture, &depth, &record.outcome);
+            ([plain, Some(relief), Some(overlay)], None)
+        }
+        Err(error) => ([plain, None, None], Some(error.to_string())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{SheetOptions, SheetOrder, rank, wants};
+    use crate::domain::{FailureClass, PairName, ThresholdMetric};
+    use crate::raster;
+    use crate::report::fixture;
+
+    fn options(order: SheetOrder) -> SheetOptions {
+        SheetOptions {
+            metric: ThresholdMetric::Ensemble,
+            pairs: None,
+            order,
+            limit: 50,
+            columns: 5,
+            limits: raster::Limits::SUGGESTED,
+        }
+    }
+
+    #[test]
+    fn failed_pairs_come_first_and_the_better_score_last() {
+        let (good, poor) = (fixture::done("a", 0.9, &[]), fixture::done("b", 0.4, &[]));
+        let failed = fixture::failed("c", FailureClass::BadInput, "c.stl is empty");
+        for order in [SheetOrder::Worst, SheetOrder::Score] {
+            let rank = |pair| rank(pair, None, &options(order));
+            assert!(
+                rank(&failed) < rank(&poor) && rank(&poor) < rank(&good),
+                "{order}"
+            );
+        }
+        assert_eq!(rank(&failed, None, &options(SheetOrder::Name)), 0.0);
+    }
+
+    #[test]
+    fn truth_outweighs_the_score_in_worst() {
+        let (near, far) = (
+            fixture::truth(1.0, 1.0, 0.9),
+            fixture::truth(90.0, 30.0, 0.1),
+        );
+        let metric = ThresholdMetric::Ensemble;
+        let worst = options(SheetOrder::Worst);
+        let (good, poor) = (fixture::done("a", 0.9, &[]), fixture::done("b", 0.4, &[]));
+        let wrong = rank(&good, far.errors.get(&metric), &worst);
+        assert!(wrong < rank(&poor, near.errors.get(&metric), &worst));
+    }
+
+    #[test]
+    fn unfinished_and_unasked_pairs_are_not_shown() {
+        let mut asked = options(SheetOrder::Name);
+        assert!(!wants(&asked, &fixture::pending("a")));
+        assert!(wants(&asked, &fixture::done("a", 0.9, &[])));
+        asked.pairs = Some(vec![PairName::new("b").expect("an id")]);
+        assert!(!wants(&asked, &fixture::done("a", 0.9, &[])));
+    }
+
+    #[test]
+    fn every_order_is_found_by_its_name() {
+        for order in SheetOrder::ALL {
+            assert_eq!(order.name().parse(), Ok(order));
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! What a pair's stored results and artifacts say together: maps, depth map, masks.
+
+use serde::de::DeserializeOwned;
+
+use crate::catalog::{PairResults, StageRecord};
+use crate::domain::{
+    Affine2, ArtifactRef, DepthOutcome, FitOutcome, PrintFromMesh, Stage, ThresholdMetric,
+};
+use crate::raster::{ArtifactError, DepthMap, Grid, Mask, decode_grey8, decode_grey16};
+use crate::store::{self, Project};
+
+/// Role of the depth map among the artifacts of the depth stage.
+pub const DEPTH: &str = "depth.png";
+/// Role of the print mask among those of the normalize stage.
+pub const PRINT_MASK: &str = "print_mask.png";
+/// Role of the print mask on the canvas among those of the register stage.
+pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
+
+/// Role of a metric's depth mask on the canvas among the artifacts of the register stage.
+pub fn canvas_depth_mask(metric: ThresholdMetric) -> String {
+    format!("canvas_depth_mask.{metric}.png")
+}
+
+/// Ink in a stored print mask; paper is 0 and what is unknown 128.
+const INK: u8 = 255;
+
+/// Why a stored result cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum AlignedError {
+    /// The catalog says the stage is done but holds no result.
+    #[error("there is no result of {0}")]
+    NoResult(Stage),
+    /// A stored outcome of another form.
+    #[error("the stored result of {stage} cannot be read: {source}")]
+    Outcome {
+        /// Which stage.
+        stage: Stage,
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// The result names no such artifact.
+    #[error("the result of {stage} has no {role}")]
+    NoArtifact {
+        /// Which stage.
+        stage: Stage,
+        /// Which artifact.
+        role: String,
+    },
+    /// The artifact cannot be read.
+    #[error(transparent)]
+    Store(#[from] store::ArtifactError),
+    /// The artifact is not the picture it should be.
+    #[error("{role}: {source}")]
+    Picture {
+        /// Which artifact.
+        role: &'static str,
+        /// Why.
+        source: ArtifactError,
+    },
+}
+
+/// A finished pair together with its project's files.
+#[derive(Debug, Clone, Copy)]
+pub struct Aligned<'a> {
+    project: &'a Project,
+    pair: &'a PairResults,
+}
+
+impl<'a> Aligned<'a> {
+    /// A pair of a project.
+    pub const fn new(project: &'a Project, pair: &'a PairResults) -> Self {
+        Self { project, pair }
+    }
+
+    /// The current result of a stage.
+    ///
+    /// # Errors
+    /// When there is none.
+    pub fn stage(&self, stage: Stage) -> Result<&'a StageRecord, AlignedError> {
+        self.pair.stage(stage).ok_or(AlignedError::NoResult(stage))
+    }
+
+    /// The numbers of a stage, such as [`FitOutcome`].
+    ///
+    /// # Errors
+    /// When there are none or they are of another form.
+    pub fn outcome<T: DeserializeOwned>(&self, stage: Stage) -> Result<T, AlignedError> {
+        self.stage(stage)?
+            .parse()
+            .map_err(|source| AlignedError::Outcome { stage, source })
+    }
+
+    /// An artifact of a stage by its role.
+    ///
+    /// # Errors
+    /// When the result has none of that role.
+    pub fn artifact(&self, stage: Stage, role: &str) -> Result<&'a ArtifactRef, AlignedError> {
+        let missing = || AlignedError::NoArtifact {
+            stage,
+            role: role.to_owned(),
+        };
+        self.stage(stage)?.files.get(role).ok_or_else(missing)
+    }
+
+    /// The bytes of an artifact, checked against its hash.
+    ///
+    /// # Errors
+    /// When there is none, or the file is missing or changed.
+    pub fn bytes(&self, stage: Stage, role: &str) -> Result<Vec<u8>, AlignedError> {
+        Ok(self.project.read_artifact(self.artifact(stage, role)?)?)
+    }
+
+    /// The depth map with its scale.
+    ///
+    /// # Errors
+    /// When the result or its picture cannot be read.
+    pub fn depth(&self) -> Result<DepthMap, AlignedError> {
+        let outcome: DepthOutcome = self.outcome(Stage::Depth)?;
+        let levels = decode_grey16(&self.bytes(Stage::Depth, DEPTH)?);
+        Ok(DepthMap {
+            levels: levels.map_err(|source| AlignedError::Picture {
+                role: DEPTH,
+                source,
+            })?,
+            scale: outcome.scale,
+        })
+    }
+
+    /// The ink of the print, in the print image's frame and size.
+    ///
+    /// # Errors
+    /// When the result or its picture cannot be read.
+    pub fn print_mask(&self) -> Result<Mask, AlignedError> {
+        let grey = self.grey(Stage::Normalize, PRINT_MASK)?;
+        Ok(grey.map(|value| *value == INK))
+    }
+
+    fn grey(&self, stage: Stage, role: &'static str) -> Result<Grid<u8>, AlignedError> {
+        decode_grey8(&self.bytes(stage, role)?)
+            .map_err(|source| AlignedError::Picture { role, source })
+    }
+
+    /// The three maps of the pipeline put together, for a metric's `print_from_depth`.
+    ///
+    /// # Errors
+    /// When the results of fit or depth cannot be read.
+    pub fn print_from_mesh(
+        &self,
+        print_from_depth: &Affine2,
+    ) -> Result<PrintFromMesh, AlignedError> {
+        let fit: FitOutcome = self.outcome(Stage::Fit)?;
+        let depth: DepthOutcome = self.outcome(Stage::Depth)?;
+        Ok(PrintFromMesh::new(
+            print_from_depth,
+            &depth.scale.depth_from_plane,
+            &fit.plane_from_mesh,
+        ))
+    }
+}
+
+/// The strokes of a depth map: levels from `level` up. No data is no stroke.
+pub fn depth_mask(depth: &DepthMap, level: u16) -> Mask {
+    depth.levels.map(|found| *found >= level.max(1))
+}

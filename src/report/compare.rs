@@ -1,0 +1,155 @@
+//! Metrics against each other on the same pairs.
+
+use super::model::{Basis, Comparison};
+use super::stats::{holm, mcnemar_exact};
+use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim};
+
+/// Level below which a difference is said to be there.
+const LEVEL: f64 = 0.05;
+/// Name of the test, with what makes it that one.
+const TEST: &str = "McNemar, exact, two-sided";
+
+/// Counts of every two metrics.
+#[derive(Debug, Clone)]
+pub(super) struct Duels([Duel; 3]);
+
+/// Counts of two metrics.
+#[derive(Debug, Clone, Copy)]
+struct Duel {
+    a: ThresholdMetric,
+    b: ThresholdMetric,
+    n: u64,
+    a_only: u64,
+    b_only: u64,
+}
+
+impl Default for Duels {
+    fn default() -> Self {
+        let pairs = [(Ensemble, NlSsim), (Ensemble, Density), (NlSsim, Density)];
+        Self(pairs.map(|(a, b)| Duel {
+            a,
+            b,
+            n: 0,
+            a_only: 0,
+            b_only: 0,
+        }))
+    }
+}
+
+impl Duels {
+    /// Counts one pair in; `right` tells whether a metric's result is right, where that is known.
+    pub(super) fn add(&mut self, right: impl Fn(ThresholdMetric) -> Option<bool>) {
+        for duel in &mut self.0 {
+            if let (Some(a), Some(b)) = (right(duel.a), right(duel.b)) {
+                duel.n += 1;
+                duel.a_only += u64::from(a && !b);
+                duel.b_only += u64::from(b && !a);
+            }
+        }
+    }
+
+    /// The comparisons of all metrics that were judged on the same pairs.
+    pub(super) fn finish(self, basis: Basis) -> Vec<Comparison> {
+        let duels: Vec<Duel> = self.0.into_iter().filter(|duel| duel.n > 0).collect();
+        // Without discordant pairs there is nothing to tell apart: such a comparison is as sure as p = 1.
+        let ps: Vec<Option<f64>> = duels
+            .iter()
+            .map(|duel| mcnemar_exact(duel.a_only, duel.b_only))
+            .collect();
+        let corrected = holm(&ps.iter().map(|p| p.unwrap_or(1.0)).collect::<Vec<_>>());
+        let both = ps.into_iter().zip(corrected);
+        duels
+            .into_iter()
+            .zip(both)
+            .map(|(duel, (p, p_holm))| duel.finish(basis, p.map(|p| (p, p_holm))))
+            .collect()
+    }
+}
+
+impl Duel {
+    fn finish(self, basis: Basis, p: Option<(f64, f64)>) -> Comparison {
+        Comparison {
+            basis,
+            a: self.a,
+            b: self.b,
+            n: self.n,
+            a_only: self.a_only,
+            b_only: self.b_only,
+            test: TEST,
+            p: p.map(|(p, _)| p),
+            p_holm: p.map(|(_, p_holm)| p_holm),
+            words: self.words(p),
+        }
+    }
+
+    /// What follows from p, raw and corrected.
+    fn words(&self, p: Option<(f64, f64)>) -> String {
+        let better = if self.a_only > self.b_only {
+            self.a
+        } else {
+            self.b
+        };
+        match p {
+            None => "right on the same pairs".to_owned(),
+            Some((_, p_holm)) if p_holm < LEVEL => format!("{} is better", better.title()),
+            Some((p, _)) if p < LEVEL => format!(
+                "{} looks better, but not after correction for several comparisons",
+                better.title()
+            ),
+            Some(_) => "cannot tell them apart".to_owned(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Duels;
+    use crate::domain::ThresholdMetric;
+    use crate::report::model::Basis;
+
+    /// `(times, [nl_ssim, density, ensemble])`
+    fn finish(worlds: &[(usize, [Option<bool>; 3])]) -> Vec<crate::report::Comparison> {
+        let mut duels = Duels::default();
+        for (times, right) in worlds {
+            for _ in 0..*times {
+                duels.add(|metric| right[metric as usize]);
+            }
+        }
+        duels.finish(Basis::Verdicts)
+    }
+
+    #[test]
+    fn the_papers_counts_do_not_tell_ensemble_from_structure() {
+        let found = finish(&[
+            (574, [Some(true), Some(true), Some(true)]),
+            (3, [Some(false), Some(true), Some(true)]),
+            (9, [Some(true), Some(false), Some(true)]),
+            (1, [Some(true), Some(true), Some(false)]),
+        ]);
+        assert_eq!(found[0].a, ThresholdMetric::Ensemble);
+        assert_eq!((found[0].n, found[0].a_only, found[0].b_only), (587, 3, 1));
+        assert_eq!(found[0].p, Some(0.625));
+        assert_eq!(found[0].words, "cannot tell them apart");
+        assert!((found[1].p.expect("ten discordant") - 0.021_484_375).abs() < 1e-12);
+        assert!((found[1].p_holm.expect("ten discordant") - 0.064_453_125).abs() < 1e-12);
+        assert!(found[1].words.contains("not after correction"));
+    }
+
+    #[test]
+    fn only_pairs_judged_for_both_count() {
+        let found = finish(&[
+            (4, [Some(true), None, Some(true)]),
+            (2, [None, None, Some(true)]),
+        ]);
+        assert_eq!(found.len(), 1);
+        assert_eq!((found[0].n, found[0].p), (4, None));
+        assert_eq!(found[0].words, "right on the same pairs");
+    }
+
+    #[test]
+    fn a_plain_difference_is_named() {
+        let found = finish(&[(20, [Some(false), Some(true), Some(true)])]);
+        assert_eq!(found[0].words, "Ensemble is better");
+        assert_eq!(found[2].words, "Pixel density is better");
+    }
+}

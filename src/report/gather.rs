@@ -1,0 +1,175 @@
+//! From the catalog to a report, page by page.
+
+use rayon::prelude::*;
+
+use super::aligned::{Aligned, AlignedError, depth_mask};
+use super::model::Report;
+use super::tally::{Tally, TruthFinding};
+use super::truth::{TruthError, TruthErrors, TruthRecord, mask_iou};
+use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
+use crate::domain::MetricOutcome;
+use crate::raster::{self, DepthMap, Grid, warp_mask};
+use crate::store::Project;
+
+/// Pairs in memory at a time.
+pub const PAGE: usize = 256;
+
+/// Why no report can be made.
+#[derive(Debug, thiserror::Error)]
+pub enum GatherError {
+    /// The catalog refused.
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    /// A thread of the comparison with truth was lost.
+    #[error("comparing with the truth stopped: {0}")]
+    Stopped(#[from] tokio::task::JoinError),
+}
+
+/// Why a pair cannot be held against its truth.
+#[derive(Debug, thiserror::Error)]
+enum Unusable {
+    #[error(transparent)]
+    Truth(#[from] TruthError),
+    #[error(transparent)]
+    Aligned(#[from] AlignedError),
+}
+
+/// The report of a project as its catalog stands.
+///
+/// Memory stays the same whatever the number of pairs, but for three numbers a pair and metric where there is truth.
+///
+/// # Errors
+/// When the catalog cannot be read.
+pub async fn gather(catalog: &Catalog, project: &Project) -> Result<Report, GatherError> {
+    let mut tally = Tally::default();
+    let mut after = None;
+    loop {
+        let page = catalog.results_page(after.as_ref(), PAGE).await?;
+        let Some(last) = page.last() else {
+            return Ok(tally.finish());
+        };
+        after = Some(last.facts.name.clone());
+        for (pair, truth) in with_truth(project, page).await? {
+            tally.add(&pair, &truth);
+        }
+    }
+}
+
+/// Pairs with what their truth says, on all cores.
+///
+/// # Errors
+/// When a thread is lost.
+pub async fn with_truth(
+    project: &Project,
+    pairs: Vec<PairResults>,
+) -> Result<Vec<(PairResults, TruthFinding)>, tokio::task::JoinError> {
+    if pairs.iter().all(|pair| pair.truth.is_none()) {
+        let none = |pair| (pair, TruthFinding::default());
+        return Ok(pairs.into_iter().map(none).collect());
+    }
+    let project = project.clone();
+    tokio::task::spawn_blocking(move || {
+        let found: Vec<TruthFinding> = pairs
+            .par_iter()
+            .map(|pair| finding(&project, pair))
+            .collect();
+        pairs.into_iter().zip(found).collect()
+    })
+    .await
+}
+
+/// What the truth says of a pair; nothing where there is no truth or no result.
+pub fn finding(project: &Project, pair: &PairResults) -> TruthFinding {
+    let Some(truth) = pair.truth.as_ref().filter(|_| !pair.metrics.is_empty()) else {
+        return TruthFinding::default();
+    };
+    match measure(project, pair, truth) {
+        Ok(finding) => finding,
+        Err(unusable) => TruthFinding {
+            problem: Some(unusable.to_string()),
+            ..TruthFinding::default()
+        },
+    }
+}
+
+fn measure(
+    project: &Project,
+    pair: &PairResults,
+    truth: &serde_json::Value,
+) -> Result<TruthFinding, Unusable> {
+    let (record, aligned) = (TruthRecord::read(truth)?, Aligned::new(project, pair));
+    let tops = match &record.tops_mask {
+        Some(path) => Some(Tops::read(project, path, &aligned)?),
+        None => None,
+    };
+    let mut finding = TruthFinding::default();
+    let mut done: Vec<&MetricRecord> = Vec::new();
+    for found in &pair.metrics {
+        let outcome = &found.outcome;
+        // Metrics that chose the same threshold have the same errors; the mask is warped once.
+        let twin = done
+            .iter()
+            .find(|other| same_alignment(&other.outcome, outcome));
+        let errors = match twin.and_then(|twin| finding.errors.get(&twin.outcome.metric)) {
+            Some(errors) => *errors,
+            None => errors(&record, &aligned, tops.as_ref(), outcome)?,
+        };
+        finding.errors.insert(outcome.metric, errors);
+        done.push(found);
+    }
+    Ok(finding)
+}
+
+fn same_alignment(a: &MetricOutcome, b: &MetricOutcome) -> bool {
+    a.threshold_level == b.threshold_level && a.print_from_depth == b.print_from_depth
+}
+
+fn errors(
+    record: &TruthRecord,
+    aligned: &Aligned<'_>,
+    tops: Option<&Tops>,
+    outcome: &MetricOutcome,
+) -> Result<TruthErrors, Unusable> {
+    let found = aligned.print_from_mesh(&outcome.print_from_depth)?;
+    let iou = tops.map(|tops| tops.iou(outcome)).transpose()?;
+    Ok(record.measure(&found, iou)?)
+}
+
+/// The true stroke tops of a pair, and the depth map to hold against them.
+struct Tops {
+    tops: Grid<u8>,
+    depth: DepthMap,
+}
+
+impl Tops {
+    fn read(project: &Project, path: &str, aligned: &Aligned<'_>) -> Result<Self, Unusable> {
+        let print = aligned.print_mask()?;
+        let tops = read_tops(project, path)?;
+        let (found, wanted) = (
+            [tops.width(), tops.height()],
+            [print.width(), print.height()],
+        );
+        if found != wanted {
+            return Err(TruthError::MaskSize { found, wanted }.into());
+        }
+        let depth = aligned.depth()?;
+        Ok(Self { tops, depth })
+    }
+
+    fn iou(&self, outcome: &MetricOutcome) -> Result<f64, TruthError> {
+        let mask = depth_mask(&self.depth, outcome.threshold_level);
+        let (width, height) = (self.tops.width(), self.tops.height());
+        let aligned = warp_mask(&mask, &outcome.print_from_depth, width, height);
+        mask_iou(&aligned, &self.tops)
+    }
+}
+
+/// The grey values of a tops mask, whatever image format it is in.
+fn read_tops(project: &Project, path: &str) -> Result<Grid<u8>, TruthError> {
+    let path = project.input_path(path);
+    let refused = |why: String| TruthError::Mask(format!("{}: {why}", path.display()));
+    let bytes = std::fs::read(&path).map_err(|error| refused(error.to_string()))?;
+    let picture = raster::decode(&bytes, &raster::Limits::SUGGESTED)
+        .map_err(|error| refused(error.to_string()))?;
+    Ok(picture.rgb.map(|colour| (colour[0] / 257) as u8))
+}

@@ -1,0 +1,178 @@
+//! The report as plain data: what `report --format json` prints and every other form is made from.
+
+use serde::Serialize;
+
+use crate::domain::{FailureClass, PairName, Stage, ThresholdMetric};
+
+/// Version of the JSON form.
+pub const SCHEMA: u32 = 1;
+
+/// The whole report.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Report {
+    /// Version of this form.
+    pub schema: u32,
+    /// Pairs in the project, in whatever state.
+    pub pairs: u64,
+    /// How far they are.
+    pub progress: Progress,
+    /// One row a metric, in the order of the paper's table.
+    pub rows: Vec<Row>,
+    /// Metrics against each other, pair by pair.
+    pub comparisons: Vec<Comparison>,
+    /// Pairs without result because they failed, by class.
+    pub failures: Vec<FailureGroup>,
+    /// What a reader of the table must know, in whole sentences.
+    pub warnings: Vec<String>,
+}
+
+/// How far the pairs are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Progress {
+    /// All stages behind them.
+    pub done: u64,
+    /// Failed for good until somebody retries them.
+    pub failed: u64,
+    /// Not there yet: waiting, in work, backing off or set aside.
+    pub pending: u64,
+}
+
+/// One metric's row. A mean over no pairs is `None`.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Which metric.
+    pub metric: ThresholdMetric,
+    /// Pairs that finished with a result of this metric; the means are over these.
+    pub n: u64,
+    /// Results with a verdict: passed, failed and unsure.
+    pub read: u64,
+    /// Passed by every reader who could tell.
+    pub passed: u64,
+    /// Failed by every reader who could tell.
+    pub failed: u64,
+    /// Neither: nobody could tell, or readers contradict each other.
+    pub unsure: u64,
+    /// Those of the unsure on which readers contradict each other.
+    pub conflicts: u64,
+    /// Results without a verdict whose earlier result had one.
+    pub stale: u64,
+    /// `passed / (passed + failed)`; `None` where nobody has told.
+    pub acc: Option<f64>,
+    /// Wilson's 95 % interval of `acc`.
+    pub acc_ci95: Option<[f64; 2]>,
+    /// Mean structural similarity.
+    pub ssim: Option<f64>,
+    /// Mean structural similarity without the luminance factor.
+    pub nl_ssim: Option<f64>,
+    /// Mean intersection over union of the masks by pixel.
+    pub iou: Option<f64>,
+    /// Mean intersection over union of the bounding boxes.
+    pub iou_box: Option<f64>,
+    /// Mean Dice coefficient of the masks by pixel.
+    pub dice: Option<f64>,
+    /// Agreement with true alignments, where the project holds them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub truth: Option<TruthBlock>,
+}
+
+/// A metric's agreement with the true alignments; never mixed with people's verdicts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TruthBlock {
+    /// Results that have a usable truth.
+    pub n: u64,
+    /// Of these, those with angle, landmarks and mask all right.
+    pub passed: u64,
+    /// `passed / n`.
+    pub acc: Option<f64>,
+    /// Wilson's 95 % interval of `acc`.
+    pub acc_ci95: Option<[f64; 2]>,
+    /// Share with an angle error of at most 5 degrees.
+    pub angle_le_5deg: Option<f64>,
+    /// Median angle error in degrees.
+    pub angle_median_deg: Option<f64>,
+    /// Median landmark error in percent of the character's height.
+    pub tre_median_pct: Option<f64>,
+    /// Median intersection over union of the depth mask with the true stroke tops, where there is a tops mask.
+    pub mask_iou_median: Option<f64>,
+    /// Results in mirror writing.
+    pub mirrored: u64,
+}
+
+/// What a comparison counts as right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Basis {
+    /// People's verdicts.
+    Verdicts,
+    /// True alignments.
+    Truth,
+}
+
+/// Two metrics on the same pairs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// What counts as right.
+    pub basis: Basis,
+    /// The first metric.
+    pub a: ThresholdMetric,
+    /// The second.
+    pub b: ThresholdMetric,
+    /// Pairs judged for both.
+    pub n: u64,
+    /// Right for `a` only.
+    pub a_only: u64,
+    /// Right for `b` only.
+    pub b_only: u64,
+    /// Name of the test that gave `p`.
+    pub test: &'static str,
+    /// Its two-sided p; `None` without discordant pairs.
+    pub p: Option<f64>,
+    /// The same after Holm's correction over the comparisons of this basis.
+    pub p_holm: Option<f64>,
+    /// What follows, in words.
+    pub words: String,
+}
+
+/// Failed pairs of one class.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct FailureGroup {
+    /// The class.
+    pub class: FailureClass,
+    /// How many.
+    pub count: u64,
+    /// The first of them by name, at most [`FailureGroup::SHOWN`].
+    pub pairs: Vec<FailedPair>,
+}
+
+impl FailureGroup {
+    /// Most pairs named in a group.
+    pub const SHOWN: usize = 100;
+}
+
+/// A failed pair.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct FailedPair {
+    /// The pair.
+    pub id: PairName,
+    /// Where it failed.
+    pub stage: Stage,
+    /// Why.
+    pub error: String,
+}
+
+impl Report {
+    /// Whether anybody has judged a result.
+    pub fn anybody_read(&self) -> bool {
+        self.rows.iter().any(|row| row.read > 0)
+    }
+
+    /// Whether the project holds true alignments.
+    pub fn has_truth(&self) -> bool {
+        self.rows.iter().any(|row| row.truth.is_some())
+    }
+
+    /// The row of a metric.
+    pub fn row(&self, metric: ThresholdMetric) -> Option<&Row> {
+        self.rows.iter().find(|row| row.metric == metric)
+    }
+}

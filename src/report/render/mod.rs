@@ -1,0 +1,147 @@
+//! The forms a report can be printed in.
+
+mod csv;
+mod latex;
+mod markdown;
+mod table;
+mod text;
+
+use super::model::Report;
+
+/// A form of the report.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// Aligned tables for a terminal of 80 columns.
+    Text,
+    /// The report as it is, every number in full.
+    Json,
+    /// One line a metric, every number in full (RFC 4180).
+    Csv,
+    /// Tables of GitHub's dialect.
+    Markdown,
+    /// Tables with `booktabs` and `siunitx`.
+    Latex,
+}
+
+impl Format {
+    /// Every form.
+    pub const ALL: [Self; 5] = [
+        Self::Text,
+        Self::Json,
+        Self::Csv,
+        Self::Markdown,
+        Self::Latex,
+    ];
+
+    /// Name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Text => "text",
+            Self::Json => "json",
+            Self::Csv => "csv",
+            Self::Markdown => "markdown",
+            Self::Latex => "latex",
+        }
+    }
+}
+
+impl std::fmt::Display for Format {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl std::str::FromStr for Format {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::ALL
+            .into_iter()
+            .find(|format| format.name() == text)
+            .ok_or_else(|| {
+                format!("{text:?} is not a report format (text, json, csv, markdown, latex)")
+            })
+    }
+}
+
+/// The report in a form; ends with a line end.
+pub fn render(report: &Report, format: Format) -> String {
+    match format {
+        Format::Text => text::render(report),
+        Format::Json => json(report),
+        Format::Csv => csv::render(report),
+        Format::Markdown => markdown::render(report),
+        Format::Latex => latex::render(report),
+    }
+}
+
+/// The report as indented JSON.
+fn json(report: &Report) -> String {
+    let mut text = serde_json::to_string_pretty(report)
+        .expect("a report holds only strings, finite numbers, lists and fields");
+    text.push('\n');
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Format, render};
+    use crate::report::{Tally, TruthFinding, fixture};
+    use serde_json::{Value, json};
+
+    #[test]
+    fn every_format_is_found_by_its_name() {
+        for format in Format::ALL {
+            assert_eq!(format.name().parse(), Ok(format));
+        }
+        assert!("html".parse::<Format>().is_err());
+    }
+
+    #[test]
+    fn json_has_the_fixed_names_and_nulls_where_nobody_read() {
+        let mut tally = Tally::default();
+        tally.add(&fixture::done("a", 0.75, &[]), &TruthFinding::default());
+        let text = render(&tally.finish(), Format::Json);
+        let value: Value = serde_json::from_str(&text).expect("the report is JSON");
+        assert_eq!((&value["schema"], &value["pairs"]), (&json!(1), &json!(1)));
+        let metrics: Vec<_> = value["rows"].as_array().expect("rows").iter().collect();
+        assert_eq!(metrics.len(), 3);
+        for (row, metric) in metrics.iter().zip(["nl_ssim", "density", "ensemble"]) {
+            assert_eq!(row["metric"], metric);
+            assert_eq!(
+                (&row["n"], &row["read"], &row["passed"]),
+                (&json!(1), &json!(0), &json!(0))
+            );
+            assert_eq!(
+                (&row["acc"], &row["acc_ci95"]),
+                (&Value::Null, &Value::Null)
+            );
+            assert_eq!(
+                (&row["ssim"], &row["iou"], &row["iou_box"]),
+                (&json!(0.81), &json!(0.75), &json!(0.9))
+            );
+            assert!(row["dice"].is_f64());
+            assert!(row.get("truth").is_none());
+        }
+        assert_eq!(value["comparisons"], json!([]));
+    }
+
+    #[test]
+    fn json_truth_has_the_fixed_names() {
+        let mut tally = Tally::default();
+        tally.add(
+            &fixture::done("a", 0.75, &[]),
+            &fixture::truth(1.0, 2.0, 0.9),
+        );
+        let text = render(&tally.finish(), Format::Json);
+        let value: Value = serde_json::from_str(&text).expect("the report is JSON");
+        let truth = &value["rows"][2]["truth"];
+        let expected = json!({
+            "n": 1, "acc": 1.0, "angle_le_5deg": 1.0, "angle_median_deg": 1.0,
+            "tre_median_pct": 2.0, "mask_iou_median": 0.9,
+        });
+        for (name, wanted) in expected.as_object().expect("an object") {
+            assert_eq!(&truth[name], wanted, "{name}");
+        }
+    }
+}

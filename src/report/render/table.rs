@@ -1,0 +1,235 @@
+//! The tables of a report with their cells as text: what text, Markdown and LaTeX have in common.
+
+use crate::report::model::{Basis, Comparison, Report, Row, TruthBlock};
+
+/// A table of text cells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Table {
+    /// One sentence on what it shows.
+    pub(super) caption: String,
+    /// Its columns.
+    pub(super) columns: Vec<Column>,
+    /// Its rows; `None` is a quantity that does not exist.
+    pub(super) rows: Vec<Vec<Option<String>>>,
+}
+
+/// A column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Column {
+    /// What stands over it.
+    pub(super) head: &'static str,
+    /// How its cells stand.
+    pub(super) kind: Kind,
+}
+
+/// How the cells of a column stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Words or an interval, from the left.
+    Words,
+    /// Numbers with so many decimals, aligned at the point.
+    Number(usize),
+}
+
+const fn words(head: &'static str) -> Column {
+    Column {
+        head,
+        kind: Kind::Words,
+    }
+}
+
+const fn number(head: &'static str, decimals: usize) -> Column {
+    Column {
+        head,
+        kind: Kind::Number(decimals),
+    }
+}
+
+/// The tables a report calls for: scores always, verdicts and truth where there are any.
+pub(super) fn tables(report: &Report) -> Vec<Table> {
+    let mut tables = vec![scores(report)];
+    tables.extend(report.anybody_read().then(|| verdicts(report)));
+    tables.extend(report.has_truth().then(|| truth(report)));
+    tables
+}
+
+/// The paper's table.
+fn scores(report: &Report) -> Table {
+    Table {
+        caption:
+            "Acc is the share passed of those passed or failed by readers; SSIM, IoU and Dice are \
+                  means over the n finished pairs, by pixel; IoU box is of bounding boxes."
+                .to_owned(),
+        columns: vec![
+            words("Method"),
+            number("n", 0),
+            number("Acc", 3),
+            words("95% Wilson"),
+            number("SSIM", 3),
+            number("IoU", 3),
+            number("IoU box", 3),
+            number("Dice", 3),
+        ],
+        rows: report.rows.iter().map(score_cells).collect(),
+    }
+}
+
+fn score_cells(row: &Row) -> Vec<Option<String>> {
+    vec![
+        Some(row.metric.title().to_owned()),
+        Some(count(row.n)),
+        fixed(row.acc, 3),
+        interval(row.acc_ci95),
+        fixed(row.ssim, 3),
+        fixed(row.iou, 3),
+        fixed(row.iou_box, 3),
+        fixed(row.dice, 3),
+    ]
+}
+
+/// Who said what.
+fn verdicts(report: &Report) -> Table {
+    let cells = |row: &Row| {
+        vec![
+            Some(row.metric.title().to_owned()),
+            Some(count(row.read)),
+            Some(count(row.n - row.read)),
+            Some(count(row.passed)),
+            Some(count(row.failed)),
+            Some(count(row.unsure)),
+            Some(count(row.stale)),
+        ]
+    };
+    Table {
+        caption: "Verdicts by result; stale ones have a verdict for an older result only."
+            .to_owned(),
+        columns: vec![
+            words("Verdicts"),
+            number("read", 0),
+            number("unread", 0),
+            number("passed", 0),
+            number("failed", 0),
+            number("unsure", 0),
+            number("stale", 0),
+        ],
+        rows: report.rows.iter().map(cells).collect(),
+    }
+}
+
+/// Agreement with true alignments.
+fn truth(report: &Report) -> Table {
+    Table {
+        caption: "Against the true alignments. Acc here: angle within 5 degrees, landmarks within 5 % of the \
+                  character's height, mask IoU with the true stroke tops at least 0.7. Angle, landmarks and \
+                  mask IoU are medians."
+            .to_owned(),
+        columns: vec![
+            words("Truth"),
+            number("n", 0),
+            number("Acc", 3),
+            words("95% Wilson"),
+            number("in 5\u{b0}", 3),
+            number("angle \u{b0}", 2),
+            number("landm. %", 2),
+            number("mask IoU", 3),
+        ],
+        rows: report.rows.iter().map(truth_cells).collect(),
+    }
+}
+
+fn truth_cells(row: &Row) -> Vec<Option<String>> {
+    let truth = row.truth.as_ref();
+    let value = |read: fn(&TruthBlock) -> Option<f64>| truth.and_then(read);
+    vec![
+        Some(row.metric.title().to_owned()),
+        Some(count(truth.map_or(0, |truth| truth.n))),
+        fixed(value(|truth| truth.acc), 3),
+        interval(truth.and_then(|truth| truth.acc_ci95)),
+        fixed(value(|truth| truth.angle_le_5deg), 3),
+        fixed(value(|truth| truth.angle_median_deg), 2),
+        fixed(value(|truth| truth.tre_median_pct), 2),
+        fixed(value(|truth| truth.mask_iou_median), 3),
+    ]
+}
+
+/// The comparisons as a table, for the forms that have room for its words; `None` without any.
+pub(super) fn comparisons(report: &Report) -> Option<Table> {
+    let test = report.comparisons.first()?.test;
+    let cells = |found: &Comparison| {
+        vec![
+            Some(title(found)),
+            Some(basis(found.basis).to_owned()),
+            Some(count(found.n)),
+            Some(count(found.a_only)),
+            Some(count(found.b_only)),
+            found.p.map(p_value),
+            found.p_holm.map(p_value),
+            Some(found.words.clone()),
+        ]
+    };
+    Some(Table {
+        caption: format!(
+            "Metrics on the same pairs ({test}; Holm's correction over the comparisons of one basis)."
+        ),
+        columns: vec![
+            words("Comparison"),
+            words("by"),
+            number("n", 0),
+            number("first only", 0),
+            number("second only", 0),
+            words("p"),
+            words("Holm"),
+            words("In words"),
+        ],
+        rows: report.comparisons.iter().map(cells).collect(),
+    })
+}
+
+/// The two metrics of a comparison.
+pub(super) fn title(comparison: &Comparison) -> String {
+    format!("{} v. {}", comparison.a.title(), comparison.b.title())
+}
+
+/// What a comparison counts by.
+pub(super) const fn basis(basis: Basis) -> &'static str {
+    match basis {
+        Basis::Verdicts => "verdicts",
+        Basis::Truth => "truth",
+    }
+}
+
+/// A p of three decimals, or that it is smaller.
+pub(super) fn p_value(p: f64) -> String {
+    if p < 0.0005 {
+        "<0.001".to_owned()
+    } else {
+        format!("{p:.3}")
+    }
+}
+
+/// How far the pairs are, in one line: `24 pairs: 22 done, 2 failed`.
+pub(super) fn headline(report: &Report) -> String {
+    let progress = report.progress;
+    let rest = [
+        (progress.failed, "failed"),
+        (progress.pending, "not finished"),
+    ]
+    .into_iter()
+    .filter(|(n, _)| *n > 0)
+    .map(|(n, what)| format!(", {n} {what}"));
+    let mut line = format!("{} pairs: {} done", report.pairs, progress.done);
+    line.extend(rest);
+    line
+}
+
+fn count(n: u64) -> String {
+    n.to_string()
+}
+
+fn fixed(value: Option<f64>, decimals: usize) -> Option<String> {
+    value.map(|value| format!("{value:.decimals$}"))
+}
+
+fn interval(bounds: Option<[f64; 2]>) -> Option<String> {
+    bounds.map(|[low, high]| format!("{low:.3}-{high:.3}"))
+}

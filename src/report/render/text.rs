@@ -1,0 +1,213 @@
+//! The report for a terminal of 80 columns.
+
+use super::table::{self, Column, Kind, Table};
+use crate::report::model::{Comparison, FailureGroup, Report};
+
+/// Columns of the terminal.
+const WIDTH: usize = 80;
+/// Failed pairs named a class.
+const NAMED: usize = 5;
+
+/// The report as aligned text.
+pub(super) fn render(report: &Report) -> String {
+    let mut blocks = vec![format!("{}\n", table::headline(report))];
+    for found in table::tables(report) {
+        blocks.push(aligned(&found) + &wrapped("", &found.caption));
+    }
+    if !report.anybody_read() && report.progress.done > 0 {
+        blocks.push(wrapped(
+            "",
+            "Nobody has read these results yet, so there is no Acc.",
+        ));
+    }
+    blocks.extend((!report.comparisons.is_empty()).then(|| comparisons(report)));
+    blocks.extend((!report.warnings.is_empty()).then(|| warnings(report)));
+    blocks.extend(report.failures.iter().map(failures));
+    blocks.join("\n")
+}
+
+/// A table with its columns padded, words to the left and numbers to the right.
+fn aligned(table: &Table) -> String {
+    let widths: Vec<usize> = (0..table.columns.len())
+        .map(|i| {
+            let cells = table
+                .rows
+                .iter()
+                .map(|row| shown(row[i].as_ref()).chars().count());
+            let head = table.columns[i].head.chars().count();
+            cells.fold(head, usize::max)
+        })
+        .collect();
+    let heads: Vec<&str> = table.columns.iter().map(|column| column.head).collect();
+    let mut text = line(&heads, &table.columns, &widths);
+    for row in &table.rows {
+        let cells: Vec<&str> = row.iter().map(|cell| shown(cell.as_ref())).collect();
+        text += &line(&cells, &table.columns, &widths);
+    }
+    text
+}
+
+fn shown(cell: Option<&String>) -> &str {
+    cell.map_or("-", String::as_str)
+}
+
+fn line(cells: &[&str], columns: &[Column], widths: &[usize]) -> String {
+    let padded: Vec<String> = cells
+        .iter()
+        .zip(columns)
+        .zip(widths)
+        .map(|((cell, column), width)| match column.kind {
+            Kind::Words => format!("{cell:<width$}"),
+            Kind::Number(_) => format!("{cell:>width$}"),
+        })
+        .collect();
+    format!("{}\n", padded.join("  ").trim_end())
+}
+
+fn comparisons(report: &Report) -> String {
+    report.comparisons.iter().map(comparison).collect()
+}
+
+fn comparison(found: &Comparison) -> String {
+    let p = |p: Option<f64>| p.map_or_else(|| "-".to_owned(), table::p_value);
+    format!(
+        "{}, by {}: {}\n    right for one only: {} / {} of {} pairs; exact McNemar p {}, Holm {}\n",
+        table::title(found),
+        table::basis(found.basis),
+        found.words,
+        found.a_only,
+        found.b_only,
+        found.n,
+        p(found.p),
+        p(found.p_holm),
+    )
+}
+
+fn warnings(report: &Report) -> String {
+    report
+        .warnings
+        .iter()
+        .map(|warning| wrapped("! ", warning))
+        .collect()
+}
+
+fn failures(group: &FailureGroup) -> String {
+    let mut lines = vec![format!("Failed: {} {}\n", group.count, group.class)];
+    let named = group.pairs.iter().take(NAMED);
+    lines.extend(named.map(|pair| format!("  {}  {}: {}\n", pair.id, pair.stage, pair.error)));
+    let more = group.count.saturating_sub(NAMED as u64);
+    lines.extend((more > 0).then(|| format!("  and {more} more\n")));
+    lines.concat()
+}
+
+/// Words laid into lines, the first after `mark`, the others under it.
+fn wrapped(mark: &str, words: &str) -> String {
+    let indent = " ".repeat(mark.chars().count());
+    let (mut text, mut line) = (String::new(), mark.to_owned());
+    let mut empty = true;
+    for word in words.split_whitespace() {
+        let longer = line.chars().count() + usize::from(!empty) + word.chars().count();
+        if !empty && longer > WIDTH {
+            text = text + &line + "\n";
+            line.clone_from(&indent);
+            empty = true;
+        }
+        if !empty {
+            line.push(' ');
+        }
+        line.push_str(word);
+        empty = false;
+    }
+    text + &line + "\n"
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{render, wrapped};
+    use crate::domain::{FailureClass, Verdict};
+    use crate::report::{Tally, TruthFinding, fixture};
+
+    const GOLDEN: &str = "\
+4 pairs: 3 done, 1 failed
+
+Method             n    Acc  95% Wilson    SSIM    IoU  IoU box   Dice
+Non-luminous SSIM  3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
+Pixel density      3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
+Ensemble           3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
+Acc is the share passed of those passed or failed by readers; SSIM, IoU and Dice
+are means over the n finished pairs, by pixel; IoU box is of bounding boxes.
+
+Verdicts           read  unread  passed  failed  unsure  stale
+Non-luminous SSIM     2       1       1       1       0      0
+Pixel density         2       1       1       1       0      0
+Ensemble              2       1       1       1       0      0
+Verdicts by result; stale ones have a verdict for an older result only.
+
+Truth              n    Acc  95% Wilson   in 5°  angle °  landm. %  mask IoU
+Non-luminous SSIM  1  1.000  0.207-1.000  1.000     0.50      2.00     0.900
+Pixel density      1  1.000  0.207-1.000  1.000     0.50      2.00     0.900
+Ensemble           1  1.000  0.207-1.000  1.000     0.50      2.00     0.900
+Against the true alignments. Acc here: angle within 5 degrees, landmarks within
+5 % of the character's height, mask IoU with the true stroke tops at least 0.7.
+Angle, landmarks and mask IoU are medians.
+";
+
+    fn report() -> crate::report::Report {
+        let mut tally = Tally::default();
+        let none = TruthFinding::default();
+        tally.add(&fixture::done("a", 0.75, &[Verdict::Pass]), &none);
+        tally.add(&fixture::done("b", 0.75, &[Verdict::Fail]), &none);
+        tally.add(
+            &fixture::done("c", 0.75, &[]),
+            &fixture::truth(0.5, 2.0, 0.9),
+        );
+        tally.add(
+            &fixture::failed("d", FailureClass::BadInput, "d.stl is empty"),
+            &none,
+        );
+        tally.finish()
+    }
+
+    #[test]
+    fn tables_are_aligned() {
+        let text = render(&report());
+        assert!(text.starts_with(GOLDEN), "{text}");
+        assert!(
+            text.contains("Failed: 1 bad_input\n  d  fit: d.stl is empty\n"),
+            "{text}"
+        );
+        assert!(
+            text.contains("! 1 of 4 pairs failed and are in no row.\n"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn no_line_is_wider_than_a_terminal() {
+        let text = render(&report());
+        for line in text.lines() {
+            assert!(line.chars().count() <= 80, "{line:?}");
+        }
+    }
+
+    #[test]
+    fn an_unread_project_says_so() {
+        let mut tally = Tally::default();
+        tally.add(&fixture::done("a", 0.75, &[]), &TruthFinding::default());
+        let text = render(&tally.finish());
+        assert!(text.contains("Nobody has read these results yet"), "{text}");
+        assert!(
+            text.contains("Ensemble           1    -  -           0.810"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn wrapping_breaks_between_words_only() {
+        let text = wrapped("! ", &"word ".repeat(40));
+        assert!(text.lines().count() > 2);
+        assert!(text.lines().skip(1).all(|line| line.starts_with("  word")));
+        let long = "x".repeat(200);
+        assert_eq!(wrapped("", &long), format!("{long}\n"));
+    }
+}

@@ -1,0 +1,96 @@
+//! What all readers together say of one result.
+
+use crate::catalog::MetricRecord;
+use crate::domain::Verdict;
+
+/// Where a result stands with its readers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// Nobody has read it or an earlier result.
+    Unread,
+    /// An earlier result was read, this one was not.
+    Stale,
+    /// Every reader who could tell passed it.
+    Passed,
+    /// Every reader who could tell failed it.
+    Failed,
+    /// No reader could tell.
+    Unsure,
+    /// Some passed it and some failed it; it counts as unsure until they agree.
+    Conflict,
+}
+
+impl Standing {
+    /// The standing of a current result.
+    pub fn of(record: &MetricRecord) -> Self {
+        let says = |verdict| record.verdicts.iter().any(|read| read.verdict == verdict);
+        match (says(Verdict::Pass), says(Verdict::Fail)) {
+            (true, true) => Self::Conflict,
+            (true, false) => Self::Passed,
+            (false, true) => Self::Failed,
+            (false, false) if says(Verdict::Unsure) => Self::Unsure,
+            (false, false) if record.older_verdicts > 0 => Self::Stale,
+            (false, false) => Self::Unread,
+        }
+    }
+
+    /// The verdict it amounts to; `None` where nobody has read the current result.
+    pub const fn verdict(self) -> Option<Verdict> {
+        match self {
+            Self::Passed => Some(Verdict::Pass),
+            Self::Failed => Some(Verdict::Fail),
+            Self::Unsure | Self::Conflict => Some(Verdict::Unsure),
+            Self::Unread | Self::Stale => None,
+        }
+    }
+
+    /// Right or wrong, where readers have told.
+    pub const fn told(self) -> Option<bool> {
+        match self {
+            Self::Passed => Some(true),
+            Self::Failed => Some(false),
+            Self::Unsure | Self::Conflict | Self::Unread | Self::Stale => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Standing;
+    use crate::domain::{ThresholdMetric, Verdict};
+    use crate::report::fixture;
+
+    fn standing(verdicts: &[Verdict], older: u64) -> Standing {
+        let mut record = fixture::metric(ThresholdMetric::Density, 0.8, verdicts);
+        record.older_verdicts = older;
+        Standing::of(&record)
+    }
+
+    #[test]
+    fn readers_who_cannot_tell_leave_the_word_to_those_who_can() {
+        assert_eq!(
+            standing(&[Verdict::Unsure, Verdict::Pass], 0),
+            Standing::Passed
+        );
+        assert_eq!(
+            standing(&[Verdict::Fail, Verdict::Unsure], 0),
+            Standing::Failed
+        );
+        assert_eq!(standing(&[Verdict::Unsure], 0), Standing::Unsure);
+    }
+
+    #[test]
+    fn contradiction_counts_as_unsure() {
+        let both = standing(&[Verdict::Fail, Verdict::Pass], 0);
+        assert_eq!(both, Standing::Conflict);
+        assert_eq!(both.verdict(), Some(Verdict::Unsure));
+    }
+
+    #[test]
+    fn verdict_on_an_older_result_is_no_verdict() {
+        assert_eq!(standing(&[], 2), Standing::Stale);
+        assert_eq!(standing(&[], 0), Standing::Unread);
+        assert_eq!(standing(&[Verdict::Pass], 2), Standing::Passed);
+        assert_eq!(Standing::Stale.verdict(), None);
+    }
+}

@@ -1,0 +1,366 @@
+//! Adds pairs up to a report, one at a time, without keeping them.
+//!
+//! What stays in memory a pair: three numbers a metric where there is truth, for the medians; nothing otherwise.
+
+use std::collections::BTreeMap;
+
+use super::compare::Duels;
+use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock};
+use super::standing::Standing;
+use super::stats::{median, wilson_95};
+use super::truth::{MAX_ANGLE_DEG, TruthErrors};
+use super::warnings;
+use crate::catalog::{MetricRecord, PairResults};
+use crate::domain::{FailureClass, JobStatus, ThresholdMetric};
+
+/// What the truth says of one pair.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TruthFinding {
+    /// Errors by metric; empty where there is no truth or it cannot be used.
+    pub errors: BTreeMap<ThresholdMetric, TruthErrors>,
+    /// Why a truth that is there cannot be used.
+    pub problem: Option<String>,
+}
+
+/// The sums so far.
+#[derive(Debug, Clone)]
+pub struct Tally {
+    pairs: u64,
+    progress: Progress,
+    columns: [Column; 3],
+    by_verdicts: Duels,
+    by_truth: Duels,
+    failures: BTreeMap<FailureClass, FailureGroup>,
+    truth_problems: TruthProblems,
+}
+
+/// Truths that could not be used.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct TruthProblems {
+    /// How many.
+    pub(super) count: u64,
+    /// The first, in words.
+    pub(super) first: Option<String>,
+}
+
+/// The sums of one metric.
+#[derive(Debug, Clone)]
+struct Column {
+    metric: ThresholdMetric,
+    n: u64,
+    passed: u64,
+    failed: u64,
+    unsure: u64,
+    conflicts: u64,
+    stale: u64,
+    ssim: f64,
+    nl_ssim: f64,
+    iou: f64,
+    iou_box: f64,
+    dice: f64,
+    truth: TruthColumn,
+}
+
+/// The truth of one metric.
+#[derive(Debug, Clone, Default)]
+struct TruthColumn {
+    passed: u64,
+    angle_right: u64,
+    mirrored: u64,
+    angles_deg: Vec<f64>,
+    tres_pct: Vec<f64>,
+    mask_ious: Vec<f64>,
+}
+
+impl Default for Tally {
+    fn default() -> Self {
+        Self {
+            pairs: 0,
+            progress: Progress::default(),
+            columns: ThresholdMetric::ALL.map(Column::new),
+            by_verdicts: Duels::default(),
+            by_truth: Duels::default(),
+            failures: BTreeMap::new(),
+            truth_problems: TruthProblems::default(),
+        }
+    }
+}
+
+impl Tally {
+    /// Counts one pair in. Pairs come in the order of their names, so that sums are the same every time.
+    pub fn add(&mut self, pair: &PairResults, truth: &TruthFinding) {
+        self.pairs += 1;
+        self.count_status(pair);
+        self.count_truth_problem(pair, truth);
+        for column in &mut self.columns {
+            if let Some(record) = pair.metric(column.metric) {
+                column.add(record, truth.errors.get(&column.metric));
+            }
+        }
+        self.by_verdicts.add(|metric| {
+            pair.metric(metric)
+                .and_then(|record| Standing::of(record).told())
+        });
+        self.by_truth
+            .add(|metric| truth.errors.get(&metric).map(TruthErrors::pass));
+    }
+
+    fn count_status(&mut self, pair: &PairResults) {
+        match pair.status {
+            JobStatus::Done => self.progress.done += 1,
+            JobStatus::Quarantined => {
+                self.progress.failed += 1;
+                self.count_failure(pair);
+            }
+            JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff | JobStatus::Held => {
+                self.progress.pending += 1;
+            }
+        }
+    }
+
+    fn count_failure(&mut self, pair: &PairResults) {
+        let Some(stored) = &pair.failure else {
+            return;
+        };
+        let class = stored.failure.class;
+        let group = self.failures.entry(class).or_insert(FailureGroup {
+            class,
+            count: 0,
+            pairs: Vec::new(),
+        });
+        group.count += 1;
+        if group.pairs.len() < FailureGroup::SHOWN {
+            group.pairs.push(FailedPair {
+                id: pair.facts.name.clone(),
+                stage: stored.stage,
+                error: stored.failure.message.clone(),
+            });
+        }
+    }
+
+    fn count_truth_problem(&mut self, pair: &PairResults, truth: &TruthFinding) {
+        if let Some(problem) = &truth.problem {
+            self.truth_problems.count += 1;
+            let first = || format!("{}: {problem}", pair.facts.name);
+            self.truth_problems.first.get_or_insert_with(first);
+        }
+    }
+
+    /// The report over all pairs counted.
+    pub fn finish(self) -> Report {
+        let rows: Vec<Row> = self.columns.into_iter().map(Column::finish).collect();
+        let mut comparisons = self.by_verdicts.finish(Basis::Verdicts);
+        comparisons.extend(self.by_truth.finish(Basis::Truth));
+        Report {
+            schema: SCHEMA,
+            pairs: self.pairs,
+            progress: self.progress,
+            warnings: warnings::of(self.progress, &rows, &self.truth_problems),
+            rows,
+            comparisons,
+            failures: self.failures.into_values().collect(),
+        }
+    }
+}
+
+impl Column {
+    fn new(metric: ThresholdMetric) -> Self {
+        Self {
+            metric,
+            n: 0,
+            passed: 0,
+            failed: 0,
+            unsure: 0,
+            conflicts: 0,
+            stale: 0,
+            ssim: 0.0,
+            nl_ssim: 0.0,
+            iou: 0.0,
+            iou_box: 0.0,
+            dice: 0.0,
+            truth: TruthColumn::default(),
+        }
+    }
+
+    fn add(&mut self, record: &MetricRecord, truth: Option<&TruthErrors>) {
+        let scores = &record.outcome.scores;
+        self.n += 1;
+        self.ssim += scores.ssim;
+        self.nl_ssim += scores.nl_ssim;
+        self.iou += scores.iou;
+        self.iou_box += scores.iou_box;
+        self.dice += scores.dice;
+        self.count_standing(Standing::of(record));
+        if let Some(errors) = truth {
+            self.truth.add(errors);
+        }
+    }
+
+    fn count_standing(&mut self, standing: Standing) {
+        match standing {
+            Standing::Unread => {}
+            Standing::Stale => self.stale += 1,
+            Standing::Passed => self.passed += 1,
+            Standing::Failed => self.failed += 1,
+            Standing::Unsure => self.unsure += 1,
+            Standing::Conflict => {
+                self.unsure += 1;
+                self.conflicts += 1;
+            }
+        }
+    }
+
+    fn finish(self) -> Row {
+        let mean = |sum: f64| share(sum, self.n);
+        let told = self.passed + self.failed;
+        Row {
+            metric: self.metric,
+            n: self.n,
+            read: told + self.unsure,
+            passed: self.passed,
+            failed: self.failed,
+            unsure: self.unsure,
+            conflicts: self.conflicts,
+            stale: self.stale,
+            acc: share(self.passed as f64, told),
+            acc_ci95: wilson_95(self.passed, told),
+            ssim: mean(self.ssim),
+            nl_ssim: mean(self.nl_ssim),
+            iou: mean(self.iou),
+            iou_box: mean(self.iou_box),
+            dice: mean(self.dice),
+            truth: self.truth.finish(),
+        }
+    }
+}
+
+impl TruthColumn {
+    fn add(&mut self, errors: &TruthErrors) {
+        self.passed += u64::from(errors.pass());
+        self.angle_right += u64::from(errors.angle_deg <= MAX_ANGLE_DEG);
+        self.mirrored += u64::from(errors.mirrored);
+        self.angles_deg.push(errors.angle_deg);
+        self.tres_pct.push(errors.tre_pct);
+        self.mask_ious.extend(errors.mask_iou);
+    }
+
+    fn finish(mut self) -> Option<TruthBlock> {
+        let n = self.angles_deg.len() as u64;
+        (n > 0).then(|| TruthBlock {
+            n,
+            passed: self.passed,
+            acc: share(self.passed as f64, n),
+            acc_ci95: wilson_95(self.passed, n),
+            angle_le_5deg: share(self.angle_right as f64, n),
+            angle_median_deg: median(&mut self.angles_deg),
+            tre_median_pct: median(&mut self.tres_pct),
+            mask_iou_median: median(&mut self.mask_ious),
+            mirrored: self.mirrored,
+        })
+    }
+}
+
+/// Sum over count; `None` of nothing.
+fn share(sum: f64, n: u64) -> Option<f64> {
+    (n > 0).then(|| sum / n as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Tally, TruthFinding};
+    use crate::domain::{FailureClass, ThresholdMetric, Verdict};
+    use crate::report::fixture;
+
+    #[test]
+    fn means_are_over_finished_pairs_only() {
+        let mut tally = Tally::default();
+        let none = TruthFinding::default();
+        tally.add(&fixture::done("a", 0.8, &[]), &none);
+        tally.add(
+            &fixture::failed("b", FailureClass::BadInput, "b.stl is empty"),
+            &none,
+        );
+        tally.add(&fixture::done("c", 0.6, &[]), &none);
+        tally.add(&fixture::pending("d"), &none);
+        let report = tally.finish();
+        assert_eq!((report.pairs, report.progress.pending), (4, 1));
+        for row in &report.rows {
+            assert_eq!(row.n, 2);
+            assert!((row.iou.expect("two pairs") - 0.7).abs() < 1e-12);
+            assert_eq!((row.acc, row.acc_ci95, row.read), (None, None, 0));
+            assert_eq!(row.truth, None);
+        }
+        assert_eq!(report.failures.len(), 1);
+        assert_eq!(report.failures[0].pairs[0].error, "b.stl is empty");
+    }
+
+    #[test]
+    fn unsure_is_read_but_neither_passed_nor_failed() {
+        let mut tally = Tally::default();
+        let all = [Verdict::Pass, Verdict::Pass, Verdict::Fail, Verdict::Unsure];
+        for (name, verdict) in ["a", "b", "c", "d"].into_iter().zip(all) {
+            tally.add(
+                &fixture::done(name, 0.8, &[verdict]),
+                &TruthFinding::default(),
+            );
+        }
+        let report = tally.finish();
+        let row = report
+            .row(ThresholdMetric::Density)
+            .expect("every metric has a row");
+        assert_eq!((row.read, row.passed, row.failed, row.unsure), (4, 2, 1, 1));
+        assert_eq!(row.acc, Some(2.0 / 3.0));
+    }
+
+    #[test]
+    fn empty_project_has_three_empty_rows() {
+        let report = Tally::default().finish();
+        assert_eq!(report.rows.len(), 3);
+        assert!(
+            report
+                .rows
+                .iter()
+                .all(|row| row.n == 0 && row.ssim.is_none())
+        );
+        assert!(report.comparisons.is_empty() && report.warnings.is_empty());
+    }
+
+    #[test]
+    fn truth_is_counted_apart_from_verdicts() {
+        let mut tally = Tally::default();
+        tally.add(
+            &fixture::done("a", 0.8, &[]),
+            &fixture::truth(1.0, 2.0, 0.9),
+        );
+        tally.add(
+            &fixture::done("b", 0.8, &[]),
+            &fixture::truth(9.0, 2.0, 0.9),
+        );
+        tally.add(
+            &fixture::done("c", 0.8, &[]),
+            &fixture::truth(3.0, 4.0, 0.6),
+        );
+        let report = tally.finish();
+        let row = report
+            .row(ThresholdMetric::Ensemble)
+            .expect("every metric has a row");
+        let truth = row.truth.as_ref().expect("all pairs have truth");
+        assert_eq!((row.acc, truth.n, truth.passed), (None, 3, 1));
+        assert_eq!(truth.angle_le_5deg, Some(2.0 / 3.0));
+        assert_eq!(truth.angle_median_deg, Some(3.0));
+        assert_eq!(truth.tre_median_pct, Some(2.0));
+        assert_eq!(truth.mask_iou_median, Some(0.9));
+    }
+
+    #[test]
+    fn failures_beyond_the_shown_are_still_counted() {
+        let mut tally = Tally::default();
+        for i in 0..130 {
+            let pair = fixture::failed(&format!("p{i:03}"), FailureClass::Io, "gone");
+            tally.add(&pair, &TruthFinding::default());
+        }
+        let report = tally.finish();
+        assert_eq!(report.failures[0].count, 130);
+        assert_eq!(report.failures[0].pairs.len(), 100);
+    }
+}

@@ -1,0 +1,383 @@
+//! How far a found alignment is from the true one.
+
+use serde::{Deserialize, Serialize};
+
+use crate::domain::{PairName, PrintFromMesh};
+use crate::raster::{Grid, Mask};
+
+/// Largest angle error that counts as right, degrees (the paper's rule).
+pub const MAX_ANGLE_DEG: f64 = 5.0;
+/// Largest landmark error that counts as right, percent of the character's height.
+pub const MAX_TRE_PCT: f64 = 5.0;
+/// Smallest intersection over union with the true stroke tops that counts as right.
+pub const MIN_MASK_IOU: f64 = 0.7;
+
+/// A pixel of a tops mask that is a true stroke top.
+const TOP: u8 = 255;
+/// A pixel of a tops mask that is left out of the score: a neighbour's stroke or a border line.
+const LEFT_OUT: u8 = 128;
+
+/// One line of `truth.jsonl`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TruthRecord {
+    /// The pair.
+    pub id: PairName,
+    /// Mesh points to print pixels and height over the true plane.
+    pub print_from_mesh: PrintFromMesh,
+    /// The plane of the stroke tops in mesh coordinates.
+    pub plane: TruthPlane,
+    /// Points on stroke tops, mesh coordinates.
+    pub landmarks: Vec<[f64; 3]>,
+    /// Height of the character in the print, print pixels.
+    pub char_height_px: f64,
+    /// Path of the tops mask in the print's frame, where there is one.
+    #[serde(default)]
+    pub tops_mask: Option<String>,
+}
+
+/// A plane `n . x + d = 0`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TruthPlane {
+    /// Unit normal, out of the block.
+    pub n: [f64; 3],
+    /// Offset, mesh units.
+    pub d: f64,
+}
+
+/// Why a truth cannot be used.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TruthError {
+    /// Not a record of the form.
+    #[error("truth is not of the form of truth.jsonl: {0}")]
+    Form(String),
+    /// A normal of length 0 or not finite.
+    #[error("the true plane's normal {0:?} is no direction")]
+    Normal([f64; 3]),
+    /// A true map that sends the plane to a line or a point.
+    #[error("the true print_from_mesh flattens the plane")]
+    Flat,
+    /// No landmark to measure at.
+    #[error("the truth has no landmarks")]
+    NoLandmarks,
+    /// A character of no height.
+    #[error("the character's height is {0} px")]
+    Height(f64),
+    /// A tops mask that cannot be read.
+    #[error("the tops mask {0}")]
+    Mask(String),
+    /// A tops mask of another size than the print.
+    #[error("the tops mask is {found:?} px, the print {wanted:?} px")]
+    MaskSize {
+        /// Size of the tops mask.
+        found: [usize; 2],
+        /// Size of the print.
+        wanted: [usize; 2],
+    },
+}
+
+/// Distance of one result from the truth.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TruthErrors {
+    /// Angle between the true and the found map on the true plane, degrees in 0..=180; 180 when mirrored.
+    pub angle_deg: f64,
+    /// Whether the found map reads in mirror writing.
+    pub mirrored: bool,
+    /// Mean distance of the landmarks in the print, percent of the character's height.
+    pub tre_pct: f64,
+    /// Intersection over union of the depth mask with the true stroke tops, where a tops mask is given.
+    pub mask_iou: Option<f64>,
+}
+
+impl TruthErrors {
+    /// Whether angle, landmarks and mask are all right.
+    pub fn pass(&self) -> bool {
+        self.angle_deg <= MAX_ANGLE_DEG
+            && self.tre_pct <= MAX_TRE_PCT
+            && self.mask_iou.is_none_or(|iou| iou >= MIN_MASK_IOU)
+    }
+
+    /// How wrong the result is: the worst of its errors as a multiple of what is still right, so that it passes up to 1.
+    pub fn severity(&self) -> f64 {
+        let mask = self
+            .mask_iou
+            .map_or(0.0, |iou| (1.0 - iou) / (1.0 - MIN_MASK_IOU));
+        (self.angle_deg / MAX_ANGLE_DEG)
+            .max(self.tre_pct / MAX_TRE_PCT)
+            .max(mask)
+    }
+}
+
+impl TruthRecord {
+    /// Reads a stored record and checks that something can be measured with it.
+    ///
+    /// # Errors
+    /// When it is not of the form, or its plane, map, landmarks or height are empty.
+    pub fn read(value: &serde_json::Value) -> Result<Self, TruthError> {
+        let record =
+            Self::deserialize(value).map_err(|error| TruthError::Form(error.to_string()))?;
+        record.tangents()?;
+        if record.landmarks.is_empty() {
+            return Err(TruthError::NoLandmarks);
+        }
+        if !(record.char_height_px > 0.0 && record.char_height_px.is_finite()) {
+            return Err(TruthError::Height(record.char_height_px));
+        }
+        if in_plane(&record.print_from_mesh, record.tangents()?)
+            .inverse()
+            .is_none()
+        {
+            return Err(TruthError::Flat);
+        }
+        Ok(record)
+    }
+
+    /// Errors of a found map; `mask_iou` is measured apart by [`mask_iou`].
+    ///
+    /// # Errors
+    /// When the true plane has no direction or the true map flattens it.
+    pub fn measure(
+        &self,
+        found: &PrintFromMesh,
+        mask_iou: Option<f64>,
+    ) -> Result<TruthErrors, TruthError> {
+        let tangents = self.tangents()?;
+        let truth = in_plane(&self.print_from_mesh, tangents);
+        let turn = in_plane(found, tangents).after(&truth.inverse().ok_or(TruthError::Flat)?);
+        let mirrored = turn.determinant() < 0.0;
+        Ok(TruthErrors {
+            angle_deg: if mirrored { 180.0 } else { turn.angle_deg() },
+            mirrored,
+            tre_pct: 100.0 * self.landmark_distance_px(found) / self.char_height_px,
+            mask_iou,
+        })
+    }
+
+    /// Mean distance in the print between where landmarks are and where the found map sends them, print pixels.
+    fn landmark_distance_px(&self, found: &PrintFromMesh) -> f64 {
+        let sum: f64 = self
+            .landmarks
+            .iter()
+            .map(|point| {
+                let ([u, v, _], [p, q, _]) =
+                    (self.print_from_mesh.apply(*point), found.apply(*point));
+                (u - p).hypot(v - q)
+            })
+            .sum();
+        sum / self.landmarks.len() as f64
+    }
+
+    /// Two directions that span the true plane at right angles.
+    fn tangents(&self) -> Result<[[f64; 3]; 2], TruthError> {
+        let n = self.plane.n;
+        let unit = |v: [f64; 3]| {
+            let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+            (length > 0.0 && length.is_finite()).then(|| v.map(|c| c / length))
+        };
+        let cross = |a: [f64; 3], b: [f64; 3]| {
+            [
+                a[1] * b[2] - a[2] * b[1],
+                a[2] * b[0] - a[0] * b[2],
+                a[0] * b[1] - a[1] * b[0],
+            ]
+        };
+        let normal = unit(n).ok_or(TruthError::Normal(n))?;
+        let least = (0..3)
+            .min_by(|i, j| normal[*i].abs().total_cmp(&normal[*j].abs()))
+            .unwrap_or(0);
+        let mut axis = [0.0; 3];
+        axis[least] = 1.0;
+        let first = unit(cross(normal, axis)).ok_or(TruthError::Normal(n))?;
+        Ok([first, cross(normal, first)])
+    }
+}
+
+/// The linear part of a map on the directions of a plane: print pixels along x and y.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Linear2([[f64; 2]; 2]);
+
+/// A map of space restricted to two directions.
+fn in_plane(map: &PrintFromMesh, tangents: [[f64; 3]; 2]) -> Linear2 {
+    let row = |r: [f64; 4]| tangents.map(|t| r[0] * t[0] + r[1] * t[1] + r[2] * t[2]);
+    Linear2([row(map.0[0]), row(map.0[1])])
+}
+
+impl Linear2 {
+    fn determinant(&self) -> f64 {
+        let [[a, b], [c, d]] = self.0;
+        a * d - b * c
+    }
+
+    fn inverse(&self) -> Option<Self> {
+        let ([[a, b], [c, d]], det) = (self.0, self.determinant());
+        (det != 0.0 && det.is_finite()).then(|| Self([[d / det, -b / det], [-c / det, a / det]]))
+    }
+
+    fn after(&self, first: &Self) -> Self {
+        let [p, q] = first.0;
+        Self(
+            self.0
+                .map(|[a, b]| [a * p[0] + b * q[0], a * p[1] + b * q[1]]),
+        )
+    }
+
+    /// Size of the turn in the rotation closest to this map, degrees in 0..=180.
+    fn angle_deg(&self) -> f64 {
+        let [[a, b], [c, d]] = self.0;
+        (c - b).atan2(a + d).to_degrees().abs()
+    }
+}
+
+/// Intersection over union of a depth mask with the true stroke tops, both in the print's frame.
+///
+/// Pixels the tops mask leaves out (128) count for neither. Two empty masks agree on nothing: 0.
+///
+/// # Errors
+/// When the sizes differ.
+pub fn mask_iou(depth_mask: &Mask, tops: &Grid<u8>) -> Result<f64, TruthError> {
+    let (found, wanted) = (
+        [tops.width(), tops.height()],
+        [depth_mask.width(), depth_mask.height()],
+    );
+    if found != wanted {
+        return Err(TruthError::MaskSize { found, wanted });
+    }
+    let (mut both, mut either) = (0_u64, 0_u64);
+    for (set, top) in depth_mask.data().iter().zip(tops.data()) {
+        if *top == LEFT_OUT {
+            continue;
+        }
+        both += u64::from(*set && *top == TOP);
+        either += u64::from(*set || *top == TOP);
+    }
+    Ok(if either == 0 {
+        0.0
+    } else {
+        both as f64 / either as f64
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{TruthError, TruthErrors, TruthRecord, mask_iou};
+    use crate::domain::{Affine2, PrintFromMesh, Rigid3};
+    use crate::raster::{Grid, Mask};
+
+    /// A tilted plane seen in mirror writing, ten pixels a unit; landmarks on a cross of arm 3.
+    fn map_turned(angle_rad: f64, shift: [f64; 2]) -> (PrintFromMesh, Rigid3) {
+        let (s, c) = 0.4_f64.sin_cos();
+        let plane_from_mesh = Rigid3::to_frame(
+            [[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]],
+            [5.0, -2.0, 1.0],
+        );
+        let mirror = Affine2([[-10.0, 0.0, 50.0], [0.0, 10.0, 60.0]]);
+        let turn = Affine2::similarity(1.0, angle_rad, shift);
+        (
+            PrintFromMesh::new(&turn, &mirror, &plane_from_mesh),
+            plane_from_mesh,
+        )
+    }
+
+    fn record() -> TruthRecord {
+        let (print_from_mesh, plane_from_mesh) = map_turned(0.0, [0.0, 0.0]);
+        let back = plane_from_mesh.inverse();
+        let landmarks = [
+            [3.0, 0.0, 0.0],
+            [-3.0, 0.0, 0.0],
+            [0.0, 3.0, 0.0],
+            [0.0, -3.0, 0.0],
+        ];
+        TruthRecord::read(&serde_json::json!({
+            "id": "a",
+            "print_from_mesh": print_from_mesh,
+            "plane": { "n": [0.4_f64.sin(), 0.0, 0.4_f64.cos()], "d": 0.0 },
+            "landmarks": landmarks.map(|point| back.apply(point)),
+            "char_height_px": 60.0,
+        }))
+        .expect("the record is whole")
+    }
+
+    fn errors(found: &PrintFromMesh) -> TruthErrors {
+        record()
+            .measure(found, Some(1.0))
+            .expect("the truth is usable")
+    }
+
+    #[test]
+    fn truth_in_gives_error_zero() {
+        let found = errors(&map_turned(0.0, [0.0, 0.0]).0);
+        assert!(found.angle_deg < 1e-9 && found.tre_pct < 1e-9 && !found.mirrored);
+        assert!(found.pass());
+    }
+
+    #[test]
+    fn turn_and_shift_are_measured() {
+        let turned = errors(&map_turned(7.0_f64.to_radians(), [0.0, 0.0]).0);
+        assert!((turned.angle_deg - 7.0).abs() < 1e-9);
+        assert!(!turned.pass());
+        let back = errors(&map_turned((-4.0_f64).to_radians(), [0.0, 0.0]).0);
+        assert!((back.angle_deg - 4.0).abs() < 1e-9);
+        let shifted = errors(&map_turned(0.0, [3.0, 0.0]).0);
+        assert!((shifted.tre_pct - 5.0).abs() < 1e-9, "{}", shifted.tre_pct);
+        assert!(shifted.angle_deg < 1e-9);
+        let upside_down = errors(&map_turned(std::f64::consts::PI, [0.0, 0.0]).0);
+        assert!((upside_down.angle_deg - 180.0).abs() < 1e-9 && !upside_down.mirrored);
+    }
+
+    #[test]
+    fn mirrored_map_is_told_and_never_passes() {
+        let (mut map, _) = map_turned(0.0, [0.0, 0.0]);
+        map.0[0] = map.0[0].map(|value| -value);
+        let found = errors(&map);
+        assert!(found.mirrored);
+        assert_eq!(found.angle_deg, 180.0);
+        assert!(!found.pass());
+    }
+
+    #[test]
+    fn a_poor_mask_fails_and_no_mask_does_not() {
+        let (map, _) = map_turned(0.0, [0.0, 0.0]);
+        let pass = |iou| record().measure(&map, iou).map(|errors| errors.pass());
+        assert_eq!(pass(Some(0.69)), Ok(false));
+        assert_eq!(pass(Some(0.7)), Ok(true));
+        assert_eq!(pass(None), Ok(true));
+        let poor = record()
+            .measure(&map, Some(0.4))
+            .expect("the truth is usable");
+        assert!((poor.severity() - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn left_out_pixels_count_for_neither_mask() {
+        let tops = Grid::from_vec(4, 1, vec![255, 255, 128, 0]).expect("four values");
+        let mask = Mask::from_vec(4, 1, vec![true, false, true, true]).expect("four values");
+        assert_eq!(mask_iou(&mask, &tops), Ok(1.0 / 3.0));
+        assert_eq!(
+            mask_iou(&Mask::new(4, 1, false), &Grid::new(4, 1, 128)),
+            Ok(0.0)
+        );
+        let other = mask_iou(&Mask::new(3, 1, false), &tops);
+        assert!(matches!(other, Err(TruthError::MaskSize { .. })));
+    }
+
+    #[test]
+    fn useless_truth_is_refused_with_its_reason() {
+        let refuse = |change: fn(&mut TruthRecord)| {
+            let mut record = record();
+            change(&mut record);
+            let value = serde_json::to_value(record).expect("a record is JSON");
+            TruthRecord::read(&value).expect_err("the record is useless")
+        };
+        assert_eq!(refuse(|r| r.landmarks.clear()), TruthError::NoLandmarks);
+        assert_eq!(refuse(|r| r.char_height_px = 0.0), TruthError::Height(0.0));
+        assert_eq!(
+            refuse(|r| r.plane.n = [0.0; 3]),
+            TruthError::Normal([0.0; 3])
+        );
+        assert_eq!(
+            refuse(|r| r.print_from_mesh.0[1] = [0.0; 4]),
+            TruthError::Flat
+        );
+        let form = TruthRecord::read(&serde_json::json!({ "id": "a" }));
+        assert!(matches!(form, Err(TruthError::Form(_))));
+    }
+}

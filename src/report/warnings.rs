@@ -1,0 +1,134 @@
+//! What a reader of the table must know, in whole sentences.
+
+use super::model::{Progress, Row};
+use super::tally::TruthProblems;
+
+/// Slack for rounding in sums before a mean is called impossible.
+const ROUNDING: f64 = 1e-9;
+
+/// Every warning that the numbers call for.
+pub(super) fn of(progress: Progress, rows: &[Row], truth: &TruthProblems) -> Vec<String> {
+    let mut warnings = Vec::new();
+    warnings.extend(missing_pairs(progress));
+    for row in rows {
+        warnings.extend(impossible_dice(row));
+        warnings.extend(uncounted_verdicts(row));
+        warnings.extend(mirrored(row));
+    }
+    warnings.extend(unusable_truth(truth));
+    warnings
+}
+
+/// Pairs that are in no row.
+fn missing_pairs(progress: Progress) -> Option<String> {
+    let pairs = progress.done + progress.failed + progress.pending;
+    match (progress.failed, progress.pending) {
+        (0, 0) => None,
+        (failed, 0) => Some(format!(
+            "{failed} of {pairs} pairs failed and are in no row."
+        )),
+        (0, pending) => Some(format!(
+            "{pending} of {pairs} pairs are not finished and are in no row."
+        )),
+        (failed, pending) => Some(format!(
+            "{failed} of {pairs} pairs failed and {pending} are not finished; they are in no row."
+        )),
+    }
+}
+
+/// Dice is `2 J / (1 + J)` of the IoU `J` for each pair, a concave function: its mean cannot lie above the
+/// function's value at the mean IoU.
+fn impossible_dice(row: &Row) -> Option<String> {
+    let (iou, dice) = (row.iou?, row.dice?);
+    let bound = 2.0 * iou / (1.0 + iou);
+    (dice > bound + ROUNDING).then(|| {
+        format!(
+            "{}: a mean Dice of {dice:.3} is above {bound:.3}, the most that a mean IoU of {iou:.3} allows; \
+             the two cannot be of the same masks.",
+            row.metric.title()
+        )
+    })
+}
+
+/// Verdicts that tell nothing about the current results.
+fn uncounted_verdicts(row: &Row) -> Option<String> {
+    let title = row.metric.title();
+    match (row.stale, row.conflicts) {
+        (0, 0) => None,
+        (stale, 0) => Some(format!(
+            "{title}: {stale} results have a verdict for an older result only; they count as unread."
+        )),
+        (0, conflicts) => Some(format!(
+            "{title}: readers contradict each other on {conflicts} results; they count as unsure."
+        )),
+        (stale, conflicts) => Some(format!(
+            "{title}: {stale} results have a verdict for an older result only and count as unread; \
+             readers contradict each other on {conflicts}, which count as unsure."
+        )),
+    }
+}
+
+/// Results whose true map says that they read in mirror writing.
+fn mirrored(row: &Row) -> Option<String> {
+    let mirrored = row.truth.as_ref()?.mirrored;
+    (mirrored > 0).then(|| {
+        format!(
+            "{}: {mirrored} results read in mirror writing; their angle error counts as 180 degrees.",
+            row.metric.title()
+        )
+    })
+}
+
+/// Truths that could not be used.
+fn unusable_truth(truth: &TruthProblems) -> Option<String> {
+    truth.first.as_ref().map(|first| {
+        format!(
+            "The truth of {} pairs cannot be used and is left out; the first is {first}.",
+            truth.count
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{impossible_dice, missing_pairs};
+    use crate::domain::ThresholdMetric;
+    use crate::report::fixture;
+    use crate::report::model::Progress;
+
+    #[test]
+    fn the_papers_density_row_is_impossible_and_its_others_are_not() {
+        let row = |iou, dice| fixture::row(ThresholdMetric::Density, iou, dice);
+        let said = impossible_dice(&row(0.708, 0.870)).expect("0.870 is above 0.829");
+        assert!(said.contains("0.870 is above 0.829"), "{said}");
+        assert_eq!(impossible_dice(&row(0.776, 0.870)), None);
+        assert_eq!(impossible_dice(&row(0.805, 0.890)), None);
+    }
+
+    #[test]
+    fn equal_masks_everywhere_meet_the_bound_without_a_warning() {
+        let iou = 0.7;
+        let dice = 2.0 * iou / (1.0 + iou);
+        assert_eq!(
+            impossible_dice(&fixture::row(ThresholdMetric::NlSsim, iou, dice)),
+            None
+        );
+    }
+
+    #[test]
+    fn failed_and_unfinished_pairs_are_said() {
+        let said = |done, failed, pending| {
+            missing_pairs(Progress {
+                done,
+                failed,
+                pending,
+            })
+        };
+        assert_eq!(said(5, 0, 0), None);
+        let two = said(5, 2, 1).expect("three are missing");
+        assert_eq!(
+            two,
+            "2 of 8 pairs failed and 1 are not finished; they are in no row."
+        );
+    }
+}

@@ -1,0 +1,268 @@
+//! The run's loop: keeps the slots filled, hears what comes back, looks after the queue.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+use tokio::task::JoinSet;
+use tokio::time::{Interval, MissedTickBehavior, interval};
+
+use super::RunError;
+use super::events::RunEvent;
+use super::policy::{self, Liveness};
+use super::stop::StopLevel;
+use super::worker::{PairEnd, PairReport, Shared, work};
+use crate::catalog::{ClaimRequest, Dead, Outstanding, PairSelection};
+use crate::domain::WorkerId;
+
+/// Between two looks for pairs that others give back or whose back-off is over.
+const LOOK_EVERY: Duration = Duration::from_millis(250);
+
+/// What the loop has counted.
+#[derive(Debug, Default)]
+pub(super) struct Tally {
+    pub(super) done: u64,
+    pub(super) failed: u64,
+    pub(super) stages: u64,
+    pub(super) too_many_failures: bool,
+}
+
+/// The loop's own state.
+pub(super) struct Dispatch {
+    pub(super) shared: Arc<Shared>,
+    pub(super) worker: WorkerId,
+    pub(super) workers: usize,
+    pub(super) among: Option<PairSelection>,
+    pub(super) max_failures: Option<u64>,
+    tasks: JoinSet<PairReport>,
+    /// A pair that nothing may run beside is in hand.
+    alone: bool,
+    /// Whether a claim may find something that the last one did not.
+    look: bool,
+    liveness: Liveness,
+    tally: Tally,
+    fatal: Option<RunError>,
+    told: StopLevel,
+}
+
+impl Dispatch {
+    pub(super) fn new(
+        shared: Arc<Shared>,
+        worker: WorkerId,
+        workers: usize,
+        among: Option<PairSelection>,
+        max_failures: Option<u64>,
+    ) -> Self {
+        Self {
+            shared,
+            worker,
+            workers: workers.max(1),
+            among,
+            max_failures,
+            tasks: JoinSet::new(),
+            alone: false,
+            look: true,
+            liveness: Liveness::default(),
+            tally: Tally::default(),
+            fatal: None,
+            told: StopLevel::Go,
+        }
+    }
+
+    /// Works until nothing is left or the run is stopped. Gives the error that ended it, if one did.
+    pub(super) async fn run(
+        &mut self,
+        events: &mut mpsc::UnboundedReceiver<RunEvent>,
+        on_event: &mut (impl FnMut(RunEvent) + Send),
+    ) -> Result<Tally, RunError> {
+        let mut looks = every(LOOK_EVERY);
+        let mut rescues = every(policy::RESCUE_EVERY);
+        let mut beats = every(policy::BEAT_EVERY);
+        let mut last_beat = self.shared.clock.now();
+        while !self.is_over().await? {
+            let shared = Arc::clone(&self.shared);
+            tokio::select! {
+                biased;
+                () = shared.stop.reached(next_level(self.told)), if self.told < StopLevel::Now => self.tell_stop(),
+                _ = beats.tick() => last_beat = self.beat(last_beat).await,
+                Some(event) = events.recv() => on_event(event),
+                Some(ended) = self.tasks.join_next() => self.take(ended),
+                _ = rescues.tick() => self.rescue().await?,
+                _ = looks.tick(), if self.tasks.len() < self.workers => self.look_again().await?,
+            }
+        }
+        while let Ok(event) = events.try_recv() {
+            on_event(event);
+        }
+        match self.fatal.take() {
+            Some(error) => Err(error),
+            None => Ok(std::mem::take(&mut self.tally)),
+        }
+    }
+
+    /// Fills the slots; whether nothing is in hand and nothing can come.
+    async fn is_over(&mut self) -> Result<bool, RunError> {
+        if self.shared.is_draining() || self.fatal.is_some() {
+            return Ok(self.tasks.is_empty());
+        }
+        if !self.look || self.alone || self.tasks.len() >= self.workers {
+            return Ok(false);
+        }
+        self.look = false;
+        self.claim(false).await?;
+        if !self.tasks.is_empty() {
+            return Ok(false);
+        }
+        // Nothing ordinary is left or in hand: now the pairs that must run by themselves, one at a time.
+        self.claim(true).await?;
+        if !self.tasks.is_empty() {
+            return Ok(false);
+        }
+        let left = self.outstanding().await?;
+        Ok(left.ready == 0 && left.leased == 0 && left.backoff == 0)
+    }
+
+    async fn claim(&mut self, alone: bool) -> Result<(), RunError> {
+        let shared = &self.shared;
+        let slots = if alone {
+            1
+        } else {
+            self.workers - self.tasks.len()
+        };
+        let leases = shared
+            .catalog
+            .claim(ClaimRequest {
+                worker: self.worker,
+                slots,
+                until: shared.until,
+                alone,
+                among: self.among.clone(),
+                deadline: shared.deadline(),
+            })
+            .await?;
+        self.alone = alone && !leases.is_empty();
+        for lease in leases {
+            self.tasks.spawn(work(Arc::clone(&self.shared), lease));
+        }
+        Ok(())
+    }
+
+    async fn outstanding(&self) -> Result<Outstanding, RunError> {
+        let shared = &self.shared;
+        let catalog = &shared.catalog;
+        Ok(catalog
+            .outstanding(shared.until, self.among.as_ref())
+            .await?)
+    }
+
+    /// Takes in how a pair ended.
+    fn take(&mut self, ended: Result<PairReport, tokio::task::JoinError>) {
+        self.alone = false;
+        self.look = true;
+        let report = match ended {
+            Ok(report) => report,
+            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
+        };
+        self.tally.stages += report.stages;
+        match report.end {
+            PairEnd::Done => self.tally.done += 1,
+            PairEnd::Failed => self.tally.failed += 1,
+            PairEnd::Later | PairEnd::GivenBack | PairEnd::Lost => {}
+        }
+        if let Some(error) = report.fatal {
+            self.drain("the run cannot go on");
+            self.fatal.get_or_insert(error);
+        }
+        if self
+            .max_failures
+            .is_some_and(|max| self.tally.failed >= max)
+            && !self.tally.too_many_failures
+        {
+            self.tally.too_many_failures = true;
+            self.drain("too many failures");
+        }
+    }
+
+    fn drain(&self, reason: &str) {
+        if self.shared.drain.level() == StopLevel::Go {
+            self.shared.drain.drain();
+            self.shared.tell(RunEvent::Stopping {
+                level: StopLevel::Drain,
+                reason: reason.to_owned(),
+            });
+        }
+    }
+
+    fn tell_stop(&mut self) {
+        self.told = self.shared.stop.level();
+        self.shared.tell(RunEvent::Stopping {
+            level: self.told,
+            reason: "asked to stop".to_owned(),
+        });
+    }
+
+    /// Makes pairs ready whose time has come; looks whether others have given some back.
+    async fn look_again(&mut self) -> Result<(), RunError> {
+        if self.shared.is_draining() {
+            return Ok(());
+        }
+        let now = self.shared.clock.now();
+        let left = self.outstanding().await?;
+        if left.next_due.is_some_and(|due| due <= now) {
+            let longest = policy::longest_backoff_ms();
+            self.shared.catalog.stage_due(now, longest).await?;
+        }
+        self.look = true;
+        Ok(())
+    }
+
+    /// A sign of life. When none can be given for as long as a lease lasts, the leases are lost: nothing new is begun.
+    async fn beat(&self, last: i64) -> i64 {
+        let now = self.shared.clock.now();
+        match self.shared.catalog.beat(self.worker, now).await {
+            Ok(()) => now,
+            Err(error) => {
+                tracing::warn!(%error, "no sign of life could be stored");
+                if now - last >= policy::LEASE.as_millis() as i64 {
+                    self.drain("the catalog cannot be written any more");
+                }
+                last
+            }
+        }
+    }
+
+    /// Takes back the leases of dead workers in other processes.
+    async fn rescue(&mut self) -> Result<(), RunError> {
+        let catalog = &self.shared.catalog;
+        let now = self.shared.clock.now();
+        let holders = catalog.lease_holders().await?;
+        let dead = self.liveness.observe(&holders, self.worker, now);
+        let mut rescued = 0;
+        if !dead.is_empty() {
+            rescued += catalog.rescue(Dead::Workers(dead), now).await?.ready;
+        }
+        if holders.iter().any(|holder| holder.worker != self.worker) {
+            let before = now - policy::DEADLINE_MARGIN.as_millis() as i64;
+            let overdue = catalog.rescue_overdue(self.worker, before, now).await?;
+            rescued += overdue.ready;
+        }
+        if rescued > 0 {
+            self.look = true;
+            self.shared.tell(RunEvent::Rescued { pairs: rescued });
+        }
+        Ok(())
+    }
+}
+
+const fn next_level(level: StopLevel) -> StopLevel {
+    match level {
+        StopLevel::Go => StopLevel::Drain,
+        StopLevel::Drain | StopLevel::Now => StopLevel::Now,
+    }
+}
+
+fn every(period: Duration) -> Interval {
+    let mut ticks = interval(period);
+    ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    ticks
+}

@@ -1,0 +1,174 @@
+//! What stages give, as numbers and files on disk, and the hashes that name them.
+
+use std::collections::BTreeMap;
+
+use serde_json::{Value, json};
+
+use super::steps::StageOutput;
+use crate::catalog::MetricResult;
+use crate::domain::{
+    ArtifactSet, ContentHash, DepthOutcome, MetricOutcome, NormalizeOutcome, RegisterOutcome,
+    ThresholdMetric,
+};
+use crate::raster::{DepthMap, Grid, Mask, png_grey8, png_grey16, png_mask};
+use crate::stages::normalize::Normalized;
+use crate::stages::register::Registered;
+use crate::store::NewArtifact;
+
+/// The depth map, 16 bits a pixel.
+pub(super) const DEPTH: &str = "depth.png";
+/// The print's ink in the print image's frame: 255 ink, 0 paper, 128 where nothing is known.
+pub(super) const PRINT_MASK: &str = "print_mask.png";
+/// The print mask on the canvas: 255 ink.
+pub(super) const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
+
+const INK: u8 = 255;
+const PAPER: u8 = 0;
+const UNKNOWN: u8 = 128;
+
+/// A metric's depth mask on the canvas: 255 stroke.
+pub(super) fn canvas_depth_mask(metric: ThresholdMetric) -> String {
+    format!("canvas_depth_mask.{metric}.png")
+}
+
+/// A stage that leaves numbers only.
+pub(super) const fn numbers(outcome: String) -> StageOutput {
+    StageOutput {
+        outcome,
+        files: Vec::new(),
+        metrics: Vec::new(),
+    }
+}
+
+/// What is told of a depth map beside its picture.
+pub(super) fn depth_outcome(map: &DepthMap) -> DepthOutcome {
+    let levels = map.levels.data();
+    let seen = levels.iter().filter(|level| **level > 0).count();
+    DepthOutcome {
+        width: map.levels.width() as u32,
+        height: map.levels.height() as u32,
+        scale: map.scale.clone(),
+        coverage: seen as f64 / levels.len().max(1) as f64,
+    }
+}
+
+/// The depth stage's output.
+pub(super) fn depth(outcome: String, map: &DepthMap) -> StageOutput {
+    StageOutput {
+        files: vec![png(DEPTH, png_grey16(&map.levels))],
+        ..numbers(outcome)
+    }
+}
+
+/// Ink, paper and the unknown in one picture.
+pub(super) fn print_mask(ink: &Mask, known: &Mask) -> Grid<u8> {
+    Grid::from_fn(ink.width(), ink.height(), |x, y| {
+        match (ink.at(x, y), known.at(x, y)) {
+            (true, _) => INK,
+            (false, true) => PAPER,
+            (false, false) => UNKNOWN,
+        }
+    })
+}
+
+/// The masks as the picture holds them, so that a run that goes on from the file sees what an unbroken one sees.
+pub(super) fn from_print_mask(outcome: NormalizeOutcome, grey: &Grid<u8>) -> Normalized {
+    Normalized {
+        outcome,
+        ink: grey.map(|grey| *grey == INK),
+        known: grey.map(|grey| *grey != UNKNOWN),
+    }
+}
+
+/// The normalize stage's output.
+pub(super) fn normalized(outcome: String, grey: &Grid<u8>) -> StageOutput {
+    StageOutput {
+        files: vec![png(PRINT_MASK, png_grey8(grey))],
+        ..numbers(outcome)
+    }
+}
+
+/// The register stage's output.
+pub(super) fn registered(
+    json: String,
+    outcome: RegisterOutcome,
+    registered: &Registered,
+) -> StageOutput {
+    let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
+    for canvas in &registered.canvases {
+        let role = canvas_depth_mask(canvas.metric);
+        files.push(png(&role, png_mask(&canvas.depth)));
+    }
+    StageOutput {
+        outcome: json,
+        files,
+        metrics: outcome.metrics,
+    }
+}
+
+fn png(role: &str, bytes: Vec<u8>) -> NewArtifact {
+    NewArtifact {
+        role: role.to_owned(),
+        ext: "png",
+        bytes,
+    }
+}
+
+/// Hash of a stage's result: its numbers and its files, no times.
+pub(super) fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
+    let whole = json!({ "outcome": outcome, "files": files });
+    ContentHash::of(whole.to_string().as_bytes())
+}
+
+/// The metrics with the hashes that verdicts are bound to: over the numbers and the pictures a reader sees.
+pub(super) fn metric_results(
+    metrics: &[MetricOutcome],
+    files: &ArtifactSet,
+    depth: Option<&ArtifactSet>,
+) -> Vec<MetricResult> {
+    let hash_of = |files: Option<&ArtifactSet>, role: &str| {
+        files
+            .and_then(|files| files.get(role))
+            .map(|artifact| artifact.hash)
+    };
+    metrics
+        .iter()
+        .map(|outcome| {
+            let seen = BTreeMap::from([
+                ("outcome", json!(outcome)),
+                ("depth", json!(hash_of(depth, DEPTH))),
+                ("print", json!(hash_of(Some(files), CANVAS_PRINT_MASK))),
+                (
+                    "mask",
+                    json!(hash_of(Some(files), &canvas_depth_mask(outcome.metric))),
+                ),
+            ]);
+            let whole: Value = json!(seen);
+            MetricResult {
+                outcome: *outcome,
+                result_hash: ContentHash::of(whole.to_string().as_bytes()),
+            }
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{INK, PAPER, UNKNOWN, print_mask, result_hash};
+    use crate::domain::ArtifactSet;
+    use crate::raster::Mask;
+
+    #[test]
+    fn ink_is_ink_wherever_it_lies() {
+        let ink = Mask::from_fn(3, 1, |x, _| x == 0);
+        let known = Mask::from_fn(3, 1, |x, _| x == 1);
+        assert_eq!(print_mask(&ink, &known).data(), [INK, PAPER, UNKNOWN]);
+    }
+
+    #[test]
+    fn another_outcome_has_another_hash() {
+        let files = ArtifactSet::new();
+        assert_eq!(result_hash("{}", &files), result_hash("{}", &files));
+        assert_ne!(result_hash("{}", &files), result_hash("[]", &files));
+    }
+}

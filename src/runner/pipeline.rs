@@ -1,0 +1,265 @@
+//! The real stages on real files: reads inputs and earlier artifacts, calls the pure stages, encodes what they give.
+
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+use super::hand::PairInHand;
+use super::outputs;
+use super::steps::{Setback, StageOutput, Steps};
+use crate::catalog::InputSeen;
+use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
+use crate::mesh::{self, Mesh};
+use crate::raster::{self, DepthMap, Picture};
+use crate::stages::normalize::Normalized;
+use crate::stages::{Settings, StageError, depth, fit, normalize, register};
+use crate::store::{ArtifactError, InputError, InputFile, Project, read_input};
+
+/// The stages of one project with their settings.
+#[derive(Debug)]
+pub(super) struct Pipeline {
+    pub(super) project: Project,
+    pub(super) settings: Settings,
+    pub(super) mesh_limits: mesh::Limits,
+    pub(super) image_limits: raster::Limits,
+}
+
+impl Steps for Pipeline {
+    fn run(&self, stage: Stage, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+        match stage {
+            Stage::Fit => self.fit(pair),
+            Stage::Depth => self.depth(pair),
+            Stage::Normalize => self.normalize(pair),
+            Stage::Register => self.register(pair),
+        }
+    }
+}
+
+impl Pipeline {
+    fn fit(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+        let mesh = self.read_mesh(pair)?;
+        // The paper's fit does not look at the print, so a changed print need not send its results back so far.
+        let print = match self.settings.fit.method {
+            fit::Method::Tops => Some(self.read_print(pair)?),
+            fit::Method::Paper => None,
+        };
+        let face_down = pair.facts.scanned_face_down;
+        let outcome = fit::fit(&mesh, print.as_ref(), face_down, &self.settings.fit)
+            .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;
+        let (outcome, json) = settled(&outcome)?;
+        (pair.mesh, pair.print) = (Some(mesh), print);
+        pair.fit = Some(outcome);
+        Ok(outputs::numbers(json))
+    }
+
+    fn depth(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+        let fit = self.fitted(pair)?;
+        // The mesh is not needed after this stage; taking it out frees its memory.
+        let mesh = self.mesh_of_fit(pair)?;
+        let map = depth::depth(&mesh, &fit, pair.facts.unit, &self.settings.depth)
+            .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;
+        let (outcome, json) = settled(&outputs::depth_outcome(&map))?;
+        let output = outputs::depth(json, &map);
+        pair.depth = Some(DepthMap {
+            scale: outcome.scale,
+            ..map
+        });
+        Ok(output)
+    }
+
+    fn normalize(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+        let depth = self.depth_map(pair)?;
+        let print = self.print_of_fit(pair)?;
+        let normalized = normalize::normalize(&depth, &print, &self.settings.normalize)
+            .map_err(|error| in_file(&pair.facts.print_path, &error.into()))?;
+        pair.depth = Some(depth);
+        let (outcome, json) = settled(&normalized.outcome)?;
+        let grey = outputs::print_mask(&normalized.ink, &normalized.known);
+        let output = outputs::normalized(json, &grey);
+        pair.normalized = Some(outputs::from_print_mask(outcome, &grey));
+        Ok(output)
+    }
+
+    fn register(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+        let depth = self.depth_map(pair)?;
+        let normalized = self.normalized(pair)?;
+        let registered = register::register(&depth, &normalized, &self.settings.register)
+            .map_err(|error| setback(&error.into(), None))?;
+        let (outcome, json) = settled(&registered.outcome)?;
+        Ok(outputs::registered(json, outcome, &registered))
+    }
+
+    /// The fit's outcome, from memory or as stored.
+    fn fitted(&self, pair: &PairInHand) -> Result<FitOutcome, Setback> {
+        let _ = self;
+        let fit = pair.fit.clone();
+        fit.or_else(|| pair.outcome(Stage::Fit))
+            .ok_or(Setback::Back(Stage::Fit))
+    }
+
+    /// The mesh that was fitted. When the file is another one by now, the fit is no fit of it.
+    fn mesh_of_fit(&self, pair: &mut PairInHand) -> Result<Mesh, Setback> {
+        if let Some(mesh) = pair.mesh.take() {
+            return Ok(mesh);
+        }
+        let fitted = pair.mesh_hash();
+        let mesh = self.read_mesh(pair)?;
+        if fitted == pair.mesh_hash() {
+            return Ok(mesh);
+        }
+        pair.mesh = Some(mesh);
+        Err(Setback::Back(Stage::Fit))
+    }
+
+    /// The print. When it is another one by now than the one that the fit looked at, the fit is no fit for it.
+    fn print_of_fit(&self, pair: &mut PairInHand) -> Result<Picture, Setback> {
+        if let Some(print) = pair.print.take() {
+            return Ok(print);
+        }
+        let seen = pair
+            .stored
+            .get(&Stage::Fit)
+            .and_then(|stored| stored.print_hash);
+        let print = self.read_print(pair)?;
+        if seen.is_none_or(|seen| pair.print_hash() == Some(seen)) {
+            return Ok(print);
+        }
+        Err(Setback::Back(Stage::Fit))
+    }
+
+    /// The depth map, from memory or from its artifact.
+    fn depth_map(&self, pair: &mut PairInHand) -> Result<DepthMap, Setback> {
+        if let Some(map) = pair.depth.take() {
+            return Ok(map);
+        }
+        let back = || Setback::Back(Stage::Depth);
+        let outcome: DepthOutcome = pair.outcome(Stage::Depth).ok_or_else(back)?;
+        let bytes = self.artifact(pair, Stage::Depth, outputs::DEPTH)?;
+        let levels = raster::decode_grey16(&bytes).ok().ok_or_else(back)?;
+        Ok(DepthMap {
+            levels,
+            scale: outcome.scale,
+        })
+    }
+
+    /// The print's masks, from memory or from their artifact.
+    fn normalized(&self, pair: &mut PairInHand) -> Result<Normalized, Setback> {
+        if let Some(normalized) = pair.normalized.take() {
+            return Ok(normalized);
+        }
+        let back = || Setback::Back(Stage::Normalize);
+        let outcome: NormalizeOutcome = pair.outcome(Stage::Normalize).ok_or_else(back)?;
+        let bytes = self.artifact(pair, Stage::Normalize, outputs::PRINT_MASK)?;
+        let grey = raster::decode_grey8(&bytes).ok().ok_or_else(back)?;
+        Ok(outputs::from_print_mask(outcome, &grey))
+    }
+
+    /// An artifact of an earlier stage. When it is gone or changed, that stage runs again.
+    fn artifact(&self, pair: &PairInHand, stage: Stage, role: &str) -> Result<Vec<u8>, Setback> {
+        let artifact = pair
+            .stored
+            .get(&stage)
+            .and_then(|stored| stored.files.get(role))
+            .ok_or(Setback::Back(stage))?;
+        self.project
+            .read_artifact(artifact)
+            .map_err(|error| match error {
+                ArtifactError::Missing(_) | ArtifactError::Changed(_) => {
+                    tracing::warn!(pair = %pair.facts.name, %stage, "{error}; the stage runs again");
+                    Setback::Back(stage)
+                }
+                ArtifactError::Io { .. } => Setback::Failed {
+                    failure: Failure::new(FailureClass::Io, error.to_string()),
+                    may_pass: true,
+                },
+            })
+    }
+
+    fn read_mesh(&self, pair: &mut PairInHand) -> Result<Mesh, Setback> {
+        let stored = &pair.facts.mesh_path;
+        let path = self.project.input_path(stored);
+        let limit = self.mesh_limits.max_bytes;
+        let file = read_input(&path, limit, "limits.mesh.max_bytes").map_err(unread)?;
+        pair.inputs.mesh = Some(seen(&file));
+        mesh::read(&file.bytes, stored, &self.mesh_limits).map_err(|error| {
+            let message = format!("{stored}: {error}");
+            Setback::failed(error.class(), message)
+        })
+    }
+
+    fn read_print(&self, pair: &mut PairInHand) -> Result<Picture, Setback> {
+        let stored = &pair.facts.print_path;
+        let path = self.project.input_path(stored);
+        let limit = self.image_limits.max_bytes;
+        let file = read_input(&path, limit, "limits.image.max_bytes").map_err(unread)?;
+        pair.inputs.print = Some(seen(&file));
+        raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
+            let message = format!("{stored}: {error}");
+            Setback::failed(error.class(), message)
+        })
+    }
+}
+
+fn seen(file: &InputFile) -> InputSeen {
+    InputSeen {
+        hash: file.hash,
+        stat: file.stat.as_str().to_owned(),
+    }
+}
+
+#[expect(clippy::needless_pass_by_value, reason = "shaped for `map_err`")]
+fn unread(error: InputError) -> Setback {
+    let may_pass = error.may_pass();
+    Setback::Failed {
+        failure: Failure::new(error.class(), error.to_string()),
+        may_pass,
+    }
+}
+
+fn in_file(path: &str, error: &StageError) -> Setback {
+    setback(error, Some(path))
+}
+
+fn setback(error: &StageError, path: Option<&str>) -> Setback {
+    let message = match path {
+        Some(path) => format!("{path}: {error}"),
+        None => error.to_string(),
+    };
+    Setback::failed(error.class(), message)
+}
+
+/// An outcome as it will be read back, with its JSON. A number that JSON cannot hold is a defect of the stage.
+fn settled<T: Serialize + DeserializeOwned + PartialEq>(
+    outcome: &T,
+) -> Result<(T, String), Setback> {
+    let json = serde_json::to_value(outcome).map(|value| value.to_string());
+    let back = json.and_then(|json| Ok((serde_json::from_str::<T>(&json)?, json)));
+    match back {
+        Ok((back, json)) if back == *outcome => Ok((back, json)),
+        Ok(_) | Err(_) => Err(Setback::failed(
+            FailureClass::Bug,
+            "the stage gave a number that is not finite",
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::settled;
+    use crate::domain::Affine2;
+
+    #[test]
+    fn every_finite_number_comes_back_bit_for_bit() {
+        let odd = Affine2([
+            [0.1 + 0.2, f64::MIN_POSITIVE, 1e300],
+            [-0.0, 1.0 / 3.0, 5e-324],
+        ]);
+        let (back, _) = settled(&odd).expect("finite numbers");
+        let bits = |map: Affine2| map.0.map(|row| row.map(f64::to_bits));
+        assert_eq!(bits(back), bits(odd));
+    }
+
+    #[test]
+    fn a_number_that_is_not_finite_is_a_defect() {
+        assert!(settled(&Affine2([[f64::NAN; 3]; 2])).is_err());
+    }
+}

@@ -1,0 +1,69 @@
+//! Before a run: which input files are not what they were. Size, time and number first; only what moved is hashed.
+
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
+
+use super::RunError;
+use crate::catalog::{Catalog, InputSeen, InputsSeen, KnownInputs, PairSelection};
+use crate::domain::{ContentHash, PairId};
+use crate::store::{InputError, Project, hash_input, stat_input};
+
+/// Pairs looked at in one go.
+const PAGE: usize = 1_000;
+
+/// Brings the catalog's knowledge of input files up to date. Files that no stage has read yet are left to it.
+pub(super) async fn inputs(
+    project: &Project,
+    catalog: &Catalog,
+    among: Option<&PairSelection>,
+) -> Result<(), RunError> {
+    let mut after = None;
+    loop {
+        let page = catalog.known_inputs(after, PAGE, among).await?;
+        let Some(last) = page.last() else {
+            return Ok(());
+        };
+        after = Some(last.pair);
+        let project = project.clone();
+        let look = move || -> Vec<_> {
+            page.into_par_iter()
+                .filter_map(|known| changed(&project, &known))
+                .collect()
+        };
+        let moved = match tokio::task::spawn_blocking(look).await {
+            Ok(moved) => moved,
+            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
+        };
+        if !moved.is_empty() {
+            catalog.store_inputs(moved).await?;
+        }
+    }
+}
+
+/// What changed of a pair's files; `None` when nothing did.
+fn changed(project: &Project, known: &KnownInputs) -> Option<(PairId, InputsSeen)> {
+    let seen = InputsSeen {
+        mesh: moved(project, &known.mesh_path, known.mesh.as_ref()),
+        print: moved(project, &known.print_path, known.print.as_ref()),
+    };
+    (seen.mesh.is_some() || seen.print.is_some()).then_some((known.pair, seen))
+}
+
+/// What a file is now, when it is not what it was. A file that has gone is left alone: results made from it stand.
+/// But where the manifest names another path than before, a file that is not there is no longer the old content.
+fn moved(project: &Project, stored: &str, known: Option<&InputSeen>) -> Option<InputSeen> {
+    let known = known?;
+    let path = project.input_path(stored);
+    match stat_input(&path) {
+        Ok(stat) if stat.as_str() == known.stat => None,
+        Ok(_) => {
+            let (hash, stat) = hash_input(&path).ok()?;
+            let stat = stat.as_str().to_owned();
+            Some(InputSeen { hash, stat })
+        }
+        Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputSeen {
+            hash: ContentHash::of(b""),
+            stat: "gone".to_owned(),
+        }),
+        Err(_) => None,
+    }
+}

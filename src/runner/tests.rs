@@ -1,0 +1,482 @@
+//! The run with made-up stages: what becomes of pairs that fail, hang, panic, or are stopped.
+
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex};
+use std::time::Duration;
+
+use serde_json::{Map, json};
+
+use super::hand::PairInHand;
+use super::steps::{Setback, StageOutput, Steps};
+use super::{Rerun, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel, run_steps};
+use crate::catalog::{Catalog, ClaimRequest, ImportRow, InputSeen, Recipes, WorkerInfo};
+use crate::domain::{
+    Affine2, ContentHash, Failure, FailureClass, JobStatus, MetricOutcome, PairName,
+    RegisterOutcome, Scores, Stage, ThresholdMetric,
+};
+use crate::store::{NewArtifact, Project};
+
+/// What a made-up pair does, told by its name.
+#[derive(Debug, Default)]
+struct MadeUp {
+    /// Times each pair and stage was computed.
+    computed: Mutex<BTreeMap<(String, Stage), usize>>,
+    running: AtomicUsize,
+    most: AtomicUsize,
+    /// Stages of pairs named `wait..` hold until this is opened.
+    gate: (Mutex<bool>, Condvar),
+}
+
+impl MadeUp {
+    fn count(&self, pair: &str, stage: Stage) -> usize {
+        let computed = self.computed.lock().expect("no panic holds it");
+        computed
+            .get(&(pair.to_owned(), stage))
+            .copied()
+            .unwrap_or(0)
+    }
+
+    fn open(&self) {
+        *self.gate.0.lock().expect("no panic holds it") = true;
+        self.gate.1.notify_all();
+    }
+
+    fn wait(&self) {
+        let open = self.gate.0.lock().expect("no panic holds it");
+        drop(
+            self.gate
+                .1
+                .wait_while(open, |open| !*open)
+                .expect("no panic holds it"),
+        );
+    }
+
+    fn behave(&self, name: &str, stage: Stage, tries: usize) -> Result<(), Setback> {
+        match name.split('_').next().unwrap_or_default() {
+            "panics" if stage == Stage::Depth => panic!("made up"),
+            "bad" if stage == Stage::Fit => {
+                Err(Setback::failed(FailureClass::BadInput, "no faces"))
+            }
+            "flaky" if stage == Stage::Fit && tries == 1 => Err(Setback::Failed {
+                failure: Failure::new(FailureClass::Io, "the disk is slow"),
+                may_pass: true,
+            }),
+            "hangs" if stage == Stage::Fit => {
+                std::thread::sleep(Duration::from_millis(400));
+                Ok(())
+            }
+            "loses" if stage == Stage::Register && tries == 1 => Err(Setback::Back(Stage::Depth)),
+            "wait" => {
+                self.wait();
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Steps for MadeUp {
+    fn run(&self, stage: Stage, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+        let name = pair.facts.name.as_str().to_owned();
+        let tries = {
+            let mut computed = self.computed.lock().expect("no panic holds it");
+            let count = computed.entry((name.clone(), stage)).or_default();
+            *count += 1;
+            *count
+        };
+        let running = self.running.fetch_add(1, Ordering::SeqCst) + 1;
+        self.most.fetch_max(running, Ordering::SeqCst);
+        let outcome = self.behave(&name, stage, tries);
+        self.running.fetch_sub(1, Ordering::SeqCst);
+        outcome?;
+        let seen = |text: &str| InputSeen {
+            hash: ContentHash::of(text.as_bytes()),
+            stat: "as it was".to_owned(),
+        };
+        pair.inputs.mesh = Some(seen("mesh"));
+        pair.inputs.print = (stage >= Stage::Normalize).then(|| seen("print"));
+        let register = RegisterOutcome {
+            metrics: ThresholdMetric::ALL.map(metric).to_vec(),
+        };
+        let last = stage == Stage::Register;
+        Ok(StageOutput {
+            outcome: if last {
+                json!(register).to_string()
+            } else {
+                json!({ "stage": stage, "pair": name }).to_string()
+            },
+            files: vec![NewArtifact {
+                role: "note.txt".to_owned(),
+                ext: "txt",
+                bytes: format!("{stage} of {name}").into_bytes(),
+            }],
+            metrics: if last { register.metrics } else { Vec::new() },
+        })
+    }
+}
+
+fn metric(metric: ThresholdMetric) -> MetricOutcome {
+    MetricOutcome {
+        metric,
+        threshold_level: 1,
+        threshold_depth: 0.1,
+        print_from_depth: Affine2::IDENTITY,
+        angle_deg: 0.0,
+        scale: 1.0,
+        shift_px: [0.0; 2],
+        scores: Scores {
+            ssim: 0.5,
+            nl_ssim: 0.5,
+            iou: 0.5,
+            iou_box: 0.5,
+            dice: 0.5,
+            density_print: 0.5,
+            density_depth: 0.5,
+        },
+        margin: 0.0,
+        at_bound: false,
+    }
+}
+
+/// A project with made-up pairs.
+struct World {
+    project: Project,
+    catalog: Catalog,
+    steps: Arc<MadeUp>,
+    stop: Stop,
+    events: Mutex<Vec<RunEvent>>,
+    _dir: tempfile::TempDir,
+}
+
+fn name(text: &str) -> PairName {
+    PairName::new(text).expect("a pair's name")
+}
+
+fn recipes() -> Recipes {
+    Recipes::new(|_| json!({ "revision": 1 }))
+}
+
+fn options(workers: usize) -> RunOptions {
+    RunOptions {
+        workers,
+        ..RunOptions::default()
+    }
+}
+
+impl World {
+    async fn new(pairs: &[&str]) -> Self {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(dir.path()).expect("a project");
+        let catalog = Catalog::create(&project.catalog_path())
+            .await
+            .expect("a catalog");
+        let rows = pairs.iter().map(|pair| ImportRow {
+            name: name(pair),
+            mesh_path: format!("{pair}.stl"),
+            print_path: format!("{pair}.png"),
+            unit: None,
+            scanned_face_down: None,
+            character: None,
+            block: None,
+            meta: Map::new(),
+        });
+        catalog.import(rows.collect(), 1).await.expect("imported");
+        Self {
+            project,
+            catalog,
+            steps: Arc::default(),
+            stop: Stop::new(),
+            events: Mutex::default(),
+            _dir: dir,
+        }
+    }
+
+    async fn try_run(&self, options: &RunOptions) -> Result<RunSummary, RunError> {
+        let steps = Arc::clone(&self.steps);
+        let note = |event| self.events.lock().expect("no panic holds it").push(event);
+        let (project, catalog) = (&self.project, &self.catalog);
+        let summary = run_steps(
+            project,
+            catalog,
+            &recipes(),
+            steps,
+            options,
+            &self.stop,
+            note,
+        )
+        .await;
+        let kept = catalog.counters().await.expect("counters");
+        assert_eq!(kept, catalog.recount().await.expect("a recount"));
+        summary
+    }
+
+    async fn run(&self, options: &RunOptions) -> RunSummary {
+        self.try_run(options)
+            .await
+            .expect("the run goes on to its end")
+    }
+
+    async fn status(&self, pair: &str) -> JobStatus {
+        let detail = self.catalog.pair(&name(pair)).await.expect("a read");
+        detail.expect("the pair").results.status
+    }
+}
+
+#[tokio::test]
+async fn every_pair_is_done_and_each_stage_computed_once() {
+    let world = World::new(&["a", "b", "c", "d", "e"]).await;
+    let summary = world.run(&options(2)).await;
+    assert_eq!(
+        (summary.done, summary.failed, summary.stages, summary.left),
+        (5, 0, 20, 0)
+    );
+    for pair in ["a", "b", "c", "d", "e"] {
+        for stage in Stage::ALL {
+            assert_eq!(world.steps.count(pair, stage), 1);
+        }
+    }
+    assert!(world.steps.most.load(Ordering::SeqCst) <= 2);
+    let again = world.run(&options(2)).await;
+    assert_eq!(
+        (
+            again.done,
+            again.stages,
+            again.status.jobs[&JobStatus::Done]
+        ),
+        (0, 0, 5)
+    );
+}
+
+#[tokio::test]
+async fn one_bad_pair_stops_nobody_and_shows() {
+    let world = World::new(&["a", "bad_1", "panics_1", "z"]).await;
+    let summary = world.run(&options(2)).await;
+    assert_eq!(
+        (summary.done, summary.failed, summary.failed_in_all),
+        (2, 2, 2)
+    );
+    let failures = world.catalog.failures(9).await.expect("a read");
+    let told: Vec<_> = failures
+        .iter()
+        .map(|failed| {
+            (
+                failed.failure.failure.class,
+                failed.failure.failure.message.as_str(),
+            )
+        })
+        .collect();
+    let bug = (FailureClass::Bug, "the stage panicked: made up");
+    assert_eq!(told, [(FailureClass::BadInput, "no faces"), bug]);
+    let again = world.run(&options(2)).await;
+    assert_eq!((again.failed, again.failed_in_all), (0, 2));
+    let failed = RunOptions {
+        rerun: Some(Rerun::Failed),
+        ..options(2)
+    };
+    assert_eq!(world.run(&failed).await.failed, 2);
+    assert_eq!(world.steps.count("panics_1", Stage::Fit), 1);
+    assert_eq!(world.steps.count("panics_1", Stage::Depth), 2);
+}
+
+#[tokio::test]
+async fn a_failure_that_may_pass_is_tried_again_in_the_same_run() {
+    let world = World::new(&["flaky_1"]).await;
+    let summary = world.run(&options(1)).await;
+    assert_eq!((summary.done, summary.failed), (1, 0));
+    assert_eq!(world.steps.count("flaky_1", Stage::Fit), 2);
+    let detail = world.catalog.pair(&name("flaky_1")).await.expect("a read");
+    let attempts = detail.expect("the pair").attempts;
+    assert_eq!(
+        attempts
+            .iter()
+            .filter(|attempt| attempt.failure.is_some())
+            .count(),
+        1
+    );
+}
+
+#[tokio::test]
+async fn a_stage_that_takes_too_long_is_tried_alone_and_then_quarantined() {
+    let world = World::new(&["a", "hangs_1"]).await;
+    let limited = RunOptions {
+        stage_limit: Duration::from_millis(150),
+        ..options(2)
+    };
+    let summary = world.run(&limited).await;
+    assert_eq!((summary.done, summary.failed), (1, 1));
+    assert_eq!(world.steps.count("hangs_1", Stage::Fit), 2);
+    let failures = world.catalog.failures(9).await.expect("a read");
+    assert_eq!(failures[0].failure.failure.class, FailureClass::Resource);
+}
+
+#[tokio::test]
+async fn what_an_earlier_stage_left_is_made_again_when_it_is_gone() {
+    let world = World::new(&["loses_1"]).await;
+    assert_eq!(world.run(&options(1)).await.done, 1);
+    let counts = Stage::ALL.map(|stage| world.steps.count("loses_1", stage));
+    assert_eq!(counts, [1, 2, 2, 2]);
+    let kept = world.catalog.counters().await.expect("counters");
+    assert_eq!(kept, world.catalog.recount().await.expect("a recount"));
+}
+
+#[tokio::test]
+async fn a_drain_finishes_the_stage_in_hand_and_gives_the_attempt_back() {
+    let world = World::new(&["wait_1", "wait_2"]).await;
+    let options = options(1);
+    let drain = async {
+        while world.steps.count("wait_1", Stage::Fit) == 0 {
+            tokio::task::yield_now().await;
+        }
+        assert_eq!(world.stop.escalate(), StopLevel::Drain);
+        world.steps.open();
+    };
+    let (summary, ()) = tokio::join!(world.run(&options), drain);
+    assert_eq!(
+        (summary.stages, summary.left, summary.stopped),
+        (1, 2, true)
+    );
+    let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
+    let detail = detail.expect("the pair");
+    assert_eq!(
+        (detail.results.status, detail.attempt),
+        (JobStatus::Ready, 0)
+    );
+    assert_eq!(detail.results.next_stage, Some(Stage::Depth));
+    assert_eq!(world.steps.count("wait_2", Stage::Fit), 0);
+}
+
+#[tokio::test]
+async fn a_second_stop_waits_for_nothing_and_leaves_all_resumable() {
+    let world = World::new(&["wait_1"]).await;
+    let options = options(1);
+    let stop = async {
+        while world.steps.count("wait_1", Stage::Fit) == 0 {
+            tokio::task::yield_now().await;
+        }
+        world.stop.escalate();
+        assert_eq!(world.stop.escalate(), StopLevel::Now);
+    };
+    let (summary, ()) = tokio::join!(world.run(&options), stop);
+    assert_eq!((summary.stages, summary.stopped), (0, true));
+    let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
+    let detail = detail.expect("the pair");
+    assert_eq!(
+        (detail.results.status, detail.attempt, detail.crashes),
+        (JobStatus::Ready, 0, 0)
+    );
+    world.steps.open();
+}
+
+#[tokio::test]
+async fn too_many_failures_drain_the_run() {
+    let world = World::new(&["bad_1", "bad_2", "bad_3", "bad_4"]).await;
+    let few = RunOptions {
+        max_failures: Some(2),
+        ..options(1)
+    };
+    let summary = world.run(&few).await;
+    assert_eq!(
+        (summary.failed, summary.too_many_failures, summary.left),
+        (2, true, 2)
+    );
+}
+
+#[tokio::test]
+async fn a_selection_runs_alone_and_an_unknown_name_runs_nothing() {
+    let world = World::new(&["a", "b", "c"]).await;
+    let some = |names: &[&str]| RunOptions {
+        pairs: Some(names.iter().map(|text| name(text)).collect()),
+        ..options(2)
+    };
+    let refused = world.try_run(&some(&["b", "nobody"])).await;
+    assert!(matches!(refused, Err(RunError::NoSuchPair(names)) if names == [name("nobody")]));
+    assert_eq!(world.run(&some(&["b"])).await.done, 1);
+    assert_eq!(world.status("a").await, JobStatus::Ready);
+    assert_eq!(world.status("b").await, JobStatus::Done);
+}
+
+#[tokio::test]
+async fn a_run_up_to_a_stage_stops_there() {
+    let world = World::new(&["a", "b"]).await;
+    let early = RunOptions {
+        until: Stage::Depth,
+        ..options(2)
+    };
+    let summary = world.run(&early).await;
+    assert_eq!((summary.done, summary.stages, summary.left), (2, 4, 0));
+    assert_eq!(world.run(&options(2)).await.stages, 4);
+}
+
+#[tokio::test]
+async fn what_a_dead_process_left_comes_back_at_once() {
+    let world = World::new(&["a", "b"]).await;
+    let info = WorkerInfo {
+        host: "here".to_owned(),
+        pid: 1,
+        boot_id: None,
+    };
+    let dead = world
+        .catalog
+        .register_worker(info, 1)
+        .await
+        .expect("a worker");
+    let request = ClaimRequest {
+        worker: dead,
+        slots: 1,
+        until: Stage::Register,
+        alone: false,
+        among: None,
+        deadline: 1,
+    };
+    assert_eq!(
+        world.catalog.claim(request).await.expect("a claim").len(),
+        1
+    );
+    assert_eq!(world.run(&options(2)).await.done, 2);
+    let events = world.events.lock().expect("no panic holds it");
+    assert!(events.contains(&RunEvent::Rescued { pairs: 1 }));
+}
+
+#[tokio::test]
+async fn a_second_run_is_refused_and_a_joined_one_shares_the_work() {
+    let world = World::new(&["wait_1", "b", "c", "d", "e", "f"]).await;
+    let (one, joined) = (
+        options(1),
+        RunOptions {
+            join: true,
+            ..options(1)
+        },
+    );
+    let others = async {
+        while world.steps.count("wait_1", Stage::Fit) == 0 {
+            tokio::task::yield_now().await;
+        }
+        let refused = world.try_run(&one).await;
+        let me = std::process::id();
+        let in_use = format!("the project is in use by pid {me}");
+        assert_eq!(refused.expect_err("in use").to_string(), in_use);
+        let open = async {
+            while world.status("f").await != JobStatus::Done {
+                tokio::task::yield_now().await;
+            }
+            world.steps.open();
+        };
+        tokio::join!(world.run(&joined), open).0
+    };
+    let (owner, joiner) = tokio::join!(world.run(&one), others);
+    assert_eq!(owner.done + joiner.done, 6);
+    assert!(joiner.done >= 5);
+    assert_eq!(world.status("wait_1").await, JobStatus::Done);
+}
+
+#[tokio::test]
+async fn a_disk_that_refuses_ends_the_run_and_blames_no_pair() {
+    let world = World::new(&["a"]).await;
+    std::fs::write(world.project.artifacts_dir(), b"in the way").expect("a file");
+    let outcome = world.try_run(&options(1)).await;
+    assert!(matches!(outcome, Err(RunError::Artifact(_))), "{outcome:?}");
+    assert_eq!(world.status("a").await, JobStatus::Ready);
+    std::fs::remove_file(world.project.artifacts_dir()).expect("removed");
+    assert_eq!(world.run(&options(1)).await.done, 1);
+}

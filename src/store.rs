@@ -1,1 +1,0 @@
-//! Inputs and artifacts on disk: temporary name, fsync, rename to the content hash.

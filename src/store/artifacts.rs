@@ -1,0 +1,216 @@
+//! Artifacts: files named by their content, either whole or not there.
+//!
+//! Temporary name, write, fsync, rename, fsync of the directory: only then may a row of the catalog name it.
+
+use std::fs::File;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use super::Project;
+use crate::domain::{ArtifactRef, ArtifactSet, ContentHash};
+
+/// An artifact that is not on disk yet.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NewArtifact {
+    /// What it is for its stage, such as `depth.png`.
+    pub role: String,
+    /// Ending of the file name without the dot.
+    pub ext: &'static str,
+    /// The bytes.
+    pub bytes: Vec<u8>,
+}
+
+impl NewArtifact {
+    /// How it will be named.
+    pub fn reference(&self) -> ArtifactRef {
+        ArtifactRef {
+            hash: ContentHash::of(&self.bytes),
+            ext: self.ext.to_owned(),
+            bytes: self.bytes.len() as u64,
+        }
+    }
+}
+
+/// Why an artifact could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum ArtifactError {
+    /// A row names it, but it is gone.
+    #[error("artifact {0} is missing")]
+    Missing(PathBuf),
+    /// It is not what it was when it was written.
+    #[error("artifact {0} was changed: its bytes do not match its name")]
+    Changed(PathBuf),
+    /// A file operation failed.
+    #[error("artifact {path}: {source}")]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+impl ArtifactError {
+    fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, source }
+    }
+}
+
+/// Makes temporary names of one process unlike each other.
+static NEXT: AtomicU64 = AtomicU64::new(0);
+
+impl Project {
+    /// Where an artifact lies.
+    pub fn artifact_path(&self, artifact: &ArtifactRef) -> PathBuf {
+        let hex = artifact.hash.to_hex();
+        let name = format!("{hex}.{}", artifact.ext);
+        self.artifacts_dir().join(&hex[..2]).join(name)
+    }
+
+    /// The bytes of an artifact, checked against its hash.
+    ///
+    /// # Errors
+    /// When the file is missing, unreadable or not what it was.
+    pub fn read_artifact(&self, artifact: &ArtifactRef) -> Result<Vec<u8>, ArtifactError> {
+        let path = self.artifact_path(artifact);
+        match std::fs::read(&path) {
+            Ok(bytes) if ContentHash::of(&bytes) == artifact.hash => Ok(bytes),
+            Ok(_) => Err(ArtifactError::Changed(path)),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                Err(ArtifactError::Missing(path))
+            }
+            Err(source) => Err(ArtifactError::Io { path, source }),
+        }
+    }
+
+    /// Writes artifacts so that all are on disk for good when this returns. One that is there already is left.
+    ///
+    /// # Errors
+    /// When the disk refuses; what was written stays, and harms nobody.
+    pub fn write_artifacts(&self, files: &[NewArtifact]) -> Result<ArtifactSet, ArtifactError> {
+        let mut written = ArtifactSet::new();
+        let mut folders = std::collections::BTreeSet::new();
+        for file in files {
+            let artifact = file.reference();
+            let path = self.artifact_path(&artifact);
+            let folder = path.parent().unwrap_or(Path::new(".")).to_owned();
+            self.make_folder(&folder)?;
+            if self.read_artifact(&artifact).is_err() {
+                self.place(&path, &file.bytes)?;
+            }
+            folders.insert(folder);
+            written.insert(file.role.clone(), artifact);
+        }
+        for folder in &folders {
+            sync_folder(folder)?;
+        }
+        Ok(written)
+    }
+
+    /// Removes what an earlier process left half-written. Only while no other process writes.
+    ///
+    /// # Errors
+    /// When the folder cannot be read or a file not removed.
+    pub fn clear_temporary(&self) -> Result<(), ArtifactError> {
+        let folder = self.temporary_dir();
+        match std::fs::remove_dir_all(&folder) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(ArtifactError::io(&folder)(error))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn temporary_dir(&self) -> PathBuf {
+        self.artifacts_dir().join("tmp")
+    }
+
+    fn make_folder(&self, folder: &Path) -> Result<(), ArtifactError> {
+        if folder.is_dir() {
+            return Ok(());
+        }
+        std::fs::create_dir_all(folder).map_err(ArtifactError::io(folder))?;
+        sync_folder(&self.artifacts_dir())
+    }
+
+    fn place(&self, path: &Path, bytes: &[u8]) -> Result<(), ArtifactError> {
+        let folder = self.temporary_dir();
+        self.make_folder(&folder)?;
+        let number = NEXT.fetch_add(1, Ordering::Relaxed);
+        let temporary = folder.join(format!("{}-{number}", std::process::id()));
+        let outcome = write_synced(&temporary, bytes)
+            .and_then(|()| std::fs::rename(&temporary, path))
+            .map_err(ArtifactError::io(path));
+        if outcome.is_err() {
+            // A full disk is better without it; that it cannot be removed changes nothing.
+            let _ = std::fs::remove_file(&temporary);
+        }
+        outcome
+    }
+}
+
+fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
+/// Makes the names in a folder durable.
+fn sync_folder(folder: &Path) -> Result<(), ArtifactError> {
+    File::open(folder)
+        .and_then(|folder| folder.sync_all())
+        .map_err(ArtifactError::io(folder))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ArtifactError, NewArtifact};
+    use crate::store::Project;
+
+    fn project() -> (tempfile::TempDir, Project) {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(dir.path()).expect("a project");
+        (dir, project)
+    }
+
+    fn picture(bytes: &[u8]) -> NewArtifact {
+        NewArtifact {
+            role: "depth.png".to_owned(),
+            ext: "png",
+            bytes: bytes.to_owned(),
+        }
+    }
+
+    #[test]
+    fn what_was_written_is_read_back_and_the_same_bytes_are_one_file() {
+        let (_dir, project) = project();
+        let first = project.write_artifacts(&[picture(b"a")]).expect("written");
+        let second = project.write_artifacts(&[picture(b"a")]).expect("written");
+        assert_eq!(first, second);
+        let artifact = &first["depth.png"];
+        assert_eq!(project.read_artifact(artifact).expect("read"), b"a");
+        let left = std::fs::read_dir(project.artifacts_dir().join("tmp")).expect("a folder");
+        assert_eq!(left.count(), 0);
+    }
+
+    #[test]
+    fn a_changed_artifact_is_told_and_written_anew() {
+        let (_dir, project) = project();
+        let written = project.write_artifacts(&[picture(b"a")]).expect("written");
+        let artifact = &written["depth.png"];
+        std::fs::write(project.artifact_path(artifact), b"b").expect("a file");
+        let outcome = project.read_artifact(artifact);
+        assert!(matches!(outcome, Err(ArtifactError::Changed(_))));
+        project.write_artifacts(&[picture(b"a")]).expect("written");
+        assert_eq!(project.read_artifact(artifact).expect("read"), b"a");
+    }
+
+    #[test]
+    fn a_missing_artifact_is_told() {
+        let (_dir, project) = project();
+        let outcome = project.read_artifact(&picture(b"a").reference());
+        assert!(matches!(outcome, Err(ArtifactError::Missing(_))));
+    }
+}

@@ -1,0 +1,11 @@
+//! A project on disk: its directory, its input files, its artifacts, and the lock of its run.
+
+mod artifacts;
+mod inputs;
+mod lock;
+mod project;
+
+pub use artifacts::{ArtifactError, NewArtifact};
+pub use inputs::{FileStat, InputError, InputFile, hash_input, read_input, stat_input};
+pub use lock::{LockError, RunLock};
+pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};

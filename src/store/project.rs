@@ -1,0 +1,146 @@
+//! The project directory: where its catalog, settings, artifacts and inputs lie.
+
+use std::path::{Path, PathBuf};
+
+/// Name of the catalog file in a project.
+pub const CATALOG_FILE: &str = "catalog.sqlite";
+/// Name of the settings file in a project.
+pub const SETTINGS_FILE: &str = "mocban.toml";
+/// Name of the folder of artifacts in a project.
+const ARTIFACTS: &str = "artifacts";
+
+/// A project directory.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Project {
+    dir: PathBuf,
+}
+
+/// What can go wrong with a project's directory.
+#[derive(Debug, thiserror::Error)]
+pub enum StoreError {
+    /// The directory holds no catalog.
+    #[error("no project at {0}: it has no {CATALOG_FILE}")]
+    NoProject(PathBuf),
+    /// A path that the catalog cannot hold.
+    #[error("path {0:?} is not UTF-8")]
+    NotUtf8(PathBuf),
+    /// A file operation failed.
+    #[error("{path}: {source}")]
+    Io {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+impl StoreError {
+    pub(super) fn io(path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, source }
+    }
+}
+
+impl Project {
+    /// A project that is there.
+    ///
+    /// # Errors
+    /// When the directory holds no catalog.
+    pub fn open(dir: &Path) -> Result<Self, StoreError> {
+        if !dir.join(CATALOG_FILE).is_file() {
+            return Err(StoreError::NoProject(dir.to_owned()));
+        }
+        Ok(Self {
+            dir: dir.to_owned(),
+        })
+    }
+
+    /// Makes the directory where it is missing. The catalog is made by `Catalog::create`.
+    ///
+    /// # Errors
+    /// When it cannot be made.
+    pub fn create(dir: &Path) -> Result<Self, StoreError> {
+        std::fs::create_dir_all(dir).map_err(StoreError::io(dir))?;
+        Ok(Self {
+            dir: dir.to_owned(),
+        })
+    }
+
+    /// The directory.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// Path of the catalog.
+    pub fn catalog_path(&self) -> PathBuf {
+        self.dir.join(CATALOG_FILE)
+    }
+
+    /// Path of the settings file, which may not be there.
+    pub fn settings_path(&self) -> PathBuf {
+        self.dir.join(SETTINGS_FILE)
+    }
+
+    /// Folder of the artifacts.
+    pub fn artifacts_dir(&self) -> PathBuf {
+        self.dir.join(ARTIFACTS)
+    }
+
+    /// Where an input lies: stored paths are relative to the project, or absolute.
+    pub fn input_path(&self, stored: &str) -> PathBuf {
+        self.dir.join(stored)
+    }
+
+    /// How a path is stored: relative to the project when it lies below it, so that a project that is moved with
+    /// its data keeps working; otherwise absolute. The file need not be there.
+    ///
+    /// # Errors
+    /// When the working directory cannot be told, or the path is not UTF-8.
+    pub fn stored_path(&self, path: &Path) -> Result<String, StoreError> {
+        let absolute = std::path::absolute(path).map_err(StoreError::io(path))?;
+        let dir = std::path::absolute(&self.dir).map_err(StoreError::io(&self.dir))?;
+        let stored = match absolute.strip_prefix(&dir) {
+            Ok(below) => below.to_owned(),
+            Err(_) => below_resolved(&absolute, &dir).unwrap_or(absolute),
+        };
+        match stored.to_str() {
+            Some(text) => Ok(text.to_owned()),
+            None => Err(StoreError::NotUtf8(stored)),
+        }
+    }
+}
+
+/// The same with links resolved; `None` when the path is not there or not below.
+fn below_resolved(path: &Path, dir: &Path) -> Option<PathBuf> {
+    let path = path.canonicalize().ok()?;
+    let dir = dir.canonicalize().ok()?;
+    Some(path.strip_prefix(dir).ok()?.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::{Project, StoreError};
+
+    #[test]
+    fn a_file_below_the_project_is_stored_relative_to_it() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(&dir.path().join("project")).expect("a project");
+        let inside = project.dir().join("data/1.stl");
+        let stored = project.stored_path(&inside).expect("a path");
+        assert_eq!(stored, "data/1.stl");
+        assert_eq!(project.input_path(&stored), inside);
+        let outside = dir.path().join("scans/1.stl");
+        let stored = project.stored_path(&outside).expect("a path");
+        assert_eq!(Path::new(&stored), outside);
+        assert_eq!(project.input_path(&stored), outside);
+    }
+
+    #[test]
+    fn a_directory_without_a_catalog_is_no_project() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let outcome = Project::open(dir.path());
+        assert!(matches!(outcome, Err(StoreError::NoProject(_))));
+    }
+}
