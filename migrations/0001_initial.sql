@@ -105,7 +105,7 @@ CREATE TABLE stage_result (
     worker INTEGER NOT NULL REFERENCES worker (id),
     at INTEGER NOT NULL,
     PRIMARY KEY (pair, stage),
-    CHECK ((stage >= 2) = (print_hash IS NOT NULL))
+    CHECK (stage < 2 OR print_hash IS NOT NULL)
 ) STRICT;
 
 -- The numbers of each threshold metric; verdicts are bound to its result_hash.

@@ -30,12 +30,15 @@ pub(super) enum Request {
     Claim(ClaimRequest, Reply<Vec<Lease>>),
 }
 
+/// Something to be stored under a lease, and where to say whether it was.
+type Under<T> = (Box<(Lease, T)>, Reply<bool>);
+
 /// Requests of one commit by kind.
 #[derive(Default)]
 pub(super) struct Batch {
     beats: Vec<(Beat, Reply<()>)>,
-    checkpoints: Vec<(Box<(Lease, StageDone)>, Reply<bool>)>,
-    failures: Vec<(Box<(Lease, StageFailed)>, Reply<bool>)>,
+    checkpoints: Vec<Under<StageDone>>,
+    failures: Vec<Under<StageFailed>>,
     releases: Vec<(Lease, Reply<bool>)>,
     claims: Vec<(ClaimRequest, Reply<Vec<Lease>>)>,
 }

@@ -9,7 +9,7 @@ use super::batch::Request;
 use super::claim::kept_pairs;
 use super::counters::{DONE, Deltas, cursor};
 use super::lease::{InputsSeen, Kept, Lease, MetricResult, StageDone};
-use super::{Catalog, Result};
+use super::{Catalog, Result, rows};
 use crate::domain::JobStatus;
 
 /// The job's step; only where the lease still holds.
@@ -76,18 +76,18 @@ pub(super) async fn apply(
     if done.is_empty() {
         return Ok(Vec::new());
     }
-    let steps = Value::from_iter(done.iter().map(|item| step(item)));
+    let steps = rows::array(done.iter().map(|item| step(item)));
     let kept = kept_pairs(conn, STEP, &steps).await?;
     let stored: Vec<_> = done
         .iter()
         .filter(|item| kept.contains(&item.0.pair.0))
         .collect();
     if !stored.is_empty() {
-        let results = Value::from_iter(stored.iter().map(|item| result(item))).to_string();
+        let results = rows::array(stored.iter().map(|item| result(item))).to_string();
         for sql in [RESULT, ATTEMPT, CLEAR_FAILURE] {
             sqlx::query(sql).bind(&results).execute(&mut *conn).await?;
         }
-        let metrics = Value::from_iter(stored.iter().flat_map(|item| metrics(item)));
+        let metrics = rows::array(stored.iter().flat_map(|item| metrics(item)));
         run_over(conn, METRICS, &metrics).await?;
         let seen = stored.iter().map(|(lease, done)| (lease, &done.inputs));
         store_seen(conn, seen).await?;
@@ -134,7 +134,7 @@ pub(super) async fn store_seen<'a>(
     seen: impl Iterator<Item = (&'a Lease, &'a InputsSeen)>,
 ) -> Result<()> {
     let items = seen.filter(|(_, seen)| seen.mesh.is_some() || seen.print.is_some());
-    let items = Value::from_iter(items.map(|(lease, seen)| seen_json(lease.pair.0, seen)));
+    let items = rows::array(items.map(|(lease, seen)| seen_json(lease.pair.0, seen)));
     run_over(conn, SEEN, &items).await
 }
 

@@ -139,7 +139,7 @@ pub(super) async fn release(
     if leases.is_empty() {
         return Ok(Vec::new());
     }
-    let items = Value::from_iter(leases.iter().map(|lease| fence(lease)));
+    let items = rows::array(leases.iter().map(|lease| fence(lease)));
     let kept = kept_pairs(conn, RELEASE, &items).await?;
     Ok(leases
         .iter()

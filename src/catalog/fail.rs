@@ -8,7 +8,7 @@ use super::checkpoint::store_seen;
 use super::claim::kept_pairs;
 use super::counters::{Deltas, cursor};
 use super::lease::{Lease, Sentence, StageFailed};
-use super::{Catalog, Result};
+use super::{Catalog, Result, rows};
 use crate::domain::JobStatus;
 
 /// Attempts that are kept of a pair that fails again and again.
@@ -53,14 +53,14 @@ pub(super) async fn apply(
     if failed.is_empty() {
         return Ok(Vec::new());
     }
-    let items = Value::from_iter(failed.iter().map(|item| json_of(item)));
+    let items = rows::array(failed.iter().map(|item| json_of(item)));
     let kept = kept_pairs(conn, FAIL, &items).await?;
     let stored: Vec<_> = failed
         .iter()
         .filter(|item| kept.contains(&item.0.pair.0))
         .collect();
     if !stored.is_empty() {
-        let items = Value::from_iter(stored.iter().map(|item| json_of(item))).to_string();
+        let items = rows::array(stored.iter().map(|item| json_of(item))).to_string();
         for sql in [FAILURE, ATTEMPT] {
             sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
         }

@@ -145,7 +145,7 @@ async fn import_chunk(
     now: UnixMillis,
     summary: &mut ImportSummary,
 ) -> Result<()> {
-    let names = Value::from_iter(chunk.iter().map(|row| row.name.as_str())).to_string();
+    let names = rows::array(chunk.iter().map(|row| row.name.as_str())).to_string();
     let known = sqlx::query(SELECT)
         .bind(&names)
         .fetch_all(&mut *conn)
@@ -164,7 +164,7 @@ async fn import_chunk(
             }),
         }
     }
-    let items = Value::from_iter(chunk.iter().map(item)).to_string();
+    let items = rows::array(chunk.iter().map(item)).to_string();
     sqlx::query(UPSERT)
         .bind(items)
         .bind(now)

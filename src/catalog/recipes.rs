@@ -4,7 +4,7 @@ use serde_json::{Value, json};
 use sqlx::SqliteConnection;
 
 use super::lease::RecipeId;
-use super::{Catalog, CatalogError, Result};
+use super::{Catalog, CatalogError, Result, rows};
 use crate::domain::{ContentHash, Stage};
 
 /// One stage's recipe.
@@ -104,7 +104,7 @@ pub(super) async fn known(
 pub(super) async fn current_json(conn: &mut SqliteConnection, recipes: &Recipes) -> Result<String> {
     let ids = known(conn, recipes).await?;
     let ids = ids.iter().map(|id| id.map_or(-1, |RecipeId(id)| id));
-    Ok(Value::from_iter(ids).to_string())
+    Ok(rows::array(ids).to_string())
 }
 
 #[cfg(test)]

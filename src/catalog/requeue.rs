@@ -1,6 +1,6 @@
 //! Taking pairs up again: after a change of settings or inputs, or because somebody asks.
 
-use serde_json::{Value, json};
+use serde_json::json;
 use sqlx::{Row as _, SqliteConnection};
 
 use super::claim::PairSelection;
@@ -162,7 +162,7 @@ async fn apply(conn: &mut SqliteConnection, moved: &[Moved]) -> Result<u64> {
     let items = moved
         .iter()
         .map(|moved| json!([moved.pair, moved.to.index()]));
-    let items = Value::from_iter(items).to_string();
+    let items = rows::array(items).to_string();
     for sql in [SEND_BACK, FORGET] {
         sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
     }

@@ -56,5 +56,10 @@ pub(super) fn pair_name(text: &str) -> Result<PairName> {
 
 /// Names as a JSON array for `json_each`.
 pub(super) fn names_json(names: &[PairName]) -> String {
-    Value::from_iter(names.iter().map(PairName::as_str)).to_string()
+    array(names.iter().map(PairName::as_str)).to_string()
+}
+
+/// A JSON array for `json_each`.
+pub(super) fn array<T: Into<Value>>(items: impl IntoIterator<Item = T>) -> Value {
+    Value::Array(items.into_iter().map(Into::into).collect())
 }

@@ -67,13 +67,8 @@ pub(super) struct Seen {
     pub(super) pair: i64,
     pub(super) cursor: i64,
     pub(super) status: JobStatus,
-    /// First result that would be made otherwise now.
-    first: Option<Stage>,
-    /// The recipe it was made with.
-    recipe: Option<i64>,
-    mesh: bool,
-    print: bool,
-    facts: bool,
+    /// First stage whose result would be made otherwise now, and what changed.
+    change: Option<(Stage, Cause)>,
     /// Whether its failure was of other settings or inputs than the current ones.
     otherwise: bool,
 }
@@ -100,14 +95,13 @@ pub(super) fn decide(seen: &Seen, again: Again) -> Option<(Stage, Cause)> {
     if matches!(seen.status, JobStatus::Leased | JobStatus::Held) {
         return None;
     }
-    let changed = seen.first.map(|stage| (stage, changed(seen, stage)));
     let asked = match again {
         Again::All(from) => Some((next.map_or(from, |next| next.min(from)), Cause::Asked)),
         Again::Failed if seen.status == JobStatus::Quarantined => next.map(|at| (at, Cause::Asked)),
         Again::Failed | Again::Changed => None,
     };
     // The earlier start wins; between equals the change says more than the asking.
-    match (changed, asked) {
+    match (seen.change, asked) {
         (Some(changed), Some(asked)) if asked.0 < changed.0 => return Some(asked),
         (Some(changed), _) => return Some(changed),
         (None, Some(asked)) => return Some(asked),
@@ -123,18 +117,6 @@ pub(super) fn decide(seen: &Seen, again: Again) -> Option<(Stage, Cause)> {
         }
     };
     next.map(|at| (at, cause))
-}
-
-fn changed(seen: &Seen, stage: Stage) -> Cause {
-    if seen.mesh {
-        Cause::Mesh
-    } else if seen.print {
-        Cause::Print
-    } else if seen.facts {
-        Cause::Manifest
-    } else {
-        Cause::Settings(stage, seen.recipe.unwrap_or_default())
-    }
 }
 
 /// Looks at the next jobs after a pair.
@@ -158,16 +140,29 @@ pub(super) async fn look(
 
 fn seen(row: &SqliteRow) -> Result<Seen> {
     let first: Option<i64> = row.try_get("first")?;
+    let change = match first.map(rows::stage).transpose()? {
+        Some(stage) => Some((stage, changed(row, stage)?)),
+        None => None,
+    };
     Ok(Seen {
         pair: row.try_get("pair")?,
         cursor: row.try_get("stage")?,
         status: rows::status(row.try_get("status")?)?,
-        first: first.map(rows::stage).transpose()?,
-        recipe: row.try_get("recipe")?,
-        mesh: row.try_get("mesh")?,
-        print: row.try_get("print")?,
-        facts: row.try_get("facts")?,
+        change,
         otherwise: row.try_get("otherwise")?,
+    })
+}
+
+/// What the first result that would be made otherwise differs in. Inputs go before settings: they say more.
+fn changed(row: &SqliteRow, stage: Stage) -> Result<Cause> {
+    Ok(if row.try_get("mesh")? {
+        Cause::Mesh
+    } else if row.try_get("print")? {
+        Cause::Print
+    } else if row.try_get("facts")? {
+        Cause::Manifest
+    } else {
+        Cause::Settings(stage, row.try_get("recipe")?)
     })
 }
 
@@ -325,11 +320,7 @@ mod tests {
             pair: 1,
             cursor,
             status,
-            first: None,
-            recipe: None,
-            mesh: false,
-            print: false,
-            facts: false,
+            change: None,
             otherwise: false,
         }
     }
@@ -355,8 +346,7 @@ mod tests {
     #[test]
     fn the_first_changed_stage_is_where_it_starts() {
         let mut print_changed = seen(4, JobStatus::Done);
-        print_changed.first = Some(Stage::Normalize);
-        print_changed.print = true;
+        print_changed.change = Some((Stage::Normalize, Cause::Print));
         let found = decide(&print_changed, Again::All(Stage::Register));
         assert_eq!(found, Some((Stage::Normalize, Cause::Print)));
     }

@@ -22,7 +22,7 @@ struct World {
     catalog: Catalog,
     recipes: RecipeIds,
     worker: WorkerId,
-    _dir: tempfile::TempDir,
+    dir: tempfile::TempDir,
 }
 
 fn name(text: &str) -> PairName {
@@ -63,7 +63,7 @@ impl World {
             catalog,
             recipes,
             worker,
-            _dir: dir,
+            dir,
         }
     }
 

@@ -29,7 +29,7 @@ impl Catalog {
                     let items = chunk
                         .iter()
                         .map(|(name, body)| json!({ "name": name, "body": body.to_string() }));
-                    let items = Value::from_iter(items).to_string();
+                    let items = rows::array(items).to_string();
                     let unknown: Option<String> = sqlx::query_scalar(UNKNOWN)
                         .bind(&items)
                         .fetch_optional(&mut *conn)

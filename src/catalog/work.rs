@@ -1,6 +1,5 @@
 //! What a worker needs to know of the pair it leased, and of its inputs.
 
-use serde_json::Value;
 use sqlx::Row as _;
 
 use super::claim::PairSelection;
@@ -101,7 +100,7 @@ impl Catalog {
                 let items = seen
                     .iter()
                     .map(|(pair, seen)| checkpoint::seen_json(pair.0, seen));
-                checkpoint::run_seen(conn, &Value::from_iter(items)).await
+                checkpoint::run_seen(conn, &rows::array(items)).await
             })
         })
         .await

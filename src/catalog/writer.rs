@@ -42,14 +42,12 @@ pub(super) async fn run(mut conn: SqliteConnection, mut inbox: mpsc::Receiver<Me
         let message = if commits == 0 {
             inbox.recv().await
         } else {
-            match tokio::time::timeout(IDLE, inbox.recv()).await {
-                Ok(message) => message,
-                Err(_) => {
-                    fold_log(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
-                    commits = 0;
-                    continue;
-                }
-            }
+            let Ok(message) = tokio::time::timeout(IDLE, inbox.recv()).await else {
+                fold_log(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
+                commits = 0;
+                continue;
+            };
+            message
         };
         match message {
             None => break None,
@@ -148,11 +146,11 @@ async fn end<T>(conn: &mut SqliteConnection, outcome: Result<T>) -> Result<T> {
     outcome
 }
 
-/// Whether another connection holds the lock (SQLITE_BUSY and its extended codes).
+/// Whether another connection holds the lock (`SQLITE_BUSY` and its extended codes).
 fn is_busy(error: &sqlx::Error) -> bool {
     let code = error
         .as_database_error()
-        .and_then(|inner| inner.code())
+        .and_then(sqlx::error::DatabaseError::code)
         .and_then(|code| code.parse::<i64>().ok());
     code.is_some_and(|code| code & 0xff == 5)
 }

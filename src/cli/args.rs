@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
 use super::exit::ExitCode;
-use super::{completions, config, import, man, retry, run, show, status, verdict};
+use super::{
+    completions, config, demo, export, import, man, report, retry, run, sheet, show, status,
+    verdict,
+};
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
 ///
@@ -114,6 +117,8 @@ pub(super) enum ProgressMode {
 /// What to do.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
+    /// Make the built-in dataset, run it and print the report
+    Demo(demo::DemoArgs),
     /// Take pairs of meshes and prints into the project
     Import(import::ImportArgs),
     /// Align the pairs that are left to align
@@ -127,6 +132,12 @@ pub(super) enum Command {
     /// Record what people say of the results
     #[command(subcommand)]
     Verdict(verdict::VerdictCommand),
+    /// Print the table of all results
+    Report(report::ReportArgs),
+    /// Write the aligned pairs for other tools
+    Export(export::ExportArgs),
+    /// Lay many overlays on one PNG, worst first
+    Sheet(sheet::SheetArgs),
     /// Show the settings in force
     #[command(subcommand)]
     Config(config::ConfigCommand),

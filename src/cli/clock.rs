@@ -26,6 +26,14 @@ pub(super) fn span(ms: u64) -> String {
     }
 }
 
+/// A time that is only guessed: no fractions of a second.
+pub(super) fn rough(ms: u64) -> String {
+    match ms.div_ceil(1000) {
+        seconds @ 0..60 => format!("{seconds} s"),
+        _ => span(ms),
+    }
+}
+
 /// Year, month and day of a day since 1970 in the Gregorian calendar, by eras of 400 years that begin in March.
 const fn civil(day: i64) -> (i64, i64, i64) {
     let shifted = day + 719_468;

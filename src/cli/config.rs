@@ -47,7 +47,8 @@ fn as_json(settings: &[Setting]) -> serde_json::Value {
     json!({"schema": 1, "settings": values})
 }
 
-fn as_toml(settings: &[Setting], origins: bool, palette: Palette) -> String {
+/// Settings as a file that reads back the same, with the origins in comments where they are wanted.
+pub(super) fn as_toml(settings: &[Setting], origins: bool, palette: Palette) -> String {
     let mut text = String::new();
     let mut section = "";
     let longest = settings.iter().map(|setting| line(setting).len()).max();

@@ -88,12 +88,6 @@ pub(super) enum Refusal {
         /// Where it was looked for.
         dir: PathBuf,
     },
-    /// Another process runs the project.
-    #[error("the project is in use{}", .pid.map_or_else(String::new, |pid| format!(" by pid {pid}")))]
-    InUse {
-        /// Its process, where it is known.
-        pid: Option<u32>,
-    },
     /// Names that are no pairs, or a selection without pairs.
     #[error("{0}")]
     NothingSelected(String),
@@ -107,7 +101,6 @@ impl Refusal {
     pub(super) const fn code(&self) -> ExitCode {
         match self {
             Self::NoProject { .. } => ExitCode::NoProject,
-            Self::InUse { .. } => ExitCode::InUse,
             Self::NothingSelected(_) => ExitCode::NothingSelected,
             Self::Usage(_) => ExitCode::Usage,
         }

@@ -5,16 +5,20 @@ mod clock;
 mod completions;
 mod config;
 mod context;
+mod demo;
 mod exit;
+mod export;
 mod failures;
 mod import;
 mod logging;
 mod man;
 mod manifest_file;
 mod progress;
+mod report;
 mod retry;
 mod run;
 mod select;
+mod sheet;
 mod show;
 mod show_text;
 mod signals;
@@ -100,12 +104,16 @@ fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
 
 async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
     match command {
+        Command::Demo(args) => demo::demo(args, context).await,
         Command::Import(args) => import::import(args, context).await,
         Command::Run(args) => run::run(args, context).await,
         Command::Status(args) => status::status(args, context).await,
         Command::Show(args) => show::show(args, context).await,
         Command::Retry(args) => retry::retry(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
+        Command::Report(args) => report::report(args, context).await,
+        Command::Export(args) => export::export(args, context).await,
+        Command::Sheet(args) => sheet::sheet(args, context).await,
         Command::Config(command) => config::config(&command, context),
         Command::Completions(args) => completions::completions(args, context),
         Command::Man(args) => man::man(&args, context),
@@ -161,13 +169,18 @@ fn code_of(error: &anyhow::Error) -> ExitCode {
             return ExitCode::Usage;
         }
         match cause.downcast_ref::<RunError>() {
-            Some(RunError::InUse { .. }) => return ExitCode::InUse,
+            Some(RunError::InUse(_)) => return ExitCode::InUse,
             Some(RunError::NoSuchPair(_)) => return ExitCode::NothingSelected,
             Some(_) | None => {}
         }
         match cause.downcast_ref::<CatalogError>() {
             Some(CatalogError::Missing(_)) => return ExitCode::NoProject,
-            Some(CatalogError::UnknownPair(_)) => return ExitCode::NothingSelected,
+            Some(
+                CatalogError::UnknownPair(_)
+                | CatalogError::NoResult(_)
+                | CatalogError::NoMetricResult(..)
+                | CatalogError::NothingToUndo(_),
+            ) => return ExitCode::NothingSelected,
             Some(_) | None => {}
         }
         if matches!(
@@ -220,9 +233,10 @@ mod tests {
 
     #[test]
     fn refusal_keeps_its_code_under_context() {
-        let error = anyhow::Error::new(Refusal::InUse { pid: Some(7) }).context("run");
-        assert_eq!(code_of(&error), ExitCode::InUse);
-        assert_eq!(sentence(&error), "run: the project is in use by pid 7");
+        let error =
+            anyhow::Error::new(Refusal::NothingSelected("no pair".to_owned())).context("run");
+        assert_eq!(code_of(&error), ExitCode::NothingSelected);
+        assert_eq!(sentence(&error), "run: no pair");
     }
 
     #[test]

@@ -66,6 +66,8 @@ enum Form {
 /// A plain line comes after this time or this share of the work, whichever is first.
 const PLAIN_EVERY: Duration = Duration::from_secs(10);
 const PLAIN_PERCENT: u64 = 5;
+/// However fast the work goes, plain lines are at least this far apart.
+const PLAIN_LEAST: Duration = Duration::from_secs(1);
 
 impl Progress {
     /// Progress in the form asked for; `-q` takes the automatic one away.

@@ -14,7 +14,7 @@ use super::table::{Align, columns, count};
 use super::{select, signals};
 use crate::catalog::{Catalog, Plan};
 use crate::config::Config;
-use crate::domain::Stage;
+use crate::domain::{JobStatus, Stage};
 use crate::runner::{self, RunOptions, RunSummary, Stop};
 use crate::store::Project;
 
@@ -78,6 +78,9 @@ pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<Exit
         context.talk.json(&as_json(&summary))?;
     }
     tell_end(&summary, &failures, context);
+    for command in next_steps(&summary, &failures) {
+        context.talk.next(&context.command(&command));
+    }
     Ok(code(&summary))
 }
 
@@ -108,6 +111,8 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
             workers => workers,
         },
         stage_limit: Duration::from_secs(config.run.stage_limit_s),
+        mesh_limits: config.limits.mesh,
+        image_limits: config.limits.image,
         ..plain
     }
 }
@@ -154,16 +159,13 @@ pub(super) const fn code(summary: &RunSummary) -> ExitCode {
     }
 }
 
-/// Says how a run ended, which pairs failed, and what comes next.
+/// Says how a run ended and which pairs failed.
 pub(super) fn tell_end(summary: &RunSummary, failures: &Failures, context: &Context) {
     let talk = &context.talk;
     talk.say(&headline(summary));
     if summary.failed_in_all > 0 {
         let number = count(summary.failed_in_all, "pair");
         talk.say(&format!("{number} failed:\n{}", failures.text().trim_end()));
-    }
-    for command in next_steps(summary, failures) {
-        talk.next(&context.command(&command));
     }
 }
 
@@ -201,19 +203,21 @@ fn headline(summary: &RunSummary) -> String {
     )
 }
 
-fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<String> {
+/// What a person may want to do after a run.
+pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<String> {
     let mut steps = Vec::new();
     if summary.status.pairs == 0 {
         steps.push("import pairs.csv".to_owned());
     }
-    if summary.stopped || summary.left > 0 {
+    let jobs = |status| summary.status.jobs.get(&status).copied().unwrap_or(0);
+    if jobs(JobStatus::Ready) + jobs(JobStatus::Backoff) > 0 {
         steps.push("run".to_owned());
     }
     if let Some(first) = failures.first().filter(|_| summary.failed_in_all > 0) {
         steps.push(format!("show {}", first.name));
         steps.push("retry".to_owned());
     }
-    if summary.left == 0 && summary.status.pairs > summary.failed_in_all {
+    if jobs(JobStatus::Done) > 0 && !summary.stopped {
         steps.push("report".to_owned());
     }
     steps
@@ -281,7 +285,7 @@ fn plan_text(plan: &Plan) -> String {
 mod tests {
     use super::{Plan, plan_text};
     use crate::catalog::{FieldChange, PlanEntry, WorkReason};
-    use crate::domain::Stage;
+    use crate::domain::{JobStatus, Stage};
 
     #[test]
     fn plan_names_the_setting_that_changed() {

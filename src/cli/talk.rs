@@ -51,7 +51,6 @@ impl Palette {
     }
 
     /// Never any colour.
-    #[cfg(test)]
     pub(super) const PLAIN: Self = Self { on: false };
 
     /// Whether it paints at all.

@@ -71,7 +71,7 @@ impl Tally {
         parts.join("  ")
     }
 
-    /// One line for a log: `42 % · 10 of 24 pairs done, 1 failed · 3.1 stages/s · about 17.0 s left`.
+    /// One line for a log: `42 % · 10 of 24 pairs done, 1 failed · 3.1 stages/s · about 17 s left`.
     pub(super) fn line(&self, elapsed_ms: u64) -> String {
         let mut line = format!(
             "{} % · {} of {} pairs done, {} failed",
@@ -84,7 +84,7 @@ impl Tally {
             let left_ms = self.stages.saturating_sub(self.passed) as f64 / rate * 1000.0;
             line += &format!(
                 " · {rate:.1} stages/s · about {} left",
-                super::clock::span(left_ms as u64)
+                super::clock::rough(left_ms as u64)
             );
         }
         line
@@ -151,7 +151,7 @@ mod tests {
         );
         assert_eq!(
             tally.line(1000),
-            "100 % · 1 of 2 pairs done, 1 failed · 5.0 stages/s · about 0 ms left"
+            "100 % · 1 of 2 pairs done, 1 failed · 5.0 stages/s · about 0 s left"
         );
     }
 

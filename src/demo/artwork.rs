@@ -75,8 +75,8 @@ impl Artwork {
     pub(super) fn surroundings(&self, glyphs: &Glyphs, rng: &mut ChaCha8Rng) -> Field {
         let frame = self.strokes.frame;
         let mut coverage = Grid::new(frame.side, frame.side, 0.0);
-        let pitch = self.size_mm * rng.random_range(1.02..1.1) + 0.3;
-        let column = self.size_mm * rng.random_range(1.06..1.2) + 0.5;
+        let pitch = self.size_mm * rng.random_range(1.0..1.08) + 0.2;
+        let column = self.size_mm * rng.random_range(1.04..1.18) + 0.4;
         for offset in [[0.0, -pitch], [0.0, pitch], [-column, 0.0], [column, 0.0]] {
             if rng.random_bool(0.75) {
                 let characters = glyphs.characters();
@@ -123,22 +123,23 @@ fn carved(distance: &Field, weight_mm: f64, rng: &mut ChaCha8Rng) -> Field {
 
 /// Small bites out of the strokes' rims.
 fn chip(strokes: &mut Field, rng: &mut ChaCha8Rng) {
-    let frame = strokes.frame;
     for _ in 0..rng.random_range(2..9_u32) {
         let Some([u, v]) = rim_point(strokes, rng) else {
             return;
         };
-        let radius = rng.random_range(0.08..0.24);
-        for y in 0..frame.side {
-            for x in 0..frame.side {
-                let [pu, pv] = frame.position(x, y);
-                let outside = (pu - u).hypot(pv - v) - radius;
-                if outside < 0.3 {
-                    let value = strokes.at(x, y).min(outside);
-                    strokes.values.set(x, y, value as f32);
-                }
-            }
-        }
+        bite(strokes, [u, v], rng.random_range(0.08..0.24));
+    }
+}
+
+/// Takes a disc out of the strokes.
+fn bite(strokes: &mut Field, [u, v]: [f64; 2], radius_mm: f64) {
+    let frame = strokes.frame;
+    let reach = radius_mm + 0.3;
+    for (x, y) in frame.box_around([u, v], reach) {
+        let [pu, pv] = frame.position(x, y);
+        let outside = (pu - u).hypot(pv - v) - radius_mm;
+        let value = strokes.at(x, y).min(outside);
+        strokes.values.set(x, y, value as f32);
     }
 }
 

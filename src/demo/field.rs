@@ -34,6 +34,21 @@ impl Frame {
         ]
     }
 
+    /// The samples within `reach_mm` of a point in each direction.
+    pub(super) fn box_around(
+        self,
+        centre: [f64; 2],
+        reach_mm: f64,
+    ) -> impl Iterator<Item = (usize, usize)> {
+        let last = (self.side - 1) as f64;
+        let bound = |offset: f64| {
+            let point = centre.map(|c| c + offset);
+            self.sample(point).map(|c| c.clamp(0.0, last) as usize)
+        };
+        let ([x0, y0], [x1, y1]) = (bound(-reach_mm), bound(reach_mm));
+        (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| (x, y)))
+    }
+
     /// Sample coordinates of a point in mm.
     pub(super) fn sample(self, [u, v]: [f64; 2]) -> [f64; 2] {
         let half = self.half_mm();

@@ -108,7 +108,10 @@ mod tests {
         Glyphs::embedded().ink('國', frame, [1.0, -0.5], 8.0, &mut coverage);
         let found = coverage.map(|share| *share > 0.5).bounding_box();
         let found = found.expect("the glyph has ink");
-        let middle = frame.position((found.x0 + found.x1) / 2, (found.y0 + found.y1) / 2);
+        let middle = frame.position(
+            usize::midpoint(found.x0, found.x1),
+            usize::midpoint(found.y0, found.y1),
+        );
         assert!((middle[0] - 1.0).abs() < 0.1 && (middle[1] + 0.5).abs() < 0.1);
         let longest = found.width().max(found.height()) as f64 * frame.step_mm;
         assert!((longest - 8.0).abs() < 0.15, "{longest}");

@@ -101,10 +101,11 @@ impl Inking {
         let bristle = self.bristles.rough(u / 0.2, v / 0.2);
         let edge = mix(1.4, 0.15, dry);
         let patchy = 0.85 * ramp(edge, edge + 0.45, bristle);
+        let rag_mm = 0.05 * bristle;
         let broken = self
             .gaps
             .iter()
-            .map(|spot| (0.5 + spot.inside_mm(point) / (1.4 * px_mm)).clamp(0.0, 0.9));
+            .map(|spot| (0.5 + (spot.inside_mm(point) + rag_mm) / (1.4 * px_mm)).clamp(0.0, 0.9));
         broken.fold(patchy, f64::max)
     }
 }
@@ -171,6 +172,9 @@ impl Spot {
     /// About the distance to the rim, positive inside, mm.
     fn inside_mm(&self, [u, v]: [f64; 2]) -> f64 {
         let (du, dv) = (u - self.centre[0], v - self.centre[1]);
+        if du * du + dv * dv > (self.long_mm + 1.0).powi(2) {
+            return -1.0;
+        }
         let along = (du * self.axis[0] + dv * self.axis[1]) / self.long_mm;
         let across = (dv * self.axis[0] - du * self.axis[1]) / self.short_mm;
         self.short_mm * (1.0 - along.hypot(across))

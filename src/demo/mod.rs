@@ -1,8 +1,8 @@
 //! The built-in dataset: glyphs carved into meshes and printed, with known truth, from one seed.
 //!
-//! A pair is a pure function of seed, tier and place: [`artwork`] draws the strokes, [`damage`] breaks some,
-//! [`relief`] carves them, [`scan`] and [`pose`] make the mesh, [`ink`], [`paper`] and [`print`] the print,
-//! [`truth`] writes down the answer, [`dataset`] puts all of it on disk.
+//! A pair is a pure function of seed, tier and place: `artwork` draws the strokes, `damage` breaks some,
+//! `relief` carves them, `scan` and `pose` make the mesh, `ink`, `paper` and `print` the print,
+//! `truth` writes down the answer, `dataset` puts all of it on disk.
 
 mod artwork;
 mod calligraphy;

@@ -8,7 +8,6 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::print::Print;
-use crate::raster::Grid;
 
 /// How a print is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,17 +74,6 @@ impl PictureFormat {
         }
         Ok(bytes.into_inner())
     }
-}
-
-/// An 8-bit grey PNG of a grid.
-pub(super) fn grey_png(grid: &Grid<u8>) -> Result<Vec<u8>, ImageError> {
-    let (width, height) = (grid.width() as u32, grid.height() as u32);
-    let picture = image::GrayImage::from_vec(width, height, grid.data().to_vec())
-        .map(DynamicImage::from)
-        .unwrap_or_default();
-    let mut bytes = Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, ImageFormat::Png)?;
-    Ok(bytes.into_inner())
 }
 
 fn rgb8(print: &Print) -> DynamicImage {

@@ -44,20 +44,12 @@ impl Polygon {
                 }),
             );
             for middle in 0..rng.random_range(0..3_u32) {
-                let t = (f64::from(middle) + rng.random_range(0.3..0.7)) / 2.0;
+                let t = 0.5 * (f64::from(middle) + rng.random_range(0.3..0.7));
                 let push = rng.random_range(0.0..wander_mm);
                 corners.push([0, 1].map(|k| from[k] + (to[k] - from[k]) * t + out[k] * push));
             }
         }
         Self { corners }
-    }
-
-    /// The polygon that is a box.
-    pub(super) fn of_box(inner: BoxMm) -> Self {
-        let ([u0, v0], [u1, v1]) = (inner.min, inner.max);
-        Self {
-            corners: vec![[u0, v0], [u1, v0], [u1, v1], [u0, v1]],
-        }
     }
 
     /// The smallest box that holds it.

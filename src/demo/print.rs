@@ -26,18 +26,19 @@ pub(super) struct PrintFrame {
 }
 
 impl PrintFrame {
-    /// A frame from its map; `None` when the map has no inverse.
-    pub(super) fn new(width: usize, height: usize, print_from_uv: Affine2) -> Option<Self> {
-        Some(Self {
+    /// A frame from its map, a similarity.
+    pub(super) fn new(width: usize, height: usize, print_from_uv: Affine2) -> Self {
+        let uv_from_print = print_from_uv.inverse();
+        Self {
             width,
             height,
             print_from_uv,
-            uv_from_print: print_from_uv.inverse()?,
-        })
+            uv_from_print: uv_from_print.expect("a similarity of positive scale has an inverse"),
+        }
     }
 
     /// A frame that holds a polygon, its longest side 100-400 px, turned by a few degrees.
-    pub(super) fn draw(outline: &Polygon, rng: &mut ChaCha8Rng) -> Option<Self> {
+    pub(super) fn draw(outline: &Polygon, rng: &mut ChaCha8Rng) -> Self {
         let angle = rng.random_range(-4.0..4.0_f64).to_radians();
         let turn = Affine2::similarity(1.0, angle, [0.0, 0.0]);
         let turned = Polygon {
@@ -103,7 +104,8 @@ pub(super) fn print(impression: &Impression, frame: &PrintFrame, rng: &mut ChaCh
         0
     };
     let paper = Paper::draw(stains, 6.0, rng);
-    let ink_colour = [0; 3].map(|_: i32| rng.random_range(22.0..48.0));
+    let ink_grey = rng.random_range(20.0..44.0);
+    let ink_colour = [0; 3].map(|_: i32| ink_grey + rng.random_range(-4.0..4.0));
     let cracks_print = rng.random_bool(0.5);
     let stretch = [Noise::draw(rng), Noise::draw(rng)];
     let is_paper = Grid::from_fn(frame.width, frame.height, |x, y| {

@@ -94,22 +94,14 @@ fn gouges(frame: Frame, rng: &mut ChaCha8Rng) -> Field {
         let centre = [0; 2].map(|_: i32| rng.random_range(-half..half));
         let (length, width) = (rng.random_range(0.5..1.6), rng.random_range(0.12..0.35));
         let depth = rng.random_range(0.05..0.22);
-        let [x0, y0] = frame
-            .sample(centre.map(|c| c - length))
-            .map(|c| c.max(0.0) as usize);
-        let [x1, y1] = frame
-            .sample(centre.map(|c| c + length))
-            .map(|c| (c as usize).min(frame.side - 1));
-        for y in y0..=y1 {
-            for x in x0..=x1 {
-                let [u, v] = frame.position(x, y);
-                let (du, dv) = (u - centre[0], v - centre[1]);
-                let along = (du * cos + dv * sin) / length;
-                let across = (dv * cos - du * sin) / width;
-                let hollow = depth * (1.0 - along * along - across * across).max(0.0);
-                let value = field.at(x, y).max(hollow);
-                field.values.set(x, y, value as f32);
-            }
+        for (x, y) in frame.box_around(centre, length) {
+            let [u, v] = frame.position(x, y);
+            let (du, dv) = (u - centre[0], v - centre[1]);
+            let along = (du * cos + dv * sin) / length;
+            let across = (dv * cos - du * sin) / width;
+            let hollow = depth * (1.0 - along * along - across * across).max(0.0);
+            let value = field.at(x, y).max(hollow);
+            field.values.set(x, y, value as f32);
         }
     }
     field

@@ -36,6 +36,26 @@ pub(super) struct TruthLine {
     pub tops_mask: String,
 }
 
+impl TruthLine {
+    /// The truth of a pair in its pose and print frame.
+    pub(super) fn new(
+        id: &str,
+        known: &Known,
+        pose: &Pose,
+        frame: &PrintFrame,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
+        Self {
+            id: id.to_owned(),
+            print_from_mesh: pose.print_from_mesh(&frame.print_from_uv),
+            plane: pose.tops_plane(),
+            landmarks: known.landmarks(pose, rng),
+            char_height_px: known.height_px(frame),
+            tops_mask: format!("tops/{id}.png"),
+        }
+    }
+}
+
 /// What is known of a pair before it is posed and printed.
 pub(super) struct Known<'a> {
     /// The strokes as carved, signed distance in mm.

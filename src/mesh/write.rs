@@ -177,3 +177,37 @@ fn obj(mesh: &Mesh) -> Vec<u8> {
 fn push(out: &mut String, text: std::fmt::Arguments) {
     out.write_fmt(text).expect("a String takes any text");
 }
+
+#[cfg(test)]
+mod tests {
+    use super::MeshFormat;
+    use crate::mesh::{Limits, Mesh, read};
+
+    fn wedge() -> Mesh {
+        Mesh {
+            vertices: vec![
+                [0.0, 0.0, 0.5],
+                [1.25, 0.0, -3.0e-5],
+                [0.0, 1.0, 123.456],
+                [-7.0, 2.0, 0.0],
+            ],
+            triangles: vec![[0, 1, 2], [2, 1, 3]],
+        }
+    }
+
+    /// Corners of all triangles, as singles.
+    fn soup(mesh: &Mesh) -> Vec<[f32; 3]> {
+        let corner = |index: &u32| mesh.vertices[*index as usize].map(|c| c as f32);
+        mesh.triangles.iter().flatten().map(corner).collect()
+    }
+
+    #[test]
+    fn every_format_is_read_back_with_its_triangles() {
+        for format in MeshFormat::ALL {
+            let name = format!("wedge.{}", format.extension());
+            let back = read(&format.encode(&wedge()), &name, &Limits::SUGGESTED);
+            let back = back.unwrap_or_else(|error| panic!("{format:?}: {error}"));
+            assert_eq!(soup(&back), soup(&wedge()), "{format:?}");
+        }
+    }
+}

@@ -8,7 +8,7 @@ use serde_json::Value;
 use crate::catalog::{InputsSeen, PairFacts, PairWork};
 use crate::domain::{ArtifactSet, ContentHash, FitOutcome, Stage};
 use crate::mesh::Mesh;
-use crate::raster::DepthMap;
+use crate::raster::{DepthMap, Picture};
 use crate::stages::normalize::Normalized;
 
 /// What an earlier stage stored.
@@ -33,6 +33,8 @@ pub(super) struct PairInHand {
     pub(super) inputs: InputsSeen,
     /// The mesh, from fit to depth.
     pub(super) mesh: Option<Mesh>,
+    /// The print, from the first stage that reads it to normalize.
+    pub(super) print: Option<Picture>,
     /// From fit on.
     pub(super) fit: Option<FitOutcome>,
     /// From depth on.
@@ -59,6 +61,7 @@ impl PairInHand {
             stored: stored.collect(),
             inputs: InputsSeen::default(),
             mesh: None,
+            print: None,
             fit: None,
             depth: None,
             normalized: None,
@@ -77,9 +80,11 @@ impl PairInHand {
         read.or_else(|| Some(self.stored.get(&Stage::Fit)?.mesh_hash))
     }
 
-    /// Content of the print that the results are of: as read now, or as read for normalize.
+    /// Content of the print that the results are of: as read now, or as an earlier stage read it; `None` while none
+    /// has.
     pub(super) fn print_hash(&self) -> Option<ContentHash> {
         let read = self.inputs.print.as_ref().map(|seen| seen.hash);
-        read.or_else(|| self.stored.get(&Stage::Normalize)?.print_hash)
+        let mut stored = self.stored.values().rev();
+        read.or_else(|| stored.find_map(|stored| stored.print_hash))
     }
 }

@@ -7,7 +7,7 @@ use super::hand::PairInHand;
 use super::outputs;
 use super::steps::{Setback, StageOutput, Steps};
 use crate::catalog::InputSeen;
-use crate::domain::{DepthOutcome, FailureClass, FitOutcome, NormalizeOutcome, Stage};
+use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
 use crate::mesh::{self, Mesh};
 use crate::raster::{self, DepthMap, Picture};
 use crate::stages::normalize::Normalized;
@@ -37,10 +37,16 @@ impl Steps for Pipeline {
 impl Pipeline {
     fn fit(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
         let mesh = self.read_mesh(pair)?;
-        let outcome = fit::fit(&mesh, pair.facts.scanned_face_down, &self.settings.fit)
-            .map_err(|error| in_file(&pair.facts.mesh_path, error.into()))?;
-        let (outcome, json) = settled(outcome)?;
-        pair.mesh = Some(mesh);
+        // The paper's fit does not look at the print, so a changed print need not send its results back so far.
+        let print = match self.settings.fit.method {
+            fit::Method::Tops => Some(self.read_print(pair)?),
+            fit::Method::Paper => None,
+        };
+        let face_down = pair.facts.scanned_face_down;
+        let outcome = fit::fit(&mesh, print.as_ref(), face_down, &self.settings.fit)
+            .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;
+        let (outcome, json) = settled(&outcome)?;
+        (pair.mesh, pair.print) = (Some(mesh), print);
         pair.fit = Some(outcome);
         Ok(outputs::numbers(json))
     }
@@ -50,8 +56,8 @@ impl Pipeline {
         // The mesh is not needed after this stage; taking it out frees its memory.
         let mesh = self.mesh_of_fit(pair)?;
         let map = depth::depth(&mesh, &fit, pair.facts.unit, &self.settings.depth)
-            .map_err(|error| in_file(&pair.facts.mesh_path, error.into()))?;
-        let (outcome, json) = settled(outputs::depth_outcome(&map))?;
+            .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;
+        let (outcome, json) = settled(&outputs::depth_outcome(&map))?;
         let output = outputs::depth(json, &map);
         pair.depth = Some(DepthMap {
             scale: outcome.scale,
@@ -62,12 +68,11 @@ impl Pipeline {
 
     fn normalize(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
         let depth = self.depth_map(pair)?;
-        let print = self.read_print(pair)?;
+        let print = self.print_of_fit(pair)?;
         let normalized = normalize::normalize(&depth, &print, &self.settings.normalize)
-            .map_err(|error| in_file(&pair.facts.print_path, error.into()));
+            .map_err(|error| in_file(&pair.facts.print_path, &error.into()))?;
         pair.depth = Some(depth);
-        let normalized = normalized?;
-        let (outcome, json) = settled(normalized.outcome)?;
+        let (outcome, json) = settled(&normalized.outcome)?;
         let grey = outputs::print_mask(&normalized.ink, &normalized.known);
         let output = outputs::normalized(json, &grey);
         pair.normalized = Some(outputs::from_print_mask(outcome, &grey));
@@ -78,8 +83,8 @@ impl Pipeline {
         let depth = self.depth_map(pair)?;
         let normalized = self.normalized(pair)?;
         let registered = register::register(&depth, &normalized, &self.settings.register)
-            .map_err(|error| setback(error.into(), None))?;
-        let (outcome, json) = settled(registered.outcome.clone())?;
+            .map_err(|error| setback(&error.into(), None))?;
+        let (outcome, json) = settled(&registered.outcome)?;
         Ok(outputs::registered(json, outcome, &registered))
     }
 
@@ -102,6 +107,22 @@ impl Pipeline {
             return Ok(mesh);
         }
         pair.mesh = Some(mesh);
+        Err(Setback::Back(Stage::Fit))
+    }
+
+    /// The print. When it is another one by now than the one that the fit looked at, the fit is no fit for it.
+    fn print_of_fit(&self, pair: &mut PairInHand) -> Result<Picture, Setback> {
+        if let Some(print) = pair.print.take() {
+            return Ok(print);
+        }
+        let seen = pair
+            .stored
+            .get(&Stage::Fit)
+            .and_then(|stored| stored.print_hash);
+        let print = self.read_print(pair)?;
+        if seen.is_none_or(|seen| pair.print_hash() == Some(seen)) {
+            return Ok(print);
+        }
         Err(Setback::Back(Stage::Fit))
     }
 
@@ -147,7 +168,7 @@ impl Pipeline {
                     Setback::Back(stage)
                 }
                 ArtifactError::Io { .. } => Setback::Failed {
-                    failure: crate::domain::Failure::new(FailureClass::Io, error.to_string()),
+                    failure: Failure::new(FailureClass::Io, error.to_string()),
                     may_pass: true,
                 },
             })
@@ -185,19 +206,20 @@ fn seen(file: &InputFile) -> InputSeen {
     }
 }
 
+#[expect(clippy::needless_pass_by_value, reason = "shaped for `map_err`")]
 fn unread(error: InputError) -> Setback {
     let may_pass = error.may_pass();
     Setback::Failed {
-        failure: crate::domain::Failure::new(error.class(), error.to_string()),
+        failure: Failure::new(error.class(), error.to_string()),
         may_pass,
     }
 }
 
-fn in_file(path: &str, error: StageError) -> Setback {
+fn in_file(path: &str, error: &StageError) -> Setback {
     setback(error, Some(path))
 }
 
-fn setback(error: StageError, path: Option<&str>) -> Setback {
+fn setback(error: &StageError, path: Option<&str>) -> Setback {
     let message = match path {
         Some(path) => format!("{path}: {error}"),
         None => error.to_string(),
@@ -207,12 +229,12 @@ fn setback(error: StageError, path: Option<&str>) -> Setback {
 
 /// An outcome as it will be read back, with its JSON. A number that JSON cannot hold is a defect of the stage.
 fn settled<T: Serialize + DeserializeOwned + PartialEq>(
-    outcome: T,
+    outcome: &T,
 ) -> Result<(T, String), Setback> {
-    let json = serde_json::to_value(&outcome).map(|value| value.to_string());
+    let json = serde_json::to_value(outcome).map(|value| value.to_string());
     let back = json.and_then(|json| Ok((serde_json::from_str::<T>(&json)?, json)));
     match back {
-        Ok((back, json)) if back == outcome => Ok((back, json)),
+        Ok((back, json)) if back == *outcome => Ok((back, json)),
         Ok(_) | Err(_) => Err(Setback::failed(
             FailureClass::Bug,
             "the stage gave a number that is not finite",
@@ -231,13 +253,13 @@ mod tests {
             [0.1 + 0.2, f64::MIN_POSITIVE, 1e300],
             [-0.0, 1.0 / 3.0, 5e-324],
         ]);
-        let (back, _) = settled(odd).expect("finite numbers");
+        let (back, _) = settled(&odd).expect("finite numbers");
         let bits = |map: Affine2| map.0.map(|row| row.map(f64::to_bits));
         assert_eq!(bits(back), bits(odd));
     }
 
     #[test]
     fn a_number_that_is_not_finite_is_a_defect() {
-        assert!(settled(Affine2([[f64::NAN; 3]; 2])).is_err());
+        assert!(settled(&Affine2([[f64::NAN; 3]; 2])).is_err());
     }
 }

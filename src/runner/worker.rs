@@ -189,7 +189,7 @@ fn done(shared: &Shared, pair: &PairInHand, stage: Stage, filed: Filed, ms: u64)
         stage,
         recipe: shared.recipes.of(stage),
         mesh_hash: stored.mesh_hash,
-        print_hash: stored.print_hash.filter(|_| stage >= Stage::Normalize),
+        print_hash: stored.print_hash,
         facts: pair.facts_text.clone(),
         outcome: filed.outcome,
         files: filed.files,

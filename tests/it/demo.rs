@@ -1,1 +1,130 @@
 //! The built-in dataset: same seed same bytes, truth true.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+use mocban::demo::{DemoOptions, Tier, write_dataset};
+use mocban::manifest::parse_csv;
+use mocban::{mesh, raster};
+
+/// Every file below a folder by its path, and what it holds.
+fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut folders = vec![dir.to_owned()];
+    while let Some(folder) = folders.pop() {
+        for entry in fs::read_dir(&folder).expect("the folder is there") {
+            let path = entry.expect("the entry is readable").path();
+            if path.is_dir() {
+                folders.push(path);
+                continue;
+            }
+            let name = path
+                .strip_prefix(dir)
+                .expect("below the folder")
+                .display()
+                .to_string();
+            found.insert(name, fs::read(&path).expect("the file is readable"));
+        }
+    }
+    found
+}
+
+fn made(tier: Tier, pairs: u64, seed: u64) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
+    let dir = tempfile::tempdir().expect("a folder for the test");
+    write_dataset(dir.path(), &DemoOptions { pairs, seed, tier }).expect("the dataset is written");
+    let found = files(dir.path());
+    (dir, found)
+}
+
+#[test]
+fn same_seed_gives_the_same_bytes_and_another_seed_others() {
+    let (_one, first) = made(Tier::Hard, 2, 5);
+    let (_two, second) = made(Tier::Hard, 2, 5);
+    let (_three, other) = made(Tier::Hard, 2, 6);
+    assert!(first == second, "the same options gave other bytes");
+    assert!(first["truth.jsonl"] != other["truth.jsonl"]);
+}
+
+#[test]
+fn a_pair_does_not_depend_on_how_many_there_are() {
+    let (_one, few) = made(Tier::Pose, 1, 9);
+    let (_two, more) = made(Tier::Pose, 2, 9);
+    let id = "tops/pose-0000.png";
+    assert_eq!(few[id], more[id]);
+    let first_line = |files: &BTreeMap<String, Vec<u8>>| {
+        files["truth.jsonl"]
+            .split(|byte| *byte == b'\n')
+            .next()
+            .map(<[u8]>::to_vec)
+    };
+    assert_eq!(first_line(&few), first_line(&more));
+}
+
+#[test]
+fn our_own_readers_read_every_file() {
+    for tier in Tier::ALL {
+        let (dir, found) = made(tier, 2, 2);
+        let rows = parse_csv(&found["manifest.csv"]).expect("the manifest is sound");
+        assert_eq!(rows.len(), 2);
+        assert_eq!(found.len(), 2 * 3 + 3, "{tier}: {:?}", found.keys());
+        for row in rows {
+            let bytes = fs::read(dir.path().join(&row.mesh)).expect("the mesh is there");
+            let name = row.mesh.display().to_string();
+            let scan = mesh::read(&bytes, &name, &mesh::Limits::SUGGESTED).expect("a mesh");
+            assert!(scan.triangles.len() > 30_000, "{name}");
+            let bytes = fs::read(dir.path().join(&row.print)).expect("the print is there");
+            let print = raster::decode(&bytes, &raster::Limits::SUGGESTED).expect("a picture");
+            let tops =
+                raster::decode_grey8(&found[&format!("tops/{}.png", row.name)]).expect("a mask");
+            let size = [print.rgb.width(), print.rgb.height()];
+            assert_eq!(size, [tops.width(), tops.height()]);
+            assert!(
+                (100..=400).contains(&size[0].max(size[1])),
+                "{tier}: {size:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn whole_dataset_is_left_alone_and_a_broken_one_made_anew() {
+    let options = DemoOptions {
+        pairs: 1,
+        seed: 3,
+        tier: Tier::Upright,
+    };
+    let (dir, found) = made(options.tier, options.pairs, options.seed);
+    assert!(
+        write_dataset(dir.path(), &options)
+            .expect("found")
+            .was_there
+    );
+    fs::remove_file(dir.path().join("dataset.json")).expect("the seal is there");
+    fs::write(dir.path().join("truth.jsonl"), "half a li").expect("the truth can be spoilt");
+    fs::write(dir.path().join("meshes/stray.stl"), "of a killed run").expect("a stray file");
+    assert!(!write_dataset(dir.path(), &options).expect("made").was_there);
+    assert!(files(dir.path()) == found, "the dataset made anew differs");
+}
+
+#[test]
+fn real_tier_has_twenty_pairs_at_most_and_its_prints_are_the_photographs() {
+    let dir = tempfile::tempdir().expect("a folder for the test");
+    let options = DemoOptions {
+        pairs: 99,
+        seed: 1,
+        tier: Tier::Real,
+    };
+    let dataset = write_dataset(dir.path(), &options).expect("the dataset is written");
+    assert_eq!(dataset.pairs, 20);
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/calligraphy");
+    for index in 0..20 {
+        let print = dir.path().join(format!("prints/real-{index:04}.png"));
+        let photograph = assets.join(format!("{index:02}_real.png"));
+        let read = |path: &Path| fs::read(path).expect("the picture is there");
+        assert!(
+            read(&print) == read(&photograph),
+            "print {index} is not the photograph"
+        );
+    }
+}

@@ -306,7 +306,7 @@ impl Game {
 async fn random_events_leave_the_catalog_as_the_state_machine_says() {
     for seed in 0..4 {
         let mut game = Game::new(seed).await;
-        let path = game.world._dir.path().join("catalog.sqlite");
+        let path = game.world.dir.path().join("catalog.sqlite");
         let mut conn = connect::writer(&path, false).await.expect("a connection");
         for _ in 0..200 {
             game.step().await;

@@ -8,7 +8,7 @@ use crate::catalog::{checkpoint, claim, connect, fail, query, requeue, results, 
 /// Lines of the query plan.
 async fn plan(sql: &str) -> Vec<String> {
     let world = World::new(0).await;
-    let path = world._dir.path().join("catalog.sqlite");
+    let path = world.dir.path().join("catalog.sqlite");
     let mut conn = connect::writer(&path, false).await.expect("a connection");
     let rows = sqlx::query(AssertSqlSafe(format!("EXPLAIN QUERY PLAN {sql}")))
         .fetch_all(&mut conn)

@@ -324,7 +324,7 @@ async fn pages_come_in_the_order_of_names_and_end() {
 #[tokio::test]
 async fn a_reader_works_beside_the_writer_and_cannot_write() {
     let world = World::new(1).await;
-    let path = world._dir.path().join("catalog.sqlite");
+    let path = world.dir.path().join("catalog.sqlite");
     let reader = Catalog::open_read_only(&path).await.expect("a reader");
     world.finish_one().await;
     let status = reader.status(&super::recipes([1; 4])).await;
@@ -364,7 +364,7 @@ async fn one_bad_request_does_not_take_its_batch_with_it() {
 #[tokio::test]
 async fn everything_sent_is_stored_when_the_catalog_is_closed() {
     let world = World::new(1).await;
-    let path = world._dir.path().join("catalog.sqlite");
+    let path = world.dir.path().join("catalog.sqlite");
     let lease = world.claim(1).await.remove(0);
     let (kept, ()) = tokio::join!(
         world
@@ -383,7 +383,7 @@ async fn everything_sent_is_stored_when_the_catalog_is_closed() {
 #[tokio::test]
 async fn checks_of_the_schema_and_our_enums_agree() {
     let world = World::new(1).await;
-    let path = world._dir.path().join("catalog.sqlite");
+    let path = world.dir.path().join("catalog.sqlite");
     let mut conn = crate::catalog::connect::writer(&path, false)
         .await
         .expect("a connection");
@@ -424,7 +424,7 @@ async fn checks_of_the_schema_and_our_enums_agree() {
 #[tokio::test]
 async fn a_job_row_that_is_no_state_is_refused() {
     let world = World::new(1).await;
-    let path = world._dir.path().join("catalog.sqlite");
+    let path = world.dir.path().join("catalog.sqlite");
     let mut conn = crate::catalog::connect::writer(&path, false)
         .await
         .expect("a connection");

@@ -144,7 +144,7 @@ async fn the_database_itself_refuses_to_change_a_verdict() {
     world.finish_one().await;
     let given = vec![verdict("ana", Verdict::Pass)];
     world.catalog.verdict_set(given, 5).await.expect("stored");
-    let path = world._dir.path().join("catalog.sqlite");
+    let path = world.dir.path().join("catalog.sqlite");
     let mut conn = crate::catalog::connect::writer(&path, false)
         .await
         .expect("a connection");

@@ -8,7 +8,7 @@ use crate::stages::ink::Ink;
 use crate::stages::pose::{Found, Layer, Limits, SEARCH_PX, Soft, refine, search};
 
 /// Working size and smoothing, in pixels, of the passes that follow the search, and how many poses go on.
-const PASSES: [(usize, f64, usize); 2] = [(64, 1.2, 4), (128, 1.2, 4)];
+const PASSES: [(usize, f64, usize); 2] = [(64, 1.2, 3), (112, 1.2, 3)];
 /// The search looks at relief that fades out from the tops to half-way down: it need not know the right cut, nor
 /// that the plane is quite right.
 const SEARCH_CUT: f64 = 0.25;

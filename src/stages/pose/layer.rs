@@ -103,3 +103,23 @@ impl Layer {
             .sum()
     }
 }
+
+/// Bilinear value; zero outside.
+#[inline]
+pub(super) fn sample(values: &Grid<f32>, [x, y]: [f64; 2]) -> f64 {
+    let (x0, y0) = (x.floor(), y.floor());
+    let (column, row) = (x0 as i64, y0 as i64);
+    if column < 0
+        || row < 0
+        || column + 1 >= values.width() as i64
+        || row + 1 >= values.height() as i64
+    {
+        return 0.0;
+    }
+    let (fx, fy) = ((x - x0) as f32, (y - y0) as f32);
+    let (column, row) = (column as usize, row as usize);
+    let (top, bottom) = (values.row(row), values.row(row + 1));
+    let a = top[column] * (1.0 - fx) + top[column + 1] * fx;
+    let b = bottom[column] * (1.0 - fx) + bottom[column + 1] * fx;
+    f64::from(a * (1.0 - fy) + b * fy)
+}

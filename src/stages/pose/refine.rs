@@ -3,14 +3,15 @@
 use nalgebra::{Matrix6, Vector6};
 
 use super::Layer;
+use super::layer::sample;
 use super::search::Found;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
 /// Most steps; a pose that has not settled by then is judged where it is.
-const MOST_STEPS: usize = 25;
+const MOST_STEPS: usize = 15;
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
-const SETTLED_PX: f64 = 0.005;
+const SETTLED_PX: f64 = 0.02;
 /// Residuals beyond this many of their median count less: what stands on one side only must not decide.
 const ROBUST: f64 = 2.5;
 
@@ -292,23 +293,4 @@ impl Slopes {
             y: slope(0, 1),
         }
     }
-}
-
-/// Bilinear value; zero outside.
-fn sample(values: &Grid<f32>, [x, y]: [f64; 2]) -> f64 {
-    let (x0, y0) = (x.floor(), y.floor());
-    let (column, row) = (x0 as i64, y0 as i64);
-    if column < 0
-        || row < 0
-        || column + 1 >= values.width() as i64
-        || row + 1 >= values.height() as i64
-    {
-        return 0.0;
-    }
-    let (fx, fy) = ((x - x0) as f32, (y - y0) as f32);
-    let (column, row) = (column as usize, row as usize);
-    let (top, bottom) = (values.row(row), values.row(row + 1));
-    let a = top[column] * (1.0 - fx) + top[column + 1] * fx;
-    let b = bottom[column] * (1.0 - fx) + bottom[column + 1] * fx;
-    f64::from(a * (1.0 - fy) + b * fy)
 }

@@ -7,8 +7,9 @@ use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
 use super::Layer;
+use super::layer::sample;
 use crate::domain::Affine2;
-use crate::raster::{Grid, warp_values};
+use crate::raster::Grid;
 
 /// Side of the square on which layers are correlated.
 const SQUARE: usize = 64;
@@ -152,7 +153,21 @@ fn centred(layer: &Layer, turn: Option<(f64, f64)>) -> Grid<f32> {
     let place =
         Affine2::similarity(scale, angle, [0.0, 0.0]).after(&Affine2::scale_shift(1.0, [-cx, -cy]));
     let place = Affine2::scale_shift(1.0, [middle, middle]).after(&place);
-    warp_values(&layer.value, &place, SQUARE, SQUARE)
+    let Some(back) = place.inverse() else {
+        return Grid::new(SQUARE, SQUARE, 0.0);
+    };
+    // Layers are smooth at this size, so one look a pixel does even where the scale shrinks them.
+    let (dx, dy) = (back.0[0][0], back.0[1][0]);
+    let mut values = Grid::new(SQUARE, SQUARE, 0.0);
+    for row in 0..SQUARE {
+        let [mut x, mut y] = back.apply([0.0, row as f64]);
+        for column in 0..SQUARE {
+            values.set(column, row, sample(&layer.value, [x, y]) as f32);
+            x += dx;
+            y += dy;
+        }
+    }
+    values
 }
 
 fn norm(values: &Grid<f32>) -> f64 {

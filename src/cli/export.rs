@@ -1,0 +1,77 @@
+//! `export`: the aligned pairs for other tools.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use serde_json::json;
+
+use super::context::Context;
+use super::exit::ExitCode;
+use super::table::count;
+use crate::export::{ExportSummary, JsonlOptions, to_jsonl};
+
+/// Arguments of `export`.
+#[derive(Debug, Args)]
+pub(super) struct ExportArgs {
+    /// Form of the export
+    #[arg(long, value_name = "FORM", default_value = "jsonl")]
+    pub(super) to: Form,
+    /// The folder to write; an earlier export there is replaced
+    #[arg(short, long, value_name = "DIR")]
+    pub(super) output: PathBuf,
+    /// Write computing times too; the bytes then differ from run to run
+    #[arg(long)]
+    pub(super) with_times: bool,
+}
+
+/// Form of an export.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum Form {
+    /// One line a pair and metric, with masks and pictures beside it.
+    Jsonl,
+}
+
+pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (project, catalog) = context.reader().await?;
+    let options = JsonlOptions {
+        with_times: args.with_times,
+        limits: context.settings()?.config.limits.image,
+    };
+    let summary = match args.to {
+        Form::Jsonl => to_jsonl(&catalog, &project, &args.output, options).await?,
+    };
+    catalog.close().await;
+    tell(&summary, &args, context)?;
+    Ok(match summary.unreadable.is_empty() {
+        true => ExitCode::Done,
+        false => ExitCode::SomeFailed,
+    })
+}
+
+fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow::Result<()> {
+    if context.global.json {
+        let unreadable: Vec<_> = summary
+            .unreadable
+            .iter()
+            .map(|(pair, why)| json!({"id": pair, "error": why}))
+            .collect();
+        context.talk.json(&json!({
+            "schema": 1,
+            "done": summary.done,
+            "without_result": summary.without_result,
+            "unreadable": unreadable,
+        }))?;
+    }
+    for (pair, why) in &summary.unreadable {
+        context
+            .talk
+            .warn(&format!("{pair} has no files in the export: {why}"));
+    }
+    context.talk.say(&format!(
+        "{} exported to {}, {} without result",
+        count(summary.done, "pair"),
+        args.output.display(),
+        summary.without_result
+    ));
+    Ok(())
+}

@@ -1,0 +1,94 @@
+//! `report`: the table of all results.
+
+use std::path::PathBuf;
+
+use anyhow::Context as _;
+use clap::Args;
+
+use super::context::Context;
+use super::exit::ExitCode;
+use crate::report::{Format, Report, gate, gather, render};
+
+/// Arguments of `report`.
+#[derive(Debug, Args)]
+pub(super) struct ReportArgs {
+    /// Form of the report: text, json, csv, markdown or latex
+    #[arg(long, short, default_value = "text")]
+    pub(super) format: Format,
+    /// Write it to this file instead of stdout
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+    /// End with code 20 unless every row somebody has read has at least this Acc, such as 0.98
+    #[arg(long, value_name = "ACC", value_parser = share)]
+    pub(super) fail_under: Option<f64>,
+    /// End with code 21 unless every pair is done and every result passed or failed
+    #[arg(long)]
+    pub(super) require_complete: bool,
+}
+
+/// A number in 0..=1.
+fn share(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
+        Ok(_) | Err(_) => Err("a share is a number from 0 to 1, such as 0.98".to_owned()),
+    }
+}
+
+pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let report = read(context).await?;
+    let format = match context.global.json {
+        true => Format::Json,
+        false => args.format,
+    };
+    let text = render(&report, format);
+    match &args.output {
+        Some(path) => {
+            let shown = path.display();
+            std::fs::write(path, text).with_context(|| format!("cannot write {shown}"))?;
+            context.talk.say(&format!("report is in {shown}"));
+        }
+        None => context.talk.data(&text)?,
+    }
+    Ok(gates(&report, &args, context))
+}
+
+/// Prints the report to stdout, as text or as `--json` asks.
+///
+/// # Errors
+/// When the catalog cannot be read or stdout is closed.
+pub(super) async fn print(context: &Context) -> anyhow::Result<()> {
+    let format = match context.global.json {
+        true => Format::Json,
+        false => Format::Text,
+    };
+    context.talk.data(&render(&read(context).await?, format))?;
+    Ok(())
+}
+
+async fn read(context: &Context) -> anyhow::Result<Report> {
+    let (project, catalog) = context.reader().await?;
+    let report = gather(&catalog, &project).await?;
+    catalog.close().await;
+    Ok(report)
+}
+
+/// Says what is not met; an incomplete report is told before one that is not good enough.
+fn gates(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
+    let missing = match args.require_complete {
+        true => gate::missing(report),
+        false => Vec::new(),
+    };
+    let below = match args.fail_under {
+        Some(least) => gate::below(report, least),
+        None => Vec::new(),
+    };
+    let code = match (missing.is_empty(), below.is_empty()) {
+        (false, _) => ExitCode::Incomplete,
+        (true, false) => ExitCode::BelowFailUnder,
+        (true, true) => ExitCode::Done,
+    };
+    for reason in missing.iter().chain(&below) {
+        context.talk.warn(reason);
+    }
+    code
+}

@@ -1,0 +1,103 @@
+//! `sheet`: the contact sheet, many pairs on one PNG, worst first.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::Args;
+use serde_json::json;
+
+use super::context::Context;
+use super::exit::{ExitCode, Refusal};
+use super::select;
+use super::table::count;
+use crate::domain::ThresholdMetric;
+use crate::export::{Sheet, SheetOptions, SheetOrder, draw_sheet};
+use crate::raster::png_rgb8;
+
+/// Arguments of `sheet`.
+#[derive(Debug, Args)]
+pub(super) struct SheetArgs {
+    /// Only these pairs
+    pub(super) pairs: Vec<String>,
+    /// The PNG to write [default: sheet.png in the project]
+    #[arg(short, long, value_name = "FILE")]
+    pub(super) output: Option<PathBuf>,
+    /// Whose results: `nl_ssim`, density or ensemble
+    #[arg(long, default_value = "ensemble")]
+    pub(super) metric: ThresholdMetric,
+    /// What comes first: worst, score, margin or name
+    #[arg(long, default_value = "worst")]
+    pub(super) order: SheetOrder,
+    /// Most pairs on the sheet
+    #[arg(long, value_name = "N", default_value = "60", value_parser = clap::value_parser!(u16).range(1..=600))]
+    pub(super) limit: u16,
+    /// Pairs in a row
+    #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u16).range(1..=12))]
+    pub(super) columns: u16,
+}
+
+impl Default for SheetArgs {
+    fn default() -> Self {
+        Self {
+            pairs: Vec::new(),
+            output: None,
+            metric: ThresholdMetric::Ensemble,
+            order: SheetOrder::Worst,
+            limit: 60,
+            columns: 5,
+        }
+    }
+}
+
+pub(super) async fn sheet(args: SheetArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (path, sheet) = write(&args, context).await?;
+    if context.global.json {
+        context
+            .talk
+            .json(&json!({"schema": 1, "file": path, "shown": sheet.shown, "of": sheet.of}))?;
+    }
+    context.talk.say(&format!(
+        "{} of {} on {}",
+        count(sheet.shown as u64, "pair"),
+        sheet.of,
+        path.display()
+    ));
+    Ok(ExitCode::Done)
+}
+
+/// Draws the sheet and writes it; says where.
+///
+/// # Errors
+/// When no pair is finished, or catalog or disk refuse.
+pub(super) async fn write(args: &SheetArgs, context: &Context) -> anyhow::Result<(PathBuf, Sheet)> {
+    let (project, catalog) = context.reader().await?;
+    let pairs = match args.pairs.as_slice() {
+        [] => None,
+        typed => Some(select::pairs(&catalog, typed).await?),
+    };
+    let options = SheetOptions {
+        metric: args.metric,
+        pairs,
+        order: args.order,
+        limit: usize::from(args.limit),
+        columns: usize::from(args.columns),
+        limits: context.settings()?.config.limits.image,
+    };
+    let sheet = draw_sheet(&catalog, &project, options).await?;
+    catalog.close().await;
+    if sheet.shown == 0 {
+        let text = "no pair is finished yet, so there is nothing to show".to_owned();
+        return Err(Refusal::NothingSelected(text).into());
+    }
+    let path = match &args.output {
+        Some(path) => path.clone(),
+        None => project.dir().join("sheet.png"),
+    };
+    save(&path, &sheet)?;
+    Ok((path, sheet))
+}
+
+fn save(path: &Path, sheet: &Sheet) -> anyhow::Result<()> {
+    let bytes = png_rgb8(&sheet.picture);
+    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
