@@ -12,7 +12,7 @@ mod wrap;
 use serde::{Deserialize, Serialize};
 
 pub use relief::Relief;
-pub(super) use wrap::box_wrap;
+use wrap::box_wrap;
 
 use super::ink;
 use super::score::SsimWindow;

@@ -151,11 +151,7 @@ fn mask_above(depth: &DepthMap, level: u16, speck_share: f64) -> Mask {
 }
 
 /// W(I): the box's longest side to `character_px`, the centroid to the middle of a square canvas.
-pub(in crate::stages) fn box_wrap(
-    mask: &Mask,
-    canvas_px: usize,
-    character_px: f64,
-) -> Option<Affine2> {
+pub(super) fn box_wrap(mask: &Mask, canvas_px: usize, character_px: f64) -> Option<Affine2> {
     let bounds = mask.bounding_box()?;
     let [x, y] = mask.centroid()?;
     let scale = character_px / bounds.width().max(bounds.height()) as f64;

@@ -1,5 +1,5 @@
-//! The paper's registration (III-D) as its authors' program does it: the wrapped depth mask turned through a full
-//! circle, then finely about the best angle; at each angle the shift climbed pixel by pixel on the masks' IoU.
+//! The paper's registration (III-D) as its authors' program does it: the depth mask turned through a full
+//! circle and wrapped at each angle, then finely about the best angle; at each angle the shift climbed pixel by pixel on the masks' IoU.
 //!
 //! The text judges six sectors at one angle each, which misses by up to half a sector; the program tries 60 angles
 //! and 60 more about the best.
@@ -8,7 +8,7 @@ use super::{Alignment, Error, Params, chosen, strokes};
 use crate::domain::{Affine2, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::components::without_specks;
-use crate::stages::normalize::{Normalized, box_wrap};
+use crate::stages::normalize::Normalized;
 
 /// Groups below this share of the picture are specks and may not decide the box.
 const SPECK_SHARE: f64 = 1.0 / 1200.0;
@@ -63,13 +63,10 @@ fn align_one(
     );
     let character_px = longest_side(canvas_print).ok_or(Error::NoStrokes(metric))?;
     let side = canvas_print.width();
-    let wrap = box_wrap(&mask, side, character_px).ok_or(Error::NoStrokes(metric))?;
+    let turner = Turner::new(&mask, side, character_px).ok_or(Error::NoStrokes(metric))?;
     let target = Packed::of(canvas_print);
-    let wrapped = warp_mask(&mask, &wrap, side, side);
-    let attempt = |angle_deg: f64| {
-        let turned = warp_mask(&wrapped, &about_middle(angle_deg, side), side, side);
-        climb(&target, &Packed::of(&turned), angle_deg)
-    };
+    let attempt =
+        |angle_deg: f64| climb(&target, &Packed::of(&turner.turned(angle_deg)), angle_deg);
     let coarse = 360.0 / f64::from(params.coarse_angles);
     let first: Vec<Turn> = (0..params.coarse_angles)
         .map(|k| attempt(f64::from(k) * coarse))
@@ -85,9 +82,7 @@ fn align_one(
         .unwrap_or(best);
     let rival = best_of_others(&first, best.angle_deg, FINE_REACH * coarse);
     let shift = Affine2::scale_shift(1.0, [best.shift[0] as f64, best.shift[1] as f64]);
-    let canvas_from_depth = shift
-        .after(&about_middle(best.angle_deg, side))
-        .after(&wrap);
+    let canvas_from_depth = shift.after(&turner.canvas_from_depth(best.angle_deg));
     let print_from_canvas = normalized
         .outcome
         .canvas_from_print
@@ -108,16 +103,67 @@ fn longest_side(mask: &Mask) -> Option<f64> {
         .map(|b| b.width().max(b.height()) as f64)
 }
 
-/// A turn about the middle of the canvas.
-fn about_middle(angle_deg: f64, side: usize) -> Affine2 {
-    let middle = (side - 1) as f64 / 2.0;
-    Affine2::scale_shift(1.0, [middle, middle])
-        .after(&Affine2::similarity(
-            1.0,
-            angle_deg.to_radians(),
-            [0.0, 0.0],
-        ))
-        .after(&Affine2::scale_shift(1.0, [-middle, -middle]))
+/// A mask that is turned first and wrapped afterwards: the box of a turned character is another one.
+struct Turner {
+    /// Set pixels of the depth mask.
+    points: Vec<[f64; 2]>,
+    /// The mask at about the canvas's size, so that a turn need not average again.
+    small: Mask,
+    small_from_depth: Affine2,
+    side: usize,
+    character_px: f64,
+}
+
+impl Turner {
+    fn new(mask: &Mask, side: usize, character_px: f64) -> Option<Self> {
+        let scale = character_px / longest_side(mask)?;
+        let small_from_depth = Affine2::scale_shift(scale, [0.0, 0.0]);
+        let shrunk = |length: usize| (length as f64 * scale).ceil() as usize + 1;
+        let set = |i: usize| [(i % mask.width()) as f64, (i / mask.width()) as f64];
+        Some(Self {
+            points: (0..mask.data().len())
+                .filter(|i| mask.data()[*i])
+                .map(set)
+                .collect(),
+            small: warp_mask(
+                mask,
+                &small_from_depth,
+                shrunk(mask.width()),
+                shrunk(mask.height()),
+            ),
+            small_from_depth,
+            side,
+            character_px,
+        })
+    }
+
+    /// Turn, then W: the turned box's longest side to the character's, the centroid to the middle.
+    fn canvas_from_depth(&self, angle_deg: f64) -> Affine2 {
+        let turn = Affine2::similarity(1.0, angle_deg.to_radians(), [0.0, 0.0]);
+        let (mut low, mut high, mut sum) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], [0.0; 2]);
+        for p in &self.points {
+            let turned = turn.apply(*p);
+            for k in 0..2 {
+                low[k] = low[k].min(turned[k]);
+                high[k] = high[k].max(turned[k]);
+                sum[k] += turned[k];
+            }
+        }
+        let n = self.points.len() as f64;
+        let scale = self.character_px / ((high[0] - low[0]).max(high[1] - low[1]) + 1.0);
+        let middle = (self.side - 1) as f64 / 2.0;
+        let shift = [middle - scale * sum[0] / n, middle - scale * sum[1] / n];
+        Affine2::scale_shift(scale, shift).after(&turn)
+    }
+
+    /// The turned and wrapped mask.
+    fn turned(&self, angle_deg: f64) -> Mask {
+        let from_depth = self.canvas_from_depth(angle_deg);
+        match self.small_from_depth.inverse() {
+            Some(depth) => warp_mask(&self.small, &from_depth.after(&depth), self.side, self.side),
+            None => Mask::new(self.side, self.side, false),
+        }
+    }
 }
 
 fn best_of(turns: &[Turn]) -> Option<Turn> {
