@@ -2,6 +2,7 @@
 
 mod args;
 mod clock;
+mod compare;
 mod completions;
 mod config;
 mod context;

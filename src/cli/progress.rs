@@ -131,8 +131,9 @@ fn form(mode: ProgressMode, quiet: bool, screen: &Screen, now: Instant) -> Form 
 }
 
 fn bar(screen: &Screen) -> Form {
+    // Not the whole width: the terminal writes "^C" at the end of the line, and must not wrap.
     let style = ProgressStyle::with_template(
-        "{msg}\n{wide_bar} {percent:>3} %  {pos}/{len} stages  {per_sec}  {eta} left",
+        "{msg}\n{bar:40} {percent:>3} %  {pos}/{len} stages  {per_sec}  {eta} left",
     )
     .unwrap_or_else(|_| ProgressStyle::default_bar())
     .progress_chars("━╸─")

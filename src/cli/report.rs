@@ -1,12 +1,14 @@
 //! `report`: the table of all results.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 use clap::Args;
+use serde_json::json;
 
+use super::compare::side_by_side;
 use super::context::Context;
-use super::exit::ExitCode;
+use super::exit::{ExitCode, Refusal};
 use super::talk;
 use crate::report::{Format, Report, gate, gather, render};
 
@@ -19,6 +21,9 @@ pub(super) struct ReportArgs {
     /// Write it to this file instead of stdout
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
+    /// Set another project's table beside this one; with the forms text and json
+    #[arg(long, value_name = "DIR")]
+    pub(super) compare: Option<PathBuf>,
     /// End with code 20 unless every row somebody has read has at least this Acc, such as 0.98
     #[arg(long, value_name = "ACC", value_parser = share)]
     pub(super) fail_under: Option<f64>,
@@ -38,7 +43,10 @@ fn share(text: &str) -> Result<f64, String> {
 pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let report = read(context).await?;
     let format = chosen(args.format, context);
-    let text = render(&report, format);
+    let text = match &args.compare {
+        Some(other) => compared(&report, other, format, context).await?,
+        None => render(&report, format),
+    };
     match &args.output {
         Some(path) => {
             let shown = path.display();
@@ -48,6 +56,33 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
         None => talk::print(&text)?,
     }
     Ok(gates(&report, &args, context))
+}
+
+/// This project's report with another's beside it.
+async fn compared(
+    here: &Report,
+    other: &Path,
+    format: Format,
+    context: &Context,
+) -> anyhow::Result<String> {
+    let there = read(&context.at(other)).await?;
+    let names = [context.dir(), other.to_owned()].map(|dir| dir.display().to_string());
+    match format {
+        Format::Text => Ok(format!(
+            "{}\n{}",
+            render(here, format),
+            side_by_side(here, &there, [&names[0], &names[1]])
+        )),
+        Format::Json => {
+            let mut value = serde_json::to_value(here)?;
+            value["compared_with"] = json!({"project": names[1], "report": there});
+            Ok(serde_json::to_string_pretty(&value)?)
+        }
+        Format::Csv | Format::Markdown | Format::Latex => {
+            let text = format!("--compare goes with the forms text and json, not {format}");
+            Err(Refusal::Usage(text).into())
+        }
+    }
 }
 
 /// Prints the report to stdout, as text or as `--json` asks.

@@ -64,7 +64,8 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
         (Some(entry), _) => format!("  from {}: {}", entry.from, entry.why),
         (None, JobStatus::Quarantined) => "  stays failed until it is retried".to_owned(),
         (None, JobStatus::Held) => "  set aside until it is retried".to_owned(),
-        (None, JobStatus::Done | JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff) => {
+        (None, JobStatus::Leased) => "  in the hands of a run".to_owned(),
+        (None, JobStatus::Done | JobStatus::Ready | JobStatus::Backoff) => {
             "  nothing left to do".to_owned()
         }
     });

@@ -1,4 +1,4 @@
-//! Ranges of the settings that are numbers.
+//! Ranges of the settings that are numbers, and settings that must fit together.
 
 use toml::Value;
 
@@ -55,10 +55,27 @@ pub(super) fn check(tree: &Tree) -> Result<(), ConfigError> {
             check_rising(low, high)?;
         }
     }
+    if let (Some(normalize), Some(register)) = (find("normalize.method"), find("register.method")) {
+        check_methods(normalize, register)?;
+    }
     for span in SPANS.iter().filter_map(|key| find(key)) {
         check_span(span)?;
     }
     Ok(())
+}
+
+/// `refine` starts from the pose that `wrap` does not look for: without this every pair would fail.
+fn check_methods(normalize: &Setting, register: &Setting) -> Result<(), ConfigError> {
+    let is = |setting: &Setting, name: &str| setting.value.as_str() == Some(name);
+    if !(is(normalize, "wrap") && is(register, "refine")) {
+        return Ok(());
+    }
+    Err(match register.origin {
+        Origin::Default => bad(normalize, "needs register.method = \"turns\"".to_owned()),
+        Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => {
+            bad(register, "needs normalize.method = \"aligned\"".to_owned())
+        }
+    })
 }
 
 /// The one of the two that somebody set is to blame, the lower one where both or neither are.
@@ -148,6 +165,10 @@ mod tests {
         assert_eq!(
             complaint("normalize.canvas_px", 128.into()),
             "--set: normalize.canvas_px = 128: must be above normalize.character_px = 192"
+        );
+        assert_eq!(
+            complaint("normalize.method", "wrap".into()),
+            "--set: normalize.method = \"wrap\": needs register.method = \"turns\""
         );
         let greys = toml::Value::from(vec![9, 5]);
         assert!(complaint("normalize.density_greys", greys).ends_with("above the last"));

@@ -1,0 +1,79 @@
+//! `report --compare`: two projects' tables row by row.
+
+use super::table::{Align, columns};
+use crate::report::{Report, Row};
+
+/// The means of both projects and their differences, a line a metric and number.
+///
+/// The two may hold other pairs; what is compared are the tables, not pairs one by one.
+pub(super) fn side_by_side(here: &Report, there: &Report, names: [&str; 2]) -> String {
+    let head = ["", "", names[0], names[1], "difference"];
+    let mut rows = vec![head.map(ToOwned::to_owned).to_vec()];
+    for row in &here.rows {
+        if let Some(other) = there.row(row.metric) {
+            rows.extend(lines(row, other));
+        }
+    }
+    let aligns = [
+        Align::Left,
+        Align::Left,
+        Align::Right,
+        Align::Right,
+        Align::Right,
+    ];
+    columns(&rows, &aligns)
+}
+
+fn lines(here: &Row, there: &Row) -> Vec<Vec<String>> {
+    let truth = |row: &Row, number: fn(&crate::report::TruthBlock) -> Option<f64>| {
+        row.truth.as_ref().and_then(number)
+    };
+    let numbers = [
+        ("Acc", here.acc, there.acc),
+        ("SSIM", here.ssim, there.ssim),
+        ("IoU", here.iou, there.iou),
+        ("IoU box", here.iou_box, there.iou_box),
+        ("Dice", here.dice, there.dice),
+        (
+            "Acc by truth",
+            truth(here, |block| block.acc),
+            truth(there, |block| block.acc),
+        ),
+        (
+            "in 5° by truth",
+            truth(here, |block| block.angle_le_5deg),
+            truth(there, |block| block.angle_le_5deg),
+        ),
+    ];
+    let counts = vec!["n".to_owned(), here.n.to_string(), there.n.to_string()];
+    let told = numbers
+        .iter()
+        .filter(|(_, a, b)| a.is_some() || b.is_some())
+        .map(|(name, a, b)| {
+            let difference = a.zip(*b).map(|(a, b)| format!("{:+.3}", a - b));
+            let show = |value: &Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+            let mut line = vec![(*name).to_owned(), show(a), show(b)];
+            line.extend(difference);
+            line
+        });
+    let mut title = here.metric.title().to_owned();
+    std::iter::once(counts)
+        .chain(told)
+        .map(|line| [vec![std::mem::take(&mut title)], line].concat())
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::side_by_side;
+    use crate::report::Tally;
+
+    #[test]
+    fn empty_projects_have_counts_only() {
+        let report = Tally::default().finish();
+        let text = side_by_side(&report, &report, ["a", "b"]);
+        let lines: Vec<&str> = text.lines().collect();
+        assert_eq!(lines.len(), 1 + report.rows.len());
+        assert!(lines[1].starts_with("Non-luminous SSIM  n  0  0"), "{text}");
+    }
+}
