@@ -3,6 +3,7 @@
 mod model;
 mod plans;
 mod protocol;
+mod schema;
 mod staleness;
 mod verdicts;
 

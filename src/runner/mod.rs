@@ -29,7 +29,8 @@ pub use options::{Rerun, RunOptions};
 pub use stop::{Stop, StopLevel};
 
 use crate::catalog::{
-    Again, Catalog, CatalogError, Dead, PairSelection, Plan, Recipes, WorkerInfo,
+    Again, Catalog, CatalogError, Dead, PairSelection, Plan, RecipeIds, Recipes, StatusCounts,
+    WorkLeft, WorkerInfo,
 };
 use crate::domain::{PairName, WorkerId};
 use crate::stages::Settings;
@@ -132,16 +133,10 @@ async fn run_steps(
     let mut lock = RunLock::acquire(project, options.join)?;
     let worker = catalog.register_worker(this_process(), clock.now()).await?;
     let rescued = take_over(project, catalog, &mut lock, worker, clock).await?;
-    refresh::inputs(project, catalog, among.as_ref()).await?;
-    let recipe_ids = catalog.register_recipes(recipes).await?;
-    catalog
-        .send_back(recipes, among.as_ref(), options.again())
-        .await?;
-    catalog
-        .stage_due(clock.now(), policy::longest_backoff_ms())
-        .await?;
+    let recipe_ids = find_work(project, catalog, recipes, options, among.as_ref(), clock).await?;
+    announce(catalog, options, among.as_ref(), rescued, &mut on_event).await?;
     let (events, mut received) = mpsc::unbounded_channel();
-    let shared = Arc::new(Shared {
+    let shared = Shared {
         catalog: catalog.clone(),
         project: project.clone(),
         steps,
@@ -152,8 +147,45 @@ async fn run_steps(
         until: options.until,
         stage_limit: options.stage_limit,
         events,
-    });
+    };
+    let (workers, most) = (options.workers, options.max_failures);
+    let mut dispatch = Dispatch::new(Arc::new(shared), worker, workers, among.clone(), most);
+    let outcome = dispatch.run(&mut received, &mut on_event).await;
+    // Said also after an error, so that this worker's end is not taken for a crash.
+    let ended = catalog.end_worker(worker, clock.now()).await;
+    let tally = outcome?;
+    ended?;
+    let status = catalog.status(recipes).await?;
     let left = catalog.work_left(options.until, among.as_ref()).await?;
+    Ok(summary(&tally, left, status, clock, stop))
+}
+
+/// Sends back what changed and what is asked for, and makes ready what is due; gives the recipes to run with.
+async fn find_work(
+    project: &Project,
+    catalog: &Catalog,
+    recipes: &Recipes,
+    options: &RunOptions,
+    among: Option<&PairSelection>,
+    clock: Clock,
+) -> Result<RecipeIds, RunError> {
+    refresh::inputs(project, catalog, among).await?;
+    let ids = catalog.register_recipes(recipes).await?;
+    catalog.send_back(recipes, among, options.again()).await?;
+    let longest = policy::longest_backoff_ms();
+    catalog.stage_due(clock.now(), longest).await?;
+    Ok(ids)
+}
+
+/// Tells what lies before the run.
+async fn announce(
+    catalog: &Catalog,
+    options: &RunOptions,
+    among: Option<&PairSelection>,
+    rescued: u64,
+    on_event: &mut (impl FnMut(RunEvent) + Send),
+) -> Result<(), RunError> {
+    let left = catalog.work_left(options.until, among).await?;
     on_event(RunEvent::Started {
         pairs: left.pairs,
         stages: left.by_stage.iter().sum(),
@@ -163,28 +195,7 @@ async fn run_steps(
     if rescued > 0 {
         on_event(RunEvent::Rescued { pairs: rescued });
     }
-    let mut dispatch = Dispatch::new(
-        shared,
-        worker,
-        options.workers,
-        among.clone(),
-        options.max_failures,
-    );
-    let outcome = dispatch.run(&mut received, &mut on_event).await;
-    // Said also after an error, so that this worker's end is not taken for a crash.
-    let ended = catalog.end_worker(worker, clock.now()).await;
-    let tally = outcome?;
-    ended?;
-    summary(
-        catalog,
-        recipes,
-        options,
-        among.as_ref(),
-        &tally,
-        clock,
-        stop,
-    )
-    .await
+    Ok(())
 }
 
 /// Brings back what a dead process left, where the lock proves that no other lives.
@@ -218,17 +229,14 @@ async fn selection(
     Ok(Some(catalog.select(names).await?))
 }
 
-async fn summary(
-    catalog: &Catalog,
-    recipes: &Recipes,
-    options: &RunOptions,
-    among: Option<&PairSelection>,
+fn summary(
     tally: &Tally,
+    left: WorkLeft,
+    status: StatusCounts,
     clock: Clock,
     stop: &Stop,
-) -> Result<RunSummary, RunError> {
-    let left = catalog.work_left(options.until, among).await?;
-    Ok(RunSummary {
+) -> RunSummary {
+    RunSummary {
         done: tally.done,
         failed: tally.failed,
         stages: tally.stages,
@@ -237,8 +245,8 @@ async fn summary(
         stopped: left.pairs > 0 && stop.level() > StopLevel::Go,
         too_many_failures: tally.too_many_failures,
         elapsed_ms: clock.elapsed_ms(),
-        status: catalog.status(recipes).await?,
-    })
+        status,
+    }
 }
 
 /// This process as the catalog knows it.

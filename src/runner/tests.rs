@@ -1,143 +1,19 @@
 //! The run with made-up stages: what becomes of pairs that fail, hang, panic, or are stopped.
 
-use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, Condvar, Mutex};
+mod made_up;
+
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use serde_json::{Map, json};
 
-use super::hand::PairInHand;
-use super::steps::{Setback, StageOutput, Steps};
+use made_up::MadeUp;
+
 use super::{Rerun, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel, run_steps};
-use crate::catalog::{Catalog, ClaimRequest, ImportRow, InputSeen, Recipes, WorkerInfo};
-use crate::domain::{
-    Affine2, ContentHash, Failure, FailureClass, JobStatus, MetricOutcome, PairName,
-    RegisterOutcome, Scores, Stage, ThresholdMetric,
-};
-use crate::store::{NewArtifact, Project};
-
-/// What a made-up pair does, told by its name.
-#[derive(Debug, Default)]
-struct MadeUp {
-    /// Times each pair and stage was computed.
-    computed: Mutex<BTreeMap<(String, Stage), usize>>,
-    running: AtomicUsize,
-    most: AtomicUsize,
-    /// Stages of pairs named `wait..` hold until this is opened.
-    gate: (Mutex<bool>, Condvar),
-}
-
-impl MadeUp {
-    fn count(&self, pair: &str, stage: Stage) -> usize {
-        let computed = self.computed.lock().expect("no panic holds it");
-        computed
-            .get(&(pair.to_owned(), stage))
-            .copied()
-            .unwrap_or(0)
-    }
-
-    fn open(&self) {
-        *self.gate.0.lock().expect("no panic holds it") = true;
-        self.gate.1.notify_all();
-    }
-
-    fn wait(&self) {
-        let open = self.gate.0.lock().expect("no panic holds it");
-        drop(
-            self.gate
-                .1
-                .wait_while(open, |open| !*open)
-                .expect("no panic holds it"),
-        );
-    }
-
-    fn behave(&self, name: &str, stage: Stage, tries: usize) -> Result<(), Setback> {
-        match name.split('_').next().unwrap_or_default() {
-            "panics" if stage == Stage::Depth => panic!("made up"),
-            "bad" if stage == Stage::Fit => {
-                Err(Setback::failed(FailureClass::BadInput, "no faces"))
-            }
-            "flaky" if stage == Stage::Fit && tries == 1 => Err(Setback::Failed {
-                failure: Failure::new(FailureClass::Io, "the disk is slow"),
-                may_pass: true,
-            }),
-            "hangs" if stage == Stage::Fit => {
-                std::thread::sleep(Duration::from_millis(400));
-                Ok(())
-            }
-            "loses" if stage == Stage::Register && tries == 1 => Err(Setback::Back(Stage::Depth)),
-            "wait" => {
-                self.wait();
-                Ok(())
-            }
-            _ => Ok(()),
-        }
-    }
-}
-
-impl Steps for MadeUp {
-    fn run(&self, stage: Stage, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
-        let name = pair.facts.name.as_str().to_owned();
-        let tries = {
-            let mut computed = self.computed.lock().expect("no panic holds it");
-            let count = computed.entry((name.clone(), stage)).or_default();
-            *count += 1;
-            *count
-        };
-        let running = self.running.fetch_add(1, Ordering::SeqCst) + 1;
-        self.most.fetch_max(running, Ordering::SeqCst);
-        let outcome = self.behave(&name, stage, tries);
-        self.running.fetch_sub(1, Ordering::SeqCst);
-        outcome?;
-        let seen = |text: &str| InputSeen {
-            hash: ContentHash::of(text.as_bytes()),
-            stat: "as it was".to_owned(),
-        };
-        pair.inputs.mesh = Some(seen("mesh"));
-        pair.inputs.print = (stage >= Stage::Normalize).then(|| seen("print"));
-        let register = RegisterOutcome {
-            metrics: ThresholdMetric::ALL.map(metric).to_vec(),
-        };
-        let last = stage == Stage::Register;
-        Ok(StageOutput {
-            outcome: if last {
-                json!(register).to_string()
-            } else {
-                json!({ "stage": stage, "pair": name }).to_string()
-            },
-            files: vec![NewArtifact {
-                role: "note.txt".to_owned(),
-                ext: "txt",
-                bytes: format!("{stage} of {name}").into_bytes(),
-            }],
-            metrics: if last { register.metrics } else { Vec::new() },
-        })
-    }
-}
-
-fn metric(metric: ThresholdMetric) -> MetricOutcome {
-    MetricOutcome {
-        metric,
-        threshold_level: 1,
-        threshold_depth: 0.1,
-        print_from_depth: Affine2::IDENTITY,
-        angle_deg: 0.0,
-        scale: 1.0,
-        shift_px: [0.0; 2],
-        scores: Scores {
-            ssim: 0.5,
-            nl_ssim: 0.5,
-            iou: 0.5,
-            iou_box: 0.5,
-            dice: 0.5,
-            density_print: 0.5,
-            density_depth: 0.5,
-        },
-        margin: 0.0,
-        at_bound: false,
-    }
-}
+use crate::catalog::{Catalog, ClaimRequest, ImportRow, Recipes, WorkerInfo};
+use crate::domain::{FailureClass, JobStatus, PairName, Stage};
+use crate::store::Project;
 
 /// A project with made-up pairs.
 struct World {

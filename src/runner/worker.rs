@@ -273,16 +273,23 @@ async fn fail(
     if !shared.catalog.fail(lease, failed).await? {
         return Ok(PairEnd::Lost);
     }
-    let (pair, failure) = (known.name, blame.failure);
-    let later = |wait_ms| RunEvent::PairBackingOff {
-        pair: pair.clone(),
-        stage,
-        failure: failure.clone(),
-        wait_ms,
-    };
-    let (event, end) = match sentence {
-        Sentence::BackOff { run_at } => (later((run_at - now).unsigned_abs()), PairEnd::Later),
-        Sentence::Alone => (later(0), PairEnd::Later),
+    let (event, end) = told(shared, stage, sentence, known.name, blame.failure, now);
+    shared.tell(event);
+    Ok(end)
+}
+
+/// What is told of a failure, and how the pair leaves its worker.
+fn told(
+    shared: &Shared,
+    stage: Stage,
+    sentence: Sentence,
+    pair: PairName,
+    failure: Failure,
+    now: UnixMillis,
+) -> (RunEvent, PairEnd) {
+    let wait_ms = match sentence {
+        Sentence::BackOff { run_at } => (run_at - now).unsigned_abs(),
+        Sentence::Alone => 0,
         Sentence::Quarantine => {
             let skipped = (shared.until.index() + 1).saturating_sub(stage.index()) as u64;
             let event = RunEvent::PairFailed {
@@ -291,11 +298,16 @@ async fn fail(
                 failure,
                 skipped,
             };
-            (event, PairEnd::Failed)
+            return (event, PairEnd::Failed);
         }
     };
-    shared.tell(event);
-    Ok(end)
+    let event = RunEvent::PairBackingOff {
+        pair,
+        stage,
+        failure,
+        wait_ms,
+    };
+    (event, PairEnd::Later)
 }
 
 impl Known {

@@ -1,14 +1,11 @@
 //! Leases, checkpoints, failures, rescue and counters.
 
-use sqlx::Connection as _;
-
 use super::{World, done, name, register, row};
 use crate::catalog::{
     Catalog, CatalogError, ClaimRequest, Dead, Kept, RetrySelection, Sentence, StageFailed,
 };
 use crate::domain::{
-    CRASH_LIMIT, Failure, FailureClass, JobStatus, LengthUnit, Reason, Stage, ThresholdMetric,
-    Verdict,
+    CRASH_LIMIT, Failure, FailureClass, JobStatus, LengthUnit, Stage, ThresholdMetric,
 };
 
 fn failed(world: &World, stage: Stage, sentence: Sentence) -> StageFailed {
@@ -389,80 +386,4 @@ async fn everything_sent_is_stored_when_the_catalog_is_closed() {
     let again = Catalog::open(&path).await.expect("a catalog");
     let detail = again.pair(&name("p0")).await.expect("a read");
     assert_eq!(detail.expect("the pair").results.stages.len(), 1);
-}
-
-/// Every name that the schema's checks allow is one of ours, and the other way round.
-#[tokio::test]
-async fn checks_of_the_schema_and_our_enums_agree() {
-    let world = World::new(1).await;
-    let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::connect::writer(&path, false)
-        .await
-        .expect("a connection");
-    let mut accepts = async |sql: &'static str, value: &str| {
-        let mut transaction = conn.begin().await.expect("a transaction");
-        let outcome = sqlx::query(sql)
-            .bind(value)
-            .execute(&mut *transaction)
-            .await;
-        outcome.is_ok()
-    };
-    let verdict = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, at)
-        VALUES (1, 1, 'density', zeroblob(32), ?1, 'me', 1)";
-    let reason = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, reason, at)
-        VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', ?1, 1)";
-    let metric = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, at)
-        VALUES (1, 1, ?1, zeroblob(32), 'fail', 'me', 1)";
-    let class = "INSERT INTO failure (pair, stage, class, message, at) VALUES (1, 0, ?1, '', 1)";
-    let unit = "UPDATE pair SET unit = ?1";
-    for (sql, names) in [
-        (verdict, Verdict::ALL.map(Verdict::name).to_vec()),
-        (reason, Reason::ALL.map(Reason::name).to_vec()),
-        (
-            metric,
-            ThresholdMetric::ALL.map(ThresholdMetric::name).to_vec(),
-        ),
-        (class, FailureClass::ALL.map(FailureClass::name).to_vec()),
-        (unit, LengthUnit::ALL.map(LengthUnit::name).to_vec()),
-    ] {
-        for name in names {
-            assert!(accepts(sql, name).await, "{name} is refused");
-        }
-        assert!(!accepts(sql, "other").await, "{sql} takes anything");
-    }
-}
-
-/// Each status is allowed exactly with the columns that belong to it.
-#[tokio::test]
-async fn a_job_row_that_is_no_state_is_refused() {
-    let world = World::new(1).await;
-    let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::connect::writer(&path, false)
-        .await
-        .expect("a connection");
-    for status in 0..=6 {
-        for bits in 0..16 {
-            let stage = if bits & 1 == 0 { 2 } else { 4 };
-            let [worker, deadline, run_at] = [2, 4, 8].map(|bit| (bits & bit != 0).then_some(1));
-            let mut transaction = conn.begin().await.expect("a transaction");
-            let outcome = sqlx::query(
-                "UPDATE job SET status = ?1, stage = ?2, worker = ?3, deadline = ?4, run_at = ?5",
-            )
-            .bind(status)
-            .bind(stage)
-            .bind(worker)
-            .bind(deadline)
-            .bind(run_at)
-            .execute(&mut *transaction)
-            .await;
-            let is = JobStatus::from_code(status);
-            let allowed = is.is_some_and(|is| {
-                (is == JobStatus::Done) == (stage == 4)
-                    && (is == JobStatus::Leased) == worker.is_some()
-                    && (is == JobStatus::Leased) == deadline.is_some()
-                    && (is == JobStatus::Backoff) == run_at.is_some()
-            });
-            assert_eq!(outcome.is_ok(), allowed, "status {status}, bits {bits:04b}");
-        }
-    }
 }
