@@ -12,11 +12,11 @@ use super::lease::{InputsSeen, Kept, Lease, MetricResult, StageDone};
 use super::{Catalog, Result, rows};
 use crate::domain::JobStatus;
 
-/// The job's step; only where the lease still holds.
+/// The job's step; only where the lease still holds. Progress clears the pair of suspicion.
 pub(super) const STEP: &str = "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
-    attempt = 1, crashes = 0
+    attempt = 1, crashes = 0, mem_class = 0
 FROM json_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.epoch = item.value ->> 'epoch' AND job.status = 1

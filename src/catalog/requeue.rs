@@ -23,7 +23,8 @@ pub enum RetrySelection {
 
 /// Back to a stage, as if newly imported; never a job that somebody works on.
 pub(super) const SEND_BACK: &str = "
-UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, attempt = 0, crashes = 0, mem_class = 0
+UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
+    mem_class = 0
 FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1";
 
 const FORGET: &str = "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";

@@ -75,18 +75,25 @@ SELECT w.id, w.beat FROM worker AS w
 WHERE w.id IN (SELECT worker FROM job WHERE status = 1)
 ORDER BY w.id";
 
-/// Takes leases back. A worker that ended in order has not crashed, so its pairs are not suspect.
+/// Workers among some, whether each died (did not end in order), and how many leases it left.
+pub(super) const LEFT_BY: &str = "
+SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
+FROM job AS j JOIN worker AS w ON w.id = j.worker
+WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.id";
+
+/// Takes leases back: worker, whether it died, whether the pair is to blame for that. Pairs of a worker that died
+/// are suspect and go behind the others, to be run alone.
 pub(super) const RESCUE: &str = "
-UPDATE job SET status = iif(crashes + item.died >= ?2, 4, 0), worker = NULL, deadline = NULL,
-    epoch = epoch + 1, crashes = crashes + item.died, mem_class = max(mem_class, item.died)
-FROM (SELECT w.id, w.ended IS NULL AS died FROM json_each(?1) AS dead JOIN worker AS w ON w.id = dead.value) AS item
-WHERE job.status = 1 AND job.worker = item.id
+UPDATE job SET status = iif(crashes + (item.value ->> 2) >= ?2, 4, 0), worker = NULL, deadline = NULL,
+    epoch = epoch + 1, crashes = crashes + (item.value ->> 2), prio = prio + (item.value ->> 1),
+    mem_class = max(mem_class, item.value ->> 1)
+FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = item.value ->> 0
 RETURNING pair, stage, status";
 
 /// Takes back leases of other workers whose deadline is long past.
 pub(super) const OVERDUE: &str = "
 UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = NULL,
-    epoch = epoch + 1, crashes = crashes + 1, mem_class = 1
+    epoch = epoch + 1, crashes = crashes + 1, prio = prio + 1, mem_class = 1
 WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1)) AND deadline < ?3
 RETURNING pair, stage, status";
 
@@ -183,6 +190,10 @@ impl Catalog {
 
     /// Takes back the leases of dead workers: ready again, or quarantined at the third crash.
     ///
+    /// A pair is blamed for a death only when its worker held no other. Otherwise all are suspect: they run later,
+    /// each by itself, and the next death tells. So a process that is killed from outside, however often, does not
+    /// bring its pairs into quarantine while there are others.
+    ///
     /// # Errors
     /// When the database refuses.
     pub async fn rescue(&self, dead: Dead, now: UnixMillis) -> Result<Rescued> {
@@ -192,7 +203,7 @@ impl Catalog {
                     Dead::Workers(workers) => workers.iter().map(|worker| worker.0).collect(),
                     Dead::AllBut(me) => holders_but(conn, me).await?,
                 };
-                let items = Value::from(workers).to_string();
+                let items = deaths(conn, workers).await?;
                 let found = sqlx::query(RESCUE)
                     .bind(items)
                     .bind(CRASH_LIMIT)
@@ -316,6 +327,22 @@ impl Catalog {
         }
         Ok(left)
     }
+}
+
+/// Items of [`RESCUE`] for some workers.
+async fn deaths(conn: &mut SqliteConnection, workers: Vec<i64>) -> Result<String> {
+    let found = sqlx::query(LEFT_BY)
+        .bind(Value::from(workers).to_string())
+        .fetch_all(conn)
+        .await?;
+    let mut items = Vec::with_capacity(found.len());
+    for row in &found {
+        let (worker, died, leases): (i64, bool, i64) =
+            (row.try_get(0)?, row.try_get(1)?, row.try_get(2)?);
+        let blamed = died && leases == 1;
+        items.push(json!([worker, i64::from(died), i64::from(blamed)]));
+    }
+    Ok(Value::from(items).to_string())
 }
 
 async fn holders_but(conn: &mut SqliteConnection, me: WorkerId) -> Result<Vec<i64>> {

@@ -4,8 +4,8 @@ use clap::{Args, CommandFactory};
 use clap_complete::Shell;
 
 use super::args::Cli;
-use super::context::Context;
 use super::exit::ExitCode;
+use super::talk;
 
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
@@ -14,9 +14,9 @@ pub(super) struct CompletionsArgs {
     pub(super) shell: Shell,
 }
 
-pub(super) fn completions(args: CompletionsArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(super) fn completions(args: &CompletionsArgs) -> anyhow::Result<ExitCode> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut Cli::command(), "mocban", &mut script);
-    context.talk.data(&String::from_utf8(script)?)?;
+    talk::print(&String::from_utf8(script)?)?;
     Ok(ExitCode::Done)
 }

@@ -5,7 +5,7 @@ use serde_json::{Map, json};
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::talk::{Palette, Tone};
+use super::talk::{self, Palette, Tone};
 use crate::config::{Origin, Setting};
 
 /// What to do with settings.
@@ -27,11 +27,9 @@ pub(super) fn config(command: &ConfigCommand, context: &Context) -> anyhow::Resu
     let ConfigCommand::Show(args) = command;
     let settings = context.settings()?.tree.settings();
     if context.global.json {
-        context.talk.json(&as_json(&settings))?;
+        talk::print_json(&as_json(&settings))?;
     } else {
-        context
-            .talk
-            .data(&as_toml(&settings, args.origin, context.talk.out))?;
+        talk::print(&as_toml(&settings, args.origin, context.talk.out))?;
     }
     Ok(ExitCode::Done)
 }
@@ -49,31 +47,35 @@ fn as_json(settings: &[Setting]) -> serde_json::Value {
 
 /// Settings as a file that reads back the same, with the origins in comments where they are wanted.
 pub(super) fn as_toml(settings: &[Setting], origins: bool, palette: Palette) -> String {
-    let mut text = String::new();
-    let mut section = "";
     let longest = settings.iter().map(|setting| line(setting).len()).max();
+    let mut lines = Vec::new();
+    let mut section = "";
     for setting in settings {
         let (own, _) = setting.key.rsplit_once('.').unwrap_or(("", &setting.key));
         if own != section {
-            let gap = if text.is_empty() { "" } else { "\n" };
-            let heading = palette.paint(Tone::Strong, format!("[{own}]"));
-            text += &format!("{gap}{heading}\n");
+            if !lines.is_empty() {
+                lines.push(String::new());
+            }
+            lines.push(palette.paint(Tone::Strong, format!("[{own}]")));
             section = own;
         }
         let line = line(setting);
-        if origins {
-            let blanks = " ".repeat(longest.unwrap_or(0) - line.len());
-            let tone = match setting.origin {
-                Origin::Default => Tone::Faint,
-                Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => Tone::Warn,
-            };
-            let origin = palette.paint(tone, format!("# {}", setting.origin));
-            text += &format!("{line}{blanks}  {origin}\n");
+        let blanks = " ".repeat(longest.unwrap_or(0) - line.len());
+        lines.push(if origins {
+            format!("{line}{blanks}  {}", origin(setting, palette))
         } else {
-            text += &format!("{line}\n");
-        }
+            line
+        });
     }
-    text
+    lines.iter().flat_map(|line| [line, "\n"]).collect()
+}
+
+fn origin(setting: &Setting, palette: Palette) -> String {
+    let tone = match setting.origin {
+        Origin::Default => Tone::Faint,
+        Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => Tone::Warn,
+    };
+    palette.paint(tone, format!("# {}", setting.origin))
 }
 
 fn line(setting: &Setting) -> String {

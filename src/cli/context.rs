@@ -7,10 +7,9 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use crate::catalog::Catalog;
 use crate::config::{Loaded, Preset, Sources, Start, load};
 use crate::domain::UnixMillis;
-use crate::store::{Project, SETTINGS_FILE};
+use crate::store::{Project, SETTINGS_FILE, StoreError};
 
 use super::args::Global;
-use super::exit::Refusal;
 use super::progress::Screen;
 use super::talk::Talk;
 
@@ -62,9 +61,8 @@ impl Context {
     ///
     /// # Errors
     /// When there is none.
-    pub(super) fn project(&self) -> Result<Project, Refusal> {
-        let dir = self.dir();
-        Project::open(&dir).map_err(|_| Refusal::NoProject { dir })
+    pub(super) fn project(&self) -> Result<Project, StoreError> {
+        Project::open(&self.dir())
     }
 
     /// The project and its catalog, to read; works while a run goes on.

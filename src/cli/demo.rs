@@ -143,11 +143,13 @@ fn check_place(dir: &Path, data: &Path, options: &DemoOptions) -> Result<(), Ref
         Some(found) if found.pairs > options.pairs => {
             refuse(&format!("holds a demo of {} pairs already", found.pairs))
         }
-        Some(_) => Ok(()),
-        None if data.join(NOTE).is_file() => Ok(()),
-        None if data.exists() => refuse("has a data folder that no demo made"),
-        None if dir.join(CATALOG_FILE).exists() => refuse("is a project of its own"),
-        None => Ok(()),
+        None if data.exists() && !data.join(NOTE).is_file() => {
+            refuse("has a data folder that no demo made")
+        }
+        None if dir.join(CATALOG_FILE).exists() && !data.exists() => {
+            refuse("is a project of its own")
+        }
+        Some(_) | None => Ok(()),
     }
 }
 

@@ -1,7 +1,5 @@
 //! Exit codes and the known ways in which a command ends without an answer.
 
-use std::path::PathBuf;
-
 /// What the process says to its caller; the numbers are fixed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
@@ -82,12 +80,6 @@ impl From<ExitCode> for std::process::ExitCode {
 /// A command that could not do what it was asked, with a code of its own.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Refusal {
-    /// No catalog in the directory.
-    #[error("no project in {}", .dir.display())]
-    NoProject {
-        /// Where it was looked for.
-        dir: PathBuf,
-    },
     /// Names that are no pairs, or a selection without pairs.
     #[error("{0}")]
     NothingSelected(String),
@@ -100,7 +92,6 @@ impl Refusal {
     /// Its exit code.
     pub(super) const fn code(&self) -> ExitCode {
         match self {
-            Self::NoProject { .. } => ExitCode::NoProject,
             Self::NothingSelected(_) => ExitCode::NothingSelected,
             Self::Usage(_) => ExitCode::Usage,
         }

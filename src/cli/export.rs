@@ -8,6 +8,7 @@ use serde_json::json;
 use super::context::Context;
 use super::exit::ExitCode;
 use super::table::count;
+use super::talk;
 use crate::export::{ExportSummary, JsonlOptions, to_jsonl};
 
 /// Arguments of `export`.
@@ -42,9 +43,10 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
     };
     catalog.close().await;
     tell(&summary, &args, context)?;
-    Ok(match summary.unreadable.is_empty() {
-        true => ExitCode::Done,
-        false => ExitCode::SomeFailed,
+    Ok(if summary.unreadable.is_empty() {
+        ExitCode::Done
+    } else {
+        ExitCode::SomeFailed
     })
 }
 
@@ -55,7 +57,7 @@ fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow
             .iter()
             .map(|(pair, why)| json!({"id": pair, "error": why}))
             .collect();
-        context.talk.json(&json!({
+        talk::print_json(&json!({
             "schema": 1,
             "done": summary.done,
             "without_result": summary.without_result,

@@ -10,6 +10,7 @@ use super::context::{Context, now};
 use super::exit::ExitCode;
 use super::manifest_file::Listing;
 use super::table::count;
+use super::talk;
 use super::truth_file::{self, refusal};
 use crate::catalog::{Catalog, ImportRow, ImportSummary};
 use crate::domain::{LengthUnit, PairName};
@@ -40,7 +41,7 @@ pub(super) struct ImportArgs {
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let taken = take(&args, context).await?;
     if context.global.json {
-        context.talk.json(&as_json(&taken))?;
+        talk::print_json(&as_json(&taken))?;
     }
     tell(&taken, context);
     context.talk.next(&context.command("run"));
@@ -161,6 +162,7 @@ fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow>
 /// Says what an import did; warnings first.
 pub(super) fn tell(taken: &Taken, context: &Context) {
     const WARNED: usize = 20;
+    const NAMED: usize = 10;
     let talk = &context.talk;
     for line in taken.missing.iter().take(WARNED) {
         talk.warn(line);
@@ -182,7 +184,6 @@ pub(super) fn tell(taken: &Taken, context: &Context) {
             truths => format!("; {} stored", count(truths, "true alignment")),
         }
     ));
-    const NAMED: usize = 10;
     for change in summary.changed.iter().take(NAMED) {
         talk.say(&format!(
             "  {}: {} changed",

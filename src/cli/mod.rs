@@ -115,7 +115,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Export(args) => export::export(args, context).await,
         Command::Sheet(args) => sheet::sheet(args, context).await,
         Command::Config(command) => config::config(&command, context),
-        Command::Completions(args) => completions::completions(args, context),
+        Command::Completions(args) => completions::completions(&args),
         Command::Man(args) => man::man(&args, context),
     }
 }

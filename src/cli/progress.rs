@@ -93,8 +93,8 @@ impl Progress {
             }
             Form::Bar(bar) => draw(bar, &self.tally),
             Form::Plain { at, percent } => {
-                let due =
-                    at.elapsed() >= PLAIN_EVERY || self.tally.percent() >= *percent + PLAIN_PERCENT;
+                let enough = self.tally.percent() >= *percent + PLAIN_PERCENT;
+                let due = at.elapsed() >= PLAIN_EVERY || enough && at.elapsed() >= PLAIN_LEAST;
                 if due {
                     (*at, *percent) = (Instant::now(), self.tally.percent());
                     let elapsed = self.started.elapsed().as_millis() as u64;

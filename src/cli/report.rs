@@ -7,6 +7,7 @@ use clap::Args;
 
 use super::context::Context;
 use super::exit::ExitCode;
+use super::talk;
 use crate::report::{Format, Report, gate, gather, render};
 
 /// Arguments of `report`.
@@ -36,10 +37,7 @@ fn share(text: &str) -> Result<f64, String> {
 
 pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let report = read(context).await?;
-    let format = match context.global.json {
-        true => Format::Json,
-        false => args.format,
-    };
+    let format = chosen(args.format, context);
     let text = render(&report, format);
     match &args.output {
         Some(path) => {
@@ -47,7 +45,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
             std::fs::write(path, text).with_context(|| format!("cannot write {shown}"))?;
             context.talk.say(&format!("report is in {shown}"));
         }
-        None => context.talk.data(&text)?,
+        None => talk::print(&text)?,
     }
     Ok(gates(&report, &args, context))
 }
@@ -57,12 +55,18 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
 /// # Errors
 /// When the catalog cannot be read or stdout is closed.
 pub(super) async fn print(context: &Context) -> anyhow::Result<()> {
-    let format = match context.global.json {
-        true => Format::Json,
-        false => Format::Text,
-    };
-    context.talk.data(&render(&read(context).await?, format))?;
+    let format = chosen(Format::Text, context);
+    talk::print(&render(&read(context).await?, format))?;
     Ok(())
+}
+
+/// `--json` wins over `--format`.
+const fn chosen(format: Format, context: &Context) -> Format {
+    if context.global.json {
+        Format::Json
+    } else {
+        format
+    }
 }
 
 async fn read(context: &Context) -> anyhow::Result<Report> {
@@ -74,9 +78,10 @@ async fn read(context: &Context) -> anyhow::Result<Report> {
 
 /// Says what is not met; an incomplete report is told before one that is not good enough.
 fn gates(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
-    let missing = match args.require_complete {
-        true => gate::missing(report),
-        false => Vec::new(),
+    let missing = if args.require_complete {
+        gate::missing(report)
+    } else {
+        Vec::new()
     };
     let below = match args.fail_under {
         Some(least) => gate::below(report, least),

@@ -7,6 +7,7 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::count;
+use super::talk;
 use crate::catalog::{Catalog, RetrySelection};
 use crate::domain::FailureClass;
 
@@ -30,9 +31,7 @@ pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<
         return Err(Refusal::NothingSelected(nothing(&selection)).into());
     }
     if context.global.json {
-        context
-            .talk
-            .json(&json!({"schema": 1, "retried": retried}))?;
+        talk::print_json(&json!({"schema": 1, "retried": retried}))?;
     }
     context
         .talk

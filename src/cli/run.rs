@@ -11,6 +11,7 @@ use super::exit::ExitCode;
 use super::failures::Failures;
 use super::progress::Progress;
 use super::table::{Align, columns, count};
+use super::talk;
 use super::{select, signals};
 use crate::catalog::{Catalog, Plan};
 use crate::config::Config;
@@ -75,7 +76,7 @@ pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<Exit
     }
     let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
     if context.global.json {
-        context.talk.json(&as_json(&summary))?;
+        talk::print_json(&as_json(&summary))?;
     }
     tell_end(&summary, &failures, context);
     for command in next_steps(&summary, &failures) {
@@ -240,12 +241,10 @@ fn as_json(summary: &RunSummary) -> Value {
 
 fn tell_plan(plan: &Plan, context: &Context) -> anyhow::Result<ExitCode> {
     if context.global.json {
-        context
-            .talk
-            .json(&json!({"schema": 1, "pairs": plan.pairs(), "plan": plan}))?;
+        talk::print_json(&json!({"schema": 1, "pairs": plan.pairs(), "plan": plan}))?;
         return Ok(ExitCode::Done);
     }
-    context.talk.data(&plan_text(plan))?;
+    talk::print(&plan_text(plan))?;
     if plan.pairs() > 0 {
         context.talk.next(&context.command("run"));
     }
@@ -253,7 +252,7 @@ fn tell_plan(plan: &Plan, context: &Context) -> anyhow::Result<ExitCode> {
 }
 
 fn plan_text(plan: &Plan) -> String {
-    let mut text = format!("{} would run", count(plan.pairs(), "pair"));
+    let mut parts = vec![format!("{} would run", count(plan.pairs(), "pair"))];
     for (number, what) in [
         (plan.done, "done"),
         (plan.quarantined, "failed and kept back"),
@@ -261,7 +260,7 @@ fn plan_text(plan: &Plan) -> String {
         (plan.leased, "in the hands of another run"),
     ] {
         if number > 0 {
-            text += &format!(", {number} {what}");
+            parts.push(format!("{number} {what}"));
         }
     }
     let rows: Vec<Vec<String>> = plan
@@ -276,7 +275,8 @@ fn plan_text(plan: &Plan) -> String {
         })
         .collect();
     format!(
-        "{text}\n{}",
+        "{}\n{}",
+        parts.join(", "),
         columns(&rows, &[Align::Right, Align::Left, Align::Left])
     )
 }
@@ -285,7 +285,7 @@ fn plan_text(plan: &Plan) -> String {
 mod tests {
     use super::{Plan, plan_text};
     use crate::catalog::{FieldChange, PlanEntry, WorkReason};
-    use crate::domain::{JobStatus, Stage};
+    use crate::domain::Stage;
 
     #[test]
     fn plan_names_the_setting_that_changed() {

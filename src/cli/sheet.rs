@@ -10,6 +10,7 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::count;
+use super::talk;
 use crate::domain::ThresholdMetric;
 use crate::export::{Sheet, SheetOptions, SheetOrder, draw_sheet};
 use crate::raster::png_rgb8;
@@ -52,9 +53,9 @@ impl Default for SheetArgs {
 pub(super) async fn sheet(args: SheetArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (path, sheet) = write(&args, context).await?;
     if context.global.json {
-        context
-            .talk
-            .json(&json!({"schema": 1, "file": path, "shown": sheet.shown, "of": sheet.of}))?;
+        talk::print_json(
+            &json!({"schema": 1, "file": path, "shown": sheet.shown, "of": sheet.of}),
+        )?;
     }
     context.talk.say(&format!(
         "{} of {} on {}",

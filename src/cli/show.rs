@@ -7,6 +7,7 @@ use super::clock::utc;
 use super::context::Context;
 use super::exit::ExitCode;
 use super::show_text::Page;
+use super::talk::{self, Palette, Tone};
 use super::{select, verdict};
 use crate::catalog::{PairDetail, PlanEntry};
 use crate::domain::JobStatus;
@@ -31,9 +32,7 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
         anyhow::bail!("pair {name} went away while it was looked up");
     };
     if context.global.json {
-        context
-            .talk
-            .json(&as_json(&detail, why.as_ref(), &project)?)?;
+        talk::print_json(&as_json(&detail, why.as_ref(), &project)?)?;
         return Ok(ExitCode::Done);
     }
     let page = Page {
@@ -41,10 +40,10 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
         project: &project,
         palette: context.talk.out,
     };
-    context.talk.data(&format!(
+    talk::print(&format!(
         "{}{}",
         page.text(),
-        tail(&detail, why.as_ref(), context)
+        tail(&detail, why.as_ref(), context.talk.out)
     ))?;
     for command in next_steps(&detail, why.is_some()) {
         context.talk.next(&context.command(&command));
@@ -53,28 +52,24 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
 }
 
 /// Verdicts and what comes next.
-fn tail(detail: &PairDetail, why: Option<&PlanEntry>, context: &Context) -> String {
-    let palette = context.talk.out;
-    let mut text = String::new();
+fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> String {
+    let mut lines = Vec::new();
     if !detail.verdict_log.is_empty() {
-        text += &super::show_text::heading("verdicts", palette);
-        for line in verdict::log_text(&detail.verdict_log, palette).lines() {
-            text += &format!("  {line}\n");
-        }
+        lines.push(palette.paint(Tone::Strong, "verdicts"));
+        let log = verdict::log_text(&detail.verdict_log, palette);
+        lines.extend(log.lines().map(|line| format!("  {line}")));
     }
-    text += &super::show_text::heading("next run", palette);
-    text += &match (why, detail.results.status) {
-        (Some(entry), _) => format!("  from {}: {}\n", entry.from, entry.why),
-        (None, JobStatus::Quarantined) => "  stays failed until it is retried\n".to_owned(),
-        (None, JobStatus::Held) => "  set aside until it is retried\n".to_owned(),
+    lines.push(palette.paint(Tone::Strong, "next run"));
+    lines.push(match (why, detail.results.status) {
+        (Some(entry), _) => format!("  from {}: {}", entry.from, entry.why),
+        (None, JobStatus::Quarantined) => "  stays failed until it is retried".to_owned(),
+        (None, JobStatus::Held) => "  set aside until it is retried".to_owned(),
         (None, JobStatus::Done | JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff) => {
-            "  nothing left to do\n".to_owned()
+            "  nothing left to do".to_owned()
         }
-    };
-    if let Some(at) = detail.run_at {
-        text += &format!("  not before {}\n", utc(at));
-    }
-    text
+    });
+    lines.extend(detail.run_at.map(|at| format!("  not before {}", utc(at))));
+    lines.join("\n")
 }
 
 fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {

@@ -35,10 +35,13 @@ impl Page<'_> {
 
     fn facts(&self) -> String {
         let facts = &self.detail.results.facts;
-        let mut name = self.palette.paint(Tone::Strong, &facts.name);
-        for extra in [&facts.character, &facts.block].into_iter().flatten() {
-            name += &format!("  {extra}");
-        }
+        let mut names = vec![self.palette.paint(Tone::Strong, &facts.name)];
+        names.extend(
+            [&facts.character, &facts.block]
+                .into_iter()
+                .flatten()
+                .cloned(),
+        );
         let unit = facts.unit.map_or("unit unknown", |unit| unit.name());
         let side = match facts.scanned_face_down {
             Some(true) => ", scanned face down",
@@ -46,7 +49,7 @@ impl Page<'_> {
             None => "",
         };
         let mut rows = vec![
-            ["pair".to_owned(), name],
+            ["pair".to_owned(), names.join("  ")],
             ["state".to_owned(), self.state()],
             [
                 "mesh".to_owned(),
@@ -83,14 +86,13 @@ impl Page<'_> {
                 Tone::Warn
             }
         };
-        let mut text = self.palette.paint(tone, results.status);
-        if let Some(stage) = results.next_stage {
-            text += &format!(" before {stage}");
-        }
-        if self.detail.crashes > 0 {
-            text += &format!(", {} workers died over it", self.detail.crashes);
-        }
-        text
+        let status = self.palette.paint(tone, results.status);
+        let stage = results.next_stage.map(|stage| format!(" before {stage}"));
+        let crashes = match self.detail.crashes {
+            0 => String::new(),
+            crashes => format!(", {crashes} workers died over it"),
+        };
+        format!("{status}{}{crashes}", stage.unwrap_or_default())
     }
 
     fn failure(&self) -> String {

@@ -10,7 +10,7 @@ use super::exit::ExitCode;
 use super::failures::Failures;
 use super::progress::CLEAR;
 use super::table::{Align, columns, count};
-use super::talk::{Palette, Tone};
+use super::talk::{self, Palette, Tone};
 use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, Stage, Verdict};
 use crate::runner;
@@ -72,9 +72,9 @@ impl View {
 fn show(view: &View, watched: bool, context: &Context) -> anyhow::Result<()> {
     let talk = &context.talk;
     if context.global.json && watched {
-        talk.data(&serde_json::to_string(&view.counts)?)?;
+        talk::print(&serde_json::to_string(&view.counts)?)?;
     } else if context.global.json {
-        talk.json(&view.counts)?;
+        talk::print_json(&view.counts)?;
     } else {
         let clear = if watched && std::io::stdout().is_terminal() {
             CLEAR
@@ -82,7 +82,7 @@ fn show(view: &View, watched: bool, context: &Context) -> anyhow::Result<()> {
             ""
         };
         let dir = context.dir().display().to_string();
-        talk.data(&format!("{clear}{}", screen(view, &dir, talk.out)))?;
+        talk::print(&format!("{clear}{}", screen(view, &dir, talk.out)))?;
         for command in next_steps(view) {
             talk.next(&context.command(&command));
         }
@@ -91,27 +91,22 @@ fn show(view: &View, watched: bool, context: &Context) -> anyhow::Result<()> {
 }
 
 fn screen(view: &View, dir: &str, palette: Palette) -> String {
-    let mut text = format!(
-        "{}  {}\n",
-        label("project", palette),
-        headline(view, dir, palette)
-    );
-    text += &stage_table(&view.counts, palette);
+    let line = |word: &str, text: &str| format!("{}  {text}\n", label(word, palette));
+    let mut parts = vec![
+        line("project", &headline(view, dir, palette)),
+        stage_table(&view.counts, palette),
+    ];
     if view.failed() > 0 {
-        text += &format!("{}\n", label("failed", palette));
-        text += &view.failures.text();
+        parts.push(format!("{}\n", label("failed", palette)));
+        parts.push(view.failures.text());
     }
     if view.counts.stale > 0 {
-        text += &format!(
-            "{}  {} ran with other settings or files than those of now\n",
-            label("stale", palette),
-            count(view.counts.stale, "pair")
-        );
+        let pairs = count(view.counts.stale, "pair");
+        let text = format!("{pairs} ran with other settings or files than those of now");
+        parts.push(line("stale", &text));
     }
-    if let Some(line) = verdict_line(&view.counts) {
-        text += &format!("{}  {line}\n", label("verdicts", palette));
-    }
-    text
+    parts.extend(verdict_line(&view.counts).map(|text| line("verdicts", &text)));
+    parts.concat()
 }
 
 fn label(word: &str, palette: Palette) -> String {

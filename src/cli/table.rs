@@ -21,15 +21,17 @@ pub(super) fn columns(rows: &[Vec<String>], aligns: &[Align]) -> String {
         })
         .collect();
     rows.iter()
-        .map(|row| {
-            let cells: Vec<String> = row
-                .iter()
-                .zip(aligns.iter().zip(&widths))
-                .map(|(cell, (align, width))| pad(cell, *align, *width))
-                .collect();
-            format!("{}\n", cells.join("  ").trim_end())
-        })
+        .flat_map(|row| [line(row, aligns, &widths), "\n".to_owned()])
         .collect()
+}
+
+fn line(row: &[String], aligns: &[Align], widths: &[usize]) -> String {
+    let cells: Vec<String> = row
+        .iter()
+        .zip(aligns.iter().zip(widths))
+        .map(|(cell, (align, width))| pad(cell, *align, *width))
+        .collect();
+    cells.join("  ").trim_end().to_owned()
 }
 
 fn pad(cell: &str, align: Align, wanted: usize) -> String {

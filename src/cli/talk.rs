@@ -101,28 +101,6 @@ impl Talk {
         }
     }
 
-    /// Writes a command's answer to stdout, with a line end.
-    ///
-    /// # Errors
-    /// When stdout is closed.
-    pub(super) fn data(&self, text: &str) -> std::io::Result<()> {
-        let mut out = std::io::stdout().lock();
-        out.write_all(text.as_bytes())?;
-        if !text.ends_with('\n') {
-            out.write_all(b"\n")?;
-        }
-        out.flush()
-    }
-
-    /// Writes a value as one JSON document to stdout.
-    ///
-    /// # Errors
-    /// When stdout is closed.
-    pub(super) fn json(&self, value: &impl serde::Serialize) -> anyhow::Result<()> {
-        self.data(&serde_json::to_string_pretty(value)?)?;
-        Ok(())
-    }
-
     /// A line on stderr; `-q` keeps it back.
     pub(super) fn say(&self, text: &str) {
         if !self.quiet {
@@ -161,6 +139,28 @@ impl Talk {
             self.err.paint(Tone::Faint, "next:")
         ));
     }
+}
+
+/// Writes a command's answer to stdout, with a line end.
+///
+/// # Errors
+/// When stdout is closed.
+pub(super) fn print(text: &str) -> std::io::Result<()> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes())?;
+    if !text.ends_with('\n') {
+        out.write_all(b"\n")?;
+    }
+    out.flush()
+}
+
+/// Writes a value as one JSON document to stdout.
+///
+/// # Errors
+/// When stdout is closed.
+pub(super) fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+    print(&serde_json::to_string_pretty(value)?)?;
+    Ok(())
 }
 
 #[cfg(test)]

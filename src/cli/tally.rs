@@ -73,21 +73,21 @@ impl Tally {
 
     /// One line for a log: `42 % · 10 of 24 pairs done, 1 failed · 3.1 stages/s · about 17 s left`.
     pub(super) fn line(&self, elapsed_ms: u64) -> String {
-        let mut line = format!(
+        let counts = format!(
             "{} % · {} of {} pairs done, {} failed",
             self.percent(),
             self.done,
             self.pairs,
             self.failed
         );
-        if let Some(rate) = self.rate(elapsed_ms) {
-            let left_ms = self.stages.saturating_sub(self.passed) as f64 / rate * 1000.0;
-            line += &format!(
-                " · {rate:.1} stages/s · about {} left",
-                super::clock::rough(left_ms as u64)
-            );
+        match self.rate(elapsed_ms) {
+            Some(rate) => {
+                let left_ms = self.stages.saturating_sub(self.passed) as f64 / rate * 1000.0;
+                let left = super::clock::rough(left_ms as u64);
+                format!("{counts} · {rate:.1} stages/s · about {left} left")
+            }
+            None => counts,
         }
-        line
     }
 
     /// Whole per cent of the stages, rounded down, so that 100 is the end.

@@ -10,7 +10,7 @@ use super::clock::utc;
 use super::context::{Context, now};
 use super::exit::ExitCode;
 use super::table::{Align, columns, count};
-use super::talk::Palette;
+use super::talk::{self, Palette, Tone};
 use super::{select, verdict_file};
 use crate::catalog::{NewVerdict, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
@@ -126,9 +126,7 @@ async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode>
     catalog.verdict_set(verdicts, now()).await?;
     catalog.close().await;
     if context.global.json {
-        context
-            .talk
-            .json(&json!({"schema": 1, "recorded": number}))?;
+        talk::print_json(&json!({"schema": 1, "recorded": number}))?;
     }
     context
         .talk
@@ -147,12 +145,12 @@ async fn log(args: LogArgs, context: &Context) -> anyhow::Result<ExitCode> {
     catalog.close().await;
     if context.global.json {
         for event in &events {
-            context.talk.data(&serde_json::to_string(event)?)?;
+            talk::print(&serde_json::to_string(event)?)?;
         }
     } else if events.is_empty() {
         context.talk.say("no verdicts yet");
     } else {
-        context.talk.data(&log_text(&events, context.talk.out))?;
+        talk::print(&log_text(&events, context.talk.out))?;
     }
     Ok(ExitCode::Done)
 }
@@ -162,7 +160,7 @@ async fn undo(args: UndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let undone = catalog.verdict_undo(args.reader.as_deref(), now()).await?;
     catalog.close().await;
     if context.global.json {
-        context.talk.json(&json!({"schema": 1, "undone": undone}))?;
+        talk::print_json(&json!({"schema": 1, "undone": undone}))?;
     }
     for event in &undone {
         context.talk.say(&format!(
@@ -180,7 +178,6 @@ pub(super) fn log_text(events: &[VerdictEvent], palette: Palette) -> String {
 }
 
 fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
-    use super::talk::Tone;
     let tone = match event.verdict {
         Verdict::Pass => Tone::Good,
         Verdict::Fail => Tone::Bad,

@@ -145,7 +145,9 @@ mod tests {
         let changes = tree
             .changes(&paper, &super::Origin::Preset("paper"))
             .expect("known keys");
-        changes.iter().for_each(|change| tree.apply(change));
+        for change in &changes {
+            tree.apply(change);
+        }
         read(&tree).expect("values of the right types");
     }
 }

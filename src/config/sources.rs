@@ -182,13 +182,12 @@ fn find_preset(name: &Value, origin: &Origin) -> Result<Preset, ConfigError> {
 
 fn parse(text: &str, origin: &Origin) -> Result<Table, ConfigError> {
     text.parse::<Table>().map_err(|error| {
-        let before = error.span().map_or(0, |span| span.start.min(text.len()));
+        let before = error
+            .span()
+            .map_or(0, |span| text.floor_char_boundary(span.start));
         ConfigError::Syntax {
             origin: origin.clone(),
-            line: 1 + text.as_bytes()[..before]
-                .iter()
-                .filter(|byte| **byte == b'\n')
-                .count(),
+            line: 1 + text[..before].matches('\n').count(),
             reason: error.message().to_owned(),
         }
     })

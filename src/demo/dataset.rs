@@ -12,7 +12,7 @@ use super::pair::{Pair, drawn_pair};
 use super::tier::Tier;
 
 /// Raised whenever the same options give other bytes than before.
-const REVISION: u32 = 1;
+const REVISION: u32 = 2;
 /// Pairs that share a block in the manifest.
 const PAIRS_PER_BLOCK: u64 = 12;
 /// Written last: a dataset that has it is whole.

@@ -64,7 +64,7 @@ impl Inking {
             spread: Noise::draw(rng),
             rim: Noise::draw(rng),
             strength: match load {
-                Load::Fair => rng.random_range(0.86..0.97),
+                Load::Fair => rng.random_range(0.80..0.97),
                 Load::Heavy => rng.random_range(0.93..0.99),
                 Load::Faint => rng.random_range(0.45..0.68),
             },
@@ -110,16 +110,14 @@ impl Inking {
     }
 }
 
+/// Too much or too little ink is a matter of the hard tier.
 fn draw_load(tier: Tier, rng: &mut ChaCha8Rng) -> Load {
     let share: f64 = rng.random();
-    let (heavy, faint) = if tier.is_damaged() {
-        (0.35, 0.7)
-    } else {
-        (0.08, 0.12)
-    };
-    if share < heavy {
+    if !tier.is_damaged() {
+        Load::Fair
+    } else if share < 0.35 {
         Load::Heavy
-    } else if share < faint {
+    } else if share < 0.7 {
         Load::Faint
     } else {
         Load::Fair

@@ -8,6 +8,7 @@ mod ids;
 mod job;
 mod metric;
 mod outcome;
+pub mod role;
 mod stage;
 mod transform;
 mod unit;

@@ -5,15 +5,14 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::pictures::View;
-use crate::catalog::{MetricRecord, PairResults};
+use crate::catalog::PairResults;
+use crate::domain::role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
 use crate::domain::{ContentHash, DepthScale, FileKind, MetricOutcome, Stage, ThresholdMetric};
 use crate::raster::{
     self, DecodeError, DepthMap, Mask, Picture, png_grey16, png_mask, png_rgb8, warp_depth,
     warp_mask,
 };
-use crate::report::aligned::{
-    Aligned, AlignedError, CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, depth_mask,
-};
+use crate::report::aligned::{Aligned, AlignedError, depth_mask};
 use crate::store::Project;
 
 /// Folder of the pairs below the export folder.
@@ -115,6 +114,14 @@ pub(super) struct PairFiles<'a> {
     depth: DepthMap,
 }
 
+/// The files of one alignment, encoded.
+pub(super) struct Drawn {
+    depth_mask: Vec<u8>,
+    aligned_depth: Vec<u8>,
+    aligned_mask: Vec<u8>,
+    overlay: Vec<u8>,
+}
+
 /// A print as given and as decoded.
 pub(super) struct Print {
     bytes: Vec<u8>,
@@ -199,56 +206,42 @@ impl<'a> PairFiles<'a> {
         write(root, &files.canvas_print_mask, &canvas)
     }
 
+    /// Draws what depends on the alignment alone.
+    pub(super) fn draw(&self, outcome: &MetricOutcome) -> Drawn {
+        let (width, height) = (self.print_mask.width(), self.print_mask.height());
+        let print_from_depth = &outcome.print_from_depth;
+        let strokes = depth_mask(&self.depth, outcome.threshold_level);
+        let aligned = warp_mask(&strokes, print_from_depth, width, height);
+        let heights = warp_depth(&self.depth, print_from_depth, width, height);
+        let view = View::to_judge_by(&self.print.picture);
+        Drawn {
+            depth_mask: png_mask(&strokes),
+            aligned_depth: png_grey16(&heights),
+            aligned_mask: png_mask(&aligned),
+            overlay: png_rgb8(&view.overlay(&self.print.picture, &self.depth, outcome)),
+        }
+    }
+
     /// Writes the files of one metric; says where all files of its line are.
     pub(super) fn write_metric(
         &self,
         root: &Path,
-        record: &MetricRecord,
+        metric: ThresholdMetric,
+        drawn: &Drawn,
     ) -> Result<Files, FilesError> {
-        let outcome = &record.outcome;
-        let files = self.files(outcome.metric);
-        let role = canvas_depth_mask(outcome.metric);
+        let files = self.files(metric);
+        let role = canvas_depth_mask(metric);
         let canvas = self.aligned.bytes(Stage::Register, &role)?;
-        let strokes = depth_mask(&self.depth, outcome.threshold_level);
-        write(root, &files.depth_mask, &png_mask(&strokes))?;
-        write(root, &files.aligned_depth, &self.aligned_depth(outcome))?;
-        write(
-            root,
-            &files.aligned_mask,
-            &self.aligned_mask(&strokes, outcome),
-        )?;
+        write(root, &files.depth_mask, &drawn.depth_mask)?;
+        write(root, &files.aligned_depth, &drawn.aligned_depth)?;
+        write(root, &files.aligned_mask, &drawn.aligned_mask)?;
         write(root, &files.canvas_depth_mask, &canvas)?;
-        write(root, &files.overlay, &self.overlay(outcome))?;
+        write(root, &files.overlay, &drawn.overlay)?;
         Ok(files)
     }
 
     fn files(&self, metric: ThresholdMetric) -> Files {
         Files::of(self.name, metric, self.print.ext())
-    }
-
-    fn aligned_depth(&self, outcome: &MetricOutcome) -> Vec<u8> {
-        let (width, height) = (self.print_mask.width(), self.print_mask.height());
-        png_grey16(&warp_depth(
-            &self.depth,
-            &outcome.print_from_depth,
-            width,
-            height,
-        ))
-    }
-
-    fn aligned_mask(&self, strokes: &Mask, outcome: &MetricOutcome) -> Vec<u8> {
-        let (width, height) = (self.print_mask.width(), self.print_mask.height());
-        png_mask(&warp_mask(
-            strokes,
-            &outcome.print_from_depth,
-            width,
-            height,
-        ))
-    }
-
-    fn overlay(&self, outcome: &MetricOutcome) -> Vec<u8> {
-        let view = View::to_judge_by(&self.print.picture);
-        png_rgb8(&view.overlay(&self.print.picture, &self.depth, outcome))
     }
 
     fn sidecar(&self) -> String {

@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::files::{FilesError, PAIRS, PairFiles};
+use super::files::{Drawn, FilesError, PAIRS, PairFiles};
 use super::folder::{Folder, FolderError, LINES};
 use super::line::{Line, LineStatus, Outcomes};
 use crate::catalog::{Catalog, CatalogError, PairResults};
-use crate::domain::{Failure, FailureClass, PairName, ThresholdMetric};
+use crate::domain::{Failure, FailureClass, MetricOutcome, PairName, ThresholdMetric};
 use crate::raster;
+use crate::report::aligned::same_alignment;
 use crate::store::Project;
 
 /// Pairs in memory at a time.
@@ -177,16 +178,25 @@ fn finished_lines(
     let files = PairFiles::read(project, pair, &options.limits)?;
     let outcomes = Outcomes::read(files.aligned())?;
     files.write_shared(root)?;
-    pair.metrics
-        .iter()
-        .map(|record| {
-            let written = files.write_metric(root, record)?;
-            Ok(Line {
-                seconds: options.with_times.then(|| pair.seconds()),
-                ..Line::of(pair, record, &outcomes, written)
-            })
-        })
-        .collect()
+    let mut drawn: Vec<(&MetricOutcome, Drawn)> = Vec::new();
+    let mut lines = Vec::new();
+    for record in &pair.metrics {
+        let outcome = &record.outcome;
+        // Metrics often choose the same threshold; what they share is drawn once.
+        let twin = drawn
+            .iter()
+            .position(|(other, _)| same_alignment(other, outcome));
+        let index = twin.unwrap_or(drawn.len());
+        if twin.is_none() {
+            drawn.push((outcome, files.draw(outcome)));
+        }
+        let written = files.write_metric(root, outcome.metric, &drawn[index].1)?;
+        lines.push(Line {
+            seconds: options.with_times.then(|| pair.seconds()),
+            ..Line::of(pair, record, &outcomes, written)
+        });
+    }
+    Ok(lines)
 }
 
 fn all_metrics(line: impl Fn(ThresholdMetric) -> Line) -> Vec<Line> {

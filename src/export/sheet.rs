@@ -219,7 +219,8 @@ fn note(candidate: &Candidate, metric: ThresholdMetric) -> String {
             let (iou, tops) = (record.outcome.scores.iou, errors.mask_iou);
             let tops = tops.map_or(String::new(), |tops| format!(" tops {tops:.2}"));
             let (angle, landmarks) = (errors.angle_deg, errors.tre_pct);
-            format!("IoU {iou:.2}  {angle:.1}\u{b0} {landmarks:.1}%{tops}")
+            let (angle, landmarks) = (short(angle), short(landmarks));
+            format!("IoU {iou:.2}  {angle}\u{b0} {landmarks}%{tops}")
         }
         (Some(record), None, _) => format!(
             "IoU {:.2}  margin {:.2}",
@@ -227,6 +228,15 @@ fn note(candidate: &Candidate, metric: ThresholdMetric) -> String {
         ),
         (None, _, Some(stored)) => format!("{}: {}", stored.failure.class, stored.failure.message),
         (None, _, None) => String::new(),
+    }
+}
+
+/// One decimal where it tells something.
+fn short(value: f64) -> String {
+    if value < 9.95 {
+        format!("{value:.1}")
+    } else {
+        format!("{value:.0}")
     }
 }
 

@@ -3,23 +3,12 @@
 use serde::de::DeserializeOwned;
 
 use crate::catalog::{PairResults, StageRecord};
+use crate::domain::role::{DEPTH, PRINT_MASK};
 use crate::domain::{
-    Affine2, ArtifactRef, DepthOutcome, FitOutcome, PrintFromMesh, Stage, ThresholdMetric,
+    Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, PrintFromMesh, Stage,
 };
 use crate::raster::{ArtifactError, DepthMap, Grid, Mask, decode_grey8, decode_grey16};
 use crate::store::{self, Project};
-
-/// Role of the depth map among the artifacts of the depth stage.
-pub const DEPTH: &str = "depth.png";
-/// Role of the print mask among those of the normalize stage.
-pub const PRINT_MASK: &str = "print_mask.png";
-/// Role of the print mask on the canvas among those of the register stage.
-pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
-
-/// Role of a metric's depth mask on the canvas among the artifacts of the register stage.
-pub fn canvas_depth_mask(metric: ThresholdMetric) -> String {
-    format!("canvas_depth_mask.{metric}.png")
-}
 
 /// Ink in a stored print mask; paper is 0 and what is unknown 128.
 const INK: u8 = 255;
@@ -161,4 +150,9 @@ impl<'a> Aligned<'a> {
 /// The strokes of a depth map: levels from `level` up. No data is no stroke.
 pub fn depth_mask(depth: &DepthMap, level: u16) -> Mask {
     depth.levels.map(|found| *found >= level.max(1))
+}
+
+/// Whether two metrics came to the same threshold and place, so that all their pictures are the same.
+pub fn same_alignment(a: &MetricOutcome, b: &MetricOutcome) -> bool {
+    a.threshold_level == b.threshold_level && a.print_from_depth == b.print_from_depth
 }

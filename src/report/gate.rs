@@ -31,21 +31,18 @@ pub fn missing(report: &Report) -> Vec<String> {
         missing.push("the project has no pairs".to_owned());
     }
     if progress.failed > 0 {
-        missing.push(format!("{} pairs failed", progress.failed));
+        missing.push(format!("failed pairs: {}", progress.failed));
     }
     if progress.pending > 0 {
-        missing.push(format!("{} pairs are not finished", progress.pending));
+        missing.push(format!("unfinished pairs: {}", progress.pending));
     }
     for row in &report.rows {
         let unread = row.n - row.read;
         if unread > 0 {
-            missing.push(format!("{unread} results of {} are unread", row.metric));
+            missing.push(format!("unread results of {}: {unread}", row.metric));
         }
         if row.unsure > 0 {
-            missing.push(format!(
-                "{} results of {} are unsure",
-                row.unsure, row.metric
-            ));
+            missing.push(format!("unsure results of {}: {}", row.metric, row.unsure));
         }
     }
     missing
@@ -94,6 +91,6 @@ mod tests {
         let none = TruthFinding::default();
         tally.add(&fixture::done("a", 0.8, &[Verdict::Pass]), &none);
         tally.add(&fixture::failed("b", FailureClass::Io, "gone"), &none);
-        assert_eq!(missing(&tally.finish()), ["1 pairs failed"]);
+        assert_eq!(missing(&tally.finish()), ["failed pairs: 1"]);
     }
 }

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::aligned::{Aligned, AlignedError, depth_mask};
+use super::aligned::{Aligned, AlignedError, depth_mask, same_alignment};
 use super::model::Report;
 use super::tally::{Tally, TruthFinding};
 use super::truth::{TruthError, TruthErrors, TruthRecord, mask_iou};
@@ -118,10 +118,6 @@ fn measure(
         done.push(found);
     }
     Ok(finding)
-}
-
-fn same_alignment(a: &MetricOutcome, b: &MetricOutcome) -> bool {
-    a.threshold_level == b.threshold_level && a.print_from_depth == b.print_from_depth
 }
 
 fn errors(

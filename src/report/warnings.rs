@@ -22,18 +22,22 @@ pub(super) fn of(progress: Progress, rows: &[Row], truth: &TruthProblems) -> Vec
 /// Pairs that are in no row.
 fn missing_pairs(progress: Progress) -> Option<String> {
     let pairs = progress.done + progress.failed + progress.pending;
-    match (progress.failed, progress.pending) {
-        (0, 0) => None,
-        (failed, 0) => Some(format!(
-            "{failed} of {pairs} pairs failed and are in no row."
-        )),
-        (0, pending) => Some(format!(
-            "{pending} of {pairs} pairs are not finished and are in no row."
-        )),
-        (failed, pending) => Some(format!(
-            "{failed} of {pairs} pairs failed and {pending} are not finished; they are in no row."
-        )),
-    }
+    let counts = [
+        (progress.failed, "failed"),
+        (progress.pending, "not finished"),
+    ];
+    let counts = list(counts)?;
+    Some(format!("In no row, of {pairs} in all: {counts}."))
+}
+
+/// Counts that are not 0, such as `2 failed, 1 not finished`; `None` when all are.
+fn list<const N: usize>(counts: [(u64, &str); N]) -> Option<String> {
+    let said: Vec<String> = counts
+        .into_iter()
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, what)| format!("{n} {what}"))
+        .collect();
+    (!said.is_empty()).then(|| said.join(", "))
 }
 
 /// Dice is `2 J / (1 + J)` of the IoU `J` for each pair, a concave function: its mean cannot lie above the
@@ -52,38 +56,38 @@ fn impossible_dice(row: &Row) -> Option<String> {
 
 /// Verdicts that tell nothing about the current results.
 fn uncounted_verdicts(row: &Row) -> Option<String> {
-    let title = row.metric.title();
-    match (row.stale, row.conflicts) {
-        (0, 0) => None,
-        (stale, 0) => Some(format!(
-            "{title}: {stale} results have a verdict for an older result only; they count as unread."
-        )),
-        (0, conflicts) => Some(format!(
-            "{title}: readers contradict each other on {conflicts} results; they count as unsure."
-        )),
-        (stale, conflicts) => Some(format!(
-            "{title}: {stale} results have a verdict for an older result only and count as unread; \
-             readers contradict each other on {conflicts}, which count as unsure."
-        )),
-    }
+    let counts = list([
+        (row.stale, "unread with a verdict for an older result"),
+        (
+            row.conflicts,
+            "unsure because readers contradict each other",
+        ),
+    ])?;
+    Some(format!(
+        "{}, of {} results: {counts}.",
+        row.metric.title(),
+        row.n
+    ))
 }
 
 /// Results whose true map says that they read in mirror writing.
 fn mirrored(row: &Row) -> Option<String> {
-    let mirrored = row.truth.as_ref()?.mirrored;
-    (mirrored > 0).then(|| {
-        format!(
-            "{}: {mirrored} results read in mirror writing; their angle error counts as 180 degrees.",
-            row.metric.title()
-        )
-    })
+    let counts = list([(
+        row.truth.as_ref()?.mirrored,
+        "in mirror writing (angle error 180 degrees)",
+    )])?;
+    Some(format!(
+        "{}, of {} results: {counts}.",
+        row.metric.title(),
+        row.n
+    ))
 }
 
 /// Truths that could not be used.
 fn unusable_truth(truth: &TruthProblems) -> Option<String> {
     truth.first.as_ref().map(|first| {
         format!(
-            "The truth of {} pairs cannot be used and is left out; the first is {first}.",
+            "Truths that cannot be used and are left out: {}. The first: {first}.",
             truth.count
         )
     })
@@ -125,10 +129,7 @@ mod tests {
             })
         };
         assert_eq!(said(5, 0, 0), None);
-        let two = said(5, 2, 1).expect("three are missing");
-        assert_eq!(
-            two,
-            "2 of 8 pairs failed and 1 are not finished; they are in no row."
-        );
+        let three = said(5, 2, 1).expect("three are missing");
+        assert_eq!(three, "In no row, of 8 in all: 2 failed, 1 not finished.");
     }
 }

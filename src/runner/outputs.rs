@@ -6,30 +6,19 @@ use serde_json::{Value, json};
 
 use super::steps::StageOutput;
 use crate::catalog::MetricResult;
+use crate::domain::role::{CANVAS_PRINT_MASK, canvas_depth_mask};
+pub(super) use crate::domain::role::{DEPTH, PRINT_MASK};
 use crate::domain::{
     ArtifactSet, ContentHash, DepthOutcome, MetricOutcome, NormalizeOutcome, RegisterOutcome,
-    ThresholdMetric,
 };
 use crate::raster::{DepthMap, Grid, Mask, png_grey8, png_grey16, png_mask};
 use crate::stages::normalize::Normalized;
 use crate::stages::register::Registered;
 use crate::store::NewArtifact;
 
-/// The depth map, 16 bits a pixel.
-pub(super) const DEPTH: &str = "depth.png";
-/// The print's ink in the print image's frame: 255 ink, 0 paper, 128 where nothing is known.
-pub(super) const PRINT_MASK: &str = "print_mask.png";
-/// The print mask on the canvas: 255 ink.
-pub(super) const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
-
 const INK: u8 = 255;
 const PAPER: u8 = 0;
 const UNKNOWN: u8 = 128;
-
-/// A metric's depth mask on the canvas: 255 stroke.
-pub(super) fn canvas_depth_mask(metric: ThresholdMetric) -> String {
-    format!("canvas_depth_mask.{metric}.png")
-}
 
 /// A stage that leaves numbers only.
 pub(super) const fn numbers(outcome: String) -> StageOutput {

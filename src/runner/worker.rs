@@ -67,6 +67,30 @@ struct Known {
     inputs: InputsSeen,
 }
 
+/// How one stage of a pair went.
+enum Step {
+    /// Computed and on disk.
+    Done(Box<PairInHand>, Box<StageDone>),
+    /// An earlier stage must run again first.
+    Back(Box<PairInHand>, Stage),
+    /// Failed.
+    Failed(Blame),
+    /// The run is to stop now.
+    Stopped,
+    /// The disk refused.
+    Refused(RunError),
+}
+
+/// What went wrong.
+struct Blame {
+    failure: Failure,
+    /// Whether another try may go better.
+    may_pass: bool,
+    /// Input files as read, where the pair came back.
+    inputs: Option<InputsSeen>,
+    ms: Option<u64>,
+}
+
 impl Shared {
     /// Whether nothing new is to be begun.
     pub(super) fn is_draining(&self) -> bool {
@@ -106,56 +130,73 @@ async fn through(shared: &Shared, lease: Lease, stages: &mut u64) -> Result<Pair
     let mut lease = lease;
     breakpoint::reach(stage, Point::Claimed);
     loop {
-        let name = pair.facts.name.clone();
-        let known = Known {
-            name: name.clone(),
-            facts: pair.facts_text.clone(),
-            inputs: pair.inputs.clone(),
-        };
-        shared.tell(RunEvent::StageStarted { pair: name, stage });
-        let computed = compute(
-            &shared.steps,
-            &shared.project,
-            stage,
-            pair,
-            shared.stage_limit,
-            &shared.stop,
-        );
-        let (back, filed, ms) = match computed.await {
-            Computed::Ended(back, Ended::Filed(filed), ms) => (back, filed, ms),
-            Computed::Ended(back, Ended::Setback(Setback::Back(earlier)), _) => {
+        let known = Known::of(&pair);
+        let (back, done) = match step(shared, stage, pair).await {
+            Step::Done(back, done) => (back, done),
+            Step::Back(back, earlier) => {
                 (pair, stage) = (back, earlier);
                 continue;
             }
-            Computed::Ended(_, Ended::NotFiled(error), _) => {
-                shared.catalog.release(lease).await?;
-                return Err(error.into());
-            }
-            Computed::Stopped => {
+            Step::Failed(blame) => return fail(shared, lease, stage, known, blame).await,
+            Step::Stopped => {
                 shared.catalog.release(lease).await?;
                 return Ok(PairEnd::GivenBack);
             }
-            other => return fail(shared, lease, stage, known, other).await,
+            Step::Refused(error) => {
+                shared.catalog.release(lease).await?;
+                return Err(error);
+            }
         };
-        pair = back;
-        let done = done(shared, &pair, stage, filed, ms);
-        let kept = shared.catalog.checkpoint(lease, done).await?;
+        let ms = done.ms;
+        let kept = shared.catalog.checkpoint(lease, *done).await?;
+        if !matches!(kept, Kept::Lost) {
+            *stages += 1;
+            finished(shared, known.name, stage, ms);
+        }
         lease = match kept {
             Kept::Lost => return Ok(PairEnd::Lost),
-            Kept::Done => {
-                *stages += 1;
-                finished(shared, known.name, stage, ms);
-                return Ok(PairEnd::Done);
-            }
+            Kept::Done => return Ok(PairEnd::Done),
             Kept::Lease(lease) => lease,
         };
-        *stages += 1;
-        finished(shared, known.name, stage, ms);
         if let Some(end) = rest(shared, stage) {
             shared.catalog.release(lease).await?;
             return Ok(end);
         }
-        stage = lease.cursor();
+        (pair, stage) = (back, lease.cursor());
+    }
+}
+
+/// Runs one stage.
+async fn step(shared: &Shared, stage: Stage, pair: Box<PairInHand>) -> Step {
+    shared.tell(RunEvent::StageStarted {
+        pair: pair.facts.name.clone(),
+        stage,
+    });
+    let (steps, project) = (&shared.steps, &shared.project);
+    let limit = shared.stage_limit;
+    match compute(steps, project, stage, pair, limit, &shared.stop).await {
+        Computed::Ended(pair, Ended::Filed(filed), ms) => {
+            let done = done(shared, &pair, stage, filed, ms);
+            Step::Done(pair, Box::new(done))
+        }
+        Computed::Ended(pair, Ended::Setback(Setback::Back(earlier)), _) => {
+            Step::Back(pair, earlier)
+        }
+        Computed::Ended(pair, Ended::Setback(Setback::Failed { failure, may_pass }), ms) => {
+            Step::Failed(Blame {
+                failure,
+                may_pass,
+                inputs: Some(pair.inputs),
+                ms: Some(ms),
+            })
+        }
+        Computed::Ended(_, Ended::NotFiled(error), _) => Step::Refused(error.into()),
+        Computed::Panicked(text) => Step::Failed(Blame::bare(FailureClass::Bug, text)),
+        Computed::TimedOut => {
+            let text = format!("{stage} took longer than {} s", limit.as_secs_f64());
+            Step::Failed(Blame::bare(FailureClass::Resource, text))
+        }
+        Computed::Stopped => Step::Stopped,
     }
 }
 
@@ -208,35 +249,40 @@ async fn fail(
     lease: Lease,
     stage: Stage,
     known: Known,
-    computed: Computed,
+    blame: Blame,
 ) -> Result<PairEnd, RunError> {
-    let (failure, may_pass, inputs, ms) = blame(shared, known.inputs, computed);
     let now = shared.clock.now();
-    let sentence = policy::sentence(
-        Try {
-            pair: lease.pair(),
-            class: failure.class,
-            may_pass,
-            attempt: lease.attempt(),
-            alone: lease.alone(),
-        },
-        now,
-    );
+    let failed = Try {
+        pair: lease.pair(),
+        class: blame.failure.class,
+        may_pass: blame.may_pass,
+        attempt: lease.attempt(),
+        alone: lease.alone(),
+    };
+    let sentence = policy::sentence(failed, now);
     let failed = StageFailed {
         stage,
-        failure: failure.clone(),
+        failure: blame.failure.clone(),
         sentence,
         recipe: shared.recipes.of(stage),
         facts: known.facts,
-        inputs,
-        ms,
+        inputs: blame.inputs.unwrap_or(known.inputs),
+        ms: blame.ms,
         at: now,
     };
     if !shared.catalog.fail(lease, failed).await? {
         return Ok(PairEnd::Lost);
     }
-    let pair = known.name;
+    let (pair, failure) = (known.name, blame.failure);
+    let later = |wait_ms| RunEvent::PairBackingOff {
+        pair: pair.clone(),
+        stage,
+        failure: failure.clone(),
+        wait_ms,
+    };
     let (event, end) = match sentence {
+        Sentence::BackOff { run_at } => (later((run_at - now).unsigned_abs()), PairEnd::Later),
+        Sentence::Alone => (later(0), PairEnd::Later),
         Sentence::Quarantine => {
             let skipped = (shared.until.index() + 1).saturating_sub(stage.index()) as u64;
             let event = RunEvent::PairFailed {
@@ -247,53 +293,29 @@ async fn fail(
             };
             (event, PairEnd::Failed)
         }
-        Sentence::BackOff { .. } | Sentence::Alone => {
-            let wait_ms = match sentence {
-                Sentence::BackOff { run_at } => (run_at - now).unsigned_abs(),
-                Sentence::Alone | Sentence::Quarantine => 0,
-            };
-            let event = RunEvent::PairBackingOff {
-                pair,
-                stage,
-                failure,
-                wait_ms,
-            };
-            (event, PairEnd::Later)
-        }
     };
     shared.tell(event);
     Ok(end)
 }
 
-/// What went wrong, whether it may pass, what was read, and the time it took.
-fn blame(
-    shared: &Shared,
-    before: InputsSeen,
-    computed: Computed,
-) -> (Failure, bool, InputsSeen, Option<u64>) {
-    let bug = |text: String| Failure::new(FailureClass::Bug, text);
-    match computed {
-        Computed::Ended(pair, Ended::Setback(Setback::Failed { failure, may_pass }), ms) => {
-            (failure, may_pass, pair.inputs, Some(ms))
+impl Known {
+    fn of(pair: &PairInHand) -> Self {
+        Self {
+            name: pair.facts.name.clone(),
+            facts: pair.facts_text.clone(),
+            inputs: pair.inputs.clone(),
         }
-        Computed::Panicked(text) => (bug(text), false, before, None),
-        Computed::TimedOut => {
-            let limit = shared.stage_limit.as_secs_f64();
-            let text = format!("the stage took longer than {limit} s (run.stage_limit_s)");
-            let failure = Failure::new(FailureClass::Resource, text);
-            (failure, false, before, None)
+    }
+}
+
+impl Blame {
+    /// A failure after which nothing is left of the pair in hand.
+    fn bare(class: FailureClass, text: String) -> Self {
+        Self {
+            failure: Failure::new(class, text),
+            may_pass: false,
+            inputs: None,
+            ms: None,
         }
-        // The caller has dealt with these.
-        Computed::Ended(
-            pair,
-            Ended::Filed(_) | Ended::NotFiled(_) | Ended::Setback(Setback::Back(_)),
-            ms,
-        ) => (
-            bug("the stage ended in no known way".to_owned()),
-            false,
-            pair.inputs,
-            Some(ms),
-        ),
-        Computed::Stopped => (bug("stopped".to_owned()), false, before, None),
     }
 }

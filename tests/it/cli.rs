@@ -15,7 +15,7 @@ pub(crate) struct Call {
 impl Call {
     /// stdout as JSON.
     pub(crate) fn json(&self) -> Value {
-        serde_json::from_str(&self.out).unwrap_or_else(|error| panic!("{error}: {}", self.out))
+        serde_json::from_str(&self.out).expect("JSON on stdout")
     }
 
     /// The commands after `next:`, ready to be run.
@@ -101,7 +101,7 @@ fn directory_without_project_is_code_10_with_a_way_on() {
     ] {
         let refused = mocban(dir.path(), command).expect(10);
         assert!(
-            refused.err.starts_with("error: no project in ."),
+            refused.err.starts_with("error: no project at ."),
             "{command:?}: {}",
             refused.err
         );
@@ -189,4 +189,191 @@ fn completions_and_manual_pages_are_made() {
     let page = std::fs::read_to_string(dir.path().join("pages/mocban.1")).expect("a page");
     assert!(page.contains(".TH mocban 1"), "{page}");
     assert!(dir.path().join("pages/mocban-verdict-set.1").is_file());
+}
+
+/// A project `p` of two pairs whose files do not exist, imported from `pairs.csv` beside it.
+fn imported() -> tempfile::TempDir {
+    let dir = empty();
+    let text = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";
+    std::fs::write(dir.path().join("pairs.csv"), text).expect("a small file");
+    mocban(dir.path(), &["-C", "p", "-q", "import", "pairs.csv"]).expect(0);
+    dir
+}
+
+#[test]
+fn refused_manifest_names_its_lines_and_leaves_nothing_behind() {
+    let dir = empty();
+    let manifest = dir.path().join("pairs.csv");
+    let import = ["-C", "p", "import", "pairs.csv"];
+    for (text, wanted) in [
+        ("id,mesh,print\na,a.stl,a.png\na,b.stl,b.png\n", "line 3: "),
+        ("id,mesh,print\na/b,a.stl,a.png\n", "line 2: "),
+        ("id,mesh\na,a.stl\n", "line 1: "),
+    ] {
+        std::fs::write(&manifest, text).expect("a small file");
+        let refused = mocban(dir.path(), &import).expect(2);
+        assert!(refused.err.contains(wanted), "{wanted}: {}", refused.err);
+        assert!(
+            refused.err.contains("nothing was imported"),
+            "{}",
+            refused.err
+        );
+        assert!(!dir.path().join("p").exists());
+    }
+    std::fs::write(&manifest, "id,mesh,print\na,a.stl,a.png\n").expect("a small file");
+    std::fs::write(dir.path().join("truth.jsonl"), "{\"id\":\"z\"}\n").expect("a small file");
+    let with_truth = [&import[..], &["--truth", "truth.jsonl"]].concat();
+    let refused = mocban(dir.path(), &with_truth).expect(2);
+    assert!(
+        refused.err.contains("truth.jsonl: line 1: "),
+        "{}",
+        refused.err
+    );
+    assert!(!dir.path().join("p").exists());
+}
+
+#[test]
+fn missing_files_are_warned_of_by_line_and_fail_their_pairs_alone() {
+    let dir = empty();
+    let text = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";
+    std::fs::write(dir.path().join("pairs.csv"), text).expect("a small file");
+    let import = ["-C", "p", "--json", "import", "pairs.csv"];
+    let first = mocban(dir.path(), &import).expect(0);
+    assert_eq!(first.json()["added"], 2);
+    assert!(
+        first
+            .err
+            .contains("pairs.csv: line 3: mesh b.stl of b is not there"),
+        "{}",
+        first.err
+    );
+    std::fs::write(dir.path().join("pairs.csv"), text.replace("b.png", "c.png")).expect("written");
+    let second = mocban(dir.path(), &import).expect(0).json();
+    assert_eq!(
+        second["changed"],
+        serde_json::json!([{"id": "b", "fields": ["print"]}])
+    );
+    assert_eq!(second["unchanged"], 1);
+
+    let ran = mocban(dir.path(), &["-C", "p", "run"]).expect(3);
+    assert!(ran.err.contains("2 pairs failed"), "{}", ran.err);
+    let status = mocban(dir.path(), &["-C", "p", "status", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(status["schema"], 1);
+    assert_eq!(status["jobs"]["quarantined"], 2);
+    assert_eq!(
+        status["stages"]["fit"],
+        serde_json::json!({"done": 0, "pending": 0, "failed": 2})
+    );
+    let shown = mocban(dir.path(), &["-C", "p", "show", "a", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(shown["failure"]["class"], "io");
+    mocban(dir.path(), &["-C", "p", "retry", "--class", "bug"]).expect(4);
+    let retried = mocban(dir.path(), &["-C", "p", "--json", "retry"])
+        .expect(0)
+        .json();
+    assert_eq!(retried["retried"], 2);
+}
+
+#[test]
+fn unknown_pair_is_code_4_with_the_nearest_ids() {
+    let dir = imported();
+    let refused = mocban(dir.path(), &["-C", "p", "show", "aa"]).expect(4);
+    assert_eq!(refused.err, "error: there is no pair aa; near are a\n");
+    mocban(dir.path(), &["-C", "p", "run", "a/b"]).expect(4);
+    let set = ["-C", "p", "verdict", "set", "a", "pass", "--reader", "lan"];
+    let refused = mocban(dir.path(), &set).expect(4);
+    assert!(refused.err.contains("no result"), "{}", refused.err);
+    mocban(dir.path(), &["-C", "p", "verdict", "undo"]).expect(4);
+}
+
+#[test]
+fn refused_verdict_file_records_nothing() {
+    let dir = imported();
+    let file = dir.path().join("verdicts.csv");
+    std::fs::write(&file, "pair,verdict,reader\na,pass,lan\nz,pass,lan\n").expect("written");
+    let refused = mocban(
+        dir.path(),
+        &["-C", "p", "verdict", "import", "verdicts.csv"],
+    )
+    .expect(2);
+    let wanted = "verdicts.csv: line 3: there is no pair z; no verdict was recorded";
+    assert!(refused.err.contains(wanted), "{}", refused.err);
+    let log = mocban(dir.path(), &["-C", "p", "verdict", "log", "--json"]).expect(0);
+    assert!(log.out.is_empty(), "{}", log.out);
+}
+
+#[test]
+fn every_next_line_can_be_run_as_it_stands() {
+    let dir = empty();
+    std::fs::create_dir(dir.path().join("my scans")).expect("a folder");
+    let text = "id,mesh,print\na,a.stl,a.png\n";
+    std::fs::write(dir.path().join("pairs.csv"), text).expect("a small file");
+    let import = [
+        "-C",
+        "my scans",
+        "--set",
+        "run.workers=1",
+        "import",
+        "pairs.csv",
+    ];
+    let mut lines = mocban(dir.path(), &import).expect(0).next();
+    for wanted in [3, 0] {
+        let line = lines.first().expect("a next line");
+        let ran = call(
+            Command::new("sh")
+                .current_dir(dir.path())
+                .args(["-c", line]),
+        )
+        .expect(wanted);
+        lines = ran.next();
+    }
+}
+
+#[test]
+fn project_that_was_moved_finds_its_files() {
+    let dir = empty();
+    let scans = dir.path().join("p/scans");
+    std::fs::create_dir_all(&scans).expect("folders");
+    for name in ["a.stl", "a.png"] {
+        std::fs::write(scans.join(name), "x").expect("a small file");
+    }
+    std::fs::write(scans.join("pairs.csv"), "id,mesh,print\na,a.stl,a.png\n").expect("written");
+    mocban(dir.path(), &["-C", "p", "import", "p/scans/pairs.csv"]).expect(0);
+    std::fs::rename(dir.path().join("p"), dir.path().join("q")).expect("moved");
+    let shown = mocban(dir.path(), &["-C", "q", "show", "a"]).expect(0);
+    assert!(shown.out.contains("q/scans/a.stl"), "{}", shown.out);
+    assert!(!shown.out.contains("not there"), "{}", shown.out);
+}
+
+#[test]
+fn project_in_use_is_code_11_and_can_still_be_looked_at() {
+    let dir = imported();
+    let lock = std::fs::File::create(dir.path().join("p/run.lock")).expect("a lock file");
+    lock.lock().expect("nobody else has it");
+    let refused = mocban(dir.path(), &["-C", "p", "run"]).expect(11);
+    assert!(
+        refused.err.contains("the project is in use"),
+        "{}",
+        refused.err
+    );
+    mocban(dir.path(), &["-C", "p", "status"]).expect(0);
+    mocban(dir.path(), &["-C", "p", "run", "--dry-run"]).expect(0);
+}
+
+#[test]
+fn progress_as_json_is_a_line_an_event() {
+    let dir = imported();
+    let ran = mocban(dir.path(), &["-C", "p", "--progress", "json", "run"]).expect(3);
+    let types: Vec<String> = ran
+        .err
+        .lines()
+        .filter_map(|line| serde_json::from_str::<Value>(line).ok())
+        .map(|event| event["message_type"].as_str().expect("a type").to_owned())
+        .collect();
+    assert_eq!(types.first().map(String::as_str), Some("started"));
+    let failed = types.iter().filter(|kind| *kind == "pair_failed").count();
+    assert_eq!(failed, 2, "{types:?}");
 }

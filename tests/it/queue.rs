@@ -1,1 +1,97 @@
-//! The durable queue through the library.
+//! The queue through the real binary: changed files and settings, missing files, two processes.
+
+use std::io::Write as _;
+use std::path::PathBuf;
+
+use mocban::domain::{FailureClass, JobStatus, Stage};
+use mocban::store::{Project, RunLock};
+
+use crate::cli::call;
+use crate::resume::{pairs, project, run};
+
+/// How often each stage of each pair was finished, pair by pair.
+fn finished(project: &Project) -> Vec<[usize; 4]> {
+    let of = |pair: &mocban::catalog::PairDetail| {
+        Stage::ALL.map(|stage| {
+            let done = pair.attempts.iter();
+            done.filter(|attempt| attempt.stage == stage && attempt.failure.is_none())
+                .count()
+        })
+    };
+    pairs(project).iter().map(of).collect()
+}
+
+fn mesh(project: &Project, index: usize) -> PathBuf {
+    project.input_path(&pairs(project)[index].results.facts.mesh_path)
+}
+
+fn print(project: &Project, index: usize) -> PathBuf {
+    project.input_path(&pairs(project)[index].results.facts.print_path)
+}
+
+/// The same picture or mesh in other bytes: every reader of ours leaves what comes after the end alone.
+fn lengthen(path: &std::path::Path) {
+    let mut file = std::fs::OpenOptions::new()
+        .append(true)
+        .open(path)
+        .expect("a file");
+    file.write_all(b"\n").expect("written");
+}
+
+#[test]
+fn only_what_changed_runs_again() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "2");
+    let away = print(&project, 1).with_extension("away");
+    std::fs::rename(print(&project, 1), &away).expect("moved");
+    call(&mut run(&project, &[])).expect(3);
+    let failed = &pairs(&project)[1].results;
+    let failure = failed.failure.as_ref().expect("a failure");
+    assert_eq!(failure.failure.class, FailureClass::Io);
+    assert!(failure.failure.message.ends_with("is not there"));
+
+    // The file comes, `retry` takes the pair up.
+    std::fs::rename(&away, print(&project, 1)).expect("moved");
+    call(&mut run(&project, &["--rerun", "failed"])).expect(0);
+    assert_eq!(finished(&project), [[1; 4]; 2]);
+    let before: Vec<_> = pairs(&project)
+        .into_iter()
+        .map(|pair| pair.results.metrics)
+        .collect();
+
+    // A new time is not a new content.
+    let file = std::fs::File::options().write(true).open(mesh(&project, 0));
+    let now = std::time::SystemTime::now();
+    file.expect("a file").set_modified(now).expect("touched");
+    call(&mut run(&project, &[])).expect(0);
+    assert_eq!(finished(&project), [[1; 4]; 2]);
+
+    // New bytes are, for that pair alone.
+    lengthen(&print(&project, 0));
+    call(&mut run(&project, &[])).expect(0);
+    assert_eq!(finished(&project), [[2; 4], [1; 4]]);
+
+    // A setting of the last stage touches no other.
+    let mut changed = run(&project, &[]);
+    changed.args(["--set", "register.smoothing_px=1.5"]);
+    call(&mut changed).expect(0);
+    assert_eq!(finished(&project), [[2, 2, 2, 3], [1, 1, 1, 2]]);
+    call(&mut run(&project, &[])).expect(0);
+    let after: Vec<_> = pairs(&project)
+        .into_iter()
+        .map(|pair| pair.results.metrics)
+        .collect();
+    assert_eq!(before, after);
+}
+
+#[test]
+fn a_project_in_use_is_refused_by_the_number_of_the_process() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "1");
+    let lock = RunLock::acquire(&project, false).expect("the lock");
+    let refused = call(&mut run(&project, &[])).expect(11);
+    let me = format!("pid {}", std::process::id());
+    assert!(refused.err.contains(&me), "{}", refused.err);
+    assert_eq!(pairs(&project)[0].results.status, JobStatus::Ready);
+    drop(lock);
+}

@@ -1,1 +1,158 @@
-//! Killed runs go on where they were.
+//! The real binary, killed and run again: nothing is computed twice, nothing is lost, the results are the same.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use mocban::catalog::{Catalog, PairDetail, Recipes};
+use mocban::domain::{JobStatus, Stage};
+use mocban::store::Project;
+
+use crate::cli::{binary, call, mocban};
+
+/// Small depth maps: what is tested is not the alignment.
+const FAST: [&str; 2] = ["--set", "depth.longest_px=96"];
+
+/// Makes a demo project of some pairs that have not run.
+pub(crate) fn project(dir: &Path, name: &str, pairs: &str) -> Project {
+    mocban(dir, &["demo", name, "--pairs", pairs, "--no-run"]).expect(0);
+    Project::open(&dir.join(name)).expect("a project")
+}
+
+/// The same project again in a folder beside it.
+fn copy(project: &Project, name: &str) -> Project {
+    let to = project.dir().with_file_name(name);
+    let mut open = vec![(project.dir().to_owned(), to.clone())];
+    while let Some((from, to)) = open.pop() {
+        std::fs::create_dir(&to).expect("a folder");
+        for entry in std::fs::read_dir(from).expect("a folder") {
+            let from = entry.expect("an entry").path();
+            let to = to.join(from.file_name().expect("a name"));
+            if from.is_dir() {
+                open.push((from, to));
+            } else {
+                std::fs::copy(from, to).expect("copied");
+            }
+        }
+    }
+    Project::open(&to).expect("a project")
+}
+
+/// `run` with some arguments, ready to be called.
+pub(crate) fn run(project: &Project, args: &[&str]) -> Command {
+    let mut command = binary();
+    command.arg("-C").arg(project.dir());
+    command
+        .args(["--progress", "none", "run"])
+        .args(FAST)
+        .args(args);
+    command
+}
+
+/// Every pair as stored.
+pub(crate) fn pairs(project: &Project) -> Vec<PairDetail> {
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+    runtime.block_on(async {
+        let path = project.catalog_path();
+        let catalog = Catalog::open_read_only(&path).await.expect("a catalog");
+        let mut found = Vec::new();
+        for name in catalog.pair_names().await.expect("names") {
+            let detail = catalog.pair(&name).await.expect("a read");
+            found.push(detail.expect("the pair"));
+        }
+        let kept = catalog.counters().await.expect("counters");
+        assert_eq!(kept, catalog.recount().await.expect("a recount"));
+        catalog.close().await;
+        found
+    })
+}
+
+/// All that a result is, without times: numbers, files, hashes.
+fn results(project: &Project) -> Vec<String> {
+    let mut lines = Vec::new();
+    for pair in pairs(project) {
+        let results = pair.results;
+        assert_eq!(results.status, JobStatus::Done, "{:?}", results.failure);
+        for stage in &results.stages {
+            for artifact in stage.files.values() {
+                project
+                    .read_artifact(artifact)
+                    .expect("the artifact is whole");
+            }
+            let (outcome, hash) = (&stage.outcome, stage.result_hash);
+            let files = &stage.files;
+            lines.push(format!(
+                "{} {} {hash:?} {outcome} {files:?}",
+                results.facts.name, stage.stage
+            ));
+        }
+        for metric in &results.metrics {
+            lines.push(format!("{} {:?}", results.facts.name, metric.result_hash));
+        }
+    }
+    lines
+}
+
+/// How often each stage of each pair was finished.
+fn finished(project: &Project) -> Vec<usize> {
+    let mut counts = Vec::new();
+    for pair in pairs(project) {
+        for stage in Stage::ALL {
+            let done = pair.attempts.iter();
+            let done = done.filter(|attempt| attempt.stage == stage && attempt.failure.is_none());
+            counts.push(done.count());
+        }
+    }
+    counts
+}
+
+/// Stages that are done, all pairs together, by a reader beside the run.
+fn stages_done(project: &Project) -> u64 {
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+    runtime.block_on(async {
+        let path = project.catalog_path();
+        let catalog = Catalog::open_read_only(&path).await.expect("a catalog");
+        let recipes = Recipes::new(|_| serde_json::Value::Null);
+        let status = catalog.status(&recipes).await.expect("a status");
+        status.stages.values().map(|stage| stage.done).sum()
+    })
+}
+
+#[test]
+fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let unbroken = project(dir.path(), "unbroken", "2");
+    let broken = copy(&unbroken, "broken");
+    let killed = copy(&unbroken, "killed");
+    call(&mut run(&unbroken, &[])).expect(0);
+    let wanted = results(&unbroken);
+
+    for point in [
+        "fit:claimed",
+        "fit:filed:2",
+        "depth:computed",
+        "normalize:stored",
+        "register:filed",
+    ] {
+        let died = run(&broken, &["-j", "1"])
+            .env("MOCBAN_BREAK_AT", point)
+            .output();
+        let died = died.expect("the binary starts");
+        assert_eq!(died.status.code(), None, "{point} was not reached");
+    }
+    call(&mut run(&broken, &[])).expect(0);
+    assert_eq!(results(&broken), wanted);
+    assert_eq!(finished(&broken), [1; 8]);
+
+    let mut child = run(&killed, &[])
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the binary starts");
+    while stages_done(&killed) < 2 {
+        std::thread::yield_now();
+    }
+    child.kill().expect("killed");
+    child.wait().expect("dead");
+    call(&mut run(&killed, &["-j", "1"])).expect(0);
+    assert_eq!(results(&killed), wanted);
+    assert_eq!(finished(&killed), [1; 8]);
+}

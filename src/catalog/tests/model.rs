@@ -210,16 +210,17 @@ impl Game {
             .catalog
             .rescue(Dead::AllBut(self.worker), self.now);
         rescue.await.expect("a rescue");
-        let pairs: Vec<_> = self.model.keys().copied().collect();
-        for pair in pairs {
-            let model = self.model.get_mut(&pair).expect("the pair");
-            if matches!(model.state, JobState::Leased { worker, .. } if worker == dead) {
-                model.epoch += 1;
-                model.crashes += 1;
-                let crashes = model.crashes;
-                assert!(crashes <= CRASH_LIMIT);
-                self.happens(pair, Event::Rescue { crashes });
-            }
+        let left = self.model.iter().filter(
+            |(_, model)| matches!(model.state, JobState::Leased { worker, .. } if worker == dead),
+        );
+        let left: Vec<_> = left.map(|(pair, _)| *pair).collect();
+        for pair in &left {
+            let model = self.model.get_mut(pair).expect("the pair");
+            model.epoch += 1;
+            model.crashes += u32::from(left.len() == 1);
+            let crashes = model.crashes;
+            assert!(crashes <= CRASH_LIMIT);
+            self.happens(*pair, Event::Rescue { crashes });
         }
     }
 

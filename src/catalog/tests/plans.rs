@@ -59,7 +59,12 @@ async fn fenced_writes_find_their_jobs_by_key() {
 
 #[tokio::test]
 async fn rescue_and_holders_use_the_index_of_leases() {
-    for sql in [upkeep::RESCUE, upkeep::OVERDUE, upkeep::HOLDERS] {
+    for sql in [
+        upkeep::RESCUE,
+        upkeep::LEFT_BY,
+        upkeep::OVERDUE,
+        upkeep::HOLDERS,
+    ] {
         let plan = plan(sql).await;
         assert!(
             plan.iter().any(|line| line.contains("INDEX job_leased")),

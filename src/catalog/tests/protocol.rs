@@ -147,6 +147,18 @@ async fn the_third_crash_is_quarantined_and_says_so() {
 }
 
 #[tokio::test]
+async fn pairs_that_died_together_are_suspect_but_not_blamed() {
+    let world = World::new(2).await;
+    assert_eq!(world.claim(2).await.len(), 2);
+    let other = register(&world.catalog).await;
+    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
+    assert_eq!(rescued.expect("a rescue").ready, 2);
+    let detail = world.catalog.pair(&name("p1")).await.expect("a read");
+    assert_eq!(detail.expect("the pair").crashes, 0);
+    assert!(world.claim_as(other, 2).await.is_empty());
+}
+
+#[tokio::test]
 async fn leases_of_a_worker_that_ended_in_order_are_no_crash() {
     let world = World::new(1).await;
     drop(world.claim(1).await);

@@ -9,7 +9,7 @@ use crate::report::aligned::depth_mask;
 /// Vermillion of Okabe and Ito's palette: told from ink and paper with every kind of colour vision.
 const EDGE: [u8; 3] = [213, 94, 0];
 /// An edge is one pixel wide for each so many pixels of the longest side.
-const SIDE_PER_EDGE_PX: usize = 360;
+const SIDE_PER_EDGE_PX: usize = 240;
 /// Longest side that a saved overlay has at least, pixels.
 const OVERLAY_SIDE: usize = 480;
 

@@ -1,6 +1,8 @@
 //! The contact sheet: many pairs on one picture, so that a person sees fifty results at a glance.
 
-use super::paint::{GROUND, Rgb, TEXT, copy, cut_to, fill, resized, text_height, write};
+use super::paint::{
+    GROUND, Rgb, TEXT, copy, cut_to, fill, resized, text_height, text_width, write,
+};
 
 /// Width of a sheet in pixels.
 pub const SHEET_WIDTH: usize = 2000;
@@ -10,6 +12,8 @@ const TILES: usize = 3;
 const GAP: usize = 6;
 /// Cells narrower than this have small letters.
 const WIDE_CELL: usize = 300;
+/// Size of the letters' dots in a long note, pixels.
+const SMALL: usize = 1;
 /// More columns than this leave nothing to see.
 const MAX_COLUMNS: usize = 12;
 /// Frame of a cell that is wrong.
@@ -85,15 +89,37 @@ fn paint(sheet: &mut Rgb, [x, y]: [usize; 2], cell: &SheetCell, layout: &Layout)
         layout.cell.map(|side| side - 4),
         colour,
     );
-    let (left, mut top) = (x + 2 * GAP, y + 2 * GAP);
-    for text in [&cell.id, &cell.note] {
-        let shown = cut_to(text, layout.cell[0] - 4 * GAP, layout.dot);
-        write(sheet, &shown, left, top, layout.dot, TEXT);
-        top += text_height(layout.dot);
+    let (left, width) = (x + 2 * GAP, layout.cell[0] - 4 * GAP);
+    let line = text_height(layout.dot);
+    let texts = [(&cell.id, y + 2 * GAP), (&cell.note, y + 2 * GAP + line)];
+    for (text, top) in texts {
+        write(
+            sheet,
+            &cut_to(text, width, layout.dot),
+            left,
+            top,
+            layout.dot,
+            TEXT,
+        );
     }
     for (i, tile) in cell.tiles.iter().enumerate() {
-        let corner = [left + i * (layout.tile + GAP), top];
+        let corner = [left + i * (layout.tile + GAP), y + 2 * GAP + 2 * line];
         paint_tile(sheet, corner, tile.as_ref(), layout.tile);
+    }
+    if let [_, None, None] = cell.tiles {
+        let corner = [left + layout.tile + 2 * GAP, y + 3 * GAP + 2 * line];
+        paint_story(sheet, corner, &cell.note, layout);
+    }
+}
+
+/// The whole note, over the places of the relief and the overlay that are not there.
+fn paint_story(sheet: &mut Rgb, [x, y]: [usize; 2], note: &str, layout: &Layout) {
+    let letters = (2 * layout.tile - 2 * GAP) / text_width(1, SMALL);
+    let lines = (layout.tile - GAP) / text_height(SMALL);
+    let note: Vec<char> = note.chars().collect();
+    for (i, line) in note.chunks(letters.max(1)).take(lines).enumerate() {
+        let text: String = line.iter().collect();
+        write(sheet, &text, x, y + i * text_height(SMALL), SMALL, TEXT);
     }
 }
 
@@ -161,6 +187,19 @@ mod tests {
         assert_eq!(sheet.at(3, 3), WRONG);
         assert_ne!(sheet.at(SHEET_WIDTH / 2 + 3, 3), WRONG);
         assert_eq!(sheet.at(500, sheet.height() - 60), MISSING);
+    }
+
+    #[test]
+    fn a_long_reason_is_written_out_where_the_pictures_are_missing() {
+        let mut failed = cell("a", true);
+        failed.note = "bad_input: ".to_owned() + &"x".repeat(300);
+        let (short, long) = (cell("a", true), failed);
+        let ink = |cell: &SheetCell| {
+            let sheet = contact_sheet(std::slice::from_ref(cell), 5);
+            let below = (70..sheet.height()).flat_map(|y| sheet.row(y)[150..390].to_vec());
+            below.filter(|colour| *colour == super::TEXT).count()
+        };
+        assert!(ink(&long) > 5 * ink(&short).max(1));
     }
 
     #[test]

@@ -31,14 +31,11 @@ fn float(table: &Table) -> String {
         body += &line(
             row.iter()
                 .zip(&table.columns)
-                .map(|(cell, column)| match cell {
-                    Some(text) => escape(text),
-                    None => missing(*column).to_owned(),
-                }),
+                .map(|(cell, column)| shown(cell.as_deref(), *column)),
         );
     }
     format!(
-        "\\begin{{table}}\n  \\centering\n  \\caption{{{}}}\n  \\begin{{tabular}}{{{}}}\n    \\toprule\n{body}    \
+        "\\begin{{table}}\n  \\centering\\small\\setlength{{\\tabcolsep}}{{3pt}}\n  \\caption{{{}}}\n  \\begin{{tabular}}{{{}}}\n    \\toprule\n{body}    \
          \\bottomrule\n  \\end{{tabular}}\n\\end{{table}}\n",
         escape(&table.caption),
         columns.join(" "),
@@ -48,7 +45,7 @@ fn float(table: &Table) -> String {
 /// The column type; a number column is as wide as its longest cell.
 fn column(table: &Table, index: usize) -> String {
     match table.columns[index].kind {
-        Kind::Words => "l".to_owned(),
+        Kind::Words | Kind::Interval => "l".to_owned(),
         Kind::Number(decimals) => {
             let whole = |cell: Option<&String>| {
                 cell.map_or(1, |text| text.split('.').next().map_or(1, str::len))
@@ -66,14 +63,22 @@ fn column(table: &Table, index: usize) -> String {
 /// A head; braces keep `siunitx` from reading it as a number.
 fn head(column: &Column) -> String {
     match column.kind {
-        Kind::Words => escape(column.head),
+        Kind::Words | Kind::Interval => escape(column.head),
         Kind::Number(_) => format!("{{{}}}", escape(column.head)),
+    }
+}
+
+fn shown(cell: Option<&str>, column: Column) -> String {
+    match (cell, column.kind) {
+        (None, _) => missing(column).to_owned(),
+        (Some(text), Kind::Interval) => escape(text).replace('-', "--"),
+        (Some(text), Kind::Words | Kind::Number(_)) => escape(text),
     }
 }
 
 const fn missing(column: Column) -> &'static str {
     match column.kind {
-        Kind::Words => "--",
+        Kind::Words | Kind::Interval => "--",
         Kind::Number(_) => "{--}",
     }
 }
@@ -115,7 +120,7 @@ mod tests {
     use crate::report::{Tally, TruthFinding, fixture};
 
     const GOLDEN: &str = r"\begin{table}
-  \centering
+  \centering\small\setlength{\tabcolsep}{3pt}
   \caption{Acc is the share passed of those passed or failed by readers; SSIM, IoU and Dice are means over the n finished pairs, by pixel; IoU box is of bounding boxes.}
   \begin{tabular}{l S[table-format=2.0] S[table-format=1.3] l S[table-format=1.3] S[table-format=1.3] S[table-format=1.3] S[table-format=1.3]}
     \toprule

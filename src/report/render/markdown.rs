@@ -8,7 +8,7 @@ pub(super) fn render(report: &Report) -> String {
     let mut blocks = vec![format!("{}\n", table::headline(report))];
     for found in table::tables(report)
         .into_iter()
-        .chain(table::comparisons(report))
+        .chain(table::comparisons_in_words(report))
     {
         blocks.push(piped(&found));
         blocks.push(format!("{}\n", escape(&found.caption)));
@@ -35,7 +35,7 @@ fn piped(table: &Table) -> String {
 
 const fn rule(column: &Column) -> &'static str {
     match column.kind {
-        Kind::Words => "---",
+        Kind::Words | Kind::Interval => "---",
         Kind::Number(_) => "---:",
     }
 }

@@ -25,8 +25,10 @@ pub(super) struct Column {
 /// How the cells of a column stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
-    /// Words or an interval, from the left.
+    /// Words, from the left.
     Words,
+    /// Two numbers with a hyphen between them, from the left.
+    Interval,
     /// Numbers with so many decimals, aligned at the point.
     Number(usize),
 }
@@ -35,6 +37,13 @@ const fn words(head: &'static str) -> Column {
     Column {
         head,
         kind: Kind::Words,
+    }
+}
+
+const fn interval(head: &'static str) -> Column {
+    Column {
+        head,
+        kind: Kind::Interval,
     }
 }
 
@@ -64,7 +73,7 @@ fn scores(report: &Report) -> Table {
             words("Method"),
             number("n", 0),
             number("Acc", 3),
-            words("95% Wilson"),
+            interval("95% Wilson"),
             number("SSIM", 3),
             number("IoU", 3),
             number("IoU box", 3),
@@ -79,7 +88,7 @@ fn score_cells(row: &Row) -> Vec<Option<String>> {
         Some(row.metric.title().to_owned()),
         Some(count(row.n)),
         fixed(row.acc, 3),
-        interval(row.acc_ci95),
+        bounds(row.acc_ci95),
         fixed(row.ssim, 3),
         fixed(row.iou, 3),
         fixed(row.iou_box, 3),
@@ -127,7 +136,7 @@ fn truth(report: &Report) -> Table {
             words("Truth"),
             number("n", 0),
             number("Acc", 3),
-            words("95% Wilson"),
+            interval("95% Wilson"),
             number("in 5\u{b0}", 3),
             number("angle \u{b0}", 2),
             number("landm. %", 2),
@@ -144,7 +153,7 @@ fn truth_cells(row: &Row) -> Vec<Option<String>> {
         Some(row.metric.title().to_owned()),
         Some(count(truth.map_or(0, |truth| truth.n))),
         fixed(value(|truth| truth.acc), 3),
-        interval(truth.and_then(|truth| truth.acc_ci95)),
+        bounds(truth.and_then(|truth| truth.acc_ci95)),
         fixed(value(|truth| truth.angle_le_5deg), 3),
         fixed(value(|truth| truth.angle_median_deg), 2),
         fixed(value(|truth| truth.tre_median_pct), 2),
@@ -152,7 +161,7 @@ fn truth_cells(row: &Row) -> Vec<Option<String>> {
     ]
 }
 
-/// The comparisons as a table, for the forms that have room for its words; `None` without any.
+/// The comparisons as a table without their words; `None` when there are none.
 pub(super) fn comparisons(report: &Report) -> Option<Table> {
     let test = report.comparisons.first()?.test;
     let cells = |found: &Comparison| {
@@ -164,7 +173,6 @@ pub(super) fn comparisons(report: &Report) -> Option<Table> {
             Some(count(found.b_only)),
             found.p.map(p_value),
             found.p_holm.map(p_value),
-            Some(found.words.clone()),
         ]
     };
     Some(Table {
@@ -179,10 +187,19 @@ pub(super) fn comparisons(report: &Report) -> Option<Table> {
             number("second only", 0),
             words("p"),
             words("Holm"),
-            words("In words"),
         ],
         rows: report.comparisons.iter().map(cells).collect(),
     })
+}
+
+/// The same with what follows from each comparison.
+pub(super) fn comparisons_in_words(report: &Report) -> Option<Table> {
+    let mut table = comparisons(report)?;
+    table.columns.push(words("In words"));
+    for (row, found) in table.rows.iter_mut().zip(&report.comparisons) {
+        row.push(Some(found.words.clone()));
+    }
+    Some(table)
 }
 
 /// The two metrics of a comparison.
@@ -217,7 +234,8 @@ pub(super) fn headline(report: &Report) -> String {
     .into_iter()
     .filter(|(n, _)| *n > 0)
     .map(|(n, what)| format!(", {n} {what}"));
-    let mut line = format!("{} pairs: {} done", report.pairs, progress.done);
+    let noun = if report.pairs == 1 { "pair" } else { "pairs" };
+    let mut line = format!("{} {noun}: {} done", report.pairs, progress.done);
     line.extend(rest);
     line
 }
@@ -230,6 +248,6 @@ fn fixed(value: Option<f64>, decimals: usize) -> Option<String> {
     value.map(|value| format!("{value:.decimals$}"))
 }
 
-fn interval(bounds: Option<[f64; 2]>) -> Option<String> {
+fn bounds(bounds: Option<[f64; 2]>) -> Option<String> {
     bounds.map(|[low, high]| format!("{low:.3}-{high:.3}"))
 }

@@ -57,7 +57,7 @@ fn line(cells: &[&str], columns: &[Column], widths: &[usize]) -> String {
         .zip(columns)
         .zip(widths)
         .map(|((cell, column), width)| match column.kind {
-            Kind::Words => format!("{cell:<width$}"),
+            Kind::Words | Kind::Interval => format!("{cell:<width$}"),
             Kind::Number(_) => format!("{cell:>width$}"),
         })
         .collect();
@@ -69,17 +69,15 @@ fn comparisons(report: &Report) -> String {
 }
 
 fn comparison(found: &Comparison) -> String {
-    let p = |p: Option<f64>| p.map_or_else(|| "-".to_owned(), table::p_value);
+    let (title, basis) = (table::title(found), table::basis(found.basis));
+    let said = format!("{title}, by {basis}: {}\n", found.words);
+    let (Some(p), Some(p_holm)) = (found.p, found.p_holm) else {
+        return said;
+    };
+    let (p, p_holm) = (table::p_value(p), table::p_value(p_holm));
+    let (a_only, b_only, n) = (found.a_only, found.b_only, found.n);
     format!(
-        "{}, by {}: {}\n    right for one only: {} / {} of {} pairs; exact McNemar p {}, Holm {}\n",
-        table::title(found),
-        table::basis(found.basis),
-        found.words,
-        found.a_only,
-        found.b_only,
-        found.n,
-        p(found.p),
-        p(found.p_holm),
+        "{said}    right for one only: {a_only} / {b_only} of {n}; exact McNemar p {p}, Holm {p_holm}\n"
     )
 }
 
@@ -177,7 +175,7 @@ Angle, landmarks and mask IoU are medians.
             "{text}"
         );
         assert!(
-            text.contains("! 1 of 4 pairs failed and are in no row.\n"),
+            text.contains("! In no row, of 4 in all: 1 failed.\n"),
             "{text}"
         );
     }

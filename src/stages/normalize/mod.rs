@@ -200,7 +200,7 @@ pub(super) mod tests_support {
             scale_band: 1.6,
             cut_from: 0.04,
             cut_to: 0.6,
-            ink_spread: 1.0,
+            ink_spread: 1.3,
             density_greys: [50, 139],
             structure_greys: [90, 149],
             window: SsimWindow::Gaussian,

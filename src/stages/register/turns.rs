@@ -65,13 +65,9 @@ fn align_one(
     let side = canvas_print.width();
     let wrap = box_wrap(&mask, side, character_px).ok_or(Error::NoStrokes(metric))?;
     let target = Packed::of(canvas_print);
+    let wrapped = warp_mask(&mask, &wrap, side, side);
     let attempt = |angle_deg: f64| {
-        let turned = warp_mask(
-            &mask,
-            &about_middle(angle_deg, side).after(&wrap),
-            side,
-            side,
-        );
+        let turned = warp_mask(&wrapped, &about_middle(angle_deg, side), side, side);
         climb(&target, &Packed::of(&turned), angle_deg)
     };
     let coarse = 360.0 / f64::from(params.coarse_angles);
