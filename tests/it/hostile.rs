@@ -118,13 +118,13 @@ fn cases() -> Vec<Case> {
         case(
             "mesh_folder",
             Bad::MeshFolder,
-            "bad_input",
+            "io",
             "is a directory, not a file",
         ),
         case(
             "print_folder",
             Bad::PrintFolder,
-            "bad_input",
+            "io",
             "is a directory, not a file",
         ),
     ]
