@@ -43,6 +43,13 @@ fn readme_walk_from_demo_to_export() {
     verdicts_count_until_they_are_taken_back(&at, id);
     only_the_touched_stage_runs_again(&at);
 
+    let compared = at(&["report", "--compare", "demo", "--json"])
+        .expect(0)
+        .json();
+    let there = &compared["compared_with"]["report"];
+    assert_eq!(there["rows"], compared["rows"]);
+    at(&["report", "--compare", "demo", "--format", "latex"]).expect(2);
+
     at(&["export", "--to", "jsonl", "-o", "out"]).expect(0);
     let exported = lines(&dir.path().join("out/pairs.jsonl"));
     assert_eq!(exported.len(), 3);
