@@ -262,7 +262,7 @@ fn reversed(values: &[Complex32]) -> Vec<Complex32> {
 }
 
 /// Rows, then columns.
-fn both_ways(fft: &dyn Fft<f32>, data: &mut Vec<Complex32>) {
+fn both_ways(fft: &dyn Fft<f32>, data: &mut [Complex32]) {
     fft.process(data);
     transpose(data);
     fft.process(data);
