@@ -1,10 +1,10 @@
 //! Every angle and scale of a band, the best shift of each by FFT: which few poses deserve a closer look.
 
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
+use rustfft::algorithm::Radix4;
 use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftPlanner};
+use rustfft::{Fft, FftDirection};
 
 use super::Layer;
 use super::layer::sample;
@@ -199,16 +199,16 @@ fn highest(surface: &[Complex32], part: usize, limit: f64) -> ([f64; 2], f32) {
 
 /// Two-dimensional transforms of the square.
 struct Transform {
-    forward: Arc<dyn Fft<f32>>,
-    inverse: Arc<dyn Fft<f32>>,
+    forward: Radix4<f32>,
+    inverse: Radix4<f32>,
 }
 
 impl Transform {
     fn new() -> Self {
-        let mut planner = FftPlanner::new();
+        // The square's side is a power of four. A planner would compile every algorithm it could choose from.
         Self {
-            forward: planner.plan_fft_forward(SQUARE),
-            inverse: planner.plan_fft_inverse(SQUARE),
+            forward: Radix4::new(SQUARE, FftDirection::Forward),
+            inverse: Radix4::new(SQUARE, FftDirection::Inverse),
         }
     }
 
@@ -218,7 +218,7 @@ impl Transform {
             .iter()
             .map(|v| Complex32::new(*v, 0.0))
             .collect();
-        both_ways(&*self.forward, &mut data);
+        both_ways(&self.forward, &mut data);
         data
     }
 
@@ -226,7 +226,7 @@ impl Transform {
     fn forward_both(&self, [a, b]: &[Grid<f32>; 2]) -> Vec<Complex32> {
         let pairs = a.data().iter().zip(b.data());
         let mut data: Vec<_> = pairs.map(|(re, im)| Complex32::new(*re, *im)).collect();
-        both_ways(&*self.forward, &mut data);
+        both_ways(&self.forward, &mut data);
         data
     }
 
@@ -248,7 +248,7 @@ impl Transform {
                 product.push(spectrum[y * SQUARE + from] * conjugated[y * SQUARE + x] * scale);
             }
         }
-        both_ways(&*self.inverse, &mut product);
+        both_ways(&self.inverse, &mut product);
         // The product above is the correlation read backwards: its value at -s belongs to shift s.
         reversed(&product)
     }
@@ -262,7 +262,7 @@ fn reversed(values: &[Complex32]) -> Vec<Complex32> {
 }
 
 /// Rows, then columns.
-fn both_ways(fft: &dyn Fft<f32>, data: &mut [Complex32]) {
+fn both_ways(fft: &Radix4<f32>, data: &mut [Complex32]) {
     fft.process(data);
     transpose(data);
     fft.process(data);
