@@ -117,7 +117,7 @@ pub(super) fn levelled(picture: &Picture, speck_share: f64) -> Result<Ink, Error
         });
     }
     let dark = grey.map(|g| f64::from(*g) < split.threshold);
-    let light_on_dark = rim_share(&dark, &known) > 0.5;
+    let light_on_dark = is_light_on_dark(&dark, &known);
     let darkness = |g: f32| if light_on_dark { 1.0 - g } else { g };
     let turned = grey.map(|g| darkness(*g));
     let paper = Mask::from_fn(grey.width(), grey.height(), |x, y| {
@@ -193,6 +193,15 @@ fn grown(mask: &Mask) -> Mask {
         let (x, y) = (x as i64, y as i64);
         (-1..=1).any(|dy| (-1..=1).any(|dx| mask.get(x + dx, y + dy).unwrap_or(false)))
     })
+}
+
+/// Ink is the smaller class, and paper reaches the rim. Heavy ink bends the first rule and border lines the second,
+/// so both have a say, the first a double one.
+fn is_light_on_dark(dark: &Mask, known: &Mask) -> bool {
+    let of_known = known.count().max(1) as f64;
+    let pairs = dark.data().iter().zip(known.data());
+    let share = pairs.filter(|(d, k)| **d && **k).count() as f64 / of_known;
+    2.0 * (share - 0.5) + (rim_share(dark, known) - 0.5) > 0.0
 }
 
 /// Share of dark pixels in the rim of what is known.
@@ -298,6 +307,19 @@ mod tests {
                 .enumerate()
                 .all(|(i, ink)| *ink == cross(i % 60, i / 60))
         );
+    }
+
+    #[test]
+    fn border_lines_do_not_turn_the_print_over() {
+        let framed = picture(|x, y| {
+            let at_rim = x < 4 || x >= 56 || y < 3;
+            if cross(x, y) || (at_rim && (x + y) % 9 != 0) {
+                45
+            } else {
+                200
+            }
+        });
+        assert!(!read(&framed).expect("ink").light_on_dark);
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! No files, no SQL, no async, no clock. Each stage has its `Params`, its `Error` and one entry function.
 
 mod blur;
+mod bulk;
 mod components;
 pub mod depth;
 pub mod fit;

@@ -1,5 +1,6 @@
 //! The highest surface under each pixel, looking straight down on a plane (orthographic z-buffer).
 
+use super::bulk::{Bounds, bulk};
 use crate::domain::{Affine2, Rigid3};
 use crate::mesh::Mesh;
 use crate::raster::Grid;
@@ -43,23 +44,16 @@ impl<'a> Projected<'a> {
         }
     }
 
-    /// Bounds in x and y as `[min, max]` corners, of what the triangles use; of all points when there are none.
-    pub(super) fn bounds(&self) -> [[f64; 2]; 2] {
-        let mut bounds = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-        let mut grow = |p: &[f64; 3]| {
-            for k in 0..2 {
-                bounds[0][k] = bounds[0][k].min(p[k]);
-                bounds[1][k] = bounds[1][k].max(p[k]);
-            }
-        };
-        if self.triangles.is_empty() {
-            self.points.iter().for_each(&mut grow);
+    /// Bounds in x and y of the bulk of what the triangles use; of all points when there are none.
+    pub(super) fn bounds(&self) -> Bounds<2> {
+        let flat = |p: &[f64; 3]| [p[0], p[1]];
+        let used: Vec<[f64; 2]> = if self.triangles.is_empty() {
+            self.points.iter().map(flat).collect()
         } else {
-            for corner in self.triangles.iter().flatten() {
-                grow(&self.points[*corner as usize]);
-            }
-        }
-        bounds
+            let corners = self.triangles.iter().flatten();
+            corners.map(|i| flat(&self.points[*i as usize])).collect()
+        };
+        bulk(&used)
     }
 
     /// The highest z under each pixel's centre; [`NOTHING`] where the ray meets no surface.
@@ -104,7 +98,7 @@ impl View {
     /// A view of the bounds whose longest side takes `longest_px` pixels, one of them free on each side.
     ///
     /// With `mirrored`, x is reflected: what is carved in mirror writing then reads right. y points down either way.
-    pub(super) fn around(bounds: [[f64; 2]; 2], longest_px: usize, mirrored: bool) -> Self {
+    pub(super) fn around(bounds: Bounds<2>, longest_px: usize, mirrored: bool) -> Self {
         let [low, high] = bounds;
         let size = [high[0] - low[0], high[1] - low[1]];
         let unit_per_px = size[0].max(size[1]) / (longest_px.max(4) as f64 - 3.0);

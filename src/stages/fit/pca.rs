@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use super::Error;
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
+use crate::stages::bulk::{bulk, holds};
 
 /// Centre and principal axes, longest first, with the variance along each.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,30 +34,35 @@ impl Axes {
     }
 
     /// Of a surface, each triangle weighing its area (so repeated vertices and uneven density change nothing);
-    /// of the vertices where there is no area.
+    /// of the vertices where there is no area. Flecks far from the bulk do not count.
     pub(super) fn of_surface(mesh: &Mesh) -> Self {
+        let bounds = bulk(&mesh.vertices);
         let corner = |i: u32| Vector3::from(mesh.vertices[i as usize]);
-        let area = |t: &[u32; 3]| {
-            let [a, b, c] = t.map(corner);
-            (b - a).cross(&(c - a)).norm() * 0.5
+        let area = |[a, b, c]: &[Vector3<f64>; 3]| (b - a).cross(&(c - a)).norm() * 0.5;
+        let triangles = || {
+            let kept = mesh.triangles.iter().filter(|t| {
+                t.iter()
+                    .all(|i| holds(&bounds, &mesh.vertices[*i as usize]))
+            });
+            kept.map(|t| t.map(corner))
         };
-        let total: f64 = mesh.triangles.iter().map(area).sum();
-        if total <= 0.0 || !total.is_finite() {
-            return Self::of_points(mesh.vertices.iter().map(|v| (*v, 1.0)));
+        let (mut total, mut centre) = (0.0, Vector3::zeros());
+        for t in triangles() {
+            total += area(&t);
+            centre += (t[0] + t[1] + t[2]) / 3.0 * area(&t);
         }
-        let mut centre = Vector3::zeros();
-        for t in &mesh.triangles {
-            let [a, b, c] = t.map(corner);
-            centre += (a + b + c) / 3.0 * area(t);
+        if total <= 0.0 || !total.is_finite() {
+            let kept = mesh.vertices.iter().filter(|v| holds(&bounds, v));
+            return Self::of_points(kept.map(|v| (*v, 1.0)));
         }
         centre /= total;
         let mut spread = Matrix3::zeros();
-        for t in &mesh.triangles {
+        for t in triangles() {
             // Second moment of a triangle: (sum of corners' outer products + outer product of their sum) / 12.
-            let [a, b, c] = t.map(|i| corner(i) - centre);
+            let [a, b, c] = t.map(|corner| corner - centre);
             let sum = a + b + c;
             let outer = a * a.transpose() + b * b.transpose() + c * c.transpose();
-            spread += (outer + sum * sum.transpose()) * (area(t) / 12.0);
+            spread += (outer + sum * sum.transpose()) * (area(&t) / 12.0);
         }
         Self::from_moments(centre, spread / total)
     }

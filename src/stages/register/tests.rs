@@ -65,3 +65,25 @@ fn the_papers_method_aligns_an_upright_pair() {
     let error = landmark_error_px(&world, &truth, &results[2].0);
     assert!(error < 4.0, "{error} px");
 }
+
+#[test]
+fn a_fleck_far_away_changes_nothing() {
+    let (picture, truth) = print(14.0, 3.0);
+    let world = World {
+        turn: some_turn(5),
+        ..World::default()
+    };
+    let mut mesh = world.mesh();
+    let first = mesh.vertices.len() as u32;
+    for place in [
+        [900.0, 40.0, 300.0],
+        [902.0, 40.0, 300.0],
+        [900.0, 44.0, 305.0],
+    ] {
+        mesh.vertices.push(place);
+    }
+    mesh.triangles.push([first, first + 1, first + 2]);
+    let results = run(&mesh, &picture, &settings()).expect("an alignment");
+    let error = landmark_error_px(&world, &truth, &results[0].0);
+    assert!(error < 0.7, "{error} px");
+}
