@@ -16,6 +16,6 @@ impl Limits {
     /// 256 MiB and 100 million pixels.
     pub const SUGGESTED: Self = Self {
         max_bytes: 256 << 20,
-        max_pixels: 100_000_000,
+        max_pixels: 30_000_000,
     };
 }

@@ -44,16 +44,9 @@ impl<'a> Projected<'a> {
         }
     }
 
-    /// Bounds in x and y of the bulk of what the triangles use; of all points when there are none.
+    /// Bounds in x and y of the bulk of the points.
     pub(super) fn bounds(&self) -> Bounds<2> {
-        let flat = |p: &[f64; 3]| [p[0], p[1]];
-        let used: Vec<[f64; 2]> = if self.triangles.is_empty() {
-            self.points.iter().map(flat).collect()
-        } else {
-            let corners = self.triangles.iter().flatten();
-            corners.map(|i| flat(&self.points[*i as usize])).collect()
-        };
-        bulk(&used)
+        bulk(&self.points).map(|corner| [corner[0], corner[1]])
     }
 
     /// The highest z under each pixel's centre; [`NOTHING`] where the ray meets no surface.

@@ -62,6 +62,9 @@ pub enum Error {
     /// Every vertex on one line.
     #[error("all {0} vertices lie on one line")]
     OneLine(usize),
+    /// Hardly a pixel of a rendering is covered, from either side.
+    #[error("mesh of {0} vertices shows no surface from either side")]
+    NoSurface(usize),
     /// Nothing is carved.
     #[error(
         "no carving found: the relief is {relief:.4} of an extent of {extent:.4} (mesh units), below fit.min_relief {min_relief}"
@@ -90,7 +93,9 @@ impl Error {
     /// What the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
-            Self::TooFewPoints(_) | Self::OnePoint(_) | Self::OneLine(_) => FailureClass::BadInput,
+            Self::TooFewPoints(_) | Self::OnePoint(_) | Self::OneLine(_) | Self::NoSurface(_) => {
+                FailureClass::BadInput
+            }
             Self::NoRelief { .. } | Self::TooFewInliers { .. } => FailureClass::NoSolution,
         }
     }

@@ -100,12 +100,21 @@ impl Axes {
 /// A right-handed plane frame with this normal whose x axis is as close to the mesh's x as it can be, so that an
 /// upright scan stays upright; close to the mesh's y where the normal runs along x.
 pub(super) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
-    let z = normal.normalize();
-    let along = if z.x.abs() < 0.9 {
+    let along = if normal.normalize().x.abs() < 0.9 {
         Vector3::x()
     } else {
         Vector3::y()
     };
+    frame_along(normal, along, origin)
+}
+
+/// A right-handed plane frame with this normal whose x axis is as close to `along` as it can be.
+pub(super) fn frame_along(
+    normal: Vector3<f64>,
+    along: Vector3<f64>,
+    origin: Vector3<f64>,
+) -> Rigid3 {
+    let z = normal.normalize();
     let x = (along - z * along.dot(&z)).normalize();
     let y = z.cross(&x);
     Rigid3::to_frame([x.into(), y.into(), z.into()], origin.into())

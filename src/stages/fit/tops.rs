@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::pca::{Axes, frame};
+use super::pca::{Axes, frame, frame_along};
 use super::side::{self, Face, Witness, layer_width};
 use super::surface::{Samples, Surface};
 use super::{Error, Params};
@@ -34,7 +34,7 @@ pub(super) fn fit(
         print,
         scanned_face_down,
     };
-    let (face, side) = side::choose(faces, witness).ok_or(Error::OneLine(mesh.vertices.len()))?;
+    let (face, side) = side::choose(faces, witness).ok_or(Error::NoSurface(mesh.vertices.len()))?;
     if face.relief < params.min_relief * face.extent {
         return Err(Error::NoRelief {
             relief: face.relief,
@@ -73,13 +73,15 @@ fn look(mesh: &Mesh, normal: Vector3<f64>, centre: Vector3<f64>, bow: bool) -> O
     None
 }
 
-/// The frame turned and raised so that `z = a + b x + c y` becomes its plane.
+/// The frame turned and raised so that `z = a + b x + c y` becomes its plane. Its x axis turns along, so that what
+/// was said in the old frame's x and y holds in the new one's.
 fn lay_on(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
     let mesh_from_plane = plane_from_mesh.inverse();
     let at = |p: [f64; 3]| Vector3::from(mesh_from_plane.apply(p));
     let origin = at([0.0, 0.0, a]);
     let normal = at([-b, -c, 1.0]) - at([0.0; 3]);
-    frame(normal, origin)
+    let along = at([1.0, 0.0, 0.0]) - at([0.0; 3]);
+    frame_along(normal, along, origin)
 }
 
 /// Gathers what was seen from one side.

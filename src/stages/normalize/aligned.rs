@@ -21,8 +21,8 @@ const SHIFT: f64 = 0.35;
 const LEAST_SCORE: f64 = 0.12;
 /// Mirrored must win by this factor before the pair is refused: symmetric characters score alike both ways.
 const MIRROR_WINS: f64 = 1.12;
-/// A scale within this share of the band's end is at the bound.
-const BOUND: f64 = 0.98;
+/// A scale whose logarithm is this close to the band's end is at the bound.
+const BOUND: f64 = 0.02;
 
 /// Finds the poses, then the thresholds.
 pub(super) fn choose(
@@ -77,7 +77,7 @@ fn find_poses(
     };
     judge(&found, |pose| {
         let ratio = ratio(pose);
-        ratio.max(1.0 / ratio) > params.scale_band * BOUND
+        params.scale_band > 1.0 && ratio.ln().abs() > params.scale_band.ln() - BOUND
     })
 }
 

@@ -25,8 +25,6 @@ impl Relief {
                 heights.extend(depth.height(x, y).map(|h| h as f32));
             }
         }
-        // A foot or a wall is much deeper than the ground: past twice the median depth nothing is carved.
-        heights.sort_unstable_by(f32::total_cmp);
         let split = otsu::split(&mut heights)?;
         (split.high > split.low).then_some(Self {
             top: split.high,

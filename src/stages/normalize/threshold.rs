@@ -64,7 +64,7 @@ struct Tried {
 /// Chooses each metric's threshold.
 ///
 /// - `nl_ssim`: the highest structure score.
-/// - `density`: the ink share closest to the print's (over `ink_spread`), the same or slightly denser.
+/// - `density`: the ink share closest to the print's over `ink_spread`.
 /// - `ensemble`: halfway in height between the two. Structure alone drifts to where worn tops fray, density alone
 ///   copies the print's ink spread; their errors are of opposite sign.
 pub(super) fn choose(

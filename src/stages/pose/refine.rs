@@ -23,6 +23,7 @@ pub(in crate::stages) fn refine(fixed: &Layer, moving: &Layer, start: &Found) ->
     let Some(mut from_fixed) = moving_from_fixed(fixed, moving, &start.fixed_from_moving) else {
         return *start;
     };
+    let at_start = from_fixed;
     let slopes = Slopes::of(&moving.value);
     let centre = fixed.centre();
     let rim = centre[0].max(centre[1]).max(1.0);
@@ -52,24 +53,21 @@ pub(in crate::stages) fn refine(fixed: &Layer, moving: &Layer, start: &Found) ->
             break;
         }
     }
-    let score = score(fixed, moving, &from_fixed);
-    if score < start.score {
-        let kept = moving_from_fixed(fixed, moving, &start.fixed_from_moving);
-        let at_start = kept.map_or(score, |k| self::score(fixed, moving, &k));
-        if at_start >= score {
-            return Found {
-                score: at_start,
-                ..*start
-            };
-        }
-    }
-    let Some(fixed_from_moving) = to_images(fixed, moving, &from_fixed) else {
-        return *start;
-    };
-    Found {
-        fixed_from_moving,
-        score,
-        mirrored: start.mirrored,
+    // The last step was never judged; it must not leave the pose worse than it came.
+    let (before, after) = (
+        score(fixed, moving, &at_start),
+        score(fixed, moving, &from_fixed),
+    );
+    match to_images(fixed, moving, &from_fixed) {
+        Some(fixed_from_moving) if after >= before => Found {
+            fixed_from_moving,
+            score: after,
+            mirrored: start.mirrored,
+        },
+        _ => Found {
+            score: before,
+            ..*start
+        },
     }
 }
 

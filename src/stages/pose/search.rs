@@ -13,7 +13,7 @@ use crate::raster::Grid;
 
 /// Side of the square on which layers are correlated.
 const SQUARE: usize = 64;
-/// Working size for layers that go into the search: with the widest scale they still fit the square.
+/// Working size for layers that go into the search; at the widest scales only their corners leave the square.
 pub(in crate::stages) const SEARCH_PX: usize = 40;
 /// Angles in a turn; two are looked at with one transform.
 const ANGLES: usize = 72;
