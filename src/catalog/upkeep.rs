@@ -81,21 +81,27 @@ SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
 FROM job AS j JOIN worker AS w ON w.id = j.worker
 WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.id";
 
-/// Takes leases back: worker, whether it died, whether the pair is to blame for that. Pairs of a worker that died
-/// are suspect and go behind the others, to be run alone.
+/// Takes leases back: worker, whether it died, whether its pair is to blame. Pairs of a worker that died are suspect:
+/// they run after the others, each by itself. The condition is `domain::is_condemned`.
 pub(super) const RESCUE: &str = "
-UPDATE job SET status = iif(crashes + (item.value ->> 2) >= ?2, 4, 0), worker = NULL, deadline = NULL,
-    epoch = epoch + 1, crashes = crashes + (item.value ->> 2), prio = prio + (item.value ->> 1),
+UPDATE job SET
+    status = iif((item.value ->> 2)
+        AND crashes + 1 >= ?2 + max(0, ?3 - crashes - 2), 4, 0),
+    worker = NULL, deadline = NULL, epoch = epoch + 1, crashes = crashes + (item.value ->> 2),
     mem_class = max(mem_class, item.value ->> 1)
 FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = item.value ->> 0
-RETURNING pair, stage, status";
+RETURNING pair, stage, status, crashes";
+
+/// Processes that did not end in order, among the newest 32; the one that asks is among them.
+const DEATHS: &str = "
+SELECT count(*) FROM (SELECT ended FROM worker ORDER BY id DESC LIMIT 32) WHERE ended IS NULL";
 
 /// Takes back leases of other workers whose deadline is long past.
 pub(super) const OVERDUE: &str = "
 UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = NULL,
-    epoch = epoch + 1, crashes = crashes + 1, prio = prio + 1, mem_class = 1
+    epoch = epoch + 1, crashes = crashes + 1, mem_class = 1
 WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1)) AND deadline < ?3
-RETURNING pair, stage, status";
+RETURNING pair, stage, status, crashes";
 
 /// Back-off times that are over, or so far ahead that the clock must have jumped.
 pub(super) const DUE: &str = "
@@ -188,11 +194,10 @@ impl Catalog {
             .collect()
     }
 
-    /// Takes back the leases of dead workers: ready again, or quarantined at the third crash.
+    /// Takes back the leases of dead workers: ready again, or quarantined when too many died over the pair.
     ///
-    /// A pair is blamed for a death only when its worker held no other. Otherwise all are suspect: they run later,
-    /// each by itself, and the next death tells. So a process that is killed from outside, however often, does not
-    /// bring its pairs into quarantine while there are others.
+    /// A pair is blamed for a death only when its worker held no other, and condemned only as `is_condemned` says.
+    /// So a process that is killed from outside, however often, does not bring its pairs into quarantine.
     ///
     /// # Errors
     /// When the database refuses.
@@ -203,10 +208,12 @@ impl Catalog {
                     Dead::Workers(workers) => workers.iter().map(|worker| worker.0).collect(),
                     Dead::AllBut(me) => holders_but(conn, me).await?,
                 };
-                let items = deaths(conn, workers).await?;
+                let items = left_by(conn, workers).await?;
+                let deaths: i64 = sqlx::query_scalar(DEATHS).fetch_one(&mut *conn).await?;
                 let found = sqlx::query(RESCUE)
                     .bind(items)
                     .bind(CRASH_LIMIT)
+                    .bind(deaths - 1)
                     .fetch_all(&mut *conn)
                     .await?;
                 brought_back(conn, &found, now).await
@@ -330,7 +337,7 @@ impl Catalog {
 }
 
 /// Items of [`RESCUE`] for some workers.
-async fn deaths(conn: &mut SqliteConnection, workers: Vec<i64>) -> Result<String> {
+async fn left_by(conn: &mut SqliteConnection, workers: Vec<i64>) -> Result<String> {
     let found = sqlx::query(LEFT_BY)
         .bind(Value::from(workers).to_string())
         .fetch_all(conn)
@@ -364,13 +371,13 @@ async fn brought_back(
     let mut crashed = Vec::new();
     for row in found {
         let (pair, stage): (i64, i64) = (row.try_get(0)?, row.try_get(1)?);
-        let status = rows::status(row.try_get(2)?)?;
+        let (status, crashes): (_, i64) = (rows::status(row.try_get(2)?)?, row.try_get(3)?);
         deltas.moved((stage, JobStatus::Leased), (stage, status));
         if status == JobStatus::Quarantined {
             rescued.quarantined += 1;
             crashed.push(json!({
                 "pair": pair, "stage": stage, "class": FailureClass::Resource, "at": now,
-                "message": format!("{CRASH_LIMIT} workers died over it at {}", rows::stage(stage)?),
+                "message": format!("{crashes} workers died over it at {}", rows::stage(stage)?),
             }));
         } else {
             rescued.ready += 1;

@@ -169,10 +169,10 @@ pub enum Event {
         /// Who gives it back.
         worker: WorkerId,
     },
-    /// The worker is dead or the deadline long past; `crashes` counts this time too.
+    /// The worker is dead or the deadline long past.
     Rescue {
-        /// How many workers died over it without a stage done between.
-        crashes: u32,
+        /// Whether too many workers died over it: see [`is_condemned`].
+        condemned: bool,
     },
     /// The back-off time may be over.
     Due {
@@ -190,6 +190,16 @@ pub enum Event {
 
 /// How many workers may die over a pair before it is quarantined.
 pub const CRASH_LIMIT: u32 = 3;
+
+/// Whether a pair is to blame for its dead workers.
+///
+/// `crashes` counts workers that died with this pair alone in hand since its last finished stage, `deaths` all that
+/// died of late. Where pairs kill their workers, nearly all deaths are one pair's, but for a first one that it shared
+/// with others. Every further death that was not its own speaks for a cause outside, such as somebody who kills
+/// processes, and the pair is allowed as many more.
+pub const fn is_condemned(crashes: u32, deaths: u32) -> bool {
+    crashes >= CRASH_LIMIT + deaths.saturating_sub(crashes + 1)
+}
 
 /// An event that cannot happen to a job where it stands; nothing changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
@@ -252,17 +262,15 @@ fn leased(stage: Stage, holder: WorkerId, event: Event) -> Option<JobState> {
             (worker == holder).then_some(JobState::Quarantined { stage })
         }
         Event::Release { worker } => (worker == holder).then_some(JobState::Ready { stage }),
-        Event::Rescue { crashes } if crashes >= CRASH_LIMIT => {
-            Some(JobState::Quarantined { stage })
-        }
-        Event::Rescue { .. } => Some(JobState::Ready { stage }),
+        Event::Rescue { condemned: true } => Some(JobState::Quarantined { stage }),
+        Event::Rescue { condemned: false } => Some(JobState::Ready { stage }),
         Event::Claim { .. } | Event::Due { .. } | Event::SendBack { .. } | Event::Hold => None,
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Event, JobState, JobStatus, transition};
+    use super::{Event, JobState, JobStatus, is_condemned, transition};
     use crate::domain::{Stage, WorkerId};
 
     const ME: WorkerId = WorkerId(1);
@@ -310,22 +318,25 @@ mod tests {
     }
 
     #[test]
-    fn third_crash_is_quarantined() {
+    fn a_condemned_pair_is_quarantined_and_another_ready() {
         let state = leased(Stage::Depth);
-        let twice = transition(state, Event::Rescue { crashes: 2 });
-        assert_eq!(
-            twice,
-            Ok(JobState::Ready {
-                stage: Stage::Depth
-            })
-        );
-        let thrice = transition(state, Event::Rescue { crashes: 3 });
-        assert_eq!(
-            thrice,
-            Ok(JobState::Quarantined {
-                stage: Stage::Depth
-            })
-        );
+        let stage = Stage::Depth;
+        let spared = transition(state, Event::Rescue { condemned: false });
+        assert_eq!(spared, Ok(JobState::Ready { stage }));
+        let condemned = transition(state, Event::Rescue { condemned: true });
+        assert_eq!(condemned, Ok(JobState::Quarantined { stage }));
+    }
+
+    #[test]
+    fn the_third_crash_condemns_unless_others_died_too() {
+        assert!(!is_condemned(2, 2));
+        assert!(is_condemned(3, 3));
+        // The first death was shared.
+        assert!(is_condemned(3, 4));
+        // Two deaths the pair had no part in.
+        assert!(!is_condemned(3, 6));
+        assert!(!is_condemned(4, 7));
+        assert!(is_condemned(5, 8));
     }
 
     #[test]

@@ -11,7 +11,7 @@ use crate::catalog::{
     Again, ClaimRequest, Dead, Kept, Lease, RetrySelection, Sentence, StageFailed, connect,
 };
 use crate::domain::{
-    CRASH_LIMIT, Event, Failure, FailureClass, JobState, JobStatus, Stage, WorkerId, transition,
+    Event, Failure, FailureClass, JobState, JobStatus, Stage, WorkerId, is_condemned, transition,
 };
 
 const PAIRS: usize = 6;
@@ -33,6 +33,8 @@ struct Game {
     leases: Vec<(Lease, WorkerId)>,
     worker: WorkerId,
     now: i64,
+    /// Workers that died.
+    deaths: u32,
 }
 
 impl Game {
@@ -51,6 +53,7 @@ impl Game {
             rng: ChaCha8Rng::seed_from_u64(seed),
             leases: Vec::new(),
             now: 100,
+            deaths: 0,
         }
     }
 
@@ -214,13 +217,14 @@ impl Game {
             |(_, model)| matches!(model.state, JobState::Leased { worker, .. } if worker == dead),
         );
         let left: Vec<_> = left.map(|(pair, _)| *pair).collect();
+        self.deaths += 1;
         for pair in &left {
+            let blamed = left.len() == 1;
             let model = self.model.get_mut(pair).expect("the pair");
             model.epoch += 1;
-            model.crashes += u32::from(left.len() == 1);
-            let crashes = model.crashes;
-            assert!(crashes <= CRASH_LIMIT);
-            self.happens(*pair, Event::Rescue { crashes });
+            model.crashes += u32::from(blamed);
+            let condemned = blamed && is_condemned(model.crashes, self.deaths.min(31));
+            self.happens(*pair, Event::Rescue { condemned });
         }
     }
 

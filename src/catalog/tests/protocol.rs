@@ -144,6 +144,31 @@ async fn the_third_crash_is_quarantined_and_says_so() {
 }
 
 #[tokio::test]
+async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
+    let world = World::new(1).await;
+    for round in 0..8 {
+        // One is killed before it has taken anything, the next with the pair in hand.
+        register(&world.catalog).await;
+        let worker = register(&world.catalog).await;
+        let request = ClaimRequest {
+            worker,
+            slots: 1,
+            until: Stage::Register,
+            alone: round > 0,
+            among: None,
+            deadline: 1_000,
+        };
+        assert_eq!(
+            world.catalog.claim(request).await.expect("a claim").len(),
+            1
+        );
+        let rescue = world.catalog.rescue(Dead::Workers(vec![worker]), 60);
+        assert_eq!(rescue.await.expect("a rescue").ready, 1, "round {round}");
+    }
+    world.counters_hold().await;
+}
+
+#[tokio::test]
 async fn pairs_that_died_together_are_suspect_but_not_blamed() {
     let world = World::new(2).await;
     assert_eq!(world.claim(2).await.len(), 2);
