@@ -1,4 +1,4 @@
-//! Ctrl-C and SIGTERM: the first drains the run, the second stops it now.
+//! Ctrl-C, SIGTERM and a closed terminal: the first drains the run, the second stops it now.
 
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::task::JoinHandle;
@@ -12,12 +12,14 @@ use crate::runner::Stop;
 pub(super) fn watch(stop: &Stop) -> std::io::Result<JoinHandle<()>> {
     let mut interrupt = signal(SignalKind::interrupt())?;
     let mut terminate = signal(SignalKind::terminate())?;
+    let mut hang_up = signal(SignalKind::hangup())?;
     let stop = stop.clone();
     Ok(tokio::spawn(async move {
         loop {
             tokio::select! {
                 Some(()) = interrupt.recv() => stop.escalate(),
                 Some(()) = terminate.recv() => stop.escalate(),
+                Some(()) = hang_up.recv() => stop.escalate(),
                 else => return,
             };
         }

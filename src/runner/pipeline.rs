@@ -52,7 +52,7 @@ impl Pipeline {
     }
 
     fn depth(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
-        let fit = self.fitted(pair)?;
+        let fit = Self::fitted(pair)?;
         // The mesh is not needed after this stage; taking it out frees its memory.
         let mesh = self.mesh_of_fit(pair)?;
         let map = depth::depth(&mesh, &fit, pair.facts.unit, &self.settings.depth)
@@ -69,8 +69,17 @@ impl Pipeline {
     fn normalize(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
         let depth = self.depth_map(pair)?;
         let print = self.print_of_fit(pair)?;
-        let normalized = normalize::normalize(&depth, &print, &self.settings.normalize)
-            .map_err(|error| in_file(&pair.facts.print_path, &error.into()))?;
+        let normalized =
+            normalize::normalize(&depth, &print, &self.settings.normalize).map_err(|error| {
+                // Only a print without ink is the print's fault; all else speaks of the relief.
+                let blamed = match error {
+                    normalize::Error::Print(_) => &pair.facts.print_path,
+                    normalize::Error::NoStrokes
+                    | normalize::Error::Mirrored { .. }
+                    | normalize::Error::NoMatch { .. } => &pair.facts.mesh_path,
+                };
+                in_file(blamed, &error.into())
+            })?;
         pair.depth = Some(depth);
         let (outcome, json) = settled(&normalized.outcome)?;
         let grey = outputs::print_mask(&normalized.ink, &normalized.known);
@@ -89,8 +98,7 @@ impl Pipeline {
     }
 
     /// The fit's outcome, from memory or as stored.
-    fn fitted(&self, pair: &PairInHand) -> Result<FitOutcome, Setback> {
-        let _ = self;
+    fn fitted(pair: &PairInHand) -> Result<FitOutcome, Setback> {
         let fit = pair.fit.clone();
         fit.or_else(|| pair.outcome(Stage::Fit))
             .ok_or(Setback::Back(Stage::Fit))

@@ -176,7 +176,7 @@ async fn a_failure_that_may_pass_is_tried_again_in_the_same_run() {
 async fn a_stage_that_takes_too_long_is_tried_alone_and_then_quarantined() {
     let world = World::new(&["a", "hangs_1"]).await;
     let limited = RunOptions {
-        stage_limit: Duration::from_millis(150),
+        stage_limit: Duration::from_secs(1),
         ..options(2)
     };
     let summary = world.run(&limited).await;
@@ -184,6 +184,7 @@ async fn a_stage_that_takes_too_long_is_tried_alone_and_then_quarantined() {
     assert_eq!(world.steps.count("hangs_1", Stage::Fit), 2);
     let failures = world.catalog.failures(9).await.expect("a read");
     assert_eq!(failures[0].failure.failure.class, FailureClass::Resource);
+    world.steps.open();
 }
 
 #[tokio::test]

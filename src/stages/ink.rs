@@ -16,8 +16,11 @@ const LEAST_PAPER: f64 = 0.2;
 const LEAST_WHITE: f64 = 0.004;
 /// Paper brightness is levelled with a gaussian of this share of the longest side.
 const LEVELLING: f64 = 0.16;
-/// Least difference between ink and paper, of full white.
-const LEAST_CONTRAST: f64 = 0.07;
+/// Least difference between ink and paper, as a share of the lighter of the two: scanners that fill but a part of
+/// their 16 bits leave dark pictures.
+const LEAST_CONTRAST: f64 = 0.08;
+/// And of full white: below it there is but noise.
+const NOISE: f64 = 0.012;
 /// Least share of ink in a print.
 const LEAST_INK: f64 = 0.002;
 /// Width of the rim that tells paper from ink, as a share of the shorter side.
@@ -111,7 +114,7 @@ pub(super) fn levelled(picture: &Picture, speck_share: f64) -> Result<Ink, Error
     let known = known(picture, grey);
     let mut values = held(grey, &known);
     let split = otsu::split(&mut values).ok_or(Error::NoContrast { contrast: 0.0 })?;
-    if split.high - split.low < LEAST_CONTRAST {
+    if split.high - split.low < (LEAST_CONTRAST * split.high).max(NOISE) {
         return Err(Error::NoContrast {
             contrast: split.high - split.low,
         });
@@ -125,7 +128,7 @@ pub(super) fn levelled(picture: &Picture, speck_share: f64) -> Result<Ink, Error
     });
     let level = level(&turned, &paper);
     let even = Grid::from_fn(grey.width(), grey.height(), |x, y| {
-        (turned.at(x, y) / level.at(x, y).max(0.05)).min(1.5)
+        (turned.at(x, y) / level.at(x, y).max(0.01)).min(1.5)
     });
     let split = otsu::split(&mut held(&even, &known)).ok_or(Error::NoContrast { contrast: 0.0 })?;
     let raw = Mask::from_fn(grey.width(), grey.height(), |x, y| {
@@ -312,7 +315,7 @@ mod tests {
     #[test]
     fn border_lines_do_not_turn_the_print_over() {
         let framed = picture(|x, y| {
-            let at_rim = x < 4 || x >= 56 || y < 3;
+            let at_rim = !(4..56).contains(&x) || y < 3;
             if cross(x, y) || (at_rim && (x + y) % 9 != 0) {
                 45
             } else {

@@ -148,6 +148,11 @@ fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
         .spawn()
         .expect("the binary starts");
     while stages_done(&killed) < 2 {
+        let ended = child.try_wait().expect("a child that can be asked");
+        assert!(
+            ended.is_none(),
+            "the run ended before it was killed: {ended:?}"
+        );
         std::thread::yield_now();
     }
     child.kill().expect("killed");

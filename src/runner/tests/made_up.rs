@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex};
-use std::time::Duration;
 
 use serde_json::json;
 
@@ -63,7 +62,7 @@ impl MadeUp {
                 may_pass: true,
             }),
             "hangs" if stage == Stage::Fit => {
-                std::thread::sleep(Duration::from_millis(400));
+                self.wait();
                 Ok(())
             }
             "loses" if stage == Stage::Register && tries == 1 => Err(Setback::Back(Stage::Depth)),

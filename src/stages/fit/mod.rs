@@ -62,6 +62,9 @@ pub enum Error {
     /// Every vertex on one line.
     #[error("all {0} vertices lie on one line")]
     OneLine(usize),
+    /// Neither faces nor enough points to stand for a surface.
+    #[error("mesh has no faces, and {0} points are too few to show a surface")]
+    NoFaces(usize),
     /// Hardly a pixel of a rendering is covered, from either side.
     #[error("mesh of {0} vertices shows no surface from either side")]
     NoSurface(usize),
@@ -93,9 +96,11 @@ impl Error {
     /// What the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
-            Self::TooFewPoints(_) | Self::OnePoint(_) | Self::OneLine(_) | Self::NoSurface(_) => {
-                FailureClass::BadInput
-            }
+            Self::TooFewPoints(_)
+            | Self::OnePoint(_)
+            | Self::OneLine(_)
+            | Self::NoFaces(_)
+            | Self::NoSurface(_) => FailureClass::BadInput,
             Self::NoRelief { .. } | Self::TooFewInliers { .. } => FailureClass::NoSolution,
         }
     }

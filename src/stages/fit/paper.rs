@@ -15,7 +15,7 @@ use crate::mesh::Mesh;
 pub(super) fn fit(mesh: &Mesh, params: &Params) -> Result<FitOutcome, Error> {
     let points = distinct(&mesh.vertices);
     let all = Axes::of_points(points.iter().map(|p| (*p, 1.0)));
-    all.require_surface(mesh.vertices.len())?;
+    all.require_surface(mesh)?;
     let extent = (all.variances.iter().sum::<f64>() * 12.0).sqrt() / std::f64::consts::SQRT_2;
     let (upper, outward, flatness) = upper_set(&points, &all);
     let taken = spaced_selection(&upper, &all, params.spacing * extent, params.spaced_points);

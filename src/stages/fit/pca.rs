@@ -7,6 +7,9 @@ use crate::domain::Rigid3;
 use crate::mesh::Mesh;
 use crate::stages::bulk::{bulk, holds};
 
+/// A surface given by points alone needs this many: 25 along a side show a stroke or two at best.
+const LEAST_POINTS: usize = 600;
+
 /// Centre and principal axes, longest first, with the variance along each.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Axes {
@@ -79,7 +82,8 @@ impl Axes {
     }
 
     /// Refuses points that span no surface.
-    pub(super) fn require_surface(&self, count: usize) -> Result<(), Error> {
+    pub(super) fn require_surface(&self, mesh: &Mesh) -> Result<(), Error> {
+        let count = mesh.vertices.len();
         let scale = self.centre.norm_squared().max(1e-300);
         let [first, second, _] = self.variances;
         if first <= scale * 1e-24 {
@@ -87,6 +91,9 @@ impl Axes {
         }
         if second <= first * 1e-10 {
             return Err(Error::OneLine(count));
+        }
+        if mesh.triangles.is_empty() && count < LEAST_POINTS {
+            return Err(Error::NoFaces(count));
         }
         Ok(())
     }

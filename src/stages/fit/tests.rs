@@ -101,6 +101,10 @@ fn points_that_span_no_surface_are_refused() {
             .map(|i| [f64::from(i), f64::from(2 * i), 1.0])
             .collect();
         assert_eq!(fit(line), Err(Error::OneLine(50)));
+        let few = (0..36)
+            .map(|i| [f64::from(i % 6), f64::from(i / 6), f64::from(i % 2)])
+            .collect();
+        assert_eq!(fit(few), Err(Error::NoFaces(36)));
         let plate = (0..900)
             .map(|i| [f64::from(i % 30), f64::from(i / 30), 0.0])
             .collect();

@@ -26,7 +26,7 @@ pub(super) fn fit(
     params: &Params,
 ) -> Result<FitOutcome, Error> {
     let axes = Axes::of_surface(mesh);
-    axes.require_surface(mesh.vertices.len())?;
+    axes.require_surface(mesh)?;
     let normal = axes.normal();
     let faces = [normal, -normal].map(|n| look(mesh, n, axes.centre, params.bow));
     let witness = Witness {
