@@ -69,11 +69,24 @@ fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow
             .talk
             .warn(&format!("{pair} has no files in the export: {why}"));
     }
+    let unreadable = match summary.unreadable.len() {
+        0 => String::new(),
+        lost => format!(", {lost} whose files are gone or changed"),
+    };
     context.talk.say(&format!(
-        "{} exported to {}, {} without result",
+        "{} exported to {}, {} without result{unreadable}",
         count(summary.done, "pair"),
         args.output.display(),
         summary.without_result
     ));
+    if let [(pair, _), rest @ ..] = summary.unreadable.as_slice() {
+        // A run trusts what the catalog says is done; only a forced one makes lost files again.
+        let again = if rest.is_empty() {
+            format!("run --rerun all {pair}")
+        } else {
+            "run --rerun all".to_owned()
+        };
+        context.talk.next(&context.command(&again));
+    }
     Ok(())
 }

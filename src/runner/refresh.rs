@@ -1,5 +1,7 @@
 //! Before a run: which input files are not what they were. Size, time and number first; only what moved is hashed.
 
+use std::path::Path;
+
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use super::RunError;
@@ -55,15 +57,18 @@ fn moved(project: &Project, stored: &str, known: Option<&InputSeen>) -> Option<I
     let path = project.input_path(stored);
     match stat_input(&path) {
         Ok(stat) if stat.as_str() == known.stat => None,
-        Ok(_) => {
-            let (hash, stat) = hash_input(&path).ok()?;
-            let stat = stat.as_str().to_owned();
-            Some(InputSeen { hash, stat })
-        }
+        Ok(_) => seen_now(&path),
         Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputSeen {
             hash: ContentHash::of(b""),
             stat: "gone".to_owned(),
         }),
         Err(_) => None,
     }
+}
+
+/// What a file is now; `None` when it cannot be read.
+pub(super) fn seen_now(path: &Path) -> Option<InputSeen> {
+    let (hash, stat) = hash_input(path).ok()?;
+    let stat = stat.as_str().to_owned();
+    Some(InputSeen { hash, stat })
 }

@@ -156,6 +156,21 @@ async fn one_bad_pair_stops_nobody_and_shows() {
 }
 
 #[tokio::test]
+async fn a_pair_that_panicked_is_taken_up_when_its_mesh_is_another() {
+    let world = World::new(&["bursts_1"]).await;
+    let mesh = world.project.input_path("bursts_1.stl");
+    for (content, tries) in [("one", 1), ("one", 1), ("another one", 2)] {
+        std::fs::write(&mesh, content).expect("written");
+        world.run(&options(1)).await;
+        assert_eq!(
+            world.steps.count("bursts_1", Stage::Fit),
+            tries,
+            "{content}"
+        );
+    }
+}
+
+#[tokio::test]
 async fn a_failure_that_may_pass_is_tried_again_in_the_same_run() {
     let world = World::new(&["flaky_1"]).await;
     let summary = world.run(&options(1)).await;

@@ -12,6 +12,7 @@ use super::events::RunEvent;
 use super::execute::{Computed, Ended, Filed, compute};
 use super::hand::PairInHand;
 use super::policy::{self, Try};
+use super::refresh;
 use super::steps::{Setback, Steps};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{
@@ -64,6 +65,8 @@ pub(super) struct PairReport {
 struct Known {
     name: PairName,
     facts: String,
+    mesh_path: String,
+    print_path: String,
     inputs: InputsSeen,
 }
 
@@ -251,6 +254,10 @@ async fn fail(
     known: Known,
     blame: Blame,
 ) -> Result<PairEnd, RunError> {
+    let inputs = match blame.inputs {
+        Some(inputs) => inputs,
+        None => known.inputs(&shared.project).await,
+    };
     let now = shared.clock.now();
     let failed = Try {
         pair: lease.pair(),
@@ -266,7 +273,7 @@ async fn fail(
         sentence,
         recipe: shared.recipes.of(stage),
         facts: known.facts,
-        inputs: blame.inputs.unwrap_or(known.inputs),
+        inputs,
         ms: blame.ms,
         at: now,
     };
@@ -315,7 +322,24 @@ impl Known {
         Self {
             name: pair.facts.name.clone(),
             facts: pair.facts_text.clone(),
+            mesh_path: pair.facts.mesh_path.clone(),
+            print_path: pair.facts.print_path.clone(),
             inputs: pair.inputs.clone(),
+        }
+    }
+
+    /// The input files as they were read, or as they are now where the reader was lost: a file that is mended later
+    /// must be told from the one that failed.
+    async fn inputs(&self, project: &Project) -> InputsSeen {
+        let seen = self.inputs.clone();
+        let paths = [&self.mesh_path, &self.print_path].map(|path| project.input_path(path));
+        let look = move || InputsSeen {
+            mesh: seen.mesh.or_else(|| refresh::seen_now(&paths[0])),
+            print: seen.print.or_else(|| refresh::seen_now(&paths[1])),
+        };
+        match tokio::task::spawn_blocking(look).await {
+            Ok(inputs) => inputs,
+            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         }
     }
 }

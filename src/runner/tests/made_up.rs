@@ -54,6 +54,7 @@ impl MadeUp {
     fn behave(&self, name: &str, stage: Stage, tries: usize) -> Result<(), Setback> {
         match name.split('_').next().unwrap_or_default() {
             "panics" if stage == Stage::Depth => panic!("made up"),
+            "bursts" => panic!("made up"),
             "bad" if stage == Stage::Fit => {
                 Err(Setback::failed(FailureClass::BadInput, "no faces"))
             }
