@@ -7,6 +7,8 @@ mod bulk;
 mod components;
 pub mod depth;
 pub mod fit;
+#[cfg(test)]
+mod golden;
 mod ink;
 pub mod normalize;
 mod otsu;

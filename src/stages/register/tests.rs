@@ -1,5 +1,7 @@
 //! Known alignments come back through all four stages.
 
+use crate::domain::PrintFromMesh;
+use crate::mesh::Mesh;
 use crate::stages::StageError;
 use crate::stages::normalize;
 use crate::stages::testing::{
@@ -86,4 +88,66 @@ fn a_fleck_far_away_changes_nothing() {
     let results = run(&mesh, &picture, &settings()).expect("an alignment");
     let error = landmark_error_px(&world, &truth, &results[0].0);
     assert!(error < 0.7, "{error} px");
+}
+
+/// The same surface as a triangle soup, its faces in another order.
+fn as_shuffled_soup(mesh: &Mesh) -> Mesh {
+    let count = mesh.triangles.len();
+    let corners = (0..count).flat_map(|k| mesh.triangles[(k * 7919) % count]);
+    let vertices: Vec<[f64; 3]> = corners.map(|i| mesh.vertices[i as usize]).collect();
+    let triangles = (0..count as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
+    Mesh {
+        triangles: triangles.collect(),
+        vertices,
+    }
+}
+
+/// Largest distance in print pixels between two answers over the sheet.
+fn apart_px(world: &World, a: &PrintFromMesh, b: &PrintFromMesh) -> f64 {
+    let corners = [[-4.0, -4.0], [4.0, -4.0], [-4.0, 4.0], [4.0, 4.0]];
+    let apart = |[x, y]: [f64; 2]| {
+        let place = world.place(x, y, 0.0);
+        let ([p, q, _], [u, v, _]) = (a.apply(place), b.apply(place));
+        (p - u).hypot(q - v)
+    };
+    corners.into_iter().map(apart).fold(0.0, f64::max)
+}
+
+#[test]
+fn order_and_repetition_of_vertices_and_the_depth_resolution_change_nothing() {
+    let (picture, _) = print(14.0, 3.0);
+    let world = World {
+        turn: some_turn(8),
+        ..World::default()
+    };
+    let mesh = world.mesh();
+    let plain = run(&mesh, &picture, &settings()).expect("an alignment");
+    let soup = run(&as_shuffled_soup(&mesh), &picture, &settings()).expect("an alignment");
+    let apart = apart_px(&world, &plain[2].0, &soup[2].0);
+    assert!(apart < 0.02, "{apart} px");
+    let mut fine = settings();
+    fine.depth.longest_px *= 2;
+    let doubled = run(&mesh, &picture, &fine).expect("an alignment");
+    // Half a pixel of the coarser depth map, in print pixels.
+    let half = 0.5 * plain[2].1.scale;
+    let apart = apart_px(&world, &plain[2].0, &doubled[2].0);
+    assert!(apart < half, "{apart} px of {half}");
+}
+
+#[test]
+fn a_turned_and_moved_print_turns_and_moves_the_alignment() {
+    let world = World {
+        turn: some_turn(9),
+        ..World::default()
+    };
+    let mesh = world.mesh();
+    let angles = [3.0, 143.0].map(|turn_deg| {
+        let (picture, truth) = print(14.0, turn_deg);
+        let results = run(&mesh, &picture, &settings()).expect("an alignment");
+        let error = landmark_error_px(&world, &truth, &results[2].0);
+        assert!(error < 0.7, "{error} px at {turn_deg} degrees");
+        results[2].1.angle_deg
+    });
+    let turned = (angles[1] - angles[0]).rem_euclid(360.0);
+    assert!((turned - 140.0).abs() < 0.3, "{turned} degrees");
 }

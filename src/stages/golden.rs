@@ -1,0 +1,56 @@
+//! Pictures of the known world as they should be, with a tolerance.
+//!
+//! `MOCBAN_REGENERATE=1 cargo test golden` writes them anew; look at them before they go in.
+
+use std::path::PathBuf;
+
+use super::testing::{World, print, settings, some_turn};
+use super::{depth, fit, normalize, register};
+use crate::raster::{Grid, decode_grey8, png_grey8};
+
+/// A pixel may differ by this much of 255 ...
+const TOLERANCE: u8 = 12;
+/// ... and this share of the pixels by more.
+const OTHERS: f64 = 0.01;
+
+fn hold(name: &str, got: &Grid<u8>) {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/golden")
+        .join(name);
+    if std::env::var_os("MOCBAN_REGENERATE").is_some() {
+        std::fs::write(&path, png_grey8(got)).expect("written");
+    }
+    let wanted = decode_grey8(&std::fs::read(&path).expect("a golden picture")).expect("grey");
+    assert_eq!(
+        (wanted.width(), wanted.height()),
+        (got.width(), got.height()),
+        "{name}"
+    );
+    let pairs = wanted.data().iter().zip(got.data());
+    let differ = pairs.filter(|(a, b)| a.abs_diff(**b) > TOLERANCE).count();
+    let share = differ as f64 / got.data().len() as f64;
+    assert!(share < OTHERS, "{name}: {share} of the pixels differ");
+}
+
+#[test]
+fn depth_map_and_mask_are_as_they_were() {
+    let mut settings = settings();
+    settings.depth.longest_px = 160;
+    let (picture, _) = print(14.0, 3.0);
+    let world = World {
+        turn: some_turn(2),
+        ..World::default()
+    };
+    let mesh = world.mesh();
+    let fitted = fit::fit(&mesh, Some(&picture), None, &settings.fit).expect("a plane");
+    let map = depth::depth(&mesh, &fitted, None, &settings.depth).expect("a map");
+    hold("depth.png", &map.levels.map(|level| (level >> 8) as u8));
+    let normalized = normalize::normalize(&map, &picture, &settings.normalize).expect("masks");
+    let registered = register::register(&map, &normalized, &settings.register).expect("a pose");
+    hold(
+        "mask.png",
+        &registered.canvases[2]
+            .depth
+            .map(|set| if *set { 255 } else { 0 }),
+    );
+}
