@@ -41,11 +41,39 @@ fn rust_files(dir: &Path, into: &mut Vec<PathBuf>) {
     }
 }
 
-/// Every source file of a room, with the room's name. `main.rs` and `lib.rs` are no rooms.
+/// Names of test modules that have files of their own: `#[cfg(test)] mod NAME;`.
+fn test_modules(files: &[PathBuf]) -> BTreeSet<String> {
+    let declared = |path: &PathBuf| {
+        let text = std::fs::read_to_string(path).expect("readable source");
+        let mut names = Vec::new();
+        for after in text.split("#[cfg(test)]\n").skip(1) {
+            let line = after.lines().next().unwrap_or_default();
+            let name = line
+                .rsplit(' ')
+                .next()
+                .and_then(|name| name.strip_suffix(';'));
+            names.extend(name.map(str::to_owned));
+        }
+        names
+    };
+    files.iter().flat_map(declared).collect()
+}
+
+/// Every source file of a room that ships, with the room's name. `main.rs` and `lib.rs` are no rooms.
 fn sources() -> Vec<(String, PathBuf, String)> {
     let mut files = Vec::new();
     rust_files(&src(), &mut files);
     files.sort();
+    let tests = test_modules(&files);
+    files.retain(|path| {
+        let inside = path
+            .strip_prefix(src())
+            .expect("below src")
+            .with_extension("");
+        !inside
+            .iter()
+            .any(|part| tests.contains(&*part.to_string_lossy()))
+    });
     files
         .into_iter()
         .filter_map(|path| {
@@ -59,9 +87,15 @@ fn sources() -> Vec<(String, PathBuf, String)> {
         .collect()
 }
 
-/// The code of a file: no comments, no unit tests.
+/// The code of a file: no comments, no unit tests. A test module in a file of its own is but a line here, and what
+/// follows it still counts.
 fn code(text: &str) -> String {
-    let shipped = text.split("#[cfg(test)]\nmod ").next().unwrap_or(text);
+    let inline = text.match_indices("#[cfg(test)]\n").find(|(at, mark)| {
+        let rest = &text[at + mark.len()..];
+        let line = rest.lines().next().unwrap_or_default();
+        line.contains("mod ") && line.ends_with('{')
+    });
+    let shipped = inline.map_or(text, |(at, _)| &text[..at]);
     shipped
         .lines()
         .filter(|line| !line.trim_start().starts_with("//"))
