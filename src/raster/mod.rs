@@ -7,6 +7,7 @@ mod grid;
 mod limits;
 mod mask;
 mod picture;
+mod resample;
 mod warp;
 
 pub use decode::{DecodeError, decode};
@@ -19,4 +20,5 @@ pub use grid::Grid;
 pub use limits::Limits;
 pub use mask::{Mask, PixelBox};
 pub use picture::Picture;
+pub use resample::resample;
 pub use warp::{warp_depth, warp_mask, warp_values};

@@ -1,8 +1,8 @@
 //! The print's ink: where there is paper at all, which side of the grey threshold is ink, how much ink each pixel has.
 
-use super::blur::blur;
 use super::components::{Components, without_specks};
 use super::otsu;
+use super::paper;
 use super::pose::Soft;
 use crate::raster::{Grid, Mask, Picture};
 
@@ -14,8 +14,8 @@ const PAPER_TELLABLE: f64 = 0.945;
 const LEAST_PAPER: f64 = 0.2;
 /// White must cover at least this share of the image to count as "beyond the cut".
 const LEAST_WHITE: f64 = 0.004;
-/// Paper brightness is levelled with a gaussian of this share of the longest side.
-const LEVELLING: f64 = 0.16;
+/// Beyond this the picture as it is says clearly which class is paper.
+const CLEAR: f64 = 0.45;
 /// Least difference between ink and paper, as a share of the lighter of the two: scanners that fill but a part of
 /// their 16 bits leave dark pictures.
 const LEAST_CONTRAST: f64 = 0.08;
@@ -120,16 +120,10 @@ pub(super) fn levelled(picture: &Picture, speck_share: f64) -> Result<Ink, Error
         });
     }
     let dark = grey.map(|g| f64::from(*g) < split.threshold);
-    let light_on_dark = is_light_on_dark(&dark, &known);
+    let light_on_dark = is_light_on_dark(grey, &dark, &known);
     let darkness = |g: f32| if light_on_dark { 1.0 - g } else { g };
     let turned = grey.map(|g| darkness(*g));
-    let paper = Mask::from_fn(grey.width(), grey.height(), |x, y| {
-        known.at(x, y) && dark.at(x, y) == light_on_dark
-    });
-    let level = level(&turned, &paper);
-    let even = Grid::from_fn(grey.width(), grey.height(), |x, y| {
-        (turned.at(x, y) / level.at(x, y).max(0.01)).min(1.5)
-    });
+    let even = evened(&turned, &known);
     let split = otsu::split(&mut held(&even, &known)).ok_or(Error::NoContrast { contrast: 0.0 })?;
     let raw = Mask::from_fn(grey.width(), grey.height(), |x, y| {
         known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
@@ -198,13 +192,37 @@ fn grown(mask: &Mask) -> Mask {
     })
 }
 
-/// Ink is the smaller class, and paper reaches the rim. Heavy ink bends the first rule and border lines the second,
-/// so both have a say, the first a double one.
-fn is_light_on_dark(dark: &Mask, known: &Mask) -> bool {
+/// Grey over the paper's around it.
+fn evened(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
+    let level = paper::level(grey, known);
+    Grid::from_fn(grey.width(), grey.height(), |x, y| {
+        (grey.at(x, y) / level.at(x, y).max(0.01)).min(1.5)
+    })
+}
+
+/// Whether ink is lighter than paper. Where the picture as it is does not say clearly, a stain may mislead: then what
+/// is dark beside its surroundings decides.
+fn is_light_on_dark(grey: &Grid<f32>, dark: &Mask, known: &Mask) -> bool {
+    let plain = paper_darkness(dark, known);
+    let even = evened(grey, known);
+    let levelled = otsu::split(&mut held(&even, known)).map_or(plain, |split| {
+        paper_darkness(&even.map(|g| f64::from(*g) < split.threshold), known)
+    });
+    if plain.abs() > CLEAR {
+        plain > 0.0
+    } else {
+        levelled > 0.0
+    }
+}
+
+/// How much speaks for the dark class being the paper; below zero it is ink. Ink is the smaller class, and paper
+/// reaches the rim. Heavy ink bends the first rule and border lines the second, so both have a say, the first a
+/// double one.
+fn paper_darkness(dark: &Mask, known: &Mask) -> f64 {
     let of_known = known.count().max(1) as f64;
     let pairs = dark.data().iter().zip(known.data());
     let share = pairs.filter(|(d, k)| **d && **k).count() as f64 / of_known;
-    2.0 * (share - 0.5) + (rim_share(dark, known) - 0.5) > 0.0
+    2.0 * (share - 0.5) + (rim_share(dark, known) - 0.5)
 }
 
 /// Share of dark pixels in the rim of what is known.
@@ -230,22 +248,6 @@ fn rim_share(dark: &Mask, known: &Mask) -> f64 {
     } else {
         of_it as f64 / rim as f64
     }
-}
-
-/// Brightness of the paper around each pixel, 0..=1.
-fn level(grey: &Grid<f32>, paper: &Mask) -> Grid<f32> {
-    let sigma = LEVELLING * grey.width().max(grey.height()) as f64;
-    let weight = paper.map(|p| if *p { 1.0 } else { 0.0 });
-    let bright = Grid::from_fn(grey.width(), grey.height(), |x, y| {
-        grey.at(x, y) * weight.at(x, y)
-    });
-    let (sum, near) = (blur(&bright, sigma), blur(&weight, sigma));
-    let count = paper.count().max(1) as f32;
-    let mean = bright.data().iter().sum::<f32>() / count;
-    // Far from any paper the mean stands in.
-    Grid::from_fn(grey.width(), grey.height(), |x, y| {
-        (sum.at(x, y) + 0.02 * mean) / (near.at(x, y) + 0.02)
-    })
 }
 
 /// 0 at paper, 1 at ink, by the classes' medians; nothing but where the cleaned mask, or its rim, has ink.

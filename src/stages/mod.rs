@@ -12,6 +12,7 @@ mod golden;
 mod ink;
 pub mod normalize;
 mod otsu;
+mod paper;
 mod pose;
 pub mod register;
 pub mod score;

@@ -9,7 +9,7 @@ use crate::domain::{Bow, Rigid3, SideEvidence};
 use crate::mesh::Mesh;
 use crate::raster::Picture;
 use crate::stages::ink;
-use crate::stages::pose::{Layer, Limits, SEARCH_PX, Soft, refine, search};
+use crate::stages::pose::{Base, Limits, Pass, Soft, find};
 
 /// A side with less than this share of the other's relief is the back of the block.
 const BACK: f64 = 0.35;
@@ -19,13 +19,20 @@ const WINDING: f64 = 2.0;
 const SHARPNESS: f64 = 0.7;
 const AGREEMENT: f64 = 6.0;
 const MANIFEST: f64 = 0.4;
-/// The search against the print: band of scales, shift, poses, working size, as in normalisation but coarser.
+/// The search against the print: as in normalisation, but not as close.
 const LIMITS: Limits = Limits {
     scale: 1.6,
     shift: 0.35,
-    keep: 3,
+    keep: 24,
 };
-const CLOSER_PX: usize = 64;
+const PASSES: [Pass; 1] = [Pass {
+    px: 40,
+    sigma: 0.8,
+    steps: 8,
+    keep: 4,
+}];
+/// Working size of the print and the tops.
+const BASE_PX: usize = 80;
 /// Groups of ink below this share of the print are specks.
 const SPECK_SHARE: f64 = 1.0 / 1200.0;
 
@@ -108,24 +115,21 @@ fn agreement(first: &Face, second: &Face, print: &Picture) -> f64 {
     let Ok(ink) = ink::levelled(print, SPECK_SHARE) else {
         return 0.0;
     };
-    let score = |face: &Face| best_score(&ink.soft, &face.tops).max(0.02);
+    let Some(ink) = Base::new(&ink.soft, BASE_PX) else {
+        return 0.0;
+    };
+    let score = |face: &Face| best_score(&ink, &face.tops).max(0.02);
     (score(first) / score(second)).ln()
 }
 
 /// Best correlation of a face, read in the mirror, with the ink.
-fn best_score(ink: &Soft, tops: &Soft) -> f64 {
-    let layers = |size, sigma| Layer::new(ink, size, sigma).zip(Layer::new(tops, size, sigma));
-    let Some((print, wood)) = layers(SEARCH_PX, 0.8) else {
+fn best_score(ink: &Base, tops: &Soft) -> f64 {
+    let Some(wood) = Base::new(tops, BASE_PX) else {
         return 0.0;
     };
-    let found = search(&print, &wood, LIMITS);
-    let Some((print, wood)) = layers(CLOSER_PX, 1.2) else {
-        return 0.0;
-    };
+    let found = find(ink, &wood, LIMITS, &PASSES);
     let mirrored = found.iter().filter(|pose| pose.mirrored);
-    mirrored
-        .map(|pose| refine(&print, &wood, pose).score)
-        .fold(0.0, f64::max)
+    mirrored.map(|pose| pose.score).fold(0.0, f64::max)
 }
 
 /// How widely the heights spread at their extreme layer: half the heights of the upper part of the relief lie within

@@ -1,20 +1,42 @@
 //! Our method: the pose first, from soft relief and soft ink; thresholds afterwards, in the aligned frame.
 
+use super::relief::soft_stroke;
 use super::threshold::{self, Canvas};
 use super::{Error, Params, Relief, Search};
 use crate::domain::{Affine2, Pose, ThresholdChoice};
 use crate::raster::DepthMap;
 use crate::stages::ink::Ink;
-use crate::stages::pose::{Found, Layer, Limits, SEARCH_PX, Soft, refine, search};
+use crate::stages::pose::{Base, Found, Limits, Pass, Soft, find};
 
-/// Working size and smoothing, in pixels, of the passes that follow the search, and how many poses go on.
-const PASSES: [(usize, f64, usize); 2] = [(64, 1.2, 3), (112, 1.2, 3)];
+/// The passes that follow the search.
+const PASSES: [Pass; 3] = [
+    Pass {
+        px: 40,
+        sigma: 0.8,
+        steps: 8,
+        keep: 8,
+    },
+    Pass {
+        px: 64,
+        sigma: 1.0,
+        steps: 8,
+        keep: 3,
+    },
+    Pass {
+        px: 112,
+        sigma: 1.2,
+        steps: 10,
+        keep: 3,
+    },
+];
+/// Working size of print and relief.
+const BASE_PX: usize = 128;
 /// The search looks at relief that fades out from the tops to half-way down: it need not know the right cut, nor
 /// that the plane is quite right.
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Poses that the search hands on.
-const KEEP: usize = 10;
+const KEEP: usize = 14;
 /// Largest shift between the middles of print and depth map, as a share of the size.
 const SHIFT: f64 = 0.35;
 /// A relief that correlates less than this matches nothing.
@@ -55,24 +77,19 @@ fn find_poses(
     relief: &Relief,
     params: &Params,
 ) -> Result<Search, Error> {
-    let tops = relief.soft_strokes(depth, SEARCH_CUT, SEARCH_SOFTNESS);
-    let layers = |size: usize, sigma: f64| {
-        Layer::new(&print.soft, size, sigma).zip(Layer::new(&tops, size, sigma))
-    };
-    let (ink, wood) = layers(SEARCH_PX, 0.8).ok_or(Error::NoStrokes)?;
+    let depths = relief.depths(depth);
+    let (ink, wood) = Base::new(&print.soft, BASE_PX)
+        .zip(Base::new(&depths, BASE_PX))
+        .ok_or(Error::NoStrokes)?;
+    let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
     let limits = Limits {
         scale: params.scale_band,
         shift: SHIFT,
         keep: KEEP,
     };
-    let mut found = search(&ink, &wood, limits);
-    for (size, sigma, keep) in PASSES {
-        let (ink, wood) = layers(size, sigma).ok_or(Error::NoStrokes)?;
-        found = found.iter().map(|pose| refine(&ink, &wood, pose)).collect();
-        found = best_of_each(found, keep);
-    }
+    let found = find(&ink, &wood, limits, &PASSES);
     let ratio = |pose: &Found| {
-        let (ink, wood) = (longest(&print.soft), longest(&tops));
+        let (ink, wood) = (longest(&print.soft), longest(&depths));
         pose.fixed_from_moving.scale() * wood / ink
     };
     judge(&found, |pose| {
@@ -85,27 +102,6 @@ fn find_poses(
 fn longest(soft: &Soft) -> f64 {
     soft.bounds()
         .map_or(1.0, |b| b.width().max(b.height()) as f64)
-}
-
-/// The best few as read and the best few mirrored, best first.
-fn best_of_each(mut found: Vec<Found>, keep: usize) -> Vec<Found> {
-    found.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let (mut upright, mut mirrored) = (0, 0);
-    found.retain(|pose| {
-        let count = if pose.mirrored {
-            &mut mirrored
-        } else {
-            &mut upright
-        };
-        *count += 1;
-        *count
-            <= if pose.mirrored {
-                keep.div_ceil(2)
-            } else {
-                keep
-            }
-    });
-    found
 }
 
 /// Refuses mirror writing and relief that matches nothing.

@@ -12,6 +12,7 @@ mod wrap;
 use serde::{Deserialize, Serialize};
 
 pub use relief::Relief;
+pub(in crate::stages) use relief::soft_stroke;
 use wrap::box_wrap;
 
 use super::ink;

@@ -45,25 +45,22 @@ impl Relief {
         (1.0 + steps.round()).clamp(1.0, 65_535.0) as u16
     }
 
-    /// Soft strokes cut at a depth under the tops: 1 well above the cut, 0 well below, in between over
-    /// `softness`; both are shares of the relief.
-    pub(in crate::stages) fn soft_strokes(
-        &self,
-        depth: &DepthMap,
-        cut: f64,
-        softness: f64,
-    ) -> Soft {
-        let middle = self.top - cut * self.depth();
-        let span = softness * self.depth();
+    /// Depth of every pixel under the tops, a share of the relief between -1 and 2.
+    pub(in crate::stages) fn depths(&self, depth: &DepthMap) -> Soft {
+        let scale = &depth.scale;
+        let per_level = scale.height_per_level / self.depth();
+        let first = (self.top - scale.height(1)) / self.depth();
         Soft {
             amount: depth.levels.map(|level| {
-                if *level == 0 {
-                    return 0.0;
-                }
-                let over = depth.scale.height(*level) - middle;
-                (0.5 + over / span).clamp(0.0, 1.0) as f32
+                (first - per_level * (f64::from(*level) - 1.0)).clamp(-1.0, 2.0) as f32
             }),
             known: depth.levels.map(|level| *level != 0),
         }
     }
+}
+
+/// Soft stroke of a depth under the tops: 1 well above the cut, 0 well below, in between over `softness`; all are
+/// shares of the relief.
+pub(in crate::stages) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
+    (0.5 + (cut as f32 - depth) / softness as f32).clamp(0.0, 1.0)
 }

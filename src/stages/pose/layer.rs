@@ -1,7 +1,7 @@
 //! A picture brought to working size, its slow variation taken out.
 
 use crate::domain::Affine2;
-use crate::raster::{Grid, Mask, PixelBox, warp_values};
+use crate::raster::{Grid, Mask, PixelBox, resample};
 use crate::stages::blur::blur;
 
 /// How much of something each pixel holds, 0..=1, and where that is known.
@@ -13,10 +13,24 @@ pub(in crate::stages) struct Soft {
     pub(in crate::stages) known: Mask,
 }
 
+/// A soft picture at the largest working size, from which its layers are made.
+#[derive(Debug, Clone)]
+pub(in crate::stages) struct Base {
+    /// Amount where it is known, zero elsewhere.
+    present: Grid<f32>,
+    known: Grid<f32>,
+    from_image: Affine2,
+    /// Longest side of what is known, pixels.
+    size: f64,
+}
+
 /// A soft picture at working size: mean near zero everywhere, zero where nothing is known.
 #[derive(Debug, Clone)]
 pub(in crate::stages) struct Layer {
     pub(super) value: Grid<f32>,
+    /// What `value` was made from: 0..=1, zero where nothing is known.
+    pub(super) amount: Grid<f32>,
+    /// 1 where the picture is known, 0 elsewhere.
     pub(super) weight: Grid<f32>,
     pub(super) work_from_image: Affine2,
 }
@@ -33,39 +47,64 @@ impl Soft {
     }
 }
 
-impl Layer {
-    /// Brings a picture to `size` pixels along the longest side of what it knows, smoothed by `sigma` pixels.
-    ///
-    /// `None` when nothing is known.
-    pub(in crate::stages) fn new(soft: &Soft, size: usize, sigma: f64) -> Option<Self> {
+impl Base {
+    /// Brings a picture to `size` pixels along the longest side of what it knows; `None` when it knows nothing.
+    pub(in crate::stages) fn new(soft: &Soft, size: usize) -> Option<Self> {
         let bounds = soft.bounds()?;
         let longest = bounds.width().max(bounds.height()) as f64;
         let scale = size as f64 / longest;
-        let centre = [
+        let middle = [
             (bounds.x0 + bounds.x1) as f64 / 2.0,
             (bounds.y0 + bounds.y1) as f64 / 2.0,
         ];
-        let half = [
-            (bounds.width() as f64 * scale / 2.0).ceil() + 1.0,
-            (bounds.height() as f64 * scale / 2.0).ceil() + 1.0,
-        ];
-        let work_from_image = Affine2::scale_shift(
-            scale,
-            [half[0] - scale * centre[0], half[1] - scale * centre[1]],
-        );
-        let (width, height) = (2 * half[0] as usize + 1, 2 * half[1] as usize + 1);
+        let (sides, shift) = framed([bounds.width(), bounds.height()], middle, scale);
         let known = soft.known.map(|k| f32::from(u8::from(*k)));
-        let present = Grid::from_fn(known.width(), known.height(), |x, y| {
-            soft.amount.at(x, y) * known.at(x, y)
-        });
-        let amount = blur(
-            &warp_values(&present, &work_from_image, width, height),
-            sigma,
-        );
-        let weight = blur(&warp_values(&known, &work_from_image, width, height), sigma);
-        Some(Self::without_slow(&amount, &weight, size, work_from_image))
+        let pairs = soft.amount.data().iter().zip(known.data());
+        let present = pairs.map(|(amount, known)| amount * known).collect();
+        let present = Grid::from_vec(known.width(), known.height(), present)?;
+        Some(Self {
+            present: resample(&present, scale, shift, sides),
+            known: resample(&known, scale, shift, sides),
+            from_image: Affine2::scale_shift(scale, shift),
+            size: size as f64,
+        })
     }
 
+    /// The same with each known pixel's amount replaced.
+    pub(in crate::stages) fn map(&self, amount: impl Fn(f32) -> f32) -> Self {
+        let pairs = self.present.data().iter().zip(self.known.data());
+        let replaced = pairs.map(|(p, k)| if *k > 0.0 { k * amount(p / k) } else { 0.0 });
+        let mut out = self.clone();
+        let values: Vec<f32> = replaced.collect();
+        out.present.data_mut().copy_from_slice(&values);
+        out
+    }
+
+    /// The layer of `size` pixels along the longest side of what is known, smoothed by `sigma` pixels.
+    pub(in crate::stages) fn layer(&self, size: usize, sigma: f64) -> Layer {
+        let scale = size as f64 / self.size;
+        let (width, height) = (self.known.width(), self.known.height());
+        let middle = [(width - 1) as f64 / 2.0, (height - 1) as f64 / 2.0];
+        let (sides, shift) = framed([width, height], middle, scale);
+        let brought = |values| blur(&resample(values, scale, shift, sides), sigma);
+        let work_from_image = Affine2::scale_shift(scale, shift).after(&self.from_image);
+        Layer::without_slow(
+            &brought(&self.present),
+            &brought(&self.known),
+            size,
+            work_from_image,
+        )
+    }
+}
+
+/// Size of the grid that holds a box of these sides, scaled, and the shift that puts the box's middle in its middle.
+fn framed(sides: [usize; 2], middle: [f64; 2], scale: f64) -> ([usize; 2], [f64; 2]) {
+    let half = sides.map(|side| (side as f64 * scale / 2.0).ceil() + 1.0);
+    let shift = [0, 1].map(|k| half[k] - scale * middle[k]);
+    (half.map(|half| 2 * half as usize + 1), shift)
+}
+
+impl Layer {
     fn without_slow(
         amount: &Grid<f32>,
         weight: &Grid<f32>,
@@ -75,12 +114,17 @@ impl Layer {
         let slow_sigma = SLOW * size as f64;
         let (slow, slow_weight) = (blur(amount, slow_sigma), blur(weight, slow_sigma));
         let held = weight.map(|w| if *w >= LEAST_KNOWN { 1.0 } else { 0.0 });
-        let value = Grid::from_fn(amount.width(), amount.height(), |x, y| {
+        let (width, height) = (amount.width(), amount.height());
+        let amount = Grid::from_fn(width, height, |x, y| {
+            held.at(x, y) * amount.at(x, y) / weight.at(x, y).max(1e-6)
+        });
+        let value = Grid::from_fn(width, height, |x, y| {
             let mean = slow.at(x, y) / slow_weight.at(x, y).max(1e-6);
-            held.at(x, y) * (amount.at(x, y) / weight.at(x, y).max(1e-6) - mean)
+            amount.at(x, y) - held.at(x, y) * mean
         });
         Self {
             value,
+            amount,
             weight: held,
             work_from_image,
         }
@@ -96,30 +140,24 @@ impl Layer {
 
     /// Sum of squares of the values.
     pub(super) fn energy(&self) -> f64 {
-        self.value
-            .data()
-            .iter()
-            .map(|v| f64::from(*v).powi(2))
-            .sum()
+        let squares = self.value.data().iter().map(|v| f64::from(*v).powi(2));
+        squares.sum()
     }
 }
 
 /// Bilinear value; zero outside.
 #[inline]
-pub(super) fn sample(values: &Grid<f32>, [x, y]: [f64; 2]) -> f64 {
+pub(super) fn sample(values: &Grid<f32>, [x, y]: [f64; 2]) -> f32 {
     let (x0, y0) = (x.floor(), y.floor());
     let (column, row) = (x0 as i64, y0 as i64);
-    if column < 0
-        || row < 0
-        || column + 1 >= values.width() as i64
-        || row + 1 >= values.height() as i64
-    {
+    let (width, height) = (values.width(), values.height());
+    if column < 0 || row < 0 || column + 1 >= width as i64 || row + 1 >= height as i64 {
         return 0.0;
     }
     let (fx, fy) = ((x - x0) as f32, (y - y0) as f32);
-    let (column, row) = (column as usize, row as usize);
-    let (top, bottom) = (values.row(row), values.row(row + 1));
-    let a = top[column] * (1.0 - fx) + top[column + 1] * fx;
-    let b = bottom[column] * (1.0 - fx) + bottom[column + 1] * fx;
-    f64::from(a * (1.0 - fy) + b * fy)
+    let from = row as usize * width + column as usize;
+    let near = &values.data()[from..from + width + 2];
+    let a = near[0] + (near[1] - near[0]) * fx;
+    let b = near[width] + (near[width + 1] - near[width]) * fx;
+    a + (b - a) * fy
 }

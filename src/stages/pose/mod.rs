@@ -3,10 +3,14 @@
 //! Neither boxes nor centroids are trusted: neighbours, specks and broken ends decide those. What is compared is
 //! soft relief with soft ink, each with its slow variation taken out, and only where it is known.
 
+mod find;
 mod layer;
+mod overlap;
 mod refine;
 mod search;
 
-pub(super) use layer::{Layer, Soft};
-pub(super) use refine::refine;
-pub(super) use search::{Found, Limits, SEARCH_PX, search};
+pub(super) use find::{Pass, find};
+pub(super) use layer::{Base, Layer, Soft};
+pub(super) use overlap::Overlap;
+pub(super) use refine::{Loss, Refiner};
+pub(super) use search::{Found, Limits};

@@ -2,293 +2,374 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use super::Layer;
-use super::layer::sample;
 use super::search::Found;
+use super::{Layer, Overlap};
 use crate::domain::Affine2;
-use crate::raster::Grid;
 
 /// Most steps; a pose that has not settled by then is judged where it is.
 const MOST_STEPS: usize = 15;
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
-const SETTLED_PX: f64 = 0.02;
+const SETTLED_PX: f64 = 0.01;
 /// Residuals beyond this many of their median count less: what stands on one side only must not decide.
-const ROBUST: f64 = 2.5;
+const ROBUST: f32 = 2.5;
+/// Residuals beyond this share of full ink belong to what is lost or was added: they do not count at all.
+const FAR: f32 = 0.5;
+/// Pixels whose sums are kept apart, so that they are added side by side.
+const LANES: usize = 8;
+/// Products of a row of the normal equations with itself, lower triangle, then with the residual.
+const SUMS: usize = 21 + 6;
 
-/// Refines a pose so that the moving layer explains the fixed one, and scores it.
-///
-/// The moving values may be scaled and offset freely; residuals are weighed down where only one side has something.
-/// The score is the correlation over what both know, over what each holds.
-pub(in crate::stages) fn refine(fixed: &Layer, moving: &Layer, start: &Found) -> Found {
-    let Some(mut from_fixed) = moving_from_fixed(fixed, moving, &start.fixed_from_moving) else {
-        return *start;
-    };
-    let at_start = from_fixed;
-    let slopes = Slopes::of(&moving.value);
-    let centre = fixed.centre();
-    let rim = centre[0].max(centre[1]).max(1.0);
-    let mut damping = 1e-3;
-    let mut cost = f64::INFINITY;
-    let mut last = from_fixed;
-    for _ in 0..MOST_STEPS {
-        let step = Step::at(fixed, moving, &slopes, &from_fixed, centre, start.mirrored);
-        if step.cost > cost {
-            from_fixed = last;
-            damping *= 8.0;
-            if damping > 1e3 {
+/// What a residual costs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::stages) enum Loss {
+    /// Large residuals count less: from afar.
+    Huber,
+    /// Large residuals do not count: once the pose is nearly right.
+    Tukey,
+}
+
+/// Two layers ready to be laid on each other many times.
+pub(in crate::stages) struct Refiner<'a> {
+    fixed: &'a Layer,
+    moving: &'a Layer,
+    /// Known pixels of the fixed layer: place relative to its middle, and value.
+    places: Vec<[f32; 2]>,
+    values: Vec<f32>,
+    /// The moving layer's value, slope in x and y, and weight, pixel by pixel.
+    cells: Vec<[f32; 4]>,
+    size: [usize; 2],
+    centre: [f64; 2],
+    rim: f64,
+    energies: [f64; 2],
+}
+
+impl<'a> Refiner<'a> {
+    /// Prepares the two layers.
+    pub(in crate::stages) fn new(fixed: &'a Layer, moving: &'a Layer) -> Self {
+        let centre = fixed.centre();
+        let (mut places, mut values) = (Vec::new(), Vec::new());
+        for y in 0..fixed.value.height() {
+            for x in 0..fixed.value.width() {
+                if fixed.weight.at(x, y) > 0.0 {
+                    places.push([x as f32 - centre[0] as f32, y as f32 - centre[1] as f32]);
+                    values.push(fixed.value.at(x, y));
+                }
+            }
+        }
+        Self {
+            places,
+            values,
+            cells: cells(moving),
+            size: [moving.value.width(), moving.value.height()],
+            centre,
+            rim: centre[0].max(centre[1]).max(1.0),
+            energies: [fixed.energy(), moving.energy()],
+            fixed,
+            moving,
+        }
+    }
+
+    /// Refines a pose so that the moving layer explains the fixed one, and scores it.
+    ///
+    /// The moving values may be scaled and offset freely; residuals are weighed down where only one side has
+    /// something. The score is the correlation over what both know, over what each holds.
+    pub(in crate::stages) fn refine(&self, start: &Found, most_steps: usize, loss: Loss) -> Found {
+        let Some(mut from_fixed) = self.moving_from_fixed(&start.fixed_from_moving) else {
+            return *start;
+        };
+        let mut room = Room::default();
+        let mut damping = 1e-3;
+        let mut best: Option<(Step, Affine2)> = None;
+        for _ in 0..most_steps.min(MOST_STEPS) {
+            let step = self.step(&from_fixed, start.mirrored, loss, &mut room);
+            let better = best.as_ref().is_none_or(|(kept, _)| step.cost < kept.cost);
+            if better {
+                best = Some((step, from_fixed));
+                damping = (damping * 0.3_f64).max(1e-6);
+            } else {
+                damping = (damping * 8.0).max(1e-2);
+            }
+            let Some((kept, at)) = &best else { break };
+            let Some(change) = kept.solve(damping) else {
+                break;
+            };
+            let reach = change[0].hypot(change[1]) * self.rim + change[2].hypot(change[3]);
+            from_fixed = moved(at, &change, start.mirrored);
+            if reach < SETTLED_PX || damping > 1e3 {
                 break;
             }
-            cost = f64::INFINITY;
-            continue;
         }
-        cost = step.cost;
-        last = from_fixed;
-        let Some(change) = step.solve(damping) else {
-            break;
-        };
-        damping = (damping * 0.5).max(1e-6);
-        from_fixed = moved(&from_fixed, &change, centre, start.mirrored);
-        let reach = change[0].hypot(change[1]) * rim + change[2].hypot(change[3]);
-        if reach < SETTLED_PX {
-            break;
+        let Some((_, at)) = best else { return *start };
+        let score = self.score(&at);
+        match self.to_images(&at) {
+            Some(fixed_from_moving) => Found {
+                fixed_from_moving,
+                score,
+                mirrored: start.mirrored,
+            },
+            None => *start,
         }
     }
-    // The last step was never judged; it must not leave the pose worse than it came.
-    let (before, after) = (
-        score(fixed, moving, &at_start),
-        score(fixed, moving, &from_fixed),
-    );
-    match to_images(fixed, moving, &from_fixed) {
-        Some(fixed_from_moving) if after >= before => Found {
-            fixed_from_moving,
-            score: after,
-            mirrored: start.mirrored,
-        },
-        _ => Found {
-            score: before,
-            ..*start
-        },
+
+    /// The score of a pose as it is.
+    pub(in crate::stages) fn judged(&self, pose: &Found) -> Found {
+        let score = self
+            .moving_from_fixed(&pose.fixed_from_moving)
+            .map_or(0.0, |at| self.score(&at));
+        Found { score, ..*pose }
     }
-}
 
-/// The pose between layers, looking from the fixed one into the moving one.
-fn moving_from_fixed(
-    fixed: &Layer,
-    moving: &Layer,
-    fixed_from_moving: &Affine2,
-) -> Option<Affine2> {
-    let image = fixed_from_moving.inverse()?;
-    let from_work = fixed.work_from_image.inverse()?;
-    Some(moving.work_from_image.after(&image).after(&from_work))
-}
-
-/// Back from layers to images.
-fn to_images(fixed: &Layer, moving: &Layer, from_fixed: &Affine2) -> Option<Affine2> {
-    let to_image = moving.work_from_image.inverse()?;
-    to_image
-        .after(from_fixed)
-        .after(&fixed.work_from_image)
-        .inverse()
-}
-
-/// Changes the map by a small similarity: `[a, b]` of the linear part about `centre`, and the shift.
-fn moved(map: &Affine2, change: &[f64; 6], centre: [f64; 2], mirrored: bool) -> Affine2 {
-    let [a, b, tx, ty, _, _] = *change;
-    let s = if mirrored { -1.0 } else { 1.0 };
-    let linear = [[a, -b * s], [b, a * s]];
-    let mut out = map.0;
-    for (row, add) in out.iter_mut().zip(linear) {
-        row[2] -= add[0] * centre[0] + add[1] * centre[1];
-        row[0] += add[0];
-        row[1] += add[1];
+    /// How much of each layer the other explains at a pose.
+    pub(in crate::stages) fn overlap(&self, pose: &Found) -> Overlap {
+        let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
+        self.moving_from_fixed(&pose.fixed_from_moving)
+            .map(|into| Overlap::of(self.fixed, self.moving, &into.after(&to_middle)))
+            .unwrap_or_default()
     }
-    out[0][2] += tx;
-    out[1][2] += ty;
-    Affine2(out)
-}
 
-/// Normal equations at one pose: four of the pose, gain and offset of the values.
-struct Step {
-    normal: Matrix6<f64>,
-    right: Vector6<f64>,
-    cost: f64,
-}
+    /// The pose between layers, from the fixed one's pixels relative to its middle into the moving one.
+    fn moving_from_fixed(&self, fixed_from_moving: &Affine2) -> Option<Affine2> {
+        let image = fixed_from_moving.inverse()?;
+        let from_work = self.fixed.work_from_image.inverse()?;
+        let from_middle = Affine2::scale_shift(1.0, self.centre);
+        let into = self.moving.work_from_image.after(&image).after(&from_work);
+        Some(into.after(&from_middle))
+    }
 
-/// One pixel's part: fixed value, moving value, slopes of the moving value, place relative to the middle.
-struct Look {
-    fixed: f64,
-    moving: f64,
-    slope: [f64; 2],
-    place: [f64; 2],
-}
+    /// Back from layers to images.
+    fn to_images(&self, from_fixed: &Affine2) -> Option<Affine2> {
+        let to_image = self.moving.work_from_image.inverse()?;
+        let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
+        to_image
+            .after(from_fixed)
+            .after(&to_middle)
+            .after(&self.fixed.work_from_image)
+            .inverse()
+    }
 
-impl Step {
-    fn at(
-        fixed: &Layer,
-        moving: &Layer,
-        slopes: &Slopes,
-        from_fixed: &Affine2,
-        centre: [f64; 2],
-        mirrored: bool,
-    ) -> Self {
-        let looks = looks(fixed, moving, slopes, from_fixed, centre);
-        let (gain, offset) = gain_and_offset(&looks);
-        let mut sizes: Vec<f64> = looks
-            .iter()
-            .map(|l| (l.fixed - gain * l.moving - offset).abs())
-            .collect();
-        let limit = ROBUST * median(&mut sizes).max(1e-4);
-        let s = if mirrored { -1.0 } else { 1.0 };
-        let mut step = Self {
-            normal: Matrix6::zeros(),
-            right: Vector6::zeros(),
-            cost: 0.0,
-        };
-        let mut total = 0.0;
-        for l in &looks {
-            let residual = l.fixed - gain * l.moving - offset;
-            let weight = if residual.abs() > limit {
-                limit / residual.abs()
-            } else {
-                1.0
+    /// What each known pixel of the fixed layer meets in the moving one.
+    fn look(&self, from_fixed: &Affine2, room: &mut Room) {
+        room.clear();
+        let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
+        for (place, value) in self.places.iter().zip(&self.values) {
+            let [x, y] = *place;
+            let u = a[0] * x + a[1] * y + a[2];
+            let v = b[0] * x + b[1] * y + b[2];
+            let Some([m, gx, gy, w]) = self.cell(u, v) else {
+                continue;
             };
-            let [gx, gy] = l.slope;
-            let [x, y] = l.place;
+            if w < 0.5 {
+                continue;
+            }
+            room.looks.push([*value, m, gx, gy, x, y]);
+        }
+    }
+
+    /// Bilinear look into the moving layer; `None` outside.
+    #[inline]
+    fn cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
+        let [width, height] = self.size;
+        if !(u >= 0.0 && v >= 0.0 && u < (width - 1) as f32 && v < (height - 1) as f32) {
+            return None;
+        }
+        let (column, row) = (u as usize, v as usize);
+        let (fx, fy) = (u - column as f32, v - row as f32);
+        let from = row * width + column;
+        let near = &self.cells[from..from + width + 2];
+        let (p, q, r, s) = (near[0], near[1], near[width], near[width + 1]);
+        Some(std::array::from_fn(|k| {
+            let top = p[k] + (q[k] - p[k]) * fx;
+            let bottom = r[k] + (s[k] - r[k]) * fx;
+            top + (bottom - top) * fy
+        }))
+    }
+
+    fn step(&self, from_fixed: &Affine2, mirrored: bool, loss: Loss, room: &mut Room) -> Step {
+        self.look(from_fixed, room);
+        let (gain, offset) = gain_and_offset(&room.looks);
+        room.sizes.clear();
+        room.sizes.extend(
+            room.looks
+                .iter()
+                .map(|l| (l[0] - gain * l[1] - offset).abs()),
+        );
+        let limit = match loss {
+            Loss::Huber => ROBUST * median(&mut room.sizes).max(1e-4),
+            Loss::Tukey => FAR,
+        };
+        let s = if mirrored { -1.0 } else { 1.0 };
+        let mut sums = [[0.0_f32; LANES]; SUMS];
+        let mut totals = [0.0_f64; SUMS];
+        let mut cost = 0.0;
+        for (k, l) in room.looks.iter().enumerate() {
+            let [f, m, gx, gy, x, y] = *l;
+            let residual = f - gain * m - offset;
+            let size = residual.abs();
+            let (weight, charge) = loss.at(size, limit);
+            cost += charge;
             let row = [
                 gain * (gx * x + gy * y * s),
                 gain * (gy * x - gx * y * s),
                 gain * gx,
                 gain * gy,
-                l.moving,
+                m,
                 1.0,
             ];
-            step.add(&row, residual, weight);
-            // Huber's cost, so that steps are judged by what they minimise.
-            let size = residual.abs();
-            step.cost += if size > limit {
-                limit * (2.0 * size - limit)
+            let lane = k % LANES;
+            let mut at = 0;
+            for i in 0..6 {
+                let weighed = weight * row[i];
+                for other in &row[..=i] {
+                    sums[at][lane] += weighed * other;
+                    at += 1;
+                }
+                sums[21 + i][lane] += weighed * residual;
+            }
+            if k % 1024 == 1023 {
+                drain(&mut sums, &mut totals);
+            }
+        }
+        drain(&mut sums, &mut totals);
+        Step {
+            sums: totals,
+            cost: if room.looks.is_empty() {
+                f64::INFINITY
             } else {
-                size * size
-            };
-            total += 1.0;
-        }
-        step.cost = if total > 0.0 {
-            step.cost / total
-        } else {
-            f64::INFINITY
-        };
-        step
-    }
-
-    fn add(&mut self, row: &[f64; 6], residual: f64, weight: f64) {
-        for i in 0..6 {
-            self.right[i] += weight * row[i] * residual;
-            for j in 0..=i {
-                self.normal[(i, j)] += weight * row[i] * row[j];
-            }
+                f64::from(cost) / room.looks.len() as f64
+            },
         }
     }
 
-    fn solve(&self, damping: f64) -> Option<[f64; 6]> {
-        let mut normal = self.normal;
-        for i in 0..6 {
-            normal[(i, i)] = normal[(i, i)] * (1.0 + damping) + 1e-12;
-            for j in 0..i {
-                normal[(j, i)] = normal[(i, j)];
+    /// Correlation over what both know, over the whole of what each holds.
+    fn score(&self, from_fixed: &Affine2) -> f64 {
+        let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
+        let mut both = 0.0_f64;
+        for (places, values) in self.places.chunks(256).zip(self.values.chunks(256)) {
+            let mut part = 0.0_f32;
+            for ([x, y], value) in places.iter().zip(values) {
+                let u = a[0] * x + a[1] * y + a[2];
+                let v = b[0] * x + b[1] * y + b[2];
+                part += self.cell(u, v).map_or(0.0, |cell| cell[0] * value);
             }
+            both += f64::from(part);
         }
-        Some(normal.cholesky()?.solve(&self.right).into())
+        // A moving pixel covers this many fixed ones.
+        let area = from_fixed.determinant().abs().max(1e-12);
+        both / (self.energies[0] * self.energies[1] / area)
+            .sqrt()
+            .max(1e-12)
     }
 }
 
-/// What each known pixel of the fixed layer meets in the moving one.
-fn looks(
-    fixed: &Layer,
-    moving: &Layer,
-    slopes: &Slopes,
-    from_fixed: &Affine2,
-    centre: [f64; 2],
-) -> Vec<Look> {
-    let mut looks = Vec::new();
-    for y in 0..fixed.value.height() {
-        for x in 0..fixed.value.width() {
-            let p = [x as f64, y as f64];
-            let there = from_fixed.apply(p);
-            if fixed.weight.at(x, y) == 0.0 || !held(&moving.weight, there) {
-                continue;
+fn drain(sums: &mut [[f32; LANES]; SUMS], totals: &mut [f64; SUMS]) {
+    for (lanes, total) in sums.iter_mut().zip(totals) {
+        *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+        *lanes = [0.0; LANES];
+    }
+}
+
+impl Loss {
+    /// Weight of a residual and its cost, so that steps are judged by what they minimise.
+    #[inline]
+    fn at(self, size: f32, limit: f32) -> (f32, f32) {
+        match self {
+            Self::Huber if size > limit => (limit / size, limit * (2.0 * size - limit)),
+            Self::Huber => (1.0, size * size),
+            Self::Tukey => {
+                let near = (1.0 - (size / limit).powi(2)).max(0.0);
+                let cost = limit * limit / 3.0 * (1.0 - near * near * near);
+                (near * near, cost)
             }
-            looks.push(Look {
-                fixed: f64::from(fixed.value.at(x, y)),
-                moving: sample(&moving.value, there),
-                slope: [sample(&slopes.x, there), sample(&slopes.y, there)],
-                place: [p[0] - centre[0], p[1] - centre[1]],
-            });
         }
     }
-    looks
+}
+
+/// Changes the map by a small similarity about the fixed layer's middle.
+fn moved(map: &Affine2, change: &[f64; 6], mirrored: bool) -> Affine2 {
+    let [a, b, tx, ty, _, _] = *change;
+    let s = if mirrored { -1.0 } else { 1.0 };
+    let [p, q] = map.0;
+    Affine2([
+        [p[0] + a, p[1] - b * s, p[2] + tx],
+        [q[0] + b, q[1] + a * s, q[2] + ty],
+    ])
+}
+
+/// Buffers of one refinement.
+#[derive(Default)]
+struct Room {
+    looks: Vec<[f32; 6]>,
+    sizes: Vec<f32>,
+}
+
+impl Room {
+    fn clear(&mut self) {
+        self.looks.clear();
+    }
+}
+
+/// Normal equations at one pose: four of the pose, gain and offset of the values.
+struct Step {
+    sums: [f64; SUMS],
+    cost: f64,
+}
+
+impl Step {
+    fn solve(&self, damping: f64) -> Option<[f64; 6]> {
+        let mut normal = Matrix6::zeros();
+        let mut at = 0;
+        for i in 0..6 {
+            for j in 0..=i {
+                normal[(i, j)] = self.sums[at];
+                normal[(j, i)] = self.sums[at];
+                at += 1;
+            }
+        }
+        for i in 0..6 {
+            normal[(i, i)] = normal[(i, i)] * (1.0 + damping) + 1e-12;
+        }
+        let right = Vector6::from_fn(|i, _| self.sums[21 + i]);
+        Some(normal.cholesky()?.solve(&right).into())
+    }
 }
 
 /// Least-squares gain and offset of the fixed values over the moving ones; the gain never below a trifle.
-fn gain_and_offset(looks: &[Look]) -> (f64, f64) {
+fn gain_and_offset(looks: &[[f32; 6]]) -> (f32, f32) {
     let n = looks.len().max(1) as f64;
-    let mean = |value: &dyn Fn(&Look) -> f64| looks.iter().map(value).sum::<f64>() / n;
-    let (f, m) = (mean(&|l| l.fixed), mean(&|l| l.moving));
-    let both = mean(&|l| (l.fixed - f) * (l.moving - m));
-    let own = mean(&|l| (l.moving - m).powi(2));
-    let gain = (both / own.max(1e-9)).max(0.05);
-    (gain, f - gain * m)
-}
-
-/// Correlation over what both know, over the whole of what each holds.
-fn score(fixed: &Layer, moving: &Layer, from_fixed: &Affine2) -> f64 {
-    let mut both = 0.0;
-    for y in 0..fixed.value.height() {
-        for x in 0..fixed.value.width() {
-            let there = from_fixed.apply([x as f64, y as f64]);
-            both += f64::from(fixed.value.at(x, y)) * sample(&moving.value, there);
-        }
+    let (mut f, mut m, mut fm, mut mm) = (0.0_f64, 0.0, 0.0, 0.0);
+    for l in looks {
+        let (a, b) = (f64::from(l[0]), f64::from(l[1]));
+        f += a;
+        m += b;
+        fm += a * b;
+        mm += b * b;
     }
-    // A moving pixel covers this many fixed ones.
-    let area = from_fixed.determinant().abs().max(1e-12);
-    both / (fixed.energy() * moving.energy() / area).sqrt().max(1e-12)
+    let (f, m) = (f / n, m / n);
+    let gain = ((fm / n - f * m) / (mm / n - m * m).max(1e-9)).max(0.05);
+    (gain as f32, (f - gain * m) as f32)
 }
 
-fn held(weight: &Grid<f32>, [x, y]: [f64; 2]) -> bool {
-    weight
-        .get(x.round() as i64, y.round() as i64)
-        .is_some_and(|w| w > 0.0)
-}
-
-fn median(values: &mut [f64]) -> f64 {
+fn median(values: &mut [f32]) -> f32 {
     if values.is_empty() {
         return 0.0;
     }
     let k = values.len() / 2;
-    *values.select_nth_unstable_by(k, f64::total_cmp).1
+    *values.select_nth_unstable_by(k, f32::total_cmp).1
 }
 
-/// Central differences of a grid.
-struct Slopes {
-    x: Grid<f32>,
-    y: Grid<f32>,
-}
-
-impl Slopes {
-    fn of(values: &Grid<f32>) -> Self {
-        let at = |x: i64, y: i64| {
-            let column = x.clamp(0, values.width() as i64 - 1) as usize;
-            let row = y.clamp(0, values.height() as i64 - 1) as usize;
-            values.at(column, row)
-        };
-        let slope = |dx: i64, dy: i64| {
-            Grid::from_fn(values.width(), values.height(), |x, y| {
-                let (x, y) = (x as i64, y as i64);
-                (at(x + dx, y + dy) - at(x - dx, y - dy)) * 0.5
-            })
-        };
-        Self {
-            x: slope(1, 0),
-            y: slope(0, 1),
+/// Value, central differences and weight of each pixel of a layer.
+fn cells(layer: &Layer) -> Vec<[f32; 4]> {
+    let (width, height) = (layer.value.width(), layer.value.height());
+    let mut cells = Vec::with_capacity(width * height);
+    for y in 0..height {
+        let row = layer.value.row(y);
+        let above = layer.value.row(y.saturating_sub(1));
+        let below = layer.value.row((y + 1).min(height - 1));
+        for x in 0..width {
+            let slope_x = (row[(x + 1).min(width - 1)] - row[x.saturating_sub(1)]) * 0.5;
+            let slope_y = (below[x] - above[x]) * 0.5;
+            cells.push([row[x], slope_x, slope_y, layer.weight.at(x, y)]);
         }
     }
+    cells
 }

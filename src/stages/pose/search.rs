@@ -9,19 +9,22 @@ use rustfft::{Fft, FftDirection};
 use super::Layer;
 use super::layer::sample;
 use crate::domain::Affine2;
-use crate::raster::Grid;
 
 /// Side of the square on which layers are correlated.
-const SQUARE: usize = 64;
+const SQUARE: usize = 32;
 /// Working size for layers that go into the search; at the widest scales only their corners leave the square.
-pub(in crate::stages) const SEARCH_PX: usize = 40;
+pub(super) const SEARCH_PX: usize = 20;
 /// Angles in a turn; two are looked at with one transform.
-const ANGLES: usize = 72;
+const ANGLES: usize = 36;
 /// Ratio between neighbouring scales: the rim of a character moves by about one pixel.
-const SCALE_STEP: f64 = 1.075;
+const SCALE_STEP: f64 = 1.15;
 /// Poses closer than this in angle (degrees) and scale (ratio) are one.
 const SAME_ANGLE_DEG: f64 = 12.0;
 const SAME_SCALE: f64 = 1.12;
+
+/// Refined poses closer than this in angle (degrees) and scale (logarithm) have met.
+const NEAR_DEG: f64 = 3.0;
+const NEAR_RATIO: f64 = 0.04;
 
 /// What the search may try.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -45,6 +48,16 @@ pub(in crate::stages) struct Found {
     pub(in crate::stages) mirrored: bool,
 }
 
+impl Found {
+    /// Whether two poses turn and scale alike.
+    pub(super) fn is_near(&self, other: &Self) -> bool {
+        let (a, b) = (&self.fixed_from_moving, &other.fixed_from_moving);
+        let turn = (a.angle_deg() - b.angle_deg()).rem_euclid(360.0);
+        let ratio = (a.scale() / b.scale()).ln().abs();
+        self.mirrored == other.mirrored && turn.min(360.0 - turn) < NEAR_DEG && ratio < NEAR_RATIO
+    }
+}
+
 /// One peak of the correlation.
 #[derive(Debug, Clone, Copy)]
 struct Peak {
@@ -56,12 +69,9 @@ struct Peak {
 }
 
 /// The best distinct poses, as read and mirrored, best first.
-pub(in crate::stages) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -> Vec<Found> {
-    let transform = Transform::new();
-    let mut target = transform.forward(&centred(fixed, None));
-    for value in &mut target {
-        *value = value.conj();
-    }
+pub(super) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -> Vec<Found> {
+    let mut transform = Transform::new();
+    let target = transform.target(&centred(fixed, None));
     let fixed_norm = fixed.energy().sqrt();
     let steps = (limits.scale.ln() / SCALE_STEP.ln()).round() as i32;
     let mut peaks = Vec::new();
@@ -71,11 +81,11 @@ pub(in crate::stages) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -
             let angles = [half, half + ANGLES / 2].map(|k| k as f64 * TAU / ANGLES as f64);
             let turned = angles.map(|angle| centred(moving, Some((angle, scale))));
             let norms = [norm(&turned[0]), norm(&turned[1])];
-            let spectrum = transform.forward_both(&turned);
+            transform.take(&turned);
             for mirrored in [false, true] {
-                let surface = transform.correlate(&spectrum, &target, mirrored);
+                let surface = transform.correlate(&target, mirrored);
                 for (k, angle) in angles.into_iter().enumerate() {
-                    let (shift, height) = highest(&surface, k, limits.shift);
+                    let (shift, height) = highest(surface, k, limits.shift);
                     let score = f64::from(height) / (norms[k] * fixed_norm).max(1e-12);
                     peaks.push(Peak {
                         angle,
@@ -146,7 +156,7 @@ fn distinct(mut peaks: Vec<Peak>, keep: usize) -> Vec<Peak> {
 }
 
 /// The layer's values in the middle of the square, turned and scaled about its own middle.
-fn centred(layer: &Layer, turn: Option<(f64, f64)>) -> Grid<f32> {
+fn centred(layer: &Layer, turn: Option<(f64, f64)>) -> Vec<f32> {
     let middle = (SQUARE / 2) as f64;
     let [cx, cy] = layer.centre();
     let (angle, scale) = turn.unwrap_or((0.0, 1.0));
@@ -154,15 +164,15 @@ fn centred(layer: &Layer, turn: Option<(f64, f64)>) -> Grid<f32> {
         Affine2::similarity(scale, angle, [0.0, 0.0]).after(&Affine2::scale_shift(1.0, [-cx, -cy]));
     let place = Affine2::scale_shift(1.0, [middle, middle]).after(&place);
     let Some(back) = place.inverse() else {
-        return Grid::new(SQUARE, SQUARE, 0.0);
+        return vec![0.0; SQUARE * SQUARE];
     };
     // Layers are smooth at this size, so one look a pixel does even where the scale shrinks them.
     let (dx, dy) = (back.0[0][0], back.0[1][0]);
-    let mut values = Grid::new(SQUARE, SQUARE, 0.0);
+    let mut values = Vec::with_capacity(SQUARE * SQUARE);
     for row in 0..SQUARE {
         let [mut x, mut y] = back.apply([0.0, row as f64]);
-        for column in 0..SQUARE {
-            values.set(column, row, sample(&layer.value, [x, y]) as f32);
+        for _ in 0..SQUARE {
+            values.push(sample(&layer.value, [x, y]));
             x += dx;
             y += dy;
         }
@@ -170,24 +180,21 @@ fn centred(layer: &Layer, turn: Option<(f64, f64)>) -> Grid<f32> {
     values
 }
 
-fn norm(values: &Grid<f32>) -> f64 {
-    values
-        .data()
-        .iter()
-        .map(|v| f64::from(*v).powi(2))
-        .sum::<f64>()
-        .sqrt()
+fn norm(values: &[f32]) -> f64 {
+    f64::from(values.iter().map(|v| v * v).sum::<f32>()).sqrt()
 }
 
 /// Highest correlation within the shift limit, of the real (0) or imaginary (1) part: shift in pixels and value.
+///
+/// The surface is read backwards: its value at -s belongs to shift s.
 fn highest(surface: &[Complex32], part: usize, limit: f64) -> ([f64; 2], f32) {
     let reach = (limit * SEARCH_PX as f64).round() as i64;
     let mut best = ([0.0; 2], f32::NEG_INFINITY);
     for dy in -reach..=reach {
+        let from = (-dy).rem_euclid(SQUARE as i64) as usize * SQUARE;
+        let row = &surface[from..from + SQUARE];
         for dx in -reach..=reach {
-            let row = dy.rem_euclid(SQUARE as i64) as usize;
-            let column = dx.rem_euclid(SQUARE as i64) as usize;
-            let value = surface[row * SQUARE + column];
+            let value = row[(-dx).rem_euclid(SQUARE as i64) as usize];
             let value = if part == 0 { value.re } else { value.im };
             if value > best.1 {
                 best = ([dx as f64, dy as f64], value);
@@ -197,76 +204,77 @@ fn highest(surface: &[Complex32], part: usize, limit: f64) -> ([f64; 2], f32) {
     best
 }
 
-/// Two-dimensional transforms of the square.
+/// Two-dimensional transforms of the square, with the room they work in.
+///
+/// Spectra are kept column by column, which saves a transposition each way.
 struct Transform {
     forward: Radix4<f32>,
     inverse: Radix4<f32>,
+    scratch: Vec<Complex32>,
+    spectrum: Vec<Complex32>,
+    product: Vec<Complex32>,
 }
 
 impl Transform {
     fn new() -> Self {
-        // The square's side is a power of four. A planner would compile every algorithm it could choose from.
+        // The square's side is a power of two. A planner would compile every algorithm it could choose from.
+        let forward = Radix4::new(SQUARE, FftDirection::Forward);
+        let inverse = Radix4::new(SQUARE, FftDirection::Inverse);
+        let room = forward
+            .get_inplace_scratch_len()
+            .max(inverse.get_inplace_scratch_len());
+        let empty = Complex32::new(0.0, 0.0);
         Self {
-            forward: Radix4::new(SQUARE, FftDirection::Forward),
-            inverse: Radix4::new(SQUARE, FftDirection::Inverse),
+            forward,
+            inverse,
+            scratch: vec![empty; room],
+            spectrum: vec![empty; SQUARE * SQUARE],
+            product: vec![empty; SQUARE * SQUARE],
         }
     }
 
-    fn forward(&self, values: &Grid<f32>) -> Vec<Complex32> {
-        let mut data: Vec<_> = values
-            .data()
-            .iter()
-            .map(|v| Complex32::new(*v, 0.0))
-            .collect();
-        both_ways(&self.forward, &mut data);
-        data
-    }
-
-    /// Two real squares in one transform: the second rides along as the imaginary part.
-    fn forward_both(&self, [a, b]: &[Grid<f32>; 2]) -> Vec<Complex32> {
-        let pairs = a.data().iter().zip(b.data());
-        let mut data: Vec<_> = pairs.map(|(re, im)| Complex32::new(*re, *im)).collect();
-        both_ways(&self.forward, &mut data);
-        data
-    }
-
-    /// Correlation with the (conjugated) target; mirrored in x by reading the spectrum backwards along x.
-    ///
-    /// A shift by s shows up at s. The square is `SQUARE` wide and its middle at `SQUARE / 2`, so mirroring about
-    /// column 0 of the transform keeps the middle.
-    fn correlate(
-        &self,
-        spectrum: &[Complex32],
-        conjugated: &[Complex32],
-        mirrored: bool,
-    ) -> Vec<Complex32> {
+    /// The conjugated spectrum of a real square, scaled so that a product transformed back is the correlation.
+    fn target(&mut self, values: &[f32]) -> Vec<Complex32> {
+        for (out, value) in self.spectrum.iter_mut().zip(values) {
+            *out = Complex32::new(*value, 0.0);
+        }
+        both_ways(&self.forward, &mut self.spectrum, &mut self.scratch);
         let scale = 1.0 / (SQUARE * SQUARE) as f32;
-        let mut product = Vec::with_capacity(SQUARE * SQUARE);
-        for y in 0..SQUARE {
-            for x in 0..SQUARE {
-                let from = if mirrored { (SQUARE - x) % SQUARE } else { x };
-                product.push(spectrum[y * SQUARE + from] * conjugated[y * SQUARE + x] * scale);
+        self.spectrum.iter().map(|v| v.conj() * scale).collect()
+    }
+
+    /// Takes in the spectrum of two real squares: the second rides along as the imaginary part.
+    fn take(&mut self, [a, b]: &[Vec<f32>; 2]) {
+        for (out, (re, im)) in self.spectrum.iter_mut().zip(a.iter().zip(b)) {
+            *out = Complex32::new(*re, *im);
+        }
+        both_ways(&self.forward, &mut self.spectrum, &mut self.scratch);
+    }
+
+    /// Correlation of what was taken in with the target; mirrored in x by reading the spectrum backwards along x.
+    ///
+    /// The square is `SQUARE` wide and its middle at `SQUARE / 2`, so mirroring about column 0 of the transform
+    /// keeps the middle. The result is read backwards: its value at -s belongs to shift s.
+    fn correlate(&mut self, target: &[Complex32], mirrored: bool) -> &[Complex32] {
+        for x in 0..SQUARE {
+            let from = if mirrored { (SQUARE - x) % SQUARE } else { x } * SQUARE;
+            let column = &self.spectrum[from..from + SQUARE];
+            let places = x * SQUARE..(x + 1) * SQUARE;
+            let out = &mut self.product[places.clone()];
+            for ((out, a), b) in out.iter_mut().zip(column).zip(&target[places]) {
+                *out = a * b;
             }
         }
-        both_ways(&self.inverse, &mut product);
-        // The product above is the correlation read backwards: its value at -s belongs to shift s.
-        reversed(&product)
+        both_ways(&self.inverse, &mut self.product, &mut self.scratch);
+        &self.product
     }
 }
 
-fn reversed(values: &[Complex32]) -> Vec<Complex32> {
-    let back = |i: usize| (SQUARE - i) % SQUARE;
-    (0..SQUARE * SQUARE)
-        .map(|i| values[back(i / SQUARE) * SQUARE + back(i % SQUARE)])
-        .collect()
-}
-
-/// Rows, then columns.
-fn both_ways(fft: &Radix4<f32>, data: &mut [Complex32]) {
-    fft.process(data);
+/// Along one axis, then along the other: rows become columns.
+fn both_ways(fft: &Radix4<f32>, data: &mut [Complex32], scratch: &mut [Complex32]) {
+    fft.process_with_scratch(data, scratch);
     transpose(data);
-    fft.process(data);
-    transpose(data);
+    fft.process_with_scratch(data, scratch);
 }
 
 fn transpose(data: &mut [Complex32]) {

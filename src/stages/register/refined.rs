@@ -3,8 +3,8 @@
 use super::{Alignment, Error, Params, chosen};
 use crate::domain::ThresholdMetric;
 use crate::raster::DepthMap;
-use crate::stages::normalize::{Normalized, Relief};
-use crate::stages::pose::{Found, Layer, Soft, refine};
+use crate::stages::normalize::{Normalized, Relief, soft_stroke};
+use crate::stages::pose::{Base, Found, Layer, Loss, Refiner, Soft};
 
 /// Poses closer in angle than this are one pose when the margin is taken.
 const SAME_POSE_DEG: f64 = 15.0;
@@ -13,7 +13,6 @@ const TRIED: usize = 3;
 /// Cuts under the tops that are tried, as shares of the relief, and the softness of each. The ink of a print spreads;
 /// strokes cut too thin or too thick for it would pull the scale.
 const CUTS: [f64; 6] = [0.05, 0.1, 0.17, 0.26, 0.37, 0.5];
-const FIRST_CUT: f64 = 0.17;
 const SOFTNESS: f64 = 0.1;
 
 /// One alignment a metric: thresholds differ, the pose does not, since it is found without one.
@@ -40,7 +39,7 @@ pub(super) fn align(
         .collect()
 }
 
-/// The first few poses at full size, best first; the best one with the cut that fits the print's strokes.
+/// The first few poses at full size, best first; each with the cut that fits the print's strokes.
 fn refined(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Option<Vec<Found>> {
     let ink = Soft {
         amount: normalized.ink.map(|set| f32::from(u8::from(*set))),
@@ -48,15 +47,17 @@ fn refined(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Option
     };
     let relief = Relief::of(depth)?;
     let size = params.working_px as usize;
-    let ink = Layer::new(&ink, size, params.smoothing_px)?;
-    let cut = |share| {
-        Layer::new(
-            &relief.soft_strokes(depth, share, SOFTNESS),
-            size,
-            params.smoothing_px,
-        )
-    };
-    let wood = cut(FIRST_CUT)?;
+    let ink = Base::new(&ink, size)?.layer(size, params.smoothing_px);
+    let depths = Base::new(&relief.depths(depth), size)?;
+    let woods: Vec<Layer> = CUTS
+        .iter()
+        .map(|cut| {
+            depths
+                .map(|d| soft_stroke(d, *cut, SOFTNESS))
+                .layer(size, params.smoothing_px)
+        })
+        .collect();
+    let woods: Vec<Refiner> = woods.iter().map(|wood| Refiner::new(&ink, wood)).collect();
     let starts = normalized
         .outcome
         .poses
@@ -67,21 +68,31 @@ fn refined(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Option
             score: 0.0,
             mirrored: false,
         });
-    let mut found: Vec<Found> = starts.map(|start| refine(&ink, &wood, &start)).collect();
+    let mut found: Vec<Found> = starts.map(|start| settled(&woods, &start)).collect();
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
-    if let Some(best) = found.first_mut() {
-        for wood in CUTS.iter().filter_map(|share| cut(*share)) {
-            let start = Found {
-                score: 0.0,
-                ..*best
-            };
-            let tried = refine(&ink, &wood, &start);
-            if tried.score > best.score {
-                *best = tried;
-            }
-        }
-    }
     Some(found)
+}
+
+/// A pose refined with the cut that fits best, first from afar, then closely.
+fn settled(woods: &[Refiner], start: &Found) -> Found {
+    let fitting = |pose: &Found| {
+        let judged = woods.iter().map(|wood| (wood, wood.judged(pose)));
+        judged.max_by(|a, b| a.1.score.total_cmp(&b.1.score))
+    };
+    let mut pose = *start;
+    for loss in [Loss::Huber, Loss::Tukey] {
+        let Some((wood, _)) = fitting(&pose) else {
+            return pose;
+        };
+        pose = wood.refine(&pose, 15, loss);
+    }
+    let Some((wood, judged)) = fitting(&pose) else {
+        return pose;
+    };
+    Found {
+        score: judged.score * wood.overlap(&pose).moving_met,
+        ..pose
+    }
 }
 
 /// Best score of any other pose: another angle, or mirrored; 0 when there is none.

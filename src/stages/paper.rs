@@ -1,0 +1,83 @@
+//! The brightness of the paper around each pixel, seen past strokes: what is dark and narrow is ink, what is dark and
+//! wide is a stain.
+
+use super::blur::blur;
+use crate::raster::{Grid, Mask, resample};
+
+/// Paper changes slowly: it is looked at on this many cells along the longest side.
+const CELLS: f64 = 96.0;
+/// Half the width of what counts as narrow, as a share of the longest side.
+const NARROW: f64 = 0.12;
+/// A cell that is known to less than this share says nothing.
+const LEAST_KNOWN: f32 = 0.3;
+
+/// Brightness of the paper under and around each pixel, 0..=1: the grey closed by a square that strokes fit into.
+pub(super) fn level(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
+    let (width, height) = (grey.width(), grey.height());
+    let scale = (CELLS / width.max(height) as f64).min(1.0);
+    let sides = [width, height].map(|side| (side as f64 * scale).ceil() as usize);
+    let shift = [(scale - 1.0) / 2.0; 2];
+    let weight = known.map(|k| f32::from(u8::from(*k)));
+    let pairs = grey.data().iter().zip(weight.data());
+    let present: Vec<f32> = pairs.map(|(g, w)| g * w).collect();
+    let Some(present) = Grid::from_vec(width, height, present) else {
+        return grey.clone();
+    };
+    let sums = resample(&present, scale, shift, sides);
+    let weights = resample(&weight, scale, shift, sides);
+    let cells = Grid::from_fn(sides[0], sides[1], |x, y| {
+        let weight = weights.at(x, y);
+        (weight > LEAST_KNOWN).then(|| sums.at(x, y) / weight)
+    });
+    let reach = ((NARROW * width.max(height) as f64 * scale).round() as usize).max(1);
+    let closed = extreme(&extreme(&cells, reach, f32::max), reach, f32::min);
+    let seen: Vec<f32> = closed.data().iter().flatten().copied().collect();
+    let mean = seen.iter().sum::<f32>() / seen.len().max(1) as f32;
+    let filled = closed.map(|value| value.unwrap_or(mean) - mean);
+    let smooth = blur(&filled, reach as f64 / 3.0);
+    let back = [(1.0 / scale - 1.0) / 2.0; 2];
+    resample(&smooth, 1.0 / scale, back, [width, height]).map(|value| value + mean)
+}
+
+/// The extreme value of the square around each cell; empty where the square holds none.
+fn extreme(
+    cells: &Grid<Option<f32>>,
+    reach: usize,
+    pick: impl Fn(f32, f32) -> f32,
+) -> Grid<Option<f32>> {
+    let best = |values: &mut dyn Iterator<Item = Option<f32>>| values.flatten().reduce(&pick);
+    let (width, height) = (cells.width(), cells.height());
+    let rows = Grid::from_fn(width, height, |x, y| {
+        let near = x.saturating_sub(reach)..(x + reach + 1).min(width);
+        best(&mut near.map(|x| cells.at(x, y)))
+    });
+    Grid::from_fn(width, height, |x, y| {
+        let near = y.saturating_sub(reach)..(y + reach + 1).min(height);
+        best(&mut near.map(|y| rows.at(x, y)))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::level;
+    use crate::raster::{Grid, Mask};
+
+    #[test]
+    fn strokes_are_seen_past_and_stains_are_not() {
+        let grey = Grid::from_fn(200, 200, |x, y| {
+            let paper = if x > 110 && y > 110 { 0.6 } else { 0.9 };
+            if x % 40 < 12 { paper - 0.4 } else { paper }
+        });
+        let level = level(&grey, &Mask::new(200, 200, true));
+        assert!(
+            (level.at(60, 50) - 0.9).abs() < 0.03,
+            "{}",
+            level.at(60, 50)
+        );
+        assert!(
+            (level.at(170, 170) - 0.6).abs() < 0.05,
+            "{}",
+            level.at(170, 170)
+        );
+    }
+}

@@ -1,0 +1,55 @@
+//! The search for a pose from coarse to fine: every angle and scale at little size, the best few closer and closer.
+
+use super::search::{Found, Limits, SEARCH_PX, search};
+use super::{Base, Loss, Refiner};
+
+/// Smoothing of the search's layers, working pixels.
+const SEARCH_SIGMA: f64 = 0.5;
+
+/// One pass after the search: working size, smoothing, steps, and how many poses go on.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::stages) struct Pass {
+    pub(in crate::stages) px: usize,
+    pub(in crate::stages) sigma: f64,
+    pub(in crate::stages) steps: usize,
+    pub(in crate::stages) keep: usize,
+}
+
+/// The best poses of the moving picture on the fixed one, as read and mirrored, best first.
+pub(in crate::stages) fn find(
+    fixed: &Base,
+    moving: &Base,
+    limits: Limits,
+    passes: &[Pass],
+) -> Vec<Found> {
+    let layers = |px, sigma| (fixed.layer(px, sigma), moving.layer(px, sigma));
+    let (a, b) = layers(SEARCH_PX, SEARCH_SIGMA);
+    let mut found = search(&a, &b, limits);
+    for pass in passes {
+        let (a, b) = layers(pass.px, pass.sigma);
+        let refiner = Refiner::new(&a, &b);
+        for pose in &mut found {
+            *pose = refiner.refine(pose, pass.steps, Loss::Huber);
+        }
+        found = best_of_each(found, pass.keep);
+    }
+    found
+}
+
+/// The best few as read and half as many mirrored, best first, none of them twice.
+fn best_of_each(mut found: Vec<Found>, keep: usize) -> Vec<Found> {
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut kept: Vec<Found> = Vec::new();
+    for pose in found {
+        let of_kind = kept.iter().filter(|k| k.mirrored == pose.mirrored).count();
+        let room = if pose.mirrored {
+            keep.div_ceil(2)
+        } else {
+            keep
+        };
+        if of_kind < room && !kept.iter().any(|other| other.is_near(&pose)) {
+            kept.push(pose);
+        }
+    }
+    kept
+}
