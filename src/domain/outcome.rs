@@ -175,6 +175,9 @@ pub struct MetricOutcome {
     pub scores: Scores,
     /// Best search score less the best of any other pose (another angle, or mirrored); above 0 is right.
     pub margin: f64,
+    /// Calibrated chance, 0..=1, that this alignment is right: angle within 5 degrees and landmarks within 5 % of the
+    /// character's height. `None` under a method that gives none.
+    pub confidence: Option<f64>,
     /// Whether the search ended at a bound of angle, scale or shift.
     pub at_bound: bool,
 }

@@ -32,6 +32,7 @@ pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) ->
                 density_depth: 0.21,
             },
             margin: 0.3,
+            confidence: None,
             at_bound: false,
         },
         result_hash: ContentHash::of(metric.name().as_bytes()),

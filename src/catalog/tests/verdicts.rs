@@ -139,6 +139,35 @@ async fn a_new_result_does_not_inherit_a_verdict_and_the_same_result_keeps_it() 
 }
 
 #[tokio::test]
+async fn a_metric_that_the_new_method_does_not_give_cannot_be_judged_any_more() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let again = crate::catalog::Again::All(Stage::Register);
+    let sent = world
+        .catalog
+        .send_back(&super::recipes([1; 4]), None, again)
+        .await;
+    assert_eq!(sent.expect("sent back"), 1);
+    let lease = world.claim(1).await.remove(0);
+    let mut done = world.done(Stage::Register);
+    let gone = done.metrics.pop().expect("a metric").outcome.metric;
+    let left: Vec<_> = done.metrics.iter().map(|m| m.outcome).collect();
+    done.outcome = serde_json::json!({ "metrics": left }).to_string();
+    let kept = world.catalog.checkpoint(lease, done).await;
+    assert!(matches!(kept, Ok(Kept::Done)));
+    let all = verdict("ana", Verdict::Pass);
+    let one = NewVerdict {
+        metric: Some(gone),
+        ..all.clone()
+    };
+    let refused = world.catalog.verdict_set(vec![one], 5).await;
+    assert!(matches!(refused, Err(CatalogError::NoMetricResult(_, metric)) if metric == gone));
+    world.catalog.verdict_set(vec![all], 6).await.expect("set");
+    let log = world.catalog.verdict_log(None).await.expect("a log");
+    assert_eq!(log.len(), left.len());
+}
+
+#[tokio::test]
 async fn the_database_itself_refuses_to_change_a_verdict() {
     let world = World::new(1).await;
     world.finish_one().await;
