@@ -158,7 +158,7 @@ pub struct PairResults {
     pub failure: Option<StoredFailure>,
     /// Results of the stages behind it, in order.
     pub stages: Vec<StageRecord>,
-    /// The metrics' results in the order of [`ThresholdMetric::ALL`]; empty unless done.
+    /// Results of the metrics that the method gave, in the order of [`ThresholdMetric::ALL`]; empty unless done.
     pub metrics: Vec<MetricRecord>,
     /// The true alignment as given, where there is one.
     pub truth: Option<Value>,

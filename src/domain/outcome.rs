@@ -131,7 +131,8 @@ pub struct NormalizeOutcome {
     pub mirrored_score: Option<f64>,
     /// Whether the pose search ended at a bound of its scale or shift.
     pub search_at_bound: bool,
-    /// One choice a metric; without the ensemble where that is settled by registering the others.
+    /// One choice a metric that the method gives; without the ensemble where that is settled by registering the
+    /// others.
     pub thresholds: Vec<ThresholdChoice>,
 }
 
@@ -185,6 +186,6 @@ pub struct MetricOutcome {
 /// Numbers of the register stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RegisterOutcome {
-    /// One result a metric, in the order of [`ThresholdMetric::ALL`].
+    /// One result a metric that the method gives, in the order of [`ThresholdMetric::ALL`].
     pub metrics: Vec<MetricOutcome>,
 }

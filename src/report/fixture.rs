@@ -62,6 +62,14 @@ pub(crate) fn done(name: &str, iou: f64, verdicts: &[Verdict]) -> PairResults {
     }
 }
 
+/// The same under the paper's method, which gives no `relief`.
+pub(crate) fn done_by_paper(name: &str, iou: f64, verdicts: &[Verdict]) -> PairResults {
+    let mut pair = done(name, iou, verdicts);
+    pair.metrics
+        .retain(|record| ThresholdMetric::PAPER.contains(&record.outcome.metric));
+    pair
+}
+
 /// A pair that failed at its first stage.
 pub(crate) fn failed(name: &str, class: FailureClass, message: &str) -> PairResults {
     PairResults {

@@ -16,7 +16,7 @@ pub struct Report {
     pub pairs: u64,
     /// How far they are.
     pub progress: Progress,
-    /// One row a metric, in the order of the paper's table.
+    /// One row a metric, in the order of the paper's table; `relief` last and only where there are results of it.
     pub rows: Vec<Row>,
     /// Metrics against each other, pair by pair.
     pub comparisons: Vec<Comparison>,

@@ -27,7 +27,7 @@ pub struct TruthFinding {
 pub struct Tally {
     pairs: u64,
     progress: Progress,
-    columns: [Column; 3],
+    columns: [Column; ThresholdMetric::ALL.len()],
     by_verdicts: Duels,
     by_truth: Duels,
     failures: BTreeMap<FailureClass, FailureGroup>,
@@ -148,7 +148,8 @@ impl Tally {
 
     /// The report over all pairs counted.
     pub fn finish(self) -> Report {
-        let rows: Vec<Row> = self.columns.into_iter().map(Column::finish).collect();
+        let told = self.columns.into_iter().filter(Column::is_told);
+        let rows: Vec<Row> = told.map(Column::finish).collect();
         let mut comparisons = self.by_verdicts.finish(Basis::Verdicts);
         comparisons.extend(self.by_truth.finish(Basis::Truth));
         Report {
@@ -180,6 +181,11 @@ impl Column {
             dice: 0.0,
             truth: TruthColumn::default(),
         }
+    }
+
+    /// Whether the report has a row for it: the paper's always, others where there are results.
+    fn is_told(&self) -> bool {
+        self.n > 0 || ThresholdMetric::PAPER.contains(&self.metric)
     }
 
     fn add(&mut self, record: &MetricRecord, truth: Option<&TruthErrors>) {
@@ -323,6 +329,18 @@ mod tests {
                 .all(|row| row.n == 0 && row.ssim.is_none())
         );
         assert!(report.comparisons.is_empty() && report.warnings.is_empty());
+    }
+
+    #[test]
+    fn the_papers_method_has_the_papers_rows_and_no_complaint() {
+        let mut tally = Tally::default();
+        let pair = fixture::done_by_paper("a", 0.8, &[Verdict::Pass]);
+        tally.add(&pair, &TruthFinding::default());
+        let report = tally.finish();
+        let metrics: Vec<_> = report.rows.iter().map(|row| row.metric).collect();
+        assert_eq!(metrics, ThresholdMetric::PAPER);
+        assert_eq!(report.comparisons.len(), 3);
+        assert_eq!(report.warnings, [""; 0]);
     }
 
     #[test]

@@ -4,6 +4,9 @@ use super::{World, name};
 use crate::catalog::{Catalog, CatalogError, Kept, NewVerdict};
 use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 
+/// Results of a pair that is done.
+const METRICS: usize = ThresholdMetric::ALL.len();
+
 fn verdict(reader: &str, verdict: Verdict) -> NewVerdict {
     NewVerdict {
         pair: name("p0"),
@@ -44,11 +47,11 @@ async fn the_newest_verdict_of_each_reader_counts() {
     assert_eq!(counted(&world.catalog).await, expected);
     let status = world.catalog.status(&super::recipes([1; 4])).await;
     let status = status.expect("a read");
-    assert_eq!(status.verdicts[&Verdict::Fail], 3);
+    assert_eq!(status.verdicts[&Verdict::Fail], METRICS as u64);
     assert_eq!(status.verdicts[&Verdict::Pass], 0);
     assert_eq!(
         world.catalog.verdict_log(None).await.expect("a log").len(),
-        9
+        3 * METRICS
     );
 }
 
@@ -65,7 +68,7 @@ async fn undo_takes_back_the_newest_act_and_the_log_keeps_both() {
     }
     let undone = world.catalog.verdict_undo(Some("ana"), 6).await;
     let undone = undone.expect("taken back");
-    assert_eq!(undone.len(), 3);
+    assert_eq!(undone.len(), METRICS);
     assert!(undone.iter().all(|event| event.verdict == Verdict::Fail));
     assert_eq!(
         counted(&world.catalog).await,
@@ -80,7 +83,7 @@ async fn undo_takes_back_the_newest_act_and_the_log_keeps_both() {
     assert!(matches!(nothing, Err(CatalogError::NothingToUndo(_))));
     let log = world.catalog.verdict_log(Some(&name("p0"))).await;
     let log = log.expect("a log");
-    assert!(log.len() == 6 && log.iter().all(|event| event.undone_at.is_some()));
+    assert!(log.len() == 2 * METRICS && log.iter().all(|event| event.undone_at.is_some()));
 }
 
 #[tokio::test]

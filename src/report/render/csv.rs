@@ -132,9 +132,9 @@ mod tests {
         );
         let text = render(&tally.finish());
         let lines: Vec<&str> = text.split("\r\n").collect();
-        assert_eq!(lines.len(), 5);
-        assert_eq!(lines[4], "");
-        for line in &lines[..4] {
+        assert_eq!(lines.len(), 6);
+        assert_eq!(lines[5], "");
+        for line in &lines[..5] {
             assert_eq!(line.split(',').count(), COLUMNS.len(), "{line}");
         }
         let golden = "nl_ssim,2,1,1,0,0,0,0,1,0.20654931437723745,1,0.81,0.82,0.75,0.9,";

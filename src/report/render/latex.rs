@@ -129,6 +129,7 @@ mod tests {
     Non-luminous SSIM & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
     Pixel density & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
     Ensemble & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
+    Relief & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
     \bottomrule
   \end{tabular}
 \end{table}
