@@ -1,10 +1,12 @@
 //! Adds pairs up to a report, one at a time, without keeping them.
 //!
-//! What stays in memory a pair: three numbers a metric where there is truth, for the medians; nothing otherwise.
+//! What stays in memory a pair: three numbers a metric where there is truth, for the medians, and its confidence where
+//! it is judged; nothing otherwise.
 
 use std::collections::BTreeMap;
 
 use super::compare::Duels;
+use super::coverage::Confidences;
 use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock};
 use super::standing::Standing;
 use super::stats::{median, wilson_95};
@@ -30,6 +32,8 @@ pub struct Tally {
     columns: [Column; ThresholdMetric::ALL.len()],
     by_verdicts: Duels,
     by_truth: Duels,
+    sure_by_verdicts: Confidences,
+    sure_by_truth: Confidences,
     failures: BTreeMap<FailureClass, FailureGroup>,
     truth_problems: TruthProblems,
 }
@@ -80,6 +84,8 @@ impl Default for Tally {
             columns: ThresholdMetric::ALL.map(Column::new),
             by_verdicts: Duels::default(),
             by_truth: Duels::default(),
+            sure_by_verdicts: Confidences::default(),
+            sure_by_truth: Confidences::default(),
             failures: BTreeMap::new(),
             truth_problems: TruthProblems::default(),
         }
@@ -97,12 +103,15 @@ impl Tally {
                 column.add(record, truth.errors.get(&column.metric));
             }
         }
-        self.by_verdicts.add(|metric| {
-            pair.metric(metric)
-                .and_then(|record| Standing::of(record).told())
-        });
-        self.by_truth
-            .add(|metric| truth.errors.get(&metric).map(TruthErrors::pass));
+        let told = |metric| Standing::of(pair.metric(metric)?).told();
+        let right = |metric| truth.errors.get(&metric).map(TruthErrors::pass);
+        let sure = |metric| pair.metric(metric)?.outcome.confidence;
+        self.by_verdicts.add(told);
+        self.by_truth.add(right);
+        self.sure_by_verdicts
+            .add(|metric| sure(metric).zip(told(metric)));
+        self.sure_by_truth
+            .add(|metric| sure(metric).zip(right(metric)));
     }
 
     fn count_status(&mut self, pair: &PairResults) {
@@ -152,6 +161,8 @@ impl Tally {
         let rows: Vec<Row> = told.map(Column::finish).collect();
         let mut comparisons = self.by_verdicts.finish(Basis::Verdicts);
         comparisons.extend(self.by_truth.finish(Basis::Truth));
+        let mut coverage = self.sure_by_verdicts.finish(Basis::Verdicts);
+        coverage.extend(self.sure_by_truth.finish(Basis::Truth));
         Report {
             schema: SCHEMA,
             pairs: self.pairs,
@@ -159,6 +170,7 @@ impl Tally {
             warnings: warnings::of(self.progress, &rows, &self.truth_problems),
             rows,
             comparisons,
+            coverage,
             failures: self.failures.into_values().collect(),
         }
     }

@@ -1,5 +1,6 @@
 //! The forms a report can be printed in.
 
+mod coverage;
 mod csv;
 mod latex;
 mod markdown;

@@ -1,5 +1,6 @@
 //! The report for a terminal of 80 columns.
 
+use super::coverage;
 use super::table::{self, Column, Kind, Table};
 use crate::report::model::{Comparison, FailureGroup, Report};
 
@@ -11,7 +12,10 @@ const NAMED: usize = 5;
 /// The report as aligned text.
 pub(super) fn render(report: &Report) -> String {
     let mut blocks = vec![format!("{}\n", table::headline(report))];
-    for found in table::tables(report) {
+    for found in table::tables(report)
+        .into_iter()
+        .chain(coverage::short(report))
+    {
         blocks.push(aligned(&found) + &wrapped("", &found.caption));
     }
     if !report.anybody_read() && report.progress.done > 0 {
