@@ -24,6 +24,8 @@ pub struct StatusCounts {
     pub stages: BTreeMap<Stage, StageCounts>,
     /// Pairs whose results were made with other settings or inputs than the current ones.
     pub stale: u64,
+    /// Pairs that are done with a result less confident than [`MetricOutcome::DOUBTFUL`].
+    pub doubtful: u64,
     /// Verdicts on current results, the newest of each reader.
     pub verdicts: BTreeMap<Verdict, u64>,
 }

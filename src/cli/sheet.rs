@@ -26,7 +26,7 @@ pub(super) struct SheetArgs {
     /// Whose results: `nl_ssim`, density, ensemble or relief
     #[arg(long, default_value = "ensemble")]
     pub(super) metric: ThresholdMetric,
-    /// What comes first: worst, score, margin or name
+    /// What comes first: worst, score, margin, confidence (the least confident) or name
     #[arg(long, default_value = "worst")]
     pub(super) order: SheetOrder,
     /// Most pairs on the sheet

@@ -183,6 +183,11 @@ pub struct MetricOutcome {
     pub at_bound: bool,
 }
 
+impl MetricOutcome {
+    /// Results with less confidence than this are worth a look before they are used.
+    pub const DOUBTFUL: f64 = 0.5;
+}
+
 /// Numbers of the register stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RegisterOutcome {

@@ -100,6 +100,40 @@ fn only_the_touched_stage_runs_again(at: &dyn Fn(&[&str]) -> crate::cli::Call) {
 }
 
 #[test]
+fn the_papers_preset_keeps_to_its_three_metrics() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "demo"], args].concat());
+    mocban(
+        dir.path(),
+        &["demo", "demo", "--pairs", "1", "--config", "paper"],
+    )
+    .expect(0);
+    let id = "upright-0000";
+    let metrics = |value: &Value| -> Vec<String> {
+        let rows = value.as_array().expect("a list").iter();
+        rows.map(|row| row["metric"].as_str().expect("a name").to_owned())
+            .collect()
+    };
+    let paper = ["nl_ssim", "density", "ensemble"];
+    let shown = at(&["show", id, "--json"]).expect(0).json();
+    assert_eq!(metrics(&shown["metrics"]), paper);
+    assert!(shown["metrics"][0]["confidence"].is_null());
+
+    at(&["verdict", "set", id, "pass", "--reader", "lan"]).expect(0);
+    let report = at(&["report", "--require-complete", "--json"]).expect(0);
+    let report = report.json();
+    assert_eq!(metrics(&report["rows"]), paper);
+    assert_eq!(report["warnings"], serde_json::json!([]));
+    assert_eq!(report["coverage"], serde_json::json!([]));
+
+    at(&["export", "--to", "jsonl", "-o", "out"]).expect(0);
+    let exported = Value::Array(lines(&dir.path().join("out/pairs.jsonl")));
+    assert_eq!(metrics(&exported), paper);
+    let none = at(&["sheet", "--metric", "relief"]).expect(4);
+    assert!(none.err.contains("has a result of relief"), "{}", none.err);
+}
+
+#[test]
 fn first_signal_drains_and_the_next_run_goes_on() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     mocban(dir.path(), &["demo", "demo", "--pairs", "2", "--no-run"]).expect(0);
