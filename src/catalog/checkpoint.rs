@@ -33,25 +33,22 @@ ON CONFLICT (pair, stage) DO UPDATE SET recipe = excluded.recipe, mesh_hash = ex
     print_hash = excluded.print_hash, facts = excluded.facts, outcome = excluded.outcome, files = excluded.files,
     result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
 
+/// A method may give fewer metrics than the one before; what it does not give is no result any more.
+const CLEAR_METRICS: &str = "
+DELETE FROM metric_result WHERE pair IN (SELECT value ->> 'pair' FROM json_each(?1))";
+
 const METRICS: &str = "
 INSERT INTO metric_result
     (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
-     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, at_bound, result_hash)
+     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, confidence, at_bound, result_hash)
 SELECT value ->> 'pair', value ->> '$.row.metric', value ->> '$.row.threshold_level',
     value ->> '$.row.threshold_depth', value -> '$.row.print_from_depth', value ->> '$.row.angle_deg',
     value ->> '$.row.scale', value ->> '$.row.shift_px[0]', value ->> '$.row.shift_px[1]',
     value ->> '$.row.scores.ssim', value ->> '$.row.scores.nl_ssim', value ->> '$.row.scores.iou',
     value ->> '$.row.scores.iou_box', value ->> '$.row.scores.dice', value ->> '$.row.scores.density_print',
-    value ->> '$.row.scores.density_depth', value ->> '$.row.margin', value ->> '$.row.at_bound',
-    unhex(value ->> 'result_hash')
-FROM json_each(?1) WHERE true
-ON CONFLICT (pair, metric) DO UPDATE SET threshold_level = excluded.threshold_level,
-    threshold_depth = excluded.threshold_depth, print_from_depth = excluded.print_from_depth,
-    angle_deg = excluded.angle_deg, scale = excluded.scale, shift_x_px = excluded.shift_x_px,
-    shift_y_px = excluded.shift_y_px, ssim = excluded.ssim, nl_ssim = excluded.nl_ssim, iou = excluded.iou,
-    iou_box = excluded.iou_box, dice = excluded.dice, density_print = excluded.density_print,
-    density_depth = excluded.density_depth, margin = excluded.margin, at_bound = excluded.at_bound,
-    result_hash = excluded.result_hash";
+    value ->> '$.row.scores.density_depth', value ->> '$.row.margin', value ->> '$.row.confidence',
+    value ->> '$.row.at_bound', unhex(value ->> 'result_hash')
+FROM json_each(?1)";
 
 const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, ms, at)
@@ -88,7 +85,9 @@ pub(super) async fn apply(
             sqlx::query(sql).bind(&results).execute(&mut *conn).await?;
         }
         let metrics = rows::array(stored.iter().flat_map(|item| metrics(item)));
-        run_over(conn, METRICS, &metrics).await?;
+        for sql in [CLEAR_METRICS, METRICS] {
+            run_over(conn, sql, &metrics).await?;
+        }
         let seen = stored.iter().map(|(lease, done)| (lease, &done.inputs));
         store_seen(conn, seen).await?;
     }

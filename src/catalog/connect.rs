@@ -6,7 +6,7 @@ use std::time::Duration;
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
-use sqlx::{ConnectOptions, SqliteConnection};
+use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
 
 use super::{CatalogError, Result};
 
@@ -15,11 +15,11 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Marks a database as a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
 /// Version of the schema, raised by each migration.
-const SCHEMA_VERSION: i64 = 1;
+const SCHEMA_VERSION: i64 = 2;
 /// Read connections of a process.
 const READERS: u32 = 4;
 
-static MIGRATOR: sqlx::migrate::Migrator = sqlx::migrate!("./migrations");
+pub(super) static MIGRATOR: sqlx::migrate::Migrator = sqlx::migrate!("./migrations");
 
 /// What every connection has in common.
 fn options(path: &Path) -> SqliteConnectOptions {
@@ -75,7 +75,8 @@ pub(super) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection
     Ok(conn)
 }
 
-/// Connections that only read. They never wait for the writer, nor the writer for them.
+/// Connections that only read. They never wait for the writer, nor the writer for them. The catalog of an older
+/// version of the program is brought up to date first.
 pub(super) async fn readers(path: &Path) -> Result<SqlitePool> {
     if !path.is_file() {
         return Err(CatalogError::Missing(path.to_owned()));
@@ -85,12 +86,14 @@ pub(super) async fn readers(path: &Path) -> Result<SqlitePool> {
         .connect_with(options(path).pragma("query_only", "1"))
         .await
         .map_err(|error| foreign(path, error))?;
-    let mut conn = pool.acquire().await?;
-    match identity(&mut conn).await? {
+    let found = identity(&mut *pool.acquire().await?).await?;
+    match found {
         (APPLICATION_ID, SCHEMA_VERSION) => {}
+        (APPLICATION_ID, version) if version < SCHEMA_VERSION => {
+            writer(path, false).await?.close().await?;
+        }
         found => return Err(wrong_identity(path, found)),
     }
-    drop(conn);
     Ok(pool)
 }
 

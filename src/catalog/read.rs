@@ -24,6 +24,8 @@ pub struct StatusCounts {
     pub stages: BTreeMap<Stage, StageCounts>,
     /// Pairs whose results were made with other settings or inputs than the current ones.
     pub stale: u64,
+    /// Pairs that are done with a result less confident than [`MetricOutcome::DOUBTFUL`].
+    pub doubtful: u64,
     /// Verdicts on current results, the newest of each reader.
     pub verdicts: BTreeMap<Verdict, u64>,
 }
@@ -158,7 +160,7 @@ pub struct PairResults {
     pub failure: Option<StoredFailure>,
     /// Results of the stages behind it, in order.
     pub stages: Vec<StageRecord>,
-    /// The metrics' results in the order of [`ThresholdMetric::ALL`]; empty unless done.
+    /// Results of the metrics that the method gave, in the order of [`ThresholdMetric::ALL`]; empty unless done.
     pub metrics: Vec<MetricRecord>,
     /// The true alignment as given, where there is one.
     pub truth: Option<Value>,

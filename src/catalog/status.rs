@@ -20,6 +20,11 @@ WHERE v.id = (
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act))
 GROUP BY v.verdict";
 
+/// The limit is that of [`MetricOutcome::DOUBTFUL`](crate::domain::MetricOutcome::DOUBTFUL), written out for the index.
+pub(super) const DOUBTFUL: &str = "
+SELECT count(DISTINCT m.pair) FROM metric_result AS m JOIN job AS j ON j.pair = m.pair
+WHERE m.confidence < 0.5 AND j.status = 3";
+
 impl Catalog {
     /// Counts for `status`; `recipes` are the current ones, to tell what is stale.
     ///
@@ -38,6 +43,10 @@ impl Catalog {
             jobs: query::by_status(&counted),
             stages: by_stage(&counted),
             stale: staleness::count(&mut conn, recipes).await?,
+            doubtful: sqlx::query_scalar::<_, i64>(DOUBTFUL)
+                .fetch_one(&mut *conn)
+                .await?
+                .unsigned_abs(),
             verdicts: verdicts(&mut conn).await?,
         })
     }

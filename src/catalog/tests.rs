@@ -1,5 +1,6 @@
 //! The protocol, statement by statement, on a real database file.
 
+mod migration;
 mod model;
 mod plans;
 mod protocol;
@@ -176,6 +177,7 @@ fn metric(metric: ThresholdMetric) -> MetricOutcome {
             density_depth: 0.31,
         },
         margin: 0.2,
+        confidence: Some(0.1 + 0.2),
         at_bound: false,
     }
 }

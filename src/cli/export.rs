@@ -34,9 +34,11 @@ pub(super) enum Form {
 
 pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.reader().await?;
+    let config = context.settings()?.config;
     let options = JsonlOptions {
+        metrics: config.stages.normalize.method.metrics(),
         with_times: args.with_times,
-        limits: context.settings()?.config.limits.image,
+        limits: config.limits.image,
     };
     let summary = match args.to {
         Form::Jsonl => to_jsonl(&catalog, &project, &args.output, options).await?,

@@ -23,10 +23,10 @@ pub(super) struct SheetArgs {
     /// The PNG to write [default: sheet.png in the project]
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
-    /// Whose results: `nl_ssim`, density or ensemble
+    /// Whose results: `nl_ssim`, density, ensemble or relief
     #[arg(long, default_value = "ensemble")]
     pub(super) metric: ThresholdMetric,
-    /// What comes first: worst, score, margin or name
+    /// What comes first: worst, score, margin, confidence (the least confident) or name
     #[arg(long, default_value = "worst")]
     pub(super) order: SheetOrder,
     /// Most pairs on the sheet
@@ -87,7 +87,10 @@ pub(super) async fn write(args: &SheetArgs, context: &Context) -> anyhow::Result
     let sheet = draw_sheet(&catalog, &project, options).await?;
     catalog.close().await;
     if sheet.shown == 0 {
-        let text = "no pair is finished yet, so there is nothing to show".to_owned();
+        let text = format!(
+            "no pair has a result of {} yet, so there is nothing to show",
+            args.metric
+        );
         return Err(Refusal::NothingSelected(text).into());
     }
     let path = match &args.output {

@@ -138,13 +138,12 @@ impl Page<'_> {
         if metrics.is_empty() {
             return String::new();
         }
-        let head =
-            "  metric,angle °,scale,shift px,threshold,ssim,iou,iou box,dice,margin,verdicts";
+        let head = "  metric,angle °,scale,shift px,threshold,ssim,iou,iou box,dice,margin,confidence,verdicts";
         let mut rows = vec![head.split(',').map(ToOwned::to_owned).collect()];
         rows.extend(metrics.iter().map(metric_row));
-        let mut aligns = [Align::Right; 11];
+        let mut aligns = [Align::Right; 12];
         aligns[0] = Align::Left;
-        aligns[10] = Align::Left;
+        aligns[11] = Align::Left;
         format!(
             "{}{}",
             heading("result", self.palette),
@@ -266,6 +265,9 @@ fn metric_row(record: &MetricRecord) -> Vec<String> {
         format!("{:.3}", result.scores.iou_box),
         format!("{:.3}", result.scores.dice),
         format!("{:.3}", result.margin),
+        result
+            .confidence
+            .map_or_else(|| "-".to_owned(), |sure| format!("{sure:.3}")),
         format!("{}{bound}", verdicts(record)),
     ]
 }

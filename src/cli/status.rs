@@ -12,7 +12,7 @@ use super::progress::CLEAR;
 use super::table::{Align, columns, count};
 use super::talk::{self, Palette, Tone};
 use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
-use crate::domain::{JobStatus, Stage, Verdict};
+use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict};
 use crate::runner;
 
 /// Arguments of `status`.
@@ -105,6 +105,7 @@ fn screen(view: &View, dir: &str, palette: Palette) -> String {
         let text = format!("{pairs} ran with other settings or files than those of now");
         parts.push(line("stale", &text));
     }
+    parts.extend(doubtful_line(&view.counts).map(|text| line("doubtful", &text)));
     parts.extend(verdict_line(&view.counts).map(|text| line("verdicts", &text)));
     parts.concat()
 }
@@ -170,6 +171,16 @@ fn stage_table(counts: &StatusCounts, palette: Palette) -> String {
     )
 }
 
+fn doubtful_line(counts: &StatusCounts) -> Option<String> {
+    (counts.doubtful > 0).then(|| {
+        let pairs = count(counts.doubtful, "done pair");
+        format!(
+            "{pairs} with a confidence below {}",
+            MetricOutcome::DOUBTFUL
+        )
+    })
+}
+
 fn verdict_line(counts: &StatusCounts) -> Option<String> {
     let of = |verdict: Verdict| counts.verdicts.get(&verdict).copied().unwrap_or(0);
     let total: u64 = Verdict::ALL.into_iter().map(of).sum();
@@ -191,6 +202,9 @@ fn next_steps(view: &View) -> Vec<String> {
     }
     if let Some(first) = view.failures.first() {
         steps.push(format!("show {}", first.name));
+    }
+    if view.counts.doubtful > 0 {
+        steps.push("sheet --order confidence".to_owned());
     }
     if view.jobs(JobStatus::Done) > 0 && !running {
         steps.push("report".to_owned());
@@ -215,6 +229,7 @@ mod tests {
                 jobs: [(JobStatus::Done, done), (JobStatus::Ready, ready)].into(),
                 stages: Stage::ALL.map(|name| (name, stage)).into(),
                 stale: 0,
+                doubtful: 0,
                 verdicts: std::collections::BTreeMap::new(),
             },
             failures: super::Failures::default(),
@@ -239,5 +254,16 @@ mod tests {
         assert_eq!(next_steps(&view(0, 0)), ["import pairs.csv"]);
         assert_eq!(next_steps(&view(0, 2)), ["run"]);
         assert_eq!(next_steps(&view(2, 0)), ["report"]);
+    }
+
+    #[test]
+    fn doubtful_pairs_are_said_with_how_to_look_at_them() {
+        let mut doubtful = view(3, 0);
+        assert!(!screen(&doubtful, "demo", Palette::PLAIN).contains("doubtful"));
+        doubtful.counts.doubtful = 1;
+        let text = screen(&doubtful, "demo", Palette::PLAIN);
+        let line = "doubtful   1 done pair with a confidence below 0.5\n";
+        assert!(text.ends_with(line), "{text}");
+        assert_eq!(next_steps(&doubtful)[0], "sheet --order confidence");
     }
 }

@@ -38,7 +38,7 @@ pub(super) struct SetArgs {
     /// Who read it
     #[arg(long, value_name = "NAME", value_parser = reader_name)]
     pub(super) reader: String,
-    /// One metric's result: `nl_ssim`, density or ensemble [default: all three]
+    /// One metric's result: `nl_ssim`, density, ensemble or relief [default: all there are]
     #[arg(long)]
     pub(super) metric: Option<ThresholdMetric>,
     /// Why it failed: angle, `strokes_lost`, `background_in`, `shift_or_scale`, mirrored or `wrong_pair`

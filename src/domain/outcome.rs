@@ -131,7 +131,8 @@ pub struct NormalizeOutcome {
     pub mirrored_score: Option<f64>,
     /// Whether the pose search ended at a bound of its scale or shift.
     pub search_at_bound: bool,
-    /// One choice a metric; without the ensemble where that is settled by registering the others.
+    /// One choice a metric that the method gives; without the ensemble where that is settled by registering the
+    /// others.
     pub thresholds: Vec<ThresholdChoice>,
 }
 
@@ -175,13 +176,21 @@ pub struct MetricOutcome {
     pub scores: Scores,
     /// Best search score less the best of any other pose (another angle, or mirrored); above 0 is right.
     pub margin: f64,
+    /// Calibrated chance, 0..=1, that this alignment is right: angle within 5 degrees and landmarks within 5 % of the
+    /// character's height. `None` under a method that gives none.
+    pub confidence: Option<f64>,
     /// Whether the search ended at a bound of angle, scale or shift.
     pub at_bound: bool,
+}
+
+impl MetricOutcome {
+    /// Results with less confidence than this are worth a look before they are used.
+    pub const DOUBTFUL: f64 = 0.5;
 }
 
 /// Numbers of the register stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RegisterOutcome {
-    /// One result a metric, in the order of [`ThresholdMetric::ALL`].
+    /// One result a metric that the method gives, in the order of [`ThresholdMetric::ALL`].
     pub metrics: Vec<MetricOutcome>,
 }

@@ -23,6 +23,8 @@ const PAGE: usize = 64;
 /// What to export.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct JsonlOptions {
+    /// Metrics that the method in force gives; a pair without result has a line for each.
+    pub metrics: &'static [ThresholdMetric],
     /// Whether to write computing times; the bytes then differ from run to run.
     pub with_times: bool,
     /// Limits on the print images.
@@ -142,10 +144,11 @@ fn pair_lines(
 ) -> Result<PairLines, ExportError> {
     let name = pair.facts.name.clone();
     if pair.metrics.is_empty() {
-        let lines = all_metrics(|metric| Line::without_result(pair, metric));
+        let metrics = options.metrics.iter();
+        let lines = metrics.map(|metric| Line::without_result(pair, *metric));
         return Ok(PairLines {
             name,
-            lines,
+            lines: lines.collect(),
             unreadable: None,
         });
     }
@@ -160,9 +163,11 @@ fn pair_lines(
             // Half of a pair's files would look like all of them.
             let _ = std::fs::remove_dir_all(root.join(PAIRS).join(name.as_str()));
             let failure = Failure::new(FailureClass::Io, error.to_string());
+            let metrics = pair.metrics.iter().map(|record| record.outcome.metric);
+            let lines = metrics.map(|metric| Line::unreadable(pair, metric, &failure));
             Ok(PairLines {
                 name,
-                lines: all_metrics(|metric| Line::unreadable(pair, metric, &failure)),
+                lines: lines.collect(),
                 unreadable: Some(failure.message),
             })
         }
@@ -197,10 +202,6 @@ fn finished_lines(
         });
     }
     Ok(lines)
-}
-
-fn all_metrics(line: impl Fn(ThresholdMetric) -> Line) -> Vec<Line> {
-    ThresholdMetric::ALL.into_iter().map(line).collect()
 }
 
 /// `pairs.jsonl` while it is written.

@@ -81,6 +81,8 @@ pub struct Numbers {
     pub density_print: Option<f64>,
     /// Share of the canvas that is stroke top.
     pub density_depth: Option<f64>,
+    /// Calibrated chance that the alignment is right, 0..=1; null under a method that gives none.
+    pub confidence: Option<f64>,
 }
 
 /// Maps between frames, row-major.
@@ -197,6 +199,7 @@ impl Numbers {
             dice: Some(scores.dice),
             density_print: Some(scores.density_print),
             density_depth: Some(scores.density_depth),
+            confidence: outcome.confidence,
         }
     }
 }
@@ -251,7 +254,7 @@ mod tests {
     use serde_json::{Value, json};
 
     /// The fields in the order the interface gives them.
-    const FIELDS: [&str; 28] = [
+    const FIELDS: [&str; 29] = [
         "id",
         "metric",
         "status",
@@ -269,6 +272,7 @@ mod tests {
         "dice",
         "density_print",
         "density_depth",
+        "confidence",
         "print_from_mesh",
         "plane_from_mesh",
         "depth_from_plane",

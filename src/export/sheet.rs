@@ -24,13 +24,21 @@ pub enum SheetOrder {
     Score,
     /// The smallest lead over the next best pose.
     Margin,
+    /// The least confident; those without a confidence last.
+    Confidence,
     /// The first name.
     Name,
 }
 
 impl SheetOrder {
     /// Every order.
-    pub const ALL: [Self; 4] = [Self::Worst, Self::Score, Self::Margin, Self::Name];
+    pub const ALL: [Self; 5] = [
+        Self::Worst,
+        Self::Score,
+        Self::Margin,
+        Self::Confidence,
+        Self::Name,
+    ];
 
     /// Name on the command line.
     pub const fn name(self) -> &'static str {
@@ -38,6 +46,7 @@ impl SheetOrder {
             Self::Worst => "worst",
             Self::Score => "score",
             Self::Margin => "margin",
+            Self::Confidence => "confidence",
             Self::Name => "name",
         }
     }
@@ -56,7 +65,9 @@ impl std::str::FromStr for SheetOrder {
         Self::ALL
             .into_iter()
             .find(|order| order.name() == text)
-            .ok_or_else(|| format!("{text:?} is not an order (worst, score, margin, name)"))
+            .ok_or_else(|| {
+                format!("{text:?} is not an order (worst, score, margin, confidence, name)")
+            })
     }
 }
 
@@ -184,6 +195,7 @@ fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &SheetOptions)
         SheetOrder::Worst => truth.map_or(score, |errors| -errors.severity()),
         SheetOrder::Score => score,
         SheetOrder::Margin => record.outcome.margin,
+        SheetOrder::Confidence => record.outcome.confidence.unwrap_or(f64::INFINITY),
         SheetOrder::Name => 0.0,
     }
 }
@@ -194,7 +206,7 @@ fn cell(project: &Project, candidate: &Candidate, options: &SheetOptions) -> She
     let off_truth = candidate.truth.is_some_and(|errors| !errors.pass());
     let (tiles, trouble) = tiles(project, pair, options);
     SheetCell {
-        id: title(pair, standing),
+        id: title(pair, options.metric),
         note: trouble.unwrap_or_else(|| note(candidate, options.metric)),
         wrong: pair.metric(options.metric).is_none()
             || off_truth
@@ -203,12 +215,16 @@ fn cell(project: &Project, candidate: &Candidate, options: &SheetOptions) -> She
     }
 }
 
-/// The id, and what readers say where anybody has.
-fn title(pair: &PairResults, standing: Option<Standing>) -> String {
-    match standing.and_then(Standing::verdict) {
-        Some(verdict) => format!("{}  {verdict}", pair.facts.name),
-        None => pair.facts.name.to_string(),
+/// The id, how sure the result is where that is known, and what readers say where anybody has.
+fn title(pair: &PairResults, metric: ThresholdMetric) -> String {
+    let mut title = pair.facts.name.to_string();
+    if let Some(record) = pair.metric(metric) {
+        let sure = record.outcome.confidence;
+        title.extend(sure.map(|sure| format!("  sure {sure:.2}")));
+        let verdict = Standing::of(record).verdict();
+        title.extend(verdict.map(|verdict| format!("  {verdict}")));
     }
+    title
 }
 
 /// The numbers of a pair, or why it failed.
@@ -266,8 +282,8 @@ fn tiles(
 
 #[cfg(test)]
 mod tests {
-    use super::{SheetOptions, SheetOrder, rank, wants};
-    use crate::domain::{FailureClass, PairName, ThresholdMetric};
+    use super::{SheetOptions, SheetOrder, rank, title, wants};
+    use crate::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
     use crate::raster;
     use crate::report::fixture;
 
@@ -294,6 +310,18 @@ mod tests {
             );
         }
         assert_eq!(rank(&failed, None, &options(SheetOrder::Name)), 0.0);
+    }
+
+    #[test]
+    fn the_least_confident_come_first_and_the_unknown_last() {
+        let order = options(SheetOrder::Confidence);
+        let (doubtful, sure) = (fixture::sure("b", 0.2), fixture::sure("a", 0.9));
+        let rank = |pair| rank(pair, None, &order);
+        assert!(rank(&doubtful) < rank(&sure));
+        assert!(rank(&sure) < rank(&fixture::done("c", 0.1, &[])));
+        assert_eq!(title(&doubtful, order.metric), "b  sure 0.20");
+        let read = fixture::done("c", 0.1, &[Verdict::Fail]);
+        assert_eq!(title(&read, order.metric), "c  fail");
     }
 
     #[test]

@@ -2,16 +2,16 @@
 
 use super::model::{Basis, Comparison};
 use super::stats::{holm, mcnemar_exact};
-use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim};
+use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
 
 /// Level below which a difference is said to be there.
 const LEVEL: f64 = 0.05;
 /// Name of the test, with what makes it that one.
 const TEST: &str = "McNemar, exact, two-sided";
 
-/// Counts of every two metrics.
+/// Counts of every two of the paper's metrics, and of the mask true to the wood against the one matched to the print.
 #[derive(Debug, Clone)]
-pub(super) struct Duels([Duel; 3]);
+pub(super) struct Duels([Duel; 4]);
 
 /// Counts of two metrics.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +25,12 @@ struct Duel {
 
 impl Default for Duels {
     fn default() -> Self {
-        let pairs = [(Ensemble, NlSsim), (Ensemble, Density), (NlSsim, Density)];
+        let pairs = [
+            (Ensemble, NlSsim),
+            (Ensemble, Density),
+            (NlSsim, Density),
+            (Relief, Ensemble),
+        ];
         Self(pairs.map(|(a, b)| Duel {
             a,
             b,
@@ -112,7 +117,7 @@ mod tests {
         let mut duels = Duels::default();
         for (times, right) in worlds {
             for _ in 0..*times {
-                duels.add(|metric| right[metric as usize]);
+                duels.add(|metric| right.get(metric as usize).copied().flatten());
             }
         }
         duels.finish(Basis::Verdicts)
@@ -144,6 +149,14 @@ mod tests {
         assert_eq!(found.len(), 1);
         assert_eq!((found[0].n, found[0].p), (4, None));
         assert_eq!(found[0].words, "right on the same pairs");
+    }
+
+    #[test]
+    fn a_metric_nobody_has_results_of_is_not_compared_and_does_not_weaken_the_others() {
+        let found = finish(&[(9, [Some(true), Some(false), Some(true)])]);
+        assert_eq!(found.len(), 3);
+        let (p, holm) = (found[1].p.expect("nine"), found[1].p_holm.expect("nine"));
+        assert!((holm - 3.0 * p).abs() < 1e-12, "{p} {holm}");
     }
 
     #[test]

@@ -32,6 +32,7 @@ pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) ->
                 density_depth: 0.21,
             },
             margin: 0.3,
+            confidence: None,
             at_bound: false,
         },
         result_hash: ContentHash::of(metric.name().as_bytes()),
@@ -59,6 +60,23 @@ pub(crate) fn done(name: &str, iou: f64, verdicts: &[Verdict]) -> PairResults {
             .collect(),
         ..pending(name)
     }
+}
+
+/// The same under the paper's method, which gives no `relief`.
+pub(crate) fn done_by_paper(name: &str, iou: f64, verdicts: &[Verdict]) -> PairResults {
+    let mut pair = done(name, iou, verdicts);
+    pair.metrics
+        .retain(|record| ThresholdMetric::PAPER.contains(&record.outcome.metric));
+    pair
+}
+
+/// A finished pair nobody has read, with the same confidence for all metrics.
+pub(crate) fn sure(name: &str, confidence: f64) -> PairResults {
+    let mut pair = done(name, 0.8, &[]);
+    for record in &mut pair.metrics {
+        record.outcome.confidence = Some(confidence);
+    }
+    pair
 }
 
 /// A pair that failed at its first stage.

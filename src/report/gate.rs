@@ -69,7 +69,7 @@ mod tests {
     fn share_at_the_limit_is_enough() {
         let half = report(&[Some(Verdict::Pass), Some(Verdict::Fail)]);
         assert!(below(&half, 0.5).is_empty());
-        assert_eq!(below(&half, 0.51).len(), 3);
+        assert_eq!(below(&half, 0.51).len(), 4);
     }
 
     #[test]
@@ -80,9 +80,18 @@ mod tests {
     #[test]
     fn complete_needs_every_result_told() {
         assert!(missing(&report(&[Some(Verdict::Pass), Some(Verdict::Fail)])).is_empty());
-        assert_eq!(missing(&report(&[Some(Verdict::Pass), None])).len(), 3);
-        assert_eq!(missing(&report(&[Some(Verdict::Unsure)])).len(), 3);
+        assert_eq!(missing(&report(&[Some(Verdict::Pass), None])).len(), 4);
+        assert_eq!(missing(&report(&[Some(Verdict::Unsure)])).len(), 4);
         assert_eq!(missing(&report(&[])), ["the project has no pairs"]);
+    }
+
+    #[test]
+    fn a_metric_that_the_method_does_not_give_is_not_missing() {
+        let mut tally = Tally::default();
+        let pair = fixture::done_by_paper("a", 0.8, &[Verdict::Pass]);
+        tally.add(&pair, &TruthFinding::default());
+        let report = tally.finish();
+        assert!(missing(&report).is_empty() && below(&report, 1.0).is_empty());
     }
 
     #[test]

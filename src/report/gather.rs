@@ -36,7 +36,7 @@ enum Unusable {
 
 /// The report of a project as its catalog stands.
 ///
-/// Memory stays the same whatever the number of pairs, but for three numbers a pair and metric where there is truth.
+/// Memory stays the same whatever the number of pairs, but for a few numbers a pair and metric where there is truth.
 ///
 /// # Errors
 /// When the catalog cannot be read.

@@ -4,6 +4,7 @@
 
 pub mod aligned;
 mod compare;
+pub mod coverage;
 #[cfg(test)]
 pub(crate) mod fixture;
 pub mod gate;
@@ -18,7 +19,8 @@ mod warnings;
 
 pub use gather::{GatherError, PAGE, finding, gather, with_truth};
 pub use model::{
-    Basis, Comparison, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock,
+    Basis, Comparison, Coverage, CoveragePoint, FailedPair, FailureGroup, Progress, Report, Row,
+    SCHEMA, TruthBlock,
 };
 pub use render::{Format, render};
 pub use standing::Standing;

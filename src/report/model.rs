@@ -16,10 +16,12 @@ pub struct Report {
     pub pairs: u64,
     /// How far they are.
     pub progress: Progress,
-    /// One row a metric, in the order of the paper's table.
+    /// One row a metric, in the order of the paper's table; `relief` last and only where there are results of it.
     pub rows: Vec<Row>,
     /// Metrics against each other, pair by pair.
     pub comparisons: Vec<Comparison>,
+    /// Accuracy against coverage, by readers and then by truth, for each metric that has confidences.
+    pub coverage: Vec<Coverage>,
     /// Pairs without result because they failed, by class.
     pub failures: Vec<FailureGroup>,
     /// What a reader of the table must know, in whole sentences.
@@ -133,6 +135,42 @@ pub struct Comparison {
     pub words: String,
 }
 
+/// How right one metric's results are when the least confident are left out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Coverage {
+    /// What counts as right.
+    pub basis: Basis,
+    /// Which metric.
+    pub metric: ThresholdMetric,
+    /// Results that have a confidence and are known to be right or wrong.
+    pub n: u64,
+    /// Of these, the wrong ones.
+    pub failures: u64,
+    /// How many the least confident 3 % are, rounded up.
+    pub least_n: u64,
+    /// The wrong ones among these.
+    pub failures_in_least: u64,
+    /// From everything kept down to half.
+    pub points: Vec<CoveragePoint>,
+}
+
+/// The results kept at one coverage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct CoveragePoint {
+    /// Share of the results that is kept, the most confident ones, 0..=1.
+    pub coverage: f64,
+    /// How many that are, rounded down.
+    pub n: u64,
+    /// Of these, the right ones.
+    pub passed: u64,
+    /// `passed / n`; `None` where nothing is kept.
+    pub acc: Option<f64>,
+    /// Wilson's 95 % interval of `acc`.
+    pub acc_ci95: Option<[f64; 2]>,
+    /// The least confidence that is kept.
+    pub least_confidence: Option<f64>,
+}
+
 /// Failed pairs of one class.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct FailureGroup {
@@ -169,6 +207,12 @@ impl Report {
     /// Whether the project holds true alignments.
     pub fn has_truth(&self) -> bool {
         self.rows.iter().any(|row| row.truth.is_some())
+    }
+
+    /// The accuracy against coverage of a metric, where it has confidences.
+    pub fn coverage(&self, basis: Basis, metric: ThresholdMetric) -> Option<&Coverage> {
+        let mut curves = self.coverage.iter();
+        curves.find(|curve| curve.basis == basis && curve.metric == metric)
     }
 
     /// The row of a metric.

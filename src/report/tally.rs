@@ -1,10 +1,12 @@
 //! Adds pairs up to a report, one at a time, without keeping them.
 //!
-//! What stays in memory a pair: three numbers a metric where there is truth, for the medians; nothing otherwise.
+//! What stays in memory a pair: three numbers a metric where there is truth, for the medians, and its confidence where
+//! it is judged; nothing otherwise.
 
 use std::collections::BTreeMap;
 
 use super::compare::Duels;
+use super::coverage::Confidences;
 use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock};
 use super::standing::Standing;
 use super::stats::{median, wilson_95};
@@ -27,9 +29,11 @@ pub struct TruthFinding {
 pub struct Tally {
     pairs: u64,
     progress: Progress,
-    columns: [Column; 3],
+    columns: [Column; ThresholdMetric::ALL.len()],
     by_verdicts: Duels,
     by_truth: Duels,
+    sure_by_verdicts: Confidences,
+    sure_by_truth: Confidences,
     failures: BTreeMap<FailureClass, FailureGroup>,
     truth_problems: TruthProblems,
 }
@@ -80,6 +84,8 @@ impl Default for Tally {
             columns: ThresholdMetric::ALL.map(Column::new),
             by_verdicts: Duels::default(),
             by_truth: Duels::default(),
+            sure_by_verdicts: Confidences::default(),
+            sure_by_truth: Confidences::default(),
             failures: BTreeMap::new(),
             truth_problems: TruthProblems::default(),
         }
@@ -97,12 +103,15 @@ impl Tally {
                 column.add(record, truth.errors.get(&column.metric));
             }
         }
-        self.by_verdicts.add(|metric| {
-            pair.metric(metric)
-                .and_then(|record| Standing::of(record).told())
-        });
-        self.by_truth
-            .add(|metric| truth.errors.get(&metric).map(TruthErrors::pass));
+        let told = |metric| Standing::of(pair.metric(metric)?).told();
+        let right = |metric| truth.errors.get(&metric).map(TruthErrors::pass);
+        let sure = |metric| pair.metric(metric)?.outcome.confidence;
+        self.by_verdicts.add(told);
+        self.by_truth.add(right);
+        self.sure_by_verdicts
+            .add(|metric| sure(metric).zip(told(metric)));
+        self.sure_by_truth
+            .add(|metric| sure(metric).zip(right(metric)));
     }
 
     fn count_status(&mut self, pair: &PairResults) {
@@ -148,9 +157,12 @@ impl Tally {
 
     /// The report over all pairs counted.
     pub fn finish(self) -> Report {
-        let rows: Vec<Row> = self.columns.into_iter().map(Column::finish).collect();
+        let told = self.columns.into_iter().filter(Column::is_told);
+        let rows: Vec<Row> = told.map(Column::finish).collect();
         let mut comparisons = self.by_verdicts.finish(Basis::Verdicts);
         comparisons.extend(self.by_truth.finish(Basis::Truth));
+        let mut coverage = self.sure_by_verdicts.finish(Basis::Verdicts);
+        coverage.extend(self.sure_by_truth.finish(Basis::Truth));
         Report {
             schema: SCHEMA,
             pairs: self.pairs,
@@ -158,6 +170,7 @@ impl Tally {
             warnings: warnings::of(self.progress, &rows, &self.truth_problems),
             rows,
             comparisons,
+            coverage,
             failures: self.failures.into_values().collect(),
         }
     }
@@ -180,6 +193,11 @@ impl Column {
             dice: 0.0,
             truth: TruthColumn::default(),
         }
+    }
+
+    /// Whether the report has a row for it: the paper's always, others where there are results.
+    fn is_told(&self) -> bool {
+        self.n > 0 || ThresholdMetric::PAPER.contains(&self.metric)
     }
 
     fn add(&mut self, record: &MetricRecord, truth: Option<&TruthErrors>) {
@@ -323,6 +341,18 @@ mod tests {
                 .all(|row| row.n == 0 && row.ssim.is_none())
         );
         assert!(report.comparisons.is_empty() && report.warnings.is_empty());
+    }
+
+    #[test]
+    fn the_papers_method_has_the_papers_rows_and_no_complaint() {
+        let mut tally = Tally::default();
+        let pair = fixture::done_by_paper("a", 0.8, &[Verdict::Pass]);
+        tally.add(&pair, &TruthFinding::default());
+        let report = tally.finish();
+        let metrics: Vec<_> = report.rows.iter().map(|row| row.metric).collect();
+        assert_eq!(metrics, ThresholdMetric::PAPER);
+        assert_eq!(report.comparisons.len(), 3);
+        assert_eq!(report.warnings, [""; 0]);
     }
 
     #[test]

@@ -124,7 +124,7 @@ pub(super) fn metric_results(
         .iter()
         .map(|outcome| {
             let seen = BTreeMap::from([
-                ("outcome", json!(outcome)),
+                ("outcome", judged(outcome)),
                 ("depth", json!(hash_of(depth, DEPTH))),
                 ("print", json!(hash_of(Some(files), CANVAS_PRINT_MASK))),
                 (
@@ -141,17 +141,39 @@ pub(super) fn metric_results(
         .collect()
 }
 
+/// The numbers that a reader judges: all but the confidence, which may be calibrated anew under the same alignment.
+fn judged(outcome: &MetricOutcome) -> Value {
+    let mut numbers = json!(outcome);
+    if let Value::Object(fields) = &mut numbers {
+        fields.remove("confidence");
+    }
+    numbers
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{INK, PAPER, UNKNOWN, print_mask, result_hash};
-    use crate::domain::ArtifactSet;
+    use super::{INK, PAPER, UNKNOWN, metric_results, print_mask, result_hash};
+    use crate::domain::{ArtifactSet, MetricOutcome, ThresholdMetric};
     use crate::raster::Mask;
+    use crate::report::fixture;
 
     #[test]
     fn ink_is_ink_wherever_it_lies() {
         let ink = Mask::from_fn(3, 1, |x, _| x == 0);
         let known = Mask::from_fn(3, 1, |x, _| x == 1);
         assert_eq!(print_mask(&ink, &known).data(), [INK, PAPER, UNKNOWN]);
+    }
+
+    #[test]
+    fn a_verdict_outlives_another_confidence_but_not_another_alignment() {
+        let hash = |change: fn(&mut MetricOutcome)| {
+            let mut outcome = fixture::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+            change(&mut outcome);
+            metric_results(&[outcome], &ArtifactSet::new(), None)[0].result_hash
+        };
+        let first = hash(|_| {});
+        assert_eq!(first, hash(|outcome| outcome.confidence = Some(0.75)));
+        assert_ne!(first, hash(|outcome| outcome.scale += 1e-9));
     }
 
     #[test]

@@ -36,7 +36,8 @@ fn readme_walk_from_demo_to_export() {
     let shown = at(&["show", id, "--json"]).expect(0).json();
     assert_eq!(shown["name"], id);
     let metrics = shown["metrics"].as_array().expect("a list");
-    assert_eq!(metrics.len(), 3);
+    let names: Vec<_> = metrics.iter().map(|metric| &metric["metric"]).collect();
+    assert_eq!(names, ["nl_ssim", "density", "ensemble", "relief"]);
     let depth = shown["files"]["depth.png"].as_str().expect("a path");
     assert!(dir.path().join(depth).is_file(), "{depth}");
 
@@ -52,7 +53,7 @@ fn readme_walk_from_demo_to_export() {
 
     at(&["export", "--to", "jsonl", "-o", "out"]).expect(0);
     let exported = lines(&dir.path().join("out/pairs.jsonl"));
-    assert_eq!(exported.len(), 3);
+    assert_eq!(exported.len(), 4);
     for line in &exported {
         assert_eq!(line["id"], id);
         for file in line["files"].as_object().expect("files").values() {
@@ -82,7 +83,7 @@ fn verdicts_count_until_they_are_taken_back(at: &dyn Fn(&[&str]) -> crate::cli::
     assert_eq!(acc(), 1.0);
     at(&["report", "--require-complete", "--fail-under", "0.98"]).expect(0);
     let log = at(&["verdict", "log", id, "--json"]).expect(0);
-    assert_eq!(log.out.lines().count(), 6);
+    assert_eq!(log.out.lines().count(), 8);
 }
 
 fn only_the_touched_stage_runs_again(at: &dyn Fn(&[&str]) -> crate::cli::Call) {
@@ -96,6 +97,40 @@ fn only_the_touched_stage_runs_again(at: &dyn Fn(&[&str]) -> crate::cli::Call) {
     assert_eq!(ran["stages"], 1);
     let back = at(&["run", "--json"]).expect(0).json();
     assert_eq!(back["stages"], 1);
+}
+
+#[test]
+fn the_papers_preset_keeps_to_its_three_metrics() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "demo"], args].concat());
+    mocban(
+        dir.path(),
+        &["demo", "demo", "--pairs", "1", "--config", "paper"],
+    )
+    .expect(0);
+    let id = "upright-0000";
+    let metrics = |value: &Value| -> Vec<String> {
+        let rows = value.as_array().expect("a list").iter();
+        rows.map(|row| row["metric"].as_str().expect("a name").to_owned())
+            .collect()
+    };
+    let paper = ["nl_ssim", "density", "ensemble"];
+    let shown = at(&["show", id, "--json"]).expect(0).json();
+    assert_eq!(metrics(&shown["metrics"]), paper);
+    assert!(shown["metrics"][0]["confidence"].is_null());
+
+    at(&["verdict", "set", id, "pass", "--reader", "lan"]).expect(0);
+    let report = at(&["report", "--require-complete", "--json"]).expect(0);
+    let report = report.json();
+    assert_eq!(metrics(&report["rows"]), paper);
+    assert_eq!(report["warnings"], serde_json::json!([]));
+    assert_eq!(report["coverage"], serde_json::json!([]));
+
+    at(&["export", "--to", "jsonl", "-o", "out"]).expect(0);
+    let exported = Value::Array(lines(&dir.path().join("out/pairs.jsonl")));
+    assert_eq!(metrics(&exported), paper);
+    let none = at(&["sheet", "--metric", "relief"]).expect(4);
+    assert!(none.err.contains("has a result of relief"), "{}", none.err);
 }
 
 #[test]

@@ -111,6 +111,7 @@ impl World {
     async fn export(&self, to: &str) -> PathBuf {
         let target = self.dir.path().join(to);
         let options = JsonlOptions {
+            metrics: &ThresholdMetric::ALL,
             with_times: false,
             limits: raster::Limits::SUGGESTED,
         };
@@ -313,12 +314,12 @@ fn failed_pair_is_told_in_both(report: &Report, export: &Path) {
     assert_eq!(report.progress.failed, 1);
     assert_eq!(report.failures[0].class.name(), "bad_input");
     let list = lines(export);
-    assert_eq!(list.len(), 9);
+    assert_eq!(list.len(), 12);
     let failed: Vec<_> = list
         .iter()
         .filter(|line| line["status"] == "failed")
         .collect();
-    assert_eq!(failed.len(), 3);
+    assert_eq!(failed.len(), 4);
     for line in failed {
         assert_eq!(line["error_class"], "bad_input");
         assert!(line["files"].is_null() && line["iou"].is_null() && line["seconds"].is_null());
@@ -357,13 +358,13 @@ async fn verdicts_make_acc(world: &World) {
         assert_eq!((row.read, row.passed, row.failed), (2, 1, 1));
         assert_eq!(row.acc, Some(0.5));
     }
-    assert_eq!(report.comparisons.len(), 6);
+    assert_eq!(report.comparisons.len(), 8);
     let verdicts: Vec<Value> = lines(&world.export("judged").await)
         .into_iter()
         .map(|line| line["verdict"].clone())
         .collect();
-    assert_eq!(verdicts[..4], ["pass", "pass", "pass", "fail"]);
-    assert!(verdicts[6].is_null());
+    assert_eq!(verdicts[..5], ["pass", "pass", "pass", "pass", "fail"]);
+    assert!(verdicts[8].is_null());
 }
 
 async fn sheet_shows_every_pair(world: &World) {

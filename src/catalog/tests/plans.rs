@@ -3,7 +3,9 @@
 use sqlx::{AssertSqlSafe, Row as _};
 
 use super::World;
-use crate::catalog::{checkpoint, claim, connect, fail, query, requeue, results, upkeep, verdicts};
+use crate::catalog::{
+    checkpoint, claim, connect, fail, query, requeue, results, status, upkeep, verdicts,
+};
 
 /// Lines of the query plan.
 async fn plan(sql: &str) -> Vec<String> {
@@ -83,6 +85,13 @@ async fn due_pairs_come_from_the_index_of_back_offs() {
         "{plan:?}"
     );
     assert_only(&plan, &["INDEX job_backoff"]);
+}
+
+#[tokio::test]
+async fn doubtful_pairs_come_from_their_index() {
+    let plan = plan(status::DOUBTFUL).await;
+    assert_only(&plan, &["m USING INDEX metric_doubtful"]);
+    assert!(plan[0].contains("INDEX metric_doubtful"), "{plan:?}");
 }
 
 #[tokio::test]

@@ -5,7 +5,8 @@ use crate::catalog::{
     Catalog, CatalogError, ClaimRequest, Dead, Kept, RetrySelection, Sentence, StageFailed,
 };
 use crate::domain::{
-    CRASH_LIMIT, Failure, FailureClass, JobStatus, LengthUnit, Stage, ThresholdMetric,
+    CRASH_LIMIT, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage,
+    ThresholdMetric,
 };
 
 fn failed(world: &World, stage: Stage, sentence: Sentence) -> StageFailed {
@@ -39,6 +40,28 @@ async fn a_pair_goes_through_four_checkpoints_and_is_read_back_whole() {
     assert_eq!(detail.attempts.len(), 4);
     assert!(detail.mesh_hash.is_some() && detail.print_hash.is_some());
     world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn pairs_below_the_limit_of_confidence_are_counted_as_doubtful() {
+    let limit = MetricOutcome::DOUBTFUL;
+    let world = World::new(4).await;
+    for confidence in [Some(limit - 1e-9), Some(limit), Some(1.0), None] {
+        let mut lease = world.claim(1).await.remove(0);
+        loop {
+            let mut done = world.done(lease.cursor());
+            for metric in &mut done.metrics {
+                metric.outcome.confidence = confidence;
+            }
+            match world.catalog.checkpoint(lease, done).await {
+                Ok(Kept::Lease(next)) => lease = next,
+                Ok(Kept::Done) => break,
+                other => panic!("the checkpoint was not kept: {other:?}"),
+            }
+        }
+    }
+    let status = world.catalog.status(&super::recipes([1; 4])).await;
+    assert_eq!(status.expect("counts").doubtful, 1);
 }
 
 #[tokio::test]

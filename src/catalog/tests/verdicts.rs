@@ -4,6 +4,9 @@ use super::{World, name};
 use crate::catalog::{Catalog, CatalogError, Kept, NewVerdict};
 use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 
+/// Results of a pair that is done.
+const METRICS: usize = ThresholdMetric::ALL.len();
+
 fn verdict(reader: &str, verdict: Verdict) -> NewVerdict {
     NewVerdict {
         pair: name("p0"),
@@ -44,11 +47,11 @@ async fn the_newest_verdict_of_each_reader_counts() {
     assert_eq!(counted(&world.catalog).await, expected);
     let status = world.catalog.status(&super::recipes([1; 4])).await;
     let status = status.expect("a read");
-    assert_eq!(status.verdicts[&Verdict::Fail], 3);
+    assert_eq!(status.verdicts[&Verdict::Fail], METRICS as u64);
     assert_eq!(status.verdicts[&Verdict::Pass], 0);
     assert_eq!(
         world.catalog.verdict_log(None).await.expect("a log").len(),
-        9
+        3 * METRICS
     );
 }
 
@@ -65,7 +68,7 @@ async fn undo_takes_back_the_newest_act_and_the_log_keeps_both() {
     }
     let undone = world.catalog.verdict_undo(Some("ana"), 6).await;
     let undone = undone.expect("taken back");
-    assert_eq!(undone.len(), 3);
+    assert_eq!(undone.len(), METRICS);
     assert!(undone.iter().all(|event| event.verdict == Verdict::Fail));
     assert_eq!(
         counted(&world.catalog).await,
@@ -80,7 +83,7 @@ async fn undo_takes_back_the_newest_act_and_the_log_keeps_both() {
     assert!(matches!(nothing, Err(CatalogError::NothingToUndo(_))));
     let log = world.catalog.verdict_log(Some(&name("p0"))).await;
     let log = log.expect("a log");
-    assert!(log.len() == 6 && log.iter().all(|event| event.undone_at.is_some()));
+    assert!(log.len() == 2 * METRICS && log.iter().all(|event| event.undone_at.is_some()));
 }
 
 #[tokio::test]
@@ -136,6 +139,35 @@ async fn a_new_result_does_not_inherit_a_verdict_and_the_same_result_keeps_it() 
     let results = detail.expect("the pair").results;
     let first = results.metric(ThresholdMetric::NlSsim).expect("the metric");
     assert_eq!(first.older_verdicts, 1);
+}
+
+#[tokio::test]
+async fn a_metric_that_the_new_method_does_not_give_cannot_be_judged_any_more() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let again = crate::catalog::Again::All(Stage::Register);
+    let sent = world
+        .catalog
+        .send_back(&super::recipes([1; 4]), None, again)
+        .await;
+    assert_eq!(sent.expect("sent back"), 1);
+    let lease = world.claim(1).await.remove(0);
+    let mut done = world.done(Stage::Register);
+    let gone = done.metrics.pop().expect("a metric").outcome.metric;
+    let left: Vec<_> = done.metrics.iter().map(|m| m.outcome).collect();
+    done.outcome = serde_json::json!({ "metrics": left }).to_string();
+    let kept = world.catalog.checkpoint(lease, done).await;
+    assert!(matches!(kept, Ok(Kept::Done)));
+    let all = verdict("ana", Verdict::Pass);
+    let one = NewVerdict {
+        metric: Some(gone),
+        ..all.clone()
+    };
+    let refused = world.catalog.verdict_set(vec![one], 5).await;
+    assert!(matches!(refused, Err(CatalogError::NoMetricResult(_, metric)) if metric == gone));
+    world.catalog.verdict_set(vec![all], 6).await.expect("set");
+    let log = world.catalog.verdict_log(None).await.expect("a log");
+    assert_eq!(log.len(), left.len());
 }
 
 #[tokio::test]

@@ -1,8 +1,9 @@
 //! The report as CSV (RFC 4180): one line a metric, numbers in full.
 
-use crate::report::model::{Report, Row, TruthBlock};
+use crate::report::coverage::{KEPT_PERCENT, LEAST_PERCENT};
+use crate::report::model::{Basis, Coverage, CoveragePoint, Report, Row, TruthBlock};
 
-/// Names of the columns, in order.
+/// Names of the columns, in order; those of [`coverage_names`] follow, for readers and then for truth.
 const COLUMNS: [&str; 26] = [
     "metric",
     "n",
@@ -34,11 +35,65 @@ const COLUMNS: [&str; 26] = [
 
 /// The report as CSV. What does not exist is an empty field.
 pub(super) fn render(report: &Report) -> String {
-    let mut text = line(COLUMNS.iter().map(|name| field(name)));
+    let names = COLUMNS.map(field).into_iter();
+    let mut text = line(names.chain(BASES.into_iter().flat_map(coverage_names)));
     for row in &report.rows {
-        text += &line(fields(row).into_iter());
+        let curves = BASES.map(|basis| report.coverage(basis, row.metric));
+        let numbers = curves.into_iter().flat_map(coverage_fields);
+        text += &line(fields(row).into_iter().chain(numbers));
     }
     text
+}
+
+/// Both judges, in the order of their columns.
+const BASES: [Basis; 2] = [Basis::Verdicts, Basis::Truth];
+
+/// Columns of accuracy against coverage; `acc_at_97` is the Acc of the 97 % most confident results.
+fn coverage_names(basis: Basis) -> Vec<String> {
+    let judge = match basis {
+        Basis::Verdicts => "",
+        Basis::Truth => "truth_",
+    };
+    let mut names = vec![
+        format!("{judge}confidence_n"),
+        format!("{judge}confidence_failures"),
+        format!("{judge}confidence_failures_in_least_{LEAST_PERCENT}"),
+    ];
+    names.extend(KEPT_PERCENT.iter().flat_map(|percent| {
+        [
+            format!("{judge}acc_at_{percent}"),
+            format!("{judge}acc_at_{percent}_ci95_low"),
+            format!("{judge}acc_at_{percent}_ci95_high"),
+            format!("{judge}least_confidence_at_{percent}"),
+        ]
+    }));
+    names
+}
+
+fn coverage_fields(curve: Option<&Coverage>) -> Vec<String> {
+    let count = |read: fn(&Coverage) -> u64| {
+        curve.map_or_else(String::new, |curve| read(curve).to_string())
+    };
+    let mut fields = vec![
+        count(|curve| curve.n),
+        count(|curve| curve.failures),
+        count(|curve| curve.failures_in_least),
+    ];
+    for i in 0..KEPT_PERCENT.len() {
+        fields.extend(point_fields(curve.and_then(|curve| curve.points.get(i))));
+    }
+    fields
+}
+
+fn point_fields(point: Option<&CoveragePoint>) -> [String; 4] {
+    let [low, high] = bounds(point.and_then(|point| point.acc_ci95));
+    let value = |read: fn(&CoveragePoint) -> Option<f64>| number(point.and_then(read));
+    [
+        value(|point| point.acc),
+        low,
+        high,
+        value(|point| point.least_confidence),
+    ]
 }
 
 fn fields(row: &Row) -> Vec<String> {
@@ -115,7 +170,7 @@ fn line(fields: impl Iterator<Item = String>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{COLUMNS, field, render};
+    use super::{BASES, COLUMNS, coverage_names, field, render};
     use crate::domain::Verdict;
     use crate::report::{Tally, TruthFinding, fixture};
 
@@ -132,23 +187,46 @@ mod tests {
         );
         let text = render(&tally.finish());
         let lines: Vec<&str> = text.split("\r\n").collect();
-        assert_eq!(lines.len(), 5);
-        assert_eq!(lines[4], "");
-        for line in &lines[..4] {
-            assert_eq!(line.split(',').count(), COLUMNS.len(), "{line}");
+        assert_eq!(lines.len(), 6);
+        assert_eq!(lines[5], "");
+        for line in &lines[..5] {
+            let coverage: usize = BASES.map(|basis| coverage_names(basis).len()).iter().sum();
+            assert_eq!(line.split(',').count(), COLUMNS.len() + coverage, "{line}");
         }
         let golden = "nl_ssim,2,1,1,0,0,0,0,1,0.20654931437723745,1,0.81,0.82,0.75,0.9,";
         assert!(lines[1].starts_with(golden), "{}", lines[1]);
-        assert!(lines[1].ends_with(",1,1.5,2,0.9,0"), "{}", lines[1]);
+        let truth: Vec<_> = lines[1].split(',').take(COLUMNS.len()).collect();
+        assert!(truth.join(",").ends_with(",1,1.5,2,0.9,0"), "{}", lines[1]);
     }
 
     #[test]
     fn what_is_not_there_is_an_empty_field() {
         let text = render(&Tally::default().finish());
-        assert!(
-            text.contains("\r\ndensity,0,0,0,0,0,0,0,,,,,,,,,,,,,,,,,,\r\n"),
-            "{text}"
-        );
+        let line = text.lines().nth(2).expect("density");
+        assert!(line.starts_with("density,0,0,0,0,0,0,0,"), "{line}");
+        assert!(line.split(',').skip(8).all(str::is_empty), "{line}");
+    }
+
+    #[test]
+    fn coverage_stands_under_its_names() {
+        let mut tally = Tally::default();
+        for (name, confidence, angle_deg) in [("a", 0.75, 1.0), ("b", 0.25, 90.0)] {
+            let truth = fixture::truth(angle_deg, 1.0, 0.9);
+            tally.add(&fixture::sure(name, confidence), &truth);
+        }
+        let text = render(&tally.finish());
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        let value = |name: &str| {
+            let place = lines[0].iter().position(|found| *found == name);
+            lines[4][place.expect(name)]
+        };
+        assert_eq!(value("metric"), "relief");
+        assert_eq!(value("truth_confidence_n"), "2");
+        assert_eq!(value("truth_confidence_failures_in_least_3"), "1");
+        assert_eq!(value("truth_acc_at_100"), "0.5");
+        assert_eq!(value("truth_acc_at_50"), "1");
+        assert_eq!(value("truth_least_confidence_at_50"), "0.75");
+        assert_eq!(value("acc_at_100"), "");
     }
 
     #[test]

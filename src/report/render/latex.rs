@@ -1,5 +1,6 @@
 //! The report as LaTeX tables with `booktabs` rules and `siunitx` columns.
 
+use super::coverage;
 use super::table::{self, Column, Kind, Table};
 use crate::report::model::Report;
 
@@ -12,7 +13,8 @@ pub(super) fn render(report: &Report) -> String {
     for warning in &report.warnings {
         blocks.push(format!("% Note: {}\n", comment(warning)));
     }
-    let tables = table::tables(report);
+    let mut tables = table::tables(report);
+    tables.extend(coverage::full(report));
     blocks.extend(
         tables
             .iter()
@@ -129,6 +131,7 @@ mod tests {
     Non-luminous SSIM & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
     Pixel density & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
     Ensemble & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
+    Relief & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
     \bottomrule
   \end{tabular}
 \end{table}

@@ -1,5 +1,6 @@
 //! The report as Markdown tables.
 
+use super::coverage;
 use super::table::{self, Column, Kind, Table};
 use crate::report::model::{FailureGroup, Report};
 
@@ -8,6 +9,7 @@ pub(super) fn render(report: &Report) -> String {
     let mut blocks = vec![format!("{}\n", table::headline(report))];
     for found in table::tables(report)
         .into_iter()
+        .chain(coverage::full(report))
         .chain(table::comparisons_in_words(report))
     {
         blocks.push(piped(&found));

@@ -1,5 +1,6 @@
 //! The forms a report can be printed in.
 
+mod coverage;
 mod csv;
 mod latex;
 mod markdown;
@@ -105,8 +106,9 @@ mod tests {
         let value: Value = serde_json::from_str(&text).expect("the report is JSON");
         assert_eq!((&value["schema"], &value["pairs"]), (&json!(1), &json!(1)));
         let metrics: Vec<_> = value["rows"].as_array().expect("rows").iter().collect();
-        assert_eq!(metrics.len(), 3);
-        for (row, metric) in metrics.iter().zip(["nl_ssim", "density", "ensemble"]) {
+        let names = ["nl_ssim", "density", "ensemble", "relief"];
+        assert_eq!(metrics.len(), names.len());
+        for (row, metric) in metrics.iter().zip(names) {
             assert_eq!(row["metric"], metric);
             assert_eq!(
                 (&row["n"], &row["read"], &row["passed"]),

@@ -33,21 +33,24 @@ pub(super) enum Kind {
     Number(usize),
 }
 
-const fn words(head: &'static str) -> Column {
+/// A column of words.
+pub(super) const fn words(head: &'static str) -> Column {
     Column {
         head,
         kind: Kind::Words,
     }
 }
 
-const fn interval(head: &'static str) -> Column {
+/// A column of intervals.
+pub(super) const fn interval(head: &'static str) -> Column {
     Column {
         head,
         kind: Kind::Interval,
     }
 }
 
-const fn number(head: &'static str, decimals: usize) -> Column {
+/// A column of numbers with so many decimals.
+pub(super) const fn number(head: &'static str, decimals: usize) -> Column {
     Column {
         head,
         kind: Kind::Number(decimals),
@@ -240,14 +243,17 @@ pub(super) fn headline(report: &Report) -> String {
     line
 }
 
-fn count(n: u64) -> String {
+/// A cell that counts.
+pub(super) fn count(n: u64) -> String {
     n.to_string()
 }
 
-fn fixed(value: Option<f64>, decimals: usize) -> Option<String> {
+/// A cell with so many decimals.
+pub(super) fn fixed(value: Option<f64>, decimals: usize) -> Option<String> {
     value.map(|value| format!("{value:.decimals$}"))
 }
 
-fn bounds(bounds: Option<[f64; 2]>) -> Option<String> {
+/// A cell with an interval, three decimals.
+pub(super) fn bounds(bounds: Option<[f64; 2]>) -> Option<String> {
     bounds.map(|[low, high]| format!("{low:.3}-{high:.3}"))
 }

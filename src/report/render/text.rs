@@ -1,5 +1,6 @@
 //! The report for a terminal of 80 columns.
 
+use super::coverage;
 use super::table::{self, Column, Kind, Table};
 use crate::report::model::{Comparison, FailureGroup, Report};
 
@@ -11,7 +12,10 @@ const NAMED: usize = 5;
 /// The report as aligned text.
 pub(super) fn render(report: &Report) -> String {
     let mut blocks = vec![format!("{}\n", table::headline(report))];
-    for found in table::tables(report) {
+    for found in table::tables(report)
+        .into_iter()
+        .chain(coverage::short(report))
+    {
         blocks.push(aligned(&found) + &wrapped("", &found.caption));
     }
     if !report.anybody_read() && report.progress.done > 0 {
@@ -132,6 +136,7 @@ Method             n    Acc  95% Wilson    SSIM    IoU  IoU box   Dice
 Non-luminous SSIM  3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
 Pixel density      3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
 Ensemble           3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
+Relief             3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
 Acc is the share passed of those passed or failed by readers; SSIM, IoU and Dice
 are means over the n finished pairs, by pixel; IoU box is of bounding boxes.
 
@@ -139,12 +144,14 @@ Verdicts           read  unread  passed  failed  unsure  stale
 Non-luminous SSIM     2       1       1       1       0      0
 Pixel density         2       1       1       1       0      0
 Ensemble              2       1       1       1       0      0
+Relief                2       1       1       1       0      0
 Verdicts by result; stale ones have a verdict for an older result only.
 
 Truth              n    Acc  95% Wilson   in 5°  angle °  landm. %  mask IoU
 Non-luminous SSIM  1  1.000  0.207-1.000  1.000     0.50      2.00     0.900
 Pixel density      1  1.000  0.207-1.000  1.000     0.50      2.00     0.900
 Ensemble           1  1.000  0.207-1.000  1.000     0.50      2.00     0.900
+Relief             1  1.000  0.207-1.000  1.000     0.50      2.00     0.900
 Against the true alignments. Acc here: angle within 5 degrees, landmarks within
 5 % of the character's height, mask IoU with the true stroke tops at least 0.7.
 Angle, landmarks and mask IoU are medians.

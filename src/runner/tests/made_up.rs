@@ -135,6 +135,7 @@ fn metric(metric: ThresholdMetric) -> MetricOutcome {
             density_depth: 0.5,
         },
         margin: 0.0,
+        confidence: None,
         at_bound: false,
     }
 }

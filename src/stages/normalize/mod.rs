@@ -17,11 +17,11 @@ use wrap::box_wrap;
 
 use super::ink;
 use super::score::SsimWindow;
-use crate::domain::{Affine2, FailureClass, NormalizeOutcome, Pose};
+use crate::domain::{Affine2, FailureClass, NormalizeOutcome, Pose, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, Picture};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 1;
+pub const REVISION: u32 = 2;
 
 /// When thresholds are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,6 +31,16 @@ pub enum Method {
     Aligned,
     /// Before, on both pictures wrapped by box and centroid: the paper's.
     Wrap,
+}
+
+impl Method {
+    /// The metrics that get a threshold, in the order of [`ThresholdMetric::ALL`].
+    pub const fn metrics(self) -> &'static [ThresholdMetric] {
+        match self {
+            Self::Aligned => &ThresholdMetric::ALL,
+            Self::Wrap => &ThresholdMetric::PAPER,
+        }
+    }
 }
 
 /// How the print's ink is told from its paper.

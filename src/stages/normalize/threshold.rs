@@ -11,6 +11,9 @@ use crate::stages::score::WindowMeans;
 
 /// Candidate thresholds between the first and the last cut.
 const CANDIDATES: u32 = 40;
+/// Depth under the tops at which `relief` cuts, as a share of the relief. On carvings whose tops are known the mask
+/// there agrees best with them.
+const RELIEF_CUT: f64 = 0.09;
 
 /// Both pictures on the canvas.
 pub(super) struct Canvas {
@@ -67,6 +70,7 @@ struct Tried {
 /// - `density`: the ink share closest to the print's over `ink_spread`.
 /// - `ensemble`: halfway in height between the two. Structure alone drifts to where worn tops fray, density alone
 ///   copies the print's ink spread; their errors are of opposite sign.
+/// - `relief`: a fixed share of the relief under the tops, whatever the print shows; it has no score.
 pub(super) fn choose(
     depth: &DepthMap,
     relief: &Relief,
@@ -99,6 +103,12 @@ pub(super) fn choose(
         choice(ThresholdMetric::NlSsim, structure, structure.structure),
         choice(ThresholdMetric::Density, density, -gap(density)),
         choice(ThresholdMetric::Ensemble, both, both.structure),
+        ThresholdChoice {
+            metric: ThresholdMetric::Relief,
+            level: relief.level_at(depth, RELIEF_CUT),
+            score: 0.0,
+            at_bound: false,
+        },
     ])
 }
 

@@ -168,6 +168,7 @@ fn outcome(
         shift_px: [x - u, y - v],
         scores,
         margin: alignment.margin,
+        confidence: None,
         at_bound: alignment.at_bound,
     }
 }

@@ -1,7 +1,6 @@
 //! Our registration: the poses that normalisation found, refined at full size; the best one serves every metric.
 
-use super::{Alignment, Error, Params, chosen};
-use crate::domain::ThresholdMetric;
+use super::{Alignment, Error, Params};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{Normalized, Relief, soft_stroke};
 use crate::stages::pose::{Base, Found, Layer, Loss, Refiner, Soft};
@@ -15,7 +14,7 @@ const TRIED: usize = 3;
 const CUTS: [f64; 6] = [0.05, 0.1, 0.17, 0.26, 0.37, 0.5];
 const SOFTNESS: f64 = 0.1;
 
-/// One alignment a metric: thresholds differ, the pose does not, since it is found without one.
+/// One alignment a metric that has a threshold: thresholds differ, the pose does not, since it is found without one.
 pub(super) fn align(
     depth: &DepthMap,
     normalized: &Normalized,
@@ -24,19 +23,15 @@ pub(super) fn align(
     let found = refined(depth, normalized, params).ok_or(Error::NoPose)?;
     let best = found.first().ok_or(Error::NoPose)?;
     let margin = best.score - second_best(&found, normalized);
-    ThresholdMetric::ALL
-        .into_iter()
-        .map(|metric| {
-            let (level, at_end) = chosen(normalized, metric)?;
-            Ok(Alignment {
-                metric,
-                level,
-                print_from_depth: best.fixed_from_moving,
-                margin,
-                at_bound: normalized.outcome.search_at_bound || at_end,
-            })
-        })
-        .collect()
+    let choices = normalized.outcome.thresholds.iter();
+    let alignments = choices.map(|choice| Alignment {
+        metric: choice.metric,
+        level: choice.level,
+        print_from_depth: best.fixed_from_moving,
+        margin,
+        at_bound: normalized.outcome.search_at_bound || choice.at_bound,
+    });
+    Ok(alignments.collect())
 }
 
 /// The first few poses at full size, best first; each with the cut that fits the print's strokes.

@@ -1,6 +1,6 @@
 //! Known alignments come back through all four stages.
 
-use crate::domain::PrintFromMesh;
+use crate::domain::{MetricOutcome, PrintFromMesh, ThresholdMetric};
 use crate::mesh::Mesh;
 use crate::stages::StageError;
 use crate::stages::normalize;
@@ -66,6 +66,36 @@ fn the_papers_method_aligns_an_upright_pair() {
     let results = run(&world.mesh(), &picture, &paper_settings()).expect("an alignment");
     let error = landmark_error_px(&world, &truth, &results[2].0);
     assert!(error < 4.0, "{error} px");
+}
+
+/// The metrics of results, in their order.
+fn metrics(results: &[(PrintFromMesh, MetricOutcome)]) -> Vec<ThresholdMetric> {
+    results.iter().map(|(_, outcome)| outcome.metric).collect()
+}
+
+#[test]
+fn the_papers_method_gives_the_papers_metrics_and_ours_one_more() {
+    let ((picture, _), mesh) = (print(12.0, 0.0), World::default().mesh());
+    let paper = run(&mesh, &picture, &paper_settings()).expect("an alignment");
+    let ours = run(&mesh, &picture, &settings()).expect("an alignment");
+    for (results, settings) in [(paper, paper_settings()), (ours, settings())] {
+        assert_eq!(metrics(&results), settings.normalize.method.metrics());
+    }
+}
+
+#[test]
+fn the_print_has_no_say_in_the_cut_of_relief() {
+    let ((picture, _), mesh) = (print(14.0, 3.0), World::default().mesh());
+    let mut spread = settings();
+    spread.normalize.ink_spread = 0.8;
+    let [one, other] = [settings(), spread].map(|settings| {
+        let results = run(&mesh, &picture, &settings).expect("an alignment");
+        assert_eq!(results[1].1.metric, ThresholdMetric::Density);
+        assert_eq!(results[3].1.metric, ThresholdMetric::Relief);
+        [1, 3].map(|i| results[i].1.threshold_level)
+    });
+    assert_ne!(one[0], other[0], "the print's ink moves density");
+    assert_eq!(one[1], other[1]);
 }
 
 #[test]
