@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! cargo bench --bench accuracy
-//! cargo bench --bench accuracy -- --tiers pose,hard --pairs 587 --seeds 7 --presets default
-//! cargo bench --bench accuracy -- --set register.refine=false --worst 50 --sheets sheets --pairs-csv pairs.csv
+//! cargo bench --bench accuracy -- --tiers pose,hard --pairs 587 --seeds 7 --presets default,paper
+//! cargo bench --bench accuracy -- --set register.window=uniform7 --worst 50 --sheets sheets --pairs-csv pairs.csv
 //! cargo bench --bench accuracy -- --decoys
 //! ```
 //!

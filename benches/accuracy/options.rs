@@ -27,8 +27,8 @@ pub(super) struct Options {
     /// Seeds of the data
     #[arg(long, value_delimiter = ',', default_value = "1")]
     seeds: Vec<u64>,
-    /// Presets to compare
-    #[arg(long, value_delimiter = ',', default_value = "default,paper", value_parser = preset)]
+    /// Presets to compare: default, paper
+    #[arg(long, value_delimiter = ',', default_value = "default", value_parser = preset)]
     presets: Vec<Preset>,
     /// A setting laid over each preset; repeatable
     #[arg(long = "set", value_name = "SECTION.KEY=VALUE")]

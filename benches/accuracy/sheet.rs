@@ -15,7 +15,7 @@ use super::trial::{Trial, of};
 use super::workers::in_order;
 
 /// Pairs in a row.
-const COLUMNS: usize = 5;
+const COLUMNS: usize = 4;
 /// A pixel of a tops mask that is a true stroke top.
 const TOP: u8 = 255;
 
