@@ -10,7 +10,8 @@
 //!
 //! To follow one pair: [`manifest`] reads its line, [`catalog`] keeps it, [`runner`] leases it and calls
 //! [`stages`] with what [`mesh`] and [`raster`] decoded, [`store`] and [`catalog`] take the results, and
-//! [`report`] and [`export`] tell them.
+//! [`report`] and [`export`] tell them. `benches/accuracy` gives pairs of [`demo`] straight to the stages and prints how
+//! often they are right, how far off, and how long each takes.
 //!
 //! The table below is kept by `tests/it/layers.rs`: a room imports those of its line and no others.
 //!

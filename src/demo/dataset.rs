@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::calligraphy;
-use super::glyph::Glyphs;
-use super::pair::{Pair, drawn_pair};
+use super::pair::Pair;
+use super::pairs::Pairs;
 use super::tier::Tier;
+use crate::raster::png_grey8;
 
 /// Raised whenever the same options give other bytes than before.
 const REVISION: u32 = 2;
@@ -103,10 +103,9 @@ struct Row {
 /// When a file cannot be written.
 pub fn write_dataset(dir: &Path, options: &DemoOptions) -> Result<DatasetFiles, Error> {
     let options = DemoOptions {
-        pairs: match options.tier {
-            Tier::Real => options.pairs.min(calligraphy::COUNT),
-            Tier::Upright | Tier::Pose | Tier::Hard => options.pairs,
-        },
+        pairs: options
+            .pairs
+            .min(options.tier.most_pairs().unwrap_or(u64::MAX)),
         ..*options
     };
     let seal = Seal {
@@ -140,10 +139,10 @@ fn make(dir: &Path, options: &DemoOptions) -> Result<(), Error> {
         remove_folder(&dir.join(folder))?;
         create_folder(&dir.join(folder))?;
     }
-    let glyphs = Glyphs::embedded();
+    let pairs = Pairs::new(options.tier, options.seed);
     let lines = (0..options.pairs)
         .into_par_iter()
-        .map(|index| one(dir, &glyphs, options, index))
+        .map(|index| one(dir, &pairs, index))
         .collect::<Result<Vec<_>, Error>>()?;
     let (rows, truths): (Vec<Row>, Vec<Vec<u8>>) = lines.into_iter().unzip();
     write_manifest(&dir.join("manifest.csv"), &rows)?;
@@ -151,25 +150,16 @@ fn make(dir: &Path, options: &DemoOptions) -> Result<(), Error> {
 }
 
 /// Makes one pair, writes its files, and returns its rows. Nothing else of it stays in memory.
-fn one(
-    dir: &Path,
-    glyphs: &Glyphs,
-    options: &DemoOptions,
-    index: u64,
-) -> Result<(Row, Vec<u8>), Error> {
-    let DemoOptions { seed, tier, .. } = *options;
-    let made = match tier {
-        Tier::Real => calligraphy::pair(seed, index),
-        Tier::Upright | Tier::Pose | Tier::Hard => drawn_pair(glyphs, tier, seed, index),
-    };
-    let pair = made.map_err(|source| Error::Picture {
+fn one(dir: &Path, pairs: &Pairs, index: u64) -> Result<(Row, Vec<u8>), Error> {
+    let tier = pairs.tier();
+    let pair = pairs.pair(index).map_err(|source| Error::Picture {
         id: super::pair::id_of(tier, index),
         source,
     })?;
     let row = row(&pair, tier, index);
     write(&dir.join(&row.mesh), &pair.mesh_format.encode(&pair.mesh))?;
     write(&dir.join(&row.print), &pair.print)?;
-    write(&dir.join(&pair.truth.tops_mask), &pair.tops)?;
+    write(&dir.join(&pair.truth.tops_mask), &png_grey8(&pair.tops))?;
     let truth = json_line(&dir.join("truth.jsonl"), &pair.truth)?;
     Ok((row, truth))
 }

@@ -20,10 +20,10 @@ use super::truth::{Known, TruthLine};
 use crate::domain::{ContentHash, LengthUnit};
 use crate::mesh::Mesh;
 use crate::mesh::write::MeshFormat;
-use crate::raster::png_grey8;
+use crate::raster::Grid;
 
-/// Everything about a pair, its files as bytes.
-pub(super) struct Pair {
+/// Everything about a pair in memory.
+pub struct Pair {
     /// File stem and manifest id.
     pub id: String,
     /// The character, as text.
@@ -42,8 +42,8 @@ pub(super) struct Pair {
     pub print: Vec<u8>,
     /// Its file name's ending.
     pub print_extension: &'static str,
-    /// The tops mask's file.
-    pub tops: Vec<u8>,
+    /// The tops mask in the print's frame: 255 a stroke top, 0 none, 128 left out of the score.
+    pub tops: Grid<u8>,
     /// The truth.
     pub truth: TruthLine,
 }
@@ -166,7 +166,7 @@ impl Scene {
         let frame = &printed.frame;
         Pair {
             truth: TruthLine::new(&self.id, &known, &pose, frame, rng),
-            tops: png_grey8(&known.tops_mask(frame)),
+            tops: known.tops_mask(frame),
             scanned_face_down: rng.random_bool(0.3).then(|| pose.is_face_down()),
             mesh_format: draw_format(mesh.vertices.len(), rng),
             id: self.id,
@@ -212,21 +212,14 @@ fn draw_format(vertices: usize, rng: &mut ChaCha8Rng) -> MeshFormat {
 
 #[cfg(test)]
 mod tests {
-    use super::{Pair, drawn_pair};
-    use crate::demo::calligraphy;
-    use crate::demo::glyph::Glyphs;
+    use super::Pair;
+    use crate::demo::Pairs;
     use crate::demo::tier::Tier;
     use crate::demo::truth::{LEFT_OUT, TOP};
-    use crate::raster::{Grid, decode_grey8};
+    use crate::raster::Grid;
 
     fn pair(tier: Tier, index: u64) -> Pair {
-        match tier {
-            Tier::Real => calligraphy::pair(11, index),
-            Tier::Upright | Tier::Pose | Tier::Hard => {
-                drawn_pair(&Glyphs::embedded(), tier, 11, index)
-            }
-        }
-        .expect("pictures encode")
+        Pairs::new(tier, 11).pair(index).expect("pictures encode")
     }
 
     /// The mask's value where the true map sends a mesh point, and its height in shares of the character's height.
@@ -244,12 +237,12 @@ mod tests {
         for tier in Tier::ALL {
             for index in 0..3 {
                 let pair = pair(tier, index);
-                let tops = decode_grey8(&pair.tops).expect("the mask is a PNG");
                 // A bend of 0.8 mm is a tenth of a character of 8 mm.
                 let level = if tier == Tier::Hard { 0.12 } else { 0.025 };
                 assert!((12..=40).contains(&pair.truth.landmarks.len()));
                 for landmark in &pair.truth.landmarks {
-                    let (value, height) = seen(&pair, &tops, *landmark).expect("inside the print");
+                    let (value, height) =
+                        seen(&pair, &pair.tops, *landmark).expect("inside the print");
                     assert_eq!(value, TOP, "{}", pair.id);
                     assert!(height.abs() < level, "{}: {height}", pair.id);
                 }
@@ -271,7 +264,7 @@ mod tests {
     fn mesh_is_high_where_the_tops_mask_says_so_and_low_elsewhere() {
         for tier in [Tier::Upright, Tier::Pose, Tier::Real] {
             let pair = pair(tier, 1);
-            let tops = without_rims(&decode_grey8(&pair.tops).expect("the mask is a PNG"));
+            let tops = without_rims(&pair.tops);
             let (mut tops_high, mut tops_all, mut ground_low, mut ground_all) = (0, 0, 0, 0);
             for vertex in &pair.mesh.vertices {
                 match seen(&pair, &tops, *vertex) {

@@ -26,9 +26,11 @@ pub(super) struct Pose {
 
 /// The plane of the tops in mesh coordinates: `n . x + d = 0`, n outward.
 #[derive(Debug, Clone, Copy, serde::Serialize)]
-pub(super) struct TopsPlane {
-    n: [f64; 3],
-    d: f64,
+pub struct TopsPlane {
+    /// Unit normal, out of the block.
+    pub n: [f64; 3],
+    /// Offset, mesh units.
+    pub d: f64,
 }
 
 impl Pose {

@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::calligraphy;
+
 /// How hard the built-in dataset is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -29,6 +31,14 @@ impl Tier {
             Self::Pose => "pose",
             Self::Hard => "hard",
             Self::Real => "real",
+        }
+    }
+
+    /// How many pairs there are, where they are not made from a font without end.
+    pub const fn most_pairs(self) -> Option<u64> {
+        match self {
+            Self::Upright | Self::Pose | Self::Hard => None,
+            Self::Real => Some(calligraphy::COUNT),
         }
     }
 

@@ -21,7 +21,7 @@ const NEIGHBOUR_RIM_MM: f64 = 0.2;
 
 /// One line of `truth.jsonl`.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct TruthLine {
+pub struct TruthLine {
     /// The pair.
     pub id: String,
     /// Print pixels and height from mesh coordinates.

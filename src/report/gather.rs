@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::aligned::{Aligned, AlignedError, depth_mask, same_alignment};
+use super::aligned::{Aligned, AlignedError, same_alignment};
 use super::model::Report;
 use super::tally::{Tally, TruthFinding};
-use super::truth::{TruthError, TruthErrors, TruthRecord, mask_iou};
+use super::truth::{TruthError, TruthErrors, TruthRecord, tops_iou};
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use crate::domain::MetricOutcome;
-use crate::raster::{self, DepthMap, Grid, warp_mask};
+use crate::raster::{self, DepthMap, Grid};
 use crate::store::Project;
 
 /// Pairs in memory at a time.
@@ -127,7 +127,7 @@ fn errors(
     outcome: &MetricOutcome,
 ) -> Result<TruthErrors, Unusable> {
     let found = aligned.print_from_mesh(&outcome.print_from_depth)?;
-    let iou = tops.map(|tops| tops.iou(outcome)).transpose()?;
+    let iou = tops.map(|tops| tops_iou(&tops.depth, outcome, &tops.tops));
     Ok(record.measure(&found, iou)?)
 }
 
@@ -150,13 +150,6 @@ impl Tops {
         }
         let depth = aligned.depth()?;
         Ok(Self { tops, depth })
-    }
-
-    fn iou(&self, outcome: &MetricOutcome) -> Result<f64, TruthError> {
-        let mask = depth_mask(&self.depth, outcome.threshold_level);
-        let (width, height) = (self.tops.width(), self.tops.height());
-        let aligned = warp_mask(&mask, &outcome.print_from_depth, width, height);
-        mask_iou(&aligned, &self.tops)
     }
 }
 

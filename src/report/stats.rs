@@ -71,9 +71,22 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     Some(f64::midpoint(values[half - 1], upper))
 }
 
+/// The value below which a share (0..=1) of the values lies, linear between two; `None` of nothing. Reorders the values.
+///
+/// Source: Hyndman and Fan 1996, doi:10.2307/2684934, definition 7.
+pub fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let place = share.clamp(0.0, 1.0) * values.len().checked_sub(1)? as f64;
+    let (low, high) = (
+        values[place.floor() as usize],
+        values[place.ceil() as usize],
+    );
+    Some(low + (high - low) * place.fract())
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{holm, mcnemar_exact, median, wilson_95};
+    use super::{holm, mcnemar_exact, median, quantile, wilson_95};
 
     /// Values of statsmodels 0.15.0 `proportion_confint(method="wilson")`.
     const WILSON: [(u64, u64, [f64; 2]); 8] = [
@@ -142,5 +155,17 @@ mod tests {
         assert_eq!(median(&mut [3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(&mut [4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!(median(&mut []), None);
+    }
+
+    #[test]
+    fn quantile_is_exact_at_values_and_linear_between() {
+        let mut values = [4.0, 1.0, 3.0, 2.0, 10.0];
+        let mut at = |share| quantile(&mut values, share);
+        assert_eq!([at(0.0), at(0.5), at(1.0)], [1.0, 3.0, 10.0].map(Some));
+        // NumPy 2 `quantile([1, 2, 3, 4, 10], 0.95)`.
+        let found = at(0.95).expect("there are values");
+        assert!((found - 8.8).abs() < 1e-12, "{found}");
+        assert_eq!(quantile(&mut [], 0.5), None);
+        assert_eq!(quantile(&mut [7.0], 0.3), Some(7.0));
     }
 }

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::{PairName, PrintFromMesh};
-use crate::raster::{Grid, Mask};
+use super::aligned::depth_mask;
+use crate::domain::{MetricOutcome, PairName, PrintFromMesh, Rigid3};
+use crate::raster::{DepthMap, Grid, Mask, warp_mask};
 
 /// Largest angle error that counts as right, degrees (the paper's rule).
 pub const MAX_ANGLE_DEG: f64 = 5.0;
@@ -152,6 +153,20 @@ impl TruthRecord {
         })
     }
 
+    /// Angle between the true plane's normal and that of a found plane, degrees in 0..=180.
+    ///
+    /// # Errors
+    /// When the true plane has no direction.
+    pub fn normal_error_deg(&self, plane_from_mesh: &Rigid3) -> Result<f64, TruthError> {
+        let [across, down] = self.tangents()?;
+        let [x, y, z, _] = plane_from_mesh.0[2];
+        let along = |axis: [f64; 3]| x * axis[0] + y * axis[1] + z * axis[2];
+        // Near zero the sine tells small angles that the cosine does not.
+        let sin = along(across).hypot(along(down));
+        let cos = along(self.plane.n);
+        Ok(sin.atan2(cos / length(self.plane.n)).to_degrees())
+    }
+
     /// Mean distance in the print between where landmarks are and where the found map sends them, print pixels.
     fn landmark_distance_px(&self, found: &PrintFromMesh) -> f64 {
         let sum: f64 = self
@@ -170,7 +185,7 @@ impl TruthRecord {
     fn tangents(&self) -> Result<[[f64; 3]; 2], TruthError> {
         let n = self.plane.n;
         let unit = |v: [f64; 3]| {
-            let length = v.iter().map(|c| c * c).sum::<f64>().sqrt();
+            let length = length(v);
             (length > 0.0 && length.is_finite()).then(|| v.map(|c| c / length))
         };
         let cross = |a: [f64; 3], b: [f64; 3]| {
@@ -189,6 +204,10 @@ impl TruthRecord {
         let first = unit(cross(normal, axis)).ok_or(TruthError::Normal(n))?;
         Ok([first, cross(normal, first)])
     }
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 /// The linear part of a map on the directions of a plane: print pixels along x and y.
@@ -225,6 +244,14 @@ impl Linear2 {
         let [[a, b], [c, d]] = self.0;
         (c - b).atan2(a + d).to_degrees().abs()
     }
+}
+
+/// Intersection over union of a metric's depth mask, laid on the print, with the true stroke tops.
+pub fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f64 {
+    let mask = depth_mask(depth, outcome.threshold_level);
+    let (width, height) = (tops.width(), tops.height());
+    let aligned = warp_mask(&mask, &outcome.print_from_depth, width, height);
+    mask_iou(&aligned, tops).expect("the mask was warped to the size of the tops")
 }
 
 /// Intersection over union of a depth mask with the true stroke tops, both in the print's frame.
@@ -321,6 +348,21 @@ mod tests {
         assert!(shifted.angle_deg < 1e-9);
         let upside_down = errors(&map_turned(std::f64::consts::PI, [0.0, 0.0]).0);
         assert!((upside_down.angle_deg - 180.0).abs() < 1e-9 && !upside_down.mirrored);
+    }
+
+    #[test]
+    fn normal_error_is_the_tilt_and_knows_the_other_side() {
+        let record = record();
+        let plane = |tilt_rad: f64| {
+            let (s, c) = (0.4 + tilt_rad).sin_cos();
+            let axes = [[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]];
+            Rigid3::to_frame(axes, [7.0, 0.0, 0.0])
+        };
+        let error = |tilt_deg: f64| record.normal_error_deg(&plane(tilt_deg.to_radians()));
+        for tilt_deg in [0.0, 1e-6, -3.0, 90.0, 179.0] {
+            let found = error(tilt_deg).expect("the truth is usable");
+            assert!((found - tilt_deg.abs()).abs() < 1e-9, "{found}");
+        }
     }
 
     #[test]

@@ -8,3 +8,4 @@ mod one_pair;
 mod queue;
 mod report;
 mod resume;
+mod semi_real;

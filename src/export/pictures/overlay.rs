@@ -8,6 +8,8 @@ use crate::report::aligned::depth_mask;
 
 /// Vermillion of Okabe and Ito's palette: told from ink and paper with every kind of colour vision.
 const EDGE: [u8; 3] = [213, 94, 0];
+/// Blue of the same palette: the edges of the true stroke tops.
+const TRUE_EDGE: [u8; 3] = [0, 114, 178];
 /// An edge is one pixel wide for each so many pixels of the longest side.
 const SIDE_PER_EDGE_PX: usize = 240;
 /// Longest side that a saved overlay has at least, pixels.
@@ -62,21 +64,41 @@ impl View {
 
     /// The print with the edges of the depth mask on it.
     pub fn overlay(&self, print: &Picture, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
+        let mut picture = self.print(print);
+        self.draw_edges(&mut picture, &self.laid_on(depth, outcome), EDGE);
+        picture
+    }
+
+    /// The overlay with the edges of the true stroke tops, a mask in the print's frame, below those of the depth mask.
+    pub fn overlay_on_truth(
+        &self,
+        print: &Picture,
+        tops: &Mask,
+        depth: &DepthMap,
+        outcome: &MetricOutcome,
+    ) -> Rgb {
+        let tops = warp_mask(tops, &self.from_print, self.width, self.height);
+        let mut picture = self.print(print);
+        self.draw_edges(&mut picture, &tops, TRUE_EDGE);
+        self.draw_edges(&mut picture, &self.laid_on(depth, outcome), EDGE);
+        picture
+    }
+
+    /// A metric's depth mask in the view.
+    fn laid_on(&self, depth: &DepthMap, outcome: &MetricOutcome) -> Mask {
         let view_from_depth = self.from_print.after(&outcome.print_from_depth);
         let mask = depth_mask(depth, outcome.threshold_level);
-        let mask = warp_mask(&mask, &view_from_depth, self.width, self.height);
+        warp_mask(&mask, &view_from_depth, self.width, self.height)
+    }
+
+    fn draw_edges(&self, onto: &mut Rgb, mask: &Mask, colour: [u8; 3]) {
         let reach = (self.width.max(self.height) / SIDE_PER_EDGE_PX).max(1);
-        let mut picture = self.print(print);
-        for (colour, edge) in picture
-            .data_mut()
-            .iter_mut()
-            .zip(edges(&mask, reach).data())
-        {
+        let edges = edges(mask, reach);
+        for (pixel, edge) in onto.data_mut().iter_mut().zip(edges.data()) {
             if *edge {
-                *colour = EDGE;
+                *pixel = colour;
             }
         }
-        picture
     }
 }
 
@@ -93,7 +115,7 @@ fn edges(mask: &Mask, reach: usize) -> Grid<bool> {
 
 #[cfg(test)]
 mod tests {
-    use super::{EDGE, View, edges};
+    use super::{EDGE, TRUE_EDGE, View, edges};
     use crate::domain::{Affine2, DepthScale, ThresholdMetric};
     use crate::raster::{DepthMap, Grid, Mask, Picture};
     use crate::report::fixture;
@@ -148,6 +170,19 @@ mod tests {
             row[0].abs_diff(128) <= 1 && row[row.len() - 1].abs_diff(191) <= 1,
             "{row:?}"
         );
+    }
+
+    #[test]
+    fn true_edges_are_drawn_below_those_that_were_found() {
+        let mut outcome = fixture::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+        outcome.print_from_depth = Affine2::scale_shift(1.0, [3.0, 0.0]);
+        let tops = Mask::from_fn(30, 30, |x, y| (8..12).contains(&x) && (5..25).contains(&y));
+        let view = View::of_side(&paper(), 30);
+        let picture = view.overlay_on_truth(&paper(), &tops, &depth(), &outcome);
+        let columns =
+            |colour| -> Vec<_> { (0..30).filter(|x| picture.at(*x, 15) == colour).collect() };
+        assert_eq!(columns(TRUE_EDGE), [8]);
+        assert_eq!(columns(EDGE), [11, 14]);
     }
 
     #[test]

@@ -1,0 +1,134 @@
+//! Whether pairs without a right answer are told.
+
+use mocban::demo::{Decoy, Tier};
+use mocban::domain::ThresholdMetric;
+use mocban::mesh::write::MeshFormat;
+use mocban::report::stats::quantile;
+
+use super::accuracy::share;
+use super::case::Case;
+use super::markdown::{Table, number};
+use super::method::Method;
+use super::numbers::Numbers;
+use super::options::Options;
+use super::run::{Input, Run};
+use super::trial::Trial;
+use super::workers::in_order;
+
+/// Share of the right pairs that may be told as well.
+const FALSE_ALARMS: f64 = 0.01;
+
+const NOTE: &str = "\
+Told by a stage: the pair ended in an error. Told: that, or a confidence of the metric below the level under which 1 % \
+of the preset's right pairs of all tiers lie.";
+
+/// What became of a decoy.
+pub(super) struct Answer {
+    tier: Tier,
+    kind: Decoy,
+    method: &'static str,
+    /// Confidence of the alignment, where it says so; `Err` when a stage gave up.
+    outcome: Result<Option<f64>, ()>,
+}
+
+/// Runs every kind of decoy of every pair under every method.
+pub(super) fn all(
+    cases: &[Case],
+    methods: &[Method],
+    options: &Options,
+) -> anyhow::Result<Vec<Answer>> {
+    let of_case = |index: usize| {
+        let mut answers = Vec::new();
+        for kind in Decoy::ALL {
+            let input = input(&cases[index], kind)?;
+            for method in methods {
+                answers.push(Answer {
+                    tier: cases[index].tier,
+                    kind,
+                    method: method.name,
+                    outcome: outcome(&Run::new(&input, &method.settings), options.metric)?,
+                });
+            }
+        }
+        Ok(answers)
+    };
+    let answers = in_order(cases.len(), options.workers, of_case)?;
+    Ok(answers.into_iter().flatten().collect())
+}
+
+fn input(case: &Case, kind: Decoy) -> anyhow::Result<Input> {
+    let decoy = case.pairs().decoy(kind, case.index)?;
+    Ok(Input {
+        mesh: MeshFormat::StlBinary.encode(&decoy.mesh),
+        print: decoy.print,
+    })
+}
+
+fn outcome(run: &Run, metric: ThresholdMetric) -> anyhow::Result<Result<Option<f64>, ()>> {
+    let Ok(aligned) = &run.result else {
+        return Ok(Err(()));
+    };
+    let mut numbers = Numbers::default();
+    numbers.add("metric", &aligned.metric(metric))?;
+    Ok(Ok(numbers.number("metric.confidence")))
+}
+
+/// A row for each tier, method and kind.
+pub(super) fn table(
+    options: &Options,
+    methods: &[Method],
+    trials: &[Trial],
+    answers: &[Answer],
+) -> String {
+    let heads = [
+        "tier",
+        "preset",
+        "decoy",
+        "n",
+        "told by a stage",
+        "level",
+        "told",
+    ];
+    let mut table = Table::new("Pairs without a right answer", &heads);
+    for tier in &options.tiers {
+        for method in methods {
+            let level = level(trials, method, options.metric);
+            for kind in Decoy::ALL {
+                let is_of = |answer: &&Answer| {
+                    (answer.tier, answer.method, answer.kind) == (*tier, method.name, kind)
+                };
+                let answers: Vec<_> = answers.iter().filter(is_of).collect();
+                let mut cells = vec![
+                    tier.to_string(),
+                    method.name.to_owned(),
+                    kind.name().to_owned(),
+                ];
+                cells.extend(row(&answers, level));
+                table.push(cells);
+            }
+        }
+    }
+    table.render(NOTE)
+}
+
+fn row(answers: &[&Answer], level: Option<f64>) -> [String; 4] {
+    let count = |is_told: &dyn Fn(&Answer) -> bool| {
+        let told = answers.iter().filter(|answer| is_told(answer)).count();
+        share(told, answers.len())
+    };
+    let by_stage = count(&|answer| answer.outcome.is_err());
+    let told = count(&|answer| match answer.outcome {
+        Err(()) => true,
+        Ok(confidence) => confidence.is_some_and(|sure| level.is_some_and(|level| sure < level)),
+    });
+    [answers.len().to_string(), by_stage, number(level, 3), told]
+}
+
+/// The confidence below which right pairs are told by mistake as often as is allowed.
+fn level(trials: &[Trial], method: &Method, metric: ThresholdMetric) -> Option<f64> {
+    let of_method = trials.iter().filter(|trial| trial.method == method.name);
+    let found = of_method.filter_map(|trial| trial.found(metric));
+    let right = found.filter(|found| found.errors.pass());
+    let mut sure: Vec<f64> = right.filter_map(|found| found.confidence).collect();
+    quantile(&mut sure, FALSE_ALARMS)
+}

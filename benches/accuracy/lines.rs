@@ -1,0 +1,110 @@
+//! Every number of every pair and metric as CSV, to calibrate with.
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use anyhow::Context as _;
+
+use super::times::Part;
+use super::trial::{Found, Trial};
+
+/// Columns before the outcomes' own.
+const HEADS: [&str; 13] = [
+    "tier",
+    "seed",
+    "id",
+    "character",
+    "preset",
+    "metric",
+    "failed",
+    "pass",
+    "angle_deg",
+    "mirrored",
+    "tre_pct",
+    "tops_iou",
+    "normal_deg",
+];
+
+/// Writes a line for each pair and metric, and one for each pair that failed.
+pub(super) fn write(path: &Path, trials: &[Trial]) -> anyhow::Result<()> {
+    let paths = paths(trials);
+    let text = || -> anyhow::Result<()> {
+        let mut writer = csv::Writer::from_path(path)?;
+        let parts = Part::ALL.map(|part| format!("ms.{}", part.name().replace(' ', "_")));
+        let heads = HEADS.map(str::to_owned);
+        writer.write_record(heads.iter().chain(&parts).chain(paths.iter().copied()))?;
+        for trial in trials {
+            for line in lines(trial, &paths) {
+                writer.write_record(line)?;
+            }
+        }
+        Ok(writer.flush()?)
+    };
+    text().with_context(|| path.display().to_string())
+}
+
+/// The paths that any result has, in order.
+fn paths(trials: &[Trial]) -> BTreeSet<&String> {
+    let found = trials
+        .iter()
+        .filter_map(|trial| trial.outcome.as_ref().ok());
+    found
+        .flatten()
+        .flat_map(|found| found.numbers.paths())
+        .collect()
+}
+
+fn lines(trial: &Trial, paths: &BTreeSet<&String>) -> Vec<Vec<String>> {
+    match &trial.outcome {
+        Ok(found) => found
+            .iter()
+            .map(|found| line(trial, Ok(found), paths))
+            .collect(),
+        Err(why) => vec![line(trial, Err(why), paths)],
+    }
+}
+
+fn line(trial: &Trial, found: Result<&Found, &String>, paths: &BTreeSet<&String>) -> Vec<String> {
+    let optional = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
+    let mut cells = vec![
+        trial.case.tier.to_string(),
+        trial.case.seed.to_string(),
+        trial.id.clone(),
+        trial.character.clone(),
+        trial.method.to_owned(),
+    ];
+    cells.extend(truth(found));
+    cells.push(optional(trial.normal_deg));
+    cells.extend(Part::ALL.map(|part| trial.times.ms(part).to_string()));
+    let text = |path: &&String| found.ok()?.numbers.text(path);
+    cells.extend(
+        paths
+            .iter()
+            .map(|path| text(path).unwrap_or_default().to_owned()),
+    );
+    cells
+}
+
+/// The cells from `metric` to `tops_iou`.
+fn truth(found: Result<&Found, &String>) -> [String; 7] {
+    match found {
+        Ok(Found { metric, errors, .. }) => [
+            metric.to_string(),
+            String::new(),
+            errors.pass().to_string(),
+            errors.angle_deg.to_string(),
+            errors.mirrored.to_string(),
+            errors.tre_pct.to_string(),
+            errors
+                .mask_iou
+                .map(|iou| iou.to_string())
+                .unwrap_or_default(),
+        ],
+        Err(why) => {
+            let mut cells = [const { String::new() }; 7];
+            cells[1].clone_from(why);
+            cells[2] = false.to_string();
+            cells
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Accuracy and speed of the four stages on data with known truth: the tables on which every change is judged.
+//!
+//! ```text
+//! cargo bench --bench accuracy
+//! cargo bench --bench accuracy -- --tiers pose,hard --pairs 587 --seeds 7 --presets default,paper
+//! cargo bench --bench accuracy -- --set register.window=uniform7 --worst 50 --sheets sheets --pairs-csv pairs.csv
+//! cargo bench --bench accuracy -- --decoys
+//! ```
+//!
+//! The pairs are those of `mocban demo`, made in memory from tier, seed and index, and given to the stages as a binary
+//! STL and the print's file. Neither unit nor side is told: the harder question. The tables are Markdown on the
+//! standard output. `cargo test --all-targets` runs one pair a tier, to see that the program works.
+
+mod accuracy;
+mod case;
+mod certainty;
+mod decoys;
+mod lines;
+mod markdown;
+mod method;
+mod numbers;
+mod options;
+mod run;
+mod sheet;
+mod speed;
+mod times;
+mod trial;
+mod workers;
+
+use std::io::Write as _;
+
+use clap::Parser as _;
+
+use options::Options;
+
+fn main() -> anyhow::Result<()> {
+    let options = Options::parse();
+    let (methods, cases) = (options.methods()?, options.cases());
+    let trials = trial::all(&cases, &methods, options.workers)?;
+    let mut tables = vec![
+        accuracy::table(&options.tiers, &methods, &trials),
+        speed::table(&options.tiers, &methods, &trials),
+    ];
+    tables.extend(certainty::table(&options.tiers, &methods, &trials));
+    if options.decoys {
+        let told = decoys::all(&cases, &methods, &options)?;
+        tables.push(decoys::table(&options, &methods, &trials, &told));
+    }
+    if let Some(path) = &options.pairs_csv {
+        lines::write(path, &trials)?;
+    }
+    if let Some(dir) = &options.sheets {
+        sheet::write(dir, &options, &methods, &trials)?;
+    }
+    let text = tables.join("\n");
+    Ok(std::io::stdout().write_all(text.as_bytes())?)
+}

@@ -1,0 +1,28 @@
+//! A preset with the settings laid over it.
+
+use mocban::config::{self, Preset, Sources, Start};
+use mocban::stages::Settings;
+
+/// How pairs are aligned.
+#[derive(Debug, Clone)]
+pub(super) struct Method {
+    /// Name of the preset.
+    pub(super) name: &'static str,
+    /// Settings of the stages.
+    pub(super) settings: Settings,
+}
+
+impl Method {
+    /// A preset under values as `--set` takes them. The environment has no say.
+    pub(super) fn load(preset: Preset, sets: &[String]) -> anyhow::Result<Self> {
+        let loaded = config::load(&Sources {
+            start: Start::Preset(preset),
+            env: Vec::new(),
+            sets: sets.to_vec(),
+        })?;
+        Ok(Self {
+            name: preset.name(),
+            settings: loaded.config.stages,
+        })
+    }
+}

@@ -1,0 +1,55 @@
+//! Every number of a result by its path, such as `normalize.poses.0.score`.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use serde_json::Value;
+
+/// Values as text by path; what is not there has none.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Numbers(BTreeMap<String, String>);
+
+impl Numbers {
+    /// Adds everything a value holds below `path`.
+    pub(super) fn add(&mut self, path: &str, value: &impl Serialize) -> anyhow::Result<()> {
+        self.flatten(path.to_owned(), &serde_json::to_value(value)?);
+        Ok(())
+    }
+
+    /// A value as text.
+    pub(super) fn text(&self, path: &str) -> Option<&str> {
+        self.0.get(path).map(String::as_str)
+    }
+
+    /// A value as a number.
+    pub(super) fn number(&self, path: &str) -> Option<f64> {
+        self.text(path)?.parse().ok()
+    }
+
+    /// Every path there is.
+    pub(super) fn paths(&self) -> impl Iterator<Item = &String> {
+        self.0.keys()
+    }
+
+    fn flatten(&mut self, path: String, value: &Value) {
+        match value {
+            Value::Null => {}
+            Value::String(text) => {
+                self.0.insert(path, text.clone());
+            }
+            Value::Bool(_) | Value::Number(_) => {
+                self.0.insert(path, value.to_string());
+            }
+            Value::Array(items) => {
+                for (i, item) in items.iter().enumerate() {
+                    self.flatten(format!("{path}.{i}"), item);
+                }
+            }
+            Value::Object(fields) => {
+                for (name, field) in fields {
+                    self.flatten(format!("{path}.{name}"), field);
+                }
+            }
+        }
+    }
+}

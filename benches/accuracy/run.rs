@@ -1,0 +1,122 @@
+//! A mesh and a print on their way through the stages.
+
+use mocban::domain::{FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh, ThresholdMetric};
+use mocban::mesh;
+use mocban::raster::{self, DepthMap, Picture};
+use mocban::stages::{Settings, StageError, depth, fit, normalize, register};
+
+use super::times::{Part, Times};
+
+/// What the stages are given.
+pub(super) struct Input {
+    /// A binary STL.
+    pub(super) mesh: Vec<u8>,
+    /// The print's file.
+    pub(super) print: Vec<u8>,
+}
+
+/// What became of an input.
+pub(super) struct Run {
+    /// How long each part took.
+    pub(super) times: Times,
+    /// The plane, if it came so far.
+    pub(super) fit: Option<FitOutcome>,
+    /// The alignments, or why there are none.
+    pub(super) result: Result<Aligned, Failed>,
+}
+
+/// What the stages found.
+pub(super) struct Aligned {
+    /// The plane.
+    pub(super) fit: FitOutcome,
+    /// The print as decoded.
+    pub(super) print: Picture,
+    /// The depth map.
+    pub(super) depth: DepthMap,
+    /// Numbers of the normalize stage.
+    pub(super) normalize: NormalizeOutcome,
+    /// One alignment a metric.
+    pub(super) metrics: Vec<MetricOutcome>,
+}
+
+/// Why nothing was found.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Failed {
+    /// The mesh cannot be read.
+    #[error(transparent)]
+    Mesh(#[from] mesh::Error),
+    /// The print cannot be read.
+    #[error(transparent)]
+    Print(#[from] raster::DecodeError),
+    /// A stage gave up.
+    #[error(transparent)]
+    Stage(#[from] StageError),
+}
+
+impl Run {
+    /// Reads an input and runs the four stages on it.
+    pub(super) fn new(input: &Input, settings: &Settings) -> Self {
+        let (mut times, mut fit) = (Times::default(), None);
+        let result = align(input, settings, &mut times, &mut fit);
+        Self { times, fit, result }
+    }
+}
+
+/// The way of an input; `fit` keeps the plane when a later stage gives up.
+fn align(
+    input: &Input,
+    settings: &Settings,
+    times: &mut Times,
+    fit: &mut Option<FitOutcome>,
+) -> Result<Aligned, Failed> {
+    let mesh = times.book(Part::ReadMesh, || {
+        mesh::read(&input.mesh, "mesh.stl", &mesh::Limits::SUGGESTED)
+    })?;
+    let print = times.book(Part::ReadPrint, || {
+        raster::decode(&input.print, &raster::Limits::SUGGESTED)
+    })?;
+    let plane = times
+        .book(Part::Fit, || {
+            fit::fit(&mesh, Some(&print), None, &settings.fit)
+        })
+        .map_err(StageError::from)?;
+    let plane = &*fit.insert(plane);
+    let depth = times
+        .book(Part::Depth, || {
+            depth::depth(&mesh, plane, None, &settings.depth)
+        })
+        .map_err(StageError::from)?;
+    let normalized = times
+        .book(Part::Normalize, || {
+            normalize::normalize(&depth, &print, &settings.normalize)
+        })
+        .map_err(StageError::from)?;
+    let registered = times
+        .book(Part::Register, || {
+            register::register(&depth, &normalized, &settings.register)
+        })
+        .map_err(StageError::from)?;
+    Ok(Aligned {
+        fit: plane.clone(),
+        print,
+        depth,
+        normalize: normalized.outcome,
+        metrics: registered.outcome.metrics,
+    })
+}
+
+impl Aligned {
+    /// A metric's alignment.
+    pub(super) fn metric(&self, metric: ThresholdMetric) -> Option<&MetricOutcome> {
+        self.metrics.iter().find(|found| found.metric == metric)
+    }
+
+    /// The three maps put together.
+    pub(super) fn print_from_mesh(&self, found: &MetricOutcome) -> PrintFromMesh {
+        PrintFromMesh::new(
+            &found.print_from_depth,
+            &self.depth.scale.depth_from_plane,
+            &self.fit.plane_from_mesh,
+        )
+    }
+}

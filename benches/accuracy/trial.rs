@@ -1,0 +1,144 @@
+//! A pair aligned by a method, held against the truth.
+
+use std::num::NonZeroUsize;
+
+use mocban::demo::{Pair, Tier};
+use mocban::domain::{MetricOutcome, ThresholdMetric};
+use mocban::report::truth::{TruthErrors, TruthRecord, tops_iou};
+
+use super::case::Case;
+use super::method::Method;
+use super::numbers::Numbers;
+use super::run::{Aligned, Run};
+use super::times::Times;
+use super::workers::in_order;
+
+/// What became of a pair under a method.
+pub(super) struct Trial {
+    /// The pair.
+    pub(super) case: Case,
+    /// Its id within tier and seed.
+    pub(super) id: String,
+    /// What it shows.
+    pub(super) character: String,
+    /// Name of the method.
+    pub(super) method: &'static str,
+    /// Vertices of the mesh, each counted once.
+    pub(super) vertices: usize,
+    /// How long each part took.
+    pub(super) times: Times,
+    /// Angle between the found plane's normal and the true one, degrees, if there is a plane.
+    pub(super) normal_deg: Option<f64>,
+    /// One result a metric, or why there is none.
+    pub(super) outcome: Result<Vec<Found>, String>,
+}
+
+/// A metric's alignment and how far it is from the truth.
+pub(super) struct Found {
+    /// Which metric.
+    pub(super) metric: ThresholdMetric,
+    /// Distance from the truth.
+    pub(super) errors: TruthErrors,
+    /// Intersection over union with the print's ink on the canvas.
+    pub(super) print_iou: f64,
+    /// How sure the method is, 0..=1, where it says so.
+    pub(super) confidence: Option<f64>,
+    /// Every number of the four stages.
+    pub(super) numbers: Numbers,
+}
+
+/// Runs every pair under every method, in the order of the pairs, then of the methods.
+pub(super) fn all(
+    cases: &[Case],
+    methods: &[Method],
+    workers: NonZeroUsize,
+) -> anyhow::Result<Vec<Trial>> {
+    let of_case = |index: usize| {
+        let case: &Case = &cases[index];
+        let (pair, input) = case.make()?;
+        let truth = TruthRecord::read(&serde_json::to_value(&pair.truth)?)?;
+        let trial = |method: &Method| {
+            let run = Run::new(&input, &method.settings);
+            Trial::new(*case, &pair, &truth, method, &run)
+        };
+        methods
+            .iter()
+            .map(trial)
+            .collect::<anyhow::Result<Vec<_>>>()
+    };
+    let trials = in_order(cases.len(), workers, of_case)?;
+    Ok(trials.into_iter().flatten().collect())
+}
+
+/// The trials of a tier under a method.
+pub(super) fn of<'a>(trials: &'a [Trial], tier: Tier, method: &Method) -> Vec<&'a Trial> {
+    let name = method.name;
+    trials
+        .iter()
+        .filter(|trial| trial.case.tier == tier && trial.method == name)
+        .collect()
+}
+
+impl Trial {
+    fn new(
+        case: Case,
+        pair: &Pair,
+        truth: &TruthRecord,
+        method: &Method,
+        run: &Run,
+    ) -> anyhow::Result<Self> {
+        let plane = run.fit.as_ref().map(|fit| &fit.plane_from_mesh);
+        let normal_deg = plane
+            .map(|plane| truth.normal_error_deg(plane))
+            .transpose()?;
+        let times = run.times;
+        let outcome = match &run.result {
+            Ok(aligned) => Ok(found(pair, truth, aligned)?),
+            Err(failed) => Err(failed.to_string()),
+        };
+        Ok(Self {
+            case,
+            id: pair.id.clone(),
+            character: pair.character.clone(),
+            method: method.name,
+            vertices: pair.mesh.vertices.len(),
+            times,
+            normal_deg,
+            outcome,
+        })
+    }
+
+    /// A metric's result.
+    pub(super) fn found(&self, metric: ThresholdMetric) -> Option<&Found> {
+        let found = self.outcome.as_ref().ok()?;
+        found.iter().find(|found| found.metric == metric)
+    }
+
+    /// How wrong a metric's result is, greatest where nothing was found.
+    pub(super) fn severity(&self, metric: ThresholdMetric) -> f64 {
+        self.found(metric)
+            .map_or(f64::INFINITY, |found| found.errors.severity())
+    }
+}
+
+/// The results of all metrics.
+fn found(pair: &Pair, truth: &TruthRecord, aligned: &Aligned) -> anyhow::Result<Vec<Found>> {
+    let mut shared = Numbers::default();
+    shared.add("fit", &aligned.fit)?;
+    shared.add("depth", &aligned.depth.scale)?;
+    shared.add("normalize", &aligned.normalize)?;
+    let held = |outcome: &MetricOutcome| {
+        let mut numbers = shared.clone();
+        numbers.add("metric", outcome)?;
+        let map = aligned.print_from_mesh(outcome);
+        let tops = tops_iou(&aligned.depth, outcome, &pair.tops);
+        Ok(Found {
+            metric: outcome.metric,
+            errors: truth.measure(&map, Some(tops))?,
+            print_iou: outcome.scores.iou,
+            confidence: numbers.number("metric.confidence"),
+            numbers,
+        })
+    };
+    aligned.metrics.iter().map(held).collect()
+}

@@ -1,0 +1,66 @@
+//! Real prints: photographed characters over reliefs carved from their own ink, through the four stages.
+
+use mocban::config::{self, Sources};
+use mocban::demo::{Pair, Pairs, Tier};
+use mocban::domain::{MetricOutcome, PrintFromMesh};
+use mocban::raster;
+use mocban::report::truth::{TruthErrors, TruthRecord, tops_iou};
+use mocban::stages::{Settings, StageError, depth, fit, normalize, register};
+use rayon::prelude::*;
+
+/// Largest landmark error, percent of the character's height: the truth of this tier is good to about a pixel.
+const MAX_LANDMARKS_PCT: f64 = 3.0;
+
+fn settings() -> Settings {
+    let loaded = config::load(&Sources::default()).expect("the defaults are sound");
+    loaded.config.stages
+}
+
+/// The errors of every metric. Neither unit nor side is told.
+fn aligned(pair: &Pair, settings: &Settings) -> Result<Vec<TruthErrors>, StageError> {
+    let print = raster::decode(&pair.print, &raster::Limits::SUGGESTED).expect("a picture");
+    let plane = fit::fit(&pair.mesh, Some(&print), None, &settings.fit)?;
+    let map = depth::depth(&pair.mesh, &plane, None, &settings.depth)?;
+    let normalized = normalize::normalize(&map, &print, &settings.normalize)?;
+    let registered = register::register(&map, &normalized, &settings.register)?;
+    let truth = serde_json::to_value(&pair.truth).expect("a truth is JSON");
+    let truth = TruthRecord::read(&truth).expect("the truth is sound");
+    let errors = |outcome: &MetricOutcome| {
+        let found = PrintFromMesh::new(
+            &outcome.print_from_depth,
+            &map.scale.depth_from_plane,
+            &plane.plane_from_mesh,
+        );
+        let tops = tops_iou(&map, outcome, &pair.tops);
+        truth
+            .measure(&found, Some(tops))
+            .expect("the truth is sound")
+    };
+    Ok(registered.outcome.metrics.iter().map(errors).collect())
+}
+
+#[test]
+fn every_real_print_is_aligned_with_the_relief_of_its_ink() {
+    let (pairs, settings) = (Pairs::new(Tier::Real, 31), settings());
+    let count = Tier::Real.most_pairs().expect("the real tier ends");
+    assert_eq!(count, 20);
+    let wrong: Vec<String> = (0..count)
+        .into_par_iter()
+        .flat_map_iter(|index| {
+            let pair = pairs.pair(index).expect("the pair is made");
+            match aligned(&pair, &settings) {
+                Ok(found) => found
+                    .iter()
+                    .filter_map(|errors| trouble(&pair, errors))
+                    .collect(),
+                Err(error) => vec![format!("{}: {error}", pair.id)],
+            }
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+fn trouble(pair: &Pair, errors: &TruthErrors) -> Option<String> {
+    let is_right = errors.angle_deg <= 5.0 && errors.tre_pct <= MAX_LANDMARKS_PCT;
+    (!is_right).then(|| format!("{}: {errors:?}", pair.id))
+}
