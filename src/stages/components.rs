@@ -52,6 +52,26 @@ impl Components {
             .map(|label| *label != u32::MAX && self.sizes[*label as usize] >= size)
     }
 
+    /// The pixels whose group comes within `reach` pixels, along either axis, of one of the other mask.
+    pub(super) fn near(&self, other: &Mask, reach: i64) -> Mask {
+        let mut touches = vec![false; self.sizes.len()];
+        for y in 0..self.labels.height() {
+            for x in 0..self.labels.width() {
+                let label = self.labels.at(x, y);
+                if label == u32::MAX || touches[label as usize] {
+                    continue;
+                }
+                let (x, y) = (x as i64, y as i64);
+                let around = [(reach, 0), (-reach, 0), (0, reach), (0, -reach)];
+                touches[label as usize] = around
+                    .iter()
+                    .any(|(dx, dy)| other.get(x + dx, y + dy).unwrap_or(true));
+            }
+        }
+        self.labels
+            .map(|label| *label != u32::MAX && touches[*label as usize])
+    }
+
     /// The pixels whose group reaches the border of the grid.
     pub(super) fn at_border(&self) -> Mask {
         let (width, height) = (self.labels.width(), self.labels.height());

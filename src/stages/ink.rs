@@ -14,8 +14,8 @@ const PAPER_TELLABLE: f64 = 0.945;
 const LEAST_PAPER: f64 = 0.2;
 /// White must cover at least this share of the image to count as "beyond the cut".
 const LEAST_WHITE: f64 = 0.004;
-/// Beyond this the picture as it is says clearly which class is paper.
-const CLEAR: f64 = 0.45;
+/// Both witnesses of the polarity must speak this loudly together for it to be clear.
+const CLEAR: f64 = 0.8;
 /// Least difference between ink and paper, as a share of the lighter of the two: scanners that fill but a part of
 /// their 16 bits leave dark pictures.
 const LEAST_CONTRAST: f64 = 0.08;
@@ -108,8 +108,9 @@ pub(super) fn fixed(picture: &Picture, grey: u8, speck_share: f64) -> Result<Ink
     })
 }
 
-/// Our mask: white beyond the cut left out, polarity told from the rim, paper levelled, threshold found.
-pub(super) fn levelled(picture: &Picture, speck_share: f64) -> Result<Ink, Error> {
+/// Our masks: white beyond the cut left out, paper levelled, threshold found. One for each polarity that the picture
+/// leaves possible, the likelier first.
+pub(super) fn readings(picture: &Picture, speck_share: f64) -> Result<Vec<Ink>, Error> {
     let grey = &grey_of(picture)?;
     let known = known(picture, grey);
     let mut values = held(grey, &known);
@@ -120,11 +121,29 @@ pub(super) fn levelled(picture: &Picture, speck_share: f64) -> Result<Ink, Error
         });
     }
     let dark = grey.map(|g| f64::from(*g) < split.threshold);
-    let light_on_dark = is_light_on_dark(grey, &dark, &known);
+    let (likelier, clear) = polarity(grey, &dark, &known);
+    let first = read(grey, &known, likelier, speck_share);
+    if clear {
+        return first.map(|ink| vec![ink]);
+    }
+    let second = read(grey, &known, !likelier, speck_share);
+    match (first, second) {
+        (Ok(first), Ok(second)) => Ok(vec![first, second]),
+        (Ok(only), Err(_)) | (Err(_), Ok(only)) => Ok(vec![only]),
+        (Err(error), Err(_)) => Err(error),
+    }
+}
+
+/// The ink of one polarity.
+fn read(
+    grey: &Grid<f32>,
+    known: &Mask,
+    light_on_dark: bool,
+    speck_share: f64,
+) -> Result<Ink, Error> {
     let darkness = |g: f32| if light_on_dark { 1.0 - g } else { g };
-    let turned = grey.map(|g| darkness(*g));
-    let even = evened(&turned, &known);
-    let split = otsu::split(&mut held(&even, &known)).ok_or(Error::NoContrast { contrast: 0.0 })?;
+    let even = evened(&grey.map(|g| darkness(*g)), known);
+    let split = otsu::split(&mut held(&even, known)).ok_or(Error::NoContrast { contrast: 0.0 })?;
     let raw = Mask::from_fn(grey.width(), grey.height(), |x, y| {
         known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
     });
@@ -137,7 +156,7 @@ pub(super) fn levelled(picture: &Picture, speck_share: f64) -> Result<Ink, Error
     Ok(Ink {
         soft: Soft {
             amount: amount(&even, &ink, split),
-            known,
+            known: known.clone(),
         },
         mask: ink,
         threshold: split.threshold,
@@ -200,19 +219,16 @@ fn evened(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
     })
 }
 
-/// Whether ink is lighter than paper. Where the picture as it is does not say clearly, a stain may mislead: then what
-/// is dark beside its surroundings decides.
-fn is_light_on_dark(grey: &Grid<f32>, dark: &Mask, known: &Mask) -> bool {
+/// Whether ink is likelier to be lighter than paper, and whether that is clear. Stains and frame lines mislead: where
+/// the picture as it is and what is dark beside its surroundings do not both say so, the other way stays possible.
+fn polarity(grey: &Grid<f32>, dark: &Mask, known: &Mask) -> (bool, bool) {
     let plain = paper_darkness(dark, known);
     let even = evened(grey, known);
     let levelled = otsu::split(&mut held(&even, known)).map_or(plain, |split| {
         paper_darkness(&even.map(|g| f64::from(*g) < split.threshold), known)
     });
-    if plain.abs() > CLEAR {
-        plain > 0.0
-    } else {
-        levelled > 0.0
-    }
+    let sum = plain + levelled;
+    (sum > 0.0, plain * levelled > 0.0 && sum.abs() > CLEAR)
 }
 
 /// How much speaks for the dark class being the paper; below zero it is ink. Ink is the smaller class, and paper
@@ -279,7 +295,7 @@ fn require_ink(ink: &Mask, area: usize, grey: &Grid<f32>, threshold: f64) -> Res
 
 #[cfg(test)]
 mod tests {
-    use super::{Error, Ink, levelled};
+    use super::{Error, Ink, readings};
     use crate::raster::{Grid, Picture};
 
     fn picture(grey: impl Fn(usize, usize) -> u16) -> Picture {
@@ -289,7 +305,7 @@ mod tests {
     }
 
     fn read(picture: &Picture) -> Result<Ink, Error> {
-        levelled(picture, 1.0 / 1200.0)
+        readings(picture, 1.0 / 1200.0).map(|mut all| all.swap_remove(0))
     }
 
     fn cross(x: usize, y: usize) -> bool {

@@ -17,20 +17,28 @@ const BACK: f64 = 0.35;
 /// ratio of the agreement with the print, word of the manifest.
 const WINDING: f64 = 2.0;
 const SHARPNESS: f64 = 0.7;
-const AGREEMENT: f64 = 6.0;
+const AGREEMENT: f64 = 14.0;
 const MANIFEST: f64 = 0.4;
 /// The search against the print: as in normalisation, but not as close.
 const LIMITS: Limits = Limits {
     scale: 1.6,
     shift: 0.35,
-    keep: 24,
+    keep: 14,
 };
-const PASSES: [Pass; 1] = [Pass {
-    px: 40,
-    sigma: 0.8,
-    steps: 8,
-    keep: 4,
-}];
+const PASSES: [Pass; 2] = [
+    Pass {
+        px: 40,
+        sigma: 0.8,
+        steps: 6,
+        keep: 3,
+    },
+    Pass {
+        px: 64,
+        sigma: 1.0,
+        steps: 6,
+        keep: 2,
+    },
+];
 /// Working size of the print and the tops.
 const BASE_PX: usize = 80;
 /// Groups of ink below this share of the print are specks.
@@ -112,13 +120,17 @@ fn log_odds(first: &Face, second: &Face, witness: Witness<'_>) -> f64 {
 
 /// Log of the ratio between the faces' best correlations with the print; 0 when the print shows no ink.
 fn agreement(first: &Face, second: &Face, print: &Picture) -> f64 {
-    let Ok(ink) = ink::levelled(print, SPECK_SHARE) else {
+    let Ok(readings) = ink::readings(print, SPECK_SHARE) else {
         return 0.0;
     };
-    let Some(ink) = Base::new(&ink.soft, BASE_PX) else {
-        return 0.0;
+    let inks: Vec<Base> = readings
+        .iter()
+        .filter_map(|ink| Base::new(&ink.soft, BASE_PX))
+        .collect();
+    let score = |face: &Face| {
+        let scores = inks.iter().map(|ink| best_score(ink, &face.tops));
+        scores.fold(0.02, f64::max)
     };
-    let score = |face: &Face| best_score(&ink, &face.tops).max(0.02);
     (score(first) / score(second)).ln()
 }
 

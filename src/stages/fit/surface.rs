@@ -5,7 +5,8 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::raster::Grid;
+use crate::raster::{Grid, Mask};
+use crate::stages::components::Components;
 use crate::stages::pose::Soft;
 use crate::stages::zbuffer::{NOTHING, View};
 
@@ -15,6 +16,15 @@ const ENVELOPE: f64 = 0.97;
 const ABOVE: f64 = 3.0;
 /// How far below the surface a point still counts, as a share of the height range, pass by pass.
 const WINDOWS: [f64; 5] = [0.35, 0.22, 0.14, 0.10, 0.08];
+/// Passes of the first kind, and of each window.
+const ENVELOPE_PASSES: usize = 8;
+const NARROW_PASSES: usize = 2;
+/// Tops this close to the cut, in pixels of the rendering, run into it.
+const CUT_PX: i64 = 2;
+/// Without the tops at the cut at least this share of all must be left.
+const LEAST_OWN: f64 = 0.4;
+/// Margin of the view, a share of each side, that the depth of the carving is not read from.
+const MARGIN: f64 = 0.15;
 /// Neighbouring pixels of a top err together: so many of them count as one.
 const CORRELATED_PX: f64 = 40.0;
 /// Standard deviation of the tops' unevenness as a share of the height range.
@@ -101,7 +111,7 @@ impl Samples {
     }
 
     fn mean_plane(&self) -> [f64; 6] {
-        solve(self.points.iter().map(|p| (*p, 1.0)), 3, None)
+        solve::<3>(self.points.iter().map(|p| (*p, 1.0)), None)
     }
 
     /// The surface over the tops; second-degree only when allowed and earned.
@@ -109,14 +119,14 @@ impl Samples {
         let ground = self.mean_plane();
         let envelope = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
         let mut start = ground;
-        for _ in 0..12 {
-            start = solve(self.weighed(&start, envelope), 3, Some(self.prior(ground)));
+        for _ in 0..ENVELOPE_PASSES {
+            start = solve::<3>(self.weighed(&start, envelope), Some(self.prior(ground)));
         }
-        let plane = self.narrow(start, ground, 3);
+        let plane = self.narrow::<3>(start, ground);
         if !allow_bow {
             return plane;
         }
-        let bent = self.narrow(start, ground, 6);
+        let bent = self.narrow::<6>(start, ground);
         if bent.support > plane.support * BOW_GAIN {
             bent
         } else {
@@ -125,12 +135,12 @@ impl Samples {
     }
 
     /// Passes with a shrinking window below the surface.
-    fn narrow(&self, start: [f64; 6], ground: [f64; 6], terms: usize) -> Surface {
+    fn narrow<const TERMS: usize>(&self, start: [f64; 6], ground: [f64; 6]) -> Surface {
         let mut c = start;
         for window in WINDOWS.map(|w| w * self.range) {
-            for _ in 0..4 {
+            for _ in 0..NARROW_PASSES {
                 let points = self.weighed(&c, |r| one_sided_weight(r, window));
-                c = solve(points, terms, Some(self.prior(ground)));
+                c = solve::<TERMS>(points, Some(self.prior(ground)));
             }
         }
         self.judge(c)
@@ -190,6 +200,22 @@ impl Samples {
             .collect()
     }
 
+    /// The same without a margin of the view: side walls, and a foot that juts out, are neither tops nor ground.
+    pub(super) fn inner_residuals(&self, surface: &Surface) -> Vec<f64> {
+        let [width, height] = self.size;
+        let inside = |i: usize, side: usize| {
+            let cut = (side as f64 * MARGIN) as usize;
+            (cut..side - cut).contains(&i)
+        };
+        let residuals = self.residuals(surface);
+        let seen = residuals.iter().zip(&self.places);
+        let inner: Vec<f64> = seen
+            .filter(|(_, place)| inside(*place % width, width) && inside(*place / width, height))
+            .map(|(residual, _)| *residual)
+            .collect();
+        if inner.len() < 16 { residuals } else { inner }
+    }
+
     /// Nearness to the surface as a picture: 1 on it, 0 from half the relief down.
     pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> Soft {
         let [width, height] = self.size;
@@ -206,17 +232,40 @@ impl Samples {
     }
 
     /// The plane through a surface's tops, `z = a + b x + c y` in plane coordinates and mesh units.
+    ///
+    /// Tops that run into the cut belong to neighbours: they tell the surface, but not where on it the character is.
     pub(super) fn plane_of_tops(&self, surface: &Surface) -> [f64; 3] {
-        let window = WINDOWS[WINDOWS.len() - 1] * self.range;
         let c = surface.coefficients;
-        let near = |r: f64| if r.abs() < window { 1.0 } else { 1e-6 };
-        let on_surface = self
-            .weighed(&c, near)
-            .map(|(p, w)| ([p[0], p[1], value(&c, &p)], w));
-        let plane = solve(on_surface, 3, None);
+        let own = self.own_tops(&c);
+        let on_surface = self.points.iter().zip(&self.places).map(|(p, place)| {
+            let weight = if own.data()[*place] { 1.0 } else { 1e-6 };
+            ([p[0], p[1], value(&c, p)], weight)
+        });
+        let plane = solve::<3>(on_surface, None);
         let (b, c) = (plane[1], plane[2]);
         let a = plane[0] * self.extent - b * self.centre[0] - c * self.centre[1];
         [a, b, c]
+    }
+
+    /// Where the tops of the character itself are; all tops where hardly any are left without those at the cut.
+    fn own_tops(&self, c: &[f64; 6]) -> Mask {
+        let window = WINDOWS[WINDOWS.len() - 1] * self.range;
+        let [width, height] = self.size;
+        let (mut tops, mut unknown) = (
+            Mask::new(width, height, false),
+            Mask::new(width, height, true),
+        );
+        for (p, place) in self.points.iter().zip(&self.places) {
+            tops.data_mut()[*place] = (p[2] - value(c, p)).abs() < window;
+            unknown.data_mut()[*place] = false;
+        }
+        let cut_off = Components::of(&tops).near(&unknown, CUT_PX);
+        let own = Mask::from_fn(width, height, |x, y| tops.at(x, y) && !cut_off.at(x, y));
+        if own.count() as f64 >= LEAST_OWN * tops.count() as f64 {
+            own
+        } else {
+            tops
+        }
     }
 
     /// The surface in plane coordinates and mesh units: coefficients of 1, x, y, x^2, xy, y^2.
@@ -244,40 +293,44 @@ struct Prior {
     noise: f64,
 }
 
-/// Weighted least squares over the first `terms` (3 or 6) of the basis.
-fn solve(
+/// Weighted least squares over the first `TERMS` (3 or 6) of the basis.
+fn solve<const TERMS: usize>(
     points: impl Iterator<Item = ([f64; 3], f64)>,
-    terms: usize,
     prior: Option<Prior>,
 ) -> [f64; 6] {
-    let mut normal = Matrix6::<f64>::zeros();
-    let mut right = Vector6::<f64>::zeros();
+    let mut sums = [[0.0_f64; TERMS]; TERMS];
+    let mut right = [0.0_f64; TERMS];
     for (p, w) in points.filter(|(_, w)| *w > 0.0) {
         let basis = basis(&p);
-        for i in 0..terms {
-            right[i] += w * basis[i] * p[2];
+        for i in 0..TERMS {
+            let weighed = w * basis[i];
+            right[i] += weighed * p[2];
             for j in 0..=i {
-                normal[(i, j)] += w * basis[i] * basis[j];
+                sums[i][j] += weighed * basis[j];
             }
         }
     }
     if let Some(prior) = prior {
-        for k in 1..terms {
+        for k in 1..TERMS {
             let sigma = if k < 3 { TILT_SIGMA } else { BOW_SIGMA };
             let precision = prior.noise / (sigma * sigma);
-            normal[(k, k)] += precision;
+            sums[k][k] += precision;
             right[k] += precision * prior.mean[k];
         }
     }
-    for i in 0..6 {
-        normal[(i, i)] += if i < terms { 1e-12 } else { 1.0 };
-        for j in 0..i {
-            normal[(j, i)] = normal[(i, j)];
+    let mut normal = Matrix6::<f64>::identity();
+    let mut side = Vector6::<f64>::zeros();
+    for i in 0..TERMS {
+        side[i] = right[i];
+        for j in 0..=i {
+            normal[(i, j)] = sums[i][j];
+            normal[(j, i)] = sums[i][j];
         }
+        normal[(i, i)] += 1e-12;
     }
     normal
         .cholesky()
-        .map_or([0.0; 6], |factor| factor.solve(&right).into())
+        .map_or([0.0; 6], |factor| factor.solve(&side).into())
 }
 
 /// The value below which a share of the values lies; reorders them.

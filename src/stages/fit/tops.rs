@@ -13,11 +13,19 @@ use crate::raster::Picture;
 use crate::stages::otsu;
 use crate::stages::zbuffer::{Projected, View};
 
-/// Longest side of the rendering that the surface is fitted to.
+/// Longest side of the rendering that tells the sides apart, and of the one that the surface is fitted to.
+const GLANCE_PX: usize = 96;
 const LOOK_PX: usize = 144;
 /// The view is turned to the tops' plane and rendered again until it turns by less than this slope.
-const SETTLED_SLOPE: f64 = 0.003;
-const MOST_LOOKS: usize = 4;
+const GLANCE_SLOPE: f64 = 0.05;
+const LOOK_SLOPE: f64 = 0.01;
+/// Most renderings of each kind.
+const MOST_GLANCES: usize = 4;
+const MOST_LOOKS: usize = 3;
+/// Where more than this share of what is seen is one smooth surface, nothing is carved: strokes never cover so much.
+const PLAIN: f64 = 0.85;
+/// Where less than this share lies on the surface it stands on a rim of walls or on flecks, not on strokes.
+const SCANT: f64 = 0.05;
 
 pub(super) fn fit(
     mesh: &Mesh,
@@ -28,13 +36,16 @@ pub(super) fn fit(
     let axes = Axes::of_surface(mesh);
     axes.require_surface(mesh)?;
     let normal = axes.normal();
-    let faces = [normal, -normal].map(|n| look(mesh, n, axes.centre, params.bow));
+    let glance = |n| look(mesh, frame(n, axes.centre), params.bow, GLANCE);
+    let faces = [normal, -normal].map(glance);
     let witness = Witness {
         mesh,
         print,
         scanned_face_down,
     };
-    let (face, side) = side::choose(faces, witness).ok_or(Error::NoSurface(mesh.vertices.len()))?;
+    let no_surface = || Error::NoSurface(mesh.vertices.len());
+    let (face, side) = side::choose(faces, witness).ok_or_else(no_surface)?;
+    let face = look(mesh, face.plane_from_mesh, params.bow, LOOK).ok_or_else(no_surface)?;
     if face.relief < params.min_relief * face.extent {
         return Err(Error::NoRelief {
             relief: face.relief,
@@ -55,18 +66,37 @@ pub(super) fn fit(
     })
 }
 
-/// Fits the tops as seen from one side, turning the view until it stands square on them.
-fn look(mesh: &Mesh, normal: Vector3<f64>, centre: Vector3<f64>, bow: bool) -> Option<Face> {
-    let mut plane_from_mesh = frame(normal, centre);
+/// How closely the surface is looked at.
+#[derive(Debug, Clone, Copy)]
+struct Care {
+    px: usize,
+    slope: f64,
+    most: usize,
+}
+
+const GLANCE: Care = Care {
+    px: GLANCE_PX,
+    slope: GLANCE_SLOPE,
+    most: MOST_GLANCES,
+};
+const LOOK: Care = Care {
+    px: LOOK_PX,
+    slope: LOOK_SLOPE,
+    most: MOST_LOOKS,
+};
+
+/// Fits the tops as seen along a frame's z, turning the view until it stands square on them.
+fn look(mesh: &Mesh, start: Rigid3, bow: bool, care: Care) -> Option<Face> {
+    let mut plane_from_mesh = start;
     for round in 1.. {
         let projected = Projected::new(mesh, &plane_from_mesh);
-        let view = View::around(projected.bounds(), LOOK_PX, false);
+        let view = View::around(projected.bounds(), care.px, false);
         let heights = projected.render(&view);
         let samples = Samples::new(&heights, &view)?;
         let surface = samples.fit(bow);
         let [a, b, c] = samples.plane_of_tops(&surface);
         plane_from_mesh = lay_on(&plane_from_mesh, [a, b, c]);
-        if b.hypot(c) < SETTLED_SLOPE || round == MOST_LOOKS {
+        if b.hypot(c) < care.slope || round == care.most {
             return Some(face(plane_from_mesh, &samples, surface, [a, b, c], &view));
         }
     }
@@ -98,7 +128,11 @@ fn face(
     }
     let bent = over_plane[3..].iter().any(|c| *c != 0.0);
     let bow = bent.then_some(Bow(over_plane));
-    let relief = relief(samples.residuals(&surface));
+    let relief = if (SCANT..=PLAIN).contains(&surface.tops) {
+        relief(samples.inner_residuals(&surface))
+    } else {
+        0.0
+    };
     Face {
         plane_from_mesh,
         bow,

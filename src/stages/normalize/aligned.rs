@@ -46,15 +46,38 @@ const MIRROR_WINS: f64 = 1.12;
 /// A scale whose logarithm is this close to the band's end is at the bound.
 const BOUND: f64 = 0.02;
 
-/// Finds the poses, then the thresholds.
-pub(super) fn choose(
+/// Finds the poses of the reading of the print that the relief agrees with best.
+pub(super) fn search(
+    depth: &DepthMap,
+    readings: Vec<Ink>,
+    params: &Params,
+) -> Result<(Ink, Search), Error> {
+    let relief = Relief::of(depth).ok_or(Error::NoStrokes)?;
+    let depths = relief.depths(depth);
+    let mut best: Result<(Ink, Search), Error> = Err(Error::NoStrokes);
+    for ink in readings {
+        let found = find_poses(&depths, &ink, params).map(|search| (ink, search));
+        best = match (best, found) {
+            (Ok(a), Ok(b)) => Ok(if b.1.score() > a.1.score() { b } else { a }),
+            (Ok(only), Err(_)) | (Err(Error::NoStrokes), Ok(only)) => Ok(only),
+            // Which failure is told: of the likelier reading, which comes first.
+            (Err(Error::NoStrokes), Err(error)) => Err(error),
+            (Err(_), Ok(only)) => Ok(only),
+            (Err(error), Err(_)) => Err(error),
+        };
+    }
+    best
+}
+
+/// Chooses the thresholds at the best pose.
+pub(super) fn thresholds(
     depth: &DepthMap,
     print: &Ink,
     canvas_from_print: &Affine2,
+    search: &Search,
     params: &Params,
-) -> Result<(Search, Vec<ThresholdChoice>), Error> {
+) -> Result<Vec<ThresholdChoice>, Error> {
     let relief = Relief::of(depth).ok_or(Error::NoStrokes)?;
-    let search = find_poses(depth, print, &relief, params)?;
     let best = search.poses.first().ok_or(Error::NoMatch {
         best: 0.0,
         needs: LEAST_SCORE,
@@ -66,20 +89,13 @@ pub(super) fn choose(
         &best.print_from_depth,
         params,
     );
-    let thresholds = threshold::choose(depth, &relief, &canvas, params)?;
-    Ok((search, thresholds))
+    threshold::choose(depth, &relief, &canvas, params)
 }
 
 /// Poses as read, best first, at least one.
-fn find_poses(
-    depth: &DepthMap,
-    print: &Ink,
-    relief: &Relief,
-    params: &Params,
-) -> Result<Search, Error> {
-    let depths = relief.depths(depth);
+fn find_poses(depths: &Soft, print: &Ink, params: &Params) -> Result<Search, Error> {
     let (ink, wood) = Base::new(&print.soft, BASE_PX)
-        .zip(Base::new(&depths, BASE_PX))
+        .zip(Base::new(depths, BASE_PX))
         .ok_or(Error::NoStrokes)?;
     let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
     let limits = Limits {
@@ -89,7 +105,7 @@ fn find_poses(
     };
     let found = find(&ink, &wood, limits, &PASSES);
     let ratio = |pose: &Found| {
-        let (ink, wood) = (longest(&print.soft), longest(&depths));
+        let (ink, wood) = (longest(&print.soft), longest(depths));
         pose.fixed_from_moving.scale() * wood / ink
     };
     judge(&found, |pose| {

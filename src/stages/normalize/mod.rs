@@ -5,6 +5,7 @@
 //! threshold, then choose each threshold in the aligned frame.
 
 mod aligned;
+mod heap;
 mod relief;
 mod threshold;
 mod wrap;
@@ -147,6 +148,13 @@ struct Search {
     at_bound: bool,
 }
 
+impl Search {
+    /// Score of the best pose as read.
+    fn score(&self) -> f64 {
+        self.poses.first().map_or(0.0, |pose| pose.score)
+    }
+}
+
 /// Finds the print's ink, the canvas, and each metric's depth threshold.
 ///
 /// `depth` reads like the print; `print` is the whole image as given. The outcome's poses map depth-map pixels to
@@ -155,16 +163,22 @@ struct Search {
 /// # Errors
 /// When the print shows no ink, the depth map no strokes, or no pose fits.
 pub fn normalize(depth: &DepthMap, print: &Picture, params: &Params) -> Result<Normalized, Error> {
-    let ink = match params.print_threshold {
-        PrintThreshold::Levelled => ink::levelled(print, params.speck_share)?,
-        PrintThreshold::Fixed => ink::fixed(print, params.print_grey, params.speck_share)?,
+    let readings = match params.print_threshold {
+        PrintThreshold::Levelled => ink::readings(print, params.speck_share)?,
+        PrintThreshold::Fixed => vec![ink::fixed(print, params.print_grey, params.speck_share)?],
     };
-    let canvas_from_print = canvas_from_print(&ink.mask, params).ok_or(Error::NoStrokes)?;
-    let (search, thresholds) = match params.method {
-        Method::Aligned => aligned::choose(depth, &ink, &canvas_from_print, params)?,
+    let (ink, canvas_from_print, search, thresholds) = match params.method {
+        Method::Aligned => {
+            let (ink, search) = aligned::search(depth, readings, params)?;
+            let canvas = canvas_from_print(&ink.mask, params).ok_or(Error::NoStrokes)?;
+            let thresholds = aligned::thresholds(depth, &ink, &canvas, &search, params)?;
+            (ink, canvas, search, thresholds)
+        }
         Method::Wrap => {
-            let thresholds = wrap::choose(depth, &ink, &canvas_from_print, params)?;
-            (Search::default(), thresholds)
+            let ink = readings.into_iter().next().ok_or(Error::NoStrokes)?;
+            let canvas = canvas_from_print(&ink.mask, params).ok_or(Error::NoStrokes)?;
+            let thresholds = wrap::choose(depth, &ink, &canvas, params)?;
+            (ink, canvas, Search::default(), thresholds)
         }
     };
     Ok(Normalized {
@@ -209,7 +223,7 @@ pub(super) mod tests_support {
             canvas_px: 256,
             character_px: 192,
             scale_band: 1.6,
-            cut_from: 0.04,
+            cut_from: 0.01,
             cut_to: 0.6,
             ink_spread: 1.3,
             density_greys: [50, 139],

@@ -7,13 +7,14 @@ use super::{Error, Params, Relief};
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Grid, Mask, warp_depth, warp_mask};
 use crate::stages::ink::Ink;
-use crate::stages::score::WindowMeans;
+use crate::stages::score::{SsimWindow, WindowMeans};
 
 /// Candidate thresholds between the first and the last cut.
 const CANDIDATES: u32 = 40;
-/// Depth under the tops at which `relief` cuts, as a share of the relief. On carvings whose tops are known the mask
-/// there agrees best with them.
-const RELIEF_CUT: f64 = 0.09;
+/// Every how many candidates the structure score is looked at first.
+const COARSE: usize = 4;
+/// `ensemble` may differ from `relief` by this factor in area.
+const CLOSE_AREA: f64 = 1.2;
 
 /// Both pictures on the canvas.
 pub(super) struct Canvas {
@@ -55,82 +56,145 @@ impl Canvas {
     }
 }
 
-/// One threshold tried.
+/// One threshold that could be chosen.
 #[derive(Debug, Clone, Copy)]
-struct Tried {
+struct Candidate {
     level: u16,
-    structure: f64,
-    /// Ink share of the depth mask over that of the print.
-    density_ratio: f64,
+    /// Pixels of the canvas that are stroke at it.
+    area: f64,
 }
 
 /// Chooses each metric's threshold.
 ///
 /// - `nl_ssim`: the highest structure score.
 /// - `density`: the ink share closest to the print's over `ink_spread`.
-/// - `ensemble`: halfway in height between the two. Structure alone drifts to where worn tops fray, density alone
-///   copies the print's ink spread; their errors are of opposite sign.
-/// - `relief`: a fixed share of the relief under the tops, whatever the print shows; it has no score.
+/// - `ensemble`: the highest structure score among thresholds whose ink share is close to that of `relief`. Structure
+///   and density alone copy the print's spread ink; geometry alone knows nothing of the print.
+/// - `relief`: where the tops end and the walls begin, whatever the print shows; it has no score.
 pub(super) fn choose(
     depth: &DepthMap,
     relief: &Relief,
     canvas: &Canvas,
     params: &Params,
 ) -> Result<Vec<ThresholdChoice>, Error> {
-    let tried = sweep(depth, relief, canvas, params);
-    let structure = tried
-        .iter()
-        .max_by(|a, b| a.structure.total_cmp(&b.structure))
-        .ok_or(Error::NoStrokes)?;
-    let gap = |t: &Tried| (t.density_ratio * params.ink_spread - 1.0).abs();
-    let density = tried
-        .iter()
-        .min_by(|a, b| gap(a).total_cmp(&gap(b)))
-        .ok_or(Error::NoStrokes)?;
-    let middle = u16::midpoint(structure.level, density.level);
-    let both = tried
-        .iter()
-        .min_by_key(|t| t.level.abs_diff(middle))
-        .ok_or(Error::NoStrokes)?;
-    let ends = [tried.first(), tried.last()];
-    let choice = |metric, t: &Tried, score| ThresholdChoice {
+    let ink = canvas.ink.count() as f64;
+    let candidates = candidates(depth, relief, canvas, params);
+    if candidates.is_empty() || ink == 0.0 {
+        return Err(Error::NoStrokes);
+    }
+    let mut structure = Structure::new(canvas, &candidates, params.window);
+    let best = structure.best_of_all();
+    let gap = |c: &Candidate| (c.area / ink * params.ink_spread - 1.0).abs();
+    let density = nearest(&candidates, gap);
+    let edge = relief.level_at(depth, relief.edge);
+    let own_area = canvas.mask(edge).count() as f64;
+    let close = |c: &Candidate| (c.area / own_area.max(1.0)).ln().abs() <= CLOSE_AREA.ln();
+    let both = structure
+        .best_among(&close)
+        .unwrap_or_else(|| nearest(&candidates, |c| f64::from(c.level.abs_diff(edge))));
+    let choice = |metric, k: usize, score| ThresholdChoice {
         metric,
-        level: t.level,
+        level: candidates[k].level,
         score,
-        at_bound: ends.iter().flatten().any(|end| end.level == t.level),
+        at_bound: k == 0 || k + 1 == candidates.len(),
     };
     Ok(vec![
-        choice(ThresholdMetric::NlSsim, structure, structure.structure),
-        choice(ThresholdMetric::Density, density, -gap(density)),
-        choice(ThresholdMetric::Ensemble, both, both.structure),
+        choice(ThresholdMetric::NlSsim, best, structure.at(best)),
+        choice(
+            ThresholdMetric::Density,
+            density,
+            -gap(&candidates[density]),
+        ),
+        choice(ThresholdMetric::Ensemble, both, structure.at(both)),
         ThresholdChoice {
             metric: ThresholdMetric::Relief,
-            level: relief.level_at(depth, RELIEF_CUT),
+            level: edge,
             score: 0.0,
             at_bound: false,
         },
     ])
 }
 
-fn sweep(depth: &DepthMap, relief: &Relief, canvas: &Canvas, params: &Params) -> Vec<Tried> {
-    let ink = canvas.ink.count();
-    let means = WindowMeans::new(&canvas.ink, params.window);
-    let share = |k: u32| {
-        params.cut_from
-            + (params.cut_to - params.cut_from) * f64::from(k) / f64::from(CANDIDATES - 1)
-    };
+/// Position of the candidate that is least far.
+fn nearest(candidates: &[Candidate], far: impl Fn(&Candidate) -> f64) -> usize {
+    (0..candidates.len())
+        .min_by(|a, b| far(&candidates[*a]).total_cmp(&far(&candidates[*b])))
+        .unwrap_or(0)
+}
+
+/// Every threshold between the cuts that leaves strokes, the shallowest first.
+fn candidates(
+    depth: &DepthMap,
+    relief: &Relief,
+    canvas: &Canvas,
+    params: &Params,
+) -> Vec<Candidate> {
+    let span = params.cut_to - params.cut_from;
+    let share = |k: u32| params.cut_from + span * f64::from(k) / f64::from(CANDIDATES - 1);
     let mut levels: Vec<u16> = (0..CANDIDATES)
         .map(|k| relief.level_at(depth, share(k)))
         .collect();
     levels.dedup();
-    levels
-        .into_iter()
-        .map(|level| (level, canvas.mask(level)))
-        .filter(|(_, mask)| mask.count() > 0 && ink > 0)
-        .map(|(level, mask)| Tried {
-            level,
-            structure: means.against(&mask).nl_ssim,
-            density_ratio: mask.count() as f64 / ink as f64,
-        })
-        .collect()
+    let candidate = |level| Candidate {
+        level,
+        area: canvas.mask(level).count() as f64,
+    };
+    let tried = levels.into_iter().map(candidate);
+    tried.filter(|c| c.area > 0.0).collect()
+}
+
+/// Structure scores of candidates, each computed once and only when asked for.
+struct Structure<'a> {
+    canvas: &'a Canvas,
+    candidates: &'a [Candidate],
+    means: WindowMeans,
+    known: Vec<Option<f64>>,
+}
+
+impl<'a> Structure<'a> {
+    fn new(canvas: &'a Canvas, candidates: &'a [Candidate], window: SsimWindow) -> Self {
+        Self {
+            canvas,
+            candidates,
+            means: WindowMeans::new(&canvas.ink, window),
+            known: vec![None; candidates.len()],
+        }
+    }
+
+    fn at(&mut self, k: usize) -> f64 {
+        if let Some(score) = self.known[k] {
+            return score;
+        }
+        let mask = self.canvas.mask(self.candidates[k].level);
+        let score = self.means.against(&mask).nl_ssim;
+        self.known[k] = Some(score);
+        score
+    }
+
+    /// The best of all: the score changes slowly with depth, so every few are tried, then those around the best.
+    fn best_of_all(&mut self) -> usize {
+        let count = self.candidates.len();
+        let coarse = self.best((0..count).step_by(COARSE));
+        let near = coarse.saturating_sub(COARSE - 1)..(coarse + COARSE).min(count);
+        self.best(near)
+    }
+
+    fn best_among(&mut self, allowed: &impl Fn(&Candidate) -> bool) -> Option<usize> {
+        let among: Vec<usize> = (0..self.candidates.len())
+            .filter(|k| allowed(&self.candidates[*k]))
+            .collect();
+        (!among.is_empty()).then(|| self.best(among.into_iter()))
+    }
+
+    /// The first of the best.
+    fn best(&mut self, among: impl Iterator<Item = usize>) -> usize {
+        let mut best = (0, f64::NEG_INFINITY);
+        for k in among {
+            let score = self.at(k);
+            if score > best.1 {
+                best = (k, score);
+            }
+        }
+        best.0
+    }
 }

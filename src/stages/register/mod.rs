@@ -16,7 +16,7 @@ use crate::domain::{
 use crate::raster::{DepthMap, Mask, warp_mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 1;
+pub const REVISION: u32 = 2;
 
 /// How the alignment is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
