@@ -1,7 +1,7 @@
 //! Our registration: the poses that normalisation found, refined at full size; the best one serves every metric.
 
 use super::{Alignment, Error, Params};
-use crate::domain::{Evidence, Pose};
+use crate::domain::{Affine2, Evidence, Pose};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{Normalized, Relief, soft_stroke};
 use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Soft};
@@ -14,6 +14,8 @@ const TRIED: usize = 3;
 /// strokes cut too thin or too thick for it would pull the scale.
 const CUTS: [f64; 6] = [0.05, 0.1, 0.17, 0.26, 0.37, 0.5];
 const SOFTNESS: f64 = 0.1;
+/// The best pose is looked at once more at this many times the working size.
+const CLOSER: f64 = 1.5;
 /// Most steps of one refinement.
 const MOST_STEPS: usize = 15;
 
@@ -23,7 +25,8 @@ pub(super) fn align(
     normalized: &Normalized,
     params: &Params,
 ) -> Result<(Vec<Alignment>, Evidence), Error> {
-    let tried = settle_all(depth, normalized, params).ok_or(Error::NoPose)?;
+    let pictures = Pictures::new(depth, normalized, params).ok_or(Error::NoPose)?;
+    let tried = settle_all(&pictures, normalized).ok_or(Error::NoPose)?;
     let best = *best_of(&tried, |pose| !pose.found.mirrored).ok_or(Error::NoPose)?;
     let score_of = |other: Option<&Settled>| other.map_or(0.0, Settled::score);
     let other_angle = score_of(best_of(&tried, |pose| {
@@ -31,11 +34,12 @@ pub(super) fn align(
     }));
     let mirrored = score_of(best_of(&tried, |pose| pose.found.mirrored));
     let evidence = best.evidence(other_angle, mirrored);
+    let print_from_depth = pictures.closer(&best);
     let choices = normalized.outcome.thresholds.iter();
     let alignments = choices.map(|choice| Alignment {
         metric: choice.metric,
         level: choice.level,
-        print_from_depth: best.found.fixed_from_moving,
+        print_from_depth,
         margin: best.score() - other_angle.max(mirrored),
         at_bound: normalized.outcome.search_at_bound || choice.at_bound,
     });
@@ -46,6 +50,8 @@ pub(super) fn align(
 #[derive(Debug, Clone, Copy)]
 struct Settled {
     found: Found,
+    /// Which of the cuts.
+    cut: f64,
     overlap: Overlap,
 }
 
@@ -79,22 +85,60 @@ fn best_of(tried: &[Settled], of_kind: impl Fn(&Settled) -> bool) -> Option<&Set
     among.max_by(|a, b| a.score().total_cmp(&b.score()))
 }
 
-/// The first few poses as read, and the best mirrored one, at full size.
-fn settle_all(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Option<Vec<Settled>> {
-    let ink = Soft {
-        amount: normalized.ink.map(|set| f32::from(u8::from(*set))),
-        known: normalized.known.clone(),
-    };
-    let relief = Relief::of(depth)?;
-    let size = params.working_px as usize;
-    let ink = Base::new(&ink, size)?.layer(size, params.smoothing_px);
-    let depths = Base::new(&relief.depths(depth), size)?;
-    let wood = |cut: &f64| {
-        let strokes = depths.map(|d| soft_stroke(d, *cut, SOFTNESS));
-        strokes.layer(size, params.smoothing_px)
-    };
-    let woods: Vec<Layer> = CUTS.iter().map(wood).collect();
-    let woods: Vec<Refiner> = woods.iter().map(|wood| Refiner::new(&ink, wood)).collect();
+/// Print and relief at the largest working size.
+struct Pictures {
+    ink: Base,
+    depths: Base,
+    px: usize,
+    smoothing_px: f64,
+}
+
+impl Pictures {
+    fn new(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Option<Self> {
+        let ink = Soft {
+            amount: normalized.ink.map(|set| f32::from(u8::from(*set))),
+            known: normalized.known.clone(),
+        };
+        let relief = Relief::of(depth)?;
+        let px = params.working_px as usize;
+        let closest = (params.working_px as f64 * CLOSER) as usize;
+        Some(Self {
+            ink: Base::new(&ink, closest)?,
+            depths: Base::new(&relief.depths(depth), closest)?,
+            px,
+            smoothing_px: params.smoothing_px,
+        })
+    }
+
+    fn ink(&self, times: f64) -> Layer {
+        let px = (self.px as f64 * times) as usize;
+        self.ink.layer(px, self.smoothing_px * times.sqrt())
+    }
+
+    /// Strokes at a cut, a share of the relief under the tops.
+    fn wood(&self, cut: f64, times: f64) -> Layer {
+        let strokes = self.depths.map(|d| soft_stroke(d, cut, SOFTNESS));
+        let px = (self.px as f64 * times) as usize;
+        strokes.layer(px, self.smoothing_px * times.sqrt())
+    }
+
+    /// The pose looked at once more, closer.
+    fn closer(&self, best: &Settled) -> Affine2 {
+        let (ink, wood) = (self.ink(CLOSER), self.wood(best.cut, CLOSER));
+        let refined = Refiner::new(&ink, &wood).refine(&best.found, MOST_STEPS, Loss::Tukey);
+        refined.fixed_from_moving
+    }
+}
+
+/// The first few poses as read, and the best mirrored one.
+fn settle_all(pictures: &Pictures, normalized: &Normalized) -> Option<Vec<Settled>> {
+    let ink = pictures.ink(1.0);
+    let woods: Vec<Layer> = CUTS.iter().map(|cut| pictures.wood(*cut, 1.0)).collect();
+    let woods: Vec<(f64, Refiner)> = CUTS
+        .iter()
+        .zip(&woods)
+        .map(|(cut, wood)| (*cut, Refiner::new(&ink, wood)))
+        .collect();
     let start = |pose: &Pose, mirrored| Found {
         fixed_from_moving: pose.print_from_depth,
         score: pose.score,
@@ -107,18 +151,20 @@ fn settle_all(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Opt
 }
 
 /// A pose refined with the cut that fits best, first from afar, then closely.
-fn settled(woods: &[Refiner], start: &Found) -> Option<Settled> {
+fn settled(woods: &[(f64, Refiner)], start: &Found) -> Option<Settled> {
     let fitting = |pose: &Found| {
-        let judged = woods.iter().map(|wood| (wood, wood.judged(pose)));
+        let judged = woods.iter().map(|wood| (wood, wood.1.judged(pose)));
         judged.max_by(|a, b| a.1.score.total_cmp(&b.1.score))
     };
     let mut pose = *start;
     for loss in [Loss::Huber, Loss::Tukey] {
-        pose = fitting(&pose)?.0.refine(&pose, MOST_STEPS, loss);
+        let ((_, wood), _) = fitting(&pose)?;
+        pose = wood.refine(&pose, MOST_STEPS, loss);
     }
-    let (wood, found) = fitting(&pose)?;
+    let ((cut, wood), found) = fitting(&pose)?;
     Some(Settled {
         found,
+        cut: *cut,
         overlap: wood.overlap(&pose),
     })
 }
