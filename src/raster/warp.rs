@@ -2,11 +2,15 @@
 //!
 //! When the map shrinks, a pixel averages several looks spread over its square; outside the source there is nothing.
 
+use std::ops::Range;
+
 use super::{DepthMap, Grid, Mask};
 use crate::domain::Affine2;
 
 /// Most looks along one side of an output pixel; beyond this a shrinking map begins to alias.
 const MAX_LOOKS: usize = 8;
+/// So many output pixels of a row are first asked for together whether what they see is all alike.
+const RUN: usize = 8;
 
 /// A mask in another frame: a pixel is set when at least half of its square is covered.
 ///
@@ -17,12 +21,22 @@ pub fn warp_mask(mask: &Mask, to_from: &Affine2, width: usize, height: usize) ->
     };
     let looks = Looks::new(&from_to);
     let counts = Counts::of(mask);
-    Mask::from_fn(width, height, |x, y| {
-        counts.alike(looks.reach(x, y)).unwrap_or_else(|| {
-            let set = |p| Some(bilinear(mask, p, |set| f64::from(u8::from(set))));
-            looks.mean(x, y, set) >= Some(0.5)
-        })
-    })
+    let look = |x, y| {
+        let set = |p| Some(bilinear(mask, p, |set| f64::from(u8::from(set))));
+        looks.mean(x, y, set) >= Some(0.5)
+    };
+    let mut out = Mask::new(width, height, false);
+    for y in 0..height {
+        for first in (0..width).step_by(RUN) {
+            let run = first..(first + RUN).min(width);
+            let alike = counts.alike(looks.reach(&run, y));
+            for x in run {
+                let one = || counts.alike(looks.reach(&(x..x + 1), y));
+                out.set(x, y, alike.or_else(one).unwrap_or_else(|| look(x, y)));
+            }
+        }
+    }
+    out
 }
 
 /// Heights in another frame as levels of the same scale; 0 where less than half of a pixel's square holds data.
@@ -61,6 +75,8 @@ pub fn warp_values(
 struct Looks {
     from_to: Affine2,
     per_side: usize,
+    /// Where the looks lie along a side, output pixels from the middle; the first `per_side` of them count.
+    offsets: [f64; MAX_LOOKS],
     /// How far the outermost looks lie from the middle one, source pixels along x and y.
     spread: [f64; 2],
 }
@@ -72,6 +88,7 @@ impl Looks {
         Self {
             from_to: *from_to,
             per_side,
+            offsets: std::array::from_fn(|i| (i as f64 + 0.5) / per_side as f64 - 0.5),
             spread: from_to
                 .0
                 .map(|row| outermost * (row[0].abs() + row[1].abs())),
@@ -81,11 +98,11 @@ impl Looks {
     /// Mean of what the looks find; `None` when half of them or more find nothing.
     fn mean(&self, x: usize, y: usize, value: impl Fn([f64; 2]) -> Option<f64>) -> Option<f64> {
         let n = self.per_side;
-        let offset = |i: usize| (i as f64 + 0.5) / n as f64 - 0.5;
+        let offsets = &self.offsets[..n];
         let (mut sum, mut found) = (0.0, 0_usize);
-        for j in 0..n {
-            for i in 0..n {
-                let p = [x as f64 + offset(i), y as f64 + offset(j)];
+        for down in offsets {
+            for across in offsets {
+                let p = [x as f64 + across, y as f64 + down];
                 if let Some(v) = value(self.from_to.apply(p)) {
                     sum += v;
                     found += 1;
@@ -95,13 +112,15 @@ impl Looks {
         (2 * found > n * n || (n == 1 && found == 1)).then(|| sum / found as f64)
     }
 
-    /// Source pixels that the looks may touch: first and last column and row, a little more rather than less.
-    fn reach(&self, x: usize, y: usize) -> [[i64; 2]; 2] {
+    /// Source pixels that the looks of a run may touch: first and last column and row, rather more than less.
+    fn reach(&self, run: &Range<usize>, y: usize) -> [[i64; 2]; 2] {
         const SLACK: f64 = 1e-6;
-        let middle = self.from_to.apply([x as f64, y as f64]);
+        let first = self.from_to.apply([run.start as f64, y as f64]);
+        let last = self.from_to.apply([run.end as f64 - 1.0, y as f64]);
         [0, 1].map(|k| {
             let reach = self.spread[k] + SLACK;
-            [floor(middle[k] - reach), floor(middle[k] + reach) + 1]
+            let (low, high) = (first[k].min(last[k]), first[k].max(last[k]));
+            [floor(low - reach), floor(high + reach) + 1]
         })
     }
 }
@@ -169,12 +188,11 @@ fn bilinear<T: Copy>(grid: &Grid<T>, [x, y]: [f64; 2], value: impl Fn(T) -> f64)
 fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
     let (x0, y0) = (floor(x), floor(y));
     let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-    let near =
-        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(dx, dy)| levels.get(x0 + dx, y0 + dy).unwrap_or(0));
+    let near = neighbours(levels, x0, y0);
     let weights = [
         (1.0 - fx) * (1.0 - fy),
-        (1.0 - fx) * fy,
         fx * (1.0 - fy),
+        (1.0 - fx) * fy,
         fx * fy,
     ];
     let (mut sum, mut weight) = (0.0, 0.0);
@@ -183,6 +201,19 @@ fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
         weight += if level == 0 { 0.0 } else { share };
     }
     (weight >= 0.5).then(|| sum / weight)
+}
+
+/// Levels of a pixel and of those to its right and below, row after row; 0 outside.
+#[inline]
+fn neighbours(levels: &Grid<u16>, x: i64, y: i64) -> [u16; 4] {
+    let width = levels.width();
+    let inside = |i: i64, side: usize| i >= 0 && i + 1 < side as i64;
+    if inside(x, width) && inside(y, levels.height()) {
+        let from = &levels.data()[y as usize * width + x as usize..][..width + 2];
+        [from[0], from[1], from[width], from[width + 1]]
+    } else {
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| levels.get(x + dx, y + dy).unwrap_or(0))
+    }
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@ pub(super) struct Split {
 ///
 /// Sorts the values.
 pub(super) fn split(values: &mut [f32]) -> Option<Split> {
-    values.sort_unstable_by(f32::total_cmp);
+    sort(values);
     let count = values.len();
     if count < 2 {
         return None;
@@ -38,9 +38,76 @@ pub(super) fn split(values: &mut [f32]) -> Option<Split> {
     })
 }
 
+/// Digits of a value's bits, lowest first: how far down they begin, and how many there are.
+const DIGITS: [u32; 3] = [0, 11, 22];
+const DIGIT_VALUES: usize = 1 << 11;
+
+/// Sorts by digits of the bits, which takes three passes however many values there are; in the order of `total_cmp`.
+fn sort(values: &mut [f32]) {
+    if values.len() < DIGIT_VALUES {
+        values.sort_unstable_by(f32::total_cmp);
+        return;
+    }
+    let mut keys: Vec<u32> = values.iter().map(|v| key(*v)).collect();
+    let mut sorted = vec![0; keys.len()];
+    for shift in DIGITS {
+        by_digit(&keys, &mut sorted, shift);
+        std::mem::swap(&mut keys, &mut sorted);
+    }
+    for (value, key) in values.iter_mut().zip(keys) {
+        *value = of_key(key);
+    }
+}
+
+/// Orders keys by one digit; those alike in it keep their order.
+fn by_digit(keys: &[u32], sorted: &mut [u32], shift: u32) {
+    let digit = |key: u32| (key >> shift) as usize % DIGIT_VALUES;
+    let mut places = [0_usize; DIGIT_VALUES];
+    for key in keys {
+        places[digit(*key)] += 1;
+    }
+    let mut next = 0;
+    for place in &mut places {
+        next += std::mem::replace(place, next);
+    }
+    for key in keys {
+        let place = &mut places[digit(*key)];
+        sorted[*place] = *key;
+        *place += 1;
+    }
+}
+
+const SIGN: u32 = 1 << 31;
+
+/// Bits that order as the values do: the negative ones turned over, the others put above them.
+fn key(value: f32) -> u32 {
+    let bits = value.to_bits();
+    if bits & SIGN == 0 { bits | SIGN } else { !bits }
+}
+
+fn of_key(key: u32) -> f32 {
+    f32::from_bits(if key & SIGN == 0 { !key } else { key & !SIGN })
+}
+
 #[cfg(test)]
 mod tests {
-    use super::split;
+    use proptest::prelude::*;
+
+    use super::{DIGIT_VALUES, sort, split};
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(20))]
+        #[test]
+        fn sorts_as_the_library_does(
+            mut values in prop::collection::vec(any::<f32>(), DIGIT_VALUES..DIGIT_VALUES + 500),
+        ) {
+            let mut wanted = values.clone();
+            wanted.sort_by(f32::total_cmp);
+            sort(&mut values);
+            let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            prop_assert_eq!(bits(&values), bits(&wanted));
+        }
+    }
 
     #[test]
     fn two_heaps_part_between_them() {

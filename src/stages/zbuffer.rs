@@ -56,16 +56,14 @@ impl<'a> Projected<'a> {
             self.splat(view, &mut heights);
             return heights;
         }
-        let corners: Vec<[f64; 3]> = self
-            .points
-            .iter()
-            .map(|p| {
-                let [x, y] = view.px_from_plane.apply([p[0], p[1]]);
-                [x, y, p[2]]
-            })
-            .collect();
+        // On the way, since a list of corners would cost more time in memory than in sums.
+        let corner = |i: u32| {
+            let [x, y, z] = self.points[i as usize];
+            let [x, y] = view.px_from_plane.apply([x, y]);
+            [x, y, z]
+        };
         for t in self.triangles {
-            fill(t.map(|i| corners[i as usize]), &mut heights);
+            fill(t.map(corner), &mut heights);
         }
         heights
     }
@@ -173,16 +171,14 @@ fn crossings(corners: &[[f64; 3]; 3], y: f64) -> Option<(f64, f64)> {
 
 /// Whole pixels from `low` to `high`, bounds included, cut to the grid.
 ///
-/// Casts do the rounding, since `ceil` and `floor` are calls: what is below zero becomes zero, NaN too.
+/// Casts to narrow integers do the rounding: `ceil` and `floor` are calls.
+#[inline]
 fn pixels(low: f64, high: f64, len: usize) -> std::ops::Range<usize> {
-    let cut = low as usize;
-    let first = cut.saturating_add(usize::from((cut as f64) < low));
-    let end = if high >= 0.0 {
-        (high as usize).saturating_add(1).min(len)
-    } else {
-        0
-    };
-    first..end.max(first)
+    let cut = |v: f64| v.max(-1.0).min(len as f64) as i32;
+    let (first, last) = (cut(low), cut(high));
+    let first = (first + i32::from(f64::from(first) < low)).max(0);
+    let end = (last + i32::from(f64::from(last) <= high)).min(len as i32);
+    first as usize..end.max(first) as usize
 }
 
 fn raise(heights: &mut Grid<f32>, x: usize, y: usize, z: f32) {

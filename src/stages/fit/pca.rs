@@ -40,34 +40,30 @@ impl Axes {
     /// of the vertices where there is no area. Flecks far from the bulk do not count.
     pub(super) fn of_surface(mesh: &Mesh) -> Self {
         let bounds = bulk(&mesh.vertices);
-        let corner = |i: u32| Vector3::from(mesh.vertices[i as usize]);
-        let area = |[a, b, c]: &[Vector3<f64>; 3]| (b - a).cross(&(c - a)).norm() * 0.5;
-        let triangles = || {
-            let kept = mesh.triangles.iter().filter(|t| {
-                t.iter()
-                    .all(|i| holds(&bounds, &mesh.vertices[*i as usize]))
-            });
-            kept.map(|t| t.map(corner))
-        };
-        let (mut total, mut centre) = (0.0, Vector3::zeros());
-        for t in triangles() {
-            total += area(&t);
-            centre += (t[0] + t[1] + t[2]) / 3.0 * area(&t);
+        let middle = (Vector3::from(bounds[0]) + Vector3::from(bounds[1])) * 0.5;
+        let (mut total, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
+        for t in &mesh.triangles {
+            let corners = t.map(|i| mesh.vertices[i as usize]);
+            if !corners.iter().all(|corner| holds(&bounds, corner)) {
+                continue;
+            }
+            // From the middle, so that little is lost when the centre's own share is taken off the moments.
+            let [a, b, c] = corners.map(|corner| Vector3::from(corner) - middle);
+            let area = (b - a).cross(&(c - a)).norm() * 0.5;
+            let sum = a + b + c;
+            total += area;
+            first += sum * (area / 3.0);
+            // Second moment of a triangle: (sum of corners' outer products + outer product of their sum) / 12.
+            let outer = a * a.transpose() + b * b.transpose() + c * c.transpose();
+            second += (outer + sum * sum.transpose()) * (area / 12.0);
         }
         if total <= 0.0 || !total.is_finite() {
             let kept = mesh.vertices.iter().filter(|v| holds(&bounds, v));
             return Self::of_points(kept.map(|v| (*v, 1.0)));
         }
-        centre /= total;
-        let mut spread = Matrix3::zeros();
-        for t in triangles() {
-            // Second moment of a triangle: (sum of corners' outer products + outer product of their sum) / 12.
-            let [a, b, c] = t.map(|corner| corner - centre);
-            let sum = a + b + c;
-            let outer = a * a.transpose() + b * b.transpose() + c * c.transpose();
-            spread += (outer + sum * sum.transpose()) * (area(&t) / 12.0);
-        }
-        Self::from_moments(centre, spread / total)
+        let centre = first / total;
+        let covariance = second / total - centre * centre.transpose();
+        Self::from_moments(middle + centre, covariance)
     }
 
     fn from_moments(centre: Vector3<f64>, covariance: Matrix3<f64>) -> Self {

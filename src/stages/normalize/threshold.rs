@@ -21,9 +21,10 @@ const LEAST_INKED: f64 = 1.15;
 
 /// Both pictures on the canvas.
 pub(super) struct Canvas {
+    /// Levels of the depth map; 0 where one of the two holds nothing.
     levels: Grid<u16>,
+    /// Ink where both hold data.
     ink: Mask,
-    known: Mask,
 }
 
 impl Canvas {
@@ -36,26 +37,30 @@ impl Canvas {
         params: &Params,
     ) -> Self {
         let side = params.canvas_px as usize;
-        let levels = warp_depth(
+        let mut levels = warp_depth(
             depth,
             &canvas_from_print.after(print_from_depth),
             side,
             side,
         );
         let paper = warp_mask(&print.soft.known, canvas_from_print, side, side);
-        let known = Mask::from_fn(side, side, |x, y| paper.at(x, y) && levels.at(x, y) > 0);
-        let ink = warp_mask(&print.mask, canvas_from_print, side, side);
-        Self {
-            ink: Mask::from_fn(side, side, |x, y| ink.at(x, y) && known.at(x, y)),
-            known,
-            levels,
+        let mut ink = warp_mask(&print.mask, canvas_from_print, side, side);
+        let both = levels.data_mut().iter_mut().zip(ink.data_mut());
+        for ((level, ink), paper) in both.zip(paper.data()) {
+            *level *= u16::from(*paper);
+            *ink &= *level > 0;
         }
+        Self { levels, ink }
     }
 
+    /// Strokes at a level above 0.
     fn mask(&self, level: u16) -> Mask {
-        Mask::from_fn(self.levels.width(), self.levels.height(), |x, y| {
-            self.known.at(x, y) && self.levels.at(x, y) >= level
-        })
+        self.levels.map(|l| *l >= level)
+    }
+
+    /// Number of pixels of the strokes at a level above 0.
+    fn area(&self, level: u16) -> f64 {
+        self.levels.data().iter().filter(|l| **l >= level).count() as f64
     }
 }
 
@@ -91,7 +96,9 @@ pub(super) fn choose(
     let density = nearest(&candidates, gap);
     let edge = relief.level_at(depth, relief.edge);
     // Ink covers more than the wood, within reason: beyond that the tops' end was misjudged.
-    let own_area = (canvas.mask(edge).count() as f64).clamp(ink / MOST_SPREAD, ink * LEAST_INKED);
+    let own_area = canvas
+        .area(edge)
+        .clamp(ink / MOST_SPREAD, ink * LEAST_INKED);
     let close = |c: &Candidate| (c.area / own_area.max(1.0)).ln().abs() <= CLOSE_AREA.ln();
     let both = structure
         .best_among(&close)
@@ -141,7 +148,7 @@ fn candidates(
     levels.dedup();
     let candidate = |level| Candidate {
         level,
-        area: canvas.mask(level).count() as f64,
+        area: canvas.area(level),
     };
     let tried = levels.into_iter().map(candidate);
     tried.filter(|c| c.area > 0.0).collect()

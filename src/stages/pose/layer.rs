@@ -148,13 +148,13 @@ impl Layer {
 /// Bilinear value; zero outside.
 #[inline]
 pub(super) fn sample(values: &Grid<f32>, [x, y]: [f64; 2]) -> f32 {
-    let (x0, y0) = (x.floor(), y.floor());
-    let (column, row) = (x0 as i64, y0 as i64);
     let (width, height) = (values.width(), values.height());
-    if column < 0 || row < 0 || column + 1 >= width as i64 || row + 1 >= height as i64 {
+    // Also says no to what is not a number; below, casts round down, where `floor` would be a call.
+    if !(x >= 0.0 && y >= 0.0 && x < (width - 1) as f64 && y < (height - 1) as f64) {
         return 0.0;
     }
-    let (fx, fy) = ((x - x0) as f32, (y - y0) as f32);
+    let (column, row) = (x as i32, y as i32);
+    let (fx, fy) = ((x - f64::from(column)) as f32, (y - f64::from(row)) as f32);
     let from = row as usize * width + column as usize;
     let near = &values.data()[from..from + width + 2];
     let a = near[0] + (near[1] - near[0]) * fx;

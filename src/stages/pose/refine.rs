@@ -149,31 +149,27 @@ impl<'a> Refiner<'a> {
 
     /// What each known pixel of the fixed layer meets in the moving one.
     fn look(&self, from_fixed: &Affine2, room: &mut Room) {
-        room.clear();
+        room.clear(self.places.len());
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
         for (place, value) in self.places.iter().zip(&self.values) {
             let [x, y] = *place;
             let u = a[0] * x + a[1] * y + a[2];
             let v = b[0] * x + b[1] * y + b[2];
-            let Some([m, gx, gy, w]) = self.cell(u, v) else {
-                continue;
-            };
-            if w < 0.5 {
-                continue;
+            if let Some(cell) = self.cell(u, v) {
+                room.put(*value, cell, [x, y]);
             }
-            room.push([*value, m, gx, gy, x, y]);
         }
+        room.close();
     }
 
     /// Bilinear look into the moving layer; `None` outside.
     #[inline]
     fn cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
         let ([p, q, r, s], [fx, fy]) = self.corners(u, v)?;
-        Some(std::array::from_fn(|k| {
-            let top = p[k] + (q[k] - p[k]) * fx;
-            let bottom = r[k] + (s[k] - r[k]) * fx;
-            top + (bottom - top) * fy
-        }))
+        let mix = |a: [f32; 4], b: [f32; 4], share: f32| -> [f32; 4] {
+            std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
+        };
+        Some(mix(mix(p, q, fx), mix(r, s, fx), fy))
     }
 
     /// The value alone.
@@ -263,14 +259,17 @@ impl<'a> Refiner<'a> {
 /// Adds the products of a few looks, side by side, to the sums of the normal equations and of the cost.
 fn add(
     sums: &mut [[f32; LANES]; SUMS + 1],
-    [f, m, gx, gy, x, y]: &Looks,
+    looks: &Looks,
     held: usize,
     mirrored: bool,
     [gain, offset, limit]: [f32; 3],
     loss: Loss,
 ) {
     let s = if mirrored { -1.0 } else { 1.0 };
-    let residual: [f32; LANES] = std::array::from_fn(|k| f[k] - gain * m[k] - offset);
+    let [x, y] = looks.place;
+    let [m, gx, gy]: [[f32; LANES]; 3] =
+        std::array::from_fn(|part| looks.met.map(|cell| cell[part]));
+    let residual: [f32; LANES] = std::array::from_fn(|k| looks.fixed[k] - gain * m[k] - offset);
     let (mut weight, mut cost) = ([0.0; LANES], [0.0; LANES]);
     for k in 0..held {
         (weight[k], cost[k]) = loss.at(residual[k].abs(), limit);
@@ -280,7 +279,7 @@ fn add(
         std::array::from_fn(|k| gain * (gy[k] * x[k] - gx[k] * y[k] * s)),
         gx.map(|v| gain * v),
         gy.map(|v| gain * v),
-        *m,
+        m,
         [1.0; LANES],
     ];
     let mut at = 0;
@@ -335,8 +334,16 @@ fn moved(map: &Affine2, change: &[f64; 6], mirrored: bool) -> Affine2 {
     ])
 }
 
-/// A few looks side by side: the fixed value, the moving one, its slopes in x and y, and the place.
-type Looks = [[f32; LANES]; 6];
+/// A few looks side by side.
+#[derive(Debug, Clone, Copy, Default)]
+struct Looks {
+    /// The fixed layer's value.
+    fixed: [f32; LANES],
+    /// The moving layer's value, slope in x and y, and weight.
+    met: [[f32; 4]; LANES],
+    /// Place in the fixed layer, relative to its middle: x of each, then y.
+    place: [[f32; LANES]; 2],
+}
 
 /// Buffers of one refinement.
 #[derive(Default)]
@@ -348,31 +355,42 @@ struct Room {
 }
 
 impl Room {
-    fn clear(&mut self) {
-        self.looks.clear();
+    /// Makes room for this many looks, and one that does not count.
+    fn clear(&mut self, most: usize) {
+        self.looks.resize(most / LANES + 1, Looks::default());
         self.count = 0;
     }
 
+    /// Takes in a look if the moving layer is known there.
     #[inline]
-    fn push(&mut self, look: [f32; 6]) {
+    fn put(&mut self, fixed: f32, met: [f32; 4], [x, y]: [f32; 2]) {
         let lane = self.count % LANES;
-        if lane == 0 {
-            self.looks.push([[0.0; LANES]; 6]);
-        }
+        let looks = &mut self.looks[self.count / LANES];
+        looks.fixed[lane] = fixed;
+        looks.met[lane] = met;
+        looks.place[0][lane] = x;
+        looks.place[1][lane] = y;
+        self.count += usize::from(met[3] >= 0.5);
+    }
+
+    /// Leaves only what was taken in.
+    fn close(&mut self) {
+        self.looks.truncate(self.count.div_ceil(LANES));
+        let held = (self.count + LANES - 1) % LANES + 1;
         if let Some(last) = self.looks.last_mut() {
-            for (lanes, value) in last.iter_mut().zip(look) {
-                lanes[lane] = value;
+            for lane in held..LANES {
+                last.fixed[lane] = 0.0;
+                last.met[lane] = [0.0; 4];
             }
         }
-        self.count += 1;
     }
 
     /// Least-squares gain and offset of the fixed values over the moving ones; the gain never below a trifle.
     fn gain_and_offset(&self) -> (f32, f32) {
         let mut sums = [[0.0_f64; LANES]; 4];
-        for [f, m, ..] in &self.looks {
+        for looks in &self.looks {
             for k in 0..LANES {
-                let (a, b) = (f64::from(f[k]), f64::from(m[k]));
+                let (a, b) = (f64::from(looks.fixed[k]), f64::from(looks.met[k][0]));
                 for (sum, value) in sums.iter_mut().zip([a, b, a * b, b * b]) {
                     sum[k] += value;
                 }
@@ -387,8 +405,9 @@ impl Room {
     /// Median size of the residuals at a gain and offset.
     fn median_residual(&mut self, gain: f32, offset: f32) -> f32 {
         self.sizes.clear();
-        for [f, m, ..] in &self.looks {
-            let sizes: [f32; LANES] = std::array::from_fn(|k| (f[k] - gain * m[k] - offset).abs());
+        for looks in &self.looks {
+            let residual = |k: usize| looks.fixed[k] - gain * looks.met[k][0] - offset;
+            let sizes: [f32; LANES] = std::array::from_fn(|k| residual(k).abs());
             self.sizes.extend(sizes);
         }
         self.sizes.truncate(self.count);
