@@ -130,6 +130,24 @@ impl Layer {
         }
     }
 
+    /// This layer and a share (0..=1) of another of the same place and size.
+    pub(in crate::stages) fn mixed(&self, other: &Self, share: f64) -> Self {
+        let share = share as f32;
+        let mix = |a: &Grid<f32>, b: &Grid<f32>| {
+            let mut mixed = a.clone();
+            for (value, other) in mixed.data_mut().iter_mut().zip(b.data()) {
+                *value += share * (other - *value);
+            }
+            mixed
+        };
+        Self {
+            value: mix(&self.value, &other.value),
+            amount: mix(&self.amount, &other.amount),
+            weight: self.weight.clone(),
+            work_from_image: self.work_from_image,
+        }
+    }
+
     /// Middle of the layer in its own pixels.
     pub(super) fn centre(&self) -> [f64; 2] {
         [

@@ -3,6 +3,7 @@
 //! [`Method::Turns`] is the paper's: turns of the wrapped mask, the shift of each by climbing. [`Method::Refine`] is
 //! ours: the pose that normalisation found, refined at full size.
 
+mod cuts;
 mod refined;
 mod turns;
 
@@ -16,7 +17,7 @@ use crate::domain::{
 use crate::raster::{DepthMap, Mask, warp_mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 2;
+pub const REVISION: u32 = 3;
 
 /// How the alignment is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

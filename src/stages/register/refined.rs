@@ -1,9 +1,10 @@
 //! Our registration: the poses that normalisation found, refined at full size; the best one serves every metric.
 
+use super::cuts::Cuts;
 use super::{Alignment, Error, Params};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{Normalized, Relief, soft_stroke};
-use crate::stages::pose::{Base, Found, Layer, Loss, Refiner, Soft};
+use crate::stages::pose::{Base, Found, Layer, Loss, Soft};
 
 /// Poses closer in angle than this are one pose when the margin is taken.
 const SAME_POSE_DEG: f64 = 15.0;
@@ -52,7 +53,7 @@ fn refined(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Option
                 .layer(size, params.smoothing_px)
         })
         .collect();
-    let woods: Vec<Refiner> = woods.iter().map(|wood| Refiner::new(&ink, wood)).collect();
+    let woods = Cuts::new(&ink, &woods);
     let starts = normalized
         .outcome
         .poses
@@ -69,19 +70,12 @@ fn refined(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Option
 }
 
 /// A pose refined with the cut that fits best, first from afar, then closely.
-fn settled(woods: &[Refiner], start: &Found) -> Found {
-    let fitting = |pose: &Found| {
-        let judged = woods.iter().map(|wood| (wood, wood.judged(pose)));
-        judged.max_by(|a, b| a.1.score.total_cmp(&b.1.score))
-    };
+fn settled(woods: &Cuts, start: &Found) -> Found {
     let mut pose = *start;
     for loss in [Loss::Huber, Loss::Tukey] {
-        let Some((wood, _)) = fitting(&pose) else {
-            return pose;
-        };
-        pose = wood.refine(&pose, 15, loss);
+        pose = woods.refine(&pose, 15, loss);
     }
-    let Some((wood, judged)) = fitting(&pose) else {
+    let Some((wood, judged)) = woods.fitting(&pose) else {
         return pose;
     };
     Found {
