@@ -16,10 +16,12 @@ pub fn warp_mask(mask: &Mask, to_from: &Affine2, width: usize, height: usize) ->
         return Mask::new(width, height, false);
     };
     let looks = Looks::new(&from_to);
+    let counts = Counts::of(mask);
     Mask::from_fn(width, height, |x, y| {
-        looks.mean(x, y, |p| {
-            Some(bilinear(mask, p, |set| f64::from(u8::from(set))))
-        }) >= Some(0.5)
+        counts.alike(looks.reach(x, y)).unwrap_or_else(|| {
+            let set = |p| Some(bilinear(mask, p, |set| f64::from(u8::from(set))));
+            looks.mean(x, y, set) >= Some(0.5)
+        })
     })
 }
 
@@ -59,14 +61,20 @@ pub fn warp_values(
 struct Looks {
     from_to: Affine2,
     per_side: usize,
+    /// How far the outermost looks lie from the middle one, source pixels along x and y.
+    spread: [f64; 2],
 }
 
 impl Looks {
     fn new(from_to: &Affine2) -> Self {
         let per_side = (from_to.scale().ceil() as usize).clamp(1, MAX_LOOKS);
+        let outermost = 0.5 - 0.5 / per_side as f64;
         Self {
             from_to: *from_to,
             per_side,
+            spread: from_to
+                .0
+                .map(|row| outermost * (row[0].abs() + row[1].abs())),
         }
     }
 
@@ -86,39 +94,100 @@ impl Looks {
         }
         (2 * found > n * n || (n == 1 && found == 1)).then(|| sum / found as f64)
     }
+
+    /// Source pixels that the looks may touch: first and last column and row, a little more rather than less.
+    fn reach(&self, x: usize, y: usize) -> [[i64; 2]; 2] {
+        const SLACK: f64 = 1e-6;
+        let middle = self.from_to.apply([x as f64, y as f64]);
+        [0, 1].map(|k| {
+            let reach = self.spread[k] + SLACK;
+            [floor(middle[k] - reach), floor(middle[k] + reach) + 1]
+        })
+    }
+}
+
+/// How many pixels of a mask are set above and to the left of each corner of its pixels.
+struct Counts {
+    sums: Vec<u32>,
+    width: usize,
+    height: usize,
+}
+
+impl Counts {
+    fn of(mask: &Mask) -> Self {
+        let (width, height) = (mask.width(), mask.height());
+        let stride = width + 1;
+        let mut sums = vec![0_u32; stride * (height + 1)];
+        for y in 0..height {
+            let (above, below) = sums[y * stride..].split_at_mut(stride);
+            let mut in_row = 0;
+            let columns = below[1..].iter_mut().zip(&above[1..]);
+            for ((sum, above), set) in columns.zip(mask.row(y)) {
+                in_row += u32::from(*set);
+                *sum = above + in_row;
+            }
+        }
+        Self {
+            sums,
+            width,
+            height,
+        }
+    }
+
+    /// What all pixels of a box are, if they are all alike; what is outside the mask is not set.
+    fn alike(&self, [[x0, x1], [y0, y1]]: [[i64; 2]; 2]) -> Option<bool> {
+        let cut = |low: i64, high: i64, side: usize| {
+            let side = side as i64;
+            [low.clamp(0, side), (high + 1).clamp(0, side)]
+        };
+        let ([left, right], [top, bottom]) = (cut(x0, x1, self.width), cut(y0, y1, self.height));
+        let at = |x: i64, y: i64| self.sums[y as usize * (self.width + 1) + x as usize];
+        let set = at(right, bottom) + at(left, top) - at(right, top) - at(left, bottom);
+        if set == 0 {
+            return Some(false);
+        }
+        (i64::from(set) == (x1 - x0 + 1) * (y1 - y0 + 1)).then_some(true)
+    }
+}
+
+/// The whole number below; a plain cast and a comparison, where `f64::floor` would be a call.
+fn floor(value: f64) -> i64 {
+    let cut = value as i64;
+    cut - i64::from(cut as f64 > value)
 }
 
 /// Bilinear value at a point; cells outside the grid count as zero.
 fn bilinear<T: Copy>(grid: &Grid<T>, [x, y]: [f64; 2], value: impl Fn(T) -> f64) -> f64 {
-    let (x0, y0) = (x.floor(), y.floor());
-    let (fx, fy) = (x - x0, y - y0);
-    let at = |dx: i64, dy: i64| grid.get(x0 as i64 + dx, y0 as i64 + dy).map_or(0.0, &value);
+    let (x0, y0) = (floor(x), floor(y));
+    let (fx, fy) = (x - x0 as f64, y - y0 as f64);
+    let at = |dx: i64, dy: i64| grid.get(x0 + dx, y0 + dy).map_or(0.0, &value);
     (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy)
         + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy
 }
 
 /// Bilinear level among the neighbours that hold data; `None` when they weigh less than half.
 fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
-    let (x0, y0) = (x.floor(), y.floor());
-    let (fx, fy) = (x - x0, y - y0);
+    let (x0, y0) = (floor(x), floor(y));
+    let (fx, fy) = (x - x0 as f64, y - y0 as f64);
+    let near =
+        [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(dx, dy)| levels.get(x0 + dx, y0 + dy).unwrap_or(0));
+    let weights = [
+        (1.0 - fx) * (1.0 - fy),
+        (1.0 - fx) * fy,
+        fx * (1.0 - fy),
+        fx * fy,
+    ];
     let (mut sum, mut weight) = (0.0, 0.0);
-    for (dx, wx) in [(0, 1.0 - fx), (1, fx)] {
-        for (dy, wy) in [(0, 1.0 - fy), (1, fy)] {
-            match levels.get(x0 as i64 + dx, y0 as i64 + dy) {
-                None | Some(0) => {}
-                Some(level) => {
-                    sum += wx * wy * f64::from(level);
-                    weight += wx * wy;
-                }
-            }
-        }
+    for (level, share) in near.into_iter().zip(weights) {
+        sum += share * f64::from(level);
+        weight += if level == 0 { 0.0 } else { share };
     }
     (weight >= 0.5).then(|| sum / weight)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{warp_mask, warp_values};
+    use super::{Looks, bilinear, warp_mask, warp_values};
     use crate::domain::Affine2;
     use crate::raster::{Grid, Mask};
 
@@ -158,6 +227,20 @@ mod tests {
             .filter(|(a, b)| a != b)
             .count();
         assert!(differ <= 12, "{differ} pixels differ");
+    }
+
+    #[test]
+    fn what_is_alike_all_over_equals_look_by_look() {
+        let mask = Mask::from_fn(90, 70, |x, y| (x / 9 + y / 14) % 2 == 0 || x * y % 31 == 0);
+        for (scale, angle) in [(0.3, 0.4), (0.8, 2.0), (1.7, -1.0)] {
+            let map = Affine2::similarity(scale, angle, [20.0, 9.0]);
+            let looks = Looks::new(&map.inverse().expect("a similarity has an inverse"));
+            let plain = Mask::from_fn(50, 60, |x, y| {
+                let set = |p| Some(bilinear(&mask, p, |set| f64::from(u8::from(set))));
+                looks.mean(x, y, set) >= Some(0.5)
+            });
+            assert_eq!(warp_mask(&mask, &map, 50, 60), plain);
+        }
     }
 
     #[test]

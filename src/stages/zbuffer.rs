@@ -46,7 +46,7 @@ impl<'a> Projected<'a> {
 
     /// Bounds in x and y of the bulk of the points.
     pub(super) fn bounds(&self) -> Bounds<2> {
-        bulk(&self.points).map(|corner| [corner[0], corner[1]])
+        bulk(&self.points)
     }
 
     /// The highest z under each pixel's centre; [`NOTHING`] where the ray meets no surface.
@@ -123,6 +123,15 @@ impl View {
 /// share an edge agree on it to the last bit and no pixel between them stays empty.
 fn fill(corners: [[f64; 3]; 3], heights: &mut Grid<f32>) {
     let [a, b, c] = corners;
+    // Most triangles of a scan are smaller than a pixel and hold no centre.
+    let span = |k: usize, len| {
+        let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
+        pixels(low, high, len)
+    };
+    let rows = span(1, heights.height());
+    if rows.is_empty() || span(0, heights.width()).is_empty() {
+        return;
+    }
     let doubled_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
     if doubled_area == 0.0 || !doubled_area.is_finite() {
         return;
@@ -132,10 +141,8 @@ fn fill(corners: [[f64; 3]; 3], heights: &mut Grid<f32>) {
     let dz_dy = (v * (b[0] - a[0]) - u * (c[0] - a[0])) / doubled_area;
     let z_low = a[2].min(b[2]).min(c[2]);
     let z_high = a[2].max(b[2]).max(c[2]);
-    let y_low = a[1].min(b[1]).min(c[1]);
-    let y_high = a[1].max(b[1]).max(c[1]);
     let width = heights.width();
-    for row in pixels(y_low, y_high, heights.height()) {
+    for row in rows {
         let Some((x_low, x_high)) = crossings(&corners, row as f64) else {
             continue;
         };
@@ -171,9 +178,16 @@ fn crossings(corners: &[[f64; 3]; 3], y: f64) -> Option<(f64, f64)> {
 }
 
 /// Whole pixels from `low` to `high`, bounds included, cut to the grid.
+///
+/// Casts do the rounding, since `ceil` and `floor` are calls: what is below zero becomes zero, NaN too.
 fn pixels(low: f64, high: f64, len: usize) -> std::ops::Range<usize> {
-    let first = low.ceil().max(0.0) as usize;
-    let end = (high.floor() + 1.0).clamp(0.0, len as f64) as usize;
+    let cut = low as usize;
+    let first = cut.saturating_add(usize::from((cut as f64) < low));
+    let end = if high >= 0.0 {
+        (high as usize).saturating_add(1).min(len)
+    } else {
+        0
+    };
     first..end.max(first)
 }
 

@@ -161,22 +161,14 @@ impl<'a> Refiner<'a> {
             if w < 0.5 {
                 continue;
             }
-            room.looks.push([*value, m, gx, gy, x, y]);
+            room.push([*value, m, gx, gy, x, y]);
         }
     }
 
     /// Bilinear look into the moving layer; `None` outside.
     #[inline]
     fn cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
-        let [width, height] = self.size;
-        if !(u >= 0.0 && v >= 0.0 && u < (width - 1) as f32 && v < (height - 1) as f32) {
-            return None;
-        }
-        let (column, row) = (u as usize, v as usize);
-        let (fx, fy) = (u - column as f32, v - row as f32);
-        let from = row * width + column;
-        let near = &self.cells[from..from + width + 2];
-        let (p, q, r, s) = (near[0], near[1], near[width], near[width + 1]);
+        let ([p, q, r, s], [fx, fy]) = self.corners(u, v)?;
         Some(std::array::from_fn(|k| {
             let top = p[k] + (q[k] - p[k]) * fx;
             let bottom = r[k] + (s[k] - r[k]) * fx;
@@ -184,59 +176,66 @@ impl<'a> Refiner<'a> {
         }))
     }
 
+    /// The value alone.
+    #[inline]
+    fn value(&self, u: f32, v: f32) -> f32 {
+        let Some(([p, q, r, s], [fx, fy])) = self.corners(u, v) else {
+            return 0.0;
+        };
+        let top = p[0] + (q[0] - p[0]) * fx;
+        let bottom = r[0] + (s[0] - r[0]) * fx;
+        top + (bottom - top) * fy
+    }
+
+    /// The four cells around a place of the moving layer, and where between them it lies; `None` outside.
+    #[inline]
+    fn corners(&self, u: f32, v: f32) -> Option<([[f32; 4]; 4], [f32; 2])> {
+        let [width, height] = self.size;
+        if !(u >= 0.0 && v >= 0.0 && u < (width - 1) as f32 && v < (height - 1) as f32) {
+            return None;
+        }
+        // Narrow integers: casts between them and floats are single instructions.
+        let (column, row) = (u as i32, v as i32);
+        let within = [u - column as f32, v - row as f32];
+        let from = row as usize * width + column as usize;
+        let (above, below) = (
+            &self.cells[from..from + 2],
+            &self.cells[from + width..][..2],
+        );
+        Some(([above[0], above[1], below[0], below[1]], within))
+    }
+
     fn step(&self, from_fixed: &Affine2, mirrored: bool, loss: Loss, room: &mut Room) -> Step {
         self.look(from_fixed, room);
-        let (gain, offset) = gain_and_offset(&room.looks);
-        room.sizes.clear();
-        room.sizes.extend(
-            room.looks
-                .iter()
-                .map(|l| (l[0] - gain * l[1] - offset).abs()),
-        );
+        let (gain, offset) = room.gain_and_offset();
         let limit = match loss {
-            Loss::Huber => ROBUST * median(&mut room.sizes).max(1e-4),
+            Loss::Huber => ROBUST * room.median_residual(gain, offset).max(1e-4),
             Loss::Tukey => FAR,
         };
-        let s = if mirrored { -1.0 } else { 1.0 };
-        let mut sums = [[0.0_f32; LANES]; SUMS];
-        let mut totals = [0.0_f64; SUMS];
-        let mut cost = 0.0;
-        for (k, l) in room.looks.iter().enumerate() {
-            let [f, m, gx, gy, x, y] = *l;
-            let residual = f - gain * m - offset;
-            let size = residual.abs();
-            let (weight, charge) = loss.at(size, limit);
-            cost += charge;
-            let row = [
-                gain * (gx * x + gy * y * s),
-                gain * (gy * x - gx * y * s),
-                gain * gx,
-                gain * gy,
-                m,
-                1.0,
-            ];
-            let lane = k % LANES;
-            let mut at = 0;
-            for i in 0..6 {
-                let weighed = weight * row[i];
-                for other in &row[..=i] {
-                    sums[at][lane] += weighed * other;
-                    at += 1;
-                }
-                sums[21 + i][lane] += weighed * residual;
-            }
-            if k % 1024 == 1023 {
+        let mut sums = [[0.0_f32; LANES]; SUMS + 1];
+        let mut totals = [0.0_f64; SUMS + 1];
+        for (k, looks) in room.looks.iter().enumerate() {
+            let held = LANES.min(room.count - k * LANES);
+            add(
+                &mut sums,
+                looks,
+                held,
+                mirrored,
+                [gain, offset, limit],
+                loss,
+            );
+            if k % 128 == 127 {
                 drain(&mut sums, &mut totals);
             }
         }
         drain(&mut sums, &mut totals);
         Step {
-            sums: totals,
-            cost: if room.looks.is_empty() {
+            cost: if room.count == 0 {
                 f64::INFINITY
             } else {
-                f64::from(cost) / room.looks.len() as f64
+                totals[SUMS] / room.count as f64
             },
+            sums: totals,
         }
     }
 
@@ -249,7 +248,7 @@ impl<'a> Refiner<'a> {
             for ([x, y], value) in places.iter().zip(values) {
                 let u = a[0] * x + a[1] * y + a[2];
                 let v = b[0] * x + b[1] * y + b[2];
-                part += self.cell(u, v).map_or(0.0, |cell| cell[0] * value);
+                part += self.value(u, v) * value;
             }
             both += f64::from(part);
         }
@@ -261,7 +260,48 @@ impl<'a> Refiner<'a> {
     }
 }
 
-fn drain(sums: &mut [[f32; LANES]; SUMS], totals: &mut [f64; SUMS]) {
+/// Adds the products of a few looks, side by side, to the sums of the normal equations and of the cost.
+fn add(
+    sums: &mut [[f32; LANES]; SUMS + 1],
+    [f, m, gx, gy, x, y]: &Looks,
+    held: usize,
+    mirrored: bool,
+    [gain, offset, limit]: [f32; 3],
+    loss: Loss,
+) {
+    let s = if mirrored { -1.0 } else { 1.0 };
+    let residual: [f32; LANES] = std::array::from_fn(|k| f[k] - gain * m[k] - offset);
+    let (mut weight, mut cost) = ([0.0; LANES], [0.0; LANES]);
+    for k in 0..held {
+        (weight[k], cost[k]) = loss.at(residual[k].abs(), limit);
+    }
+    let row: [[f32; LANES]; 6] = [
+        std::array::from_fn(|k| gain * (gx[k] * x[k] + gy[k] * y[k] * s)),
+        std::array::from_fn(|k| gain * (gy[k] * x[k] - gx[k] * y[k] * s)),
+        gx.map(|v| gain * v),
+        gy.map(|v| gain * v),
+        *m,
+        [1.0; LANES],
+    ];
+    let mut at = 0;
+    for i in 0..6 {
+        let weighed: [f32; LANES] = std::array::from_fn(|k| weight[k] * row[i][k]);
+        for other in &row[..=i] {
+            for k in 0..LANES {
+                sums[at][k] += weighed[k] * other[k];
+            }
+            at += 1;
+        }
+        for k in 0..LANES {
+            sums[21 + i][k] += weighed[k] * residual[k];
+        }
+    }
+    for k in 0..LANES {
+        sums[SUMS][k] += cost[k];
+    }
+}
+
+fn drain(sums: &mut [[f32; LANES]; SUMS + 1], totals: &mut [f64; SUMS + 1]) {
     for (lanes, total) in sums.iter_mut().zip(totals) {
         *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
         *lanes = [0.0; LANES];
@@ -295,22 +335,71 @@ fn moved(map: &Affine2, change: &[f64; 6], mirrored: bool) -> Affine2 {
     ])
 }
 
+/// A few looks side by side: the fixed value, the moving one, its slopes in x and y, and the place.
+type Looks = [[f32; LANES]; 6];
+
 /// Buffers of one refinement.
 #[derive(Default)]
 struct Room {
-    looks: Vec<[f32; 6]>,
+    /// The last one may be filled only in part, with zeros after.
+    looks: Vec<Looks>,
+    count: usize,
     sizes: Vec<f32>,
 }
 
 impl Room {
     fn clear(&mut self) {
         self.looks.clear();
+        self.count = 0;
+    }
+
+    #[inline]
+    fn push(&mut self, look: [f32; 6]) {
+        let lane = self.count % LANES;
+        if lane == 0 {
+            self.looks.push([[0.0; LANES]; 6]);
+        }
+        if let Some(last) = self.looks.last_mut() {
+            for (lanes, value) in last.iter_mut().zip(look) {
+                lanes[lane] = value;
+            }
+        }
+        self.count += 1;
+    }
+
+    /// Least-squares gain and offset of the fixed values over the moving ones; the gain never below a trifle.
+    fn gain_and_offset(&self) -> (f32, f32) {
+        let mut sums = [[0.0_f64; LANES]; 4];
+        for [f, m, ..] in &self.looks {
+            for k in 0..LANES {
+                let (a, b) = (f64::from(f[k]), f64::from(m[k]));
+                for (sum, value) in sums.iter_mut().zip([a, b, a * b, b * b]) {
+                    sum[k] += value;
+                }
+            }
+        }
+        let n = self.count.max(1) as f64;
+        let [f, m, fm, mm] = sums.map(|lanes| lanes.iter().sum::<f64>() / n);
+        let gain = ((fm - f * m) / (mm - m * m).max(1e-9)).max(0.05);
+        (gain as f32, (f - gain * m) as f32)
+    }
+
+    /// Median size of the residuals at a gain and offset.
+    fn median_residual(&mut self, gain: f32, offset: f32) -> f32 {
+        self.sizes.clear();
+        for [f, m, ..] in &self.looks {
+            let sizes: [f32; LANES] = std::array::from_fn(|k| (f[k] - gain * m[k] - offset).abs());
+            self.sizes.extend(sizes);
+        }
+        self.sizes.truncate(self.count);
+        median(&mut self.sizes)
     }
 }
 
 /// Normal equations at one pose: four of the pose, gain and offset of the values.
 struct Step {
-    sums: [f64; SUMS],
+    /// The last is the cost before it was shared out.
+    sums: [f64; SUMS + 1],
     cost: f64,
 }
 
@@ -331,22 +420,6 @@ impl Step {
         let right = Vector6::from_fn(|i, _| self.sums[21 + i]);
         Some(normal.cholesky()?.solve(&right).into())
     }
-}
-
-/// Least-squares gain and offset of the fixed values over the moving ones; the gain never below a trifle.
-fn gain_and_offset(looks: &[[f32; 6]]) -> (f32, f32) {
-    let n = looks.len().max(1) as f64;
-    let (mut f, mut m, mut fm, mut mm) = (0.0_f64, 0.0, 0.0, 0.0);
-    for l in looks {
-        let (a, b) = (f64::from(l[0]), f64::from(l[1]));
-        f += a;
-        m += b;
-        fm += a * b;
-        mm += b * b;
-    }
-    let (f, m) = (f / n, m / n);
-    let gain = ((fm / n - f * m) / (mm / n - m * m).max(1e-9)).max(0.05);
-    (gain as f32, (f - gain * m) as f32)
 }
 
 fn median(values: &mut [f32]) -> f32 {

@@ -56,17 +56,21 @@ pub struct Structure {
 #[derive(Debug, Clone)]
 pub struct WindowMeans {
     mask: Mask,
+    taps: Taps,
+    /// Means over the windows that lie wholly in the mask: a rim of half a window is left out.
     means: Grid<f64>,
-    window: SsimWindow,
+    covariance_factor: f64,
 }
 
 impl WindowMeans {
     /// Computes the windowed means of a mask.
     pub fn new(mask: &Mask, window: SsimWindow) -> Self {
+        let taps = Taps::new(window.taps());
         Self {
-            means: smooth(&indicator(mask), &window.taps()),
+            means: taps.means(mask),
+            taps,
             mask: mask.clone(),
-            window,
+            covariance_factor: window.covariance_factor(),
         }
     }
 
@@ -77,36 +81,31 @@ impl WindowMeans {
 
     /// Structure of this mask against another of the same size.
     pub fn against(&self, other: &Mask) -> Structure {
-        let taps = self.window.taps();
-        let both = Mask::from_fn(other.width(), other.height(), |x, y| {
-            other.at(x, y) && self.mask.at(x, y)
-        });
-        let mean_other = smooth(&indicator(other), &taps);
-        let mean_both = smooth(&indicator(&both), &taps);
-        self.fold(&mean_other, &mean_both, taps.len() / 2)
+        let pairs = self.mask.data().iter().zip(other.data());
+        let mut both = other.clone();
+        for (both, (a, b)) in both.data_mut().iter_mut().zip(pairs) {
+            *both = *a && *b;
+        }
+        self.fold(&self.taps.means(other), &self.taps.means(&both))
     }
 
     /// Since a mask is its own square, `E[x^2] = E[x]`: three windowed means hold all there is.
-    fn fold(&self, mean_other: &Grid<f64>, mean_both: &Grid<f64>, rim: usize) -> Structure {
-        let factor = self.window.covariance_factor();
-        let (width, height) = (self.means.width(), self.means.height());
-        let (mut ssim, mut nl_ssim, mut n) = (0.0, 0.0, 0_usize);
-        for y in rim..height.saturating_sub(rim) {
-            for x in rim..width.saturating_sub(rim) {
-                let (u, v) = (self.means.at(x, y), mean_other.at(x, y));
-                let variances = factor * (u - u * u + v - v * v);
-                let covariance = factor * (mean_both.at(x, y) - u * v);
-                let structure = (2.0 * covariance + C2) / (variances + C2);
-                let luminance = (2.0 * u * v + C1) / (u * u + v * v + C1);
-                ssim += luminance * structure;
-                nl_ssim += structure;
-                n += 1;
-            }
+    fn fold(&self, mean_other: &Grid<f64>, mean_both: &Grid<f64>) -> Structure {
+        let factor = self.covariance_factor;
+        let (mut ssim, mut nl_ssim) = ([0.0; LANES], [0.0; LANES]);
+        let others = mean_other.data().iter().zip(mean_both.data());
+        for (k, (u, (v, both))) in self.means.data().iter().zip(others).enumerate() {
+            let variances = factor * (u - u * u + v - v * v);
+            let covariance = factor * (both - u * v);
+            let structure = (2.0 * covariance + C2) / (variances + C2);
+            let luminance = (2.0 * u * v + C1) / (u * u + v * v + C1);
+            ssim[k % LANES] += luminance * structure;
+            nl_ssim[k % LANES] += structure;
         }
-        let n = n.max(1) as f64;
+        let n = self.means.data().len().max(1) as f64;
         Structure {
-            ssim: ssim / n,
-            nl_ssim: nl_ssim / n,
+            ssim: ssim.iter().sum::<f64>() / n,
+            nl_ssim: nl_ssim.iter().sum::<f64>() / n,
         }
     }
 }
@@ -116,53 +115,76 @@ pub fn structure_maps(a: &Mask, b: &Mask, window: SsimWindow) -> Structure {
     WindowMeans::new(a, window).against(b)
 }
 
-fn indicator(mask: &Mask) -> Grid<f64> {
-    mask.map(|set| f64::from(u8::from(*set)))
+/// Sums kept apart, so that one addition need not wait for the last.
+const LANES: usize = 4;
+
+/// The weights of a window along one axis.
+#[derive(Debug, Clone)]
+struct Taps {
+    weights: Vec<f64>,
+    /// The weighted mean of every row of so many pixels of a mask, by its bits: the last pixel is the lowest bit.
+    of_bits: Vec<f64>,
 }
 
-/// Separable weighted mean; beyond the rim values are mirrored (the edge pixel twice), as SciPy's `reflect`.
-fn smooth(values: &Grid<f64>, taps: &[f64]) -> Grid<f64> {
-    let (width, height) = (values.width(), values.height());
-    let half = taps.len() / 2;
-    let mut across = Grid::new(width, height, 0.0);
-    for y in 0..height {
-        let row = values.row(y);
-        for x in 0..width {
-            let mean = if x >= half && x + half < width {
-                dot(&row[x - half..=x + half], taps)
-            } else {
-                (0..taps.len())
-                    .map(|k| taps[k] * row[mirror(x + k, half, width)])
-                    .sum()
-            };
-            across.set(x, y, mean);
-        }
+impl Taps {
+    fn new(weights: Vec<f64>) -> Self {
+        let mean = |bits: usize| {
+            let set = weights
+                .iter()
+                .enumerate()
+                .filter(|(k, _)| bits >> k & 1 == 1);
+            set.map(|(_, weight)| weight).sum()
+        };
+        let of_bits = (0..1 << weights.len()).map(mean).collect();
+        Self { weights, of_bits }
     }
-    let mut both = Grid::new(width, height, 0.0);
-    for y in 0..height {
-        let out = &mut both.data_mut()[y * width..(y + 1) * width];
-        for (k, weight) in taps.iter().enumerate() {
-            let row = across.row(mirror(y + k, half, height));
-            for (sum, value) in out.iter_mut().zip(row) {
+
+    /// Weighted means of a mask over the windows that lie wholly in it.
+    fn means(&self, mask: &Mask) -> Grid<f64> {
+        self.down(&self.across(mask))
+    }
+
+    fn across(&self, mask: &Mask) -> Grid<f64> {
+        let lost = self.weights.len() - 1;
+        let width = mask.width().saturating_sub(lost);
+        let mut across = Grid::new(width, mask.height(), 0.0);
+        for y in 0..mask.height() {
+            let row = mask.row(y);
+            let shift_in =
+                |bits: usize, set: bool| (bits << 1 | usize::from(set)) & (self.of_bits.len() - 1);
+            let mut bits = row
+                .iter()
+                .take(lost)
+                .fold(0, |bits, set| shift_in(bits, *set));
+            let means = &mut across.data_mut()[y * width..(y + 1) * width];
+            for (mean, set) in means.iter_mut().zip(row.iter().skip(lost)) {
+                bits = shift_in(bits, *set);
+                *mean = self.of_bits[bits];
+            }
+        }
+        across
+    }
+
+    /// Weighted means down the columns; weights that are alike share a product.
+    fn down(&self, across: &Grid<f64>) -> Grid<f64> {
+        let width = across.width();
+        let last = self.weights.len() - 1;
+        let height = across.height().saturating_sub(last);
+        let mut means = Grid::new(width, height, 0.0);
+        for y in 0..height {
+            let out = &mut means.data_mut()[y * width..(y + 1) * width];
+            for (k, weight) in self.weights[..last / 2].iter().enumerate() {
+                let mirrored = across.row(y + k).iter().zip(across.row(y + last - k));
+                for (sum, (a, b)) in out.iter_mut().zip(mirrored) {
+                    *sum += weight * (a + b);
+                }
+            }
+            let weight = self.weights[last / 2];
+            for (sum, value) in out.iter_mut().zip(across.row(y + last / 2)) {
                 *sum += weight * value;
             }
         }
-    }
-    both
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(p, q)| p * q).sum()
-}
-
-/// Index `shifted - half` mirrored into `0..len`.
-fn mirror(shifted: usize, half: usize, len: usize) -> usize {
-    let period = 2 * len as i64;
-    let i = (shifted as i64 - half as i64).rem_euclid(period);
-    if i < len as i64 {
-        i as usize
-    } else {
-        (period - 1 - i) as usize
+        means
     }
 }
 
