@@ -14,9 +14,17 @@ const LEAST_KNOWN: f32 = 0.3;
 /// Brightness of the paper under and around each pixel, 0..=1: the grey closed by a square that strokes fit into.
 pub(super) fn level(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
     let (width, height) = (grey.width(), grey.height());
-    let scale = (CELLS / width.max(height) as f64).min(1.0);
-    let sides = [width, height].map(|side| (side as f64 * scale).ceil() as usize);
-    let shift = [(scale - 1.0) / 2.0; 2];
+    let Some(bounds) = known.bounding_box() else {
+        return grey.clone();
+    };
+    // Middle on middle of what is known, so that a print turned by a right angle, or with more white around it, gives
+    // the same cells.
+    let lengths = [bounds.width(), bounds.height()];
+    let longest = lengths[0].max(lengths[1]) as f64;
+    let scale = (CELLS / longest).min(1.0);
+    let sides = lengths.map(|length| (length as f64 * scale).ceil() as usize);
+    let middle = [bounds.x0 + bounds.x1, bounds.y0 + bounds.y1].map(|sum| sum as f64 / 2.0);
+    let shift = [0, 1].map(|k| (sides[k] - 1) as f64 / 2.0 - scale * middle[k]);
     let weight = known.map(|k| f32::from(u8::from(*k)));
     let pairs = grey.data().iter().zip(weight.data());
     let present: Vec<f32> = pairs.map(|(g, w)| g * w).collect();
@@ -29,13 +37,13 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
         let weight = weights.at(x, y);
         (weight > LEAST_KNOWN).then(|| sums.at(x, y) / weight)
     });
-    let reach = ((NARROW * width.max(height) as f64 * scale).round() as usize).max(1);
+    let reach = ((NARROW * longest * scale).round() as usize).max(1);
     let closed = extreme(&extreme(&cells, reach, f32::max), reach, f32::min);
     let seen: Vec<f32> = closed.data().iter().flatten().copied().collect();
     let mean = seen.iter().sum::<f32>() / seen.len().max(1) as f32;
     let filled = closed.map(|value| value.unwrap_or(mean) - mean);
     let smooth = blur(&filled, reach as f64 / 3.0);
-    let back = [(1.0 / scale - 1.0) / 2.0; 2];
+    let back = shift.map(|shift| -shift / scale);
     resample(&smooth, 1.0 / scale, back, [width, height]).map(|value| value + mean)
 }
 

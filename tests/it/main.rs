@@ -3,6 +3,7 @@
 mod cli;
 mod demo;
 mod hostile;
+mod invariance;
 mod layers;
 mod one_pair;
 mod queue;

@@ -94,7 +94,9 @@ fn heights(depth: &DepthMap, margin: f64) -> Vec<f32> {
     };
     let inner = |low: usize, high: usize| {
         let cut = ((high - low) as f64 * margin) as usize;
-        (low + cut..=high - cut).step_by(STRIDE)
+        // As far from one end as from the other: a map turned about must give the same heights.
+        let rest = 2 * (high - low - 2 * cut) % STRIDE;
+        (low + cut + rest..=high - cut).step_by(STRIDE)
     };
     let rows = inner(bounds.y0, bounds.y1);
     rows.flat_map(|y| inner(bounds.x0, bounds.x1).map(move |x| (x, y)))

@@ -4,6 +4,7 @@
 //! ours: the pose that normalisation found, refined at full size.
 
 mod confidence;
+mod cuts;
 mod refined;
 mod turns;
 
@@ -17,7 +18,7 @@ use crate::domain::{
 use crate::raster::{DepthMap, Mask, warp_mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 2;
+pub const REVISION: u32 = 3;
 
 /// Mirrored must win by this factor to be named the cause: symmetric characters score alike both ways.
 const MIRROR_WINS: f64 = 1.12;

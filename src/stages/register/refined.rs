@@ -1,5 +1,6 @@
 //! Our registration: the poses that normalisation found, refined at full size; the best one serves every metric.
 
+use super::cuts::{CUTS, Cuts};
 use super::{Alignment, Error, Params};
 use crate::domain::{Affine2, Evidence, Pose};
 use crate::raster::DepthMap;
@@ -10,9 +11,7 @@ use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Soft};
 const SAME_POSE_DEG: f64 = 15.0;
 /// How many of the poses are refined.
 const TRIED: usize = 3;
-/// Cuts under the tops that are tried, as shares of the relief, and the softness of each. The ink of a print spreads;
-/// strokes cut too thin or too thick for it would pull the scale.
-const CUTS: [f64; 6] = [0.05, 0.1, 0.17, 0.26, 0.37, 0.5];
+/// Softness of a cut, a share of the relief.
 const SOFTNESS: f64 = 0.1;
 /// The best pose is looked at once more at this many times the working size.
 const CLOSER: f64 = 1.5;
@@ -50,7 +49,7 @@ pub(super) fn align(
 #[derive(Debug, Clone, Copy)]
 struct Settled {
     found: Found,
-    /// Which of the cuts.
+    /// The cut that fits best, a share of the relief under the tops.
     cut: f64,
     overlap: Overlap,
 }
@@ -134,11 +133,7 @@ impl Pictures {
 fn settle_all(pictures: &Pictures, normalized: &Normalized) -> Option<Vec<Settled>> {
     let ink = pictures.ink(1.0);
     let woods: Vec<Layer> = CUTS.iter().map(|cut| pictures.wood(*cut, 1.0)).collect();
-    let woods: Vec<(f64, Refiner)> = CUTS
-        .iter()
-        .zip(&woods)
-        .map(|(cut, wood)| (*cut, Refiner::new(&ink, wood)))
-        .collect();
+    let cuts = Cuts::new(&ink, &woods);
     let start = |pose: &Pose, mirrored| Found {
         fixed_from_moving: pose.print_from_depth,
         score: pose.score,
@@ -147,24 +142,19 @@ fn settle_all(pictures: &Pictures, normalized: &Normalized) -> Option<Vec<Settle
     let outcome = &normalized.outcome;
     let upright = outcome.poses.iter().take(TRIED).map(|p| start(p, false));
     let starts = upright.chain(outcome.mirrored.iter().map(|p| start(p, true)));
-    starts.map(|start| settled(&woods, &start)).collect()
+    starts.map(|start| settled(&cuts, &start)).collect()
 }
 
 /// A pose refined with the cut that fits best, first from afar, then closely.
-fn settled(woods: &[(f64, Refiner)], start: &Found) -> Option<Settled> {
-    let fitting = |pose: &Found| {
-        let judged = woods.iter().map(|wood| (wood, wood.1.judged(pose)));
-        judged.max_by(|a, b| a.1.score.total_cmp(&b.1.score))
-    };
+fn settled(cuts: &Cuts, start: &Found) -> Option<Settled> {
     let mut pose = *start;
     for loss in [Loss::Huber, Loss::Tukey] {
-        let ((_, wood), _) = fitting(&pose)?;
-        pose = wood.refine(&pose, MOST_STEPS, loss);
+        pose = cuts.fitting(&pose)?.0.refine(&pose, MOST_STEPS, loss);
     }
-    let ((cut, wood), found) = fitting(&pose)?;
+    let (wood, found) = cuts.fitting(&pose)?;
     Some(Settled {
         found,
-        cut: *cut,
+        cut: cuts.best_cut(&pose),
         overlap: wood.overlap(&pose),
     })
 }
