@@ -120,6 +120,7 @@ async fn register(catalog: &Catalog) -> WorkerId {
 fn done(recipes: RecipeIds, stage: Stage) -> StageDone {
     let register = RegisterOutcome {
         metrics: ThresholdMetric::ALL.map(metric).to_vec(),
+        evidence: None,
     };
     let last = stage == Stage::Register;
     let metrics = register.metrics.iter().map(|outcome| MetricResult {

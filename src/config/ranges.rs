@@ -29,6 +29,7 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("normalize.ink_spread", 1.0, 3.0),
     ("register.working_px", 32.0, 1024.0),
     ("register.smoothing_px", 0.0, 10.0),
+    ("register.least_confidence", 0.0, 1.0),
     ("register.coarse_angles", 4.0, 3600.0),
     ("register.fine_angles", 2.0, 3600.0),
 ];

@@ -1,6 +1,7 @@
 //! Nouns of the project: small values without files, SQL, async or image buffers.
 
 mod artifact;
+mod evidence;
 mod failure;
 mod file_kind;
 mod hash;
@@ -15,6 +16,7 @@ mod unit;
 mod verdict;
 
 pub use artifact::{ArtifactRef, ArtifactSet};
+pub use evidence::Evidence;
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Affine2, LengthUnit, Rigid3, ThresholdMetric};
+use super::{Affine2, Evidence, LengthUnit, Rigid3, ThresholdMetric};
 
 /// A second-degree surface over the tops: height over the plane at plane (x, y), all in mesh units.
 ///
@@ -127,8 +127,9 @@ pub struct NormalizeOutcome {
     pub canvas_from_print: Affine2,
     /// Poses found before thresholds were chosen, best first; empty when the method registers afterwards.
     pub poses: Vec<Pose>,
-    /// Best score of the mirrored relief, where it was searched for.
-    pub mirrored_score: Option<f64>,
+    /// Best pose of the relief read in the mirror, where it was searched for.
+    #[serde(default)]
+    pub mirrored: Option<Pose>,
     /// Whether the pose search ended at a bound of its scale or shift.
     pub search_at_bound: bool,
     /// One choice a metric that the method gives; without the ensemble where that is settled by registering the
@@ -193,4 +194,7 @@ impl MetricOutcome {
 pub struct RegisterOutcome {
     /// One result a metric that the method gives, in the order of [`ThresholdMetric::ALL`].
     pub metrics: Vec<MetricOutcome>,
+    /// What speaks for and against the pose that all metrics share, where the method gathers it.
+    #[serde(default)]
+    pub evidence: Option<Evidence>,
 }

@@ -98,6 +98,7 @@ impl Steps for MadeUp {
         pair.inputs.print = (stage >= Stage::Normalize).then(|| seen("print"));
         let register = RegisterOutcome {
             metrics: ThresholdMetric::ALL.map(metric).to_vec(),
+            evidence: None,
         };
         let last = stage == Stage::Register;
         Ok(StageOutput {

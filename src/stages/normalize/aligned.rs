@@ -54,19 +54,23 @@ pub(super) fn search(
 ) -> Result<(Ink, Search), Error> {
     let relief = Relief::of(depth).ok_or(Error::NoStrokes)?;
     let depths = relief.depths(depth);
-    let mut best: Result<(Ink, Search), Error> = Err(Error::NoStrokes);
+    let mut best: Option<(Ink, Search)> = None;
+    // Which failure is told: that of the likelier reading, which comes first.
+    let mut failure = None;
     for ink in readings {
-        let found = find_poses(&depths, &ink, params).map(|search| (ink, search));
-        best = match (best, found) {
-            (Ok(a), Ok(b)) => Ok(if b.1.score() > a.1.score() { b } else { a }),
-            (Ok(only), Err(_)) | (Err(Error::NoStrokes), Ok(only)) => Ok(only),
-            // Which failure is told: of the likelier reading, which comes first.
-            (Err(Error::NoStrokes), Err(error)) => Err(error),
-            (Err(_), Ok(only)) => Ok(only),
-            (Err(error), Err(_)) => Err(error),
-        };
+        match find_poses(&depths, &ink, params) {
+            Ok(search) => {
+                let score = |(_, search): &(Ink, Search)| search.score();
+                if best.as_ref().map(score).is_none_or(|s| search.score() > s) {
+                    best = Some((ink, search));
+                }
+            }
+            Err(error) => {
+                failure.get_or_insert(error);
+            }
+        }
     }
-    best
+    best.ok_or(failure.unwrap_or(Error::NoStrokes))
 }
 
 /// Chooses the thresholds at the best pose.
@@ -136,14 +140,14 @@ fn judge(found: &[Found], at_bound: impl Fn(&Found) -> bool) -> Result<Search, E
             needs: LEAST_SCORE,
         });
     }
-    let upright: Vec<&Found> = found.iter().filter(|pose| !pose.mirrored).collect();
-    let pose = |found: &&Found| Pose {
+    let upright = || found.iter().filter(|pose| !pose.mirrored);
+    let pose = |found: &Found| Pose {
         print_from_depth: found.fixed_from_moving,
         score: found.score,
     };
     Ok(Search {
-        poses: upright.iter().map(pose).collect(),
-        mirrored_score: (mirrored > 0.0).then_some(mirrored),
-        at_bound: upright.first().is_some_and(|best| at_bound(best)),
+        poses: upright().map(pose).collect(),
+        mirrored: found.iter().find(|found| found.mirrored).map(pose),
+        at_bound: upright().next().is_some_and(at_bound),
     })
 }

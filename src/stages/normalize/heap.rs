@@ -46,13 +46,7 @@ impl Heap {
 
     /// Depth at which most heights crowd near the tops.
     pub(super) fn peak(&self) -> f64 {
-        middle(self.peak_bin(&smoothed(&self.counts, FINE)))
-    }
-
-    fn peak_bin(&self, fine: &[f64]) -> usize {
-        let near = bin_of(-NEAR)..bin_of(NEAR);
-        near.max_by(|a, b| fine[*a].total_cmp(&fine[*b]))
-            .unwrap_or(bin_of(0.0))
+        middle(peak_bin(&smoothed(&self.counts, FINE)))
     }
 
     /// Depth at which the tops end, going down from depth zero.
@@ -62,13 +56,20 @@ impl Heap {
         let mut walls = coarse[bin_of(WALLS[0])..bin_of(WALLS[1])].to_vec();
         let half = walls.len() / 2;
         let wall = *walls.select_nth_unstable_by(half, f64::total_cmp).1;
-        let start = self.peak_bin(&fine);
+        let start = peak_bin(&fine);
         let end = (EDGE * wall).min(f64::midpoint(wall, fine[start].max(wall)));
         (start..bin_of(WALLS[1]))
             .find(|bin| fine[*bin] <= end)
             .map_or(USUAL, middle)
             .clamp(RANGE[0], RANGE[1])
     }
+}
+
+/// Bin near depth zero that holds most.
+fn peak_bin(fine: &[f64]) -> usize {
+    let near = bin_of(-NEAR)..bin_of(NEAR);
+    near.max_by(|a, b| fine[*a].total_cmp(&fine[*b]))
+        .unwrap_or(bin_of(0.0))
 }
 
 fn bin_of(share: f64) -> usize {

@@ -144,7 +144,7 @@ pub struct Normalized {
 #[derive(Debug, Default)]
 struct Search {
     poses: Vec<Pose>,
-    mirrored_score: Option<f64>,
+    mirrored: Option<Pose>,
     at_bound: bool,
 }
 
@@ -188,7 +188,7 @@ pub fn normalize(depth: &DepthMap, print: &Picture, params: &Params) -> Result<N
             canvas_px: params.canvas_px,
             canvas_from_print,
             poses: search.poses,
-            mirrored_score: search.mirrored_score,
+            mirrored: search.mirrored,
             search_at_bound: search.at_bound,
             thresholds,
         },

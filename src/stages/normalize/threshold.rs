@@ -15,6 +15,9 @@ const CANDIDATES: u32 = 40;
 const COARSE: usize = 4;
 /// `ensemble` may differ from `relief` by this factor in area.
 const CLOSE_AREA: f64 = 1.2;
+/// Ink covers at most this many times the area of the tops, and of the tops' area at least one in this many is inked.
+const MOST_SPREAD: f64 = 2.2;
+const LEAST_INKED: f64 = 1.15;
 
 /// Both pictures on the canvas.
 pub(super) struct Canvas {
@@ -92,7 +95,10 @@ pub(super) fn choose(
     let gap = |c: &Candidate| (c.area / ink * params.ink_spread - 1.0).abs();
     let density = nearest(&candidates, gap);
     let edge = relief.level_at(depth, relief.edge);
-    let own_area = canvas.area(edge);
+    // Ink covers more than the wood, within reason: beyond that the tops' end was misjudged.
+    let own_area = canvas
+        .area(edge)
+        .clamp(ink / MOST_SPREAD, ink * LEAST_INKED);
     let close = |c: &Candidate| (c.area / own_area.max(1.0)).ln().abs() <= CLOSE_AREA.ln();
     let both = structure
         .best_among(&close)

@@ -3,6 +3,7 @@
 //! [`Method::Turns`] is the paper's: turns of the wrapped mask, the shift of each by climbing. [`Method::Refine`] is
 //! ours: the pose that normalisation found, refined at full size.
 
+mod confidence;
 mod refined;
 mod turns;
 
@@ -11,12 +12,15 @@ use serde::{Deserialize, Serialize};
 use super::normalize::Normalized;
 use super::score::{self, SsimWindow};
 use crate::domain::{
-    Affine2, FailureClass, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric,
+    Affine2, Evidence, FailureClass, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric,
 };
 use crate::raster::{DepthMap, Mask, warp_mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
 pub const REVISION: u32 = 2;
+
+/// Mirrored must win by this factor to be named the cause: symmetric characters score alike both ways.
+const MIRROR_WINS: f64 = 1.12;
 
 /// How the alignment is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -38,6 +42,8 @@ pub struct Params {
     pub working_px: u32,
     /// `refine`: smoothing in working pixels, 0..=10.
     pub smoothing_px: f64,
+    /// `refine`: a pair with less confidence than this is refused, 0..=1.
+    pub least_confidence: f64,
     /// `turns`: how many angles of a full turn are tried first, 4 or more.
     pub coarse_angles: u32,
     /// `turns`: how many angles within three coarse steps each side are tried next, 2 or more.
@@ -60,13 +66,35 @@ pub enum Error {
     /// The mask of a threshold is empty.
     #[error("the depth map has no strokes at the threshold of {0}")]
     NoStrokes(ThresholdMetric),
+    /// The relief reads in mirror writing.
+    #[error(
+        "the relief matches the print better in mirror writing ({times:.2} times as well); was the mesh mirrored?"
+    )]
+    Mirrored {
+        /// Score of the mirrored relief over that as read.
+        times: f64,
+    },
+    /// Relief and print do not show the same character, or cannot be told to.
+    #[error(
+        "relief and print do not match: confidence {confidence:.2} is below register.least_confidence {needs}; is it the print of another character?"
+    )]
+    NoMatch {
+        /// Chance that the best pose is right.
+        confidence: f64,
+        /// The setting.
+        needs: f64,
+    },
 }
 
 impl Error {
     /// What the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
-            Self::NoPose | Self::NoThreshold(_) | Self::NoStrokes(_) => FailureClass::NoSolution,
+            Self::NoPose
+            | Self::NoThreshold(_)
+            | Self::NoStrokes(_)
+            | Self::Mirrored { .. }
+            | Self::NoMatch { .. } => FailureClass::NoSolution,
         }
     }
 }
@@ -106,7 +134,7 @@ struct Alignment {
 /// The canvas is the print character's: see [`super::normalize`]. Every metric is scored on the same print mask.
 ///
 /// # Errors
-/// When there is no pose to refine, or a threshold leaves no strokes.
+/// When there is no pose to refine, the best one is not to be trusted, or a threshold leaves no strokes.
 pub fn register(
     depth: &DepthMap,
     normalized: &Normalized,
@@ -115,9 +143,16 @@ pub fn register(
     let side = normalized.outcome.canvas_px as usize;
     let canvas_from_print = normalized.outcome.canvas_from_print;
     let canvas_print = warp_mask(&normalized.ink, &canvas_from_print, side, side);
-    let alignments = match params.method {
-        Method::Refine => refined::align(depth, normalized, params)?,
-        Method::Turns => turns::align(depth, &canvas_print, normalized, params)?,
+    let (alignments, evidence) = match params.method {
+        Method::Refine => {
+            let (alignments, evidence) = refined::align(depth, normalized, params)?;
+            require_match(&evidence, params)?;
+            (alignments, Some(evidence))
+        }
+        Method::Turns => (
+            turns::align(depth, &canvas_print, normalized, params)?,
+            None,
+        ),
     };
     let mut metrics = Vec::new();
     let mut canvases = Vec::new();
@@ -134,11 +169,49 @@ pub fn register(
             depth: mask,
         });
     }
+    if let Some(evidence) = &evidence {
+        trust(&mut metrics, evidence);
+    }
     Ok(Registered {
-        outcome: RegisterOutcome { metrics },
+        outcome: RegisterOutcome { metrics, evidence },
         canvas_print,
         canvases,
     })
+}
+
+/// Gives each metric its confidence: the pose's, and the mask's beside the one that the relief alone chose.
+fn trust(metrics: &mut [MetricOutcome], evidence: &Evidence) {
+    let pose = confidence::of_pose(evidence);
+    let own = metrics
+        .iter()
+        .find(|outcome| outcome.metric == ThresholdMetric::Relief);
+    let own = own.map(|outcome| outcome.scores.density_depth);
+    for outcome in metrics {
+        let scores = outcome.scores;
+        let areas = confidence::Areas {
+            mask: scores.density_depth,
+            relief: own.unwrap_or(scores.density_depth),
+            ink: scores.density_print,
+        };
+        outcome.confidence = Some(pose * confidence::of_mask(evidence, areas));
+    }
+}
+
+/// Refuses what cannot be told to be the same character.
+fn require_match(evidence: &Evidence, params: &Params) -> Result<(), Error> {
+    let confidence = confidence::of_pose(evidence);
+    if confidence >= params.least_confidence {
+        Ok(())
+    } else if evidence.mirrored > MIRROR_WINS {
+        Err(Error::Mirrored {
+            times: evidence.mirrored,
+        })
+    } else {
+        Err(Error::NoMatch {
+            confidence,
+            needs: params.least_confidence,
+        })
+    }
 }
 
 /// Pixels of the depth map at a level or above.
