@@ -9,7 +9,7 @@ use crate::domain::{Bow, Rigid3, SideEvidence};
 use crate::mesh::Mesh;
 use crate::raster::Picture;
 use crate::stages::ink;
-use crate::stages::pose::{Base, Limits, Pass, Soft, find};
+use crate::stages::pose::{Base, Keep, Limits, Pass, Soft, find};
 
 /// A side with less than this share of the other's relief is the back of the block.
 const BACK: f64 = 0.35;
@@ -23,22 +23,29 @@ const MANIFEST: f64 = 0.4;
 const LIMITS: Limits = Limits {
     scale: 1.6,
     shift: 0.35,
-    keep: 14,
+    keep: mirrored(6),
 };
 const PASSES: [Pass; 2] = [
     Pass {
         px: 40,
         sigma: 0.8,
         steps: 6,
-        keep: 3,
+        keep: mirrored(3),
     },
     Pass {
         px: 64,
         sigma: 1.0,
         steps: 6,
-        keep: 2,
+        keep: mirrored(1),
     },
 ];
+/// A face is seen from outside, in mirror writing: no other reading counts.
+const fn mirrored(count: usize) -> Keep {
+    Keep {
+        upright: 0,
+        mirrored: count,
+    }
+}
 /// Working size of the print and the tops.
 const BASE_PX: usize = 80;
 /// Groups of ink below this share of the print are specks.
@@ -140,8 +147,7 @@ fn best_score(ink: &Base, tops: &Soft) -> f64 {
         return 0.0;
     };
     let found = find(ink, &wood, LIMITS, &PASSES);
-    let mirrored = found.iter().filter(|pose| pose.mirrored);
-    mirrored.map(|pose| pose.score).fold(0.0, f64::max)
+    found.iter().map(|pose| pose.score).fold(0.0, f64::max)
 }
 
 /// How widely the heights spread at their extreme layer: half the heights of the upper part of the relief lie within

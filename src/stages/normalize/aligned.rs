@@ -6,7 +6,7 @@ use super::{Error, Params, Relief, Search};
 use crate::domain::{Affine2, Pose, ThresholdChoice};
 use crate::raster::DepthMap;
 use crate::stages::ink::Ink;
-use crate::stages::pose::{Base, Found, Limits, Pass, Soft, find};
+use crate::stages::pose::{Base, Found, Keep, Limits, Pass, Soft, find};
 
 /// The passes that follow the search.
 const PASSES: [Pass; 3] = [
@@ -14,21 +14,24 @@ const PASSES: [Pass; 3] = [
         px: 40,
         sigma: 0.8,
         steps: 8,
-        keep: 8,
+        keep: keep(6, 3),
     },
     Pass {
         px: 64,
         sigma: 1.0,
         steps: 8,
-        keep: 3,
+        keep: keep(3, 2),
     },
     Pass {
         px: 112,
         sigma: 1.2,
         steps: 10,
-        keep: 3,
+        keep: keep(3, 1),
     },
 ];
+const fn keep(upright: usize, mirrored: usize) -> Keep {
+    Keep { upright, mirrored }
+}
 /// Working size of print and relief.
 const BASE_PX: usize = 128;
 /// The search looks at relief that fades out from the tops to half-way down: it need not know the right cut, nor
@@ -36,7 +39,7 @@ const BASE_PX: usize = 128;
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Poses that the search hands on.
-const KEEP: usize = 14;
+const KEEP: Keep = keep(10, 4);
 /// Largest shift between the middles of print and depth map, as a share of the size.
 const SHIFT: f64 = 0.35;
 /// A relief that correlates less than this matches nothing.

@@ -1,6 +1,6 @@
 //! The search for a pose from coarse to fine: every angle and scale at little size, the best few closer and closer.
 
-use super::search::{Found, Limits, SEARCH_PX, search};
+use super::search::{Found, Keep, Limits, SEARCH_PX, search};
 use super::{Base, Loss, Refiner};
 
 /// Smoothing of the search's layers, working pixels.
@@ -12,7 +12,7 @@ pub(in crate::stages) struct Pass {
     pub(in crate::stages) px: usize,
     pub(in crate::stages) sigma: f64,
     pub(in crate::stages) steps: usize,
-    pub(in crate::stages) keep: usize,
+    pub(in crate::stages) keep: Keep,
 }
 
 /// The best poses of the moving picture on the fixed one, as read and mirrored, best first.
@@ -36,17 +36,13 @@ pub(in crate::stages) fn find(
     found
 }
 
-/// The best few as read and half as many mirrored, best first, none of them twice.
-fn best_of_each(mut found: Vec<Found>, keep: usize) -> Vec<Found> {
+/// The best few of each reading, best first, none of them twice.
+fn best_of_each(mut found: Vec<Found>, keep: Keep) -> Vec<Found> {
     found.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<Found> = Vec::new();
     for pose in found {
         let of_kind = kept.iter().filter(|k| k.mirrored == pose.mirrored).count();
-        let room = if pose.mirrored {
-            keep.div_ceil(2)
-        } else {
-            keep
-        };
+        let room = keep.of(pose.mirrored);
         if of_kind < room && !kept.iter().any(|other| other.is_near(&pose)) {
             kept.push(pose);
         }

@@ -13,4 +13,4 @@ pub(super) use find::{Pass, find};
 pub(super) use layer::{Base, Layer, Soft};
 pub(super) use overlap::Overlap;
 pub(super) use refine::{Loss, Refiner};
-pub(super) use search::{Found, Limits};
+pub(super) use search::{Found, Keep, Limits};

@@ -26,6 +26,26 @@ const SAME_SCALE: f64 = 1.12;
 const NEAR_DEG: f64 = 3.0;
 const NEAR_RATIO: f64 = 0.04;
 
+/// How many poses of each reading to keep; a reading of which none is kept is not looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::stages) struct Keep {
+    /// As the pictures are.
+    pub(in crate::stages) upright: usize,
+    /// With the moving picture mirrored.
+    pub(in crate::stages) mirrored: usize,
+}
+
+impl Keep {
+    /// How many of one reading.
+    pub(super) const fn of(self, mirrored: bool) -> usize {
+        if mirrored {
+            self.mirrored
+        } else {
+            self.upright
+        }
+    }
+}
+
 /// What the search may try.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::stages) struct Limits {
@@ -34,7 +54,7 @@ pub(in crate::stages) struct Limits {
     /// Largest shift between the pictures' middles, as a share of the size.
     pub(in crate::stages) shift: f64,
     /// How many poses to keep.
-    pub(in crate::stages) keep: usize,
+    pub(in crate::stages) keep: Keep,
 }
 
 /// A pose that the search found.
@@ -74,6 +94,10 @@ pub(super) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -> Vec<Found
     let target = transform.target(&centred(fixed, None));
     let fixed_norm = fixed.energy().sqrt();
     let steps = (limits.scale.ln() / SCALE_STEP.ln()).round() as i32;
+    let readings: Vec<bool> = [false, true]
+        .into_iter()
+        .filter(|mirrored| limits.keep.of(*mirrored) > 0)
+        .collect();
     let mut peaks = Vec::new();
     for step in -steps..=steps {
         let scale = SCALE_STEP.powi(step);
@@ -82,7 +106,7 @@ pub(super) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -> Vec<Found
             let turned = angles.map(|angle| centred(moving, Some((angle, scale))));
             let norms = [norm(&turned[0]), norm(&turned[1])];
             transform.take(&turned);
-            for mirrored in [false, true] {
+            for mirrored in readings.iter().copied() {
                 let surface = transform.correlate(&target, mirrored);
                 for (k, angle) in angles.into_iter().enumerate() {
                     let (shift, height) = highest(surface, k, limits.shift);
@@ -129,7 +153,7 @@ impl Peak {
 }
 
 /// The best peaks of which no two are the same pose; mirrored ones compete among themselves.
-fn distinct(mut peaks: Vec<Peak>, keep: usize) -> Vec<Peak> {
+fn distinct(mut peaks: Vec<Peak>, keep: Keep) -> Vec<Peak> {
     peaks.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<Peak> = Vec::new();
     for peak in peaks {
@@ -143,12 +167,7 @@ fn distinct(mut peaks: Vec<Peak>, keep: usize) -> Vec<Peak> {
             .iter()
             .filter(|other| other.mirrored == peak.mirrored)
             .count();
-        let room = if peak.mirrored {
-            keep.div_ceil(3)
-        } else {
-            keep
-        };
-        if of_kind < room && !kept.iter().any(same) {
+        if of_kind < keep.of(peak.mirrored) && !kept.iter().any(same) {
             kept.push(peak);
         }
     }
