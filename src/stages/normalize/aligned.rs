@@ -20,7 +20,7 @@ const PASSES: [Pass; 3] = [
         px: 64,
         sigma: 1.0,
         steps: 8,
-        keep: keep(3, 2),
+        keep: keep(3, 1),
     },
     Pass {
         px: 112,

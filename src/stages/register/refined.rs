@@ -15,7 +15,8 @@ const TRIED: usize = 3;
 const SOFTNESS: f64 = 0.1;
 /// The best pose is looked at once more at this many times the working size.
 const CLOSER: f64 = 1.5;
-/// Most steps of one refinement.
+/// Most steps of a candidate's refinements, and of the last one.
+const FEW_STEPS: usize = 8;
 const MOST_STEPS: usize = 15;
 
 /// One alignment a metric that has a threshold: thresholds differ, the pose does not, since it is found without one.
@@ -25,7 +26,10 @@ pub(super) fn align(
     params: &Params,
 ) -> Result<(Vec<Alignment>, Evidence), Error> {
     let pictures = Pictures::new(depth, normalized, params).ok_or(Error::NoPose)?;
-    let tried = settle_all(&pictures, normalized).ok_or(Error::NoPose)?;
+    let ink = pictures.ink(1.0);
+    let woods = CUTS.map(|cut| pictures.wood(cut, 1.0));
+    let cuts = Cuts::new(&ink, &woods);
+    let tried = settle_all(&cuts, normalized).ok_or(Error::NoPose)?;
     let best = *best_of(&tried, |pose| !pose.found.mirrored).ok_or(Error::NoPose)?;
     let score_of = |other: Option<&Settled>| other.map_or(0.0, Settled::score);
     let other_angle = score_of(best_of(&tried, |pose| {
@@ -33,7 +37,7 @@ pub(super) fn align(
     }));
     let mirrored = score_of(best_of(&tried, |pose| pose.found.mirrored));
     let evidence = best.evidence(other_angle, mirrored);
-    let print_from_depth = pictures.closer(&best);
+    let print_from_depth = pictures.closer(&best.found, cuts.best_cut(&best.found));
     let choices = normalized.outcome.thresholds.iter();
     let alignments = choices.map(|choice| Alignment {
         metric: choice.metric,
@@ -49,8 +53,6 @@ pub(super) fn align(
 #[derive(Debug, Clone, Copy)]
 struct Settled {
     found: Found,
-    /// The cut that fits best, a share of the relief under the tops.
-    cut: f64,
     overlap: Overlap,
 }
 
@@ -122,18 +124,15 @@ impl Pictures {
     }
 
     /// The pose looked at once more, closer.
-    fn closer(&self, best: &Settled) -> Affine2 {
-        let (ink, wood) = (self.ink(CLOSER), self.wood(best.cut, CLOSER));
-        let refined = Refiner::new(&ink, &wood).refine(&best.found, MOST_STEPS, Loss::Tukey);
+    fn closer(&self, best: &Found, cut: f64) -> Affine2 {
+        let (ink, wood) = (self.ink(CLOSER), self.wood(cut, CLOSER));
+        let refined = Refiner::new(&ink, &wood).refine(best, MOST_STEPS, Loss::Tukey);
         refined.fixed_from_moving
     }
 }
 
 /// The first few poses as read, and the best mirrored one.
-fn settle_all(pictures: &Pictures, normalized: &Normalized) -> Option<Vec<Settled>> {
-    let ink = pictures.ink(1.0);
-    let woods: Vec<Layer> = CUTS.iter().map(|cut| pictures.wood(*cut, 1.0)).collect();
-    let cuts = Cuts::new(&ink, &woods);
+fn settle_all(cuts: &Cuts, normalized: &Normalized) -> Option<Vec<Settled>> {
     let start = |pose: &Pose, mirrored| Found {
         fixed_from_moving: pose.print_from_depth,
         score: pose.score,
@@ -142,19 +141,17 @@ fn settle_all(pictures: &Pictures, normalized: &Normalized) -> Option<Vec<Settle
     let outcome = &normalized.outcome;
     let upright = outcome.poses.iter().take(TRIED).map(|p| start(p, false));
     let starts = upright.chain(outcome.mirrored.iter().map(|p| start(p, true)));
-    starts.map(|start| settled(&cuts, &start)).collect()
+    starts.map(|start| settled(cuts, &start)).collect()
 }
 
 /// A pose refined with the cut that fits best, first from afar, then closely.
 fn settled(cuts: &Cuts, start: &Found) -> Option<Settled> {
-    let mut pose = *start;
-    for loss in [Loss::Huber, Loss::Tukey] {
-        pose = cuts.fitting(&pose)?.0.refine(&pose, MOST_STEPS, loss);
-    }
+    let (wood, _) = cuts.fitting(start)?;
+    let near = wood.refine(start, FEW_STEPS, Loss::Huber);
+    let pose = wood.refine(&near, FEW_STEPS, Loss::Tukey);
     let (wood, found) = cuts.fitting(&pose)?;
     Some(Settled {
         found,
-        cut: cuts.best_cut(&pose),
         overlap: wood.overlap(&pose),
     })
 }
