@@ -12,7 +12,7 @@ use crate::raster::{
     self, DecodeError, DepthMap, Mask, Picture, png_grey16, png_mask, png_rgb8, warp_depth,
     warp_mask,
 };
-use crate::report::aligned::{Aligned, AlignedError, depth_mask};
+use crate::report::aligned::{Aligned, AlignedError};
 use crate::store::Project;
 
 /// Folder of the pairs below the export folder.
@@ -210,7 +210,7 @@ impl<'a> PairFiles<'a> {
     pub(super) fn draw(&self, outcome: &MetricOutcome) -> Drawn {
         let (width, height) = (self.print_mask.width(), self.print_mask.height());
         let print_from_depth = &outcome.print_from_depth;
-        let strokes = depth_mask(&self.depth, outcome.threshold_level);
+        let strokes = self.depth.strokes(outcome.threshold_level);
         let aligned = warp_mask(&strokes, print_from_depth, width, height);
         let heights = warp_depth(&self.depth, print_from_depth, width, height);
         let view = View::to_judge_by(&self.print.picture);

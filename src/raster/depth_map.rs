@@ -1,6 +1,6 @@
 //! The depth map: heights over the fitted surface, seen as the print is read.
 
-use super::Grid;
+use super::{Grid, Mask};
 use crate::domain::DepthScale;
 
 /// A 16-bit depth map. Level 0 holds no data; 1..=65535 are linear in height.
@@ -19,5 +19,10 @@ impl DepthMap {
             0 => None,
             level => Some(self.scale.height(level)),
         }
+    }
+
+    /// The strokes at a threshold: levels from `level` up. No data is no stroke.
+    pub fn strokes(&self, level: u16) -> Mask {
+        self.levels.map(|found| *found >= level.max(1))
     }
 }

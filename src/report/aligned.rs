@@ -147,11 +147,6 @@ impl<'a> Aligned<'a> {
     }
 }
 
-/// The strokes of a depth map: levels from `level` up. No data is no stroke.
-pub fn depth_mask(depth: &DepthMap, level: u16) -> Mask {
-    depth.levels.map(|found| *found >= level.max(1))
-}
-
 /// Whether two metrics came to the same threshold and place, so that all their pictures are the same.
 pub fn same_alignment(a: &MetricOutcome, b: &MetricOutcome) -> bool {
     a.threshold_level == b.threshold_level && a.print_from_depth == b.print_from_depth

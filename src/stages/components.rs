@@ -2,6 +2,9 @@
 
 use crate::raster::{Grid, Mask};
 
+/// Groups below this share of a picture are specks, unless a setting says otherwise; the authors' code has it.
+pub(super) const SPECK_SHARE: f64 = 1.0 / 1200.0;
+
 /// Groups of set pixels that touch along an edge, each with its size.
 #[derive(Debug)]
 pub(super) struct Components {

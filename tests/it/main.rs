@@ -1,6 +1,7 @@
 //! Integration tests in one binary.
 
 mod cli;
+mod decoys;
 mod demo;
 mod hostile;
 mod invariance;

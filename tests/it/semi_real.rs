@@ -11,7 +11,7 @@ use rayon::prelude::*;
 /// Largest landmark error, percent of the character's height: the truth of this tier is good to about a pixel.
 const MAX_LANDMARKS_PCT: f64 = 3.0;
 
-fn settings() -> Settings {
+pub(crate) fn settings() -> Settings {
     let loaded = config::load(&Sources::default()).expect("the defaults are sound");
     loaded.config.stages
 }

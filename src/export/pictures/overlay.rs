@@ -4,7 +4,6 @@ use super::paint::{Rgb, eight_bits, resized};
 use super::relief::shaded;
 use crate::domain::{Affine2, MetricOutcome};
 use crate::raster::{DepthMap, Grid, Mask, Picture, warp_depth, warp_mask};
-use crate::report::aligned::depth_mask;
 
 /// Vermillion of Okabe and Ito's palette: told from ink and paper with every kind of colour vision.
 const EDGE: [u8; 3] = [213, 94, 0];
@@ -87,7 +86,7 @@ impl View {
     /// A metric's depth mask in the view.
     fn laid_on(&self, depth: &DepthMap, outcome: &MetricOutcome) -> Mask {
         let view_from_depth = self.from_print.after(&outcome.print_from_depth);
-        let mask = depth_mask(depth, outcome.threshold_level);
+        let mask = depth.strokes(outcome.threshold_level);
         warp_mask(&mask, &view_from_depth, self.width, self.height)
     }
 

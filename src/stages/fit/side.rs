@@ -8,6 +8,7 @@ use super::surface::{Samples, Surface, quantile};
 use crate::domain::{Bow, Rigid3, SideEvidence};
 use crate::mesh::Mesh;
 use crate::raster::Picture;
+use crate::stages::components::SPECK_SHARE;
 use crate::stages::ink;
 use crate::stages::pose::{Base, Keep, Limits, Pass, Soft, find};
 
@@ -48,8 +49,6 @@ const fn mirrored(count: usize) -> Keep {
 }
 /// Working size of the print and the tops.
 const BASE_PX: usize = 80;
-/// Groups of ink below this share of the print are specks.
-const SPECK_SHARE: f64 = 1.0 / 1200.0;
 
 /// What was seen from one side.
 #[derive(Debug, Clone)]

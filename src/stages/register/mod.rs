@@ -159,7 +159,7 @@ pub fn register(
     let mut canvases = Vec::new();
     for alignment in &alignments {
         let to_canvas = canvas_from_print.after(&alignment.print_from_depth);
-        let mask = warp_mask(&strokes(depth, alignment.level), &to_canvas, side, side);
+        let mask = warp_mask(&depth.strokes(alignment.level), &to_canvas, side, side);
         if mask.count() == 0 {
             return Err(Error::NoStrokes(alignment.metric));
         }
@@ -213,11 +213,6 @@ fn require_match(evidence: &Evidence, params: &Params) -> Result<(), Error> {
             needs: params.least_confidence,
         })
     }
-}
-
-/// Pixels of the depth map at a level or above.
-fn strokes(depth: &DepthMap, level: u16) -> Mask {
-    depth.levels.map(|l| *l >= level && *l > 0)
 }
 
 fn outcome(

@@ -4,14 +4,12 @@
 //! The text judges six sectors at one angle each, which misses by up to half a sector; the program tries 60 angles
 //! and 60 more about the best.
 
-use super::{Alignment, Error, Params, chosen, strokes};
+use super::{Alignment, Error, Params, chosen};
 use crate::domain::{Affine2, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
-use crate::stages::components::without_specks;
+use crate::stages::components::{SPECK_SHARE, without_specks};
 use crate::stages::normalize::Normalized;
 
-/// Groups below this share of the picture are specks and may not decide the box.
-const SPECK_SHARE: f64 = 1.0 / 1200.0;
 /// The fine pass spans this many coarse steps to each side.
 const FINE_REACH: f64 = 3.0;
 /// Longest climb in pixels.
@@ -56,7 +54,7 @@ fn align_one(
     params: &Params,
 ) -> Result<(Alignment, f64), Error> {
     let (level, at_bound) = chosen(normalized, metric)?;
-    let raw = strokes(depth, level);
+    let raw = depth.strokes(level);
     let mask = without_specks(
         &raw,
         (raw.data().len() as f64 * SPECK_SHARE).round() as usize,
