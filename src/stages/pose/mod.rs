@@ -8,9 +8,11 @@ mod layer;
 mod overlap;
 mod refine;
 mod search;
+mod step;
 
 pub(super) use find::{Pass, find};
 pub(super) use layer::{Base, Layer, Soft};
 pub(super) use overlap::Overlap;
-pub(super) use refine::{Loss, Refiner};
+pub(super) use refine::Refiner;
 pub(super) use search::{Found, Keep, Limits};
+pub(super) use step::Loss;

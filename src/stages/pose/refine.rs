@@ -1,8 +1,7 @@
 //! Sub-pixel refinement of one pose: robust Gauss-Newton on what both layers know.
 
-use nalgebra::{Matrix6, Vector6};
-
 use super::search::Found;
+use super::step::{Loss, Room, Step};
 use super::{Layer, Overlap};
 use crate::domain::Affine2;
 
@@ -10,24 +9,6 @@ use crate::domain::Affine2;
 const MOST_STEPS: usize = 15;
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
 const SETTLED_PX: f64 = 0.01;
-/// Residuals beyond this many of their median count less: what stands on one side only must not decide.
-const ROBUST: f32 = 2.5;
-/// Residuals beyond this share of full ink belong to what is lost or was added: they do not count at all.
-const FAR: f32 = 0.5;
-/// Pixels whose sums are kept apart, so that they are added side by side.
-const LANES: usize = 8;
-/// Products of a row of the normal equations with itself, lower triangle, then with the residual.
-const SUMS: usize = 21 + 6;
-
-/// What a residual costs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::stages) enum Loss {
-    /// Large residuals count less: from afar.
-    Huber,
-    /// Large residuals do not count: once the pose is nearly right.
-    Tukey,
-}
-
 /// Two layers ready to be laid on each other many times.
 pub(in crate::stages) struct Refiner<'a> {
     fixed: &'a Layer,
@@ -203,36 +184,7 @@ impl<'a> Refiner<'a> {
 
     fn step(&self, from_fixed: &Affine2, mirrored: bool, loss: Loss, room: &mut Room) -> Step {
         self.look(from_fixed, room);
-        let (gain, offset) = room.gain_and_offset();
-        let limit = match loss {
-            Loss::Huber => ROBUST * room.median_residual(gain, offset).max(1e-4),
-            Loss::Tukey => FAR,
-        };
-        let mut sums = [[0.0_f32; LANES]; SUMS + 1];
-        let mut totals = [0.0_f64; SUMS + 1];
-        for (k, looks) in room.looks.iter().enumerate() {
-            let held = LANES.min(room.count - k * LANES);
-            add(
-                &mut sums,
-                looks,
-                held,
-                mirrored,
-                [gain, offset, limit],
-                loss,
-            );
-            if k % 128 == 127 {
-                drain(&mut sums, &mut totals);
-            }
-        }
-        drain(&mut sums, &mut totals);
-        Step {
-            cost: if room.count == 0 {
-                f64::INFINITY
-            } else {
-                totals[SUMS] / room.count as f64
-            },
-            sums: totals,
-        }
+        Step::of(room, mirrored, loss)
     }
 
     /// Correlation over what both know, over the whole of what each holds.
@@ -256,73 +208,6 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// Adds the products of a few looks, side by side, to the sums of the normal equations and of the cost.
-fn add(
-    sums: &mut [[f32; LANES]; SUMS + 1],
-    looks: &Looks,
-    held: usize,
-    mirrored: bool,
-    [gain, offset, limit]: [f32; 3],
-    loss: Loss,
-) {
-    let s = if mirrored { -1.0 } else { 1.0 };
-    let [x, y] = looks.place;
-    let [m, gx, gy]: [[f32; LANES]; 3] =
-        std::array::from_fn(|part| looks.met.map(|cell| cell[part]));
-    let residual: [f32; LANES] = std::array::from_fn(|k| looks.fixed[k] - gain * m[k] - offset);
-    let (mut weight, mut cost) = ([0.0; LANES], [0.0; LANES]);
-    for k in 0..held {
-        (weight[k], cost[k]) = loss.at(residual[k].abs(), limit);
-    }
-    let row: [[f32; LANES]; 6] = [
-        std::array::from_fn(|k| gain * (gx[k] * x[k] + gy[k] * y[k] * s)),
-        std::array::from_fn(|k| gain * (gy[k] * x[k] - gx[k] * y[k] * s)),
-        gx.map(|v| gain * v),
-        gy.map(|v| gain * v),
-        m,
-        [1.0; LANES],
-    ];
-    let mut at = 0;
-    for i in 0..6 {
-        let weighed: [f32; LANES] = std::array::from_fn(|k| weight[k] * row[i][k]);
-        for other in &row[..=i] {
-            for k in 0..LANES {
-                sums[at][k] += weighed[k] * other[k];
-            }
-            at += 1;
-        }
-        for k in 0..LANES {
-            sums[21 + i][k] += weighed[k] * residual[k];
-        }
-    }
-    for k in 0..LANES {
-        sums[SUMS][k] += cost[k];
-    }
-}
-
-fn drain(sums: &mut [[f32; LANES]; SUMS + 1], totals: &mut [f64; SUMS + 1]) {
-    for (lanes, total) in sums.iter_mut().zip(totals) {
-        *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
-        *lanes = [0.0; LANES];
-    }
-}
-
-impl Loss {
-    /// Weight of a residual and its cost, so that steps are judged by what they minimise.
-    #[inline]
-    fn at(self, size: f32, limit: f32) -> (f32, f32) {
-        match self {
-            Self::Huber if size > limit => (limit / size, limit * (2.0 * size - limit)),
-            Self::Huber => (1.0, size * size),
-            Self::Tukey => {
-                let near = (1.0 - (size / limit).powi(2)).max(0.0);
-                let cost = limit * limit / 3.0 * (1.0 - near * near * near);
-                (near * near, cost)
-            }
-        }
-    }
-}
-
 /// Changes the map by a small similarity about the fixed layer's middle.
 fn moved(map: &Affine2, change: &[f64; 6], mirrored: bool) -> Affine2 {
     let [a, b, tx, ty, _, _] = *change;
@@ -332,121 +217,6 @@ fn moved(map: &Affine2, change: &[f64; 6], mirrored: bool) -> Affine2 {
         [p[0] + a, p[1] - b * s, p[2] + tx],
         [q[0] + b, q[1] + a * s, q[2] + ty],
     ])
-}
-
-/// A few looks side by side.
-#[derive(Debug, Clone, Copy, Default)]
-struct Looks {
-    /// The fixed layer's value.
-    fixed: [f32; LANES],
-    /// The moving layer's value, slope in x and y, and weight.
-    met: [[f32; 4]; LANES],
-    /// Place in the fixed layer, relative to its middle: x of each, then y.
-    place: [[f32; LANES]; 2],
-}
-
-/// Buffers of one refinement.
-#[derive(Default)]
-struct Room {
-    /// The last one may be filled only in part, with zeros after.
-    looks: Vec<Looks>,
-    count: usize,
-    sizes: Vec<f32>,
-}
-
-impl Room {
-    /// Makes room for this many looks, and one that does not count.
-    fn clear(&mut self, most: usize) {
-        self.looks.resize(most / LANES + 1, Looks::default());
-        self.count = 0;
-    }
-
-    /// Takes in a look if the moving layer is known there.
-    #[inline]
-    fn put(&mut self, fixed: f32, met: [f32; 4], [x, y]: [f32; 2]) {
-        let lane = self.count % LANES;
-        let looks = &mut self.looks[self.count / LANES];
-        looks.fixed[lane] = fixed;
-        looks.met[lane] = met;
-        looks.place[0][lane] = x;
-        looks.place[1][lane] = y;
-        self.count += usize::from(met[3] >= 0.5);
-    }
-
-    /// Leaves only what was taken in.
-    fn close(&mut self) {
-        self.looks.truncate(self.count.div_ceil(LANES));
-        let held = (self.count + LANES - 1) % LANES + 1;
-        if let Some(last) = self.looks.last_mut() {
-            for lane in held..LANES {
-                last.fixed[lane] = 0.0;
-                last.met[lane] = [0.0; 4];
-            }
-        }
-    }
-
-    /// Least-squares gain and offset of the fixed values over the moving ones; the gain never below a trifle.
-    fn gain_and_offset(&self) -> (f32, f32) {
-        let mut sums = [[0.0_f64; LANES]; 4];
-        for looks in &self.looks {
-            for k in 0..LANES {
-                let (a, b) = (f64::from(looks.fixed[k]), f64::from(looks.met[k][0]));
-                for (sum, value) in sums.iter_mut().zip([a, b, a * b, b * b]) {
-                    sum[k] += value;
-                }
-            }
-        }
-        let n = self.count.max(1) as f64;
-        let [f, m, fm, mm] = sums.map(|lanes| lanes.iter().sum::<f64>() / n);
-        let gain = ((fm - f * m) / (mm - m * m).max(1e-9)).max(0.05);
-        (gain as f32, (f - gain * m) as f32)
-    }
-
-    /// Median size of the residuals at a gain and offset.
-    fn median_residual(&mut self, gain: f32, offset: f32) -> f32 {
-        self.sizes.clear();
-        for looks in &self.looks {
-            let residual = |k: usize| looks.fixed[k] - gain * looks.met[k][0] - offset;
-            let sizes: [f32; LANES] = std::array::from_fn(|k| residual(k).abs());
-            self.sizes.extend(sizes);
-        }
-        self.sizes.truncate(self.count);
-        median(&mut self.sizes)
-    }
-}
-
-/// Normal equations at one pose: four of the pose, gain and offset of the values.
-struct Step {
-    /// The last is the cost before it was shared out.
-    sums: [f64; SUMS + 1],
-    cost: f64,
-}
-
-impl Step {
-    fn solve(&self, damping: f64) -> Option<[f64; 6]> {
-        let mut normal = Matrix6::zeros();
-        let mut at = 0;
-        for i in 0..6 {
-            for j in 0..=i {
-                normal[(i, j)] = self.sums[at];
-                normal[(j, i)] = self.sums[at];
-                at += 1;
-            }
-        }
-        for i in 0..6 {
-            normal[(i, i)] = normal[(i, i)] * (1.0 + damping) + 1e-12;
-        }
-        let right = Vector6::from_fn(|i, _| self.sums[21 + i]);
-        Some(normal.cholesky()?.solve(&right).into())
-    }
-}
-
-fn median(values: &mut [f32]) -> f32 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let k = values.len() / 2;
-    *values.select_nth_unstable_by(k, f32::total_cmp).1
 }
 
 /// Value, central differences and weight of each pixel of a layer.
