@@ -10,7 +10,7 @@ use crate::mesh::Mesh;
 use crate::raster::Picture;
 use crate::stages::components::SPECK_SHARE;
 use crate::stages::ink;
-use crate::stages::pose::{Base, Keep, Limits, Pass, Soft, find};
+use crate::stages::pose::{Base, Keep, Limits, Pass, Refiner, Soft, find};
 
 /// A side with less than this share of the other's relief is the back of the block.
 const BACK: f64 = 0.35;
@@ -47,6 +47,8 @@ const fn mirrored(count: usize) -> Keep {
         mirrored: count,
     }
 }
+/// Working size at which a face is judged: what correlates must also have printed.
+const JUDGED_PX: usize = 64;
 /// Working size of the print and the tops.
 const BASE_PX: usize = 80;
 
@@ -146,7 +148,12 @@ fn best_score(ink: &Base, tops: &Soft) -> f64 {
         return 0.0;
     };
     let found = find(ink, &wood, LIMITS, &PASSES);
-    found.iter().map(|pose| pose.score).fold(0.0, f64::max)
+    let (print, tops) = (ink.layer(JUDGED_PX, 1.0), wood.layer(JUDGED_PX, 1.0));
+    let judge = Refiner::new(&print, &tops);
+    let scores = found
+        .iter()
+        .map(|pose| pose.score * judge.overlap(pose).moving_met);
+    scores.fold(0.0, f64::max)
 }
 
 /// How widely the heights spread at their extreme layer: half the heights of the upper part of the relief lie within

@@ -45,7 +45,7 @@ const SHIFT: f64 = 0.35;
 /// A relief that correlates less than this matches nothing.
 const LEAST_SCORE: f64 = 0.12;
 /// Mirrored must win by this factor before the pair is refused: symmetric characters score alike both ways.
-const MIRROR_WINS: f64 = 1.12;
+const MIRROR_WINS: f64 = 1.3;
 /// A scale whose logarithm is this close to the band's end is at the bound.
 const BOUND: f64 = 0.02;
 
