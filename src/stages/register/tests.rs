@@ -1,5 +1,6 @@
 //! Known alignments come back through all four stages.
 
+use super::Error;
 use crate::domain::{MetricOutcome, PrintFromMesh, ThresholdMetric};
 use crate::mesh::Mesh;
 use crate::stages::StageError;
@@ -50,10 +51,12 @@ fn a_mirrored_mesh_never_passes() {
     };
     let refused = run(&world.mesh(), &picture, &settings());
     let error = refused.expect_err("mirror writing reads wrong");
+    // Told by the search where it is plain, by the last look where it takes that.
     assert!(
         matches!(
             error,
             StageError::Normalize(normalize::Error::Mirrored { .. })
+                | StageError::Register(Error::Mirrored { .. })
         ),
         "{error}"
     );
