@@ -121,12 +121,21 @@ pub(super) fn readings(picture: &Picture, speck_share: f64) -> Result<Vec<Ink>, 
         });
     }
     let dark = grey.map(|g| f64::from(*g) < split.threshold);
-    let (likelier, clear) = polarity(grey, &dark, &known);
-    let first = read(grey, &known, likelier, speck_share);
+    let even = evened(grey, &known);
+    let (likelier, clear) = polarity(&even, &dark, &known);
+    let of = |light_on_dark| {
+        if light_on_dark {
+            let turned = evened(&grey.map(|g| 1.0 - *g), &known);
+            read(grey, &turned, &known, light_on_dark, speck_share)
+        } else {
+            read(grey, &even, &known, light_on_dark, speck_share)
+        }
+    };
+    let first = of(likelier);
     if clear {
         return first.map(|ink| vec![ink]);
     }
-    let second = read(grey, &known, !likelier, speck_share);
+    let second = of(!likelier);
     match (first, second) {
         (Ok(first), Ok(second)) => Ok(vec![first, second]),
         (Ok(only), Err(_)) | (Err(_), Ok(only)) => Ok(vec![only]),
@@ -134,16 +143,15 @@ pub(super) fn readings(picture: &Picture, speck_share: f64) -> Result<Vec<Ink>, 
     }
 }
 
-/// The ink of one polarity.
+/// The ink of one polarity, from the grey over the paper's around it.
 fn read(
     grey: &Grid<f32>,
+    even: &Grid<f32>,
     known: &Mask,
     light_on_dark: bool,
     speck_share: f64,
 ) -> Result<Ink, Error> {
-    let darkness = |g: f32| if light_on_dark { 1.0 - g } else { g };
-    let even = evened(&grey.map(|g| darkness(*g)), known);
-    let split = otsu::split(&mut held(&even, known)).ok_or(Error::NoContrast { contrast: 0.0 })?;
+    let split = otsu::split(&mut held(even, known)).ok_or(Error::NoContrast { contrast: 0.0 })?;
     let raw = Mask::from_fn(grey.width(), grey.height(), |x, y| {
         known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
     });
@@ -155,7 +163,7 @@ fn read(
     require_ink(&ink, area, grey, split.threshold)?;
     Ok(Ink {
         soft: Soft {
-            amount: amount(&even, &ink, split),
+            amount: amount(even, &ink, split),
             known: known.clone(),
         },
         mask: ink,
@@ -221,10 +229,9 @@ fn evened(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
 
 /// Whether ink is likelier to be lighter than paper, and whether that is clear. Stains and frame lines mislead: where
 /// the picture as it is and what is dark beside its surroundings do not both say so, the other way stays possible.
-fn polarity(grey: &Grid<f32>, dark: &Mask, known: &Mask) -> (bool, bool) {
+fn polarity(even: &Grid<f32>, dark: &Mask, known: &Mask) -> (bool, bool) {
     let plain = paper_darkness(dark, known);
-    let even = evened(grey, known);
-    let levelled = otsu::split(&mut held(&even, known)).map_or(plain, |split| {
+    let levelled = otsu::split(&mut held(even, known)).map_or(plain, |split| {
         paper_darkness(&even.map(|g| f64::from(*g) < split.threshold), known)
     });
     let sum = plain + levelled;

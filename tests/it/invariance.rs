@@ -207,8 +207,7 @@ fn framed(print: &Picture, [left, top, right, bottom]: [i64; 4]) -> (Picture, Af
     (Picture { rgb }, motion)
 }
 
-/// A change that the stages do not see at all moves no landmark by more than this, pixels. Measured: 0.0005 for meshes,
-/// 0.014 for turned prints, whose sums run in another order.
+/// A change that the stages do not see at all moves no landmark by more than this, pixels.
 const EXACT_PX: f64 = 0.02;
 /// The same for a turn of the mesh that is not by a right angle in the plane: the depth map stays upright, so its
 /// pixels see other places. Measured: median 0.03, worst 0.14.

@@ -23,7 +23,6 @@ const MANIFEST: f64 = 0.4;
 /// The search against the print: as in normalisation, but not as close.
 const LIMITS: Limits = Limits {
     scale: 1.6,
-    shift: 0.35,
     keep: mirrored(6),
 };
 const PASSES: [Pass; 2] = [
@@ -40,6 +39,7 @@ const PASSES: [Pass; 2] = [
         keep: mirrored(1),
     },
 ];
+
 /// A face is seen from outside, in mirror writing: no other reading counts.
 const fn mirrored(count: usize) -> Keep {
     Keep {
@@ -47,6 +47,7 @@ const fn mirrored(count: usize) -> Keep {
         mirrored: count,
     }
 }
+
 /// Working size at which a face is judged: what correlates must also have printed.
 const JUDGED_PX: usize = 64;
 /// Working size of the print and the tops.
@@ -126,7 +127,7 @@ fn log_odds(first: &Face, second: &Face, witness: Witness<'_>) -> f64 {
     WINDING * winding + SHARPNESS * sharpness + MANIFEST * manifest + AGREEMENT * agreement
 }
 
-/// Log of the ratio between the faces' best correlations with the print; 0 when the print shows no ink.
+/// Log of the ratio between the faces' agreements with the print; 0 when the print shows no ink.
 fn agreement(first: &Face, second: &Face, print: &Picture) -> f64 {
     let Ok(readings) = ink::readings(print, SPECK_SHARE) else {
         return 0.0;
@@ -142,7 +143,7 @@ fn agreement(first: &Face, second: &Face, print: &Picture) -> f64 {
     (score(first) / score(second)).ln()
 }
 
-/// Best correlation of a face, read in the mirror, with the ink.
+/// How well a face, read in the mirror, agrees with the ink: correlation times the share of the tops that has printed.
 fn best_score(ink: &Base, tops: &Soft) -> f64 {
     let Some(wood) = Base::new(tops, BASE_PX) else {
         return 0.0;

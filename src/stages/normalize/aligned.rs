@@ -40,8 +40,6 @@ const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Poses that the search hands on.
 const KEEP: Keep = keep(10, 4);
-/// Largest shift between the middles of print and depth map, as a share of the size.
-const SHIFT: f64 = 0.35;
 /// A relief that correlates less than this matches nothing.
 const LEAST_SCORE: f64 = 0.12;
 /// Mirrored must win by this factor before the pair is refused: symmetric characters score alike both ways.
@@ -52,10 +50,10 @@ const BOUND: f64 = 0.02;
 /// Finds the poses of the reading of the print that the relief agrees with best.
 pub(super) fn search(
     depth: &DepthMap,
+    relief: &Relief,
     readings: Vec<Ink>,
     params: &Params,
 ) -> Result<(Ink, Search), Error> {
-    let relief = Relief::of(depth).ok_or(Error::NoStrokes)?;
     let depths = relief.depths(depth);
     let mut best: Option<(Ink, Search)> = None;
     // Which failure is told: that of the likelier reading, which comes first.
@@ -79,12 +77,12 @@ pub(super) fn search(
 /// Chooses the thresholds at the best pose.
 pub(super) fn thresholds(
     depth: &DepthMap,
+    relief: &Relief,
     print: &Ink,
     canvas_from_print: &Affine2,
     search: &Search,
     params: &Params,
 ) -> Result<Vec<ThresholdChoice>, Error> {
-    let relief = Relief::of(depth).ok_or(Error::NoStrokes)?;
     let best = search.poses.first().ok_or(Error::NoMatch {
         best: 0.0,
         needs: LEAST_SCORE,
@@ -96,7 +94,7 @@ pub(super) fn thresholds(
         &best.print_from_depth,
         params,
     );
-    threshold::choose(depth, &relief, &canvas, params)
+    threshold::choose(depth, relief, &canvas, params)
 }
 
 /// Poses as read, best first, at least one.
@@ -107,7 +105,6 @@ fn find_poses(depths: &Soft, print: &Ink, params: &Params) -> Result<Search, Err
     let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
     let limits = Limits {
         scale: params.scale_band,
-        shift: SHIFT,
         keep: KEEP,
     };
     let found = find(&ink, &wood, limits, &PASSES);

@@ -169,9 +169,10 @@ pub fn normalize(depth: &DepthMap, print: &Picture, params: &Params) -> Result<N
     };
     let (ink, canvas_from_print, search, thresholds) = match params.method {
         Method::Aligned => {
-            let (ink, search) = aligned::search(depth, readings, params)?;
+            let relief = Relief::of(depth).ok_or(Error::NoStrokes)?;
+            let (ink, search) = aligned::search(depth, &relief, readings, params)?;
             let canvas = canvas_from_print(&ink.mask, params).ok_or(Error::NoStrokes)?;
-            let thresholds = aligned::thresholds(depth, &ink, &canvas, &search, params)?;
+            let thresholds = aligned::thresholds(depth, &relief, &ink, &canvas, &search, params)?;
             (ink, canvas, search, thresholds)
         }
         Method::Wrap => {

@@ -11,26 +11,22 @@ pub(in crate::stages) struct Overlap {
     pub(in crate::stages) moving_met: f64,
     /// Share of the fixed picture's amount that meets the moving one's: of the ink, what has tops under it.
     pub(in crate::stages) fixed_met: f64,
-    /// Share of the fixed picture's known area where the moving one is known too.
-    pub(in crate::stages) known: f64,
 }
 
 impl Overlap {
     /// Of two layers, given where the fixed one's pixels lie in the moving one; zeros where they do not meet.
     pub(super) fn of(fixed: &Layer, moving: &Layer, moving_from_fixed: &Affine2) -> Self {
-        let (mut both, mut ink, mut wood, mut known, mut area) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        let (mut both, mut ink, mut wood) = (0.0, 0.0, 0.0);
         for y in 0..fixed.amount.height() {
             for x in 0..fixed.amount.width() {
                 if fixed.weight.at(x, y) == 0.0 {
                     continue;
                 }
-                area += 1.0;
                 let there = moving_from_fixed.apply([x as f64, y as f64]);
                 if sample(&moving.weight, there) < 0.5 {
                     continue;
                 }
                 let (a, b) = (fixed.amount.at(x, y), sample(&moving.amount, there));
-                known += 1.0;
                 both += f64::from(a.min(b));
                 ink += f64::from(a);
                 wood += f64::from(b);
@@ -40,7 +36,6 @@ impl Overlap {
         Self {
             moving_met: share(both, wood),
             fixed_met: share(both, ink),
-            known: share(known, area),
         }
     }
 }

@@ -5,10 +5,9 @@ use super::step::{Loss, Room, Step};
 use super::{Layer, Overlap};
 use crate::domain::Affine2;
 
-/// Most steps; a pose that has not settled by then is judged where it is.
-const MOST_STEPS: usize = 15;
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
 const SETTLED_PX: f64 = 0.01;
+
 /// Two layers ready to be laid on each other many times.
 pub(in crate::stages) struct Refiner<'a> {
     fixed: &'a Layer,
@@ -53,7 +52,8 @@ impl<'a> Refiner<'a> {
     /// Refines a pose so that the moving layer explains the fixed one, and scores it.
     ///
     /// The moving values may be scaled and offset freely; residuals are weighed down where only one side has
-    /// something. The score is the correlation over what both know, over what each holds.
+    /// something. A pose that has not settled after `most_steps` is judged where it is. The score is the correlation
+    /// over what both know, over what each holds.
     pub(in crate::stages) fn refine(&self, start: &Found, most_steps: usize, loss: Loss) -> Found {
         let Some(mut from_fixed) = self.moving_from_fixed(&start.fixed_from_moving) else {
             return *start;
@@ -61,7 +61,7 @@ impl<'a> Refiner<'a> {
         let mut room = Room::default();
         let mut damping = 1e-3;
         let mut best: Option<(Step, Affine2)> = None;
-        for _ in 0..most_steps.min(MOST_STEPS) {
+        for _ in 0..most_steps {
             let step = self.step(&from_fixed, start.mirrored, loss, &mut room);
             let better = best.as_ref().is_none_or(|(kept, _)| step.cost < kept.cost);
             if better {

@@ -14,6 +14,8 @@ use crate::domain::Affine2;
 const SQUARE: usize = 32;
 /// Working size for layers that go into the search; at the widest scales only their corners leave the square.
 pub(super) const SEARCH_PX: usize = 20;
+/// Largest shift between the pictures' middles, as a share of the size.
+const SHIFT: f64 = 0.35;
 /// Angles in a turn; two are looked at with one transform.
 const ANGLES: usize = 36;
 /// Ratio between neighbouring scales: the rim of a character moves by about one pixel.
@@ -51,8 +53,6 @@ impl Keep {
 pub(in crate::stages) struct Limits {
     /// Largest ratio, up or down, between the pictures' sizes.
     pub(in crate::stages) scale: f64,
-    /// Largest shift between the pictures' middles, as a share of the size.
-    pub(in crate::stages) shift: f64,
     /// How many poses to keep.
     pub(in crate::stages) keep: Keep,
 }
@@ -69,12 +69,18 @@ pub(in crate::stages) struct Found {
 }
 
 impl Found {
+    /// By how much two poses are turned from each other, degrees, 0..=180.
+    pub(in crate::stages) fn turn_from(&self, other: &Self) -> f64 {
+        let angle = |pose: &Self| pose.fixed_from_moving.angle_deg();
+        let turn = (angle(self) - angle(other)).rem_euclid(360.0);
+        turn.min(360.0 - turn)
+    }
+
     /// Whether two poses turn and scale alike.
     pub(super) fn is_near(&self, other: &Self) -> bool {
-        let (a, b) = (&self.fixed_from_moving, &other.fixed_from_moving);
-        let turn = (a.angle_deg() - b.angle_deg()).rem_euclid(360.0);
-        let ratio = (a.scale() / b.scale()).ln().abs();
-        self.mirrored == other.mirrored && turn.min(360.0 - turn) < NEAR_DEG && ratio < NEAR_RATIO
+        let scale = |pose: &Self| pose.fixed_from_moving.scale();
+        let ratio = (scale(self) / scale(other)).ln().abs();
+        self.mirrored == other.mirrored && self.turn_from(other) < NEAR_DEG && ratio < NEAR_RATIO
     }
 }
 
@@ -109,7 +115,7 @@ pub(super) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -> Vec<Found
             for mirrored in readings.iter().copied() {
                 let surface = transform.correlate(&target, mirrored);
                 for (k, angle) in angles.into_iter().enumerate() {
-                    let (shift, height) = highest(surface, k, limits.shift);
+                    let (shift, height) = highest(surface, k);
                     let score = f64::from(height) / (norms[k] * fixed_norm).max(1e-12);
                     peaks.push(Peak {
                         angle,
@@ -206,8 +212,8 @@ fn norm(values: &[f32]) -> f64 {
 /// Highest correlation within the shift limit, of the real (0) or imaginary (1) part: shift in pixels and value.
 ///
 /// The surface is read backwards: its value at -s belongs to shift s.
-fn highest(surface: &[Complex32], part: usize, limit: f64) -> ([f64; 2], f32) {
-    let reach = (limit * SEARCH_PX as f64).round() as i64;
+fn highest(surface: &[Complex32], part: usize) -> ([f64; 2], f32) {
+    let reach = (SHIFT * SEARCH_PX as f64).round() as i64;
     let mut best = ([0.0; 2], f32::NEG_INFINITY);
     for dy in -reach..=reach {
         let from = (-dy).rem_euclid(SQUARE as i64) as usize * SQUARE;

@@ -1,6 +1,6 @@
 //! How likely an alignment is right, from what speaks for and against it.
 //!
-//! A logistic model. Its weights were fitted to 1,000 made pairs of two independent generators: right pairs of every
+//! A logistic model. Its weights were fitted to 980 made pairs of two independent generators: right pairs of every
 //! kind, meshes with another character's print, mirrored meshes and uncarved plates.
 
 use crate::domain::Evidence;

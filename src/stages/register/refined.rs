@@ -33,7 +33,7 @@ pub(super) fn align(
     let best = *best_of(&tried, |pose| !pose.found.mirrored).ok_or(Error::NoPose)?;
     let score_of = |other: Option<&Settled>| other.map_or(0.0, Settled::score);
     let other_angle = score_of(best_of(&tried, |pose| {
-        !pose.found.mirrored && pose.is_turned_from(&best)
+        !pose.found.mirrored && pose.found.turn_from(&best.found) > SAME_POSE_DEG
     }));
     let mirrored = score_of(best_of(&tried, |pose| pose.found.mirrored));
     let evidence = best.evidence(other_angle, mirrored);
@@ -61,12 +61,6 @@ impl Settled {
     /// break off after a print was made; tops without ink are rare.
     fn score(&self) -> f64 {
         self.found.score * self.overlap.moving_met
-    }
-
-    fn is_turned_from(&self, other: &Self) -> bool {
-        let angle = |pose: &Self| pose.found.fixed_from_moving.angle_deg();
-        let turn = (angle(self) - angle(other)).rem_euclid(360.0);
-        turn.min(360.0 - turn) > SAME_POSE_DEG
     }
 
     fn evidence(&self, other_angle: f64, mirrored: f64) -> Evidence {
