@@ -6,47 +6,41 @@ use crate::raster::Grid;
 ///
 /// Beyond the rim values are taken to be zero, so divide by the smoothed weight where that matters.
 pub(super) fn blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
-    // Three boxes of half-width r have the variance r (r + 1) of one gaussian.
-    let half = ((1.0 + 4.0 * sigma * sigma).sqrt() - 1.0) / 2.0;
-    let mut out = values.clone();
     if sigma < 0.5 {
-        return out;
+        return values.clone();
     }
-    for pass in 0..3 {
-        // Three whole half-widths whose mean is as close to `half` as it can be.
-        let radius =
-            ((half * f64::from(pass + 1)).round() - (half * f64::from(pass)).round()) as usize;
-        if radius > 0 {
-            box_rows(&mut out, radius);
-            box_columns(&mut out, radius);
-        }
-    }
-    out
+    // Three boxes of half-width r have the variance r (r + 1) of one gaussian: three whole half-widths whose mean is
+    // as close to that as it can be.
+    let half = ((1.0 + 4.0 * sigma * sigma).sqrt() - 1.0) / 2.0;
+    let whole = |pass: u32| (half * f64::from(pass)).round() as usize;
+    let radii = [0, 1, 2].map(|pass| whole(pass + 1) - whole(pass));
+    // Columns are summed side by side, so rows are turned into columns for their turn.
+    transposed(&down(transposed(&down(values.clone(), radii)), radii))
 }
 
-fn box_rows(values: &mut Grid<f32>, radius: usize) {
-    let width = values.width();
-    for y in 0..values.height() {
-        let row = &mut values.data_mut()[y * width..(y + 1) * width];
-        let copy = row.to_vec();
-        running_mean(&copy, radius, |x, mean| row[x] = mean);
+/// Box means down the columns, one after the other.
+fn down(mut values: Grid<f32>, radii: [usize; 3]) -> Grid<f32> {
+    let mut means = Grid::new(values.width(), values.height(), 0.0);
+    for radius in radii.into_iter().filter(|radius| *radius > 0) {
+        box_columns(&values, radius, &mut means);
+        std::mem::swap(&mut values, &mut means);
     }
+    values
 }
 
-fn box_columns(values: &mut Grid<f32>, radius: usize) {
+fn box_columns(values: &Grid<f32>, radius: usize, means: &mut Grid<f32>) {
     let (width, height) = (values.width(), values.height());
     let mut sums = vec![0.0_f32; width];
-    let copy = values.clone();
     let scale = 1.0 / (2 * radius + 1) as f32;
     for y in 0..height + radius {
         if y < height {
-            add(&mut sums, copy.row(y), 1.0);
+            add(&mut sums, values.row(y), 1.0);
         }
         if y > 2 * radius {
-            add(&mut sums, copy.row(y - 2 * radius - 1), -1.0);
+            add(&mut sums, values.row(y - 2 * radius - 1), -1.0);
         }
         if y >= radius {
-            let row = &mut values.data_mut()[(y - radius) * width..(y - radius + 1) * width];
+            let row = &mut means.data_mut()[(y - radius) * width..(y - radius + 1) * width];
             for (out, sum) in row.iter_mut().zip(&sums) {
                 *out = sum * scale;
             }
@@ -60,20 +54,24 @@ fn add(sums: &mut [f32], row: &[f32], sign: f32) {
     }
 }
 
-fn running_mean(values: &[f32], radius: usize, mut set: impl FnMut(usize, f32)) {
-    let scale = 1.0 / (2 * radius + 1) as f32;
-    let mut sum = 0.0;
-    for x in 0..values.len() + radius {
-        if x < values.len() {
-            sum += values[x];
-        }
-        if x > 2 * radius {
-            sum -= values[x - 2 * radius - 1];
-        }
-        if x >= radius {
-            set(x - radius, sum * scale);
+/// Side of the squares that are turned over one by one, so that rows of either side stay at hand.
+const TILE: usize = 16;
+
+fn transposed(values: &Grid<f32>) -> Grid<f32> {
+    let (width, height) = (values.width(), values.height());
+    let mut out = Grid::new(height, width, 0.0);
+    let to = out.data_mut();
+    for top in (0..height).step_by(TILE) {
+        for left in (0..width).step_by(TILE) {
+            for y in top..(top + TILE).min(height) {
+                let from = &values.row(y)[left..(left + TILE).min(width)];
+                for (x, value) in from.iter().enumerate() {
+                    to[(left + x) * height + y] = *value;
+                }
+            }
         }
     }
+    out
 }
 
 #[cfg(test)]

@@ -2,16 +2,17 @@
 
 mod ssim;
 
-pub use ssim::{SsimWindow, Structure, WindowMeans, structure_maps};
+pub use ssim::{SsimWindow, Structure, WindowMeans};
 
 use crate::domain::Scores;
 use crate::raster::{Mask, PixelBox};
 
 /// Every score of a depth mask against a print mask of the same size.
 ///
-/// `ssim` and `nl_ssim` use `window`; masks count as 0 and 1 with data range 1.
-pub fn measure(print: &Mask, depth: &Mask, window: SsimWindow) -> Scores {
-    let structure = structure_maps(print, depth, window);
+/// `ssim` and `nl_ssim` use the print's window; masks count as 0 and 1 with data range 1.
+pub fn measure(print: &WindowMeans, depth: &Mask) -> Scores {
+    let structure = print.against(depth);
+    let print = print.mask();
     let overlap = Overlap::of(print, depth);
     Scores {
         ssim: structure.ssim,
@@ -84,7 +85,7 @@ fn box_iou(a: Option<PixelBox>, b: Option<PixelBox>) -> f64 {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Overlap, SsimWindow, box_iou, measure};
+    use super::{Overlap, SsimWindow, WindowMeans, box_iou, measure};
     use crate::raster::Mask;
 
     fn masks() -> impl Strategy<Value = (Mask, Mask)> {
@@ -107,7 +108,8 @@ mod tests {
 
         #[test]
         fn scores_do_not_care_which_mask_is_first((a, b) in masks()) {
-            let (p, q) = (measure(&a, &b, SsimWindow::Gaussian), measure(&b, &a, SsimWindow::Gaussian));
+            let means = |mask| WindowMeans::new(mask, SsimWindow::Gaussian);
+            let (p, q) = (measure(&means(&a), &b), measure(&means(&b), &a));
             prop_assert!((p.ssim - q.ssim).abs() < 1e-12);
             prop_assert_eq!(p.iou_box, q.iou_box);
         }
@@ -116,7 +118,7 @@ mod tests {
     #[test]
     fn a_mask_agrees_wholly_with_itself() {
         let mask = Mask::from_fn(40, 40, |x, y| (10..30).contains(&x) && (5..20).contains(&y));
-        let scores = measure(&mask, &mask, SsimWindow::Gaussian);
+        let scores = measure(&WindowMeans::new(&mask, SsimWindow::Gaussian), &mask);
         for one in [
             scores.ssim,
             scores.nl_ssim,

@@ -23,19 +23,19 @@ const MANIFEST: f64 = 0.4;
 /// The search against the print: as in normalisation, but not as close.
 const LIMITS: Limits = Limits {
     scale: 1.6,
-    keep: mirrored(6),
+    keep: mirrored(5),
 };
 const PASSES: [Pass; 2] = [
     Pass {
-        px: 40,
+        px: 36,
         sigma: 0.8,
         steps: 6,
-        keep: mirrored(3),
+        keep: mirrored(2),
     },
     Pass {
-        px: 64,
+        px: JUDGED_PX,
         sigma: 1.0,
-        steps: 6,
+        steps: 5,
         keep: mirrored(1),
     },
 ];
@@ -49,9 +49,9 @@ const fn mirrored(count: usize) -> Keep {
 }
 
 /// Working size at which a face is judged: what correlates must also have printed.
-const JUDGED_PX: usize = 64;
+const JUDGED_PX: usize = 56;
 /// Working size of the print and the tops.
-const BASE_PX: usize = 80;
+const BASE_PX: usize = 72;
 
 /// What was seen from one side.
 #[derive(Debug, Clone)]
@@ -84,36 +84,42 @@ pub(super) fn choose(
     let (first, second) = match faces {
         [Some(a), Some(b)] => (a, b),
         [Some(only), None] | [None, Some(only)] => {
-            let evidence = evidence(&only, 1.0, witness.mesh);
+            let winding = outward_share(witness.mesh, &only.plane_from_mesh);
+            let evidence = evidence(&only, 1.0, winding);
             return Some((only, evidence));
         }
         [None, None] => return None,
     };
-    let odds = log_odds(&first, &second, witness);
+    let winding = outward_share(witness.mesh, &first.plane_from_mesh);
+    let odds = log_odds(&first, &second, winding, witness);
     let confidence = (odds.abs() / 2.0).tanh();
-    let face = if odds >= 0.0 { first } else { second };
-    let evidence = evidence(&face, confidence, witness.mesh);
+    // What looks out on one side looks in on the other.
+    let (face, winding) = if odds >= 0.0 {
+        (first, winding)
+    } else {
+        (second, winding.map(|out| 1.0 - out))
+    };
+    let evidence = evidence(&face, confidence, winding);
     Some((face, evidence))
 }
 
-fn evidence(face: &Face, confidence: f64, mesh: &Mesh) -> SideEvidence {
+fn evidence(face: &Face, confidence: f64, winding: Option<f64>) -> SideEvidence {
     SideEvidence {
-        winding: outward_share(mesh, &face.plane_from_mesh),
+        winding,
         flatness: face.surface.tops,
         confidence,
     }
 }
 
 /// Log-odds that the first face is the carved one.
-fn log_odds(first: &Face, second: &Face, witness: Witness<'_>) -> f64 {
+fn log_odds(first: &Face, second: &Face, winding: Option<f64>, witness: Witness<'_>) -> f64 {
     if first.relief < BACK * second.relief {
         return -10.0;
     }
     if second.relief < BACK * first.relief {
         return 10.0;
     }
-    let winding =
-        outward_share(witness.mesh, &first.plane_from_mesh).map_or(0.0, |w| 2.0 * w - 1.0);
+    let winding = winding.map_or(0.0, |out| 2.0 * out - 1.0);
     let sharpness = (second.layer_width / first.layer_width)
         .ln()
         .clamp(-1.5, 1.5);

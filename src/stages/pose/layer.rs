@@ -135,17 +135,17 @@ impl<'a> Sizer<'a> {
             self.sigma,
         );
         let slow = blur(&sum, self.slow_sigma);
-        let [width, height] = self.sides;
-        let held = self
-            .weight
-            .map(|w| if *w >= LEAST_KNOWN { 1.0 } else { 0.0 });
-        let amount = Grid::from_fn(width, height, |x, y| {
-            held.at(x, y) * sum.at(x, y) / self.weight.at(x, y).max(1e-6)
-        });
-        let value = Grid::from_fn(width, height, |x, y| {
-            let mean = slow.at(x, y) / self.slow_weight.at(x, y).max(1e-6);
-            amount.at(x, y) - held.at(x, y) * mean
-        });
+        let mut held = self.weight.clone();
+        let (mut amount, mut value) = (sum.clone(), sum.clone());
+        let means = slow.data().iter().zip(self.slow_weight.data());
+        let weights = held.data_mut().iter_mut();
+        let made = amount.data_mut().iter_mut().zip(value.data_mut());
+        for ((held, (slow, slow_weight)), (amount, value)) in weights.zip(means).zip(made) {
+            let known = if *held >= LEAST_KNOWN { 1.0 } else { 0.0 };
+            *amount *= known / held.max(1e-6);
+            *value = *amount - known * slow / slow_weight.max(1e-6);
+            *held = known;
+        }
         Layer {
             value,
             amount,

@@ -12,10 +12,12 @@ const SETTLED_PX: f64 = 0.01;
 pub(in crate::stages) struct Refiner<'a> {
     fixed: &'a Layer,
     moving: &'a Layer,
-    /// Known pixels of the fixed layer: place relative to its middle, and value. Those that steps look at come first.
+    /// Known pixels of the fixed layer: place relative to its middle, and value. One colour of a chessboard is
+    /// enough: layers are smooth, neighbours say nearly the same.
     places: Vec<[f32; 2]>,
     values: Vec<f32>,
-    looked_at: usize,
+    /// Share of the known pixels that are in these lists.
+    looked_at: f64,
     /// The moving layer's value, slope in x and y, and weight, pixel by pixel.
     cells: Vec<[f32; 4]>,
     size: [usize; 2],
@@ -30,25 +32,19 @@ impl<'a> Refiner<'a> {
         let centre = fixed.centre();
         let (width, height) = (fixed.value.width(), fixed.value.height());
         let (mut places, mut values) = (Vec::new(), Vec::new());
-        let mut looked_at = 0;
-        // One colour of a chessboard is enough for steps: layers are smooth, neighbours say nearly the same.
-        for colour in 0..2 {
-            for y in 0..height {
-                for x in ((y + colour) % 2..width).step_by(2) {
-                    if fixed.weight.at(x, y) > 0.0 {
-                        places.push([x as f32 - centre[0] as f32, y as f32 - centre[1] as f32]);
-                        values.push(fixed.value.at(x, y));
-                    }
+        for y in 0..height {
+            for x in (y % 2..width).step_by(2) {
+                if fixed.weight.at(x, y) > 0.0 {
+                    places.push([x as f32 - centre[0] as f32, y as f32 - centre[1] as f32]);
+                    values.push(fixed.value.at(x, y));
                 }
             }
-            if colour == 0 {
-                looked_at = places.len();
-            }
         }
+        let known = fixed.weight.data().iter().filter(|w| **w > 0.0).count();
         Self {
+            looked_at: places.len().max(1) as f64 / known.max(1) as f64,
             places,
             values,
-            looked_at,
             cells: cells(moving),
             size: [moving.value.width(), moving.value.height()],
             centre,
@@ -140,10 +136,9 @@ impl<'a> Refiner<'a> {
 
     /// What each known pixel of the fixed layer meets in the moving one.
     fn look(&self, from_fixed: &Affine2, room: &mut Room) {
-        room.clear(self.looked_at);
+        room.clear(self.places.len());
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
-        let looked_at = self.places[..self.looked_at].iter();
-        for (place, value) in looked_at.zip(&self.values) {
+        for (place, value) in self.places.iter().zip(&self.values) {
             let [x, y] = *place;
             let u = a[0] * x + a[1] * y + a[2];
             let v = b[0] * x + b[1] * y + b[2];
@@ -157,27 +152,34 @@ impl<'a> Refiner<'a> {
     /// Bilinear look into the moving layer; `None` outside.
     #[inline]
     fn cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
-        let ([p, q, r, s], [fx, fy]) = self.corners(u, v)?;
+        let (from, [fx, fy]) = self.corner(u, v)?;
+        let (above, below) = (
+            &self.cells[from..from + 2],
+            &self.cells[from + self.size[0]..][..2],
+        );
         let mix = |a: [f32; 4], b: [f32; 4], share: f32| -> [f32; 4] {
             std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
         };
-        Some(mix(mix(p, q, fx), mix(r, s, fx), fy))
+        let (top, bottom) = (mix(above[0], above[1], fx), mix(below[0], below[1], fx));
+        Some(mix(top, bottom, fy))
     }
 
     /// The value alone.
     #[inline]
     fn value(&self, u: f32, v: f32) -> f32 {
-        let Some(([p, q, r, s], [fx, fy])) = self.corners(u, v) else {
+        let Some((from, [fx, fy])) = self.corner(u, v) else {
             return 0.0;
         };
-        let top = p[0] + (q[0] - p[0]) * fx;
-        let bottom = r[0] + (s[0] - r[0]) * fx;
+        let width = self.size[0];
+        let near = &self.moving.value.data()[from..from + width + 2];
+        let top = near[0] + (near[1] - near[0]) * fx;
+        let bottom = near[width] + (near[width + 1] - near[width]) * fx;
         top + (bottom - top) * fy
     }
 
-    /// The four cells around a place of the moving layer, and where between them it lies; `None` outside.
+    /// The cell of the moving layer up and left of a place, and where beyond it the place lies; `None` outside.
     #[inline]
-    fn corners(&self, u: f32, v: f32) -> Option<([[f32; 4]; 4], [f32; 2])> {
+    fn corner(&self, u: f32, v: f32) -> Option<(usize, [f32; 2])> {
         let [width, height] = self.size;
         if !(u >= 0.0 && v >= 0.0 && u < (width - 1) as f32 && v < (height - 1) as f32) {
             return None;
@@ -185,12 +187,7 @@ impl<'a> Refiner<'a> {
         // Narrow integers: casts between them and floats are single instructions.
         let (column, row) = (u as i32, v as i32);
         let within = [u - column as f32, v - row as f32];
-        let from = row as usize * width + column as usize;
-        let (above, below) = (
-            &self.cells[from..from + 2],
-            &self.cells[from + width..][..2],
-        );
-        Some(([above[0], above[1], below[0], below[1]], within))
+        Some((row as usize * width + column as usize, within))
     }
 
     fn step(&self, from_fixed: &Affine2, mirrored: bool, loss: Loss, room: &mut Room) -> Step {
@@ -213,9 +210,10 @@ impl<'a> Refiner<'a> {
         }
         // A moving pixel covers this many fixed ones.
         let area = from_fixed.determinant().abs().max(1e-12);
-        both / (self.energies[0] * self.energies[1] / area)
-            .sqrt()
-            .max(1e-12)
+        both / self.looked_at
+            / (self.energies[0] * self.energies[1] / area)
+                .sqrt()
+                .max(1e-12)
     }
 }
 

@@ -6,6 +6,9 @@ use crate::stages::pose::{Found, Layer, Refiner};
 /// too thick for it would pull the scale.
 pub(super) const CUTS: [f64; 6] = [0.05, 0.1, 0.17, 0.26, 0.37, 0.5];
 
+/// Cuts that are tried while poses are compared.
+pub(super) const FEW_CUTS: [f64; 3] = [0.08, 0.2, 0.4];
+
 /// The strokes of each cut, the shallowest first, ready to be laid on the print's ink.
 pub(super) struct Cuts<'a> {
     refiners: Vec<Refiner<'a>>,

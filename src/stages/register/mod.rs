@@ -11,7 +11,7 @@ mod turns;
 use serde::{Deserialize, Serialize};
 
 use super::normalize::Normalized;
-use super::score::{self, SsimWindow};
+use super::score::{self, SsimWindow, WindowMeans};
 use crate::domain::{
     Affine2, Evidence, FailureClass, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric,
 };
@@ -155,6 +155,7 @@ pub fn register(
             None,
         ),
     };
+    let print_means = WindowMeans::new(&canvas_print, params.window);
     let mut metrics = Vec::new();
     let mut canvases = Vec::new();
     for alignment in &alignments {
@@ -163,7 +164,7 @@ pub fn register(
         if mask.count() == 0 {
             return Err(Error::NoStrokes(alignment.metric));
         }
-        let scores = score::measure(&canvas_print, &mask, params.window);
+        let scores = score::measure(&print_means, &mask);
         metrics.push(outcome(depth, normalized, alignment, scores));
         canvases.push(CanvasMasks {
             metric: alignment.metric,

@@ -1,7 +1,7 @@
 //! Our registration: the poses that normalisation found, refined and compared; the best one, looked at closely, serves
 //! every metric.
 
-use super::cuts::{CUTS, Cuts};
+use super::cuts::{CUTS, Cuts, FEW_CUTS};
 use super::{Alignment, Error, Params};
 use crate::domain::{Affine2, Evidence, Pose};
 use crate::raster::DepthMap;
@@ -29,7 +29,7 @@ pub(super) fn align(
 ) -> Result<(Vec<Alignment>, Evidence), Error> {
     let pictures = Pictures::new(depth, normalized, params).ok_or(Error::NoPose)?;
     let rivals = Rivals::of(&pictures, normalized).ok_or(Error::NoPose)?;
-    let (ink, woods) = pictures.cut(CLOSER);
+    let (ink, woods) = pictures.layers(CLOSER, &CUTS);
     let cuts = Cuts::new(&ink, &woods);
     let best = settled(&cuts, &rivals.best.found).ok_or(Error::NoPose)?;
     let print_from_depth = pictures.look(&best.found, cuts.best_cut(&best.found));
@@ -71,7 +71,7 @@ struct Rivals {
 impl Rivals {
     /// Compares the poses that normalisation found.
     fn of(pictures: &Pictures, normalized: &Normalized) -> Option<Self> {
-        let (ink, woods) = pictures.cut(COMPARED);
+        let (ink, woods) = pictures.layers(COMPARED, &FEW_CUTS);
         let tried = settle_all(&Cuts::new(&ink, &woods), normalized)?;
         let best = *best_of(&tried, |pose| !pose.found.mirrored)?;
         let score_of = |other: Option<&Settled>| other.map_or(0.0, Settled::score);
@@ -130,11 +130,7 @@ impl Pictures {
         })
     }
 
-    /// The ink, and the strokes of every cut, at a share of the working size.
-    fn cut(&self, share: f64) -> (Layer, Vec<Layer>) {
-        self.layers(share, &CUTS)
-    }
-
+    /// The ink, and the strokes of cuts under the tops, at a share of the working size.
     fn layers(&self, share: f64, cuts: &[f64]) -> (Layer, Vec<Layer>) {
         let px = (self.px as f64 * share).round() as usize;
         let sigma = self.smoothing_px * share.sqrt();
