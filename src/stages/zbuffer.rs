@@ -10,6 +10,8 @@ pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
 
 /// Points of a set without faces are grown to this many times half their mean spacing, so that no holes stay.
 const POINT_GROWTH: f64 = 1.5;
+/// In triangles no wider than this each pixel is asked whether it is inside; wider ones are crossed row by row.
+const FEW_COLUMNS: usize = 6;
 /// Triangles that are asked together whether they hold a pixel's centre: most of a scan's are too small.
 const LANES: usize = 8;
 
@@ -250,8 +252,8 @@ impl View {
 
 /// Fills the pixels whose centre lies in the triangle, borders included, with the plane through its corners.
 ///
-/// Every crossing of an edge with a row is computed from the edge's lower to its upper end, so two triangles that
-/// share an edge agree on it to the last bit and no pixel between them stays empty.
+/// Edges are always looked at from their lower to their upper end, so two triangles that share one agree on it to the
+/// last bit and no pixel between them stays empty.
 fn fill(corners: [[f32; 3]; 3], [width, height]: [usize; 2], meet: &mut impl FnMut(usize, f32)) {
     let [a, b, c] = corners;
     let doubled_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
@@ -259,25 +261,33 @@ fn fill(corners: [[f32; 3]; 3], [width, height]: [usize; 2], meet: &mut impl FnM
         return;
     }
     let (u, v) = (b[2] - a[2], c[2] - a[2]);
-    let dz_dx = (u * (c[1] - a[1]) - v * (b[1] - a[1])) / doubled_area;
-    let dz_dy = (v * (b[0] - a[0]) - u * (c[0] - a[0])) / doubled_area;
-    let low = |k: usize| a[k].min(b[k]).min(c[k]);
-    let high = |k: usize| a[k].max(b[k]).max(c[k]);
+    let per_area = 1.0 / doubled_area;
+    let dz_dx = (u * (c[1] - a[1]) - v * (b[1] - a[1])) * per_area;
+    let dz_dy = (v * (b[0] - a[0]) - u * (c[0] - a[0])) * per_area;
+    let low = |k: usize| lower(lower(a[k], b[k]), c[k]);
+    let high = |k: usize| higher(higher(a[k], b[k]), c[k]);
     let (z_low, z_high) = (low(2), high(2));
+    let height_at = |x: f32, y: f32| {
+        let z = a[2] + (y - a[1]) * dz_dy + (x - a[0]) * dz_dx;
+        lower(higher(z, z_low), z_high)
+    };
     let edges = [Edge::new(a, b), Edge::new(b, c), Edge::new(c, a)];
+    let columns = pixels(low(0), high(0), width);
+    let left = doubled_area > 0.0;
     for row in pixels(low(1), high(1), height) {
         let y = row as f32;
-        let (mut x_low, mut x_high) = (f32::INFINITY, f32::NEG_INFINITY);
-        for edge in &edges {
-            if let Some(x) = edge.crossing(y) {
-                x_low = x_low.min(x);
-                x_high = x_high.max(x);
-            }
-        }
-        let at_row = a[2] + (y - a[1]) * dz_dy;
-        for column in pixels(x_low, x_high, width) {
-            let z = at_row + (column as f32 - a[0]) * dz_dx;
-            meet(row * width + column, z.clamp(z_low, z_high));
+        let mut set = |column: usize| {
+            meet(row * width + column, height_at(column as f32, y));
+        };
+        if columns.len() <= FEW_COLUMNS {
+            let inside = |column: &usize| edges.iter().all(|e| e.has([*column as f32, y], left));
+            columns.clone().filter(inside).for_each(&mut set);
+        } else {
+            let crossings = edges.iter().filter_map(|edge| edge.crossing(y));
+            let (first, last) = crossings.fold((f32::INFINITY, f32::NEG_INFINITY), |(p, q), x| {
+                (lower(p, x), higher(q, x))
+            });
+            pixels(first, last, width).for_each(&mut set);
         }
     }
 }
@@ -285,34 +295,40 @@ fn fill(corners: [[f32; 3]; 3], [width, height]: [usize; 2], meet: &mut impl FnM
 /// An edge from its lower to its upper end.
 struct Edge {
     low: [f32; 2],
-    high: [f32; 2],
-    slope: f32,
+    along: [f32; 2],
+    /// Whether the triangle's own order runs the other way.
+    turned: bool,
 }
 
 impl Edge {
+    #[inline]
     fn new(a: [f32; 3], b: [f32; 3]) -> Self {
-        let (low, high) = if (a[1], a[0]) <= (b[1], b[0]) {
-            (a, b)
-        } else {
-            (b, a)
-        };
+        let turned = (a[1], a[0]) > (b[1], b[0]);
+        let (low, high) = if turned { (b, a) } else { (a, b) };
         Self {
             low: [low[0], low[1]],
-            high: [high[0], high[1]],
-            slope: (high[0] - low[0]) / (high[1] - low[1]),
+            along: [high[0] - low[0], high[1] - low[1]],
+            turned,
+        }
+    }
+
+    /// Whether a point is on the triangle's side of the edge, or on it; `left` when its corners run that way round.
+    #[inline]
+    fn has(&self, [x, y]: [f32; 2], left: bool) -> bool {
+        let side = self.along[0] * (y - self.low[1]) - self.along[1] * (x - self.low[0]);
+        if left == self.turned {
+            side <= 0.0
+        } else {
+            side >= 0.0
         }
     }
 
     /// x at which the edge meets a row; level edges meet none.
     #[inline]
     fn crossing(&self, y: f32) -> Option<f32> {
-        if y < self.low[1] || y > self.high[1] || self.low[1] == self.high[1] {
-            None
-        } else if y == self.high[1] {
-            Some(self.high[0])
-        } else {
-            Some(self.low[0] + (y - self.low[1]) * self.slope)
-        }
+        let up = y - self.low[1];
+        let meets = up >= 0.0 && up <= self.along[1] && self.along[1] > 0.0;
+        meets.then(|| self.low[0] + up / self.along[1] * self.along[0])
     }
 }
 

@@ -130,6 +130,13 @@ struct Alignment {
     at_bound: bool,
 }
 
+impl Alignment {
+    /// Whether the same strokes are laid on the same place.
+    fn is_as(&self, other: &Self) -> bool {
+        self.level == other.level && self.print_from_depth == other.print_from_depth
+    }
+}
+
 /// Aligns the depth map with the print for each metric's threshold and scores the masks on the canvas.
 ///
 /// The canvas is the print character's: see [`super::normalize`]. Every metric is scored on the same print mask.
@@ -158,13 +165,24 @@ pub fn register(
     let print_means = WindowMeans::new(&canvas_print, params.window);
     let mut metrics = Vec::new();
     let mut canvases = Vec::new();
-    for alignment in &alignments {
-        let to_canvas = canvas_from_print.after(&alignment.print_from_depth);
-        let mask = warp_mask(&depth.strokes(alignment.level), &to_canvas, side, side);
+    for (k, alignment) in alignments.iter().enumerate() {
+        // Metrics often choose the same threshold.
+        let twin = alignments[..k]
+            .iter()
+            .position(|other| other.is_as(alignment));
+        let (mask, scores) = if let Some(twin) = twin {
+            let (canvas, outcome): (&CanvasMasks, &MetricOutcome) =
+                (&canvases[twin], &metrics[twin]);
+            (canvas.depth.clone(), outcome.scores)
+        } else {
+            let to_canvas = canvas_from_print.after(&alignment.print_from_depth);
+            let mask = warp_mask(&depth.strokes(alignment.level), &to_canvas, side, side);
+            let scores = score::measure(&print_means, &mask);
+            (mask, scores)
+        };
         if mask.count() == 0 {
             return Err(Error::NoStrokes(alignment.metric));
         }
-        let scores = score::measure(&print_means, &mask);
         metrics.push(outcome(depth, normalized, alignment, scores));
         canvases.push(CanvasMasks {
             metric: alignment.metric,

@@ -93,15 +93,25 @@ impl WindowMeans {
     fn fold(&self, mean_other: &Grid<f64>, mean_both: &Grid<f64>) -> Structure {
         let factor = self.covariance_factor;
         let (mut ssim, mut nl_ssim) = ([0.0; LANES], [0.0; LANES]);
-        let others = mean_other.data().iter().zip(mean_both.data());
-        for (k, (u, (v, both))) in self.means.data().iter().zip(others).enumerate() {
-            let variances = factor * (u - u * u + v - v * v);
-            let covariance = factor * (both - u * v);
-            let structure = (2.0 * covariance + C2) / (variances + C2);
-            let luminance = (2.0 * u * v + C1) / (u * u + v * v + C1);
-            ssim[k % LANES] += luminance * structure;
-            nl_ssim[k % LANES] += structure;
+        let mut add = |u: [f64; LANES], v: [f64; LANES], both: [f64; LANES], count: usize| {
+            for k in 0..count {
+                let (u, v) = (u[k], v[k]);
+                let variances = factor * (u - u * u + v - v * v);
+                let covariance = factor * (both[k] - u * v);
+                let structure = (2.0 * covariance + C2) / (variances + C2);
+                let luminance = (2.0 * u * v + C1) / (u * u + v * v + C1);
+                ssim[k] += luminance * structure;
+                nl_ssim[k] += structure;
+            }
+        };
+        let parts = [&self.means, mean_other, mean_both].map(|means| means.data().as_chunks());
+        let [(first, first_rest), (other, other_rest), (both, both_rest)] = parts;
+        for ((u, v), both) in first.iter().zip(other).zip(both) {
+            add(*u, *v, *both, LANES);
         }
+        let padded = |rest: &[f64]| std::array::from_fn(|k| rest.get(k).copied().unwrap_or(0.0));
+        let rest = [first_rest, other_rest, both_rest].map(padded);
+        add(rest[0], rest[1], rest[2], first_rest.len());
         let n = self.means.data().len().max(1) as f64;
         Structure {
             ssim: ssim.iter().sum::<f64>() / n,
