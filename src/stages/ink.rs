@@ -1,7 +1,7 @@
 //! The print's ink: where there is paper at all, which side of the grey threshold is ink, how much ink each pixel has.
 
 use super::components::{Components, without_specks};
-use super::otsu;
+use super::otsu::{self, Split};
 use super::paper;
 use super::pose::Soft;
 use crate::raster::{Grid, Mask, Picture};
@@ -122,13 +122,15 @@ pub(super) fn readings(picture: &Picture, speck_share: f64) -> Result<Vec<Ink>, 
     }
     let dark = grey.map(|g| f64::from(*g) < split.threshold);
     let even = evened(grey, &known);
-    let (likelier, clear) = polarity(&even, &dark, &known);
+    let levelled = otsu::split(&mut held(&even, &known));
+    let (likelier, clear) = polarity(&even, levelled, &dark, &known);
     let of = |light_on_dark| {
         if light_on_dark {
             let turned = evened(&grey.map(|g| 1.0 - *g), &known);
-            read(grey, &turned, &known, light_on_dark, speck_share)
+            let split = otsu::split(&mut held(&turned, &known));
+            read(grey, &turned, split, &known, light_on_dark, speck_share)
         } else {
-            read(grey, &even, &known, light_on_dark, speck_share)
+            read(grey, &even, levelled, &known, light_on_dark, speck_share)
         }
     };
     let first = of(likelier);
@@ -147,11 +149,12 @@ pub(super) fn readings(picture: &Picture, speck_share: f64) -> Result<Vec<Ink>, 
 fn read(
     grey: &Grid<f32>,
     even: &Grid<f32>,
+    split: Option<Split>,
     known: &Mask,
     light_on_dark: bool,
     speck_share: f64,
 ) -> Result<Ink, Error> {
-    let split = otsu::split(&mut held(even, known)).ok_or(Error::NoContrast { contrast: 0.0 })?;
+    let split = split.ok_or(Error::NoContrast { contrast: 0.0 })?;
     let raw = Mask::from_fn(grey.width(), grey.height(), |x, y| {
         known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
     });
@@ -229,9 +232,9 @@ fn evened(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
 
 /// Whether ink is likelier to be lighter than paper, and whether that is clear. Stains and frame lines mislead: where
 /// the picture as it is and what is dark beside its surroundings do not both say so, the other way stays possible.
-fn polarity(even: &Grid<f32>, dark: &Mask, known: &Mask) -> (bool, bool) {
+fn polarity(even: &Grid<f32>, levelled: Option<Split>, dark: &Mask, known: &Mask) -> (bool, bool) {
     let plain = paper_darkness(dark, known);
-    let levelled = otsu::split(&mut held(even, known)).map_or(plain, |split| {
+    let levelled = levelled.map_or(plain, |split| {
         paper_darkness(&even.map(|g| f64::from(*g) < split.threshold), known)
     });
     let sum = plain + levelled;
@@ -274,7 +277,7 @@ fn rim_share(dark: &Mask, known: &Mask) -> f64 {
 }
 
 /// 0 at paper, 1 at ink, by the classes' medians; nothing but where the cleaned mask, or its rim, has ink.
-fn amount(even: &Grid<f32>, ink: &Mask, split: otsu::Split) -> Grid<f32> {
+fn amount(even: &Grid<f32>, ink: &Mask, split: Split) -> Grid<f32> {
     let near = grown(ink);
     let span = (split.high - split.low).max(1e-6);
     Grid::from_fn(even.width(), even.height(), |x, y| {

@@ -186,6 +186,7 @@ pub(super) fn settings() -> Settings {
         register: register::Params {
             method: register::Method::Refine,
             working_px: 192,
+            stretch: false,
             least_confidence: 0.2,
             smoothing_px: 1.2,
             coarse_angles: 60,

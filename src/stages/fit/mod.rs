@@ -16,7 +16,7 @@ use crate::mesh::Mesh;
 use crate::raster::Picture;
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 3;
+pub const REVISION: u32 = 4;
 
 /// How the plane is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

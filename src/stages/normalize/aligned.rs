@@ -11,29 +11,30 @@ use crate::stages::pose::{Base, Found, Keep, Limits, Pass, Soft, find};
 /// The passes that follow the search.
 const PASSES: [Pass; 2] = [
     Pass {
-        px: 40,
+        px: 36,
         sigma: 0.8,
-        steps: 8,
-        keep: keep(6, 3),
+        steps: 7,
+        keep: keep(4, 2),
     },
     Pass {
-        px: 64,
+        px: 60,
         sigma: 1.0,
-        steps: 8,
+        steps: 6,
         keep: keep(3, 1),
     },
 ];
+
 const fn keep(upright: usize, mirrored: usize) -> Keep {
     Keep { upright, mirrored }
 }
 /// Working size of print and relief.
-const BASE_PX: usize = 80;
+const BASE_PX: usize = 72;
 /// The search looks at relief that fades out from the tops to half-way down: it need not know the right cut, nor
 /// that the plane is quite right.
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Poses that the search hands on.
-const KEEP: Keep = keep(10, 4);
+const KEEP: Keep = keep(9, 3);
 /// A relief that correlates less than this matches nothing.
 const LEAST_SCORE: f64 = 0.12;
 /// Mirrored must win by this factor before the pair is refused: symmetric characters score alike both ways.

@@ -22,7 +22,7 @@ use crate::domain::{Affine2, FailureClass, NormalizeOutcome, Pose, ThresholdMetr
 use crate::raster::{DepthMap, Mask, Picture};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 3;
+pub const REVISION: u32 = 4;
 
 /// When thresholds are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -4,7 +4,7 @@ use crate::stages::pose::{Found, Layer, Refiner};
 
 /// Cuts under the tops that are tried, as shares of the relief. The ink of a print spreads; strokes cut too thin or
 /// too thick for it would pull the scale.
-pub(super) const CUTS: [f64; 6] = [0.05, 0.1, 0.17, 0.26, 0.37, 0.5];
+pub(super) const CUTS: [f64; 5] = [0.05, 0.11, 0.2, 0.32, 0.47];
 
 /// Cuts that are tried while poses are compared.
 pub(super) const FEW_CUTS: [f64; 3] = [0.08, 0.2, 0.4];

@@ -6,6 +6,7 @@
 mod confidence;
 mod cuts;
 mod refined;
+mod stretch;
 mod turns;
 
 use serde::{Deserialize, Serialize};
@@ -18,7 +19,7 @@ use crate::domain::{
 use crate::raster::{DepthMap, Mask, warp_mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 3;
+pub const REVISION: u32 = 4;
 
 /// Mirrored must win by this factor to be named the cause: symmetric characters score alike both ways.
 const MIRROR_WINS: f64 = 1.12;
@@ -43,6 +44,8 @@ pub struct Params {
     pub working_px: u32,
     /// `refine`: smoothing in working pixels, 0..=10.
     pub smoothing_px: f64,
+    /// `refine`: whether the pose may stretch the relief along one axis, as paper shrinks across its grain.
+    pub stretch: bool,
     /// `refine`: a pair with less confidence than this is refused, 0..=1.
     pub least_confidence: f64,
     /// `turns`: how many angles of a full turn are tried first, 4 or more.

@@ -2,6 +2,7 @@
 //! every metric.
 
 use super::cuts::{CUTS, Cuts, FEW_CUTS};
+use super::stretch::stretched;
 use super::{Alignment, Error, Params};
 use crate::domain::{Affine2, Evidence, Pose};
 use crate::raster::DepthMap;
@@ -17,6 +18,8 @@ const SOFTNESS: f64 = 0.1;
 /// Shares of the working size at which poses are compared, and at which the best one finds its cut.
 const COMPARED: f64 = 0.42;
 const CLOSER: f64 = 0.67;
+/// Rivals that reach this share of the best one's score are looked at as closely as it.
+const CLOSE: f64 = 0.75;
 /// Most steps of a refinement, and of the last one.
 const FEW_STEPS: usize = 8;
 const MOST_STEPS: usize = 15;
@@ -28,10 +31,11 @@ pub(super) fn align(
     params: &Params,
 ) -> Result<(Vec<Alignment>, Evidence), Error> {
     let pictures = Pictures::new(depth, normalized, params).ok_or(Error::NoPose)?;
-    let rivals = Rivals::of(&pictures, normalized).ok_or(Error::NoPose)?;
+    let mut rivals = Rivals::of(&pictures, normalized).ok_or(Error::NoPose)?;
     let (ink, woods) = pictures.layers(CLOSER, &CUTS);
     let cuts = Cuts::new(&ink, &woods);
-    let best = settled(&cuts, &rivals.best.found).ok_or(Error::NoPose)?;
+    rivals.look_closer(&cuts).ok_or(Error::NoPose)?;
+    let best = &rivals.best;
     let print_from_depth = pictures.look(&best.found, cuts.best_cut(&best.found));
     let choices = normalized.outcome.thresholds.iter();
     let alignments = choices.map(|choice| Alignment {
@@ -41,7 +45,7 @@ pub(super) fn align(
         margin: rivals.margin(),
         at_bound: normalized.outcome.search_at_bound || choice.at_bound,
     });
-    Ok((alignments.collect(), rivals.evidence(&best)))
+    Ok((alignments.collect(), rivals.evidence()))
 }
 
 /// A pose with the cut that fits the print's strokes there.
@@ -59,13 +63,15 @@ impl Settled {
     }
 }
 
-/// The best pose beside the best of those that cannot be right if it is.
+/// The best pose beside those that cannot be right if it is.
 #[derive(Debug, Clone, Copy)]
 struct Rivals {
     best: Settled,
-    /// Score of the best pose at another angle, and of the best in mirror writing.
-    other_angle: f64,
-    mirrored: f64,
+    /// The best pose at another angle, and the best in mirror writing.
+    other_angle: Option<Settled>,
+    mirrored: Option<Settled>,
+    /// Shares of the best one's score that they reach.
+    shares: [f64; 2],
 }
 
 impl Rivals {
@@ -74,32 +80,63 @@ impl Rivals {
         let (ink, woods) = pictures.layers(COMPARED, &FEW_CUTS);
         let tried = settle_all(&Cuts::new(&ink, &woods), normalized)?;
         let best = *best_of(&tried, |pose| !pose.found.mirrored)?;
-        let score_of = |other: Option<&Settled>| other.map_or(0.0, Settled::score);
+        let elsewhere = |pose: &Settled| {
+            !pose.found.mirrored && pose.found.turn_from(&best.found) > SAME_POSE_DEG
+        };
+        let other_angle = best_of(&tried, elsewhere).copied();
+        let mirrored = best_of(&tried, |pose| pose.found.mirrored).copied();
         Some(Self {
             best,
-            other_angle: score_of(best_of(&tried, |pose| {
-                !pose.found.mirrored && pose.found.turn_from(&best.found) > SAME_POSE_DEG
-            })),
-            mirrored: score_of(best_of(&tried, |pose| pose.found.mirrored)),
+            other_angle,
+            mirrored,
+            shares: [other_angle, mirrored].map(|rival| share(rival, &best)),
         })
+    }
+
+    /// Looks at the best pose more closely, and at rivals that come near it, which may then win.
+    fn look_closer(&mut self, cuts: &Cuts) -> Option<()> {
+        let is_close = self.shares.iter().any(|share| *share > CLOSE);
+        self.best = settled(cuts, &self.best.found)?;
+        if !is_close {
+            return Some(());
+        }
+        for rival in [&mut self.other_angle, &mut self.mirrored]
+            .into_iter()
+            .flatten()
+        {
+            *rival = settled(cuts, &rival.found)?;
+        }
+        if let Some(other) = &mut self.other_angle
+            && other.score() > self.best.score()
+        {
+            std::mem::swap(&mut self.best, other);
+        }
+        self.shares = [self.other_angle, self.mirrored].map(|rival| share(rival, &self.best));
+        Some(())
     }
 
     /// By how much the best pose wins.
     fn margin(&self) -> f64 {
-        self.best.score() - self.other_angle.max(self.mirrored)
+        let [other_angle, mirrored] = self.shares;
+        self.best.score() * (1.0 - other_angle.max(mirrored))
     }
 
-    /// What speaks for and against the best pose, given what was seen of it from closer by.
-    fn evidence(&self, closer: &Settled) -> Evidence {
-        let own = self.best.score().max(1e-6);
+    /// What speaks for and against the best pose.
+    fn evidence(&self) -> Evidence {
+        let [other_angle, mirrored] = self.shares;
         Evidence {
-            correlation: closer.found.score,
-            tops_met: closer.overlap.moving_met,
-            ink_met: closer.overlap.fixed_met,
-            other_angle: self.other_angle / own,
-            mirrored: self.mirrored / own,
+            correlation: self.best.found.score,
+            tops_met: self.best.overlap.moving_met,
+            ink_met: self.best.overlap.fixed_met,
+            other_angle,
+            mirrored,
         }
     }
+}
+
+/// Share of the best pose's score that a rival reaches.
+fn share(rival: Option<Settled>, best: &Settled) -> f64 {
+    rival.map_or(0.0, |rival| rival.score() / best.score().max(1e-6))
 }
 
 fn best_of(tried: &[Settled], of_kind: impl Fn(&Settled) -> bool) -> Option<&Settled> {
@@ -113,6 +150,9 @@ struct Pictures {
     depths: Base,
     px: usize,
     smoothing_px: f64,
+    may_stretch: bool,
+    /// Middle of the depth map, pixels.
+    middle: [f64; 2],
 }
 
 impl Pictures {
@@ -127,6 +167,8 @@ impl Pictures {
             depths: Base::new(&Relief::of(depth)?.depths(depth), px)?,
             px,
             smoothing_px: params.smoothing_px,
+            may_stretch: params.stretch,
+            middle: [depth.levels.width(), depth.levels.height()].map(|side| side as f64 / 2.0),
         })
     }
 
@@ -145,10 +187,17 @@ impl Pictures {
     /// The pose looked at once more at working size, with the strokes of a cut.
     fn look(&self, best: &Found, cut: f64) -> Affine2 {
         let (ink, woods) = self.layers(1.0, &[cut]);
-        let refined = woods
-            .first()
-            .map(|wood| Refiner::new(&ink, wood).refine(best, MOST_STEPS, Loss::Tukey));
-        refined.unwrap_or(*best).fixed_from_moving
+        let Some(wood) = woods.first() else {
+            return best.fixed_from_moving;
+        };
+        let refiner = Refiner::new(&ink, wood);
+        let refined = refiner.refine(best, MOST_STEPS, Loss::Tukey);
+        let last = if self.may_stretch {
+            stretched(&refiner, &refined, self.middle)
+        } else {
+            refined
+        };
+        last.fixed_from_moving
     }
 }
 
