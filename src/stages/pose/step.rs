@@ -6,8 +6,6 @@ use nalgebra::{Matrix6, Vector6};
 const ROBUST: f32 = 2.5;
 /// Residuals beyond this share of full ink belong to what is lost or was added: they do not count at all.
 const FAR: f32 = 0.5;
-/// Every so many looks tell the median of the residuals.
-const SAMPLED: usize = 3;
 /// Pixels whose sums are kept apart, so that they are added side by side.
 const LANES: usize = 8;
 /// Products of a row of the normal equations with itself, lower triangle, then with the residual.
@@ -90,12 +88,10 @@ impl Room {
         (gain as f32, (f - gain * m) as f32)
     }
 
-    /// Median size of some of the residuals at a gain and offset.
+    /// Median size of the residuals at a gain and offset.
     fn median_residual(&mut self, gain: f32, offset: f32) -> f32 {
         self.sizes.clear();
-        // Without the last looks, which may be filled only in part, unless there are no others.
-        let whole = (self.count / LANES).max(1).min(self.looks.len());
-        for looks in self.looks[..whole].iter().step_by(SAMPLED) {
+        for looks in &self.looks {
             let residual = |k: usize| looks.fixed[k] - gain * looks.met[k][0] - offset;
             let sizes: [f32; LANES] = std::array::from_fn(|k| residual(k).abs());
             self.sizes.extend(sizes);
