@@ -25,6 +25,7 @@
 //! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `mesh`, `raster` |
 //! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain` |
 //! | `runner` | workers, policy, execution of one pair, events | `domain`, `mesh`, `raster`, `stages`, `store`, `catalog` |
+//! | `check` | a project held against itself, and mended | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets | `domain`, `raster`, `store`, `catalog`, `report` |
 //! | `demo` | the built-in dataset: carved reliefs and prints with known truth, from one seed | `domain`, `mesh`, `raster` |
@@ -32,6 +33,7 @@
 //! | `cli` | one thin file a command; exit codes, progress, log | all |
 
 pub mod catalog;
+pub mod check;
 pub mod cli;
 pub mod config;
 pub mod demo;

@@ -26,6 +26,7 @@ use tokio::sync::mpsc;
 
 pub use events::{RunEvent, RunSummary};
 pub use options::{Rerun, RunOptions};
+pub use outputs::result_hash;
 pub use stop::{Stop, StopLevel};
 
 use crate::catalog::{

@@ -9,6 +9,9 @@ use std::path::{Path, PathBuf};
 
 use super::Project;
 
+/// Name of the file that all who work hold in common.
+const MEMBERS: &str = "run.members";
+
 /// The right to work on a project; ends when it is dropped or the process dies.
 #[derive(Debug)]
 pub struct RunLock {
@@ -56,7 +59,7 @@ impl RunLock {
             }
             Err(TryLockError::Error(source)) => return Err(LockError::Io { path, source }),
         };
-        let path = project.dir().join("run.members");
+        let path = project.dir().join(MEMBERS);
         let members = open(&path)?;
         let alone = owner.is_some() && members.try_lock().is_ok();
         if !alone {
@@ -67,6 +70,16 @@ impl RunLock {
             members,
             alone,
         })
+    }
+
+    /// Whether a process works on the project now. Looks without keeping anybody out: a run that begins in this very
+    /// moment goes on, it only takes some seconds longer to find out that it is alone.
+    pub fn is_held(project: &Project) -> bool {
+        // A lock needs no right to write.
+        match File::open(project.dir().join(MEMBERS)) {
+            Ok(members) => matches!(members.try_lock(), Err(TryLockError::WouldBlock)),
+            Err(_) => false,
+        }
     }
 
     /// Whether no other process works on the project, until [`RunLock::admit`].
@@ -85,7 +98,7 @@ impl RunLock {
     /// When the file cannot be locked in common.
     pub fn admit(&mut self) -> Result<(), LockError> {
         if self.alone {
-            let path = Path::new("run.members");
+            let path = Path::new(MEMBERS);
             self.members.unlock().map_err(io(path))?;
             self.members.lock_shared().map_err(io(path))?;
             self.alone = false;
@@ -133,12 +146,16 @@ mod tests {
         let project = Project::create(dir.path()).expect("a project");
         let mut owner = RunLock::acquire(&project, false).expect("the lock");
         assert!(owner.is_owner() && owner.is_alone());
+        assert!(RunLock::is_held(&project));
         let refused = RunLock::acquire(&project, false).expect_err("in use");
         let me = std::process::id();
         assert!(matches!(refused, LockError::InUse { pid: Some(pid) } if pid == me));
         owner.admit().expect("the lock in common");
         let joined = RunLock::acquire(&project, true).expect("joined");
         assert!(!joined.is_owner() && !joined.is_alone());
+        assert!(RunLock::is_held(&project));
+        drop((owner, joined));
+        assert!(!RunLock::is_held(&project));
     }
 
     #[test]

@@ -47,12 +47,20 @@ impl Project {
     /// # Errors
     /// When the directory holds no catalog.
     pub fn open(dir: &Path) -> Result<Self, StoreError> {
-        if !dir.join(CATALOG_FILE).is_file() {
+        // What else may lie there in its place is told when the catalog is opened.
+        if !dir.join(CATALOG_FILE).exists() {
             return Err(StoreError::NoProject(dir.to_owned()));
         }
         Ok(Self {
             dir: dir.to_owned(),
         })
+    }
+
+    /// A project that may not be there yet: nothing is looked at or made.
+    pub fn at(dir: &Path) -> Self {
+        Self {
+            dir: dir.to_owned(),
+        }
     }
 
     /// Makes the directory where it is missing. The catalog is made by `Catalog::create`.
