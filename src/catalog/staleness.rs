@@ -195,6 +195,15 @@ impl Catalog {
         plan(&mut conn, recipes, among.as_ref(), again).await
     }
 
+    /// Pairs with results that were made with other settings or inputs than those of now.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn stale(&self, recipes: &Recipes) -> Result<u64> {
+        let mut conn = self.reader().await?;
+        count(&mut conn, recipes).await
+    }
+
     /// Why a pair would run, and from which stage; `None` when nothing is left to do.
     ///
     /// # Errors

@@ -1,6 +1,5 @@
 //! `backup`: the catalog, the verdicts and the settings, copied whole while a run may be writing.
 
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -11,7 +10,8 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::table::count;
 use super::talk;
-use crate::catalog::{Catalog, VerdictEvent};
+use crate::catalog::Catalog;
+use crate::export::verdict_lines;
 use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of, write_whole};
 
 /// Arguments of `backup`.
@@ -79,7 +79,7 @@ async fn beside(partial: &Partial, file: &Path, project: &Project) -> anyhow::Re
     let pairs = copy.counters().await?.values().sum();
     copy.close().await;
     let path = verdicts_file(file);
-    write_whole(&path, as_lines(&log)?.as_bytes())
+    write_whole(&path, verdict_lines(&log).as_bytes())
         .with_context(|| format!("cannot write {}", path.display()))?;
     settings(file, project)?;
     Ok((log.len() as u64, pairs))
@@ -103,15 +103,6 @@ fn settings(file: &Path, project: &Project) -> anyhow::Result<()> {
 
 fn verdicts_file(file: &Path) -> PathBuf {
     file.with_extension("verdicts.jsonl")
-}
-
-/// The log of verdicts, a line each, as `verdict log --json` prints it.
-pub(super) fn as_lines(log: &[VerdictEvent]) -> anyhow::Result<String> {
-    let mut text = String::new();
-    for event in log {
-        writeln!(text, "{}", serde_json::to_string(event)?)?;
-    }
-    Ok(text)
 }
 
 /// Refuses a place where something lies that is not an earlier backup.
