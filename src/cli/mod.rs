@@ -200,6 +200,12 @@ fn code_of(error: &anyhow::Error) -> ExitCode {
         ) {
             return ExitCode::NoProject;
         }
+        if matches!(
+            cause.downcast_ref::<StoreError>(),
+            Some(StoreError::NotUtf8(_))
+        ) {
+            return ExitCode::Usage;
+        }
     }
     ExitCode::Error
 }

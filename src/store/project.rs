@@ -22,7 +22,7 @@ pub enum StoreError {
     #[error("no project at {0}: it has no {CATALOG_FILE}")]
     NoProject(PathBuf),
     /// A path that the catalog cannot hold.
-    #[error("path {0:?} is not UTF-8")]
+    #[error("path {0:?} is not UTF-8, so the catalog cannot hold it; rename the file or folder")]
     NotUtf8(PathBuf),
     /// A file operation failed.
     #[error("{path}: {source}")]
