@@ -94,7 +94,15 @@ fn unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<ExitCod
     let Some(found) = of_catalog.filter(|error| trouble::is_damage(error)) else {
         return Err(error);
     };
-    let said = trouble::sentence(found, &context.dir()).unwrap_or_else(|| found.to_string());
+    let dir = context.dir();
+    let said = match trouble::sentence(found, &dir) {
+        Some(said) if !trouble::is_damaged_file(found) => said,
+        None if !trouble::is_damaged_file(found) => found.to_string(),
+        Some(_) | None => format!(
+            "{} is damaged so far that it cannot be read; put a backup in its place, then `check --repair`",
+            trouble::file(&dir)
+        ),
+    };
     context.talk.error(&said, ExitCode::Damaged);
     Ok(ExitCode::Damaged)
 }

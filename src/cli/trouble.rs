@@ -34,26 +34,36 @@ pub(super) fn of_catalog<'a>(cause: &'a (dyn Error + 'static)) -> Option<&'a Cat
 pub(super) fn is_damage(error: &CatalogError) -> bool {
     let told = matches!(
         error,
-        CatalogError::Damaged(_)
-            | CatalogError::Empty(_)
+        CatalogError::Empty(_)
             | CatalogError::Foreign { .. }
             | CatalogError::Corrupt(_)
             | CatalogError::Json(_)
     );
-    told || matches!(
-        error.trouble(),
-        Some(Trouble::Damaged | Trouble::NotADatabase)
-    )
+    told || is_damaged_file(error)
+}
+
+/// Whether the pages of the catalog's file contradict each other.
+pub(super) fn is_damaged_file(error: &CatalogError) -> bool {
+    matches!(error, CatalogError::Damaged(_))
+        || matches!(
+            error.trouble(),
+            Some(Trouble::Damaged | Trouble::NotADatabase)
+        )
+}
+
+/// The catalog's file as it is shown.
+pub(super) fn file(dir: &Path) -> String {
+    let file = dir.join(CATALOG_FILE);
+    if file.exists() {
+        file.display().to_string()
+    } else {
+        "the catalog".to_owned()
+    }
 }
 
 /// A sentence with the file and what to do; `None` where the error says so itself.
 pub(super) fn sentence(error: &CatalogError, dir: &Path) -> Option<String> {
-    let file = dir.join(CATALOG_FILE);
-    let shown = if file.exists() {
-        file.display().to_string()
-    } else {
-        "the catalog".to_owned()
-    };
+    let shown = file(dir);
     Some(match error.trouble() {
         Some(Trouble::Damaged | Trouble::NotADatabase) => {
             CatalogError::Damaged(shown.into()).to_string()

@@ -1,11 +1,14 @@
 //! Integration tests in one binary.
 
+mod backup;
+mod check;
 mod cli;
 mod decoys;
 mod demo;
 mod hostile;
 mod invariance;
 mod layers;
+mod odd;
 mod one_pair;
 mod queue;
 mod report;

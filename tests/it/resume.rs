@@ -19,7 +19,7 @@ pub(crate) fn project(dir: &Path, name: &str, pairs: &str) -> Project {
 }
 
 /// The same project again in a folder beside it.
-fn copy(project: &Project, name: &str) -> Project {
+pub(crate) fn copy(project: &Project, name: &str) -> Project {
     let to = project.dir().with_file_name(name);
     let mut open = vec![(project.dir().to_owned(), to.clone())];
     while let Some((from, to)) = open.pop() {
@@ -106,7 +106,7 @@ fn finished(project: &Project) -> Vec<usize> {
 }
 
 /// Stages that are done, all pairs together, by a reader beside the run.
-fn stages_done(project: &Project) -> u64 {
+pub(crate) fn stages_done(project: &Project) -> u64 {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
         let path = project.catalog_path();
