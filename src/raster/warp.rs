@@ -9,6 +9,8 @@ use crate::domain::Affine2;
 
 /// Most looks along one side of an output pixel; beyond this a shrinking map begins to alias.
 const MAX_LOOKS: usize = 8;
+/// A look mixes the pixels around it, so looks this far apart in the source miss nothing between them.
+const APART_PX: f64 = 1.5;
 /// So many output pixels of a row are first asked for together whether what they see is all alike.
 const RUN: usize = 8;
 
@@ -83,7 +85,7 @@ struct Looks {
 
 impl Looks {
     fn new(from_to: &Affine2) -> Self {
-        let per_side = (from_to.scale().ceil() as usize).clamp(1, MAX_LOOKS);
+        let per_side = ((from_to.scale() / APART_PX).ceil() as usize).clamp(1, MAX_LOOKS);
         let outermost = 0.5 - 0.5 / per_side as f64;
         Self {
             from_to: *from_to,

@@ -10,6 +10,8 @@ const CELLS: f64 = 96.0;
 const NARROW: f64 = 0.12;
 /// A cell that is known to less than this share says nothing.
 const LEAST_KNOWN: f32 = 0.3;
+/// A cell that says nothing: `f32::max` and `f32::min` pass over it.
+const EMPTY: f32 = f32::NAN;
 
 /// Brightness of the paper under and around each pixel, 0..=1: the grey closed by a square that strokes fit into.
 pub(super) fn level(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
@@ -35,34 +37,61 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
     let weights = resample(&weight, scale, shift, sides);
     let cells = Grid::from_fn(sides[0], sides[1], |x, y| {
         let weight = weights.at(x, y);
-        (weight > LEAST_KNOWN).then(|| sums.at(x, y) / weight)
+        if weight > LEAST_KNOWN {
+            sums.at(x, y) / weight
+        } else {
+            EMPTY
+        }
     });
     let reach = ((NARROW * longest * scale).round() as usize).max(1);
     let closed = extreme(&extreme(&cells, reach, f32::max), reach, f32::min);
-    let seen: Vec<f32> = closed.data().iter().flatten().copied().collect();
+    let seen: Vec<f32> = closed
+        .data()
+        .iter()
+        .copied()
+        .filter(|v| !v.is_nan())
+        .collect();
     let mean = seen.iter().sum::<f32>() / seen.len().max(1) as f32;
-    let filled = closed.map(|value| value.unwrap_or(mean) - mean);
+    let filled = closed.map(|value| if value.is_nan() { 0.0 } else { value - mean });
     let smooth = blur(&filled, reach as f64 / 3.0);
     let back = shift.map(|shift| -shift / scale);
     resample(&smooth, 1.0 / scale, back, [width, height]).map(|value| value + mean)
 }
 
-/// The extreme value of the square around each cell; empty where the square holds none.
-fn extreme(
-    cells: &Grid<Option<f32>>,
-    reach: usize,
-    pick: impl Fn(f32, f32) -> f32,
-) -> Grid<Option<f32>> {
-    let best = |values: &mut dyn Iterator<Item = Option<f32>>| values.flatten().reduce(&pick);
-    let (width, height) = (cells.width(), cells.height());
-    let rows = Grid::from_fn(width, height, |x, y| {
-        let near = x.saturating_sub(reach)..(x + reach + 1).min(width);
-        best(&mut near.map(|x| cells.at(x, y)))
-    });
-    Grid::from_fn(width, height, |x, y| {
-        let near = y.saturating_sub(reach)..(y + reach + 1).min(height);
-        best(&mut near.map(|y| rows.at(x, y)))
-    })
+/// The extreme value of the square around each cell; `pick` passes over cells that hold nothing.
+fn extreme(cells: &Grid<f32>, reach: usize, pick: impl Fn(f32, f32) -> f32) -> Grid<f32> {
+    let along_rows = |cells: &Grid<f32>| {
+        let (width, height) = (cells.width(), cells.height());
+        // Turned over on the way: twice gives both axes.
+        let mut turned = Grid::new(height, width, EMPTY);
+        for y in 0..height {
+            let spans = doubled(cells.row(y), reach, &pick);
+            for (x, value) in spans.into_iter().enumerate() {
+                turned.set(y, x, value);
+            }
+        }
+        turned
+    };
+    along_rows(&along_rows(cells))
+}
+
+/// The extreme of the window of `reach` cells each way around each cell, from windows that double in width.
+fn doubled(row: &[f32], reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Vec<f32> {
+    let (len, window) = (row.len(), 2 * reach + 1);
+    // The window of a cell begins at it, until the end: there it is put around it.
+    let mut spans = vec![EMPTY; reach];
+    spans.extend_from_slice(row);
+    spans.resize(len + 2 * reach, EMPTY);
+    let mut width = 1;
+    while width < window {
+        let step = width.min(window - width);
+        for k in 0..spans.len() - step {
+            spans[k] = pick(spans[k], spans[k + step]);
+        }
+        width += step;
+    }
+    spans.truncate(len);
+    spans
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use crate::stages::ink::Ink;
 use crate::stages::pose::{Base, Found, Keep, Limits, Pass, Soft, find};
 
 /// The passes that follow the search.
-const PASSES: [Pass; 3] = [
+const PASSES: [Pass; 2] = [
     Pass {
         px: 40,
         sigma: 0.8,
@@ -22,18 +22,12 @@ const PASSES: [Pass; 3] = [
         steps: 8,
         keep: keep(3, 1),
     },
-    Pass {
-        px: 112,
-        sigma: 1.2,
-        steps: 10,
-        keep: keep(3, 1),
-    },
 ];
 const fn keep(upright: usize, mirrored: usize) -> Keep {
     Keep { upright, mirrored }
 }
 /// Working size of print and relief.
-const BASE_PX: usize = 128;
+const BASE_PX: usize = 80;
 /// The search looks at relief that fades out from the tops to half-way down: it need not know the right cut, nor
 /// that the plane is quite right.
 const SEARCH_CUT: f64 = 0.25;

@@ -19,7 +19,7 @@ const CLOSE_AREA: f64 = 1.2;
 const MOST_SPREAD: f64 = 2.2;
 const LEAST_INKED: f64 = 1.15;
 
-/// Both pictures on the canvas.
+/// Both pictures on the canvas, at half its size: the structure of strokes shows as well, in a quarter of the time.
 pub(super) struct Canvas {
     /// Levels of the depth map; 0 where one of the two holds nothing.
     levels: Grid<u16>,
@@ -36,15 +36,12 @@ impl Canvas {
         print_from_depth: &Affine2,
         params: &Params,
     ) -> Self {
-        let side = params.canvas_px as usize;
-        let mut levels = warp_depth(
-            depth,
-            &canvas_from_print.after(print_from_depth),
-            side,
-            side,
-        );
-        let paper = warp_mask(&print.soft.known, canvas_from_print, side, side);
-        let mut ink = warp_mask(&print.mask, canvas_from_print, side, side);
+        let side = params.canvas_px as usize / 2;
+        let half_from_print = Affine2::scale_shift(0.5, [-0.25, -0.25]).after(canvas_from_print);
+        let half_from_depth = half_from_print.after(print_from_depth);
+        let mut levels = warp_depth(depth, &half_from_depth, side, side);
+        let paper = warp_mask(&print.soft.known, &half_from_print, side, side);
+        let mut ink = warp_mask(&print.mask, &half_from_print, side, side);
         let both = levels.data_mut().iter_mut().zip(ink.data_mut());
         for ((level, ink), paper) in both.zip(paper.data()) {
             *level *= u16::from(*paper);

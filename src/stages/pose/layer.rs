@@ -82,18 +82,77 @@ impl Base {
 
     /// The layer of `size` pixels along the longest side of what is known, smoothed by `sigma` pixels.
     pub(in crate::stages) fn layer(&self, size: usize, sigma: f64) -> Layer {
-        let scale = size as f64 / self.size;
-        let (width, height) = (self.known.width(), self.known.height());
-        let middle = [(width - 1) as f64 / 2.0, (height - 1) as f64 / 2.0];
-        let (sides, shift) = framed([width, height], middle, scale);
-        let brought = |values| blur(&resample(values, scale, shift, sides), sigma);
-        let work_from_image = Affine2::scale_shift(scale, shift).after(&self.from_image);
-        Layer::without_slow(
-            &brought(&self.present),
-            &brought(&self.known),
-            size,
-            work_from_image,
-        )
+        self.at(size, sigma).layer(&self.present)
+    }
+
+    /// Ready to make layers of one size and smoothing.
+    pub(in crate::stages) fn at(&self, size: usize, sigma: f64) -> Sizer<'_> {
+        Sizer::new(self, size, sigma)
+    }
+}
+
+/// What all layers of one size and smoothing of a picture share.
+pub(in crate::stages) struct Sizer<'a> {
+    base: &'a Base,
+    sigma: f64,
+    slow_sigma: f64,
+    scale: f64,
+    shift: [f64; 2],
+    sides: [usize; 2],
+    /// How much of each working pixel is known, and the slow variation of that.
+    weight: Grid<f32>,
+    slow_weight: Grid<f32>,
+}
+
+impl<'a> Sizer<'a> {
+    fn new(base: &'a Base, size: usize, sigma: f64) -> Self {
+        let scale = size as f64 / base.size;
+        let sides = [base.known.width(), base.known.height()];
+        let middle = sides.map(|side| (side - 1) as f64 / 2.0);
+        let (sides, shift) = framed(sides, middle, scale);
+        let weight = blur(&resample(&base.known, scale, shift, sides), sigma);
+        let slow_sigma = SLOW * size as f64;
+        Self {
+            slow_weight: blur(&weight, slow_sigma),
+            base,
+            sigma,
+            slow_sigma,
+            scale,
+            shift,
+            sides,
+            weight,
+        }
+    }
+
+    /// The layer of the picture with each known pixel's amount replaced.
+    pub(in crate::stages) fn mapped(&self, amount: impl Fn(f32) -> f32) -> Layer {
+        self.layer(&self.base.map(amount).present)
+    }
+
+    fn layer(&self, present: &Grid<f32>) -> Layer {
+        let sum = blur(
+            &resample(present, self.scale, self.shift, self.sides),
+            self.sigma,
+        );
+        let slow = blur(&sum, self.slow_sigma);
+        let [width, height] = self.sides;
+        let held = self
+            .weight
+            .map(|w| if *w >= LEAST_KNOWN { 1.0 } else { 0.0 });
+        let amount = Grid::from_fn(width, height, |x, y| {
+            held.at(x, y) * sum.at(x, y) / self.weight.at(x, y).max(1e-6)
+        });
+        let value = Grid::from_fn(width, height, |x, y| {
+            let mean = slow.at(x, y) / self.slow_weight.at(x, y).max(1e-6);
+            amount.at(x, y) - held.at(x, y) * mean
+        });
+        Layer {
+            value,
+            amount,
+            weight: held,
+            work_from_image: Affine2::scale_shift(self.scale, self.shift)
+                .after(&self.base.from_image),
+        }
     }
 }
 
@@ -105,31 +164,6 @@ fn framed(sides: [usize; 2], middle: [f64; 2], scale: f64) -> ([usize; 2], [f64;
 }
 
 impl Layer {
-    fn without_slow(
-        amount: &Grid<f32>,
-        weight: &Grid<f32>,
-        size: usize,
-        work_from_image: Affine2,
-    ) -> Self {
-        let slow_sigma = SLOW * size as f64;
-        let (slow, slow_weight) = (blur(amount, slow_sigma), blur(weight, slow_sigma));
-        let held = weight.map(|w| if *w >= LEAST_KNOWN { 1.0 } else { 0.0 });
-        let (width, height) = (amount.width(), amount.height());
-        let amount = Grid::from_fn(width, height, |x, y| {
-            held.at(x, y) * amount.at(x, y) / weight.at(x, y).max(1e-6)
-        });
-        let value = Grid::from_fn(width, height, |x, y| {
-            let mean = slow.at(x, y) / slow_weight.at(x, y).max(1e-6);
-            amount.at(x, y) - held.at(x, y) * mean
-        });
-        Self {
-            value,
-            amount,
-            weight: held,
-            work_from_image,
-        }
-    }
-
     /// Middle of the layer in its own pixels.
     pub(super) fn centre(&self) -> [f64; 2] {
         [

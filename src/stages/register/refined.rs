@@ -1,4 +1,5 @@
-//! Our registration: the poses that normalisation found, refined at full size; the best one serves every metric.
+//! Our registration: the poses that normalisation found, refined and compared; the best one, looked at closely, serves
+//! every metric.
 
 use super::cuts::{CUTS, Cuts};
 use super::{Alignment, Error, Params};
@@ -13,9 +14,10 @@ const SAME_POSE_DEG: f64 = 15.0;
 const TRIED: usize = 3;
 /// Softness of a cut, a share of the relief.
 const SOFTNESS: f64 = 0.1;
-/// The best pose is looked at once more at this many times the working size.
-const CLOSER: f64 = 1.5;
-/// Most steps of a candidate's refinements, and of the last one.
+/// Shares of the working size at which poses are compared, and at which the best one finds its cut.
+const COMPARED: f64 = 0.42;
+const CLOSER: f64 = 0.67;
+/// Most steps of a refinement, and of the last one.
 const FEW_STEPS: usize = 8;
 const MOST_STEPS: usize = 15;
 
@@ -26,30 +28,23 @@ pub(super) fn align(
     params: &Params,
 ) -> Result<(Vec<Alignment>, Evidence), Error> {
     let pictures = Pictures::new(depth, normalized, params).ok_or(Error::NoPose)?;
-    let ink = pictures.ink(1.0);
-    let woods = CUTS.map(|cut| pictures.wood(cut, 1.0));
+    let rivals = Rivals::of(&pictures, normalized).ok_or(Error::NoPose)?;
+    let (ink, woods) = pictures.cut(CLOSER);
     let cuts = Cuts::new(&ink, &woods);
-    let tried = settle_all(&cuts, normalized).ok_or(Error::NoPose)?;
-    let best = *best_of(&tried, |pose| !pose.found.mirrored).ok_or(Error::NoPose)?;
-    let score_of = |other: Option<&Settled>| other.map_or(0.0, Settled::score);
-    let other_angle = score_of(best_of(&tried, |pose| {
-        !pose.found.mirrored && pose.found.turn_from(&best.found) > SAME_POSE_DEG
-    }));
-    let mirrored = score_of(best_of(&tried, |pose| pose.found.mirrored));
-    let evidence = best.evidence(other_angle, mirrored);
-    let print_from_depth = pictures.closer(&best.found, cuts.best_cut(&best.found));
+    let best = settled(&cuts, &rivals.best.found).ok_or(Error::NoPose)?;
+    let print_from_depth = pictures.look(&best.found, cuts.best_cut(&best.found));
     let choices = normalized.outcome.thresholds.iter();
     let alignments = choices.map(|choice| Alignment {
         metric: choice.metric,
         level: choice.level,
         print_from_depth,
-        margin: best.score() - other_angle.max(mirrored),
+        margin: rivals.margin(),
         at_bound: normalized.outcome.search_at_bound || choice.at_bound,
     });
-    Ok((alignments.collect(), evidence))
+    Ok((alignments.collect(), rivals.evidence(&best)))
 }
 
-/// A pose at full size with the cut that fits the print's strokes.
+/// A pose with the cut that fits the print's strokes there.
 #[derive(Debug, Clone, Copy)]
 struct Settled {
     found: Found,
@@ -62,15 +57,47 @@ impl Settled {
     fn score(&self) -> f64 {
         self.found.score * self.overlap.moving_met
     }
+}
 
-    fn evidence(&self, other_angle: f64, mirrored: f64) -> Evidence {
-        let own = self.score().max(1e-6);
+/// The best pose beside the best of those that cannot be right if it is.
+#[derive(Debug, Clone, Copy)]
+struct Rivals {
+    best: Settled,
+    /// Score of the best pose at another angle, and of the best in mirror writing.
+    other_angle: f64,
+    mirrored: f64,
+}
+
+impl Rivals {
+    /// Compares the poses that normalisation found.
+    fn of(pictures: &Pictures, normalized: &Normalized) -> Option<Self> {
+        let (ink, woods) = pictures.cut(COMPARED);
+        let tried = settle_all(&Cuts::new(&ink, &woods), normalized)?;
+        let best = *best_of(&tried, |pose| !pose.found.mirrored)?;
+        let score_of = |other: Option<&Settled>| other.map_or(0.0, Settled::score);
+        Some(Self {
+            best,
+            other_angle: score_of(best_of(&tried, |pose| {
+                !pose.found.mirrored && pose.found.turn_from(&best.found) > SAME_POSE_DEG
+            })),
+            mirrored: score_of(best_of(&tried, |pose| pose.found.mirrored)),
+        })
+    }
+
+    /// By how much the best pose wins.
+    fn margin(&self) -> f64 {
+        self.best.score() - self.other_angle.max(self.mirrored)
+    }
+
+    /// What speaks for and against the best pose, given what was seen of it from closer by.
+    fn evidence(&self, closer: &Settled) -> Evidence {
+        let own = self.best.score().max(1e-6);
         Evidence {
-            correlation: self.found.score,
-            tops_met: self.overlap.moving_met,
-            ink_met: self.overlap.fixed_met,
-            other_angle: other_angle / own,
-            mirrored: mirrored / own,
+            correlation: closer.found.score,
+            tops_met: closer.overlap.moving_met,
+            ink_met: closer.overlap.fixed_met,
+            other_angle: self.other_angle / own,
+            mirrored: self.mirrored / own,
         }
     }
 }
@@ -80,7 +107,7 @@ fn best_of(tried: &[Settled], of_kind: impl Fn(&Settled) -> bool) -> Option<&Set
     among.max_by(|a, b| a.score().total_cmp(&b.score()))
 }
 
-/// Print and relief at the largest working size.
+/// Print and relief at working size.
 struct Pictures {
     ink: Base,
     depths: Base,
@@ -94,34 +121,38 @@ impl Pictures {
             amount: normalized.ink.map(|set| f32::from(u8::from(*set))),
             known: normalized.known.clone(),
         };
-        let relief = Relief::of(depth)?;
         let px = params.working_px as usize;
-        let closest = (params.working_px as f64 * CLOSER) as usize;
         Some(Self {
-            ink: Base::new(&ink, closest)?,
-            depths: Base::new(&relief.depths(depth), closest)?,
+            ink: Base::new(&ink, px)?,
+            depths: Base::new(&Relief::of(depth)?.depths(depth), px)?,
             px,
             smoothing_px: params.smoothing_px,
         })
     }
 
-    fn ink(&self, times: f64) -> Layer {
-        let px = (self.px as f64 * times) as usize;
-        self.ink.layer(px, self.smoothing_px * times.sqrt())
+    /// The ink, and the strokes of every cut, at a share of the working size.
+    fn cut(&self, share: f64) -> (Layer, Vec<Layer>) {
+        self.layers(share, &CUTS)
     }
 
-    /// Strokes at a cut, a share of the relief under the tops.
-    fn wood(&self, cut: f64, times: f64) -> Layer {
-        let strokes = self.depths.map(|d| soft_stroke(d, cut, SOFTNESS));
-        let px = (self.px as f64 * times) as usize;
-        strokes.layer(px, self.smoothing_px * times.sqrt())
+    fn layers(&self, share: f64, cuts: &[f64]) -> (Layer, Vec<Layer>) {
+        let px = (self.px as f64 * share).round() as usize;
+        let sigma = self.smoothing_px * share.sqrt();
+        let depths = self.depths.at(px, sigma);
+        let strokes = |cut: &f64| depths.mapped(|d| soft_stroke(d, *cut, SOFTNESS));
+        (
+            self.ink.layer(px, sigma),
+            cuts.iter().map(strokes).collect(),
+        )
     }
 
-    /// The pose looked at once more, closer.
-    fn closer(&self, best: &Found, cut: f64) -> Affine2 {
-        let (ink, wood) = (self.ink(CLOSER), self.wood(cut, CLOSER));
-        let refined = Refiner::new(&ink, &wood).refine(best, MOST_STEPS, Loss::Tukey);
-        refined.fixed_from_moving
+    /// The pose looked at once more at working size, with the strokes of a cut.
+    fn look(&self, best: &Found, cut: f64) -> Affine2 {
+        let (ink, woods) = self.layers(1.0, &[cut]);
+        let refined = woods
+            .first()
+            .map(|wood| Refiner::new(&ink, wood).refine(best, MOST_STEPS, Loss::Tukey));
+        refined.unwrap_or(*best).fixed_from_moving
     }
 }
 
