@@ -75,9 +75,10 @@ pub(super) async fn take(args: &ImportArgs, context: &Context) -> anyhow::Result
         .iter()
         .map(|row| stored_row(row, &project))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    let summary = catalog.import(rows, now()).await?;
-    let stored = catalog.set_truth(stored_truths(truths, &project)?).await?;
+    let truths = stored_truths(truths, &project)?;
+    let imported = catalog.import_with_truth(rows, truths, now()).await;
     catalog.close().await;
+    let (summary, stored) = imported?;
     Ok(Taken {
         summary,
         truths: stored,
