@@ -1,8 +1,10 @@
-//! Named points at which a test build dies as a killed process does, or is stopped as by SIGSTOP.
+//! Named points at which a test build dies as a killed process does, is stopped, or is held up.
 //!
 //! `MOCBAN_BREAK_AT=STAGE:POINT[:N][@PAIR]`, for example `depth:filed:2` or `fit:claimed@0003`, ends the process the
-//! N-th time (1 when left out) that a pair, or that pair, reaches the point at that stage. `MOCBAN_STOP_AT` stops it
-//! there instead, until it is sent SIGCONT. Only builds with debug assertions look.
+//! N-th time (1 when left out, 0 for each time) that a pair, or that pair, reaches the point at that stage.
+//! `MOCBAN_STOP_AT` stops the process there instead, until it is sent SIGCONT. `MOCBAN_HOLD_AT` holds the thread up:
+//! it makes the file that `MOCBAN_HOLD_FILE` names and goes on when somebody has removed it; such a point must be one
+//! that a stage's own thread reaches, `computed` or `filed`. Only builds with debug assertions look.
 
 use crate::domain::{PairName, Stage};
 
@@ -23,7 +25,7 @@ pub(crate) enum Point {
     Stored,
 }
 
-/// Dies or stops here if a test asks for it.
+/// Dies, stops or waits here if a test asks for it.
 #[cfg(debug_assertions)]
 pub(crate) fn reach(stage: Stage, point: Point, pair: Option<&PairName>) {
     use test_build::{Wanted, asked};
@@ -36,6 +38,10 @@ pub(crate) fn reach(stage: Stage, point: Point, pair: Option<&PairName>) {
         let me = rustix::process::getpid();
         // A signal that cannot be sent leaves the process running, and the test that waits for it fails.
         let _ = rustix::process::kill_process(me, rustix::process::Signal::STOP);
+    }
+    let hold = asked(&test_build::HOLD_AT, "MOCBAN_HOLD_AT");
+    if hold.is_some_and(|at| at.is(stage, point, pair)) {
+        test_build::hold();
     }
 }
 
@@ -54,6 +60,7 @@ mod test_build {
 
     pub(super) static BREAK_AT: OnceLock<Option<Wanted>> = OnceLock::new();
     pub(super) static STOP_AT: OnceLock<Option<Wanted>> = OnceLock::new();
+    pub(super) static HOLD_AT: OnceLock<Option<Wanted>> = OnceLock::new();
 
     /// A place that a test names.
     #[derive(Debug)]
@@ -70,6 +77,17 @@ mod test_build {
     ) -> Option<&'static Wanted> {
         let wanted = place.get_or_init(|| Wanted::parse(&std::env::var(variable).ok()?));
         wanted.as_ref()
+    }
+
+    /// Waits until the file that tells of it is gone.
+    pub(super) fn hold() {
+        let Some(file) = std::env::var_os("MOCBAN_HOLD_FILE") else {
+            return;
+        };
+        let made = std::fs::write(&file, b"");
+        while made.is_ok() && std::path::Path::new(&file).exists() {
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
     }
 
     impl Wanted {
@@ -93,7 +111,7 @@ mod test_build {
             let pair_is = |wanted: &String| pair.is_some_and(|pair| pair.as_str() == wanted);
             self.place == format!("{stage}:{}", name(point))
                 && self.pair.as_ref().is_none_or(pair_is)
-                && self.reached.fetch_add(1, Ordering::SeqCst) + 1 == self.nth
+                && (self.reached.fetch_add(1, Ordering::SeqCst) + 1 == self.nth || self.nth == 0)
         }
     }
 

@@ -5,6 +5,7 @@ mod decoys;
 mod demo;
 mod hostile;
 mod invariance;
+mod kill;
 mod layers;
 mod one_pair;
 mod queue;
