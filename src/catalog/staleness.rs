@@ -274,7 +274,7 @@ async fn reason(
 }
 
 /// Leaves that differ between two recipes' fields, by name: `register.max_scale`.
-fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
+pub(super) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
     let (old, new) = (leaves(stage, old), leaves(stage, new));
     let names = old.keys().chain(new.keys());
     let names: std::collections::BTreeSet<_> = names.collect();

@@ -81,6 +81,7 @@ impl World {
             alone: false,
             among: None,
             deadline: 1_000,
+            alive_since: 0,
         };
         self.catalog.claim(request).await.expect("a claim")
     }
@@ -145,6 +146,7 @@ fn done(recipes: RecipeIds, stage: Stage) -> StageDone {
         ms: 5,
         at: 100,
         next_deadline: 2_000,
+        alive_since: 0,
     }
 }
 

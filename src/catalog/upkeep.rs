@@ -42,9 +42,9 @@ pub struct Rescued {
 pub struct Outstanding {
     /// Ready pairs with a stage to run.
     pub ready: u64,
-    /// Leased pairs, by anybody.
+    /// Pairs leased by anybody, with such a stage.
     pub leased: u64,
-    /// Pairs that back off.
+    /// Pairs that back off from such a stage.
     pub backoff: u64,
     /// When the first of those is due.
     pub next_due: Option<UnixMillis>,
@@ -81,14 +81,15 @@ SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
 FROM job AS j JOIN worker AS w ON w.id = j.worker
 WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.id";
 
-/// Takes leases back: worker, whether it died, whether its pair is to blame. Pairs of a worker that died are suspect:
+/// Takes leases back: worker, whether it died, whether its pair is to blame. A crash counts as a crash and not as a
+/// try, so that a failure that may pass later keeps all its tries. Pairs of a worker that died are suspect:
 /// they run after the others, each by itself. The condition is `domain::is_condemned`.
 pub(super) const RESCUE: &str = "
 UPDATE job SET
     status = iif((item.value ->> 2)
         AND crashes + 1 >= ?2 + max(0, ?3 - crashes - 2), 4, 0),
     worker = NULL, deadline = NULL, epoch = epoch + 1, crashes = crashes + (item.value ->> 2),
-    mem_class = max(mem_class, item.value ->> 1)
+    attempt = max(attempt - 1, 0), mem_class = max(mem_class, item.value ->> 1)
 FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = item.value ->> 0
 RETURNING pair, stage, status, crashes";
 
@@ -96,11 +97,13 @@ RETURNING pair, stage, status, crashes";
 const DEATHS: &str = "
 SELECT count(*) FROM (SELECT ended FROM worker ORDER BY id DESC LIMIT 32) WHERE ended IS NULL";
 
-/// Takes back leases of other workers whose deadline is long past.
+/// Takes back leases of other workers that still give signs of life long after the lease's deadline. Beat and deadline
+/// are both by the worker's own clock: two clocks are never compared.
 pub(super) const OVERDUE: &str = "
 UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = NULL,
-    epoch = epoch + 1, crashes = crashes + 1, mem_class = 1
-WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1)) AND deadline < ?3
+    epoch = epoch + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), mem_class = 1
+WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))
+    AND deadline + ?3 < (SELECT w.beat FROM worker AS w WHERE w.id = job.worker)
 RETURNING pair, stage, status, crashes";
 
 /// Back-off times that are over, or so far ahead that the clock must have jumped.
@@ -122,14 +125,14 @@ SELECT value ->> 'pair', value ->> 'stage', value ->> 'class', value ->> 'messag
 const LEFT_ALL: &str = "
 SELECT
     (SELECT count(*) FROM (SELECT 1 FROM job WHERE status = 0 AND stage <= ?1 LIMIT 1000)),
-    (SELECT count(*) FROM job WHERE status = 1),
-    (SELECT count(*) FROM job WHERE status = 2),
-    (SELECT min(run_at) FROM job WHERE status = 2)";
+    (SELECT count(*) FROM job WHERE status = 1 AND stage <= ?1),
+    (SELECT count(*) FROM job WHERE status = 2 AND stage <= ?1),
+    (SELECT min(run_at) FROM job WHERE status = 2 AND stage <= ?1)";
 
 const LEFT_AMONG: &str = "
-SELECT count(*) FILTER (WHERE j.status = 0 AND j.stage <= ?1), count(*) FILTER (WHERE j.status = 1),
+SELECT count(*) FILTER (WHERE j.status = 0), count(*) FILTER (WHERE j.status = 1),
     count(*) FILTER (WHERE j.status = 2), min(j.run_at)
-FROM json_each(?2) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value";
+FROM json_each(?2) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value WHERE j.stage <= ?1";
 
 const COUNT_AMONG: &str = "
 SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
@@ -222,14 +225,15 @@ impl Catalog {
         .await
     }
 
-    /// Takes back other workers' leases whose deadline passed before `before`.
+    /// Takes back the leases of other workers that have outlived the lease's deadline by more than `margin_ms`: they
+    /// hang although their process lives. A living process looks after its deadlines itself, so this is rare.
     ///
     /// # Errors
     /// When the database refuses.
     pub async fn rescue_overdue(
         &self,
         me: WorkerId,
-        before: UnixMillis,
+        margin_ms: i64,
         now: UnixMillis,
     ) -> Result<Rescued> {
         self.alone(move |conn| {
@@ -238,7 +242,7 @@ impl Catalog {
                 let found = sqlx::query(OVERDUE)
                     .bind(Value::from(others).to_string())
                     .bind(CRASH_LIMIT)
-                    .bind(before)
+                    .bind(margin_ms)
                     .fetch_all(&mut *conn)
                     .await?;
                 brought_back(conn, &found, now).await
@@ -377,7 +381,7 @@ async fn brought_back(
             rescued.quarantined += 1;
             crashed.push(json!({
                 "pair": pair, "stage": stage, "class": FailureClass::Resource, "at": now,
-                "message": format!("{crashes} workers died over it at {}", rows::stage(stage)?),
+                "message": format!("{crashes} workers died or hung over it at {}", rows::stage(stage)?),
             }));
         } else {
             rescued.ready += 1;

@@ -96,14 +96,9 @@ async fn store(
 ) -> anyhow::Result<(ImportSummary, u64)> {
     Project::create(project.dir())?;
     let catalog = Catalog::create(&project.catalog_path()).await?;
-    let stored = async {
-        let summary = catalog.import(rows, now()).await?;
-        let truths = catalog.set_truth(truths).await?;
-        anyhow::Ok((summary, truths))
-    };
-    let stored = stored.await;
+    let stored = catalog.import_with_truth(rows, truths, now()).await;
     catalog.close().await;
-    stored
+    Ok(stored?)
 }
 
 /// What was there before an import, so that one that fails leaves no half-made project.

@@ -180,6 +180,7 @@ fn code_of(error: &anyhow::Error) -> ExitCode {
         }
         match cause.downcast_ref::<RunError>() {
             Some(RunError::InUse(_)) => return ExitCode::InUse,
+            Some(RunError::OtherSettings(_)) => return ExitCode::Usage,
             Some(RunError::NoSuchPair(_)) => return ExitCode::NothingSelected,
             Some(_) | None => {}
         }

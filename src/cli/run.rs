@@ -17,7 +17,7 @@ use crate::catalog::{Catalog, Plan};
 use crate::config::Config;
 use crate::domain::{JobStatus, Stage};
 use crate::runner::{self, RunOptions, RunSummary, Stop};
-use crate::store::Project;
+use crate::store::{Project, RunLock};
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
@@ -72,7 +72,7 @@ pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<Exit
     if args.dry_run {
         let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;
         catalog.close().await;
-        return tell_plan(&plan, context);
+        return tell_plan(&plan, RunLock::is_held(&project), context);
     }
     let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
     if context.global.json {
@@ -239,25 +239,30 @@ fn as_json(summary: &RunSummary) -> Value {
     })
 }
 
-fn tell_plan(plan: &Plan, context: &Context) -> anyhow::Result<ExitCode> {
+fn tell_plan(plan: &Plan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
     if context.global.json {
         talk::print_json(&json!({"schema": 1, "pairs": plan.pairs(), "plan": plan}))?;
         return Ok(ExitCode::Done);
     }
-    talk::print(&plan_text(plan))?;
-    if plan.pairs() > 0 {
+    talk::print(&plan_text(plan, running))?;
+    if plan.pairs() > 0 || plan.leased > 0 && !running {
         context.talk.next(&context.command("run"));
     }
     Ok(ExitCode::Done)
 }
 
-fn plan_text(plan: &Plan) -> String {
+fn plan_text(plan: &Plan, running: bool) -> String {
+    let leased = if running {
+        "in the hands of another run"
+    } else {
+        "cut off by the end of their process would run on"
+    };
     let mut parts = vec![format!("{} would run", count(plan.pairs(), "pair"))];
     for (number, what) in [
         (plan.done, "done"),
         (plan.quarantined, "failed and kept back"),
         (plan.held, "set aside"),
-        (plan.leased, "in the hands of another run"),
+        (plan.leased, leased),
     ] {
         if number > 0 {
             parts.push(format!("{number} {what}"));
@@ -306,7 +311,7 @@ mod tests {
             ..Plan::default()
         };
         assert_eq!(
-            plan_text(&plan),
+            plan_text(&plan, false),
             "24 pairs would run, 2 done\n  24  from register  register.max_scale: 1.2 -> 1.3\n"
         );
     }

@@ -7,13 +7,13 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
-use super::RunError;
 use super::events::RunEvent;
 use super::policy::{self, Liveness};
 use super::stop::StopLevel;
 use super::worker::{PairEnd, PairReport, Shared, work};
+use super::{RunError, this_process};
 use crate::catalog::{ClaimRequest, Dead, Outstanding, PairSelection};
-use crate::domain::WorkerId;
+use crate::domain::{UnixMillis, WorkerId};
 
 /// Between two looks for pairs that others give back or whose back-off is over.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
@@ -30,7 +30,7 @@ pub(super) struct Tally {
 /// The loop's own state.
 pub(super) struct Dispatch {
     pub(super) shared: Arc<Shared>,
-    pub(super) worker: WorkerId,
+    worker: WorkerId,
     pub(super) workers: usize,
     pub(super) among: Option<PairSelection>,
     pub(super) max_failures: Option<u64>,
@@ -39,6 +39,8 @@ pub(super) struct Dispatch {
     alone: bool,
     /// Whether a claim may find something that the last one did not.
     look: bool,
+    /// When this worker last showed that it lives, by the run's clock.
+    last_beat: UnixMillis,
     liveness: Liveness,
     tally: Tally,
     fatal: Option<RunError>,
@@ -54,6 +56,8 @@ impl Dispatch {
         max_failures: Option<u64>,
     ) -> Self {
         Self {
+            last_beat: shared.clock.now(),
+            liveness: Liveness::new(shared.timing.lease_ms()),
             shared,
             worker,
             workers: workers.max(1),
@@ -62,11 +66,15 @@ impl Dispatch {
             tasks: JoinSet::new(),
             alone: false,
             look: true,
-            liveness: Liveness::default(),
             tally: Tally::default(),
             fatal: None,
             told: StopLevel::Go,
         }
+    }
+
+    /// The number this process works under now.
+    pub(super) const fn worker(&self) -> WorkerId {
+        self.worker
     }
 
     /// Works until nothing is left or the run is stopped. Gives the error that ended it, if one did.
@@ -75,16 +83,16 @@ impl Dispatch {
         events: &mut mpsc::UnboundedReceiver<RunEvent>,
         on_event: &mut (impl FnMut(RunEvent) + Send),
     ) -> Result<Tally, RunError> {
+        let timing = self.shared.timing;
         let mut looks = every(LOOK_EVERY);
-        let mut rescues = every(policy::RESCUE_EVERY);
-        let mut beats = every(policy::BEAT_EVERY);
-        let mut last_beat = self.shared.clock.now();
+        let mut rescues = every(timing.rescue_every);
+        let mut beats = every(timing.beat_every);
         while !self.is_over().await? {
             let shared = Arc::clone(&self.shared);
             tokio::select! {
                 biased;
                 () = shared.stop.reached(next_level(self.told)), if self.told < StopLevel::Now => self.tell_stop(),
-                _ = beats.tick() => last_beat = self.beat(last_beat).await,
+                _ = beats.tick() => self.beat().await?,
                 Some(event) = events.recv() => on_event(event),
                 Some(ended) = self.tasks.join_next() => self.take(ended),
                 _ = rescues.tick() => self.rescue().await?,
@@ -138,6 +146,7 @@ impl Dispatch {
                 alone,
                 among: self.among.clone(),
                 deadline: shared.deadline(),
+                alive_since: shared.alive_since(),
             })
             .await?;
         self.alone = alone && !leases.is_empty();
@@ -216,19 +225,37 @@ impl Dispatch {
         Ok(())
     }
 
-    /// A sign of life. When none can be given for as long as a lease lasts, the leases are lost: nothing new is begun.
-    async fn beat(&self, last: i64) -> i64 {
+    /// A sign of life. When none can be stored for as long as a lease lasts, the run is over; when one comes too late,
+    /// because the process was held up, it goes on as another worker.
+    async fn beat(&mut self) -> Result<(), RunError> {
         let now = self.shared.clock.now();
-        match self.shared.catalog.beat(self.worker, now).await {
-            Ok(()) => now,
+        let alive_since = self.shared.alive_since();
+        let catalog = &self.shared.catalog;
+        match catalog.beat(self.worker, now, alive_since).await {
+            Ok(true) => self.last_beat = now,
+            Ok(false) => self.enter_anew(now).await?,
             Err(error) => {
                 tracing::warn!(%error, "no sign of life could be stored");
-                if now - last >= policy::LEASE.as_millis() as i64 {
+                if self.last_beat < alive_since {
                     self.drain("the catalog cannot be written any more");
+                    self.fatal.get_or_insert(error.into());
                 }
-                last
             }
         }
+        Ok(())
+    }
+
+    /// Takes a new number. What is in hand under the old one can no longer be stored; its pairs are ready again.
+    async fn enter_anew(&mut self, now: UnixMillis) -> Result<(), RunError> {
+        tracing::warn!("held up past the end of its leases: the stages in hand run again");
+        let catalog = &self.shared.catalog;
+        let old = self.worker;
+        catalog.end_worker(old, now).await?;
+        self.worker = catalog.register_worker(this_process(), now).await?;
+        self.last_beat = now;
+        catalog.rescue(Dead::Workers(vec![old]), now).await?;
+        self.look = true;
+        Ok(())
     }
 
     /// Takes back the leases of dead workers in other processes.
@@ -242,8 +269,8 @@ impl Dispatch {
             rescued += catalog.rescue(Dead::Workers(dead), now).await?.ready;
         }
         if holders.iter().any(|holder| holder.worker != self.worker) {
-            let before = now - policy::DEADLINE_MARGIN.as_millis() as i64;
-            let overdue = catalog.rescue_overdue(self.worker, before, now).await?;
+            let margin = self.shared.timing.deadline_margin.as_millis() as i64;
+            let overdue = catalog.rescue_overdue(self.worker, margin, now).await?;
             rescued += overdue.ready;
         }
         if rescued > 0 {

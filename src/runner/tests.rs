@@ -320,6 +320,7 @@ async fn what_a_dead_process_left_comes_back_at_once() {
         alone: false,
         among: None,
         deadline: 1,
+        alive_since: 0,
     };
     assert_eq!(
         world.catalog.claim(request).await.expect("a claim").len(),

@@ -154,7 +154,9 @@ impl Project {
             return Ok(());
         }
         std::fs::create_dir_all(folder).map_err(ArtifactError::io(folder))?;
-        sync_folder(&self.artifacts_dir())
+        sync_folder(&self.artifacts_dir())?;
+        // The folder of artifacts may be new too.
+        sync_folder(self.dir())
     }
 
     fn place(&self, path: &Path, bytes: &[u8]) -> Result<(), ArtifactError> {

@@ -24,7 +24,7 @@ fn a_backup_taken_while_a_run_writes_is_restored_to_the_same_export() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let whole = project(dir.path(), "whole", "3");
     std::fs::write(whole.settings_path(), "[depth]\nlongest_px = 96\n").expect("written");
-    let blank = copy(&whole, "blank");
+    let blank = copy(&whole, &dir.path().join("blank"));
     let file = dir.path().join("b.sqlite");
     let backup = ["backup", file.to_str().expect("UTF-8")];
 

@@ -7,6 +7,7 @@ mod decoys;
 mod demo;
 mod hostile;
 mod invariance;
+mod kill;
 mod layers;
 mod odd;
 mod one_pair;

@@ -100,6 +100,7 @@ impl Game {
             alone: self.rng.random_bool(0.4),
             among: None,
             deadline: DEADLINE,
+            alive_since: 0,
         };
         for lease in self.world.catalog.claim(request).await.expect("a claim") {
             let pair = lease.pair().0;
@@ -177,6 +178,7 @@ impl Game {
             inputs: super::inputs(stage),
             ms: None,
             at: self.now,
+            alive_since: 0,
         };
         let kept = self
             .world
