@@ -238,6 +238,25 @@ fn indexes_that_disagree_with_their_tables_are_made_anew() {
 }
 
 #[test]
+fn a_database_with_faults_of_its_own_is_not_written_to() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    sql(
+        &project,
+        "PRAGMA ignore_check_constraints = ON; UPDATE job SET crashes = -1 WHERE pair = 1;
+        UPDATE counter SET n = n + 1 WHERE stage = 0 AND status = 0",
+    );
+    let before = std::fs::read(project.catalog_path()).expect("read");
+    let found = at(&project, &["check", "--repair", "--json"])
+        .expect(12)
+        .json();
+    let wanted = ["counter", "database"].map(ToOwned::to_owned);
+    assert_eq!(kinds(&found), wanted.into());
+    let after = std::fs::read(project.catalog_path()).expect("read");
+    assert!(after == before, "the repair wrote to it");
+}
+
+#[test]
 fn files_that_no_row_names_are_told_and_removed_but_no_others() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
