@@ -8,7 +8,7 @@ use csv::StringRecord;
 use crate::catalog::NewVerdict;
 use crate::config::hint;
 use crate::domain::PairName;
-use crate::manifest::{as_utf8, delimiter};
+use crate::manifest::{LineCounter, as_utf8, delimiter};
 
 const COLUMNS: [&str; 6] = ["pair", "verdict", "reader", "metric", "reason", "note"];
 const NEEDED: usize = 3;
@@ -55,10 +55,14 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Row>, VerdictFileError> {
         .delimiter(delimiter(&text))
         .trim(csv::Trim::All)
         .from_reader(&*text);
-    let places = places(reader.headers().map_err(|error| csv_error(&error))?)?;
+    let refused = |error: &csv::Error| csv_error(error, &text);
+    let places = places(reader.headers().map_err(|error| refused(&error))?)?;
+    let mut lines = LineCounter::new(&text);
     let mut rows = Vec::new();
     for record in reader.records() {
-        rows.push(row(&record.map_err(|error| csv_error(&error))?, &places)?);
+        let record = record.map_err(|error| refused(&error))?;
+        let line = lines.at(record.position()) as u64;
+        rows.push(row(&record, line, &places)?);
     }
     Ok(rows)
 }
@@ -95,8 +99,11 @@ fn places(headers: &StringRecord) -> Result<[Option<usize>; 6], VerdictFileError
     Ok(places)
 }
 
-fn row(record: &StringRecord, places: &[Option<usize>; 6]) -> Result<Row, VerdictFileError> {
-    let line = record.position().map_or(0, csv::Position::line);
+fn row(
+    record: &StringRecord,
+    line: u64,
+    places: &[Option<usize>; 6],
+) -> Result<Row, VerdictFileError> {
     let cell = |column: usize| {
         places[column]
             .and_then(|place| record.get(place))
@@ -125,8 +132,8 @@ where
         .map_err(|error: T::Err| VerdictFileError::new(line, error.to_string()))
 }
 
-fn csv_error(error: &csv::Error) -> VerdictFileError {
-    let line = error.position().map_or(1, csv::Position::line);
+fn csv_error(error: &csv::Error, text: &[u8]) -> VerdictFileError {
+    let line = LineCounter::new(text).at(error.position()) as u64;
     let reason = match error.kind() {
         csv::ErrorKind::UnequalLengths {
             expected_len, len, ..

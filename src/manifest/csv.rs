@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::draft::{Draft, Rows};
-use super::{COLUMNS, ManifestError, ManifestRow, Problem, REQUIRED, as_utf8, delimiter};
+use super::{
+    COLUMNS, LineCounter, ManifestError, ManifestRow, Problem, REQUIRED, as_utf8, delimiter,
+};
 
 /// Parses a CSV list with a header line. Column names may stand in any order and in capitals; blank lines are
 /// left out.
@@ -22,7 +24,7 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     let mut lines = LineCounter::new(bytes);
     let mut records = reader.byte_records().map(|record| {
         let record = record.map_err(|error| Problem::whole(error.to_string()))?;
-        let line = lines.at(&record);
+        let line = lines.at(record.position());
         Ok::<_, Problem>((line, record))
     });
     let header = match records.next() {
@@ -39,36 +41,6 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
         }
     }
     ManifestError::unless_none(rows.accepted, rows.problems)
-}
-
-/// Tells the line a record begins at. The reader's own count stops at the end of the record before, and blank
-/// lines may follow there.
-struct LineCounter<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    line: usize,
-}
-
-impl<'a> LineCounter<'a> {
-    const fn new(bytes: &'a [u8]) -> Self {
-        Self {
-            bytes,
-            at: 0,
-            line: 1,
-        }
-    }
-
-    fn at(&mut self, record: &::csv::ByteRecord) -> usize {
-        let from = record.position().map_or(0, ::csv::Position::byte) as usize;
-        let blank = self.bytes[from..]
-            .iter()
-            .take_while(|byte| matches!(**byte, b'\r' | b'\n'))
-            .count();
-        let passed = &self.bytes[self.at..from + blank];
-        self.line += passed.split(|byte| *byte == b'\n').count() - 1;
-        self.at = from + blank;
-        self.line
-    }
 }
 
 /// What a column holds.

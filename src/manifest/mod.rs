@@ -18,7 +18,7 @@ pub use self::csv::parse_csv;
 pub use error::{ManifestError, Place, Problem};
 pub use folders::{FolderPairs, pair_folders};
 pub use jsonl::parse_jsonl;
-pub use text::{NotText, as_utf8, delimiter};
+pub use text::{LineCounter, NotText, as_utf8, delimiter};
 
 /// One pair as a list gives it. Paths are as written: relative ones are relative to the list.
 #[derive(Debug, Clone, PartialEq)]

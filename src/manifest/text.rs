@@ -47,6 +47,39 @@ pub fn delimiter(bytes: &[u8]) -> u8 {
         .unwrap_or(b',')
 }
 
+/// Tells the line a record of a CSV list begins at. The reader's own count stops at the end of the record before, and
+/// half a line end or blank lines may follow there.
+#[derive(Debug)]
+pub struct LineCounter<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    line: usize,
+}
+
+impl<'a> LineCounter<'a> {
+    /// At the start of a list.
+    pub const fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            bytes,
+            at: 0,
+            line: 1,
+        }
+    }
+
+    /// The line of a record, counted from 1. Records come in their order.
+    pub fn at(&mut self, position: Option<&::csv::Position>) -> usize {
+        let from = position.map_or(0, ::csv::Position::byte) as usize;
+        let blank = self.bytes[from..]
+            .iter()
+            .take_while(|byte| matches!(**byte, b'\r' | b'\n'))
+            .count();
+        let passed = &self.bytes[self.at..from + blank];
+        self.line += passed.split(|byte| *byte == b'\n').count() - 1;
+        self.at = from + blank;
+        self.line
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::{NotText, as_utf8, delimiter};
