@@ -51,7 +51,8 @@ fn not_copied(file: &Path, error: sqlx::Error) -> CatalogError {
         Some(Trouble::Full) => "the disk is full",
         Some(Trouble::ReadOnly | Trouble::CannotOpen) => "it cannot be written",
         Some(Trouble::Disk) => "the disk refused",
-        Some(Trouble::Damaged | Trouble::NotADatabase | Trouble::Busy) | None => {
+        Some(Trouble::Damaged | Trouble::NotADatabase | Trouble::Busy | Trouble::Contradiction)
+        | None => {
             return error.into();
         }
     };

@@ -19,6 +19,8 @@ pub enum Trouble {
     Busy,
     /// The disk refused to read or write.
     Disk,
+    /// A write broke a rule of the schema: rows or counters contradict each other already.
+    Contradiction,
 }
 
 impl Trouble {
@@ -31,6 +33,7 @@ impl Trouble {
             11 => Some(Self::Damaged),
             13 => Some(Self::Full),
             14 => Some(Self::CannotOpen),
+            19 => Some(Self::Contradiction),
             26 => Some(Self::NotADatabase),
             _ => None,
         }

@@ -81,6 +81,9 @@ pub(super) fn sentence(error: &CatalogError, dir: &Path) -> Option<String> {
             "{shown}: the disk refused ({}); look after the disk and call again, what was stored is safe",
             root(error)
         ),
+        Some(Trouble::Contradiction) => format!(
+            "{shown} holds rows or counters that contradict each other; `check` tells which, `check --repair` mends them"
+        ),
         None => match error {
             CatalogError::Corrupt(_) | CatalogError::Json(_) => {
                 format!("{shown} holds what it must not: {error}; `check` tells more")

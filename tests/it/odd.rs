@@ -120,6 +120,19 @@ fn a_catalog_with_garbage_in_its_middle_is_told_and_no_repair_writes_to_it() {
     }
 }
 
+#[test]
+fn counters_that_are_off_end_a_run_in_a_sentence_that_leads_to_their_mending() {
+    let dir = empty();
+    let project = done(dir.path());
+    sql(&project, "UPDATE counter SET n = 0");
+    let again = ["run", "--rerun", "all", "--stage", "register"];
+    let refused = at(&project, &again).expect(1);
+    plain(&refused.err, "`check --repair` mends them");
+    at(&project, &["check", "--repair"]).expect(0);
+    at(&project, &again).expect(0);
+    at(&project, &["check"]).expect(0);
+}
+
 /// Calls the binary as somebody who may read but not write there.
 fn as_nobody(project: &Project, args: &[&str]) -> crate::cli::Call {
     let mut command = binary();
