@@ -61,6 +61,26 @@ async fn a_reused_worker_identity_cannot_complete() {
     assert_eq!(status(&world).await, JobStatus::Leased);
 }
 
+/// The pair hung under it, was taken back by others, and came to the same worker again: only the epoch tells.
+#[tokio::test]
+async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothing() {
+    let world = World::new(1).await;
+    let late = world.claim(1).await.remove(0);
+    let beat = world.catalog.beat(world.worker, 5_000, 0).await;
+    assert!(beat.expect("an answer"));
+    let other = register(&world.catalog).await;
+    let overdue = world.catalog.rescue_overdue(other, 60, 70).await;
+    assert_eq!(overdue.expect("a rescue").ready, 1);
+    let again = claim_alone(&world, world.worker).await.remove(0);
+    let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
+    assert!(matches!(kept, Ok(Kept::Lost)));
+    let kept = world
+        .catalog
+        .checkpoint(again, world.done(Stage::Fit))
+        .await;
+    assert!(matches!(kept, Ok(Kept::Lease(_))));
+}
+
 #[tokio::test]
 async fn a_worker_that_ended_completes_and_claims_nothing() {
     let world = World::new(2).await;
