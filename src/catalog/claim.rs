@@ -46,6 +46,14 @@ impl PairSelection {
         self.len
     }
 
+    /// These pairs.
+    pub fn of(pairs: &[PairId]) -> Self {
+        Self {
+            json: rows::array(pairs.iter().map(|pair| pair.0)).to_string(),
+            len: pairs.len(),
+        }
+    }
+
     /// Whether it is none at all.
     pub const fn is_empty(&self) -> bool {
         self.len == 0

@@ -21,6 +21,7 @@ mod query;
 pub mod read;
 mod recipes;
 mod requeue;
+mod rescue;
 mod results;
 mod rows;
 mod staleness;
@@ -55,9 +56,10 @@ pub use read::{
 };
 pub use recipes::{Recipe, RecipeIds, Recipes};
 pub use requeue::RetrySelection;
+pub use rescue::{Dead, LeaseHolder, Rescued};
 pub use staleness::Again;
 pub use trouble::Trouble;
-pub use upkeep::{Dead, LeaseHolder, Outstanding, Rescued, WorkLeft, WorkerInfo};
+pub use upkeep::{Outstanding, WorkLeft, WorkerInfo};
 pub use verdicts::{NewVerdict, VerdictEvent};
 pub use work::{KnownInputs, PairWork};
 

@@ -59,6 +59,11 @@ impl RecipeIds {
     pub const fn of(&self, stage: Stage) -> RecipeId {
         self.0[stage.index()]
     }
+
+    /// The numbers as a JSON array by stage.
+    pub(super) fn json(self) -> String {
+        rows::array(self.0.map(|RecipeId(id)| id)).to_string()
+    }
 }
 
 impl Catalog {

@@ -1,5 +1,6 @@
 //! The run's loop: keeps the slots filled, hears what comes back, looks after the queue.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -7,13 +8,17 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
+use super::budget::{self, Budget};
 use super::events::RunEvent;
+use super::options::RunOptions;
 use super::policy::{self, Liveness};
+use super::refresh;
 use super::stop::StopLevel;
 use super::worker::{PairEnd, PairReport, Shared, work};
 use super::{RunError, this_process};
-use crate::catalog::{ClaimRequest, Dead, Outstanding, PairSelection};
-use crate::domain::{UnixMillis, WorkerId};
+use crate::catalog::{ClaimRequest, Dead, KnownInputs, Lease, Outstanding, PairSelection};
+use crate::domain::{PairId, UnixMillis, WorkerId};
+use crate::raster;
 
 /// Between two looks for pairs that others give back or whose back-off is over.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
@@ -34,7 +39,12 @@ pub(super) struct Dispatch {
     pub(super) workers: usize,
     pub(super) among: Option<PairSelection>,
     pub(super) max_failures: Option<u64>,
-    tasks: JoinSet<PairReport>,
+    images: raster::Limits,
+    /// Pairs in hand, each with the memory it was given.
+    tasks: JoinSet<(PairReport, u64)>,
+    budget: Budget,
+    /// The next pair waits for memory that somebody must give back first.
+    short: bool,
     /// A pair that nothing may run beside is in hand.
     alone: bool,
     /// Whether a claim may find something that the last one did not.
@@ -51,19 +61,21 @@ impl Dispatch {
     pub(super) fn new(
         shared: Arc<Shared>,
         worker: WorkerId,
-        workers: usize,
         among: Option<PairSelection>,
-        max_failures: Option<u64>,
+        options: &RunOptions,
     ) -> Self {
         Self {
             last_beat: shared.clock.now(),
             liveness: Liveness::new(shared.timing.lease_ms()),
             shared,
             worker,
-            workers: workers.max(1),
+            workers: options.workers.max(1),
             among,
-            max_failures,
+            max_failures: options.max_failures,
+            images: options.image_limits,
             tasks: JoinSet::new(),
+            budget: Budget::new(options.memory),
+            short: false,
             alone: false,
             look: true,
             tally: Tally::default(),
@@ -113,7 +125,7 @@ impl Dispatch {
         if self.shared.is_draining() || self.fatal.is_some() {
             return Ok(self.tasks.is_empty());
         }
-        if !self.look || self.alone || self.tasks.len() >= self.workers {
+        if !self.look || self.alone || self.short || self.tasks.len() >= self.workers {
             return Ok(false);
         }
         self.look = false;
@@ -150,10 +162,48 @@ impl Dispatch {
             })
             .await?;
         self.alone = alone && !leases.is_empty();
+        let needs = self.needs(&leases).await?;
         for lease in leases {
-            self.tasks.spawn(work(Arc::clone(&self.shared), lease));
+            let need = needs.get(&lease.pair()).copied().unwrap_or(0);
+            // Those after one that must wait wait too, so that it is not passed over for ever.
+            self.short = self.short || !self.budget.give(need);
+            if self.short {
+                self.shared.catalog.release(lease).await?;
+            } else {
+                let work = work(Arc::clone(&self.shared), lease);
+                self.tasks.spawn(async move { (work.await, need) });
+            }
         }
         Ok(())
+    }
+
+    /// Memory that leased pairs may need.
+    async fn needs(&self, leases: &[Lease]) -> Result<BTreeMap<PairId, u64>, RunError> {
+        if leases.is_empty() || !self.budget.is_limited() {
+            return Ok(BTreeMap::new());
+        }
+        let pairs: Vec<_> = leases.iter().map(Lease::pair).collect();
+        let among = PairSelection::of(&pairs);
+        let catalog = &self.shared.catalog;
+        let inputs = catalog
+            .known_inputs(None, pairs.len(), Some(&among))
+            .await?;
+        let from: BTreeMap<_, _> = leases
+            .iter()
+            .map(|lease| (lease.pair(), lease.cursor()))
+            .collect();
+        let (project, images) = (self.shared.project.clone(), self.images);
+        let look = move || {
+            let need = |inputs: KnownInputs| {
+                let need = budget::need(&project, &inputs, from[&inputs.pair], &images);
+                (inputs.pair, need)
+            };
+            inputs.into_iter().map(need).collect()
+        };
+        match tokio::task::spawn_blocking(look).await {
+            Ok(needs) => Ok(needs),
+            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
+        }
     }
 
     async fn outstanding(&self) -> Result<Outstanding, RunError> {
@@ -165,13 +215,15 @@ impl Dispatch {
     }
 
     /// Takes in how a pair ended.
-    fn take(&mut self, ended: Result<PairReport, tokio::task::JoinError>) {
+    fn take(&mut self, ended: Result<(PairReport, u64), tokio::task::JoinError>) {
         self.alone = false;
+        self.short = false;
         self.look = true;
-        let report = match ended {
-            Ok(report) => report,
+        let (report, need) = match ended {
+            Ok(ended) => ended,
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
+        self.budget.take_back(need);
         self.tally.stages += report.stages;
         match report.end {
             PairEnd::Done => self.tally.done += 1,
@@ -251,7 +303,9 @@ impl Dispatch {
         let catalog = &self.shared.catalog;
         let old = self.worker;
         catalog.end_worker(old, now).await?;
-        self.worker = catalog.register_worker(this_process(), now).await?;
+        self.worker = catalog
+            .register_worker(this_process(), self.shared.recipes, now)
+            .await?;
         self.last_beat = now;
         catalog.rescue(Dead::Workers(vec![old]), now).await?;
         self.look = true;
@@ -266,7 +320,9 @@ impl Dispatch {
         let dead = self.liveness.observe(&holders, self.worker, now);
         let mut rescued = 0;
         if !dead.is_empty() {
-            rescued += catalog.rescue(Dead::Workers(dead), now).await?.ready;
+            let found = catalog.rescue(Dead::Workers(dead), now).await?;
+            refresh::condemned(&self.shared.project, catalog, &found.condemned).await?;
+            rescued += found.ready;
         }
         if holders.iter().any(|holder| holder.worker != self.worker) {
             let margin = self.shared.timing.deadline_margin.as_millis() as i64;

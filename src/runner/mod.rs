@@ -3,6 +3,7 @@
 //! [`run`] prepares (lock, dead workers' leases, changed inputs and settings), then `dispatch` keeps the slots filled,
 //! `worker` takes one pair through its stages, and `execute` is the one bridge to the threads that compute.
 
+mod budget;
 mod clock;
 mod dispatch;
 mod events;
@@ -24,6 +25,7 @@ use std::sync::Arc;
 
 use tokio::sync::mpsc;
 
+pub use budget::free_memory;
 pub use events::{RunEvent, RunSummary};
 pub use options::{Rerun, RunOptions};
 pub use outputs::result_hash;
@@ -150,7 +152,9 @@ async fn run_steps(
     let recipe_ids = catalog.register_recipes(recipes).await?;
     let mut lock = RunLock::acquire(project, options.join)?;
     agree(catalog, &mut lock, recipes).await?;
-    let worker = catalog.register_worker(this_process(), clock.now()).await?;
+    let worker = catalog
+        .register_worker(this_process(), recipe_ids, clock.now())
+        .await?;
     let prepared = async {
         let rescued = take_over(project, catalog, &mut lock, worker, clock).await?;
         find_work(project, catalog, recipes, options, among.as_ref(), clock).await?;
@@ -175,8 +179,7 @@ async fn run_steps(
         stage_limit: options.stage_limit,
         events,
     };
-    let (workers, most) = (options.workers, options.max_failures);
-    let mut dispatch = Dispatch::new(Arc::new(shared), worker, workers, among.clone(), most);
+    let mut dispatch = Dispatch::new(Arc::new(shared), worker, among.clone(), options);
     let outcome = dispatch.run(&mut received, &mut on_event).await;
     // Said also after an error, so that this worker's end is not taken for a crash.
     let ended = catalog.end_worker(dispatch.worker(), clock.now()).await;
@@ -250,6 +253,7 @@ async fn take_over(
         return Ok(0);
     }
     let rescued = catalog.rescue(Dead::AllBut(me), clock.now()).await?;
+    refresh::condemned(project, catalog, &rescued.condemned).await?;
     project.clear_temporary()?;
     lock.admit()?;
     Ok(rescued.ready)

@@ -111,6 +111,7 @@ fn run_under_fire(project: &Project, dice: &mut ChaCha8Rng) -> u32 {
 }
 
 /// Kills runs of copies of a project of so many pairs until there were so many kills.
+#[expect(clippy::print_stderr, reason = "the figures of the long test")]
 fn survives(count: &str, kills: u32) {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let fresh = project(dir.path(), "fresh", count);

@@ -54,10 +54,15 @@ pub(crate) fn copy(project: &Project, to: &Path) -> Project {
 
 /// `run` with some arguments, ready to be called.
 pub(crate) fn run(project: &Project, args: &[&str]) -> Command {
+    run_telling(project, "none", args)
+}
+
+/// The same with progress in some form on stderr.
+pub(crate) fn run_telling(project: &Project, progress: &str, args: &[&str]) -> Command {
     let mut command = binary();
     command.arg("-C").arg(project.dir());
     command
-        .args(["--progress", "none", "run"])
+        .args(["--progress", progress, "run"])
         .args(FAST)
         .args(args);
     command

@@ -4,7 +4,7 @@ use sqlx::{AssertSqlSafe, Row as _};
 
 use super::World;
 use crate::catalog::{
-    audit, checkpoint, claim, connect, fail, mend, query, requeue, results, status, upkeep,
+    audit, checkpoint, claim, connect, fail, mend, query, requeue, rescue, results, status, upkeep,
     verdicts,
 };
 
@@ -64,10 +64,11 @@ async fn fenced_writes_find_their_jobs_by_key() {
 #[tokio::test]
 async fn rescue_and_holders_use_the_index_of_leases() {
     for sql in [
-        upkeep::RESCUE,
-        upkeep::LEFT_BY,
-        upkeep::OVERDUE,
-        upkeep::HOLDERS,
+        rescue::RESCUE,
+        rescue::LEFT_BY,
+        rescue::OVERDUE,
+        rescue::HOLDERS,
+        rescue::VICTIMS,
     ] {
         let plan = plan(sql).await;
         assert!(

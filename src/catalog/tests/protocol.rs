@@ -189,7 +189,8 @@ async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
             world.catalog.claim(request).await.expect("a claim").len(),
             1
         );
-        let rescue = world.catalog.rescue(Dead::Workers(vec![worker]), 60);
+        let next = register(&world.catalog).await;
+        let rescue = world.catalog.rescue(Dead::AllBut(next), 60);
         assert_eq!(rescue.await.expect("a rescue").ready, 1, "round {round}");
     }
     world.counters_hold().await;
