@@ -1,7 +1,7 @@
 //! Where the bulk of a scan lies: a fleck far away must not shrink everything else.
 
 /// About so many points are looked at.
-const LOOKED_AT: usize = 20_000;
+const LOOKED_AT: usize = 4_000;
 /// This share of the points at either end of an axis may be flecks.
 const FLECKS: f64 = 0.002;
 /// The rest, widened by this share of its length on each side, is the bulk.
@@ -10,33 +10,50 @@ const WIDENED: f64 = 0.25;
 /// A box along the axes, `[low, high]`.
 pub(super) type Bounds<const N: usize> = [[f64; N]; 2];
 
-/// Bounds along the first `N` axes of the points that belong to the bulk; a scan without flecks keeps all of its
-/// bounds.
-pub(super) fn bulk<const N: usize, const D: usize>(points: &[[f64; D]]) -> Bounds<N> {
-    let mut bounds = [[f64::INFINITY; N], [f64::NEG_INFINITY; N]];
-    if points.is_empty() {
-        return bounds;
-    }
-    let limits: [[f64; 2]; N] = std::array::from_fn(|axis| limits(points, axis));
-    for p in points {
-        for (axis, [low, high]) in limits.iter().enumerate() {
-            if p[axis] >= *low && p[axis] <= *high {
-                bounds[0][axis] = bounds[0][axis].min(p[axis]);
-                bounds[1][axis] = bounds[1][axis].max(p[axis]);
-            }
+/// The first and the last of the values that belong to the bulk; a scan without flecks keeps all of its bounds.
+pub(super) fn bulk_along(values: &[f32]) -> [f64; 2] {
+    let limits = limits(values.iter().map(|v| f64::from(*v)));
+    let [least, most] = limits.map(|limit| limit as f32);
+    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let (runs, rest) = values.as_chunks::<LANES>();
+    let rest = std::iter::once(padded(rest, f32::NAN));
+    for run in runs.iter().copied().chain(rest) {
+        for (k, v) in run.into_iter().enumerate() {
+            let counts = v >= least && v <= most;
+            low[k] = low[k].min(if counts { v } else { f32::INFINITY });
+            high[k] = high[k].max(if counts { v } else { f32::NEG_INFINITY });
         }
     }
-    bounds
+    [
+        f64::from(low.into_iter().fold(f32::INFINITY, f32::min)),
+        f64::from(high.into_iter().fold(f32::NEG_INFINITY, f32::max)),
+    ]
 }
 
-/// Between which values along an axis a point belongs to the bulk.
-fn limits<const D: usize>(points: &[[f64; D]], axis: usize) -> [f64; 2] {
-    let stride = points.len().div_ceil(LOOKED_AT);
-    let looked_at = points.len().div_ceil(stride);
+fn padded(values: &[f32], with: f32) -> [f32; LANES] {
+    std::array::from_fn(|k| values.get(k).copied().unwrap_or(with))
+}
+
+/// Values that are compared side by side.
+const LANES: usize = 8;
+
+/// A box somewhat wider than the bulk: points outside it along an axis are flecks.
+pub(super) fn room(points: &[[f64; 3]]) -> Bounds<3> {
+    let along = [0, 1, 2].map(|axis| limits(points.iter().map(|p| p[axis])));
+    [0, 1].map(|end| along.map(|limits| limits[end]))
+}
+
+/// Between which values one belongs to the bulk.
+fn limits(values: impl ExactSizeIterator<Item = f64> + Clone) -> [f64; 2] {
+    if values.len() == 0 {
+        return [f64::INFINITY, f64::NEG_INFINITY];
+    }
+    let stride = values.len().div_ceil(LOOKED_AT);
+    let looked_at = values.len().div_ceil(stride);
     let flecks = ((looked_at - 1) as f64 * FLECKS) as usize;
-    let values = || points.iter().step_by(stride).map(|p| p[axis]);
-    let low = smallest(values(), flecks);
-    let high = -smallest(values().map(|v| -v), flecks);
+    let values = values.step_by(stride);
+    let low = smallest(values.clone(), flecks);
+    let high = -smallest(values.map(|v| -v), flecks);
     let slack = WIDENED * (high - low);
     [low - slack, high + slack]
 }
@@ -64,23 +81,30 @@ pub(super) fn holds<const N: usize>([low, high]: &Bounds<N>, point: &[f64; N]) -
 
 #[cfg(test)]
 mod tests {
-    use super::{bulk, holds};
+    use super::{bulk_along, holds, room};
 
     #[test]
     fn a_fleck_is_left_out_and_nothing_else() {
-        let mut points: Vec<[f64; 2]> = (0..5000)
-            .map(|i| [f64::from(i % 100), f64::from(i / 100)])
-            .collect();
-        assert_eq!(bulk::<2, 2>(&points), [[0.0, 0.0], [99.0, 49.0]]);
-        points.push([9000.0, -700.0]);
-        let bounds: [[f64; 2]; 2] = bulk(&points);
-        assert_eq!(bounds, [[0.0, 0.0], [99.0, 49.0]]);
-        assert!(holds(&bounds, &[99.0, 0.0]) && !holds(&bounds, &[9000.0, -700.0]));
+        let mut values: Vec<f32> = (0..5003).map(|i| (i % 100) as f32).collect();
+        assert_eq!(bulk_along(&values), [0.0, 99.0]);
+        values.push(9000.0);
+        values.insert(0, -700.0);
+        assert_eq!(bulk_along(&values), [0.0, 99.0]);
     }
 
     #[test]
-    fn two_points_keep_their_bounds() {
-        assert_eq!(bulk::<1, 1>(&[[1.0], [4.0]]), [[1.0], [4.0]]);
-        assert_eq!(bulk::<1, 2>(&[[1.0, 0.0], [4.0, 2.0]]), [[1.0], [4.0]]);
+    fn two_values_keep_their_bounds() {
+        assert_eq!(bulk_along(&[1.0, 4.0]), [1.0, 4.0]);
+    }
+
+    #[test]
+    fn a_fleck_is_outside_of_the_room() {
+        let mut points: Vec<[f64; 3]> = (0..5000)
+            .map(|i| [f64::from(i % 100), f64::from(i / 100), 1.0])
+            .collect();
+        points.push([9000.0, -700.0, 1.0]);
+        let room = room(&points);
+        assert!(points[..5000].iter().all(|p| holds(&room, p)));
+        assert!(!holds(&room, &points[5000]));
     }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::zbuffer::{NOTHING, Projected, View};
+use super::zbuffer::{NOTHING, Shell, View};
 use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
 use crate::mesh::Mesh;
 use crate::raster::{DepthMap, Grid};
@@ -79,11 +79,11 @@ pub fn depth(
     unit: Option<LengthUnit>,
     params: &Params,
 ) -> Result<DepthMap, Error> {
-    let projected = Projected::new(mesh, &fit.plane_from_mesh);
-    let bounds = projected.bounds();
+    let shell = Shell::new(mesh);
+    let bounds = shell.bounds(&fit.plane_from_mesh);
     let view = View::around(bounds, longest_px(bounds, unit, params)?, true);
     let plane_from_px = view.px_from_plane.inverse().ok_or(Error::NothingSeen)?;
-    let mut heights = projected.render(&view);
+    let mut heights = shell.render(&fit.plane_from_mesh, &view);
     if let Some(bow) = &fit.bow {
         for y in 0..view.height {
             for x in 0..view.width {

@@ -1,6 +1,6 @@
 //! The highest surface under each pixel, looking straight down on a plane (orthographic z-buffer).
 
-use super::bulk::{Bounds, bulk};
+use super::bulk::{Bounds, bulk_along, room};
 use crate::domain::{Affine2, Rigid3};
 use crate::mesh::Mesh;
 use crate::raster::Grid;
@@ -10,13 +10,24 @@ pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
 
 /// Points of a set without faces are grown to this many times half their mean spacing, so that no holes stay.
 const POINT_GROWTH: f64 = 1.5;
+/// Triangles that are asked together whether they hold a pixel's centre: most of a scan's are too small.
+const LANES: usize = 8;
 
-/// The mesh in the plane frame: x, y in the plane, z the height over it; mesh units.
+/// A surface ready to be looked at along any direction.
+///
+/// Corners are kept relative to the middle of the bulk, which single precision resolves to a ten-millionth of its
+/// extent.
 #[derive(Debug)]
-pub(super) struct Projected<'a> {
-    points: Vec<[f64; 3]>,
-    triangles: &'a [[u32; 3]],
+pub(super) struct Shell {
+    middle: [f64; 3],
+    blocks: Vec<Block>,
+    has_faces: bool,
 }
+
+/// A few triangles side by side: x, y and z of their first corners, then of their second and third. The last block
+/// repeats its last triangle; a point is a triangle whose corners are one.
+type Block = [[Lanes; 3]; 3];
+type Lanes = [f32; LANES];
 
 /// Where the pixels of a rendering lie in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,58 +42,180 @@ pub(super) struct View {
     pub(super) unit_per_px: f64,
 }
 
-impl<'a> Projected<'a> {
-    /// Moves every vertex into the plane frame.
-    pub(super) fn new(mesh: &'a Mesh, plane_from_mesh: &Rigid3) -> Self {
-        Self {
-            points: mesh
-                .vertices
-                .iter()
-                .map(|v| plane_from_mesh.apply(*v))
-                .collect(),
-            triangles: &mesh.triangles,
-        }
-    }
+/// A linear function of a corner's place relative to the middle.
+#[derive(Debug, Clone, Copy)]
+struct Row([f32; 4]);
 
-    /// Bounds in x and y of the bulk of the points.
-    pub(super) fn bounds(&self) -> Bounds<2> {
-        bulk(&self.points)
+impl Row {
+    #[inline]
+    fn at(&self, [x, y, z]: &[Lanes; 3]) -> Lanes {
+        let [a, b, c, d] = self.0;
+        std::array::from_fn(|k| a * x[k] + b * y[k] + c * z[k] + d)
     }
+}
 
-    /// The highest z under each pixel's centre; [`NOTHING`] where the ray meets no surface.
-    pub(super) fn render(&self, view: &View) -> Grid<f32> {
-        let mut heights = Grid::new(view.width, view.height, NOTHING);
-        if self.triangles.is_empty() {
-            self.splat(view, &mut heights);
-            return heights;
-        }
-        // On the way, since a list of corners would cost more time in memory than in sums.
-        let corner = |i: u32| {
-            let [x, y, z] = self.points[i as usize];
-            let [x, y] = view.px_from_plane.apply([x, y]);
-            [x, y, z]
+impl Shell {
+    /// Takes the corners of a mesh's triangles, or its points when it has none.
+    pub(super) fn new(mesh: &Mesh) -> Self {
+        let [low, high]: Bounds<3> = room(&mesh.vertices);
+        let middle: [f64; 3] = std::array::from_fn(|k| f64::midpoint(low[k], high[k]));
+        let points: Vec<[u32; 3]>;
+        let triangles = if mesh.triangles.is_empty() {
+            points = (0..mesh.vertices.len() as u32).map(|i| [i; 3]).collect();
+            &points
+        } else {
+            &mesh.triangles
         };
-        for t in self.triangles {
-            fill(t.map(corner), &mut heights);
+        Self {
+            middle,
+            blocks: triangles
+                .chunks(LANES)
+                .map(|few| block(few, &mesh.vertices, middle))
+                .collect(),
+            has_faces: !mesh.triangles.is_empty(),
         }
+    }
+
+    /// Rows that give a place in a frame: x, y, z.
+    fn rows(&self, frame: &Rigid3) -> [[f64; 4]; 3] {
+        let origin = frame.apply(self.middle);
+        std::array::from_fn(|k| {
+            let [a, b, c, _] = frame.0[k];
+            [a, b, c, origin[k]]
+        })
+    }
+
+    /// Bounds in x and y of a frame of the bulk of the corners.
+    pub(super) fn bounds(&self, plane_from_mesh: &Rigid3) -> Bounds<2> {
+        let [x, y, _] = self.rows(plane_from_mesh);
+        let [x, y] = [x, y].map(|row| {
+            let row = Row(row.map(|v| v as f32));
+            let corners = self.blocks.iter().flatten();
+            let places: Vec<Lanes> = corners.map(|corner| row.at(corner)).collect();
+            bulk_along(places.as_flattened())
+        });
+        [[x[0], y[0]], [x[1], y[1]]]
+    }
+
+    /// The highest z of a frame under each pixel's centre; [`NOTHING`] where the ray meets no surface.
+    pub(super) fn render(&self, plane_from_mesh: &Rigid3, view: &View) -> Grid<f32> {
+        let mut heights = Grid::new(view.width, view.height, NOTHING);
+        self.raster(plane_from_mesh, view, |place, z| {
+            let height = &mut heights.data_mut()[place];
+            *height = height.max(z);
+        });
         heights
     }
 
+    /// The highest z, and seen from the other side the highest of -z: of `plane_from_mesh` turned about its x axis.
+    pub(super) fn render_both(&self, plane_from_mesh: &Rigid3, view: &View) -> [Grid<f32>; 2] {
+        let mut heights = Grid::new(view.width, view.height, [NOTHING; 2]);
+        self.raster(plane_from_mesh, view, |place, z| {
+            let [front, back] = &mut heights.data_mut()[place];
+            *front = front.max(z);
+            *back = back.max(-z);
+        });
+        let last = view.height.saturating_sub(1);
+        [
+            heights.map(|[front, _]| *front),
+            Grid::from_fn(view.width, view.height, |x, y| heights.at(x, last - y)[1]),
+        ]
+    }
+
+    /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet.
+    fn raster(&self, plane_from_mesh: &Rigid3, view: &View, meet: impl FnMut(usize, f32)) {
+        let [x, y, z] = self.rows(plane_from_mesh);
+        let [[a, b, c], [d, e, f]] = view.px_from_plane.0;
+        let mixed = |p: f64, q: f64, r: f64| {
+            std::array::from_fn(|k| p * x[k] + q * y[k] + if k == 3 { r } else { 0.0 })
+        };
+        let rows =
+            [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| Row(row.map(|v| v as f32)));
+        let size = [view.width, view.height];
+        if self.has_faces {
+            self.fill_all(&rows, size, meet);
+        } else {
+            self.splat(&rows, size, meet);
+        }
+    }
+
+    /// Fills the triangles that hold a pixel's centre.
+    fn fill_all(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
+        let [u, v, z] = rows;
+        for block in &self.blocks {
+            let across = block.each_ref().map(|corner| u.at(corner));
+            let down = block.each_ref().map(|corner| v.at(corner));
+            let (wide, high) = (holding(&across, size[0]), holding(&down, size[1]));
+            let held: [bool; LANES] = std::array::from_fn(|k| wide[k] & high[k]);
+            if held == [false; LANES] {
+                continue;
+            }
+            let heights = block.each_ref().map(|corner| z.at(corner));
+            for k in (0..LANES).filter(|k| held[*k]) {
+                let corner = |c: usize| [across[c][k], down[c][k], heights[c][k]];
+                fill([corner(0), corner(1), corner(2)], size, &mut meet);
+            }
+        }
+    }
+
     /// Each point as a small square.
-    fn splat(&self, view: &View, heights: &mut Grid<f32>) {
-        let [low, high] = self.bounds();
-        let area = (high[0] - low[0]) * (high[1] - low[1]);
-        let spacing_px = (area / self.points.len().max(1) as f64).sqrt() / view.unit_per_px;
-        let reach = (spacing_px * 0.5 * POINT_GROWTH).max(0.5);
-        for p in &self.points {
-            let [x, y] = view.px_from_plane.apply([p[0], p[1]]);
-            for row in pixels(y - reach, y + reach, view.height) {
-                for column in pixels(x - reach, x + reach, view.width) {
-                    raise(heights, column, row, p[2] as f32);
+    fn splat(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
+        let of_row = |row: &Row| -> Vec<f32> {
+            let blocks = self.blocks.iter();
+            blocks.flat_map(|block| row.at(&block[0])).collect()
+        };
+        let [xs, ys, zs] = rows.each_ref().map(of_row);
+        let length = |places: &[f32]| {
+            let [low, high] = bulk_along(places);
+            high - low
+        };
+        let spacing_px = (length(&xs) * length(&ys) / xs.len().max(1) as f64).sqrt();
+        let reach = (spacing_px * 0.5 * POINT_GROWTH).max(0.5) as f32;
+        for ((x, y), z) in xs.iter().zip(&ys).zip(zs) {
+            for row in pixels(y - reach, y + reach, size[1]) {
+                for column in pixels(x - reach, x + reach, size[0]) {
+                    meet(row * size[0] + column, z);
                 }
             }
         }
     }
+}
+
+/// Up to [`LANES`] triangles, the last repeated.
+fn block(triangles: &[[u32; 3]], vertices: &[[f64; 3]], middle: [f64; 3]) -> Block {
+    let mut block = [[[0.0; LANES]; 3]; 3];
+    for lane in 0..LANES {
+        let triangle = triangles[lane.min(triangles.len() - 1)];
+        for (corner, i) in block.iter_mut().zip(triangle) {
+            let vertex = vertices[i as usize];
+            for axis in 0..3 {
+                corner[axis][lane] = (vertex[axis] - middle[axis]) as f32;
+            }
+        }
+    }
+    block
+}
+
+/// Which triangles may hold a pixel's centre along one axis of the grid, given their corners' places along it.
+#[inline]
+fn holding([a, b, c]: &[Lanes; 3], side: usize) -> [bool; LANES] {
+    let last = side as f32 - 1.0;
+    std::array::from_fn(|k| {
+        let low = lower(lower(a[k], b[k]), c[k]);
+        let high = higher(higher(a[k], b[k]), c[k]);
+        // The last whole pixel at or below the upper end; a narrow cast rounds down from 0 up.
+        let below = (lower(higher(high, -1.0), last) + 1.0) as i32 - 1;
+        below as f32 >= higher(low, 0.0)
+    })
+}
+
+/// Plain comparisons, which are one instruction for many lanes; `f32::min` minds what is not a number.
+fn lower(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+fn higher(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
 impl View {
@@ -119,17 +252,8 @@ impl View {
 ///
 /// Every crossing of an edge with a row is computed from the edge's lower to its upper end, so two triangles that
 /// share an edge agree on it to the last bit and no pixel between them stays empty.
-fn fill(corners: [[f64; 3]; 3], heights: &mut Grid<f32>) {
+fn fill(corners: [[f32; 3]; 3], [width, height]: [usize; 2], meet: &mut impl FnMut(usize, f32)) {
     let [a, b, c] = corners;
-    // Most triangles of a scan are smaller than a pixel and hold no centre.
-    let span = |k: usize, len| {
-        let (low, high) = (a[k].min(b[k]).min(c[k]), a[k].max(b[k]).max(c[k]));
-        pixels(low, high, len)
-    };
-    let rows = span(1, heights.height());
-    if rows.is_empty() || span(0, heights.width()).is_empty() {
-        return;
-    }
     let doubled_area = (b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1]);
     if doubled_area == 0.0 || !doubled_area.is_finite() {
         return;
@@ -137,67 +261,78 @@ fn fill(corners: [[f64; 3]; 3], heights: &mut Grid<f32>) {
     let (u, v) = (b[2] - a[2], c[2] - a[2]);
     let dz_dx = (u * (c[1] - a[1]) - v * (b[1] - a[1])) / doubled_area;
     let dz_dy = (v * (b[0] - a[0]) - u * (c[0] - a[0])) / doubled_area;
-    let z_low = a[2].min(b[2]).min(c[2]);
-    let z_high = a[2].max(b[2]).max(c[2]);
-    let width = heights.width();
-    for row in rows {
-        let Some((x_low, x_high)) = crossings(&corners, row as f64) else {
-            continue;
-        };
-        let at_row = a[2] + (row as f64 - a[1]) * dz_dy;
+    let low = |k: usize| a[k].min(b[k]).min(c[k]);
+    let high = |k: usize| a[k].max(b[k]).max(c[k]);
+    let (z_low, z_high) = (low(2), high(2));
+    let edges = [Edge::new(a, b), Edge::new(b, c), Edge::new(c, a)];
+    for row in pixels(low(1), high(1), height) {
+        let y = row as f32;
+        let (mut x_low, mut x_high) = (f32::INFINITY, f32::NEG_INFINITY);
+        for edge in &edges {
+            if let Some(x) = edge.crossing(y) {
+                x_low = x_low.min(x);
+                x_high = x_high.max(x);
+            }
+        }
+        let at_row = a[2] + (y - a[1]) * dz_dy;
         for column in pixels(x_low, x_high, width) {
-            let z = at_row + (column as f64 - a[0]) * dz_dx;
-            raise(heights, column, row, z.clamp(z_low, z_high) as f32);
+            let z = at_row + (column as f32 - a[0]) * dz_dx;
+            meet(row * width + column, z.clamp(z_low, z_high));
         }
     }
 }
 
-/// First and last x at which the triangle's border meets a row.
-fn crossings(corners: &[[f64; 3]; 3], y: f64) -> Option<(f64, f64)> {
-    let mut span: Option<(f64, f64)> = None;
-    for k in 0..3 {
-        let (p, q) = (corners[k], corners[(k + 1) % 3]);
-        let (low, high) = if (p[1], p[0]) <= (q[1], q[0]) {
-            (p, q)
+/// An edge from its lower to its upper end.
+struct Edge {
+    low: [f32; 2],
+    high: [f32; 2],
+    slope: f32,
+}
+
+impl Edge {
+    fn new(a: [f32; 3], b: [f32; 3]) -> Self {
+        let (low, high) = if (a[1], a[0]) <= (b[1], b[0]) {
+            (a, b)
         } else {
-            (q, p)
+            (b, a)
         };
-        if y < low[1] || y > high[1] || low[1] == high[1] {
-            continue;
+        Self {
+            low: [low[0], low[1]],
+            high: [high[0], high[1]],
+            slope: (high[0] - low[0]) / (high[1] - low[1]),
         }
-        let x = if y == high[1] {
-            high[0]
-        } else {
-            low[0] + (y - low[1]) / (high[1] - low[1]) * (high[0] - low[0])
-        };
-        span = Some(span.map_or((x, x), |(a, b)| (a.min(x), b.max(x))));
     }
-    span
+
+    /// x at which the edge meets a row; level edges meet none.
+    #[inline]
+    fn crossing(&self, y: f32) -> Option<f32> {
+        if y < self.low[1] || y > self.high[1] || self.low[1] == self.high[1] {
+            None
+        } else if y == self.high[1] {
+            Some(self.high[0])
+        } else {
+            Some(self.low[0] + (y - self.low[1]) * self.slope)
+        }
+    }
 }
 
 /// Whole pixels from `low` to `high`, bounds included, cut to the grid.
 ///
 /// Casts to narrow integers do the rounding: `ceil` and `floor` are calls.
 #[inline]
-fn pixels(low: f64, high: f64, len: usize) -> std::ops::Range<usize> {
-    let cut = |v: f64| v.max(-1.0).min(len as f64) as i32;
+fn pixels(low: f32, high: f32, len: usize) -> std::ops::Range<usize> {
+    let cut = |v: f32| v.max(-1.0).min(len as f32) as i32;
     let (first, last) = (cut(low), cut(high));
-    let first = (first + i32::from(f64::from(first) < low)).max(0);
-    let end = (last + i32::from(f64::from(last) <= high)).min(len as i32);
+    let first = (first + i32::from((first as f32) < low)).max(0);
+    let end = (last + i32::from(last as f32 <= high)).min(len as i32);
     first as usize..end.max(first) as usize
-}
-
-fn raise(heights: &mut Grid<f32>, x: usize, y: usize, z: f32) {
-    if z > heights.at(x, y) {
-        heights.set(x, y, z);
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
-    use super::{NOTHING, Projected, View};
+    use super::{NOTHING, Shell, View};
     use crate::domain::{Affine2, Rigid3};
     use crate::mesh::Mesh;
 
@@ -226,7 +361,7 @@ mod tests {
                 continue;
             }
             let w = w.map(|one| one / area);
-            near_edge |= w.iter().any(|one| one.abs() < 1e-6);
+            near_edge |= w.iter().any(|one| one.abs() < 1e-4);
             if w.iter().all(|one| *one >= 0.0) {
                 let z = w[0] * p[0][2] + w[1] * p[1][2] + w[2] * p[2][2];
                 best = Some(best.map_or(z, |b: f64| b.max(z)));
@@ -254,9 +389,8 @@ mod tests {
     proptest! {
         #[test]
         fn equals_a_ray_caster(mesh in soup()) {
-            let projected = Projected::new(&mesh, &UPRIGHT);
             let view = View::around([[0.0, 0.0], [10.0, 10.0]], 24, true);
-            let heights = projected.render(&view);
+            let heights = Shell::new(&mesh).render(&UPRIGHT, &view);
             for y in 0..view.height {
                 for x in 0..view.width {
                     let got = heights.at(x, y);
@@ -289,7 +423,7 @@ mod tests {
             height: 121,
             unit_per_px: 0.1,
         };
-        let heights = Projected::new(&mesh, &UPRIGHT).render(&view);
+        let heights = Shell::new(&mesh).render(&UPRIGHT, &view);
         for y in 0..121_i64 {
             for x in 0..121_i64 {
                 let inside = (x - 60).pow(2) + (y - 60).pow(2) < 49 * 49;
@@ -318,9 +452,9 @@ mod tests {
             vertices,
             triangles: Vec::new(),
         };
-        let projected = Projected::new(&mesh, &UPRIGHT);
-        let view = View::around(projected.bounds(), 128, false);
-        let heights = projected.render(&view);
+        let shell = Shell::new(&mesh);
+        let view = View::around(shell.bounds(&UPRIGHT), 128, false);
+        let heights = shell.render(&UPRIGHT, &view);
         let covered = heights.data().iter().filter(|z| **z == 1.0).count();
         assert!(covered > 120 * 120, "{covered}");
     }

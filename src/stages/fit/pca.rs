@@ -5,10 +5,13 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use super::Error;
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
-use crate::stages::bulk::{bulk, holds};
+use crate::stages::bulk::{Bounds, holds, room};
 
 /// A surface given by points alone needs this many: 25 along a side show a stroke or two at best.
 const LEAST_POINTS: usize = 600;
+
+/// Axes of the moments of second degree, each kept once.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
 /// Centre and principal axes, longest first, with the variance along each.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,9 +42,9 @@ impl Axes {
     /// Of a surface, each triangle weighing its area (so repeated vertices and uneven density change nothing);
     /// of the vertices where there is no area. Flecks far from the bulk do not count.
     pub(super) fn of_surface(mesh: &Mesh) -> Self {
-        let bounds = bulk(&mesh.vertices);
+        let bounds: Bounds<3> = room(&mesh.vertices);
         let middle = (Vector3::from(bounds[0]) + Vector3::from(bounds[1])) * 0.5;
-        let (mut total, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
+        let (mut total, mut first, mut second) = (0.0, Vector3::zeros(), [0.0; 6]);
         for t in &mesh.triangles {
             let corners = t.map(|i| mesh.vertices[i as usize]);
             if !corners.iter().all(|corner| holds(&bounds, corner)) {
@@ -54,14 +57,18 @@ impl Axes {
             total += area;
             first += sum * (area / 3.0);
             // Second moment of a triangle: (sum of corners' outer products + outer product of their sum) / 12.
-            let outer = a * a.transpose() + b * b.transpose() + c * c.transpose();
-            second += (outer + sum * sum.transpose()) * (area / 12.0);
+            for (moment, (i, j)) in second.iter_mut().zip(PAIRS) {
+                let outer = a[i] * a[j] + b[i] * b[j] + c[i] * c[j];
+                *moment += (outer + sum[i] * sum[j]) * (area / 12.0);
+            }
         }
         if total <= 0.0 || !total.is_finite() {
             let kept = mesh.vertices.iter().filter(|v| holds(&bounds, v));
             return Self::of_points(kept.map(|v| (*v, 1.0)));
         }
         let centre = first / total;
+        let [xx, xy, xz, yy, yz, zz] = second;
+        let second = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
         let covariance = second / total - centre * centre.transpose();
         Self::from_moments(middle + centre, covariance)
     }

@@ -9,9 +9,9 @@ use super::surface::{Samples, Surface};
 use super::{Error, Params};
 use crate::domain::{Bow, FitOutcome, Rigid3};
 use crate::mesh::Mesh;
-use crate::raster::Picture;
+use crate::raster::{Grid, Picture};
 use crate::stages::otsu;
-use crate::stages::zbuffer::{Projected, View};
+use crate::stages::zbuffer::{Shell, View};
 
 /// Longest side of the rendering that tells the sides apart, and of the one that the surface is fitted to.
 const GLANCE_PX: usize = 96;
@@ -35,9 +35,8 @@ pub(super) fn fit(
 ) -> Result<FitOutcome, Error> {
     let axes = Axes::of_surface(mesh);
     axes.require_surface(mesh)?;
-    let normal = axes.normal();
-    let glance = |n| look(mesh, frame(n, axes.centre), params.bow, GLANCE);
-    let faces = [normal, -normal].map(glance);
+    let shell = Shell::new(mesh);
+    let faces = glances(&shell, &frame(axes.normal(), axes.centre), params.bow);
     let witness = Witness {
         mesh,
         print,
@@ -45,7 +44,7 @@ pub(super) fn fit(
     };
     let no_surface = || Error::NoSurface(mesh.vertices.len());
     let (face, side) = side::choose(faces, witness).ok_or_else(no_surface)?;
-    let face = look(mesh, face.plane_from_mesh, params.bow, LOOK).ok_or_else(no_surface)?;
+    let face = look(&shell, face.plane_from_mesh, params.bow, LOOK).ok_or_else(no_surface)?;
     if face.relief < params.min_relief * face.extent {
         return Err(Error::NoRelief {
             relief: face.relief,
@@ -85,22 +84,105 @@ const LOOK: Care = Care {
     most: MOST_LOOKS,
 };
 
-/// Fits the tops as seen along a frame's z, turning the view until it stands square on them.
-fn look(mesh: &Mesh, start: Rigid3, bow: bool, care: Care) -> Option<Face> {
-    let mut plane_from_mesh = start;
-    for round in 1.. {
-        let projected = Projected::new(mesh, &plane_from_mesh);
-        let view = View::around(projected.bounds(), care.px, false);
-        let heights = projected.render(&view);
-        let samples = Samples::new(&heights, &view)?;
-        let surface = samples.fit(bow);
-        let [a, b, c] = samples.plane_of_tops(&surface);
-        plane_from_mesh = lay_on(&plane_from_mesh, [a, b, c]);
-        if b.hypot(c) < care.slope || round == care.most {
-            return Some(face(plane_from_mesh, &samples, surface, [a, b, c], &view));
+/// Glances at both sides of a frame's plane.
+fn glances(shell: &Shell, front: &Rigid3, bow: bool) -> [Option<Face>; 2] {
+    let view = View::around(shell.bounds(front), GLANCE.px, false);
+    let frames = [*front, turned_about_x(front)];
+    let [front, back] = shell.render_both(front, &view);
+    let again = Care {
+        most: GLANCE.most - 1,
+        ..GLANCE
+    };
+    let glance = |heights: Grid<f32>, frame: &Rigid3| {
+        let seen = Seen::new(frame, &heights, view, bow)?;
+        if seen.slope() < GLANCE.slope {
+            Some(seen.face())
+        } else {
+            look(shell, seen.plane_from_mesh(), bow, again)
         }
+    };
+    [glance(front, &frames[0]), glance(back, &frames[1])]
+}
+
+/// The frame of the other side: x stays, y and z look the other way.
+fn turned_about_x(frame: &Rigid3) -> Rigid3 {
+    let [x, y, z, last] = frame.0;
+    Rigid3([x, y.map(|v| -v), z.map(|v| -v), last])
+}
+
+/// Fits the tops as seen along a frame's z, turning the view until it stands square on them.
+fn look(shell: &Shell, start: Rigid3, bow: bool, care: Care) -> Option<Face> {
+    let mut frame = start;
+    for round in 1.. {
+        let view = View::around(shell.bounds(&frame), care.px, false);
+        let seen = Seen::new(&frame, &shell.render(&frame, &view), view, bow)?;
+        if seen.slope() < care.slope || round >= care.most {
+            return Some(seen.face());
+        }
+        frame = seen.plane_from_mesh();
     }
     None
+}
+
+/// What a rendering shows.
+struct Seen {
+    frame: Rigid3,
+    view: View,
+    samples: Samples,
+    surface: Surface,
+    /// The tops' plane in the frame, `z = a + b x + c y`.
+    plane: [f64; 3],
+}
+
+impl Seen {
+    fn new(frame: &Rigid3, heights: &Grid<f32>, view: View, bow: bool) -> Option<Self> {
+        let samples = Samples::new(heights, &view)?;
+        let surface = samples.fit(bow);
+        Some(Self {
+            frame: *frame,
+            view,
+            plane: samples.plane_of_tops(&surface),
+            samples,
+            surface,
+        })
+    }
+
+    /// How far the tops' plane leans in the view.
+    fn slope(&self) -> f64 {
+        self.plane[1].hypot(self.plane[2])
+    }
+
+    /// The frame laid on the tops' plane.
+    fn plane_from_mesh(&self) -> Rigid3 {
+        lay_on(&self.frame, self.plane)
+    }
+
+    /// Gathers what there is to say of this side.
+    fn face(&self) -> Face {
+        let (samples, surface) = (&self.samples, &self.surface);
+        let mut over_plane = samples.in_plane_units(surface);
+        for (coefficient, flat) in over_plane.iter_mut().zip(self.plane) {
+            *coefficient -= flat;
+        }
+        let bent = over_plane[3..].iter().any(|c| *c != 0.0);
+        let bow = bent.then_some(Bow(over_plane));
+        let relief = if (SCANT..=PLAIN).contains(&surface.tops) {
+            relief(samples.inner_residuals(surface))
+        } else {
+            0.0
+        };
+        let view = &self.view;
+        Face {
+            plane_from_mesh: self.plane_from_mesh(),
+            bow,
+            bow_height: bow.map_or(0.0, |b| bow_height(&b, view)),
+            relief,
+            layer_width: layer_width(samples, surface, relief),
+            tops: samples.soft_tops(surface, relief),
+            extent: view.unit_per_px * view.width.max(view.height) as f64,
+            surface: *surface,
+        }
+    }
 }
 
 /// The frame turned and raised so that `z = a + b x + c y` becomes its plane. Its x axis turns along, so that what
@@ -112,37 +194,6 @@ fn lay_on(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
     let normal = at([-b, -c, 1.0]) - at([0.0; 3]);
     let along = at([1.0, 0.0, 0.0]) - at([0.0; 3]);
     frame_along(normal, along, origin)
-}
-
-/// Gathers what was seen from one side.
-fn face(
-    plane_from_mesh: Rigid3,
-    samples: &Samples,
-    surface: Surface,
-    plane: [f64; 3],
-    view: &View,
-) -> Face {
-    let mut over_plane = samples.in_plane_units(&surface);
-    for (coefficient, flat) in over_plane.iter_mut().zip(plane) {
-        *coefficient -= flat;
-    }
-    let bent = over_plane[3..].iter().any(|c| *c != 0.0);
-    let bow = bent.then_some(Bow(over_plane));
-    let relief = if (SCANT..=PLAIN).contains(&surface.tops) {
-        relief(samples.inner_residuals(&surface))
-    } else {
-        0.0
-    };
-    Face {
-        plane_from_mesh,
-        bow,
-        bow_height: bow.map_or(0.0, |b| bow_height(&b, view)),
-        relief,
-        layer_width: layer_width(samples, &surface, relief),
-        tops: samples.soft_tops(&surface, relief),
-        extent: view.unit_per_px * view.width.max(view.height) as f64,
-        surface,
-    }
 }
 
 /// Largest less smallest height of the bow over the view.

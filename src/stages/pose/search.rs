@@ -16,8 +16,8 @@ const SQUARE: usize = 32;
 pub(super) const SEARCH_PX: usize = 20;
 /// Largest shift between the pictures' middles, as a share of the size.
 const SHIFT: f64 = 0.35;
-/// Angles in a turn; two are looked at with one transform.
-const ANGLES: usize = 36;
+/// Angles in a quarter turn. The four that quarter turns make of one are looked at together.
+const ANGLES: usize = 9;
 /// Ratio between neighbouring scales: the rim of a character moves by about one pixel.
 const SCALE_STEP: f64 = 1.15;
 /// Poses closer than this in angle (degrees) and scale (ratio) are one.
@@ -107,23 +107,28 @@ pub(super) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -> Vec<Found
     let mut peaks = Vec::new();
     for step in -steps..=steps {
         let scale = SCALE_STEP.powi(step);
-        for half in 0..ANGLES / 2 {
-            let angles = [half, half + ANGLES / 2].map(|k| k as f64 * TAU / ANGLES as f64);
-            let turned = angles.map(|angle| centred(moving, Some((angle, scale))));
-            let norms = [norm(&turned[0]), norm(&turned[1])];
+        for k in 0..ANGLES {
+            let angle = k as f64 * TAU / (4 * ANGLES) as f64;
+            let turned = centred(moving, Some((angle, scale)));
+            let norm = norm(&turned);
             transform.take(&turned);
-            for mirrored in readings.iter().copied() {
-                let surface = transform.correlate(&target, mirrored);
-                for (k, angle) in angles.into_iter().enumerate() {
-                    let (shift, height) = highest(surface, k);
-                    let score = f64::from(height) / (norms[k] * fixed_norm).max(1e-12);
-                    peaks.push(Peak {
-                        angle,
-                        scale,
-                        shift,
-                        score,
-                        mirrored,
-                    });
+            for quarter in [false, true] {
+                if quarter {
+                    transform.turn();
+                }
+                for mirrored in readings.iter().copied() {
+                    let surface = transform.correlate(&target, mirrored);
+                    for part in 0..2 {
+                        let (shift, height) = highest(surface, part);
+                        let turns = usize::from(quarter) + 2 * part;
+                        peaks.push(Peak {
+                            angle: angle + turns as f64 * TAU / 4.0,
+                            scale,
+                            shift,
+                            score: f64::from(height) / (norm * fixed_norm).max(1e-12),
+                            mirrored,
+                        });
+                    }
                 }
             }
         }
@@ -268,12 +273,27 @@ impl Transform {
         self.spectrum.iter().map(|v| v.conj() * scale).collect()
     }
 
-    /// Takes in the spectrum of two real squares: the second rides along as the imaginary part.
-    fn take(&mut self, [a, b]: &[Vec<f32>; 2]) {
-        for (out, (re, im)) in self.spectrum.iter_mut().zip(a.iter().zip(b)) {
-            *out = Complex32::new(*re, *im);
+    /// Takes in the spectrum of a real square; the same turned by half a turn rides along as the imaginary part.
+    fn take(&mut self, values: &[f32]) {
+        for y in 0..SQUARE {
+            let back = (SQUARE - y) % SQUARE * SQUARE;
+            for x in 0..SQUARE {
+                let opposite = values[back + (SQUARE - x) % SQUARE];
+                self.spectrum[y * SQUARE + x] = Complex32::new(values[y * SQUARE + x], opposite);
+            }
         }
         both_ways(&self.forward, &mut self.spectrum, &mut self.scratch);
+    }
+
+    /// Turns what was taken in by a quarter turn, x to y: a turn of the square is the same turn of its spectrum.
+    fn turn(&mut self) {
+        // Kept column by column: the value of column u and row v lies at u * SQUARE + v.
+        for u in 0..SQUARE {
+            for v in 0..SQUARE {
+                self.product[u * SQUARE + v] = self.spectrum[v * SQUARE + (SQUARE - u) % SQUARE];
+            }
+        }
+        std::mem::swap(&mut self.spectrum, &mut self.product);
     }
 
     /// Correlation of what was taken in with the target; mirrored in x by reading the spectrum backwards along x.
