@@ -22,16 +22,20 @@
 //! | `mesh` | triangles and points in their own frame; readers of OBJ, PLY, STL, XYZ | `domain` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two folders | `domain` |
 //! | `stages` | fit, depth, normalize, register as pure functions, and the scores | `domain`, `mesh`, `raster` |
+//! | `breakpoint` | named points where a test makes the process die | `domain` |
 //! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `mesh`, `raster` |
-//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain` |
-//! | `runner` | workers, policy, execution of one pair, events | `domain`, `mesh`, `raster`, `stages`, `store`, `catalog` |
+//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain`, `breakpoint` |
+//! | `runner` | workers, policy, execution of one pair, events | `domain`, `mesh`, `raster`, `stages`, `store`, `catalog`, `breakpoint` |
+//! | `check` | a project held against itself, and mended | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets | `domain`, `raster`, `store`, `catalog`, `report` |
 //! | `demo` | the built-in dataset: carved reliefs and prints with known truth, from one seed | `domain`, `mesh`, `raster` |
 //! | `config` | settings in layers, typed and checked, each with its origin | `domain`, `mesh`, `raster`, `stages`, `runner` |
 //! | `cli` | one thin file a command; exit codes, progress, log | all |
 
+mod breakpoint;
 pub mod catalog;
+pub mod check;
 pub mod cli;
 pub mod config;
 pub mod demo;

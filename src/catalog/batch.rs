@@ -19,11 +19,12 @@ pub(super) type Reply<T> = oneshot::Sender<Result<T>>;
 pub(super) struct Beat {
     pub(super) worker: WorkerId,
     pub(super) now: UnixMillis,
+    pub(super) alive_since: UnixMillis,
 }
 
 /// A request that may share a commit. The lease travels with it and comes back only if it still holds.
 pub(super) enum Request {
-    Beat(Beat, Reply<()>),
+    Beat(Beat, Reply<bool>),
     Checkpoint(Box<(Lease, StageDone)>, Reply<bool>),
     Fail(Box<(Lease, StageFailed)>, Reply<bool>),
     Release(Lease, Reply<bool>),
@@ -36,7 +37,7 @@ type Under<T> = (Box<(Lease, T)>, Reply<bool>);
 /// Requests of one commit by kind.
 #[derive(Default)]
 pub(super) struct Batch {
-    beats: Vec<(Beat, Reply<()>)>,
+    beats: Vec<(Beat, Reply<bool>)>,
     checkpoints: Vec<Under<StageDone>>,
     failures: Vec<Under<StageFailed>>,
     releases: Vec<(Lease, Reply<bool>)>,
@@ -45,6 +46,7 @@ pub(super) struct Batch {
 
 /// Answers to the requests of a batch, in their order.
 pub(super) struct Answers {
+    beats: Vec<bool>,
     checkpoints: Vec<bool>,
     failures: Vec<bool>,
     releases: Vec<bool>,
@@ -73,8 +75,9 @@ impl Batch {
     /// Runs the requests in the transaction that is open: beats, checkpoints, failures, releases, claims.
     pub(super) async fn apply(&self, conn: &mut SqliteConnection) -> Result<Answers> {
         let mut deltas = Deltas::default();
+        let mut beats = Vec::with_capacity(self.beats.len());
         for (beat, _) in &self.beats {
-            claim::beat(conn, *beat).await?;
+            beats.push(claim::beat(conn, *beat).await?);
         }
         let done: Vec<_> = self.checkpoints.iter().map(|(done, _)| &**done).collect();
         let checkpoints = checkpoint::apply(conn, &done, &mut deltas).await?;
@@ -88,6 +91,7 @@ impl Batch {
         }
         deltas.apply(conn).await?;
         Ok(Answers {
+            beats,
             checkpoints,
             failures,
             releases,
@@ -97,8 +101,8 @@ impl Batch {
 
     /// Tells everybody what became of the request. Whoever does not wait any more gets no answer.
     pub(super) fn answer(self, answers: Answers) {
-        for (_, reply) in self.beats {
-            let _ = reply.send(Ok(()));
+        for ((_, reply), alive) in self.beats.into_iter().zip(answers.beats) {
+            let _ = reply.send(Ok(alive));
         }
         for ((_, reply), kept) in self.checkpoints.into_iter().zip(answers.checkpoints) {
             let _ = reply.send(Ok(kept));
@@ -117,10 +121,8 @@ impl Batch {
     /// Tells everybody that nothing was stored.
     pub(super) fn refuse(self, error: &Arc<CatalogError>) {
         let shared = || CatalogError::Shared(Arc::clone(error));
-        for (_, reply) in self.beats {
-            let _ = reply.send(Err(shared()));
-        }
-        let replies = self.checkpoints.into_iter().map(|(_, reply)| reply);
+        let replies = self.beats.into_iter().map(|(_, reply)| reply);
+        let replies = replies.chain(self.checkpoints.into_iter().map(|(_, reply)| reply));
         let replies = replies.chain(self.failures.into_iter().map(|(_, reply)| reply));
         for reply in replies.chain(self.releases.into_iter().map(|(_, reply)| reply)) {
             let _ = reply.send(Err(shared()));

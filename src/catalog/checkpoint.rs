@@ -10,16 +10,19 @@ use super::claim::kept_pairs;
 use super::counters::{DONE, Deltas, cursor};
 use super::lease::{InputsSeen, Kept, Lease, MetricResult, StageDone};
 use super::{Catalog, Result, rows};
+use crate::breakpoint::{self, Point};
 use crate::domain::JobStatus;
 
-/// The job's step; only where the lease still holds. Progress clears the pair of suspicion.
+/// The job's step; only where the lease still holds and its worker has given a sign of life lately. Progress clears the pair of suspicion.
 pub(super) const STEP: &str = "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
     attempt = 1, crashes = 0, mem_class = 0
 FROM json_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
-    AND job.epoch = item.value ->> 'epoch' AND job.status = 1
+    AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
+        SELECT 1 FROM worker AS w
+        WHERE w.id = job.worker AND w.ended IS NULL AND w.beat >= item.value ->> 'alive_since')
 RETURNING pair";
 
 const RESULT: &str = "
@@ -91,6 +94,9 @@ pub(super) async fn apply(
         let seen = stored.iter().map(|(lease, done)| (lease, &done.inputs));
         store_seen(conn, seen).await?;
     }
+    for (_, done) in stored.iter().map(|item| &***item) {
+        breakpoint::reach(done.stage, Point::Rowed, None);
+    }
     count(&stored, deltas);
     Ok(answer(done, &kept))
 }
@@ -105,7 +111,7 @@ fn step((lease, done): &(Lease, StageDone)) -> Value {
     json!({
         "pair": lease.pair.0, "worker": lease.worker.0, "epoch": lease.epoch,
         "next": done.stage.index() + 1, "status": status.code(),
-        "deadline": (!finished).then_some(done.next_deadline),
+        "deadline": (!finished).then_some(done.next_deadline), "alive_since": done.alive_since,
     })
 }
 

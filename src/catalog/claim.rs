@@ -9,6 +9,7 @@ use super::counters::{Deltas, cursor};
 use super::lease::Lease;
 use super::writer::Message;
 use super::{Catalog, CatalogError, Result, rows};
+use crate::breakpoint::{self, Point};
 use crate::domain::{JobStatus, PairId, Stage, UnixMillis, WorkerId};
 
 /// What a worker wants to take.
@@ -26,6 +27,8 @@ pub struct ClaimRequest {
     pub among: Option<PairSelection>,
     /// When the first stage should be over.
     pub deadline: UnixMillis,
+    /// Nothing is taken unless the worker's last sign of life is of then or later, by its own clock.
+    pub alive_since: UnixMillis,
 }
 
 /// Some pairs of the catalog.
@@ -43,6 +46,14 @@ impl PairSelection {
         self.len
     }
 
+    /// These pairs.
+    pub fn of(pairs: &[PairId]) -> Self {
+        Self {
+            json: rows::array(pairs.iter().map(|pair| pair.0)).to_string(),
+            len: pairs.len(),
+        }
+    }
+
     /// Whether it is none at all.
     pub const fn is_empty(&self) -> bool {
         self.len == 0
@@ -55,15 +66,17 @@ UPDATE job SET status = 1, worker = ?1, deadline = ?2, epoch = epoch + 1, attemp
 WHERE pair IN (
     SELECT pair FROM job WHERE status = 0 AND stage <= ?3 AND mem_class = ?4
     ORDER BY prio, stage DESC, pair LIMIT ?5)
+    AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND beat >= ?6)
 RETURNING pair, stage, attempt, epoch, crashes, mem_class";
 
 /// The same among some pairs only.
 pub(super) const CLAIM_AMONG: &str = "
 UPDATE job SET status = 1, worker = ?1, deadline = ?2, epoch = epoch + 1, attempt = attempt + 1
 WHERE pair IN (
-    SELECT j.pair FROM json_each(?6) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+    SELECT j.pair FROM json_each(?7) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
     WHERE j.status = 0 AND j.stage <= ?3 AND j.mem_class = ?4
     ORDER BY j.prio, j.stage DESC, j.pair LIMIT ?5)
+    AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND beat >= ?6)
 RETURNING pair, stage, attempt, epoch, crashes, mem_class";
 
 /// Gives leases back as if they had never been taken.
@@ -74,16 +87,19 @@ WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.epoc
     AND job.status = 1
 RETURNING pair";
 
-/// A sign of life; a worker that has ended gives none.
-pub(super) const BEAT: &str = "UPDATE worker SET beat = ?2 WHERE id = ?1 AND ended IS NULL";
+/// A sign of life. A worker that has ended, or whose last one is too long ago, gives none: others may have taken it for
+/// dead.
+pub(super) const BEAT: &str =
+    "UPDATE worker SET beat = ?2 WHERE id = ?1 AND ended IS NULL AND beat >= ?3";
 
-pub(super) async fn beat(conn: &mut SqliteConnection, beat: Beat) -> Result<()> {
-    sqlx::query(BEAT)
+pub(super) async fn beat(conn: &mut SqliteConnection, beat: Beat) -> Result<bool> {
+    let stored = sqlx::query(BEAT)
         .bind(beat.worker.0)
         .bind(beat.now)
+        .bind(beat.alive_since)
         .execute(conn)
         .await?;
-    Ok(())
+    Ok(stored.rows_affected() == 1)
 }
 
 pub(super) async fn claim(
@@ -101,7 +117,8 @@ pub(super) async fn claim(
         .bind(request.deadline)
         .bind(cursor(request.until))
         .bind(i64::from(request.alone))
-        .bind(request.slots as i64);
+        .bind(request.slots as i64)
+        .bind(request.alive_since);
     if let Some(among) = &request.among {
         query = query.bind(&among.json);
     }
@@ -115,6 +132,7 @@ pub(super) async fn claim(
     for lease in &leases {
         let at = cursor(lease.cursor);
         deltas.moved((at, JobStatus::Ready), (at, JobStatus::Leased));
+        breakpoint::reach(lease.cursor, Point::Claiming, None);
     }
     Ok(leases)
 }
@@ -189,13 +207,23 @@ impl Catalog {
         self.grouped(|reply| Request::Release(lease, reply)).await
     }
 
-    /// A sign of life of a worker.
+    /// A sign of life of a worker; `false` when it comes too late, because the last one is from before `alive_since`
+    /// or the worker has ended. Then its leases are over, and it must enter anew to work on.
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn beat(&self, worker: WorkerId, now: UnixMillis) -> Result<()> {
-        self.grouped(|reply| Request::Beat(Beat { worker, now }, reply))
-            .await
+    pub async fn beat(
+        &self,
+        worker: WorkerId,
+        now: UnixMillis,
+        alive_since: UnixMillis,
+    ) -> Result<bool> {
+        let beat = Beat {
+            worker,
+            now,
+            alive_since,
+        };
+        self.grouped(|reply| Request::Beat(beat, reply)).await
     }
 
     /// Sends a request into the next group commit and waits for the answer.

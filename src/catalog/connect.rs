@@ -1,5 +1,6 @@
 //! Opening the database: the right file, the right disk, the right settings, read back.
 
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -8,14 +9,15 @@ use sqlx::sqlite::{
 };
 use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
 
-use super::{CatalogError, Result};
+use super::{CatalogError, Result, Trouble, network};
+use crate::domain::FileKind;
 
 /// How long a connection waits for another process's write.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Marks a database as a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
 /// Version of the schema, raised by each migration.
-const SCHEMA_VERSION: i64 = 2;
+const SCHEMA_VERSION: i64 = 3;
 /// Read connections of a process.
 const READERS: u32 = 4;
 
@@ -34,10 +36,8 @@ fn options(path: &Path) -> SqliteConnectOptions {
 
 /// The write connection, with the schema brought up to date. Makes the file when `create` is set.
 pub(super) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection> {
-    refuse_network(path)?;
-    if !create && !path.is_file() {
-        return Err(CatalogError::Missing(path.to_owned()));
-    }
+    network::refuse(path)?;
+    look(path, create)?;
     // The writer runs the checkpoints itself, so that no commit is made to wait for one.
     let mut conn = options(path)
         .create_if_missing(create)
@@ -46,8 +46,10 @@ pub(super) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection
         .pragma("journal_size_limit", "67108864")
         .connect()
         .await
-        .map_err(|error| foreign(path, error))?;
-    migrate(&mut conn, path).await?;
+        .map_err(|error| not_writable(path, error.into()))?;
+    migrate(&mut conn, path)
+        .await
+        .map_err(|error| not_writable(path, error))?;
     for (name, sql, wanted) in [
         (
             "journal_mode",
@@ -76,54 +78,110 @@ pub(super) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection
 }
 
 /// Connections that only read. They never wait for the writer, nor the writer for them. The catalog of an older
-/// version of the program is brought up to date first.
+/// version of the program is brought up to date first. Where nothing can be written, not even the files that readers
+/// share, the catalog is read as it lies.
 pub(super) async fn readers(path: &Path) -> Result<SqlitePool> {
-    if !path.is_file() {
-        return Err(CatalogError::Missing(path.to_owned()));
+    look(path, false)?;
+    let (pool, found) = match shared(path).await {
+        Err(error) if is_kept_out(&error) => frozen(path, error).await?,
+        outcome => outcome.map_err(|error| unreadable(path, error))?,
+    };
+    match found {
+        Identity::Current => Ok(pool),
+        Identity::Older => {
+            pool.close().await;
+            writer(path, false).await?.close().await?;
+            Ok(shared(path).await?.0)
+        }
+        Identity::Other(number) => Err(wrong_identity(path, number)),
     }
+}
+
+/// Readers beside writers.
+async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
+    pool(options(path).pragma("query_only", "1")).await
+}
+
+/// Readers of a file that nobody can change. Only a log that was folded back can be left out of sight.
+async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identity)> {
+    let log = beside(path, "-wal");
+    match std::fs::metadata(&log) {
+        Ok(meta) if meta.len() > 0 => Err(CatalogError::UnfoldedLog(log)),
+        Ok(_) | Err(_) if std::fs::File::open(path).is_err() => Err(error),
+        Ok(_) | Err(_) => pool(options(path).read_only(true).immutable(true))
+            .await
+            .map_err(|error| unreadable(path, error)),
+    }
+}
+
+async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
     let pool = SqlitePoolOptions::new()
         .max_connections(READERS)
-        .connect_with(options(path).pragma("query_only", "1"))
-        .await
-        .map_err(|error| foreign(path, error))?;
+        .connect_with(options)
+        .await?;
     let found = identity(&mut *pool.acquire().await?).await?;
-    match found {
-        (APPLICATION_ID, SCHEMA_VERSION) => {}
-        (APPLICATION_ID, version) if version < SCHEMA_VERSION => {
-            writer(path, false).await?.close().await?;
-        }
-        found => return Err(wrong_identity(path, found)),
+    Ok((pool, found))
+}
+
+/// A file that SQLite keeps beside the catalog.
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    PathBuf::from(name)
+}
+
+/// What lies where the catalog should be, before the database is let near it: an empty file would pass for a new
+/// catalog. The file is not opened, because closing it again would drop the locks of this process's connections.
+fn look(path: &Path, create: bool) -> Result<()> {
+    match std::fs::metadata(path) {
+        Ok(meta) if meta.is_dir() => Err(CatalogError::IsDirectory(path.to_owned())),
+        Ok(meta) if meta.len() == 0 && !create => Err(CatalogError::Empty(path.to_owned())),
+        Ok(_) => Ok(()),
+        Err(_) if create => Ok(()),
+        Err(_) => Err(CatalogError::Missing(path.to_owned())),
     }
-    Ok(pool)
 }
 
 /// Brings the schema up to date.
 async fn migrate(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
-    match identity(conn)
-        .await
-        .map_err(|error| unreadable(path, error))?
-    {
-        (APPLICATION_ID, SCHEMA_VERSION) => return Ok(()),
-        (0, 0) if is_empty(conn).await? => {}
-        (APPLICATION_ID, version) if version < SCHEMA_VERSION => {}
-        found => return Err(wrong_identity(path, found)),
+    match identity(conn).await? {
+        Identity::Current => return Ok(()),
+        Identity::Older => {}
+        Identity::Other(number) => return Err(wrong_identity(path, number)),
     }
     let outcome = MIGRATOR.run(&mut *conn).await;
     // Another process may have made the schema at the same time; then ours failed and all is well.
-    if identity(conn).await? == (APPLICATION_ID, SCHEMA_VERSION) {
+    if identity(conn).await? == Identity::Current {
         return Ok(());
     }
     Ok(outcome?)
 }
 
-async fn identity(conn: &mut SqliteConnection) -> Result<(i64, i64)> {
+/// Whose database it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Identity {
+    /// A catalog as this program writes it.
+    Current,
+    /// A catalog of an earlier version, or one whose making was cut short.
+    Older,
+    /// Something else, by application id and version.
+    Other((i64, i64)),
+}
+
+/// Reads whose database it is.
+pub(super) async fn identity(conn: &mut SqliteConnection) -> Result<Identity> {
     let id = sqlx::query_scalar("PRAGMA application_id")
         .fetch_one(&mut *conn)
         .await?;
     let version = sqlx::query_scalar("PRAGMA user_version")
-        .fetch_one(conn)
+        .fetch_one(&mut *conn)
         .await?;
-    Ok((id, version))
+    Ok(match (id, version) {
+        (APPLICATION_ID, SCHEMA_VERSION) => Identity::Current,
+        (APPLICATION_ID, version) if version < SCHEMA_VERSION => Identity::Older,
+        (0, 0) if is_empty(conn).await? => Identity::Older,
+        number => Identity::Other(number),
+    })
 }
 
 async fn is_empty(conn: &mut SqliteConnection) -> Result<bool> {
@@ -135,33 +193,57 @@ async fn is_empty(conn: &mut SqliteConnection) -> Result<bool> {
 }
 
 fn wrong_identity(path: &Path, (id, version): (i64, i64)) -> CatalogError {
-    let reason = if id == APPLICATION_ID {
-        format!("its schema is version {version}, this program's is {SCHEMA_VERSION}")
-    } else {
-        "it is another program's database".to_owned()
-    };
+    let path = path.to_owned();
+    if id == APPLICATION_ID {
+        return CatalogError::Newer {
+            path,
+            found: version,
+            known: SCHEMA_VERSION,
+        };
+    }
     CatalogError::Foreign {
-        path: path.to_owned(),
-        reason,
+        path,
+        reason: "another program's database".to_owned(),
     }
 }
 
-fn foreign(path: &Path, error: sqlx::Error) -> CatalogError {
-    unreadable(path, error.into())
+/// Whether the file or its directory cannot be written to, as readers beside writers need it.
+fn is_kept_out(error: &CatalogError) -> bool {
+    matches!(
+        error.trouble(),
+        Some(Trouble::ReadOnly | Trouble::CannotOpen)
+    )
 }
 
-/// Says plainly when the file is no database at all.
+fn not_writable(path: &Path, error: CatalogError) -> CatalogError {
+    if is_kept_out(&error) {
+        CatalogError::NotWritable(path.to_owned())
+    } else {
+        unreadable(path, error)
+    }
+}
+
+/// Says plainly when the file is no database, or no longer a whole one.
 fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
-    match error {
-        CatalogError::Database(sqlx::Error::Database(inner))
-            if inner.message().contains("not a database") =>
-        {
-            CatalogError::Foreign {
-                path: path.to_owned(),
-                reason: inner.message().to_owned(),
-            }
-        }
-        other => other,
+    match error.trouble() {
+        // No connection can be open on a file that is no database, so it may be looked into.
+        Some(Trouble::NotADatabase) => CatalogError::Foreign {
+            path: path.to_owned(),
+            reason: kind(path).to_owned(),
+        },
+        Some(Trouble::Damaged) => CatalogError::Damaged(path.to_owned()),
+        _ => error,
+    }
+}
+
+/// What a file is that is no database.
+fn kind(path: &Path) -> &'static str {
+    let mut head = [0; 512];
+    let read = std::fs::File::open(path).and_then(|mut file| file.read(&mut head));
+    let read = read.unwrap_or(0);
+    match FileKind::of(&head[..read]) {
+        FileKind::Other("an SQLite database") => "a database cut short or encrypted",
+        kind => kind.description(),
     }
 }
 
@@ -182,60 +264,10 @@ async fn assert_pragma(
     })
 }
 
-/// Refuses a directory on a network file system, where the write-ahead log's shared memory does not work.
-fn refuse_network(path: &Path) -> Result<()> {
-    let dir = path.parent().filter(|dir| !dir.as_os_str().is_empty());
-    let dir = dir.unwrap_or(Path::new("."));
-    match network_kind(dir) {
-        Some(kind) => Err(CatalogError::NetworkFileSystem {
-            path: PathBuf::from(dir),
-            kind,
-        }),
-        None => Ok(()),
-    }
-}
-
-/// Name of the network file system a directory is on; `None` on a local one, or where it cannot be told.
-#[cfg(target_os = "linux")]
-fn network_kind(dir: &Path) -> Option<&'static str> {
-    let magic = rustix::fs::statfs(dir).ok()?.f_type;
-    network_magic(u64::try_from(magic).ok()? & 0xffff_ffff)
-}
-
-#[cfg(not(target_os = "linux"))]
-fn network_kind(_dir: &Path) -> Option<&'static str> {
-    None
-}
-
-/// File systems by the number that `statfs` gives (statfs(2) and the kernels' `magic.h`).
-#[cfg(target_os = "linux")]
-const fn network_magic(magic: u64) -> Option<&'static str> {
-    match magic {
-        0x6969 => Some("nfs"),
-        0x517b => Some("smb"),
-        0xff53_4d42 => Some("cifs"),
-        0xfe53_4d42 => Some("smb2"),
-        0x0bd0_0bd0 => Some("lustre"),
-        0x4750_4653 => Some("gpfs"),
-        0x5346_414f | 0x6b41_4653 => Some("afs"),
-        0x00c3_6400 => Some("ceph"),
-        0x2003_0528 => Some("orangefs"),
-        0xaad7_aaea => Some("panfs"),
-        0x7461_636f => Some("ocfs2"),
-        _ => None,
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{network_magic, readers, writer};
+    use super::{readers, writer};
     use crate::catalog::CatalogError;
-
-    #[test]
-    fn nfs_is_a_network_and_ext4_is_not() {
-        assert_eq!(network_magic(0x6969), Some("nfs"));
-        assert_eq!(network_magic(0xef53), None);
-    }
 
     #[tokio::test]
     async fn a_text_file_is_no_catalog() {

@@ -10,17 +10,54 @@ pub enum CatalogError {
     /// There is no catalog file.
     #[error("no catalog at {0}")]
     Missing(PathBuf),
-    /// The file is not a catalog, or of another version of the program.
-    #[error("{path} is not a catalog this program can read: {reason}")]
+    /// A directory lies where the file should be.
+    #[error("{0} is a directory where the catalog should be a file; move it away")]
+    IsDirectory(PathBuf),
+    /// The file has no bytes.
+    #[error(
+        "{0} is empty (0 bytes), so nothing is known of this project; put a backup in its place, or import its pairs again"
+    )]
+    Empty(PathBuf),
+    /// The file is not a catalog.
+    #[error(
+        "{path} is not a catalog but {reason}; move it away, and put a backup in its place if there is one"
+    )]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What it holds instead.
+        /// What it is instead.
         reason: String,
     },
+    /// The file is of a later version of the program.
+    #[error(
+        "{path} was written by a newer version of this program (schema {found}, this one knows {known}); open it with that version"
+    )]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Version of its schema.
+        found: i64,
+        /// Version of ours.
+        known: i64,
+    },
+    /// Pages of the file contradict each other.
+    #[error(
+        "{0} is damaged: some of it is not what the database wrote; `check` tells how far it can be read, and a backup can take its place"
+    )]
+    Damaged(PathBuf),
+    /// The file or its directory cannot be written to.
+    #[error(
+        "{0} cannot be written to; status, show, report and export work here, all else needs a copy that can be written"
+    )]
+    NotWritable(PathBuf),
+    /// The last writer did not fold its log back, and it cannot be done here.
+    #[error(
+        "{0} holds changes that are not in the catalog yet, and nothing can be written here; copy the project to where it can be written"
+    )]
+    UnfoldedLog(PathBuf),
     /// The directory is on a network file system.
     #[error(
-        "{path} is on a network file system ({kind}); the catalog needs a local disk, because its write-ahead log is shared through memory"
+        "{path} is on a network file system ({kind}), where the catalog could be damaged: its write-ahead log is shared through memory; put the project on a local disk, its meshes and prints may stay where they are"
     )]
     NetworkFileSystem {
         /// The directory.
@@ -28,6 +65,9 @@ pub enum CatalogError {
         /// Name of the file system.
         kind: &'static str,
     },
+    /// A path that SQLite cannot take.
+    #[error("path {0:?} is not UTF-8")]
+    NotUtf8(PathBuf),
     /// A setting of the database did not take.
     #[error("the database set {name} to {found}, not {wanted}")]
     Pragma {

@@ -21,7 +21,9 @@ UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.val
     worker = NULL, deadline = NULL
 FROM json_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
-    AND job.epoch = item.value ->> 'epoch' AND job.status = 1
+    AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
+        SELECT 1 FROM worker AS w
+        WHERE w.id = job.worker AND w.ended IS NULL AND w.beat >= item.value ->> 'alive_since')
 RETURNING pair";
 
 const FAILURE: &str = "
@@ -103,7 +105,7 @@ fn json_of((lease, failed): &(Lease, StageFailed)) -> Value {
         "class": failed.failure.class, "message": failed.failure.message, "recipe": failed.recipe.0,
         "mesh_hash": failed.inputs.mesh.as_ref().map(|seen| seen.hash),
         "print_hash": failed.inputs.print.as_ref().map(|seen| seen.hash),
-        "facts": failed.facts, "ms": failed.ms, "at": failed.at,
+        "facts": failed.facts, "ms": failed.ms, "at": failed.at, "alive_since": failed.alive_since,
     })
 }
 

@@ -118,6 +118,8 @@ pub struct StageDone {
     pub at: UnixMillis,
     /// When the next stage should be over.
     pub next_deadline: UnixMillis,
+    /// The lease stands only if the worker's last sign of life is of then or later, by its own clock.
+    pub alive_since: UnixMillis,
 }
 
 /// What a failure means for the job.
@@ -153,6 +155,8 @@ pub struct StageFailed {
     pub ms: Option<u64>,
     /// When it failed.
     pub at: UnixMillis,
+    /// The lease stands only if the worker's last sign of life is of then or later, by its own clock.
+    pub alive_since: UnixMillis,
 }
 
 /// A recipe's number in the catalog.

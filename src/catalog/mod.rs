@@ -3,26 +3,32 @@
 //! One writer task owns the only write connection and commits in groups; readers have their own connections and
 //! work while a run goes on. All times come in as arguments.
 
+mod audit;
 mod batch;
 mod checkpoint;
 mod claim;
 mod connect;
+mod copy;
 mod counters;
 mod error;
 mod fail;
 mod lease;
+mod mend;
+mod network;
 mod pairs;
 mod plan;
 mod query;
 pub mod read;
 mod recipes;
 mod requeue;
+mod rescue;
 mod results;
 mod rows;
 mod staleness;
 mod status;
 #[cfg(test)]
 mod tests;
+mod trouble;
 mod truth;
 mod upkeep;
 mod verdicts;
@@ -35,6 +41,7 @@ use sqlx::pool::PoolConnection;
 use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
 use tokio::sync::{mpsc, oneshot};
 
+pub use audit::{AuditedPair, AuditedResult, Drift};
 pub use claim::{ClaimRequest, PairSelection};
 pub use counters::Counts;
 pub use error::{CatalogError, Result};
@@ -49,8 +56,10 @@ pub use read::{
 };
 pub use recipes::{Recipe, RecipeIds, Recipes};
 pub use requeue::RetrySelection;
+pub use rescue::{Dead, LeaseHolder, Rescued};
 pub use staleness::Again;
-pub use upkeep::{Dead, LeaseHolder, Outstanding, Rescued, WorkLeft, WorkerInfo};
+pub use trouble::Trouble;
+pub use upkeep::{Outstanding, WorkLeft, WorkerInfo};
 pub use verdicts::{NewVerdict, VerdictEvent};
 pub use work::{KnownInputs, PairWork};
 

@@ -9,7 +9,7 @@ use sqlx::{Row as _, SqliteConnection};
 use super::claim::PairSelection;
 use super::counters::{Deltas, cursor};
 use super::read::PairFacts;
-use super::{Catalog, Result, rows};
+use super::{Catalog, Result, rows, truth};
 use crate::domain::{JobStatus, PairName, Stage, UnixMillis};
 
 /// A row to import.
@@ -67,6 +67,20 @@ impl Catalog {
     /// # Errors
     /// When the database refuses; then nothing is imported.
     pub async fn import(&self, rows: Vec<ImportRow>, now: UnixMillis) -> Result<ImportSummary> {
+        let (summary, _) = self.import_with_truth(rows, Vec::new(), now).await?;
+        Ok(summary)
+    }
+
+    /// Imports rows and true alignments in one transaction; also says how many of those were stored.
+    ///
+    /// # Errors
+    /// When a pair of a true alignment is not there even now, or the database refuses; then nothing is imported.
+    pub async fn import_with_truth(
+        &self,
+        rows: Vec<ImportRow>,
+        truths: Vec<(PairName, Value)>,
+        now: UnixMillis,
+    ) -> Result<(ImportSummary, u64)> {
         self.alone(move |conn| {
             Box::pin(async move {
                 let mut summary = ImportSummary::default();
@@ -78,7 +92,8 @@ impl Catalog {
                 deltas.add(at, summary.added as i64);
                 deltas.apply(conn).await?;
                 summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
-                Ok(summary)
+                let stored = truth::set(conn, &truths).await?;
+                Ok((summary, stored))
             })
         })
         .await

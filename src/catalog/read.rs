@@ -11,7 +11,7 @@ use crate::domain::{
     PairName, Reason, Stage, ThresholdMetric, UnixMillis, Verdict,
 };
 
-/// Counts of the whole project; serialises to exactly what `status --json` prints.
+/// Counts of the whole project; `status --json` prints them with whether a process is at work.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct StatusCounts {
     /// Version of this form.

@@ -4,6 +4,8 @@ use serde_json::{Value, json};
 use sqlx::SqliteConnection;
 
 use super::lease::RecipeId;
+use super::plan::FieldChange;
+use super::staleness::differences;
 use super::{Catalog, CatalogError, Result, rows};
 use crate::domain::{ContentHash, Stage};
 
@@ -38,6 +40,14 @@ impl Recipes {
     pub fn of(&self, stage: Stage) -> &Recipe {
         &self.0[stage.index()]
     }
+
+    /// The recipes in a line, for processes to compare; [`Catalog::changes_from`] reads it.
+    pub fn terms(&self) -> String {
+        self.0
+            .each_ref()
+            .map(|recipe| recipe.hash.to_hex())
+            .join(" ")
+    }
 }
 
 /// Numbers of the current recipes in the catalog.
@@ -48,6 +58,11 @@ impl RecipeIds {
     /// The recipe of a stage.
     pub const fn of(&self, stage: Stage) -> RecipeId {
         self.0[stage.index()]
+    }
+
+    /// The numbers as a JSON array by stage.
+    pub(super) fn json(self) -> String {
+        rows::array(self.0.map(|RecipeId(id)| id)).to_string()
     }
 }
 
@@ -81,6 +96,30 @@ impl Catalog {
             })
         })
         .await
+    }
+}
+
+impl Catalog {
+    /// What differs between recipes as [`Recipes::terms`] told them and these; what the catalog does not know of is
+    /// left out.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn changes_from(&self, terms: &str, recipes: &Recipes) -> Result<Vec<FieldChange>> {
+        let mut conn = self.reader().await?;
+        let mut changes = Vec::new();
+        for (stage, hash) in Stage::ALL.into_iter().zip(terms.split_whitespace()) {
+            let fields: Option<String> =
+                sqlx::query_scalar("SELECT fields FROM recipe WHERE hash = unhex(?1)")
+                    .bind(hash)
+                    .fetch_optional(&mut *conn)
+                    .await?;
+            if let Some(fields) = fields {
+                let old = serde_json::from_str(&fields)?;
+                changes.extend(differences(stage, &old, &recipes.of(stage).fields));
+            }
+        }
+        Ok(changes)
     }
 }
 

@@ -195,6 +195,15 @@ impl Catalog {
         plan(&mut conn, recipes, among.as_ref(), again).await
     }
 
+    /// Pairs with results that were made with other settings or inputs than those of now.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn stale(&self, recipes: &Recipes) -> Result<u64> {
+        let mut conn = self.reader().await?;
+        count(&mut conn, recipes).await
+    }
+
     /// Why a pair would run, and from which stage; `None` when nothing is left to do.
     ///
     /// # Errors
@@ -265,7 +274,7 @@ async fn reason(
 }
 
 /// Leaves that differ between two recipes' fields, by name: `register.max_scale`.
-fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
+pub(super) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
     let (old, new) = (leaves(stage, old), leaves(stage, new));
     let names = old.keys().chain(new.keys());
     let names: std::collections::BTreeSet<_> = names.collect();

@@ -1,5 +1,7 @@
 //! The protocol, statement by statement, on a real database file.
 
+mod guards;
+mod histories;
 mod migration;
 mod model;
 mod plans;
@@ -81,6 +83,7 @@ impl World {
             alone: false,
             among: None,
             deadline: 1_000,
+            alive_since: 0,
         };
         self.catalog.claim(request).await.expect("a claim")
     }
@@ -114,7 +117,9 @@ async fn register(catalog: &Catalog) -> WorkerId {
         pid: 1,
         boot_id: None,
     };
-    catalog.register_worker(info, 1).await.expect("a worker")
+    let recipes = catalog.register_recipes(&recipes([1; 4])).await;
+    let entered = catalog.register_worker(info, recipes.expect("recipes"), 1);
+    entered.await.expect("a worker")
 }
 
 fn done(recipes: RecipeIds, stage: Stage) -> StageDone {
@@ -145,6 +150,7 @@ fn done(recipes: RecipeIds, stage: Stage) -> StageDone {
         ms: 5,
         at: 100,
         next_deadline: 2_000,
+        alive_since: 0,
     }
 }
 

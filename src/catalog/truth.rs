@@ -1,6 +1,7 @@
 //! True alignments, where a dataset has them: stored as given, read by the report.
 
 use serde_json::{Value, json};
+use sqlx::SqliteConnection;
 
 use super::{Catalog, CatalogError, Result, rows};
 use crate::domain::PairName;
@@ -22,31 +23,8 @@ impl Catalog {
     /// # Errors
     /// When a pair is not there; then nothing is stored.
     pub async fn set_truth(&self, truths: Vec<(PairName, Value)>) -> Result<u64> {
-        self.alone(move |conn| {
-            Box::pin(async move {
-                let mut stored = 0;
-                for chunk in truths.chunks(500) {
-                    let items = chunk
-                        .iter()
-                        .map(|(name, body)| json!({ "name": name, "body": body.to_string() }));
-                    let items = rows::array(items).to_string();
-                    let unknown: Option<String> = sqlx::query_scalar(UNKNOWN)
-                        .bind(&items)
-                        .fetch_optional(&mut *conn)
-                        .await?;
-                    if let Some(name) = unknown {
-                        return Err(CatalogError::UnknownPair(rows::pair_name(&name)?));
-                    }
-                    stored += sqlx::query(SET)
-                        .bind(items)
-                        .fetch_all(&mut *conn)
-                        .await?
-                        .len() as u64;
-                }
-                Ok(stored)
-            })
-        })
-        .await
+        self.alone(move |conn| Box::pin(async move { set(conn, &truths).await }))
+            .await
     }
 
     /// Whether any pair has a true alignment.
@@ -59,4 +37,28 @@ impl Catalog {
             .fetch_one(&mut *conn)
             .await?)
     }
+}
+
+/// Stores true alignments in the transaction that is open; says how many.
+pub(super) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)]) -> Result<u64> {
+    let mut stored = 0;
+    for chunk in truths.chunks(500) {
+        let items = chunk
+            .iter()
+            .map(|(name, body)| json!({ "name": name, "body": body.to_string() }));
+        let items = rows::array(items).to_string();
+        let unknown: Option<String> = sqlx::query_scalar(UNKNOWN)
+            .bind(&items)
+            .fetch_optional(&mut *conn)
+            .await?;
+        if let Some(name) = unknown {
+            return Err(CatalogError::UnknownPair(rows::pair_name(&name)?));
+        }
+        stored += sqlx::query(SET)
+            .bind(items)
+            .fetch_all(&mut *conn)
+            .await?
+            .len() as u64;
+    }
+    Ok(stored)
 }

@@ -107,7 +107,7 @@ impl Catalog {
     }
 }
 
-fn known_inputs(row: &sqlx::sqlite::SqliteRow) -> Result<KnownInputs> {
+pub(super) fn known_inputs(row: &sqlx::sqlite::SqliteRow) -> Result<KnownInputs> {
     let seen = |hash: &str, stat: &str| -> Result<Option<InputSeen>> {
         let hash: Option<Vec<u8>> = row.try_get(hash)?;
         let hash: Option<ContentHash> = rows::hash_option(hash.as_deref())?;

@@ -6,8 +6,8 @@ use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
 
 use super::exit::ExitCode;
 use super::{
-    completions, config, demo, export, import, man, report, retry, run, sheet, show, status,
-    verdict,
+    backup, check, completions, config, demo, export, import, man, report, retry, run, sheet, show,
+    status, verdict,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -129,6 +129,10 @@ pub(super) enum Command {
     Show(show::ShowArgs),
     /// Take failed pairs up again at the next run
     Retry(retry::RetryArgs),
+    /// Hold files, rows and counters against each other
+    Check(check::CheckArgs),
+    /// Copy the catalog and the verdicts to a file, also while a run goes on
+    Backup(backup::BackupArgs),
     /// Record what people say of the results
     #[command(subcommand)]
     Verdict(verdict::VerdictCommand),

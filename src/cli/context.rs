@@ -7,10 +7,12 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use crate::catalog::Catalog;
 use crate::config::{Loaded, Preset, Sources, Start, load};
 use crate::domain::UnixMillis;
+use crate::runner;
 use crate::store::{Project, SETTINGS_FILE, StoreError};
 
 use super::args::Global;
 use super::progress::Screen;
+use super::table::count;
 use super::talk::Talk;
 
 /// The global flags and what follows from them.
@@ -99,6 +101,27 @@ impl Context {
                 .collect(),
             sets: self.global.set.clone(),
         })?)
+    }
+
+    /// Warns of results that were made with other settings or files than those of now. Settings that cannot be read
+    /// are for others to tell.
+    ///
+    /// # Errors
+    /// When the catalog refuses.
+    pub(super) async fn warn_of_stale(&self, catalog: &Catalog) -> anyhow::Result<()> {
+        let Ok(settings) = self.settings() else {
+            return Ok(());
+        };
+        let recipes = runner::recipes(&settings.config.stages);
+        let stale = catalog.stale(&recipes).await?;
+        if stale > 0 {
+            let pairs = count(stale, "pair");
+            let verb = if stale == 1 { "is" } else { "are" };
+            self.talk.warn(&format!(
+                "{pairs} {verb} stale: made with other settings or files than those of now; `run` brings them up to date"
+            ));
+        }
+        Ok(())
     }
 
     fn start(&self) -> Start {

@@ -35,6 +35,7 @@ pub(super) enum Form {
 pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.reader().await?;
     let config = context.settings()?.config;
+    context.warn_of_stale(&catalog).await?;
     let options = JsonlOptions {
         metrics: config.stages.normalize.method.metrics(),
         with_times: args.with_times,
@@ -64,6 +65,7 @@ fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow
             "done": summary.done,
             "without_result": summary.without_result,
             "unreadable": unreadable,
+            "kept_earlier": summary.kept_earlier,
         }))?;
     }
     for (pair, why) in &summary.unreadable {
@@ -71,6 +73,24 @@ fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow
             .talk
             .warn(&format!("{pair} has no files in the export: {why}"));
     }
+    let shown = args.output.display();
+    if summary.kept_earlier {
+        let lost = count(summary.unreadable.len() as u64, "pair");
+        context.talk.say(&format!(
+            "the earlier export in {shown} stays: the new one would lack the files of {lost}; mend them, or export to a new folder"
+        ));
+    } else {
+        tell_done(summary, args, context);
+    }
+    if !summary.unreadable.is_empty() {
+        // A run trusts what the catalog says is done; a check does not.
+        context.talk.next(&context.command("check --repair"));
+        context.talk.next(&context.command("run"));
+    }
+    Ok(())
+}
+
+fn tell_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
     let unreadable = match summary.unreadable.len() {
         0 => String::new(),
         lost => format!(", {lost} whose files are gone or changed"),
@@ -81,14 +101,4 @@ fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow
         args.output.display(),
         summary.without_result
     ));
-    if let [(pair, _), rest @ ..] = summary.unreadable.as_slice() {
-        // A run trusts what the catalog says is done; only a forced one makes lost files again.
-        let again = if rest.is_empty() {
-            format!("run --rerun all {pair}")
-        } else {
-            "run --rerun all".to_owned()
-        };
-        context.talk.next(&context.command(&again));
-    }
-    Ok(())
 }

@@ -68,22 +68,67 @@ pub(super) async fn take(args: &ImportArgs, context: &Context) -> anyhow::Result
         Some(file) => read_truths(file, &listing.rows, &dir).await?,
         None => Vec::new(),
     };
-    let project = Project::create(&dir)?;
-    let catalog = Catalog::create(&project.catalog_path()).await?;
+    let project = Project::at(&dir);
     let rows = listing
         .rows
         .iter()
         .map(|row| stored_row(row, &project))
         .collect::<anyhow::Result<Vec<_>>>()?;
-    let summary = catalog.import(rows, now()).await?;
-    let stored = catalog.set_truth(stored_truths(truths, &project)?).await?;
-    catalog.close().await;
+    let truths = stored_truths(truths, &project)?;
+    let before = Before::of(&project);
+    let stored = store(&project, rows, truths).await;
+    if stored.is_err() {
+        before.restore(&project);
+    }
+    let (summary, stored) = stored?;
     Ok(Taken {
         summary,
         truths: stored,
         missing: listing.missing(),
         remarks: listing.remarks,
     })
+}
+
+async fn store(
+    project: &Project,
+    rows: Vec<ImportRow>,
+    truths: Vec<(PairName, Value)>,
+) -> anyhow::Result<(ImportSummary, u64)> {
+    Project::create(project.dir())?;
+    let catalog = Catalog::create(&project.catalog_path()).await?;
+    let stored = catalog.import_with_truth(rows, truths, now()).await;
+    catalog.close().await;
+    Ok(stored?)
+}
+
+/// What was there before an import, so that one that fails leaves no half-made project.
+struct Before {
+    dir: bool,
+    catalog: bool,
+}
+
+impl Before {
+    fn of(project: &Project) -> Self {
+        Self {
+            dir: project.dir().exists(),
+            catalog: project.catalog_path().exists(),
+        }
+    }
+
+    /// Takes away what was not there. What cannot be removed is an empty project, which harms nobody.
+    fn restore(&self, project: &Project) {
+        if !self.catalog {
+            for ending in ["", "-wal", "-shm"] {
+                let mut name = project.catalog_path().into_os_string();
+                name.push(ending);
+                let _ = std::fs::remove_file(name);
+            }
+        }
+        if !self.dir {
+            // Only where it is empty.
+            let _ = std::fs::remove_dir(project.dir());
+        }
+    }
 }
 
 fn listing(args: &ImportArgs) -> anyhow::Result<Listing> {

@@ -1,6 +1,8 @@
 //! The command line: one thin file a command.
 
 mod args;
+mod backup;
+mod check;
 mod clock;
 mod compare;
 mod completions;
@@ -27,6 +29,7 @@ mod status;
 mod table;
 mod talk;
 mod tally;
+mod trouble;
 mod truth_file;
 mod verdict;
 mod verdict_file;
@@ -111,6 +114,8 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Status(args) => status::status(args, context).await,
         Command::Show(args) => show::show(args, context).await,
         Command::Retry(args) => retry::retry(args, context).await,
+        Command::Check(args) => check::check(args, context).await,
+        Command::Backup(args) => backup::backup(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
         Command::Report(args) => report::report(args, context).await,
         Command::Export(args) => export::export(args, context).await,
@@ -127,7 +132,11 @@ fn conclude(error: &anyhow::Error, context: &Context) -> ExitCode {
         return ExitCode::Done;
     }
     let code = code_of(error);
-    context.talk.error(&sentence(error), code);
+    let of_catalog = error.chain().find_map(trouble::of_catalog);
+    let explained = of_catalog.and_then(|found| trouble::sentence(found, &context.dir()));
+    context
+        .talk
+        .error(&explained.unwrap_or_else(|| sentence(error)), code);
     match code {
         ExitCode::NoProject => {
             context.talk.next(&context.command("import pairs.csv"));
@@ -171,11 +180,13 @@ fn code_of(error: &anyhow::Error) -> ExitCode {
         }
         match cause.downcast_ref::<RunError>() {
             Some(RunError::InUse(_)) => return ExitCode::InUse,
+            Some(RunError::OtherSettings(_)) => return ExitCode::Usage,
             Some(RunError::NoSuchPair(_)) => return ExitCode::NothingSelected,
             Some(_) | None => {}
         }
-        match cause.downcast_ref::<CatalogError>() {
+        match trouble::of_catalog(cause) {
             Some(CatalogError::Missing(_)) => return ExitCode::NoProject,
+            Some(CatalogError::NetworkFileSystem { .. }) => return ExitCode::Usage,
             Some(
                 CatalogError::UnknownPair(_)
                 | CatalogError::NoResult(_)
@@ -189,6 +200,12 @@ fn code_of(error: &anyhow::Error) -> ExitCode {
             Some(StoreError::NoProject(_))
         ) {
             return ExitCode::NoProject;
+        }
+        if matches!(
+            cause.downcast_ref::<StoreError>(),
+            Some(StoreError::NotUtf8(_))
+        ) {
+            return ExitCode::Usage;
         }
     }
     ExitCode::Error

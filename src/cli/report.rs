@@ -11,6 +11,7 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::talk;
 use crate::report::{Format, Report, gate, gather, render};
+use crate::store::write_whole;
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
@@ -41,7 +42,10 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let report = read(context).await?;
+    let (project, catalog) = context.reader().await?;
+    context.warn_of_stale(&catalog).await?;
+    let report = gather(&catalog, &project).await?;
+    catalog.close().await;
     let format = chosen(args.format, context);
     let text = match &args.compare {
         Some(other) => compared(&report, other, format, context).await?,
@@ -50,7 +54,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     match &args.output {
         Some(path) => {
             let shown = path.display();
-            std::fs::write(path, text).with_context(|| format!("cannot write {shown}"))?;
+            write_whole(path, text.as_bytes()).with_context(|| format!("cannot write {shown}"))?;
             context.talk.say(&format!("report is in {shown}"));
         }
         None => talk::print(&text)?,

@@ -17,7 +17,7 @@ use crate::catalog::{Catalog, Plan};
 use crate::config::Config;
 use crate::domain::{JobStatus, Stage};
 use crate::runner::{self, RunOptions, RunSummary, Stop};
-use crate::store::Project;
+use crate::store::{Project, RunLock};
 
 /// Arguments of `run`.
 #[derive(Debug, Args)]
@@ -27,6 +27,10 @@ pub(super) struct RunArgs {
     /// Pairs worked on at the same time [default: one a core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
+    /// Memory for the pairs worked on at the same time, such as 4G or 512M, by the sizes of their files; a larger pair
+    /// runs alone [default: most of what is free]
+    #[arg(long, value_name = "SIZE", value_parser = bytes)]
+    pub(super) memory: Option<u64>,
     /// Say what would run and why, and run nothing
     #[arg(short = 'n', long)]
     pub(super) dry_run: bool,
@@ -72,7 +76,7 @@ pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<Exit
     if args.dry_run {
         let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;
         catalog.close().await;
-        return tell_plan(&plan, context);
+        return tell_plan(&plan, RunLock::is_held(&project), context);
     }
     let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
     if context.global.json {
@@ -85,6 +89,23 @@ pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<Exit
     Ok(code(&summary))
 }
 
+/// A number of bytes with an ending for its unit: 4G, 512M, 900K.
+fn bytes(text: &str) -> Result<u64, String> {
+    let text = text.trim();
+    let (number, shift) = match text.chars().last().map(|c| c.to_ascii_uppercase()) {
+        Some('K') => (&text[..text.len() - 1], 10),
+        Some('M') => (&text[..text.len() - 1], 20),
+        Some('G') => (&text[..text.len() - 1], 30),
+        Some('T') => (&text[..text.len() - 1], 40),
+        Some(_) | None => (text, 0),
+    };
+    let number: Option<u64> = number.parse().ok();
+    number
+        .and_then(|number| number.checked_mul(1 << shift))
+        .filter(|bytes| *bytes > 0)
+        .ok_or_else(|| "a size is a whole number with K, M, G or T, such as 4G".to_owned())
+}
+
 async fn options(args: &RunArgs, config: &Config, catalog: &Catalog) -> anyhow::Result<RunOptions> {
     let pairs = match args.pairs.as_slice() {
         [] => None,
@@ -93,6 +114,7 @@ async fn options(args: &RunArgs, config: &Config, catalog: &Catalog) -> anyhow::
     let plain = from_config(config);
     Ok(RunOptions {
         workers: args.jobs.map_or(plain.workers, usize::from),
+        memory: args.memory.or(plain.memory),
         join: args.join,
         max_failures: args.max_failures,
         pairs,
@@ -110,6 +132,10 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
         workers: match config.run.workers {
             0 => plain.workers,
             workers => workers,
+        },
+        memory: match config.run.memory_mib {
+            0 => runner::free_memory(),
+            mib => Some(mib << 20),
         },
         stage_limit: Duration::from_secs(config.run.stage_limit_s),
         mesh_limits: config.limits.mesh,
@@ -239,25 +265,30 @@ fn as_json(summary: &RunSummary) -> Value {
     })
 }
 
-fn tell_plan(plan: &Plan, context: &Context) -> anyhow::Result<ExitCode> {
+fn tell_plan(plan: &Plan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
     if context.global.json {
         talk::print_json(&json!({"schema": 1, "pairs": plan.pairs(), "plan": plan}))?;
         return Ok(ExitCode::Done);
     }
-    talk::print(&plan_text(plan))?;
-    if plan.pairs() > 0 {
+    talk::print(&plan_text(plan, running))?;
+    if plan.pairs() > 0 || plan.leased > 0 && !running {
         context.talk.next(&context.command("run"));
     }
     Ok(ExitCode::Done)
 }
 
-fn plan_text(plan: &Plan) -> String {
+fn plan_text(plan: &Plan, running: bool) -> String {
+    let leased = if running {
+        "in the hands of another run"
+    } else {
+        "cut off by the end of their process would run on"
+    };
     let mut parts = vec![format!("{} would run", count(plan.pairs(), "pair"))];
     for (number, what) in [
         (plan.done, "done"),
         (plan.quarantined, "failed and kept back"),
         (plan.held, "set aside"),
-        (plan.leased, "in the hands of another run"),
+        (plan.leased, leased),
     ] {
         if number > 0 {
             parts.push(format!("{number} {what}"));
@@ -283,9 +314,19 @@ fn plan_text(plan: &Plan) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Plan, plan_text};
+    use super::{Plan, bytes, plan_text};
     use crate::catalog::{FieldChange, PlanEntry, WorkReason};
     use crate::domain::Stage;
+
+    #[test]
+    fn sizes_have_a_unit() {
+        assert_eq!(bytes("4G"), Ok(4 << 30));
+        assert_eq!(bytes("512m"), Ok(512 << 20));
+        assert_eq!(bytes("1000"), Ok(1000));
+        for wrong in ["", "G", "0", "-1G", "1.5G", "99999999999T", "4Gé"] {
+            assert!(bytes(wrong).is_err(), "{wrong}");
+        }
+    }
 
     #[test]
     fn plan_names_the_setting_that_changed() {
@@ -306,7 +347,7 @@ mod tests {
             ..Plan::default()
         };
         assert_eq!(
-            plan_text(&plan),
+            plan_text(&plan, false),
             "24 pairs would run, 2 done\n  24  from register  register.max_scale: 1.2 -> 1.3\n"
         );
     }

@@ -14,6 +14,7 @@ use super::talk;
 use crate::domain::ThresholdMetric;
 use crate::export::{Sheet, SheetOptions, SheetOrder, draw_sheet};
 use crate::raster::png_rgb8;
+use crate::store::write_whole;
 
 /// Arguments of `sheet`.
 #[derive(Debug, Args)]
@@ -103,5 +104,5 @@ pub(super) async fn write(args: &SheetArgs, context: &Context) -> anyhow::Result
 
 fn save(path: &Path, sheet: &Sheet) -> anyhow::Result<()> {
     let bytes = png_rgb8(&sheet.picture);
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+    write_whole(path, &bytes).with_context(|| format!("cannot write {}", path.display()))
 }

@@ -4,6 +4,7 @@ use std::io::IsTerminal;
 use std::time::Duration;
 
 use clap::Args;
+use serde_json::Value;
 
 use super::context::Context;
 use super::exit::ExitCode;
@@ -14,6 +15,7 @@ use super::talk::{self, Palette, Tone};
 use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict};
 use crate::runner;
+use crate::store::{Project, RunLock};
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]
@@ -26,10 +28,10 @@ pub(super) struct StatusArgs {
 const EVERY: Duration = Duration::from_secs(2);
 
 pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.reader().await?;
+    let (project, catalog) = context.reader().await?;
     loop {
         let recipes = runner::recipes(&context.settings()?.config.stages);
-        let view = View::read(&catalog, &recipes).await?;
+        let view = View::read(&project, &catalog, &recipes).await?;
         show(&view, args.watch, context)?;
         if !args.watch {
             break;
@@ -46,14 +48,22 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
 /// What the screen shows.
 struct View {
     counts: StatusCounts,
+    /// Whether a process works on the project: without one nothing runs, whatever the leases say.
+    running: bool,
     failures: Failures,
 }
 
 impl View {
-    async fn read(catalog: &Catalog, recipes: &Recipes) -> anyhow::Result<Self> {
+    async fn read(project: &Project, catalog: &Catalog, recipes: &Recipes) -> anyhow::Result<Self> {
+        // Before the counts: a run that ends in between leaves no leases.
+        let running = RunLock::is_held(project);
         let counts = catalog.status(recipes).await?;
         let failures = Failures::read(catalog).await?;
-        Ok(Self { counts, failures })
+        Ok(Self {
+            counts,
+            running,
+            failures,
+        })
     }
 
     fn jobs(&self, status: JobStatus) -> u64 {
@@ -64,6 +74,21 @@ impl View {
         self.jobs(JobStatus::Ready) + self.jobs(JobStatus::Backoff)
     }
 
+    /// Pairs that a process had in hand when it died; the next run takes them up.
+    fn interrupted(&self) -> u64 {
+        if self.running {
+            0
+        } else {
+            self.jobs(JobStatus::Leased)
+        }
+    }
+
+    fn json(&self) -> anyhow::Result<Value> {
+        let mut json = serde_json::to_value(&self.counts)?;
+        json["running"] = Value::from(self.running);
+        Ok(json)
+    }
+
     fn failed(&self) -> u64 {
         self.jobs(JobStatus::Quarantined)
     }
@@ -72,9 +97,9 @@ impl View {
 fn show(view: &View, watched: bool, context: &Context) -> anyhow::Result<()> {
     let talk = &context.talk;
     if context.global.json && watched {
-        talk::print(&serde_json::to_string(&view.counts)?)?;
+        talk::print(&view.json()?.to_string())?;
     } else if context.global.json {
-        talk::print_json(&view.counts)?;
+        talk::print_json(&view.json()?)?;
     } else {
         let clear = if watched && std::io::stdout().is_terminal() {
             CLEAR
@@ -99,6 +124,10 @@ fn screen(view: &View, dir: &str, palette: Palette) -> String {
     if view.failed() > 0 {
         parts.push(format!("{}\n", label("failed", palette)));
         parts.push(view.failures.text());
+    }
+    if view.interrupted() > 0 {
+        let text = "the process that had them died; the next run takes them up";
+        parts.push(line("cut off", text));
     }
     if view.counts.stale > 0 {
         let pairs = count(view.counts.stale, "pair");
@@ -125,7 +154,12 @@ fn headline(view: &View, dir: &str, palette: Palette) -> String {
     ];
     for (number, word, tone) in [
         (view.failed(), "failed", Tone::Bad),
-        (view.jobs(JobStatus::Leased), "running", Tone::Strong),
+        (
+            view.jobs(JobStatus::Leased) - view.interrupted(),
+            "running",
+            Tone::Strong,
+        ),
+        (view.interrupted(), "cut off", Tone::Warn),
         (view.waiting(), "waiting", Tone::Warn),
         (view.jobs(JobStatus::Held), "set aside", Tone::Warn),
     ] {
@@ -196,8 +230,8 @@ fn next_steps(view: &View) -> Vec<String> {
     if view.counts.pairs == 0 {
         steps.push("import pairs.csv".to_owned());
     }
-    let running = view.jobs(JobStatus::Leased) > 0;
-    if !running && view.waiting() + view.counts.stale > 0 {
+    let running = view.jobs(JobStatus::Leased) > view.interrupted();
+    if !running && view.waiting() + view.interrupted() + view.counts.stale > 0 {
         steps.push("run".to_owned());
     }
     if let Some(first) = view.failures.first() {
@@ -232,8 +266,30 @@ mod tests {
                 doubtful: 0,
                 verdicts: std::collections::BTreeMap::new(),
             },
+            running: true,
             failures: super::Failures::default(),
         }
+    }
+
+    #[test]
+    fn what_a_dead_process_had_in_hand_is_not_running() {
+        let mut view = view(3, 0);
+        view.counts.jobs.insert(JobStatus::Leased, 2);
+        let headline = |view: &View| {
+            let text = screen(view, "demo", Palette::PLAIN);
+            text.lines().next().map(str::to_owned)
+        };
+        let told = |word: &str| {
+            Some(format!(
+                "project    demo · 3 pairs · 3 done · 2 {word} · 100.0 %"
+            ))
+        };
+        assert_eq!(headline(&view), told("running"));
+        assert!(next_steps(&view).is_empty());
+        view.running = false;
+        assert_eq!(headline(&view), told("cut off"));
+        assert_eq!(next_steps(&view), ["run", "report"]);
+        assert_eq!(view.json().expect("JSON")["running"], false);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! A CSV file of verdicts: read whole or refused by line number.
+//! A CSV file of verdicts: read whole or refused by line number. Separators and encoding are told from the file.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -8,6 +8,7 @@ use csv::StringRecord;
 use crate::catalog::NewVerdict;
 use crate::config::hint;
 use crate::domain::PairName;
+use crate::manifest::{LineCounter, as_utf8, delimiter};
 
 const COLUMNS: [&str; 6] = ["pair", "verdict", "reader", "metric", "reason", "note"];
 const NEEDED: usize = 3;
@@ -49,14 +50,19 @@ impl VerdictFileError {
 /// # Errors
 /// At the first line that is wrong.
 pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Row>, VerdictFileError> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let text = as_utf8(bytes).map_err(|error| VerdictFileError::new(1, error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
+        .delimiter(delimiter(&text))
         .trim(csv::Trim::All)
-        .from_reader(bytes);
-    let places = places(reader.headers().map_err(|error| csv_error(&error))?)?;
+        .from_reader(&*text);
+    let refused = |error: &csv::Error| csv_error(error, &text);
+    let places = places(reader.headers().map_err(|error| refused(&error))?)?;
+    let mut lines = LineCounter::new(&text);
     let mut rows = Vec::new();
     for record in reader.records() {
-        rows.push(row(&record.map_err(|error| csv_error(&error))?, &places)?);
+        let record = record.map_err(|error| refused(&error))?;
+        let line = lines.at(record.position()) as u64;
+        rows.push(row(&record, line, &places)?);
     }
     Ok(rows)
 }
@@ -93,8 +99,11 @@ fn places(headers: &StringRecord) -> Result<[Option<usize>; 6], VerdictFileError
     Ok(places)
 }
 
-fn row(record: &StringRecord, places: &[Option<usize>; 6]) -> Result<Row, VerdictFileError> {
-    let line = record.position().map_or(0, csv::Position::line);
+fn row(
+    record: &StringRecord,
+    line: u64,
+    places: &[Option<usize>; 6],
+) -> Result<Row, VerdictFileError> {
     let cell = |column: usize| {
         places[column]
             .and_then(|place| record.get(place))
@@ -123,13 +132,13 @@ where
         .map_err(|error: T::Err| VerdictFileError::new(line, error.to_string()))
 }
 
-fn csv_error(error: &csv::Error) -> VerdictFileError {
-    let line = error.position().map_or(1, csv::Position::line);
+fn csv_error(error: &csv::Error, text: &[u8]) -> VerdictFileError {
+    let line = LineCounter::new(text).at(error.position()) as u64;
     let reason = match error.kind() {
         csv::ErrorKind::UnequalLengths {
             expected_len, len, ..
         } => format!("{len} cells where the header has {expected_len}"),
-        csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8".to_owned(),
+        csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8; save it as \"CSV UTF-8\"".to_owned(),
         _ => error.to_string(),
     };
     VerdictFileError::new(line, reason)
@@ -157,6 +166,25 @@ mod tests {
         assert_eq!(rows[1].verdict.reason, Some(Reason::StrokesLost));
         assert_eq!(rows[1].verdict.note.as_deref(), Some("thin, broken"));
         assert_eq!(parse(b"pair,verdict,reader\n").expect("valid"), []);
+    }
+
+    #[test]
+    fn what_spreadsheets_write_is_read() {
+        let plain = parse(b"pair,verdict,reader,note\n1,pass,lan,\"a, b\"\n").expect("valid");
+        let semicolons = "pair;verdict;reader;note\r\n1;pass;lan;a, b\r\n";
+        let tabs = semicolons.replace(';', "\t");
+        let utf16: Vec<u8> = "\u{feff}"
+            .chars()
+            .chain(tabs.chars())
+            .flat_map(|c| (c as u16).to_le_bytes())
+            .collect();
+        for bytes in [semicolons.as_bytes(), tabs.as_bytes(), &utf16] {
+            assert_eq!(parse(bytes).expect("valid"), plain);
+        }
+        let cut = parse(&utf16[..utf16.len() - 1]).expect_err("cut short");
+        assert!(cut.to_string().contains("UTF-16"), "{cut}");
+        let latin = parse(b"pair;verdict;reader\n1;pass;Nguy\xean\n").expect_err("not UTF-8");
+        assert!(latin.to_string().contains("CSV UTF-8"), "{latin}");
     }
 
     #[test]

@@ -35,6 +35,8 @@ pub struct Limits {
 pub struct RunSettings {
     /// Pairs worked on at the same time; 0 is one a core.
     pub workers: usize,
+    /// Memory for the pairs worked on at the same time, in MiB; 0 is most of what is free.
+    pub memory_mib: u64,
     /// Longest time for one stage of one pair, in seconds.
     pub stage_limit_s: u64,
 }

@@ -12,6 +12,7 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("limits.image.max_bytes", 1.0, 1e15),
     ("limits.image.max_pixels", 1.0, 1e10),
     ("run.workers", 0.0, 1024.0),
+    ("run.memory_mib", 0.0, 1e9),
     ("run.stage_limit_s", 1.0, 86_400.0),
     ("fit.spaced_points", 3.0, 100_000.0),
     ("fit.spacing", 1e-6, 1.0),

@@ -10,6 +10,9 @@ use super::files::PAIRS;
 /// The list of lines; a folder with it is an export.
 pub(super) const LINES: &str = "pairs.jsonl";
 
+/// The verdict log, as it was when the export was made.
+pub(super) const VERDICTS: &str = "verdicts.jsonl";
+
 /// A folder being filled beside the one it will become. Dropped unfinished, it is removed.
 #[derive(Debug)]
 pub(super) struct Folder {
@@ -51,6 +54,11 @@ impl Folder {
         refuse_foreign(target)?;
         let (parent, name) = place(target)?;
         fs::create_dir_all(&parent).map_err(at(&parent))?;
+        let old = parent.join(hidden(&name, "old"));
+        if old.exists() && !target.exists() {
+            // A process died between its two renames.
+            fs::rename(&old, target).map_err(at(&old))?;
+        }
         let partial = parent.join(hidden(&name, "partial"));
         remove(&partial)?;
         fs::create_dir(&partial).map_err(at(&partial))?;
@@ -66,11 +74,21 @@ impl Folder {
         &self.partial
     }
 
-    /// Puts the folder in the place of the target.
+    /// Whether an earlier export is there, which finishing would replace.
+    pub(super) fn replaces(&self) -> bool {
+        self.target.join(LINES).exists()
+    }
+
+    /// Puts the folder in the place of the target, once all of it is on disk.
     ///
     /// # Errors
     /// When it cannot be renamed; an earlier export then stays.
     pub(super) fn finish(mut self) -> Result<(), FolderError> {
+        sync(&self.partial).map_err(at(&self.partial))?;
+        if self.target.exists() && exchange(&self.partial, &self.target) {
+            self.finished = true;
+            return remove(&self.partial);
+        }
         let (parent, name) = place(&self.target)?;
         let old = parent.join(hidden(&name, "old"));
         remove(&old)?;
@@ -96,6 +114,29 @@ impl Drop for Folder {
             let _ = fs::remove_dir_all(&self.partial);
         }
     }
+}
+
+/// Brings everything below a folder to disk.
+#[cfg(target_os = "linux")]
+fn sync(folder: &Path) -> io::Result<()> {
+    Ok(rustix::fs::syncfs(fs::File::open(folder)?)?)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn sync(folder: &Path) -> io::Result<()> {
+    fs::File::open(folder)?.sync_all()
+}
+
+/// Swaps two folders in one step, so that at no moment neither is there; `false` where the file system cannot.
+#[cfg(target_os = "linux")]
+fn exchange(one: &Path, other: &Path) -> bool {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    renameat_with(CWD, one, CWD, other, RenameFlags::EXCHANGE).is_ok()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn exchange(_one: &Path, _other: &Path) -> bool {
+    false
 }
 
 /// The folder a target lies in, and its name there.
@@ -133,7 +174,7 @@ fn refuse_foreign(target: &Path) -> Result<(), FolderError> {
     };
     for entry in entries {
         let name = entry.map_err(at(target))?.file_name();
-        if name != LINES && name != PAIRS {
+        if name != LINES && name != PAIRS && name != VERDICTS {
             return Err(not_an_export(target, &name));
         }
     }
@@ -199,6 +240,19 @@ mod tests {
         fs::write(first.path().join(LINES), "one").expect("written");
         first.finish().expect("renamed");
         drop(Folder::begin(&target).expect("an export may be replaced"));
+        assert_eq!(fs::read_to_string(target.join(LINES)).expect("read"), "one");
+        assert_eq!(names(dir.path()), ["out"]);
+    }
+
+    #[test]
+    fn an_export_that_lost_its_place_half_way_gets_it_back() {
+        let dir = tempfile::tempdir().expect("a folder");
+        let (target, old) = (dir.path().join("out"), dir.path().join(".out.mocban-old"));
+        fs::create_dir(&old).expect("made");
+        fs::write(old.join(LINES), "one").expect("written");
+        let folder = Folder::begin(&target).expect("the target is free");
+        assert!(folder.replaces());
+        drop(folder);
         assert_eq!(fs::read_to_string(target.join(LINES)).expect("read"), "one");
         assert_eq!(names(dir.path()), ["out"]);
     }

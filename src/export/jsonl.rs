@@ -9,9 +9,9 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 
 use super::files::{Drawn, FilesError, PAIRS, PairFiles};
-use super::folder::{Folder, FolderError, LINES};
+use super::folder::{Folder, FolderError, LINES, VERDICTS};
 use super::line::{Line, LineStatus, Outcomes};
-use crate::catalog::{Catalog, CatalogError, PairResults};
+use crate::catalog::{Catalog, CatalogError, PairResults, VerdictEvent};
 use crate::domain::{Failure, FailureClass, MetricOutcome, PairName, ThresholdMetric};
 use crate::raster;
 use crate::report::aligned::same_alignment;
@@ -40,6 +40,8 @@ pub struct ExportSummary {
     pub without_result: u64,
     /// Pairs whose result is there but cannot be read, and why.
     pub unreadable: Vec<(PairName, String)>,
+    /// Whether an earlier export stayed in place, because this one lacks files of pairs that are done.
+    pub kept_earlier: bool,
 }
 
 /// Why nothing was exported.
@@ -66,7 +68,8 @@ pub enum ExportError {
 
 /// Exports every pair of a project to a folder, which is new, empty or an earlier export that is replaced.
 ///
-/// A pair whose files cannot be read any more is told in its lines and in the summary; the others go on.
+/// A pair whose files cannot be read any more is told in its lines and in the summary; the others go on. But such an
+/// export never takes the place of an earlier one: that stays, and the new one is dropped.
 ///
 /// # Errors
 /// When the folder cannot be written or the catalog cannot be read; an earlier export then stays as it was.
@@ -92,8 +95,27 @@ pub async fn to_jsonl(
         }
     }
     lines.finish()?;
-    folder.finish()?;
+    write_verdicts(catalog, folder.path()).await?;
+    summary.kept_earlier = !summary.unreadable.is_empty() && folder.replaces();
+    if !summary.kept_earlier {
+        folder.finish()?;
+    }
     Ok(summary)
+}
+
+/// The log of verdicts, a line each, oldest first, those taken back too.
+pub fn verdict_lines(log: &[VerdictEvent]) -> String {
+    let line = |event| {
+        let text = serde_json::to_string(event);
+        text.expect("a verdict holds only numbers, names and text") + "\n"
+    };
+    log.iter().map(line).collect()
+}
+
+async fn write_verdicts(catalog: &Catalog, root: &Path) -> Result<(), ExportError> {
+    let lines = verdict_lines(&catalog.verdict_log(None).await?);
+    let path = root.join(VERDICTS);
+    std::fs::write(&path, lines).map_err(|source| ExportError::Write { path, source })
 }
 
 /// A pair's lines, and why its files are not there although it is done.

@@ -9,6 +9,6 @@ mod sheet;
 
 pub use files::Files;
 pub use folder::FolderError;
-pub use jsonl::{ExportError, ExportSummary, JsonlOptions, to_jsonl};
+pub use jsonl::{ExportError, ExportSummary, JsonlOptions, to_jsonl, verdict_lines};
 pub use line::{Hashes, Line, LineStatus, Maps, Numbers};
 pub use sheet::{Sheet, SheetError, SheetOptions, SheetOrder, draw_sheet};

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use super::draft::{Draft, Rows};
-use super::{COLUMNS, ManifestError, ManifestRow, Problem, REQUIRED};
-
-const BOM: &[u8] = b"\xef\xbb\xbf";
+use super::{
+    COLUMNS, LineCounter, ManifestError, ManifestRow, Problem, REQUIRED, as_utf8, delimiter,
+};
 
 /// Parses a CSV list with a header line. Column names may stand in any order and in capitals; blank lines are
 /// left out.
@@ -13,7 +13,8 @@ const BOM: &[u8] = b"\xef\xbb\xbf";
 /// # Errors
 /// All that is wrong, by the line each row begins at.
 pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
-    let bytes = bytes.strip_prefix(BOM).unwrap_or(bytes);
+    let text = as_utf8(bytes).map_err(|error| Problem::whole(error.to_string()))?;
+    let bytes = &*text;
     let mut reader = ::csv::ReaderBuilder::new()
         .delimiter(delimiter(bytes))
         .trim(::csv::Trim::All)
@@ -23,7 +24,7 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     let mut lines = LineCounter::new(bytes);
     let mut records = reader.byte_records().map(|record| {
         let record = record.map_err(|error| Problem::whole(error.to_string()))?;
-        let line = lines.at(&record);
+        let line = lines.at(record.position());
         Ok::<_, Problem>((line, record))
     });
     let header = match records.next() {
@@ -40,47 +41,6 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
         }
     }
     ManifestError::unless_none(rows.accepted, rows.problems)
-}
-
-/// The separator that the first line holds most of; a comma when in doubt.
-fn delimiter(bytes: &[u8]) -> u8 {
-    let start = bytes.trim_ascii_start();
-    let header = start.split(|byte| *byte == b'\n').next().unwrap_or(start);
-    let count = |delimiter: u8| header.split(|byte| *byte == delimiter).count();
-    [b'\t', b';', b',']
-        .into_iter()
-        .max_by_key(|delimiter| count(*delimiter))
-        .unwrap_or(b',')
-}
-
-/// Tells the line a record begins at. The reader's own count stops at the end of the record before, and blank
-/// lines may follow there.
-struct LineCounter<'a> {
-    bytes: &'a [u8],
-    at: usize,
-    line: usize,
-}
-
-impl<'a> LineCounter<'a> {
-    const fn new(bytes: &'a [u8]) -> Self {
-        Self {
-            bytes,
-            at: 0,
-            line: 1,
-        }
-    }
-
-    fn at(&mut self, record: &::csv::ByteRecord) -> usize {
-        let from = record.position().map_or(0, ::csv::Position::byte) as usize;
-        let blank = self.bytes[from..]
-            .iter()
-            .take_while(|byte| matches!(**byte, b'\r' | b'\n'))
-            .count();
-        let passed = &self.bytes[self.at..from + blank];
-        self.line += passed.split(|byte| *byte == b'\n').count() - 1;
-        self.at = from + blank;
-        self.line
-    }
 }
 
 /// What a column holds.

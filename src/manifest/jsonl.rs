@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 use super::draft::{Draft, Rows};
-use super::{COLUMNS, ManifestError, ManifestRow, Problem};
+use super::{COLUMNS, ManifestError, ManifestRow, Problem, as_utf8};
 
 /// Parses a JSON Lines list. Keys have the names of the CSV columns; `null` is the same as no key; blank lines are
 /// left out.
@@ -11,7 +11,8 @@ use super::{COLUMNS, ManifestError, ManifestRow, Problem};
 /// # Errors
 /// All that is wrong, by line.
 pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let text = as_utf8(bytes).map_err(|error| Problem::whole(error.to_string()))?;
+    let bytes = &*text;
     let mut rows = Rows::default();
     for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
         let content = content.trim_ascii();

@@ -7,6 +7,7 @@ mod draft;
 mod error;
 mod folders;
 mod jsonl;
+mod text;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -17,6 +18,7 @@ pub use self::csv::parse_csv;
 pub use error::{ManifestError, Place, Problem};
 pub use folders::{FolderPairs, pair_folders};
 pub use jsonl::parse_jsonl;
+pub use text::{LineCounter, NotText, as_utf8, delimiter};
 
 /// One pair as a list gives it. Paths are as written: relative ones are relative to the list.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,5 +1,6 @@
 //! The run's loop: keeps the slots filled, hears what comes back, looks after the queue.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -7,13 +8,17 @@ use tokio::sync::mpsc;
 use tokio::task::JoinSet;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
-use super::RunError;
+use super::budget::{self, Budget};
 use super::events::RunEvent;
+use super::options::RunOptions;
 use super::policy::{self, Liveness};
+use super::refresh;
 use super::stop::StopLevel;
 use super::worker::{PairEnd, PairReport, Shared, work};
-use crate::catalog::{ClaimRequest, Dead, Outstanding, PairSelection};
-use crate::domain::WorkerId;
+use super::{RunError, this_process};
+use crate::catalog::{ClaimRequest, Dead, KnownInputs, Lease, Outstanding, PairSelection};
+use crate::domain::{PairId, UnixMillis, WorkerId};
+use crate::raster;
 
 /// Between two looks for pairs that others give back or whose back-off is over.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
@@ -30,15 +35,22 @@ pub(super) struct Tally {
 /// The loop's own state.
 pub(super) struct Dispatch {
     pub(super) shared: Arc<Shared>,
-    pub(super) worker: WorkerId,
+    worker: WorkerId,
     pub(super) workers: usize,
     pub(super) among: Option<PairSelection>,
     pub(super) max_failures: Option<u64>,
-    tasks: JoinSet<PairReport>,
+    images: raster::Limits,
+    /// Pairs in hand, each with the memory it was given.
+    tasks: JoinSet<(PairReport, u64)>,
+    budget: Budget,
+    /// The next pair waits for memory that somebody must give back first.
+    short: bool,
     /// A pair that nothing may run beside is in hand.
     alone: bool,
     /// Whether a claim may find something that the last one did not.
     look: bool,
+    /// When this worker last showed that it lives, by the run's clock.
+    last_beat: UnixMillis,
     liveness: Liveness,
     tally: Tally,
     fatal: Option<RunError>,
@@ -49,24 +61,32 @@ impl Dispatch {
     pub(super) fn new(
         shared: Arc<Shared>,
         worker: WorkerId,
-        workers: usize,
         among: Option<PairSelection>,
-        max_failures: Option<u64>,
+        options: &RunOptions,
     ) -> Self {
         Self {
+            last_beat: shared.clock.now(),
+            liveness: Liveness::new(shared.timing.lease_ms()),
             shared,
             worker,
-            workers: workers.max(1),
+            workers: options.workers.max(1),
             among,
-            max_failures,
+            max_failures: options.max_failures,
+            images: options.image_limits,
             tasks: JoinSet::new(),
+            budget: Budget::new(options.memory),
+            short: false,
             alone: false,
             look: true,
-            liveness: Liveness::default(),
             tally: Tally::default(),
             fatal: None,
             told: StopLevel::Go,
         }
+    }
+
+    /// The number this process works under now.
+    pub(super) const fn worker(&self) -> WorkerId {
+        self.worker
     }
 
     /// Works until nothing is left or the run is stopped. Gives the error that ended it, if one did.
@@ -75,16 +95,16 @@ impl Dispatch {
         events: &mut mpsc::UnboundedReceiver<RunEvent>,
         on_event: &mut (impl FnMut(RunEvent) + Send),
     ) -> Result<Tally, RunError> {
+        let timing = self.shared.timing;
         let mut looks = every(LOOK_EVERY);
-        let mut rescues = every(policy::RESCUE_EVERY);
-        let mut beats = every(policy::BEAT_EVERY);
-        let mut last_beat = self.shared.clock.now();
+        let mut rescues = every(timing.rescue_every);
+        let mut beats = every(timing.beat_every);
         while !self.is_over().await? {
             let shared = Arc::clone(&self.shared);
             tokio::select! {
                 biased;
                 () = shared.stop.reached(next_level(self.told)), if self.told < StopLevel::Now => self.tell_stop(),
-                _ = beats.tick() => last_beat = self.beat(last_beat).await,
+                _ = beats.tick() => self.beat().await?,
                 Some(event) = events.recv() => on_event(event),
                 Some(ended) = self.tasks.join_next() => self.take(ended),
                 _ = rescues.tick() => self.rescue().await?,
@@ -105,7 +125,7 @@ impl Dispatch {
         if self.shared.is_draining() || self.fatal.is_some() {
             return Ok(self.tasks.is_empty());
         }
-        if !self.look || self.alone || self.tasks.len() >= self.workers {
+        if !self.look || self.alone || self.short || self.tasks.len() >= self.workers {
             return Ok(false);
         }
         self.look = false;
@@ -138,13 +158,52 @@ impl Dispatch {
                 alone,
                 among: self.among.clone(),
                 deadline: shared.deadline(),
+                alive_since: shared.alive_since(),
             })
             .await?;
         self.alone = alone && !leases.is_empty();
+        let needs = self.needs(&leases).await?;
         for lease in leases {
-            self.tasks.spawn(work(Arc::clone(&self.shared), lease));
+            let need = needs.get(&lease.pair()).copied().unwrap_or(0);
+            // Those after one that must wait wait too, so that it is not passed over for ever.
+            self.short = self.short || !self.budget.give(need);
+            if self.short {
+                self.shared.catalog.release(lease).await?;
+            } else {
+                let work = work(Arc::clone(&self.shared), lease);
+                self.tasks.spawn(async move { (work.await, need) });
+            }
         }
         Ok(())
+    }
+
+    /// Memory that leased pairs may need.
+    async fn needs(&self, leases: &[Lease]) -> Result<BTreeMap<PairId, u64>, RunError> {
+        if leases.is_empty() || !self.budget.is_limited() {
+            return Ok(BTreeMap::new());
+        }
+        let pairs: Vec<_> = leases.iter().map(Lease::pair).collect();
+        let among = PairSelection::of(&pairs);
+        let catalog = &self.shared.catalog;
+        let inputs = catalog
+            .known_inputs(None, pairs.len(), Some(&among))
+            .await?;
+        let from: BTreeMap<_, _> = leases
+            .iter()
+            .map(|lease| (lease.pair(), lease.cursor()))
+            .collect();
+        let (project, images) = (self.shared.project.clone(), self.images);
+        let look = move || {
+            let need = |inputs: KnownInputs| {
+                let need = budget::need(&project, &inputs, from[&inputs.pair], &images);
+                (inputs.pair, need)
+            };
+            inputs.into_iter().map(need).collect()
+        };
+        match tokio::task::spawn_blocking(look).await {
+            Ok(needs) => Ok(needs),
+            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
+        }
     }
 
     async fn outstanding(&self) -> Result<Outstanding, RunError> {
@@ -156,13 +215,15 @@ impl Dispatch {
     }
 
     /// Takes in how a pair ended.
-    fn take(&mut self, ended: Result<PairReport, tokio::task::JoinError>) {
+    fn take(&mut self, ended: Result<(PairReport, u64), tokio::task::JoinError>) {
         self.alone = false;
+        self.short = false;
         self.look = true;
-        let report = match ended {
-            Ok(report) => report,
+        let (report, need) = match ended {
+            Ok(ended) => ended,
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
+        self.budget.take_back(need);
         self.tally.stages += report.stages;
         match report.end {
             PairEnd::Done => self.tally.done += 1,
@@ -216,19 +277,39 @@ impl Dispatch {
         Ok(())
     }
 
-    /// A sign of life. When none can be given for as long as a lease lasts, the leases are lost: nothing new is begun.
-    async fn beat(&self, last: i64) -> i64 {
+    /// A sign of life. When none can be stored for as long as a lease lasts, the run is over; when one comes too late,
+    /// because the process was held up, it goes on as another worker.
+    async fn beat(&mut self) -> Result<(), RunError> {
         let now = self.shared.clock.now();
-        match self.shared.catalog.beat(self.worker, now).await {
-            Ok(()) => now,
+        let alive_since = self.shared.alive_since();
+        let catalog = &self.shared.catalog;
+        match catalog.beat(self.worker, now, alive_since).await {
+            Ok(true) => self.last_beat = now,
+            Ok(false) => self.enter_anew(now).await?,
             Err(error) => {
                 tracing::warn!(%error, "no sign of life could be stored");
-                if now - last >= policy::LEASE.as_millis() as i64 {
+                if self.last_beat < alive_since {
                     self.drain("the catalog cannot be written any more");
+                    self.fatal.get_or_insert(error.into());
                 }
-                last
             }
         }
+        Ok(())
+    }
+
+    /// Takes a new number. What is in hand under the old one can no longer be stored; its pairs are ready again.
+    async fn enter_anew(&mut self, now: UnixMillis) -> Result<(), RunError> {
+        tracing::warn!("held up past the end of its leases: the stages in hand run again");
+        let catalog = &self.shared.catalog;
+        let old = self.worker;
+        catalog.end_worker(old, now).await?;
+        self.worker = catalog
+            .register_worker(this_process(), self.shared.recipes, now)
+            .await?;
+        self.last_beat = now;
+        catalog.rescue(Dead::Workers(vec![old]), now).await?;
+        self.look = true;
+        Ok(())
     }
 
     /// Takes back the leases of dead workers in other processes.
@@ -239,11 +320,13 @@ impl Dispatch {
         let dead = self.liveness.observe(&holders, self.worker, now);
         let mut rescued = 0;
         if !dead.is_empty() {
-            rescued += catalog.rescue(Dead::Workers(dead), now).await?.ready;
+            let found = catalog.rescue(Dead::Workers(dead), now).await?;
+            refresh::condemned(&self.shared.project, catalog, &found.condemned).await?;
+            rescued += found.ready;
         }
         if holders.iter().any(|holder| holder.worker != self.worker) {
-            let before = now - policy::DEADLINE_MARGIN.as_millis() as i64;
-            let overdue = catalog.rescue_overdue(self.worker, before, now).await?;
+            let margin = self.shared.timing.deadline_margin.as_millis() as i64;
+            let overdue = catalog.rescue_overdue(self.worker, margin, now).await?;
             rescued += overdue.ready;
         }
         if rescued > 0 {

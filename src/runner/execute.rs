@@ -10,11 +10,11 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::oneshot;
 
-use super::breakpoint::{self, Point};
 use super::hand::{PairInHand, Stored};
 use super::outputs;
 use super::steps::{Setback, Steps};
 use super::stop::{Stop, StopLevel};
+use crate::breakpoint::{self, Point};
 use crate::catalog::MetricResult;
 use crate::domain::{ArtifactSet, ContentHash, FailureClass, Stage};
 use crate::store::{ArtifactError, Project};
@@ -46,6 +46,8 @@ pub(super) enum Computed {
     Ended(Box<PairInHand>, Ended, u64),
     /// The stage panicked; the pair in hand is lost with it.
     Panicked(String),
+    /// The system gave no thread for it; the pair in hand is lost.
+    NoThread(std::io::Error),
     /// It took too long; its thread is left behind.
     TimedOut,
     /// The run is to stop now; its thread is left behind.
@@ -71,7 +73,7 @@ pub(super) async fn compute(
         let _ = sender.send(catch_unwind(work));
     });
     if let Err(error) = spawned {
-        return Computed::Panicked(format!("no thread for the stage: {error}"));
+        return Computed::NoThread(error);
     }
     tokio::select! {
         biased;
@@ -97,7 +99,7 @@ fn run(
     let ended = match outcome {
         Err(setback) => Ended::Setback(setback),
         Ok(output) => {
-            breakpoint::reach(stage, Point::Computed);
+            breakpoint::reach(stage, Point::Computed, Some(&pair.facts.name));
             match project.write_artifacts(&output.files) {
                 Err(error) => Ended::NotFiled(error),
                 Ok(files) => filed(stage, &mut pair, output, files),
@@ -114,7 +116,7 @@ fn filed(
     output: super::steps::StageOutput,
     files: ArtifactSet,
 ) -> Ended {
-    breakpoint::reach(stage, Point::Filed);
+    breakpoint::reach(stage, Point::Filed, Some(&pair.facts.name));
     let Some(mesh_hash) = pair.mesh_hash() else {
         let text = "a stage was done before the mesh was read";
         return Ended::Setback(Setback::failed(FailureClass::Bug, text));

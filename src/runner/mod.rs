@@ -3,7 +3,7 @@
 //! [`run`] prepares (lock, dead workers' leases, changed inputs and settings), then `dispatch` keeps the slots filled,
 //! `worker` takes one pair through its stages, and `execute` is the one bridge to the threads that compute.
 
-mod breakpoint;
+mod budget;
 mod clock;
 mod dispatch;
 mod events;
@@ -18,18 +18,21 @@ mod steps;
 mod stop;
 #[cfg(test)]
 mod tests;
+mod timing;
 mod worker;
 
 use std::sync::Arc;
 
 use tokio::sync::mpsc;
 
+pub use budget::free_memory;
 pub use events::{RunEvent, RunSummary};
 pub use options::{Rerun, RunOptions};
+pub use outputs::result_hash;
 pub use stop::{Stop, StopLevel};
 
 use crate::catalog::{
-    Again, Catalog, CatalogError, Dead, PairSelection, Plan, RecipeIds, Recipes, StatusCounts,
+    Again, Catalog, CatalogError, Dead, FieldChange, PairSelection, Plan, Recipes, StatusCounts,
     WorkLeft, WorkerInfo,
 };
 use crate::domain::{PairName, WorkerId};
@@ -39,6 +42,7 @@ use clock::Clock;
 use dispatch::{Dispatch, Tally};
 use pipeline::Pipeline;
 use steps::Steps;
+use timing::Timing;
 use worker::Shared;
 
 /// Why a run could not go on. Pairs that fail are no error: they are in the summary.
@@ -50,6 +54,12 @@ pub enum RunError {
     /// The lock files cannot be used.
     #[error(transparent)]
     Lock(LockError),
+    /// Processes work on the project with other settings.
+    #[error(
+        "the run that goes on has other settings{}; give the same ones, or wait until it is over",
+        listed(.0)
+    )]
+    OtherSettings(Vec<FieldChange>),
     /// Pairs were named that are not there.
     #[error("there is no pair {}", .0.iter().map(PairName::as_str).collect::<Vec<_>>().join(", "))]
     NoSuchPair(Vec<PairName>),
@@ -62,6 +72,15 @@ pub enum RunError {
     /// An artifact could not be written.
     #[error(transparent)]
     Artifact(#[from] ArtifactError),
+}
+
+/// `: register.smoothing_px: 1.0 -> 1.5`, or nothing where it cannot be told what differs.
+fn listed(changes: &[FieldChange]) -> String {
+    let changes: Vec<_> = changes.iter().map(ToString::to_string).collect();
+    match changes.as_slice() {
+        [] => String::new(),
+        changes => format!(" ({})", changes.join(", ")),
+    }
 }
 
 impl From<LockError> for RunError {
@@ -130,11 +149,22 @@ async fn run_steps(
 ) -> Result<RunSummary, RunError> {
     let clock = Clock::start();
     let among = selection(catalog, options).await?;
+    let recipe_ids = catalog.register_recipes(recipes).await?;
     let mut lock = RunLock::acquire(project, options.join)?;
-    let worker = catalog.register_worker(this_process(), clock.now()).await?;
-    let rescued = take_over(project, catalog, &mut lock, worker, clock).await?;
-    let recipe_ids = find_work(project, catalog, recipes, options, among.as_ref(), clock).await?;
-    announce(catalog, options, among.as_ref(), rescued, &mut on_event).await?;
+    agree(catalog, &mut lock, recipes).await?;
+    let worker = catalog
+        .register_worker(this_process(), recipe_ids, clock.now())
+        .await?;
+    let prepared = async {
+        let rescued = take_over(project, catalog, &mut lock, worker, clock).await?;
+        find_work(project, catalog, recipes, options, among.as_ref(), clock).await?;
+        announce(catalog, options, among.as_ref(), rescued, &mut on_event).await
+    };
+    if let Err(error) = prepared.await {
+        // What went wrong says more than that the end could not be noted either.
+        let _ = catalog.end_worker(worker, clock.now()).await;
+        return Err(error);
+    }
     let (events, mut received) = mpsc::unbounded_channel();
     let shared = Shared {
         catalog: catalog.clone(),
@@ -142,17 +172,17 @@ async fn run_steps(
         steps,
         recipes: recipe_ids,
         clock,
+        timing: Timing::of_this_build(),
         stop: stop.clone(),
         drain: Stop::new(),
         until: options.until,
         stage_limit: options.stage_limit,
         events,
     };
-    let (workers, most) = (options.workers, options.max_failures);
-    let mut dispatch = Dispatch::new(Arc::new(shared), worker, workers, among.clone(), most);
+    let mut dispatch = Dispatch::new(Arc::new(shared), worker, among.clone(), options);
     let outcome = dispatch.run(&mut received, &mut on_event).await;
     // Said also after an error, so that this worker's end is not taken for a crash.
-    let ended = catalog.end_worker(worker, clock.now()).await;
+    let ended = catalog.end_worker(dispatch.worker(), clock.now()).await;
     let tally = outcome?;
     ended?;
     let status = catalog.status(recipes).await?;
@@ -160,7 +190,7 @@ async fn run_steps(
     Ok(summary(&tally, left, status, clock, stop))
 }
 
-/// Sends back what changed and what is asked for, and makes ready what is due; gives the recipes to run with.
+/// Sends back what changed and what is asked for, and makes ready what is due.
 async fn find_work(
     project: &Project,
     catalog: &Catalog,
@@ -168,13 +198,12 @@ async fn find_work(
     options: &RunOptions,
     among: Option<&PairSelection>,
     clock: Clock,
-) -> Result<RecipeIds, RunError> {
+) -> Result<(), RunError> {
     refresh::inputs(project, catalog, among).await?;
-    let ids = catalog.register_recipes(recipes).await?;
     catalog.send_back(recipes, among, options.again()).await?;
     let longest = policy::longest_backoff_ms();
     catalog.stage_due(clock.now(), longest).await?;
-    Ok(ids)
+    Ok(())
 }
 
 /// Tells what lies before the run.
@@ -198,6 +227,20 @@ async fn announce(
     Ok(())
 }
 
+/// Holds this process to the settings of those that work already; the first one's settings are the run's.
+async fn agree(catalog: &Catalog, lock: &mut RunLock, recipes: &Recipes) -> Result<(), RunError> {
+    if lock.is_alone() {
+        lock.set_terms(&recipes.terms())?;
+        return Ok(());
+    }
+    let terms = lock.terms()?;
+    if terms == recipes.terms() {
+        return Ok(());
+    }
+    let changes = catalog.changes_from(&terms, recipes).await?;
+    Err(RunError::OtherSettings(changes))
+}
+
 /// Brings back what a dead process left, where the lock proves that no other lives.
 async fn take_over(
     project: &Project,
@@ -210,6 +253,7 @@ async fn take_over(
         return Ok(0);
     }
     let rescued = catalog.rescue(Dead::AllBut(me), clock.now()).await?;
+    refresh::condemned(project, catalog, &rescued.condemned).await?;
     project.clear_temporary()?;
     lock.admit()?;
     Ok(rescued.ready)

@@ -21,6 +21,9 @@ pub enum Rerun {
 pub struct RunOptions {
     /// Pairs worked on at the same time; each has one thread.
     pub workers: usize,
+    /// Memory that the pairs worked on at the same time may need together, in bytes by the sizes of their files; one
+    /// that needs more runs with nothing beside it. `None` for no limit.
+    pub memory: Option<u64>,
     /// Join a run that goes on in another process.
     pub join: bool,
     /// Drain after this many failed pairs.
@@ -45,6 +48,7 @@ impl Default for RunOptions {
     fn default() -> Self {
         Self {
             workers: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+            memory: None,
             join: false,
             max_failures: None,
             pairs: None,

@@ -104,7 +104,7 @@ fn png(role: &str, bytes: Vec<u8>) -> NewArtifact {
 }
 
 /// Hash of a stage's result: its numbers and its files, no times.
-pub(super) fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
+pub fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
     let whole = json!({ "outcome": outcome, "files": files });
     ContentHash::of(whole.to_string().as_bytes())
 }

@@ -12,14 +12,6 @@ pub(super) const IO_ATTEMPTS: u32 = 3;
 pub(super) const BACKOFF_BASE: Duration = Duration::from_secs(1);
 /// Longest wait.
 pub(super) const BACKOFF_CAP: Duration = Duration::from_mins(1);
-/// Between two signs of life.
-pub(super) const BEAT_EVERY: Duration = Duration::from_secs(10);
-/// Without a sign of life for so long a worker is dead.
-pub(super) const LEASE: Duration = Duration::from_mins(1);
-/// Between two looks for dead workers.
-pub(super) const RESCUE_EVERY: Duration = Duration::from_secs(15);
-/// How long after its deadline another worker's lease is taken back.
-pub(super) const DEADLINE_MARGIN: Duration = Duration::from_mins(1);
 
 /// What is known of a failed try.
 #[derive(Debug, Clone, Copy)]
@@ -66,12 +58,21 @@ pub(super) fn longest_backoff_ms() -> i64 {
 
 /// Tells dead workers by their beats: the same beat for as long as a lease, by our own clock. Two machines' clocks
 /// are never compared.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Liveness {
+    lease_ms: i64,
     seen: BTreeMap<WorkerId, (UnixMillis, UnixMillis)>,
 }
 
 impl Liveness {
+    /// With leases of this length.
+    pub(super) const fn new(lease_ms: i64) -> Self {
+        Self {
+            lease_ms,
+            seen: BTreeMap::new(),
+        }
+    }
+
     /// Takes in what the lease holders' beats are now; gives those that are dead.
     pub(super) fn observe(
         &mut self,
@@ -86,7 +87,7 @@ impl Liveness {
             let (beat, since) = self.seen.entry(holder.worker).or_insert((holder.beat, now));
             if *beat != holder.beat {
                 (*beat, *since) = (holder.beat, now);
-            } else if now - *since >= LEASE.as_millis() as i64 {
+            } else if now - *since >= self.lease_ms {
                 dead.push(holder.worker);
             }
         }
@@ -167,7 +168,7 @@ mod tests {
                 beat: if worker == me { 0 } else { beat },
             })
         };
-        let mut liveness = Liveness::default();
+        let mut liveness = Liveness::new(60_000);
         assert!(liveness.observe(&holders(5), me, 0).is_empty());
         assert!(liveness.observe(&holders(6), me, 59_999).is_empty());
         assert!(liveness.observe(&holders(6), me, 119_998).is_empty());

@@ -41,6 +41,43 @@ pub(super) async fn inputs(
     }
 }
 
+/// Notes what the files of pairs are that killed their workers before any stage could tell.
+pub(super) async fn condemned(
+    project: &Project,
+    catalog: &Catalog,
+    pairs: &[PairId],
+) -> Result<(), RunError> {
+    if pairs.is_empty() {
+        return Ok(());
+    }
+    let among = PairSelection::of(pairs);
+    let known = catalog
+        .known_inputs(None, pairs.len(), Some(&among))
+        .await?;
+    let project = project.clone();
+    let look = move || -> Vec<_> {
+        let look = |known: KnownInputs| (known.pair, unread(&project, &known));
+        known.into_par_iter().map(look).collect()
+    };
+    let seen = match tokio::task::spawn_blocking(look).await {
+        Ok(seen) => seen,
+        Err(panic) => std::panic::resume_unwind(panic.into_panic()),
+    };
+    Ok(catalog.note_fatal_inputs(seen).await?)
+}
+
+/// What the files are that no stage has told of.
+fn unread(project: &Project, known: &KnownInputs) -> InputsSeen {
+    let look = |known: Option<&InputSeen>, stored: &str| match known {
+        Some(_) => None,
+        None => seen_now(&project.input_path(stored)),
+    };
+    InputsSeen {
+        mesh: look(known.mesh.as_ref(), &known.mesh_path),
+        print: look(known.print.as_ref(), &known.print_path),
+    }
+}
+
 /// What changed of a pair's files; `None` when nothing did.
 fn changed(project: &Project, known: &KnownInputs) -> Option<(PairId, InputsSeen)> {
     let seen = InputsSeen {

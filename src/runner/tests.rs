@@ -308,9 +308,10 @@ async fn what_a_dead_process_left_comes_back_at_once() {
         pid: 1,
         boot_id: None,
     };
+    let ids = world.catalog.register_recipes(&recipes()).await;
     let dead = world
         .catalog
-        .register_worker(info, 1)
+        .register_worker(info, ids.expect("recipes"), 1)
         .await
         .expect("a worker");
     let request = ClaimRequest {
@@ -320,6 +321,7 @@ async fn what_a_dead_process_left_comes_back_at_once() {
         alone: false,
         among: None,
         deadline: 1,
+        alive_since: 0,
     };
     assert_eq!(
         world.catalog.claim(request).await.expect("a claim").len(),
@@ -371,4 +373,75 @@ async fn a_disk_that_refuses_ends_the_run_and_blames_no_pair() {
     assert_eq!(world.status("a").await, JobStatus::Ready);
     std::fs::remove_file(world.project.artifacts_dir()).expect("removed");
     assert_eq!(world.run(&options(1)).await.done, 1);
+}
+
+/// Both are leased in one claim; the second is given back when it does not fit, before the first can end.
+#[tokio::test]
+async fn pairs_that_do_not_fit_together_run_one_after_the_other() {
+    let world = World::new(&["wait_1", "wait_2", "wait_3"]).await;
+    for (limit, together) in [(None, 3), (Some(80 << 20), 2), (Some(1), 1)] {
+        let world = if limit.is_none() {
+            &world
+        } else {
+            &World::new(&["wait_1", "wait_2", "wait_3"]).await
+        };
+        let options = RunOptions {
+            memory: limit,
+            ..options(3)
+        };
+        let open = async {
+            let settled = async || {
+                let pairs = ["wait_1", "wait_2", "wait_3"];
+                let begun = pairs
+                    .iter()
+                    .filter(|pair| world.steps.count(pair, Stage::Fit) > 0);
+                let begun = begun.count();
+                let mut ready = 0;
+                for pair in pairs {
+                    ready += usize::from(world.status(pair).await == JobStatus::Ready);
+                }
+                begun > 0 && begun + ready == 3
+            };
+            while !settled().await {
+                tokio::task::yield_now().await;
+            }
+            world.steps.open();
+        };
+        let (summary, ()) = tokio::join!(world.run(&options), open);
+        assert_eq!(summary.done, 3);
+        let most = world.steps.most.load(Ordering::SeqCst);
+        assert_eq!(most, together, "{limit:?}");
+    }
+}
+
+/// A pair that is past the last stage to run and backs off is nothing to wait for.
+#[tokio::test]
+async fn a_run_up_to_a_stage_does_not_wait_for_a_later_one_to_be_tried_again() {
+    let world = World::new(&["breaks_1", "a"]).await;
+    let first = RunOptions {
+        pairs: Some(vec![name("breaks_1")]),
+        ..options(1)
+    };
+    let stop = async {
+        while world.status("breaks_1").await != JobStatus::Backoff {
+            tokio::task::yield_now().await;
+        }
+        world.stop.escalate();
+    };
+    let (summary, ()) = tokio::join!(world.run(&first), stop);
+    assert_eq!((summary.stages, summary.left), (1, 1));
+    let early = RunOptions {
+        until: Stage::Fit,
+        ..options(1)
+    };
+    let again = World {
+        stop: Stop::new(),
+        ..world
+    };
+    let summary = again.run(&early).await;
+    assert_eq!((summary.done, summary.stages, summary.left), (1, 1, 0));
+    assert_eq!(again.status("breaks_1").await, JobStatus::Backoff);
+    // The next run takes up what the stopped one left.
+    assert_eq!(again.run(&options(1)).await.done, 2);
+    assert_eq!(again.steps.count("breaks_1", Stage::Depth), 2);
 }

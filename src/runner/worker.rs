@@ -6,7 +6,6 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 
 use super::RunError;
-use super::breakpoint::{self, Point};
 use super::clock::Clock;
 use super::events::RunEvent;
 use super::execute::{Computed, Ended, Filed, compute};
@@ -15,6 +14,8 @@ use super::policy::{self, Try};
 use super::refresh;
 use super::steps::{Setback, Steps};
 use super::stop::{Stop, StopLevel};
+use super::timing::Timing;
+use crate::breakpoint::{self, Point};
 use crate::catalog::{
     Catalog, InputsSeen, Kept, Lease, RecipeIds, Sentence, StageDone, StageFailed,
 };
@@ -28,6 +29,7 @@ pub(super) struct Shared {
     pub(super) steps: Arc<dyn Steps>,
     pub(super) recipes: RecipeIds,
     pub(super) clock: Clock,
+    pub(super) timing: Timing,
     pub(super) stop: Stop,
     /// Raised when the run drains for a reason of its own.
     pub(super) drain: Stop,
@@ -104,6 +106,11 @@ impl Shared {
         self.clock.now() + self.stage_limit.as_millis() as i64
     }
 
+    /// How far back this process's last sign of life may lie for its leases to stand.
+    pub(super) fn alive_since(&self) -> UnixMillis {
+        self.clock.now() - self.timing.lease_ms()
+    }
+
     pub(super) fn tell(&self, event: RunEvent) {
         // The run may have ended by an error; then nobody listens any more.
         let _ = self.events.send(event);
@@ -131,7 +138,7 @@ async fn through(shared: &Shared, lease: Lease, stages: &mut u64) -> Result<Pair
     let mut stage = lease.cursor();
     let mut pair = Box::new(PairInHand::new(shared.catalog.work(&lease).await?));
     let mut lease = lease;
-    breakpoint::reach(stage, Point::Claimed);
+    breakpoint::reach(stage, Point::Claimed, Some(&pair.facts.name));
     loop {
         let known = Known::of(&pair);
         let (back, done) = match step(shared, stage, pair).await {
@@ -194,6 +201,10 @@ async fn step(shared: &Shared, stage: Stage, pair: Box<PairInHand>) -> Step {
             })
         }
         Computed::Ended(_, Ended::NotFiled(error), _) => Step::Refused(error.into()),
+        Computed::NoThread(error) => {
+            let text = format!("the system gave no thread for {stage}: {error}");
+            Step::Failed(Blame::bare(FailureClass::Resource, text))
+        }
         Computed::Panicked(text) => Step::Failed(Blame::bare(FailureClass::Bug, text)),
         Computed::TimedOut => {
             let text = format!("{stage} took longer than {} s", limit.as_secs_f64());
@@ -215,7 +226,7 @@ fn rest(shared: &Shared, done: Stage) -> Option<PairEnd> {
 }
 
 fn finished(shared: &Shared, pair: PairName, stage: Stage, ms: u64) {
-    breakpoint::reach(stage, Point::Stored);
+    breakpoint::reach(stage, Point::Stored, Some(&pair));
     let last = stage == shared.until.min(Stage::Register);
     shared.tell(RunEvent::StageFinished {
         pair: pair.clone(),
@@ -243,6 +254,7 @@ fn done(shared: &Shared, pair: &PairInHand, stage: Stage, filed: Filed, ms: u64)
         ms,
         at: shared.clock.now(),
         next_deadline: shared.deadline(),
+        alive_since: shared.alive_since(),
     }
 }
 
@@ -276,6 +288,7 @@ async fn fail(
         inputs,
         ms: blame.ms,
         at: now,
+        alive_since: shared.alive_since(),
     };
     if !shared.catalog.fail(lease, failed).await? {
         return Ok(PairEnd::Lost);

@@ -85,6 +85,28 @@ impl Project {
         }
     }
 
+    /// Whether an artifact is there and whole, without holding it in memory; `quick` compares its length only.
+    ///
+    /// # Errors
+    /// When the file is missing, unreadable or not what it was.
+    pub fn check_artifact(&self, artifact: &ArtifactRef, quick: bool) -> Result<(), ArtifactError> {
+        let path = self.artifact_path(artifact);
+        let found = match std::fs::metadata(&path) {
+            Ok(meta) if meta.len() != artifact.bytes => Ok(false),
+            Ok(_) if quick => Ok(true),
+            Ok(_) => is_of(&path, &artifact.hash),
+            Err(error) => Err(error),
+        };
+        match found {
+            Ok(true) => Ok(()),
+            Ok(false) => Err(ArtifactError::Changed(path)),
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+                Err(ArtifactError::Missing(path))
+            }
+            Err(source) => Err(ArtifactError::Io { path, source }),
+        }
+    }
+
     /// Writes artifacts so that all are on disk for good when this returns. One that is there already is left.
     ///
     /// # Errors
@@ -123,7 +145,7 @@ impl Project {
         }
     }
 
-    fn temporary_dir(&self) -> PathBuf {
+    pub(super) fn temporary_dir(&self) -> PathBuf {
         self.artifacts_dir().join("tmp")
     }
 
@@ -132,7 +154,9 @@ impl Project {
             return Ok(());
         }
         std::fs::create_dir_all(folder).map_err(ArtifactError::io(folder))?;
-        sync_folder(&self.artifacts_dir())
+        sync_folder(&self.artifacts_dir())?;
+        // The folder of artifacts may be new too.
+        sync_folder(self.dir())
     }
 
     fn place(&self, path: &Path, bytes: &[u8]) -> Result<(), ArtifactError> {
@@ -149,6 +173,13 @@ impl Project {
         }
         outcome
     }
+}
+
+/// Whether the bytes of a file have this hash.
+fn is_of(path: &Path, hash: &ContentHash) -> std::io::Result<bool> {
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(File::open(path)?)?;
+    Ok(hasher.finalize().as_bytes() == hash.as_bytes())
 }
 
 fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
@@ -200,9 +231,14 @@ mod tests {
         let (_dir, project) = project();
         let written = project.write_artifacts(&[picture(b"a")]).expect("written");
         let artifact = &written["depth.png"];
+        assert!(project.check_artifact(artifact, false).is_ok());
         std::fs::write(project.artifact_path(artifact), b"b").expect("a file");
         let outcome = project.read_artifact(artifact);
         assert!(matches!(outcome, Err(ArtifactError::Changed(_))));
+        let outcome = project.check_artifact(artifact, false);
+        assert!(matches!(outcome, Err(ArtifactError::Changed(_))));
+        // Of the same length: only its bytes tell.
+        assert!(project.check_artifact(artifact, true).is_ok());
         project.write_artifacts(&[picture(b"a")]).expect("written");
         assert_eq!(project.read_artifact(artifact).expect("read"), b"a");
     }
@@ -211,6 +247,8 @@ mod tests {
     fn a_missing_artifact_is_told() {
         let (_dir, project) = project();
         let outcome = project.read_artifact(&picture(b"a").reference());
+        assert!(matches!(outcome, Err(ArtifactError::Missing(_))));
+        let outcome = project.check_artifact(&picture(b"a").reference(), true);
         assert!(matches!(outcome, Err(ArtifactError::Missing(_))));
     }
 }

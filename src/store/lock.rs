@@ -6,8 +6,17 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use super::Project;
+
+/// Name of the file that all who work hold in common.
+const MEMBERS: &str = "run.members";
+
+/// How often the lock of the members is asked for before it is believed that others have it: somebody who looks
+/// whether anybody works has it for a moment.
+const ASKED: u32 = 20;
+const BETWEEN: Duration = Duration::from_millis(5);
 
 /// The right to work on a project; ends when it is dropped or the process dies.
 #[derive(Debug)]
@@ -46,7 +55,7 @@ impl RunLock {
         let mut file = open(&path)?;
         let owner = match file.try_lock() {
             Ok(()) => {
-                write_pid(&mut file).map_err(io(&path))?;
+                write_over(&mut file, &std::process::id().to_string()).map_err(io(&path))?;
                 Some(file)
             }
             Err(TryLockError::WouldBlock) if join => None,
@@ -56,9 +65,9 @@ impl RunLock {
             }
             Err(TryLockError::Error(source)) => return Err(LockError::Io { path, source }),
         };
-        let path = project.dir().join("run.members");
+        let path = project.dir().join(MEMBERS);
         let members = open(&path)?;
-        let alone = owner.is_some() && members.try_lock().is_ok();
+        let alone = owner.is_some() && nobody_else(&members);
         if !alone {
             members.lock_shared().map_err(io(&path))?;
         }
@@ -67,6 +76,15 @@ impl RunLock {
             members,
             alone,
         })
+    }
+
+    /// Whether a process works on the project now. Looks without keeping anybody out.
+    pub fn is_held(project: &Project) -> bool {
+        // A lock needs no right to write.
+        match File::open(project.dir().join(MEMBERS)) {
+            Ok(members) => matches!(members.try_lock(), Err(TryLockError::WouldBlock)),
+            Err(_) => false,
+        }
     }
 
     /// Whether no other process works on the project, until [`RunLock::admit`].
@@ -79,19 +97,51 @@ impl RunLock {
         self.owner.is_some()
     }
 
+    /// Writes what those who join must agree to. Only while alone.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn set_terms(&mut self, terms: &str) -> Result<(), LockError> {
+        write_over(&mut self.members, terms).map_err(io(Path::new(MEMBERS)))
+    }
+
+    /// What those who work already have agreed to; empty where nothing was written.
+    ///
+    /// # Errors
+    /// When the file cannot be read.
+    pub fn terms(&mut self) -> Result<String, LockError> {
+        let mut text = String::new();
+        self.members
+            .seek(SeekFrom::Start(0))
+            .and_then(|_| self.members.read_to_string(&mut text))
+            .map_err(io(Path::new(MEMBERS)))?;
+        Ok(text)
+    }
+
     /// Lets others join from here on.
     ///
     /// # Errors
     /// When the file cannot be locked in common.
     pub fn admit(&mut self) -> Result<(), LockError> {
         if self.alone {
-            let path = Path::new("run.members");
+            let path = Path::new(MEMBERS);
             self.members.unlock().map_err(io(path))?;
             self.members.lock_shared().map_err(io(path))?;
             self.alone = false;
         }
         Ok(())
     }
+}
+
+/// Takes the members' lock for this process alone, if nobody else has it for longer than a look.
+fn nobody_else(members: &File) -> bool {
+    for _ in 0..ASKED {
+        if members.try_lock().is_ok() {
+            return true;
+        }
+        std::thread::sleep(BETWEEN);
+    }
+    false
 }
 
 fn io(path: &Path) -> impl FnOnce(std::io::Error) -> LockError {
@@ -109,10 +159,10 @@ fn open(path: &Path) -> Result<File, LockError> {
         .map_err(io(path))
 }
 
-fn write_pid(file: &mut File) -> std::io::Result<()> {
+fn write_over(file: &mut File, text: &str) -> std::io::Result<()> {
     file.set_len(0)?;
     file.seek(SeekFrom::Start(0))?;
-    write!(file, "{}", std::process::id())
+    file.write_all(text.as_bytes())
 }
 
 /// The number in the file; `None` while its owner has not written it yet.
@@ -157,5 +207,30 @@ mod tests {
                 .expect("the lock")
                 .is_alone()
         );
+    }
+
+    #[test]
+    fn who_looks_sees_whether_anybody_works_and_disturbs_nobody() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(dir.path()).expect("a project");
+        assert!(!RunLock::is_held(&project));
+        let mut owner = RunLock::acquire(&project, false).expect("the lock");
+        assert!(RunLock::is_held(&project));
+        owner.admit().expect("the lock in common");
+        assert!(RunLock::is_held(&project));
+        drop(owner);
+        assert!(!RunLock::is_held(&project));
+    }
+
+    #[test]
+    fn who_joins_reads_the_terms_of_the_first() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = Project::create(dir.path()).expect("a project");
+        let mut owner = RunLock::acquire(&project, false).expect("the lock");
+        owner.set_terms("longer than the next").expect("written");
+        owner.set_terms("in mm").expect("written");
+        owner.admit().expect("the lock in common");
+        let mut joined = RunLock::acquire(&project, true).expect("joined");
+        assert_eq!(joined.terms().expect("read"), "in mm");
     }
 }

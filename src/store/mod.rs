@@ -3,9 +3,13 @@
 mod artifacts;
 mod inputs;
 mod lock;
+mod named;
 mod project;
+mod whole;
 
 pub use artifacts::{ArtifactError, NewArtifact};
 pub use inputs::{FileStat, InputError, InputFile, hash_input, read_input, stat_input};
 pub use lock::{LockError, RunLock};
+pub use named::{NamedArtifacts, Unnamed, UnnamedKind};
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
+pub use whole::{finish_whole, partial_of, write_whole};

@@ -22,7 +22,7 @@ pub enum StoreError {
     #[error("no project at {0}: it has no {CATALOG_FILE}")]
     NoProject(PathBuf),
     /// A path that the catalog cannot hold.
-    #[error("path {0:?} is not UTF-8")]
+    #[error("path {0:?} is not UTF-8, so the catalog cannot hold it; rename the file or folder")]
     NotUtf8(PathBuf),
     /// A file operation failed.
     #[error("{path}: {source}")]
@@ -47,12 +47,20 @@ impl Project {
     /// # Errors
     /// When the directory holds no catalog.
     pub fn open(dir: &Path) -> Result<Self, StoreError> {
-        if !dir.join(CATALOG_FILE).is_file() {
+        // What else may lie there in its place is told when the catalog is opened.
+        if !dir.join(CATALOG_FILE).exists() {
             return Err(StoreError::NoProject(dir.to_owned()));
         }
         Ok(Self {
             dir: dir.to_owned(),
         })
+    }
+
+    /// A project that may not be there yet: nothing is looked at or made.
+    pub fn at(dir: &Path) -> Self {
+        Self {
+            dir: dir.to_owned(),
+        }
     }
 
     /// Makes the directory where it is missing. The catalog is made by `Catalog::create`.

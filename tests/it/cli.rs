@@ -65,7 +65,7 @@ pub(crate) fn call(command: &mut Command) -> Call {
     }
 }
 
-fn empty() -> tempfile::TempDir {
+pub(crate) fn empty() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary directory")
 }
 
@@ -94,6 +94,9 @@ fn directory_without_project_is_code_10_with_a_way_on() {
         &["status"],
         &["show", "0001"],
         &["retry"],
+        &["check"],
+        &["check", "--repair"],
+        &["backup", "b.sqlite"],
         &["verdict", "log"],
         &["report"],
         &["export", "-o", "out"],

@@ -12,18 +12,33 @@ use crate::cli::{binary, call, mocban};
 /// Small depth maps: what is tested is not the alignment.
 const FAST: [&str; 2] = ["--set", "depth.longest_px=96"];
 
+/// Every named point between claim, artifact, row and commit, in an order in which three pairs come by.
+const POINTS: [&str; 12] = [
+    "fit:claiming",
+    "fit:claimed",
+    "fit:computed",
+    "fit:filed:2",
+    "depth:rowed",
+    "depth:stored",
+    "normalize:claiming",
+    "normalize:computed",
+    "normalize:stored",
+    "register:claimed",
+    "register:rowed",
+    "register:stored",
+];
+
 /// Makes a demo project of some pairs that have not run.
 pub(crate) fn project(dir: &Path, name: &str, pairs: &str) -> Project {
     mocban(dir, &["demo", name, "--pairs", pairs, "--no-run"]).expect(0);
     Project::open(&dir.join(name)).expect("a project")
 }
 
-/// The same project again in a folder beside it.
-fn copy(project: &Project, name: &str) -> Project {
-    let to = project.dir().with_file_name(name);
-    let mut open = vec![(project.dir().to_owned(), to.clone())];
+/// The same project again in another folder.
+pub(crate) fn copy(project: &Project, to: &Path) -> Project {
+    let mut open = vec![(project.dir().to_owned(), to.to_owned())];
     while let Some((from, to)) = open.pop() {
-        std::fs::create_dir(&to).expect("a folder");
+        std::fs::create_dir_all(&to).expect("a folder");
         for entry in std::fs::read_dir(from).expect("a folder") {
             let from = entry.expect("an entry").path();
             let to = to.join(from.file_name().expect("a name"));
@@ -34,15 +49,20 @@ fn copy(project: &Project, name: &str) -> Project {
             }
         }
     }
-    Project::open(&to).expect("a project")
+    Project::open(to).expect("a project")
 }
 
 /// `run` with some arguments, ready to be called.
 pub(crate) fn run(project: &Project, args: &[&str]) -> Command {
+    run_telling(project, "none", args)
+}
+
+/// The same with progress in some form on stderr.
+pub(crate) fn run_telling(project: &Project, progress: &str, args: &[&str]) -> Command {
     let mut command = binary();
     command.arg("-C").arg(project.dir());
     command
-        .args(["--progress", "none", "run"])
+        .args(["--progress", progress, "run"])
         .args(FAST)
         .args(args);
     command
@@ -67,7 +87,7 @@ pub(crate) fn pairs(project: &Project) -> Vec<PairDetail> {
 }
 
 /// All that a result is, without times: numbers, files, hashes.
-fn results(project: &Project) -> Vec<String> {
+pub(crate) fn results(project: &Project) -> Vec<String> {
     let mut lines = Vec::new();
     for pair in pairs(project) {
         let results = pair.results;
@@ -93,7 +113,7 @@ fn results(project: &Project) -> Vec<String> {
 }
 
 /// How often each stage of each pair was finished.
-fn finished(project: &Project) -> Vec<usize> {
+pub(crate) fn finished(project: &Project) -> Vec<usize> {
     let mut counts = Vec::new();
     for pair in pairs(project) {
         for stage in Stage::ALL {
@@ -106,7 +126,7 @@ fn finished(project: &Project) -> Vec<usize> {
 }
 
 /// Stages that are done, all pairs together, by a reader beside the run.
-fn stages_done(project: &Project) -> u64 {
+pub(crate) fn stages_done(project: &Project) -> u64 {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
         let path = project.catalog_path();
@@ -120,19 +140,13 @@ fn stages_done(project: &Project) -> u64 {
 #[test]
 fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let unbroken = project(dir.path(), "unbroken", "2");
-    let broken = copy(&unbroken, "broken");
-    let killed = copy(&unbroken, "killed");
+    let unbroken = project(dir.path(), "unbroken", "3");
+    let broken = copy(&unbroken, &dir.path().join("broken"));
+    let killed = copy(&unbroken, &dir.path().join("killed"));
     call(&mut run(&unbroken, &[])).expect(0);
     let wanted = results(&unbroken);
 
-    for point in [
-        "fit:claimed",
-        "fit:filed:2",
-        "depth:computed",
-        "normalize:stored",
-        "register:filed",
-    ] {
+    for point in POINTS {
         let died = run(&broken, &["-j", "1"])
             .env("MOCBAN_BREAK_AT", point)
             .output();
@@ -141,7 +155,7 @@ fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
     }
     call(&mut run(&broken, &[])).expect(0);
     assert_eq!(results(&broken), wanted);
-    assert_eq!(finished(&broken), [1; 8]);
+    assert_eq!(finished(&broken), [1; 12]);
 
     let mut child = run(&killed, &[])
         .stderr(Stdio::null())
@@ -159,5 +173,5 @@ fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
     child.wait().expect("dead");
     call(&mut run(&killed, &["-j", "1"])).expect(0);
     assert_eq!(results(&killed), wanted);
-    assert_eq!(finished(&killed), [1; 8]);
+    assert_eq!(finished(&killed), [1; 12]);
 }

@@ -1,321 +1,306 @@
-//! Random events against the catalog and against the pure state machine: both must always say the same.
+//! The queue in memory, as small as it can be said: what the SQL is held to.
 
 use std::collections::BTreeMap;
 
-use rand::{RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
-use sqlx::Row as _;
-
-use super::{World, recipes, register};
-use crate::catalog::{
-    Again, ClaimRequest, Dead, Kept, Lease, RetrySelection, Sentence, StageFailed, connect,
-};
+use crate::catalog::{Again, Lease, RecipeIds};
 use crate::domain::{
-    Event, Failure, FailureClass, JobState, JobStatus, Stage, WorkerId, is_condemned, transition,
+    Event, JobState, JobStatus, Stage, UnixMillis, WorkerId, is_condemned, transition,
 };
 
-const PAIRS: usize = 6;
-const DEADLINE: i64 = 1_000_000;
+/// How long a worker lives without a sign of life.
+pub(super) const LEASE: i64 = 100;
+/// How many of the newest workers are looked at for deaths.
+const LOOKED_AT: usize = 32;
 
 /// What a job should be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Model {
-    state: JobState,
-    epoch: i64,
-    crashes: u32,
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Job {
+    pub(super) state: JobState,
+    pub(super) epoch: i64,
+    pub(super) attempt: u32,
+    pub(super) crashes: u32,
+    pub(super) alone: bool,
+    /// What each stage's result was computed with.
+    results: [Option<RecipeIds>; 4],
+    /// Where it failed, and with what.
+    failure: Option<(Stage, RecipeIds)>,
 }
 
-struct Game {
-    world: World,
-    rng: ChaCha8Rng,
-    model: BTreeMap<i64, Model>,
-    /// Leases of living and of dead workers.
-    leases: Vec<(Lease, WorkerId)>,
-    worker: WorkerId,
-    now: i64,
-    /// Workers that died.
-    deaths: u32,
+/// A worker's process.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Process {
+    pub(super) worker: WorkerId,
+    /// Its own clock, which tells nobody else's time.
+    pub(super) clock: UnixMillis,
+    pub(super) beat: UnixMillis,
+    pub(super) ended: bool,
+    pub(super) died: bool,
+    /// Whether it can still do anything. One that was taken for dead may.
+    pub(super) running: bool,
+    pub(super) recipes: RecipeIds,
 }
 
-impl Game {
-    async fn new(seed: u64) -> Self {
-        let world = World::new(PAIRS).await;
-        let stage = Stage::Fit;
-        let fresh = Model {
-            state: JobState::Ready { stage },
-            epoch: 0,
-            crashes: 0,
-        };
+impl Process {
+    /// Whether its leases stand, by its own clock.
+    pub(super) const fn is_alive(&self) -> bool {
+        !self.ended && self.beat >= self.alive_since()
+    }
+
+    pub(super) const fn alive_since(&self) -> UnixMillis {
+        self.clock - LEASE
+    }
+}
+
+/// All jobs and processes.
+#[derive(Debug, Default)]
+pub(super) struct Queue {
+    pub(super) jobs: BTreeMap<i64, Job>,
+    pub(super) processes: Vec<Process>,
+}
+
+impl Job {
+    const fn fresh() -> Self {
         Self {
-            worker: world.worker,
-            model: (1..=PAIRS as i64).map(|pair| (pair, fresh)).collect(),
-            world,
-            rng: ChaCha8Rng::seed_from_u64(seed),
-            leases: Vec::new(),
-            now: 100,
-            deaths: 0,
+            state: JobState::Ready { stage: Stage::Fit },
+            epoch: 0,
+            attempt: 0,
+            crashes: 0,
+            alone: false,
+            results: [None; 4],
+            failure: None,
         }
     }
 
-    async fn step(&mut self) {
-        self.now += self.rng.random_range(0..50);
-        match self.rng.random_range(0..20) {
-            0..6 => self.claim().await,
-            6..13 => self.checkpoint().await,
-            13..15 => self.fail().await,
-            15 => self.release().await,
-            16 => self.crash().await,
-            17 => self.due().await,
-            18 => self.send_back().await,
-            _ => self.retry().await,
-        }
+    fn happens(&mut self, event: Event) {
+        self.state = transition(self.state, event).expect("the model allows it");
     }
 
-    /// Moves one pair of the model; what the machine refuses must not have happened.
-    fn happens(&mut self, pair: i64, event: Event) {
-        let model = self.model.get_mut(&pair).expect("the pair");
-        model.state = transition(model.state, event).expect("the catalog allowed it");
+    /// First stage that would be computed otherwise now.
+    fn changed(&self, current: RecipeIds) -> Option<Stage> {
+        let behind = |stage: &Stage| self.state.stage().is_none_or(|next| *stage < next);
+        Stage::ALL.into_iter().filter(behind).find(|stage| {
+            self.results[stage.index()].is_some_and(|then| then.of(*stage) != current.of(*stage))
+        })
     }
 
-    fn holds(&self, lease: &Lease, worker: WorkerId) -> bool {
-        let model = self.model[&lease.pair().0];
-        let held =
-            matches!(model.state, JobState::Leased { worker: holder, .. } if holder == worker);
-        held && model.epoch == lease.epoch()
-    }
-
-    fn some_lease(&mut self) -> Option<(Lease, WorkerId)> {
-        if self.leases.is_empty() {
-            return None;
-        }
-        let index = self.rng.random_range(0..self.leases.len());
-        Some(self.leases.swap_remove(index))
-    }
-
-    async fn claim(&mut self) {
-        let request = ClaimRequest {
-            worker: self.worker,
-            slots: self.rng.random_range(1..3),
-            until: Stage::Register,
-            alone: self.rng.random_bool(0.4),
-            among: None,
-            deadline: DEADLINE,
-        };
-        for lease in self.world.catalog.claim(request).await.expect("a claim") {
-            let pair = lease.pair().0;
-            let event = Event::Claim {
-                worker: self.worker,
-                deadline: DEADLINE,
-            };
-            self.happens(pair, event);
-            let model = self.model.get_mut(&pair).expect("the pair");
-            model.epoch += 1;
-            assert_eq!(model.epoch, lease.epoch());
-            self.leases.push((lease, self.worker));
-        }
-    }
-
-    async fn checkpoint(&mut self) {
-        let Some((lease, worker)) = self.some_lease() else {
-            return;
-        };
-        let (held, pair) = (self.holds(&lease, worker), lease.pair().0);
-        // Now and then an earlier stage is done again, as when an artifact is gone.
-        let back = self.rng.random_range(0..=lease.cursor().index());
-        let redo = self.rng.random_bool(0.2);
-        let stage = if redo {
-            Stage::ALL[back]
-        } else {
-            lease.cursor()
-        };
-        let mut done = self.world.done(stage);
-        done.next_deadline = DEADLINE;
-        let kept = self
-            .world
-            .catalog
-            .checkpoint(lease, done)
-            .await
-            .expect("an answer");
-        assert_eq!(held, !matches!(kept, Kept::Lost));
-        if held {
-            let deadline = DEADLINE;
-            self.happens(
-                pair,
-                Event::Checkpoint {
-                    worker,
-                    stage,
-                    deadline,
-                },
-            );
-            self.model.get_mut(&pair).expect("the pair").crashes = 0;
-        }
-        if let Kept::Lease(lease) = kept {
-            self.leases.push((lease, worker));
-        }
-    }
-
-    async fn fail(&mut self) {
-        let Some((lease, worker)) = self.some_lease() else {
-            return;
-        };
-        let (held, pair, stage) = (self.holds(&lease, worker), lease.pair().0, lease.cursor());
-        let run_at = self.now + 70;
-        let (sentence, event) = if self.rng.random_bool(0.5) {
-            (
-                Sentence::BackOff { run_at },
-                Event::BackOff { worker, run_at },
-            )
-        } else {
-            (Sentence::Quarantine, Event::Quarantine { worker })
-        };
-        let failed = StageFailed {
-            stage,
-            failure: Failure::new(FailureClass::Bug, "made up"),
-            sentence,
-            recipe: self.world.recipes.of(stage),
-            facts: "{}".to_owned(),
-            inputs: super::inputs(stage),
-            ms: None,
-            at: self.now,
-        };
-        let kept = self
-            .world
-            .catalog
-            .fail(lease, failed)
-            .await
-            .expect("an answer");
-        assert_eq!(held, kept);
-        if held {
-            self.happens(pair, event);
-        }
-    }
-
-    async fn release(&mut self) {
-        let Some((lease, worker)) = self.some_lease() else {
-            return;
-        };
-        let (held, pair) = (self.holds(&lease, worker), lease.pair().0);
-        assert_eq!(
-            self.world.catalog.release(lease).await.expect("an answer"),
-            held
-        );
-        if held {
-            self.happens(pair, Event::Release { worker });
-        }
-    }
-
-    /// The worker dies, another takes over; the dead one's leases stay in the game.
-    async fn crash(&mut self) {
-        let dead = self.worker;
-        self.worker = register(&self.world.catalog).await;
-        let rescue = self
-            .world
-            .catalog
-            .rescue(Dead::AllBut(self.worker), self.now);
-        rescue.await.expect("a rescue");
-        let left = self.model.iter().filter(
-            |(_, model)| matches!(model.state, JobState::Leased { worker, .. } if worker == dead),
-        );
-        let left: Vec<_> = left.map(|(pair, _)| *pair).collect();
-        self.deaths += 1;
-        for pair in &left {
-            let blamed = left.len() == 1;
-            let model = self.model.get_mut(pair).expect("the pair");
-            model.epoch += 1;
-            model.crashes += u32::from(blamed);
-            let condemned = blamed && is_condemned(model.crashes, self.deaths.min(31));
-            self.happens(*pair, Event::Rescue { condemned });
-        }
-    }
-
-    async fn due(&mut self) {
-        let due = self.world.catalog.stage_due(self.now, 1_000_000).await;
-        let mut expected = 0;
-        for model in self.model.values_mut() {
-            if let Ok(next) = transition(model.state, Event::Due { now: self.now }) {
-                (model.state, expected) = (next, expected + 1);
-            }
-        }
-        assert_eq!(due.expect("stored"), expected);
-    }
-
-    async fn send_back(&mut self) {
-        let stage = Stage::ALL[self.rng.random_range(0..4)];
-        let recipes = recipes([1; 4]);
-        let sent = self
-            .world
-            .catalog
-            .send_back(&recipes, None, Again::All(stage));
-        sent.await.expect("sent back");
-        for model in self.model.values_mut() {
-            if let Ok(next) = transition(model.state, Event::SendBack { stage }) {
-                (model.state, model.crashes) = (next, 0);
-            }
-        }
-    }
-
-    async fn retry(&mut self) {
-        let retried = self.world.catalog.retry(&RetrySelection::All).await;
-        retried.expect("retried");
-        for model in self.model.values_mut() {
-            let failed = [JobStatus::Backoff, JobStatus::Quarantined];
-            let Some(stage) = model.state.stage() else {
-                continue;
-            };
-            if failed.contains(&model.state.status()) {
-                let next = transition(model.state, Event::SendBack { stage });
-                (model.state, model.crashes) = (next.expect("sent back"), 0);
-            }
-        }
-    }
-
-    /// Every row is what the model says, and the counters are right.
-    async fn agrees(&self, conn: &mut sqlx::SqliteConnection) {
-        let rows = sqlx::query("SELECT pair, stage, status, epoch, crashes, worker FROM job")
-            .fetch_all(conn)
-            .await
-            .expect("a read");
-        for row in rows {
-            let pair: i64 = row.get("pair");
-            let model = self.model[&pair];
-            let stage: i64 = row.get("stage");
-            let expected = model.state.stage().map_or(4, |stage| stage.index() as i64);
-            let worker: Option<i64> = row.get("worker");
-            let holder = match model.state {
-                JobState::Leased { worker, .. } => Some(worker.0),
-                _ => None,
-            };
-            assert_eq!(
-                (
-                    row.get::<i64, _>("status"),
-                    stage,
-                    row.get("epoch"),
-                    row.get("crashes"),
-                    worker
-                ),
-                (
-                    model.state.status().code(),
-                    expected,
-                    model.epoch,
-                    model.crashes,
-                    holder
-                ),
-                "pair {pair}"
-            );
-        }
-        self.world.counters_hold().await;
+    fn start_over(&mut self, stage: Stage) {
+        self.happens(Event::SendBack { stage });
+        (self.attempt, self.crashes, self.alone) = (0, 0, false);
+        self.failure = None;
     }
 }
 
-#[tokio::test]
-async fn random_events_leave_the_catalog_as_the_state_machine_says() {
-    for seed in 0..4 {
-        let mut game = Game::new(seed).await;
-        let path = game.world.dir.path().join("catalog.sqlite");
-        let mut conn = connect::writer(&path, false).await.expect("a connection");
-        for _ in 0..200 {
-            game.step().await;
-            game.agrees(&mut conn).await;
+impl Queue {
+    pub(super) fn import(&mut self) {
+        self.jobs.insert(self.jobs.len() as i64 + 1, Job::fresh());
+    }
+
+    fn job(&mut self, pair: i64) -> &mut Job {
+        self.jobs.get_mut(&pair).expect("the pair")
+    }
+
+    fn of_worker(&self, worker: WorkerId) -> &Process {
+        let mut processes = self.processes.iter();
+        processes
+            .find(|process| process.worker == worker)
+            .expect("a process")
+    }
+
+    /// Whether a lease is the pair's own.
+    pub(super) fn holds(&self, lease: &Lease) -> bool {
+        let job = &self.jobs[&lease.pair().0];
+        let held = |worker| matches!(job.state, JobState::Leased { worker: holder, .. } if holder == worker);
+        held(lease.worker) && job.epoch == lease.epoch()
+    }
+
+    /// Whether something may be stored under a lease.
+    pub(super) fn stands(&self, lease: &Lease) -> bool {
+        self.holds(lease) && self.of_worker(lease.worker).is_alive()
+    }
+
+    /// Takes jobs; gives the pairs with their epochs, in order.
+    pub(super) fn claim(
+        &mut self,
+        process: &Process,
+        slots: usize,
+        alone: bool,
+        deadline: UnixMillis,
+    ) -> Vec<(i64, i64)> {
+        if !process.is_alive() {
+            return Vec::new();
+        }
+        let ready = self.jobs.iter().filter_map(|(pair, job)| match job.state {
+            JobState::Ready { stage } if job.alone == alone => {
+                Some((std::cmp::Reverse(stage), *pair))
+            }
+            _ => None,
+        });
+        let mut ready: Vec<_> = ready.collect();
+        ready.sort_unstable();
+        ready.truncate(slots);
+        let worker = process.worker;
+        let take = |(_, pair)| {
+            let job = self.job(pair);
+            job.happens(Event::Claim { worker, deadline });
+            job.epoch += 1;
+            job.attempt += 1;
+            (pair, job.epoch)
+        };
+        ready.into_iter().map(take).collect()
+    }
+
+    pub(super) fn checkpoint(&mut self, lease: &Lease, stage: Stage, deadline: UnixMillis) {
+        let (worker, recipes) = (lease.worker, self.of_worker(lease.worker).recipes);
+        let job = self.job(lease.pair().0);
+        job.happens(Event::Checkpoint {
+            worker,
+            stage,
+            deadline,
+        });
+        (job.attempt, job.crashes, job.alone) = (1, 0, false);
+        job.results[stage.index()] = Some(recipes);
+        job.failure = None;
+    }
+
+    /// `back_off` is the time to try again; `alone` sends it to run by itself; neither quarantines.
+    pub(super) fn fail(&mut self, lease: &Lease, back_off: Option<UnixMillis>, alone: bool) {
+        let (worker, recipes) = (lease.worker, self.of_worker(lease.worker).recipes);
+        let job = self.job(lease.pair().0);
+        if alone {
+            job.happens(Event::Release { worker });
+            job.alone = true;
+            return;
+        }
+        job.happens(match back_off {
+            Some(run_at) => Event::BackOff { worker, run_at },
+            None => Event::Quarantine { worker },
+        });
+        job.failure = Some((lease.cursor(), recipes));
+    }
+
+    pub(super) fn release(&mut self, lease: &Lease) {
+        let worker = lease.worker;
+        let job = self.job(lease.pair().0);
+        job.happens(Event::Release { worker });
+        job.attempt = job.attempt.saturating_sub(1);
+    }
+
+    /// Takes back the leases of workers that are taken for dead; how many pairs are ready again.
+    pub(super) fn rescue(&mut self, dead: &[WorkerId]) -> u64 {
+        for process in &mut self.processes {
+            process.died |= dead.contains(&process.worker) && !process.ended;
+        }
+        let newest = self.processes.iter().rev().take(LOOKED_AT);
+        let deaths = newest.filter(|process| process.died && !process.ended);
+        let deaths = deaths.count() as u32;
+        let mut ready = 0;
+        for worker in dead {
+            let (died, recipes) = (
+                !self.of_worker(*worker).ended,
+                self.of_worker(*worker).recipes,
+            );
+            let left: Vec<_> = self.leased_by(*worker);
+            let blamed = died && left.len() == 1;
+            for pair in left {
+                let job = self.job(pair);
+                job.crashes += u32::from(blamed);
+                job.alone |= died;
+                let condemned = blamed && is_condemned(job.crashes, deaths);
+                ready += u64::from(!condemned);
+                job.taken_back(condemned, recipes);
+            }
+        }
+        ready
+    }
+
+    fn leased_by(&self, wanted: WorkerId) -> Vec<i64> {
+        let leased =
+            |job: &Job| matches!(job.state, JobState::Leased { worker, .. } if worker == wanted);
+        let jobs = self.jobs.iter().filter(|(_, job)| leased(job));
+        jobs.map(|(pair, _)| *pair).collect()
+    }
+
+    /// Takes back what others hold although their own clock is past the deadline by more than a margin.
+    pub(super) fn rescue_overdue(&mut self, me: WorkerId, margin: i64) -> u64 {
+        let mut ready = 0;
+        for process in self.processes.clone() {
+            for pair in self.leased_by(process.worker) {
+                let job = self.job(pair);
+                let late = matches!(job.state, JobState::Leased { deadline, .. } if deadline + margin < process.beat);
+                if late && process.worker != me {
+                    job.crashes += 1;
+                    job.alone = true;
+                    let condemned = is_condemned(job.crashes, job.crashes);
+                    ready += u64::from(!condemned);
+                    job.taken_back(condemned, process.recipes);
+                }
+            }
+        }
+        ready
+    }
+
+    /// Back-offs that are over, or further ahead than any can be.
+    pub(super) fn due(&mut self, now: UnixMillis, longest: i64) -> u64 {
+        let mut due = 0;
+        for job in self.jobs.values_mut() {
+            if let JobState::Backoff { stage, run_at } = job.state
+                && (run_at <= now || run_at > now + longest)
+            {
+                job.state = JobState::Ready { stage };
+                due += 1;
+            }
+        }
+        due
+    }
+
+    /// What other settings, or somebody who asks for all, send back; how many.
+    pub(super) fn send_back(&mut self, current: RecipeIds, again: Again) -> u64 {
+        let mut sent = 0;
+        for job in self.jobs.values_mut() {
+            if job.state.status() == JobStatus::Leased {
+                continue;
+            }
+            let at = job.state.stage();
+            let asked = match again {
+                Again::All(from) => Some(at.map_or(from, |at| at.min(from))),
+                Again::Changed | Again::Failed => None,
+            };
+            let failed_otherwise = job.state.status() == JobStatus::Quarantined
+                && job
+                    .failure
+                    .is_some_and(|(stage, then)| then.of(stage) != current.of(stage));
+            let to = job.changed(current).into_iter().chain(asked).min();
+            if let Some(stage) = to.or(at.filter(|_| failed_otherwise)) {
+                job.start_over(stage);
+                sent += 1;
+            }
+        }
+        sent
+    }
+
+    pub(super) fn retry(&mut self) -> u64 {
+        let mut taken_up = 0;
+        for job in self.jobs.values_mut() {
+            let failed = [JobStatus::Backoff, JobStatus::Quarantined];
+            if let Some(stage) = job.state.stage()
+                && failed.contains(&job.state.status())
+            {
+                job.start_over(stage);
+                taken_up += 1;
+            }
+        }
+        taken_up
+    }
+}
+
+impl Job {
+    fn taken_back(&mut self, condemned: bool, recipes: RecipeIds) {
+        let stage = self.state.stage().expect("it is leased");
+        self.epoch += 1;
+        self.attempt = self.attempt.saturating_sub(1);
+        self.happens(Event::Rescue { condemned });
+        if condemned {
+            self.failure = Some((stage, recipes));
         }
     }
 }

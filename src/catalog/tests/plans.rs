@@ -4,7 +4,8 @@ use sqlx::{AssertSqlSafe, Row as _};
 
 use super::World;
 use crate::catalog::{
-    checkpoint, claim, connect, fail, query, requeue, results, status, upkeep, verdicts,
+    audit, checkpoint, claim, connect, fail, mend, query, requeue, rescue, results, status, upkeep,
+    verdicts,
 };
 
 /// Lines of the query plan.
@@ -48,6 +49,7 @@ async fn fenced_writes_find_their_jobs_by_key() {
         fail::FAIL,
         claim::RELEASE,
         requeue::SEND_BACK,
+        mend::PUT_BACK,
     ] {
         let plan = plan(sql).await;
         assert!(
@@ -62,10 +64,11 @@ async fn fenced_writes_find_their_jobs_by_key() {
 #[tokio::test]
 async fn rescue_and_holders_use_the_index_of_leases() {
     for sql in [
-        upkeep::RESCUE,
-        upkeep::LEFT_BY,
-        upkeep::OVERDUE,
-        upkeep::HOLDERS,
+        rescue::RESCUE,
+        rescue::LEFT_BY,
+        rescue::OVERDUE,
+        rescue::HOLDERS,
+        rescue::VICTIMS,
     ] {
         let plan = plan(sql).await;
         assert!(
@@ -96,10 +99,13 @@ async fn doubtful_pairs_come_from_their_index() {
 
 #[tokio::test]
 async fn pages_and_their_parts_are_searched_by_key() {
-    let page = plan(query::PAGE).await;
-    assert_only(&page, &[]);
+    for sql in [query::PAGE, audit::PAGE] {
+        let page = plan(sql).await;
+        assert_only(&page, &[]);
+    }
     for sql in [
         results::STAGE_RESULTS,
+        audit::RESULTS,
         results::METRIC_HASHES,
         verdicts::COUNTED,
     ] {

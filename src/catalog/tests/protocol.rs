@@ -19,6 +19,7 @@ fn failed(world: &World, stage: Stage, sentence: Sentence) -> StageFailed {
         inputs: super::inputs(stage),
         ms: Some(3),
         at: 50,
+        alive_since: 0,
     }
 }
 
@@ -118,6 +119,7 @@ async fn a_late_completion_of_a_rescued_job_changes_nothing() {
         alone: true,
         among: None,
         deadline: 1_000,
+        alive_since: 0,
     });
     let again = again.await.expect("a claim").remove(0);
     assert!(again.alone() && again.epoch() > epoch);
@@ -151,6 +153,7 @@ async fn the_third_crash_is_quarantined_and_says_so() {
             alone: crash > 1,
             among: None,
             deadline: 1_000,
+            alive_since: 0,
         };
         assert_eq!(
             world.catalog.claim(request).await.expect("a claim").len(),
@@ -180,12 +183,14 @@ async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
             alone: round > 0,
             among: None,
             deadline: 1_000,
+            alive_since: 0,
         };
         assert_eq!(
             world.catalog.claim(request).await.expect("a claim").len(),
             1
         );
-        let rescue = world.catalog.rescue(Dead::Workers(vec![worker]), 60);
+        let next = register(&world.catalog).await;
+        let rescue = world.catalog.rescue(Dead::AllBut(next), 60);
         assert_eq!(rescue.await.expect("a rescue").ready, 1, "round {round}");
     }
     world.counters_hold().await;
@@ -230,6 +235,7 @@ async fn progress_forgives_crashes() {
         alone: true,
         among: None,
         deadline: 1_000,
+        alive_since: 0,
     };
     let lease = world
         .catalog
@@ -249,19 +255,24 @@ async fn progress_forgives_crashes() {
 }
 
 #[tokio::test]
-async fn a_lease_past_its_deadline_by_far_comes_back_to_others() {
+async fn a_lease_long_past_its_deadline_under_a_living_worker_comes_back_to_others() {
     let world = World::new(1).await;
     drop(world.claim(1).await);
     let other = register(&world.catalog).await;
-    let soon = world.catalog.rescue_overdue(other, 999, 1_059).await;
-    assert_eq!(soon.expect("a rescue").ready, 0);
-    let own = world
-        .catalog
-        .rescue_overdue(world.worker, 5_000, 5_000)
-        .await;
-    assert_eq!(own.expect("a rescue").ready, 0);
-    let late = world.catalog.rescue_overdue(other, 1_001, 1_061).await;
-    assert_eq!(late.expect("a rescue").ready, 1);
+    // Its deadline is 1000, and it still beats; what time others have is nothing to it.
+    for (beat, rescued) in [(1_060, 0), (1_061, 1)] {
+        assert!(
+            world
+                .catalog
+                .beat(world.worker, beat, 0)
+                .await
+                .expect("stored")
+        );
+        let own = world.catalog.rescue_overdue(world.worker, 60, 9_000_000);
+        assert_eq!(own.await.expect("a rescue").ready, 0);
+        let by_others = world.catalog.rescue_overdue(other, 60, 9_000_000);
+        assert_eq!(by_others.await.expect("a rescue").ready, rescued);
+    }
     world.counters_hold().await;
 }
 
@@ -334,6 +345,7 @@ async fn a_claim_among_some_pairs_takes_no_other() {
         alone: false,
         among: Some(among.clone()),
         deadline: 1_000,
+        alive_since: 0,
     };
     assert_eq!(
         world.catalog.claim(request).await.expect("a claim").len(),

@@ -143,6 +143,7 @@ async fn a_failure_is_taken_up_when_its_settings_change() {
         inputs: super::inputs(Stage::Fit),
         ms: None,
         at: 5,
+        alive_since: 0,
     };
     assert!(world.catalog.fail(lease, failed).await.expect("stored"));
     assert_eq!(send_back(&world, &recipes([1; 4])).await, 0);

@@ -62,6 +62,10 @@ impl MadeUp {
                 failure: Failure::new(FailureClass::Io, "the disk is slow"),
                 may_pass: true,
             }),
+            "breaks" if stage == Stage::Depth && tries == 1 => Err(Setback::Failed {
+                failure: Failure::new(FailureClass::Io, "the disk is slow"),
+                may_pass: true,
+            }),
             "hangs" if stage == Stage::Fit => {
                 self.wait();
                 Ok(())

@@ -1,0 +1,237 @@
+//! What the catalog says of itself: the database's own checks, its schema, counters against rows, pages of rows.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteRow};
+use sqlx::{ConnectOptions as _, Row as _, SqliteConnection};
+
+use super::work::{self, KnownInputs};
+use super::{Catalog, Result, Trouble, connect, results, rows};
+use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
+
+/// Lines of each check that are read at most.
+const LINES: usize = 50;
+
+/// A counter that does not say how many jobs there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Drift {
+    /// Number of the next stage, 0 to 4.
+    pub cursor: i64,
+    /// The status.
+    pub status: JobStatus,
+    /// What the counter says; `None` when there is none.
+    pub kept: Option<i64>,
+    /// Jobs that there are.
+    pub counted: i64,
+}
+
+/// A pair with all that is stored of it, as it is stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditedPair {
+    /// The user's id.
+    pub name: PairName,
+    /// Paths and content of its files as last read, with its number.
+    pub inputs: KnownInputs,
+    /// Where its job stands: status and number of the next stage; `None` when it has no job.
+    pub job: Option<(JobStatus, i64)>,
+    /// Whether a failure is stored.
+    pub has_failure: bool,
+    /// Every stage's stored result, also of stages that are to run again.
+    pub results: BTreeMap<Stage, AuditedResult>,
+    /// Metrics that have a row.
+    pub metrics: BTreeSet<ThresholdMetric>,
+}
+
+/// A result as it is stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditedResult {
+    /// The stage's numbers as JSON text.
+    pub outcome: String,
+    /// Its artifacts as JSON text.
+    pub files: String,
+    /// Hash over both.
+    pub result_hash: ContentHash,
+}
+
+const REFERENCES: &str = "
+SELECT \"table\" || coalesce(' row ' || rowid, '') || ' names a ' || parent || ' that is not there'
+FROM pragma_foreign_key_check LIMIT ?1";
+
+const OBJECTS: &str = "
+SELECT type || ' ' || name, sql FROM sqlite_schema
+WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name <> '_sqlx_migrations' ORDER BY 1";
+
+const DRIFT: &str = "
+SELECT stage.value AS stage, status.value AS status, c.n AS kept, coalesce(k.n, 0) AS counted
+FROM json_each('[0,1,2,3,4]') AS stage CROSS JOIN json_each('[0,1,2,3,4,5]') AS status
+    LEFT JOIN counter AS c ON c.stage = stage.value AND c.status = status.value
+    LEFT JOIN (SELECT stage, status, count(*) AS n FROM job GROUP BY stage, status) AS k
+        ON k.stage = stage.value AND k.status = status.value
+WHERE c.n IS NOT coalesce(k.n, 0)";
+
+pub(super) const PAGE: &str = "
+SELECT p.id, p.name, p.mesh_path, p.mesh_hash, p.mesh_stat, p.print_path, p.print_hash, p.print_stat,
+    j.stage, j.status, f.pair IS NOT NULL AS has_failure
+FROM pair AS p LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN failure AS f ON f.pair = p.id
+WHERE p.id > ?1 ORDER BY p.id LIMIT ?2";
+
+pub(super) const RESULTS: &str = "
+SELECT r.pair, r.stage, r.outcome, r.files, r.result_hash
+FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value";
+
+impl Catalog {
+    /// What SQLite finds wrong with the file, at most 50 lines; empty when it is sound. `quick` leaves out whether
+    /// indexes agree with their tables.
+    ///
+    /// # Errors
+    /// When the check cannot be made.
+    pub async fn integrity(&self, quick: bool) -> Result<Vec<String>> {
+        let mut conn = self.reader().await?;
+        let lines = integrity(&mut conn, quick).await;
+        lines.or_else(|error| match error.trouble() {
+            Some(Trouble::Damaged | Trouble::NotADatabase) => Ok(vec![error.to_string()]),
+            _ => Err(error),
+        })
+    }
+
+    /// Rows that name a row that is not there, at most 50.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn broken_references(&self) -> Result<Vec<String>> {
+        let mut conn = self.reader().await?;
+        let lines = sqlx::query_scalar(REFERENCES).bind(LINES as i64);
+        Ok(lines.fetch_all(&mut *conn).await?)
+    }
+
+    /// Tables, indexes and triggers that are not as this program makes them: gone, changed or added.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn schema_differences(&self) -> Result<Vec<String>> {
+        let mut conn = self.reader().await?;
+        let found = objects(&mut conn).await?;
+        let wanted = wanted_objects().await?;
+        let gone = wanted.keys().filter(|name| !found.contains_key(*name));
+        let gone = gone.map(|name| format!("{name} is gone"));
+        let other = found
+            .iter()
+            .filter_map(|(name, sql)| match wanted.get(name) {
+                None => Some(format!("{name} is not of this program")),
+                Some(wanted) if wanted != sql => Some(format!("{name} is not as it was made")),
+                Some(_) => None,
+            });
+        Ok(gone.chain(other).collect())
+    }
+
+    /// Counters that are off.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn counter_drift(&self) -> Result<Vec<Drift>> {
+        // One statement sees one moment, so a run that goes on beside it does not look like drift.
+        let mut conn = self.reader().await?;
+        let found = sqlx::query(DRIFT).fetch_all(&mut *conn).await?;
+        found
+            .iter()
+            .map(|row| {
+                Ok(Drift {
+                    cursor: row.try_get("stage")?,
+                    status: rows::status(row.try_get("status")?)?,
+                    kept: row.try_get("kept")?,
+                    counted: row.try_get("counted")?,
+                })
+            })
+            .collect()
+    }
+
+    /// The next pairs after one, by number, at most `limit`; empty at the end.
+    ///
+    /// # Errors
+    /// When the database refuses or holds what it must not.
+    pub async fn audit_page(
+        &self,
+        after: Option<PairId>,
+        limit: usize,
+    ) -> Result<Vec<AuditedPair>> {
+        let mut conn = self.snapshot().await?;
+        let found = sqlx::query(PAGE)
+            .bind(after.map_or(0, |pair| pair.0))
+            .bind(limit as i64)
+            .fetch_all(&mut *conn)
+            .await?;
+        let mut pairs = found.iter().map(pair).collect::<Result<Vec<_>>>()?;
+        let ids: Vec<i64> = pairs.iter().map(|pair| pair.inputs.pair.0).collect();
+        let mut results = stored(&mut conn, &ids).await?;
+        let metrics = results::metric_hashes(&mut conn, &ids).await?;
+        for pair in &mut pairs {
+            let id = pair.inputs.pair.0;
+            pair.results = results.remove(&id).unwrap_or_default();
+            let of_pair = metrics.keys().filter(|(of, _)| *of == id);
+            pair.metrics = of_pair.map(|(_, metric)| *metric).collect();
+        }
+        Ok(pairs)
+    }
+}
+
+/// See [`Catalog::integrity`].
+pub(super) async fn integrity(conn: &mut SqliteConnection, quick: bool) -> Result<Vec<String>> {
+    let sql = if quick {
+        "PRAGMA quick_check(50)"
+    } else {
+        "PRAGMA integrity_check(50)"
+    };
+    let mut lines: Vec<String> = sqlx::query_scalar(sql).fetch_all(conn).await?;
+    lines.retain(|line| line != "ok");
+    Ok(lines)
+}
+
+/// Tables, indexes and triggers by kind and name, with the statement that makes each.
+pub(super) async fn objects(conn: &mut SqliteConnection) -> Result<BTreeMap<String, String>> {
+    let found: Vec<(String, String)> = sqlx::query_as(OBJECTS).fetch_all(conn).await?;
+    Ok(found.into_iter().collect())
+}
+
+/// [`objects`] of a new catalog.
+pub(super) async fn wanted_objects() -> Result<BTreeMap<String, String>> {
+    let options = SqliteConnectOptions::new().in_memory(true);
+    let mut conn = options.connect().await?;
+    connect::MIGRATOR.run(&mut conn).await?;
+    objects(&mut conn).await
+}
+
+fn pair(row: &SqliteRow) -> Result<AuditedPair> {
+    let status: Option<i64> = row.try_get("status")?;
+    let cursor: Option<i64> = row.try_get("stage")?;
+    Ok(AuditedPair {
+        name: rows::pair_name(&row.try_get::<String, _>("name")?)?,
+        inputs: work::known_inputs(row)?,
+        job: status.map(rows::status).transpose()?.zip(cursor),
+        has_failure: row.try_get("has_failure")?,
+        results: BTreeMap::new(),
+        metrics: BTreeSet::new(),
+    })
+}
+
+async fn stored(
+    conn: &mut SqliteConnection,
+    pairs: &[i64],
+) -> Result<BTreeMap<i64, BTreeMap<Stage, AuditedResult>>> {
+    let found = sqlx::query(RESULTS)
+        .bind(Value::from(pairs).to_string())
+        .fetch_all(conn)
+        .await?;
+    let mut results: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
+    for row in &found {
+        let stage = rows::stage(row.try_get("stage")?)?;
+        let result = AuditedResult {
+            outcome: row.try_get("outcome")?,
+            files: row.try_get("files")?,
+            result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
+        };
+        let of_pair = results.entry(row.try_get("pair")?).or_default();
+        of_pair.insert(stage, result);
+    }
+    Ok(results)
+}

@@ -1,0 +1,329 @@
+//! What breaks other queues, each by name: late workers, worn-out identities, busy databases, jumping clocks.
+
+use super::{World, done, inputs, name, recipes, register, row};
+use crate::catalog::{
+    Again, Catalog, ClaimRequest, Dead, Kept, Lease, RecipeIds, Sentence, StageFailed, WorkerInfo,
+    connect,
+};
+use crate::domain::{CRASH_LIMIT, Failure, FailureClass, JobStatus, PairId, Stage, WorkerId};
+
+async fn status(world: &World) -> JobStatus {
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    detail.expect("the pair").results.status
+}
+
+fn failed(recipes: RecipeIds, sentence: Sentence) -> StageFailed {
+    StageFailed {
+        stage: Stage::Fit,
+        failure: Failure::new(FailureClass::Io, "the disk is slow"),
+        sentence,
+        recipe: recipes.of(Stage::Fit),
+        facts: done(recipes, Stage::Fit).facts,
+        inputs: inputs(Stage::Fit),
+        ms: None,
+        at: 50,
+        alive_since: 0,
+    }
+}
+
+async fn claim_alone(world: &World, worker: WorkerId) -> Vec<Lease> {
+    let request = ClaimRequest {
+        worker,
+        slots: 1,
+        until: Stage::Register,
+        alone: true,
+        among: None,
+        deadline: 1_000,
+        alive_since: 0,
+    };
+    world.catalog.claim(request).await.expect("a claim")
+}
+
+/// As a process that was given the same number by its machine, or a catalog whose last worker was removed.
+#[tokio::test]
+async fn a_reused_worker_identity_cannot_complete() {
+    let world = World::new(1).await;
+    let first = register(&world.catalog).await;
+    let lease = world.claim_as(first, 1).await.remove(0);
+    let me = world.worker;
+    let rescued = world.catalog.rescue(Dead::AllBut(me), 60).await;
+    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let path = world.dir.path().join("catalog.sqlite");
+    let mut conn = connect::writer(&path, false).await.expect("a connection");
+    let removed = sqlx::query("DELETE FROM worker WHERE id = ?1").bind(first.0);
+    removed.execute(&mut conn).await.expect("removed");
+
+    let second = register(&world.catalog).await;
+    assert!(second > first, "{second:?} again");
+    assert_eq!(claim_alone(&world, second).await.len(), 1);
+    let late = world.catalog.checkpoint(lease, world.done(Stage::Fit));
+    assert!(matches!(late.await, Ok(Kept::Lost)));
+    assert_eq!(status(&world).await, JobStatus::Leased);
+}
+
+/// The pair hung under it, was taken back by others, and came to the same worker again: only the epoch tells.
+#[tokio::test]
+async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothing() {
+    let world = World::new(1).await;
+    let late = world.claim(1).await.remove(0);
+    let beat = world.catalog.beat(world.worker, 5_000, 0).await;
+    assert!(beat.expect("an answer"));
+    let other = register(&world.catalog).await;
+    let overdue = world.catalog.rescue_overdue(other, 60, 70).await;
+    assert_eq!(overdue.expect("a rescue").ready, 1);
+    let again = claim_alone(&world, world.worker).await.remove(0);
+    let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
+    assert!(matches!(kept, Ok(Kept::Lost)));
+    let kept = world
+        .catalog
+        .checkpoint(again, world.done(Stage::Fit))
+        .await;
+    assert!(matches!(kept, Ok(Kept::Lease(_))));
+}
+
+#[tokio::test]
+async fn a_worker_that_ended_completes_and_claims_nothing() {
+    let world = World::new(2).await;
+    let lease = world.claim(1).await.remove(0);
+    let ended = world.catalog.end_worker(world.worker, 50).await;
+    ended.expect("ended");
+    let late = world.catalog.checkpoint(lease, world.done(Stage::Fit));
+    assert!(matches!(late.await, Ok(Kept::Lost)));
+    assert!(world.claim(1).await.is_empty());
+    let beat = world.catalog.beat(world.worker, 51, 0).await;
+    assert!(!beat.expect("an answer"));
+}
+
+/// The worker's last sign of life was at 1; nobody has taken its leases back yet.
+#[tokio::test]
+async fn a_beat_or_completion_after_the_lease_is_over_is_refused() {
+    let world = World::new(3).await;
+    let mut leases = world.claim(2).await;
+    let (first, second) = (leases.remove(0), leases.remove(0));
+    let mut late = world.done(Stage::Fit);
+    late.alive_since = 2;
+    let kept = world.catalog.checkpoint(first, late).await;
+    assert!(matches!(kept, Ok(Kept::Lost)));
+    let late = StageFailed {
+        alive_since: 2,
+        ..failed(world.recipes, Sentence::Quarantine)
+    };
+    assert!(!world.catalog.fail(second, late).await.expect("an answer"));
+    let beat = world.catalog.beat(world.worker, 90, 2).await;
+    assert!(!beat.expect("an answer"));
+    let request = ClaimRequest {
+        worker: world.worker,
+        slots: 1,
+        until: Stage::Register,
+        alone: false,
+        among: None,
+        deadline: 1_000,
+        alive_since: 2,
+    };
+    assert!(
+        world
+            .catalog
+            .claim(request)
+            .await
+            .expect("a claim")
+            .is_empty()
+    );
+    assert_eq!(status(&world).await, JobStatus::Leased);
+    // In time, all of it is taken.
+    let beat = world.catalog.beat(world.worker, 90, 1).await;
+    assert!(beat.expect("an answer"));
+    assert_eq!(world.claim(1).await.len(), 1);
+    world.counters_hold().await;
+}
+
+/// Two processes that write as fast as they can, a third that imports, and readers beside them.
+#[tokio::test(flavor = "multi_thread", worker_threads = 4)]
+async fn busy_reaches_no_caller() {
+    let world = World::new(80).await;
+    let path = world.dir.path().join("catalog.sqlite");
+    let recipes = world.recipes;
+    let worker = |catalog: Catalog| async move {
+        let worker = register(&catalog).await;
+        let mut done = 0;
+        loop {
+            let request = ClaimRequest {
+                worker,
+                slots: 1,
+                until: Stage::Register,
+                alone: false,
+                among: None,
+                deadline: 1_000,
+                alive_since: 0,
+            };
+            let Some(lease) = catalog.claim(request).await.expect("a claim").pop() else {
+                return done;
+            };
+            let stage = lease.cursor();
+            let kept = catalog.checkpoint(lease, super::done(recipes, stage)).await;
+            let Kept::Lease(lease) = kept.expect("stored") else {
+                panic!("the first of four stages")
+            };
+            let fail = failed(recipes, Sentence::Quarantine);
+            assert!(catalog.fail(lease, fail).await.expect("stored"));
+            done += 1;
+        }
+    };
+    let mut tasks = Vec::new();
+    for _ in 0..2 {
+        let catalog = Catalog::open(&path).await.expect("a catalog");
+        tasks.push(tokio::spawn(worker(catalog)));
+    }
+    let importer = Catalog::open(&path).await.expect("a catalog");
+    for count in 80..100 {
+        let rows = vec![row(&format!("p{count}"))];
+        importer.import(rows, 1).await.expect("imported");
+        world
+            .catalog
+            .outstanding(Stage::Register, None)
+            .await
+            .expect("a read");
+    }
+    let mut done = 0;
+    for task in tasks {
+        done += task.await.expect("no panic");
+    }
+    done += worker(importer).await;
+    assert_eq!(done, 100);
+    world.counters_hold().await;
+}
+
+/// A process dies over a pair that backs off: the time to try again stands in the row, not in the process.
+#[tokio::test]
+async fn a_failure_that_may_pass_is_not_stranded_by_a_death() {
+    let world = World::new(1).await;
+    for attempt in 1..=2 {
+        let worker = register(&world.catalog).await;
+        let lease = world.claim_as(worker, 1).await.remove(0);
+        assert_eq!(lease.attempt(), attempt);
+        let back_off = failed(world.recipes, Sentence::BackOff { run_at: 2_000 });
+        assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
+        let next = register(&world.catalog).await;
+        let rescued = world.catalog.rescue(Dead::AllBut(next), 60).await;
+        assert_eq!(rescued.expect("a rescue").ready, 0);
+        assert_eq!(status(&world).await, JobStatus::Backoff);
+        let due = world.catalog.stage_due(2_000, 60_000).await;
+        assert_eq!(due.expect("stored"), 1);
+    }
+    // A crash is no try: the failure keeps all it may have.
+    let worker = register(&world.catalog).await;
+    assert_eq!(world.claim_as(worker, 1).await[0].attempt(), 3);
+    let next = register(&world.catalog).await;
+    let rescued = world.catalog.rescue(Dead::AllBut(next), 60).await;
+    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let again = claim_alone(&world, next).await;
+    assert_eq!((again[0].attempt(), again[0].crashes()), (3, 1));
+}
+
+/// One worker's clock is years behind, another's years ahead: nobody living loses a lease, nothing waits for ever.
+#[tokio::test]
+async fn a_clock_that_jumps_strands_nothing_and_robs_nobody() {
+    const YEARS: i64 = 100_000_000_000;
+    let world = World::new(3).await;
+    let enter = async |clock: i64| {
+        let info = WorkerInfo {
+            host: "here".to_owned(),
+            pid: 1,
+            boot_id: None,
+        };
+        let entered = world.catalog.register_worker(info, world.recipes, clock);
+        entered.await.expect("a worker")
+    };
+    let (past, future) = (enter(5).await, enter(YEARS).await);
+    let mut leases = Vec::new();
+    for (worker, clock) in [(past, 5), (future, YEARS)] {
+        let request = ClaimRequest {
+            worker,
+            slots: 1,
+            until: Stage::Register,
+            alone: false,
+            among: None,
+            deadline: clock + 10,
+            alive_since: clock - 50,
+        };
+        leases.extend(world.catalog.claim(request).await.expect("a claim"));
+        let beat = world.catalog.beat(worker, clock + 20, clock - 30).await;
+        assert!(beat.expect("an answer"));
+    }
+    for (me, now) in [(past, 25), (future, YEARS + 20)] {
+        let overdue = world.catalog.rescue_overdue(me, 60, now).await;
+        assert_eq!(overdue.expect("a rescue").ready, 0);
+    }
+    for (lease, clock) in leases.into_iter().zip([5, YEARS]) {
+        let mut done = world.done(Stage::Fit);
+        (done.at, done.alive_since) = (clock + 20, clock - 30);
+        let kept = world.catalog.checkpoint(lease, done).await;
+        assert!(matches!(kept, Ok(Kept::Lease(_))));
+    }
+    // What the future put off is tried by the past.
+    let lease = world.claim_as(future, 1).await.remove(0);
+    let run_at = YEARS + 1_000;
+    let back_off = failed(world.recipes, Sentence::BackOff { run_at });
+    assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
+    let due = world.catalog.stage_due(25, 90_000).await;
+    assert_eq!(due.expect("stored"), 1);
+    world.counters_hold().await;
+}
+
+/// A pair that killed its workers, and the worker that is there now.
+async fn condemned() -> (World, WorkerId) {
+    let world = World::new(1).await;
+    let mut me = world.worker;
+    for crash in 0..CRASH_LIMIT {
+        let taken = if crash == 0 {
+            world.claim_as(me, 1).await
+        } else {
+            claim_alone(&world, me).await
+        };
+        assert_eq!(taken.len(), 1);
+        me = register(&world.catalog).await;
+        let rescued = world.catalog.rescue(Dead::AllBut(me), 60).await;
+        let condemned = rescued.expect("a rescue").condemned;
+        let expected = (crash + 1 == CRASH_LIMIT).then_some(PairId(1));
+        assert_eq!(condemned, Vec::from_iter(expected));
+    }
+    (world, me)
+}
+
+#[tokio::test]
+async fn a_pair_that_killed_its_workers_is_tried_again_with_other_settings() {
+    let (world, _) = condemned().await;
+    for (revision, sent) in [([1; 4], 0), ([1, 2, 1, 1], 0), ([2, 1, 1, 1], 1)] {
+        let recipes = recipes(revision);
+        let back = world
+            .catalog
+            .send_back(&recipes, None, Again::Changed)
+            .await;
+        assert_eq!(back.expect("sent back"), sent);
+    }
+    assert_eq!(status(&world).await, JobStatus::Ready);
+}
+
+#[tokio::test]
+async fn a_pair_that_killed_its_workers_is_tried_again_with_another_mesh() {
+    let (world, _) = condemned().await;
+    let seen = |text: &str| {
+        let mut seen = inputs(Stage::Fit);
+        let mesh = seen.mesh.as_mut().expect("a mesh");
+        mesh.hash = crate::domain::ContentHash::of(text.as_bytes());
+        vec![(PairId(1), seen)]
+    };
+    let noted = world.catalog.note_fatal_inputs(seen("fatal")).await;
+    noted.expect("stored");
+    let send_back = async || {
+        let recipes = recipes([1; 4]);
+        let back = world
+            .catalog
+            .send_back(&recipes, None, Again::Changed)
+            .await;
+        back.expect("sent back")
+    };
+    assert_eq!(send_back().await, 0);
+    let mended = world.catalog.store_inputs(seen("mended")).await;
+    mended.expect("stored");
+    assert_eq!(send_back().await, 1);
+}

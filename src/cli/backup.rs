@@ -1,0 +1,149 @@
+//! `backup`: the catalog, the verdicts and the settings, copied whole while a run may be writing.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use clap::Args;
+use serde_json::json;
+
+use super::context::Context;
+use super::exit::{ExitCode, Refusal};
+use super::table::count;
+use super::talk;
+use crate::catalog::Catalog;
+use crate::export::verdict_lines;
+use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of, write_whole};
+
+/// Arguments of `backup`.
+#[derive(Debug, Args)]
+pub(super) struct BackupArgs {
+    /// The file to write, such as blocks.sqlite; an earlier backup there stays until the new one is whole. The
+    /// verdicts go beside it as blocks.verdicts.jsonl, the project's settings as blocks.mocban.toml
+    pub(super) file: PathBuf,
+}
+
+pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (project, catalog) = context.reader().await?;
+    let file = &args.file;
+    let shown = file.display();
+    refuse_place(file, &project)?;
+    let partial = Partial(partial_of(file));
+    partial.clear();
+    catalog
+        .copy_to(&partial.0)
+        .await
+        .with_context(|| format!("cannot write the backup {shown}"))?;
+    catalog.close().await;
+    let (verdicts, pairs) = beside(&partial, &args.file, &project).await?;
+    finish_whole(&partial.0, file).with_context(|| format!("cannot write {shown}"))?;
+    let bytes = std::fs::metadata(file)?.len();
+    if context.global.json {
+        talk::print_json(&json!({
+            "schema": 1, "file": file, "bytes": bytes, "pairs": pairs, "verdicts": verdicts,
+            "verdicts_file": verdicts_file(file),
+        }))?;
+    }
+    context.talk.say(&format!(
+        "{} and {} are in {shown}, {:.1} MB; pictures are not in it, `run` makes them again",
+        count(pairs, "pair"),
+        count(verdicts, "verdict"),
+        bytes as f64 / 1e6
+    ));
+    Ok(ExitCode::Done)
+}
+
+/// A copy under way; what is left of it goes when it is dropped.
+struct Partial(PathBuf);
+
+impl Partial {
+    fn clear(&self) {
+        for ending in ["", "-wal", "-shm", "-journal"] {
+            let mut name = self.0.as_os_str().to_owned();
+            name.push(ending);
+            // Mostly there is nothing; and what cannot be removed shows when the copy is written.
+            let _ = std::fs::remove_file(PathBuf::from(name));
+        }
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        self.clear();
+    }
+}
+
+/// Writes what goes beside the backup, verdicts as they are in the copy; says how many verdicts and pairs it holds.
+async fn beside(partial: &Partial, file: &Path, project: &Project) -> anyhow::Result<(u64, u64)> {
+    let copy = Catalog::open_read_only(&partial.0).await?;
+    let log = copy.verdict_log(None).await?;
+    let pairs = copy.counters().await?.values().sum();
+    copy.close().await;
+    let path = verdicts_file(file);
+    write_whole(&path, verdict_lines(&log).as_bytes())
+        .with_context(|| format!("cannot write {}", path.display()))?;
+    settings(file, project)?;
+    Ok((log.len() as u64, pairs))
+}
+
+/// The project's own settings, without which other results would come of it. One that an earlier backup left goes when
+/// the project has none any more.
+fn settings(file: &Path, project: &Project) -> anyhow::Result<()> {
+    let path = file.with_extension("mocban.toml");
+    let shown = path.display();
+    match std::fs::read(project.settings_path()) {
+        Ok(bytes) => write_whole(&path, &bytes).with_context(|| format!("cannot write {shown}")),
+        Err(_) => match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                Err(error).with_context(|| format!("cannot remove {shown}"))
+            }
+            _ => Ok(()),
+        },
+    }
+}
+
+fn verdicts_file(file: &Path) -> PathBuf {
+    file.with_extension("verdicts.jsonl")
+}
+
+/// Refuses a place where something lies that is not an earlier backup.
+fn refuse_place(file: &Path, project: &Project) -> Result<(), Refusal> {
+    let shown = file.display();
+    let refuse = |what: &str| Err(Refusal::Usage(format!("{shown} {what}")));
+    if file.file_name().is_none() || file.is_dir() {
+        return refuse("is a directory; name a file for the backup");
+    }
+    let called = |known: &str| file.file_name().is_some_and(|name| name == known);
+    let here = is_same(file.parent(), project.dir());
+    if called(CATALOG_FILE) && (here || file.exists())
+        || called(SETTINGS_FILE) && here
+        || is_same(Some(file), &project.catalog_path())
+    {
+        return refuse("is a file of a project itself; name another file for the backup");
+    }
+    match std::fs::metadata(file) {
+        Err(_) => Ok(()),
+        Ok(meta) if meta.len() == 0 || is_backup(file) => Ok(()),
+        Ok(_) => refuse("is there already and no backup; name another file"),
+    }
+}
+
+/// Whether two paths lead to the same file.
+fn is_same(one: Option<&Path>, other: &Path) -> bool {
+    let one = one.map(|path| {
+        if path == Path::new("") {
+            Path::new(".")
+        } else {
+            path
+        }
+    });
+    let whole = one.and_then(|path| path.canonicalize().ok());
+    whole.is_some() && whole == other.canonicalize().ok()
+}
+
+/// Whether a file is a database with the catalog's mark: bytes 68 to 71 of an SQLite file.
+fn is_backup(file: &Path) -> bool {
+    use std::io::Read as _;
+    let mut head = [0; 72];
+    let read = std::fs::File::open(file).and_then(|mut file| file.read_exact(&mut head));
+    read.is_ok() && head.starts_with(b"SQLite format 3\0") && head[68..].starts_with(b"mocb")
+}

@@ -1,0 +1,113 @@
+//! The bytes of a list as UTF-8 text: spreadsheets also write UTF-16, and marks at the start.
+
+use std::borrow::Cow;
+
+const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// UTF-16 text that cannot be read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[error("the text is UTF-16 and cut short or damaged; save it as UTF-8")]
+pub struct NotText;
+
+/// The bytes without a byte-order mark, and in UTF-8 where they are UTF-16. What is not UTF-8 otherwise is passed on,
+/// to be refused by its line.
+///
+/// # Errors
+/// When UTF-16 is cut short or damaged.
+pub fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, NotText> {
+    match *bytes {
+        [0xff, 0xfe, ref rest @ ..] => from_utf16(rest, u16::from_le_bytes),
+        [0xfe, 0xff, ref rest @ ..] => from_utf16(rest, u16::from_be_bytes),
+        // Without a mark: a list begins with a letter, a quote or a brace, which leave one byte of two empty.
+        [first, 0, ..] if first != 0 => from_utf16(bytes, u16::from_le_bytes),
+        [0, second, ..] if second != 0 => from_utf16(bytes, u16::from_be_bytes),
+        _ => Ok(bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes).into()),
+    }
+}
+
+fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, NotText> {
+    let (pairs, []) = bytes.as_chunks::<2>() else {
+        return Err(NotText);
+    };
+    let units = pairs.iter().map(|pair| unit(*pair));
+    let text: Result<String, _> = char::decode_utf16(units).collect();
+    text.map(|text| text.into_bytes().into())
+        .ok()
+        .ok_or(NotText)
+}
+
+/// The separator that the first line holds most of: tab, semicolon or comma; a comma when in doubt.
+pub fn delimiter(bytes: &[u8]) -> u8 {
+    let start = bytes.trim_ascii_start();
+    let header = start.split(|byte| *byte == b'\n').next().unwrap_or(start);
+    let count = |delimiter: u8| header.split(|byte| *byte == delimiter).count();
+    [b'\t', b';', b',']
+        .into_iter()
+        .max_by_key(|delimiter| count(*delimiter))
+        .unwrap_or(b',')
+}
+
+/// Tells the line a record of a CSV list begins at. The reader's own count stops at the end of the record before, and
+/// half a line end or blank lines may follow there.
+#[derive(Debug)]
+pub struct LineCounter<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    line: usize,
+}
+
+impl<'a> LineCounter<'a> {
+    /// At the start of a list.
+    pub const fn new(bytes: &'a [u8]) -> Self {
+        Self {
+            bytes,
+            at: 0,
+            line: 1,
+        }
+    }
+
+    /// The line of a record, counted from 1. Records come in their order.
+    pub fn at(&mut self, position: Option<&::csv::Position>) -> usize {
+        let from = position.map_or(0, ::csv::Position::byte) as usize;
+        let blank = self.bytes[from..]
+            .iter()
+            .take_while(|byte| matches!(**byte, b'\r' | b'\n'))
+            .count();
+        let passed = &self.bytes[self.at..from + blank];
+        self.line += passed.split(|byte| *byte == b'\n').count() - 1;
+        self.at = from + blank;
+        self.line
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{NotText, as_utf8, delimiter};
+
+    #[test]
+    fn utf16_and_marks_come_out_as_plain_utf8() {
+        let text = "id;mesh\n明;b\n";
+        let units: Vec<u16> = text.encode_utf16().collect();
+        let little: Vec<u8> = units.iter().flat_map(|unit| unit.to_le_bytes()).collect();
+        let big: Vec<u8> = units.iter().flat_map(|unit| unit.to_be_bytes()).collect();
+        for bytes in [
+            text.as_bytes().to_vec(),
+            [b"\xef\xbb\xbf", text.as_bytes()].concat(),
+            [b"\xff\xfe", little.as_slice()].concat(),
+            [b"\xfe\xff", big.as_slice()].concat(),
+            little.clone(),
+            big,
+        ] {
+            assert_eq!(as_utf8(&bytes).as_deref(), Ok(text.as_bytes()));
+        }
+        assert_eq!(as_utf8(&little[..little.len() - 1]), Err(NotText));
+        assert_eq!(as_utf8(b""), Ok(b"".as_slice().into()));
+    }
+
+    #[test]
+    fn the_header_tells_the_separator() {
+        assert_eq!(delimiter(b"a;b;c\n1,5;2;3\n"), b';');
+        assert_eq!(delimiter(b"a\tb\n"), b'\t');
+        assert_eq!(delimiter(b"a\n"), b',');
+    }
+}

@@ -1,0 +1,80 @@
+//! Files that appear whole or not at all: written beside their place, synced, renamed.
+
+use std::fs::File;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+/// Writes a file so that an earlier one of its name stays until the new one is whole and on disk. What is no plain
+/// file, such as a pipe or a terminal, is written to as it is.
+///
+/// # Errors
+/// When it cannot be written; an earlier one is then as it was.
+pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    // A link stays a link: what it leads to is replaced.
+    let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    if path.exists() && !path.is_file() {
+        return std::fs::write(path, bytes);
+    }
+    let partial = partial_of(&path);
+    let written = File::create(&partial)
+        .and_then(|mut file| file.write_all(bytes))
+        .and_then(|()| finish_whole(&partial, &path));
+    if written.is_err() {
+        // That it cannot be removed changes nothing.
+        let _ = std::fs::remove_file(&partial);
+    }
+    written
+}
+
+/// Where a file is written before it gets its name: beside it, hidden.
+pub fn partial_of(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}.mocban-partial"))
+}
+
+/// Puts a written file in its place for good: syncs it, renames it, syncs the folder.
+///
+/// # Errors
+/// When the disk refuses.
+pub fn finish_whole(partial: &Path, path: &Path) -> std::io::Result<()> {
+    File::open(partial)?.sync_all()?;
+    if let Ok(there) = std::fs::metadata(path) {
+        std::fs::set_permissions(partial, there.permissions())?;
+    }
+    std::fs::rename(partial, path)?;
+    let folder = path.parent().filter(|dir| !dir.as_os_str().is_empty());
+    File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{partial_of, write_whole};
+
+    #[test]
+    fn the_earlier_file_stays_until_the_new_one_is_whole() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("report.txt");
+        write_whole(&path, b"one").expect("written");
+        // Nothing can be written where a folder stands in the way.
+        std::fs::create_dir(partial_of(&path)).expect("a folder");
+        assert!(write_whole(&path, b"two").is_err());
+        assert_eq!(std::fs::read(&path).expect("read"), b"one");
+        std::fs::remove_dir(partial_of(&path)).expect("removed");
+        write_whole(&path, b"two").expect("written");
+        assert_eq!(std::fs::read(&path).expect("read"), b"two");
+        assert_eq!(std::fs::read_dir(dir.path()).expect("listed").count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_a_link_and_a_device_is_written_to() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let (path, link) = (dir.path().join("a.txt"), dir.path().join("link.txt"));
+        std::fs::write(&path, "one").expect("written");
+        std::os::unix::fs::symlink(&path, &link).expect("a link");
+        write_whole(&link, b"two").expect("written");
+        assert_eq!(std::fs::read(&path).expect("read"), b"two");
+        assert!(link.is_symlink());
+        write_whole(std::path::Path::new("/dev/null"), b"x").expect("written");
+    }
+}

@@ -1,0 +1,131 @@
+//! `backup` through the real binary: taken while a run writes, restored, and never half there.
+
+use std::process::Stdio;
+
+use mocban::store::Project;
+
+use crate::check::{at, done, exported, sql};
+use crate::cli::mocban;
+use crate::resume::{copy, project, run, stages_done};
+
+fn files(dir: &std::path::Path) -> Vec<String> {
+    let entries = std::fs::read_dir(dir).expect("a folder");
+    let name = |entry: std::io::Result<std::fs::DirEntry>| {
+        let name = entry.expect("an entry").file_name();
+        name.into_string().expect("UTF-8")
+    };
+    let mut names: Vec<_> = entries.map(name).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_backup_taken_while_a_run_writes_is_restored_to_the_same_export() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let whole = project(dir.path(), "whole", "3");
+    std::fs::write(whole.settings_path(), "[depth]\nlongest_px = 96\n").expect("written");
+    let blank = copy(&whole, &dir.path().join("blank"));
+    let file = dir.path().join("b.sqlite");
+    let backup = ["backup", file.to_str().expect("UTF-8")];
+
+    let mut child = run(&whole, &["-j", "1"])
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the binary starts");
+    while stages_done(&whole) < 2 {
+        std::thread::yield_now();
+    }
+    at(&whole, &backup).expect(0);
+    assert!(
+        child.try_wait().expect("a child").is_none(),
+        "the run ended before the backup"
+    );
+    assert!(child.wait().expect("a child").success());
+    let wanted = exported(&whole, "wanted");
+
+    // The inputs are where they were; the artifacts are gone with the old project.
+    std::fs::copy(&file, blank.catalog_path()).expect("copied");
+    let settings = dir.path().join("b.mocban.toml");
+    std::fs::copy(settings, blank.settings_path()).expect("copied");
+    let mended = at(&blank, &["check", "--repair", "--json"])
+        .expect(0)
+        .json();
+    assert_eq!(mended["pairs"], 3);
+    assert!(mended["damage"]["file_missing"]["found"].as_u64() >= Some(1));
+    at(&blank, &["run"]).expect(0);
+    at(&blank, &["check"]).expect(0);
+    assert!(exported(&blank, "restored") == wanted, "another export");
+}
+
+#[test]
+fn verdicts_survive_a_restore_and_go_beside_it_as_lines() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let file = dir.path().join("blocks.sqlite");
+    let backup = ["backup", file.to_str().expect("UTF-8"), "--json"];
+    let told = at(&project, &backup).expect(0).json();
+    assert_eq!(told["verdicts"], 4);
+    let log = at(&project, &["verdict", "log", "--json"]).expect(0).out;
+    let lines = dir.path().join("blocks.verdicts.jsonl");
+    assert_eq!(std::fs::read_to_string(&lines).expect("read"), log);
+
+    let data = project.dir().join("data");
+    std::fs::create_dir(dir.path().join("q")).expect("a folder");
+    std::fs::rename(data, dir.path().join("q/data")).expect("moved");
+    std::fs::copy(&file, dir.path().join("q/catalog.sqlite")).expect("copied");
+    let settings = dir.path().join("blocks.mocban.toml");
+    std::fs::copy(settings, dir.path().join("q/mocban.toml")).expect("copied");
+    let restored = Project::open(&dir.path().join("q")).expect("a project");
+    at(&restored, &["check", "--repair"]).expect(0);
+    at(&restored, &["run"]).expect(0);
+    // The same results, so the verdicts are on the current ones again.
+    assert_eq!(
+        at(&restored, &["verdict", "log", "--json"]).expect(0).out,
+        log
+    );
+    let status = at(&restored, &["status", "--json"]).expect(0).json();
+    assert_eq!(status["verdicts"]["pass"], 4);
+}
+
+#[test]
+fn a_backup_that_fails_leaves_the_earlier_one_and_nothing_half_made() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let file = dir.path().join("b.sqlite");
+    let backup = ["backup", file.to_str().expect("UTF-8")];
+    at(&project, &backup).expect(0);
+    let (good, names) = (std::fs::read(&file).expect("read"), files(dir.path()));
+    let spoilt = crate::odd::spoil(&project, 5, 7);
+    let refused = at(&project, &backup).expect(1);
+    assert!(refused.err.contains("is damaged"), "{}", refused.err);
+    assert!(std::fs::read(&file).expect("read") == good);
+    assert_eq!(files(dir.path()), names);
+    // Half a copy that a killed process left is in nobody's way.
+    std::fs::write(project.catalog_path(), spoilt).expect("mended");
+    sql(&project, "UPDATE pair SET block = 'b1'");
+    std::fs::write(dir.path().join(".b.sqlite.mocban-partial"), "half").expect("written");
+    at(&project, &backup).expect(0);
+    assert!(std::fs::read(&file).expect("read") != good);
+    assert_eq!(files(dir.path()), names);
+}
+
+#[test]
+fn a_backup_overwrites_nothing_but_a_backup() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let thesis = dir.path().join("thesis.docx");
+    std::fs::write(&thesis, "ten years").expect("written");
+    for (place, says) in [
+        ("../thesis.docx", "no backup"),
+        ("catalog.sqlite", "of a project itself"),
+        ("mocban.toml", "of a project itself"),
+        ("artifacts", "is a directory"),
+    ] {
+        let refused = mocban(project.dir(), &["backup", place]).expect(2);
+        assert!(refused.err.contains(says), "{place}: {}", refused.err);
+    }
+    assert_eq!(std::fs::read(&thesis).expect("read"), b"ten years");
+    let nowhere = mocban(project.dir(), &["backup", "no/such/b.sqlite"]).expect(1);
+    assert!(nowhere.err.contains("no/such"), "{}", nowhere.err);
+    at(&project, &["check"]).expect(0);
+}

@@ -1,0 +1,124 @@
+//! Pairs that kill, hang or need too much, and runs with too many failures: through the real binary.
+
+use std::process::Stdio;
+
+use mocban::domain::{FailureClass, JobStatus};
+use mocban::store::Project;
+
+use crate::cli::call;
+use crate::resume::{finished, pairs, project, run};
+
+fn status(project: &Project) -> Vec<JobStatus> {
+    let all = pairs(project);
+    all.iter().map(|pair| pair.results.status).collect()
+}
+
+/// Runs until a run ends by itself; how often it died, and its exit code.
+fn deaths(project: &Project, jobs: &str, point: &str) -> (u32, Option<i32>) {
+    for deaths in 0..10 {
+        let mut command = run(project, &["-j", jobs]);
+        let ended = command
+            .env("MOCBAN_BREAK_AT", point)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .status();
+        if let Some(code) = ended.expect("the binary starts").code() {
+            return (deaths, Some(code));
+        }
+    }
+    (10, None)
+}
+
+#[test]
+fn a_pair_that_kills_its_process_is_quarantined_after_three_and_stops_nobody() {
+    // The first death may be shared with a pair beside it.
+    for (jobs, most) in [("1", 3), ("2", 4)] {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = project(dir.path(), "p", "3");
+        let (deaths, code) = deaths(&project, jobs, "fit:computed@upright-0001");
+        assert!((3..=most).contains(&deaths), "{deaths} deaths");
+        assert_eq!(code, Some(3));
+        let all = pairs(&project);
+        let stand: Vec<_> = all.iter().map(|pair| pair.results.status).collect();
+        assert_eq!(
+            stand,
+            [JobStatus::Done, JobStatus::Quarantined, JobStatus::Done]
+        );
+        let failure = all[1].results.failure.as_ref().expect("a failure");
+        assert_eq!(failure.failure.class, FailureClass::Resource);
+        assert_eq!(
+            failure.failure.message,
+            "3 workers died or hung over it at fit"
+        );
+
+        // It stays so, until somebody asks or its mesh is another.
+        call(&mut run(&project, &[])).expect(3);
+        let mesh = project.input_path(&all[1].results.facts.mesh_path);
+        let mut bytes = std::fs::read(&mesh).expect("a mesh");
+        bytes.push(b'\n');
+        std::fs::write(&mesh, bytes).expect("written");
+        call(&mut run(&project, &[])).expect(0);
+        assert_eq!(finished(&project), [1; 12]);
+    }
+}
+
+#[test]
+fn a_stage_past_its_deadline_is_tried_alone_then_quarantined() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "2");
+    let file = dir.path().join("held");
+    let mut command = run(&project, &["-j", "2", "--set", "run.stage_limit_s=2"]);
+    command
+        .env("MOCBAN_HOLD_AT", "fit:computed:0@upright-0000")
+        .env("MOCBAN_HOLD_FILE", &file);
+    call(&mut command).expect(3);
+    assert_eq!(status(&project), [JobStatus::Quarantined, JobStatus::Done]);
+    let failure = pairs(&project)[0]
+        .results
+        .failure
+        .clone()
+        .expect("a failure");
+    assert_eq!(failure.failure.class, FailureClass::Resource);
+    assert_eq!(failure.failure.message, "fit took longer than 2 s");
+    let attempts = &pairs(&project)[0].attempts;
+    assert_eq!(attempts.len(), 2);
+}
+
+#[test]
+fn too_many_failures_stop_the_claiming_and_show_in_the_exit_code() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "4");
+    for pair in &pairs(&project)[..3] {
+        let print = project.input_path(&pair.results.facts.print_path);
+        std::fs::write(print, b"no picture").expect("written");
+    }
+    let args = ["-j", "1", "--json", "--max-failures", "2"];
+    let ended = call(&mut run(&project, &args)).expect(3);
+    let summary = ended.json();
+    assert_eq!(
+        (&summary["too_many_failures"], &summary["failed"]),
+        (&true.into(), &2.into())
+    );
+    let bad = JobStatus::Quarantined;
+    assert_eq!(
+        status(&project),
+        [bad, bad, JobStatus::Ready, JobStatus::Ready]
+    );
+    // One bad pair stops nobody, but shows.
+    let ended = call(&mut run(&project, &["--json"])).expect(3).json();
+    assert_eq!(
+        (&ended["done"], &ended["failed_in_all"]),
+        (&1.into(), &3.into())
+    );
+}
+
+#[test]
+fn pairs_larger_than_the_memory_run_one_by_one_to_the_same_end() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "2");
+    call(&mut run(&project, &["-j", "2", "--memory", "1M"])).expect(0);
+    assert_eq!(finished(&project), [1; 8]);
+    assert!(pairs(&project).iter().all(|pair| pair.attempt == 1));
+    let refused = call(&mut run(&project, &["--memory", "much"])).expect(2);
+    assert!(refused.err.contains("such as 4G"), "{}", refused.err);
+}

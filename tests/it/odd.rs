@@ -1,0 +1,290 @@
+//! Odd things on disk: each gives one clear sentence with the file and what to do, and nothing is lost.
+
+use std::os::unix::fs::MetadataExt as _;
+use std::os::unix::process::CommandExt as _;
+use std::path::Path;
+
+use mocban::store::Project;
+
+use crate::check::{at, below, done, exported, sql};
+use crate::cli::{binary, call, empty, mocban};
+
+/// Writes garbage over the catalog from one eighth of it to another; gives what it was.
+pub(crate) fn spoil(project: &Project, from: usize, to: usize) -> Vec<u8> {
+    let path = project.catalog_path();
+    let whole = std::fs::read(&path).expect("read");
+    let mut bytes = whole.clone();
+    let (from, to) = (bytes.len() * from / 8, bytes.len() * to / 8);
+    for (index, byte) in bytes[from..to].iter_mut().enumerate() {
+        *byte = (index * 37 % 251) as u8;
+    }
+    std::fs::write(path, bytes).expect("written");
+    whole
+}
+
+/// Words of the database that no user should have to read.
+const RAW: [&str; 4] = ["code:", "returned from database", "SQLITE_", "malformed"];
+
+#[track_caller]
+fn plain(said: &str, wanted: &str) {
+    assert!(said.contains(wanted), "{wanted}: {said}");
+    assert!(!RAW.iter().any(|raw| said.contains(raw)), "{said}");
+}
+
+#[test]
+fn a_catalog_that_is_none_is_told_in_a_sentence() {
+    let dir = empty();
+    let file = dir.path().join("catalog.sqlite");
+    let import = ["import", "pairs.csv"];
+    let manifest = "id,mesh,print\na,a.stl,a.png\n";
+    std::fs::write(dir.path().join("pairs.csv"), manifest).expect("written");
+    let cases: [(&[u8], &str); 3] = [
+        (b"", "is empty (0 bytes)"),
+        (
+            b"id,mesh,print\na,a.stl,a.png\n",
+            "is not a catalog but text",
+        ),
+        (b"\x89PNG\r\n\x1a\nrest", "is not a catalog but a PNG image"),
+    ];
+    for (bytes, wanted) in cases {
+        std::fs::write(&file, bytes).expect("written");
+        for (command, code) in [(&["status"][..], 1), (&["run"], 1), (&["check"], 12)] {
+            let refused = mocban(dir.path(), command).expect(code);
+            plain(&refused.err, wanted);
+            assert!(refused.err.contains("catalog.sqlite"), "{}", refused.err);
+        }
+        assert_eq!(std::fs::read(&file).expect("read"), bytes);
+        if !bytes.is_empty() {
+            plain(&mocban(dir.path(), &import).expect(1).err, wanted);
+            assert_eq!(std::fs::read(&file).expect("read"), bytes);
+        }
+    }
+    // As a kill in the first moment of an import leaves it: the import is done again.
+    std::fs::write(&file, "").expect("written");
+    mocban(dir.path(), &import).expect(0);
+    std::fs::remove_file(&file).expect("removed");
+    std::fs::create_dir(&file).expect("a folder");
+    for (command, code) in [(&["status"][..], 1), (&["run"], 1), (&import, 1)] {
+        let refused = mocban(dir.path(), command).expect(code);
+        plain(
+            &refused.err,
+            "is a directory where the catalog should be a file",
+        );
+    }
+}
+
+#[test]
+fn a_newer_or_foreign_database_is_refused_and_left_alone() {
+    let dir = empty();
+    let project = done(dir.path());
+    sql(&project, "PRAGMA user_version = 9000");
+    let before = std::fs::read(project.catalog_path()).expect("read");
+    for command in ["status", "run", "check"] {
+        let refused = at(&project, &[command]).expect(1);
+        plain(&refused.err, "newer version of this program");
+    }
+    assert!(std::fs::read(project.catalog_path()).expect("read") == before);
+    sql(
+        &project,
+        "PRAGMA application_id = 1; PRAGMA user_version = 1",
+    );
+    plain(&at(&project, &["status"]).expect(1).err, "another program");
+    plain(&at(&project, &["check"]).expect(12).err, "another program");
+}
+
+#[test]
+fn a_catalog_with_garbage_in_its_middle_is_told_and_no_repair_writes_to_it() {
+    let dir = empty();
+    let project = done(dir.path());
+    let whole = spoil(&project, 5, 7);
+    for command in [&["report"][..], &["export", "-o", "x"], &["run"]] {
+        let refused = at(&project, command).expect(1);
+        plain(&refused.err, "is damaged");
+        assert!(refused.err.contains("catalog.sqlite"), "{}", refused.err);
+    }
+    let before = std::fs::read(project.catalog_path()).expect("read");
+    for command in [&["check"][..], &["check", "--repair"]] {
+        let found = at(&project, command).expect(12).out;
+        assert!(found.contains("faults of the database"), "{found}");
+        assert!(found.contains("put a backup in its place"), "{found}");
+    }
+    let after = std::fs::read(project.catalog_path()).expect("read");
+    assert!(after == before, "the repair wrote to a damaged catalog");
+
+    // Where not even the schema can be read, there is nothing to list.
+    std::fs::write(project.catalog_path(), whole).expect("mended");
+    spoil(&project, 1, 7);
+    for command in [&["check"][..], &["check", "--repair"]] {
+        let refused = at(&project, command).expect(12);
+        plain(&refused.err, "damaged so far that it cannot be read");
+    }
+}
+
+#[test]
+fn counters_that_are_off_end_a_run_in_a_sentence_that_leads_to_their_mending() {
+    let dir = empty();
+    let project = done(dir.path());
+    sql(&project, "UPDATE counter SET n = 0");
+    let again = ["run", "--rerun", "all", "--stage", "register"];
+    let refused = at(&project, &again).expect(1);
+    plain(&refused.err, "`check --repair` mends them");
+    at(&project, &["check", "--repair"]).expect(0);
+    at(&project, &again).expect(0);
+    at(&project, &["check"]).expect(0);
+}
+
+/// Calls the binary as somebody who may read but not write there.
+fn as_nobody(project: &Project, args: &[&str]) -> crate::cli::Call {
+    let mut command = binary();
+    command
+        .current_dir("/")
+        .arg("-C")
+        .arg(project.dir())
+        .args(args);
+    let owner = std::fs::metadata(project.dir()).expect("a folder").uid();
+    // Root may write everywhere.
+    if owner == 0 {
+        command.uid(65534).gid(65534);
+    }
+    call(&mut command)
+}
+
+/// Takes from everybody the right to write below a directory, or gives it back to the owner.
+fn set_writable(dir: &Path, writable: bool) {
+    use std::os::unix::fs::PermissionsExt as _;
+    for entry in std::fs::read_dir(dir).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        if path.is_dir() {
+            set_writable(&path, writable);
+        } else {
+            let mode = if writable { 0o644 } else { 0o444 };
+            let mode = std::fs::Permissions::from_mode(mode);
+            std::fs::set_permissions(path, mode).expect("set");
+        }
+    }
+    let mode = if writable { 0o755 } else { 0o555 };
+    std::fs::set_permissions(dir, std::fs::Permissions::from_mode(mode)).expect("set");
+}
+
+#[test]
+fn a_project_that_cannot_be_written_to_can_be_looked_at() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let dir = empty();
+    let open = std::fs::Permissions::from_mode(0o755);
+    std::fs::set_permissions(dir.path(), open).expect("set");
+    let project = done(dir.path());
+    let wanted = at(&project, &["report", "--json"]).expect(0).out;
+    set_writable(project.dir(), false);
+    assert_eq!(
+        as_nobody(&project, &["report", "--json"]).expect(0).out,
+        wanted
+    );
+    as_nobody(&project, &["status"]).expect(0);
+    as_nobody(&project, &["show", "upright-0001"]).expect(0);
+    as_nobody(&project, &["check"]).expect(0);
+    for command in [&["run"][..], &["check", "--repair"], &["verdict", "undo"]] {
+        let refused = as_nobody(&project, command).expect(1);
+        plain(&refused.err, "cannot be written to; status, show, report");
+    }
+
+    // A log that was never folded back must not be passed over in silence.
+    set_writable(project.dir(), true);
+    std::fs::write(project.dir().join("catalog.sqlite-wal"), [7; 64]).expect("written");
+    set_writable(project.dir(), false);
+    let refused = as_nobody(&project, &["status"]).expect(1);
+    plain(&refused.err, "catalog.sqlite-wal holds changes");
+    set_writable(project.dir(), true);
+}
+
+#[test]
+fn an_export_that_would_lack_files_leaves_the_earlier_one() {
+    let dir = empty();
+    let project = done(dir.path());
+    let before = exported(&project, "out");
+    let one = std::fs::read_dir(project.artifacts_dir()).expect("a folder");
+    for folder in one.flatten().filter(|entry| entry.path().is_dir()) {
+        std::fs::remove_dir_all(folder.path()).expect("removed");
+    }
+    let again = at(&project, &["export", "-o", "../out"]).expect(3);
+    assert!(
+        again.err.contains("the earlier export in ../out stays"),
+        "{}",
+        again.err
+    );
+    assert!(below(&dir.path().join("out")) == before);
+    // In a new place it is written, and says what it lacks.
+    at(&project, &["export", "-o", "../new"]).expect(3);
+    let lines = std::fs::read_to_string(dir.path().join("new/pairs.jsonl")).expect("read");
+    assert!(lines.contains("is missing"), "{lines}");
+    for command in again.next() {
+        let ran = call(
+            std::process::Command::new("sh")
+                .current_dir(project.dir())
+                .args(["-c", &command]),
+        );
+        ran.expect(0);
+    }
+    assert!(exported(&project, "out") == before);
+}
+
+#[test]
+fn stale_results_are_warned_of_in_report_and_export() {
+    let dir = empty();
+    let project = done(dir.path());
+    let warning = "warning: 2 pairs are stale";
+    for command in [&["report"][..], &["export", "-o", "../out"]] {
+        let now = at(&project, command).expect(0);
+        assert!(!now.err.contains("stale"), "{}", now.err);
+        let changed = ["--set", "register.smoothing_px=1.5"];
+        let later = at(&project, &[&changed[..], command].concat()).expect(0);
+        let warned = later.err.lines().filter(|line| line.starts_with(warning));
+        assert_eq!(warned.count(), 1, "{}", later.err);
+    }
+}
+
+#[test]
+fn verdicts_are_read_as_spreadsheets_write_them() {
+    let dir = empty();
+    let project = done(dir.path());
+    let file = project.dir().join("verdicts.csv");
+    let text = "pair;verdict;reader;note\r\nupright-0001;fail;Trần;\"1,5 px; nghiêng\"\r\n";
+    let utf16: Vec<u8> = "\u{feff}"
+        .encode_utf16()
+        .chain(text.encode_utf16())
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    let bytes: [&[u8]; 2] = [text.as_bytes(), &utf16];
+    for bytes in bytes {
+        std::fs::write(&file, bytes).expect("written");
+        at(&project, &["verdict", "import", "verdicts.csv"]).expect(0);
+        let log = at(&project, &["verdict", "log", "upright-0001", "--json"])
+            .expect(0)
+            .out;
+        let last: serde_json::Value =
+            serde_json::from_str(log.lines().last().expect("a line")).expect("JSON");
+        assert_eq!(
+            (&last["reader"], &last["note"]),
+            (&"Trần".into(), &"1,5 px; nghiêng".into())
+        );
+        at(&project, &["verdict", "undo"]).expect(0);
+    }
+}
+
+#[test]
+fn a_path_that_is_not_utf8_leaves_no_project_behind() {
+    use std::os::unix::ffi::OsStrExt as _;
+    let dir = empty();
+    let odd = dir.path().join(std::ffi::OsStr::from_bytes(b"scans-\xff"));
+    std::fs::create_dir(&odd).expect("a folder");
+    for name in ["1.stl", "1.png"] {
+        std::fs::write(odd.join(name), "x").expect("written");
+    }
+    let mut import = binary();
+    import
+        .current_dir(dir.path())
+        .args(["-C", "p", "import", "--meshes"]);
+    import.arg(&odd).arg("--prints").arg(&odd);
+    let refused = call(&mut import).expect(2);
+    plain(&refused.err, "is not UTF-8");
+    assert!(!dir.path().join("p").exists());
+}
