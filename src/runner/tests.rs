@@ -438,7 +438,8 @@ async fn a_run_up_to_a_stage_does_not_wait_for_a_later_one_to_be_tried_again() {
         stop: Stop::new(),
         ..world
     };
-    let summary = again.run(&early).await;
+    let ended = tokio::time::timeout(Duration::from_secs(20), again.run(&early)).await;
+    let summary = ended.expect("it does not wait");
     assert_eq!((summary.done, summary.stages, summary.left), (1, 1, 0));
     assert_eq!(again.status("breaks_1").await, JobStatus::Backoff);
     // The next run takes up what the stopped one left.
