@@ -94,14 +94,11 @@ impl Disk {
 
     fn sync(&mut self, sync: &Sync, names: Names) {
         self.name(sync, names);
-        match &sync.bytes {
-            Some(bytes) => {
-                self.files.insert(sync.inode, bytes.clone());
-            }
-            None => {
-                let there = sync.names.get(&sync.inode).cloned();
-                self.folders.insert(sync.inode, there.unwrap_or_default());
-            }
+        if let Some(bytes) = &sync.bytes {
+            self.files.insert(sync.inode, bytes.clone());
+        } else {
+            let there = sync.names.get(&sync.inode).cloned();
+            self.folders.insert(sync.inode, there.unwrap_or_default());
         }
     }
 
@@ -281,9 +278,9 @@ fn a_power_cut_at_any_sync_loses_nothing_that_was_stored() {
 fn a_stage_is_on_the_disk_before_the_next_one_ends() {
     let world = World::new("1");
     let recorded = world.recorded(&["-j", "1"]);
-    let disks = recorded.disks(Names::Late).into_iter();
-    let done = disks.map(|disk| {
-        let broken = world.folder("done");
+    let disks = recorded.disks(Names::Late).into_iter().enumerate();
+    let done = disks.map(|(index, disk)| {
+        let broken = world.folder(&format!("done-{index}"));
         disk.write(&broken);
         stages_done(&Project::open(&broken).expect("a project"))
     });

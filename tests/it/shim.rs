@@ -27,13 +27,12 @@ impl Shim {
             .arg(&library)
             .arg(&source)
             .args(["-ldl", "-lpthread"])
-            .output()
-            .unwrap_or_else(|error| {
-                let compiler = compiler.display();
-                panic!(
-                    "{compiler}: {error}; a C compiler is needed, as for the SQLite that is built in"
-                )
-            });
+            .output();
+        let shown = compiler.display();
+        let built = built.map_err(|error| {
+            format!("{shown}: {error}; a C compiler is needed, as for the SQLite that is built in")
+        });
+        let built = built.expect("a C compiler");
         let said = String::from_utf8_lossy(&built.stderr);
         assert!(built.status.success(), "{source}: {said}");
         Self { library, _dir: dir }
