@@ -68,8 +68,8 @@ static void hold(int fd, ino_t inode) {
     held[holds++] = inode;
 }
 
-/* The bytes are read by a mapping's way past the file's own position, and through a new description, which may read
- * where the caller's may only write. Closing it must not give back SQLite's locks, so it is never closed. */
+/* A file that may only be written is opened anew to be read. That is never closed: closing it would give back SQLite's
+ * locks on the file. */
 static void copy_bytes(int fd) {
     char name[32], link[64], bytes[65536];
     snprintf(name, sizeof name, "%ld.file", number);
