@@ -9,6 +9,7 @@ use sqlx::sqlite::{
 };
 use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
 
+use super::patience::Patience;
 use super::{CatalogError, Result, Trouble, network};
 use crate::domain::FileKind;
 
@@ -38,18 +39,13 @@ fn options(path: &Path) -> SqliteConnectOptions {
 pub(super) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection> {
     network::refuse(path)?;
     look(path, create)?;
-    // The writer runs the checkpoints itself, so that no commit is made to wait for one.
-    let mut conn = options(path)
-        .create_if_missing(create)
-        .journal_mode(SqliteJournalMode::Wal)
-        .pragma("wal_autocheckpoint", "0")
-        .pragma("journal_size_limit", "67108864")
-        .connect()
+    let is_new = create && !path.exists();
+    let mut conn = connect(path, create)
         .await
-        .map_err(|error| not_writable(path, error.into()))?;
-    migrate(&mut conn, path)
-        .await
-        .map_err(|error| not_writable(path, error))?;
+        .map_err(|error| match error.trouble() {
+            Some(Trouble::CannotOpen) if is_new => CatalogError::NotMade(path.to_owned()),
+            _ => not_writable(path, error),
+        })?;
     for (name, sql, wanted) in [
         (
             "journal_mode",
@@ -77,6 +73,30 @@ pub(super) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection
     Ok(conn)
 }
 
+async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
+    let patience = Patience::begin();
+    loop {
+        let outcome = try_connect(path, create).await;
+        match patience.wait(&outcome) {
+            Some(moment) => moment.await,
+            None => return outcome,
+        }
+    }
+}
+
+async fn try_connect(path: &Path, create: bool) -> Result<SqliteConnection> {
+    // The writer runs the checkpoints itself, so that no commit is made to wait for one.
+    let mut conn = options(path)
+        .create_if_missing(create)
+        .journal_mode(SqliteJournalMode::Wal)
+        .pragma("wal_autocheckpoint", "0")
+        .pragma("journal_size_limit", "67108864")
+        .connect()
+        .await?;
+    migrate(&mut conn, path).await?;
+    Ok(conn)
+}
+
 /// Connections that only read. They never wait for the writer, nor the writer for them. The catalog of an older
 /// version of the program is brought up to date first. Where nothing can be written, not even the files that readers
 /// share, the catalog is read as it lies.
@@ -99,7 +119,14 @@ pub(super) async fn readers(path: &Path) -> Result<SqlitePool> {
 
 /// Readers beside writers.
 async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
-    pool(options(path).pragma("query_only", "1")).await
+    let patience = Patience::begin();
+    loop {
+        let outcome = pool(options(path).pragma("query_only", "1")).await;
+        match patience.wait(&outcome) {
+            Some(moment) => moment.await,
+            None => return outcome,
+        }
+    }
 }
 
 /// Readers of a file that nobody can change. Only a log that was folded back can be left out of sight.

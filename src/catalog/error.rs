@@ -42,9 +42,12 @@ pub enum CatalogError {
     },
     /// Pages of the file contradict each other.
     #[error(
-        "{0} is damaged: some of it is not what the database wrote; `check` tells how far it can be read, and a backup can take its place"
+        "{0} is damaged: some of it is not what the database wrote, or the disk cannot read it; `check` tells how far it can be read, and a backup can take its place"
     )]
     Damaged(PathBuf),
+    /// There was no file, and none can be made.
+    #[error("{0} cannot be made: its folder takes no new file, or the disk refuses")]
+    NotMade(PathBuf),
     /// The file or its directory cannot be written to.
     #[error(
         "{0} cannot be written to; status, show, report and export work here, all else needs a copy that can be written"

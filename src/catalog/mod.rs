@@ -16,6 +16,7 @@ mod lease;
 mod mend;
 mod network;
 mod pairs;
+mod patience;
 mod plan;
 mod query;
 pub mod read;

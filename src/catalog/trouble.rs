@@ -27,7 +27,8 @@ impl Trouble {
     /// By SQLite's result code, extended ones included.
     const fn of_code(code: i64) -> Option<Self> {
         match code & 0xff {
-            5 | 6 => Some(Self::Busy),
+            // The last is of a reader that others kept out while the log was looked through.
+            5 | 6 | 15 => Some(Self::Busy),
             8 => Some(Self::ReadOnly),
             10 => Some(Self::Disk),
             11 => Some(Self::Damaged),

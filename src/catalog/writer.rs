@@ -6,9 +6,9 @@ use std::time::Duration;
 
 use sqlx::{Connection as _, SqliteConnection};
 use tokio::sync::{mpsc, oneshot};
-use tokio::time::Instant;
 
 use super::batch::{Answers, Batch, Request};
+use super::patience::Patience;
 use super::{CatalogError, Result};
 
 /// Most requests in one commit.
@@ -17,8 +17,6 @@ const BATCH: usize = 256;
 const COMMITS_PER_CHECKPOINT: u32 = 128;
 /// How long nothing must come in before the log is folded back.
 const IDLE: Duration = Duration::from_millis(250);
-/// How long other processes' writes are waited for, over and above SQLite's own waiting.
-const PATIENCE: Duration = Duration::from_mins(1);
 
 /// A future that borrows the write connection.
 pub(super) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
@@ -116,16 +114,15 @@ async fn attempt(conn: &mut SqliteConnection, batch: &Batch) -> Result<Answers> 
     end(conn, outcome).await
 }
 
-/// Begins a write transaction. Waits for another process's, so that "busy" never reaches a caller before its time.
+/// Begins a write transaction, when no other process has one.
 async fn begin(conn: &mut SqliteConnection) -> Result<()> {
-    let until = Instant::now() + PATIENCE;
+    let patience = Patience::begin();
     loop {
-        match sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await {
-            Ok(_) => return Ok(()),
-            Err(error) if is_busy(&error) && Instant::now() < until => {
-                tracing::debug!("the catalog is busy, waiting");
-            }
-            Err(error) => return Err(error.into()),
+        let begun = sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await;
+        let outcome = begun.map(|_| ()).map_err(CatalogError::from);
+        match patience.wait(&outcome) {
+            Some(moment) => moment.await,
+            None => return outcome,
         }
     }
 }
@@ -144,15 +141,6 @@ async fn end<T>(conn: &mut SqliteConnection, outcome: Result<T>) -> Result<T> {
         tracing::debug!(%error, "nothing to roll back");
     }
     outcome
-}
-
-/// Whether another connection holds the lock (`SQLITE_BUSY` and its extended codes).
-fn is_busy(error: &sqlx::Error) -> bool {
-    let code = error
-        .as_database_error()
-        .and_then(sqlx::error::DatabaseError::code)
-        .and_then(|code| code.parse::<i64>().ok());
-    code.is_some_and(|code| code & 0xff == 5)
 }
 
 async fn fold_log(conn: &mut SqliteConnection, pragma: &'static str) {

@@ -118,7 +118,7 @@ impl Before {
     /// Takes away what was not there. What cannot be removed is an empty project, which harms nobody.
     fn restore(&self, project: &Project) {
         if !self.catalog {
-            for ending in ["", "-wal", "-shm"] {
+            for ending in ["", "-wal", "-shm", "-journal"] {
                 let mut name = project.catalog_path().into_os_string();
                 name.push(ending);
                 let _ = std::fs::remove_file(name);

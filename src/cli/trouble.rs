@@ -53,12 +53,7 @@ pub(super) fn is_damaged_file(error: &CatalogError) -> bool {
 
 /// The catalog's file as it is shown.
 pub(super) fn file(dir: &Path) -> String {
-    let file = dir.join(CATALOG_FILE);
-    if file.exists() {
-        file.display().to_string()
-    } else {
-        "the catalog".to_owned()
-    }
+    dir.join(CATALOG_FILE).display().to_string()
 }
 
 /// A sentence with the file and what to do; `None` where the error says so itself.
@@ -117,7 +112,7 @@ mod tests {
         assert!(is_damage(found));
         let said = sentence(found, Path::new("nowhere")).expect("a sentence");
         assert!(
-            said.contains("the catalog") && said.contains("`check`"),
+            said.contains("nowhere/catalog.sqlite") && said.contains("`check`"),
             "{said}"
         );
         let plain = CatalogError::Missing("p/catalog.sqlite".into());

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Project;
+use super::whole::{folder_of, sync_folder};
 use crate::domain::{ArtifactRef, ArtifactSet, ContentHash};
 
 /// An artifact that is not on disk yet.
@@ -117,8 +118,8 @@ impl Project {
         for file in files {
             let artifact = file.reference();
             let path = self.artifact_path(&artifact);
-            let folder = path.parent().unwrap_or(Path::new(".")).to_owned();
-            self.make_folder(&folder)?;
+            let folder = folder_of(&path);
+            make_folder(&folder)?;
             if self.read_artifact(&artifact).is_err() {
                 self.place(&path, &file.bytes)?;
             }
@@ -126,7 +127,13 @@ impl Project {
             written.insert(file.role.clone(), artifact);
         }
         for folder in &folders {
-            sync_folder(folder)?;
+            sync(folder)?;
+        }
+        if !folders.is_empty() {
+            // These folders may be new, whoever made them: it may have died, or not have come to syncing, before it
+            // had their names on disk. Where nothing is new this takes no time.
+            sync(&self.artifacts_dir())?;
+            sync(self.dir())?;
         }
         Ok(written)
     }
@@ -149,19 +156,9 @@ impl Project {
         self.artifacts_dir().join("tmp")
     }
 
-    fn make_folder(&self, folder: &Path) -> Result<(), ArtifactError> {
-        if folder.is_dir() {
-            return Ok(());
-        }
-        std::fs::create_dir_all(folder).map_err(ArtifactError::io(folder))?;
-        sync_folder(&self.artifacts_dir())?;
-        // The folder of artifacts may be new too.
-        sync_folder(self.dir())
-    }
-
     fn place(&self, path: &Path, bytes: &[u8]) -> Result<(), ArtifactError> {
         let folder = self.temporary_dir();
-        self.make_folder(&folder)?;
+        make_folder(&folder)?;
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let temporary = folder.join(format!("{}-{number}", std::process::id()));
         let outcome = write_synced(&temporary, bytes)
@@ -188,11 +185,12 @@ fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     file.sync_all()
 }
 
-/// Makes the names in a folder durable.
-fn sync_folder(folder: &Path) -> Result<(), ArtifactError> {
-    File::open(folder)
-        .and_then(|folder| folder.sync_all())
-        .map_err(ArtifactError::io(folder))
+fn sync(folder: &Path) -> Result<(), ArtifactError> {
+    sync_folder(folder).map_err(ArtifactError::io(folder))
+}
+
+fn make_folder(folder: &Path) -> Result<(), ArtifactError> {
+    std::fs::create_dir_all(folder).map_err(ArtifactError::io(folder))
 }
 
 #[cfg(test)]

@@ -23,6 +23,8 @@ const BETWEEN: Duration = Duration::from_millis(5);
 pub struct RunLock {
     owner: Option<File>,
     members: File,
+    /// Where the members' file lies.
+    path: PathBuf,
     alone: bool,
 }
 
@@ -74,6 +76,7 @@ impl RunLock {
         Ok(Self {
             owner,
             members,
+            path,
             alone,
         })
     }
@@ -102,7 +105,7 @@ impl RunLock {
     /// # Errors
     /// When the file cannot be written.
     pub fn set_terms(&mut self, terms: &str) -> Result<(), LockError> {
-        write_over(&mut self.members, terms).map_err(io(Path::new(MEMBERS)))
+        write_over(&mut self.members, terms).map_err(io(&self.path))
     }
 
     /// What those who work already have agreed to; empty where nothing was written.
@@ -114,7 +117,7 @@ impl RunLock {
         self.members
             .seek(SeekFrom::Start(0))
             .and_then(|_| self.members.read_to_string(&mut text))
-            .map_err(io(Path::new(MEMBERS)))?;
+            .map_err(io(&self.path))?;
         Ok(text)
     }
 
@@ -124,9 +127,8 @@ impl RunLock {
     /// When the file cannot be locked in common.
     pub fn admit(&mut self) -> Result<(), LockError> {
         if self.alone {
-            let path = Path::new(MEMBERS);
-            self.members.unlock().map_err(io(path))?;
-            self.members.lock_shared().map_err(io(path))?;
+            self.members.unlock().map_err(io(&self.path))?;
+            self.members.lock_shared().map_err(io(&self.path))?;
             self.alone = false;
         }
         Ok(())

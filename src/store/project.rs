@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::whole::{folder_of, sync_folder};
+
 /// Name of the catalog file in a project.
 pub const CATALOG_FILE: &str = "catalog.sqlite";
 /// Name of the settings file in a project.
@@ -63,12 +65,17 @@ impl Project {
         }
     }
 
-    /// Makes the directory where it is missing. The catalog is made by `Catalog::create`.
+    /// Makes the directory where it is missing, for good. The catalog is made by `Catalog::create`.
     ///
     /// # Errors
     /// When it cannot be made.
     pub fn create(dir: &Path) -> Result<Self, StoreError> {
+        let missing: Vec<_> = dir.ancestors().take_while(|dir| !dir.exists()).collect();
         std::fs::create_dir_all(dir).map_err(StoreError::io(dir))?;
+        for made in missing {
+            let folder = folder_of(made);
+            sync_folder(&folder).map_err(StoreError::io(&folder))?;
+        }
         Ok(Self {
             dir: dir.to_owned(),
         })

@@ -42,8 +42,18 @@ pub fn finish_whole(partial: &Path, path: &Path) -> std::io::Result<()> {
         std::fs::set_permissions(partial, there.permissions())?;
     }
     std::fs::rename(partial, path)?;
+    sync_folder(&folder_of(path))
+}
+
+/// The folder that holds the name of a file or folder.
+pub(super) fn folder_of(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|dir| !dir.as_os_str().is_empty());
-    File::open(folder.unwrap_or(Path::new(".")))?.sync_all()
+    folder.unwrap_or(Path::new(".")).to_owned()
+}
+
+/// Makes the names in a folder durable.
+pub(super) fn sync_folder(folder: &Path) -> std::io::Result<()> {
+    File::open(folder)?.sync_all()
 }
 
 #[cfg(test)]

@@ -1,89 +1,14 @@
 //! The real binary under random `kill -9` until its run is done: nothing lost, nothing doubled, the same bytes.
 
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use mocban::domain::JobStatus;
 use mocban::store::Project;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use crate::cli::{call, mocban};
-use crate::resume::{copy, finished, pairs, project, results, run};
-
-/// A project's parent, its bytes to come and what an unbroken run of it gave.
-struct Wanted {
-    project: Project,
-    results: Vec<String>,
-    told: BTreeMap<PathBuf, Vec<u8>>,
-    artifacts: Vec<PathBuf>,
-}
-
-/// Every file below a folder, by its path in it.
-fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut open = vec![folder.to_owned()];
-    while let Some(at) = open.pop() {
-        for entry in std::fs::read_dir(at).expect("a folder") {
-            let path = entry.expect("an entry").path();
-            if path.is_dir() {
-                open.push(path);
-            } else {
-                let inside = path.strip_prefix(folder).expect("below").to_owned();
-                found.insert(inside, std::fs::read(path).expect("a file"));
-            }
-        }
-    }
-    found
-}
-
-/// The report and the export of the project `p` in a folder, as bytes.
-fn told(parent: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    mocban(parent, &["-C", "p", "export", "-o", "out"]).expect(0);
-    let mut told = files(&parent.join("out"));
-    for form in ["csv", "json", "text"] {
-        let report = mocban(parent, &["-C", "p", "report", "-f", form]).expect(0);
-        told.insert(PathBuf::from(form), report.out.into_bytes());
-    }
-    told
-}
-
-fn artifacts(project: &Project) -> Vec<PathBuf> {
-    files(&project.artifacts_dir()).into_keys().collect()
-}
-
-impl Wanted {
-    /// Runs a copy of the project without a break.
-    fn of(fresh: &Project, parent: &Path) -> Self {
-        let project = copy(fresh, &parent.join("p"));
-        call(&mut run(&project, &[])).expect(0);
-        Self {
-            results: results(&project),
-            told: told(parent),
-            artifacts: artifacts(&project),
-            project,
-        }
-    }
-
-    /// Holds a broken run's project, done at last, against the unbroken one's.
-    fn is_met_by(&self, broken: &Project) {
-        for pair in pairs(broken) {
-            assert_eq!(pair.results.status, JobStatus::Done);
-        }
-        assert_eq!(results(broken), self.results);
-        assert_eq!(finished(broken), finished(&self.project));
-        assert!(finished(broken).iter().all(|times| *times == 1));
-        assert_eq!(artifacts(broken), self.artifacts);
-        let told = told(broken.dir().parent().expect("a folder"));
-        let names = |told: &BTreeMap<PathBuf, Vec<u8>>| told.keys().cloned().collect::<Vec<_>>();
-        assert_eq!(names(&told), names(&self.told));
-        for (path, bytes) in &told {
-            assert!(*bytes == self.told[path], "{} differs", path.display());
-        }
-    }
-}
+use crate::resume::{copy, project, run};
+use crate::unbroken::Wanted;
 
 /// Starts the run again and again and kills it after 50 to 500 ms, until one ends by itself; says how often it was
 /// killed.

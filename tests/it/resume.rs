@@ -36,7 +36,13 @@ pub(crate) fn project(dir: &Path, name: &str, pairs: &str) -> Project {
 
 /// The same project again in another folder.
 pub(crate) fn copy(project: &Project, to: &Path) -> Project {
-    let mut open = vec![(project.dir().to_owned(), to.to_owned())];
+    copy_folder(project.dir(), to);
+    Project::open(to).expect("a project")
+}
+
+/// A folder again with all below it.
+pub(crate) fn copy_folder(from: &Path, to: &Path) {
+    let mut open = vec![(from.to_owned(), to.to_owned())];
     while let Some((from, to)) = open.pop() {
         std::fs::create_dir_all(&to).expect("a folder");
         for entry in std::fs::read_dir(from).expect("a folder") {
@@ -49,7 +55,6 @@ pub(crate) fn copy(project: &Project, to: &Path) -> Project {
             }
         }
     }
-    Project::open(to).expect("a project")
 }
 
 /// `run` with some arguments, ready to be called.

@@ -1,0 +1,193 @@
+/* Makes a chosen call of the operating system fail in the process it is loaded into.
+ *
+ * FAULT_CALL     open, read, write, sync, rename, truncate, unlink, mkdir or lock
+ * FAULT_PATH     pattern (fnmatch) that the file's whole path must match; of a rename, either path
+ * FAULT_NTH      which of the matching calls, from 1; 0 for none
+ * FAULT_TIMES    how many from there on, 1 when left out; 0 for all
+ * FAULT_ERROR    number of the error; 0 lets the call through
+ * FAULT_SHORT    set: the first of them writes half of the bytes and says so, as a nearly full disk does
+ * FAULT_DELAY_MS milliseconds that each of them is held up first
+ * FAULT_NO_SLEEP set: the process never sleeps, so that one that waits for a lock is through with it at once
+ * FAULT_LOG      file that gets a line for every matching call
+ * FAULT_MARK     file that gets a line for every call that was struck
+ */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <fnmatch.h>
+#include <limits.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <sys/uio.h>
+#include <time.h>
+#include <unistd.h>
+
+#define REAL(name) ((__typeof__(&name))real(#name))
+
+static struct {
+    const char *call, *path, *log, *mark;
+    long nth, times, delay_ms;
+    int error, half, no_sleep;
+} plan;
+
+static atomic_long seen;
+
+static void *real(const char *name) { return dlsym(RTLD_NEXT, name); }
+
+static long number(const char *name, long otherwise) {
+    const char *text = getenv(name);
+    return text ? atol(text) : otherwise;
+}
+
+__attribute__((constructor)) static void read_plan(void) {
+    plan.call = getenv("FAULT_CALL");
+    plan.path = getenv("FAULT_PATH");
+    plan.log = getenv("FAULT_LOG");
+    plan.mark = getenv("FAULT_MARK");
+    plan.nth = number("FAULT_NTH", 0);
+    plan.times = number("FAULT_TIMES", 1);
+    plan.error = (int)number("FAULT_ERROR", 0);
+    plan.delay_ms = number("FAULT_DELAY_MS", 0);
+    plan.half = getenv("FAULT_SHORT") != NULL;
+    plan.no_sleep = getenv("FAULT_NO_SLEEP") != NULL;
+}
+
+/* Adds a line to a file, past our own calls. */
+static void note(const char *file, const char *call, const char *path) {
+    char line[PATH_MAX + 32];
+    int length = snprintf(line, sizeof line, "%s %s\n", call, path);
+    long fd = syscall(SYS_openat, AT_FDCWD, file, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+    if (fd < 0 || length < 0 || syscall(SYS_write, fd, line, (size_t)length) != length) {
+        abort();
+    }
+    syscall(SYS_close, fd);
+}
+
+enum verdict { PASS, FAIL, HALF };
+
+/* What is to become of a call; sets errno where it is to fail. */
+static enum verdict judge(const char *call, const char *path, const char *other) {
+    if (!plan.call || !plan.path || strcmp(call, plan.call) != 0) {
+        return PASS;
+    }
+    if (fnmatch(plan.path, path, 0) != 0 && (!other || fnmatch(plan.path, other, 0) != 0)) {
+        return PASS;
+    }
+    int before = errno;
+    long which = atomic_fetch_add(&seen, 1) + 1;
+    if (plan.log) {
+        note(plan.log, call, path);
+    }
+    if (plan.nth == 0 || which < plan.nth || (plan.times && which >= plan.nth + plan.times)) {
+        errno = before;
+        return PASS;
+    }
+    if (plan.mark) {
+        note(plan.mark, call, path);
+    }
+    if (plan.delay_ms) {
+        struct timespec delay = {plan.delay_ms / 1000, plan.delay_ms % 1000 * 1000000};
+        syscall(SYS_nanosleep, &delay, NULL);
+    }
+    if (plan.half && which == plan.nth) {
+        return HALF;
+    }
+    errno = plan.error ? plan.error : before;
+    return plan.error ? FAIL : PASS;
+}
+
+/* The same for a call on an open file. */
+static enum verdict judge_file(const char *call, int fd) {
+    if (!plan.call || strcmp(call, plan.call) != 0) {
+        return PASS;
+    }
+    char link[64], path[PATH_MAX];
+    snprintf(link, sizeof link, "/proc/self/fd/%d", fd);
+    ssize_t length = readlink(link, path, sizeof path - 1);
+    if (length < 0) {
+        return PASS;
+    }
+    path[length] = 0;
+    return judge(call, path, NULL);
+}
+
+static size_t part(enum verdict verdict, size_t count) { return verdict == HALF ? (count + 1) / 2 : count; }
+
+#define OPEN(name)                                                                                                     \
+    int name(const char *path, int flags, ...) {                                                                       \
+        va_list rest;                                                                                                  \
+        va_start(rest, flags);                                                                                         \
+        mode_t mode = flags & (O_CREAT | O_TMPFILE) ? va_arg(rest, mode_t) : 0;                                        \
+        va_end(rest);                                                                                                  \
+        return judge("open", path, NULL) == FAIL ? -1 : REAL(name)(path, flags, mode);                                 \
+    }
+OPEN(open)
+OPEN(open64)
+
+ssize_t read(int fd, void *bytes, size_t count) {
+    return judge_file("read", fd) == FAIL ? -1 : REAL(read)(fd, bytes, count);
+}
+
+ssize_t pread64(int fd, void *bytes, size_t count, off64_t at) {
+    return judge_file("read", fd) == FAIL ? -1 : REAL(pread64)(fd, bytes, count, at);
+}
+
+ssize_t write(int fd, const void *bytes, size_t count) {
+    enum verdict verdict = judge_file("write", fd);
+    return verdict == FAIL ? -1 : REAL(write)(fd, bytes, part(verdict, count));
+}
+
+ssize_t pwrite64(int fd, const void *bytes, size_t count, off64_t at) {
+    enum verdict verdict = judge_file("write", fd);
+    return verdict == FAIL ? -1 : REAL(pwrite64)(fd, bytes, part(verdict, count), at);
+}
+
+ssize_t writev(int fd, const struct iovec *parts, int count) {
+    enum verdict verdict = judge_file("write", fd);
+    return verdict == FAIL ? -1 : REAL(writev)(fd, parts, (int)part(verdict, (size_t)count));
+}
+
+int fsync(int fd) { return judge_file("sync", fd) == FAIL ? -1 : REAL(fsync)(fd); }
+
+int fdatasync(int fd) { return judge_file("sync", fd) == FAIL ? -1 : REAL(fdatasync)(fd); }
+
+int ftruncate64(int fd, off64_t length) {
+    return judge_file("truncate", fd) == FAIL ? -1 : REAL(ftruncate64)(fd, length);
+}
+
+int rename(const char *from, const char *to) {
+    return judge("rename", from, to) == FAIL ? -1 : REAL(rename)(from, to);
+}
+
+int unlink(const char *path) { return judge("unlink", path, NULL) == FAIL ? -1 : REAL(unlink)(path); }
+
+int mkdir(const char *path, mode_t mode) { return judge("mkdir", path, NULL) == FAIL ? -1 : REAL(mkdir)(path, mode); }
+
+/* SQLite's locks: both names lead here. Giving a lock back never fails. */
+static int control(const char *name, int fd, int command, void *argument) {
+    if (command == F_SETLK && ((struct flock *)argument)->l_type != F_UNLCK && judge_file("lock", fd) == FAIL) {
+        return -1;
+    }
+    return ((int (*)(int, int, ...))real(name))(fd, command, argument);
+}
+
+#define CONTROL(name)                                                                                                  \
+    int name(int fd, int command, ...) {                                                                               \
+        va_list rest;                                                                                                  \
+        va_start(rest, command);                                                                                       \
+        void *argument = va_arg(rest, void *);                                                                         \
+        va_end(rest);                                                                                                  \
+        return control(#name, fd, command, argument);                                                                  \
+    }
+CONTROL(fcntl)
+CONTROL(fcntl64)
+
+int nanosleep(const struct timespec *time, struct timespec *left) {
+    return plan.no_sleep ? 0 : REAL(nanosleep)(time, left);
+}

@@ -1,0 +1,45 @@
+//! The small C libraries of `tests/faults`, built once and loaded into the real binary.
+
+use std::path::PathBuf;
+use std::process::Command;
+use std::sync::LazyLock;
+
+/// Makes a chosen call of the operating system fail.
+pub(crate) static FAULTS: LazyLock<Shim> = LazyLock::new(|| Shim::built("faults"));
+
+/// Writes down what a disk that loses its power would still hold.
+pub(crate) static SHADOW: LazyLock<Shim> = LazyLock::new(|| Shim::built("shadow"));
+
+/// A library that lies in a folder of its own.
+pub(crate) struct Shim {
+    library: PathBuf,
+    _dir: tempfile::TempDir,
+}
+
+impl Shim {
+    fn built(name: &str) -> Self {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let library = dir.path().join(format!("{name}.so"));
+        let source = format!("{}/tests/faults/{name}.c", env!("CARGO_MANIFEST_DIR"));
+        let compiler = std::env::var_os("CC").unwrap_or_else(|| "cc".into());
+        let built = Command::new(&compiler)
+            .args(["-shared", "-fPIC", "-O1", "-o"])
+            .arg(&library)
+            .arg(&source)
+            .args(["-ldl", "-lpthread"])
+            .output();
+        let shown = compiler.display();
+        let built = built.map_err(|error| {
+            format!("{shown}: {error}; a C compiler is needed, as for the SQLite that is built in")
+        });
+        let built = built.expect("a C compiler");
+        let said = String::from_utf8_lossy(&built.stderr);
+        assert!(built.status.success(), "{source}: {said}");
+        Self { library, _dir: dir }
+    }
+
+    /// Loads it into a command that is about to start.
+    pub(crate) fn load<'c>(&self, command: &'c mut Command) -> &'c mut Command {
+        command.env("LD_PRELOAD", &self.library)
+    }
+}
