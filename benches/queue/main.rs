@@ -3,8 +3,8 @@
 //! ```text
 //! cargo bench --bench queue
 //! cargo bench --bench queue -- --pairs 10000,100000,1000000 --queue-pairs 5000
-//! cargo build --release --manifest-path benches/peers-queue/Cargo.toml
-//! cargo bench --bench queue -- --peer benches/peers-queue/target/release/peers-queue
+//! cargo build --release --manifest-path benches/peers-queue/Cargo.toml --target-dir target/peers-queue
+//! cargo bench --bench queue -- --peer target/peers-queue/release/peers-queue
 //! ```
 //!
 //! Catalogs are made in the build's directory and removed again. Stages are faked: nothing is computed, and what is
