@@ -17,7 +17,9 @@ use crate::domain::JobStatus;
 pub(super) const STEP: &str = "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
-    attempt = 1, crashes = 0, mem_class = 0
+    attempt = 1, crashes = 0, mem_class = 0, doubtful = item.value ->> 'doubtful',
+    made = iif(item.value ->> 'next' = 1 OR made = (SELECT upstream FROM recipe WHERE id = item.value ->> 'made'),
+        item.value ->> 'made', NULL)
 FROM json_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
@@ -67,6 +69,10 @@ FROM json_each(?1) AS item WHERE pair.id = item.value ->> 'pair'";
 const CLEAR_FAILURE: &str =
     "DELETE FROM failure WHERE pair IN (SELECT value ->> 'pair' FROM json_each(?1))";
 
+/// What is written beside the job.
+#[cfg(test)]
+pub(super) const ROWS: [&str; 6] = [RESULT, CLEAR_METRICS, METRICS, ATTEMPT, SEEN, CLEAR_FAILURE];
+
 /// Stores what is done under leases that still hold; says which did.
 pub(super) async fn apply(
     conn: &mut SqliteConnection,
@@ -108,9 +114,14 @@ fn step((lease, done): &(Lease, StageDone)) -> Value {
     } else {
         JobStatus::Leased
     };
+    let doubtful = done
+        .metrics
+        .iter()
+        .any(|metric| metric.outcome.is_doubtful());
     json!({
         "pair": lease.pair.0, "worker": lease.worker.0, "epoch": lease.epoch,
-        "next": done.stage.index() + 1, "status": status.code(),
+        "next": done.stage.index() + 1, "status": status.code(), "made": done.recipe.0,
+        "doubtful": i64::from(doubtful),
         "deadline": (!finished).then_some(done.next_deadline), "alive_since": done.alive_since,
     })
 }

@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 use sqlx::SqliteConnection;
 
+use super::alike::made;
 use super::batch::Request;
 use super::checkpoint::store_seen;
 use super::claim::kept_pairs;
@@ -15,16 +16,20 @@ use crate::domain::JobStatus;
 const ATTEMPTS_KEPT: i64 = 64;
 
 /// The job's new state; only where the lease still holds.
-pub(super) const FAIL: &str = "
+pub(super) const FAIL: &str = concat!(
+    "
 UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.value ->> 'status',
     run_at = item.value ->> 'run_at', mem_class = max(mem_class, item.value ->> 'mem_class'),
-    worker = NULL, deadline = NULL
+    worker = NULL, deadline = NULL, made = ",
+    made!("min(job.stage, item.value ->> 'stage')"),
+    "
 FROM json_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = job.worker AND w.ended IS NULL AND w.beat >= item.value ->> 'alive_since')
-RETURNING pair";
+RETURNING pair"
+);
 
 const FAILURE: &str = "
 INSERT INTO failure (pair, stage, class, message, recipe, mesh_hash, print_hash, facts, at)

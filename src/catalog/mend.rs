@@ -3,6 +3,7 @@
 use serde_json::{Value, json};
 use sqlx::{AssertSqlSafe, Row as _, SqliteConnection};
 
+use super::alike::made;
 use super::audit::{integrity, objects, wanted_objects};
 use super::counters::{Deltas, cursor};
 use super::{Catalog, Result, rows};
@@ -18,10 +19,15 @@ SELECT value ->> 0, 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job 
 
 /// Back to a stage and never forward. A lease is no hindrance: no process lives that could hold it, and the new epoch
 /// shuts out one that does. What somebody set aside stays set aside.
-pub(super) const PUT_BACK: &str = "
+pub(super) const PUT_BACK: &str = concat!(
+    "
 UPDATE job SET stage = min(stage, item.value ->> 1), status = iif(status = 5, 5, 0), run_at = NULL, prio = 0,
-    attempt = 0, crashes = 0, mem_class = 0, worker = NULL, deadline = NULL, epoch = epoch + 1
-FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0";
+    attempt = 0, crashes = 0, mem_class = 0, worker = NULL, deadline = NULL, epoch = epoch + 1,
+    made = ",
+    made!("min(job.stage, item.value ->> 1)"),
+    "
+FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0"
+);
 
 const FORGET: &str = "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
 

@@ -3,6 +3,7 @@
 //! One writer task owns the only write connection and commits in groups; readers have their own connections and
 //! work while a run goes on. All times come in as arguments.
 
+mod alike;
 mod audit;
 mod batch;
 mod checkpoint;

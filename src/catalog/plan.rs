@@ -78,13 +78,13 @@ impl Plan {
         self.entries.iter().map(|entry| entry.pairs).sum()
     }
 
-    /// Counts a pair that would not run.
-    pub(super) const fn stays(&mut self, status: JobStatus) {
+    /// Counts pairs that would not run.
+    pub(super) const fn stays(&mut self, status: JobStatus, pairs: u64) {
         match status {
-            JobStatus::Done => self.done += 1,
-            JobStatus::Quarantined => self.quarantined += 1,
-            JobStatus::Held => self.held += 1,
-            JobStatus::Leased => self.leased += 1,
+            JobStatus::Done => self.done += pairs,
+            JobStatus::Quarantined => self.quarantined += pairs,
+            JobStatus::Held => self.held += pairs,
+            JobStatus::Leased => self.leased += pairs,
             // These always have work before them.
             JobStatus::Ready | JobStatus::Backoff => {}
         }

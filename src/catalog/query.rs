@@ -33,12 +33,12 @@ FROM pair AS p JOIN job AS j ON j.pair = p.id
     LEFT JOIN truth AS t ON t.pair = p.id
 WHERE p.name = ?1";
 
-const FAILED: &str = "
+pub(super) const FAILED: &str = "
 SELECT p.name, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at
 FROM job AS j JOIN pair AS p ON p.id = j.pair JOIN failure AS f ON f.pair = j.pair
 WHERE j.status IN (4, 5) AND j.status = 4 ORDER BY p.name LIMIT ?1";
 
-const FAILED_BY_CLASS: &str = "
+pub(super) const FAILED_BY_CLASS: &str = "
 SELECT f.class, count(*) FROM job AS j JOIN failure AS f ON f.pair = j.pair
 WHERE j.status IN (4, 5) AND j.status = 4 GROUP BY f.class";
 

@@ -66,6 +66,10 @@ impl RecipeIds {
     }
 }
 
+const ENTER: &str = "
+INSERT INTO recipe (stage, hash, fields, upstream) VALUES (?1, ?2, ?3, ?4)
+ON CONFLICT (hash) DO UPDATE SET upstream = excluded.upstream RETURNING id";
+
 impl Catalog {
     /// Enters the current recipes where they are new; gives their numbers.
     ///
@@ -75,16 +79,17 @@ impl Catalog {
         let recipes = recipes.clone();
         self.alone(move |conn| {
             Box::pin(async move {
+                let mut upstream: Option<i64> = None;
                 for stage in Stage::ALL {
                     let recipe = recipes.of(stage);
-                    sqlx::query(
-                        "INSERT OR IGNORE INTO recipe (stage, hash, fields) VALUES (?1, ?2, ?3)",
-                    )
-                    .bind(stage.index() as i64)
-                    .bind(&recipe.hash.as_bytes()[..])
-                    .bind(recipe.fields.to_string())
-                    .execute(&mut *conn)
-                    .await?;
+                    let id = sqlx::query_scalar(ENTER)
+                        .bind(stage.index() as i64)
+                        .bind(&recipe.hash.as_bytes()[..])
+                        .bind(recipe.fields.to_string())
+                        .bind(upstream)
+                        .fetch_one(&mut *conn)
+                        .await?;
+                    upstream = Some(id);
                 }
                 let mut ids = [RecipeId(0); 4];
                 for (id, found) in ids.iter_mut().zip(known(conn, &recipes).await?) {

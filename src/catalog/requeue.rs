@@ -3,11 +3,12 @@
 use serde_json::json;
 use sqlx::{Row as _, SqliteConnection};
 
+use super::alike::made;
 use super::claim::PairSelection;
 use super::counters::{Deltas, cursor};
 use super::recipes::{Recipes, current_json};
 use super::staleness::{Again, Cause, decide, look};
-use super::{Catalog, CatalogError, Result, pairs, rows};
+use super::{Catalog, CatalogError, Result, alike, pairs, rows};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 
 /// Which failed pairs to take up again.
@@ -22,10 +23,14 @@ pub enum RetrySelection {
 }
 
 /// Back to a stage, as if newly imported; never a job that somebody works on.
-pub(super) const SEND_BACK: &str = "
+pub(super) const SEND_BACK: &str = concat!(
+    "
 UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
-    mem_class = 0
-FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1";
+    mem_class = 0, made = ",
+    made!("(item.value ->> 1)"),
+    "
+FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1"
+);
 
 const FORGET: &str = "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
 
@@ -110,7 +115,11 @@ async fn page(
         })
         .collect();
     let sent = apply(conn, &moved).await?;
-    Ok((sent, found.last().map(|seen| seen.pair)))
+    let last = found.last().map(|seen| seen.pair);
+    if let (Some(last), None) = (last, among) {
+        alike::settle(conn, after, last).await?;
+    }
+    Ok((sent, last))
 }
 
 async fn kept_back(conn: &mut SqliteConnection, selection: &RetrySelection) -> Result<Vec<Moved>> {

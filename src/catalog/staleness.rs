@@ -9,11 +9,11 @@ use sqlx::{Row as _, SqliteConnection};
 use super::claim::PairSelection;
 use super::plan::{FieldChange, Plan, PlanEntry, WorkReason};
 use super::recipes::{Recipes, current_json};
-use super::{Catalog, CatalogError, Result, pairs, rows};
+use super::{Catalog, CatalogError, Result, alike, pairs, rows};
 use crate::domain::{JobStatus, PairName, Stage};
 
 /// Pairs looked at in one statement.
-const PAGE: usize = 10_000;
+pub(super) const PAGE: usize = 10_000;
 
 /// What to run again besides what changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,15 +51,9 @@ FROM seen LEFT JOIN stage_result AS r ON r.pair = seen.pair AND r.stage = seen.f
 }
 
 pub(super) const LOOK_ALL: &str = look!("job AS j");
-const LOOK_AMONG: &str = look!(
+pub(super) const LOOK_AMONG: &str = look!(
     "(SELECT value FROM json_each(?4)) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value"
 );
-
-const COUNT: &str = "
-SELECT count(*) FROM job AS j JOIN pair AS p ON p.id = j.pair WHERE EXISTS (
-    SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-        r.recipe <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
-        OR r.facts <> p.facts))";
 
 /// A job as the look found it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -166,16 +160,6 @@ fn changed(row: &SqliteRow, stage: Stage) -> Result<Cause> {
     })
 }
 
-/// Pairs with a result that would be made otherwise now.
-pub(super) async fn count(conn: &mut SqliteConnection, recipes: &Recipes) -> Result<u64> {
-    let current = current_json(conn, recipes).await?;
-    let n: i64 = sqlx::query_scalar(COUNT)
-        .bind(current)
-        .fetch_one(conn)
-        .await?;
-    Ok(n.unsigned_abs())
-}
-
 impl Catalog {
     /// What a run with these settings would do with the pairs named, or with all.
     ///
@@ -201,7 +185,7 @@ impl Catalog {
     /// When the database refuses.
     pub async fn stale(&self, recipes: &Recipes) -> Result<u64> {
         let mut conn = self.reader().await?;
-        count(&mut conn, recipes).await
+        alike::stale(&mut conn, recipes).await
     }
 
     /// Why a pair would run, and from which stage; `None` when nothing is left to do.
@@ -228,23 +212,39 @@ async fn plan(
     let current = current_json(conn, recipes).await?;
     let mut plan = Plan::default();
     let mut entries: BTreeMap<(Stage, Cause), u64> = BTreeMap::new();
-    let mut after = 0;
-    loop {
-        let page = look(conn, &current, after, among).await?;
-        let Some(last) = page.last() else { break };
-        after = last.pair;
-        for seen in &page {
-            match decide(seen, again) {
-                Some(key) => *entries.entry(key).or_default() += 1,
-                None => plan.stays(seen.status),
-            }
-        }
+    let mut take = |seen: &Seen, pairs: u64| match decide(seen, again) {
+        Some(key) => *entries.entry(key).or_default() += pairs,
+        None => plan.stays(seen.status, pairs),
+    };
+    match among {
+        Some(among) => look_at(conn, &current, among, &mut take).await?,
+        None => alike::look_at_all(conn, &current, &mut take).await?,
     }
     for ((from, cause), pairs) in entries {
         let why = reason(conn, recipes, cause).await?;
         plan.entries.push(PlanEntry { from, why, pairs });
     }
     Ok(plan)
+}
+
+/// Gives the state of each of some pairs to `each`.
+async fn look_at(
+    conn: &mut SqliteConnection,
+    current: &str,
+    among: &PairSelection,
+    mut each: impl FnMut(&Seen, u64),
+) -> Result<()> {
+    let mut after = 0;
+    loop {
+        let page = look(conn, current, after, Some(among)).await?;
+        let Some(last) = page.last() else {
+            return Ok(());
+        };
+        after = last.pair;
+        for seen in &page {
+            each(seen, 1);
+        }
+    }
 }
 
 async fn reason(

@@ -7,7 +7,7 @@ use sqlx::{Row as _, SqliteConnection};
 use super::counters::{Counts, counts};
 use super::read::{StageCounts, StatusCounts};
 use super::recipes::Recipes;
-use super::{Catalog, Result, query, rows, staleness};
+use super::{Catalog, Result, alike, query, rows};
 use crate::domain::{JobStatus, Stage, Verdict};
 
 /// Newest verdict of each reader on each current result, by verdict.
@@ -20,10 +20,8 @@ WHERE v.id = (
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act))
 GROUP BY v.verdict";
 
-/// The limit is that of [`MetricOutcome::DOUBTFUL`](crate::domain::MetricOutcome::DOUBTFUL), written out for the index.
-pub(super) const DOUBTFUL: &str = "
-SELECT count(DISTINCT m.pair) FROM metric_result AS m JOIN job AS j ON j.pair = m.pair
-WHERE m.confidence < 0.5 AND j.status = 3";
+/// Finished pairs with a metric that is unsure of itself.
+pub(super) const DOUBTFUL: &str = "SELECT count(*) FROM job WHERE doubtful = 1 AND status = 3";
 
 impl Catalog {
     /// Counts for `status`; `recipes` are the current ones, to tell what is stale.
@@ -42,7 +40,7 @@ impl Catalog {
             pairs: counted.values().sum(),
             jobs: query::by_status(&counted),
             stages: by_stage(&counted),
-            stale: staleness::count(&mut conn, recipes).await?,
+            stale: alike::stale(&mut conn, recipes).await?,
             doubtful: sqlx::query_scalar::<_, i64>(DOUBTFUL)
                 .fetch_one(&mut *conn)
                 .await?

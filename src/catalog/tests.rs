@@ -13,8 +13,8 @@ mod verdicts;
 use serde_json::{Map, json};
 
 use super::{
-    Catalog, ClaimRequest, ImportRow, InputSeen, InputsSeen, Kept, Lease, MetricResult, RecipeIds,
-    Recipes, StageDone, WorkerInfo,
+    Again, Catalog, ClaimRequest, ImportRow, InputSeen, InputsSeen, Kept, Lease, MetricResult,
+    RecipeIds, Recipes, StageDone, WorkerInfo,
 };
 use crate::domain::{
     Affine2, ArtifactSet, ContentHash, MetricOutcome, PairName, RegisterOutcome, Scores, Stage,
@@ -108,6 +108,41 @@ impl World {
     async fn counters_hold(&self) {
         let kept = self.catalog.counters().await.expect("counters");
         assert_eq!(kept, self.catalog.recount().await.expect("a recount"));
+        self.shortcuts_hold().await;
+    }
+}
+
+impl World {
+    /// What is told of all pairs at once is what a look at each of them tells, with the settings of now and others.
+    async fn shortcuts_hold(&self) {
+        let names = self.catalog.pair_names().await.expect("names");
+        for revision in [[1; 4], [1, 1, 2, 1]] {
+            let recipes = recipes(revision);
+            let plan = |names| self.catalog.plan(&recipes, names, Again::Changed);
+            let all = plan(None).await.expect("a plan");
+            let each = plan(Some(names.as_slice())).await.expect("a plan");
+            assert_eq!(all, each, "{revision:?}");
+            let stale = self.catalog.stale(&recipes).await.expect("a read");
+            let counted = self.count_stale(&recipes).await;
+            assert_eq!(stale, counted, "{revision:?}");
+        }
+    }
+
+    /// Looks at every result of every pair.
+    async fn count_stale(&self, recipes: &Recipes) -> u64 {
+        let mut conn = self.catalog.reader().await.expect("a reader");
+        let current = super::recipes::current_json(&mut conn, recipes).await;
+        let n: i64 = sqlx::query_scalar(
+            "SELECT count(*) FROM job AS j JOIN pair AS p ON p.id = j.pair WHERE EXISTS (
+                SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
+                    r.recipe <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash
+                    OR r.print_hash <> p.print_hash OR r.facts <> p.facts))",
+        )
+        .bind(current.expect("recipes"))
+        .fetch_one(&mut *conn)
+        .await
+        .expect("a count");
+        n.unsigned_abs()
     }
 }
 

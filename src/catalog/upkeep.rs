@@ -48,7 +48,7 @@ pub(super) const DUE: &str = "
 UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
 RETURNING stage";
 
-const LEFT_ALL: &str = "
+pub(super) const LEFT_ALL: &str = "
 SELECT
     (SELECT count(*) FROM (SELECT 1 FROM job WHERE status = 0 AND stage <= ?1 LIMIT 1000)),
     (SELECT count(*) FROM job WHERE status = 1 AND stage <= ?1),

@@ -187,6 +187,12 @@ pub struct MetricOutcome {
 impl MetricOutcome {
     /// Results with less confidence than this are worth a look before they are used.
     pub const DOUBTFUL: f64 = 0.5;
+
+    /// Whether it is known to be less confident than [`Self::DOUBTFUL`].
+    pub fn is_doubtful(&self) -> bool {
+        self.confidence
+            .is_some_and(|confidence| confidence < Self::DOUBTFUL)
+    }
 }
 
 /// Numbers of the register stage.

@@ -4,8 +4,8 @@ use sqlx::{AssertSqlSafe, Row as _};
 
 use super::World;
 use crate::catalog::{
-    audit, checkpoint, claim, connect, fail, mend, query, requeue, rescue, results, status, upkeep,
-    verdicts,
+    alike, audit, checkpoint, claim, connect, fail, mend, query, requeue, rescue, results,
+    staleness, status, upkeep, verdicts, work,
 };
 
 /// Lines of the query plan.
@@ -93,8 +93,53 @@ async fn due_pairs_come_from_the_index_of_back_offs() {
 #[tokio::test]
 async fn doubtful_pairs_come_from_their_index() {
     let plan = plan(status::DOUBTFUL).await;
-    assert_only(&plan, &["m USING INDEX metric_doubtful"]);
-    assert!(plan[0].contains("INDEX metric_doubtful"), "{plan:?}");
+    assert_only(&plan, &["job USING COVERING INDEX job_doubtful"]);
+    assert!(plan[0].contains("INDEX job_doubtful"), "{plan:?}");
+}
+
+#[tokio::test]
+async fn stale_pairs_are_counted_without_a_look_at_every_pair() {
+    for sql in [alike::STALE, alike::APART, alike::SETTLE] {
+        let plan = plan(sql).await;
+        let small = [
+            "SCAN made",
+            "SCAN moved",
+            "SCAN m",
+            "VIRTUAL TABLE",
+            "INDEX job_mixed",
+            "CONSTANT ROW",
+        ];
+        assert_only(&plan, &small);
+    }
+}
+
+#[tokio::test]
+async fn a_plan_scans_the_jobs_once_and_nothing_else() {
+    let all = plan(alike::GROUPS).await;
+    let scans: Vec<_> = all.iter().filter(|line| line.starts_with("SCAN")).collect();
+    assert_eq!(scans, ["SCAN j"]);
+    let among = plan(staleness::LOOK_AMONG).await;
+    assert_only(&among, &["VIRTUAL TABLE", "SCAN seen"]);
+    let page = plan(staleness::LOOK_ALL).await;
+    assert_only(&page, &["SCAN seen"]);
+}
+
+#[tokio::test]
+async fn what_a_checkpoint_writes_is_found_by_key() {
+    for sql in checkpoint::ROWS {
+        assert_only(&plan(sql).await, &["VIRTUAL TABLE"]);
+    }
+}
+
+#[tokio::test]
+async fn what_a_run_asks_of_inputs_and_counts_is_paged_or_small() {
+    assert_only(&plan(work::INPUTS).await, &[]);
+    assert_only(
+        &plan(upkeep::LEFT_ALL).await,
+        &["INDEX job_", "CONSTANT ROW", "SCAN (subquery"],
+    );
+    assert_only(&plan(query::FAILED).await, &["INDEX job_bad"]);
+    assert_only(&plan(query::FAILED_BY_CLASS).await, &["INDEX job_bad"]);
 }
 
 #[tokio::test]

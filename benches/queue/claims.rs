@@ -1,0 +1,35 @@
+//! How long a claim takes.
+
+use std::time::Instant;
+
+use mocban::catalog::Catalog;
+
+use super::fake::Fake;
+use super::spread::Spread;
+use super::world::{World, recipes};
+
+/// Pairs in a large claim.
+pub(super) const MANY: usize = 64;
+/// Claims that are measured.
+const TIMES: usize = 200;
+
+/// Times of claims of one pair and of many, each stored before it is answered. All are given back.
+pub(super) async fn times(world: &World, catalog: &Catalog) -> anyhow::Result<[String; 2]> {
+    let fake = Fake::enter(&world.project, catalog, &recipes(None)?).await?;
+    let mut cells = [String::new(), String::new()];
+    for (cell, slots) in cells.iter_mut().zip([1, MANY]) {
+        let mut spread = Spread::default();
+        for _ in 0..TIMES {
+            let start = Instant::now();
+            let leases = catalog.claim(fake.request(slots)).await?;
+            spread.since(start);
+            anyhow::ensure!(leases.len() == slots, "{} pairs ready", leases.len());
+            for lease in leases {
+                catalog.release(lease).await?;
+            }
+        }
+        *cell = spread.cell();
+    }
+    catalog.end_worker(fake.worker, 2).await?;
+    Ok(cells)
+}

@@ -1,0 +1,47 @@
+//! Many finished pairs at once: the rows of a pair that was worked, copied to others by SQL.
+
+use std::path::Path;
+
+use sqlx::sqlite::{SqliteConnectOptions, SqliteSynchronous};
+use sqlx::{ConnectOptions as _, Connection as _};
+
+const COPIES: [&str; 6] = [
+    "INSERT INTO stage_result (pair, stage, recipe, mesh_hash, print_hash, facts, outcome, files, result_hash, ms,
+        worker, at)
+    SELECT j.pair, r.stage, r.recipe, r.mesh_hash, r.print_hash, r.facts, r.outcome, r.files, r.result_hash, r.ms,
+        r.worker, r.at
+    FROM job AS j CROSS JOIN stage_result AS r ON r.pair = 1 WHERE j.pair > ?1 AND j.pair <= ?2",
+    "INSERT INTO metric_result (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale,
+        shift_x_px, shift_y_px, ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, confidence,
+        at_bound, result_hash)
+    SELECT j.pair, m.metric, m.threshold_level, m.threshold_depth, m.print_from_depth, m.angle_deg, m.scale,
+        m.shift_x_px, m.shift_y_px, m.ssim, m.nl_ssim, m.iou, m.iou_box, m.dice, m.density_print, m.density_depth,
+        m.margin, m.confidence, m.at_bound, m.result_hash
+    FROM job AS j CROSS JOIN metric_result AS m ON m.pair = 1 WHERE j.pair > ?1 AND j.pair <= ?2",
+    "INSERT INTO attempt (pair, stage, worker, ms, at)
+    SELECT j.pair, a.stage, a.worker, a.ms, a.at
+    FROM job AS j CROSS JOIN attempt AS a ON a.pair = 1 WHERE j.pair > ?1 AND j.pair <= ?2",
+    "UPDATE pair SET mesh_hash = one.mesh_hash, mesh_stat = one.mesh_stat, print_hash = one.print_hash,
+        print_stat = one.print_stat
+    FROM (SELECT * FROM pair WHERE id = 1) AS one WHERE pair.id > ?1 AND pair.id <= ?2",
+    "UPDATE job SET stage = 4, status = 3, attempt = 1, epoch = 1, made = (SELECT made FROM job WHERE pair = 1)
+    WHERE pair > ?1 AND pair <= ?2",
+    "UPDATE counter SET n = (SELECT count(*) FROM job AS j WHERE j.stage = counter.stage AND j.status = counter.status)
+    WHERE ?1 < ?2",
+];
+
+/// Makes the pairs after one up to another as finished as the first pair is.
+pub(super) async fn copy(catalog: &Path, after: usize, last: usize) -> anyhow::Result<()> {
+    let options = SqliteConnectOptions::new()
+        .filename(catalog)
+        .synchronous(SqliteSynchronous::Off);
+    let mut conn = options.connect().await?;
+    for sql in COPIES {
+        let query = sqlx::query(sql).bind(after as i64).bind(last as i64);
+        query.execute(&mut conn).await?;
+    }
+    sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)")
+        .execute(&mut conn)
+        .await?;
+    Ok(conn.close().await?)
+}

@@ -1,0 +1,134 @@
+//! The plain way to do it: one transaction a claim and one a checkpoint, row by row, over the same schema.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use mocban::domain::Stage;
+use serde_json::json;
+use sqlx::sqlite::{
+    SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
+};
+use sqlx::{Row as _, SqliteConnection};
+
+use super::fake::Fake;
+
+const CLAIM: &str = "
+UPDATE job SET status = 1, worker = ?1, deadline = 1000, epoch = epoch + 1, attempt = attempt + 1
+WHERE pair = (SELECT pair FROM job WHERE status = 0 ORDER BY prio, stage DESC, pair LIMIT 1)
+RETURNING pair, epoch";
+const STEP: &str = "
+UPDATE job SET stage = ?2, status = iif(?2 = 4, 3, 1), worker = iif(?2 = 4, NULL, worker),
+    deadline = iif(?2 = 4, NULL, 2000), attempt = 1, crashes = 0
+WHERE pair = ?1 AND epoch = ?3 AND status = 1";
+const RESULT: &str = "
+INSERT INTO stage_result
+    (pair, stage, recipe, mesh_hash, print_hash, facts, outcome, files, result_hash, ms, worker, at)
+VALUES (?1, ?2, (SELECT id FROM recipe WHERE stage = ?2), ?3, ?4, ?5, ?6, '{}', ?7, 1, ?8, 1)";
+const ATTEMPT: &str = "INSERT INTO attempt (pair, stage, worker, ms, at) VALUES (?1, ?2, ?3, 1, 1)";
+const SEEN: &str = "UPDATE pair SET mesh_hash = ?2, print_hash = ?3 WHERE id = ?1";
+const COUNTER: &str = "UPDATE counter SET n = n + ?3 WHERE stage = ?1 AND status = ?2";
+const METRIC: &str = "
+INSERT INTO metric_result
+    (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
+     ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, confidence, at_bound, result_hash)
+VALUES (?1, ?2, 100, 0.3, ?3, 0.5, 1.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.75, 0, ?4)";
+
+/// Takes so many pairs through all stages, each worker with a connection of its own.
+pub(super) async fn work(
+    catalog: &Path,
+    fake: &Fake,
+    pairs: usize,
+    workers: usize,
+) -> anyhow::Result<Duration> {
+    let options = SqliteConnectOptions::new()
+        .filename(catalog)
+        .journal_mode(SqliteJournalMode::Wal)
+        .synchronous(SqliteSynchronous::Full)
+        .busy_timeout(Duration::from_mins(5));
+    let pool = SqlitePoolOptions::new().max_connections(workers as u32);
+    let pool = pool.connect_with(options).await?;
+    let left = Arc::new(AtomicUsize::new(pairs));
+    let start = Instant::now();
+    let mut tasks = tokio::task::JoinSet::new();
+    for _ in 0..workers {
+        tasks.spawn(through(pool.clone(), fake.clone(), Arc::clone(&left)));
+    }
+    while let Some(ended) = tasks.join_next().await {
+        ended??;
+    }
+    let time = start.elapsed();
+    pool.close().await;
+    Ok(time)
+}
+
+async fn through(pool: SqlitePool, fake: Fake, left: Arc<AtomicUsize>) -> anyhow::Result<()> {
+    let mut conn = pool.acquire().await?;
+    let one_less = |n: usize| n.checked_sub(1);
+    while left
+        .fetch_update(Ordering::SeqCst, Ordering::SeqCst, one_less)
+        .is_ok()
+    {
+        let (pair, epoch) = claim(&mut conn, &fake).await?;
+        for stage in Stage::ALL {
+            checkpoint(&mut conn, &fake, stage, pair, epoch).await?;
+        }
+    }
+    Ok(())
+}
+
+async fn claim(conn: &mut SqliteConnection, fake: &Fake) -> anyhow::Result<(i64, i64)> {
+    sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await?;
+    let row = sqlx::query(CLAIM).bind(fake.worker.0);
+    let row = row.fetch_one(&mut *conn).await?;
+    count(conn, (0, 0), (0, 1)).await?;
+    sqlx::query("COMMIT").execute(conn).await?;
+    Ok((row.try_get(0)?, row.try_get(1)?))
+}
+
+async fn checkpoint(
+    conn: &mut SqliteConnection,
+    fake: &Fake,
+    stage: Stage,
+    pair: i64,
+    epoch: i64,
+) -> anyhow::Result<()> {
+    let (done, at) = (fake.done(stage), stage.index() as i64);
+    let mesh = done.mesh_hash.as_bytes().to_vec();
+    let print = done.print_hash.map(|hash| hash.as_bytes().to_vec());
+    sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await?;
+    let step = sqlx::query(STEP).bind(pair).bind(at + 1).bind(epoch);
+    anyhow::ensure!(step.execute(&mut *conn).await?.rows_affected() == 1);
+    let result = sqlx::query(RESULT).bind(pair).bind(at).bind(&mesh);
+    let result = result.bind(&print).bind(done.facts).bind(done.outcome);
+    let result = result.bind(done.result_hash.as_bytes().to_vec());
+    result.bind(fake.worker.0).execute(&mut *conn).await?;
+    let attempt = sqlx::query(ATTEMPT).bind(pair).bind(at);
+    attempt.bind(fake.worker.0).execute(&mut *conn).await?;
+    let seen = sqlx::query(SEEN).bind(pair).bind(mesh).bind(print);
+    seen.execute(&mut *conn).await?;
+    for metric in done.metrics {
+        let row = sqlx::query(METRIC).bind(pair);
+        let row = row.bind(metric.outcome.metric.name());
+        let row = row.bind(json!(metric.outcome.print_from_depth).to_string());
+        let row = row.bind(metric.result_hash.as_bytes().to_vec());
+        row.execute(&mut *conn).await?;
+    }
+    let status = if at == 3 { 3 } else { 1 };
+    count(conn, (at, 1), (at + 1, status)).await?;
+    sqlx::query("COMMIT").execute(conn).await?;
+    Ok(())
+}
+
+async fn count(
+    conn: &mut SqliteConnection,
+    from: (i64, i64),
+    to: (i64, i64),
+) -> anyhow::Result<()> {
+    for ((stage, status), n) in [(from, -1), (to, 1)] {
+        let query = sqlx::query(COUNTER).bind(stage).bind(status).bind(n);
+        query.execute(&mut *conn).await?;
+    }
+    Ok(())
+}

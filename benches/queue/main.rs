@@ -1,0 +1,45 @@
+//! What the catalog costs on many pairs: import, status, claims, checkpoints, plan, check, memory; and other queues.
+//!
+//! ```text
+//! cargo bench --bench queue
+//! cargo bench --bench queue -- --pairs 10000,100000,1000000 --queue-pairs 5000
+//! cargo build --release --manifest-path benches/peers-queue/Cargo.toml --target-dir target/peers-queue
+//! cargo bench --bench queue -- --peer target/peers-queue/release/peers-queue
+//! ```
+//!
+//! Catalogs are made in the build's directory and removed again. Stages are faked: nothing is computed, and what is
+//! stored for a pair is what a run stores, with small outcomes and no artifacts. Everything else is the real thing:
+//! the writer task at `synchronous=FULL`, and the program itself as a process of its own where it says so. The tables
+//! are Markdown on the standard output. `cargo test --all-targets` runs a few pairs, to see that the program works.
+
+mod claims;
+mod fake;
+mod fill;
+mod loops;
+#[path = "../accuracy/markdown.rs"]
+mod markdown;
+mod options;
+mod process;
+mod queues;
+mod scale;
+mod share;
+mod spread;
+mod world;
+
+use std::io::Write as _;
+
+use clap::Parser as _;
+
+use options::Options;
+
+fn main() -> anyhow::Result<()> {
+    let options = Options::parse();
+    let runtime = tokio::runtime::Runtime::new()?;
+    let mut tables = runtime.block_on(scale::tables(&options))?;
+    tables.push(runtime.block_on(queues::table(&options))?);
+    if let Some(pairs) = options.real_pairs() {
+        tables.push(runtime.block_on(share::table(&options, pairs))?);
+    }
+    let text = tables.join("\n");
+    Ok(std::io::stdout().write_all(text.as_bytes())?)
+}

@@ -1,0 +1,207 @@
+//! One catalog after another, each larger: does the cost of a question grow with the pairs?
+
+use std::time::Instant;
+
+use mocban::catalog::{Again, Catalog, Recipes};
+
+use super::claims::{self, MANY};
+use super::fill;
+use super::markdown::{Table, number};
+use super::options::Options;
+use super::process::{self, Needed};
+use super::spread::Spread;
+use super::world::{World, recipes, work};
+
+/// Pairs that are left to do where most are done.
+const LEFT: usize = 1_000;
+/// Pairs that are worked; the others of a large catalog get copies of their rows.
+const WORKED: usize = 20_000;
+/// Pairs in hand while a catalog is filled.
+const IN_HAND: usize = 128;
+/// A setting of the last stage that is not the default.
+const OTHER: &str = "register.smoothing_px=1.3";
+
+const IMPORT_NOTE: &str = "\
+The whole process, from the list's first byte to the closed catalog. MiB: the most memory the process held.";
+const FILL_NOTE: &str = "\
+A pair: one claim and four checkpoints with four metrics, through the writer at synchronous=FULL, 128 pairs in hand, for \
+at most 20,000 pairs in the catalog of that size; the others are filled with copies. MiB: the most memory held \
+meanwhile; the catalog's size is that in the end.";
+const CLAIM_NOTE: &str = "\
+Milliseconds until a claim is stored and answered, median / 95th percentile of 200.";
+const ASK_NOTE: &str = "\
+Milliseconds, median / 95th percentile. Library: the question alone, over an open catalog. Process: the program from \
+start to end; `run --dry-run` looks at every input file too. MiB: the most memory the process held. Changed: a setting \
+of the last stage is not what it was.";
+
+/// The tables, in the order they are printed.
+struct Tables {
+    import: Table,
+    fill: Table,
+    claims: Table,
+    asked: Table,
+}
+
+/// What is measured on catalogs of these sizes.
+pub(super) async fn tables(options: &Options) -> anyhow::Result<Vec<String>> {
+    let mut tables = Tables::new();
+    for pairs in options.sizes() {
+        size(options, pairs, &mut tables).await?;
+    }
+    Ok(vec![
+        tables.import.render(IMPORT_NOTE),
+        tables.fill.render(FILL_NOTE),
+        tables.claims.render(CLAIM_NOTE),
+        tables.asked.render(ASK_NOTE),
+    ])
+}
+
+impl Tables {
+    fn new() -> Self {
+        let asked = ["pairs", "state", "what", "library", "process", "MiB"];
+        let claims = ["pairs", "state", "one pair", "64 pairs"];
+        let fill = ["pairs", "pairs/s", "jobs/s", "MiB", "catalog, MiB"];
+        Self {
+            import: Table::new("Import", &["pairs", "seconds", "rows/s", "MiB"]),
+            fill: Table::new("Run with stages that compute nothing", &fill),
+            claims: Table::new("Claim", &claims),
+            asked: Table::new("Questions", &asked),
+        }
+    }
+}
+
+async fn size(options: &Options, pairs: usize, tables: &mut Tables) -> anyhow::Result<()> {
+    let (world, needed) = World::import(pairs)?;
+    let seconds = needed.time.as_secs_f64();
+    let numbers = [(seconds, 2), (pairs as f64 / seconds, 0), (needed.mib, 0)];
+    tables.import.push(row(pairs, &numbers));
+    let catalog = world.catalog().await?;
+    at(&world, &catalog, pairs, "new", tables).await?;
+    if options.import_only {
+        catalog.close().await;
+        return Ok(());
+    }
+    let to_do = pairs - LEFT.min(pairs / 3);
+    process::forget_peak();
+    let worked = to_do.min(WORKED);
+    let time = work(&world, &catalog, worked, IN_HAND).await?;
+    let rate = worked as f64 / time.as_secs_f64();
+    let peak = process::peak_mib("self").unwrap_or(0.0);
+    catalog.close().await;
+    fill::copy(&world.project.catalog_path(), worked, to_do).await?;
+    let catalog = world.catalog().await?;
+    let size = world.bytes()? as f64 / 1_048_576.0;
+    let numbers = [(rate, 0), (rate * 4.0, 0), (peak, 0), (size, 0)];
+    tables.fill.push(row(pairs, &numbers));
+    at(&world, &catalog, pairs, "done but few", tables).await?;
+    changed(&world, &catalog, pairs, tables).await?;
+    catalog.close().await;
+    Ok(())
+}
+
+fn row(pairs: usize, numbers: &[(f64, usize)]) -> Vec<String> {
+    let cells = numbers.iter();
+    let cells = cells.map(|(value, decimals)| number(Some(*value), *decimals));
+    [pairs.to_string()].into_iter().chain(cells).collect()
+}
+
+/// Claims and questions in one state of the catalog.
+async fn at(
+    world: &World,
+    catalog: &Catalog,
+    pairs: usize,
+    state: &str,
+    tables: &mut Tables,
+) -> anyhow::Result<()> {
+    if pairs / 3 >= MANY {
+        let [one, many] = claims::times(world, catalog).await?;
+        tables
+            .claims
+            .push(vec![pairs.to_string(), state.to_owned(), one, many]);
+    }
+    let now = recipes(None)?;
+    let mut asked = |what: &str, (library, process): (Spread, (Spread, f64))| {
+        tables
+            .asked
+            .push(line(pairs, state, what, library, process));
+    };
+    asked("status", status(world, catalog, &now, &["status"]).await?);
+    let plan = plan(world, catalog, &now, &["run", "--dry-run"]).await?;
+    asked("run --dry-run", plan);
+    let check = ask(world, &["check", "--quick"], 1)?;
+    asked("check --quick", (Spread::default(), check));
+    Ok(())
+}
+
+/// Questions after a change of settings, when every pair that is done is stale.
+async fn changed(
+    world: &World,
+    catalog: &Catalog,
+    pairs: usize,
+    tables: &mut Tables,
+) -> anyhow::Result<()> {
+    let now = recipes(Some(OTHER))?;
+    let (library, process) = status(world, catalog, &now, &["--set", OTHER, "status"]).await?;
+    let asked = line(pairs, "changed", "status", library, process);
+    tables.asked.push(asked);
+    let args = ["--set", OTHER, "run", "--dry-run"];
+    let (library, process) = plan(world, catalog, &now, &args).await?;
+    let asked = line(pairs, "changed", "run --dry-run", library, process);
+    tables.asked.push(asked);
+    Ok(())
+}
+
+fn line(
+    pairs: usize,
+    state: &str,
+    what: &str,
+    mut library: Spread,
+    (mut process, mib): (Spread, f64),
+) -> Vec<String> {
+    let words = [pairs.to_string(), state.to_owned(), what.to_owned()];
+    let numbers = [library.cell(), process.cell(), number(Some(mib), 0)];
+    words.into_iter().chain(numbers).collect()
+}
+
+async fn status(
+    world: &World,
+    catalog: &Catalog,
+    now: &Recipes,
+    args: &[&str],
+) -> anyhow::Result<(Spread, (Spread, f64))> {
+    let mut library = Spread::default();
+    for _ in 0..20 {
+        let start = Instant::now();
+        catalog.status(now).await?;
+        library.since(start);
+    }
+    Ok((library, ask(world, args, 10)?))
+}
+
+async fn plan(
+    world: &World,
+    catalog: &Catalog,
+    now: &Recipes,
+    args: &[&str],
+) -> anyhow::Result<(Spread, (Spread, f64))> {
+    let mut library = Spread::default();
+    for _ in 0..3 {
+        let start = Instant::now();
+        catalog.plan(now, None, Again::Changed).await?;
+        library.since(start);
+    }
+    Ok((library, ask(world, args, 1)?))
+}
+
+/// Times and memory of the program when it is asked.
+fn ask(world: &World, args: &[&str], times: usize) -> anyhow::Result<(Spread, f64)> {
+    let (mut spread, mut mib) = (Spread::default(), 0.0_f64);
+    for _ in 0..times {
+        let Needed {
+            time, mib: held, ..
+        } = world.ask(args)?;
+        spread.add(time);
+        mib = mib.max(held);
+    }
+    Ok((spread, mib))
+}

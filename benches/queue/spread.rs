@@ -1,0 +1,33 @@
+//! Times of something done many times.
+
+use std::time::{Duration, Instant};
+
+use mocban::report::stats::quantile;
+
+use super::markdown::two;
+
+/// Milliseconds, in the order they were measured.
+#[derive(Debug, Default)]
+pub(super) struct Spread(Vec<f64>);
+
+impl Spread {
+    /// Adds the time since.
+    pub(super) fn since(&mut self, start: Instant) {
+        self.add(start.elapsed());
+    }
+
+    /// Adds a time.
+    pub(super) fn add(&mut self, time: Duration) {
+        self.0.push(time.as_secs_f64() * 1e3);
+    }
+
+    /// The middle one.
+    pub(super) fn median(&mut self) -> Option<f64> {
+        quantile(&mut self.0, 0.5)
+    }
+
+    /// `median / 95th percentile`.
+    pub(super) fn cell(&mut self) -> String {
+        two([0.5, 0.95].map(|share| quantile(&mut self.0, share)), 2)
+    }
+}

@@ -1,0 +1,116 @@
+//! Pairs that are alike are looked at once for all of them: the plan and the number of stale pairs without a look at
+//! every pair.
+//!
+//! A job keeps the recipe of the result right behind its cursor. Jobs with the same cursor, status and recipe fare
+//! alike, except for pairs that failed, whose files or facts moved, or whose settings changed half-way: those are looked at one by one.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+use sqlx::{Row as _, SqliteConnection};
+
+use super::Result;
+use super::claim::PairSelection;
+use super::recipes::{Recipes, current_json};
+use super::staleness::{PAGE, Seen, look};
+
+/// The recipe that a job keeps when its cursor goes back to a stage: that of the result before it, where that took in
+/// those of all results before it.
+macro_rules! made {
+    ($to:literal) => {
+        concat!(
+            "(SELECT r.recipe FROM stage_result AS r WHERE r.pair = job.pair AND r.stage = ",
+            $to,
+            " - 1 AND NOT EXISTS (
+        SELECT 1 FROM stage_result AS own JOIN recipe ON recipe.id = own.recipe
+        WHERE own.pair = r.pair AND own.stage BETWEEN 1 AND r.stage AND recipe.upstream IS NOT (
+            SELECT recipe FROM stage_result AS b WHERE b.pair = r.pair AND b.stage = own.stage - 1)))"
+        )
+    };
+}
+pub(super) use made;
+
+/// Jobs that are alike, how many, and one of them.
+pub(super) const GROUPS: &str = "
+SELECT count(*) AS n, min(j.pair) AS pair FROM job AS j
+WHERE NOT EXISTS (SELECT 1 FROM moved AS m WHERE m.pair = j.pair)
+    AND NOT EXISTS (SELECT 1 FROM failure AS f WHERE f.pair = j.pair) AND (j.made IS NOT NULL OR j.stage = 0)
+GROUP BY j.stage, j.status, j.made";
+
+/// The others, in pages by number.
+pub(super) const APART: &str = "
+SELECT pair FROM moved WHERE pair > ?1 UNION SELECT pair FROM failure WHERE pair > ?1
+UNION SELECT pair FROM job WHERE pair > ?1 AND made IS NULL AND stage > 0 ORDER BY 1 LIMIT ?2";
+
+/// Pairs with a result that would be made otherwise now: by settings from the counts, by files and facts among those
+/// that moved.
+pub(super) const STALE: &str = "
+SELECT (SELECT coalesce(sum(n), 0) FROM made WHERE recipe NOT IN (SELECT value FROM json_each(?1))) + (
+    SELECT count(*) FROM (SELECT pair FROM moved UNION SELECT pair FROM job WHERE made IS NULL AND stage > 0) AS m
+        CROSS JOIN job AS j ON j.pair = m.pair CROSS JOIN pair AS p ON p.id = m.pair
+    WHERE (j.made IS NULL OR j.made IN (SELECT value FROM json_each(?1))) AND EXISTS (
+        SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
+            r.recipe <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.facts <> p.facts)))";
+
+/// Takes out pairs in a range of numbers that have been looked after. Leased ones stay: their results are yet to come.
+pub(super) const SETTLE: &str = "
+DELETE FROM moved WHERE pair > ?1 AND pair <= ?2 AND EXISTS (
+    SELECT 1 FROM job AS j JOIN pair AS p ON p.id = j.pair
+    WHERE j.pair = moved.pair AND j.status <> 1 AND NOT EXISTS (
+        SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
+            r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.facts <> p.facts)))";
+
+/// How many pairs have a result that would be made otherwise now.
+pub(super) async fn stale(conn: &mut SqliteConnection, recipes: &Recipes) -> Result<u64> {
+    let current = current_json(conn, recipes).await?;
+    let n: i64 = sqlx::query_scalar(STALE)
+        .bind(current)
+        .fetch_one(conn)
+        .await?;
+    Ok(n.unsigned_abs())
+}
+
+/// Gives every pair's state to `each`, with the number of pairs that are in it.
+pub(super) async fn look_at_all(
+    conn: &mut SqliteConnection,
+    current: &str,
+    mut each: impl FnMut(&Seen, u64),
+) -> Result<()> {
+    let groups = sqlx::query(GROUPS).fetch_all(&mut *conn).await?;
+    let sizes = groups
+        .iter()
+        .map(|row| Ok((row.try_get("pair")?, row.try_get("n")?)))
+        .collect::<Result<BTreeMap<i64, i64>>>()?;
+    for seen in look(conn, current, 0, Some(&these(sizes.keys()))).await? {
+        each(&seen, sizes[&seen.pair].unsigned_abs());
+    }
+    let mut after = 0;
+    loop {
+        let page: Vec<i64> = sqlx::query_scalar(APART)
+            .bind(after)
+            .bind(PAGE as i64)
+            .fetch_all(&mut *conn)
+            .await?;
+        let Some(last) = page.last() else {
+            return Ok(());
+        };
+        for seen in look(conn, current, after, Some(&these(page.iter()))).await? {
+            each(&seen, 1);
+        }
+        after = *last;
+    }
+}
+
+/// Notes which pairs in a range of numbers no longer differ from their files and facts.
+pub(super) async fn settle(conn: &mut SqliteConnection, after: i64, last: i64) -> Result<()> {
+    let query = sqlx::query(SETTLE).bind(after).bind(last);
+    query.execute(conn).await?;
+    Ok(())
+}
+
+fn these<'a>(pairs: impl ExactSizeIterator<Item = &'a i64>) -> PairSelection {
+    PairSelection {
+        len: pairs.len(),
+        json: Value::from(pairs.copied().collect::<Vec<_>>()).to_string(),
+    }
+}
