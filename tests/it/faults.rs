@@ -291,9 +291,8 @@ const MANY: usize = 24;
 #[test]
 #[ignore = "takes minutes: cargo test --test it every_refusal -- --ignored --nocapture"]
 fn every_refusal_under_the_catalog_is_told_of_and_costs_nothing() {
-    for faults in [OF_THE_CATALOG, LOCKED] {
-        RUN.survives_all(faults, MANY);
-    }
+    RUN.survives_all(LOCKED, usize::MAX);
+    RUN.survives_all(OF_THE_CATALOG, MANY);
 }
 
 #[test]
