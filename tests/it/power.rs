@@ -265,7 +265,7 @@ fn survives(pairs: &str, moments: usize) {
 
 #[test]
 fn a_power_cut_at_some_syncs_loses_nothing_that_was_stored() {
-    survives("2", 50);
+    survives("2", 36);
 }
 
 #[test]
@@ -310,7 +310,7 @@ fn a_folder_that_another_process_made_is_on_the_disk_before_a_row_is() {
     let mut command = run(&project, &["-j", "1"]);
     let recorded = Recorded::of(project.dir(), &root.join("notes"), start, &mut command);
     let disks: Vec<_> = all(&recorded);
-    world.is_met_by_all(&some(disks, 10));
+    world.is_met_by_all(&some(disks, 6));
     world.is_met_by(&recorded.end(Names::Late), "end");
 }
 
@@ -326,7 +326,7 @@ fn an_import_is_on_the_disk_when_it_says_so_and_can_be_made_again_before() {
     let recorded = Recorded::of(&root, &notes, start, &mut command);
     for names in [Names::Late, Names::Early] {
         let disks = recorded.disks(names);
-        for disk in disks.iter().step_by(3) {
+        for disk in disks.iter().step_by(5) {
             let root = world.folder("cut");
             disk.write(&root);
             call(&mut import(&root)).expect(0);
