@@ -359,10 +359,11 @@ mod tests {
         [0.0, 0.0, 0.0, 1.0],
     ]);
 
-    /// The slow obvious twin: one ray at a time against every triangle.
-    fn cast(mesh: &Mesh, view: &View, x: usize, y: usize) -> Option<(f64, bool)> {
+    /// The slow obvious twin: one ray at a time against every triangle. Also says how true single precision can be
+    /// there, which is less on slivers, and whether the ray passes too near to an edge to tell.
+    fn cast(mesh: &Mesh, view: &View, x: usize, y: usize) -> (Option<f64>, f64, bool) {
         let mut best: Option<f64> = None;
-        let mut near_edge = false;
+        let (mut tolerance, mut near_edge) = (1e-5_f64, false);
         for t in &mesh.triangles {
             let corner = |k: usize| {
                 let v = mesh.vertices[t[k] as usize];
@@ -377,13 +378,15 @@ mod tests {
                 continue;
             }
             let w = w.map(|one| one / area);
-            near_edge |= w.iter().any(|one| one.abs() < 1e-4);
+            let unsure = 5e-4 / area.abs();
+            near_edge |= w.iter().any(|one| one.abs() < unsure.max(1e-4));
             if w.iter().all(|one| *one >= 0.0) {
                 let z = w[0] * p[0][2] + w[1] * p[1][2] + w[2] * p[2][2];
                 best = Some(best.map_or(z, |b: f64| b.max(z)));
+                tolerance = tolerance.max(2.0 * unsure);
             }
         }
-        best.map(|z| (z, near_edge))
+        (best, tolerance, near_edge)
     }
 
     fn soup() -> impl Strategy<Value = Mesh> {
@@ -411,9 +414,11 @@ mod tests {
                 for x in 0..view.width {
                     let got = heights.at(x, y);
                     match cast(&mesh, &view, x, y) {
-                        Some((_, true)) => {}
-                        Some((z, false)) => prop_assert!((f64::from(got) - z).abs() < 1e-5),
-                        None => prop_assert!(got == NOTHING),
+                        (_, _, true) => {}
+                        (Some(z), tolerance, false) => {
+                            prop_assert!((f64::from(got) - z).abs() < tolerance);
+                        }
+                        (None, _, false) => prop_assert!(got == NOTHING),
                     }
                 }
             }

@@ -177,7 +177,7 @@ fn who_joins_with_other_settings_is_refused_and_told_which() {
     let mut other = joined(&world.project);
     other.args(["--set", "register.smoothing_px=1.5"]);
     let refused = call(&mut other).expect(2);
-    let told = "the run that goes on has other settings (register.smoothing_px: 1.0 -> 1.5); \
+    let told = "the run that goes on has other settings (register.smoothing_px: 1.22 -> 1.5); \
         give the same ones, or wait until it is over";
     assert!(refused.err.contains(told), "{}", refused.err);
     std::fs::remove_file(file).expect("removed");
