@@ -128,7 +128,8 @@ impl Catalog {
     /// Takes back the leases of dead workers: ready again, or quarantined when too many died over the pair.
     ///
     /// A pair is blamed for a death only when its worker held no other, and condemned only as `is_condemned` says.
-    /// So a process that is killed from outside, however often, does not bring its pairs into quarantine.
+    /// So a process that is killed from outside, however often, hardly ever brings its pairs into quarantine: only one
+    /// that was alone in hand at nearly every death there was, which is what a pair that kills looks like.
     ///
     /// # Errors
     /// When the database refuses.
