@@ -14,7 +14,7 @@ const CANDIDATES: u32 = 40;
 /// Every how many candidates the structure score is looked at first.
 const COARSE: usize = 4;
 /// `ensemble` may differ from `relief` by this factor in area.
-const CLOSE_AREA: f64 = 1.2;
+const CLOSE_AREA: f64 = 1.12;
 /// Ink covers at most this many times the area of the tops, and of the tops' area at least one in this many is inked.
 const MOST_SPREAD: f64 = 2.2;
 const LEAST_INKED: f64 = 1.15;
