@@ -16,6 +16,7 @@ mod import;
 mod logging;
 mod man;
 mod manifest_file;
+mod panics;
 mod progress;
 mod report;
 mod retry;
@@ -66,10 +67,12 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let context = Context::new(cli.global, args.first());
-    match start(cli.command, &context) {
+    panics::log_only();
+    let work = || match start(cli.command, &context) {
         Ok(code) => code,
         Err(error) => conclude(&error, &context),
-    }
+    };
+    panics::caught(work, |text| context.talk.error(text, ExitCode::Error))
 }
 
 fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
