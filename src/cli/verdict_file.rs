@@ -194,6 +194,8 @@ mod tests {
             "line 3: \"maybe\" is not a verdict (pass, fail, unsure); no verdict was recorded"
         );
         assert!(error("pair,verdict,reader\n1,pass,\n").starts_with("line 2: reader is empty"));
+        let rude = error("pair,ver\u{1b}[2J\n");
+        assert!(!rude.contains('\u{1b}'), "{rude}");
         assert!(error("pair,verdict\n").starts_with("line 1: column reader is missing"));
         assert!(error("pair,verdict,raeder\n").contains("did you mean \"reader\"?"));
         assert!(error("pair,verdict,reader\n1,pass\n").starts_with("line 2: 2 cells"));

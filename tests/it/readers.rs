@@ -147,3 +147,35 @@ fn the_fuzzer_starts_from_whole_files() {
         }
     }
 }
+
+/// What the fuzzer found: words of a file went to the screen as they were, commands to the terminal among them.
+#[test]
+fn words_with_commands_to_a_screen_come_out_as_escapes() {
+    for (read, name, bytes) in [
+        (
+            read_mesh as Reader,
+            "a.ply",
+            &b"ply\nformat ascii 1.0\nelement \x1b[2J 9\nproperty char a\nend_header\n1\n"[..],
+        ),
+        (read_mesh, "a.ply", b"ply\nformat \x07\n"),
+        (read_mesh, "a.stl", b"solid a\n\x1b]0;owned\x07 b\n"),
+        (read_mesh, "a.obj", b"v 0 \x1b[31m 0\n"),
+        (read_list, "a.csv", b"id,mesh,pr\x00int\na,b,c\n"),
+        (
+            read_list,
+            "a.csv",
+            "id,mesh,print\n\u{202e}\x1b[2J,b,c\n".as_bytes(),
+        ),
+        (read_list, "a.jsonl", b"{\"id\":[\"\\u001b[2J\"]}\n"),
+        (read_settings, "a.toml", b"\"r\\u001bun\" = 1\n"),
+        (
+            read_settings,
+            "a.toml",
+            b"[run]\nworkers = \"\\u001b[2J\"\n",
+        ),
+        (read_settings, "a.txt", b"run.work\x1bers=1\n"),
+    ] {
+        let sentence = read(name, bytes).expect_err(name);
+        assert_one_sentence(&sentence);
+    }
+}

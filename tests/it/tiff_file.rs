@@ -4,6 +4,8 @@
 pub(crate) const WHITE_IS_ZERO: u16 = 0;
 /// Grey of which 0 is black.
 pub(crate) const BLACK_IS_ZERO: u16 = 1;
+/// Red, green, blue.
+pub(crate) const RGB: u16 = 2;
 /// Colours by number.
 pub(crate) const PALETTE: u16 = 3;
 

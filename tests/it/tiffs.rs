@@ -2,7 +2,7 @@
 
 use mocban::raster::{Grid, Limits, decode};
 
-use crate::tiff_file::{FLOAT, INT, PALETTE, TiffFile, WHITE_IS_ZERO};
+use crate::tiff_file::{FLOAT, INT, PALETTE, RGB, TiffFile, WHITE_IS_ZERO};
 
 fn read(file: &TiffFile) -> Result<Grid<[u16; 3]>, String> {
     let picture = decode(&file.encode(), &Limits::SUGGESTED);
@@ -185,4 +185,16 @@ fn signed_samples_and_huge_headers_are_refused_in_a_sentence() {
         ..TiffFile::grey(900, 1, 4, vec![0; 450])
     };
     assert!(read(&short).is_err());
+}
+
+#[test]
+fn a_decoder_that_lists_thousands_of_samples_is_cut_short() {
+    let file = TiffFile {
+        photometric: RGB,
+        bits: vec![8; 5000],
+        ..TiffFile::grey(2, 2, 8, vec![0; 4])
+    };
+    let error = read(&file).expect_err("5000 samples a pixel");
+    crate::seeds::assert_one_sentence(&error);
+    assert!(error.ends_with("..."), "{error}");
 }

@@ -4,7 +4,6 @@ mod error;
 mod tiff;
 
 use std::io::Cursor;
-use std::panic::catch_unwind;
 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
@@ -26,9 +25,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture, DecodeError> {
     if kind == FileKind::Png {
         check_png_header(bytes, limits)?;
     }
-    let rgb = catch_unwind(|| colours(bytes, format, kind, limits));
-    // The decoders are not ours; one that gives up in the middle of a damaged file takes nothing else along.
-    let rgb = rgb.unwrap_or_else(|_| Err(broken(kind, "its decoder broke off")))?;
+    let rgb = colours(bytes, format, kind, limits)?;
     Ok(Picture { rgb })
 }
 
