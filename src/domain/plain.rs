@@ -1,19 +1,22 @@
 //! Words out of files, as they may stand in a message.
 
 /// The beginning of a text on one line: what a screen would not show, or would obey, comes as an escape; what is
-/// longer than `most` characters ends in three dots.
+/// longer than `most` characters, escapes counted as they are shown, ends in three dots.
 pub fn plain(text: &str, most: usize) -> String {
-    let mut shown = String::new();
-    for (at, c) in text.chars().enumerate() {
-        if at == most {
+    let (mut shown, mut count) = (String::new(), 0);
+    for c in text.chars() {
+        let piece = match c {
+            '"' | '\'' | '\\' => c.to_string(),
+            '\n' | '\r' | '\t' => " ".to_owned(),
+            // Behind another character, so that an accent over a letter stays one.
+            _ => format!(".{c}").escape_debug().skip(1).collect(),
+        };
+        count += piece.chars().count();
+        if count > most {
             shown.push_str("...");
             break;
         }
-        match c {
-            '"' | '\'' | '\\' => shown.push(c),
-            '\n' | '\r' | '\t' => shown.push(' '),
-            _ => shown.extend(c.escape_debug()),
-        }
+        shown.push_str(&piece);
     }
     shown
 }
@@ -32,7 +35,9 @@ mod tests {
             plain("a\nb\x1b[2J\u{202e}\0", 40),
             "a b\\u{1b}[2J\\u{202e}\\0"
         );
+        assert_eq!(plain("Tra\u{302}\u{300}n", 40), "Tra\u{302}\u{300}n");
         assert_eq!(plain("abc", 3), "abc");
         assert_eq!(plain("abcd", 3), "abc...");
+        assert_eq!(plain("a\0\0\0", 5), "a\\0\\0...");
     }
 }
