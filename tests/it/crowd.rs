@@ -19,8 +19,8 @@ use crate::seeds::assert_one_sentence;
 
 /// Good pairs in the crowd.
 const GOOD: u64 = 2;
-/// What a run may take at most: less than two of the largest stages, and far less than a file's header may ask for.
-const MEMORY_MIB: u64 = 600;
+/// What a run is given and may take, far less than the headers of its files ask for.
+const MEMORY_MIB: u64 = 256;
 /// Longest time for a stage, seconds.
 const STAGE_LIMIT_S: u64 = 60;
 
