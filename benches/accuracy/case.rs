@@ -14,17 +14,24 @@ pub(super) struct Case {
     pub(super) seed: u64,
     /// Place in the data.
     pub(super) index: u64,
+    /// About how many vertices the scan has, if that is not left to chance.
+    vertices: Option<u32>,
 }
 
 impl Case {
     /// A pair by tier, seed and place.
-    pub(super) const fn new(tier: Tier, seed: u64, index: u64) -> Self {
-        Self { tier, seed, index }
+    pub(super) const fn new(tier: Tier, seed: u64, index: u64, vertices: Option<u32>) -> Self {
+        Self {
+            tier,
+            seed,
+            index,
+            vertices,
+        }
     }
 
     /// All pairs of its kind.
     pub(super) fn pairs(&self) -> Pairs {
-        Pairs::new(self.tier, self.seed)
+        Pairs::new(self.tier, self.seed).with_vertices(self.vertices)
     }
 
     /// Makes the pair and what the stages are given of it.

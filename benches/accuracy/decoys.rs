@@ -65,7 +65,7 @@ fn input(case: &Case, kind: Decoy) -> anyhow::Result<Input> {
 }
 
 fn outcome(run: &Run, metric: ThresholdMetric) -> anyhow::Result<Result<Option<f64>, ()>> {
-    let Ok(aligned) = &run.result else {
+    let Ok((_, aligned)) = &run.result else {
         return Ok(Err(()));
     };
     let mut numbers = Numbers::default();

@@ -5,6 +5,7 @@
 //! cargo bench --bench accuracy -- --tiers pose,hard --pairs 587 --seeds 7 --presets default,paper
 //! cargo bench --bench accuracy -- --set register.window=uniform7 --worst 50 --sheets sheets --pairs-csv pairs.csv
 //! cargo bench --bench accuracy -- --decoys
+//! cargo bench --bench accuracy -- --vertices 60000 --workers 1
 //! ```
 //!
 //! The pairs are those of `mocban demo`, made in memory from tier, seed and index, and given to the stages as a binary

@@ -24,6 +24,9 @@ pub(super) struct Options {
     /// Pairs of each tier and seed; the real tier has 20 [default: 60, and 1 under `cargo test`]
     #[arg(long, value_name = "N")]
     pairs: Option<u64>,
+    /// Scans of about so many vertices [default: 20,000 to 150,000]
+    #[arg(long, value_name = "N")]
+    vertices: Option<u32>,
     /// Seeds of the data
     #[arg(long, value_delimiter = ',', default_value = "1")]
     seeds: Vec<u64>,
@@ -70,7 +73,8 @@ impl Options {
         for tier in &self.tiers {
             let count = wanted.min(tier.most_pairs().unwrap_or(u64::MAX));
             for seed in &self.seeds {
-                cases.extend((0..count).map(|index| Case::new(*tier, *seed, index)));
+                let case = |index| Case::new(*tier, *seed, index, self.vertices);
+                cases.extend((0..count).map(case));
             }
         }
         cases

@@ -1,9 +1,9 @@
 //! A mesh and a print on their way through the stages.
 
-use mocban::domain::{FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh, ThresholdMetric};
+use mocban::domain::FitOutcome;
 use mocban::mesh;
-use mocban::raster::{self, DepthMap, Picture};
-use mocban::stages::{Settings, StageError, depth, fit, normalize, register};
+use mocban::raster;
+use mocban::stages::{Aligned, Print, Settings, StageError, depth, fit, normalize, register};
 
 use super::times::{Part, Times};
 
@@ -21,22 +21,8 @@ pub(super) struct Run {
     pub(super) times: Times,
     /// The plane, if it came so far.
     pub(super) fit: Option<FitOutcome>,
-    /// The alignments, or why there are none.
-    pub(super) result: Result<Aligned, Failed>,
-}
-
-/// What the stages found.
-pub(super) struct Aligned {
-    /// The plane.
-    pub(super) fit: FitOutcome,
-    /// The print as decoded.
-    pub(super) print: Picture,
-    /// The depth map.
-    pub(super) depth: DepthMap,
-    /// Numbers of the normalize stage.
-    pub(super) normalize: NormalizeOutcome,
-    /// One alignment a metric.
-    pub(super) metrics: Vec<MetricOutcome>,
+    /// The print as read and what the stages found, or why there is nothing.
+    pub(super) result: Result<(Print, Aligned), Failed>,
 }
 
 /// Why nothing was found.
@@ -68,12 +54,12 @@ fn align(
     settings: &Settings,
     times: &mut Times,
     fit: &mut Option<FitOutcome>,
-) -> Result<Aligned, Failed> {
+) -> Result<(Print, Aligned), Failed> {
     let mesh = times.book(Part::ReadMesh, || {
         mesh::read(&input.mesh, "mesh.stl", &mesh::Limits::SUGGESTED)
     })?;
     let print = times.book(Part::ReadPrint, || {
-        raster::decode(&input.print, &raster::Limits::SUGGESTED)
+        raster::decode(&input.print, &raster::Limits::SUGGESTED).map(Print::from)
     })?;
     let plane = times
         .book(Part::Fit, || {
@@ -96,27 +82,11 @@ fn align(
             register::register(&depth, &normalized, &settings.register)
         })
         .map_err(StageError::from)?;
-    Ok(Aligned {
+    let aligned = Aligned {
         fit: plane.clone(),
-        print,
         depth,
-        normalize: normalized.outcome,
-        metrics: registered.outcome.metrics,
-    })
-}
-
-impl Aligned {
-    /// A metric's alignment.
-    pub(super) fn metric(&self, metric: ThresholdMetric) -> Option<&MetricOutcome> {
-        self.metrics.iter().find(|found| found.metric == metric)
-    }
-
-    /// The three maps put together.
-    pub(super) fn print_from_mesh(&self, found: &MetricOutcome) -> PrintFromMesh {
-        PrintFromMesh::new(
-            &found.print_from_depth,
-            &self.depth.scale.depth_from_plane,
-            &self.fit.plane_from_mesh,
-        )
-    }
+        normalized,
+        registered,
+    };
+    Ok((print, aligned))
 }

@@ -87,17 +87,17 @@ fn note(trial: &Trial, metric: ThresholdMetric) -> String {
 fn tiles(run: &Run, tops: &Grid<u8>, print: &[u8], metric: ThresholdMetric) -> [Option<Rgb>; 3] {
     let side = tile_side(COLUMNS);
     let decode = |bytes| mocban::raster::decode(bytes, &mocban::raster::Limits::SUGGESTED).ok();
-    let Ok(aligned) = &run.result else {
+    let Ok((print, aligned)) = &run.result else {
         let plain = |print: Picture| View::of_side(&print, side).print(&print);
         return [decode(print).map(plain), None, None];
     };
-    let view = View::of_side(&aligned.print, side);
-    let plain = Some(view.print(&aligned.print));
+    let view = View::of_side(print.picture(), side);
+    let plain = Some(view.print(print.picture()));
     let Some(found) = aligned.metric(metric) else {
         return [plain, None, None];
     };
     let tops = tops.map(|value| *value == TOP);
     let relief = view.relief(&aligned.depth, &found.print_from_depth);
-    let overlay = view.overlay_on_truth(&aligned.print, &tops, &aligned.depth, found);
+    let overlay = view.overlay_on_truth(print.picture(), &tops, &aligned.depth, found);
     [plain, Some(relief), Some(overlay)]
 }

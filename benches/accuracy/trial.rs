@@ -5,11 +5,12 @@ use std::num::NonZeroUsize;
 use mocban::demo::{Pair, Tier};
 use mocban::domain::{MetricOutcome, ThresholdMetric};
 use mocban::report::truth::{TruthErrors, TruthRecord, tops_iou};
+use mocban::stages::Aligned;
 
 use super::case::Case;
 use super::method::Method;
 use super::numbers::Numbers;
-use super::run::{Aligned, Run};
+use super::run::Run;
 use super::times::Times;
 use super::workers::in_order;
 
@@ -93,7 +94,7 @@ impl Trial {
             .transpose()?;
         let times = run.times;
         let outcome = match &run.result {
-            Ok(aligned) => Ok(found(pair, truth, aligned)?),
+            Ok((_, aligned)) => Ok(found(pair, truth, aligned)?),
             Err(failed) => Err(failed.to_string()),
         };
         Ok(Self {
@@ -126,7 +127,7 @@ fn found(pair: &Pair, truth: &TruthRecord, aligned: &Aligned) -> anyhow::Result<
     let mut shared = Numbers::default();
     shared.add("fit", &aligned.fit)?;
     shared.add("depth", &aligned.depth.scale)?;
-    shared.add("normalize", &aligned.normalize)?;
+    shared.add("normalize", &aligned.normalized.outcome)?;
     let held = |outcome: &MetricOutcome| {
         let mut numbers = shared.clone();
         numbers.add("metric", outcome)?;
@@ -140,5 +141,5 @@ fn found(pair: &Pair, truth: &TruthRecord, aligned: &Aligned) -> anyhow::Result<
             numbers,
         })
     };
-    aligned.metrics.iter().map(held).collect()
+    aligned.metrics().iter().map(held).collect()
 }

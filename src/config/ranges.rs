@@ -21,7 +21,6 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("fit.min_relief", 0.0, 1.0),
     ("depth.longest_px", 32.0, 16_384.0),
     ("depth.px_per_mm", 1e-3, 1e4),
-    ("normalize.speck_share", 0.0, 0.1),
     ("normalize.canvas_px", 64.0, 2048.0),
     ("normalize.character_px", 32.0, 2048.0),
     ("normalize.scale_band", 1.0, 2.0),

@@ -65,7 +65,7 @@ static CELLS: [Cell; COUNT as usize] = [
 ///
 /// # Errors
 /// When a picture cannot be read or encoded.
-pub(super) fn pair(seed: u64, index: u64) -> Result<Pair, ImageError> {
+pub(super) fn pair(seed: u64, index: u64, vertices: Option<u32>) -> Result<Pair, ImageError> {
     let cell = &CELLS[(index % COUNT) as usize];
     let mut rng = rng_of(seed, Tier::Real, index);
     let clean = image::load_from_memory(cell.clean)?.to_luma8();
@@ -91,7 +91,7 @@ pub(super) fn pair(seed: u64, index: u64) -> Result<Pair, ImageError> {
         print_around: bare,
         damage: Damage::default(),
     };
-    Ok(scene.carved(printed, &mut rng))
+    Ok(scene.carved(printed, vertices, &mut rng))
 }
 
 /// Pixels from mm such that the ink box is centred and its longest side is `size_mm`.

@@ -98,7 +98,7 @@ impl Pairs {
             max: [PLATE_HALF_MM; 2],
         };
         let outline = Polygon::around(face, 0.5, 1.1, &mut rng);
-        let style = ScanStyle::draw(self.tier().is_damaged(), &mut rng);
+        let style = ScanStyle::draw(self.tier().is_damaged(), self.vertices(), &mut rng);
         let mut mesh = scan(&surface, &outline, &style, &mut rng);
         let pose = Pose::draw(self.tier(), &mut rng);
         for vertex in &mut mesh.vertices {

@@ -96,11 +96,12 @@ pub(super) fn drawn_pair(
     tier: Tier,
     seed: u64,
     index: u64,
+    vertices: Option<u32>,
 ) -> Result<Pair, ImageError> {
     let mut rng = rng_of(seed, tier, index);
     let scene = Scene::draw(glyphs, tier, id_of(tier, index), &mut rng);
     let printed = scene.printed(&mut rng)?;
-    Ok(scene.carved(printed, &mut rng))
+    Ok(scene.carved(printed, vertices, &mut rng))
 }
 
 impl Scene {
@@ -147,10 +148,15 @@ impl Scene {
     }
 
     /// Carves and scans the block as it is now, and writes down the truth.
-    pub(super) fn carved(self, printed: Printed, rng: &mut ChaCha8Rng) -> Pair {
+    pub(super) fn carved(
+        self,
+        printed: Printed,
+        vertices: Option<u32>,
+        rng: &mut ChaCha8Rng,
+    ) -> Pair {
         let remaining = self.damage.remaining(&self.artwork.strokes);
         let surface = self.surface(&remaining, rng);
-        let style = ScanStyle::draw(self.tier.is_damaged(), rng);
+        let style = ScanStyle::draw(self.tier.is_damaged(), vertices, rng);
         let mut mesh = scan(&surface, &cut(&self.artwork, rng), &style, rng);
         let pose = Pose::draw(self.tier, rng);
         for vertex in &mut mesh.vertices {

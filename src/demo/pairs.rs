@@ -12,6 +12,7 @@ pub struct Pairs {
     glyphs: Glyphs,
     tier: Tier,
     seed: u64,
+    vertices: Option<u32>,
 }
 
 impl Pairs {
@@ -21,7 +22,14 @@ impl Pairs {
             glyphs: Glyphs::embedded(),
             tier,
             seed,
+            vertices: None,
         }
+    }
+
+    /// The same pairs with scans of about so many vertices, where `None` leaves the number to chance.
+    #[must_use]
+    pub fn with_vertices(self, vertices: Option<u32>) -> Self {
+        Self { vertices, ..self }
     }
 
     /// Their tier.
@@ -34,15 +42,20 @@ impl Pairs {
         self.seed
     }
 
+    /// About how many vertices a scan has, if that is not left to chance.
+    pub(super) const fn vertices(&self) -> Option<u32> {
+        self.vertices
+    }
+
     /// Makes a pair; those of the real tier repeat after its last.
     ///
     /// # Errors
     /// When a picture cannot be encoded or, from the program itself, decoded.
     pub fn pair(&self, index: u64) -> Result<Pair, ImageError> {
         match self.tier {
-            Tier::Real => calligraphy::pair(self.seed, index),
+            Tier::Real => calligraphy::pair(self.seed, index, self.vertices),
             Tier::Upright | Tier::Pose | Tier::Hard => {
-                drawn_pair(&self.glyphs, self.tier, self.seed, index)
+                drawn_pair(&self.glyphs, self.tier, self.seed, index, self.vertices)
             }
         }
     }

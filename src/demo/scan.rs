@@ -33,13 +33,13 @@ pub(super) struct ScanStyle {
 }
 
 impl ScanStyle {
-    /// A scan of 20,000 to 150,000 vertices, mostly of the smaller ones.
-    pub(super) fn draw(is_rough: bool, rng: &mut ChaCha8Rng) -> Self {
+    /// A scan of about `wanted` vertices, or else of 20,000 to 150,000, mostly of the smaller ones.
+    pub(super) fn draw(is_rough: bool, wanted: Option<u32>, rng: &mut ChaCha8Rng) -> Self {
         let is_closed = rng.random_bool(0.125);
         let share: f64 = rng.random_range(0.0..1.0);
         Self {
             is_closed,
-            vertices: 22_000.0 * 6.0_f64.powf(share * share),
+            vertices: wanted.map_or_else(|| 22_000.0 * 6.0_f64.powf(share * share), f64::from),
             noise_mm: rng.random_range(0.005..0.010),
             spikes: if is_rough {
                 rng.random_range(0..40)

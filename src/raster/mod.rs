@@ -21,4 +21,4 @@ pub use limits::Limits;
 pub use mask::{Mask, PixelBox};
 pub use picture::Picture;
 pub use resample::resample;
-pub use warp::{warp_depth, warp_mask, warp_values};
+pub use warp::{warp_depth, warp_mask};

@@ -24,7 +24,7 @@ pub fn warp_mask(mask: &Mask, to_from: &Affine2, width: usize, height: usize) ->
     let looks = Looks::new(&from_to);
     let counts = Counts::of(mask);
     let look = |x, y| {
-        let set = |p| Some(bilinear(mask, p, |set| f64::from(u8::from(set))));
+        let set = |p| Some(coverage(mask, p));
         looks.mean(x, y, set) >= Some(0.5)
     };
     let mut out = Mask::new(width, height, false);
@@ -53,23 +53,6 @@ pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usi
         looks
             .mean(x, y, |p| level_at(&depth.levels, p))
             .map_or(0, |level| level.round().clamp(1.0, 65535.0) as u16)
-    })
-}
-
-/// Values in another frame by bilinear look-up, averaged where the map shrinks; zero outside the source.
-pub fn warp_values(
-    values: &Grid<f32>,
-    to_from: &Affine2,
-    width: usize,
-    height: usize,
-) -> Grid<f32> {
-    let Some(from_to) = to_from.inverse() else {
-        return Grid::new(width, height, 0.0);
-    };
-    let looks = Looks::new(&from_to);
-    Grid::from_fn(width, height, |x, y| {
-        let mean = looks.mean(x, y, |p| Some(bilinear(values, p, f64::from)));
-        mean.unwrap_or(0.0) as f32
     })
 }
 
@@ -177,11 +160,11 @@ fn floor(value: f64) -> i64 {
     cut - i64::from(cut as f64 > value)
 }
 
-/// Bilinear value at a point; cells outside the grid count as zero.
-fn bilinear<T: Copy>(grid: &Grid<T>, [x, y]: [f64; 2], value: impl Fn(T) -> f64) -> f64 {
+/// Bilinear coverage at a point; pixels outside the mask are not set.
+fn coverage(mask: &Mask, [x, y]: [f64; 2]) -> f64 {
     let (x0, y0) = (floor(x), floor(y));
     let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-    let at = |dx: i64, dy: i64| grid.get(x0 + dx, y0 + dy).map_or(0.0, &value);
+    let at = |dx: i64, dy: i64| f64::from(u8::from(mask.get(x0 + dx, y0 + dy).unwrap_or(false)));
     (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy)
         + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy
 }
@@ -190,19 +173,21 @@ fn bilinear<T: Copy>(grid: &Grid<T>, [x, y]: [f64; 2], value: impl Fn(T) -> f64)
 fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
     let (x0, y0) = (floor(x), floor(y));
     let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-    let near = neighbours(levels, x0, y0);
-    let weights = [
-        (1.0 - fx) * (1.0 - fy),
-        fx * (1.0 - fy),
-        (1.0 - fx) * fy,
-        fx * fy,
-    ];
-    let (mut sum, mut weight) = (0.0, 0.0);
-    for (level, share) in near.into_iter().zip(weights) {
-        sum += share * f64::from(level);
-        weight += if level == 0 { 0.0 } else { share };
+    let near = neighbours(levels, x0, y0).map(f64::from);
+    if near == [0.0; 4] {
+        return None;
     }
-    (weight >= 0.5).then(|| sum / weight)
+    let above = near[0] + (near[1] - near[0]) * fx;
+    let below = near[2] + (near[3] - near[2]) * fx;
+    let level = above + (below - above) * fy;
+    if near.iter().all(|level| *level > 0.0) {
+        return Some(level);
+    }
+    let held = near.map(|level| if level > 0.0 { 1.0 } else { 0.0 });
+    let above = held[0] + (held[1] - held[0]) * fx;
+    let below = held[2] + (held[3] - held[2]) * fx;
+    let weight = above + (below - above) * fy;
+    (weight >= 0.5).then(|| level / weight)
 }
 
 /// Levels of a pixel and of those to its right and below, row after row; 0 outside.
@@ -220,9 +205,9 @@ fn neighbours(levels: &Grid<u16>, x: i64, y: i64) -> [u16; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Looks, bilinear, warp_mask, warp_values};
+    use super::{Looks, coverage, warp_mask};
     use crate::domain::Affine2;
-    use crate::raster::{Grid, Mask};
+    use crate::raster::Mask;
 
     fn blob() -> Mask {
         Mask::from_fn(40, 30, |x, y| {
@@ -269,22 +254,10 @@ mod tests {
             let map = Affine2::similarity(scale, angle, [20.0, 9.0]);
             let looks = Looks::new(&map.inverse().expect("a similarity has an inverse"));
             let plain = Mask::from_fn(50, 60, |x, y| {
-                let set = |p| Some(bilinear(&mask, p, |set| f64::from(u8::from(set))));
+                let set = |p| Some(coverage(&mask, p));
                 looks.mean(x, y, set) >= Some(0.5)
             });
             assert_eq!(warp_mask(&mask, &map, 50, 60), plain);
         }
-    }
-
-    #[test]
-    fn shrinking_averages() {
-        let stripes = Grid::from_fn(64, 64, |x, _| if x % 2 == 0 { 1.0_f32 } else { 0.0 });
-        let small = warp_values(
-            &stripes,
-            &Affine2::scale_shift(0.25, [-0.375, -0.375]),
-            16,
-            16,
-        );
-        assert!(small.data().iter().all(|v| (v - 0.5).abs() < 1e-6));
     }
 }

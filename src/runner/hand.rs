@@ -8,7 +8,8 @@ use serde_json::Value;
 use crate::catalog::{InputsSeen, PairFacts, PairWork};
 use crate::domain::{ArtifactSet, ContentHash, FitOutcome, Stage};
 use crate::mesh::Mesh;
-use crate::raster::{DepthMap, Picture};
+use crate::raster::DepthMap;
+use crate::stages::Print;
 use crate::stages::normalize::Normalized;
 
 /// What an earlier stage stored.
@@ -34,7 +35,7 @@ pub(super) struct PairInHand {
     /// The mesh, from fit to depth.
     pub(super) mesh: Option<Mesh>,
     /// The print, from the first stage that reads it to normalize.
-    pub(super) print: Option<Picture>,
+    pub(super) print: Option<Print>,
     /// From fit on.
     pub(super) fit: Option<FitOutcome>,
     /// From depth on.

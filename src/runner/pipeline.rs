@@ -9,9 +9,9 @@ use super::steps::{Setback, StageOutput, Steps};
 use crate::catalog::InputSeen;
 use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
 use crate::mesh::{self, Mesh};
-use crate::raster::{self, DepthMap, Picture};
+use crate::raster::{self, DepthMap};
 use crate::stages::normalize::Normalized;
-use crate::stages::{Settings, StageError, depth, fit, normalize, register};
+use crate::stages::{Print, Settings, StageError, depth, fit, normalize, register};
 use crate::store::{ArtifactError, InputError, InputFile, Project, read_input};
 
 /// The stages of one project with their settings.
@@ -119,7 +119,7 @@ impl Pipeline {
     }
 
     /// The print. When it is another one by now than the one that the fit looked at, the fit is no fit for it.
-    fn print_of_fit(&self, pair: &mut PairInHand) -> Result<Picture, Setback> {
+    fn print_of_fit(&self, pair: &mut PairInHand) -> Result<Print, Setback> {
         if let Some(print) = pair.print.take() {
             return Ok(print);
         }
@@ -194,16 +194,17 @@ impl Pipeline {
         })
     }
 
-    fn read_print(&self, pair: &mut PairInHand) -> Result<Picture, Setback> {
+    fn read_print(&self, pair: &mut PairInHand) -> Result<Print, Setback> {
         let stored = &pair.facts.print_path;
         let path = self.project.input_path(stored);
         let limit = self.image_limits.max_bytes;
         let file = read_input(&path, limit, "limits.image.max_bytes").map_err(unread)?;
         pair.inputs.print = Some(seen(&file));
-        raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
+        let picture = raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
             let message = format!("{stored}: {error}");
             Setback::failed(error.class(), message)
-        })
+        })?;
+        Ok(Print::from(picture))
     }
 }
 

@@ -2,8 +2,8 @@
 
 use crate::raster::{Grid, Mask};
 
-/// Groups below this share of a picture are specks, unless a setting says otherwise; the authors' code has it.
-pub(super) const SPECK_SHARE: f64 = 1.0 / 1200.0;
+/// Groups below this share of a picture are specks; the authors' code has it.
+const SPECK_SHARE: f64 = 1.0 / 1200.0;
 
 /// Groups of set pixels that touch along an edge, each with its size.
 #[derive(Debug)]
@@ -93,8 +93,9 @@ impl Components {
     }
 }
 
-/// The mask without groups smaller than `size`, neither set ones nor holes.
-pub(super) fn without_specks(mask: &Mask, size: usize) -> Mask {
+/// The mask without specks for a picture of so many pixels, neither set ones nor holes.
+pub(super) fn without_specks(mask: &Mask, area: usize) -> Mask {
+    let size = (area as f64 * SPECK_SHARE).round() as usize;
     let kept = Components::of(mask).at_least(size);
     let holes = Components::of(&kept.map(|set| !set)).at_least(size);
     holes.map(|hole| !hole)
@@ -113,7 +114,7 @@ mod tests {
     fn specks_and_pinholes_go() {
         let mask = drawn(["#.....", ".####.", ".#.##.", ".####.", ".....#"]);
         let clean = drawn(["......", ".####.", ".####.", ".####.", "......"]);
-        assert_eq!(without_specks(&mask, 2), clean);
+        assert_eq!(without_specks(&mask, 2400), clean);
     }
 
     #[test]

@@ -4,8 +4,8 @@
 
 use std::path::PathBuf;
 
+use super::Aligned;
 use super::testing::{World, print, settings, some_turn};
-use super::{depth, fit, normalize, register};
 use crate::raster::{Grid, decode_grey8, png_grey8};
 
 /// A pixel may differ by this much of 255 ...
@@ -42,14 +42,12 @@ fn depth_map_and_mask_are_as_they_were() {
         ..World::default()
     };
     let mesh = world.mesh();
-    let fitted = fit::fit(&mesh, Some(&picture), None, &settings.fit).expect("a plane");
-    let map = depth::depth(&mesh, &fitted, None, &settings.depth).expect("a map");
-    hold("depth.png", &map.levels.map(|level| (level >> 8) as u8));
-    let normalized = normalize::normalize(&map, &picture, &settings.normalize).expect("masks");
-    let registered = register::register(&map, &normalized, &settings.register).expect("a pose");
+    let aligned = Aligned::new(&mesh, &picture, &settings).expect("an alignment");
+    let levels = &aligned.depth.levels;
+    hold("depth.png", &levels.map(|level| (level >> 8) as u8));
     hold(
         "mask.png",
-        &registered.canvases[2]
+        &aligned.registered.canvases[2]
             .depth
             .map(|set| if *set { 255 } else { 0 }),
     );

@@ -91,11 +91,11 @@ fn luminance(c: [u16; 3]) -> f32 {
 }
 
 /// The paper's mask: darker than a fixed grey is ink, all of the image is known.
-pub(super) fn fixed(picture: &Picture, grey: u8, speck_share: f64) -> Result<Ink, Error> {
+pub(super) fn fixed(picture: &Picture, grey: u8) -> Result<Ink, Error> {
     let threshold = f64::from(grey) / 255.0;
     let grey = &grey_of(picture)?;
     let raw = grey.map(|g| f64::from(*g) < threshold);
-    let ink = without_specks(&raw, speck_size(speck_share, raw.data().len()));
+    let ink = without_specks(&raw, raw.data().len());
     require_ink(&ink, ink.data().len(), grey, threshold)?;
     Ok(Ink {
         soft: Soft {
@@ -110,7 +110,7 @@ pub(super) fn fixed(picture: &Picture, grey: u8, speck_share: f64) -> Result<Ink
 
 /// Our masks: white beyond the cut left out, paper levelled, threshold found. One for each polarity that the picture
 /// leaves possible, the likelier first.
-pub(super) fn readings(picture: &Picture, speck_share: f64) -> Result<Vec<Ink>, Error> {
+pub(super) fn readings(picture: &Picture) -> Result<Vec<Ink>, Error> {
     let grey = &grey_of(picture)?;
     let known = known(picture, grey);
     let mut values = held(grey, &known);
@@ -128,9 +128,9 @@ pub(super) fn readings(picture: &Picture, speck_share: f64) -> Result<Vec<Ink>, 
         if light_on_dark {
             let turned = evened(&grey.map(|g| 1.0 - *g), &known);
             let split = otsu::split(&mut held(&turned, &known));
-            read(grey, &turned, split, &known, light_on_dark, speck_share)
+            read(grey, &turned, split, &known, light_on_dark)
         } else {
-            read(grey, &even, levelled, &known, light_on_dark, speck_share)
+            read(grey, &even, levelled, &known, light_on_dark)
         }
     };
     let first = of(likelier);
@@ -152,14 +152,13 @@ fn read(
     split: Option<Split>,
     known: &Mask,
     light_on_dark: bool,
-    speck_share: f64,
 ) -> Result<Ink, Error> {
     let split = split.ok_or(Error::NoContrast { contrast: 0.0 })?;
     let raw = Mask::from_fn(grey.width(), grey.height(), |x, y| {
         known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
     });
     let area = known.count();
-    let ink = without_specks(&raw, speck_size(speck_share, area));
+    let ink = without_specks(&raw, area);
     let ink = Mask::from_fn(ink.width(), ink.height(), |x, y| {
         ink.at(x, y) && known.at(x, y)
     });
@@ -173,11 +172,6 @@ fn read(
         threshold: split.threshold,
         light_on_dark,
     })
-}
-
-/// Pixels of a group smaller than this are specks.
-fn speck_size(speck_share: f64, area: usize) -> usize {
-    (area as f64 * speck_share).round() as usize
 }
 
 fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
@@ -315,7 +309,7 @@ mod tests {
     }
 
     fn read(picture: &Picture) -> Result<Ink, Error> {
-        readings(picture, 1.0 / 1200.0).map(|mut all| all.swap_remove(0))
+        readings(picture).map(|mut all| all.swap_remove(0))
     }
 
     fn cross(x: usize, y: usize) -> bool {

@@ -2,6 +2,7 @@
 //!
 //! No files, no SQL, no async, no clock. Each stage has its `Params`, its `Error` and one entry function.
 
+mod aligned;
 mod blur;
 mod bulk;
 mod components;
@@ -14,11 +15,15 @@ pub mod normalize;
 mod otsu;
 mod paper;
 mod pose;
+mod print;
 pub mod register;
 pub mod score;
 #[cfg(test)]
 mod testing;
 mod zbuffer;
+
+pub use aligned::Aligned;
+pub use print::Print;
 
 use serde::{Deserialize, Serialize};
 

@@ -6,8 +6,8 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Settings, depth, fit, normalize, register};
-use crate::domain::{Affine2, PrintFromMesh};
+use super::{Aligned, Print, Settings, StageError, depth, fit, normalize, register};
+use crate::domain::{Affine2, MetricOutcome, PrintFromMesh};
 use crate::mesh::Mesh;
 use crate::raster::{Grid, Picture};
 
@@ -139,7 +139,7 @@ static CARVED: LazyLock<Grid<f64>> = LazyLock::new(|| {
 });
 
 /// The print: `px_per_mm` pixels a millimetre, turned by `turn_deg` clockwise, with `print_from_sheet` as truth.
-pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Picture, Affine2) {
+pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
     let size = (SHEET_MM * px_per_mm) as usize;
     let middle = (size - 1) as f64 / 2.0;
     let print_from_sheet = Affine2::similarity(
@@ -161,7 +161,7 @@ pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Picture, Affine2) {
         let paper = 52_000.0 - 40.0 * x as f64;
         [(paper - ink * 42_000.0) as u16; 3]
     });
-    (Picture { rgb }, print_from_sheet)
+    (Picture { rgb }.into(), print_from_sheet)
 }
 
 /// The default settings of all stages.
@@ -210,24 +210,12 @@ pub(super) fn paper_settings() -> Settings {
 /// Runs the four stages; `print_from_mesh` of each metric with its outcome.
 pub(super) fn run(
     mesh: &Mesh,
-    print: &Picture,
+    print: &Print,
     settings: &Settings,
-) -> Result<Vec<(PrintFromMesh, crate::domain::MetricOutcome)>, super::StageError> {
-    let fit = fit::fit(mesh, Some(print), None, &settings.fit)?;
-    let map = depth::depth(mesh, &fit, None, &settings.depth)?;
-    let normalized = normalize::normalize(&map, print, &settings.normalize)?;
-    let registered = register::register(&map, &normalized, &settings.register)?;
-    let metrics = registered.outcome.metrics.into_iter();
-    Ok(metrics
-        .map(|m| {
-            let whole = PrintFromMesh::new(
-                &m.print_from_depth,
-                &map.scale.depth_from_plane,
-                &fit.plane_from_mesh,
-            );
-            (whole, m)
-        })
-        .collect())
+) -> Result<Vec<(PrintFromMesh, MetricOutcome)>, StageError> {
+    let aligned = Aligned::new(mesh, print, settings)?;
+    let of = |metric: &MetricOutcome| (aligned.print_from_mesh(metric), *metric);
+    Ok(aligned.metrics().iter().map(of).collect())
 }
 
 /// Mean distance in pixels between where truth and the answer put points of the strokes.

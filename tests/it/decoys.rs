@@ -3,7 +3,7 @@
 
 use mocban::demo::{Decoy, DecoyPair, Pairs, Tier};
 use mocban::raster;
-use mocban::stages::{Settings, StageError, depth, fit, normalize, register};
+use mocban::stages::{Aligned, Settings, StageError};
 use rayon::prelude::*;
 
 use crate::semi_real::settings;
@@ -13,10 +13,7 @@ const COUNT: u64 = 3;
 
 fn refusal(decoy: &DecoyPair, settings: &Settings) -> Result<(), StageError> {
     let print = raster::decode(&decoy.print, &raster::Limits::SUGGESTED).expect("a picture");
-    let plane = fit::fit(&decoy.mesh, Some(&print), None, &settings.fit)?;
-    let map = depth::depth(&decoy.mesh, &plane, None, &settings.depth)?;
-    let normalized = normalize::normalize(&map, &print, &settings.normalize)?;
-    register::register(&map, &normalized, &settings.register).map(|_| ())?;
+    Aligned::new(&decoy.mesh, &print.into(), settings)?;
     Ok(())
 }
 

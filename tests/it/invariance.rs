@@ -10,7 +10,7 @@ use mocban::demo::{Pairs, Tier};
 use mocban::domain::{Affine2, PrintFromMesh};
 use mocban::mesh::Mesh;
 use mocban::raster::{self, Grid, Picture};
-use mocban::stages::{Settings, depth, fit, normalize, register};
+use mocban::stages::{Aligned, Settings};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -53,17 +53,10 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
 });
 
 fn align(mesh: &Mesh, print: &Picture) -> PrintFromMesh {
-    let settings = &*SETTINGS;
-    let plane = fit::fit(mesh, Some(print), None, &settings.fit).expect("a plane");
-    let map = depth::depth(mesh, &plane, None, &settings.depth).expect("a depth map");
-    let normalized = normalize::normalize(&map, print, &settings.normalize).expect("a pose");
-    let registered = register::register(&map, &normalized, &settings.register).expect("an answer");
-    let best = registered.outcome.metrics.first().expect("a metric");
-    PrintFromMesh::new(
-        &best.print_from_depth,
-        &map.scale.depth_from_plane,
-        &plane.plane_from_mesh,
-    )
+    let print = print.clone().into();
+    let aligned = Aligned::new(mesh, &print, &SETTINGS).expect("an alignment");
+    let best = aligned.metrics().first().expect("a metric");
+    aligned.print_from_mesh(best)
 }
 
 /// A motion and scaling of the mesh.

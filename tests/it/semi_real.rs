@@ -2,10 +2,10 @@
 
 use mocban::config::{self, Sources};
 use mocban::demo::{Pair, Pairs, Tier};
-use mocban::domain::{MetricOutcome, PrintFromMesh};
+use mocban::domain::MetricOutcome;
 use mocban::raster;
 use mocban::report::truth::{TruthErrors, TruthRecord, tops_iou};
-use mocban::stages::{Settings, StageError, depth, fit, normalize, register};
+use mocban::stages::{Aligned, Settings, StageError};
 use rayon::prelude::*;
 
 /// Largest landmark error, percent of the character's height: the truth of this tier is good to about a pixel.
@@ -19,24 +19,17 @@ pub(crate) fn settings() -> Settings {
 /// The errors of every metric. Neither unit nor side is told.
 fn aligned(pair: &Pair, settings: &Settings) -> Result<Vec<TruthErrors>, StageError> {
     let print = raster::decode(&pair.print, &raster::Limits::SUGGESTED).expect("a picture");
-    let plane = fit::fit(&pair.mesh, Some(&print), None, &settings.fit)?;
-    let map = depth::depth(&pair.mesh, &plane, None, &settings.depth)?;
-    let normalized = normalize::normalize(&map, &print, &settings.normalize)?;
-    let registered = register::register(&map, &normalized, &settings.register)?;
+    let aligned = Aligned::new(&pair.mesh, &print.into(), settings)?;
     let truth = serde_json::to_value(&pair.truth).expect("a truth is JSON");
     let truth = TruthRecord::read(&truth).expect("the truth is sound");
     let errors = |outcome: &MetricOutcome| {
-        let found = PrintFromMesh::new(
-            &outcome.print_from_depth,
-            &map.scale.depth_from_plane,
-            &plane.plane_from_mesh,
-        );
-        let tops = tops_iou(&map, outcome, &pair.tops);
+        let found = aligned.print_from_mesh(outcome);
+        let tops = tops_iou(&aligned.depth, outcome, &pair.tops);
         truth
             .measure(&found, Some(tops))
             .expect("the truth is sound")
     };
-    Ok(registered.outcome.metrics.iter().map(errors).collect())
+    Ok(aligned.metrics().iter().map(errors).collect())
 }
 
 #[test]

@@ -13,10 +13,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::{FailureClass, FitOutcome};
 use crate::mesh::Mesh;
-use crate::raster::Picture;
+use crate::stages::Print;
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 4;
+pub const REVISION: u32 = 5;
 
 /// How the plane is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -117,7 +117,7 @@ impl Error {
 /// When the vertices span no surface, nothing is carved, or no plane is found.
 pub fn fit(
     mesh: &Mesh,
-    print: Option<&Picture>,
+    print: Option<&Print>,
     scanned_face_down: Option<bool>,
     params: &Params,
 ) -> Result<FitOutcome, Error> {

@@ -9,9 +9,9 @@ use super::surface::{Samples, Surface};
 use super::{Error, Params};
 use crate::domain::{Bow, FitOutcome, Rigid3};
 use crate::mesh::Mesh;
-use crate::raster::{Grid, Picture};
-use crate::stages::otsu;
+use crate::raster::Grid;
 use crate::stages::zbuffer::{Shell, View};
+use crate::stages::{Print, otsu};
 
 /// Longest side of the rendering that tells the sides apart, and of the one that the surface is fitted to.
 const GLANCE_PX: usize = 96;
@@ -29,7 +29,7 @@ const SCANT: f64 = 0.05;
 
 pub(super) fn fit(
     mesh: &Mesh,
-    print: Option<&Picture>,
+    print: Option<&Print>,
     scanned_face_down: Option<bool>,
     params: &Params,
 ) -> Result<FitOutcome, Error> {

@@ -16,13 +16,14 @@ pub use relief::Relief;
 pub(in crate::stages) use relief::soft_stroke;
 use wrap::box_wrap;
 
+use super::Print;
 use super::ink;
 use super::score::SsimWindow;
 use crate::domain::{Affine2, FailureClass, NormalizeOutcome, Pose, ThresholdMetric};
-use crate::raster::{DepthMap, Mask, Picture};
+use crate::raster::{DepthMap, Mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 4;
+pub const REVISION: u32 = 5;
 
 /// When thresholds are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -64,8 +65,6 @@ pub struct Params {
     pub print_threshold: PrintThreshold,
     /// Grey 0..=255 below which `fixed` takes a pixel for ink.
     pub print_grey: u8,
-    /// Groups of pixels below this share of the picture are specks, 0..=0.1.
-    pub speck_share: f64,
     /// Side of the square canvas in pixels, 64..=2048.
     pub canvas_px: u32,
     /// Longest side of the print character on the canvas in pixels, below `canvas_px`.
@@ -162,10 +161,10 @@ impl Search {
 ///
 /// # Errors
 /// When the print shows no ink, the depth map no strokes, or no pose fits.
-pub fn normalize(depth: &DepthMap, print: &Picture, params: &Params) -> Result<Normalized, Error> {
+pub fn normalize(depth: &DepthMap, print: &Print, params: &Params) -> Result<Normalized, Error> {
     let readings = match params.print_threshold {
-        PrintThreshold::Levelled => ink::readings(print, params.speck_share)?,
-        PrintThreshold::Fixed => vec![ink::fixed(print, params.print_grey, params.speck_share)?],
+        PrintThreshold::Levelled => print.readings()?.to_vec(),
+        PrintThreshold::Fixed => vec![ink::fixed(print.picture(), params.print_grey)?],
     };
     let (ink, canvas_from_print, search, thresholds) = match params.method {
         Method::Aligned => {
@@ -220,7 +219,6 @@ pub(super) mod tests_support {
             method: Method::Aligned,
             print_threshold: PrintThreshold::Levelled,
             print_grey: 127,
-            speck_share: 1.0 / 1200.0,
             canvas_px: 256,
             character_px: 192,
             scale_band: 1.6,

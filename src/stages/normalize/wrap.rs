@@ -120,7 +120,7 @@ fn attempt(
     params: &Params,
 ) -> Option<Tried> {
     let side = params.canvas_px as usize;
-    let mask = mask_above(depth, level, params.speck_share);
+    let mask = mask_above(depth, level);
     let wrap = box_wrap(&mask, side, f64::from(params.character_px))?;
     let wrapped = warp_mask(&mask, &wrap, side, side);
     let mut turned = wrapped.clone();
@@ -142,12 +142,9 @@ fn attempt(
 }
 
 /// Strokes of the depth map at a level, specks removed.
-fn mask_above(depth: &DepthMap, level: u16, speck_share: f64) -> Mask {
+fn mask_above(depth: &DepthMap, level: u16) -> Mask {
     let raw = depth.levels.map(|l| *l >= level && *l > 0);
-    without_specks(
-        &raw,
-        (raw.data().len() as f64 * speck_share).round() as usize,
-    )
+    without_specks(&raw, raw.data().len())
 }
 
 /// W(I): the box's longest side to `character_px`, the centroid to the middle of a square canvas.

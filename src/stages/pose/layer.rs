@@ -37,6 +37,8 @@ pub(in crate::stages) struct Layer {
 
 /// Slow variation is what a gaussian of this share of the working size keeps.
 const SLOW: f64 = 0.14;
+/// Slow variation is computed on this many pixels along the longest side: nothing finer is left in it.
+const SLOW_PX: usize = 48;
 /// Where less than this share of a working pixel is known, it holds nothing.
 const LEAST_KNOWN: f32 = 0.5;
 
@@ -94,8 +96,8 @@ impl Base {
 /// What all layers of one size and smoothing of a picture share.
 pub(in crate::stages) struct Sizer<'a> {
     base: &'a Base,
+    size: usize,
     sigma: f64,
-    slow_sigma: f64,
     scale: f64,
     shift: [f64; 2],
     sides: [usize; 2],
@@ -111,12 +113,11 @@ impl<'a> Sizer<'a> {
         let middle = sides.map(|side| (side - 1) as f64 / 2.0);
         let (sides, shift) = framed(sides, middle, scale);
         let weight = blur(&resample(&base.known, scale, shift, sides), sigma);
-        let slow_sigma = SLOW * size as f64;
         Self {
-            slow_weight: blur(&weight, slow_sigma),
+            slow_weight: slow(&weight, size),
             base,
+            size,
             sigma,
-            slow_sigma,
             scale,
             shift,
             sides,
@@ -134,7 +135,7 @@ impl<'a> Sizer<'a> {
             &resample(present, self.scale, self.shift, self.sides),
             self.sigma,
         );
-        let slow = blur(&sum, self.slow_sigma);
+        let slow = slow(&sum, self.size);
         let mut held = self.weight.clone();
         let (mut amount, mut value) = (sum.clone(), sum.clone());
         let means = slow.data().iter().zip(self.slow_weight.data());
@@ -154,6 +155,19 @@ impl<'a> Sizer<'a> {
                 .after(&self.base.from_image),
         }
     }
+}
+
+/// The slow variation of a layer of `size` pixels along the longest side of what is known.
+fn slow(values: &Grid<f32>, size: usize) -> Grid<f32> {
+    if size <= SLOW_PX {
+        return blur(values, SLOW * size as f64);
+    }
+    let sides = [values.width(), values.height()];
+    let middle = sides.map(|side| (side - 1) as f64 / 2.0);
+    let scale = SLOW_PX as f64 / size as f64;
+    let (few, shift) = framed(sides, middle, scale);
+    let small = blur(&resample(values, scale, shift, few), SLOW * SLOW_PX as f64);
+    resample(&small, 1.0 / scale, shift.map(|s| -s / scale), sides)
 }
 
 /// Size of the grid that holds a box of these sides, scaled, and the shift that puts the box's middle in its middle.

@@ -2,48 +2,84 @@
 
 use crate::stages::pose::{Found, Layer, Refiner};
 
-/// Cuts under the tops that are tried, as shares of the relief. The ink of a print spreads; strokes cut too thin or
-/// too thick for it would pull the scale.
-pub(super) const CUTS: [f64; 5] = [0.05, 0.11, 0.2, 0.32, 0.47];
+/// Cuts under the tops, as shares of the relief. The ink of a print spreads; strokes cut too thin or too thick for it
+/// would pull the scale.
+const CUTS: [f64; 5] = [0.05, 0.11, 0.2, 0.32, 0.47];
+/// How many of them are tried once a cut is known about.
+const NEAR: usize = 3;
 
 /// Cuts that are tried while poses are compared.
-pub(super) const FEW_CUTS: [f64; 3] = [0.08, 0.2, 0.4];
+pub(super) const FEW_CUTS: [f64; NEAR] = [0.08, 0.2, 0.4];
+
+/// The cuts around one that is known about.
+pub(super) fn near(cut: f64) -> &'static [f64] {
+    let far = |at: usize| {
+        (CUTS[at + NEAR / 2] / cut.max(f64::MIN_POSITIVE))
+            .ln()
+            .abs()
+    };
+    let nearest = |a: &usize, b: &usize| far(*a).total_cmp(&far(*b));
+    let first = (0..=CUTS.len() - NEAR).min_by(nearest).unwrap_or(0);
+    &CUTS[first..first + NEAR]
+}
 
 /// The strokes of each cut, the shallowest first, ready to be laid on the print's ink.
 pub(super) struct Cuts<'a> {
+    cuts: &'a [f64],
     refiners: Vec<Refiner<'a>>,
+}
+
+/// The strokes that fit best at a pose.
+pub(super) struct Fitting<'a, 'b> {
+    /// They, ready to be laid on the ink.
+    pub(super) strokes: &'b Refiner<'a>,
+    /// The pose with its score.
+    pub(super) found: Found,
+    /// The cut that fits best, between those that were tried: a choice between cuts that fit alike would make the
+    /// answer jump.
+    pub(super) cut: f64,
 }
 
 impl<'a> Cuts<'a> {
     /// Of one layer a cut.
-    pub(super) fn new(ink: &'a Layer, woods: &'a [Layer]) -> Self {
+    pub(super) fn new(cuts: &'a [f64], ink: &'a Layer, woods: &'a [Layer]) -> Self {
         Self {
+            cuts,
             refiners: woods.iter().map(|wood| Refiner::new(ink, wood)).collect(),
         }
     }
 
-    /// The strokes that fit best at a pose, and the pose with its score there.
-    pub(super) fn fitting(&self, pose: &Found) -> Option<(&Refiner<'a>, Found)> {
-        let judged = self.refiners.iter().map(|wood| (wood, wood.judged(pose)));
-        judged.max_by(|a, b| a.1.score.total_cmp(&b.1.score))
-    }
-
-    /// The cut that fits best at a pose, between those that were tried: a choice between cuts that fit alike would
-    /// make the answer jump.
-    pub(super) fn best_cut(&self, pose: &Found) -> f64 {
-        let score = |wood: &Refiner| wood.judged(pose).score;
-        let scores: Vec<f64> = self.refiners.iter().map(score).collect();
+    /// What fits best at a pose.
+    pub(super) fn fitting<'b>(&'b self, pose: &Found) -> Option<Fitting<'a, 'b>> {
+        let scores: Vec<f64> = self
+            .refiners
+            .iter()
+            .map(|strokes| strokes.judged(pose).score)
+            .collect();
+        let best = highest(&scores);
         let at = summit(&scores);
-        let cut = |k: usize| CUTS[k.min(CUTS.len() - 1)];
+        let cut = |k: usize| self.cuts[k.min(self.cuts.len() - 1)];
         let first = at as usize;
-        cut(first) + at.fract() * (cut(first + 1) - cut(first))
+        Some(Fitting {
+            strokes: self.refiners.get(best)?,
+            found: Found {
+                score: scores[best],
+                ..*pose
+            },
+            cut: cut(first) + at.fract() * (cut(first + 1) - cut(first)),
+        })
     }
+}
+
+/// Which value is the highest.
+fn highest(values: &[f64]) -> usize {
+    let order = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
+    (0..values.len()).max_by(order).unwrap_or(0)
 }
 
 /// Place of the highest value, by a parabola through it and its neighbours, in steps from the first.
 fn summit(values: &[f64]) -> f64 {
-    let highest = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
-    let best = (0..values.len()).max_by(highest).unwrap_or(0);
+    let best = highest(values);
     let last = values.len().saturating_sub(1);
     let middle = best.clamp(1, last.saturating_sub(1).max(1));
     let Some([a, b, c]) = values.get(middle - 1..middle + 2) else {
@@ -58,7 +94,14 @@ fn summit(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::summit;
+    use super::{CUTS, near, summit};
+
+    #[test]
+    fn cuts_near_one_lie_around_it() {
+        assert_eq!(near(0.01), &CUTS[..3]);
+        assert_eq!(near(0.2), &CUTS[1..4]);
+        assert_eq!(near(0.4), &CUTS[2..]);
+    }
 
     #[test]
     fn summit_lies_between_the_values_and_does_not_jump() {

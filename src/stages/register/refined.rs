@@ -1,7 +1,7 @@
 //! Our registration: the poses that normalisation found, refined and compared; the best one, looked at closely, serves
 //! every metric.
 
-use super::cuts::{CUTS, Cuts, FEW_CUTS};
+use super::cuts::{Cuts, FEW_CUTS, near};
 use super::stretch::stretched;
 use super::{Alignment, Error, Params};
 use crate::domain::{Affine2, Evidence, Pose};
@@ -32,11 +32,11 @@ pub(super) fn align(
 ) -> Result<(Vec<Alignment>, Evidence), Error> {
     let pictures = Pictures::new(depth, normalized, params).ok_or(Error::NoPose)?;
     let mut rivals = Rivals::of(&pictures, normalized).ok_or(Error::NoPose)?;
-    let (ink, woods) = pictures.layers(CLOSER, &CUTS);
-    let cuts = Cuts::new(&ink, &woods);
+    let cuts = near(rivals.best.cut);
+    let (ink, woods) = pictures.layers(CLOSER, cuts);
+    let cuts = Cuts::new(cuts, &ink, &woods);
     rivals.look_closer(&cuts).ok_or(Error::NoPose)?;
-    let best = &rivals.best;
-    let print_from_depth = pictures.look(&best.found, cuts.best_cut(&best.found));
+    let print_from_depth = pictures.look(&rivals.best);
     let choices = normalized.outcome.thresholds.iter();
     let alignments = choices.map(|choice| Alignment {
         metric: choice.metric,
@@ -53,6 +53,7 @@ pub(super) fn align(
 struct Settled {
     found: Found,
     overlap: Overlap,
+    cut: f64,
 }
 
 impl Settled {
@@ -78,7 +79,7 @@ impl Rivals {
     /// Compares the poses that normalisation found.
     fn of(pictures: &Pictures, normalized: &Normalized) -> Option<Self> {
         let (ink, woods) = pictures.layers(COMPARED, &FEW_CUTS);
-        let tried = settle_all(&Cuts::new(&ink, &woods), normalized)?;
+        let tried = settle_all(&Cuts::new(&FEW_CUTS, &ink, &woods), normalized)?;
         let best = *best_of(&tried, |pose| !pose.found.mirrored)?;
         let elsewhere = |pose: &Settled| {
             !pose.found.mirrored && pose.found.turn_from(&best.found) > SAME_POSE_DEG
@@ -184,14 +185,14 @@ impl Pictures {
         )
     }
 
-    /// The pose looked at once more at working size, with the strokes of a cut.
-    fn look(&self, best: &Found, cut: f64) -> Affine2 {
-        let (ink, woods) = self.layers(1.0, &[cut]);
+    /// The pose looked at once more at working size, with the strokes of its cut.
+    fn look(&self, best: &Settled) -> Affine2 {
+        let (ink, woods) = self.layers(1.0, &[best.cut]);
         let Some(wood) = woods.first() else {
-            return best.fixed_from_moving;
+            return best.found.fixed_from_moving;
         };
         let refiner = Refiner::new(&ink, wood);
-        let refined = refiner.refine(best, MOST_STEPS, Loss::Tukey);
+        let refined = refiner.refine(&best.found, MOST_STEPS, Loss::Tukey);
         let last = if self.may_stretch {
             stretched(&refiner, &refined, self.middle)
         } else {
@@ -216,12 +217,13 @@ fn settle_all(cuts: &Cuts, normalized: &Normalized) -> Option<Vec<Settled>> {
 
 /// A pose refined with the cut that fits best, first from afar, then closely.
 fn settled(cuts: &Cuts, start: &Found) -> Option<Settled> {
-    let (wood, _) = cuts.fitting(start)?;
-    let near = wood.refine(start, FEW_STEPS, Loss::Huber);
-    let pose = wood.refine(&near, FEW_STEPS, Loss::Tukey);
-    let (wood, found) = cuts.fitting(&pose)?;
+    let strokes = cuts.fitting(start)?.strokes;
+    let close = strokes.refine(start, FEW_STEPS, Loss::Huber);
+    let pose = strokes.refine(&close, FEW_STEPS, Loss::Tukey);
+    let fitting = cuts.fitting(&pose)?;
     Some(Settled {
-        found,
-        overlap: wood.overlap(&pose),
+        found: fitting.found,
+        overlap: fitting.strokes.overlap(&pose),
+        cut: fitting.cut,
     })
 }

@@ -7,7 +7,7 @@
 use super::{Alignment, Error, Params, chosen};
 use crate::domain::{Affine2, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
-use crate::stages::components::{SPECK_SHARE, without_specks};
+use crate::stages::components::without_specks;
 use crate::stages::normalize::Normalized;
 
 /// The fine pass spans this many coarse steps to each side.
@@ -55,10 +55,7 @@ fn align_one(
 ) -> Result<(Alignment, f64), Error> {
     let (level, at_bound) = chosen(normalized, metric)?;
     let raw = depth.strokes(level);
-    let mask = without_specks(
-        &raw,
-        (raw.data().len() as f64 * SPECK_SHARE).round() as usize,
-    );
+    let mask = without_specks(&raw, raw.data().len());
     let character_px = longest_side(canvas_print).ok_or(Error::NoStrokes(metric))?;
     let side = canvas_print.width();
     let turner = Turner::new(&mask, side, character_px).ok_or(Error::NoStrokes(metric))?;

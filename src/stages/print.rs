@@ -1,0 +1,35 @@
+//! A print and its ink, which fit and normalize both ask for and which is read once.
+
+use std::sync::OnceLock;
+
+use super::ink::{Error, Ink, readings};
+use crate::raster::Picture;
+
+/// A print as the stages see it: the whole picture as decoded, and its ink once somebody has asked.
+#[derive(Debug, Clone)]
+pub struct Print {
+    picture: Picture,
+    readings: OnceLock<Result<Vec<Ink>, Error>>,
+}
+
+impl Print {
+    /// The picture as decoded.
+    pub const fn picture(&self) -> &Picture {
+        &self.picture
+    }
+
+    /// The ink under every polarity that the picture leaves possible, the likelier first; at least one.
+    pub(super) fn readings(&self) -> Result<&[Ink], Error> {
+        let read = self.readings.get_or_init(|| readings(&self.picture));
+        read.as_deref().map_err(|error| *error)
+    }
+}
+
+impl From<Picture> for Print {
+    fn from(picture: Picture) -> Self {
+        Self {
+            picture,
+            readings: OnceLock::new(),
+        }
+    }
+}
