@@ -2,7 +2,8 @@
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Args, Parser, Subcommand, ValueEnum};
+use clap::builder::{Resettable, StyledStr};
+use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 
 use super::exit::ExitCode;
 use super::{
@@ -23,6 +24,30 @@ pub(super) struct Cli {
     /// What to do.
     #[command(subcommand)]
     pub(super) command: Command,
+}
+
+/// The command line with its help as a terminal shows it: without the marks of code in its texts.
+pub(super) fn command() -> clap::Command {
+    unmarked(Cli::command())
+}
+
+fn unmarked(command: clap::Command) -> clap::Command {
+    let about = plain(command.get_about());
+    let long_about = plain(command.get_long_about());
+    command
+        .mut_args(|arg| {
+            let (help, long_help) = (plain(arg.get_help()), plain(arg.get_long_help()));
+            arg.help(help).long_help(long_help)
+        })
+        .mut_subcommands(unmarked)
+        .about(about)
+        .long_about(long_about)
+}
+
+fn plain(text: Option<&StyledStr>) -> Resettable<StyledStr> {
+    text.map_or(Resettable::Reset, |text| {
+        Resettable::Value(text.to_string().replace('`', "").into())
+    })
 }
 
 /// Flags of every command.
@@ -153,10 +178,25 @@ pub(super) enum Command {
 
 #[cfg(test)]
 mod tests {
-    use super::Cli;
+    use super::command;
 
     #[test]
     fn command_line_is_sound() {
-        <Cli as clap::CommandFactory>::command().debug_assert();
+        command().debug_assert();
+    }
+
+    #[test]
+    fn help_is_without_the_marks_of_code() {
+        fn check(mut command: clap::Command) {
+            let help = command.render_long_help().to_string();
+            assert!(!help.contains('`'), "{help}");
+            command.get_subcommands().cloned().for_each(check);
+        }
+        let shown = command().render_long_help().to_string();
+        assert!(
+            shown.contains("import makes one from your files"),
+            "{shown}"
+        );
+        check(command());
     }
 }

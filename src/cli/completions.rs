@@ -1,9 +1,9 @@
 //! `completions SHELL`: a completion script on stdout.
 
-use clap::{Args, CommandFactory};
+use clap::Args;
 use clap_complete::Shell;
 
-use super::args::Cli;
+use super::args;
 use super::exit::ExitCode;
 use super::talk;
 
@@ -16,7 +16,7 @@ pub(super) struct CompletionsArgs {
 
 pub(super) fn completions(args: &CompletionsArgs) -> anyhow::Result<ExitCode> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "mocban", &mut script);
+    clap_complete::generate(args.shell, &mut args::command(), "mocban", &mut script);
     talk::print(&String::from_utf8(script)?)?;
     Ok(ExitCode::Done)
 }

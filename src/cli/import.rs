@@ -169,7 +169,7 @@ async fn read_truths(
     match truths.iter().find(|truth| unknown.contains(&truth.name)) {
         Some(truth) => {
             let reason = format!("there is no pair {}", truth.name);
-            Err(refusal(file, truth.line, reason).into())
+            Err(refusal(file, truth.line, &reason).into())
         }
         None => Ok(truths),
     }

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::Context as _;
-use clap::{Args, CommandFactory};
+use clap::Args;
 
-use super::args::Cli;
+use super::args;
 use super::context::Context;
 use super::exit::ExitCode;
 
@@ -19,7 +19,7 @@ pub(super) struct ManArgs {
 pub(super) fn man(args: &ManArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let dir = args.dir.display();
     std::fs::create_dir_all(&args.dir).with_context(|| format!("cannot make {dir}"))?;
-    clap_mangen::generate_to(Cli::command(), &args.dir)
+    clap_mangen::generate_to(args::command(), &args.dir)
         .with_context(|| format!("cannot write manual pages to {dir}"))?;
     context.talk.say(&format!("manual pages are in {dir}"));
     let page = args.dir.join("mocban.1");

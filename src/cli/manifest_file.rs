@@ -1,5 +1,6 @@
 //! Reads a manifest or two folders from disk for the pure parsers in `manifest`.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -62,8 +63,8 @@ impl Listing {
             row.print = folder.join(&row.print);
         }
         Ok(Self {
+            remarks: same_but_for_case(&rows).into_iter().collect(),
             rows,
-            remarks: Vec::new(),
             place: format!("{shown}: line"),
         })
     }
@@ -91,9 +92,10 @@ impl Listing {
             remark("print without mesh", &found.prints_alone),
             remark("file that is neither", &found.ignored),
         ];
+        let remarks = remarks.into_iter().chain([same_but_for_case(&rows)]);
         Ok(Self {
             rows,
-            remarks: remarks.into_iter().flatten().collect(),
+            remarks: remarks.flatten().collect(),
             place: "pair".to_owned(),
         })
     }
@@ -116,6 +118,24 @@ impl Listing {
         }
         lines
     }
+}
+
+/// Ids that some disks cannot tell apart.
+fn same_but_for_case(rows: &[ManifestRow]) -> Option<String> {
+    let mut seen = BTreeMap::new();
+    let mut alike = rows.iter().filter_map(|row| {
+        let lower = row.name.as_str().to_ascii_lowercase();
+        Some((seen.insert(lower, &row.name)?, &row.name))
+    });
+    let (first, second) = alike.next()?;
+    let more = match alike.count() {
+        0 => String::new(),
+        more => format!(", as do {more} more"),
+    };
+    Some(format!(
+        "ids {first} and {second} differ only in capitals{more}; an export to a disk that takes these for one name \
+         (Windows, macOS, memory sticks) would mix their folders"
+    ))
 }
 
 fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
@@ -172,6 +192,19 @@ mod tests {
         assert!(!is_jsonl(Path::new("a.csv"), b"{"));
         assert!(is_jsonl(Path::new("a"), b"\xef\xbb\xbf {\"id\":1}"));
         assert!(!is_jsonl(Path::new("a.txt"), b"id,mesh,print"));
+    }
+
+    #[test]
+    fn ids_that_differ_only_in_capitals_are_remarked() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let file = dir.path().join("pairs.csv");
+        std::fs::write(&file, "id,mesh,print\nA1,m,p\nb,m,p\na1,m,p\nB,m,p\n").expect("written");
+        let remarks = Listing::from_file(&file).expect("valid").remarks;
+        assert_eq!(remarks.len(), 1);
+        assert!(
+            remarks[0].starts_with("ids A1 and a1 differ only in capitals, as do 1 more"),
+            "{remarks:?}"
+        );
     }
 
     #[test]

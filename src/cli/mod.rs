@@ -16,6 +16,7 @@ mod import;
 mod logging;
 mod man;
 mod manifest_file;
+mod panics;
 mod progress;
 mod report;
 mod retry;
@@ -36,7 +37,7 @@ mod verdict_file;
 
 use std::ffi::OsString;
 
-use clap::{ColorChoice, CommandFactory, FromArgMatches};
+use clap::{ColorChoice, FromArgMatches};
 
 use crate::catalog::CatalogError;
 use crate::config::ConfigError;
@@ -66,33 +67,48 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         }
     };
     let context = Context::new(cli.global, args.first());
-    match start(cli.command, &context) {
+    panics::log_only();
+    let work = || match start(cli.command, &context) {
         Ok(code) => code,
         Err(error) => conclude(&error, &context),
-    }
+    };
+    panics::caught(work, |text| context.talk.error(text, ExitCode::Error))
 }
 
 fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
-    let command = Cli::command().color(help_color(args));
-    Cli::from_arg_matches(&command.try_get_matches_from(args)?)
+    let command = args::command().color(help_color(args));
+    let mut cli = Cli::from_arg_matches(&command.try_get_matches_from(args)?)?;
+    // clap lets those behind the command's name take the place of those before it.
+    cli.global.set = values_of("--set", args);
+    Ok(cli)
 }
 
 /// Help and usage errors come before the flags are read, so `--color` is looked for by hand.
 fn help_color(args: &[OsString]) -> ColorChoice {
-    let mut words = args.iter().filter_map(|arg| arg.to_str());
+    let asked = values_of("--color", args);
+    let known = asked.iter().find_map(|value| match value.as_str() {
+        "never" => Some(ColorChoice::Never),
+        "always" => Some(ColorChoice::Always),
+        _ => None,
+    });
+    known.unwrap_or(ColorChoice::Auto)
+}
+
+/// Every value of a flag, wherever on the command line it stands.
+fn values_of(flag: &str, args: &[OsString]) -> Vec<String> {
+    let words = args.iter().skip(1).filter_map(|arg| arg.to_str());
+    let mut words = words.take_while(|word| *word != "--");
+    let mut values = Vec::new();
     while let Some(word) = words.next() {
-        let value = match word {
-            "--" => break,
-            "--color" => words.next(),
-            _ => word.strip_prefix("--color="),
+        let joined = word.strip_prefix(flag);
+        let value = match joined {
+            Some("") => words.next(),
+            Some(rest) => rest.strip_prefix('='),
+            None => None,
         };
-        match value {
-            Some("never") => return ColorChoice::Never,
-            Some("always") => return ColorChoice::Always,
-            Some(_) | None => {}
-        }
+        values.extend(value.map(str::to_owned));
     }
-    ColorChoice::Auto
+    values
 }
 
 fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
@@ -230,11 +246,14 @@ fn is_closed_pipe(error: &anyhow::Error) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{ColorChoice, ExitCode, Refusal, code_of, help_color, sentence};
+    use super::{ColorChoice, ExitCode, Refusal, code_of, help_color, parse, sentence};
+
+    fn args(text: &str) -> Vec<std::ffi::OsString> {
+        text.split(' ').map(Into::into).collect()
+    }
 
     #[test]
     fn color_is_found_before_the_command_line_is_read() {
-        let args = |text: &str| text.split(' ').map(Into::into).collect::<Vec<_>>();
         assert_eq!(
             help_color(&args("mocban --color never run")),
             ColorChoice::Never
@@ -247,6 +266,15 @@ mod tests {
             help_color(&args("mocban -- --color never")),
             ColorChoice::Auto
         );
+    }
+
+    #[test]
+    fn settings_before_and_behind_the_command_add_up() {
+        let cli = parse(&args(
+            "mocban --set run.workers=1 run --set=fit.seed=2 --set run.workers=3",
+        ));
+        let wanted = ["run.workers=1", "fit.seed=2", "run.workers=3"];
+        assert_eq!(cli.expect("valid").global.set, wanted);
     }
 
     #[test]

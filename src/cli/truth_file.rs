@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::domain::PairName;
+use crate::domain::{PairName, plain};
 use crate::report::truth::TruthRecord;
 
 /// One true alignment and the line it stands on.
@@ -40,7 +40,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<Row>, TruthFileError>
         if text.trim().is_empty() {
             continue;
         }
-        let refuse = |reason: String| refusal(file, line, reason);
+        let refuse = |reason: String| refusal(file, line, &reason);
         let value: Value =
             serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
         let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
@@ -61,11 +61,11 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<Row>, TruthFileError>
 }
 
 /// A refusal of one line.
-pub(super) fn refusal(file: &Path, line: usize, reason: String) -> TruthFileError {
+pub(super) fn refusal(file: &Path, line: usize, reason: &str) -> TruthFileError {
     TruthFileError {
         file: file.to_owned(),
         line,
-        reason,
+        reason: plain(reason, 300),
     }
 }
 

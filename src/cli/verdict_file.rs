@@ -7,7 +7,7 @@ use csv::StringRecord;
 
 use crate::catalog::NewVerdict;
 use crate::config::hint;
-use crate::domain::PairName;
+use crate::domain::{PairName, plain};
 use crate::manifest::{LineCounter, as_utf8, delimiter};
 
 const COLUMNS: [&str; 6] = ["pair", "verdict", "reader", "metric", "reason", "note"];
@@ -30,11 +30,11 @@ pub(super) struct VerdictFileError {
 }
 
 impl VerdictFileError {
-    const fn new(line: u64, reason: String) -> Self {
+    fn new(line: u64, reason: &str) -> Self {
         Self {
             file: None,
             line,
-            reason,
+            reason: plain(reason, 300),
         }
     }
 
@@ -50,7 +50,7 @@ impl VerdictFileError {
 /// # Errors
 /// At the first line that is wrong.
 pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Row>, VerdictFileError> {
-    let text = as_utf8(bytes).map_err(|error| VerdictFileError::new(1, error.to_string()))?;
+    let text = as_utf8(bytes).map_err(|error| VerdictFileError::new(1, &error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter(&text))
         .trim(csv::Trim::All)
@@ -75,7 +75,7 @@ pub(super) fn refuse_unknown(rows: &[Row], unknown: &[PairName]) -> Result<(), V
     match rows.iter().find(|row| unknown.contains(&row.verdict.pair)) {
         Some(row) => {
             let reason = format!("there is no pair {}", row.verdict.pair);
-            Err(VerdictFileError::new(row.line, reason))
+            Err(VerdictFileError::new(row.line, &reason))
         }
         None => Ok(()),
     }
@@ -85,14 +85,14 @@ pub(super) fn refuse_unknown(rows: &[Row], unknown: &[PairName]) -> Result<(), V
 fn places(headers: &StringRecord) -> Result<[Option<usize>; 6], VerdictFileError> {
     if let Some(unknown) = headers.iter().find(|name| !COLUMNS.contains(name)) {
         let reason = format!("there is no column {unknown}{}", hint(unknown, COLUMNS));
-        return Err(VerdictFileError::new(1, reason));
+        return Err(VerdictFileError::new(1, &reason));
     }
     let places = COLUMNS.map(|name| headers.iter().position(|header| header == name));
     for (name, place) in COLUMNS.iter().zip(places).take(NEEDED) {
         if place.is_none() {
             return Err(VerdictFileError::new(
                 1,
-                format!("column {name} is missing"),
+                &format!("column {name} is missing"),
             ));
         }
     }
@@ -111,7 +111,7 @@ fn row(
     };
     let needed = |column: usize| {
         cell(column)
-            .ok_or_else(|| VerdictFileError::new(line, format!("{} is empty", COLUMNS[column])))
+            .ok_or_else(|| VerdictFileError::new(line, &format!("{} is empty", COLUMNS[column])))
     };
     let verdict = NewVerdict {
         pair: word(needed(0)?, line)?,
@@ -129,7 +129,7 @@ where
     T: FromStr<Err: std::fmt::Display>,
 {
     text.parse()
-        .map_err(|error: T::Err| VerdictFileError::new(line, error.to_string()))
+        .map_err(|error: T::Err| VerdictFileError::new(line, &error.to_string()))
 }
 
 fn csv_error(error: &csv::Error, text: &[u8]) -> VerdictFileError {
@@ -141,7 +141,7 @@ fn csv_error(error: &csv::Error, text: &[u8]) -> VerdictFileError {
         csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8; save it as \"CSV UTF-8\"".to_owned(),
         _ => error.to_string(),
     };
-    VerdictFileError::new(line, reason)
+    VerdictFileError::new(line, &reason)
 }
 
 #[cfg(test)]
@@ -194,6 +194,8 @@ mod tests {
             "line 3: \"maybe\" is not a verdict (pass, fail, unsure); no verdict was recorded"
         );
         assert!(error("pair,verdict,reader\n1,pass,\n").starts_with("line 2: reader is empty"));
+        let rude = error("pair,ver\u{1b}[2J\n");
+        assert!(!rude.contains('\u{1b}'), "{rude}");
         assert!(error("pair,verdict\n").starts_with("line 1: column reader is missing"));
         assert!(error("pair,verdict,raeder\n").contains("did you mean \"reader\"?"));
         assert!(error("pair,verdict,reader\n1,pass\n").starts_with("line 2: 2 cells"));

@@ -3,6 +3,10 @@
 use std::path::PathBuf;
 
 use super::Origin;
+use crate::domain::plain;
+
+/// Characters shown of what somebody wrote.
+const LONGEST: usize = 160;
 
 /// A setting that cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -16,7 +20,7 @@ pub enum ConfigError {
         source: std::io::Error,
     },
     /// The text is not TOML.
-    #[error("{origin}: line {line}: {reason}")]
+    #[error("{origin}: line {line}: {}", plain(reason, LONGEST))]
     Syntax {
         /// Whose text.
         origin: Origin,
@@ -26,7 +30,7 @@ pub enum ConfigError {
         reason: String,
     },
     /// A section or key that does not exist.
-    #[error("{origin}: there is no setting {key}{hint}")]
+    #[error("{origin}: there is no setting {}{hint}", plain(key, LONGEST))]
     Unknown {
         /// Where it stands.
         origin: Origin,
@@ -36,7 +40,10 @@ pub enum ConfigError {
         hint: String,
     },
     /// A section where a value stands, or the other way round.
-    #[error("{origin}: {key} is a section; give its keys one by one")]
+    #[error(
+        "{origin}: {} is a section; give its keys one by one",
+        plain(key, LONGEST)
+    )]
     NotASection {
         /// Where it stands.
         origin: Origin,
@@ -44,7 +51,12 @@ pub enum ConfigError {
         key: String,
     },
     /// A value of the wrong type, or one that the setting does not know.
-    #[error("{origin}: {key} = {value}: {reason}")]
+    #[error(
+        "{origin}: {} = {}: {}",
+        plain(key, LONGEST),
+        plain(value, LONGEST),
+        plain(reason, LONGEST)
+    )]
     Value {
         /// Where it stands.
         origin: Origin,
@@ -56,7 +68,11 @@ pub enum ConfigError {
         reason: String,
     },
     /// A number outside its range.
-    #[error("{origin}: {key} = {value} is outside {min} to {max}")]
+    #[error(
+        "{origin}: {} = {} is outside {min} to {max}",
+        plain(key, LONGEST),
+        plain(value, LONGEST)
+    )]
     Range {
         /// Where it stands.
         origin: Origin,
@@ -70,7 +86,10 @@ pub enum ConfigError {
         max: f64,
     },
     /// A preset that does not exist.
-    #[error("{origin}: there is no preset {name:?}, only default and paper{hint}")]
+    #[error(
+        "{origin}: there is no preset \"{}\", only default and paper{hint}",
+        plain(name, LONGEST)
+    )]
     UnknownPreset {
         /// Where it stands.
         origin: Origin,
@@ -80,7 +99,10 @@ pub enum ConfigError {
         hint: String,
     },
     /// `--set` without `=`, or without a section.
-    #[error("--set {text:?} is not of the form section.key=value")]
+    #[error(
+        "--set \"{}\" is not of the form section.key=value",
+        plain(text, LONGEST)
+    )]
     SetForm {
         /// As typed.
         text: String,

@@ -39,7 +39,7 @@ pub fn load(sources: &Sources) -> Result<Loaded, ConfigError> {
     for (layer, origin) in sources.tables()? {
         changes.extend(tree.changes(&layer, &origin)?);
     }
-    for (key, value, origin) in sources.single_values()? {
+    for (key, value, origin) in sources.single_values(&tree)? {
         changes.extend(tree.change(&key, value, &origin)?);
     }
     for change in &changes {
@@ -191,6 +191,40 @@ mod tests {
         );
         let error = with(&["workers=1"]).expect_err("no section");
         assert!(matches!(error, ConfigError::SetForm { .. }), "{error}");
+    }
+
+    #[test]
+    fn variables_with_one_underscore_count_and_mistyped_ones_are_refused() {
+        let env = |name: &str, value: &str| {
+            load(&Sources {
+                env: vec![
+                    (name.to_owned(), value.to_owned()),
+                    ("MOCBAN_BREAK_AT".into(), "fit".into()),
+                ],
+                ..Sources::default()
+            })
+        };
+        let loaded = env("MOCBAN_LIMITS_MESH_MAX_BYTES", "7").expect("a setting");
+        assert_eq!(loaded.config.limits.mesh.max_bytes, 7);
+        let error = env("MOCBAN_RUN_WROKERS", "7").expect_err("no setting");
+        assert_eq!(
+            error.to_string(),
+            "MOCBAN_RUN_WROKERS: there is no setting run.wrokers; did you mean \"workers\"?"
+        );
+        let both = load(&Sources {
+            env: vec![
+                ("MOCBAN_RUN__WORKERS".into(), "2".into()),
+                ("MOCBAN_RUN_WORKERS".into(), "3".into()),
+            ],
+            ..Sources::default()
+        });
+        assert_eq!(both.expect("settings").config.run.workers, 2);
+    }
+
+    #[test]
+    fn a_value_is_one_value_whatever_lines_it_holds() {
+        let error = with(&["run.workers=2\nstage_limit_s = 3"]).expect_err("two lines");
+        assert_eq!(error.to_string().lines().count(), 1, "{error}");
     }
 
     #[test]

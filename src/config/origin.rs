@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::domain::plain;
+
 /// A layer of settings; later variants win over earlier ones.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
@@ -23,7 +25,7 @@ impl std::fmt::Display for Origin {
             Self::Default => f.write_str("default"),
             Self::Preset(name) => write!(f, "preset {name}"),
             Self::File(path) => write!(f, "{}", path.display()),
-            Self::Env(name) => f.write_str(name),
+            Self::Env(name) => f.write_str(&plain(name, 160)),
             Self::Flag => f.write_str("--set"),
         }
     }

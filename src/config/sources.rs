@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 use super::nearest::hint;
-use super::{ConfigError, Origin};
+use super::{ConfigError, Origin, Tree};
 
 /// Settings that come with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -76,7 +76,7 @@ impl Default for Start {
 pub struct Sources {
     /// Preset or file.
     pub start: Start,
-    /// Environment variables; those named `MOCBAN_SECTION__KEY` are settings.
+    /// Environment variables; those named `MOCBAN_SECTION__KEY` or `MOCBAN_SECTION_KEY` are settings.
     pub env: Vec<(String, String)>,
     /// `section.key=value`, as given to `--set`.
     pub sets: Vec<String>,
@@ -94,16 +94,21 @@ impl Sources {
     }
 
     /// Layers of one value each: environment, then flags.
-    pub(super) fn single_values(&self) -> Result<Vec<(String, Value, Origin)>, ConfigError> {
-        let mut values: Vec<_> = self
+    pub(super) fn single_values(
+        &self,
+        defaults: &Tree,
+    ) -> Result<Vec<(String, Value, Origin)>, ConfigError> {
+        let mut named: Vec<_> = self
             .env
             .iter()
-            .filter_map(|(name, text)| {
-                let key = env_key(name)?;
-                Some((key, value(text), Origin::Env(name.clone())))
-            })
+            .filter_map(|(name, text)| Some((env_key(name, defaults)?, name, text)))
             .collect();
-        values.sort_by(|a, b| a.0.cmp(&b.0));
+        // Of two ways to write one name, that with two underscores wins.
+        named.sort();
+        let mut values: Vec<_> = named
+            .into_iter()
+            .map(|(key, name, text)| (key, value(text), Origin::Env(name.clone())))
+            .collect();
         for text in &self.sets {
             let (key, new) = split_set(text)?;
             values.push((key, new, Origin::Flag));
@@ -112,11 +117,18 @@ impl Sources {
     }
 }
 
-/// `MOCBAN_LIMITS__MESH__MAX_BYTES` is `limits.mesh.max_bytes`; names without `__` are no settings.
-fn env_key(name: &str) -> Option<String> {
-    let rest = name.strip_prefix("MOCBAN_")?;
-    rest.contains("__")
-        .then(|| rest.replace("__", ".").to_ascii_lowercase())
+/// `MOCBAN_LIMITS__MESH__MAX_BYTES` is `limits.mesh.max_bytes`, and so is `MOCBAN_LIMITS_MESH_MAX_BYTES`. A name that
+/// begins with no section is no setting; one that does and is none is passed on, to be refused by its name.
+fn env_key(name: &str, defaults: &Tree) -> Option<String> {
+    let rest = name.strip_prefix("MOCBAN_")?.to_ascii_lowercase();
+    if rest.contains("__") {
+        return Some(rest.replace("__", "."));
+    }
+    let (section, key) = rest.split_once('_')?;
+    defaults.table().get(section)?;
+    let mut known = defaults.settings().into_iter().map(|setting| setting.key);
+    let same = known.find(|known| known.replace('.', "_") == rest);
+    Some(same.unwrap_or_else(|| format!("{section}.{key}")))
 }
 
 fn split_set(text: &str) -> Result<(String, Value), ConfigError> {
@@ -142,6 +154,7 @@ fn value(text: &str) -> Value {
     format!("value = {text}")
         .parse::<Table>()
         .ok()
+        .filter(|table| table.len() == 1)
         .and_then(|mut table| table.remove("value"))
         .unwrap_or_else(|| Value::String(text.to_owned()))
 }

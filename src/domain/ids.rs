@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::plain;
+
 /// A pair's number in the catalog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct PairId(pub i64);
@@ -22,7 +24,7 @@ pub enum PairNameError {
     #[error("the id is empty")]
     Empty,
     /// A character outside `[A-Za-z0-9_-]`.
-    #[error("id {0:?} holds {1:?}; an id is made of letters A-Z, digits, _ and -")]
+    #[error("id \"{shown}\" holds {1:?}; an id is made of letters A-Z, digits, _ and -", shown = plain(.0, 48))]
     Character(String, char),
     /// Longer than a file name may be with our endings.
     #[error("id of {0} characters is longer than 128")]

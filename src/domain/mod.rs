@@ -9,6 +9,7 @@ mod ids;
 mod job;
 mod metric;
 mod outcome;
+mod plain;
 pub mod role;
 mod stage;
 mod transform;
@@ -27,6 +28,7 @@ pub use outcome::{
     Bow, DepthOutcome, DepthScale, FitOutcome, MetricOutcome, NormalizeOutcome, Pose,
     RegisterOutcome, Scores, SideEvidence, ThresholdChoice,
 };
+pub use plain::plain;
 pub use stage::Stage;
 pub use transform::{Affine2, PrintFromMesh, Rigid3};
 pub use unit::LengthUnit;

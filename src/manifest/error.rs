@@ -3,6 +3,11 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use crate::domain::plain;
+
+/// Characters of a problem that are shown.
+const LONGEST: usize = 300;
+
 /// Problems shown at most; the rest are counted.
 const SHOWN: usize = 20;
 
@@ -21,7 +26,7 @@ impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Line(line) => write!(f, "line {line}: "),
-            Self::File(path) => write!(f, "{}: ", path.display()),
+            Self::File(path) => write!(f, "{}: ", plain(&path.to_string_lossy(), 4096)),
             Self::Whole => Ok(()),
         }
     }
@@ -41,7 +46,7 @@ impl Problem {
     pub(super) fn line(line: usize, reason: impl Into<String>) -> Self {
         Self {
             place: Place::Line(line),
-            reason: reason.into(),
+            reason: plain(&reason.into(), LONGEST),
         }
     }
 
@@ -49,7 +54,7 @@ impl Problem {
     pub(super) fn whole(reason: impl Into<String>) -> Self {
         Self {
             place: Place::Whole,
-            reason: reason.into(),
+            reason: plain(&reason.into(), LONGEST),
         }
     }
 }

@@ -223,10 +223,7 @@ fn face_fault(rest: &[u8], line: u64, face: u64, (before, all): (u64, u64)) -> O
         }
         let position = corner.split(|byte| *byte == b'/').next();
         let Some(index) = position.and_then(text::integer) else {
-            let reason = format!(
-                "corner {:?} names no vertex",
-                String::from_utf8_lossy(corner)
-            );
+            let reason = format!("corner {} names no vertex", text::shown(corner));
             return Some(Error::Line { line, reason });
         };
         let from_one = if index < 0 {

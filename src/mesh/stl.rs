@@ -144,7 +144,7 @@ impl Ascii {
             b"endsolid" => self.step(Open::Solid, Open::Nothing, keyword),
             _ => Err(Wrong::Line(format!(
                 "{} is not a word of ascii STL",
-                shown(keyword)
+                text::shown(keyword)
             ))),
         }
     }
@@ -153,7 +153,7 @@ impl Ascii {
         if self.open != from {
             return Err(Wrong::Line(format!(
                 "{} stands where it must not",
-                shown(keyword)
+                text::shown(keyword)
             )));
         }
         self.open = to;
@@ -181,10 +181,6 @@ impl Ascii {
         limits.check_triangles(self.vertices.len() as u64 / 3)?;
         limits.check_vertices(self.vertices.len() as u64)
     }
-}
-
-fn shown(word: &[u8]) -> String {
-    format!("{:?}", String::from_utf8_lossy(&word[..word.len().min(32)]))
 }
 
 #[cfg(test)]

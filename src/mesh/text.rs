@@ -41,6 +41,16 @@ pub(super) fn position<'a>(mut words: impl Iterator<Item = &'a [u8]>) -> Result<
 
 /// Says that a word is no number, and shows at most the beginning of it.
 pub(super) fn not_a_number(word: &[u8]) -> String {
-    let shown = String::from_utf8_lossy(&word[..word.len().min(32)]);
-    format!("{shown:?} is not a number")
+    format!("{} is not a number", shown(word))
+}
+
+/// The beginning of a word in quotes, without what would be lost or do harm on a screen.
+pub(super) fn shown(word: &[u8]) -> String {
+    let beginning = &word[..word.len().min(200)];
+    format!("\"{}\"", plain(&String::from_utf8_lossy(beginning)))
+}
+
+/// The same of a text, without quotes.
+pub(super) fn plain(text: &str) -> String {
+    crate::domain::plain(text, 48)
 }

@@ -3,6 +3,8 @@
 mod backup;
 mod check;
 mod cli;
+#[cfg(target_os = "linux")]
+mod crowd;
 mod decoys;
 mod demo;
 #[cfg(target_os = "linux")]
@@ -10,6 +12,8 @@ mod fault;
 #[cfg(target_os = "linux")]
 mod faults;
 mod hostile;
+#[cfg(target_os = "linux")]
+mod hostile_pairs;
 mod invariance;
 mod kill;
 mod layers;
@@ -20,9 +24,14 @@ mod one_pair;
 mod power;
 mod processes;
 mod queue;
+mod readers;
 mod report;
 mod resume;
+mod seeds;
 mod semi_real;
 #[cfg(target_os = "linux")]
 mod shim;
+mod spoil;
+mod tiff_file;
+mod tiffs;
 mod unbroken;

@@ -1,7 +1,7 @@
 //! The rows of a PLY body into a mesh.
 
-use super::super::{Error, Limits, Mesh, error};
-use super::header::{Element, Header, Shape};
+use super::super::{Error, Limits, Mesh, error, text};
+use super::header::{Element, Header, Scalar, Shape};
 use super::source::{NoNumber, Source};
 
 /// Names under which programs write a face's corners.
@@ -30,21 +30,22 @@ struct Body<'a, S> {
     limits: &'a Limits,
     declared_vertices: u64,
     mesh: Mesh,
-    /// The list or the values of the row in hand.
+    /// The values of the vertex in hand.
     row: Vec<f64>,
 }
 
 impl<S: Source> Body<'_, S> {
     fn element(&mut self, element: &Element) -> Result<(), Error> {
-        // Rows without properties have no bytes, however many are declared.
-        if element.rows == 0 || element.properties.is_empty() {
+        // Rows without properties have no bytes, however many are declared; a vertex without is an error.
+        let is_vertex = element.name == "vertex";
+        if element.rows == 0 || (element.properties.is_empty() && !is_vertex) {
             return Ok(());
         }
         self.check_rows(element)?;
         match element.name.as_str() {
             "vertex" => self.vertices(element),
-            "face" => self.faces(element, Body::fan),
-            "tristrips" => self.faces(element, Body::strips),
+            "face" => self.faces(element, Joining::Fan),
+            "tristrips" => self.faces(element, Joining::Strips),
             _ => self.skip_rows(element),
         }
     }
@@ -52,7 +53,7 @@ impl<S: Source> Body<'_, S> {
     /// Whether the bytes that are left can hold the rows, before memory is reserved for them.
     fn check_rows(&self, element: &Element) -> Result<(), Error> {
         match element.name.as_str() {
-            "vertex" => self.limits.check_vertices(element.rows)?,
+            "vertex" => self.limits.check_vertices(self.declared_vertices)?,
             "face" => self.limits.check_triangles(element.rows)?,
             _ => {}
         }
@@ -69,7 +70,7 @@ impl<S: Source> Body<'_, S> {
             what: match element.name.as_str() {
                 "vertex" => "vertices".into(),
                 "face" => "faces".into(),
-                other => format!("rows of {other}"),
+                other => format!("rows of {}", text::plain(other)),
             },
             have,
             want: element.rows,
@@ -139,11 +140,7 @@ impl<S: Source> Body<'_, S> {
         Ok(())
     }
 
-    fn faces(
-        &mut self,
-        element: &Element,
-        add: impl Fn(&mut Self, &Element, u64) -> Result<(), Error>,
-    ) -> Result<(), Error> {
+    fn faces(&mut self, element: &Element, joining: Joining) -> Result<(), Error> {
         let corners = element.place(&CORNERS).ok_or_else(|| {
             Error::Header(format!(
                 "element {:?} has no property \"vertex_indices\"",
@@ -151,61 +148,43 @@ impl<S: Source> Body<'_, S> {
             ))
         })?;
         for row in 0..element.rows {
-            self.face_row(element, corners)
-                .map_err(|reason| self.no_number(element, row, reason))?;
-            add(self, element, row)?;
-            self.limits
-                .check_triangles(self.mesh.triangles.len() as u64)?;
-        }
-        Ok(())
-    }
-
-    /// Reads a row's corners into `self.row`.
-    fn face_row(&mut self, element: &Element, corners: usize) -> Result<(), NoNumber> {
-        for (place, property) in element.properties.iter().enumerate() {
-            match property.shape {
-                Shape::List { count, item } if place == corners => {
-                    let length = length(self.source.next(count)?)?;
-                    self.row.clear();
-                    for _ in 0..length {
-                        self.row.push(self.source.next(item)?);
+            for (place, property) in element.properties.iter().enumerate() {
+                match property.shape {
+                    Shape::List { count, item } if place == corners => {
+                        self.corners(element, row, (count, item), joining)?;
                     }
+                    other => self
+                        .skip(other)
+                        .map_err(|reason| self.no_number(element, row, reason))?,
                 }
-                other => self.skip(other)?,
             }
         }
         Ok(())
     }
 
-    /// A polygon as a fan around its first corner.
-    fn fan(&mut self, element: &Element, row: u64) -> Result<(), Error> {
-        for at in 0..self.row.len() {
-            self.check_index(element, row, self.row[at])?;
-        }
-        if let [first, rest @ ..] = self.row.as_slice() {
-            let fan = rest
-                .windows(2)
-                .map(|pair| [*first, pair[0], pair[1]].map(|index| index as u32));
-            self.mesh.triangles.extend(fan);
-        }
-        Ok(())
-    }
-
-    /// Strips of triangles laid end to end with -1 between; every other triangle is wound the other way.
-    fn strips(&mut self, element: &Element, row: u64) -> Result<(), Error> {
-        let mut start = 0;
-        for at in 0..self.row.len() {
-            if self.row[at] == -1.0 {
-                start = at + 1;
+    /// Reads a list of corners into triangles, one by one, so that no list is longer in memory than the limit.
+    fn corners(
+        &mut self,
+        element: &Element,
+        row: u64,
+        (count, item): (Scalar, Scalar),
+        joining: Joining,
+    ) -> Result<(), Error> {
+        let length = self.source.next(count).and_then(length);
+        let length = length.map_err(|reason| self.no_number(element, row, reason))?;
+        let mut joined = Joined::default();
+        for _ in 0..length {
+            let index = self.source.next(item);
+            let index = index.map_err(|reason| self.no_number(element, row, reason))?;
+            if joining == Joining::Strips && index == -1.0 {
+                joined = Joined::default();
                 continue;
             }
-            self.check_index(element, row, self.row[at])?;
-            if at >= start + 2 {
-                let [a, b, c] = [at - 2, at - 1, at].map(|i| self.row[i] as u32);
-                let turned = (at - start) % 2 == 1;
-                self.mesh
-                    .triangles
-                    .push(if turned { [b, a, c] } else { [a, b, c] });
+            self.check_index(element, row, index)?;
+            if let Some(triangle) = joined.corner(index as u32, joining) {
+                let count = self.mesh.triangles.len() as u64 + 1;
+                self.limits.check_triangles(count)?;
+                self.mesh.triangles.push(triangle);
             }
         }
         Ok(())
@@ -230,6 +209,43 @@ impl<S: Source> Body<'_, S> {
     }
 }
 
+/// How a row's corners make triangles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Joining {
+    /// A polygon as a fan around its first corner.
+    Fan,
+    /// Strips laid end to end with -1 between; every other triangle is wound the other way.
+    Strips,
+}
+
+/// The corners that the next one makes a triangle with.
+#[derive(Debug, Default)]
+struct Joined {
+    kept: [u32; 2],
+    seen: u64,
+}
+
+impl Joined {
+    /// Takes the next corner; gives the triangle that it closes.
+    fn corner(&mut self, corner: u32, joining: Joining) -> Option<[u32; 3]> {
+        let [a, b] = self.kept;
+        let before = self.seen;
+        self.seen += 1;
+        self.kept = match joining {
+            _ if before == 0 => [corner; 2],
+            _ if before == 1 => [a, corner],
+            Joining::Fan => [a, corner],
+            Joining::Strips => [b, corner],
+        };
+        let turned = joining == Joining::Strips && before % 2 == 1;
+        (before >= 2).then_some(if turned {
+            [b, a, corner]
+        } else {
+            [a, b, corner]
+        })
+    }
+}
+
 /// A list's length; a negative or broken one is taken for a damaged body.
 fn length(count: f64) -> Result<u64, NoNumber> {
     if count >= 0.0 && count.fract() == 0.0 {
@@ -243,7 +259,7 @@ fn length(count: f64) -> Result<u64, NoNumber> {
 
 fn wrong_row(element: &Element, row: u64, reason: String) -> Error {
     Error::Row {
-        element: element.name.clone(),
+        element: text::plain(&element.name),
         row: row + 1,
         reason,
     }

@@ -120,6 +120,9 @@ impl Element {
     }
 }
 
+/// Longest header in bytes; it holds names and notes, and every line of it is kept.
+const LONGEST: usize = 1 << 20;
+
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Header {
     pub(super) encoding: Encoding,
@@ -134,6 +137,9 @@ impl Header {
         let mut at = 0;
         while let Some((line, next)) = line_at(bytes, at) {
             at = next;
+            if at > LONGEST {
+                return Err(wrong("it is longer than 1 MiB"));
+            }
             let words: Vec<&[u8]> = text::words(line).collect();
             match words.as_slice() {
                 [b"end_header"] => {
@@ -148,7 +154,7 @@ impl Header {
                     .properties
                     .push(parse_property(rest)?),
                 [] | [b"ply" | b"comment" | b"obj_info", ..] => {}
-                _ => return Err(wrong(&format!("{} is not understood", shown(line)))),
+                _ => return Err(wrong(&format!("{} is not understood", text::shown(line)))),
             }
         }
         Err(wrong("the file ends before end_header"))
@@ -177,7 +183,7 @@ fn parse_encoding(name: &[u8]) -> Result<Encoding, Error> {
     Encoding::parse(name).ok_or_else(|| {
         wrong(&format!(
             "{} is not a format (ascii, binary_little_endian, binary_big_endian)",
-            shown(name)
+            text::shown(name)
         ))
     })
 }
@@ -189,8 +195,9 @@ fn parse_element(name: &[u8], rows: &[u8]) -> Result<Element, Error> {
     let name = String::from_utf8_lossy(name).into_owned();
     let Some(count) = count else {
         return Err(wrong(&format!(
-            "element {name:?} has the count {}",
-            shown(rows)
+            "element {} has the count {}",
+            text::shown(name.as_bytes()),
+            text::shown(rows)
         )));
     };
     Ok(Element {
@@ -202,7 +209,7 @@ fn parse_element(name: &[u8], rows: &[u8]) -> Result<Element, Error> {
 
 fn parse_property(words: &[&[u8]]) -> Result<Property, Error> {
     let scalar = |word: &[u8]| {
-        Scalar::parse(word).ok_or_else(|| wrong(&format!("{} is not a type", shown(word))))
+        Scalar::parse(word).ok_or_else(|| wrong(&format!("{} is not a type", text::shown(word))))
     };
     let (shape, name) = match words {
         [b"list", count, item, name] => {
@@ -224,8 +231,4 @@ fn parse_property(words: &[&[u8]]) -> Result<Property, Error> {
 
 fn wrong(reason: &str) -> Error {
     Error::Header(reason.to_owned())
-}
-
-fn shown(word: &[u8]) -> String {
-    format!("{:?}", String::from_utf8_lossy(&word[..word.len().min(48)]))
 }

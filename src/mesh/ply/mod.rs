@@ -110,6 +110,65 @@ mod tests {
     }
 
     #[test]
+    fn a_long_list_of_corners_meets_the_limit_before_it_is_read() {
+        let limits = Limits {
+            max_triangles: 10,
+            ..Limits::SUGGESTED
+        };
+        for element in ["face", "tristrips"] {
+            let elements = format!("element vertex 1\n{XYZ}element {element} 1\n{CORNERS}");
+            let corners = elements.replace("list uchar", "list uint");
+            let bytes = ascii(&corners, &format!("1 2 3\n5000 {}x", "0 ".repeat(4999)));
+            let error = super::read(&bytes, &limits).expect_err("long");
+            assert_eq!(
+                error.to_string(),
+                "the file has 11 triangles; limits.mesh.max_triangles is 10"
+            );
+        }
+    }
+
+    #[test]
+    fn vertices_declared_twice_or_without_coordinates_name_no_corners() {
+        let bare = ascii(
+            &format!("element vertex 2\nelement vertex 1\n{XYZ}element face 1\n{CORNERS}"),
+            "1 2 3\n3 0 1 2\n",
+        );
+        assert_eq!(
+            read(&bare).expect_err("bare").to_string(),
+            "the PLY header is wrong: element \"vertex\" has no property \"x\""
+        );
+        let limits = Limits {
+            max_vertices: 3,
+            ..Limits::SUGGESTED
+        };
+        let twice = ascii(
+            &format!("element vertex 2\n{XYZ}").repeat(2),
+            &"0 ".repeat(12),
+        );
+        assert_eq!(read(&twice).expect("reads").vertices.len(), 4);
+        let error = super::read(&twice, &limits).expect_err("over");
+        assert!(
+            error.to_string().starts_with("the file has 4 vertices"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn a_header_without_end_is_not_kept_line_by_line() {
+        let bytes = ascii(
+            &"property char a\n"
+                .repeat(80_000)
+                .replacen("property char a", "element a 1", 1),
+            "",
+        );
+        let error = read(&bytes).expect_err("long");
+        assert_eq!(
+            error.to_string(),
+            "the PLY header is wrong: it is longer than 1 MiB"
+        );
+    }
+
+    #[test]
     fn faults_are_told_by_their_place() {
         let elements = format!("element vertex 2\n{XYZ}element face 1\n{CORNERS}");
         let fault = |body: &str| read(&ascii(&elements, body)).expect_err(body).to_string();

@@ -1,69 +1,18 @@
 //! Print images into [`Picture`]s: PNG, JPEG and TIFF told apart by content, never by name.
 
+mod error;
+mod tiff;
+
 use std::io::Cursor;
 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use super::{Grid, Limits, Picture};
-use crate::domain::{FailureClass, FileKind};
+use crate::domain::{FileKind, plain};
 
-/// Why a print image could not be decoded.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum DecodeError {
-    /// No bytes at all.
-    #[error("the file is empty (0 bytes)")]
-    Empty,
-    /// The content is of another kind than PNG, JPEG or TIFF.
-    #[error("the file is {0}; PNG, JPEG and TIFF images are read")]
-    NotAnImage(FileKind),
-    /// More bytes than the settings allow.
-    #[error("the file has {bytes} bytes; limits.image.max_bytes is {limit}")]
-    TooManyBytes {
-        /// Size of the file.
-        bytes: u64,
-        /// The setting.
-        limit: u64,
-    },
-    /// More pixels than the settings allow, by the header.
-    #[error("the image is {width} x {height} pixels; limits.image.max_pixels is {limit}")]
-    TooManyPixels {
-        /// Columns by the header.
-        width: u32,
-        /// Rows by the header.
-        height: u32,
-        /// The setting.
-        limit: u64,
-    },
-    /// A side of no length.
-    #[error("the image is {width} x {height} pixels: it has no pixels")]
-    NoPixels {
-        /// Columns by the header.
-        width: u32,
-        /// Rows by the header.
-        height: u32,
-    },
-    /// The file ends before the image does.
-    #[error("the {} is truncated: it ends before the image does", .0.name())]
-    Truncated(FileKind),
-    /// The file breaks its own format, or uses a part of it that is not read.
-    #[error("the {} cannot be decoded: {reason}", .kind.name())]
-    Broken {
-        /// What the file claims to be.
-        kind: FileKind,
-        /// The decoder's words.
-        reason: String,
-    },
-}
+pub use error::DecodeError;
 
-impl DecodeError {
-    /// Decides retry or quarantine: the file is at fault in every case.
-    pub const fn class(&self) -> FailureClass {
-        FailureClass::BadInput
-    }
-}
-
-/// Decodes a print image of 8 or 16 bits a channel: grey, RGB or a palette, with or without transparency, which is
-/// laid on white paper.
+/// Decodes a print image: grey, RGB or a palette, with or without transparency, which is laid on white paper.
 ///
 /// The image is taken as given: an EXIF orientation is not applied, so that print pixels mean the same to every
 /// program. The header's size is checked before any pixel is decoded.
@@ -76,10 +25,23 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture, DecodeError> {
     if kind == FileKind::Png {
         check_png_header(bytes, limits)?;
     }
+    let rgb = colours(bytes, format, kind, limits)?;
+    Ok(Picture { rgb })
+}
+
+fn colours(
+    bytes: &[u8],
+    format: ImageFormat,
+    kind: FileKind,
+    limits: &Limits,
+) -> Result<Grid<[u16; 3]>, DecodeError> {
+    if kind == FileKind::Tiff
+        && let Some(colours) = tiff::rare(bytes, limits)?
+    {
+        return Ok(colours);
+    }
     let image = decode_pixels(bytes, format, kind, limits)?;
-    Ok(Picture {
-        rgb: colours_on_white(&image),
-    })
+    Ok(colours_on_white(&image))
 }
 
 fn kind_within_limits(bytes: &[u8], limits: &Limits) -> Result<FileKind, DecodeError> {
@@ -142,7 +104,7 @@ fn decode_pixels(
     limits: &Limits,
 ) -> Result<DynamicImage, DecodeError> {
     let whole = kind != FileKind::Jpeg || has_end_marker(bytes);
-    let broken = |error: ImageError| {
+    let refused = |error: ImageError| {
         if whole {
             decoder_error(kind, &error)
         } else {
@@ -159,13 +121,13 @@ fn decode_pixels(
             .saturating_add(64 << 20),
     );
     reader.limits(memory);
-    let decoder = reader.into_decoder().map_err(broken)?;
+    let decoder = reader.into_decoder().map_err(refused)?;
     let (width, height) = decoder.dimensions();
     check_size(width, height, limits)?;
     if !whole {
         return Err(DecodeError::Truncated(kind));
     }
-    DynamicImage::from_decoder(decoder).map_err(broken)
+    DynamicImage::from_decoder(decoder).map_err(refused)
 }
 
 fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {
@@ -177,9 +139,14 @@ fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {
     if early_end {
         return DecodeError::Truncated(kind);
     }
+    broken(kind, &reason)
+}
+
+/// The decoder's words on one line; some list all they found.
+fn broken(kind: FileKind, reason: &str) -> DecodeError {
     DecodeError::Broken {
         kind,
-        reason: reason.split_whitespace().collect::<Vec<_>>().join(" "),
+        reason: plain(reason, 160),
     }
 }
 

@@ -1,0 +1,18 @@
+//! Any bytes as a print image: an error of one line, or a picture within the limits.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use mocban::raster::{Limits, decode};
+
+const LIMITS: Limits = Limits {
+    max_bytes: 1 << 20,
+    max_pixels: 1 << 16,
+};
+
+fuzz_target!(|bytes: &[u8]| {
+    match decode(bytes, &LIMITS) {
+        Ok(picture) => assert!(picture.rgb.data().len() as u64 <= LIMITS.max_pixels),
+        Err(error) => mocban_fuzz::one_sentence(&error.to_string()),
+    }
+});

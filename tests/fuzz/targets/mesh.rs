@@ -1,0 +1,29 @@
+//! Any bytes as a mesh file: an error of one line, or a mesh that keeps the reader's promises.
+
+#![no_main]
+
+use libfuzzer_sys::fuzz_target;
+use mocban::mesh::{Limits, read};
+
+/// Small enough that every limit is met by small files.
+const LIMITS: Limits = Limits {
+    max_bytes: 1 << 20,
+    max_vertices: 5000,
+    max_triangles: 5000,
+};
+
+fuzz_target!(|bytes: &[u8]| {
+    for name in ["scan", "scan.stl"] {
+        match read(bytes, name, &LIMITS) {
+            Ok(mesh) => {
+                assert!(mesh.vertices.capacity() <= 2 * bytes.len() + 64);
+                assert!(mesh.vertices.len() as u64 <= LIMITS.max_vertices);
+                assert!(mesh.triangles.len() as u64 <= LIMITS.max_triangles);
+                assert!(mesh.vertices.as_flattened().iter().all(|v| v.is_finite()));
+                let count = mesh.vertices.len() as u32;
+                assert!(mesh.triangles.as_flattened().iter().all(|i| *i < count));
+            }
+            Err(error) => mocban_fuzz::one_sentence(&error.to_string()),
+        }
+    }
+});

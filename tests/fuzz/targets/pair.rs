@@ -1,0 +1,54 @@
+//! Any bytes as a mesh, with a print chosen by the first of them, through all four stages.
+
+#![no_main]
+
+use std::sync::OnceLock;
+
+use libfuzzer_sys::fuzz_target;
+use mocban::config::{Config, Sources, load};
+use mocban::mesh;
+use mocban::raster::{Picture, decode};
+use mocban::stages::{StageError, depth, fit, normalize, register};
+
+const LIMITS: mesh::Limits = mesh::Limits {
+    max_bytes: 1 << 20,
+    max_vertices: 5000,
+    max_triangles: 5000,
+};
+
+fn config() -> &'static Config {
+    static CONFIG: OnceLock<Config> = OnceLock::new();
+    CONFIG.get_or_init(|| load(&Sources::default()).expect("the defaults").config)
+}
+
+fn prints() -> &'static [Picture] {
+    static PRINTS: OnceLock<Vec<Picture>> = OnceLock::new();
+    PRINTS.get_or_init(|| {
+        let limits = config().limits.image;
+        let images = mocban_fuzz::images();
+        images
+            .iter()
+            .filter_map(|bytes| decode(bytes, &limits).ok())
+            .collect()
+    })
+}
+
+fn align(bytes: &[u8], print: &Picture) -> Result<(), StageError> {
+    let settings = &config().stages;
+    let Ok(mesh) = mesh::read(bytes, "scan.stl", &LIMITS) else {
+        return Ok(());
+    };
+    let fit = fit::fit(&mesh, Some(print), None, &settings.fit)?;
+    let map = depth::depth(&mesh, &fit, None, &settings.depth)?;
+    let masks = normalize::normalize(&map, print, &settings.normalize)?;
+    register::register(&map, &masks, &settings.register)?;
+    Ok(())
+}
+
+fuzz_target!(|bytes: &[u8]| {
+    let [choice, bytes @ ..] = bytes else { return };
+    let prints = prints();
+    if let Err(error) = align(bytes, &prints[usize::from(*choice) % prints.len()]) {
+        mocban_fuzz::one_sentence(&error.to_string());
+    }
+});

@@ -1,0 +1,28 @@
+//! Any bytes as a file of verdicts or of true alignments: rows, or an error that names the line.
+
+#![no_main]
+#![allow(
+    dead_code,
+    reason = "the readers are taken from the command line, where all of them is used"
+)]
+
+use std::path::Path;
+
+use libfuzzer_sys::fuzz_target;
+use mocban::{catalog, config, domain, manifest, report};
+
+#[path = "../../../src/cli/truth_file.rs"]
+mod truth_file;
+#[path = "../../../src/cli/verdict_file.rs"]
+mod verdict_file;
+
+fuzz_target!(|bytes: &[u8]| {
+    if let Err(error) = verdict_file::parse(bytes) {
+        mocban_fuzz::one_sentence(&error.to_string());
+    }
+    if let Ok(text) = std::str::from_utf8(bytes)
+        && let Err(error) = truth_file::parse(Path::new("truth.jsonl"), text)
+    {
+        mocban_fuzz::one_sentence(&error.to_string());
+    }
+});

@@ -1,0 +1,238 @@
+//! A crowd of hostile pairs through the real binary, good ones among them: each is told in a sentence, none stops the
+//! others, and the good ones come out as if they were alone. `MOCBAN_HOSTILE` says how many.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use mocban::demo::{DemoOptions, Tier, write_dataset};
+use mocban::manifest::{ManifestRow, parse_csv};
+use serde_json::Value;
+
+use crate::check::below;
+use crate::cli::{Call, binary, empty, mocban};
+use crate::hostile_pairs::{HostilePair, HostilePairs};
+use crate::seeds::assert_one_sentence;
+
+/// Good pairs in the crowd.
+const GOOD: u64 = 2;
+/// What a run is given and may take, far less than the headers of its files ask for.
+const MEMORY_MIB: u64 = 256;
+/// Longest time for a stage, seconds.
+const STAGE_LIMIT_S: u64 = 60;
+
+fn good_pairs(dir: &Path) -> Vec<ManifestRow> {
+    let options = DemoOptions {
+        pairs: GOOD,
+        seed: 5,
+        tier: Tier::Upright,
+    };
+    let files = write_dataset(dir, &options).expect("a dataset");
+    parse_csv(&fs::read(files.manifest).expect("a manifest")).expect("rows")
+}
+
+/// Lists the hostile pairs with the good ones spread among them, and the good ones alone.
+fn write_lists(dir: &Path, hostile: &[HostilePair]) {
+    let good = good_pairs(dir);
+    let row = |id: &str, mesh: &Path, print: &Path| {
+        format!("{id},{},{}\n", mesh.display(), print.display())
+    };
+    let (mut crowd, mut alone) = (
+        String::from("id,mesh,print\n"),
+        String::from("id,mesh,print\n"),
+    );
+    let each = hostile.len() / good.len() + 1;
+    for (group, good) in hostile.chunks(each).zip(&good) {
+        crowd.extend(
+            group
+                .iter()
+                .map(|pair| row(&pair.id, &pair.mesh, &pair.print)),
+        );
+        let good = row(good.name.as_str(), &good.mesh, &good.print);
+        crowd += &good;
+        alone += &good;
+    }
+    fs::write(dir.join("crowd.csv"), crowd).expect("written");
+    fs::write(dir.join("alone.csv"), alone).expect("written");
+}
+
+/// Calls the binary and looks at its memory while it works: the code and both streams, and the most it held in KiB.
+fn watched(dir: &Path, args: &[&str]) -> (Call, u64) {
+    let mut command = binary();
+    command
+        .current_dir(dir)
+        .args(args)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let mut child = command.spawn().expect("the binary starts");
+    let status = PathBuf::from(format!("/proc/{}/status", child.id()));
+    let mut streams = (
+        child.stdout.take().expect("piped"),
+        child.stderr.take().expect("piped"),
+    );
+    let read = |stream: &mut dyn std::io::Read| {
+        let mut text = String::new();
+        stream.read_to_string(&mut text).expect("UTF-8");
+        text
+    };
+    std::thread::scope(|scope| {
+        let out = scope.spawn(|| read(&mut streams.0));
+        let err = scope.spawn(|| read(&mut streams.1));
+        let mut most = 0;
+        let code = loop {
+            // The kernel keeps the peak; it goes with the process, so it is asked for now and then.
+            most = most.max(peak_kib(&status).unwrap_or(0));
+            if let Some(code) = child.try_wait().expect("waited for") {
+                break code.code().expect("no signal");
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        };
+        let (out, err) = (out.join().expect("read"), err.join().expect("read"));
+        (Call { code, out, err }, most)
+    })
+}
+
+fn peak_kib(status: &Path) -> Option<u64> {
+    let mut text = String::new();
+    fs::File::open(status)
+        .ok()?
+        .read_to_string(&mut text)
+        .ok()?;
+    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    line.trim().strip_suffix(" kB")?.parse().ok()
+}
+
+/// The lines of an export by pair, in their order.
+fn lines(export: &Path) -> BTreeMap<String, Vec<Value>> {
+    let text = fs::read_to_string(export.join("pairs.jsonl")).expect("an export");
+    let mut lines: BTreeMap<String, Vec<Value>> = BTreeMap::new();
+    for line in text.lines() {
+        let line: Value = serde_json::from_str(line).expect("JSON");
+        let id = line["id"].as_str().expect("an id").to_owned();
+        lines.entry(id).or_default().push(line);
+    }
+    lines
+}
+
+/// No words of a panic, of Rust or of the database on either stream.
+#[track_caller]
+fn assert_plain(call: &Call) {
+    for stream in [&call.out, &call.err] {
+        for word in [
+            "panicked",
+            "RUST_BACKTRACE",
+            "unwrap()",
+            "Os {",
+            "stack backtrace",
+            "SQLITE_",
+        ] {
+            let line = stream.lines().find(|line| line.contains(word));
+            assert!(line.is_none(), "{line:?}");
+        }
+    }
+}
+
+/// One sentence with the file that is to blame, and a class that is no defect of ours.
+fn assert_told(pair: &HostilePair, line: &Value) {
+    let (class, message) = (
+        &line["error_class"],
+        line["error"].as_str().unwrap_or_default(),
+    );
+    assert_one_sentence(message);
+    for word in ["panicked", "Error(", "Os {", "took longer", "workers died"] {
+        assert!(!message.contains(word), "{}: {message}", pair.id);
+    }
+    assert!(
+        ["bad_input", "no_solution", "io"]
+            .iter()
+            .any(|known| class == known),
+        "{}: {class}: {message}",
+        pair.id
+    );
+    // A relief and a print that do not match are both to blame, or neither.
+    let both = class == "no_solution" && message.contains("relief") && message.contains("print");
+    let named = [&pair.mesh, &pair.print]
+        .into_iter()
+        .any(|path| message.contains(&*path.to_string_lossy()));
+    assert!(both || named, "{}: {message}", pair.id);
+}
+
+/// The good pairs alone, in a project of their own: what their export holds.
+fn alone(dir: &Path) -> PathBuf {
+    mocban(dir, &["-C", "clean", "import", "data/alone.csv"]).expect(0);
+    mocban(dir, &["-C", "clean", "run"]).expect(0);
+    mocban(dir, &["-C", "clean", "export", "-o", "clean-out"]).expect(0);
+    dir.join("clean-out")
+}
+
+#[test]
+fn a_crowd_of_hostile_pairs_harms_nobody_and_is_told_pair_by_pair() {
+    let count =
+        std::env::var("MOCBAN_HOSTILE").map_or(240, |count| count.parse().expect("a number"));
+    let dir = empty();
+    let data = dir.path().join("data");
+    fs::create_dir(&data).expect("a folder");
+    let mut maker = HostilePairs::new(&data, 4);
+    let hostile: Vec<_> = (0..count).map(|_| maker.make()).collect();
+    write_lists(&data, &hostile);
+
+    let begun = Instant::now();
+    let (imported, import_kib) = watched(dir.path(), &["import", "data/crowd.csv"]);
+    assert_plain(&imported.expect(0));
+    let limit = format!("run.stage_limit_s={STAGE_LIMIT_S}");
+    let memory = format!("{MEMORY_MIB}M");
+    let (ran, run_kib) = watched(dir.path(), &["--set", &limit, "run", "--memory", &memory]);
+    assert_plain(&ran.expect(3));
+    let took = begun.elapsed();
+    assert!(run_kib >> 10 < MEMORY_MIB, "{} MiB", run_kib >> 10);
+
+    let status = mocban(dir.path(), &["status", "--json"]).expect(0).json();
+    let jobs = &status["jobs"];
+    let done = jobs["done"].as_u64().expect("a number");
+    let quarantined = jobs["quarantined"].as_u64().expect("a number");
+    assert_eq!(done + quarantined, count + GOOD, "{jobs}");
+    for command in [
+        &["status"][..],
+        &["report"],
+        &["show", "h-00000"],
+        &["run", "--dry-run"],
+    ] {
+        assert_plain(&mocban(dir.path(), command).expect(0));
+    }
+    assert_plain(&mocban(dir.path(), &["export", "-o", "out"]).expect(0));
+    mocban(dir.path(), &["check"]).expect(0);
+
+    let out = dir.path().join("out");
+    let told = lines(&out);
+    let mut classes: BTreeMap<String, u64> = BTreeMap::new();
+    for pair in &hostile {
+        let line = &told[&pair.id][0];
+        if line["status"] == "done" {
+            continue;
+        }
+        assert_told(pair, line);
+        *classes.entry(line["error_class"].to_string()).or_default() += 1;
+    }
+    let clean = alone(dir.path());
+    for (id, line) in lines(&clean) {
+        assert_eq!(told[&id], line);
+        let folder = Path::new("pairs").join(&id);
+        let (beside, alone) = (below(&out.join(&folder)), below(&clean.join(&folder)));
+        let names = |files: &[(PathBuf, Vec<u8>)]| {
+            files.iter().map(|file| file.0.clone()).collect::<Vec<_>>()
+        };
+        assert_eq!(names(&beside), names(&alone), "{id}");
+        for (beside, alone) in beside.iter().zip(&alone) {
+            assert!(beside == alone, "{id}: {}", alone.0.display());
+        }
+    }
+    eprintln!(
+        "{count} hostile pairs in {:.1} s: {done} done, {classes:?}; peak {} MiB in import, {} MiB in run",
+        took.as_secs_f64(),
+        import_kib >> 10,
+        run_kib >> 10
+    );
+}
