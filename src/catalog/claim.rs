@@ -31,6 +31,21 @@ pub struct ClaimRequest {
     pub alive_since: UnixMillis,
 }
 
+impl ClaimRequest {
+    /// Any ordinary pairs with any stages left, whenever the worker gave its last sign of life.
+    pub const fn new(worker: WorkerId, slots: usize, deadline: UnixMillis) -> Self {
+        Self {
+            worker,
+            slots,
+            until: Stage::Register,
+            alone: false,
+            among: None,
+            deadline,
+            alive_since: UnixMillis::MIN,
+        }
+    }
+}
+
 /// Some pairs of the catalog.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PairSelection {

@@ -184,21 +184,26 @@ impl Catalog {
         margin_ms: i64,
         now: UnixMillis,
     ) -> Result<Rescued> {
-        self.alone(move |conn| {
-            Box::pin(async move {
-                let others = holders_but(conn, me).await?;
-                let victims = victims(conn, &others).await?;
-                let found = sqlx::query(OVERDUE)
-                    .bind(others)
-                    .bind(CRASH_LIMIT)
-                    .bind(margin_ms)
-                    .fetch_all(&mut *conn)
-                    .await?;
-                brought_back(conn, &found, &victims, now).await
-            })
-        })
-        .await
+        self.alone(move |conn| Box::pin(overdue(conn, me, margin_ms, now)))
+            .await
     }
+}
+
+async fn overdue(
+    conn: &mut SqliteConnection,
+    me: WorkerId,
+    margin_ms: i64,
+    now: UnixMillis,
+) -> Result<Rescued> {
+    let others = holders_but(conn, me).await?;
+    let victims = victims(conn, &others).await?;
+    let found = sqlx::query(OVERDUE)
+        .bind(others)
+        .bind(CRASH_LIMIT)
+        .bind(margin_ms)
+        .fetch_all(&mut *conn)
+        .await?;
+    brought_back(conn, &found, &victims, now).await
 }
 
 /// Items of [`RESCUE`] for some workers.
