@@ -1,15 +1,13 @@
 //! Storing a finished stage: the job's step and the results, fenced by the lease.
 
-use std::collections::BTreeSet;
-
 use serde_json::{Value, json};
 use sqlx::SqliteConnection;
 
 use super::batch::Request;
-use super::claim::kept_pairs;
 use super::counters::{DONE, Deltas, cursor};
 use super::lease::{InputsSeen, Kept, Lease, MetricResult, StageDone};
-use super::{Catalog, Result, rows};
+use super::script::Script;
+use super::{Catalog, Result};
 use crate::breakpoint::{self, Point};
 use crate::domain::JobStatus;
 
@@ -25,7 +23,7 @@ WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = job.worker AND w.ended IS NULL AND w.beat >= item.value ->> 'alive_since')
-RETURNING pair";
+RETURNING pair, epoch";
 
 const RESULT: &str = "
 INSERT INTO stage_result
@@ -64,7 +62,9 @@ UPDATE pair SET mesh_hash = coalesce(unhex(item.value ->> 'mesh_hash'), mesh_has
     mesh_stat = coalesce(item.value ->> 'mesh_stat', mesh_stat),
     print_hash = coalesce(unhex(item.value ->> 'print_hash'), print_hash),
     print_stat = coalesce(item.value ->> 'print_stat', print_stat)
-FROM json_each(?1) AS item WHERE pair.id = item.value ->> 'pair'";
+FROM json_each(?1) AS item WHERE pair.id = item.value ->> 'pair' AND (
+    pair.mesh_hash IS NOT unhex(item.value ->> 'mesh_hash') OR pair.mesh_stat IS NOT item.value ->> 'mesh_stat'
+    OR pair.print_hash IS NOT unhex(item.value ->> 'print_hash') OR pair.print_stat IS NOT item.value ->> 'print_stat')";
 
 const CLEAR_FAILURE: &str =
     "DELETE FROM failure WHERE pair IN (SELECT value ->> 'pair' FROM json_each(?1))";
@@ -73,41 +73,37 @@ const CLEAR_FAILURE: &str =
 #[cfg(test)]
 pub(super) const ROWS: [&str; 6] = [RESULT, CLEAR_METRICS, METRICS, ATTEMPT, SEEN, CLEAR_FAILURE];
 
-/// Stores what is done under leases that still hold; says which did.
-pub(super) async fn apply(
-    conn: &mut SqliteConnection,
-    done: &[&(Lease, StageDone)],
-    deltas: &mut Deltas,
-) -> Result<Vec<bool>> {
-    if done.is_empty() {
-        return Ok(Vec::new());
-    }
-    let steps = rows::array(done.iter().map(|item| step(item)));
-    let kept = kept_pairs(conn, STEP, &steps).await?;
-    let stored: Vec<_> = done
-        .iter()
-        .filter(|item| kept.contains(&item.0.pair.0))
-        .collect();
-    if !stored.is_empty() {
-        let results = rows::array(stored.iter().map(|item| result(item))).to_string();
-        for sql in [RESULT, ATTEMPT, CLEAR_FAILURE] {
-            sqlx::query(sql).bind(&results).execute(&mut *conn).await?;
-        }
-        let metrics = rows::array(stored.iter().flat_map(|item| metrics(item)));
-        for sql in [CLEAR_METRICS, METRICS] {
-            run_over(conn, sql, &metrics).await?;
-        }
-        let seen = stored.iter().map(|(lease, done)| (lease, &done.inputs));
-        store_seen(conn, seen).await?;
-    }
-    for (_, done) in stored.iter().map(|item| &***item) {
-        breakpoint::reach(done.stage, Point::Rowed, None);
-    }
-    count(&stored, deltas);
-    Ok(answer(done, &kept))
+/// Adds the steps of jobs to a script; those whose leases no longer hold stay where they are.
+pub(super) fn step<'i>(
+    script: &mut Script,
+    done: impl Iterator<Item = &'i (Lease, StageDone)>,
+) -> Result<()> {
+    over(script, &[STEP], done.map(job))
 }
 
-fn step((lease, done): &(Lease, StageDone)) -> Value {
+/// Adds what is stored beside steps that were made.
+pub(super) fn store(
+    script: &mut Script,
+    done: &[&(Lease, StageDone)],
+    deltas: &mut Deltas,
+) -> Result<()> {
+    for (lease, done) in done.iter().map(|item| &**item) {
+        breakpoint::reach(done.stage, Point::Rowed, None);
+        let to = match done.stage.next() {
+            Some(next) => (cursor(next), JobStatus::Leased),
+            None => (DONE, JobStatus::Done),
+        };
+        deltas.moved((cursor(lease.cursor), JobStatus::Leased), to);
+    }
+    let results = done.iter().map(|item| result(item));
+    over(script, &[RESULT, ATTEMPT, CLEAR_FAILURE], results)?;
+    let metrics = done.iter().flat_map(|item| metrics(item));
+    over(script, &[CLEAR_METRICS, METRICS], metrics)?;
+    let seen = done.iter().map(|(lease, done)| (lease, &done.inputs));
+    store_seen(script, seen)
+}
+
+fn job((lease, done): &(Lease, StageDone)) -> Value {
     let finished = done.stage.next().is_none();
     let status = if finished {
         JobStatus::Done
@@ -144,14 +140,14 @@ fn metrics((lease, done): &(Lease, StageDone)) -> impl Iterator<Item = Value> {
     )
 }
 
-/// Stores what is known of the input files of some pairs.
-pub(super) async fn store_seen<'a>(
-    conn: &mut SqliteConnection,
+/// Adds what is known of the input files of leased pairs.
+pub(super) fn store_seen<'a>(
+    script: &mut Script,
     seen: impl Iterator<Item = (&'a Lease, &'a InputsSeen)>,
 ) -> Result<()> {
     let items = seen.filter(|(_, seen)| seen.mesh.is_some() || seen.print.is_some());
-    let items = rows::array(items.map(|(lease, seen)| seen_json(lease.pair.0, seen)));
-    run_over(conn, SEEN, &items).await
+    let items = items.map(|(lease, seen)| seen_json(lease.pair.0, seen));
+    over(script, &[SEEN], items)
 }
 
 /// One item of [`SEEN`].
@@ -167,33 +163,25 @@ pub(super) fn seen_json(pair: i64, seen: &InputsSeen) -> Value {
 
 /// Stores what is known of input files.
 pub(super) async fn run_seen(conn: &mut SqliteConnection, items: &Value) -> Result<()> {
-    run_over(conn, SEEN, items).await
-}
-
-async fn run_over(conn: &mut SqliteConnection, sql: &'static str, items: &Value) -> Result<()> {
-    if items.as_array().is_some_and(|items| !items.is_empty()) {
-        sqlx::query(sql)
-            .bind(items.to_string())
-            .execute(conn)
-            .await?;
-    }
+    sqlx::query(SEEN)
+        .bind(items.to_string())
+        .execute(conn)
+        .await?;
     Ok(())
 }
 
-fn count(stored: &[&&(Lease, StageDone)], deltas: &mut Deltas) {
-    for (lease, done) in stored.iter().map(|item| &***item) {
-        let to = match done.stage.next() {
-            Some(next) => (cursor(next), JobStatus::Leased),
-            None => (DONE, JobStatus::Done),
-        };
-        deltas.moved((cursor(lease.cursor), JobStatus::Leased), to);
+/// Adds statements over a JSON array, unless that is empty.
+pub(super) fn over(
+    script: &mut Script,
+    statements: &[&'static str],
+    items: impl Iterator<Item = Value>,
+) -> Result<()> {
+    let items: Vec<_> = items.collect();
+    if !items.is_empty() {
+        let items = Value::from(items).to_string();
+        script.add(statements).bind(items)?;
     }
-}
-
-fn answer(done: &[&(Lease, StageDone)], kept: &BTreeSet<i64>) -> Vec<bool> {
-    done.iter()
-        .map(|item| kept.contains(&item.0.pair.0))
-        .collect()
+    Ok(())
 }
 
 impl Catalog {

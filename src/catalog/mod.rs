@@ -26,6 +26,7 @@ mod requeue;
 mod rescue;
 mod results;
 mod rows;
+mod script;
 mod staleness;
 mod status;
 #[cfg(test)]
