@@ -100,7 +100,7 @@ RETURNING pair, stage, attempt, epoch, crashes, mem_class";
 /// Gives leases back as if they had never been taken.
 pub(super) const RELEASE: &str = "
 UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = max(attempt - 1, 0)
-FROM json_each(?1) AS item
+FROM jsonb_each(?1) AS item
 WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.epoch = item.value ->> 2
     AND job.status = 1
 RETURNING pair, epoch";

@@ -10,7 +10,7 @@ use super::{Catalog, Result};
 use crate::domain::{JobStatus, Stage};
 
 const CHANGE: &str = "
-UPDATE counter SET n = n + (d.value ->> 2) FROM json_each(?1) AS d
+UPDATE counter SET n = n + (d.value ->> 2) FROM jsonb_each(?1) AS d
 WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1";
 
 /// Cursor of a job: its next stage 0..4, or 4 when done.

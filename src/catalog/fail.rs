@@ -22,7 +22,7 @@ UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.val
     worker = NULL, deadline = NULL, made = ",
     made!("min(job.stage, item.value ->> 'stage')"),
     "
-FROM json_each(?1) AS item
+FROM jsonb_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
@@ -34,7 +34,7 @@ const FAILURE: &str = "
 INSERT INTO failure (pair, stage, class, message, recipe, mesh_hash, print_hash, facts, at)
 SELECT value ->> 'pair', value ->> 'stage', value ->> 'class', value ->> 'message', value ->> 'recipe',
     unhex(value ->> 'mesh_hash'), unhex(value ->> 'print_hash'), value ->> 'facts', value ->> 'at'
-FROM json_each(?1) WHERE value ->> 'status' <> 0
+FROM jsonb_each(?1) WHERE value ->> 'status' <> 0
 ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
     recipe = excluded.recipe, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
     facts = excluded.facts, at = excluded.at";
@@ -43,11 +43,11 @@ const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, class, message, ms, at)
 SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'class', value ->> 'message',
     value ->> 'ms', value ->> 'at'
-FROM json_each(?1)";
+FROM jsonb_each(?1)";
 
 const PRUNE: &str = "
 DELETE FROM attempt WHERE id IN (
-    SELECT old.id FROM json_each(?1) AS item JOIN attempt AS old ON old.pair = item.value ->> 'pair'
+    SELECT old.id FROM jsonb_each(?1) AS item JOIN attempt AS old ON old.pair = item.value ->> 'pair'
     WHERE old.id <= (SELECT id FROM attempt WHERE pair = item.value ->> 'pair' ORDER BY id DESC LIMIT 1 OFFSET ?2))";
 
 /// Adds the new states of jobs that failed; those whose leases no longer hold stay as they are.
