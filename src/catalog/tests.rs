@@ -2,6 +2,7 @@
 
 mod guards;
 mod histories;
+mod import;
 mod migration;
 mod model;
 mod plans;

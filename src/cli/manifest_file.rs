@@ -6,17 +6,34 @@ use anyhow::Context as _;
 
 use super::exit::Refusal;
 use crate::domain::LengthUnit;
-use crate::manifest::{ManifestError, ManifestRow, pair_folders, parse_csv, parse_jsonl};
+use crate::manifest::{Ids, ManifestError, ManifestRow, pair_folders, read_csv, read_jsonl};
 
-/// Pairs to import: paths as they are reached from the working directory.
+/// Pairs to import, known to be sound. A list is kept as it is written and its rows are made one after another.
 #[derive(Debug)]
 pub(super) struct Listing {
-    pub(super) rows: Vec<ManifestRow>,
+    source: Source,
+    /// The ids of all its pairs.
+    pub(super) ids: Ids,
     /// What a person should know, a line each.
     pub(super) remarks: Vec<String>,
     /// What a row's number counts: `pairs.csv: line`, or `pair` for folders.
     place: String,
 }
+
+/// Where the rows come from.
+#[derive(Debug)]
+enum Source {
+    /// A list, and the folder that its paths are relative to.
+    List {
+        bytes: Vec<u8>,
+        read: Reader,
+        folder: PathBuf,
+    },
+    /// Two folders.
+    Folders(Vec<ManifestRow>),
+}
+
+type Reader = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<Ids, ManifestError>;
 
 /// A manifest that is refused as a whole.
 #[derive(Debug, thiserror::Error)]
@@ -47,22 +64,23 @@ impl Listing {
             return Err(Refusal::Usage(text).into());
         }
         let bytes = std::fs::read(file).with_context(|| format!("cannot read {shown}"))?;
-        let rows = if is_jsonl(file, &bytes) {
-            parse_jsonl(&bytes)
+        let read: Reader = if is_jsonl(file, &bytes) {
+            read_jsonl
         } else {
-            parse_csv(&bytes)
+            read_csv
         };
-        let mut rows = rows.map_err(|problems| RefusedManifest {
+        let ids = read(&bytes, &mut drop).map_err(|problems| RefusedManifest {
             from: file.to_owned(),
             problems,
         })?;
-        let folder = file.parent().unwrap_or(Path::new(""));
-        for row in &mut rows {
-            row.mesh = folder.join(&row.mesh);
-            row.print = folder.join(&row.print);
-        }
+        let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
-            rows,
+            source: Source::List {
+                bytes,
+                read,
+                folder,
+            },
+            ids,
             remarks: Vec::new(),
             place: format!("{shown}: line"),
         })
@@ -92,30 +110,47 @@ impl Listing {
             remark("file that is neither", &found.ignored),
         ];
         Ok(Self {
-            rows,
+            ids: rows.iter().map(|row| &row.name).collect(),
+            source: Source::Folders(rows),
             remarks: remarks.into_iter().flatten().collect(),
             place: "pair".to_owned(),
         })
     }
 
-    /// A line for each file that is not there.
-    pub(super) fn missing(&self) -> Vec<String> {
-        let mut lines = Vec::new();
-        for row in &self.rows {
-            for (what, path) in [("mesh", &row.mesh), ("print", &row.print)] {
-                if !path.exists() {
-                    lines.push(format!(
-                        "{} {}: {what} {} of {} is not there",
-                        self.place,
-                        row.line,
-                        path.display(),
-                        row.name
-                    ));
-                }
+    /// Gives each row, with paths as they are reached from the working directory, and a line for each of its files
+    /// that is not there.
+    pub(super) fn rows(self, mut each: impl FnMut(ManifestRow, Vec<String>)) {
+        let place = self.place;
+        let mut each = |row: ManifestRow| {
+            let missing = missing(&place, &row);
+            each(row, missing);
+        };
+        match self.source {
+            Source::Folders(rows) => rows.into_iter().for_each(each),
+            Source::List {
+                bytes,
+                read,
+                folder,
+            } => {
+                let read = read(&bytes, &mut |mut row| {
+                    row.mesh = folder.join(&row.mesh);
+                    row.print = folder.join(&row.print);
+                    each(row);
+                });
+                read.expect("the same bytes were read before");
             }
         }
-        lines
     }
+}
+
+fn missing(place: &str, row: &ManifestRow) -> Vec<String> {
+    let files = [("mesh", &row.mesh), ("print", &row.print)].into_iter();
+    let missing = files.filter(|(_, path)| !path.exists());
+    let line = |(what, path): (&str, &PathBuf)| {
+        let (path, line, name) = (path.display(), row.line, &row.name);
+        format!("{place} {line}: {what} {path} of {name} is not there")
+    };
+    missing.map(line).collect()
 }
 
 fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
@@ -180,8 +215,12 @@ mod tests {
         let file = dir.path().join("pairs.csv");
         std::fs::write(&file, "id,mesh,print\na,a.stl,pairs.csv\n").expect("a small file");
         let listing = Listing::from_file(&file).expect("valid");
-        assert_eq!(listing.rows[0].mesh, dir.path().join("a.stl"));
-        let missing = listing.missing();
+        let (mut meshes, mut missing) = (Vec::new(), Vec::new());
+        listing.rows(|row, lines| {
+            meshes.push(row.mesh);
+            missing.extend(lines);
+        });
+        assert_eq!(meshes, [dir.path().join("a.stl")]);
         assert_eq!(missing.len(), 1);
         assert!(
             missing[0].contains("pairs.csv: line 2: mesh "),

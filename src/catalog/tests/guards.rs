@@ -78,6 +78,30 @@ async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothi
     world.counters_hold().await;
 }
 
+/// Both are in one commit: what is told of the one must not be taken for the other.
+#[tokio::test]
+async fn a_late_completion_beside_the_right_one_changes_nothing() {
+    let world = World::new(1).await;
+    let late = world.claim(1).await.remove(0);
+    let other = register(&world.catalog).await;
+    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
+    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let lease = world.claim_alone(other).await.remove(0);
+    let mut lost = world.done(Stage::Fit);
+    lost.outcome = r#"{"late":true}"#.to_owned();
+    // Neither is polled again before both are on their way.
+    let (lost, kept) = tokio::join!(
+        world.catalog.checkpoint(late, lost),
+        world.catalog.checkpoint(lease, world.done(Stage::Fit)),
+    );
+    assert!(matches!(lost, Ok(Kept::Lost)), "{lost:?}");
+    assert!(matches!(kept, Ok(Kept::Lease(_))), "{kept:?}");
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    let stages = detail.expect("the pair").results.stages;
+    assert_eq!(stages[0].outcome, serde_json::json!({}));
+    world.counters_hold().await;
+}
+
 #[tokio::test]
 async fn a_late_failure_under_an_older_lease_of_the_same_worker_changes_nothing() {
     let world = World::new(1).await;
