@@ -30,6 +30,25 @@ macro_rules! made {
 }
 pub(super) use made;
 
+/// Whether a job keeps another recipe than that of the result right behind its cursor.
+macro_rules! misremembered {
+    () => {
+        "EXISTS (SELECT 1 FROM stage_result AS r
+    WHERE r.pair = job.pair AND r.stage = job.stage - 1 AND r.recipe <> job.made)"
+    };
+}
+pub(super) use misremembered;
+
+/// Pairs that are not noted as moved, with a result whose files or facts are not what they are now.
+macro_rules! unnoted {
+    () => {
+        "SELECT p.id FROM pair AS p WHERE NOT EXISTS (SELECT 1 FROM moved WHERE moved.pair = p.id) AND EXISTS (
+    SELECT 1 FROM job AS j JOIN stage_result AS r ON r.pair = j.pair AND r.stage < j.stage
+    WHERE j.pair = p.id AND (r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.facts <> p.facts))"
+    };
+}
+pub(super) use unnoted;
+
 /// Jobs that are alike, how many, and one of them.
 pub(super) const GROUPS: &str = "
 SELECT count(*) AS n, min(j.pair) AS pair FROM job AS j

@@ -153,7 +153,8 @@ fn missing(place: &str, row: &ManifestRow) -> Vec<String> {
     missing.map(line).collect()
 }
 
-fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
+/// Whether a file holds JSON Lines, by its ending, and where that does not tell, by its first character.
+pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
     let ending = file.extension().and_then(|ending| ending.to_str());
     match ending.map(str::to_ascii_lowercase).as_deref() {
         Some("jsonl" | "ndjson" | "json") => true,
