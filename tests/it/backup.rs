@@ -91,9 +91,14 @@ fn verdicts_survive_a_restore_and_go_beside_it_as_lines() {
 fn verdicts_that_an_export_wrote_are_taken_into_another_project() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
-    let undone = [
-        "verdict", "set", "0002", "fail", "--reader", "lan", "--reason", "angle",
-    ];
+    let log = at(&project, &["verdict", "log", "--json"]).expect(0).out;
+    let first: serde_json::Value = log
+        .lines()
+        .next()
+        .and_then(|line| serde_json::from_str(line).ok())
+        .expect("a line");
+    let pair = first["pair"].as_str().expect("a name");
+    let undone = ["verdict", "set", pair, "fail", "--reader", "lan"];
     at(&project, &undone).expect(0);
     at(&project, &["verdict", "undo"]).expect(0);
     let out = dir.path().join("out");
@@ -101,7 +106,10 @@ fn verdicts_that_an_export_wrote_are_taken_into_another_project() {
     let lines = out.join("verdicts.jsonl");
     let file = lines.to_str().expect("UTF-8");
 
-    let other = crate::resume::project(dir.path(), "other", "3");
+    let demo = ["demo", "other", "--pairs", "2", "--no-run"];
+    let small = ["--set", "depth.longest_px=96"];
+    mocban(dir.path(), &[&demo[..], &small].concat()).expect(0);
+    let other = Project::open(&dir.path().join("other")).expect("a project");
     at(&other, &["run"]).expect(0);
     let taken = at(&other, &["verdict", "import", file, "--json"]).expect(0);
     assert_eq!(taken.json()["recorded"], 4);
