@@ -20,7 +20,8 @@ synchronous=FULL on every connection. mocban asks as a run does, for all free sl
 rows in the same schema, but a transaction and a statement for each, by workers with connections of their own. \
 apalis-sqlite stores no results: a task a stage, each acknowledged, in no order; or a task a pair and four updates of \
 one small row. plain: its configuration and pool as they come, tuned: tasks fetched and connections for all that are \
-in hand. All tasks are there from the start, so no polling is waited for.";
+in hand. All tasks are there from the start; now and then \
+apalis-sqlite fetches nothing until its heartbeat after 30 s, as it would for its users, and that is in its time.";
 
 /// A queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -10,8 +10,7 @@
 //!   best, and a connection for every task in hand.
 //!
 //! All connections use a write-ahead log and `synchronous=FULL`; `SqliteStorage::setup` would turn syncing off on one
-//! of them, so it gets a pool of its own. Nothing is ever waited for: all tasks are there from the start, and a fetch
-//! follows a fetch.
+//! of them, so it gets a pool of its own. All tasks are there from the start.
 
 mod load;
 
