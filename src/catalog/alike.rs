@@ -115,7 +115,9 @@ pub(super) async fn look_at_all(
     }
     let mut after = 0;
     while let Some((page, last)) = look_apart(conn, current, after).await? {
-        page.iter().for_each(|seen| each(seen, 1));
+        for seen in &page {
+            each(seen, 1);
+        }
         after = last;
     }
     Ok(())
