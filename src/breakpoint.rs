@@ -19,7 +19,7 @@ pub(crate) enum Point {
     Computed,
     /// Its files are on disk, no row names them.
     Filed,
-    /// Its rows are written, not committed. Pairs have no names here.
+    /// Its job's step is written, not committed. Pairs have no names here.
     Rowed,
     /// Its rows are committed.
     Stored,

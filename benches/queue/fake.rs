@@ -47,15 +47,7 @@ impl Fake {
 
     /// Asks for so many pairs.
     pub(super) fn request(&self, slots: usize) -> ClaimRequest {
-        ClaimRequest {
-            worker: self.worker,
-            slots,
-            until: Stage::Register,
-            alone: false,
-            among: None,
-            deadline: 1_000,
-            alive_since: 0,
-        }
+        ClaimRequest::new(self.worker, slots, 1_000)
     }
 
     /// Takes a pair through the stages it has before it.

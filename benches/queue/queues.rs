@@ -16,24 +16,35 @@ use super::world::{World, recipes, work};
 
 const NOTE: &str = "\
 Medians. A pair: one claim and four checkpoints, each durable before the next; all with a write-ahead log and \
-synchronous=FULL. single rows: the same rows in the same schema, but a transaction and a statement for each, by \
-workers with connections of their own. apalis-sqlite: a task a pair and four updates of one small row in place of the \
-checkpoints; it stores no results.";
+synchronous=FULL on every connection. mocban asks as a run does, for all free slots at once. single rows: the same \
+rows in the same schema, but a transaction and a statement for each, by workers with connections of their own. \
+apalis-sqlite stores no results: a task a stage, each acknowledged, in no order; or a task a pair and four updates of \
+one small row. plain: its configuration and pool as they come, tuned: tasks fetched and connections for all that are \
+in hand. All tasks are there from the start; now and then \
+apalis-sqlite fetches nothing until its heartbeat after 30 s, as it would for its users, and that is in its time.";
 
 /// A queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Queue {
     Ours,
     Rows,
-    Peer,
+    /// The other program with its load and set-up.
+    Peer(&'static str, &'static str),
 }
 
 impl Queue {
-    const fn name(self) -> &'static str {
+    const PEERS: [Self; 4] = [
+        Self::Peer("stages", "plain"),
+        Self::Peer("stages", "tuned"),
+        Self::Peer("updates", "plain"),
+        Self::Peer("updates", "tuned"),
+    ];
+
+    fn name(self) -> String {
         match self {
-            Self::Ours => "mocban",
-            Self::Rows => "single rows",
-            Self::Peer => "apalis-sqlite",
+            Self::Ours => "mocban".to_owned(),
+            Self::Rows => "single rows".to_owned(),
+            Self::Peer(load, set_up) => format!("apalis-sqlite, {load}, {set_up}"),
         }
     }
 }
@@ -43,7 +54,9 @@ pub(super) async fn table(options: &Options) -> anyhow::Result<String> {
     let heads = ["workers", "queue", "pairs", "pairs/s", "jobs/s", "ours is"];
     let mut table = Table::new("Queues", &heads);
     let mut queues = vec![Queue::Ours, Queue::Rows];
-    queues.extend(options.peer.as_ref().map(|_| Queue::Peer));
+    if options.peer.is_some() {
+        queues.extend(Queue::PEERS);
+    }
     for workers in &options.workers {
         let times = times(options, &queues, *workers).await?;
         let ours = times[0];
@@ -51,7 +64,7 @@ pub(super) async fn table(options: &Options) -> anyhow::Result<String> {
             let rate = options.queue_pairs() as f64 * 1e3 / ms;
             table.push(vec![
                 workers.to_string(),
-                queue.name().to_owned(),
+                queue.name(),
                 options.queue_pairs().to_string(),
                 number(Some(rate), 0),
                 number(Some(rate * 4.0), 0),
@@ -93,17 +106,23 @@ async fn time(options: &Options, queue: Queue, workers: usize) -> anyhow::Result
             catalog.close().await;
             loops::work(&path, &fake, pairs, workers).await
         }
-        Queue::Peer => peer(options, pairs, workers),
+        Queue::Peer(load, set_up) => peer(options, pairs, workers, [load, set_up]),
     }
 }
 
 /// Runs the other program, which says how many seconds its queue took.
-fn peer(options: &Options, pairs: usize, workers: usize) -> anyhow::Result<Duration> {
+fn peer(
+    options: &Options,
+    pairs: usize,
+    workers: usize,
+    how: [&str; 2],
+) -> anyhow::Result<Duration> {
     let program = options.peer.as_ref().context("no other program is given")?;
     let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
     let mut command = Command::new(program);
     command.arg(dir.path().join("queue.sqlite"));
     command.args([pairs.to_string(), workers.to_string()]);
+    command.args(how);
     let said = process::run(&mut command)?.stdout;
     Ok(Duration::from_secs_f64(said.trim().parse()?))
 }

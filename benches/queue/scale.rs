@@ -1,7 +1,5 @@
 //! One catalog after another, each larger: does the cost of a question grow with the pairs?
 
-use std::time::Instant;
-
 use mocban::catalog::{Again, Catalog, Recipes};
 
 use super::claims::{self, MANY};
@@ -169,12 +167,7 @@ async fn status(
     now: &Recipes,
     args: &[&str],
 ) -> anyhow::Result<(Spread, (Spread, f64))> {
-    let mut library = Spread::default();
-    for _ in 0..20 {
-        let start = Instant::now();
-        catalog.status(now).await?;
-        library.since(start);
-    }
+    let library = Spread::of(20, async || catalog.status(now).await).await?;
     Ok((library, ask(world, args, 10)?))
 }
 
@@ -184,13 +177,8 @@ async fn plan(
     now: &Recipes,
     args: &[&str],
 ) -> anyhow::Result<(Spread, (Spread, f64))> {
-    let mut library = Spread::default();
-    for _ in 0..3 {
-        let start = Instant::now();
-        catalog.plan(now, None, Again::Changed).await?;
-        library.since(start);
-    }
-    Ok((library, ask(world, args, 1)?))
+    let plan = async || catalog.plan(now, None, Again::Changed).await;
+    Ok((Spread::of(3, plan).await?, ask(world, args, 1)?))
 }
 
 /// Times and memory of the program when it is asked.

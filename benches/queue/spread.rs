@@ -11,6 +11,20 @@ use super::markdown::two;
 pub(super) struct Spread(Vec<f64>);
 
 impl Spread {
+    /// Times of something done so often.
+    pub(super) async fn of<T, E: Into<anyhow::Error>>(
+        times: usize,
+        mut what: impl AsyncFnMut() -> Result<T, E>,
+    ) -> anyhow::Result<Self> {
+        let mut spread = Self::default();
+        for _ in 0..times {
+            let start = Instant::now();
+            what().await.map_err(Into::into)?;
+            spread.since(start);
+        }
+        Ok(spread)
+    }
+
     /// Adds the time since.
     pub(super) fn since(&mut self, start: Instant) {
         self.add(start.elapsed());

@@ -76,7 +76,7 @@ pub(super) fn recipes(set: Option<&str>) -> anyhow::Result<Recipes> {
     Ok(runner::recipes(&loaded.config.stages))
 }
 
-/// Takes so many pairs through all stages, with so many in hand at a time.
+/// Takes so many pairs through all stages, with so many in hand at a time; asks as a run does, for all free slots.
 pub(super) async fn work(
     world: &World,
     catalog: &Catalog,
@@ -84,23 +84,25 @@ pub(super) async fn work(
     in_hand: usize,
 ) -> anyhow::Result<Duration> {
     let fake = Arc::new(Fake::enter(&world.project, catalog, &recipes(None)?).await?);
-    let left = Arc::new(tokio::sync::Semaphore::new(pairs));
     let start = Instant::now();
-    let mut workers = tokio::task::JoinSet::new();
-    for _ in 0..in_hand {
-        let (fake, left, catalog) = (Arc::clone(&fake), Arc::clone(&left), catalog.clone());
-        workers.spawn(async move {
-            while let Ok(one) = left.try_acquire() {
-                one.forget();
-                let lease = catalog.claim(fake.request(1)).await?.pop();
-                fake.through(&catalog, lease.context("no pair is ready")?)
-                    .await?;
+    let mut left = pairs;
+    let mut tasks = tokio::task::JoinSet::new();
+    while left > 0 || !tasks.is_empty() {
+        let slots = left.min(in_hand - tasks.len());
+        if slots > 0 {
+            let leases = catalog.claim(fake.request(slots)).await?;
+            anyhow::ensure!(leases.len() == slots, "{} pairs ready", leases.len());
+            left -= slots;
+            for lease in leases {
+                let (fake, catalog) = (Arc::clone(&fake), catalog.clone());
+                tasks.spawn(async move { fake.through(&catalog, lease).await });
             }
-            anyhow::Ok(())
-        });
-    }
-    while let Some(ended) = workers.join_next().await {
-        ended??;
+        }
+        let mut ended = tasks.join_next().await;
+        while let Some(one) = ended {
+            one??;
+            ended = tasks.try_join_next();
+        }
     }
     let time = start.elapsed();
     catalog.end_worker(fake.worker, 2).await?;

@@ -30,12 +30,46 @@ macro_rules! made {
 }
 pub(super) use made;
 
-/// Jobs that are alike, how many, and one of them.
-pub(super) const GROUPS: &str = "
-SELECT count(*) AS n, min(j.pair) AS pair FROM job AS j
-WHERE NOT EXISTS (SELECT 1 FROM moved AS m WHERE m.pair = j.pair)
-    AND NOT EXISTS (SELECT 1 FROM failure AS f WHERE f.pair = j.pair) AND (j.made IS NOT NULL OR j.stage = 0)
-GROUP BY j.stage, j.status, j.made";
+/// Whether a job keeps another recipe than that of the result right behind its cursor.
+macro_rules! misremembered {
+    () => {
+        "EXISTS (SELECT 1 FROM stage_result AS r
+    WHERE r.pair = job.pair AND r.stage = job.stage - 1 AND r.recipe <> job.made)"
+    };
+}
+pub(super) use misremembered;
+
+/// Pairs that are not noted as moved, with a result whose files or facts are not what they are now.
+macro_rules! unnoted {
+    () => {
+        "SELECT p.id FROM pair AS p WHERE NOT EXISTS (SELECT 1 FROM moved WHERE moved.pair = p.id) AND EXISTS (
+    SELECT 1 FROM job AS j JOIN stage_result AS r ON r.pair = j.pair AND r.stage < j.stage
+    WHERE j.pair = p.id AND (r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.facts <> p.facts))"
+    };
+}
+pub(super) use unnoted;
+
+/// Whether a job fares as those do that are like it.
+macro_rules! alike {
+    () => {
+        "NOT EXISTS (SELECT 1 FROM moved AS m WHERE m.pair = j.pair)
+    AND NOT EXISTS (SELECT 1 FROM failure AS f WHERE f.pair = j.pair) AND (j.made IS NOT NULL OR j.stage = 0)"
+    };
+}
+
+/// Jobs that are alike, how many, and one of them. Where jobs go back to is a group that comes before their own.
+pub(super) const GROUPS: &str = concat!(
+    "SELECT j.stage, j.status, j.made, count(*) AS n, min(j.pair) AS pair FROM job AS j WHERE ",
+    alike!(),
+    " GROUP BY j.stage, j.status, j.made ORDER BY j.stage, j.status, j.made"
+);
+
+/// Those of a group, in pages by number.
+pub(super) const MEMBERS: &str = concat!(
+    "SELECT j.pair FROM job AS j WHERE j.pair > ?1 AND j.stage = ?2 AND j.status = ?3 AND j.made IS ?4 AND ",
+    alike!(),
+    " ORDER BY j.pair LIMIT ?5"
+);
 
 /// The others, in pages by number.
 pub(super) const APART: &str = "
@@ -76,29 +110,80 @@ pub(super) async fn look_at_all(
     current: &str,
     mut each: impl FnMut(&Seen, u64),
 ) -> Result<()> {
-    let groups = sqlx::query(GROUPS).fetch_all(&mut *conn).await?;
-    let sizes = groups
-        .iter()
-        .map(|row| Ok((row.try_get("pair")?, row.try_get("n")?)))
-        .collect::<Result<BTreeMap<i64, i64>>>()?;
-    for seen in look(conn, current, 0, Some(&these(sizes.keys()))).await? {
-        each(&seen, sizes[&seen.pair].unsigned_abs());
+    for group in groups(conn, current).await? {
+        each(&group.seen, group.pairs);
     }
     let mut after = 0;
-    loop {
-        let page: Vec<i64> = sqlx::query_scalar(APART)
-            .bind(after)
-            .bind(PAGE as i64)
-            .fetch_all(&mut *conn)
-            .await?;
-        let Some(last) = page.last() else {
-            return Ok(());
-        };
-        for seen in look(conn, current, after, Some(&these(page.iter()))).await? {
-            each(&seen, 1);
+    while let Some((page, last)) = look_apart(conn, current, after).await? {
+        for seen in &page {
+            each(seen, 1);
         }
-        after = *last;
+        after = last;
     }
+    Ok(())
+}
+
+/// Jobs that fare alike.
+pub(super) struct Group {
+    /// One of them, as the look found it.
+    pub(super) seen: Seen,
+    /// How many.
+    pub(super) pairs: u64,
+    made: Option<i64>,
+}
+
+/// All groups; those with earlier stages first.
+pub(super) async fn groups(conn: &mut SqliteConnection, current: &str) -> Result<Vec<Group>> {
+    let found = sqlx::query(GROUPS).fetch_all(&mut *conn).await?;
+    let one_of_each = found.iter().map(|row| row.try_get("pair"));
+    let one_of_each = one_of_each.collect::<Result<Vec<i64>, _>>()?;
+    let seen = look(conn, current, 0, &these(&one_of_each)).await?;
+    let seen: BTreeMap<i64, Seen> = seen.into_iter().map(|seen| (seen.pair, seen)).collect();
+    let mut groups = Vec::with_capacity(found.len());
+    for (row, pair) in found.iter().zip(one_of_each) {
+        // In one transaction the look finds what the groups were made of.
+        if let Some(seen) = seen.get(&pair) {
+            groups.push(Group {
+                seen: *seen,
+                pairs: row.try_get::<i64, _>("n")?.unsigned_abs(),
+                made: row.try_get("made")?,
+            });
+        }
+    }
+    Ok(groups)
+}
+
+/// The next members of a group after a pair.
+pub(super) async fn members(
+    conn: &mut SqliteConnection,
+    group: &Group,
+    after: i64,
+) -> Result<Vec<i64>> {
+    let query = sqlx::query_scalar(MEMBERS)
+        .bind(after)
+        .bind(group.seen.cursor)
+        .bind(group.seen.status.code())
+        .bind(group.made)
+        .bind(PAGE as i64);
+    Ok(query.fetch_all(conn).await?)
+}
+
+/// Looks at the next pairs that are in no group, and tells the last of them; `None` at the end.
+pub(super) async fn look_apart(
+    conn: &mut SqliteConnection,
+    current: &str,
+    after: i64,
+) -> Result<Option<(Vec<Seen>, i64)>> {
+    let page: Vec<i64> = sqlx::query_scalar(APART)
+        .bind(after)
+        .bind(PAGE as i64)
+        .fetch_all(&mut *conn)
+        .await?;
+    let Some(last) = page.last().copied() else {
+        return Ok(None);
+    };
+    let seen = look(conn, current, after, &these(&page)).await?;
+    Ok(Some((seen, last)))
 }
 
 /// Notes which pairs in a range of numbers no longer differ from their files and facts.
@@ -108,9 +193,9 @@ pub(super) async fn settle(conn: &mut SqliteConnection, after: i64, last: i64) -
     Ok(())
 }
 
-fn these<'a>(pairs: impl ExactSizeIterator<Item = &'a i64>) -> PairSelection {
+fn these(pairs: &[i64]) -> PairSelection {
     PairSelection {
         len: pairs.len(),
-        json: Value::from(pairs.copied().collect::<Vec<_>>()).to_string(),
+        json: Value::from(pairs).to_string(),
     }
 }

@@ -6,6 +6,7 @@ use serde_json::Value;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteRow};
 use sqlx::{ConnectOptions as _, Row as _, SqliteConnection};
 
+use super::alike::{misremembered, unnoted};
 use super::work::{self, KnownInputs};
 use super::{Catalog, Result, Trouble, connect, results, rows};
 use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
@@ -69,6 +70,17 @@ FROM json_each('[0,1,2,3,4]') AS stage CROSS JOIN json_each('[0,1,2,3,4,5]') AS 
     LEFT JOIN (SELECT stage, status, count(*) AS n FROM job GROUP BY stage, status) AS k
         ON k.stage = stage.value AND k.status = status.value
 WHERE c.n IS NOT coalesce(k.n, 0)";
+
+const MADE_DRIFT: &str = "
+SELECT 'the counter of recipe ' || coalesce(m.recipe, k.recipe) || ' says ' || coalesce(m.n, 0) || ', there are '
+    || coalesce(k.n, 0)
+FROM made AS m FULL JOIN (SELECT made AS recipe, count(*) AS n FROM job WHERE made IS NOT NULL GROUP BY made) AS k
+    ON k.recipe = m.recipe
+WHERE coalesce(m.n, 0) <> coalesce(k.n, 0) ORDER BY 1";
+
+const KEPT_DRIFT: &str = concat!("SELECT count(*) FROM job WHERE ", misremembered!());
+
+const MOVED_DRIFT: &str = concat!("SELECT count(*) FROM (", unnoted!(), ")");
 
 pub(super) const PAGE: &str = "
 SELECT p.id, p.name, p.mesh_path, p.mesh_hash, p.mesh_stat, p.print_path, p.print_hash, p.print_stat,
@@ -144,6 +156,36 @@ impl Catalog {
                 })
             })
             .collect()
+    }
+
+    /// What is kept to tell stale pairs without a look at each, and does not agree with the rows, a line each; empty
+    /// when it does. `quick` leaves out what a look at each pair would tell.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn shortcut_drift(&self, quick: bool) -> Result<Vec<String>> {
+        let mut conn = self.snapshot().await?;
+        let counts = sqlx::query_scalar(MADE_DRIFT).fetch_all(&mut *conn).await?;
+        let mut lines: Vec<String> = counts;
+        for (sql, what) in [
+            (
+                KEPT_DRIFT,
+                "keep another recipe than that of their last result",
+            ),
+            (
+                MOVED_DRIFT,
+                "are not noted, though their files or facts changed since",
+            ),
+        ] {
+            if quick {
+                break;
+            }
+            let pairs: i64 = sqlx::query_scalar(sql).fetch_one(&mut *conn).await?;
+            if pairs > 0 {
+                lines.push(format!("{pairs} pairs {what}"));
+            }
+        }
+        Ok(lines)
     }
 
     /// The next pairs after one, by number, at most `limit`; empty at the end.

@@ -1,13 +1,16 @@
 //! One group commit: requests in their order of weight, one statement for all of a kind.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use sqlx::SqliteConnection;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row as _, SqliteConnection};
 use tokio::sync::oneshot;
 
 use super::claim::{self, ClaimRequest};
 use super::counters::Deltas;
 use super::lease::{Lease, StageDone, StageFailed};
+use super::script::Script;
 use super::{CatalogError, Result, checkpoint, fail};
 use crate::domain::{UnixMillis, WorkerId};
 
@@ -53,6 +56,46 @@ pub(super) struct Answers {
     claims: Vec<Vec<Lease>>,
 }
 
+/// What the changed rows of workers and jobs tell.
+#[derive(Default)]
+struct Told {
+    /// Workers whose beat came in time.
+    alive: BTreeSet<i64>,
+    /// Leases that held, by pair and epoch.
+    held: BTreeSet<(i64, i64)>,
+    /// Jobs of the first claim.
+    taken: Vec<SqliteRow>,
+}
+
+impl Told {
+    /// Beats return one column, writes under a lease two, claims more.
+    fn of(rows: Vec<SqliteRow>) -> Result<Self> {
+        let mut told = Self::default();
+        for row in rows {
+            match row.len() {
+                1 => drop(told.alive.insert(row.try_get(0)?)),
+                2 => drop(told.held.insert((row.try_get(0)?, row.try_get(1)?))),
+                _ => told.taken.push(row),
+            }
+        }
+        Ok(told)
+    }
+
+    fn holds(&self, lease: &Lease) -> bool {
+        self.held.contains(&(lease.pair.0, lease.epoch))
+    }
+
+    fn each<'l>(&self, leases: impl Iterator<Item = &'l Lease>) -> Vec<bool> {
+        leases.map(|lease| self.holds(lease)).collect()
+    }
+
+    /// What is to be stored under leases that held.
+    fn under<'i, T>(&self, items: &'i [Under<T>]) -> Vec<&'i (Lease, T)> {
+        let items = items.iter().map(|(item, _)| &**item);
+        items.filter(|(lease, _)| self.holds(lease)).collect()
+    }
+}
+
 impl Batch {
     pub(super) fn push(&mut self, request: Request) {
         match request {
@@ -72,31 +115,67 @@ impl Batch {
             + self.claims.len()
     }
 
-    /// Runs the requests in the transaction that is open: beats, checkpoints, failures, releases, claims.
+    /// Runs the requests in a transaction of their own: beats, checkpoints, failures, releases, claims. After an error
+    /// that transaction may still be open.
     pub(super) async fn apply(&self, conn: &mut SqliteConnection) -> Result<Answers> {
         let mut deltas = Deltas::default();
-        let mut beats = Vec::with_capacity(self.beats.len());
-        for (beat, _) in &self.beats {
-            beats.push(claim::beat(conn, *beat).await?);
-        }
-        let done: Vec<_> = self.checkpoints.iter().map(|(done, _)| &**done).collect();
-        let checkpoints = checkpoint::apply(conn, &done, &mut deltas).await?;
-        let failed: Vec<_> = self.failures.iter().map(|(failed, _)| &**failed).collect();
-        let failures = fail::apply(conn, &failed, &mut deltas).await?;
-        let given_back: Vec<_> = self.releases.iter().map(|(lease, _)| lease).collect();
-        let releases = claim::release(conn, &given_back, &mut deltas).await?;
-        let mut claims = Vec::with_capacity(self.claims.len());
-        for (request, _) in &self.claims {
-            claims.push(claim::claim(conn, request, &mut deltas).await?);
-        }
-        deltas.apply(conn).await?;
+        let (told, claims) = self.ask(conn, &mut deltas).await?;
+        let done = told.under(&self.checkpoints);
+        let failed = told.under(&self.failures);
+        let released = self.releases.iter().map(|(lease, _)| lease);
+        let mut script = Script::default();
+        checkpoint::store(&mut script, &done, &mut deltas)?;
+        fail::store(&mut script, &failed, &mut deltas)?;
+        claim::given_back(released.filter(|lease| told.holds(lease)), &mut deltas);
+        deltas.write(&mut script)?;
+        script.add(&["COMMIT"]);
+        script.run(conn).await?;
+        let beats = self.beats.iter();
         Ok(Answers {
-            beats,
-            checkpoints,
-            failures,
-            releases,
+            beats: beats
+                .map(|(beat, _)| told.alive.contains(&beat.worker.0))
+                .collect(),
+            checkpoints: told.each(self.checkpoints.iter().map(|(item, _)| &item.0)),
+            failures: told.each(self.failures.iter().map(|(item, _)| &item.0)),
+            releases: told.each(self.releases.iter().map(|(lease, _)| lease)),
             claims,
         })
+    }
+
+    /// Begins the transaction and changes workers and jobs, as far as leases hold.
+    async fn ask(
+        &self,
+        conn: &mut SqliteConnection,
+        deltas: &mut Deltas,
+    ) -> Result<(Told, Vec<Vec<Lease>>)> {
+        let mut script = Script::default();
+        script.add(&["BEGIN IMMEDIATE"]);
+        for (beat, _) in &self.beats {
+            claim::beat(&mut script, *beat)?;
+        }
+        checkpoint::step(
+            &mut script,
+            self.checkpoints.iter().map(|(item, _)| &**item),
+        )?;
+        fail::step(&mut script, self.failures.iter().map(|(item, _)| &**item))?;
+        claim::release(&mut script, self.releases.iter().map(|(lease, _)| lease))?;
+        let mut requests = self.claims.iter().map(|(request, _)| request);
+        let first = requests.next();
+        if let Some(request) = first {
+            claim::take(&mut script, request)?;
+        }
+        let told = Told::of(script.run(conn).await?)?;
+        let mut claims = Vec::with_capacity(self.claims.len());
+        if let Some(request) = first {
+            claims.push(claim::taken(&told.taken, request, deltas)?);
+        }
+        // A process asks for all it wants at once, so more than one are rare.
+        for request in requests {
+            let mut script = Script::default();
+            claim::take(&mut script, request)?;
+            claims.push(claim::taken(&script.run(conn).await?, request, deltas)?);
+        }
+        Ok((told, claims))
     }
 
     /// Tells everybody what became of the request. Whoever does not wait any more gets no answer.

@@ -1,17 +1,15 @@
 //! Storing a finished stage: the job's step and the results, fenced by the lease.
 
-use std::collections::BTreeSet;
-
-use serde_json::{Value, json};
-use sqlx::SqliteConnection;
+use serde::Serialize;
+use serde_json::json;
 
 use super::batch::Request;
-use super::claim::kept_pairs;
 use super::counters::{DONE, Deltas, cursor};
-use super::lease::{InputsSeen, Kept, Lease, MetricResult, StageDone};
-use super::{Catalog, Result, rows};
+use super::lease::{InputsSeen, Kept, Lease, StageDone};
+use super::script::Script;
+use super::{Catalog, Result};
 use crate::breakpoint::{self, Point};
-use crate::domain::JobStatus;
+use crate::domain::{ContentHash, JobStatus, MetricOutcome, PairId, UnixMillis};
 
 /// The job's step; only where the lease still holds and its worker has given a sign of life lately. Progress clears the pair of suspicion.
 pub(super) const STEP: &str = "
@@ -20,12 +18,12 @@ UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     attempt = 1, crashes = 0, mem_class = 0, doubtful = item.value ->> 'doubtful',
     made = iif(item.value ->> 'next' = 1 OR made = (SELECT upstream FROM recipe WHERE id = item.value ->> 'made'),
         item.value ->> 'made', NULL)
-FROM json_each(?1) AS item
+FROM jsonb_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = job.worker AND w.ended IS NULL AND w.beat >= item.value ->> 'alive_since')
-RETURNING pair";
+RETURNING pair, epoch";
 
 const RESULT: &str = "
 INSERT INTO stage_result
@@ -33,14 +31,14 @@ INSERT INTO stage_result
 SELECT value ->> 'pair', value ->> 'stage', value ->> 'recipe', unhex(value ->> 'mesh_hash'),
     unhex(value ->> 'print_hash'), value ->> 'facts', value ->> 'outcome', value ->> 'files',
     unhex(value ->> 'result_hash'), value ->> 'ms', value ->> 'worker', value ->> 'at'
-FROM json_each(?1) WHERE true
+FROM jsonb_each(?1) WHERE true
 ON CONFLICT (pair, stage) DO UPDATE SET recipe = excluded.recipe, mesh_hash = excluded.mesh_hash,
     print_hash = excluded.print_hash, facts = excluded.facts, outcome = excluded.outcome, files = excluded.files,
     result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
 
 /// A method may give fewer metrics than the one before; what it does not give is no result any more.
 const CLEAR_METRICS: &str = "
-DELETE FROM metric_result WHERE pair IN (SELECT value ->> 'pair' FROM json_each(?1))";
+DELETE FROM metric_result WHERE pair IN (SELECT value ->> 'pair' FROM jsonb_each(?1))";
 
 const METRICS: &str = "
 INSERT INTO metric_result
@@ -53,147 +51,206 @@ SELECT value ->> 'pair', value ->> '$.row.metric', value ->> '$.row.threshold_le
     value ->> '$.row.scores.iou_box', value ->> '$.row.scores.dice', value ->> '$.row.scores.density_print',
     value ->> '$.row.scores.density_depth', value ->> '$.row.margin', value ->> '$.row.confidence',
     value ->> '$.row.at_bound', unhex(value ->> 'result_hash')
-FROM json_each(?1)";
+FROM jsonb_each(?1)";
 
 const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, ms, at)
-SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'ms', value ->> 'at' FROM json_each(?1)";
+SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?1)";
 
-const SEEN: &str = "
+/// What is known of the input files of pairs.
+pub(super) const SEEN: &str = "
 UPDATE pair SET mesh_hash = coalesce(unhex(item.value ->> 'mesh_hash'), mesh_hash),
     mesh_stat = coalesce(item.value ->> 'mesh_stat', mesh_stat),
     print_hash = coalesce(unhex(item.value ->> 'print_hash'), print_hash),
     print_stat = coalesce(item.value ->> 'print_stat', print_stat)
-FROM json_each(?1) AS item WHERE pair.id = item.value ->> 'pair'";
+FROM jsonb_each(?1) AS item WHERE pair.id = item.value ->> 'pair' AND (
+    pair.mesh_hash IS NOT unhex(item.value ->> 'mesh_hash') OR pair.mesh_stat IS NOT item.value ->> 'mesh_stat'
+    OR pair.print_hash IS NOT unhex(item.value ->> 'print_hash') OR pair.print_stat IS NOT item.value ->> 'print_stat')";
 
 const CLEAR_FAILURE: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT value ->> 'pair' FROM json_each(?1))";
+    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?1))";
 
 /// What is written beside the job.
 #[cfg(test)]
 pub(super) const ROWS: [&str; 6] = [RESULT, CLEAR_METRICS, METRICS, ATTEMPT, SEEN, CLEAR_FAILURE];
 
-/// Stores what is done under leases that still hold; says which did.
-pub(super) async fn apply(
-    conn: &mut SqliteConnection,
+/// Adds the steps of jobs to a script; those whose leases no longer hold stay where they are.
+pub(super) fn step<'i>(
+    script: &mut Script,
+    done: impl Iterator<Item = &'i (Lease, StageDone)>,
+) -> Result<()> {
+    over(script, &[STEP], done.map(job))
+}
+
+/// Adds what is stored beside steps that were made.
+pub(super) fn store(
+    script: &mut Script,
     done: &[&(Lease, StageDone)],
     deltas: &mut Deltas,
-) -> Result<Vec<bool>> {
-    if done.is_empty() {
-        return Ok(Vec::new());
-    }
-    let steps = rows::array(done.iter().map(|item| step(item)));
-    let kept = kept_pairs(conn, STEP, &steps).await?;
-    let stored: Vec<_> = done
-        .iter()
-        .filter(|item| kept.contains(&item.0.pair.0))
-        .collect();
-    if !stored.is_empty() {
-        let results = rows::array(stored.iter().map(|item| result(item))).to_string();
-        for sql in [RESULT, ATTEMPT, CLEAR_FAILURE] {
-            sqlx::query(sql).bind(&results).execute(&mut *conn).await?;
-        }
-        let metrics = rows::array(stored.iter().flat_map(|item| metrics(item)));
-        for sql in [CLEAR_METRICS, METRICS] {
-            run_over(conn, sql, &metrics).await?;
-        }
-        let seen = stored.iter().map(|(lease, done)| (lease, &done.inputs));
-        store_seen(conn, seen).await?;
-    }
-    for (_, done) in stored.iter().map(|item| &***item) {
-        breakpoint::reach(done.stage, Point::Rowed, None);
-    }
-    count(&stored, deltas);
-    Ok(answer(done, &kept))
-}
-
-fn step((lease, done): &(Lease, StageDone)) -> Value {
-    let finished = done.stage.next().is_none();
-    let status = if finished {
-        JobStatus::Done
-    } else {
-        JobStatus::Leased
-    };
-    let doubtful = done
-        .metrics
-        .iter()
-        .any(|metric| metric.outcome.is_doubtful());
-    json!({
-        "pair": lease.pair.0, "worker": lease.worker.0, "epoch": lease.epoch,
-        "next": done.stage.index() + 1, "status": status.code(), "made": done.recipe.0,
-        "doubtful": i64::from(doubtful),
-        "deadline": (!finished).then_some(done.next_deadline), "alive_since": done.alive_since,
-    })
-}
-
-fn result((lease, done): &(Lease, StageDone)) -> Value {
-    json!({
-        "pair": lease.pair.0, "stage": done.stage.index(), "recipe": done.recipe.0,
-        "mesh_hash": done.mesh_hash, "print_hash": done.print_hash, "facts": done.facts,
-        "outcome": done.outcome, "files": json!(done.files).to_string(), "result_hash": done.result_hash,
-        "ms": done.ms, "worker": lease.worker.0, "at": done.at,
-    })
-}
-
-fn metrics((lease, done): &(Lease, StageDone)) -> impl Iterator<Item = Value> {
-    done.metrics.iter().map(
-        |MetricResult {
-             outcome,
-             result_hash,
-         }| json!({ "pair": lease.pair.0, "row": outcome, "result_hash": result_hash }),
-    )
-}
-
-/// Stores what is known of the input files of some pairs.
-pub(super) async fn store_seen<'a>(
-    conn: &mut SqliteConnection,
-    seen: impl Iterator<Item = (&'a Lease, &'a InputsSeen)>,
 ) -> Result<()> {
-    let items = seen.filter(|(_, seen)| seen.mesh.is_some() || seen.print.is_some());
-    let items = rows::array(items.map(|(lease, seen)| seen_json(lease.pair.0, seen)));
-    run_over(conn, SEEN, &items).await
-}
-
-/// One item of [`SEEN`].
-pub(super) fn seen_json(pair: i64, seen: &InputsSeen) -> Value {
-    let hash = |input: &Option<super::lease::InputSeen>| input.as_ref().map(|seen| seen.hash);
-    let stat =
-        |input: &Option<super::lease::InputSeen>| input.as_ref().map(|seen| seen.stat.clone());
-    json!({
-        "pair": pair, "mesh_hash": hash(&seen.mesh), "mesh_stat": stat(&seen.mesh),
-        "print_hash": hash(&seen.print), "print_stat": stat(&seen.print),
-    })
-}
-
-/// Stores what is known of input files.
-pub(super) async fn run_seen(conn: &mut SqliteConnection, items: &Value) -> Result<()> {
-    run_over(conn, SEEN, items).await
-}
-
-async fn run_over(conn: &mut SqliteConnection, sql: &'static str, items: &Value) -> Result<()> {
-    if items.as_array().is_some_and(|items| !items.is_empty()) {
-        sqlx::query(sql)
-            .bind(items.to_string())
-            .execute(conn)
-            .await?;
-    }
-    Ok(())
-}
-
-fn count(stored: &[&&(Lease, StageDone)], deltas: &mut Deltas) {
-    for (lease, done) in stored.iter().map(|item| &***item) {
+    for (lease, done) in done.iter().map(|item| &**item) {
+        breakpoint::reach(done.stage, Point::Rowed, None);
         let to = match done.stage.next() {
             Some(next) => (cursor(next), JobStatus::Leased),
             None => (DONE, JobStatus::Done),
         };
         deltas.moved((cursor(lease.cursor), JobStatus::Leased), to);
     }
+    over(script, &[RESULT], done.iter().map(|item| result(item)))?;
+    let attempts = done.iter().map(|item| attempt(item));
+    over(script, &[ATTEMPT, CLEAR_FAILURE], attempts)?;
+    let metrics = done.iter().flat_map(|item| metrics(item));
+    over(script, &[CLEAR_METRICS, METRICS], metrics)?;
+    let seen = done.iter().map(|(lease, done)| (lease, &done.inputs));
+    store_seen(script, seen)
 }
 
-fn answer(done: &[&(Lease, StageDone)], kept: &BTreeSet<i64>) -> Vec<bool> {
-    done.iter()
-        .map(|item| kept.contains(&item.0.pair.0))
-        .collect()
+/// One item of [`STEP`].
+#[derive(Serialize)]
+struct Job {
+    pair: i64,
+    worker: i64,
+    epoch: i64,
+    next: usize,
+    status: i64,
+    made: i64,
+    doubtful: i64,
+    deadline: Option<UnixMillis>,
+    alive_since: UnixMillis,
+}
+
+fn job((lease, done): &(Lease, StageDone)) -> Job {
+    let finished = done.stage.next().is_none();
+    let status = if finished {
+        JobStatus::Done
+    } else {
+        JobStatus::Leased
+    };
+    let metrics = &mut done.metrics.iter();
+    Job {
+        pair: lease.pair.0,
+        worker: lease.worker.0,
+        epoch: lease.epoch,
+        next: done.stage.index() + 1,
+        status: status.code(),
+        made: done.recipe.0,
+        doubtful: i64::from(metrics.any(|metric| metric.outcome.is_doubtful())),
+        deadline: (!finished).then_some(done.next_deadline),
+        alive_since: done.alive_since,
+    }
+}
+
+/// One item of [`RESULT`].
+#[derive(Serialize)]
+struct ResultRow<'d> {
+    pair: i64,
+    stage: usize,
+    recipe: i64,
+    mesh_hash: ContentHash,
+    print_hash: Option<ContentHash>,
+    facts: &'d str,
+    outcome: &'d str,
+    files: String,
+    result_hash: ContentHash,
+    ms: u64,
+    worker: i64,
+    at: UnixMillis,
+}
+
+fn result((lease, done): &(Lease, StageDone)) -> ResultRow<'_> {
+    ResultRow {
+        pair: lease.pair.0,
+        stage: done.stage.index(),
+        recipe: done.recipe.0,
+        mesh_hash: done.mesh_hash,
+        print_hash: done.print_hash,
+        facts: &done.facts,
+        outcome: &done.outcome,
+        files: json!(done.files).to_string(),
+        result_hash: done.result_hash,
+        ms: done.ms,
+        worker: lease.worker.0,
+        at: done.at,
+    }
+}
+
+/// One item of [`ATTEMPT`]: pair, stage, worker, milliseconds, time.
+type Attempt = (i64, usize, i64, u64, UnixMillis);
+
+const fn attempt((lease, done): &(Lease, StageDone)) -> Attempt {
+    let stage = done.stage.index();
+    (lease.pair.0, stage, lease.worker.0, done.ms, done.at)
+}
+
+/// One item of [`METRICS`].
+#[derive(Serialize)]
+struct MetricRow<'d> {
+    pair: i64,
+    row: &'d MetricOutcome,
+    result_hash: ContentHash,
+}
+
+fn metrics((lease, done): &(Lease, StageDone)) -> impl Iterator<Item = MetricRow<'_>> {
+    done.metrics.iter().map(|metric| MetricRow {
+        pair: lease.pair.0,
+        row: &metric.outcome,
+        result_hash: metric.result_hash,
+    })
+}
+
+/// Adds what is known of the input files of leased pairs.
+pub(super) fn store_seen<'a>(
+    script: &mut Script,
+    seen: impl Iterator<Item = (&'a Lease, &'a InputsSeen)>,
+) -> Result<()> {
+    let items = seen.filter(|(_, seen)| seen.mesh.is_some() || seen.print.is_some());
+    let items = items.map(|(lease, seen)| seen_row(lease.pair.0, seen));
+    over(script, &[SEEN], items)
+}
+
+/// One item of [`SEEN`].
+#[derive(Serialize)]
+pub(super) struct SeenRow<'s> {
+    pair: i64,
+    mesh_hash: Option<ContentHash>,
+    mesh_stat: Option<&'s str>,
+    print_hash: Option<ContentHash>,
+    print_stat: Option<&'s str>,
+}
+
+pub(super) fn seen_row(pair: i64, seen: &InputsSeen) -> SeenRow<'_> {
+    let (mesh, print) = (seen.mesh.as_ref(), seen.print.as_ref());
+    SeenRow {
+        pair,
+        mesh_hash: mesh.map(|seen| seen.hash),
+        mesh_stat: mesh.map(|seen| seen.stat.as_str()),
+        print_hash: print.map(|seen| seen.hash),
+        print_stat: print.map(|seen| seen.stat.as_str()),
+    }
+}
+
+/// Adds what is known of input files.
+pub(super) fn store_inputs(script: &mut Script, seen: &[(PairId, InputsSeen)]) -> Result<()> {
+    let items = seen.iter().map(|(pair, seen)| seen_row(pair.0, seen));
+    over(script, &[SEEN], items)
+}
+
+/// Adds statements over a JSON array, unless that is empty.
+pub(super) fn over(
+    script: &mut Script,
+    statements: &[&'static str],
+    items: impl Iterator<Item = impl Serialize>,
+) -> Result<()> {
+    let mut array = String::new();
+    for item in items {
+        array.push(if array.is_empty() { '[' } else { ',' });
+        array.push_str(&serde_json::to_string(&item)?);
+    }
+    if !array.is_empty() {
+        array.push(']');
+        script.add(statements).bind(array)?;
+    }
+    Ok(())
 }
 
 impl Catalog {

@@ -1,12 +1,15 @@
 //! Leases: taking them, keeping them alive, giving them back.
 
 use serde_json::{Value, json};
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::Row as _;
+use sqlx::sqlite::SqliteRow;
 use tokio::sync::oneshot;
 
 use super::batch::{Beat, Reply, Request};
+use super::checkpoint::over;
 use super::counters::{Deltas, cursor};
 use super::lease::Lease;
+use super::script::Script;
 use super::writer::Message;
 use super::{Catalog, CatalogError, Result, rows};
 use crate::breakpoint::{self, Point};
@@ -29,6 +32,21 @@ pub struct ClaimRequest {
     pub deadline: UnixMillis,
     /// Nothing is taken unless the worker's last sign of life is of then or later, by its own clock.
     pub alive_since: UnixMillis,
+}
+
+impl ClaimRequest {
+    /// Any ordinary pairs with any stages left, whenever the worker gave its last sign of life.
+    pub const fn new(worker: WorkerId, slots: usize, deadline: UnixMillis) -> Self {
+        Self {
+            worker,
+            slots,
+            until: Stage::Register,
+            alone: false,
+            among: None,
+            deadline,
+            alive_since: UnixMillis::MIN,
+        }
+    }
 }
 
 /// Some pairs of the catalog.
@@ -82,48 +100,49 @@ RETURNING pair, stage, attempt, epoch, crashes, mem_class";
 /// Gives leases back as if they had never been taken.
 pub(super) const RELEASE: &str = "
 UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = max(attempt - 1, 0)
-FROM json_each(?1) AS item
+FROM jsonb_each(?1) AS item
 WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.epoch = item.value ->> 2
     AND job.status = 1
-RETURNING pair";
+RETURNING pair, epoch";
 
 /// A sign of life. A worker that has ended, or whose last one is too long ago, gives none: others may have taken it for
 /// dead.
 pub(super) const BEAT: &str =
-    "UPDATE worker SET beat = ?2 WHERE id = ?1 AND ended IS NULL AND beat >= ?3";
+    "UPDATE worker SET beat = ?2 WHERE id = ?1 AND ended IS NULL AND beat >= ?3 RETURNING id";
 
-pub(super) async fn beat(conn: &mut SqliteConnection, beat: Beat) -> Result<bool> {
-    let stored = sqlx::query(BEAT)
-        .bind(beat.worker.0)
-        .bind(beat.now)
-        .bind(beat.alive_since)
-        .execute(conn)
-        .await?;
-    Ok(stored.rows_affected() == 1)
+pub(super) fn beat(script: &mut Script, beat: Beat) -> Result<()> {
+    let script = script.add(&[BEAT]).bind(beat.worker.0)?;
+    script.bind(beat.now)?.bind(beat.alive_since)?;
+    Ok(())
 }
 
-pub(super) async fn claim(
-    conn: &mut SqliteConnection,
-    request: &ClaimRequest,
-    deltas: &mut Deltas,
-) -> Result<Vec<Lease>> {
+/// Adds a claim to a script.
+pub(super) fn take(script: &mut Script, request: &ClaimRequest) -> Result<()> {
     let sql = if request.among.is_some() {
         CLAIM_AMONG
     } else {
         CLAIM
     };
-    let mut query = sqlx::query(sql)
-        .bind(request.worker.0)
-        .bind(request.deadline)
-        .bind(cursor(request.until))
-        .bind(i64::from(request.alone))
-        .bind(request.slots as i64)
-        .bind(request.alive_since);
+    let script = script.add(&[sql]).bind(request.worker.0)?;
+    let script = script
+        .bind(request.deadline)?
+        .bind(cursor(request.until))?
+        .bind(i64::from(request.alone))?
+        .bind(request.slots as i64)?
+        .bind(request.alive_since)?;
     if let Some(among) = &request.among {
-        query = query.bind(&among.json);
+        script.bind(among.json.clone())?;
     }
-    let taken = query.fetch_all(conn).await?;
-    let mut leases = taken
+    Ok(())
+}
+
+/// The leases of a claim from the rows that it returned.
+pub(super) fn taken(
+    rows: &[SqliteRow],
+    request: &ClaimRequest,
+    deltas: &mut Deltas,
+) -> Result<Vec<Lease>> {
+    let mut leases = rows
         .iter()
         .map(|row| lease(row, request.worker))
         .collect::<Result<Vec<_>>>()?;
@@ -137,7 +156,7 @@ pub(super) async fn claim(
     Ok(leases)
 }
 
-fn lease(row: &sqlx::sqlite::SqliteRow, worker: WorkerId) -> Result<Lease> {
+fn lease(row: &SqliteRow, worker: WorkerId) -> Result<Lease> {
     Ok(Lease {
         pair: PairId(row.try_get("pair")?),
         worker,
@@ -149,45 +168,25 @@ fn lease(row: &sqlx::sqlite::SqliteRow, worker: WorkerId) -> Result<Lease> {
     })
 }
 
-pub(super) async fn release(
-    conn: &mut SqliteConnection,
-    leases: &[&Lease],
-    deltas: &mut Deltas,
-) -> Result<Vec<bool>> {
-    if leases.is_empty() {
-        return Ok(Vec::new());
+/// Adds the giving back of leases to a script.
+pub(super) fn release<'l>(
+    script: &mut Script,
+    leases: impl Iterator<Item = &'l Lease>,
+) -> Result<()> {
+    over(script, &[RELEASE], leases.map(fence))
+}
+
+/// Counts leases that were given back.
+pub(super) fn given_back<'l>(leases: impl Iterator<Item = &'l Lease>, deltas: &mut Deltas) {
+    for lease in leases {
+        let at = cursor(lease.cursor);
+        deltas.moved((at, JobStatus::Leased), (at, JobStatus::Ready));
     }
-    let items = rows::array(leases.iter().map(|lease| fence(lease)));
-    let kept = kept_pairs(conn, RELEASE, &items).await?;
-    Ok(leases
-        .iter()
-        .map(|lease| {
-            let kept = kept.contains(&lease.pair.0);
-            if kept {
-                let at = cursor(lease.cursor);
-                deltas.moved((at, JobStatus::Leased), (at, JobStatus::Ready));
-            }
-            kept
-        })
-        .collect())
 }
 
 /// What a write under a lease must match: pair, worker, epoch.
 fn fence(lease: &Lease) -> Value {
     json!([lease.pair.0, lease.worker.0, lease.epoch])
-}
-
-/// Runs a fenced update over items; gives the pairs whose lease still held.
-pub(super) async fn kept_pairs(
-    conn: &mut SqliteConnection,
-    sql: &'static str,
-    items: &Value,
-) -> Result<std::collections::BTreeSet<i64>> {
-    let kept = sqlx::query_scalar(sql)
-        .bind(items.to_string())
-        .fetch_all(conn)
-        .await?;
-    Ok(kept.into_iter().collect())
 }
 
 impl Catalog {

@@ -5,8 +5,13 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use sqlx::{Row as _, SqliteConnection};
 
+use super::script::Script;
 use super::{Catalog, Result};
 use crate::domain::{JobStatus, Stage};
+
+const CHANGE: &str = "
+UPDATE counter SET n = n + (d.value ->> 2) FROM jsonb_each(?1) AS d
+WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1";
 
 /// Cursor of a job: its next stage 0..4, or 4 when done.
 pub(super) type Cursor = i64;
@@ -37,6 +42,14 @@ impl Deltas {
 
     /// Writes the changes.
     pub(super) async fn apply(&self, conn: &mut SqliteConnection) -> Result<()> {
+        let mut script = Script::default();
+        self.write(&mut script)?;
+        script.run(conn).await?;
+        Ok(())
+    }
+
+    /// Adds the changes to a script.
+    pub(super) fn write(&self, script: &mut Script) -> Result<()> {
         let rows: Vec<_> = self
             .0
             .iter()
@@ -46,13 +59,8 @@ impl Deltas {
         if rows.is_empty() {
             return Ok(());
         }
-        sqlx::query(
-            "UPDATE counter SET n = n + (d.value ->> 2) FROM json_each(?1) AS d
-             WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1",
-        )
-        .bind(serde_json::Value::from(rows).to_string())
-        .execute(conn)
-        .await?;
+        let changes = serde_json::Value::from(rows).to_string();
+        script.add(&[CHANGE]).bind(changes)?;
         Ok(())
     }
 }

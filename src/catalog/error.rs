@@ -71,6 +71,9 @@ pub enum CatalogError {
     /// A path that SQLite cannot take.
     #[error("path {0:?} is not UTF-8")]
     NotUtf8(PathBuf),
+    /// The rows of an import ended before they were all there.
+    #[error("the list was not read to its end, nothing was imported")]
+    CutShort,
     /// A setting of the database did not take.
     #[error("the database set {name} to {found}, not {wanted}")]
     Pragma {

@@ -1,14 +1,13 @@
 //! Storing a failed stage: what it means for the job, why, and the attempt.
 
 use serde_json::{Value, json};
-use sqlx::SqliteConnection;
 
 use super::alike::made;
 use super::batch::Request;
-use super::checkpoint::store_seen;
-use super::claim::kept_pairs;
+use super::checkpoint::{over, store_seen};
 use super::counters::{Deltas, cursor};
 use super::lease::{Lease, Sentence, StageFailed};
+use super::script::Script;
 use super::{Catalog, Result, rows};
 use crate::domain::JobStatus;
 
@@ -23,19 +22,19 @@ UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.val
     worker = NULL, deadline = NULL, made = ",
     made!("min(job.stage, item.value ->> 'stage')"),
     "
-FROM json_each(?1) AS item
+FROM jsonb_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = job.worker AND w.ended IS NULL AND w.beat >= item.value ->> 'alive_since')
-RETURNING pair"
+RETURNING pair, epoch"
 );
 
 const FAILURE: &str = "
 INSERT INTO failure (pair, stage, class, message, recipe, mesh_hash, print_hash, facts, at)
 SELECT value ->> 'pair', value ->> 'stage', value ->> 'class', value ->> 'message', value ->> 'recipe',
     unhex(value ->> 'mesh_hash'), unhex(value ->> 'print_hash'), value ->> 'facts', value ->> 'at'
-FROM json_each(?1) WHERE value ->> 'status' <> 0
+FROM jsonb_each(?1) WHERE value ->> 'status' <> 0
 ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
     recipe = excluded.recipe, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
     facts = excluded.facts, at = excluded.at";
@@ -44,50 +43,43 @@ const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, class, message, ms, at)
 SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'class', value ->> 'message',
     value ->> 'ms', value ->> 'at'
-FROM json_each(?1)";
+FROM jsonb_each(?1)";
 
 const PRUNE: &str = "
 DELETE FROM attempt WHERE id IN (
-    SELECT old.id FROM json_each(?1) AS item JOIN attempt AS old ON old.pair = item.value ->> 'pair'
+    SELECT old.id FROM jsonb_each(?1) AS item JOIN attempt AS old ON old.pair = item.value ->> 'pair'
     WHERE old.id <= (SELECT id FROM attempt WHERE pair = item.value ->> 'pair' ORDER BY id DESC LIMIT 1 OFFSET ?2))";
 
-/// Stores failures under leases that still hold; says which did.
-pub(super) async fn apply(
-    conn: &mut SqliteConnection,
+/// Adds the new states of jobs that failed; those whose leases no longer hold stay as they are.
+pub(super) fn step<'i>(
+    script: &mut Script,
+    failed: impl Iterator<Item = &'i (Lease, StageFailed)>,
+) -> Result<()> {
+    over(script, &[FAIL], failed.map(json_of))
+}
+
+/// Adds what is stored beside failures that counted.
+pub(super) fn store(
+    script: &mut Script,
     failed: &[&(Lease, StageFailed)],
     deltas: &mut Deltas,
-) -> Result<Vec<bool>> {
+) -> Result<()> {
     if failed.is_empty() {
-        return Ok(Vec::new());
+        return Ok(());
     }
     let items = rows::array(failed.iter().map(|item| json_of(item)));
-    let kept = kept_pairs(conn, FAIL, &items).await?;
-    let stored: Vec<_> = failed
-        .iter()
-        .filter(|item| kept.contains(&item.0.pair.0))
-        .collect();
-    if !stored.is_empty() {
-        let items = rows::array(stored.iter().map(|item| json_of(item))).to_string();
-        for sql in [FAILURE, ATTEMPT] {
-            sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
-        }
-        sqlx::query(PRUNE)
-            .bind(&items)
-            .bind(ATTEMPTS_KEPT)
-            .execute(&mut *conn)
-            .await?;
-        let seen = stored.iter().map(|(lease, failed)| (lease, &failed.inputs));
-        store_seen(conn, seen).await?;
-    }
-    for (lease, failed) in stored.iter().map(|item| &***item) {
+    let script = script
+        .add(&[FAILURE, ATTEMPT, PRUNE])
+        .bind(items.to_string())?;
+    script.bind(ATTEMPTS_KEPT)?;
+    let seen = failed.iter().map(|(lease, failed)| (lease, &failed.inputs));
+    store_seen(script, seen)?;
+    for (lease, failed) in failed.iter().map(|item| &**item) {
         let to = cursor(lease.cursor.min(failed.stage));
         let from = (cursor(lease.cursor), JobStatus::Leased);
         deltas.moved(from, (to, status(failed.sentence)));
     }
-    Ok(failed
-        .iter()
-        .map(|item| kept.contains(&item.0.pair.0))
-        .collect())
+    Ok(())
 }
 
 const fn status(sentence: Sentence) -> JobStatus {

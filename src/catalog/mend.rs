@@ -3,9 +3,10 @@
 use serde_json::{Value, json};
 use sqlx::{AssertSqlSafe, Row as _, SqliteConnection};
 
-use super::alike::made;
+use super::alike::{made, misremembered, unnoted};
 use super::audit::{integrity, objects, wanted_objects};
 use super::counters::{Deltas, cursor};
+use super::script::Script;
 use super::{Catalog, Result, rows};
 use crate::domain::{JobStatus, PairId, Stage};
 
@@ -39,6 +40,22 @@ FROM json_each('[0,1,2,3,4]') AS stage CROSS JOIN json_each('[0,1,2,3,4,5]') AS 
         ON k.stage = stage.value AND k.status = status.value
 WHERE true ON CONFLICT (stage, status) DO UPDATE SET n = excluded.n";
 
+const REMAKE: &str = concat!(
+    "UPDATE job SET made = ",
+    made!("job.stage"),
+    " WHERE ",
+    misremembered!()
+);
+
+/// The trigger has counted along; what was off before is off still.
+const RECOUNT_MADE: [&str; 2] = [
+    "DELETE FROM made",
+    "INSERT INTO made SELECT made, count(*) FROM job WHERE made IS NOT NULL GROUP BY made",
+];
+
+/// One too many does no harm: a run takes out those that it has looked after.
+const NOTE_MOVED: &str = concat!("INSERT INTO moved ", unnoted!());
+
 impl Catalog {
     /// Puts pairs back to be done, each from a stage on; a pair without a job gets one. The counters must be right
     /// already: see [`Catalog::mend_counters`].
@@ -50,14 +67,19 @@ impl Catalog {
             .await
     }
 
-    /// Sets every counter to the number of jobs there are.
+    /// Sets every counter to the number of jobs there are, and makes anew what jobs keep of their results.
     ///
     /// # Errors
     /// When the database refuses.
     pub async fn mend_counters(&self) -> Result<()> {
         self.alone(|conn| {
             Box::pin(async move {
-                sqlx::query(RECOUNT).execute(conn).await?;
+                let mut script = Script::default();
+                script
+                    .add(&[RECOUNT, REMAKE])
+                    .add(&RECOUNT_MADE)
+                    .add(&[NOTE_MOVED]);
+                script.run(conn).await?;
                 Ok(())
             })
         })

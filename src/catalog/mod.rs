@@ -26,6 +26,7 @@ mod requeue;
 mod rescue;
 mod results;
 mod rows;
+mod script;
 mod staleness;
 mod status;
 #[cfg(test)]
@@ -50,7 +51,7 @@ pub use error::{CatalogError, Result};
 pub use lease::{
     InputSeen, InputsSeen, Kept, Lease, MetricResult, RecipeId, Sentence, StageDone, StageFailed,
 };
-pub use pairs::{ImportRow, ImportSummary, PairChange};
+pub use pairs::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use plan::{FieldChange, Plan, PlanEntry, WorkReason};
 pub use read::{
     AttemptRecord, FailedPair, MetricRecord, PairDetail, PairFacts, PairResults, ReaderVerdict,

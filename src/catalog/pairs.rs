@@ -5,11 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Value, json};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row as _, SqliteConnection};
+use tokio::sync::mpsc;
 
 use super::claim::PairSelection;
 use super::counters::{Deltas, cursor};
 use super::read::PairFacts;
-use super::{Catalog, Result, rows, truth};
+use super::{Catalog, CatalogError, Result, rows, truth};
 use crate::domain::{JobStatus, PairName, Stage, UnixMillis};
 
 /// A row to import.
@@ -17,6 +18,15 @@ pub type ImportRow = PairFacts;
 
 /// Rows in one statement.
 const CHUNK: usize = 2_000;
+
+/// A part of what is imported.
+#[derive(Debug)]
+pub enum ImportChunk {
+    /// The next rows.
+    Rows(Vec<ImportRow>),
+    /// That was all of them.
+    End,
+}
 
 /// What an import changed.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -67,25 +77,39 @@ impl Catalog {
     /// # Errors
     /// When the database refuses; then nothing is imported.
     pub async fn import(&self, rows: Vec<ImportRow>, now: UnixMillis) -> Result<ImportSummary> {
-        let (summary, _) = self.import_with_truth(rows, Vec::new(), now).await?;
+        let (sender, chunks) = mpsc::channel(2);
+        for chunk in [ImportChunk::Rows(rows), ImportChunk::End] {
+            // There is room for both, and the receiver is at hand.
+            let _ = sender.try_send(chunk);
+        }
+        let (summary, _) = self.import_all(chunks, Vec::new(), now).await?;
         Ok(summary)
     }
 
-    /// Imports rows and true alignments in one transaction; also says how many of those were stored.
+    /// Imports rows as they come, and true alignments, in one transaction; also says how many of those were stored.
     ///
     /// # Errors
-    /// When a pair of a true alignment is not there even now, or the database refuses; then nothing is imported.
-    pub async fn import_with_truth(
+    /// When the rows stop without an end, a pair of a true alignment is not there even now, or the database refuses;
+    /// then nothing is imported.
+    pub async fn import_all(
         &self,
-        rows: Vec<ImportRow>,
+        mut chunks: mpsc::Receiver<ImportChunk>,
         truths: Vec<(PairName, Value)>,
         now: UnixMillis,
     ) -> Result<(ImportSummary, u64)> {
         self.alone(move |conn| {
             Box::pin(async move {
                 let mut summary = ImportSummary::default();
-                for chunk in rows.chunks(CHUNK) {
-                    import_chunk(conn, chunk, now, &mut summary).await?;
+                loop {
+                    match chunks.recv().await {
+                        Some(ImportChunk::Rows(rows)) => {
+                            for chunk in rows.chunks(CHUNK) {
+                                import_chunk(conn, chunk, now, &mut summary).await?;
+                            }
+                        }
+                        Some(ImportChunk::End) => break,
+                        None => return Err(CatalogError::CutShort),
+                    }
                 }
                 let mut deltas = Deltas::default();
                 let at = (cursor(Stage::Fit), JobStatus::Ready);

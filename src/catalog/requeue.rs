@@ -1,5 +1,7 @@
 //! Taking pairs up again: after a change of settings or inputs, or because somebody asks.
 
+use std::sync::Arc;
+
 use serde_json::json;
 use sqlx::{Row as _, SqliteConnection};
 
@@ -7,7 +9,7 @@ use super::alike::made;
 use super::claim::PairSelection;
 use super::counters::{Deltas, cursor};
 use super::recipes::{Recipes, current_json};
-use super::staleness::{Again, Cause, decide, look};
+use super::staleness::{Again, Cause, Seen, decide, look};
 use super::{Catalog, CatalogError, Result, alike, pairs, rows};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 
@@ -60,15 +62,51 @@ impl Catalog {
         among: Option<&PairSelection>,
         again: Again,
     ) -> Result<u64> {
+        let Some(among) = among else {
+            return self.send_all_back(recipes, again).await;
+        };
         let mut sent = 0;
         let mut after = Some(0);
-        // A page is a transaction of its own, so that others' writes are not kept waiting.
         while let Some(from) = after {
-            let (recipes, among) = (recipes.clone(), among.cloned());
+            let (recipes, among) = (recipes.clone(), among.clone());
             let (moved, next) = self
                 .alone(move |conn| {
-                    Box::pin(async move { page(conn, &recipes, among.as_ref(), again, from).await })
+                    Box::pin(async move { page(conn, &recipes, &among, again, from).await })
                 })
+                .await?;
+            sent += moved;
+            after = next;
+        }
+        Ok(sent)
+    }
+
+    /// Pairs that are alike go back together; only those that are not are looked at one by one. Each page is a
+    /// transaction of its own, so that others' writes are not kept waiting.
+    async fn send_all_back(&self, recipes: &Recipes, again: Again) -> Result<u64> {
+        let (current, groups) = {
+            let mut conn = self.snapshot().await?;
+            let current = current_json(&mut conn, recipes).await?;
+            let groups = alike::groups(&mut conn, &current).await?;
+            (current, groups)
+        };
+        let mut sent = 0;
+        for group in groups {
+            let group = Arc::new(group);
+            let mut after = Some(0);
+            while let (Some(from), Some(to)) = (after, goes_back(&group.seen, again)) {
+                let group = Arc::clone(&group);
+                let (moved, next) = self
+                    .alone(move |conn| Box::pin(group_page(conn, group, to, from)))
+                    .await?;
+                sent += moved;
+                after = next;
+            }
+        }
+        let mut after = Some(0);
+        while let Some(from) = after {
+            let current = current.clone();
+            let (moved, next) = self
+                .alone(move |conn| Box::pin(apart_page(conn, current, again, from)))
                 .await?;
             sent += moved;
             after = next;
@@ -92,34 +130,69 @@ impl Catalog {
     }
 }
 
-/// One page of [`Catalog::send_back`]: how many moved, and where the next page begins.
+/// Where a job goes back to; `None` when it stays or waits to be run anyhow.
+fn goes_back(seen: &Seen, again: Again) -> Option<Stage> {
+    let (to, cause) = decide(seen, again)?;
+    let waits = matches!(cause, Cause::New | Cause::Unfinished | Cause::BackingOff);
+    (!waits).then_some(to)
+}
+
+fn moved(seen: &[Seen], again: Again) -> Vec<Moved> {
+    let moved = |seen: &Seen| {
+        Some(Moved {
+            pair: seen.pair,
+            from: (seen.cursor, seen.status),
+            to: goes_back(seen, again)?,
+        })
+    };
+    seen.iter().filter_map(moved).collect()
+}
+
+/// One page of some pairs: how many moved, and where the next page begins.
 async fn page(
     conn: &mut SqliteConnection,
     recipes: &Recipes,
-    among: Option<&PairSelection>,
+    among: &PairSelection,
     again: Again,
     after: i64,
 ) -> Result<(u64, Option<i64>)> {
     let current = current_json(conn, recipes).await?;
     let found = look(conn, &current, after, among).await?;
-    let moved: Vec<_> = found
-        .iter()
-        .filter_map(|seen| {
-            let (to, cause) = decide(seen, again)?;
-            let waits = matches!(cause, Cause::New | Cause::Unfinished | Cause::BackingOff);
-            (!waits).then_some(Moved {
-                pair: seen.pair,
-                from: (seen.cursor, seen.status),
-                to,
-            })
-        })
-        .collect();
-    let sent = apply(conn, &moved).await?;
-    let last = found.last().map(|seen| seen.pair);
-    if let (Some(last), None) = (last, among) {
-        alike::settle(conn, after, last).await?;
-    }
-    Ok((sent, last))
+    let sent = apply(conn, &moved(&found, again)).await?;
+    Ok((sent, found.last().map(|seen| seen.pair)))
+}
+
+/// One page of a group that goes back.
+async fn group_page(
+    conn: &mut SqliteConnection,
+    group: Arc<alike::Group>,
+    to: Stage,
+    after: i64,
+) -> Result<(u64, Option<i64>)> {
+    let pairs = alike::members(conn, &group, after).await?;
+    let from = (group.seen.cursor, group.seen.status);
+    let moved = pairs.iter().map(|pair| Moved {
+        pair: *pair,
+        from,
+        to,
+    });
+    let sent = apply(conn, &moved.collect::<Vec<_>>()).await?;
+    Ok((sent, pairs.last().copied()))
+}
+
+/// One page of the pairs that are in no group.
+async fn apart_page(
+    conn: &mut SqliteConnection,
+    current: String,
+    again: Again,
+    after: i64,
+) -> Result<(u64, Option<i64>)> {
+    let Some((found, last)) = alike::look_apart(conn, &current, after).await? else {
+        return Ok((0, None));
+    };
+    let sent = apply(conn, &moved(&found, again)).await?;
+    alike::settle(conn, after, last).await?;
+    Ok((sent, Some(last)))
 }
 
 async fn kept_back(conn: &mut SqliteConnection, selection: &RetrySelection) -> Result<Vec<Moved>> {

@@ -5,9 +5,10 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 use sqlx::{Row as _, SqliteConnection};
 
-use super::checkpoint::{run_seen, seen_json};
+use super::checkpoint::{SEEN, over, seen_row};
 use super::counters::Deltas;
 use super::lease::InputsSeen;
+use super::script::Script;
 use super::{Catalog, Result, rows};
 use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
@@ -160,13 +161,10 @@ impl Catalog {
     pub async fn note_fatal_inputs(&self, seen: Vec<(PairId, InputsSeen)>) -> Result<()> {
         self.alone(move |conn| {
             Box::pin(async move {
-                let items = seen.iter().map(|(pair, seen)| seen_json(pair.0, seen));
-                let items = rows::array(items);
-                run_seen(conn, &items).await?;
-                sqlx::query(FATAL_INPUTS)
-                    .bind(items.to_string())
-                    .execute(conn)
-                    .await?;
+                let mut script = Script::default();
+                let items = seen.iter().map(|(pair, seen)| seen_row(pair.0, seen));
+                over(&mut script, &[SEEN, FATAL_INPUTS], items)?;
+                script.run(conn).await?;
                 Ok(())
             })
         })
@@ -184,21 +182,26 @@ impl Catalog {
         margin_ms: i64,
         now: UnixMillis,
     ) -> Result<Rescued> {
-        self.alone(move |conn| {
-            Box::pin(async move {
-                let others = holders_but(conn, me).await?;
-                let victims = victims(conn, &others).await?;
-                let found = sqlx::query(OVERDUE)
-                    .bind(others)
-                    .bind(CRASH_LIMIT)
-                    .bind(margin_ms)
-                    .fetch_all(&mut *conn)
-                    .await?;
-                brought_back(conn, &found, &victims, now).await
-            })
-        })
-        .await
+        self.alone(move |conn| Box::pin(overdue(conn, me, margin_ms, now)))
+            .await
     }
+}
+
+async fn overdue(
+    conn: &mut SqliteConnection,
+    me: WorkerId,
+    margin_ms: i64,
+    now: UnixMillis,
+) -> Result<Rescued> {
+    let others = holders_but(conn, me).await?;
+    let victims = victims(conn, &others).await?;
+    let found = sqlx::query(OVERDUE)
+        .bind(others)
+        .bind(CRASH_LIMIT)
+        .bind(margin_ms)
+        .fetch_all(&mut *conn)
+        .await?;
+    brought_back(conn, &found, &victims, now).await
 }
 
 /// Items of [`RESCUE`] for some workers.

@@ -27,33 +27,21 @@ pub enum Again {
 }
 
 /// Each job with its first result that was made otherwise than it would be now.
-macro_rules! look {
-    ($from:literal) => {
-        concat!(
-            "
+pub(super) const LOOK: &str = "
 WITH seen AS (
     SELECT j.pair, j.stage, j.status, p.mesh_hash, p.print_hash, p.facts, (
         SELECT min(r.stage) FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
             r.recipe <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
             OR r.facts <> p.facts)) AS first
-    FROM ",
-            $from,
-            " JOIN pair AS p ON p.id = j.pair WHERE j.pair > ?2 ORDER BY j.pair LIMIT ?3)
+    FROM (SELECT value FROM json_each(?4)) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+        JOIN pair AS p ON p.id = j.pair WHERE j.pair > ?2 ORDER BY j.pair LIMIT ?3)
 SELECT seen.pair, seen.stage, seen.status, seen.first, r.recipe,
     coalesce(r.mesh_hash <> seen.mesh_hash, 0) AS mesh, coalesce(r.print_hash <> seen.print_hash, 0) AS print,
     coalesce(r.facts <> seen.facts, 0) AS facts,
     coalesce(f.recipe <> (?1 ->> f.stage), 0) OR coalesce(f.mesh_hash <> seen.mesh_hash, 0)
         OR coalesce(f.print_hash <> seen.print_hash, 0) OR coalesce(f.facts <> seen.facts, 0) AS otherwise
 FROM seen LEFT JOIN stage_result AS r ON r.pair = seen.pair AND r.stage = seen.first
-    LEFT JOIN failure AS f ON f.pair = seen.pair ORDER BY seen.pair"
-        )
-    };
-}
-
-pub(super) const LOOK_ALL: &str = look!("job AS j");
-pub(super) const LOOK_AMONG: &str = look!(
-    "(SELECT value FROM json_each(?4)) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value"
-);
+    LEFT JOIN failure AS f ON f.pair = seen.pair ORDER BY seen.pair";
 
 /// A job as the look found it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,23 +101,16 @@ pub(super) fn decide(seen: &Seen, again: Again) -> Option<(Stage, Cause)> {
     next.map(|at| (at, cause))
 }
 
-/// Looks at the next jobs after a pair.
+/// Looks at the next of some jobs after a pair.
 pub(super) async fn look(
     conn: &mut SqliteConnection,
     current: &str,
     after: i64,
-    among: Option<&PairSelection>,
+    among: &PairSelection,
 ) -> Result<Vec<Seen>> {
-    let query = match among {
-        None => sqlx::query(LOOK_ALL),
-        Some(_) => sqlx::query(LOOK_AMONG),
-    };
-    let mut query = query.bind(current).bind(after).bind(PAGE as i64);
-    if let Some(among) = among {
-        query = query.bind(&among.json);
-    }
-    let found = query.fetch_all(conn).await?;
-    found.iter().map(seen).collect()
+    let query = sqlx::query(LOOK).bind(current).bind(after);
+    let query = query.bind(PAGE as i64).bind(&among.json);
+    query.fetch_all(conn).await?.iter().map(seen).collect()
 }
 
 fn seen(row: &SqliteRow) -> Result<Seen> {
@@ -236,7 +217,7 @@ async fn look_at(
 ) -> Result<()> {
     let mut after = 0;
     loop {
-        let page = look(conn, current, after, Some(among)).await?;
+        let page = look(conn, current, after, among).await?;
         let Some(last) = page.last() else {
             return Ok(());
         };

@@ -2,6 +2,7 @@
 
 mod guards;
 mod histories;
+mod import;
 mod migration;
 mod model;
 mod plans;
@@ -18,7 +19,7 @@ use super::{
 };
 use crate::domain::{
     Affine2, ArtifactSet, ContentHash, MetricOutcome, PairName, RegisterOutcome, Scores, Stage,
-    ThresholdMetric, WorkerId,
+    ThresholdMetric, UnixMillis, WorkerId,
 };
 
 /// A catalog in a directory of its own.
@@ -76,14 +77,15 @@ impl World {
     }
 
     async fn claim_as(&self, worker: WorkerId, slots: usize) -> Vec<Lease> {
+        let request = ClaimRequest::new(worker, slots, 1_000);
+        self.catalog.claim(request).await.expect("a claim")
+    }
+
+    /// One pair that must run by itself.
+    async fn claim_alone(&self, worker: WorkerId) -> Vec<Lease> {
         let request = ClaimRequest {
-            worker,
-            slots,
-            until: Stage::Register,
-            alone: false,
-            among: None,
-            deadline: 1_000,
-            alive_since: 0,
+            alone: true,
+            ..ClaimRequest::new(worker, 1, 1_000)
         };
         self.catalog.claim(request).await.expect("a claim")
     }
@@ -147,13 +149,18 @@ impl World {
 }
 
 async fn register(catalog: &Catalog) -> WorkerId {
+    let recipes = catalog.register_recipes(&recipes([1; 4])).await;
+    enter(catalog, recipes.expect("recipes"), 1).await
+}
+
+/// Enters a worker whose clock shows this.
+async fn enter(catalog: &Catalog, recipes: RecipeIds, clock: UnixMillis) -> WorkerId {
     let info = WorkerInfo {
         host: "here".to_owned(),
         pid: 1,
         boot_id: None,
     };
-    let recipes = catalog.register_recipes(&recipes([1; 4])).await;
-    let entered = catalog.register_worker(info, recipes.expect("recipes"), 1);
+    let entered = catalog.register_worker(info, recipes, clock);
     entered.await.expect("a worker")
 }
 

@@ -1,6 +1,6 @@
 //! Upkeep of the queue: workers, back-off times, what is left.
 
-use sqlx::Row as _;
+use sqlx::{Row as _, SqliteConnection};
 
 use super::claim::PairSelection;
 use super::counters::{Deltas, cursor};
@@ -75,23 +75,8 @@ impl Catalog {
         recipes: RecipeIds,
         now: UnixMillis,
     ) -> Result<WorkerId> {
-        self.alone(move |conn| {
-            Box::pin(async move {
-                let id: i64 = sqlx::query_scalar(
-                    "INSERT INTO worker (host, pid, boot_id, started, beat, recipes)
-                    VALUES (?1, ?2, ?3, ?4, ?4, ?5) RETURNING id",
-                )
-                .bind(info.host)
-                .bind(info.pid)
-                .bind(info.boot_id)
-                .bind(now)
-                .bind(recipes.json())
-                .fetch_one(conn)
-                .await?;
-                Ok(WorkerId(id))
-            })
-        })
-        .await
+        self.alone(move |conn| Box::pin(enter(conn, info, recipes, now)))
+            .await
     }
 
     /// Says that a worker ended in order.
@@ -161,6 +146,26 @@ impl Catalog {
             next_due: row.try_get(3)?,
         })
     }
+}
+
+async fn enter(
+    conn: &mut SqliteConnection,
+    info: WorkerInfo,
+    recipes: RecipeIds,
+    now: UnixMillis,
+) -> Result<WorkerId> {
+    let id: i64 = sqlx::query_scalar(
+        "INSERT INTO worker (host, pid, boot_id, started, beat, recipes)
+        VALUES (?1, ?2, ?3, ?4, ?4, ?5) RETURNING id",
+    )
+    .bind(info.host)
+    .bind(info.pid)
+    .bind(info.boot_id)
+    .bind(now)
+    .bind(recipes.json())
+    .fetch_one(conn)
+    .await?;
+    Ok(WorkerId(id))
 }
 
 impl Catalog {

@@ -5,6 +5,7 @@ use sqlx::Row as _;
 use super::claim::PairSelection;
 use super::lease::{InputSeen, InputsSeen, Lease};
 use super::read::{PairFacts, StageRecord};
+use super::script::Script;
 use super::{Catalog, Result, checkpoint, pairs, results, rows};
 use crate::domain::{ContentHash, PairId};
 
@@ -97,10 +98,10 @@ impl Catalog {
     pub async fn store_inputs(&self, seen: Vec<(PairId, InputsSeen)>) -> Result<()> {
         self.alone(move |conn| {
             Box::pin(async move {
-                let items = seen
-                    .iter()
-                    .map(|(pair, seen)| checkpoint::seen_json(pair.0, seen));
-                checkpoint::run_seen(conn, &rows::array(items)).await
+                let mut script = Script::default();
+                checkpoint::store_inputs(&mut script, &seen)?;
+                script.run(conn).await?;
+                Ok(())
             })
         })
         .await

@@ -116,9 +116,17 @@ async fn commit(conn: &mut SqliteConnection, batch: Batch) {
 }
 
 async fn attempt(conn: &mut SqliteConnection, batch: &Batch) -> Result<Answers> {
-    begin(conn).await?;
-    let outcome = batch.apply(conn).await;
-    end(conn, outcome).await
+    let patience = Patience::begin();
+    loop {
+        let outcome = batch.apply(conn).await;
+        if outcome.is_err() {
+            take_back(conn).await;
+        }
+        match patience.wait(&outcome) {
+            Some(moment) => moment.await,
+            None => return outcome,
+        }
+    }
 }
 
 /// Begins a write transaction, when no other process has one.
@@ -143,11 +151,16 @@ async fn end<T>(conn: &mut SqliteConnection, outcome: Result<T>) -> Result<T> {
         },
         failed => failed,
     };
+    take_back(conn).await;
+    outcome
+}
+
+/// Takes back what a transaction did that went wrong.
+async fn take_back(conn: &mut SqliteConnection) {
     // Some errors, such as a full disk, have rolled back already; then there is nothing to take back.
     if let Err(error) = sqlx::query("ROLLBACK").execute(conn).await {
         tracing::debug!(%error, "nothing to roll back");
     }
-    outcome
 }
 
 async fn fold_log(conn: &mut SqliteConnection, pragma: &'static str) {

@@ -128,6 +128,11 @@ impl Finding {
         Self::bare(Kind::Counter, what)
     }
 
+    /// A count or note of stale pairs that is off.
+    pub(super) const fn shortcut(line: String) -> Self {
+        Self::bare(Kind::Counter, line)
+    }
+
     const fn bare(kind: Kind, what: String) -> Self {
         Self {
             kind,

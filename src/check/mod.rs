@@ -172,7 +172,12 @@ async fn counters(
     for drift in &drift {
         summary.add(Finding::counter(drift));
     }
-    if options.repair && !drift.is_empty() {
+    let lines = catalog.shortcut_drift(options.quick).await?;
+    let is_off = !drift.is_empty() || !lines.is_empty();
+    for line in lines {
+        summary.add(Finding::shortcut(line));
+    }
+    if options.repair && is_off {
         catalog.mend_counters().await?;
         summary.mended(Kind::Counter);
         summary.repaired.counters = true;

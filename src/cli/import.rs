@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Context as _;
 use clap::Args;
 use serde_json::{Value, json};
+use tokio::sync::mpsc;
 
 use super::context::{Context, now};
 use super::exit::ExitCode;
@@ -12,10 +13,14 @@ use super::manifest_file::Listing;
 use super::table::count;
 use super::talk;
 use super::truth_file::{self, refusal};
-use crate::catalog::{Catalog, ImportRow, ImportSummary};
+use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
 use crate::domain::{LengthUnit, PairName};
-use crate::manifest::ManifestRow;
+use crate::manifest::{Ids, ManifestRow};
 use crate::store::Project;
+
+/// Rows handed to the catalog at a time, and how many times it may be behind.
+const CHUNK: usize = 2_000;
+const CHUNKS_AHEAD: usize = 2;
 
 /// Arguments of `import`.
 #[derive(Debug, Default, Args)]
@@ -62,43 +67,74 @@ pub(super) struct Taken {
 /// # Errors
 /// When a list is refused, or catalog or disk refuse.
 pub(super) async fn take(args: &ImportArgs, context: &Context) -> anyhow::Result<Taken> {
-    let listing = listing(args)?;
+    let mut listing = listing(args)?;
+    let remarks = std::mem::take(&mut listing.remarks);
     let dir = context.dir();
     let truths = match &args.truth {
-        Some(file) => read_truths(file, &listing.rows, &dir).await?,
+        Some(file) => read_truths(file, &listing.ids, &dir).await?,
         None => Vec::new(),
     };
     let project = Project::at(&dir);
-    let rows = listing
-        .rows
-        .iter()
-        .map(|row| stored_row(row, &project))
-        .collect::<anyhow::Result<Vec<_>>>()?;
     let truths = stored_truths(truths, &project)?;
     let before = Before::of(&project);
-    let stored = store(&project, rows, truths).await;
+    let stored = store(&project, listing, truths).await;
     if stored.is_err() {
         before.restore(&project);
     }
-    let (summary, stored) = stored?;
+    let (summary, truths, missing) = stored?;
     Ok(Taken {
         summary,
-        truths: stored,
-        missing: listing.missing(),
-        remarks: listing.remarks,
+        truths,
+        missing,
+        remarks,
     })
 }
 
+/// Stores the list; gives what changed, how many true alignments were stored, and a line for each file that is not
+/// there.
 async fn store(
     project: &Project,
-    rows: Vec<ImportRow>,
+    listing: Listing,
     truths: Vec<(PairName, Value)>,
-) -> anyhow::Result<(ImportSummary, u64)> {
+) -> anyhow::Result<(ImportSummary, u64, Vec<String>)> {
     Project::create(project.dir())?;
     let catalog = Catalog::create(&project.catalog_path()).await?;
-    let stored = catalog.import_with_truth(rows, truths, now()).await;
+    let (sender, rows) = mpsc::channel(CHUNKS_AHEAD);
+    let of = project.clone();
+    let fed = tokio::task::spawn_blocking(move || feed(listing, &of, &sender));
+    let stored = catalog.import_all(rows, truths, now()).await;
     catalog.close().await;
-    Ok(stored?)
+    // Where a row cannot be made, that says more than that the import was cut short.
+    let missing = fed.await.context("the list's reader stopped")??;
+    let (summary, truths) = stored?;
+    Ok((summary, truths, missing))
+}
+
+/// Makes the rows and hands them on, some at a time; gives a line for each file that is not there.
+fn feed(
+    listing: Listing,
+    project: &Project,
+    sender: &mpsc::Sender<ImportChunk>,
+) -> anyhow::Result<Vec<String>> {
+    let (mut missing, mut chunk) = (Vec::new(), Vec::new());
+    let mut outcome = Ok(());
+    listing.rows(|row, lines| {
+        missing.extend(lines);
+        match stored_row(&row, project) {
+            Ok(row) => chunk.push(row),
+            Err(error) if outcome.is_ok() => outcome = Err(error),
+            Err(_) => {}
+        }
+        if chunk.len() == CHUNK {
+            // The catalog hears no more after an error of its own, which is told there.
+            let _ = sender.blocking_send(ImportChunk::Rows(std::mem::take(&mut chunk)));
+        }
+    });
+    outcome?;
+    for last in [ImportChunk::Rows(chunk), ImportChunk::End] {
+        let _ = sender.blocking_send(last);
+    }
+    Ok(missing)
 }
 
 /// What was there before an import, so that one that fails leaves no half-made project.
@@ -142,13 +178,12 @@ fn listing(args: &ImportArgs) -> anyhow::Result<Listing> {
 /// Reads true alignments and refuses those of pairs that are neither in the list nor in the project.
 async fn read_truths(
     file: &Path,
-    rows: &[ManifestRow],
+    listed: &Ids,
     dir: &Path,
 ) -> anyhow::Result<Vec<truth_file::Row>> {
     let shown = file.display();
     let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {shown}"))?;
     let truths = truth_file::parse(file, &text)?;
-    let listed: std::collections::BTreeSet<&PairName> = rows.iter().map(|row| &row.name).collect();
     let others: Vec<PairName> = truths
         .iter()
         .map(|truth| truth.name.clone())

@@ -1,23 +1,40 @@
 //! Reads a manifest or two folders from disk for the pure parsers in `manifest`.
 
-use std::collections::BTreeMap;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
 
 use super::exit::Refusal;
-use crate::domain::LengthUnit;
-use crate::manifest::{ManifestError, ManifestRow, pair_folders, parse_csv, parse_jsonl};
+use crate::domain::{ContentHash, LengthUnit, PairName};
+use crate::manifest::{Ids, ManifestError, ManifestRow, pair_folders, read_csv, read_jsonl};
 
-/// Pairs to import: paths as they are reached from the working directory.
+/// Pairs to import, known to be sound. A list is kept as it is written and its rows are made one after another.
 #[derive(Debug)]
 pub(super) struct Listing {
-    pub(super) rows: Vec<ManifestRow>,
+    source: Source,
+    /// The ids of all its pairs.
+    pub(super) ids: Ids,
     /// What a person should know, a line each.
     pub(super) remarks: Vec<String>,
     /// What a row's number counts: `pairs.csv: line`, or `pair` for folders.
     place: String,
 }
+
+/// Where the rows come from.
+#[derive(Debug)]
+enum Source {
+    /// A list, and the folder that its paths are relative to.
+    List {
+        bytes: Vec<u8>,
+        read: Reader,
+        folder: PathBuf,
+    },
+    /// Two folders.
+    Folders(Vec<ManifestRow>),
+}
+
+type Reader = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<Ids, ManifestError>;
 
 /// A manifest that is refused as a whole.
 #[derive(Debug, thiserror::Error)]
@@ -48,23 +65,27 @@ impl Listing {
             return Err(Refusal::Usage(text).into());
         }
         let bytes = std::fs::read(file).with_context(|| format!("cannot read {shown}"))?;
-        let rows = if is_jsonl(file, &bytes) {
-            parse_jsonl(&bytes)
+        let read: Reader = if is_jsonl(file, &bytes) {
+            read_jsonl
         } else {
-            parse_csv(&bytes)
+            read_csv
         };
-        let mut rows = rows.map_err(|problems| RefusedManifest {
-            from: file.to_owned(),
-            problems,
+        let mut capitals = Capitals::default();
+        let ids = read(&bytes, &mut |row| capitals.note(&row.name)).map_err(|problems| {
+            RefusedManifest {
+                from: file.to_owned(),
+                problems,
+            }
         })?;
-        let folder = file.parent().unwrap_or(Path::new(""));
-        for row in &mut rows {
-            row.mesh = folder.join(&row.mesh);
-            row.print = folder.join(&row.print);
-        }
+        let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
-            remarks: same_but_for_case(&rows).into_iter().collect(),
-            rows,
+            source: Source::List {
+                bytes,
+                read,
+                folder,
+            },
+            ids,
+            remarks: capitals.remark().into_iter().collect(),
             place: format!("{shown}: line"),
         })
     }
@@ -92,53 +113,92 @@ impl Listing {
             remark("print without mesh", &found.prints_alone),
             remark("file that is neither", &found.ignored),
         ];
-        let remarks = remarks.into_iter().chain([same_but_for_case(&rows)]);
+        let mut capitals = Capitals::default();
+        for row in &rows {
+            capitals.note(&row.name);
+        }
+        let remarks = remarks.into_iter().chain([capitals.remark()]);
         Ok(Self {
-            rows,
+            ids: rows.iter().map(|row| &row.name).collect(),
+            source: Source::Folders(rows),
             remarks: remarks.flatten().collect(),
             place: "pair".to_owned(),
         })
     }
 
-    /// A line for each file that is not there.
-    pub(super) fn missing(&self) -> Vec<String> {
-        let mut lines = Vec::new();
-        for row in &self.rows {
-            for (what, path) in [("mesh", &row.mesh), ("print", &row.print)] {
-                if !path.exists() {
-                    lines.push(format!(
-                        "{} {}: {what} {} of {} is not there",
-                        self.place,
-                        row.line,
-                        path.display(),
-                        row.name
-                    ));
-                }
+    /// Gives each row, with paths as they are reached from the working directory, and a line for each of its files
+    /// that is not there.
+    pub(super) fn rows(self, mut each: impl FnMut(ManifestRow, Vec<String>)) {
+        let place = self.place;
+        let mut each = |row: ManifestRow| {
+            let missing = missing(&place, &row);
+            each(row, missing);
+        };
+        match self.source {
+            Source::Folders(rows) => rows.into_iter().for_each(each),
+            Source::List {
+                bytes,
+                read,
+                folder,
+            } => {
+                let read = read(&bytes, &mut |mut row| {
+                    row.mesh = folder.join(&row.mesh);
+                    row.print = folder.join(&row.print);
+                    each(row);
+                });
+                read.expect("the same bytes were read before");
             }
         }
-        lines
     }
 }
 
-/// Ids that some disks cannot tell apart.
-fn same_but_for_case(rows: &[ManifestRow]) -> Option<String> {
-    let mut seen = BTreeMap::new();
-    let mut alike = rows.iter().filter_map(|row| {
-        let lower = row.name.as_str().to_ascii_lowercase();
-        Some((seen.insert(lower, &row.name)?, &row.name))
-    });
-    let (first, second) = alike.next()?;
-    let more = match alike.count() {
-        0 => String::new(),
-        more => format!(", as do {more} more"),
-    };
-    Some(format!(
-        "ids {first} and {second} differ only in capitals{more}; an export to a disk that takes these for one name \
-         (Windows, macOS, memory sticks) would mix their folders"
-    ))
+/// Finds ids that some disks cannot tell apart.
+#[derive(Debug, Default)]
+struct Capitals {
+    /// The beginnings of hashes of the ids without capitals: a list may have millions.
+    seen: HashSet<[u8; 8]>,
+    first: Option<PairName>,
+    more: usize,
 }
 
-fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
+impl Capitals {
+    fn note(&mut self, name: &PairName) {
+        let hash = ContentHash::of(name.as_str().to_ascii_lowercase().as_bytes());
+        let is_new = self
+            .seen
+            .insert(std::array::from_fn(|at| hash.as_bytes()[at]));
+        match (is_new, &self.first) {
+            (true, _) => {}
+            (false, None) => self.first = Some(name.clone()),
+            (false, Some(_)) => self.more += 1,
+        }
+    }
+
+    fn remark(self) -> Option<String> {
+        let name = self.first?;
+        let more = match self.more {
+            0 => String::new(),
+            more => format!(", as do {more} more ids"),
+        };
+        Some(format!(
+            "id {name} differs from another only in capitals{more}; an export to a disk that takes these for one name \
+             (Windows, macOS, memory sticks) would mix their folders"
+        ))
+    }
+}
+
+fn missing(place: &str, row: &ManifestRow) -> Vec<String> {
+    let files = [("mesh", &row.mesh), ("print", &row.print)].into_iter();
+    let missing = files.filter(|(_, path)| !path.exists());
+    let line = |(what, path): (&str, &PathBuf)| {
+        let (path, line, name) = (path.display(), row.line, &row.name);
+        format!("{place} {line}: {what} {path} of {name} is not there")
+    };
+    missing.map(line).collect()
+}
+
+/// Whether a file holds JSON Lines, by its ending, and where that does not tell, by its first character.
+pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
     let ending = file.extension().and_then(|ending| ending.to_str());
     match ending.map(str::to_ascii_lowercase).as_deref() {
         Some("jsonl" | "ndjson" | "json") => true,
@@ -202,7 +262,7 @@ mod tests {
         let remarks = Listing::from_file(&file).expect("valid").remarks;
         assert_eq!(remarks.len(), 1);
         assert!(
-            remarks[0].starts_with("ids A1 and a1 differ only in capitals, as do 1 more"),
+            remarks[0].starts_with("id a1 differs from another only in capitals, as do 1 more ids"),
             "{remarks:?}"
         );
     }
@@ -213,8 +273,12 @@ mod tests {
         let file = dir.path().join("pairs.csv");
         std::fs::write(&file, "id,mesh,print\na,a.stl,pairs.csv\n").expect("a small file");
         let listing = Listing::from_file(&file).expect("valid");
-        assert_eq!(listing.rows[0].mesh, dir.path().join("a.stl"));
-        let missing = listing.missing();
+        let (mut meshes, mut missing) = (Vec::new(), Vec::new());
+        listing.rows(|row, lines| {
+            meshes.push(row.mesh);
+            missing.extend(lines);
+        });
+        assert_eq!(meshes, [dir.path().join("a.stl")]);
         assert_eq!(missing.len(), 1);
         assert!(
             missing[0].contains("pairs.csv: line 2: mesh "),

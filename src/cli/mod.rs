@@ -34,6 +34,7 @@ mod trouble;
 mod truth_file;
 mod verdict;
 mod verdict_file;
+mod verdict_lines;
 
 use std::ffi::OsString;
 

@@ -9,10 +9,12 @@ use serde_json::json;
 use super::clock::utc;
 use super::context::{Context, now};
 use super::exit::ExitCode;
+use super::manifest_file::is_jsonl;
 use super::table::{Align, columns, count};
 use super::talk::{self, Palette, Tone};
-use super::{select, verdict_file};
-use crate::catalog::{NewVerdict, VerdictEvent};
+use super::verdict_file::Row;
+use super::{select, verdict_file, verdict_lines};
+use crate::catalog::{Catalog, NewVerdict, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 
 /// What to do with verdicts.
@@ -20,7 +22,8 @@ use crate::domain::{Reason, ThresholdMetric, Verdict};
 pub(super) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(SetArgs),
-    /// Record the verdicts of a CSV file: pair, verdict, reader, and if wanted metric, reason, note
+    /// Record the verdicts of a CSV file (pair, verdict, reader, and if wanted metric, reason, note), or of the
+    /// verdicts.jsonl of an export or a backup
     Import(ImportArgs),
     /// Print the log, oldest first
     Log(LogArgs),
@@ -52,7 +55,7 @@ pub(super) struct SetArgs {
 /// Arguments of `verdict import`.
 #[derive(Debug, Args)]
 pub(super) struct ImportArgs {
-    /// The CSV file
+    /// The file
     pub(super) file: PathBuf,
 }
 
@@ -117,22 +120,55 @@ async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode>
     let path = args.file.display();
     let bytes = std::fs::read(&args.file).with_context(|| format!("cannot read {path}"))?;
     let (_project, catalog) = context.writer().await?;
-    let rows = verdict_file::parse(&bytes).map_err(|error| error.in_file(&args.file))?;
+    let parse = if is_jsonl(&args.file, &bytes) {
+        verdict_lines::parse
+    } else {
+        verdict_file::parse
+    };
+    let rows = parse(&bytes).map_err(|error| error.in_file(&args.file))?;
     let names: Vec<_> = rows.iter().map(|row| row.verdict.pair.clone()).collect();
     let unknown = catalog.unknown_names(&names).await?;
     verdict_file::refuse_unknown(&rows, &unknown).map_err(|error| error.in_file(&args.file))?;
+    let all = rows.len() as u64;
+    let rows = on_current_results(&catalog, rows).await?;
     let number = rows.len() as u64;
     let verdicts = rows.into_iter().map(|row| row.verdict).collect();
     catalog.verdict_set(verdicts, now()).await?;
     catalog.close().await;
     if context.global.json {
-        talk::print_json(&json!({"schema": 1, "recorded": number}))?;
+        talk::print_json(&json!({"schema": 1, "recorded": number, "left_out": all - number}))?;
+    }
+    if all > number {
+        let left_out = count(all - number, "verdict");
+        let why = "on a result that the pair does not have here";
+        context.talk.warn(&format!("{left_out} left out: {why}"));
     }
     context
         .talk
         .say(&format!("{} recorded", count(number, "verdict")));
     context.talk.next(&context.command("report"));
     Ok(ExitCode::Done)
+}
+
+/// Those of the rows that name no result, or one that is current here.
+async fn on_current_results(catalog: &Catalog, rows: Vec<Row>) -> anyhow::Result<Vec<Row>> {
+    let mut kept = Vec::with_capacity(rows.len());
+    for row in rows {
+        let Some(judged) = row.judged else {
+            kept.push(row);
+            continue;
+        };
+        let detail = catalog.pair(&row.verdict.pair).await?;
+        let metrics = detail.map_or_else(Vec::new, |detail| detail.results.metrics);
+        let is_current = metrics.iter().any(|metric| {
+            let named = row.verdict.metric;
+            metric.result_hash == judged && named.is_none_or(|named| named == metric.outcome.metric)
+        });
+        if is_current {
+            kept.push(row);
+        }
+    }
+    Ok(kept)
 }
 
 async fn log(args: LogArgs, context: &Context) -> anyhow::Result<ExitCode> {

@@ -7,7 +7,7 @@ use csv::StringRecord;
 
 use crate::catalog::NewVerdict;
 use crate::config::hint;
-use crate::domain::{PairName, plain};
+use crate::domain::{ContentHash, PairName, plain};
 use crate::manifest::{LineCounter, as_utf8, delimiter};
 
 const COLUMNS: [&str; 6] = ["pair", "verdict", "reader", "metric", "reason", "note"];
@@ -18,6 +18,8 @@ const NEEDED: usize = 3;
 pub(super) struct Row {
     pub(super) line: u64,
     pub(super) verdict: NewVerdict,
+    /// The result that it judged, where the file says so.
+    pub(super) judged: Option<ContentHash>,
 }
 
 /// Why the file is refused.
@@ -30,7 +32,7 @@ pub(super) struct VerdictFileError {
 }
 
 impl VerdictFileError {
-    fn new(line: u64, reason: &str) -> Self {
+    pub(super) fn new(line: u64, reason: &str) -> Self {
         Self {
             file: None,
             line,
@@ -121,7 +123,11 @@ fn row(
         reason: cell(4).map(|text| word(text, line)).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
     };
-    Ok(Row { line, verdict })
+    Ok(Row {
+        line,
+        verdict,
+        judged: None,
+    })
 }
 
 fn word<T>(text: &str, line: u64) -> Result<T, VerdictFileError>

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::draft::{Draft, Rows};
 use super::{
-    COLUMNS, LineCounter, ManifestError, ManifestRow, Problem, REQUIRED, as_utf8, delimiter,
+    COLUMNS, Ids, LineCounter, ManifestError, ManifestRow, Problem, REQUIRED, as_utf8, delimiter,
 };
 
 /// Parses a CSV list with a header line. Column names may stand in any order and in capitals; blank lines are
@@ -13,6 +13,17 @@ use super::{
 /// # Errors
 /// All that is wrong, by the line each row begins at.
 pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
+    let mut rows = Vec::new();
+    read_csv(bytes, &mut |row| rows.push(row))?;
+    Ok(rows)
+}
+
+/// The same for lists that are too long to be held: each row goes to `each` as it is read, also where a later one is
+/// refused.
+///
+/// # Errors
+/// All that is wrong, by the line each row begins at.
+pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<Ids, ManifestError> {
     let text = as_utf8(bytes).map_err(|error| Problem::whole(error.to_string()))?;
     let bytes = &*text;
     let mut reader = ::csv::ReaderBuilder::new()
@@ -31,7 +42,7 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
         Some(header) => Header::parse(&header?)?,
         None => return Err(Problem::whole("the list is empty").into()),
     };
-    let mut rows = Rows::default();
+    let mut rows = Rows::new(each);
     for record in records {
         let (line, record) = record?;
         match header.draft(line, &record) {
@@ -40,7 +51,7 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
             Err(problem) => rows.problems.push(problem),
         }
     }
-    ManifestError::unless_none(rows.accepted, rows.problems)
+    rows.end()
 }
 
 /// What a column holds.

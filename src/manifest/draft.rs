@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::{ManifestRow, Problem, REQUIRED};
+use super::{Ids, ManifestError, ManifestRow, Problem, REQUIRED};
 use crate::domain::{LengthUnit, PairName};
 
 /// Cells of one row by lower-case column name, and the columns of no meaning to us.
@@ -14,15 +14,29 @@ pub(super) struct Draft {
     pub(super) meta: BTreeMap<String, serde_json::Value>,
 }
 
-/// Collects rows, problems, and the line of each id.
-#[derive(Debug, Default)]
-pub(super) struct Rows {
-    pub(super) accepted: Vec<ManifestRow>,
+/// Passes rows on; collects problems, and the line of each id.
+pub(super) struct Rows<'e> {
     pub(super) problems: Vec<Problem>,
-    lines: BTreeMap<PairName, usize>,
+    ids: Ids,
+    each: &'e mut dyn FnMut(ManifestRow),
 }
 
-impl Rows {
+impl<'e> Rows<'e> {
+    /// For a list whose sound rows are to go to `each`.
+    pub(super) fn new(each: &'e mut dyn FnMut(ManifestRow)) -> Self {
+        Self {
+            problems: Vec::new(),
+            ids: Ids::default(),
+            each,
+        }
+    }
+
+    /// The ids of the list, or all that is wrong with it.
+    pub(super) fn end(self) -> Result<Ids, ManifestError> {
+        ManifestError::unless_none(self.ids.is_empty(), self.problems)?;
+        Ok(self.ids)
+    }
+
     /// Checks a row; what is wrong with it is noted.
     pub(super) fn push(&mut self, draft: Draft) {
         let line = draft.line;
@@ -33,7 +47,7 @@ impl Rows {
         let before = self.problems.len();
         self.problems.extend(problems);
         if before == self.problems.len() {
-            self.accepted.extend(row);
+            row.into_iter().for_each(&mut self.each);
         }
     }
 
@@ -47,11 +61,10 @@ impl Rows {
                 return None;
             }
         };
-        if let Some(first) = self.lines.get(&name) {
+        if let Some(first) = self.ids.insert(&name, draft.line) {
             reasons.push(format!("id {text:?} was given in line {first} already"));
             return None;
         }
-        self.lines.insert(name.clone(), draft.line);
         Some(name)
     }
 }

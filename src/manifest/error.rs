@@ -73,15 +73,15 @@ pub struct ManifestError {
 }
 
 impl ManifestError {
-    /// The rows when nothing is wrong, or all that is.
-    pub(super) fn unless_none<T>(rows: Vec<T>, problems: Vec<Problem>) -> Result<Vec<T>, Self> {
+    /// Refuses a list with anything wrong in it, or without pairs.
+    pub(super) fn unless_none(is_empty: bool, problems: Vec<Problem>) -> Result<(), Self> {
         if !problems.is_empty() {
             return Err(Self { problems });
         }
-        if rows.is_empty() {
+        if is_empty {
             return Err(Problem::whole("the list holds no pairs").into());
         }
-        Ok(rows)
+        Ok(())
     }
 }
 

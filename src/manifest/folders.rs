@@ -46,7 +46,7 @@ pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPair
             Err(error) => problems.push(at_file(&mesh, error.to_string())),
         }
     }
-    let rows = ManifestError::unless_none(rows, problems)?;
+    ManifestError::unless_none(rows.is_empty(), problems)?;
     Ok(FolderPairs {
         rows,
         meshes_alone,

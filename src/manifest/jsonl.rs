@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 use super::draft::{Draft, Rows};
-use super::{COLUMNS, ManifestError, ManifestRow, Problem, as_utf8};
+use super::{COLUMNS, Ids, ManifestError, ManifestRow, Problem, as_utf8};
 
 /// Parses a JSON Lines list. Keys have the names of the CSV columns; `null` is the same as no key; blank lines are
 /// left out.
@@ -11,9 +11,20 @@ use super::{COLUMNS, ManifestError, ManifestRow, Problem, as_utf8};
 /// # Errors
 /// All that is wrong, by line.
 pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
+    let mut rows = Vec::new();
+    read_jsonl(bytes, &mut |row| rows.push(row))?;
+    Ok(rows)
+}
+
+/// The same for lists that are too long to be held: each row goes to `each` as it is read, also where a later one is
+/// refused.
+///
+/// # Errors
+/// All that is wrong, by line.
+pub fn read_jsonl(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<Ids, ManifestError> {
     let text = as_utf8(bytes).map_err(|error| Problem::whole(error.to_string()))?;
     let bytes = &*text;
-    let mut rows = Rows::default();
+    let mut rows = Rows::new(each);
     for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
         let content = content.trim_ascii();
         if content.is_empty() {
@@ -24,7 +35,7 @@ pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
             Err(reason) => rows.problems.push(Problem::line(line, reason)),
         }
     }
-    ManifestError::unless_none(rows.accepted, rows.problems)
+    rows.end()
 }
 
 fn draft(line: usize, content: &[u8]) -> Result<Draft, String> {

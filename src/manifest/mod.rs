@@ -6,6 +6,7 @@ mod csv;
 mod draft;
 mod error;
 mod folders;
+mod ids;
 mod jsonl;
 mod text;
 
@@ -14,10 +15,11 @@ use std::path::PathBuf;
 
 use crate::domain::{LengthUnit, PairName};
 
-pub use self::csv::parse_csv;
+pub use self::csv::{parse_csv, read_csv};
 pub use error::{ManifestError, Place, Problem};
 pub use folders::{FolderPairs, pair_folders};
-pub use jsonl::parse_jsonl;
+pub use ids::Ids;
+pub use jsonl::{parse_jsonl, read_jsonl};
 pub use text::{LineCounter, NotText, as_utf8, delimiter};
 
 /// One pair as a list gives it. Paths are as written: relative ones are relative to the list.

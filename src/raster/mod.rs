@@ -10,7 +10,7 @@ mod picture;
 mod resample;
 mod warp;
 
-pub use decode::{DecodeError, decode};
+pub use decode::{DecodeError, decode, pixels_by_header};
 pub use depth_map::DepthMap;
 pub use encode::{
     ArtifactError, decode_grey8, decode_grey16, decode_mask, png_grey8, png_grey16, png_mask,

@@ -1,5 +1,7 @@
 //! Memory: what a pair may need at once, told by the sizes of its files, and how much of it is given out.
 
+use std::fs::File;
+use std::io::BufReader;
 use std::path::Path;
 
 use crate::catalog::KnownInputs;
@@ -15,7 +17,7 @@ const MESH_FACTOR: f64 = 3.5;
 const OBJ_FACTOR: f64 = 6.0;
 /// Bytes at work for each pixel of a print.
 const PIXEL_BYTES: u64 = 50;
-/// Most pixels that a byte of a print's file is expected to hold.
+/// Most pixels that a byte of a print's file is expected to hold, where its header does not tell.
 const PIXELS_PER_BYTE: u64 = 1;
 const JPEG_PIXELS_PER_BYTE: u64 = 8;
 /// Share of the memory that is free at the start.
@@ -63,47 +65,53 @@ pub(super) fn need(
     from: Stage,
     images: &raster::Limits,
 ) -> u64 {
-    let size = |stored: &str| {
-        let meta = std::fs::metadata(project.input_path(stored));
-        meta.map_or(0, |meta| meta.len())
-    };
     let mesh = match from {
-        Stage::Fit | Stage::Depth => mesh_bytes(&inputs.mesh_path, size(&inputs.mesh_path)),
+        Stage::Fit | Stage::Depth => mesh_bytes(&project.input_path(&inputs.mesh_path)),
         Stage::Normalize | Stage::Register => 0,
     };
     let print = match from {
         Stage::Fit | Stage::Depth | Stage::Normalize => {
-            print_bytes(&inputs.print_path, size(&inputs.print_path), images)
+            print_bytes(&project.input_path(&inputs.print_path), images)
         }
         Stage::Register => 0,
     };
     PAIR_BYTES.saturating_add(mesh).saturating_add(print)
 }
 
-fn mesh_bytes(path: &str, size: u64) -> u64 {
+fn size(path: &Path) -> u64 {
+    std::fs::metadata(path).map_or(0, |meta| meta.len())
+}
+
+fn mesh_bytes(path: &Path) -> u64 {
     let factor = if has_ending(path, &["obj"]) {
         OBJ_FACTOR
     } else {
         MESH_FACTOR
     };
-    (size as f64 * factor) as u64
+    (size(path) as f64 * factor) as u64
 }
 
-/// No more than the largest print that is read.
-fn print_bytes(path: &str, size: u64, images: &raster::Limits) -> u64 {
-    let pixels = if has_ending(path, &["jpg", "jpeg"]) {
-        JPEG_PIXELS_PER_BYTE
-    } else {
-        PIXELS_PER_BYTE
-    };
-    let pixels = size.saturating_mul(pixels).min(images.max_pixels);
+/// No more than the largest print that is read. A small file may hold many pixels, so its header is asked first.
+fn print_bytes(path: &Path, images: &raster::Limits) -> u64 {
+    let size = size(path);
+    // What has no size may be a pipe, which would keep us waiting.
+    let of_header = (size > 0).then(|| File::open(path).ok()).flatten();
+    let pixels = of_header
+        .and_then(|file| raster::pixels_by_header(BufReader::new(file)))
+        .unwrap_or_else(|| {
+            let is_jpeg = has_ending(path, &["jpg", "jpeg"]);
+            size.saturating_mul(if is_jpeg {
+                JPEG_PIXELS_PER_BYTE
+            } else {
+                PIXELS_PER_BYTE
+            })
+        });
+    let pixels = pixels.min(images.max_pixels);
     pixels.saturating_mul(PIXEL_BYTES).saturating_add(size)
 }
 
-fn has_ending(path: &str, endings: &[&str]) -> bool {
-    let ending = Path::new(path)
-        .extension()
-        .and_then(std::ffi::OsStr::to_str);
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    let ending = path.extension().and_then(std::ffi::OsStr::to_str);
     ending.is_some_and(|ending| {
         endings
             .iter()
@@ -135,7 +143,7 @@ fn available(meminfo: &str) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Budget, PAIR_BYTES, available, need};
+    use super::{Budget, PAIR_BYTES, PIXEL_BYTES, available, need, print_bytes};
     use crate::catalog::KnownInputs;
     use crate::domain::{PairId, Stage};
     use crate::raster;
@@ -159,6 +167,18 @@ mod tests {
     fn without_a_limit_everybody_gets_what_they_need() {
         let mut budget = Budget::new(None);
         assert!(budget.give(u64::MAX) && budget.give(u64::MAX));
+    }
+
+    #[test]
+    fn a_small_file_of_many_pixels_is_told_by_its_header() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("white.png");
+        let white = image::GrayImage::from_pixel(3000, 2000, image::Luma([255]));
+        white.save(&path).expect("a file");
+        let size = std::fs::metadata(&path).expect("a file").len();
+        assert!(size < 100_000);
+        let bytes = print_bytes(&path, &raster::Limits::SUGGESTED);
+        assert_eq!(bytes, 6_000_000 * PIXEL_BYTES + size);
     }
 
     #[test]

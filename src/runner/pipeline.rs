@@ -92,7 +92,7 @@ impl Pipeline {
         let depth = self.depth_map(pair)?;
         let normalized = self.normalized(pair)?;
         let registered = register::register(&depth, &normalized, &self.settings.register)
-            .map_err(|error| setback(&error.into(), None))?;
+            .map_err(|error| in_file(&pair.facts.print_path, &error.into()))?;
         let (outcome, json) = settled(&registered.outcome)?;
         Ok(outputs::registered(json, outcome, &registered))
     }
@@ -225,15 +225,7 @@ fn unread(error: InputError) -> Setback {
 }
 
 fn in_file(path: &str, error: &StageError) -> Setback {
-    setback(error, Some(path))
-}
-
-fn setback(error: &StageError, path: Option<&str>) -> Setback {
-    let message = match path {
-        Some(path) => format!("{path}: {error}"),
-        None => error.to_string(),
-    };
-    Setback::failed(error.class(), message)
+    Setback::failed(error.class(), format!("{path}: {error}"))
 }
 
 /// An outcome as it will be read back, with its JSON. A number that JSON cannot hold is a defect of the stage.

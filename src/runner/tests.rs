@@ -314,15 +314,7 @@ async fn what_a_dead_process_left_comes_back_at_once() {
         .register_worker(info, ids.expect("recipes"), 1)
         .await
         .expect("a worker");
-    let request = ClaimRequest {
-        worker: dead,
-        slots: 1,
-        until: Stage::Register,
-        alone: false,
-        among: None,
-        deadline: 1,
-        alive_since: 0,
-    };
+    let request = ClaimRequest::new(dead, 1, 1);
     assert_eq!(
         world.catalog.claim(request).await.expect("a claim").len(),
         1

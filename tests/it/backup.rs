@@ -88,6 +88,67 @@ fn verdicts_survive_a_restore_and_go_beside_it_as_lines() {
 }
 
 #[test]
+fn verdicts_that_an_export_wrote_are_taken_into_another_project() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = done(dir.path());
+    let log = at(&project, &["verdict", "log", "--json"]).expect(0).out;
+    let first: serde_json::Value = log
+        .lines()
+        .next()
+        .and_then(|line| serde_json::from_str(line).ok())
+        .expect("a line");
+    let pair = first["pair"].as_str().expect("a name");
+    let undone = ["verdict", "set", pair, "fail", "--reader", "lan"];
+    at(&project, &undone).expect(0);
+    at(&project, &["verdict", "undo"]).expect(0);
+    let out = dir.path().join("out");
+    at(&project, &["export", "-o", out.to_str().expect("UTF-8")]).expect(0);
+    let lines = out.join("verdicts.jsonl");
+    let file = lines.to_str().expect("UTF-8");
+
+    let demo = ["demo", "other", "--pairs", "2", "--no-run"];
+    let small = ["--set", "depth.longest_px=96"];
+    mocban(dir.path(), &[&demo[..], &small].concat()).expect(0);
+    let other = Project::open(&dir.path().join("other")).expect("a project");
+    at(&other, &["run"]).expect(0);
+    let taken = at(&other, &["verdict", "import", file, "--json"]).expect(0);
+    assert_eq!(taken.json()["recorded"], 4);
+    let of = |project| {
+        let log = at(project, &["verdict", "log", "--json"]).expect(0).out;
+        let lines = log.lines().map(serde_json::from_str::<serde_json::Value>);
+        let lines = lines.map(|line| line.expect("JSON"));
+        let lines = lines.filter(|line| line["undone_at"].is_null());
+        let keys = [
+            "pair",
+            "metric",
+            "result_hash",
+            "verdict",
+            "reader",
+            "reason",
+            "note",
+        ];
+        let told = |line: &serde_json::Value| keys.map(|key| line[key].to_string());
+        lines.map(|line| told(&line)).collect::<Vec<_>>()
+    };
+    assert_eq!(of(&other), of(&project));
+    assert_eq!(of(&other).len(), 4);
+
+    // What was said of another result is not said of this one.
+    let text = std::fs::read_to_string(&lines).expect("read");
+    let first = text.lines().next().expect("a line");
+    let hash = "0".repeat(64);
+    let mut line: serde_json::Value = serde_json::from_str(first).expect("JSON");
+    line["result_hash"] = hash.into();
+    std::fs::write(&lines, line.to_string()).expect("written");
+    let taken = at(&other, &["verdict", "import", file, "--json"]).expect(0);
+    assert_eq!(
+        (&taken.json()["recorded"], &taken.json()["left_out"]),
+        (&0.into(), &1.into())
+    );
+    assert!(taken.err.contains("1 verdict left out"), "{}", taken.err);
+}
+
+#[test]
 fn a_backup_that_fails_leaves_the_earlier_one_and_nothing_half_made() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());

@@ -169,6 +169,17 @@ fn rows_and_counters_that_disagree_are_found_and_mended() {
             "UPDATE counter SET n = n + 1 WHERE stage = 0 AND status = 0",
         ),
         ("counter", "DELETE FROM counter WHERE n = 0"),
+        // What tells stale pairs without a look at each: counts by recipe, recipes of jobs, notes of other files.
+        ("counter", "UPDATE made SET n = n + 1"),
+        ("counter", "DELETE FROM made"),
+        (
+            "counter",
+            "UPDATE job SET made = (SELECT min(id) FROM recipe) WHERE pair = 1",
+        ),
+        (
+            "counter",
+            "UPDATE pair SET mesh_hash = zeroblob(32) WHERE id = 1; DELETE FROM moved",
+        ),
         (
             "result_missing",
             "DELETE FROM stage_result WHERE pair = 1 AND stage = 1",
@@ -186,11 +197,13 @@ fn rows_and_counters_that_disagree_are_found_and_mended() {
         // A pair without a job, and one that failed without a reason.
         (
             "job_missing",
-            "DELETE FROM job WHERE pair = 1; UPDATE counter SET n = 1 WHERE stage = 4 AND status = 3",
+            "UPDATE job SET made = NULL WHERE pair = 1; DELETE FROM job WHERE pair = 1;
+            UPDATE counter SET n = 1 WHERE stage = 4 AND status = 3",
         ),
         (
             "reason_missing",
-            "UPDATE job SET stage = 3, status = 4 WHERE pair = 2;
+            "UPDATE job SET stage = 3, status = 4, made = (SELECT recipe FROM stage_result WHERE pair = 2 AND stage = 2)
+            WHERE pair = 2;
             UPDATE counter SET n = 1 WHERE (stage, status) IN ((4, 3), (3, 4))",
         ),
     ];

@@ -58,6 +58,16 @@ impl World {
         (child, file)
     }
 
+    /// `run --json` with one worker, stopped with the first stage's files on the disk and its rows not yet written.
+    fn stopped(&self) -> Running {
+        let mut command = run(&self.project, &["-j", "1", "--json"]);
+        command.env("MOCBAN_STOP_AT", "fit:filed").envs([HASTE]);
+        let mut stopped = Running::start(&mut command);
+        let pid = stopped.pid();
+        stopped.wait_until("it is stopped", || is_stopped(pid));
+        stopped
+    }
+
     /// Where a held process says what happens.
     fn said(&self) -> PathBuf {
         self.dir.path().join("said")
@@ -188,11 +198,7 @@ fn who_joins_with_other_settings_is_refused_and_told_which() {
 #[test]
 fn what_a_stopped_process_stores_too_late_changes_nothing() {
     let world = World::new("2");
-    let mut command = run(&world.project, &["-j", "1", "--json"]);
-    command.env("MOCBAN_STOP_AT", "fit:filed").envs([HASTE]);
-    let mut stopped = Running::start(&mut command);
-    let pid = stopped.pid();
-    stopped.wait_until("it is stopped", || is_stopped(pid));
+    let mut stopped = world.stopped();
 
     let second = Running::start(joined(&world.project).envs([HASTE]));
     let (code, json, said) = second.end();
@@ -210,11 +216,7 @@ fn what_a_stopped_process_stores_too_late_changes_nothing() {
 #[test]
 fn a_process_held_up_past_its_leases_drops_what_it_had_and_goes_on() {
     let world = World::new("2");
-    let mut command = run(&world.project, &["-j", "1", "--json"]);
-    command.env("MOCBAN_STOP_AT", "fit:filed").envs([HASTE]);
-    let mut stopped = Running::start(&mut command);
-    let pid = stopped.pid();
-    stopped.wait_until("it is stopped", || is_stopped(pid));
+    let mut stopped = world.stopped();
     // Time itself is what runs out here: a lease is a second long.
     std::thread::sleep(Duration::from_millis(1200));
     stopped.send(Signal::CONT);

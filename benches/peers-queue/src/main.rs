@@ -1,8 +1,18 @@
-//! apalis-sqlite under the load of `benches/queue`: a task a pair, four durable updates of a small row while it runs.
+//! apalis-sqlite under the load of `benches/queue`, in four ways.
 //!
-//! `peers-queue FILE PAIRS WORKERS` makes a database with as many tasks, works them off with as many in hand at a time,
-//! and prints the seconds from the first claim to the last acknowledged task. All connections use a write-ahead log
-//! and `synchronous=FULL`; `SqliteStorage::setup` would turn syncing off on one of them, so it gets a pool of its own.
+//! `peers-queue FILE PAIRS WORKERS LOAD SET-UP` makes a database with the tasks, works them off with as many in hand at
+//! a time, and prints the seconds from the first claim to the last acknowledged task.
+//!
+//! - LOAD `stages`: four tasks a pair, one a stage, each with its own acknowledgement; that no stage begins before the
+//!   one before it is over is left out, and no result is stored. `updates`: one task a pair, and four committed updates
+//!   of one small row while it runs.
+//! - SET-UP `plain`: its configuration and a pool as they come. `tuned`: as many tasks fetched at a time as serve it
+//!   best, and a connection for every task in hand.
+//!
+//! All connections use a write-ahead log and `synchronous=FULL`; `SqliteStorage::setup` would turn syncing off on one
+//! of them, so it gets a pool of its own. All tasks are there from the start.
+
+mod load;
 
 use std::str::FromStr as _;
 use std::time::{Duration, Instant};
@@ -14,19 +24,33 @@ use apalis_sqlite::{Config, SqliteStorage};
 use sqlx::SqlitePool;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteJournalMode, SqlitePoolOptions, SqliteSynchronous};
 
+use load::Load;
+
 /// Between two looks whether all tasks are acknowledged.
-const LOOK_EVERY: Duration = Duration::from_millis(5);
+const LOOK_EVERY: Duration = Duration::from_millis(20);
+/// Connections of a pool as they come.
+const PLAIN_CONNECTIONS: u32 = 10;
 
 #[tokio::main]
 async fn main() -> anyhow::Result<()> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [path, pairs, workers] = args.as_slice() else {
-        anyhow::bail!("give a file, a number of pairs and a number of workers");
+    let [path, pairs, workers, load, set_up] = args.as_slice() else {
+        anyhow::bail!("give a file, a number of pairs, a number of workers, a load and a set-up");
     };
     let (pairs, workers): (u32, usize) = (pairs.parse()?, workers.parse()?);
-    set_up(path, pairs).await?;
-    let pool = pool(path, workers as u32 + 4).await?;
-    let time = work(&pool, pairs, workers).await?;
+    let load = Load::named(load).context("a load is `stages` or `updates`")?;
+    let (config, connections) = match set_up.as_str() {
+        "plain" => (Config::default(), PLAIN_CONNECTIONS),
+        "tuned" => (
+            Config::default().batch_size(2 * workers.max(32)),
+            workers as u32 + 4,
+        ),
+        _ => anyhow::bail!("a set-up is `plain` or `tuned`"),
+    };
+    let config = config.queue("pairs");
+    fill(path, pairs, load, &config).await?;
+    let pool = pool(path, connections).await?;
+    let time = work(&pool, load.tasks(pairs), workers, load, config).await?;
     println!("{}", time.as_secs_f64());
     Ok(())
 }
@@ -42,49 +66,39 @@ async fn pool(path: &str, connections: u32) -> anyhow::Result<SqlitePool> {
 }
 
 /// Makes the tables and the tasks, over connections that are closed again.
-async fn set_up(path: &str, pairs: u32) -> anyhow::Result<()> {
+async fn fill(path: &str, pairs: u32, load: Load, config: &Config) -> anyhow::Result<()> {
     let pool = pool(path, 1).await?;
     SqliteStorage::setup(&pool).await?;
-    sqlx::query("CREATE TABLE progress (pair INTEGER PRIMARY KEY, stage INTEGER NOT NULL) STRICT")
-        .execute(&pool)
-        .await?;
-    let mut storage = SqliteStorage::new(&pool).with_config(Config::default().queue("pairs"));
-    let mut tasks = futures::stream::iter((0..pairs).map(|pair| TaskBuilder::new(pair).build()));
+    load.prepare(&pool, pairs).await?;
+    let mut storage = SqliteStorage::new(&pool).with_config(config.clone());
+    let tasks = (0..load.tasks(pairs)).map(|task| TaskBuilder::new(task).build());
+    let mut tasks = futures::stream::iter(tasks);
     storage.push_all(&mut tasks).await.context("the tasks")?;
-    sqlx::query("WITH RECURSIVE n(i) AS (SELECT 0 UNION ALL SELECT i + 1 FROM n WHERE i + 1 < ?1) INSERT INTO progress SELECT i, 0 FROM n")
-        .bind(pairs)
-        .execute(&pool)
-        .await?;
     pool.close().await;
     Ok(())
 }
 
-/// A pair: four stages that compute nothing, each stored before the next.
-async fn pair(pair: u32, pool: Data<SqlitePool>) -> Result<(), BoxDynError> {
-    for stage in 1..=4 {
-        sqlx::query("UPDATE progress SET stage = ?2 WHERE pair = ?1")
-            .bind(pair)
-            .bind(stage)
-            .execute(&*pool)
-            .await?;
-    }
-    Ok(())
+async fn task(task: u32, pool: Data<SqlitePool>, load: Data<Load>) -> Result<(), BoxDynError> {
+    Ok(load.work(&pool, task).await?)
 }
 
-async fn work(pool: &SqlitePool, pairs: u32, workers: usize) -> anyhow::Result<Duration> {
-    let config = Config::default()
-        .queue("pairs")
-        .batch_size(workers.max(10))
-        .heartbeat_interval(Duration::from_secs(1));
+async fn work(
+    pool: &SqlitePool,
+    tasks: u32,
+    workers: usize,
+    load: Load,
+    config: Config,
+) -> anyhow::Result<Duration> {
     let storage = SqliteStorage::new(pool).with_config(config);
     let start = Instant::now();
     let worker = WorkerBuilder::new("bench")
         .backend(storage)
         .concurrency(workers)
         .data(pool.clone())
-        .build(pair);
+        .data(load)
+        .build(task);
     let running = tokio::spawn(async move { worker.run().await });
-    let mut left = i64::from(pairs);
+    let mut left = i64::from(tasks);
     while left > 0 {
         anyhow::ensure!(
             !running.is_finished(),
@@ -94,7 +108,7 @@ async fn work(pool: &SqlitePool, pairs: u32, workers: usize) -> anyhow::Result<D
         let done: i64 = sqlx::query_scalar("SELECT count(*) FROM Jobs WHERE status = 'Done'")
             .fetch_one(pool)
             .await?;
-        left = i64::from(pairs) - done;
+        left = i64::from(tasks) - done;
     }
     Ok(start.elapsed())
 }

@@ -1,9 +1,8 @@
 //! What breaks other queues, each by name: late workers, worn-out identities, busy databases, jumping clocks.
 
-use super::{World, done, inputs, name, recipes, register, row};
+use super::{World, done, enter, inputs, name, recipes, register, row};
 use crate::catalog::{
-    Again, Catalog, ClaimRequest, Dead, Kept, Lease, RecipeIds, Sentence, StageFailed, WorkerInfo,
-    connect,
+    Again, Catalog, ClaimRequest, Dead, Kept, Lease, RecipeIds, Sentence, StageFailed, connect,
 };
 use crate::domain::{CRASH_LIMIT, Failure, FailureClass, JobStatus, PairId, Stage, WorkerId};
 
@@ -26,19 +25,6 @@ fn failed(recipes: RecipeIds, sentence: Sentence) -> StageFailed {
     }
 }
 
-async fn claim_alone(world: &World, worker: WorkerId) -> Vec<Lease> {
-    let request = ClaimRequest {
-        worker,
-        slots: 1,
-        until: Stage::Register,
-        alone: true,
-        among: None,
-        deadline: 1_000,
-        alive_since: 0,
-    };
-    world.catalog.claim(request).await.expect("a claim")
-}
-
 /// As a process that was given the same number by its machine, or a catalog whose last worker was removed.
 #[tokio::test]
 async fn a_reused_worker_identity_cannot_complete() {
@@ -55,23 +41,33 @@ async fn a_reused_worker_identity_cannot_complete() {
 
     let second = register(&world.catalog).await;
     assert!(second > first, "{second:?} again");
-    assert_eq!(claim_alone(&world, second).await.len(), 1);
+    assert_eq!(world.claim_alone(second).await.len(), 1);
     let late = world.catalog.checkpoint(lease, world.done(Stage::Fit));
     assert!(matches!(late.await, Ok(Kept::Lost)));
     assert_eq!(status(&world).await, JobStatus::Leased);
 }
 
-/// The pair hung under it, was taken back by others, and came to the same worker again: only the epoch tells.
-#[tokio::test]
-async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothing() {
-    let world = World::new(1).await;
+/// The older and the newer lease of a pair that hung under a worker, was taken back by others, and came to the same
+/// worker again, which lives: pair, worker, status and sign of life are what they were, and only the epoch tells.
+async fn taken_twice(world: &World) -> [Lease; 2] {
     let late = world.claim(1).await.remove(0);
     let beat = world.catalog.beat(world.worker, 5_000, 0).await;
     assert!(beat.expect("an answer"));
     let other = register(&world.catalog).await;
     let overdue = world.catalog.rescue_overdue(other, 60, 70).await;
     assert_eq!(overdue.expect("a rescue").ready, 1);
-    let again = claim_alone(&world, world.worker).await.remove(0);
+    let again = world.claim_alone(world.worker).await.remove(0);
+    assert_eq!(
+        (again.pair(), again.cursor(), again.epoch()),
+        (late.pair(), late.cursor(), late.epoch() + 2)
+    );
+    [late, again]
+}
+
+#[tokio::test]
+async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothing() {
+    let world = World::new(1).await;
+    let [late, again] = taken_twice(&world).await;
     let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
     assert!(matches!(kept, Ok(Kept::Lost)));
     let kept = world
@@ -79,6 +75,64 @@ async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothi
         .checkpoint(again, world.done(Stage::Fit))
         .await;
     assert!(matches!(kept, Ok(Kept::Lease(_))));
+    world.counters_hold().await;
+}
+
+/// Both are in one commit: what is told of the one must not be taken for the other.
+#[tokio::test]
+async fn a_late_completion_beside_the_right_one_changes_nothing() {
+    let world = World::new(1).await;
+    let late = world.claim(1).await.remove(0);
+    let other = register(&world.catalog).await;
+    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
+    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let lease = world.claim_alone(other).await.remove(0);
+    let mut lost = world.done(Stage::Fit);
+    lost.outcome = r#"{"late":true}"#.to_owned();
+    // Neither is polled again before both are on their way.
+    let (lost, kept) = tokio::join!(
+        world.catalog.checkpoint(late, lost),
+        world.catalog.checkpoint(lease, world.done(Stage::Fit)),
+    );
+    assert!(matches!(lost, Ok(Kept::Lost)), "{lost:?}");
+    assert!(matches!(kept, Ok(Kept::Lease(_))), "{kept:?}");
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    let stages = detail.expect("the pair").results.stages;
+    assert_eq!(stages[0].outcome, serde_json::json!({}));
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn a_late_failure_under_an_older_lease_of_the_same_worker_changes_nothing() {
+    let world = World::new(1).await;
+    let [late, again] = taken_twice(&world).await;
+    let quarantine = || failed(world.recipes, Sentence::Quarantine);
+    assert!(
+        !world
+            .catalog
+            .fail(late, quarantine())
+            .await
+            .expect("an answer")
+    );
+    assert_eq!(status(&world).await, JobStatus::Leased);
+    assert!(
+        world
+            .catalog
+            .fail(again, quarantine())
+            .await
+            .expect("an answer")
+    );
+    world.counters_hold().await;
+}
+
+#[tokio::test]
+async fn a_late_release_of_an_older_lease_of_the_same_worker_changes_nothing() {
+    let world = World::new(1).await;
+    let [late, again] = taken_twice(&world).await;
+    assert!(!world.catalog.release(late).await.expect("an answer"));
+    assert_eq!(status(&world).await, JobStatus::Leased);
+    assert!(world.catalog.release(again).await.expect("an answer"));
+    world.counters_hold().await;
 }
 
 #[tokio::test]
@@ -112,13 +166,8 @@ async fn a_beat_or_completion_after_the_lease_is_over_is_refused() {
     let beat = world.catalog.beat(world.worker, 90, 2).await;
     assert!(!beat.expect("an answer"));
     let request = ClaimRequest {
-        worker: world.worker,
-        slots: 1,
-        until: Stage::Register,
-        alone: false,
-        among: None,
-        deadline: 1_000,
         alive_since: 2,
+        ..ClaimRequest::new(world.worker, 1, 1_000)
     };
     assert!(
         world
@@ -146,15 +195,7 @@ async fn busy_reaches_no_caller() {
         let worker = register(&catalog).await;
         let mut done = 0;
         loop {
-            let request = ClaimRequest {
-                worker,
-                slots: 1,
-                until: Stage::Register,
-                alone: false,
-                among: None,
-                deadline: 1_000,
-                alive_since: 0,
-            };
+            let request = ClaimRequest::new(worker, 1, 1_000);
             let Some(lease) = catalog.claim(request).await.expect("a claim").pop() else {
                 return done;
             };
@@ -215,7 +256,7 @@ async fn a_failure_that_may_pass_is_not_stranded_by_a_death() {
     let next = register(&world.catalog).await;
     let rescued = world.catalog.rescue(Dead::AllBut(next), 60).await;
     assert_eq!(rescued.expect("a rescue").ready, 1);
-    let again = claim_alone(&world, next).await;
+    let again = world.claim_alone(next).await;
     assert_eq!((again[0].attempt(), again[0].crashes()), (3, 1));
 }
 
@@ -224,26 +265,13 @@ async fn a_failure_that_may_pass_is_not_stranded_by_a_death() {
 async fn a_clock_that_jumps_strands_nothing_and_robs_nobody() {
     const YEARS: i64 = 100_000_000_000;
     let world = World::new(3).await;
-    let enter = async |clock: i64| {
-        let info = WorkerInfo {
-            host: "here".to_owned(),
-            pid: 1,
-            boot_id: None,
-        };
-        let entered = world.catalog.register_worker(info, world.recipes, clock);
-        entered.await.expect("a worker")
-    };
-    let (past, future) = (enter(5).await, enter(YEARS).await);
+    let past = enter(&world.catalog, world.recipes, 5).await;
+    let future = enter(&world.catalog, world.recipes, YEARS).await;
     let mut leases = Vec::new();
     for (worker, clock) in [(past, 5), (future, YEARS)] {
         let request = ClaimRequest {
-            worker,
-            slots: 1,
-            until: Stage::Register,
-            alone: false,
-            among: None,
-            deadline: clock + 10,
             alive_since: clock - 50,
+            ..ClaimRequest::new(worker, 1, clock + 10)
         };
         leases.extend(world.catalog.claim(request).await.expect("a claim"));
         let beat = world.catalog.beat(worker, clock + 20, clock - 30).await;
@@ -277,7 +305,7 @@ async fn condemned() -> (World, WorkerId) {
         let taken = if crash == 0 {
             world.claim_as(me, 1).await
         } else {
-            claim_alone(&world, me).await
+            world.claim_alone(me).await
         };
         assert_eq!(taken.len(), 1);
         me = register(&world.catalog).await;

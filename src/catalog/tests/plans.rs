@@ -118,10 +118,14 @@ async fn a_plan_scans_the_jobs_once_and_nothing_else() {
     let all = plan(alike::GROUPS).await;
     let scans: Vec<_> = all.iter().filter(|line| line.starts_with("SCAN")).collect();
     assert_eq!(scans, ["SCAN j"]);
-    let among = plan(staleness::LOOK_AMONG).await;
+    let among = plan(staleness::LOOK).await;
     assert_only(&among, &["VIRTUAL TABLE", "SCAN seen"]);
-    let page = plan(staleness::LOOK_ALL).await;
-    assert_only(&page, &["SCAN seen"]);
+}
+
+/// A page of a group goes on where the one before ended.
+#[tokio::test]
+async fn members_of_a_group_are_paged_by_key() {
+    assert_only(&plan(alike::MEMBERS).await, &[]);
 }
 
 #[tokio::test]

@@ -112,16 +112,7 @@ async fn a_late_completion_of_a_rescued_job_changes_nothing() {
         (detail.results.status, detail.crashes),
         (JobStatus::Ready, 1)
     );
-    let again = world.catalog.claim(ClaimRequest {
-        worker: other,
-        slots: 1,
-        until: Stage::Register,
-        alone: true,
-        among: None,
-        deadline: 1_000,
-        alive_since: 0,
-    });
-    let again = again.await.expect("a claim").remove(0);
+    let again = world.claim_alone(other).await.remove(0);
     assert!(again.alone() && again.epoch() > epoch);
     world.counters_hold().await;
 }
@@ -147,13 +138,8 @@ async fn the_third_crash_is_quarantined_and_says_so() {
     for crash in 1..=CRASH_LIMIT {
         let worker = register(&world.catalog).await;
         let request = ClaimRequest {
-            worker,
-            slots: 1,
-            until: Stage::Register,
             alone: crash > 1,
-            among: None,
-            deadline: 1_000,
-            alive_since: 0,
+            ..ClaimRequest::new(worker, 1, 1_000)
         };
         assert_eq!(
             world.catalog.claim(request).await.expect("a claim").len(),
@@ -177,13 +163,8 @@ async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
         register(&world.catalog).await;
         let worker = register(&world.catalog).await;
         let request = ClaimRequest {
-            worker,
-            slots: 1,
-            until: Stage::Register,
             alone: round > 0,
-            among: None,
-            deadline: 1_000,
-            alive_since: 0,
+            ..ClaimRequest::new(worker, 1, 1_000)
         };
         assert_eq!(
             world.catalog.claim(request).await.expect("a claim").len(),
@@ -229,13 +210,8 @@ async fn progress_forgives_crashes() {
     let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
     rescued.expect("a rescue");
     let request = ClaimRequest {
-        worker: other,
-        slots: 1,
-        until: Stage::Register,
         alone: true,
-        among: None,
-        deadline: 1_000,
-        alive_since: 0,
+        ..ClaimRequest::new(other, 1, 1_000)
     };
     let lease = world
         .catalog
@@ -339,13 +315,8 @@ async fn a_claim_among_some_pairs_takes_no_other() {
     let wanted = [name("p3"), name("p1")];
     let among = world.catalog.select(&wanted).await.expect("a read");
     let request = ClaimRequest {
-        worker: world.worker,
-        slots: 9,
-        until: Stage::Register,
-        alone: false,
         among: Some(among.clone()),
-        deadline: 1_000,
-        alive_since: 0,
+        ..ClaimRequest::new(world.worker, 9, 1_000)
     };
     assert_eq!(
         world.catalog.claim(request).await.expect("a claim").len(),

@@ -3,7 +3,7 @@
 mod error;
 mod tiff;
 
-use std::io::Cursor;
+use std::io::{BufRead, Cursor, Seek};
 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
@@ -27,6 +27,13 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture, DecodeError> {
     }
     let rgb = colours(bytes, format, kind, limits)?;
     Ok(Picture { rgb })
+}
+
+/// How many pixels the header of an image promises; `None` where it does not tell.
+pub fn pixels_by_header(file: impl BufRead + Seek) -> Option<u64> {
+    let reader = ImageReader::new(file).with_guessed_format().ok()?;
+    let (width, height) = reader.into_dimensions().ok()?;
+    Some(u64::from(width) * u64::from(height))
 }
 
 fn colours(

@@ -7,10 +7,8 @@ use std::sync::{Condvar, Mutex};
 use serde_json::json;
 
 use crate::catalog::InputSeen;
-use crate::domain::{
-    Affine2, ContentHash, Failure, FailureClass, MetricOutcome, RegisterOutcome, Scores, Stage,
-    ThresholdMetric,
-};
+use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric};
+use crate::report::fixture;
 use crate::runner::hand::PairInHand;
 use crate::runner::steps::{Setback, StageOutput, Steps};
 use crate::store::NewArtifact;
@@ -101,7 +99,9 @@ impl Steps for MadeUp {
         pair.inputs.mesh = Some(seen("mesh"));
         pair.inputs.print = (stage >= Stage::Normalize).then(|| seen("print"));
         let register = RegisterOutcome {
-            metrics: ThresholdMetric::ALL.map(metric).to_vec(),
+            metrics: ThresholdMetric::ALL
+                .map(|metric| fixture::metric(metric, 0.5, &[]).outcome)
+                .to_vec(),
             evidence: None,
         };
         let last = stage == Stage::Register;
@@ -118,29 +118,5 @@ impl Steps for MadeUp {
             }],
             metrics: if last { register.metrics } else { Vec::new() },
         })
-    }
-}
-
-fn metric(metric: ThresholdMetric) -> MetricOutcome {
-    MetricOutcome {
-        metric,
-        threshold_level: 1,
-        threshold_depth: 0.1,
-        print_from_depth: Affine2::IDENTITY,
-        angle_deg: 0.0,
-        scale: 1.0,
-        shift_px: [0.0; 2],
-        scores: Scores {
-            ssim: 0.5,
-            nl_ssim: 0.5,
-            iou: 0.5,
-            iou_box: 0.5,
-            dice: 0.5,
-            density_print: 0.5,
-            density_depth: 0.5,
-        },
-        margin: 0.0,
-        confidence: None,
-        at_bound: false,
     }
 }

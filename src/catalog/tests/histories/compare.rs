@@ -1,0 +1,95 @@
+//! What the catalog holds against what the model says, and before against after.
+
+use sqlx::{AssertSqlSafe, Row as _};
+
+use super::Game;
+use crate::domain::JobState;
+
+/// Tables that no refused write may touch.
+const TABLES: [&str; 8] = [
+    "job",
+    "stage_result",
+    "metric_result",
+    "attempt",
+    "failure",
+    "verdict",
+    "counter",
+    "pair",
+];
+
+impl Game {
+    /// Everything that a write could change, when the write is to be refused; nothing when it is not.
+    pub(super) async fn dump(&mut self, allowed: bool) -> Vec<String> {
+        let mut lines = Vec::new();
+        for table in TABLES.iter().filter(|_| !allowed) {
+            let columns: String = sqlx::query_scalar(
+                "SELECT group_concat('quote(' || name || ')', ' || '' '' || ') FROM pragma_table_info(?1)",
+            )
+            .bind(table)
+            .fetch_one(&mut self.conn)
+            .await
+            .expect("columns");
+            let rows = sqlx::query_scalar(AssertSqlSafe(format!(
+                "SELECT {columns} FROM {table} ORDER BY 1"
+            )));
+            lines.extend(rows.fetch_all(&mut self.conn).await.expect("rows"));
+        }
+        lines
+    }
+
+    /// Every row is what the model says, no epoch falls, the counters are right, no verdict is lost.
+    pub(super) async fn agrees(&mut self) {
+        let rows = sqlx::query(
+            "SELECT pair, stage, status, epoch, attempt, crashes, mem_class, worker, deadline, run_at FROM job ORDER BY pair",
+        );
+        let rows = rows.fetch_all(&mut self.conn).await.expect("a read");
+        assert_eq!(rows.len(), self.model.jobs.len());
+        for (row, (pair, job)) in rows.iter().zip(&self.model.jobs) {
+            let (mut holder, mut when, mut run_at) = (None, None, None);
+            match job.state {
+                JobState::Leased {
+                    worker, deadline, ..
+                } => {
+                    (holder, when) = (Some(worker.0), Some(deadline));
+                }
+                JobState::Backoff { run_at: at, .. } => run_at = Some(at),
+                JobState::Ready { .. }
+                | JobState::Done
+                | JobState::Quarantined { .. }
+                | JobState::Held { .. } => {}
+            }
+            let number = |column: &str| row.get::<i64, _>(column);
+            let stage = job.state.stage().map_or(4, |stage| stage.index() as i64);
+            assert_eq!(
+                (number("pair"), number("stage"), number("status")),
+                (*pair, stage, job.state.status().code())
+            );
+            assert_eq!(
+                (
+                    number("epoch"),
+                    number("attempt"),
+                    number("crashes"),
+                    number("mem_class")
+                ),
+                (
+                    job.epoch,
+                    i64::from(job.attempt),
+                    i64::from(job.crashes),
+                    i64::from(job.alone)
+                ),
+                "pair {pair}"
+            );
+            assert_eq!(
+                (row.get("worker"), row.get("deadline"), row.get("run_at")),
+                (holder, when, run_at),
+                "pair {pair}"
+            );
+            assert!(job.epoch >= self.epochs[*pair as usize]);
+            self.epochs[*pair as usize] = job.epoch;
+        }
+        self.world.counters_hold().await;
+        let log = self.world.catalog.verdict_log(None).await.expect("a log");
+        let kept: Vec<_> = log.iter().map(|event| event.id).collect();
+        assert_eq!(kept, self.verdicts);
+    }
+}

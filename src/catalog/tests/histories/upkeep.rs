@@ -1,0 +1,143 @@
+//! Moves that no worker makes for itself: deaths, rescues, jumping clocks, and what people ask for.
+
+use rand::RngExt as _;
+
+use super::super::model::LEASE;
+use super::super::{name, recipes, row};
+use super::{Game, LONGEST, MOST_PAIRS};
+use crate::catalog::{Again, Dead, NewVerdict, RetrySelection};
+use crate::domain::{JobState, JobStatus, Stage, ThresholdMetric, Verdict};
+
+impl Game {
+    pub(super) async fn end(&mut self) {
+        let Some(index) = self.somebody() else { return };
+        let process = &mut self.model.processes[index];
+        (process.ended, process.running) = (true, false);
+        let ended = self.world.catalog.end_worker(process.worker, process.clock);
+        ended.await.expect("ended");
+    }
+
+    /// A process dies; nobody knows yet.
+    pub(super) fn crash(&mut self) {
+        if let Some(index) = self.somebody() {
+            self.model.processes[index].running = false;
+        }
+    }
+
+    /// Somebody takes another for dead, rightly or not, or finds its deadlines long past.
+    pub(super) async fn rescue(&mut self) {
+        let (Some(me), now) = (self.somebody(), self.wall) else {
+            return;
+        };
+        let me = self.model.processes[me].worker;
+        let other = self.dice.random_range(0..self.model.processes.len());
+        let other = self.model.processes[other].worker;
+        let rescued = if self.is_likely(0.5) && other != me {
+            let rescue = self.world.catalog.rescue(Dead::Workers(vec![other]), now);
+            (rescue.await, self.model.rescue(&[other]))
+        } else {
+            if let Some(index) = self.somebody() {
+                self.model.processes[index].clock += LEASE / 2;
+                self.beat_of(index).await;
+            }
+            let overdue = self.world.catalog.rescue_overdue(me, 10, now);
+            let expected = self.model.rescue_overdue(me, 10);
+            self.seen.overdue += expected;
+            (overdue.await, expected)
+        };
+        let found = rescued.0.expect("a rescue");
+        assert_eq!(found.ready, rescued.1);
+        self.seen.condemned += found.condemned.len() as u32;
+    }
+
+    /// All processes die; a new one opens the catalog alone.
+    pub(super) async fn take_over(&mut self) {
+        for process in &mut self.model.processes {
+            process.running = false;
+        }
+        self.join().await;
+        let (me, others) = self.model.processes.split_last().expect("it joined");
+        let (me, others) = (me.worker, others.iter().map(|other| other.worker));
+        let others: Vec<_> = others.collect();
+        let rescue = self.world.catalog.rescue(Dead::AllBut(me), self.wall);
+        let rescued = rescue.await.expect("a rescue");
+        assert_eq!(rescued.ready, self.model.rescue(&others));
+        self.seen.condemned += rescued.condemned.len() as u32;
+        assert!(
+            self.model
+                .jobs
+                .values()
+                .all(|job| job.state.status() != JobStatus::Leased)
+        );
+    }
+
+    /// A pair kills one process after the other.
+    pub(super) async fn poison(&mut self) {
+        let before = self.seen.condemned;
+        for round in 0..8 {
+            self.take_over().await;
+            let me = self.model.processes.len() - 1;
+            self.claim_by(me, 1, round > 0).await;
+            if self.seen.condemned > before {
+                return;
+            }
+        }
+    }
+
+    /// The wall clock jumps, forward or back.
+    pub(super) async fn due(&mut self) {
+        self.wall += self.dice.random_range(-300..300);
+        let due = self.world.catalog.stage_due(self.wall, LONGEST).await;
+        assert_eq!(due.expect("stored"), self.model.due(self.wall, LONGEST));
+    }
+
+    pub(super) async fn send_back(&mut self) {
+        let mut again = Again::Changed;
+        if self.is_likely(0.7) {
+            let revisions = [1; 4].map(|one: u32| one + self.dice.random_range(0..2));
+            let new = recipes(revisions);
+            let ids = self.world.catalog.register_recipes(&new).await;
+            self.settings = (new, ids.expect("recipes"));
+        } else {
+            again = Again::All(Stage::ALL[self.dice.random_range(0..4)]);
+        }
+        let (recipes, ids) = &self.settings;
+        let sent = self.world.catalog.send_back(recipes, None, again).await;
+        assert_eq!(sent.expect("sent back"), self.model.send_back(*ids, again));
+    }
+
+    pub(super) async fn retry(&mut self) {
+        let retried = self.world.catalog.retry(&RetrySelection::All).await;
+        assert_eq!(retried.expect("retried"), self.model.retry());
+    }
+
+    pub(super) async fn import(&mut self) {
+        let count = self.model.jobs.len();
+        if count < MOST_PAIRS {
+            let imported = self
+                .world
+                .catalog
+                .import(vec![row(&format!("p{count}"))], 1);
+            imported.await.expect("imported");
+            self.model.import();
+        }
+    }
+
+    pub(super) async fn verdict(&mut self) {
+        let pair = self.dice.random_range(1..=self.model.jobs.len());
+        if self.model.jobs[&(pair as i64)].state != JobState::Done {
+            return;
+        }
+        let verdict = NewVerdict {
+            pair: name(&format!("p{}", pair - 1)),
+            metric: Some(ThresholdMetric::Density),
+            verdict: Verdict::Pass,
+            reader: "ana".to_owned(),
+            reason: None,
+            note: None,
+        };
+        let stored = self.world.catalog.verdict_set(vec![verdict], self.wall);
+        stored.await.expect("stored");
+        self.verdicts.push(self.verdicts.len() as i64 + 1);
+    }
+}
