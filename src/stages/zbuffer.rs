@@ -1,9 +1,13 @@
 //! The highest surface under each pixel, looking straight down on a plane (orthographic z-buffer).
 
+mod view;
+
 use super::bulk::{Bounds, bulk_along, room};
-use crate::domain::{Affine2, Rigid3};
+use crate::domain::Rigid3;
 use crate::mesh::Mesh;
 use crate::raster::Grid;
+
+pub(super) use view::View;
 
 /// Height of a pixel that no surface covers.
 pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
@@ -30,19 +34,6 @@ pub(super) struct Shell {
 /// repeats its last triangle; a point is a triangle whose corners are one.
 type Block = [[Lanes; 3]; 3];
 type Lanes = [f32; LANES];
-
-/// Where the pixels of a rendering lie in the plane.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct View {
-    /// Plane x, y to pixels.
-    pub(super) px_from_plane: Affine2,
-    /// Columns.
-    pub(super) width: usize,
-    /// Rows.
-    pub(super) height: usize,
-    /// Side of a pixel, mesh units.
-    pub(super) unit_per_px: f64,
-}
 
 /// A linear function of a corner's place relative to the middle.
 #[derive(Debug, Clone, Copy)]
@@ -218,36 +209,6 @@ fn lower(a: f32, b: f32) -> f32 {
 
 fn higher(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
-}
-
-impl View {
-    /// A view of the bounds whose longest side takes `longest_px` pixels, one of them free on each side.
-    ///
-    /// The bounds' middle is the view's, so a mesh turned by a right angle is seen by the same rays.
-    /// With `mirrored`, x is reflected: what is carved in mirror writing then reads right. y points down either way.
-    pub(super) fn around(bounds: Bounds<2>, longest_px: usize, mirrored: bool) -> Self {
-        let [low, high] = bounds;
-        let size = [high[0] - low[0], high[1] - low[1]];
-        let unit_per_px = size[0].max(size[1]) / (longest_px.max(4) as f64 - 3.0);
-        let scale = 1.0 / unit_per_px;
-        // Rounding must not add a pixel to a side that takes a whole number of them.
-        let side = |length: f64| (length * scale - 1e-6).ceil() as usize + 3;
-        let [width, height] = size.map(side);
-        let along = |axis: usize, side: usize, scale: f64| {
-            let middle = f64::midpoint(low[axis], high[axis]);
-            (side - 1) as f64 / 2.0 - scale * middle
-        };
-        let x_scale = if mirrored { -scale } else { scale };
-        Self {
-            px_from_plane: Affine2([
-                [x_scale, 0.0, along(0, width, x_scale)],
-                [0.0, -scale, along(1, height, -scale)],
-            ]),
-            width,
-            height,
-            unit_per_px,
-        }
-    }
 }
 
 /// Fills the pixels whose centre lies in the triangle, borders included, with the plane through its corners.

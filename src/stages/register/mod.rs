@@ -223,12 +223,12 @@ fn trust(metrics: &mut [MetricOutcome], evidence: &Evidence) {
 /// Refuses what cannot be told to be the same character.
 fn require_match(evidence: &Evidence, params: &Params) -> Result<(), Error> {
     let confidence = confidence::of_pose(evidence);
-    if confidence >= params.least_confidence {
-        Ok(())
-    } else if evidence.mirrored > MIRROR_WINS {
+    if evidence.mirrored > MIRROR_WINS && params.least_confidence > 0.0 {
         Err(Error::Mirrored {
             times: evidence.mirrored,
         })
+    } else if confidence >= params.least_confidence {
+        Ok(())
     } else {
         Err(Error::NoMatch {
             confidence,
