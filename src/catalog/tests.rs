@@ -14,8 +14,8 @@ mod verdicts;
 use serde_json::{Map, json};
 
 use super::{
-    Again, Catalog, ClaimRequest, ImportRow, InputSeen, InputsSeen, Kept, Lease, MetricResult,
-    RecipeIds, Recipes, StageDone, WorkerInfo,
+    Again, Catalog, ClaimRequest, Dead, ImportRow, InputSeen, InputsSeen, Kept, Lease,
+    MetricResult, RecipeIds, Recipes, StageDone, WorkerInfo,
 };
 use crate::domain::{
     Affine2, ArtifactSet, ContentHash, MetricOutcome, PairName, RegisterOutcome, Scores, Stage,
@@ -88,6 +88,14 @@ impl World {
             ..ClaimRequest::new(worker, 1, 1_000)
         };
         self.catalog.claim(request).await.expect("a claim")
+    }
+
+    /// Enters another worker that takes all others for dead, and so many pairs come back from them.
+    async fn rescued_by_another(&self, pairs: u64) -> WorkerId {
+        let other = register(&self.catalog).await;
+        let rescued = self.catalog.rescue(Dead::AllBut(other), 60).await;
+        assert_eq!(rescued.expect("a rescue").ready, pairs);
+        other
     }
 
     fn done(&self, stage: Stage) -> StageDone {

@@ -16,6 +16,7 @@ use crate::check::below;
 use crate::cli::{Call, binary, empty, mocban};
 use crate::hostile_pairs::{HostilePair, HostilePairs};
 use crate::seeds::assert_one_sentence;
+use crate::sizes::asked;
 
 /// Good pairs in the crowd.
 const GOOD: u64 = 2;
@@ -168,8 +169,7 @@ fn alone(dir: &Path) -> PathBuf {
 
 #[test]
 fn a_crowd_of_hostile_pairs_harms_nobody_and_is_told_pair_by_pair() {
-    let count =
-        std::env::var("MOCBAN_HOSTILE").map_or(240, |count| count.parse().expect("a number"));
+    let count = asked("MOCBAN_HOSTILE", 240);
     let dir = empty();
     let data = dir.path().join("data");
     fs::create_dir(&data).expect("a folder");
@@ -191,7 +191,7 @@ fn a_crowd_of_hostile_pairs_harms_nobody_and_is_told_pair_by_pair() {
     let jobs = &status["jobs"];
     let done = jobs["done"].as_u64().expect("a number");
     let quarantined = jobs["quarantined"].as_u64().expect("a number");
-    assert_eq!(done + quarantined, count + GOOD, "{jobs}");
+    assert_eq!(done + quarantined, count as u64 + GOOD, "{jobs}");
     for command in [
         &["status"][..],
         &["report"],

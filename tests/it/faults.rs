@@ -1,5 +1,5 @@
 //! Faults of the disk under the real binary: what fails says so in a sentence and leaves nothing half-made, and the
-//! next call ends as if nothing had been.
+//! next call ends as if nothing had been. `MOCBAN_FAULT_MOMENTS` says at how many calls each strikes: 24 take minutes.
 
 use std::path::Path;
 use std::process::Command;
@@ -9,6 +9,7 @@ use mocban::store::Project;
 use crate::cli::{Call, binary, call, mocban};
 use crate::fault::{EAGAIN, EIO, ENOSPC, Fault, spread};
 use crate::resume::{copy, copy_folder, run};
+use crate::sizes::asked;
 use crate::unbroken::World;
 
 /// How a command under a fault must end.
@@ -263,42 +264,29 @@ const EXPORT: Deed = Deed {
     },
 };
 
+/// Moments at which each fault strikes, evenly over all there are.
+fn moments() -> usize {
+    asked("MOCBAN_FAULT_MOMENTS", 1)
+}
+
 #[test]
 fn a_refusing_disk_under_the_catalog_is_told_of_and_costs_nothing() {
-    RUN.survives_all(OF_THE_CATALOG, 1);
+    RUN.survives_all(OF_THE_CATALOG, moments());
 }
 
 #[test]
 fn a_refusing_disk_under_the_files_is_told_of_and_costs_nothing() {
-    RUN.survives_all(OF_THE_FILES, 1);
+    RUN.survives_all(OF_THE_FILES, moments());
 }
 
 #[test]
 fn an_import_or_export_that_the_disk_refuses_leaves_nothing_half_made() {
-    IMPORT.survives_all(OF_AN_IMPORT, 1);
-    EXPORT.survives_all(OF_AN_EXPORT, 1);
+    IMPORT.survives_all(OF_AN_IMPORT, moments());
+    EXPORT.survives_all(OF_AN_EXPORT, moments());
 }
 
 /// Another process holds each lock of the database for longer than SQLite itself waits.
 #[test]
 fn a_locked_catalog_is_waited_for() {
-    RUN.survives_all(LOCKED, 4);
-}
-
-/// Moments at which each fault strikes in the long tests, evenly over all there are.
-const MANY: usize = 24;
-
-#[test]
-#[ignore = "takes minutes: cargo test --test it every_refusal -- --ignored --nocapture"]
-fn every_refusal_under_the_catalog_is_told_of_and_costs_nothing() {
-    RUN.survives_all(LOCKED, usize::MAX);
-    RUN.survives_all(OF_THE_CATALOG, MANY);
-}
-
-#[test]
-#[ignore = "takes minutes: cargo test --test it every_refusal -- --ignored --nocapture"]
-fn every_refusal_under_the_files_is_told_of_and_costs_nothing() {
-    RUN.survives_all(OF_THE_FILES, MANY);
-    IMPORT.survives_all(OF_AN_IMPORT, MANY);
-    EXPORT.survives_all(OF_AN_EXPORT, MANY);
+    RUN.survives_all(LOCKED, 4 * moments());
 }

@@ -1,4 +1,5 @@
 //! The real binary under random `kill -9` until its run is done: nothing lost, nothing doubled, the same bytes.
+//! `MOCBAN_KILLS` says how often, `MOCBAN_KILLED_PAIRS` over how many pairs: 300 over 200 is a look of some minutes.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -8,6 +9,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use crate::resume::{copy, project, run};
+use crate::sizes::asked;
 use crate::unbroken::Wanted;
 
 /// Deaths with no pair in hand that come before the shots.
@@ -27,7 +29,7 @@ fn opening(project: &Project) {
 
 /// Starts the run again and again and kills it after 50 to 500 ms, until one ends by itself; says how often it was
 /// killed.
-fn run_under_fire(project: &Project, dice: &mut ChaCha8Rng) -> u32 {
+fn run_under_fire(project: &Project, dice: &mut ChaCha8Rng) -> usize {
     for kills in 0.. {
         let jobs = if dice.random_bool(0.5) { "1" } else { "2" };
         let mut child = run(project, &["-j", jobs])
@@ -50,11 +52,13 @@ fn run_under_fire(project: &Project, dice: &mut ChaCha8Rng) -> u32 {
     unreachable!("the loop has no end of its own")
 }
 
-/// Kills runs of copies of a project of so many pairs until there were so many kills.
-#[expect(clippy::print_stderr, reason = "the figures of the long test")]
-fn survives(count: &str, kills: u32) {
+/// Kills runs of copies of a project until there were enough kills.
+#[test]
+fn twenty_kills_lose_nothing_and_double_nothing() {
+    let count = asked("MOCBAN_KILLED_PAIRS", 8);
+    let kills = asked("MOCBAN_KILLS", 20);
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let fresh = project(dir.path(), "fresh", count);
+    let fresh = project(dir.path(), "fresh", &count.to_string());
     let wanted = Wanted::of(&fresh, &dir.path().join("unbroken"));
     let mut dice = ChaCha8Rng::seed_from_u64(4);
     let (mut done, mut copies) = (0, 0);
@@ -68,15 +72,4 @@ fn survives(count: &str, kills: u32) {
         std::fs::remove_dir_all(parent).expect("removed");
     }
     eprintln!("{done} kills over {count} pairs, run to the end {copies} times");
-}
-
-#[test]
-fn twenty_kills_lose_nothing_and_double_nothing() {
-    survives("8", 20);
-}
-
-#[test]
-#[ignore = "takes minutes: cargo test --test it hundreds_of_kills -- --ignored --nocapture"]
-fn hundreds_of_kills_lose_nothing_and_double_nothing() {
-    survives("200", 300);
 }

@@ -31,6 +31,7 @@ mod seeds;
 mod semi_real;
 #[cfg(target_os = "linux")]
 mod shim;
+mod sizes;
 mod spoil;
 mod tiff_file;
 mod tiffs;

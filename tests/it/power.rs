@@ -16,6 +16,7 @@ use mocban::store::Project;
 use crate::cli::{binary, call, mocban};
 use crate::resume::{copy, copy_folder, finished, run, stages_done};
 use crate::shim::SHADOW;
+use crate::sizes::asked;
 use crate::unbroken::World;
 
 type Inode = u64;
@@ -247,10 +248,11 @@ fn some(disks: Vec<(String, Disk)>, wanted: usize) -> Vec<(String, Disk)> {
     disks.into_iter().step_by(step).collect()
 }
 
-/// Cuts the power during a run of so many pairs at so many moments.
-#[expect(clippy::print_stderr, reason = "the figures of the long test")]
-fn survives(pairs: &str, moments: usize) {
-    let world = World::new(pairs);
+/// Cuts the power during a run at some moments.
+#[test]
+fn a_power_cut_at_some_syncs_loses_nothing_that_was_stored() {
+    let moments = asked("MOCBAN_POWER_CUTS", 36);
+    let world = World::new("2");
     let recorded = world.recorded(&["-j", "2"]);
     let disks = all(&recorded);
     let (syncs, found) = (recorded.syncs.len(), disks.len());
@@ -261,17 +263,6 @@ fn survives(pairs: &str, moments: usize) {
         "{syncs} syncs, {found} disks, {} opened and run to the end",
         chosen.len()
     );
-}
-
-#[test]
-fn a_power_cut_at_some_syncs_loses_nothing_that_was_stored() {
-    survives("2", 36);
-}
-
-#[test]
-#[ignore = "takes minutes: cargo test --test it a_power_cut_at_any -- --ignored --nocapture"]
-fn a_power_cut_at_any_sync_loses_nothing_that_was_stored() {
-    survives("3", usize::MAX);
 }
 
 #[test]

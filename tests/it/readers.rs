@@ -7,6 +7,7 @@ use mocban::manifest::{parse_csv, parse_jsonl};
 use mocban::{mesh, raster};
 
 use crate::seeds::{self, Named, assert_one_sentence};
+use crate::sizes::asked;
 use crate::spoil::Spoiler;
 
 const MESH: mesh::Limits = mesh::Limits {
@@ -109,7 +110,7 @@ fn every_whole_file_is_read() {
 
 #[test]
 fn spoilt_files_of_every_kind_are_read_or_told_in_a_sentence() {
-    let each = std::env::var("MOCBAN_SPOILT").map_or(120, |each| each.parse().expect("a number"));
+    let each = asked("MOCBAN_SPOILT", 120);
     for (kind, files, read) in readers() {
         let mut spoiler = Spoiler::new(2026);
         let mut refused = 0;

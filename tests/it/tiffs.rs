@@ -69,27 +69,22 @@ fn grey_with_transparency_lies_on_white() {
         extra: Some(2),
         ..TiffFile::grey(4, 1, 8, data.clone())
     };
-    let grey = |levels: [u16; 4]| levels.map(|level| [level; 3]);
-    assert_eq!(
-        read(&plain).expect("reads").data(),
-        grey([0, 65535, 25700, 52428])
-    );
-    let premultiplied = TiffFile {
-        extra: Some(1),
-        ..plain.clone()
-    };
-    assert_eq!(
-        read(&premultiplied).expect("reads").data(),
-        grey([0, 65535, 25700, 52428])
-    );
-    let unknown = TiffFile {
-        extra: Some(0),
-        ..plain.clone()
-    };
-    assert_eq!(
-        read(&unknown).expect("reads").data(),
-        grey([0, 0, 25700, 0])
-    );
+    // Plain, premultiplied, and something unknown that is left out of account.
+    for (extra, levels) in [
+        (2, [0, 65535, 25700, 52428]),
+        (1, [0, 65535, 25700, 52428]),
+        (0, [0, 0, 25700, 0]),
+    ] {
+        let file = TiffFile {
+            extra: Some(extra),
+            ..plain.clone()
+        };
+        assert_eq!(
+            read(&file).expect("reads").data(),
+            levels.map(|level| [level; 3]),
+            "extra sample {extra}"
+        );
+    }
     let white_is_zero = TiffFile {
         photometric: WHITE_IS_ZERO,
         extra: Some(0),

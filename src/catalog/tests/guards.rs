@@ -83,9 +83,7 @@ async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothi
 async fn a_late_completion_beside_the_right_one_changes_nothing() {
     let world = World::new(1).await;
     let late = world.claim(1).await.remove(0);
-    let other = register(&world.catalog).await;
-    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
-    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let other = world.rescued_by_another(1).await;
     let lease = world.claim_alone(other).await.remove(0);
     let mut lost = world.done(Stage::Fit);
     lost.outcome = r#"{"late":true}"#.to_owned();

@@ -99,9 +99,7 @@ async fn two_claims_never_get_the_same_pair() {
 async fn a_late_completion_of_a_rescued_job_changes_nothing() {
     let world = World::new(1).await;
     let late = world.claim(1).await.remove(0);
-    let other = register(&world.catalog).await;
-    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
-    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let other = world.rescued_by_another(1).await;
     let epoch = late.epoch();
     let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
     assert!(matches!(kept, Ok(Kept::Lost)));
@@ -121,9 +119,7 @@ async fn a_late_completion_of_a_rescued_job_changes_nothing() {
 async fn a_late_failure_and_a_late_release_change_nothing() {
     let world = World::new(2).await;
     let mut leases = world.claim(2).await;
-    let other = register(&world.catalog).await;
-    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
-    assert_eq!(rescued.expect("a rescue").ready, 2);
+    world.rescued_by_another(2).await;
     let (first, second) = (leases.remove(0), leases.remove(0));
     let kept = failed(&world, Stage::Fit, Sentence::Quarantine);
     assert!(!world.catalog.fail(first, kept).await.expect("an answer"));
@@ -170,9 +166,7 @@ async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
             world.catalog.claim(request).await.expect("a claim").len(),
             1
         );
-        let next = register(&world.catalog).await;
-        let rescue = world.catalog.rescue(Dead::AllBut(next), 60);
-        assert_eq!(rescue.await.expect("a rescue").ready, 1, "round {round}");
+        world.rescued_by_another(1).await;
     }
     world.counters_hold().await;
 }
@@ -181,9 +175,7 @@ async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
 async fn pairs_that_died_together_are_suspect_but_not_blamed() {
     let world = World::new(2).await;
     assert_eq!(world.claim(2).await.len(), 2);
-    let other = register(&world.catalog).await;
-    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
-    assert_eq!(rescued.expect("a rescue").ready, 2);
+    let other = world.rescued_by_another(2).await;
     let detail = world.catalog.pair(&name("p1")).await.expect("a read");
     assert_eq!(detail.expect("the pair").crashes, 0);
     assert!(world.claim_as(other, 2).await.is_empty());
@@ -195,9 +187,7 @@ async fn leases_of_a_worker_that_ended_in_order_are_no_crash() {
     drop(world.claim(1).await);
     let ended = world.catalog.end_worker(world.worker, 50).await;
     ended.expect("ended");
-    let other = register(&world.catalog).await;
-    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
-    assert_eq!(rescued.expect("a rescue").ready, 1);
+    world.rescued_by_another(1).await;
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     assert_eq!(detail.expect("the pair").crashes, 0);
 }
@@ -206,19 +196,8 @@ async fn leases_of_a_worker_that_ended_in_order_are_no_crash() {
 async fn progress_forgives_crashes() {
     let world = World::new(1).await;
     drop(world.claim(1).await);
-    let other = register(&world.catalog).await;
-    let rescued = world.catalog.rescue(Dead::AllBut(other), 60).await;
-    rescued.expect("a rescue");
-    let request = ClaimRequest {
-        alone: true,
-        ..ClaimRequest::new(other, 1, 1_000)
-    };
-    let lease = world
-        .catalog
-        .claim(request)
-        .await
-        .expect("a claim")
-        .remove(0);
+    let other = world.rescued_by_another(1).await;
+    let lease = world.claim_alone(other).await.remove(0);
     assert_eq!(lease.crashes(), 1);
     let kept = world
         .catalog
