@@ -3,6 +3,7 @@
 //! Neither boxes nor centroids are trusted: neighbours, specks and broken ends decide those. What is compared is
 //! soft relief with soft ink, each with its slow variation taken out, and only where it is known.
 
+mod duel;
 mod find;
 mod layer;
 mod overlap;

@@ -1,5 +1,6 @@
 //! Sub-pixel refinement of one pose: robust Gauss-Newton on what both layers know.
 
+use super::duel::{Side, duel};
 use super::search::Found;
 use super::step::{Loss, Room, Step};
 use super::{Layer, Overlap};
@@ -108,10 +109,31 @@ impl<'a> Refiner<'a> {
 
     /// How much of each layer the other explains at a pose.
     pub(in crate::stages) fn overlap(&self, pose: &Found) -> Overlap {
-        let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
-        self.moving_from_fixed(&pose.fixed_from_moving)
-            .map(|into| Overlap::of(self.fixed, self.moving, &into.after(&to_middle)))
+        self.moving_from_pixels(pose)
+            .map(|into| Overlap::of(self.fixed, self.moving, &into))
             .unwrap_or_default()
+    }
+
+    /// The scores of a pose and of a rival, which may have other strokes, on the same ground; zeros where a pose cannot
+    /// be turned round.
+    pub(in crate::stages) fn duel(&self, pose: &Found, other: &Self, rival: &Found) -> [f64; 2] {
+        let side = |of: &Self, pose: &Found| {
+            of.moving_from_pixels(pose).map(|moving_from_fixed| Side {
+                moving: of.moving,
+                moving_from_fixed,
+            })
+        };
+        match (side(self, pose), side(other, rival)) {
+            (Some(one), Some(two)) => duel(self.fixed, [one, two]),
+            _ => [0.0; 2],
+        }
+    }
+
+    /// From the fixed layer's pixels into the moving one at a pose.
+    fn moving_from_pixels(&self, pose: &Found) -> Option<Affine2> {
+        let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
+        let into = self.moving_from_fixed(&pose.fixed_from_moving)?;
+        Some(into.after(&to_middle))
     }
 
     /// The pose between layers, from the fixed one's pixels relative to its middle into the moving one.

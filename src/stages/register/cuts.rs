@@ -38,6 +38,8 @@ pub(super) struct Fitting<'a, 'b> {
     /// The cut that fits best, between those that were tried: a choice between cuts that fit alike would make the
     /// answer jump.
     pub(super) cut: f64,
+    /// Which of those that were tried came nearest.
+    pub(super) nearest: usize,
 }
 
 impl<'a> Cuts<'a> {
@@ -67,7 +69,13 @@ impl<'a> Cuts<'a> {
                 ..*pose
             },
             cut: cut(first) + at.fract() * (cut(first + 1) - cut(first)),
+            nearest: best,
         })
+    }
+
+    /// The scores of two poses, each with the strokes of one of the cuts, on the same ground.
+    pub(super) fn duel(&self, [one, two]: [(usize, &Found); 2]) -> [f64; 2] {
+        self.refiners[one.0].duel(one.1, &self.refiners[two.0], two.1)
     }
 }
 

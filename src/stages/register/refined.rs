@@ -54,6 +54,8 @@ struct Settled {
     found: Found,
     overlap: Overlap,
     cut: f64,
+    /// Which of the tried cuts came nearest.
+    nearest: usize,
 }
 
 impl Settled {
@@ -108,11 +110,12 @@ impl Rivals {
             *rival = settled(cuts, &rival.found)?;
         }
         if let Some(other) = &mut self.other_angle
-            && other.score() > self.best.score()
+            && fair_share(cuts, other, &self.best) > 1.0
         {
             std::mem::swap(&mut self.best, other);
         }
-        self.shares = [self.other_angle, self.mirrored].map(|rival| share(rival, &self.best));
+        self.shares = [self.other_angle, self.mirrored]
+            .map(|rival| rival.map_or(0.0, |rival| fair_share(cuts, &rival, &self.best)));
         Some(())
     }
 
@@ -138,6 +141,12 @@ impl Rivals {
 /// Share of the best pose's score that a rival reaches.
 fn share(rival: Option<Settled>, best: &Settled) -> f64 {
     rival.map_or(0.0, |rival| rival.score() / best.score().max(1e-6))
+}
+
+/// The same on the ground that both have in common.
+fn fair_share(cuts: &Cuts, rival: &Settled, best: &Settled) -> f64 {
+    let [score, rival] = cuts.duel([best, rival].map(|pose| (pose.nearest, &pose.found)));
+    rival / score.max(1e-6)
 }
 
 fn best_of(tried: &[Settled], of_kind: impl Fn(&Settled) -> bool) -> Option<&Settled> {
@@ -225,5 +234,6 @@ fn settled(cuts: &Cuts, start: &Found) -> Option<Settled> {
         found: fitting.found,
         overlap: fitting.strokes.overlap(&pose),
         cut: fitting.cut,
+        nearest: fitting.nearest,
     })
 }
