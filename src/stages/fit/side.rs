@@ -18,8 +18,8 @@ const WINDING: f64 = 2.0;
 const SHARPNESS: f64 = 0.7;
 const AGREEMENT: f64 = 14.0;
 const MANIFEST: f64 = 0.4;
-/// A face that agrees with the print so well is the carved one: none of 317 backs came above 0.48.
-const SURE: f64 = 0.6;
+/// A face that agrees with the print so well is the carved one: none of 500 backs came above 0.55.
+const SURE: f64 = 0.62;
 /// What is taken for the agreement of a face that need not be asked.
 const UNASKED: f64 = 0.45;
 /// No face agrees less than this.
@@ -54,6 +54,9 @@ const fn mirrored(count: usize) -> Keep {
 
 /// Working size at which a face is judged: what correlates must also have printed.
 const JUDGED_PX: usize = 56;
+/// Nearness to the tops below which nothing prints. The search is content with slopes; to judge by, they are too broad
+/// for thin strokes.
+const PRINTS: f32 = 0.7;
 /// Working size of the print and the tops.
 const BASE_PX: usize = 72;
 
@@ -167,11 +170,14 @@ fn best_score(ink: &Base, tops: &Soft) -> f64 {
         return 0.0;
     };
     let found = find(ink, &wood, LIMITS, &PASSES);
-    let (print, tops) = (ink.layer(JUDGED_PX, 1.0), wood.layer(JUDGED_PX, 1.0));
+    let print = ink.layer(JUDGED_PX, 1.0);
+    let tops = wood
+        .at(JUDGED_PX, 1.0)
+        .mapped(|near| ((near - PRINTS) / (1.0 - PRINTS)).max(0.0));
     let judge = Refiner::new(&print, &tops);
     let scores = found
         .iter()
-        .map(|pose| pose.score * judge.overlap(pose).moving_met);
+        .map(|pose| judge.judged(pose).score * judge.overlap(pose).moving_met);
     scores.fold(0.0, f64::max)
 }
 
