@@ -27,7 +27,7 @@ pub(super) struct Side<'a> {
 
 /// The scores of two poses over what is known at both: correlation times the share of the moving picture's amount that
 /// meets the fixed one's, 0..=1.
-pub(super) fn duel(fixed: &Layer, sides: [Side<'_>; 2]) -> [f64; 2] {
+pub(super) fn duel(fixed: &Layer, sides: &[Side<'_>; 2]) -> [f64; 2] {
     let paper = own_ground(fixed);
     let grounds = [0, 1].map(|k: usize| own_ground(sides[k].moving));
     let mut sums = [Sums::default(); 2];
@@ -106,5 +106,61 @@ impl Sums {
         let spread = |k: usize| (self.squares[k] - self.values[k].powi(2) / n).max(1e-9);
         let correlation = (self.products - a * b / n) / (spread(0) * spread(1)).sqrt();
         correlation.max(0.0) * self.met / self.amount.max(1e-9)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Side, duel};
+    use crate::domain::Affine2;
+    use crate::raster::{Grid, Mask};
+    use crate::stages::pose::{Base, Layer, Soft};
+
+    const SIDE: usize = 64;
+
+    /// Bars as boxes of left, top, right and bottom, right and bottom not in them.
+    fn layer(bars: &[[usize; 4]]) -> Layer {
+        let on = |x, y| {
+            bars.iter()
+                .any(|[l, t, r, b]| (*l..*r).contains(&x) && (*t..*b).contains(&y))
+        };
+        let soft = Soft {
+            amount: Grid::from_fn(SIDE, SIDE, |x, y| f32::from(u8::from(on(x, y)))),
+            known: Mask::new(SIDE, SIDE, true),
+        };
+        let base = Base::new(&soft, SIDE).expect("something is known");
+        base.layer(SIDE, 0.8)
+    }
+
+    fn scores(print: &Layer, relief: &Layer) -> [f64; 2] {
+        let last = (relief.amount.width() - 1) as f64;
+        let as_read = Affine2([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+        let mirrored = Affine2([[-1.0, 0.0, last], [0.0, 1.0, 0.0]]);
+        let side = |moving_from_fixed| Side {
+            moving: relief,
+            moving_from_fixed,
+        };
+        duel(print, &[side(as_read), side(mirrored)])
+    }
+
+    /// A beam that is heavier at its right end, on a stem.
+    const CHARACTER: [[usize; 4]; 3] = [[14, 20, 50, 26], [44, 16, 50, 26], [29, 20, 35, 50]];
+
+    #[test]
+    fn a_small_difference_within_the_character_tells_the_mirror() {
+        let [as_read, mirrored] = scores(&layer(&CHARACTER), &layer(&CHARACTER));
+        assert!(as_read > 0.99, "{as_read}");
+        assert!(mirrored < 0.95 * as_read, "{mirrored} of {as_read}");
+    }
+
+    #[test]
+    fn a_wall_that_falls_on_a_frame_line_only_in_the_mirror_decides_nothing() {
+        let with = |bar| layer(&[&CHARACTER[..], &[bar]].concat());
+        let (left, right) = ([0, 0, 6, SIDE], [SIDE - 6, 0, SIDE, SIDE]);
+        let bare = scores(&layer(&CHARACTER), &layer(&CHARACTER));
+        let walled = scores(&with(right), &with(left));
+        for (k, score) in walled.into_iter().enumerate() {
+            assert!((score - bare[k]).abs() < 0.02, "{walled:?} {bare:?}");
+        }
     }
 }

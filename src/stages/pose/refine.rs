@@ -124,7 +124,7 @@ impl<'a> Refiner<'a> {
             })
         };
         match (side(self, pose), side(other, rival)) {
-            (Some(one), Some(two)) => duel(self.fixed, [one, two]),
+            (Some(one), Some(two)) => duel(self.fixed, &[one, two]),
             _ => [0.0; 2],
         }
     }

@@ -19,10 +19,10 @@ use crate::domain::{
 use crate::raster::{DepthMap, Mask, warp_mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 5;
+pub const REVISION: u32 = 6;
 
 /// Mirrored must win by this factor to be named the cause: symmetric characters score alike both ways.
-const MIRROR_WINS: f64 = 1.12;
+const MIRROR_WINS: f64 = 1.06;
 
 /// How the alignment is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
