@@ -14,8 +14,10 @@ const PAPER_TELLABLE: f64 = 0.945;
 const LEAST_PAPER: f64 = 0.2;
 /// White must cover at least this share of the image to count as "beyond the cut".
 const LEAST_WHITE: f64 = 0.004;
-/// Both witnesses of the polarity must speak this loudly together for it to be clear.
+/// Both witnesses of the polarity must speak this loudly together for it to be clear; louder for ink that is lighter
+/// than paper, as in rubbings: heavy ink within a frame passes for dark paper.
 const CLEAR: f64 = 0.8;
+const CLEAR_LIGHT: f64 = 1.6;
 /// Least difference between ink and paper, as a share of the lighter of the two: scanners that fill but a part of
 /// their 16 bits leave dark pictures.
 const LEAST_CONTRAST: f64 = 0.08;
@@ -232,7 +234,8 @@ fn polarity(even: &Grid<f32>, levelled: Option<Split>, dark: &Mask, known: &Mask
         paper_darkness(&even.map(|g| f64::from(*g) < split.threshold), known)
     });
     let sum = plain + levelled;
-    (sum > 0.0, plain * levelled > 0.0 && sum.abs() > CLEAR)
+    let clear = if sum > 0.0 { CLEAR_LIGHT } else { CLEAR };
+    (sum > 0.0, plain * levelled > 0.0 && sum.abs() > clear)
 }
 
 /// How much speaks for the dark class being the paper; below zero it is ink. Ink is the smaller class, and paper

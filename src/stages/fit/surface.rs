@@ -33,6 +33,15 @@ const TOP_SIGMA: f64 = 0.05;
 const TILT_SIGMA: f64 = 0.05;
 /// Second-degree coefficients in units of the extent (one standard deviation): a bow of 2-8 % of the extent.
 const BOW_SIGMA: f64 = 0.15;
+/// The same around the ground's, where the ground is seen well.
+const GROUND_BOW_SIGMA: f64 = 0.03;
+/// The ground is looked for from this quantile of the heights over the mean plane, within these shares of the height
+/// range, and is seen well where the last one holds this share of what is seen.
+const GROUND_START: f64 = 0.25;
+const GROUND_WINDOWS: [f64; 4] = [0.35, 0.22, 0.14, 0.1];
+const LEAST_GROUND: f64 = 0.3;
+/// A surface with less support lies on few strokes.
+const SPARSE: f64 = 0.2;
 /// Soft tops fade to nothing at this share of the relief under the surface.
 const SOFT_SPAN: f64 = 0.5;
 /// A bow must explain this much more of the tops than the plane does.
@@ -122,11 +131,17 @@ impl Samples {
         for _ in 0..ENVELOPE_PASSES {
             start = solve::<3>(self.weighed(&start, envelope), Some(self.prior(ground)));
         }
-        let plane = self.narrow::<3>(start, ground);
+        let plane = self.narrow::<3>(start, self.prior(ground));
         if !allow_bow {
             return plane;
         }
-        let bent = self.narrow::<6>(start, ground);
+        let free = self.narrow::<6>(start, self.prior(ground));
+        let sparse = free.support < SPARSE;
+        let prior = sparse.then(|| self.prior_along_ground(ground)).flatten();
+        let bent = prior
+            .map(|prior| self.narrow::<6>(start, prior))
+            .filter(|along| along.support > free.support)
+            .unwrap_or(free);
         if bent.support > plane.support * BOW_GAIN {
             bent
         } else {
@@ -135,12 +150,12 @@ impl Samples {
     }
 
     /// Passes with a shrinking window below the surface.
-    fn narrow<const TERMS: usize>(&self, start: [f64; 6], ground: [f64; 6]) -> Surface {
+    fn narrow<const TERMS: usize>(&self, start: [f64; 6], prior: Prior) -> Surface {
         let mut c = start;
         for window in WINDOWS.map(|w| w * self.range) {
             for _ in 0..NARROW_PASSES {
                 let points = self.weighed(&c, |r| one_sided_weight(r, window));
-                c = solve::<TERMS>(points, Some(self.prior(ground)));
+                c = solve::<TERMS>(points, Some(prior));
             }
         }
         self.judge(c)
@@ -188,8 +203,38 @@ impl Samples {
     fn prior(&self, ground: [f64; 6]) -> Prior {
         Prior {
             mean: ground,
+            bow_sigma: BOW_SIGMA,
             noise: CORRELATED_PX * (TOP_SIGMA * self.range).powi(2),
         }
+    }
+
+    /// The same where much of the ground is seen: a block bends as a whole, so the tops bend as the ground does. Few
+    /// strokes would bend the surface as they like.
+    fn prior_along_ground(&self, mean_plane: [f64; 6]) -> Option<Prior> {
+        let [a, b, c, ..] = mean_plane;
+        let [_, _, _, bow @ ..] = self.ground(mean_plane)?;
+        Some(Prior {
+            mean: [a, b, c, bow[0], bow[1], bow[2]],
+            bow_sigma: GROUND_BOW_SIGMA,
+            ..self.prior(mean_plane)
+        })
+    }
+
+    /// The second-degree surface of the carved ground, where enough of it is seen.
+    fn ground(&self, mean_plane: [f64; 6]) -> Option<[f64; 6]> {
+        let mut c = mean_plane;
+        let mut residuals: Vec<f64> = self.points.iter().map(|p| p[2] - value(&c, p)).collect();
+        c[0] += quantile(&mut residuals, GROUND_START);
+        for window in GROUND_WINDOWS.map(|w| w * self.range) {
+            for _ in 0..NARROW_PASSES {
+                let weight = |r: f64| (1.0 - (r / window).powi(2)).max(0.0).powi(2);
+                c = solve::<6>(self.weighed(&c, weight), Some(self.prior(mean_plane)));
+            }
+        }
+        let window = GROUND_WINDOWS[GROUND_WINDOWS.len() - 1] * self.range;
+        let near = |p: &&[f64; 3]| (p[2] - value(&c, p)).abs() < window;
+        let share = self.points.iter().filter(near).count() as f64 / self.points.len() as f64;
+        (share > LEAST_GROUND).then_some(c)
     }
 
     /// Residual of every seen pixel over a surface, mesh units.
@@ -290,6 +335,8 @@ impl Samples {
 #[derive(Debug, Clone, Copy)]
 struct Prior {
     mean: [f64; 6],
+    /// Of the second-degree coefficients.
+    bow_sigma: f64,
     noise: f64,
 }
 
@@ -312,7 +359,7 @@ fn solve<const TERMS: usize>(
     }
     if let Some(prior) = prior {
         for k in 1..TERMS {
-            let sigma = if k < 3 { TILT_SIGMA } else { BOW_SIGMA };
+            let sigma = if k < 3 { TILT_SIGMA } else { prior.bow_sigma };
             let precision = prior.noise / (sigma * sigma);
             sums[k][k] += precision;
             right[k] += precision * prior.mean[k];

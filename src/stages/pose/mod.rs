@@ -5,6 +5,7 @@
 
 mod duel;
 mod find;
+mod ground;
 mod layer;
 mod overlap;
 mod refine;

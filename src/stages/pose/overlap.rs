@@ -3,6 +3,7 @@
 use super::Layer;
 use super::layer::sample;
 use crate::domain::Affine2;
+use crate::raster::Grid;
 
 /// Shares of two pictures that lie on each other at a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -14,16 +15,21 @@ pub(in crate::stages) struct Overlap {
 }
 
 impl Overlap {
-    /// Of two layers, given where the fixed one's pixels lie in the moving one; zeros where they do not meet.
-    pub(super) fn of(fixed: &Layer, moving: &Layer, moving_from_fixed: &Affine2) -> Self {
+    /// Of the fixed and the moving layer on the grounds on which they can be judged, given where the fixed one's pixels
+    /// lie in the moving one; zeros where they do not meet.
+    pub(super) fn of(
+        [fixed, moving]: [&Layer; 2],
+        [paper, ground]: [&Grid<f32>; 2],
+        moving_from_fixed: &Affine2,
+    ) -> Self {
         let (mut both, mut ink, mut wood) = (0.0, 0.0, 0.0);
         for y in 0..fixed.amount.height() {
             for x in 0..fixed.amount.width() {
-                if fixed.weight.at(x, y) == 0.0 {
+                if paper.at(x, y) == 0.0 {
                     continue;
                 }
                 let there = moving_from_fixed.apply([x as f64, y as f64]);
-                if sample(&moving.weight, there) < 0.5 {
+                if sample(ground, there) < 0.5 {
                     continue;
                 }
                 let (a, b) = (fixed.amount.at(x, y), sample(&moving.amount, there));

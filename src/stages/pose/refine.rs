@@ -1,10 +1,14 @@
 //! Sub-pixel refinement of one pose: robust Gauss-Newton on what both layers know.
 
+use std::cell::OnceCell;
+
 use super::duel::{Side, duel};
+use super::ground::own_ground;
 use super::search::Found;
 use super::step::{Loss, Room, Step};
 use super::{Layer, Overlap};
 use crate::domain::Affine2;
+use crate::raster::Grid;
 
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
 const SETTLED_PX: f64 = 0.01;
@@ -25,6 +29,8 @@ pub(in crate::stages) struct Refiner<'a> {
     centre: [f64; 2],
     rim: f64,
     energies: [f64; 2],
+    /// Where either layer can be judged, once somebody has asked.
+    grounds: [OnceCell<Grid<f32>>; 2],
 }
 
 impl<'a> Refiner<'a> {
@@ -51,6 +57,7 @@ impl<'a> Refiner<'a> {
             centre,
             rim: centre[0].max(centre[1]).max(1.0),
             energies: [fixed.energy(), moving.energy()],
+            grounds: Default::default(),
             fixed,
             moving,
         }
@@ -110,23 +117,41 @@ impl<'a> Refiner<'a> {
     /// How much of each layer the other explains at a pose.
     pub(in crate::stages) fn overlap(&self, pose: &Found) -> Overlap {
         self.moving_from_pixels(pose)
-            .map(|into| Overlap::of(self.fixed, self.moving, &into))
+            .map(|into| {
+                Overlap::of(
+                    [self.fixed, self.moving],
+                    [self.paper(), self.ground()],
+                    &into,
+                )
+            })
             .unwrap_or_default()
     }
 
-    /// The scores of a pose and of a rival, which may have other strokes, on the same ground; zeros where a pose cannot
+    /// The scores of a pose and of a rival, which may have other strokes, on the ground they share; zeros where a pose cannot
     /// be turned round.
     pub(in crate::stages) fn duel(&self, pose: &Found, other: &Self, rival: &Found) -> [f64; 2] {
-        let side = |of: &Self, pose: &Found| {
-            of.moving_from_pixels(pose).map(|moving_from_fixed| Side {
-                moving: of.moving,
-                moving_from_fixed,
-            })
-        };
-        match (side(self, pose), side(other, rival)) {
-            (Some(one), Some(two)) => duel(self.fixed, &[one, two]),
+        match (self.side(pose), other.side(rival)) {
+            (Some(one), Some(two)) => duel(self.fixed, self.paper(), &[one, two]),
             _ => [0.0; 2],
         }
+    }
+
+    fn side(&self, pose: &Found) -> Option<Side<'_>> {
+        Some(Side {
+            moving: self.moving,
+            ground: self.ground(),
+            moving_from_fixed: self.moving_from_pixels(pose)?,
+        })
+    }
+
+    /// Where the fixed layer can be judged.
+    fn paper(&self) -> &Grid<f32> {
+        self.grounds[0].get_or_init(|| own_ground(self.fixed))
+    }
+
+    /// Where the moving layer can be judged.
+    fn ground(&self) -> &Grid<f32> {
+        self.grounds[1].get_or_init(|| own_ground(self.moving))
     }
 
     /// From the fixed layer's pixels into the moving one at a pose.
