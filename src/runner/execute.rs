@@ -100,7 +100,8 @@ fn run(
         Err(setback) => Ended::Setback(setback),
         Ok(output) => {
             breakpoint::reach(stage, Point::Computed, Some(&pair.facts.name));
-            match project.write_artifacts(&output.files) {
+            let written = || breakpoint::reach(stage, Point::Written, Some(&pair.facts.name));
+            match project.write_artifacts_telling(&output.files, &written) {
                 Err(error) => Ended::NotFiled(error),
                 Ok(files) => filed(stage, &mut pair, output, files),
             }
