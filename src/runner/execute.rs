@@ -16,7 +16,7 @@ use super::steps::{Setback, Steps};
 use super::stop::{Stop, StopLevel};
 use crate::breakpoint::{self, Point};
 use crate::catalog::MetricResult;
-use crate::domain::{ArtifactSet, ContentHash, FailureClass, Stage};
+use crate::domain::{ArtifactSet, ContentHash, FailureClass, Stage, plain};
 use crate::store::{ArtifactError, Project};
 
 /// A stage that is computed and whose files are on disk.
@@ -139,14 +139,17 @@ fn filed(
     })
 }
 
-/// What a panic said.
+/// Most characters of a panic's own words.
+const LONGEST: usize = 160;
+
+/// What a panic said, and what to do.
 fn panic_text(payload: &(dyn Any + Send)) -> String {
     let said = payload
         .downcast_ref::<&str>()
         .map(|text| (*text).to_owned())
         .or_else(|| payload.downcast_ref::<String>().cloned());
-    match said {
-        Some(text) => format!("the stage panicked: {text}"),
-        None => "the stage panicked".to_owned(),
-    }
+    let said = said.map_or_else(String::new, |text| format!(" ({})", plain(&text, LONGEST)));
+    format!(
+        "the stage panicked{said}: a defect of this program, please report it with what `run --rerun failed -v` tells"
+    )
 }
