@@ -153,3 +153,16 @@ fn panic_text(payload: &(dyn Any + Send)) -> String {
         "the stage panicked{said}: a defect of this program, please report it with what `run --rerun failed -v` tells"
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{LONGEST, panic_text};
+
+    #[test]
+    fn words_of_a_panic_come_plain_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(LONGEST + 1)] {
+            let said = panic_text(&rude);
+            assert!(!said.contains(&rude), "{said:?}");
+        }
+    }
+}
