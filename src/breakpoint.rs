@@ -4,7 +4,7 @@
 //! N-th time (1 when left out, 0 for each time) that a pair, or that pair, reaches the point at that stage.
 //! `MOCBAN_STOP_AT` stops the process there instead, until it is sent SIGCONT. `MOCBAN_HOLD_AT` holds the thread up:
 //! it makes the file that `MOCBAN_HOLD_FILE` names and goes on when somebody has removed it; such a point must be one
-//! that a stage's own thread reaches, `computed` or `filed`. Only builds with debug assertions look.
+//! that a stage's own thread reaches: `computed`, `written` or `filed`. Only builds with debug assertions look.
 
 use crate::domain::{PairName, Stage};
 
@@ -17,6 +17,8 @@ pub(crate) enum Point {
     Claimed,
     /// The stage is computed, nothing is on disk.
     Computed,
+    /// A file of it is written under a temporary name, and has not got its own.
+    Written,
     /// Its files are on disk, no row names them.
     Filed,
     /// Its job's step is written, not committed. Pairs have no names here.
@@ -120,6 +122,7 @@ mod test_build {
             Point::Claiming => "claiming",
             Point::Claimed => "claimed",
             Point::Computed => "computed",
+            Point::Written => "written",
             Point::Filed => "filed",
             Point::Rowed => "rowed",
             Point::Stored => "stored",

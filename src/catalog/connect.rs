@@ -74,7 +74,7 @@ pub(super) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection
 }
 
 async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
-    let patience = Patience::begin();
+    let mut patience = Patience::begin(path);
     loop {
         let outcome = try_connect(path, create).await;
         match patience.wait(&outcome) {
@@ -119,7 +119,7 @@ pub(super) async fn readers(path: &Path) -> Result<SqlitePool> {
 
 /// Readers beside writers.
 async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
-    let patience = Patience::begin();
+    let mut patience = Patience::begin(path);
     loop {
         let outcome = pool(options(path).pragma("query_only", "1")).await;
         match patience.wait(&outcome) {
@@ -151,7 +151,7 @@ async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
 }
 
 /// A file that SQLite keeps beside the catalog.
-fn beside(path: &Path, ending: &str) -> PathBuf {
+pub(super) fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(ending);
     PathBuf::from(name)

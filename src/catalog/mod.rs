@@ -13,6 +13,7 @@ mod copy;
 mod counters;
 mod error;
 mod fail;
+mod holder;
 mod lease;
 mod mend;
 mod network;
@@ -39,6 +40,7 @@ mod work;
 mod writer;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use sqlx::pool::PoolConnection;
 use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
@@ -48,6 +50,7 @@ pub use audit::{AuditedPair, AuditedResult, Drift};
 pub use claim::{ClaimRequest, PairSelection};
 pub use counters::Counts;
 pub use error::{CatalogError, Result};
+pub use holder::{Holder, holder};
 pub use lease::{
     InputSeen, InputsSeen, Kept, Lease, MetricResult, RecipeId, Sentence, StageDone, StageFailed,
 };
@@ -77,6 +80,7 @@ pub struct Catalog {
     readers: SqlitePool,
     /// `None` when opened to read only.
     inbox: Option<mpsc::Sender<Message>>,
+    path: Arc<Path>,
 }
 
 impl Catalog {
@@ -104,6 +108,7 @@ impl Catalog {
         Ok(Self {
             readers: connect::readers(path).await?,
             inbox: None,
+            path: path.into(),
         })
     }
 
@@ -111,10 +116,12 @@ impl Catalog {
         let conn = connect::writer(path, create).await?;
         let readers = connect::readers(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
-        tokio::spawn(writer::run(conn, inbox));
+        let path: Arc<Path> = path.into();
+        tokio::spawn(writer::run(conn, Arc::clone(&path), inbox));
         Ok(Self {
             readers,
             inbox: Some(sender),
+            path,
         })
     }
 
@@ -149,6 +156,6 @@ impl Catalog {
         &self,
         work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
     ) -> Result<T> {
-        writer::alone(self.writer()?, work).await
+        writer::alone(self.writer()?, &self.path, work).await
     }
 }

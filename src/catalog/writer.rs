@@ -1,5 +1,6 @@
 //! The one task that writes: takes all requests that wait, commits them together, answers after the commit.
 
+use std::path::Path;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
@@ -9,7 +10,7 @@ use tokio::sync::{mpsc, oneshot};
 
 use super::batch::{Answers, Batch, Request};
 use super::patience::Patience;
-use super::{CatalogError, Result};
+use super::{CatalogError, Result, Trouble};
 
 /// Most requests in one commit.
 const BATCH: usize = 256;
@@ -34,7 +35,11 @@ pub(super) enum Message {
 }
 
 /// The writer's loop. Ends at `Close` or when nobody can send any more.
-pub(super) async fn run(mut conn: SqliteConnection, mut inbox: mpsc::Receiver<Message>) {
+pub(super) async fn run(
+    mut conn: SqliteConnection,
+    path: Arc<Path>,
+    mut inbox: mpsc::Receiver<Message>,
+) {
     let mut commits = 0_u32;
     let closing = loop {
         let message = if commits == 0 {
@@ -53,7 +58,7 @@ pub(super) async fn run(mut conn: SqliteConnection, mut inbox: mpsc::Receiver<Me
             Some(Message::Alone(work)) => work(&mut conn).await,
             Some(Message::Grouped(first)) => {
                 let (batch, after) = gather(first, &mut inbox).await;
-                commit(&mut conn, batch).await;
+                commit(&mut conn, &path, batch).await;
                 match after {
                     Some(Message::Close(done)) => break Some(done),
                     Some(Message::Alone(work)) => work(&mut conn).await,
@@ -99,14 +104,16 @@ async fn gather(first: Request, inbox: &mut mpsc::Receiver<Message>) -> (Batch, 
 }
 
 /// Commits a batch and answers. When it fails, each request is tried alone, so that one that cannot be stored
-/// does not take the others with it.
-async fn commit(conn: &mut SqliteConnection, batch: Batch) {
-    match attempt(conn, &batch).await {
+/// does not take the others with it. A lock that was waited for in vain is no request's fault.
+async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
+    match attempt(conn, path, &batch).await {
         Ok(answers) => batch.answer(answers),
-        Err(error) if batch.len() == 1 => batch.refuse(&Arc::new(error)),
+        Err(error) if batch.len() == 1 || error.trouble() == Some(Trouble::Busy) => {
+            batch.refuse(&Arc::new(error));
+        }
         Err(_) => {
             for single in batch.split() {
-                match attempt(conn, &single).await {
+                match attempt(conn, path, &single).await {
                     Ok(answers) => single.answer(answers),
                     Err(error) => single.refuse(&Arc::new(error)),
                 }
@@ -115,8 +122,8 @@ async fn commit(conn: &mut SqliteConnection, batch: Batch) {
     }
 }
 
-async fn attempt(conn: &mut SqliteConnection, batch: &Batch) -> Result<Answers> {
-    let patience = Patience::begin();
+async fn attempt(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Result<Answers> {
+    let mut patience = Patience::begin(path);
     loop {
         let outcome = batch.apply(conn).await;
         if outcome.is_err() {
@@ -130,8 +137,8 @@ async fn attempt(conn: &mut SqliteConnection, batch: &Batch) -> Result<Answers> 
 }
 
 /// Begins a write transaction, when no other process has one.
-async fn begin(conn: &mut SqliteConnection) -> Result<()> {
-    let patience = Patience::begin();
+async fn begin(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
+    let mut patience = Patience::begin(path);
     loop {
         let begun = sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await;
         let outcome = begun.map(|_| ()).map_err(CatalogError::from);
@@ -173,12 +180,14 @@ async fn fold_log(conn: &mut SqliteConnection, pragma: &'static str) {
 /// Runs `work` in its own transaction through the writer.
 pub(super) async fn alone<T: Send + 'static>(
     inbox: &mpsc::Sender<Message>,
+    path: &Arc<Path>,
     work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
 ) -> Result<T> {
     let (sender, receiver) = oneshot::channel();
+    let path = Arc::clone(path);
     let task: Alone = Box::new(move |conn| {
         Box::pin(async move {
-            let _ = sender.send(in_transaction(conn, work).await);
+            let _ = sender.send(in_transaction(conn, &path, work).await);
         })
     });
     if inbox.send(Message::Alone(task)).await.is_err() {
@@ -189,9 +198,10 @@ pub(super) async fn alone<T: Send + 'static>(
 
 async fn in_transaction<T>(
     conn: &mut SqliteConnection,
+    path: &Path,
     work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>>,
 ) -> Result<T> {
-    begin(conn).await?;
+    begin(conn, path).await?;
     let outcome = work(&mut *conn).await;
     end(conn, outcome).await
 }

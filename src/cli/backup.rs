@@ -1,5 +1,7 @@
 //! `backup`: the catalog, the verdicts and the settings, copied whole while a run may be writing.
 
+use std::fs::File;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -10,9 +12,9 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::table::count;
 use super::talk;
-use crate::catalog::Catalog;
+use crate::catalog::{Catalog, VerdictEvent};
 use crate::export::verdict_lines;
-use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of, write_whole};
+use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of};
 
 /// Arguments of `backup`.
 #[derive(Debug, Args)]
@@ -27,15 +29,27 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
     let file = &args.file;
     let shown = file.display();
     refuse_place(file, &project)?;
-    let partial = Partial(partial_of(file));
-    partial.clear();
+    let partial = Partial::of(file);
     catalog
         .copy_to(&partial.0)
         .await
         .with_context(|| format!("cannot write the backup {shown}"))?;
     catalog.close().await;
-    let (verdicts, pairs) = beside(&partial, &args.file, &project).await?;
-    finish_whole(&partial.0, file).with_context(|| format!("cannot write {shown}"))?;
+    let (log, pairs) = held_by(&partial).await?;
+    let verdicts = log.len() as u64;
+    let log = prepare(&verdicts_file(file), verdict_lines(&log).as_bytes())?;
+    let settings_file = file.with_extension("mocban.toml");
+    let settings = match std::fs::read(project.settings_path()) {
+        Ok(bytes) => Some(prepare(&settings_file, &bytes)?),
+        Err(_) => None,
+    };
+    // All of it is written before the first takes its name, and the catalog takes its name last.
+    place(&log, &verdicts_file(file))?;
+    match &settings {
+        Some(partial) => place(partial, &settings_file)?,
+        None => remove(&settings_file)?,
+    }
+    place(&partial, file)?;
     let bytes = std::fs::metadata(file)?.len();
     if context.global.json {
         talk::print_json(&json!({
@@ -52,10 +66,17 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
     Ok(ExitCode::Done)
 }
 
-/// A copy under way; what is left of it goes when it is dropped.
+/// A file under way; what is left of it goes when it is dropped.
 struct Partial(PathBuf);
 
 impl Partial {
+    /// Nothing yet, also where a killed process left half a file.
+    fn of(file: &Path) -> Self {
+        let partial = Self(partial_of(file));
+        partial.clear();
+        partial
+    }
+
     fn clear(&self) {
         for ending in ["", "-wal", "-shm", "-journal"] {
             let mut name = self.0.as_os_str().to_owned();
@@ -72,32 +93,39 @@ impl Drop for Partial {
     }
 }
 
-/// Writes what goes beside the backup, verdicts as they are in the copy; says how many verdicts and pairs it holds.
-async fn beside(partial: &Partial, file: &Path, project: &Project) -> anyhow::Result<(u64, u64)> {
+/// The verdicts and the number of pairs in a copy.
+async fn held_by(partial: &Partial) -> anyhow::Result<(Vec<VerdictEvent>, u64)> {
     let copy = Catalog::open_read_only(&partial.0).await?;
     let log = copy.verdict_log(None).await?;
     let pairs = copy.counters().await?.values().sum();
     copy.close().await;
-    let path = verdicts_file(file);
-    write_whole(&path, verdict_lines(&log).as_bytes())
-        .with_context(|| format!("cannot write {}", path.display()))?;
-    settings(file, project)?;
-    Ok((log.len() as u64, pairs))
+    Ok((log, pairs))
 }
 
-/// The project's own settings, without which other results would come of it. One that an earlier backup left goes when
-/// the project has none any more.
-fn settings(file: &Path, project: &Project) -> anyhow::Result<()> {
-    let path = file.with_extension("mocban.toml");
-    let shown = path.display();
-    match std::fs::read(project.settings_path()) {
-        Ok(bytes) => write_whole(&path, &bytes).with_context(|| format!("cannot write {shown}")),
-        Err(_) => match std::fs::remove_file(&path) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                Err(error).with_context(|| format!("cannot remove {shown}"))
-            }
-            _ => Ok(()),
-        },
+/// Writes what goes beside the backup, under another name.
+fn prepare(file: &Path, bytes: &[u8]) -> anyhow::Result<Partial> {
+    let partial = Partial::of(file);
+    let written = File::create(&partial.0).and_then(|mut at| {
+        at.write_all(bytes)?;
+        at.sync_all()
+    });
+    written.with_context(|| format!("cannot write {}", file.display()))?;
+    Ok(partial)
+}
+
+/// Gives a file its name.
+fn place(partial: &Partial, file: &Path) -> anyhow::Result<()> {
+    finish_whole(&partial.0, file).with_context(|| format!("cannot write {}", file.display()))
+}
+
+/// Removes the settings that an earlier backup left, when the project has none any more: without them other results
+/// would come of it.
+fn remove(file: &Path) -> anyhow::Result<()> {
+    match std::fs::remove_file(file) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+            Err(error).with_context(|| format!("cannot remove {}", file.display()))
+        }
+        _ => Ok(()),
     }
 }
 

@@ -53,6 +53,9 @@ use manifest_file::RefusedManifest;
 use truth_file::TruthFileError;
 use verdict_file::VerdictFileError;
 
+/// Letters that stand for flags without a value, so that others may follow in the same word.
+const FLAGS: [char; 6] = ['h', 'n', 'q', 'v', 'V', 'w'];
+
 /// Reads the command line, does what it says, and tells the exit code. Errors are shown here, once.
 pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let args: Vec<OsString> = args.into_iter().collect();
@@ -81,7 +84,24 @@ fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
     let mut cli = Cli::from_arg_matches(&command.try_get_matches_from(args)?)?;
     // clap lets those behind the command's name take the place of those before it.
     cli.global.set = values_of("--set", args);
+    cli.global.verbose = times_verbose(args);
     Ok(cli)
+}
+
+/// How often `-v` stands on a command line that clap has taken, where a word with a dash in front is never a value.
+fn times_verbose(args: &[OsString]) -> u8 {
+    let words = args.iter().skip(1).filter_map(|arg| arg.to_str());
+    let words = words.take_while(|word| *word != "--");
+    let times = words.map(|word| match word.strip_prefix('-') {
+        Some("-verbose") => 1,
+        // Behind a letter that takes a value stands its value.
+        Some(letters) => {
+            let flags = letters.chars().take_while(|c| FLAGS.contains(c));
+            flags.filter(|c| *c == 'v').count()
+        }
+        None => 0,
+    });
+    u8::try_from(times.sum::<usize>()).unwrap_or(u8::MAX)
 }
 
 /// Help and usage errors come before the flags are read, so `--color` is looked for by hand.
@@ -247,7 +267,7 @@ fn is_closed_pipe(error: &anyhow::Error) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{ColorChoice, ExitCode, Refusal, code_of, help_color, parse, sentence};
+    use super::{ColorChoice, ExitCode, FLAGS, Refusal, code_of, help_color, parse, sentence};
 
     fn args(text: &str) -> Vec<std::ffi::OsString> {
         text.split(' ').map(Into::into).collect()
@@ -276,6 +296,40 @@ mod tests {
         ));
         let wanted = ["run.workers=1", "fit.seed=2", "run.workers=3"];
         assert_eq!(cli.expect("valid").global.set, wanted);
+    }
+
+    #[test]
+    fn verbose_before_and_behind_the_command_adds_up() {
+        for (text, times) in [
+            ("mocban run", 0),
+            ("mocban -v run", 1),
+            ("mocban run -v", 1),
+            ("mocban -v run -v", 2),
+            ("mocban --verbose status -wv", 2),
+            ("mocban -vv run -j2 -Cv", 2),
+            ("mocban run -nvv -- -v", 2),
+        ] {
+            let cli = parse(&args(text)).expect(text);
+            assert_eq!(cli.global.verbose, times, "{text}");
+        }
+    }
+
+    /// The letters that may be followed by others in a word are those of the command line.
+    #[test]
+    fn letters_without_a_value_are_all_known() {
+        fn check(command: &clap::Command) {
+            for arg in command.get_arguments() {
+                let Some(letter) = arg.get_short() else {
+                    continue;
+                };
+                let takes_value = arg.get_action().takes_values();
+                assert_eq!(FLAGS.contains(&letter), !takes_value, "-{letter}");
+            }
+            command.get_subcommands().for_each(check);
+        }
+        let mut command = super::args::command();
+        command.build();
+        check(&command);
     }
 
     #[test]

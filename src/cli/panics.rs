@@ -1,12 +1,19 @@
 //! Panics are defects of ours: logged for us, told to the user in a sentence.
 
+use std::backtrace::Backtrace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::exit::ExitCode;
 
-/// Lets a panic's own words go to the log (`-v`, `--log-file`) instead of the screen; who catches it says the rest.
+/// Lets a panic's own words and the way to it go to the log (`-v`, `--log-file`) instead of the screen; who catches it
+/// says the rest.
 pub(super) fn log_only() {
-    std::panic::set_hook(Box::new(|panic| tracing::info!("{panic}")));
+    std::panic::set_hook(Box::new(|panic| {
+        if tracing::enabled!(tracing::Level::INFO) {
+            let way = Backtrace::force_capture();
+            tracing::info!("{panic}\n{way}");
+        }
+    }));
 }
 
 /// Does some work; a panic in it becomes `told` and an exit code.

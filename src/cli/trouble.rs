@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::Path;
 
-use crate::catalog::{CatalogError, Trouble};
+use crate::catalog::{CatalogError, Holder, Trouble, holder};
 use crate::check::CheckError;
 use crate::export::{ExportError, SheetError};
 use crate::report::GatherError;
@@ -69,9 +69,7 @@ pub(super) fn sentence(error: &CatalogError, dir: &Path) -> Option<String> {
         Some(Trouble::Full) => format!(
             "{shown} cannot grow: the disk is full; make room and call again, what was stored is safe"
         ),
-        Some(Trouble::Busy) => {
-            format!("{shown} was kept locked by another process for too long; call again")
-        }
+        Some(Trouble::Busy) => locked(&shown, holder(Path::new(&shown))),
         Some(Trouble::Disk) => format!(
             "{shown}: the disk refused ({}); look after the disk and call again, what was stored is safe",
             root(error)
@@ -88,6 +86,18 @@ pub(super) fn sentence(error: &CatalogError, dir: &Path) -> Option<String> {
     })
 }
 
+/// That somebody else kept the catalog locked.
+fn locked(shown: &str, by: Option<Holder>) -> String {
+    match by {
+        Some(holder) => {
+            format!(
+                "{shown} was kept locked by {holder} for too long; call again when it is done or has ended"
+            )
+        }
+        None => format!("{shown} was kept locked by another process for too long; call again"),
+    }
+}
+
 /// The last cause, in its own words.
 fn root(error: &CatalogError) -> String {
     let mut last: &dyn Error = error;
@@ -101,8 +111,8 @@ fn root(error: &CatalogError) -> String {
 mod tests {
     use std::path::Path;
 
-    use super::{is_damage, of_catalog, sentence};
-    use crate::catalog::CatalogError;
+    use super::{is_damage, locked, of_catalog, sentence};
+    use crate::catalog::{CatalogError, Holder};
     use crate::export::ExportError;
 
     #[test]
@@ -118,5 +128,21 @@ mod tests {
         let plain = CatalogError::Missing("p/catalog.sqlite".into());
         assert_eq!(sentence(&plain, Path::new("p")), None);
         assert!(!is_damage(&plain));
+    }
+
+    #[test]
+    fn who_keeps_the_catalog_locked_is_named_with_what_frees_it() {
+        let (pid, is_stopped) = (12, true);
+        let said = locked("p/catalog.sqlite", Some(Holder { pid, is_stopped }));
+        assert!(
+            said.contains("pid 12, which is stopped") && said.contains("kill -CONT 12"),
+            "{said}"
+        );
+        let is_stopped = false;
+        let said = locked("p/catalog.sqlite", Some(Holder { pid, is_stopped }));
+        assert!(
+            said.contains("by pid 12 for too long") && !said.contains("CONT"),
+            "{said}"
+        );
     }
 }

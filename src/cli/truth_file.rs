@@ -73,12 +73,20 @@ pub(super) fn refusal(file: &Path, line: usize, reason: &str) -> TruthFileError 
 mod tests {
     use std::path::Path;
 
-    use super::{Row, parse};
+    use super::{Row, parse, refusal};
 
     const LINE: &str = r#"{"id":"a","print_from_mesh":[[1,0,0,0],[0,-1,0,0],[0,0,1,0]],"plane":{"n":[0,0,1],"d":0},"landmarks":[[0,0,0]],"char_height_px":10,"tops_mask":"tops/a.png"}"#;
 
     fn read(text: &str) -> Result<Vec<Row>, String> {
         parse(Path::new("data/truth.jsonl"), text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn words_of_a_line_come_plain_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(301)] {
+            let said = refusal(Path::new("truth.jsonl"), 1, &rude).to_string();
+            assert!(!said.contains(&rude), "{said:?}");
+        }
     }
 
     #[test]

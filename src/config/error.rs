@@ -111,3 +111,68 @@ pub enum ConfigError {
     #[error("the built-in settings do not fit together: {0}")]
     BuiltIn(String),
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{ConfigError, LONGEST, Origin};
+
+    /// Every word of a message that comes from outside is shown without commands to the screen, and short.
+    #[test]
+    fn words_of_others_come_plain_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(LONGEST + 1)] {
+            for error in errors(&rude) {
+                let said = error.to_string();
+                assert!(!said.contains(&rude), "{error:?}: {said:?}");
+            }
+        }
+    }
+
+    /// Each with one word from outside.
+    fn errors(rude: &str) -> Vec<ConfigError> {
+        let (origin, word) = (|| Origin::Flag, || rude.to_owned());
+        let value = |key: &str, value: &str, reason: &str| ConfigError::Value {
+            origin: origin(),
+            key: key.to_owned(),
+            value: value.to_owned(),
+            reason: reason.to_owned(),
+        };
+        let range = |key: &str, value: &str| ConfigError::Range {
+            origin: origin(),
+            key: key.to_owned(),
+            value: value.to_owned(),
+            min: 0.0,
+            max: 1.0,
+        };
+        vec![
+            ConfigError::Syntax {
+                origin: origin(),
+                line: 1,
+                reason: word(),
+            },
+            ConfigError::Unknown {
+                origin: origin(),
+                key: word(),
+                hint: String::new(),
+            },
+            ConfigError::NotASection {
+                origin: origin(),
+                key: word(),
+            },
+            value(rude, "1", "no"),
+            value("key", rude, "no"),
+            value("key", "1", rude),
+            range(rude, "1"),
+            range("key", rude),
+            ConfigError::UnknownPreset {
+                origin: origin(),
+                name: word(),
+                hint: String::new(),
+            },
+            ConfigError::SetForm { text: word() },
+            ConfigError::NotASection {
+                origin: Origin::Env(word()),
+                key: String::new(),
+            },
+        ]
+    }
+}

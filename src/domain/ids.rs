@@ -94,6 +94,14 @@ mod tests {
     use super::{PairName, PairNameError};
 
     #[test]
+    fn a_refused_id_is_shown_plain_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "\u{e9}".repeat(60)] {
+            let refused = PairName::new(&rude).expect_err("a refusal").to_string();
+            assert!(!refused.contains(&rude), "{refused:?}");
+        }
+    }
+
+    #[test]
     fn slash_dot_and_empty_are_refused() {
         assert_eq!(PairName::new(""), Err(PairNameError::Empty));
         assert_eq!(

@@ -108,7 +108,21 @@ impl fmt::Display for ManifestError {
 
 #[cfg(test)]
 mod tests {
-    use super::{ManifestError, Problem};
+    use super::{ManifestError, Place, Problem};
+
+    #[test]
+    fn words_of_a_list_come_plain_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(5000)] {
+            let place = Place::File(rude.as_str().into());
+            for said in [
+                Problem::line(1, rude.as_str()).to_string(),
+                Problem::whole(rude.as_str()).to_string(),
+                place.to_string(),
+            ] {
+                assert!(!said.contains(&rude), "{said:?}");
+            }
+        }
+    }
 
     #[test]
     fn twenty_problems_are_shown_and_the_rest_counted() {

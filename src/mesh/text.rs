@@ -54,3 +54,17 @@ pub(super) fn shown(word: &[u8]) -> String {
 pub(super) fn plain(text: &str) -> String {
     crate::domain::plain(text, 48)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{plain, shown};
+
+    #[test]
+    fn words_of_a_mesh_come_plain_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(49)] {
+            for said in [shown(rude.as_bytes()), plain(&rude)] {
+                assert!(!said.contains(&rude), "{said:?}");
+            }
+        }
+    }
+}

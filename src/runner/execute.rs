@@ -16,7 +16,7 @@ use super::steps::{Setback, Steps};
 use super::stop::{Stop, StopLevel};
 use crate::breakpoint::{self, Point};
 use crate::catalog::MetricResult;
-use crate::domain::{ArtifactSet, ContentHash, FailureClass, Stage};
+use crate::domain::{ArtifactSet, ContentHash, FailureClass, Stage, plain};
 use crate::store::{ArtifactError, Project};
 
 /// A stage that is computed and whose files are on disk.
@@ -100,7 +100,8 @@ fn run(
         Err(setback) => Ended::Setback(setback),
         Ok(output) => {
             breakpoint::reach(stage, Point::Computed, Some(&pair.facts.name));
-            match project.write_artifacts(&output.files) {
+            let written = || breakpoint::reach(stage, Point::Written, Some(&pair.facts.name));
+            match project.write_artifacts_telling(&output.files, &written) {
                 Err(error) => Ended::NotFiled(error),
                 Ok(files) => filed(stage, &mut pair, output, files),
             }
@@ -138,14 +139,30 @@ fn filed(
     })
 }
 
-/// What a panic said.
+/// Most characters of a panic's own words.
+const LONGEST: usize = 160;
+
+/// What a panic said, and what to do.
 fn panic_text(payload: &(dyn Any + Send)) -> String {
     let said = payload
         .downcast_ref::<&str>()
         .map(|text| (*text).to_owned())
         .or_else(|| payload.downcast_ref::<String>().cloned());
-    match said {
-        Some(text) => format!("the stage panicked: {text}"),
-        None => "the stage panicked".to_owned(),
+    let said = said.map_or_else(String::new, |text| format!(" ({})", plain(&text, LONGEST)));
+    format!(
+        "the stage panicked{said}: a defect of this program, please report it with what `run --rerun failed -v` tells"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LONGEST, panic_text};
+
+    #[test]
+    fn words_of_a_panic_come_plain_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(LONGEST + 1)] {
+            let said = panic_text(&rude);
+            assert!(!said.contains(&rude), "{said:?}");
+        }
     }
 }

@@ -142,7 +142,9 @@ async fn one_bad_pair_stops_nobody_and_shows() {
             )
         })
         .collect();
-    let bug = (FailureClass::Bug, "the stage panicked: made up");
+    let told_of = "the stage panicked (made up): a defect of this program, please report it with what \
+        `run --rerun failed -v` tells";
+    let bug = (FailureClass::Bug, told_of);
     assert_eq!(told, [(FailureClass::BadInput, "no faces"), bug]);
     let again = world.run(&options(2)).await;
     assert_eq!((again.failed, again.failed_in_all), (0, 2));

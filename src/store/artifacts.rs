@@ -113,6 +113,19 @@ impl Project {
     /// # Errors
     /// When the disk refuses; what was written stays, and harms nobody.
     pub fn write_artifacts(&self, files: &[NewArtifact]) -> Result<ArtifactSet, ArtifactError> {
+        self.write_artifacts_telling(files, &|| {})
+    }
+
+    /// [`Project::write_artifacts`] that calls `tell` for each file that is on disk under a temporary name and is
+    /// about to get its own.
+    ///
+    /// # Errors
+    /// When the disk refuses; what was written stays, and harms nobody.
+    pub fn write_artifacts_telling(
+        &self,
+        files: &[NewArtifact],
+        tell: &dyn Fn(),
+    ) -> Result<ArtifactSet, ArtifactError> {
         let mut written = ArtifactSet::new();
         let mut folders = std::collections::BTreeSet::new();
         for file in files {
@@ -121,7 +134,7 @@ impl Project {
             let folder = folder_of(&path);
             make_folder(&folder)?;
             if self.read_artifact(&artifact).is_err() {
-                self.place(&path, &file.bytes)?;
+                self.place(&path, &file.bytes, tell)?;
             }
             folders.insert(folder);
             written.insert(file.role.clone(), artifact);
@@ -156,13 +169,16 @@ impl Project {
         self.artifacts_dir().join("tmp")
     }
 
-    fn place(&self, path: &Path, bytes: &[u8]) -> Result<(), ArtifactError> {
+    fn place(&self, path: &Path, bytes: &[u8], tell: &dyn Fn()) -> Result<(), ArtifactError> {
         let folder = self.temporary_dir();
         make_folder(&folder)?;
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let temporary = folder.join(format!("{}-{number}", std::process::id()));
         let outcome = write_synced(&temporary, bytes)
-            .and_then(|()| std::fs::rename(&temporary, path))
+            .and_then(|()| {
+                tell();
+                std::fs::rename(&temporary, path)
+            })
             .map_err(ArtifactError::io(path));
         if outcome.is_err() {
             // A full disk is better without it; that it cannot be removed changes nothing.

@@ -6,22 +6,11 @@ use std::process::Command;
 
 use mocban::store::Project;
 
-use crate::cli::{Call, binary, call, mocban};
-use crate::fault::{EAGAIN, EIO, ENOSPC, Fault, spread};
+use crate::cli::{binary, call, mocban};
+use crate::deed::{Deed, End, moments};
+use crate::fault::{EAGAIN, EIO, ENOSPC, Fault};
 use crate::resume::{copy, copy_folder, run};
-use crate::sizes::asked;
-use crate::unbroken::World;
-
-/// How a command under a fault must end.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum End {
-    /// With an error.
-    Refused,
-    /// As if nothing had been.
-    Unmoved,
-    /// Either, by the moment at which it strikes.
-    Either,
-}
+use crate::unbroken::{World, files};
 
 const WAL: &str = "p/catalog.sqlite-wal";
 const INDEX: &str = "p/catalog.sqlite-shm";
@@ -99,6 +88,35 @@ const OF_AN_EXPORT: &[(Fault, End)] = &[
     (Fault::once("rename", "out", EIO), End::Refused),
 ];
 
+/// Faults of a backup.
+const OF_A_BACKUP: &[(Fault, End)] = &[
+    (Fault::once("open", ".b.*", ENOSPC), End::Either),
+    (Fault::once("write", ".b.*", ENOSPC), End::Refused),
+    (Fault::once("write", ".b.v*", ENOSPC), End::Refused),
+    (Fault::once("write", "*", EIO).on(), End::Refused),
+    (Fault::half(".b.v*"), End::Unmoved),
+    (Fault::once("sync", ".b.*", EIO), End::Refused),
+    (Fault::once("sync", "*", EIO).on(), End::Refused),
+    (Fault::once("rename", "b.sqlite", EIO), End::Refused),
+    (Fault::once("rename", "b.v*", EIO), End::Refused),
+    (Fault::once("unlink", ".b.*", EIO), End::Unmoved),
+    (Fault::once("read", CATALOG, EIO), End::Refused),
+];
+
+/// Faults of a repair.
+const OF_A_REPAIR: &[(Fault, End)] = &[
+    (Fault::once("write", WAL, ENOSPC), End::Refused),
+    (Fault::once("write", WAL, EIO).on(), End::Refused),
+    (Fault::half(WAL), End::Unmoved),
+    (Fault::once("sync", WAL, EIO), End::Either),
+    (Fault::once("open", CATALOG, EIO), End::Either),
+    (Fault::once("read", PLACED, EIO), End::Unmoved),
+    (Fault::once("open", PLACED, EIO), End::Unmoved),
+    (Fault::once("unlink", PLACED, EIO), End::Unmoved),
+    (Fault::once("open", "p/run.*", EIO), End::Refused),
+    (Fault::once("write", "*", ENOSPC).on(), End::Refused),
+];
+
 /// Locks that are not to be had for so many tries: SQLite gives up after about a hundred.
 const LOCKED: &[(Fault, End)] = &[
     (Fault::once("lock", INDEX, EAGAIN).times(300), End::Unmoved),
@@ -107,91 +125,6 @@ const LOCKED: &[(Fault, End)] = &[
         End::Unmoved,
     ),
 ];
-
-/// Something that is done while the disk refuses.
-struct Deed {
-    /// Puts what it needs in a folder.
-    before: fn(&World, &Path),
-    /// The command, to be called in that folder.
-    command: fn(&Path) -> Command,
-    /// Looks whether all is as it must be after it, and goes on to the end; told whether it said that it was done.
-    after: fn(&World, &Path, bool),
-}
-
-impl Deed {
-    /// How many calls of the kind it makes when nothing fails.
-    fn calls(&self, world: &World, fault: &Fault) -> usize {
-        let (root, notes) = (world.folder("counted"), world.folder("notes"));
-        (self.before)(world, &root);
-        call(fault.strike(0, &root, &notes, &mut (self.command)(&root))).expect(0);
-        let calls = Fault::calls(&notes);
-        assert!(calls > 0, "{fault}: there is no such call");
-        calls
-    }
-
-    /// Does it under a fault at the n-th call, and then again without. Gives the exit code; `None` when there were
-    /// not so many calls this time.
-    fn survives(&self, world: &World, fault: &Fault, nth: usize, end: End) -> Option<i32> {
-        let (root, notes) = (world.folder("struck"), world.folder("notes"));
-        (self.before)(world, &root);
-        let told = call(fault.strike(nth, &root, &notes, &mut (self.command)(&root)));
-        if Fault::struck(&notes) == 0 {
-            return None;
-        }
-        let at = format!("{fault}, call {nth}: code {}, {}", told.code, told.err);
-        is_said(&told, end, &root, &at);
-        (self.after)(world, &root, told.code == 0);
-        Some(told.code)
-    }
-
-    /// Strikes with each fault at so many of the calls it could strike.
-    #[expect(clippy::print_stderr, reason = "the figures of the long test")]
-    fn survives_all(&self, faults: &[(Fault, End)], moments: usize) {
-        let world = World::new("1");
-        for (fault, end) in faults {
-            let calls = self.calls(&world, fault);
-            let chosen = spread(calls, moments);
-            let codes: Vec<_> = (chosen.iter())
-                .map(|nth| self.survives(&world, fault, *nth, *end))
-                .collect();
-            let struck = codes.iter().flatten().count();
-            assert!(struck > 0, "{fault}: nothing was struck");
-            let refused = codes.iter().flatten().filter(|code| **code != 0).count();
-            eprintln!("{fault}: {struck} of {calls} calls struck, {refused} refused");
-        }
-    }
-}
-
-/// It ended as it must, and an error is one sentence with its file and its reason.
-fn is_said(told: &Call, end: End, root: &Path, at: &str) {
-    match end {
-        End::Refused => assert_ne!(told.code, 0, "{at}"),
-        End::Unmoved => assert_eq!(told.code, 0, "{at}"),
-        End::Either => {}
-    }
-    assert!(!told.err.contains("panicked"), "{at}");
-    if told.code == 0 {
-        return;
-    }
-    assert_eq!(told.code, 1, "{at}");
-    // A warning, or a line of the log, is no error.
-    let told = told.err.lines();
-    let mut lines = told.filter(|line| !line.starts_with("warning: ") && !line.contains(" WARN "));
-    let error = lines.next().unwrap_or_default();
-    assert_eq!(lines.next(), None, "{at}");
-    assert!(error.starts_with("error: "), "{at}");
-    assert!(error.contains(&format!("{}/", root.display())), "{at}");
-    let reasons = [
-        "disk is full",
-        "disk refused",
-        "disk refuses",
-        "disk cannot read",
-        "cannot be written to",
-        "No space left",
-        "Input/output error",
-    ];
-    assert!(reasons.iter().any(|reason| error.contains(reason)), "{at}");
-}
 
 const RUN: Deed = Deed {
     before: |world, root| {
@@ -249,9 +182,7 @@ fn export(root: &Path) -> Command {
 }
 
 const EXPORT: Deed = Deed {
-    before: |world, root| {
-        copy(world.wanted.project(), &root.join("p"));
-    },
+    before: put_done,
     command: export,
     after: |world, root, done| {
         if !done {
@@ -264,10 +195,99 @@ const EXPORT: Deed = Deed {
     },
 };
 
-/// Moments at which each fault strikes, evenly over all there are.
-fn moments() -> usize {
-    asked("MOCBAN_FAULT_MOMENTS", 1)
+/// Puts the project that ran without a break in a folder.
+fn put_done(world: &World, root: &Path) {
+    copy(world.wanted.project(), &root.join("p"));
 }
+
+/// A backup beside the project.
+fn backup(root: &Path) -> Command {
+    let mut command = binary();
+    command.arg("-C").arg(root.join("p")).arg("backup");
+    command.arg(root.join("b.sqlite"));
+    command
+}
+
+fn bytes(path: &Path) -> Vec<u8> {
+    std::fs::read(path).expect("a file")
+}
+
+/// The names in a folder.
+fn names(root: &Path) -> Vec<String> {
+    let inside = std::fs::read_dir(root).expect("a folder");
+    let name = |entry: std::io::Result<std::fs::DirEntry>| {
+        let name = entry.expect("an entry").file_name();
+        name.to_string_lossy().into_owned()
+    };
+    let mut names: Vec<_> = inside.map(name).collect();
+    names.sort();
+    names
+}
+
+const BACKUP: Deed = Deed {
+    before: |world, root| {
+        put_done(world, root);
+        call(&mut backup(root)).expect(0);
+        std::fs::copy(root.join("b.sqlite"), root.join("earlier")).expect("copied");
+        let set = ["-C", "p", "verdict", "set", "upright-0000", "pass"];
+        mocban(root, &[&set[..], &["--reader", "lan"]].concat()).expect(0);
+    },
+    command: backup,
+    after: |_, root, done| {
+        let (file, earlier) = (root.join("b.sqlite"), bytes(&root.join("earlier")));
+        let names_are = |wanted: &[&str]| assert_eq!(names(root), wanted);
+        let whole = ["b.sqlite", "b.verdicts.jsonl", "earlier", "p"];
+        if !done {
+            names_are(&whole);
+            assert!(bytes(&file) == earlier, "another backup");
+            call(&mut backup(root)).expect(0);
+        }
+        call(&mut backup(root)).expect(0);
+        names_are(&whole);
+        assert!(bytes(&file) != earlier, "the earlier backup");
+        let catalog = root.join(CATALOG);
+        std::fs::copy(&file, &catalog).expect("copied");
+        mocban(root, &["-C", "p", "check"]).expect(0);
+        let log = ["-C", "p", "verdict", "log", "--json"];
+        let log = mocban(root, &log).expect(0).out;
+        assert_eq!(log.as_bytes(), bytes(&root.join("b.verdicts.jsonl")));
+        assert!(log.contains("lan"), "{log}");
+    },
+};
+
+fn repair(root: &Path) -> Command {
+    let mut command = binary();
+    command.arg("-C").arg(root.join("p"));
+    command.args(["check", "--repair"]);
+    command
+}
+
+const REPAIR: Deed = Deed {
+    before: |world, root| {
+        put_done(world, root);
+        let folder = root.join("p/artifacts");
+        let found = files(&folder);
+        let mut pictures = found.keys().filter(|path| path.extension().is_some());
+        let mut picture = || folder.join(pictures.next().expect("a picture"));
+        std::fs::remove_file(picture()).expect("removed");
+        std::fs::write(picture(), "another").expect("written");
+        let named_by_none = format!("{}.png", "0".repeat(64));
+        std::fs::create_dir_all(folder.join("00")).expect("a folder");
+        std::fs::write(folder.join("00").join(named_by_none), "spare").expect("written");
+    },
+    command: repair,
+    after: |world, root, done| {
+        if !done {
+            call(&mut repair(root)).expect(0);
+        }
+        let project = Project::at(&root.join("p"));
+        mocban(root, &["-C", "p", "check"]).expect(0);
+        call(&mut run(&project, &[])).expect(0);
+        mocban(root, &["-C", "p", "check"]).expect(0);
+        call(&mut export(root)).expect(0);
+        world.wanted.is_exported_to(&root.join("out"));
+    },
+};
 
 #[test]
 fn a_refusing_disk_under_the_catalog_is_told_of_and_costs_nothing() {
@@ -283,6 +303,16 @@ fn a_refusing_disk_under_the_files_is_told_of_and_costs_nothing() {
 fn an_import_or_export_that_the_disk_refuses_leaves_nothing_half_made() {
     IMPORT.survives_all(OF_AN_IMPORT, moments());
     EXPORT.survives_all(OF_AN_EXPORT, moments());
+}
+
+#[test]
+fn a_backup_that_the_disk_refuses_leaves_the_earlier_one_in_place() {
+    BACKUP.survives_all(OF_A_BACKUP, moments());
+}
+
+#[test]
+fn a_repair_that_the_disk_refuses_is_told_of_and_done_by_the_next() {
+    REPAIR.survives_all(OF_A_REPAIR, moments());
 }
 
 /// Another process holds each lock of the database for longer than SQLite itself waits.

@@ -10,7 +10,7 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::resume::{copy, project, run};
 use crate::sizes::asked;
-use crate::unbroken::Wanted;
+use crate::unbroken::{Wanted, files};
 
 /// Deaths with no pair in hand that come before the shots.
 const OPENING: u32 = 12;
@@ -27,17 +27,48 @@ fn opening(project: &Project) {
     }
 }
 
-/// Starts the run again and again and kills it after 50 to 500 ms, until one ends by itself; says how often it was
-/// killed.
+/// How long shots are held off. A machine that has much else to do gets nowhere in half a second, and then a pair is
+/// rightly taken for what kills; so each three shots in a row without a new file of results double the time.
+struct Mercy {
+    files: usize,
+    in_vain: u32,
+}
+
+impl Mercy {
+    /// How many times as long as usual the next shot may come, by what lies in the folder of results.
+    fn next(&mut self, project: &Project) -> u64 {
+        let folder = project.artifacts_dir();
+        let found = if folder.exists() {
+            files(&folder).len()
+        } else {
+            0
+        };
+        self.in_vain = if found > self.files {
+            0
+        } else {
+            self.in_vain + 1
+        };
+        self.files = self.files.max(found);
+        1 << (self.in_vain / 3).min(8)
+    }
+}
+
+/// Starts the run again and again and kills it after 50 to 500 ms, longer where nothing comes of it, until one ends
+/// by itself; says how often it was killed.
 fn run_under_fire(project: &Project, dice: &mut ChaCha8Rng) -> usize {
+    let mut mercy = Mercy {
+        files: 0,
+        in_vain: 0,
+    };
     for kills in 0.. {
         let jobs = if dice.random_bool(0.5) { "1" } else { "2" };
+        let longest = 500 * mercy.next(project);
         let mut child = run(project, &["-j", jobs])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .expect("the binary starts");
-        let shot = Instant::now() + Duration::from_millis(dice.random_range(50..=500));
+        let shot = Instant::now() + Duration::from_millis(dice.random_range(50..=longest));
         while Instant::now() < shot {
             if let Some(ended) = child.try_wait().expect("a child that can be asked") {
                 assert!(ended.success(), "{ended:?}");

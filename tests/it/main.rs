@@ -6,6 +6,8 @@ mod cli;
 #[cfg(target_os = "linux")]
 mod crowd;
 mod decoys;
+#[cfg(target_os = "linux")]
+mod deed;
 mod demo;
 #[cfg(target_os = "linux")]
 mod fault;

@@ -6,6 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
+use mocban::catalog::holder;
 use mocban::domain::{JobStatus, Stage};
 use mocban::store::Project;
 use rustix::process::{Pid, Signal, kill_process};
@@ -58,10 +59,25 @@ impl World {
         (child, file)
     }
 
-    /// `run --json` with one worker, stopped with the first stage's files on the disk and its rows not yet written.
-    fn stopped(&self) -> Running {
+    /// A project whose run with one worker is stopped with the first stage's files on the disk and its rows not yet
+    /// written. The signal may strike while another of its threads writes a sign of life: then all others wait for it,
+    /// which is not what is asked here, and another is begun.
+    fn stopped(count: &str) -> (Self, Running) {
+        loop {
+            let world = Self::new(count);
+            let stopped = world.stopped_at("fit:filed", &[HASTE]);
+            if holder(&world.project.catalog_path()).is_none() {
+                return (world, stopped);
+            }
+        }
+    }
+
+    /// `run --json` with one worker, stopped at a point.
+    fn stopped_at(&self, point: &str, pace: &[(&str, &str)]) -> Running {
         let mut command = run(&self.project, &["-j", "1", "--json"]);
-        command.env("MOCBAN_STOP_AT", "fit:filed").envs([HASTE]);
+        command
+            .env("MOCBAN_STOP_AT", point)
+            .envs(pace.iter().copied());
         let mut stopped = Running::start(&mut command);
         let pid = stopped.pid();
         stopped.wait_until("it is stopped", || is_stopped(pid));
@@ -197,8 +213,7 @@ fn who_joins_with_other_settings_is_refused_and_told_which() {
 
 #[test]
 fn what_a_stopped_process_stores_too_late_changes_nothing() {
-    let world = World::new("2");
-    let mut stopped = world.stopped();
+    let (world, mut stopped) = World::stopped("2");
 
     let second = Running::start(joined(&world.project).envs([HASTE]));
     let (code, json, said) = second.end();
@@ -212,11 +227,33 @@ fn what_a_stopped_process_stores_too_late_changes_nothing() {
     world.is_as_unbroken();
 }
 
+/// A process may be stopped inside a commit; then nobody else can write until it goes on.
+#[test]
+fn who_is_stopped_inside_a_commit_is_named_to_those_who_wait() {
+    let world = World::new("2");
+    let mut stopped = world.stopped_at("fit:claiming", &[]);
+    let pid = stopped.pid();
+    let found = holder(&world.project.catalog_path()).expect("a holder");
+    assert_eq!((found.pid, found.is_stopped), (pid, true));
+    let mut command = joined(&world.project);
+    command.stderr(File::create(world.said()).expect("a file"));
+    let second = command.stdout(Stdio::piped()).spawn();
+    let mut second = Running(Some(second.expect("the binary starts")));
+    let told = format!("catalog.sqlite is kept locked by pid {pid}, which is stopped");
+    second.wait_until("it names who is waited for", || {
+        let said = std::fs::read_to_string(world.said()).expect("a file");
+        said.contains(&told)
+    });
+    stopped.send(Signal::CONT);
+    let (first, second) = (stopped.end(), second.end());
+    assert_eq!((first.0, second.0), (Some(0), Some(0)), "{}", first.2);
+    world.is_as_unbroken();
+}
+
 /// Nobody takes its leases back: its own late write is refused all the same, and it goes on under another number.
 #[test]
 fn a_process_held_up_past_its_leases_drops_what_it_had_and_goes_on() {
-    let world = World::new("2");
-    let mut stopped = world.stopped();
+    let (world, mut stopped) = World::stopped("2");
     // Time itself is what runs out here: a lease is a second long.
     std::thread::sleep(Duration::from_millis(1200));
     stopped.send(Signal::CONT);

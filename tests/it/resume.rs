@@ -13,17 +13,19 @@ use crate::cli::{binary, call, mocban};
 const FAST: [&str; 2] = ["--set", "depth.longest_px=96"];
 
 /// Every named point between claim, artifact, row and commit, in an order in which three pairs come by.
-const POINTS: [&str; 12] = [
+const POINTS: [&str; 14] = [
     "fit:claiming",
     "fit:claimed",
     "fit:computed",
     "fit:filed:2",
+    "depth:written:2",
     "depth:rowed",
     "depth:stored",
     "normalize:claiming",
     "normalize:computed",
     "normalize:stored",
     "register:claimed",
+    "register:written",
     "register:rowed",
     "register:stored",
 ];
@@ -117,6 +119,12 @@ pub(crate) fn results(project: &Project) -> Vec<String> {
     lines
 }
 
+/// How many files of results are written and have not got their names.
+fn half_placed(project: &Project) -> usize {
+    let temporary = project.artifacts_dir().join("tmp");
+    std::fs::read_dir(temporary).map_or(0, Iterator::count)
+}
+
 /// How often each stage of each pair was finished.
 pub(crate) fn finished(project: &Project) -> Vec<usize> {
     let mut counts = Vec::new();
@@ -157,8 +165,11 @@ fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
             .output();
         let died = died.expect("the binary starts");
         assert_eq!(died.status.code(), None, "{point} was not reached");
+        let is_between = point.contains(":written");
+        assert_eq!(half_placed(&broken), usize::from(is_between), "{point}");
     }
     call(&mut run(&broken, &[])).expect(0);
+    assert_eq!(half_placed(&broken), 0);
     assert_eq!(results(&broken), wanted);
     assert_eq!(finished(&broken), [1; 12]);
 

@@ -219,7 +219,16 @@ mod tests {
     use image::{DynamicImage, ImageFormat};
     use proptest::prelude::*;
 
-    use super::{DecodeError, decode};
+    use super::{DecodeError, broken, decode};
+
+    #[test]
+    fn words_of_a_decoder_come_plain_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(161)] {
+            let said = broken(FileKind::of(b""), &rude).to_string();
+            assert!(!said.contains(&rude), "{said:?}");
+        }
+    }
+
     use crate::domain::FileKind;
     use crate::raster::Limits;
 
