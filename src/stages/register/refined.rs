@@ -20,6 +20,8 @@ const COMPARED: f64 = 0.42;
 const CLOSER: f64 = 0.67;
 /// Rivals that reach this share of the best one's score are looked at as closely as it.
 const CLOSE: f64 = 0.75;
+/// A rival's share that is no sign of a wrong pose: symmetric characters have it.
+const SYMMETRIC: f64 = 0.9;
 /// Most steps of a refinement, and of the last one.
 const FEW_STEPS: usize = 8;
 const MOST_STEPS: usize = 15;
@@ -143,10 +145,11 @@ fn share(rival: Option<Settled>, best: &Settled) -> f64 {
     rival.map_or(0.0, |rival| rival.score() / best.score().max(1e-6))
 }
 
-/// The same on the ground that both have in common.
+/// The same on the ground that both have in common. Where that is little it may say anything in favour of the best, so
+/// there the plain share is not undercut by more than it takes to clear a symmetric character.
 fn fair_share(cuts: &Cuts, rival: &Settled, best: &Settled) -> f64 {
-    let [score, rival] = cuts.duel([best, rival].map(|pose| (pose.nearest, &pose.found)));
-    rival / score.max(1e-6)
+    let [score, fair] = cuts.duel([best, rival].map(|pose| (pose.nearest, &pose.found)));
+    (fair / score.max(1e-6)).max(share(Some(*rival), best).min(SYMMETRIC))
 }
 
 fn best_of(tried: &[Settled], of_kind: impl Fn(&Settled) -> bool) -> Option<&Settled> {
