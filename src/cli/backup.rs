@@ -1,7 +1,5 @@
 //! `backup`: the catalog, the verdicts and the settings, copied whole while a run may be writing.
 
-use std::fs::File;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
@@ -14,7 +12,7 @@ use super::table::count;
 use super::talk;
 use crate::catalog::{Catalog, VerdictEvent};
 use crate::export::verdict_lines;
-use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of};
+use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of, write_synced};
 
 /// Arguments of `backup`.
 #[derive(Debug, Args)]
@@ -105,11 +103,7 @@ async fn held_by(partial: &Partial) -> anyhow::Result<(Vec<VerdictEvent>, u64)> 
 /// Writes what goes beside the backup, under another name.
 fn prepare(file: &Path, bytes: &[u8]) -> anyhow::Result<Partial> {
     let partial = Partial::of(file);
-    let written = File::create(&partial.0).and_then(|mut at| {
-        at.write_all(bytes)?;
-        at.sync_all()
-    });
-    written.with_context(|| format!("cannot write {}", file.display()))?;
+    write_synced(&partial.0, bytes).with_context(|| format!("cannot write {}", file.display()))?;
     Ok(partial)
 }
 

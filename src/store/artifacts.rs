@@ -3,12 +3,11 @@
 //! Temporary name, write, fsync, rename, fsync of the directory: only then may a row of the catalog name it.
 
 use std::fs::File;
-use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Project;
-use super::whole::{folder_of, sync_folder};
+use super::whole::{folder_of, sync_folder, write_synced};
 use crate::domain::{ArtifactRef, ArtifactSet, ContentHash};
 
 /// An artifact that is not on disk yet.
@@ -193,12 +192,6 @@ fn is_of(path: &Path, hash: &ContentHash) -> std::io::Result<bool> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(File::open(path)?)?;
     Ok(hasher.finalize().as_bytes() == hash.as_bytes())
-}
-
-fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut file = File::create(path)?;
-    file.write_all(bytes)?;
-    file.sync_all()
 }
 
 fn sync(folder: &Path) -> Result<(), ArtifactError> {

@@ -12,4 +12,4 @@ pub use inputs::{FileStat, InputError, InputFile, hash_input, read_input, stat_i
 pub use lock::{LockError, RunLock};
 pub use named::{NamedArtifacts, Unnamed, UnnamedKind};
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
-pub use whole::{finish_whole, partial_of, write_whole};
+pub use whole::{finish_whole, partial_of, write_synced, write_whole};

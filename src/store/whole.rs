@@ -26,6 +26,16 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     written
 }
 
+/// Writes a new file, its bytes on the disk when it returns.
+///
+/// # Errors
+/// When the disk refuses; what was written stays.
+pub fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = File::create(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
+}
+
 /// Where a file is written before it gets its name: beside it, hidden.
 pub fn partial_of(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -127,8 +127,8 @@ impl<'a> Refiner<'a> {
             .unwrap_or_default()
     }
 
-    /// The scores of a pose and of a rival, which may have other strokes, on the ground they share; zeros where a pose cannot
-    /// be turned round.
+    /// The scores of a pose and of a rival, which may have other strokes, on the ground they share; zeros where a pose
+    /// cannot be turned round.
     pub(in crate::stages) fn duel(&self, pose: &Found, other: &Self, rival: &Found) -> [f64; 2] {
         match (self.side(pose), other.side(rival)) {
             (Some(one), Some(two)) => duel(self.fixed, self.paper(), &[one, two]),

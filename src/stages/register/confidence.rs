@@ -1,7 +1,8 @@
 //! How likely an alignment is right, from what speaks for and against it.
 //!
 //! A logistic model. Its weights were fitted to 1,010 made pairs of two independent generators: right pairs of every
-//! kind, meshes with another character's print, mirrored meshes and uncarved plates.
+//! kind, meshes with another character's print, mirrored meshes and uncarved plates, when walls and frame lines still
+//! counted. Since they do not, the least of 896 right pairs has 0.75 and the highest of 505 wrong ones 0.43.
 
 use crate::domain::Evidence;
 

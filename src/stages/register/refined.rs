@@ -111,14 +111,20 @@ impl Rivals {
         {
             *rival = settled(cuts, &rival.found)?;
         }
+        self.shares = self.fair_shares(cuts);
         if let Some(other) = &mut self.other_angle
-            && fair_share(cuts, other, &self.best) > 1.0
+            && self.shares[0] > 1.0
         {
             std::mem::swap(&mut self.best, other);
+            self.shares = self.fair_shares(cuts);
         }
-        self.shares = [self.other_angle, self.mirrored]
-            .map(|rival| rival.map_or(0.0, |rival| fair_share(cuts, &rival, &self.best)));
         Some(())
+    }
+
+    /// The rivals' shares on the ground that they have in common with the best pose.
+    fn fair_shares(&self, cuts: &Cuts) -> [f64; 2] {
+        [self.other_angle, self.mirrored]
+            .map(|rival| rival.map_or(0.0, |rival| fair_share(cuts, &rival, &self.best)))
     }
 
     /// By how much the best pose wins.
