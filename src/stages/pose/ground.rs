@@ -19,35 +19,74 @@ const RIM_PX: usize = 3;
 /// this share of the size along the border is left out instead.
 const MOST_STRAYS: f64 = 0.5;
 const BAND: f64 = 0.1;
+/// Surroundings agree when they meet this many times as much of each other as the character does.
+const AS_WELL: f64 = 0.75;
 
 /// 1 where a layer is known and free of what runs into its border, 0 elsewhere.
 pub(super) fn own_ground(layer: &Layer) -> Grid<f32> {
     Strokes::of(layer).ground(layer)
 }
 
-/// Two layers, each known only where it is free of what runs into its border; `None` for a map that cannot be turned
-/// round. What runs into the border is left in where the other layer has strokes that do not: there it is the character
-/// that hangs on its surroundings.
-pub(in crate::stages) fn alone(
-    [fixed, moving]: [&Layer; 2],
-    fixed_from_moving: &Affine2,
-) -> Option<[Layer; 2]> {
-    let onto = |a: &Layer, b: &Layer, b_from_a: &Affine2| {
-        let from_work = a.work_from_image.inverse()?;
-        Some(b.work_from_image.after(b_from_a).after(&from_work))
-    };
-    let strokes = [fixed, moving].map(Strokes::of);
-    let own = [0, 1].map(|k: usize| strokes[k].own());
-    let [mut ink, mut wood] = strokes;
-    ink.keep(
-        &own[1],
-        &onto(fixed, moving, &fixed_from_moving.inverse()?)?,
-    );
-    wood.keep(&own[0], &onto(moving, fixed, fixed_from_moving)?);
-    Some([
-        fixed.known_on(ink.ground(fixed)),
-        moving.known_on(wood.ground(moving)),
-    ])
+/// Two layers at a pose, and what of them runs into the border. What the other layer has strokes for that do not is no
+/// stray: there it is the character that hangs on its surroundings.
+pub(in crate::stages) struct Surroundings<'a> {
+    layers: [&'a Layer; 2],
+    strokes: [Strokes; 2],
+    moving_from_fixed: Affine2,
+}
+
+impl<'a> Surroundings<'a> {
+    /// Of a fixed and a moving layer; `None` for a map that cannot be turned round.
+    pub(in crate::stages) fn of(
+        layers: [&'a Layer; 2],
+        fixed_from_moving: &Affine2,
+    ) -> Option<Self> {
+        let onto = |a: &Layer, b: &Layer, b_from_a: &Affine2| {
+            let from_work = a.work_from_image.inverse()?;
+            Some(b.work_from_image.after(b_from_a).after(&from_work))
+        };
+        let [fixed, moving] = layers;
+        let moving_from_fixed = onto(fixed, moving, &fixed_from_moving.inverse()?)?;
+        let [mut ink, mut wood] = layers.map(Strokes::of);
+        let [own_ink, own_wood] = [ink.own(), wood.own()];
+        ink.keep(&own_wood, &moving_from_fixed);
+        wood.keep(&own_ink, &onto(moving, fixed, fixed_from_moving)?);
+        Some(Self {
+            layers,
+            strokes: [ink, wood],
+            moving_from_fixed,
+        })
+    }
+
+    /// The layers without them.
+    pub(in crate::stages) fn without(&self) -> [Layer; 2] {
+        [0, 1].map(|k: usize| self.layers[k].known_on(self.strokes[k].ground(self.layers[k])))
+    }
+
+    /// Whether they lie on each other as well as the rest does. Then they are of one state of the block, and tell the pose
+    /// as well as the character.
+    pub(in crate::stages) fn agree(&self) -> bool {
+        let [fixed, moving] = self.layers;
+        let strays = self.strokes[1]
+            .strays
+            .map(|stray| f32::from(u8::from(*stray)));
+        let mut sums = [[0.0_f64; 2]; 2];
+        for y in 0..fixed.weight.height() {
+            for x in (0..fixed.weight.width()).filter(|x| fixed.weight.at(*x, y) > 0.0) {
+                let there = self.moving_from_fixed.apply([x as f64, y as f64]);
+                if sample(&moving.weight, there) < 0.5 {
+                    continue;
+                }
+                let stray = self.strokes[0].strays.at(x, y) || sample(&strays, there) > 0.5;
+                let (ink, wood) = (fixed.amount.at(x, y), sample(&moving.amount, there));
+                let [met, all] = &mut sums[usize::from(stray)];
+                *met += f64::from(ink.min(wood));
+                *all += f64::from(ink.max(wood));
+            }
+        }
+        let [own, around] = sums.map(|[met, all]| met / all.max(1e-9));
+        around >= AS_WELL * own
+    }
 }
 
 /// What a layer shows, and what of it runs into the border.
@@ -123,7 +162,7 @@ fn without_band(weight: &Grid<f32>) -> Grid<f32> {
 
 #[cfg(test)]
 mod tests {
-    use super::alone;
+    use super::Surroundings;
     use crate::domain::Affine2;
     use crate::raster::{Grid, Mask};
     use crate::stages::pose::{Base, Layer, Soft};
@@ -151,8 +190,9 @@ mod tests {
     }
 
     fn as_they_lie(fixed: &Layer, moving: &Layer) -> [Layer; 2] {
-        alone([fixed, moving], &Affine2::scale_shift(1.0, [0.0; 2]))
-            .expect("the map can be turned round")
+        let same = Affine2::scale_shift(1.0, [0.0; 2]);
+        let around = Surroundings::of([fixed, moving], &same);
+        around.expect("the map can be turned round").without()
     }
 
     fn amount(layer: &Layer, x: usize, y: usize) -> f32 {

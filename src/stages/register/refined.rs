@@ -7,7 +7,7 @@ use super::{Alignment, Error, Params};
 use crate::domain::{Affine2, Evidence, Pose};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{Normalized, Relief, soft_stroke};
-use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Soft, alone};
+use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Soft, Surroundings};
 
 /// Poses closer in angle than this are one pose when the margin is taken.
 const SAME_POSE_DEG: f64 = 15.0;
@@ -207,7 +207,7 @@ impl Pictures {
     }
 
     /// The pose looked at once more, with the strokes of its cut, by the character alone: walls, frame lines and
-    /// neighbours need not stand alike around print and relief. Says as well how far the answers lie apart.
+    /// neighbours need not stand alike around print and relief; where they do, with them. Says as well how far the answers lie apart.
     fn look(&self, best: &Settled, cuts: &Cuts) -> Option<(Affine2, f64)> {
         let [ink, wood] = cuts.alone(best.nearest, &best.found)?;
         let refiner = Refiner::new(&ink, &wood);
@@ -216,8 +216,11 @@ impl Pictures {
             &refiner.refine(&best.found, FEW_STEPS, Loss::Huber),
         );
         let (ink, woods) = self.layers(1.0, &[best.cut]);
-        let [ink, wood] = alone([&ink, woods.first()?], &closer.fixed_from_moving)?;
-        let refiner = Refiner::new(&ink, &wood);
+        let both = [&ink, woods.first()?];
+        let around = Surroundings::of(both, &closer.fixed_from_moving)?;
+        let alone = (!around.agree()).then(|| around.without());
+        let [ink, wood] = alone.as_ref().map_or(both, |[ink, wood]| [ink, wood]);
+        let refiner = Refiner::new(ink, wood);
         let refined = refiner.refine(&closer, MOST_STEPS, Loss::Tukey);
         let last = if self.may_stretch {
             stretched(&refiner, &refined, self.middle)
