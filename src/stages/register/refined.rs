@@ -40,7 +40,7 @@ pub(super) fn align(
     let (ink, woods) = pictures.layers(CLOSER, cuts);
     let cuts = Cuts::new(cuts, &ink, &woods);
     rivals.look_closer(&cuts).ok_or(Error::NoPose)?;
-    let (print_from_depth, spread) = pictures.look(&rivals.best, &cuts).ok_or(Error::NoPose)?;
+    let (print_from_depth, spread) = pictures.look(&rivals.best).ok_or(Error::NoPose)?;
     let choices = normalized.outcome.thresholds.iter();
     let alignments = choices.map(|choice| Alignment {
         metric: choice.metric,
@@ -103,7 +103,7 @@ impl Rivals {
     /// Looks at the best pose more closely, and at rivals that come near it, which may then win.
     fn look_closer(&mut self, cuts: &Cuts) -> Option<()> {
         let is_close = self.shares.iter().any(|share| *share > CLOSE);
-        self.best = settled(cuts, &self.best.found)?;
+        self.best = sharpened(cuts, &self.best.found)?;
         if !is_close {
             return Some(());
         }
@@ -111,7 +111,7 @@ impl Rivals {
             .into_iter()
             .flatten()
         {
-            *rival = settled(cuts, &rival.found)?;
+            *rival = sharpened(cuts, &rival.found)?;
         }
         self.shares = self.fair_shares(cuts);
         if let Some(other) = &mut self.other_angle
@@ -208,13 +208,11 @@ impl Pictures {
 
     /// The pose looked at once more, with the strokes of its cut, by the character alone: walls, frame lines and
     /// neighbours need not stand alike around print and relief; where they do, with them. Says as well how far the answers lie apart.
-    fn look(&self, best: &Settled, cuts: &Cuts) -> Option<(Affine2, f64)> {
-        let [ink, wood] = cuts.alone(best.nearest, &best.found)?;
-        let refiner = Refiner::new(&ink, &wood);
-        let (closer, spread) = self.steadied(
-            &refiner,
-            &refiner.refine(&best.found, FEW_STEPS, Loss::Huber),
-        );
+    fn look(&self, best: &Settled) -> Option<(Affine2, f64)> {
+        let (ink, woods) = self.layers(COMPARED, &[best.cut]);
+        let around = Surroundings::of([&ink, woods.first()?], &best.found.fixed_from_moving)?;
+        let [ink, wood] = around.without();
+        let (closer, spread) = self.steadied(&Refiner::new(&ink, &wood), &best.found);
         let (ink, woods) = self.layers(1.0, &[best.cut]);
         let both = [&ink, woods.first()?];
         let around = Surroundings::of(both, &closer.fixed_from_moving)?;
@@ -282,9 +280,17 @@ fn settle_all(cuts: &Cuts, normalized: &Normalized) -> Option<Vec<Settled>> {
 
 /// A pose refined with the cut that fits best, first from afar, then closely.
 fn settled(cuts: &Cuts, start: &Found) -> Option<Settled> {
+    let close = cuts
+        .fitting(start)?
+        .strokes
+        .refine(start, FEW_STEPS, Loss::Huber);
+    sharpened(cuts, &close)
+}
+
+/// A pose that is nearly right refined with the cut that fits best.
+fn sharpened(cuts: &Cuts, start: &Found) -> Option<Settled> {
     let strokes = cuts.fitting(start)?.strokes;
-    let close = strokes.refine(start, FEW_STEPS, Loss::Huber);
-    let pose = strokes.refine(&close, FEW_STEPS, Loss::Tukey);
+    let pose = strokes.refine(start, FEW_STEPS, Loss::Tukey);
     let fitting = cuts.fitting(&pose)?;
     Some(Settled {
         found: fitting.found,
