@@ -210,13 +210,18 @@ impl Pictures {
     /// neighbours need not stand alike around print and relief; where they do, with them. Says as well how far the answers lie apart.
     fn look(&self, best: &Settled) -> Option<(Affine2, f64)> {
         let (ink, woods) = self.layers(COMPARED, &[best.cut]);
-        let around = Surroundings::of([&ink, woods.first()?], &best.found.fixed_from_moving)?;
+        let both = [&ink, woods.first()?];
+        let around = Surroundings::of(both, &best.found.fixed_from_moving)?;
         let [ink, wood] = around.without();
         let (closer, spread) = self.steadied(&Refiner::new(&ink, &wood), &best.found);
+        let agree = Surroundings::of(both, &closer.fixed_from_moving)?.agree();
         let (ink, woods) = self.layers(1.0, &[best.cut]);
         let both = [&ink, woods.first()?];
-        let around = Surroundings::of(both, &closer.fixed_from_moving)?;
-        let alone = (!around.agree()).then(|| around.without());
+        let alone = if agree {
+            None
+        } else {
+            Some(Surroundings::of(both, &closer.fixed_from_moving)?.without())
+        };
         let [ink, wood] = alone.as_ref().map_or(both, |[ink, wood]| [ink, wood]);
         let refiner = Refiner::new(ink, wood);
         let refined = refiner.refine(&closer, MOST_STEPS, Loss::Tukey);
