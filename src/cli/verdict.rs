@@ -14,7 +14,7 @@ use super::table::{Align, columns, count};
 use super::talk::{self, Palette, Tone};
 use super::verdict_file::Row;
 use super::{select, verdict_file, verdict_lines};
-use crate::catalog::{Catalog, NewVerdict, VerdictEvent};
+use crate::catalog::{Catalog, Look, NewVerdict, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 
 /// What to do with verdicts.
@@ -22,7 +22,7 @@ use crate::domain::{Reason, ThresholdMetric, Verdict};
 pub(super) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(SetArgs),
-    /// Record the verdicts of a CSV file (pair, verdict, reader, and if wanted metric, reason, note), or of the
+    /// Record the verdicts of a CSV file (pair, verdict, reader, and if wanted metric, reason, note, at), or of the
     /// verdicts.jsonl of an export or a backup
     Import(ImportArgs),
     /// Print the log, oldest first
@@ -50,6 +50,9 @@ pub(super) struct SetArgs {
     /// In your own words
     #[arg(long, value_name = "TEXT")]
     pub(super) note: Option<String>,
+    /// How far the relief still had to be turned to lie on the print, degrees clockwise
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle)]
+    pub(super) angle: Option<f64>,
 }
 
 /// Arguments of `verdict import`.
@@ -83,6 +86,14 @@ fn reader_name(text: &str) -> Result<String, String> {
     Ok(name.to_owned())
 }
 
+/// An angle of at most half a turn.
+fn angle(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(angle) if angle.abs() <= 180.0 => Ok(angle),
+        Ok(_) | Err(_) => Err("an angle is a number from -180 to 180".to_owned()),
+    }
+}
+
 pub(super) async fn verdict(
     command: VerdictCommand,
     context: &Context,
@@ -104,6 +115,11 @@ async fn set(args: SetArgs, context: &Context) -> anyhow::Result<ExitCode> {
         reader: args.reader,
         reason: args.reason,
         note: args.note,
+        look: Look {
+            angle_read_deg: args.angle,
+            ..Look::default()
+        },
+        at: None,
     };
     let said = format!("{} of {}: {}", new.pair, on(new.metric), new.verdict);
     catalog.verdict_set(vec![new], now()).await?;
