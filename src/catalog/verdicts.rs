@@ -71,6 +71,7 @@ pub(super) struct Counted {
     pub(super) verdict: Verdict,
     pub(super) reader: String,
     pub(super) reason: Option<Reason>,
+    pub(super) queue: Option<Queue>,
 }
 
 /// Results that a verdict on a pair judges: those of a job that is done.
@@ -95,7 +96,7 @@ FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON
 WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) ORDER BY v.id";
 
 pub(super) const COUNTED: &str = "
-SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reader, v.reason
+SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reader, v.reason, v.queue
 FROM json_each(?1) AS wanted CROSS JOIN verdict AS v ON v.pair = wanted.value
 WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 ORDER BY v.pair, v.metric, v.reader, v.id";
@@ -270,11 +271,13 @@ pub(super) async fn of_pairs(
     for row in &found {
         let metric = rows::name(&row.try_get::<String, _>("metric")?)?;
         let reason: Option<String> = row.try_get("reason")?;
+        let queue: Option<String> = row.try_get("queue")?;
         let newest = Counted {
             result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
             verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
             reader: row.try_get("reader")?,
             reason: reason.map(|reason| rows::name(&reason)).transpose()?,
+            queue: queue.map(|queue| rows::name(&queue)).transpose()?,
         };
         let of_metric = counted.entry((row.try_get("pair")?, metric)).or_default();
         // Rows come oldest first, so a later one of the same reader on the same result takes its place.

@@ -78,7 +78,7 @@ pub(super) struct UndoArgs {
 }
 
 /// A reader's name: not empty, on one line.
-fn reader_name(text: &str) -> Result<String, String> {
+pub(super) fn reader_name(text: &str) -> Result<String, String> {
     let name = text.trim();
     if name.is_empty() || name.chars().any(char::is_control) {
         return Err("a reader needs a name on one line".to_owned());

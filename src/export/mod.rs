@@ -7,7 +7,7 @@ mod line;
 pub mod pictures;
 mod sheet;
 
-pub use files::Files;
+pub use files::{Files, FilesError, Print};
 pub use folder::FolderError;
 pub use jsonl::{ExportError, ExportSummary, JsonlOptions, to_jsonl, verdict_lines};
 pub use line::{Hashes, Line, LineStatus, Maps, Numbers};
