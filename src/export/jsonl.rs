@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
+use super::by_hand;
 use super::files::{Drawn, FilesError, PAIRS, PairFiles};
 use super::folder::{Folder, FolderError, LINES, VERDICTS};
 use super::line::{Line, LineStatus, Outcomes};
@@ -82,6 +83,7 @@ pub async fn to_jsonl(
     let folder = Folder::begin(dir)?;
     let mut lines = Lines::create(folder.path())?;
     let mut summary = ExportSummary::default();
+    let by_hand = by_hand::newest(catalog).await?;
     let mut after = None;
     loop {
         let page = catalog.results_page(after.as_ref(), PAGE).await?;
@@ -89,7 +91,10 @@ pub async fn to_jsonl(
             break;
         };
         after = Some(last.facts.name.clone());
-        for pair in write_page(project, folder.path(), page, options).await? {
+        for mut pair in write_page(project, folder.path(), page, options).await? {
+            for line in &mut pair.lines {
+                line.by_hand = by_hand.get(&line.id).cloned();
+            }
             lines.write(&pair.lines)?;
             summary.count(pair);
         }

@@ -1,5 +1,6 @@
 //! Aligned pairs and pictures for other tools and for people.
 
+mod by_hand;
 mod files;
 mod folder;
 mod jsonl;
@@ -7,6 +8,7 @@ mod line;
 pub mod pictures;
 mod sheet;
 
+pub use by_hand::ByHand;
 pub use files::{Files, FilesError, Print};
 pub use folder::FolderError;
 pub use jsonl::{ExportError, ExportSummary, JsonlOptions, to_jsonl, verdict_lines};

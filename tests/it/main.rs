@@ -22,6 +22,7 @@ mod layers;
 mod limits;
 mod odd;
 mod one_pair;
+mod page;
 #[cfg(target_os = "linux")]
 mod power;
 mod processes;
@@ -29,6 +30,9 @@ mod queue;
 mod readers;
 mod report;
 mod resume;
+mod review_guard;
+mod review_kill;
+mod review_page;
 mod seeds;
 mod semi_real;
 #[cfg(target_os = "linux")]
