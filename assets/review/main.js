@@ -59,8 +59,14 @@ async function show(pressedAt) {
     document.body.dataset.shown = item.id;
     screen.measure(pressedAt ? `${document.body.dataset.paintMs} ms` : "");
     // After the paint: decoding must not hold it up.
-    setTimeout(() => deck.ahead(AHEAD).forEach(({ id }) => pictures(id)), 0);
+    setTimeout(() => lookAhead(item), 0);
   });
+}
+
+/** Decodes what comes next; the page tells when all of it is there. */
+async function lookAhead(item) {
+  await Promise.allSettled(deck.ahead(AHEAD).map(({ id }) => pictures(id).loading));
+  document.body.dataset.ahead = item.id;
 }
 
 /** Marks what is on, in words and buttons. */
@@ -235,7 +241,10 @@ function act(action, event) {
 
 addEventListener("click", (event) => {
   const button = event.target.closest("[data-do]");
-  if (button) act(button.dataset.do);
+  if (!button) return;
+  act(button.dataset.do);
+  // After a click the keys are the page's again; who goes by Tab keeps the place.
+  if (event.detail > 0) button.blur();
 });
 listen(act, (action) => action === "flicker" && !stage.rocking && stage.hold(false));
 label();

@@ -129,7 +129,7 @@ fn stage(language: Language) -> Markup {
         section #stage tabindex="-1" aria-label=(language.say("stage")) {
             div.modes role="group" aria-label=(language.say("modes")) {
                 @for mode in MODES { (look(mode, language)) }
-                span.gap {}
+                span.rule {}
                 @for switch in SWITCHES { (look(switch, language)) }
             }
             div.picture {
@@ -210,14 +210,16 @@ fn help(language: Language) -> Markup {
     ];
     html! {
         dialog #help aria-labelledby="help-title" {
-            h2 #help-title { (language.say("help")) }
+            form.title method="dialog" {
+                h2 #help-title { (language.say("help")) }
+                button { (language.say("close")) }
+            }
             div.groups {
                 @for (name, actions) in groups {
                     section { h3 { (Language::say(language, name)) } (list(actions)) }
                 }
             }
             p { (language.say("correct_hint")) }
-            form method="dialog" { button { (language.say("close")) } }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Integration tests in one binary.
 
 mod backup;
+mod browser;
 mod check;
 mod cli;
 #[cfg(target_os = "linux")]
@@ -30,6 +31,7 @@ mod queue;
 mod readers;
 mod report;
 mod resume;
+mod review_browser;
 mod review_guard;
 mod review_kill;
 mod review_page;
