@@ -89,25 +89,26 @@ function give(verdict, reason, pressedAt) {
   if (!item) return;
   if (outbox.isFull) return screen.alert(say("blocked"));
   if (shownAt === null || pressedAt - shownAt < leastViewMs) return screen.tell(say("too_soon"));
-  const shownMs = Math.round(pressedAt - shownAt);
-  const body = {
-    event: crypto.randomUUID(),
-    item: item.id,
-    verdict,
-    reason,
-    note,
-    angle_read_deg: stage.turn === 0 ? null : Number(stage.turn.toFixed(2)),
-    shown_ms: shownMs,
-  };
-  times.push(shownMs);
+  const body = { ...answerTo(item, verdict, reason), shown_ms: Math.round(pressedAt - shownAt) };
+  times.push(body.shown_ms);
   screen.pace(times.slice(-200));
+  send(item, body);
+  deck.advance();
+  show(pressedAt);
+}
+
+/** An answer as it stands on the page now. */
+function answerTo(item, verdict, reason) {
+  const turned = stage.turn === 0 ? null : Number(stage.turn.toFixed(2));
+  return { event: crypto.randomUUID(), item: item.id, verdict, reason, note, angle_read_deg: turned };
+}
+
+function send(item, body) {
   deck.answer(item, body);
   screen.tell(`${item.pair}: ${screen.words(body)}`);
   outbox.put("/api/answer", body).then(() => {
     if (queue === "adjudicate") about(item);
   });
-  deck.advance();
-  show(pressedAt);
 }
 
 function undo(pressedAt) {
@@ -190,8 +191,12 @@ async function saveCorrection() {
 async function takeNote() {
   const item = deck.current;
   if (!item) return;
+  if (outbox.isFull) return screen.alert(say("blocked"));
   const text = await screen.askNote(note);
-  if (text !== null && deck.current === item) note = text || null;
+  if (text === null || deck.current !== item || (text || null) === note) return refresh();
+  note = text || null;
+  // On a card that is answered the note is an answer again, with the same verdict.
+  if (item.answer) send(item, { ...answerTo(item, item.answer.verdict, item.answer.reason), shown_ms: null });
   refresh();
 }
 

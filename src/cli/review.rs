@@ -81,6 +81,12 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let settings = context.settings()?;
     let keys = review::key_map(&settings.config.review.keys);
     let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
+    if args.listen.is_some_and(|address| address.is_unspecified()) {
+        // The page answers to its own name only, and "any address" is none.
+        let text =
+            "--listen needs the one address of this machine under which the page is to be reached";
+        return Err(Refusal::Usage(text.to_owned()).into());
+    }
     let (project, catalog) = context.writer().await?;
     let language = args.lang.unwrap_or_else(language_of_system);
     let options = ReviewOptions {

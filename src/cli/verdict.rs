@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::clock::utc;
+use super::clock::{span, utc};
 use super::context::{Context, now};
 use super::exit::ExitCode;
 use super::manifest_file::is_jsonl;
@@ -226,7 +226,7 @@ async fn undo(args: UndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
 /// The log as lines, one an event.
 pub(super) fn log_text(events: &[VerdictEvent], palette: Palette) -> String {
     let rows: Vec<Vec<String>> = events.iter().map(|event| log_row(event, palette)).collect();
-    columns(&rows, &[Align::Left; 8])
+    columns(&rows, &[Align::Left; 9])
 }
 
 fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
@@ -249,7 +249,16 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
         event
             .reason
             .map_or_else(String::new, |reason| reason.to_string()),
+        looked(&event.look),
         event.note.clone().unwrap_or_default(),
         standing,
     ]
+}
+
+/// How long it was looked at, and by how much it was found turned.
+fn looked(look: &Look) -> String {
+    let shown = look.shown_ms.map(span);
+    let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
+    let parts: Vec<String> = shown.into_iter().chain(angle).collect();
+    parts.join(" ")
 }

@@ -11,6 +11,6 @@ mod sheet;
 pub use by_hand::ByHand;
 pub use files::{Files, FilesError, Print};
 pub use folder::FolderError;
-pub use jsonl::{ExportError, ExportSummary, JsonlOptions, to_jsonl, verdict_lines};
+pub use jsonl::{ExportError, ExportSummary, JsonlOptions, json_lines, to_jsonl};
 pub use line::{Hashes, Line, LineStatus, Maps, Numbers};
 pub use sheet::{Sheet, SheetError, SheetOptions, SheetOrder, draw_sheet};

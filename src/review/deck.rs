@@ -33,25 +33,41 @@ pub struct DeckOptions {
     pub rates: Rates,
 }
 
+/// A reader's answers: the newest to each thing.
+#[derive(Debug, Default)]
+pub(super) struct Answers(BTreeMap<AnsweredOn, Answer>);
+
+impl Answers {
+    /// Reads those that were not taken back.
+    ///
+    /// # Errors
+    /// When the catalog refuses.
+    pub(super) async fn read(catalog: &Catalog, reader: &str) -> Result<Self, CatalogError> {
+        let answers = catalog.answers(reader).await?.into_iter();
+        // Oldest first, so that the newest stays.
+        Ok(Self(answers.map(|answer| (answer.on, answer)).collect()))
+    }
+
+    /// The answer to a card, if there is one.
+    pub(super) fn to(&self, card: &Card) -> Option<&Answer> {
+        if card.control.is_some() {
+            return self.0.get(&AnsweredOn::Control(card.view.seen()));
+        }
+        let on_results = card.results.iter();
+        on_results
+            .filter_map(|(_, hash)| self.0.get(&AnsweredOn::Result(*hash)))
+            .max_by_key(|answer| answer.at)
+    }
+}
+
 /// Cards in order, with a reader's answers.
 #[derive(Debug, Default)]
 pub(super) struct Deck {
     pub(super) cards: Vec<Arc<Card>>,
-    answers: BTreeMap<AnsweredOn, Answer>,
+    pub(super) answers: Answers,
 }
 
 impl Deck {
-    /// The reader's newest answer to a card, if there is one.
-    pub(super) fn answer(&self, card: &Card) -> Option<&Answer> {
-        if card.control.is_some() {
-            return self.answers.get(&AnsweredOn::Control(card.view.seen()));
-        }
-        let on_results = card.results.iter();
-        on_results
-            .filter_map(|(_, hash)| self.answers.get(&AnsweredOn::Result(*hash)))
-            .max_by_key(|answer| answer.at)
-    }
-
     /// Reads the deck of a reader as the catalog stands.
     ///
     /// # Errors
@@ -73,11 +89,9 @@ impl Deck {
         }
         let cards = cards.into_iter();
         let cards = cards.map(|card| Arc::new(card.named(&key, &options.reader)));
-        // Oldest first, so that the newest answer stays.
-        let answers = catalog.answers(&options.reader).await?.into_iter();
         Ok(Self {
             cards: cards.collect(),
-            answers: answers.map(|answer| (answer.on, answer)).collect(),
+            answers: Answers::read(catalog, &options.reader).await?,
         })
     }
 }

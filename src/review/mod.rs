@@ -20,7 +20,7 @@ mod session;
 mod words;
 
 use std::collections::BTreeMap;
-use std::net::{IpAddr, SocketAddr};
+use std::net::SocketAddr;
 use std::sync::Arc;
 
 use tokio::net::TcpListener;
@@ -125,7 +125,10 @@ pub async fn open(
     // An answer that was not acknowledged before a restart may come before anybody asks for the deck.
     let deck = desk.deal().await;
     let deck = deck.map_err(|error| ReviewError::Deck(error.to_string()))?;
-    let answered = deck.cards.iter().filter(|card| deck.answer(card).is_some());
+    let answered = deck
+        .cards
+        .iter()
+        .filter(|card| deck.answers.to(card).is_some());
     Ok(Review {
         cards: [deck.cards.len(), answered.count()],
         listener,
@@ -176,9 +179,6 @@ fn hosts(address: SocketAddr) -> Vec<String> {
     let mut hosts = vec![address.to_string()];
     if address.ip().is_loopback() {
         hosts.extend([format!("localhost:{port}"), format!("127.0.0.1:{port}")]);
-    }
-    if address.ip() == IpAddr::from([0, 0, 0, 0]) {
-        hosts.push(format!("127.0.0.1:{port}"));
     }
     hosts
 }

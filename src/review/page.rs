@@ -64,6 +64,7 @@ pub(super) fn review(desk: &Desk, language: Language) -> Markup {
     let title = format!("{} · {}", language.say("title"), desk.deck_options.reader);
     let head = html! {
         link rel="stylesheet" href="/assets/review.css";
+        link rel="icon" href="/assets/icon.svg";
         script type="module" src="/assets/main.js" {}
     };
     let body = html! {

@@ -14,7 +14,7 @@ use super::answer::{AnswerBody, BadAnswer, UndoBody};
 use super::assets;
 use super::card::Card;
 use super::correction::{self, AlignBody};
-use super::deck::DeckError;
+use super::deck::{Answers, DeckError};
 use super::desk::Desk;
 use super::guard::{BODY_LIMIT, START, guard};
 use super::page;
@@ -141,7 +141,7 @@ async fn boot(State(desk): State<Arc<Desk>>) -> Json<Value> {
 async fn deck(State(desk): State<Arc<Desk>>) -> Answered {
     let deck = desk.deal().await?;
     let items = deck.cards.iter().map(|card| {
-        let answer = deck.answer(card).map(|answer| {
+        let answer = deck.answers.to(card).map(|answer| {
             json!({
                 "event": answer.event, "verdict": answer.verdict, "reason": answer.reason,
                 "note": answer.note, "at": answer.at,
@@ -166,8 +166,8 @@ async fn picture(
 /// What is told of a card once it is answered: for planted faults and repeats as for all others.
 async fn about(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answered {
     let card = card(&desk, &id)?;
-    let deck = desk.deal().await?;
-    if deck.answer(&card).is_none() {
+    let answers = Answers::read(&desk.catalog, &desk.deck_options.reader).await?;
+    if answers.to(&card).is_none() {
         return Err(Trouble::NotAnswered);
     }
     let drawn = desk.pictures(&card).await?;

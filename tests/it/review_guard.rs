@@ -173,6 +173,7 @@ fn a_body_that_a_form_can_send_is_refused() {
         Some("text/plain"),
         Some("application/x-www-form-urlencoded"),
         Some("text/plain; application/json"),
+        Some("application/ld+json"),
     ] {
         assert_eq!(world.with("content-type", kind).status, 415, "{kind:?}");
     }

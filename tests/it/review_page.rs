@@ -296,6 +296,10 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
         "{a:?} {b:?}"
     );
     mocban(project.dir(), &["export", "-o", "out"]).expect(0);
+    let log = std::fs::read_to_string(project.dir().join("out/alignments.jsonl")).expect("a log");
+    assert_eq!(log.lines().count(), 2);
+    // An export with all it may hold is replaced as any other.
+    mocban(project.dir(), &["export", "-o", "out"]).expect(0);
     let lines = std::fs::read_to_string(project.dir().join("out/pairs.jsonl")).expect("lines");
     let lines = lines
         .lines()
