@@ -72,6 +72,7 @@ pub(super) fn review(desk: &Desk, language: Language) -> Markup {
         (top(desk, language))
         noscript { p.alert { (language.say("no_script")) } }
         p #alert .alert role="alert" hidden {}
+        (modes(language))
         main {
             div.side {
                 (figure("print", language))
@@ -128,15 +129,20 @@ fn figure(layer: &'static str, language: Language) -> Markup {
 fn stage(language: Language) -> Markup {
     html! {
         section #stage tabindex="-1" aria-label=(language.say("stage")) {
-            div.modes role="group" aria-label=(language.say("modes")) {
-                @for mode in MODES { (look(mode, language)) }
-                span.rule {}
-                @for switch in SWITCHES { (look(switch, language)) }
-            }
             div.picture {
                 canvas #canvas role="img" aria-label=(language.say("stage")) {}
             }
             p.under { span #legend {} span.gap {} span #measure {} }
+        }
+    }
+}
+
+fn modes(language: Language) -> Markup {
+    html! {
+        div.modes role="group" aria-label=(language.say("modes")) {
+            @for mode in MODES { (look(mode, language)) }
+            span.rule {}
+            @for switch in SWITCHES { (look(switch, language)) }
         }
     }
 }
