@@ -21,7 +21,8 @@ const GOOD: f64 = 0.8;
 pub struct DeckOptions {
     /// Who reads.
     pub reader: String,
-    /// Only results of these metrics; of all where there is none.
+    /// Only results of these metrics; of all where there is none. A metric that is not asked for gets no verdict, also
+    /// where it looks the same: the accuracy of such a choice would stand for nothing.
     pub metrics: Vec<ThresholdMetric>,
     /// What comes first.
     pub queue: Queue,
