@@ -26,6 +26,7 @@ let correction = null;
 /** Shows the current card; it is there at once when it was decoded ahead. */
 async function show(pressedAt) {
   const item = deck.current;
+  if (!outbox.trouble) screen.calm();
   leaveCorrection();
   note = item?.answer?.note ?? null;
   shownAt = null;
@@ -125,8 +126,8 @@ function undo(pressedAt) {
 /** The server will never take it: the card is open again, and why is said. */
 function refused(letter, why) {
   if (letter.path === "/api/answer") deck.forget(letter.body.event);
-  screen.alert(say("was_refused", { why }));
   show();
+  screen.alert(say("was_refused", { why }));
 }
 
 function go(item) {

@@ -1,6 +1,6 @@
 // Everything on the page around the stage: names, numbers, history, words for the ear.
 
-import { language, say } from "./boot.js";
+import { language, queue, say } from "./boot.js";
 
 const at = (id) => document.getElementById(id);
 const SIGNS = { pass: "✓", fail: "✗", unsure: "?" };
@@ -8,7 +8,8 @@ const SIDES = ["print", "print_mask", "relief", "depth_mask"];
 const LAYERS = { print: "print", print_mask: "printMask", relief: "relief", depth_mask: "depthMask" };
 
 export function head(item, deck) {
-  at("pair").textContent = item?.pair ?? (deck.items.length > 0 ? say("done") : say("empty"));
+  const none = queue === "adjudicate" ? say("empty_adjudicate") : say("empty");
+  at("pair").textContent = item?.pair ?? (deck.items.length > 0 ? say("done") : none);
   const [done, all] = [deck.done, deck.items.length];
   at("progress").textContent = say("progress", { done, all });
   at("bar").max = Math.max(all, 1);

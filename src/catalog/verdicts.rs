@@ -102,17 +102,19 @@ WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 ORDER BY v.pair, v.metric, v.reader, v.id";
 
 impl Catalog {
-    /// Appends verdicts on the current results, all or none.
+    /// Appends verdicts on the current results, all or none. Those that are there already by the client's number are
+    /// left alone; says how many were not.
     ///
     /// # Errors
     /// When a pair is not there or has no result; then nothing is stored.
-    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<()> {
+    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
         self.alone(move |conn| {
             Box::pin(async move {
+                let mut stored = 0;
                 for verdict in &verdicts {
-                    append(conn, verdict, now).await?;
+                    stored += u64::from(append(conn, verdict, now).await?);
                 }
-                Ok(())
+                Ok(stored)
             })
         })
         .await
@@ -168,7 +170,8 @@ impl Catalog {
     }
 }
 
-async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) -> Result<()> {
+/// Says whether anything of it is new.
+async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) -> Result<bool> {
     let judged = sqlx::query(JUDGED)
         .bind(new.pair.as_str())
         .fetch_all(&mut *conn)
@@ -193,7 +196,7 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
     }
     match new.metric {
         Some(metric) if !found => Err(CatalogError::NoMetricResult(new.pair.clone(), metric)),
-        Some(_) | None => Ok(()),
+        Some(_) | None => Ok(act.is_some()),
     }
 }
 

@@ -147,17 +147,23 @@ async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode>
     verdict_file::refuse_unknown(&rows, &unknown).map_err(|error| error.in_file(&args.file))?;
     let all = rows.len() as u64;
     let rows = on_current_results(&catalog, rows).await?;
-    let number = rows.len() as u64;
+    let kept = rows.len() as u64;
     let verdicts = rows.into_iter().map(|row| row.verdict).collect();
-    catalog.verdict_set(verdicts, now()).await?;
+    let number = catalog.verdict_set(verdicts, now()).await?;
     catalog.close().await;
     if context.global.json {
-        talk::print_json(&json!({"schema": 1, "recorded": number, "left_out": all - number}))?;
+        talk::print_json(
+            &json!({"schema": 1, "recorded": number, "left_out": all - kept, "known": kept - number}),
+        )?;
     }
-    if all > number {
-        let left_out = count(all - number, "verdict");
+    if all > kept {
+        let left_out = count(all - kept, "verdict");
         let why = "on a result that the pair does not have here";
         context.talk.warn(&format!("{left_out} left out: {why}"));
+    }
+    if kept > number {
+        let known = count(kept - number, "verdict");
+        context.talk.say(&format!("{known} there already"));
     }
     context
         .talk

@@ -170,6 +170,25 @@ async fn a_verdict_from_the_command_line_is_among_the_answers() {
 }
 
 #[tokio::test]
+async fn a_log_that_is_taken_in_again_doubles_nothing() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let of = |metric| NewVerdict {
+        metric: Some(metric),
+        ..given("e1", Verdict::Pass)
+    };
+    let log = ThresholdMetric::PAPER.map(of).to_vec();
+    for stored in [3, 0] {
+        let set = world.catalog.verdict_set(log.clone(), 5).await;
+        assert_eq!(set.expect("stored"), stored);
+    }
+    assert_eq!(
+        world.catalog.verdict_log(None).await.expect("a log").len(),
+        3
+    );
+}
+
+#[tokio::test]
 async fn a_verdict_on_what_is_no_current_result_any_more_is_kept_as_stale() {
     let world = World::new(1).await;
     world.finish_one().await;
