@@ -15,4 +15,8 @@ pub struct Evidence {
     pub other_angle: f64,
     /// Score of the best pose of the mirrored relief, over that of the best pose.
     pub mirrored: f64,
+    /// How far the answers lie apart that are found from smaller and larger poses, a share of the depth map's longest
+    /// side.
+    #[serde(default)]
+    pub spread: f64,
 }

@@ -4,6 +4,8 @@
 //! character, yet would decide where a symmetric one reads as well turned or in the mirror.
 
 use super::Layer;
+use super::layer::sample;
+use crate::domain::Affine2;
 use crate::raster::{Grid, Mask};
 use crate::stages::components::Components;
 
@@ -17,16 +19,115 @@ const RIM_PX: usize = 3;
 /// this share of the size along the border is left out instead.
 const MOST_STRAYS: f64 = 0.5;
 const BAND: f64 = 0.1;
+/// Surroundings agree when they meet this many times as much of each other as the character does.
+const AS_WELL: f64 = 0.75;
 
 /// 1 where a layer is known and free of what runs into its border, 0 elsewhere.
 pub(super) fn own_ground(layer: &Layer) -> Grid<f32> {
-    let strokes = layer.amount.map(|amount| *amount > STROKE);
-    let unknown = layer.weight.map(|weight| *weight == 0.0);
-    let strays = Components::of(&strokes).near(&unknown, BORDER_PX);
-    if strays.count() as f64 > MOST_STRAYS * strokes.count() as f64 {
-        without_band(&layer.weight)
-    } else {
-        without_strays(&layer.weight, &strays)
+    Strokes::of(layer).ground(layer)
+}
+
+/// Two layers at a pose, and what of them runs into the border. What the other layer has strokes for that do not is no
+/// stray: there it is the character that hangs on its surroundings.
+pub(in crate::stages) struct Surroundings<'a> {
+    layers: [&'a Layer; 2],
+    strokes: [Strokes; 2],
+    moving_from_fixed: Affine2,
+}
+
+impl<'a> Surroundings<'a> {
+    /// Of a fixed and a moving layer; `None` for a map that cannot be turned round.
+    pub(in crate::stages) fn of(
+        layers: [&'a Layer; 2],
+        fixed_from_moving: &Affine2,
+    ) -> Option<Self> {
+        let onto = |a: &Layer, b: &Layer, b_from_a: &Affine2| {
+            let from_work = a.work_from_image.inverse()?;
+            Some(b.work_from_image.after(b_from_a).after(&from_work))
+        };
+        let [fixed, moving] = layers;
+        let moving_from_fixed = onto(fixed, moving, &fixed_from_moving.inverse()?)?;
+        let [mut ink, mut wood] = layers.map(Strokes::of);
+        let [own_ink, own_wood] = [ink.own(), wood.own()];
+        ink.keep(&own_wood, &moving_from_fixed);
+        wood.keep(&own_ink, &onto(moving, fixed, fixed_from_moving)?);
+        Some(Self {
+            layers,
+            strokes: [ink, wood],
+            moving_from_fixed,
+        })
+    }
+
+    /// The layers without them.
+    pub(in crate::stages) fn without(&self) -> [Layer; 2] {
+        [0, 1].map(|k: usize| self.layers[k].known_on(self.strokes[k].ground(self.layers[k])))
+    }
+
+    /// Whether they lie on each other as well as the rest does. Then they are of one state of the block, and tell the pose
+    /// as well as the character.
+    pub(in crate::stages) fn agree(&self) -> bool {
+        let [fixed, moving] = self.layers;
+        let strays = self.strokes[1]
+            .strays
+            .map(|stray| f32::from(u8::from(*stray)));
+        let mut sums = [[0.0_f64; 2]; 2];
+        for y in 0..fixed.weight.height() {
+            for x in (0..fixed.weight.width()).filter(|x| fixed.weight.at(*x, y) > 0.0) {
+                let there = self.moving_from_fixed.apply([x as f64, y as f64]);
+                if sample(&moving.weight, there) < 0.5 {
+                    continue;
+                }
+                let stray = self.strokes[0].strays.at(x, y) || sample(&strays, there) > 0.5;
+                let (ink, wood) = (fixed.amount.at(x, y), sample(&moving.amount, there));
+                let [met, all] = &mut sums[usize::from(stray)];
+                *met += f64::from(ink.min(wood));
+                *all += f64::from(ink.max(wood));
+            }
+        }
+        let [own, around] = sums.map(|[met, all]| met / all.max(1e-9));
+        around >= AS_WELL * own
+    }
+}
+
+/// What a layer shows, and what of it runs into the border.
+struct Strokes {
+    all: Mask,
+    strays: Mask,
+}
+
+impl Strokes {
+    fn of(layer: &Layer) -> Self {
+        let all = layer.amount.map(|amount| *amount > STROKE);
+        let unknown = layer.weight.map(|weight| *weight == 0.0);
+        let strays = Components::of(&all).near(&unknown, BORDER_PX);
+        Self { all, strays }
+    }
+
+    /// 1 where strokes do not run into the border.
+    fn own(&self) -> Grid<f32> {
+        let own = |x, y| f32::from(u8::from(self.all.at(x, y) && !self.strays.at(x, y)));
+        Grid::from_fn(self.all.width(), self.all.height(), own)
+    }
+
+    /// Takes for no strays what lies on strokes of another layer.
+    fn keep(&mut self, others: &Grid<f32>, other_from_this: &Affine2) {
+        for y in 0..self.strays.height() {
+            for x in 0..self.strays.width() {
+                if self.strays.at(x, y) {
+                    let there = other_from_this.apply([x as f64, y as f64]);
+                    self.strays.set(x, y, sample(others, there) == 0.0);
+                }
+            }
+        }
+    }
+
+    /// 1 where the layer is known and free of strays, 0 elsewhere.
+    fn ground(&self, layer: &Layer) -> Grid<f32> {
+        if self.strays.count() as f64 > MOST_STRAYS * self.all.count() as f64 {
+            without_band(&layer.weight)
+        } else {
+            without_strays(&layer.weight, &self.strays)
+        }
     }
 }
 
@@ -57,4 +158,65 @@ fn without_band(weight: &Grid<f32>) -> Grid<f32> {
             0.0
         }
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Surroundings;
+    use crate::domain::Affine2;
+    use crate::raster::{Grid, Mask};
+    use crate::stages::pose::{Base, Layer, Soft};
+
+    const SIDE: usize = 64;
+    /// A cross in the middle, and bars that run into the left and the right border.
+    const CROSS: [[usize; 4]; 2] = [[16, 30, 48, 35], [30, 16, 35, 48]];
+    const LEFT: [usize; 4] = [0, 0, 6, SIDE];
+    const RIGHT: [usize; 4] = [SIDE - 6, 0, SIDE, SIDE];
+    /// Joins the cross to the left bar.
+    const BRIDGE: [usize; 4] = [4, 30, 20, 35];
+
+    /// Bars as boxes of left, top, right and bottom.
+    fn layer(bars: &[[usize; 4]]) -> Layer {
+        let on = |x, y| {
+            let mut bars = bars.iter();
+            bars.any(|[l, t, r, b]| (*l..*r).contains(&x) && (*t..*b).contains(&y))
+        };
+        let soft = Soft {
+            amount: Grid::from_fn(SIDE, SIDE, |x, y| f32::from(u8::from(on(x, y)))),
+            known: Mask::new(SIDE, SIDE, true),
+        };
+        let base = Base::new(&soft, SIDE).expect("something is known");
+        base.layer(SIDE, 0.8)
+    }
+
+    fn as_they_lie(fixed: &Layer, moving: &Layer) -> [Layer; 2] {
+        let same = Affine2::scale_shift(1.0, [0.0; 2]);
+        let around = Surroundings::of([fixed, moving], &same);
+        around.expect("the map can be turned round").without()
+    }
+
+    fn amount(layer: &Layer, x: usize, y: usize) -> f32 {
+        let [x, y] = layer.work_from_image.apply([x as f64, y as f64]);
+        layer.amount.at(x.round() as usize, y.round() as usize)
+    }
+
+    #[test]
+    fn what_runs_into_the_border_is_left_out_of_both() {
+        let with = |bar| layer(&[CROSS[0], CROSS[1], bar]);
+        let [ink, wood] = as_they_lie(&with(LEFT), &with(RIGHT));
+        for layer in [&ink, &wood] {
+            assert!(amount(layer, 32, 32) > 0.9);
+            assert_eq!(amount(layer, 2, 10) + amount(layer, SIDE - 3, 10), 0.0);
+        }
+    }
+
+    #[test]
+    fn a_character_that_hangs_on_a_frame_line_in_one_picture_stays() {
+        let bridged = layer(&[CROSS[0], CROSS[1], BRIDGE, LEFT]);
+        let free = layer(&[CROSS[0], CROSS[1]]);
+        let [ink, wood] = as_they_lie(&bridged, &free);
+        assert!(amount(&ink, 32, 32) > 0.9 && amount(&ink, 32, 44) > 0.9);
+        assert!(amount(&wood, 32, 32) > 0.9);
+        assert_eq!(amount(&ink, 2, 10), 0.0);
+    }
 }

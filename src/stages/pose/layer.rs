@@ -178,6 +178,23 @@ fn framed(sides: [usize; 2], middle: [f64; 2], scale: f64) -> ([usize; 2], [f64;
 }
 
 impl Layer {
+    /// The same, known only on some ground: 1 there, 0 elsewhere.
+    pub(super) fn known_on(&self, ground: Grid<f32>) -> Self {
+        let over = |values: &Grid<f32>| {
+            let kept = values.data().iter().zip(ground.data()).map(|(v, g)| v * g);
+            let mut out = values.clone();
+            let kept: Vec<f32> = kept.collect();
+            out.data_mut().copy_from_slice(&kept);
+            out
+        };
+        Self {
+            value: over(&self.value),
+            amount: over(&self.amount),
+            weight: ground,
+            work_from_image: self.work_from_image,
+        }
+    }
+
     /// Middle of the layer in its own pixels.
     pub(super) fn centre(&self) -> [f64; 2] {
         [

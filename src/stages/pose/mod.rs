@@ -13,6 +13,7 @@ mod search;
 mod step;
 
 pub(super) use find::{Pass, find};
+pub(super) use ground::Surroundings;
 pub(super) use layer::{Base, Layer, Soft};
 pub(super) use overlap::Overlap;
 pub(super) use refine::Refiner;

@@ -3,7 +3,7 @@
 use std::cell::OnceCell;
 
 use super::duel::{Side, duel};
-use super::ground::own_ground;
+use super::ground::{Surroundings, own_ground};
 use super::search::Found;
 use super::step::{Loss, Room, Step};
 use super::{Layer, Overlap};
@@ -104,6 +104,12 @@ impl<'a> Refiner<'a> {
             },
             None => *start,
         }
+    }
+
+    /// The same two layers without what need not stand alike around them, as a pose near the right one tells.
+    pub(in crate::stages) fn alone(&self, pose: &Found) -> Option<[Layer; 2]> {
+        let around = Surroundings::of([self.fixed, self.moving], &pose.fixed_from_moving)?;
+        Some(around.without())
     }
 
     /// The score of a pose as it is.

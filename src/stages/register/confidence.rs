@@ -9,8 +9,10 @@ use crate::domain::Evidence;
 /// Weights of the logarithms of correlation, tops met, ink met, other angle and mirrored; the first stands alone.
 const POSE: [f64; 6] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
 /// Weights of one; logarithm of the mask's area over that of the mask by relief alone, and its square; that of the
-/// ink's area over it, and its square; logarithm of the correlation.
-const MASK: [f64; 6] = [4.18, -3.54, -3.51, 1.12, -1.79, 3.29];
+/// ink's area over it, and its square; logarithm of the correlation; spread of the answers, by [`spread_out`].
+const MASK: [f64; 7] = [4.58, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5];
+/// A spread that nobody would see, as share of the depth map's longest side.
+const UNSEEN: f64 = 0.002;
 /// Shares below this are as bad as none.
 const FLOOR: f64 = 0.02;
 /// Ratios to the other poses' scores are cut to this range.
@@ -53,8 +55,14 @@ pub(super) fn of_mask(evidence: &Evidence, areas: Areas) -> f64 {
         ink,
         ink * ink,
         evidence.correlation.max(FLOOR).ln(),
+        spread_out(evidence.spread),
     ];
     logistic(MASK.iter().zip(features).map(|(w, f)| w * f).sum())
+}
+
+/// 0 for answers that lie on each other, growing slowly with how far they lie apart.
+fn spread_out(spread: f64) -> f64 {
+    (spread / UNSEEN).ln_1p()
 }
 
 fn logistic(value: f64) -> f64 {
@@ -72,6 +80,7 @@ mod tests {
         ink_met: 0.91,
         other_angle: 0.3,
         mirrored: 0.4,
+        spread: 0.0,
     };
 
     #[test]
@@ -117,6 +126,18 @@ mod tests {
     }
 
     #[test]
+    fn a_pose_that_hangs_on_its_start_is_trusted_less() {
+        let areas = Areas {
+            mask: 0.2,
+            relief: 0.2,
+            ink: 0.25,
+        };
+        let chance = |spread| of_mask(&Evidence { spread, ..PLAIN }, areas);
+        assert!(chance(0.0005) > 0.95);
+        assert!(chance(0.02) < 0.7);
+    }
+
+    #[test]
     fn another_characters_print_is_not_believed() {
         let wrong = Evidence {
             correlation: 0.34,
@@ -124,6 +145,7 @@ mod tests {
             ink_met: 0.68,
             other_angle: 0.88,
             mirrored: 0.94,
+            spread: 0.0,
         };
         assert!(of_pose(&wrong) < 0.05);
     }

@@ -73,6 +73,11 @@ impl<'a> Cuts<'a> {
         })
     }
 
+    /// The ink and the strokes of one of the cuts, the character alone, as a pose near the right one tells.
+    pub(super) fn alone(&self, nearest: usize, pose: &Found) -> Option<[Layer; 2]> {
+        self.refiners.get(nearest)?.alone(pose)
+    }
+
     /// The scores of two poses, each with the strokes of one of the cuts, on the same ground.
     pub(super) fn duel(&self, [one, two]: [(usize, &Found); 2]) -> [f64; 2] {
         self.refiners[one.0].duel(one.1, &self.refiners[two.0], two.1)

@@ -7,7 +7,7 @@ use super::{Alignment, Error, Params};
 use crate::domain::{Affine2, Evidence, Pose};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{Normalized, Relief, soft_stroke};
-use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Soft};
+use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Soft, Surroundings};
 
 /// Poses closer in angle than this are one pose when the margin is taken.
 const SAME_POSE_DEG: f64 = 15.0;
@@ -22,6 +22,8 @@ const CLOSER: f64 = 0.67;
 const CLOSE: f64 = 0.75;
 /// A rival's share that is no sign of a wrong pose: symmetric characters have it.
 const SYMMETRIC: f64 = 0.9;
+/// How much smaller and larger the pose is from which the answer must be the same.
+const OTHER_SIZE: f64 = 1.08;
 /// Most steps of a refinement, and of the last one.
 const FEW_STEPS: usize = 8;
 const MOST_STEPS: usize = 15;
@@ -38,7 +40,7 @@ pub(super) fn align(
     let (ink, woods) = pictures.layers(CLOSER, cuts);
     let cuts = Cuts::new(cuts, &ink, &woods);
     rivals.look_closer(&cuts).ok_or(Error::NoPose)?;
-    let print_from_depth = pictures.look(&rivals.best);
+    let (print_from_depth, spread) = pictures.look(&rivals.best, &cuts).ok_or(Error::NoPose)?;
     let choices = normalized.outcome.thresholds.iter();
     let alignments = choices.map(|choice| Alignment {
         metric: choice.metric,
@@ -47,7 +49,7 @@ pub(super) fn align(
         margin: rivals.margin(),
         at_bound: normalized.outcome.search_at_bound || choice.at_bound,
     });
-    Ok((alignments.collect(), rivals.evidence()))
+    Ok((alignments.collect(), rivals.evidence(spread)))
 }
 
 /// A pose with the cut that fits the print's strokes there.
@@ -134,7 +136,7 @@ impl Rivals {
     }
 
     /// What speaks for and against the best pose.
-    fn evidence(&self) -> Evidence {
+    fn evidence(&self, spread: f64) -> Evidence {
         let [other_angle, mirrored] = self.shares;
         Evidence {
             correlation: self.best.found.score,
@@ -142,6 +144,7 @@ impl Rivals {
             ink_met: self.best.overlap.fixed_met,
             other_angle,
             mirrored,
+            spread,
         }
     }
 }
@@ -203,20 +206,64 @@ impl Pictures {
         )
     }
 
-    /// The pose looked at once more at working size, with the strokes of its cut.
-    fn look(&self, best: &Settled) -> Affine2 {
+    /// The pose looked at once more, with the strokes of its cut, by the character alone: walls, frame lines and
+    /// neighbours need not stand alike around print and relief; where they do, with them. Says as well how far the answers lie apart.
+    fn look(&self, best: &Settled, cuts: &Cuts) -> Option<(Affine2, f64)> {
+        let [ink, wood] = cuts.alone(best.nearest, &best.found)?;
+        let refiner = Refiner::new(&ink, &wood);
+        let (closer, spread) = self.steadied(
+            &refiner,
+            &refiner.refine(&best.found, FEW_STEPS, Loss::Huber),
+        );
         let (ink, woods) = self.layers(1.0, &[best.cut]);
-        let Some(wood) = woods.first() else {
-            return best.found.fixed_from_moving;
-        };
-        let refiner = Refiner::new(&ink, wood);
-        let refined = refiner.refine(&best.found, MOST_STEPS, Loss::Tukey);
+        let both = [&ink, woods.first()?];
+        let around = Surroundings::of(both, &closer.fixed_from_moving)?;
+        let alone = (!around.agree()).then(|| around.without());
+        let [ink, wood] = alone.as_ref().map_or(both, |[ink, wood]| [ink, wood]);
+        let refiner = Refiner::new(ink, wood);
+        let refined = refiner.refine(&closer, MOST_STEPS, Loss::Tukey);
         let last = if self.may_stretch {
             stretched(&refiner, &refined, self.middle)
         } else {
             refined
         };
-        last.fixed_from_moving
+        Some((last.fixed_from_moving, spread))
+    }
+
+    /// The best of the answers from the pose and from a smaller and a larger one, and how far the others lie from it: few
+    /// or broken strokes hold a pose where it happens to be.
+    fn steadied(&self, refiner: &Refiner, pose: &Found) -> (Found, f64) {
+        let answer = |k: f64| {
+            let [x, y] = pose.fixed_from_moving.apply(self.middle);
+            let resize = Affine2::scale_shift(k, [x - k * x, y - k * y]);
+            let start = Found {
+                fixed_from_moving: resize.after(&pose.fixed_from_moving),
+                ..*pose
+            };
+            refiner.refine(&start, MOST_STEPS, Loss::Tukey)
+        };
+        let answers = [1.0, 1.0 / OTHER_SIZE, OTHER_SIZE].map(answer);
+        let best = answers.iter().fold(answers[0], |best, other| {
+            if other.score > best.score {
+                *other
+            } else {
+                best
+            }
+        });
+        let apart = answers.iter().map(|other| self.apart(&best, other));
+        (best, apart.fold(0.0, f64::max))
+    }
+
+    /// How far two poses lay the depth map's corners apart in the mean, a share of its longest side.
+    fn apart(&self, one: &Found, other: &Found) -> f64 {
+        let [width, height] = self.middle.map(|middle| 2.0 * middle);
+        let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
+        let distance = |corner: [f64; 2]| {
+            let [a, b] = [one, other].map(|pose| pose.fixed_from_moving.apply(corner));
+            (a[0] - b[0]).hypot(a[1] - b[1])
+        };
+        let side = width.max(height) * one.fixed_from_moving.scale();
+        corners.map(distance).iter().sum::<f64>() / 4.0 / side.max(1e-9)
     }
 }
 
