@@ -31,6 +31,7 @@
 //! | `check` | a project held against itself, and mended | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets | `domain`, `raster`, `store`, `catalog`, `report` |
+//! | `review` | the review page: verdicts and alignments by hand, planted faults, a server on loopback | `domain`, `raster`, `store`, `catalog`, `report`, `export` |
 //! | `demo` | the built-in dataset: carved reliefs and prints with known truth, from one seed | `domain`, `mesh`, `raster` |
 //! | `config` | settings in layers, typed and checked, each with its origin | `domain`, `mesh`, `raster`, `stages`, `runner` |
 //! | `cli` | one thin file a command; exit codes, progress, log | all |
@@ -47,6 +48,7 @@ pub mod manifest;
 pub mod mesh;
 pub mod raster;
 pub mod report;
+pub mod review;
 pub mod runner;
 pub mod stages;
 pub mod store;

@@ -18,7 +18,7 @@ const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Marks a database as a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
 /// Version of the schema, raised by each migration.
-const SCHEMA_VERSION: i64 = 4;
+const SCHEMA_VERSION: i64 = 5;
 /// Read connections of a process.
 const READERS: u32 = 4;
 

@@ -3,7 +3,9 @@
 //! One writer task owns the only write connection and commits in groups; readers have their own connections and
 //! work while a run goes on. All times come in as arguments.
 
+mod alignments;
 mod alike;
+mod answers;
 mod audit;
 mod batch;
 mod checkpoint;
@@ -15,6 +17,7 @@ mod error;
 mod fail;
 mod holder;
 mod lease;
+mod look;
 mod mend;
 mod network;
 mod pairs;
@@ -46,6 +49,8 @@ use sqlx::pool::PoolConnection;
 use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
 use tokio::sync::{mpsc, oneshot};
 
+pub use alignments::{HandAlignment, StoredAlignment};
+pub use answers::{Answer, AnsweredOn, ControlAnswer, Shown};
 pub use audit::{AuditedPair, AuditedResult, Drift};
 pub use claim::{ClaimRequest, PairSelection};
 pub use counters::Counts;
@@ -54,6 +59,7 @@ pub use holder::{Holder, holder};
 pub use lease::{
     InputSeen, InputsSeen, Kept, Lease, MetricResult, RecipeId, Sentence, StageDone, StageFailed,
 };
+pub use look::Look;
 pub use pairs::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use plan::{FieldChange, Plan, PlanEntry, WorkReason};
 pub use read::{

@@ -232,6 +232,7 @@ fn reader_verdict(counted: &verdicts::Counted) -> ReaderVerdict {
         reader: counted.reader.clone(),
         verdict: counted.verdict,
         reason: counted.reason,
+        queue: counted.queue,
     }
 }
 

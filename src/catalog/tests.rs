@@ -1,5 +1,6 @@
 //! The protocol, statement by statement, on a real database file.
 
+mod answers;
 mod guards;
 mod histories;
 mod import;

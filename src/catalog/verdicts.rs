@@ -7,11 +7,12 @@ use serde_json::Value;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row as _, SqliteConnection};
 
+use super::look::Look;
 use super::{Catalog, CatalogError, Result, rows};
-use crate::domain::{ContentHash, PairName, Reason, ThresholdMetric, UnixMillis, Verdict};
+use crate::domain::{ContentHash, PairName, Queue, Reason, ThresholdMetric, UnixMillis, Verdict};
 
 /// A verdict to store.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct NewVerdict {
     /// The pair.
     pub pair: PairName,
@@ -25,10 +26,14 @@ pub struct NewVerdict {
     pub reason: Option<Reason>,
     /// In the reader's words.
     pub note: Option<String>,
+    /// How it came about, as far as it is known.
+    pub look: Look,
+    /// When it was given, where that was before it is stored.
+    pub at: Option<UnixMillis>,
 }
 
 /// One line of the verdict log.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct VerdictEvent {
     /// Number in the log.
     pub id: i64,
@@ -48,6 +53,9 @@ pub struct VerdictEvent {
     pub reason: Option<Reason>,
     /// In the reader's words.
     pub note: Option<String>,
+    /// How it came about, as far as it is known.
+    #[serde(flatten)]
+    pub look: Look,
     /// When.
     pub at: UnixMillis,
     /// When it was taken back, if it was.
@@ -63,6 +71,7 @@ pub(super) struct Counted {
     pub(super) verdict: Verdict,
     pub(super) reader: String,
     pub(super) reason: Option<Reason>,
+    pub(super) queue: Option<Queue>,
 }
 
 /// Results that a verdict on a pair judges: those of a job that is done.
@@ -72,35 +81,40 @@ SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
 WHERE p.name = ?1 ORDER BY m.metric";
 
 const INSERT: &str = "
-INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, reason, note, at)
-VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9)";
+INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, reason, note, at,
+    event, seen, shown_ms, angle_read_deg, queue)
+SELECT coalesce(?1, (SELECT coalesce(max(id), 0) + 1 FROM verdict)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
+WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
+RETURNING act";
 
 /// Lines of the log of one act, or of one pair, or all.
 const LOG: &str = "
 SELECT v.id, v.act, p.name, v.metric, v.result_hash, v.verdict, v.reader, v.reason, v.note, v.at,
-    u.at AS undone_at, coalesce(m.result_hash = v.result_hash, 0) AS current
+    v.event, v.seen, v.shown_ms, v.angle_read_deg, v.queue, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, 0) AS current
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act
     LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
 WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) ORDER BY v.id";
 
 pub(super) const COUNTED: &str = "
-SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reader, v.reason
+SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reader, v.reason, v.queue
 FROM json_each(?1) AS wanted CROSS JOIN verdict AS v ON v.pair = wanted.value
 WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 ORDER BY v.pair, v.metric, v.reader, v.id";
 
 impl Catalog {
-    /// Appends verdicts on the current results, all or none.
+    /// Appends verdicts on the current results, all or none. Those that are there already by the client's number are
+    /// left alone; says how many were not.
     ///
     /// # Errors
     /// When a pair is not there or has no result; then nothing is stored.
-    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<()> {
+    pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
         self.alone(move |conn| {
             Box::pin(async move {
+                let mut stored = 0;
                 for verdict in &verdicts {
-                    append(conn, verdict, now).await?;
+                    stored += u64::from(append(conn, verdict, now).await?);
                 }
-                Ok(())
+                Ok(stored)
             })
         })
         .await
@@ -156,7 +170,8 @@ impl Catalog {
     }
 }
 
-async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) -> Result<()> {
+/// Says whether anything of it is new.
+async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) -> Result<bool> {
     let judged = sqlx::query(JUDGED)
         .bind(new.pair.as_str())
         .fetch_all(&mut *conn)
@@ -165,47 +180,54 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
         return Err(CatalogError::UnknownPair(new.pair.clone()));
     }
     let mut act: Option<i64> = None;
+    let mut found = false;
     for row in &judged {
         let Some(metric) = row.try_get::<Option<String>, _>("metric")? else {
             return Err(CatalogError::NoResult(new.pair.clone()));
         };
-        if new.metric.is_some_and(|wanted| wanted.name() != metric) {
+        let metric = rows::name(&metric)?;
+        if new.metric.is_some_and(|wanted| wanted != metric) {
             continue;
         }
-        let id = insert(conn, new, row, &metric, act, now).await?;
-        act.get_or_insert(id);
+        found = true;
+        let hash = rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?;
+        let judged = (row.try_get("pair")?, metric, hash);
+        act = insert(conn, new, judged, act, now).await?.or(act);
     }
-    match (act, new.metric) {
-        (None, Some(metric)) => Err(CatalogError::NoMetricResult(new.pair.clone(), metric)),
-        _ => Ok(()),
+    match new.metric {
+        Some(metric) if !found => Err(CatalogError::NoMetricResult(new.pair.clone(), metric)),
+        Some(_) | None => Ok(act.is_some()),
     }
 }
 
-/// Appends one row; its act is the number of the act's first row.
-async fn insert(
+/// Appends one row on a result of a pair; its act is the number of the act's first row, which is told. A row with the
+/// client's number of one that is there already is left out.
+pub(super) async fn insert(
     conn: &mut SqliteConnection,
     new: &NewVerdict,
-    judged: &SqliteRow,
-    metric: &str,
+    (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
     act: Option<i64>,
     now: UnixMillis,
-) -> Result<i64> {
-    let next: i64 = sqlx::query_scalar("SELECT coalesce(max(id), 0) + 1 FROM verdict")
-        .fetch_one(&mut *conn)
-        .await?;
-    sqlx::query(INSERT)
-        .bind(act.unwrap_or(next))
-        .bind(judged.try_get::<i64, _>("pair")?)
-        .bind(metric)
-        .bind(judged.try_get::<Vec<u8>, _>("result_hash")?)
+) -> Result<Option<i64>> {
+    let look = &new.look;
+    let act = sqlx::query_scalar(INSERT)
+        .bind(act)
+        .bind(pair)
+        .bind(metric.name())
+        .bind(&result_hash.as_bytes()[..])
         .bind(new.verdict.name())
         .bind(&new.reader)
         .bind(new.reason.map(Reason::name))
         .bind(&new.note)
-        .bind(now)
-        .execute(conn)
+        .bind(new.at.unwrap_or(now))
+        .bind(&look.event)
+        .bind(look.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
+        .bind(look.shown_ms.map(u64::cast_signed))
+        .bind(look.angle_read_deg)
+        .bind(look.queue.map(Queue::name))
+        .fetch_optional(conn)
         .await?;
-    Ok(next)
+    Ok(act)
 }
 
 pub(super) async fn log(
@@ -232,6 +254,7 @@ fn event(row: &SqliteRow) -> Result<VerdictEvent> {
         reader: row.try_get("reader")?,
         reason: reason.map(|reason| rows::name(&reason)).transpose()?,
         note: row.try_get("note")?,
+        look: Look::read(row)?,
         at: row.try_get("at")?,
         undone_at: row.try_get("undone_at")?,
         current: row.try_get("current")?,
@@ -251,11 +274,13 @@ pub(super) async fn of_pairs(
     for row in &found {
         let metric = rows::name(&row.try_get::<String, _>("metric")?)?;
         let reason: Option<String> = row.try_get("reason")?;
+        let queue: Option<String> = row.try_get("queue")?;
         let newest = Counted {
             result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
             verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
             reader: row.try_get("reader")?,
             reason: reason.map(|reason| rows::name(&reason)).transpose()?,
+            queue: queue.map(|queue| rows::name(&queue)).transpose()?,
         };
         let of_metric = counted.entry((row.try_get("pair")?, metric)).or_default();
         // Rows come oldest first, so a later one of the same reader on the same result takes its place.

@@ -7,8 +7,8 @@ use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 
 use super::exit::ExitCode;
 use super::{
-    backup, check, completions, config, demo, export, import, man, report, retry, run, sheet, show,
-    status, verdict,
+    backup, check, completions, config, demo, export, import, man, report, retry, review, run,
+    sheet, show, status, verdict,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -161,6 +161,8 @@ pub(super) enum Command {
     /// Record what people say of the results
     #[command(subcommand)]
     Verdict(verdict::VerdictCommand),
+    /// Judge results in the browser, by keys, and lay reliefs by hand
+    Review(review::ReviewArgs),
     /// Print the table of all results
     Report(report::ReportArgs),
     /// Write the aligned pairs for other tools

@@ -11,7 +11,7 @@ use super::exit::{ExitCode, Refusal};
 use super::table::count;
 use super::talk;
 use crate::catalog::{Catalog, VerdictEvent};
-use crate::export::verdict_lines;
+use crate::export::json_lines;
 use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of, write_synced};
 
 /// Arguments of `backup`.
@@ -35,7 +35,7 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
     catalog.close().await;
     let (log, pairs) = held_by(&partial).await?;
     let verdicts = log.len() as u64;
-    let log = prepare(&verdicts_file(file), verdict_lines(&log).as_bytes())?;
+    let log = prepare(&verdicts_file(file), json_lines(&log).as_bytes())?;
     let settings_file = file.with_extension("mocban.toml");
     let settings = match std::fs::read(project.settings_path()) {
         Ok(bytes) => Some(prepare(&settings_file, &bytes)?),

@@ -15,6 +15,37 @@ pub(super) fn utc(at: UnixMillis) -> String {
     )
 }
 
+/// A moment in UTC from `2026-11-21`, `2026-11-21 04:10:03` or `2026-11-21T04:10:03Z`; `None` for all else.
+pub(super) fn from_utc(text: &str) -> Option<UnixMillis> {
+    let text = text.strip_suffix('Z').unwrap_or(text);
+    let (date, time) = text.split_once([' ', 'T']).unwrap_or((text, "00:00:00"));
+    let [year, month, day] = numbers(date, '-')?;
+    let [hour, minute, second] = numbers(time, ':')?;
+    // A day that there is comes back the same.
+    let days = days_from_civil(year, month, day);
+    let is_there = civil(days) == (year, month, day);
+    let in_day = hour < 24 && minute < 60 && second < 60;
+    (is_there && in_day).then_some(((days * 24 + hour) * 60 + minute) * 60_000 + second * 1000)
+}
+
+/// Three numbers without signs.
+fn numbers(text: &str, separator: char) -> Option<[i64; 3]> {
+    let is_number = |part: &&str| part.len() <= 4 && part.bytes().all(|byte| byte.is_ascii_digit());
+    let parts: Vec<&str> = text.split(separator).filter(is_number).collect();
+    let numbers: Vec<i64> = parts.iter().filter_map(|part| part.parse().ok()).collect();
+    numbers.try_into().ok()
+}
+
+/// Days since 1970 of a date, the way back from [`civil`].
+const fn days_from_civil(year: i64, month: i64, day: i64) -> i64 {
+    let year = year - (month <= 2) as i64;
+    let era = year.div_euclid(400);
+    let from_march = (month + 9) % 12;
+    let of_year = (153 * from_march + 2) / 5 + day - 1;
+    let year_of_era = year.rem_euclid(400);
+    era * 146_097 + year_of_era * 365 + year_of_era / 4 - year_of_era / 100 + of_year - 719_468
+}
+
 /// `480 ms`, `12.3 s`, `4 min 05 s`, `2 h 03 min`.
 pub(super) fn span(ms: u64) -> String {
     let seconds = ms / 1000;
@@ -53,7 +84,7 @@ const fn civil(day: i64) -> (i64, i64, i64) {
 
 #[cfg(test)]
 mod tests {
-    use super::{span, utc};
+    use super::{from_utc, span, utc};
 
     #[test]
     fn known_moments_are_written_right() {
@@ -61,6 +92,31 @@ mod tests {
         assert_eq!(utc(951_782_400_000), "2000-02-29 00:00:00");
         assert_eq!(utc(1_795_234_203_999), "2026-11-21 04:10:03");
         assert_eq!(utc(-1000), "1969-12-31 23:59:59");
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_and_what_is_no_time_is_not() {
+        for at in [
+            0,
+            951_782_400_000,
+            1_795_234_203_000,
+            -1000,
+            4_102_444_799_000,
+        ] {
+            assert_eq!(from_utc(&utc(at)), Some(at));
+        }
+        assert_eq!(from_utc("2000-02-29"), Some(951_782_400_000));
+        assert_eq!(from_utc("2026-11-21T04:10:03Z"), Some(1_795_234_203_000));
+        for text in [
+            "2026-02-29",
+            "2026-13-01",
+            "21.11.2026",
+            "2026-11-21 24:00:00",
+            "1-2",
+            "",
+        ] {
+            assert_eq!(from_utc(text), None, "{text}");
+        }
     }
 
     #[test]

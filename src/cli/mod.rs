@@ -20,6 +20,7 @@ mod panics;
 mod progress;
 mod report;
 mod retry;
+mod review;
 mod run;
 mod select;
 mod sheet;
@@ -154,6 +155,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Check(args) => check::check(args, context).await,
         Command::Backup(args) => backup::backup(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
+        Command::Review(args) => review::review(args, context).await,
         Command::Report(args) => report::report(args, context).await,
         Command::Export(args) => export::export(args, context).await,
         Command::Sheet(args) => sheet::sheet(args, context).await,

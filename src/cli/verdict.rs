@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::clock::utc;
+use super::clock::{span, utc};
 use super::context::{Context, now};
 use super::exit::ExitCode;
 use super::manifest_file::is_jsonl;
@@ -14,7 +14,7 @@ use super::table::{Align, columns, count};
 use super::talk::{self, Palette, Tone};
 use super::verdict_file::Row;
 use super::{select, verdict_file, verdict_lines};
-use crate::catalog::{Catalog, NewVerdict, VerdictEvent};
+use crate::catalog::{Catalog, Look, NewVerdict, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 
 /// What to do with verdicts.
@@ -22,7 +22,7 @@ use crate::domain::{Reason, ThresholdMetric, Verdict};
 pub(super) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(SetArgs),
-    /// Record the verdicts of a CSV file (pair, verdict, reader, and if wanted metric, reason, note), or of the
+    /// Record the verdicts of a CSV file (pair, verdict, reader, and if wanted metric, reason, note, at), or of the
     /// verdicts.jsonl of an export or a backup
     Import(ImportArgs),
     /// Print the log, oldest first
@@ -50,6 +50,9 @@ pub(super) struct SetArgs {
     /// In your own words
     #[arg(long, value_name = "TEXT")]
     pub(super) note: Option<String>,
+    /// How far the relief still had to be turned to lie on the print, degrees clockwise
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle)]
+    pub(super) angle: Option<f64>,
 }
 
 /// Arguments of `verdict import`.
@@ -75,12 +78,20 @@ pub(super) struct UndoArgs {
 }
 
 /// A reader's name: not empty, on one line.
-fn reader_name(text: &str) -> Result<String, String> {
+pub(super) fn reader_name(text: &str) -> Result<String, String> {
     let name = text.trim();
     if name.is_empty() || name.chars().any(char::is_control) {
         return Err("a reader needs a name on one line".to_owned());
     }
     Ok(name.to_owned())
+}
+
+/// An angle of at most half a turn.
+fn angle(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(angle) if angle.abs() <= 180.0 => Ok(angle),
+        Ok(_) | Err(_) => Err("an angle is a number from -180 to 180".to_owned()),
+    }
 }
 
 pub(super) async fn verdict(
@@ -104,6 +115,11 @@ async fn set(args: SetArgs, context: &Context) -> anyhow::Result<ExitCode> {
         reader: args.reader,
         reason: args.reason,
         note: args.note,
+        look: Look {
+            angle_read_deg: args.angle,
+            ..Look::default()
+        },
+        at: None,
     };
     let said = format!("{} of {}: {}", new.pair, on(new.metric), new.verdict);
     catalog.verdict_set(vec![new], now()).await?;
@@ -131,17 +147,23 @@ async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode>
     verdict_file::refuse_unknown(&rows, &unknown).map_err(|error| error.in_file(&args.file))?;
     let all = rows.len() as u64;
     let rows = on_current_results(&catalog, rows).await?;
-    let number = rows.len() as u64;
+    let kept = rows.len() as u64;
     let verdicts = rows.into_iter().map(|row| row.verdict).collect();
-    catalog.verdict_set(verdicts, now()).await?;
+    let number = catalog.verdict_set(verdicts, now()).await?;
     catalog.close().await;
     if context.global.json {
-        talk::print_json(&json!({"schema": 1, "recorded": number, "left_out": all - number}))?;
+        talk::print_json(
+            &json!({"schema": 1, "recorded": number, "left_out": all - kept, "known": kept - number}),
+        )?;
     }
-    if all > number {
-        let left_out = count(all - number, "verdict");
+    if all > kept {
+        let left_out = count(all - kept, "verdict");
         let why = "on a result that the pair does not have here";
         context.talk.warn(&format!("{left_out} left out: {why}"));
+    }
+    if kept > number {
+        let known = count(kept - number, "verdict");
+        context.talk.say(&format!("{known} there already"));
     }
     context
         .talk
@@ -210,7 +232,7 @@ async fn undo(args: UndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
 /// The log as lines, one an event.
 pub(super) fn log_text(events: &[VerdictEvent], palette: Palette) -> String {
     let rows: Vec<Vec<String>> = events.iter().map(|event| log_row(event, palette)).collect();
-    columns(&rows, &[Align::Left; 8])
+    columns(&rows, &[Align::Left; 9])
 }
 
 fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
@@ -233,7 +255,16 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
         event
             .reason
             .map_or_else(String::new, |reason| reason.to_string()),
+        looked(&event.look),
         event.note.clone().unwrap_or_default(),
         standing,
     ]
+}
+
+/// How long it was looked at, and by how much it was found turned.
+fn looked(look: &Look) -> String {
+    let shown = look.shown_ms.map(span);
+    let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
+    let parts: Vec<String> = shown.into_iter().chain(angle).collect();
+    parts.join(" ")
 }

@@ -5,16 +5,19 @@ use std::str::FromStr;
 
 use csv::StringRecord;
 
-use crate::catalog::NewVerdict;
+use super::clock::from_utc;
+use crate::catalog::{Look, NewVerdict};
 use crate::config::hint;
-use crate::domain::{ContentHash, PairName, plain};
+use crate::domain::{ContentHash, PairName, UnixMillis, plain};
 use crate::manifest::{LineCounter, as_utf8, delimiter};
 
-const COLUMNS: [&str; 6] = ["pair", "verdict", "reader", "metric", "reason", "note"];
+const COLUMNS: [&str; 7] = [
+    "pair", "verdict", "reader", "metric", "reason", "note", "at",
+];
 const NEEDED: usize = 3;
 
 /// One verdict and the line it stands on.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Row {
     pub(super) line: u64,
     pub(super) verdict: NewVerdict,
@@ -84,7 +87,7 @@ pub(super) fn refuse_unknown(rows: &[Row], unknown: &[PairName]) -> Result<(), V
 }
 
 /// Where each of [`COLUMNS`] stands in the file.
-fn places(headers: &StringRecord) -> Result<[Option<usize>; 6], VerdictFileError> {
+fn places(headers: &StringRecord) -> Result<[Option<usize>; 7], VerdictFileError> {
     if let Some(unknown) = headers.iter().find(|name| !COLUMNS.contains(name)) {
         let reason = format!("there is no column {unknown}{}", hint(unknown, COLUMNS));
         return Err(VerdictFileError::new(1, &reason));
@@ -104,7 +107,7 @@ fn places(headers: &StringRecord) -> Result<[Option<usize>; 6], VerdictFileError
 fn row(
     record: &StringRecord,
     line: u64,
-    places: &[Option<usize>; 6],
+    places: &[Option<usize>; 7],
 ) -> Result<Row, VerdictFileError> {
     let cell = |column: usize| {
         places[column]
@@ -122,11 +125,21 @@ fn row(
         metric: cell(3).map(|text| word(text, line)).transpose()?,
         reason: cell(4).map(|text| word(text, line)).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
+        look: Look::default(),
+        at: cell(6).map(|text| moment(text, line)).transpose()?,
     };
     Ok(Row {
         line,
         verdict,
         judged: None,
+    })
+}
+
+fn moment(text: &str, line: u64) -> Result<UnixMillis, VerdictFileError> {
+    from_utc(text).ok_or_else(|| {
+        let reason =
+            format!("at is {text:?}, not a time such as 2026-11-21 or 2026-11-21 04:10:03");
+        VerdictFileError::new(line, &reason)
     })
 }
 
@@ -172,6 +185,19 @@ mod tests {
         assert_eq!(rows[1].verdict.reason, Some(Reason::StrokesLost));
         assert_eq!(rows[1].verdict.note.as_deref(), Some("thin, broken"));
         assert_eq!(parse(b"pair,verdict,reader\n").expect("valid"), []);
+    }
+
+    #[test]
+    fn a_time_is_kept_and_what_is_none_is_refused() {
+        let rows = parse(b"pair,verdict,reader,at\n1,pass,lan,2026-11-21 04:10:03\n1,pass,lan,\n");
+        let rows = rows.expect("valid");
+        assert_eq!(rows[0].verdict.at, Some(1_795_234_203_000));
+        assert_eq!(rows[1].verdict.at, None);
+        let refused = error("pair,verdict,reader,at\n1,pass,lan,yesterday\n");
+        assert!(
+            refused.starts_with("line 2: at is \"yesterday\""),
+            "{refused}"
+        );
     }
 
     #[test]

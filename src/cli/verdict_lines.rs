@@ -3,8 +3,8 @@
 use serde::Deserialize;
 
 use super::verdict_file::{Row, VerdictFileError};
-use crate::catalog::NewVerdict;
-use crate::domain::{ContentHash, PairName, Reason, ThresholdMetric, UnixMillis, Verdict};
+use crate::catalog::{Look, NewVerdict};
+use crate::domain::{ContentHash, PairName, Queue, Reason, ThresholdMetric, UnixMillis, Verdict};
 use crate::manifest::as_utf8;
 
 /// A line; what else it has, such as numbers of the other log, means nothing here.
@@ -17,6 +17,12 @@ struct Line {
     result_hash: Option<ContentHash>,
     reason: Option<Reason>,
     note: Option<String>,
+    event: Option<String>,
+    seen: Option<ContentHash>,
+    shown_ms: Option<u64>,
+    angle_read_deg: Option<f64>,
+    queue: Option<Queue>,
+    at: Option<UnixMillis>,
     undone_at: Option<UnixMillis>,
 }
 
@@ -47,6 +53,14 @@ fn row(line: u64, parsed: Line) -> Row {
         reader: parsed.reader,
         reason: parsed.reason,
         note: parsed.note,
+        look: Look {
+            event: parsed.event,
+            seen: parsed.seen,
+            shown_ms: parsed.shown_ms,
+            angle_read_deg: parsed.angle_read_deg,
+            queue: parsed.queue,
+        },
+        at: parsed.at,
     };
     Row {
         line,

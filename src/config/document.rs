@@ -1,5 +1,7 @@
 //! The settings as plain values for the rooms that use them, and the sections they are written in.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 use toml::Value;
 
@@ -17,6 +19,8 @@ pub struct Config {
     pub run: RunSettings,
     /// The method.
     pub stages: Settings,
+    /// The review page.
+    pub review: ReviewSettings,
 }
 
 /// What an input file may ask of the machine before it is refused.
@@ -41,6 +45,14 @@ pub struct RunSettings {
     pub stage_limit_s: u64,
 }
 
+/// The review page.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ReviewSettings {
+    /// Keys by what they do, each named by its place on the keyboard.
+    pub keys: BTreeMap<String, String>,
+}
+
 /// The sections of a settings file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -51,6 +63,7 @@ struct Document {
     depth: depth::Params,
     normalize: normalize::Params,
     register: register::Params,
+    review: ReviewSettings,
 }
 
 impl From<Document> for Config {
@@ -64,6 +77,7 @@ impl From<Document> for Config {
                 normalize: document.normalize,
                 register: document.register,
             },
+            review: document.review,
         }
     }
 }

@@ -11,7 +11,7 @@ mod ranges;
 mod sources;
 mod tree;
 
-pub use document::{Config, Limits, RunSettings};
+pub use document::{Config, Limits, ReviewSettings, RunSettings};
 pub use error::ConfigError;
 pub use nearest::{hint, nearest};
 pub use origin::Origin;

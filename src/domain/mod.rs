@@ -1,6 +1,7 @@
 //! Nouns of the project: small values without files, SQL, async or image buffers.
 
 mod artifact;
+mod control;
 mod evidence;
 mod failure;
 mod file_kind;
@@ -10,6 +11,7 @@ mod job;
 mod metric;
 mod outcome;
 mod plain;
+mod queue;
 pub mod role;
 mod stage;
 mod transform;
@@ -17,6 +19,7 @@ mod unit;
 mod verdict;
 
 pub use artifact::{ArtifactRef, ArtifactSet};
+pub use control::Control;
 pub use evidence::Evidence;
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
@@ -29,6 +32,7 @@ pub use outcome::{
     RegisterOutcome, Scores, SideEvidence, ThresholdChoice,
 };
 pub use plain::plain;
+pub use queue::Queue;
 pub use stage::Stage;
 pub use transform::{Affine2, PrintFromMesh, Rigid3};
 pub use unit::LengthUnit;

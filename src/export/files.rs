@@ -61,7 +61,7 @@ impl Files {
 
 /// Why the files of a pair cannot be written.
 #[derive(Debug, thiserror::Error)]
-pub(super) enum FilesError {
+pub enum FilesError {
     /// A result or artifact cannot be read; the pair is told and the others go on.
     #[error(transparent)]
     Aligned(#[from] AlignedError),
@@ -123,14 +123,19 @@ pub(super) struct Drawn {
 }
 
 /// A print as given and as decoded.
-pub(super) struct Print {
+#[derive(Debug)]
+pub struct Print {
     bytes: Vec<u8>,
-    pub(super) picture: Picture,
+    /// As decoded.
+    pub picture: Picture,
 }
 
 impl Print {
     /// Reads a pair's print and makes sure it is the one that was aligned.
-    pub(super) fn read(
+    ///
+    /// # Errors
+    /// When it cannot be read or decoded, or is another one.
+    pub fn read(
         project: &Project,
         pair: &PairResults,
         limits: &raster::Limits,

@@ -12,6 +12,12 @@ pub(super) const LINES: &str = "pairs.jsonl";
 
 /// The verdict log, as it was when the export was made.
 pub(super) const VERDICTS: &str = "verdicts.jsonl";
+/// The log of answers to planted faults and repeats.
+pub(super) const CONTROLS: &str = "controls.jsonl";
+/// The log of alignments by hand.
+pub(super) const ALIGNMENTS: &str = "alignments.jsonl";
+/// All that lies in an export.
+const KNOWN: [&str; 5] = [LINES, PAIRS, VERDICTS, CONTROLS, ALIGNMENTS];
 
 /// A folder being filled beside the one it will become. Dropped unfinished, it is removed.
 #[derive(Debug)]
@@ -174,7 +180,7 @@ fn refuse_foreign(target: &Path) -> Result<(), FolderError> {
     };
     for entry in entries {
         let name = entry.map_err(at(target))?.file_name();
-        if name != LINES && name != PAIRS && name != VERDICTS {
+        if !KNOWN.iter().any(|known| name == *known) {
             return Err(not_an_export(target, &name));
         }
     }

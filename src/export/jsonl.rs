@@ -7,11 +7,13 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
+use serde::Serialize;
 
+use super::by_hand;
 use super::files::{Drawn, FilesError, PAIRS, PairFiles};
-use super::folder::{Folder, FolderError, LINES, VERDICTS};
+use super::folder::{ALIGNMENTS, CONTROLS, Folder, FolderError, LINES, VERDICTS};
 use super::line::{Line, LineStatus, Outcomes};
-use crate::catalog::{Catalog, CatalogError, PairResults, VerdictEvent};
+use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Failure, FailureClass, MetricOutcome, PairName, ThresholdMetric};
 use crate::raster;
 use crate::report::aligned::same_alignment;
@@ -82,6 +84,7 @@ pub async fn to_jsonl(
     let folder = Folder::begin(dir)?;
     let mut lines = Lines::create(folder.path())?;
     let mut summary = ExportSummary::default();
+    let by_hand = by_hand::newest(catalog).await?;
     let mut after = None;
     loop {
         let page = catalog.results_page(after.as_ref(), PAGE).await?;
@@ -89,13 +92,16 @@ pub async fn to_jsonl(
             break;
         };
         after = Some(last.facts.name.clone());
-        for pair in write_page(project, folder.path(), page, options).await? {
+        for mut pair in write_page(project, folder.path(), page, options).await? {
+            for line in &mut pair.lines {
+                line.by_hand = by_hand.get(&line.id).cloned();
+            }
             lines.write(&pair.lines)?;
             summary.count(pair);
         }
     }
     lines.finish()?;
-    write_verdicts(catalog, folder.path()).await?;
+    write_logs(catalog, folder.path()).await?;
     summary.kept_earlier = !summary.unreadable.is_empty() && folder.replaces();
     if !summary.kept_earlier {
         folder.finish()?;
@@ -103,19 +109,33 @@ pub async fn to_jsonl(
     Ok(summary)
 }
 
-/// The log of verdicts, a line each, oldest first, those taken back too.
-pub fn verdict_lines(log: &[VerdictEvent]) -> String {
+/// A log as JSON, a line each.
+pub fn json_lines<T: Serialize>(log: &[T]) -> String {
     let line = |event| {
         let text = serde_json::to_string(event);
-        text.expect("a verdict holds only numbers, names and text") + "\n"
+        text.expect("an event holds only numbers, names and text") + "\n"
     };
     log.iter().map(line).collect()
 }
 
-async fn write_verdicts(catalog: &Catalog, root: &Path) -> Result<(), ExportError> {
-    let lines = verdict_lines(&catalog.verdict_log(None).await?);
-    let path = root.join(VERDICTS);
-    std::fs::write(&path, lines).map_err(|source| ExportError::Write { path, source })
+/// What people said and did, oldest first, with what was taken back. Of the other two
+/// nothing is written where there is nothing.
+async fn write_logs(catalog: &Catalog, root: &Path) -> Result<(), ExportError> {
+    write_log(root, VERDICTS, &catalog.verdict_log(None).await?)?;
+    let controls = catalog.control_answers().await?;
+    if !controls.is_empty() {
+        write_log(root, CONTROLS, &controls)?;
+    }
+    let alignments = catalog.hand_alignments().await?;
+    if !alignments.is_empty() {
+        write_log(root, ALIGNMENTS, &alignments)?;
+    }
+    Ok(())
+}
+
+fn write_log<T: Serialize>(root: &Path, name: &str, log: &[T]) -> Result<(), ExportError> {
+    let path = root.join(name);
+    std::fs::write(&path, json_lines(log)).map_err(|source| ExportError::Write { path, source })
 }
 
 /// A pair's lines, and why its files are not there although it is done.

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::by_hand::ByHand;
 use super::files::Files;
 use crate::catalog::{MetricRecord, PairResults};
 use crate::domain::{
@@ -50,6 +51,8 @@ pub struct Line {
     pub hashes: Hashes,
     /// What readers together say of this result.
     pub verdict: Option<Verdict>,
+    /// The newest alignment by hand, where people made one.
+    pub by_hand: Option<ByHand>,
     /// Computing time of the pair's stages, where times were asked for.
     pub seconds: Option<f64>,
 }
@@ -148,6 +151,7 @@ impl Line {
                 ..hashes(pair)
             },
             verdict: None,
+            by_hand: None,
             seconds: None,
         }
     }
@@ -254,7 +258,7 @@ mod tests {
     use serde_json::{Value, json};
 
     /// The fields in the order the interface gives them.
-    const FIELDS: [&str; 29] = [
+    const FIELDS: [&str; 30] = [
         "id",
         "metric",
         "status",
@@ -283,6 +287,7 @@ mod tests {
         "result_hash",
         "config_hash",
         "verdict",
+        "by_hand",
         "seconds",
     ];
 

@@ -1,5 +1,6 @@
 //! Aligned pairs and pictures for other tools and for people.
 
+mod by_hand;
 mod files;
 mod folder;
 mod jsonl;
@@ -7,8 +8,9 @@ mod line;
 pub mod pictures;
 mod sheet;
 
-pub use files::Files;
+pub use by_hand::ByHand;
+pub use files::{Files, FilesError, Print};
 pub use folder::FolderError;
-pub use jsonl::{ExportError, ExportSummary, JsonlOptions, to_jsonl, verdict_lines};
+pub use jsonl::{ExportError, ExportSummary, JsonlOptions, json_lines, to_jsonl};
 pub use line::{Hashes, Line, LineStatus, Maps, Numbers};
 pub use sheet::{Sheet, SheetError, SheetOptions, SheetOrder, draw_sheet};

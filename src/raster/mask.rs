@@ -30,7 +30,28 @@ impl PixelBox {
     }
 }
 
+/// How far two masks of the same size cover each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Overlap {
+    /// Pixels set in both over pixels set in either, 0..=1; 0 where none is set.
+    pub iou: f64,
+    /// Twice the pixels set in both over the sum of both counts, 0..=1; 0 where none is set.
+    pub dice: f64,
+}
+
 impl Mask {
+    /// How far this mask and another of the same size cover each other.
+    pub fn overlap(&self, other: &Self) -> Overlap {
+        let pixels = self.data().iter().zip(other.data());
+        let both = pixels.filter(|(a, b)| **a && **b).count() as f64;
+        let sum = (self.count() + other.count()) as f64;
+        let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
+        Overlap {
+            iou: share(both, sum - both),
+            dice: share(2.0 * both, sum),
+        }
+    }
+
     /// Number of set pixels.
     pub fn count(&self) -> usize {
         self.data().iter().filter(|set| **set).count()
@@ -87,6 +108,20 @@ impl Mask {
 #[cfg(test)]
 mod tests {
     use super::{Mask, PixelBox};
+
+    #[test]
+    fn overlap_of_halves_and_of_nothing() {
+        let [left, middle] =
+            [0..4, 2..6].map(|columns| Mask::from_fn(8, 3, |x, _| columns.contains(&x)));
+        let found = left.overlap(&middle);
+        assert_eq!((found.iou, found.dice), (1.0 / 3.0, 0.5));
+        assert_eq!(left.overlap(&left).iou, 1.0);
+        let none = Mask::new(8, 3, false);
+        assert_eq!(
+            (none.overlap(&none).iou, none.overlap(&none).dice),
+            (0.0, 0.0)
+        );
+    }
 
     #[test]
     fn box_and_centroid_of_two_pixels() {

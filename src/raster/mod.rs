@@ -18,7 +18,7 @@ pub use encode::{
 };
 pub use grid::Grid;
 pub use limits::Limits;
-pub use mask::{Mask, PixelBox};
+pub use mask::{Mask, Overlap, PixelBox};
 pub use picture::Picture;
 pub use resample::resample;
 pub use warp::{warp_depth, warp_mask};

@@ -43,6 +43,7 @@ pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) ->
                 reader: format!("r{i}"),
                 verdict: *verdict,
                 reason: None,
+                queue: None,
             })
             .collect(),
         older_verdicts: 0,

@@ -98,6 +98,7 @@ fn directory_without_project_is_code_10_with_a_way_on() {
         &["check", "--repair"],
         &["backup", "b.sqlite"],
         &["verdict", "log"],
+        &["review", "--reader", "lan"],
         &["report"],
         &["export", "-o", "out"],
         &["sheet", "-o", "sheet.png"],

@@ -1,6 +1,7 @@
 //! Integration tests in one binary.
 
 mod backup;
+mod browser;
 mod check;
 mod cli;
 #[cfg(target_os = "linux")]
@@ -22,6 +23,7 @@ mod layers;
 mod limits;
 mod odd;
 mod one_pair;
+mod page;
 #[cfg(target_os = "linux")]
 mod power;
 mod processes;
@@ -29,6 +31,10 @@ mod queue;
 mod readers;
 mod report;
 mod resume;
+mod review_browser;
+mod review_guard;
+mod review_kill;
+mod review_page;
 mod seeds;
 mod semi_real;
 #[cfg(target_os = "linux")]

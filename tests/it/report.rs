@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mocban::catalog::{Catalog, ImportRow, NewVerdict};
+use mocban::catalog::{Catalog, ImportRow, Look, NewVerdict};
 use mocban::config::{self, Sources};
 use mocban::demo::{DemoOptions, Tier, write_dataset};
 use mocban::domain::{PairName, ThresholdMetric, Verdict};
@@ -343,6 +343,8 @@ async fn verdicts_make_acc(world: &World) {
         reader: "lan".to_owned(),
         reason: None,
         note: None,
+        look: Look::default(),
+        at: None,
     };
     let set = vec![
         verdict(&names[0], Verdict::Pass),

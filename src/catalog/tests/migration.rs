@@ -7,7 +7,7 @@ use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions as _, Connection as _, SqliteConnection};
 
 use super::{metric, name, row};
-use crate::catalog::{Catalog, NewVerdict, connect};
+use crate::catalog::{Catalog, Look, NewVerdict, connect};
 use crate::domain::{MetricOutcome, ThresholdMetric, Verdict};
 
 /// What version 1 of the schema could hold of metrics.
@@ -121,6 +121,8 @@ async fn a_migrated_catalog_goes_on_like_a_new_one() {
         reader: "ana".to_owned(),
         reason: None,
         note: None,
+        look: Look::default(),
+        at: None,
     };
     catalog.verdict_set(vec![verdict], 9).await.expect("stored");
     let log = catalog.verdict_log(None).await.expect("a log");

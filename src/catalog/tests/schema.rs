@@ -3,7 +3,7 @@
 use sqlx::Connection as _;
 
 use super::World;
-use crate::domain::{FailureClass, JobStatus, LengthUnit, Reason, ThresholdMetric, Verdict};
+use crate::domain::{FailureClass, JobStatus, LengthUnit, Queue, Reason, ThresholdMetric, Verdict};
 
 /// Every name that the schema's checks allow is one of ours, and the other way round.
 #[tokio::test]
@@ -27,6 +27,8 @@ async fn checks_of_the_schema_and_our_enums_agree() {
         VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', ?1, 1)";
     let metric = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, at)
         VALUES (1, 1, ?1, zeroblob(32), 'fail', 'me', 1)";
+    let queue = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, at, queue)
+        VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', 1, ?1)";
     let class = "INSERT INTO failure (pair, stage, class, message, at) VALUES (1, 0, ?1, '', 1)";
     let unit = "UPDATE pair SET unit = ?1";
     for (sql, names) in [
@@ -36,6 +38,7 @@ async fn checks_of_the_schema_and_our_enums_agree() {
             metric,
             ThresholdMetric::ALL.map(ThresholdMetric::name).to_vec(),
         ),
+        (queue, Queue::ALL.map(Queue::name).to_vec()),
         (class, FailureClass::ALL.map(FailureClass::name).to_vec()),
         (unit, LengthUnit::ALL.map(LengthUnit::name).to_vec()),
     ] {

@@ -1,7 +1,7 @@
 //! Verdicts: bound to results, appended, taken back.
 
 use super::{World, name};
-use crate::catalog::{Catalog, CatalogError, Kept, NewVerdict};
+use crate::catalog::{Catalog, CatalogError, Kept, Look, NewVerdict};
 use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 
 /// Results of a pair that is done.
@@ -15,6 +15,8 @@ fn verdict(reader: &str, verdict: Verdict) -> NewVerdict {
         reader: reader.to_owned(),
         reason: (verdict == Verdict::Fail).then_some(Reason::Angle),
         note: None,
+        look: Look::default(),
+        at: None,
     }
 }
 

@@ -76,18 +76,28 @@ impl View {
         depth: &DepthMap,
         outcome: &MetricOutcome,
     ) -> Rgb {
-        let tops = warp_mask(tops, &self.from_print, self.width, self.height);
+        let tops = self.mask(tops, &Affine2::IDENTITY);
         let mut picture = self.print(print);
         self.draw_edges(&mut picture, &tops, TRUE_EDGE);
         self.draw_edges(&mut picture, &self.laid_on(depth, outcome), EDGE);
         picture
     }
 
+    /// A mask in the view, given what takes its pixels to print pixels.
+    pub fn mask(&self, mask: &Mask, print_from_mask: &Affine2) -> Mask {
+        let view_from_mask = self.from_print.after(print_from_mask);
+        warp_mask(mask, &view_from_mask, self.width, self.height)
+    }
+
+    /// Print pixels to pixels of the view.
+    pub const fn from_print(&self) -> &Affine2 {
+        &self.from_print
+    }
+
     /// A metric's depth mask in the view.
     fn laid_on(&self, depth: &DepthMap, outcome: &MetricOutcome) -> Mask {
-        let view_from_depth = self.from_print.after(&outcome.print_from_depth);
-        let mask = depth.strokes(outcome.threshold_level);
-        warp_mask(&mask, &view_from_depth, self.width, self.height)
+        let strokes = depth.strokes(outcome.threshold_level);
+        self.mask(&strokes, &outcome.print_from_depth)
     }
 
     fn draw_edges(&self, onto: &mut Rgb, mask: &Mask, colour: [u8; 3]) {

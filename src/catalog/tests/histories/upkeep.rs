@@ -5,7 +5,7 @@ use rand::RngExt as _;
 use super::super::model::LEASE;
 use super::super::{name, recipes, row};
 use super::{Game, LONGEST, MOST_PAIRS};
-use crate::catalog::{Again, Dead, NewVerdict, RetrySelection};
+use crate::catalog::{Again, Dead, Look, NewVerdict, RetrySelection};
 use crate::domain::{JobState, JobStatus, Stage, ThresholdMetric, Verdict};
 
 impl Game {
@@ -135,6 +135,8 @@ impl Game {
             reader: "ana".to_owned(),
             reason: None,
             note: None,
+            look: Look::default(),
+            at: None,
         };
         let stored = self.world.catalog.verdict_set(vec![verdict], self.wall);
         stored.await.expect("stored");

@@ -1,0 +1,266 @@
+// The page put together: what each key and button does.
+
+import { leastViewMs, language, queue, say } from "./boot.js";
+import { Correction } from "./correction.js";
+import { Deck } from "./deck.js";
+import { label, listen } from "./keys.js";
+import { Outbox } from "./outbox.js";
+import { pictures } from "./pictures.js";
+import * as screen from "./screen.js";
+import { Stage } from "./stage.js";
+
+const AHEAD = 5;
+const HISTORY = 24;
+const MODES = ["two_up", "overlay", "edges", "onion", "checker", "difference", "reveal"];
+const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scale", "mirrored", "wrong_pair"];
+
+const deck = new Deck();
+const stage = new Stage(document.getElementById("canvas"));
+const reader = document.querySelector("header b").textContent;
+const outbox = new Outbox(reader, screen.saved, refused);
+const times = [];
+let shownAt = null;
+let note = null;
+let correction = null;
+
+/** Shows the current card; it is there at once when it was decoded ahead. */
+async function show(pressedAt) {
+  const item = deck.current;
+  if (!outbox.trouble) screen.calm();
+  leaveCorrection();
+  note = item?.answer?.note ?? null;
+  shownAt = null;
+  screen.head(item, deck);
+  screen.history(deck.behind(HISTORY), item, go);
+  if (!item) {
+    stage.clear();
+    screen.sides(null);
+    refresh();
+    screen.tell(document.getElementById("pair").textContent);
+    return;
+  }
+  const found = pictures(item.id);
+  if (!found.ready) {
+    stage.clear();
+    screen.sides(null);
+    try {
+      await found.loading;
+    } catch (error) {
+      if (deck.current === item) screen.alert(say("no_picture", { why: error.message }));
+      return;
+    }
+    if (deck.current !== item) return;
+  }
+  stage.show(found.ready);
+  screen.sides(found.ready);
+  refresh();
+  requestAnimationFrame(() => {
+    shownAt = performance.now();
+    if (pressedAt) document.body.dataset.paintMs = String(Math.round(shownAt - pressedAt));
+    document.body.dataset.shown = item.id;
+    screen.measure(pressedAt ? `${document.body.dataset.paintMs} ms` : "");
+    // After the paint: decoding must not hold it up.
+    setTimeout(() => lookAhead(item), 0);
+  });
+}
+
+/** Decodes what comes next; the page tells when all of it is there. */
+async function lookAhead(item) {
+  await Promise.allSettled(deck.ahead(AHEAD).map(({ id }) => pictures(id).loading));
+  document.body.dataset.ahead = item.id;
+}
+
+/** Marks what is on, in words and buttons. */
+function refresh() {
+  const on = new Set([stage.mode]);
+  for (const [name, isOn] of Object.entries(stage.overlays)) if (isOn) on.add(name);
+  if (stage.rocking) on.add("rock");
+  if (stage.lens.zoom > 1) on.add("zoom");
+  if (correction) on.add("correct");
+  const answer = deck.current?.answer;
+  if (answer) on.add(answer.verdict).add(answer.reason);
+  if (note) on.add("note");
+  screen.pressed(on);
+  const turned = stage.turn ? say("turned_by", { deg: stage.turn.toFixed(2) }) : "";
+  screen.legend(correction ? [] : stage.legend(), correction ? `${correction.words()} — ${say("correct_hint")}` : turned);
+}
+
+function give(verdict, reason, pressedAt) {
+  const item = deck.current;
+  if (!item) return;
+  if (outbox.isFull) return screen.alert(say("blocked"));
+  if (shownAt === null || pressedAt - shownAt < leastViewMs) return screen.tell(say("too_soon"));
+  const body = { ...answerTo(item, verdict, reason), shown_ms: Math.round(pressedAt - shownAt) };
+  times.push(body.shown_ms);
+  screen.pace(times.slice(-200));
+  send(item, body);
+  deck.advance();
+  show(pressedAt);
+}
+
+/** An answer as it stands on the page now. */
+function answerTo(item, verdict, reason) {
+  const turned = stage.turn === 0 ? null : Number(stage.turn.toFixed(2));
+  return { event: crypto.randomUUID(), item: item.id, verdict, reason, note, angle_read_deg: turned };
+}
+
+function send(item, body) {
+  deck.answer(item, body);
+  screen.tell(`${item.pair}: ${screen.words(body)}`);
+  outbox.put("/api/answer", body).then(() => {
+    if (queue === "adjudicate") about(item);
+  });
+}
+
+function undo(pressedAt) {
+  const act = deck.last();
+  if (!act) return screen.tell(say("nothing_to_undo"));
+  if (outbox.isFull) return screen.alert(say("blocked"));
+  const item = deck.forget(act.event) ?? deck.items.find(({ id }) => id === act.id);
+  outbox.put("/api/undo", { event: act.event });
+  if (item) deck.goTo(item);
+  screen.tell(`${say("undone")}: ${item?.pair ?? ""}`);
+  show(pressedAt);
+}
+
+/** The server will never take it: the card is open again, and why is said. */
+function refused(letter, why) {
+  if (letter.path === "/api/answer") deck.forget(letter.body.event);
+  show();
+  screen.alert(say("was_refused", { why }));
+}
+
+function go(item) {
+  if (!deck.goTo(item)) return false;
+  show(performance.now());
+  return true;
+}
+
+/** What is known of a card, once it is answered. */
+async function about(item = deck.current) {
+  if (!item?.answer) return screen.tell(say("answer_first"));
+  await outbox.sending;
+  const answer = await fetch(`/api/about/${item.id}`);
+  if (!answer.ok) return screen.tell(say("answer_first"));
+  const { metrics, iou, dice, others } = await answer.json();
+  const number = (value) => value.toLocaleString(language, { maximumFractionDigits: 3 });
+  const said = others.map((other) => `${other.reader}: ${screen.words(other)}${other.note ? ` (${other.note})` : ""}`);
+  const parts = [
+    item.pair,
+    `${say("metrics")} ${metrics.join(", ")}`,
+    `${say("iou")} ${number(iou)}`,
+    `${say("dice")} ${number(dice)}`,
+    ...(said.length > 0 ? [`${say("others")}: ${said.join("; ")}`] : []),
+  ];
+  screen.tell(parts.join(" · "));
+}
+
+async function correct() {
+  const item = deck.current;
+  const layers = item && pictures(item.id).ready;
+  if (correction || !layers) return leaveCorrection();
+  stage.lens.reset();
+  const begun = await Correction.begin(item, layers, stage, refresh).catch((error) => {
+    screen.alert(error.message);
+    return null;
+  });
+  if (!begun) return;
+  if (deck.current !== item) return begun.leave();
+  correction = begun;
+  stage.guest = begun;
+  stage.draw();
+  refresh();
+}
+
+function leaveCorrection() {
+  if (!correction) return;
+  correction.leave();
+  correction = null;
+  stage.guest = null;
+  stage.draw();
+  refresh();
+}
+
+async function saveCorrection() {
+  if (outbox.isFull) return screen.alert(say("blocked"));
+  const body = correction.body(crypto.randomUUID(), note);
+  const stored = await outbox.put("/api/align", body);
+  screen.tell(`${say("corrected")}: ${say("iou")} ${stored.iou.toFixed(3)}, ${say("dice")} ${stored.dice.toFixed(3)}`);
+  leaveCorrection();
+}
+
+async function takeNote() {
+  const item = deck.current;
+  if (!item) return;
+  if (outbox.isFull) return screen.alert(say("blocked"));
+  const text = await screen.askNote(note);
+  if (text === null || deck.current !== item || (text || null) === note) return refresh();
+  note = text || null;
+  // On a card that is answered the note is an answer again, with the same verdict.
+  if (item.answer) send(item, { ...answerTo(item, item.answer.verdict, item.answer.reason), shown_ms: null });
+  refresh();
+}
+
+/** What an action does; `at` is when the key or button was pressed. */
+const deeds = {
+  pass: (at) => give("pass", null, at),
+  fail: (at) => give("fail", null, at),
+  unsure: (at) => give("unsure", null, at),
+  undo,
+  note: takeNote,
+  flicker: () => stage.hold(true),
+  rock: () => stage.rock(),
+  protractor: () => stage.toggle("protractor"),
+  strokes: () => stage.toggle("strokes"),
+  zoom: () => stage.layers && stage.zoom(),
+  turn_left: (at, event) => stage.turnBy(event?.shiftKey ? -0.25 : -1),
+  turn_right: (at, event) => stage.turnBy(event?.shiftKey ? 0.25 : 1),
+  less: () => stage.adjust(-1),
+  more: () => stage.adjust(1),
+  reset: () => stage.turnBy(-stage.turn),
+  next: (at) => deck.step(1) && show(at),
+  previous: (at) => deck.step(-1) && show(at),
+  jump: () => screen.askPair([...new Set(deck.items.map(({ pair }) => pair))], (name) => {
+    const item = deck.ofPair(name);
+    return Boolean(item) && go(item);
+  }),
+  info: () => about(),
+  help: () => screen.help(),
+  correct,
+  save: () => correction && saveCorrection(),
+  leave: () => leaveCorrection(),
+  other_language: () => document.getElementById("language").click(),
+};
+for (const reason of REASONS) deeds[reason] = (at) => give("fail", reason, at);
+for (const mode of MODES) deeds[mode] = () => stage.setMode(mode);
+
+/** Holding a key down moves things, but judges nothing twice. */
+const MAY_REPEAT = new Set(["turn_left", "turn_right", "less", "more", "next", "previous", "larger", "smaller"]);
+
+function act(action, event) {
+  const isArrow = event?.code?.startsWith("Arrow");
+  if (event?.repeat && !MAY_REPEAT.has(action) && !isArrow) return;
+  if (correction && event && correction.key(action, event)) return;
+  deeds[action]?.(performance.now(), event);
+  refresh();
+}
+
+addEventListener("click", (event) => {
+  const button = event.target.closest("[data-do]");
+  if (!button) return;
+  act(button.dataset.do);
+  // After a click the keys are the page's again; who goes by Tab keeps the place.
+  if (event.detail > 0) button.blur();
+});
+listen(act, (action) => action === "flicker" && !stage.rocking && stage.hold(false));
+label();
+
+try {
+  outbox.start();
+  await deck.load(outbox.letters);
+  screen.saved(outbox.waiting, null);
+  await show();
+  document.body.dataset.ready = "true";
+} catch (error) {
+  screen.alert(error.message);
+}

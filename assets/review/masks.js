@@ -1,0 +1,177 @@
+// Pictures made from masks: edges, the overlay of two masks, what one has and the other lacks.
+
+export const INK = [0, 82, 155];
+export const RELIEF = [196, 78, 0];
+const BOTH = [38, 38, 38];
+const PAPER = [247, 245, 240];
+/** A stroke counts as missing only past this share of the picture's side: edges never agree to the pixel. */
+const SLACK = 1 / 90;
+/** Pieces smaller than this share of the picture are no strokes. */
+const LEAST_PIECE = 1 / 4000;
+
+export function sheet(width, height) {
+  const canvas = new OffscreenCanvas(width, height);
+  return { canvas, brush: canvas.getContext("2d", { willReadFrequently: true }) };
+}
+
+/** The pixels of a bitmap. */
+export function pixels(bitmap) {
+  const { brush } = sheet(bitmap.width, bitmap.height);
+  brush.drawImage(bitmap, 0, 0);
+  return brush.getImageData(0, 0, bitmap.width, bitmap.height);
+}
+
+/** Which pixels of a mask are set. */
+export function bits(bitmap) {
+  const { data } = pixels(bitmap);
+  const set = new Uint8Array(data.length / 4);
+  for (let i = 0; i < set.length; i++) set[i] = data[4 * i] > 127 ? 1 : 0;
+  return set;
+}
+
+/** A canvas painted pixel by pixel; `colour(i)` gives [r, g, b] or [r, g, b, a], or nothing. */
+export function painted(width, height, colour) {
+  const { canvas, brush } = sheet(width, height);
+  const image = brush.createImageData(width, height);
+  for (let i = 0; i < width * height; i++) {
+    const found = colour(i);
+    if (found) image.data.set([found[0], found[1], found[2], found[3] ?? 255], 4 * i);
+  }
+  brush.putImageData(image, 0, 0);
+  return canvas;
+}
+
+/** All set pixels grown by a radius, as a square brush does, in two passes. */
+function grown(set, width, height, radius) {
+  const across = spread(set, width, height, radius, 1, width);
+  return spread(across, height, width, radius, width, 1);
+}
+
+function spread(set, length, lines, radius, step, line) {
+  const out = new Uint8Array(set.length);
+  for (let l = 0; l < lines; l++) {
+    let left = 0;
+    for (let i = -radius; i < length; i++) {
+      const ahead = i + radius;
+      if (ahead < length && set[l * line + ahead * step]) left = 2 * radius + 1;
+      if (i >= 0 && left > 0) out[l * line + i * step] = 1;
+      if (left > 0) left--;
+    }
+  }
+  return out;
+}
+
+/** The border of a mask: set pixels that have an unset one within reach. */
+function border(set, width, height, reach) {
+  const unset = set.map((value) => 1 - value);
+  const near = grown(unset, width, height, reach);
+  return set.map((value, i) => value & near[i]);
+}
+
+/** The edges of a mask in a colour, with a light rim so that they show on ink and on paper. */
+export function edges(set, width, height, colour, rimmed = true) {
+  const reach = Math.max(1, Math.round(Math.max(width, height) / 400));
+  const line = border(set, width, height, reach);
+  const rim = rimmed ? grown(line, width, height, 1) : line;
+  return painted(width, height, (i) => (line[i] ? colour : rim[i] ? [255, 255, 255, 190] : null));
+}
+
+/** Pieces of a mask that are joined, the largest first; the smallest are left out. */
+function pieces(set, width, height) {
+  const seen = new Uint8Array(set.length);
+  const least = set.length * LEAST_PIECE;
+  const found = [];
+  for (let start = 0; start < set.length; start++) {
+    if (!set[start] || seen[start]) continue;
+    const piece = [start];
+    seen[start] = 1;
+    for (let k = 0; k < piece.length; k++) {
+      const at = piece[k];
+      const x = at % width;
+      const near = [x > 0 ? at - 1 : -1, x < width - 1 ? at + 1 : -1, at - width, at + width];
+      for (const next of near) {
+        if (next >= 0 && next < set.length && set[next] && !seen[next]) {
+          seen[next] = 1;
+          piece.push(next);
+        }
+      }
+    }
+    if (piece.length >= least) found.push(piece);
+  }
+  return found.sort((a, b) => b.length - a.length);
+}
+
+/** Centre and radius of a piece. */
+function ring(piece, width) {
+  const xs = piece.map((at) => at % width);
+  const ys = piece.map((at) => Math.floor(at / width));
+  const span = (values) => values.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]);
+  const [[x0, x1], [y0, y1]] = [span(xs), span(ys)];
+  return { x: (x0 + x1) / 2, y: (y0 + y1) / 2, radius: Math.hypot(x1 - x0, y1 - y0) / 2 + 8 };
+}
+
+/** What ink has no relief and what relief has no ink, hatched, the largest lost piece with a ring. */
+export function strokeMap(layers) {
+  const { width, height, ink, strokes } = layers;
+  const slack = Math.max(2, Math.round(Math.max(width, height) * SLACK));
+  const lacking = (set, other) => {
+    const covered = grown(other, width, height, slack);
+    return pieces(set.map((value, i) => value & (1 - covered[i])), width, height);
+  };
+  const [lost, extra] = [lacking(ink, strokes), lacking(strokes, ink)];
+  const kind = new Uint8Array(width * height);
+  for (const piece of lost) for (const at of piece) kind[at] = 1;
+  for (const piece of extra) for (const at of piece) kind[at] = 2;
+  const map = painted(width, height, (i) => {
+    const [x, y] = [i % width, Math.floor(i / width)];
+    // Hatched one way and the other: told apart without colour.
+    if (kind[i] === 1) return (x + y) % 6 < 3 ? INK : [255, 255, 255, 230];
+    if (kind[i] === 2) return (x - y + height) % 6 < 3 ? RELIEF : [255, 255, 255, 230];
+    return ink[i] || strokes[i] ? [120, 120, 120, 70] : null;
+  });
+  return { map, ring: lost.length > 0 ? ring(lost[0], width) : null };
+}
+
+/** Mean position of the set pixels. */
+function middle(set, width, height) {
+  let [n, x, y] = [0, 0, 0];
+  for (let i = 0; i < set.length; i++) {
+    if (set[i]) {
+      n += 1;
+      x += i % width;
+      y += Math.floor(i / width);
+    }
+  }
+  return n > 0 ? { x: x / n, y: y / n } : { x: width / 2, y: height / 2 };
+}
+
+/** Everything that the stage draws, made once a card. */
+export function derive(bitmaps) {
+  const { print, printMask, relief, depthMask } = bitmaps;
+  const { width, height } = print;
+  const [ink, strokes] = [bits(printMask), bits(depthMask)];
+  const grey = pixels(print).data;
+  const luminance = (i) => (grey[4 * i] * 3 + grey[4 * i + 1] * 6 + grey[4 * i + 2]) / 10;
+  const layers = { print, relief, printMask, depthMask, width, height, ink, strokes };
+  layers.edges = edges(strokes, width, height, RELIEF);
+  layers.overlay = painted(width, height, (i) => {
+    if (ink[i]) return strokes[i] ? BOTH : INK;
+    return strokes[i] ? RELIEF : PAPER;
+  });
+  layers.difference = painted(width, height, (i) => {
+    const apart = Math.abs(255 - luminance(i) - 255 * strokes[i]);
+    return [apart, apart, apart];
+  });
+  layers.middle = middle(strokes, width, height);
+  return layers;
+}
+
+/** How far two masks cover each other. */
+export function overlap(a, b) {
+  let [both, sum] = [0, 0];
+  for (let i = 0; i < a.length; i++) {
+    both += a[i] & b[i];
+    sum += a[i] + b[i];
+  }
+  return { iou: sum > both ? both / (sum - both) : 0, dice: sum > 0 ? (2 * both) / sum : 0 };
+}

@@ -1,0 +1,302 @@
+//! Answers of the review page: bound to what was shown, stored once, taken back by number, controls apart.
+
+use super::{World, name};
+use crate::catalog::{
+    AnsweredOn, Catalog, CatalogError, HandAlignment, Look, NewVerdict, Shown, connect,
+};
+use crate::domain::{
+    Affine2, ContentHash, Control, PrintFromMesh, Queue, Reason, ThresholdMetric, Verdict,
+};
+
+fn given(event: &str, verdict: Verdict) -> NewVerdict {
+    NewVerdict {
+        pair: name("p0"),
+        metric: None,
+        verdict,
+        reader: "ana".to_owned(),
+        reason: (verdict == Verdict::Fail).then_some(Reason::WrongPair),
+        note: Some("torn".to_owned()),
+        look: Look {
+            event: Some(event.to_owned()),
+            seen: Some(ContentHash::of(b"seen")),
+            shown_ms: Some(1_900),
+            angle_read_deg: Some(-4.5),
+            queue: Some(Queue::Random),
+        },
+        at: None,
+    }
+}
+
+/// Two metrics that came to the same.
+fn two() -> Shown {
+    let of = |metric: ThresholdMetric| (metric, ContentHash::of(metric.name().as_bytes()));
+    Shown::Results(vec![
+        of(ThresholdMetric::Density),
+        of(ThresholdMetric::Ensemble),
+    ])
+}
+
+fn turned() -> Shown {
+    Shown::Control {
+        control: Control::Turned { angle_deg: 9.5 },
+        metric: ThresholdMetric::Density,
+        result_hash: ContentHash::of(b"density"),
+    }
+}
+
+async fn counted(catalog: &Catalog) -> Vec<Vec<Verdict>> {
+    let detail = catalog.pair(&name("p0")).await.expect("a read");
+    let metrics = detail.expect("the pair").results.metrics;
+    let verdicts = metrics
+        .iter()
+        .map(|m| m.verdicts.iter().map(|v| v.verdict).collect());
+    verdicts.collect()
+}
+
+#[tokio::test]
+async fn an_answer_sent_again_is_stored_once() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    for (shown, is_new) in [(two(), true), (two(), false), (turned(), false)] {
+        let stored = world
+            .catalog
+            .answer(given("e1", Verdict::Fail), shown, 5)
+            .await;
+        assert_eq!(stored.expect("stored"), is_new);
+    }
+    let log = world.catalog.verdict_log(None).await.expect("a log");
+    assert_eq!(log.len(), 2);
+    assert!(log.iter().all(|event| event.act == log[0].id));
+    assert_eq!(log[0].look, given("e1", Verdict::Fail).look);
+    assert_eq!(log[0].reason, Some(Reason::WrongPair));
+    let fail = vec![Verdict::Fail];
+    assert_eq!(
+        counted(&world.catalog).await,
+        [vec![], fail.clone(), fail, vec![]]
+    );
+}
+
+#[tokio::test]
+async fn answers_to_controls_are_no_verdicts() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    for event in ["c1", "c1"] {
+        let stored = world
+            .catalog
+            .answer(given(event, Verdict::Fail), turned(), 5)
+            .await;
+        stored.expect("stored");
+    }
+    assert!(
+        world
+            .catalog
+            .verdict_log(None)
+            .await
+            .expect("a log")
+            .is_empty()
+    );
+    assert!(counted(&world.catalog).await.iter().all(Vec::is_empty));
+    let controls = world.catalog.control_answers().await.expect("controls");
+    assert_eq!(controls.len(), 1);
+    assert_eq!(controls[0].control, Control::Turned { angle_deg: 9.5 });
+    assert!(controls[0].control.is_fault());
+    assert_eq!(controls[0].look.shown_ms, Some(1_900));
+}
+
+#[tokio::test]
+async fn answers_are_taken_back_by_number_and_by_their_reader_only() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let answer = async |event: &str, verdict, shown, at| {
+        let stored = world.catalog.answer(given(event, verdict), shown, at).await;
+        stored.expect("stored");
+    };
+    answer("e1", Verdict::Pass, two(), 5).await;
+    answer("c1", Verdict::Fail, turned(), 6).await;
+    answer("e2", Verdict::Fail, two(), 7).await;
+    let left = async || -> Vec<String> {
+        let answers = world.catalog.answers("ana").await.expect("answers");
+        answers.into_iter().map(|a| a.event).collect()
+    };
+    assert_eq!(left().await, ["e1", "e1", "c1", "e2", "e2"]);
+    let other = world.catalog.take_back("e2", "bo", 8).await;
+    assert!(matches!(other, Err(CatalogError::NothingToUndo(_))));
+    for event in ["e2", "e2", "c1"] {
+        let taken = world.catalog.take_back(event, "ana", 8).await;
+        taken.expect("taken back");
+    }
+    assert_eq!(left().await, ["e1", "e1"]);
+    assert_eq!(counted(&world.catalog).await[1], [Verdict::Pass]);
+    let controls = world.catalog.control_answers().await.expect("controls");
+    assert_eq!(controls[0].undone_at, Some(8));
+    assert!(
+        world
+            .catalog
+            .answers("bo")
+            .await
+            .expect("answers")
+            .is_empty()
+    );
+}
+
+#[tokio::test]
+async fn a_verdict_from_the_command_line_is_among_the_answers() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let typed = NewVerdict {
+        look: Look::default(),
+        at: Some(3),
+        ..given("", Verdict::Pass)
+    };
+    world
+        .catalog
+        .verdict_set(vec![typed], 9)
+        .await
+        .expect("set");
+    let answers = world.catalog.answers("ana").await.expect("answers");
+    assert_eq!(answers.len(), ThresholdMetric::ALL.len());
+    assert_eq!((answers[0].event.as_str(), answers[0].at), ("act-1", 3));
+    assert!(matches!(answers[0].on, AnsweredOn::Result(_)));
+    let taken = world.catalog.take_back("act-1", "ana", 10).await;
+    taken.expect("taken back");
+    assert!(
+        world
+            .catalog
+            .answers("ana")
+            .await
+            .expect("answers")
+            .is_empty()
+    );
+}
+
+#[tokio::test]
+async fn a_log_that_is_taken_in_again_doubles_nothing() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let of = |metric| NewVerdict {
+        metric: Some(metric),
+        ..given("e1", Verdict::Pass)
+    };
+    let log = ThresholdMetric::PAPER.map(of).to_vec();
+    for stored in [3, 0] {
+        let set = world.catalog.verdict_set(log.clone(), 5).await;
+        assert_eq!(set.expect("stored"), stored);
+    }
+    assert_eq!(
+        world.catalog.verdict_log(None).await.expect("a log").len(),
+        3
+    );
+}
+
+#[tokio::test]
+async fn a_verdict_on_what_is_no_current_result_any_more_is_kept_as_stale() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let old = Shown::Results(vec![(ThresholdMetric::Density, ContentHash::of(b"old"))]);
+    let stored = world
+        .catalog
+        .answer(given("e1", Verdict::Pass), old, 5)
+        .await;
+    assert!(stored.expect("stored"));
+    assert!(counted(&world.catalog).await.iter().all(Vec::is_empty));
+    let log = world.catalog.verdict_log(None).await.expect("a log");
+    assert!(log.len() == 1 && !log[0].current);
+}
+
+fn by_hand(event: &str) -> HandAlignment {
+    HandAlignment {
+        event: event.to_owned(),
+        pair: name("p0"),
+        reader: "ana".to_owned(),
+        print_from_depth: Affine2::similarity(0.1 + 0.2, 0.3, [1.0, -2.0]),
+        print_from_mesh: PrintFromMesh([[0.1; 4], [0.2; 4], [0.3; 4]]),
+        mesh_hash: ContentHash::of(b"mesh"),
+        print_hash: ContentHash::of(b"print"),
+        depth_hash: ContentHash::of(b"depth"),
+        seen: ContentHash::of(b"seen"),
+        iou: 0.75,
+        dice: 0.85,
+        note: None,
+    }
+}
+
+#[tokio::test]
+async fn an_alignment_by_hand_is_stored_once_beside_the_result() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    for is_new in [true, false] {
+        let stored = world.catalog.hand_align(by_hand("a1"), 5).await;
+        assert_eq!(stored.expect("stored"), is_new);
+    }
+    let another_mesh = HandAlignment {
+        mesh_hash: ContentHash::of(b"another"),
+        ..by_hand("a2")
+    };
+    world
+        .catalog
+        .hand_align(another_mesh, 6)
+        .await
+        .expect("stored");
+    let stored = world.catalog.hand_alignments().await.expect("a read");
+    assert_eq!(stored[0].made, by_hand("a1"));
+    assert!(stored[0].holds && stored[0].on_current_depth);
+    assert!(!stored[1].holds);
+    world
+        .catalog
+        .take_back("a1", "ana", 7)
+        .await
+        .expect("taken back");
+    let stored = world.catalog.hand_alignments().await.expect("a read");
+    assert_eq!((stored.len(), stored[0].undone_at), (2, Some(7)));
+}
+
+#[tokio::test]
+async fn the_database_itself_refuses_to_change_answers_and_alignments() {
+    let world = World::new(1).await;
+    world.finish_one().await;
+    let control = given("c1", Verdict::Fail);
+    world
+        .catalog
+        .answer(control, turned(), 5)
+        .await
+        .expect("stored");
+    world
+        .catalog
+        .hand_align(by_hand("a1"), 5)
+        .await
+        .expect("stored");
+    for event in ["c1", "a1"] {
+        world
+            .catalog
+            .take_back(event, "ana", 6)
+            .await
+            .expect("taken back");
+    }
+    let path = world.dir.path().join("catalog.sqlite");
+    let mut conn = connect::writer(&path, false).await.expect("a connection");
+    for sql in [
+        "UPDATE control_answer SET reader = 'bo'",
+        "DELETE FROM control_answer",
+        "UPDATE control_undo SET at = 9",
+        "DELETE FROM control_undo",
+        "UPDATE manual_alignment SET iou = 1",
+        "DELETE FROM manual_alignment",
+        "UPDATE manual_alignment_undo SET at = 9",
+        "DELETE FROM manual_alignment_undo",
+    ] {
+        let refused = sqlx::query(sql).execute(&mut conn).await;
+        let refused = refused.expect_err(sql).to_string();
+        assert!(refused.contains("append-only"), "{sql}: {refused}");
+    }
+}
+
+#[tokio::test]
+async fn the_key_of_picture_names_outlives_the_process() {
+    let world = World::new(0).await;
+    let key = world.catalog.review_key().await.expect("a key");
+    let path = world.dir.path().join("catalog.sqlite");
+    let again = Catalog::open(&path).await.expect("it opens");
+    assert_eq!(again.review_key().await.expect("a key"), key);
+    let other = World::new(0).await;
+    assert_ne!(other.catalog.review_key().await.expect("a key"), key);
+}

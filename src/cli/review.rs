@@ -1,0 +1,241 @@
+//! `review`: serves the review page on this machine and says where.
+
+use std::io::Write as _;
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use clap::Args;
+use serde_json::json;
+
+use super::context::{Context, now};
+use super::exit::{ExitCode, Refusal};
+use super::signals;
+use super::talk;
+use super::verdict::reader_name;
+use crate::domain::{Queue, ThresholdMetric};
+use crate::review::{self, DeckOptions, Language, Rates, Review, ReviewOptions};
+use crate::runner::{Stop, StopLevel};
+
+/// Arguments of `review`.
+#[derive(Debug, Args)]
+pub(super) struct ReviewArgs {
+    /// Who reads; a label for the verdicts, no login
+    #[arg(long, value_name = "NAME", value_parser = reader_name)]
+    reader: String,
+    /// What comes first: random stands for all; risk, the most doubtful, finds failures but does not
+    #[arg(long, default_value = "random", value_parser = order)]
+    order: Queue,
+    /// Only what two other readers contradict each other on
+    #[arg(long, conflicts_with = "order")]
+    adjudicate: bool,
+    /// Only results of this metric; may be given many times [default: all]
+    #[arg(long)]
+    metric: Vec<ThresholdMetric>,
+    /// Another seed gives another random order
+    #[arg(long, value_name = "N", default_value = "1")]
+    seed: u64,
+    /// Only the first so many results of the order
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    sample: Option<u32>,
+    /// Planted faults for each hundred results, to measure how many are caught
+    #[arg(long, value_name = "PERCENT", default_value = "4", value_parser = percent)]
+    controls: f64,
+    /// Results of each hundred that are shown twice, to measure how steady the reader is
+    #[arg(long, value_name = "PERCENT", default_value = "5", value_parser = percent)]
+    repeats: f64,
+    /// Least time a picture is shown before a verdict is taken, milliseconds
+    #[arg(long, value_name = "MS", default_value = "250", value_parser = clap::value_parser!(u64).range(0..=60_000))]
+    min_view_ms: u64,
+    /// Port on this machine; 0 takes any that is free
+    #[arg(long, value_name = "N", default_value = "0")]
+    port: u16,
+    /// Listen on this address in the place of 127.0.0.1; whoever can reach it sees that there is a page
+    #[arg(long, value_name = "ADDRESS")]
+    listen: Option<IpAddr>,
+    /// Language of the page, en or vi [default: by LANG]
+    #[arg(long)]
+    lang: Option<Language>,
+    /// Print the address and open no browser
+    #[arg(long)]
+    no_open: bool,
+}
+
+/// An order that can be asked for by name.
+fn order(text: &str) -> Result<Queue, String> {
+    match text.parse() {
+        Ok(queue @ (Queue::Random | Queue::Risk)) => Ok(queue),
+        Ok(Queue::Adjudicate) | Err(_) => Err("an order is random or risk".to_owned()),
+    }
+}
+
+/// A share from a number of percent.
+fn percent(text: &str) -> Result<f64, String> {
+    match text.trim_end_matches('%').parse::<f64>() {
+        Ok(percent) if (0.0..=100.0).contains(&percent) => Ok(percent / 100.0),
+        Ok(_) | Err(_) => Err("a percentage is a number from 0 to 100".to_owned()),
+    }
+}
+
+pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let settings = context.settings()?;
+    let keys = review::key_map(&settings.config.review.keys);
+    let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
+    if args.listen.is_some_and(|address| address.is_unspecified()) {
+        // The page answers to its own name only, and "any address" is none.
+        let text =
+            "--listen needs the one address of this machine under which the page is to be reached";
+        return Err(Refusal::Usage(text.to_owned()).into());
+    }
+    let (project, catalog) = context.writer().await?;
+    let language = args.lang.unwrap_or_else(language_of_system);
+    let options = ReviewOptions {
+        listen: SocketAddr::new(
+            args.listen.unwrap_or(IpAddr::V4(Ipv4Addr::LOCALHOST)),
+            args.port,
+        ),
+        language,
+        keys,
+        min_view_ms: args.min_view_ms,
+        limits: settings.config.limits.image,
+        now,
+        deck: deck(&args),
+    };
+    let page = review::open(catalog.clone(), project, options).await?;
+    let _file = tell(&page, &args, context)?;
+    let stop = Stop::default();
+    let signals = signals::watch(&stop)?;
+    let drain = stop.clone();
+    let served = page.serve(async move { drain.reached(StopLevel::Drain).await });
+    tokio::select! {
+        served = served => served?,
+        // A second signal does not wait for connections that stay open. What was acknowledged is stored.
+        () = stop.reached(StopLevel::Now) => {}
+    }
+    signals.abort();
+    catalog.close().await;
+    context
+        .talk
+        .say("the page is closed; every answer is stored");
+    context.talk.next(&context.command("report"));
+    Ok(ExitCode::Done)
+}
+
+fn deck(args: &ReviewArgs) -> DeckOptions {
+    DeckOptions {
+        reader: args.reader.clone(),
+        metrics: args.metric.clone(),
+        queue: if args.adjudicate {
+            Queue::Adjudicate
+        } else {
+            args.order
+        },
+        seed: args.seed,
+        sample: args.sample.map(|sample| sample as usize),
+        rates: Rates {
+            controls: args.controls,
+            repeats: args.repeats,
+        },
+    }
+}
+
+/// Says where the page is, and opens it where a person sits. The file it is opened by lives as long as what is given
+/// back.
+fn tell(
+    page: &Review,
+    args: &ReviewArgs,
+    context: &Context,
+) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
+    let (url, address) = (page.url(), page.address());
+    if context.global.json {
+        talk::print(&json!({"schema": 1, "url": url}).to_string())?;
+    } else {
+        talk::print(&url)?;
+    }
+    let [all, answered] = page.cards();
+    let reader = &args.reader;
+    context.talk.say(&format!(
+        "{reader} has answered {answered} of {all}; the address opens once, in one browser; Ctrl-C ends"
+    ));
+    if address.ip().is_loopback() {
+        let port = address.port();
+        context.talk.say(&format!(
+            "on a far machine, first: ssh -L {port}:127.0.0.1:{port} THAT-MACHINE"
+        ));
+    } else {
+        context.talk.warn(&format!(
+            "the page listens on {address}, not only for this machine, and what it sends is not encrypted"
+        ));
+    }
+    let is_for_script = args.no_open || context.global.json || context.global.quiet;
+    Ok(if is_for_script { None } else { open(&url) })
+}
+
+/// Opens the address in the system's browser by way of a file that only this user can read, so that the token is in
+/// no list of processes. That there is no browser is no error: the address is printed.
+fn open(url: &str) -> Option<tempfile::NamedTempFile> {
+    let program = if cfg!(target_os = "macos") {
+        "open"
+    } else {
+        let has_screen = ["DISPLAY", "WAYLAND_DISPLAY"].map(std::env::var_os);
+        has_screen.iter().flatten().next()?;
+        "xdg-open"
+    };
+    let mut file = tempfile::Builder::new().suffix(".html").tempfile().ok()?;
+    write!(
+        file,
+        "<meta http-equiv=\"refresh\" content=\"0;url={url}\">"
+    )
+    .ok()?;
+    open_by(program, file.path());
+    Some(file)
+}
+
+fn open_by(program: &str, path: &Path) {
+    let started = Command::new(program)
+        .arg(path)
+        .stdin(Stdio::null())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn();
+    if let Err(error) = started {
+        tracing::debug!(%error, "no browser was opened");
+    }
+}
+
+/// Vietnamese where the system speaks it.
+fn language_of_system() -> Language {
+    let names = ["LC_ALL", "LC_MESSAGES", "LANG"];
+    let set = names.iter().filter_map(|name| std::env::var(name).ok());
+    let mut set = set.filter(|value| !value.is_empty());
+    match set.next() {
+        Some(value) if value.starts_with("vi") => Language::Vietnamese,
+        Some(_) | None => Language::English,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{order, percent};
+    use crate::config::{Sources, load};
+    use crate::domain::Queue;
+    use crate::review::key_map;
+
+    #[test]
+    fn the_settings_give_every_action_a_key_of_its_own() {
+        let settings = load(&Sources::default()).expect("the defaults");
+        let keys = &settings.config.review.keys;
+        let map = key_map(keys).expect("the default keys");
+        assert_eq!((map.len(), keys.len()), (40, 40));
+        assert_eq!(map["KeyP"], "pass");
+    }
+
+    #[test]
+    fn percentages_and_orders_are_read() {
+        assert_eq!(percent("4"), Ok(0.04));
+        assert_eq!(percent("12.5%"), Ok(0.125));
+        assert!(percent("101").is_err() && percent("-1").is_err() && percent("NaN").is_err());
+        assert_eq!(order("risk"), Ok(Queue::Risk));
+        assert!(order("adjudicate").is_err());
+    }
+}

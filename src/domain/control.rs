@@ -1,0 +1,63 @@
+//! What is shown to a reader only to test the reader.
+
+use serde::{Deserialize, Serialize};
+
+/// A planted fault, or a result shown a second time. Answers to them are no verdicts.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Control {
+    /// A good result turned by so much, degrees clockwise on the screen.
+    Turned {
+        /// How far.
+        angle_deg: f64,
+    },
+    /// A good result with the relief in mirror writing.
+    Mirrored,
+    /// A good result cut at another level of the depth map.
+    Cut {
+        /// Depth-map levels from this one up were shown as stroke.
+        level: u16,
+    },
+    /// A result that the reader had judged before.
+    Repeat,
+}
+
+impl Control {
+    /// Name in JSON and in the catalog.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Turned { .. } => "turned",
+            Self::Mirrored => "mirrored",
+            Self::Cut { .. } => "cut",
+            Self::Repeat => "repeat",
+        }
+    }
+
+    /// Whether it is a fault, so that a reader who fails it has caught it.
+    pub const fn is_fault(&self) -> bool {
+        match self {
+            Self::Turned { .. } | Self::Mirrored | Self::Cut { .. } => true,
+            Self::Repeat => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Control;
+    use serde_json::json;
+
+    #[test]
+    fn name_is_the_one_in_json() {
+        for control in [
+            Control::Turned { angle_deg: -9.5 },
+            Control::Mirrored,
+            Control::Cut { level: 7 },
+            Control::Repeat,
+        ] {
+            let value = json!(control);
+            assert_eq!(value["kind"], control.name());
+            assert_eq!(serde_json::from_value::<Control>(value).ok(), Some(control));
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! In which order results come to a reader.
+
+use serde::{Deserialize, Serialize};
+
+/// The order of a review.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Queue {
+    /// By lot from a seed: what was read so far stands for all.
+    Random,
+    /// The most doubtful first, to find failures: what was read so far does not stand for all.
+    Risk,
+    /// Only what other readers contradict each other on.
+    Adjudicate,
+}
+
+impl Queue {
+    /// Every order.
+    pub const ALL: [Self; 3] = [Self::Random, Self::Risk, Self::Adjudicate];
+
+    /// Name in JSON and in the catalog.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Random => "random",
+            Self::Risk => "risk",
+            Self::Adjudicate => "adjudicate",
+        }
+    }
+}
+
+impl std::fmt::Display for Queue {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl std::str::FromStr for Queue {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::ALL
+            .into_iter()
+            .find(|queue| queue.name() == text)
+            .ok_or_else(|| format!("{text:?} is not an order (random, risk, adjudicate)"))
+    }
+}

@@ -1,0 +1,292 @@
+//! The deck: all that a reader is to judge, in order, results that look the same as one card.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::card::{Card, View};
+use super::control::{self, Rates};
+use super::order::{self, Lots};
+use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, MetricRecord, PairResults};
+use crate::domain::{DepthOutcome, PairName, Queue, Stage, ThresholdMetric, Verdict};
+use crate::report::aligned::{Aligned, same_alignment};
+use crate::store::Project;
+
+/// Pairs in memory at a time.
+const PAGE: usize = 256;
+/// Confidence from which on a result is good enough to plant a fault in.
+const GOOD: f64 = 0.8;
+
+/// What goes into a deck.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeckOptions {
+    /// Who reads.
+    pub reader: String,
+    /// Only results of these metrics; of all where there is none. A metric that is not asked for gets no verdict, also
+    /// where it looks the same: the accuracy of such a choice would stand for nothing.
+    pub metrics: Vec<ThresholdMetric>,
+    /// What comes first.
+    pub queue: Queue,
+    /// Another seed, another order.
+    pub seed: u64,
+    /// Only so many results, the first in order.
+    pub sample: Option<usize>,
+    /// How often the reader is tested; not when conflicts are settled.
+    pub rates: Rates,
+}
+
+/// A reader's answers: the newest to each thing.
+#[derive(Debug, Default)]
+pub(super) struct Answers(BTreeMap<AnsweredOn, Answer>);
+
+impl Answers {
+    /// Reads those that were not taken back.
+    ///
+    /// # Errors
+    /// When the catalog refuses.
+    pub(super) async fn read(catalog: &Catalog, reader: &str) -> Result<Self, CatalogError> {
+        let answers = catalog.answers(reader).await?.into_iter();
+        // Oldest first, so that the newest stays.
+        Ok(Self(answers.map(|answer| (answer.on, answer)).collect()))
+    }
+
+    /// The answer to a card, if there is one.
+    pub(super) fn to(&self, card: &Card) -> Option<&Answer> {
+        if card.control.is_some() {
+            return self.0.get(&AnsweredOn::Control(card.view.seen()));
+        }
+        let on_results = card.results.iter();
+        on_results
+            .filter_map(|(_, hash)| self.0.get(&AnsweredOn::Result(*hash)))
+            .max_by_key(|answer| answer.at)
+    }
+}
+
+/// Cards in order, with a reader's answers.
+#[derive(Debug, Default)]
+pub(super) struct Deck {
+    pub(super) cards: Vec<Arc<Card>>,
+    pub(super) answers: Answers,
+}
+
+impl Deck {
+    /// Reads the deck of a reader as the catalog stands.
+    ///
+    /// # Errors
+    /// When the catalog refuses, or a thread is lost.
+    pub(super) async fn read(
+        catalog: &Catalog,
+        project: &Project,
+        options: &DeckOptions,
+    ) -> Result<Self, DeckError> {
+        let key = catalog.review_key().await?;
+        let lots = Lots::new(options.seed, &options.reader);
+        let mut cards = all_cards(catalog, options).await?;
+        order::sort(&mut cards, options.queue, &lots);
+        cards.truncate(options.sample.unwrap_or(usize::MAX));
+        if options.queue != Queue::Adjudicate {
+            let chosen = control::chosen(&cards, &options.rates, &lots);
+            let faults = faults(catalog, project, chosen, &lots).await?;
+            cards = control::mixed(cards, faults, &options.rates, &lots);
+        }
+        let cards = cards.into_iter();
+        let cards = cards.map(|card| Arc::new(card.named(&key, &options.reader)));
+        Ok(Self {
+            cards: cards.collect(),
+            answers: Answers::read(catalog, &options.reader).await?,
+        })
+    }
+}
+
+/// Why there is no deck.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum DeckError {
+    /// The catalog refused.
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    /// A thread was lost.
+    #[error("planting faults stopped: {0}")]
+    Stopped(#[from] tokio::task::JoinError),
+}
+
+async fn all_cards(catalog: &Catalog, options: &DeckOptions) -> Result<Vec<Card>, CatalogError> {
+    let mut cards = Vec::new();
+    let mut after: Option<PairName> = None;
+    loop {
+        let page = catalog.results_page(after.as_ref(), PAGE).await?;
+        let Some(last) = page.last() else {
+            return Ok(cards);
+        };
+        after = Some(last.facts.name.clone());
+        for pair in &page {
+            cards.extend(cards_of(pair, options));
+        }
+    }
+}
+
+/// The cards of one pair: one for each picture that its results make.
+fn cards_of(pair: &PairResults, options: &DeckOptions) -> Vec<Card> {
+    let (Some(depth), Some(print)) = (pair.stage(Stage::Depth), pair.stage(Stage::Normalize))
+    else {
+        return Vec::new();
+    };
+    let (Ok(outcome), Some(print_hash)) = (depth.parse::<DepthOutcome>(), print.print_hash) else {
+        return Vec::new();
+    };
+    let mut groups: Vec<Vec<&MetricRecord>> = Vec::new();
+    let asked = &options.metrics;
+    let is_of_metric =
+        |record: &&MetricRecord| asked.is_empty() || asked.contains(&record.outcome.metric);
+    for record in pair.metrics.iter().filter(is_of_metric) {
+        let alike =
+            |group: &&mut Vec<&MetricRecord>| same_alignment(&group[0].outcome, &record.outcome);
+        match groups.iter_mut().find(alike) {
+            Some(group) => group.push(record),
+            None => groups.push(vec![record]),
+        }
+    }
+    let is_asked = |group: &Vec<&MetricRecord>| {
+        options.queue != Queue::Adjudicate
+            || group
+                .iter()
+                .any(|record| is_open_conflict(record, &options.reader))
+    };
+    groups.retain(is_asked);
+    let card = |group: Vec<&MetricRecord>| {
+        let outcome_of_metric = group[0].outcome;
+        Card {
+            id: String::new(),
+            pair: pair.facts.name.clone(),
+            results: group
+                .iter()
+                .map(|record| (record.outcome.metric, record.result_hash))
+                .collect(),
+            control: None,
+            view: View {
+                print_hash,
+                depth_hash: depth.result_hash,
+                depth_px: View::size(&outcome),
+                level: outcome_of_metric.threshold_level,
+                print_from_depth: outcome_of_metric.print_from_depth,
+            },
+            risk: risk(group[0]),
+            is_good: group.iter().all(|record| is_good(record)),
+        }
+    };
+    groups.into_iter().map(card).collect()
+}
+
+/// How much speaks against a result: little confidence, little likeness, a search that ended at a bound.
+fn risk(record: &MetricRecord) -> f64 {
+    let outcome = &record.outcome;
+    let doubt = 1.0 - outcome.confidence.unwrap_or(0.5);
+    let unlike = 1.0 - outcome.scores.nl_ssim;
+    doubt + 0.5 * unlike + if outcome.at_bound { 0.25 } else { 0.0 }
+}
+
+/// Whether a fault can be planted in it: nobody failed it and it is sure of itself.
+fn is_good(record: &MetricRecord) -> bool {
+    let outcome = &record.outcome;
+    let mut verdicts = record.verdicts.iter().map(|read| read.verdict);
+    outcome
+        .confidence
+        .is_none_or(|confidence| confidence >= GOOD)
+        && !outcome.at_bound
+        && verdicts.all(|verdict| verdict == Verdict::Pass)
+}
+
+/// Whether others contradict each other on it and nobody else has settled it. Who is party to it cannot settle it.
+fn is_open_conflict(record: &MetricRecord, reader: &str) -> bool {
+    let (words, read): (Vec<_>, Vec<_>) = record
+        .verdicts
+        .iter()
+        .partition(|read| read.queue == Some(Queue::Adjudicate));
+    let says = |verdict| read.iter().any(|read| read.verdict == verdict);
+    let is_party = read.iter().any(|read| read.reader == reader);
+    let is_settled = words
+        .iter()
+        .any(|word| word.reader != reader && word.verdict != Verdict::Unsure);
+    says(Verdict::Pass) && says(Verdict::Fail) && !is_party && !is_settled
+}
+
+/// Faults made from these cards. A pair whose files cannot be read gets none.
+async fn faults(
+    catalog: &Catalog,
+    project: &Project,
+    chosen: Vec<&Card>,
+    lots: &Lots,
+) -> Result<Vec<Card>, DeckError> {
+    let mut faults = Vec::with_capacity(chosen.len());
+    for card in chosen {
+        let Some(detail) = catalog.pair(&card.pair).await? else {
+            continue;
+        };
+        let (project, card, lots) = (project.clone(), card.clone(), lots.clone());
+        let fault = tokio::task::spawn_blocking(move || {
+            let depth = Aligned::new(&project, &detail.results).depth().ok()?;
+            Some(control::plant(&card, &depth, &lots))
+        });
+        faults.extend(fault.await?);
+    }
+    Ok(faults)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{cards_of, is_good, is_open_conflict};
+    use crate::catalog::ReaderVerdict;
+    use crate::domain::{Queue, ThresholdMetric, Verdict};
+    use crate::report::fixture;
+
+    fn read(reader: &str, verdict: Verdict, queue: Queue) -> ReaderVerdict {
+        ReaderVerdict {
+            reader: reader.to_owned(),
+            verdict,
+            reason: None,
+            queue: Some(queue),
+        }
+    }
+
+    #[test]
+    fn a_conflict_is_for_a_third_reader_until_one_has_settled_it() {
+        let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &[]);
+        record.verdicts = vec![read("ana", Verdict::Pass, Queue::Random)];
+        assert!(!is_open_conflict(&record, "chi"));
+        record
+            .verdicts
+            .push(read("bo", Verdict::Fail, Queue::Random));
+        assert!(is_open_conflict(&record, "chi"));
+        assert!(!is_open_conflict(&record, "ana"));
+        record
+            .verdicts
+            .push(read("chi", Verdict::Fail, Queue::Adjudicate));
+        assert!(
+            is_open_conflict(&record, "chi"),
+            "it stays with its adjudicator"
+        );
+        assert!(!is_open_conflict(&record, "dung"));
+    }
+
+    #[test]
+    fn no_fault_is_planted_in_what_somebody_failed() {
+        let record =
+            |verdicts: &[Verdict]| fixture::metric(ThresholdMetric::Density, 0.8, verdicts);
+        assert!(is_good(&record(&[])) && is_good(&record(&[Verdict::Pass])));
+        assert!(!is_good(&record(&[Verdict::Pass, Verdict::Fail])));
+    }
+
+    #[test]
+    fn a_pair_without_results_has_no_card() {
+        let options = super::DeckOptions {
+            reader: "ana".to_owned(),
+            metrics: Vec::new(),
+            queue: Queue::Random,
+            seed: 1,
+            sample: None,
+            rates: super::Rates {
+                controls: 0.0,
+                repeats: 0.0,
+            },
+        };
+        assert_eq!(cards_of(&fixture::pending("a"), &options), []);
+    }
+}

@@ -1,0 +1,117 @@
+//! In which order cards come: by lot from a seed and the reader's name, or the most doubtful first.
+
+use crate::domain::{ContentHash, Queue};
+
+use super::card::Card;
+
+/// A lot drawn for a thing: the same for the same seed, reader, thing and purpose.
+#[derive(Debug, Clone)]
+pub(super) struct Lots {
+    seed: u64,
+    reader: String,
+}
+
+impl Lots {
+    pub(super) fn new(seed: u64, reader: &str) -> Self {
+        Self {
+            seed,
+            reader: reader.to_owned(),
+        }
+    }
+
+    /// A number from 0 up to 1, evenly.
+    pub(super) fn draw(&self, thing: &ContentHash, purpose: &str) -> f64 {
+        let mut bytes = self.seed.to_le_bytes().to_vec();
+        for part in [self.reader.as_bytes(), thing.as_bytes(), purpose.as_bytes()] {
+            bytes.extend((part.len() as u64).to_le_bytes());
+            bytes.extend(part);
+        }
+        let hash = ContentHash::of(&bytes);
+        let mut head = [0; 8];
+        head.copy_from_slice(&hash.as_bytes()[..8]);
+        // 53 bits fill the fraction of an f64.
+        (u64::from_le_bytes(head) >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// Sorts cards of results into the order in which they are shown.
+pub(super) fn sort(cards: &mut [Card], queue: Queue, lots: &Lots) {
+    let lot = |card: &Card| lots.draw(&card.view.seen(), "order");
+    cards.sort_by_cached_key(|card| OrderKey {
+        risk: match queue {
+            Queue::Random | Queue::Adjudicate => 0.0,
+            Queue::Risk => -card.risk,
+        },
+        lot: lot(card),
+    });
+}
+
+/// By risk, then by lot.
+#[derive(Debug, PartialEq)]
+struct OrderKey {
+    risk: f64,
+    lot: f64,
+}
+
+impl Eq for OrderKey {}
+
+impl PartialOrd for OrderKey {
+    fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for OrderKey {
+    fn cmp(&self, other: &Self) -> std::cmp::Ordering {
+        let by_risk = self.risk.total_cmp(&other.risk);
+        by_risk.then(self.lot.total_cmp(&other.lot))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Lots, sort};
+    use crate::domain::{ContentHash, Queue};
+    use crate::review::card::fixture::card;
+
+    fn order(queue: Queue, seed: u64, reader: &str) -> Vec<String> {
+        let mut cards: Vec<_> = (0..50).map(card).collect();
+        for (i, card) in cards.iter_mut().enumerate() {
+            card.risk = i as f64;
+        }
+        sort(&mut cards, queue, &Lots::new(seed, reader));
+        cards.iter().map(|card| card.pair.to_string()).collect()
+    }
+
+    #[test]
+    fn order_is_by_seed_and_reader() {
+        let first = order(Queue::Random, 1, "ana");
+        assert_eq!(first, order(Queue::Random, 1, "ana"));
+        assert_ne!(first, order(Queue::Random, 2, "ana"));
+        assert_ne!(first, order(Queue::Random, 1, "bo"));
+        assert_eq!(order(Queue::Risk, 1, "ana")[..2], ["p49", "p48"]);
+    }
+
+    #[test]
+    fn a_new_card_leaves_the_order_of_the_others() {
+        let lots = Lots::new(1, "ana");
+        let names = |count: u16| {
+            let mut cards: Vec<_> = (0..count).map(card).collect();
+            sort(&mut cards, Queue::Random, &lots);
+            let old = cards.iter().filter(|card| card.pair.as_str() != "p30");
+            old.map(|card| card.pair.to_string()).collect::<Vec<_>>()
+        };
+        assert_eq!(names(30), names(31));
+    }
+
+    #[test]
+    fn lots_fall_evenly() {
+        let lots = Lots::new(7, "ana");
+        let low = (0..2000_u32).filter(|i| {
+            let thing = ContentHash::of(&i.to_le_bytes());
+            lots.draw(&thing, "control") < 0.25
+        });
+        let low = low.count();
+        assert!((430..570).contains(&low), "{low}");
+    }
+}

@@ -1,0 +1,263 @@
+//! What the server answers, address by address. Whoever comes here has passed the guard.
+
+use std::sync::Arc;
+
+use axum::extract::rejection::JsonRejection;
+use axum::extract::{DefaultBodyLimit, Path, RawQuery, State};
+use axum::http::{StatusCode, header};
+use axum::response::{Html, IntoResponse, Redirect, Response};
+use axum::routing::{get, post};
+use axum::{Json, Router, middleware};
+use serde_json::{Value, json};
+
+use super::answer::{AnswerBody, BadAnswer, UndoBody};
+use super::assets;
+use super::card::Card;
+use super::correction::{self, AlignBody};
+use super::deck::{Answers, DeckError};
+use super::desk::Desk;
+use super::guard::{BODY_LIMIT, START, guard};
+use super::page;
+use super::pictures::{Layer, PictureError};
+use super::words::Language;
+use crate::catalog::CatalogError;
+use crate::domain::Queue;
+use crate::report::aligned::AlignedError;
+
+/// Everything there is, behind the guard.
+pub(super) fn router(desk: &Arc<Desk>) -> Router {
+    Router::new()
+        .route(START, get(begin))
+        .route("/", get(index))
+        .route("/assets/{name}", get(asset))
+        .route("/picture/{id}/{layer}", get(picture))
+        .route("/api/boot", get(boot))
+        .route("/api/deck", get(deck))
+        .route("/api/about/{id}", get(about))
+        .route("/api/correction/{id}", get(correction_start))
+        .route("/api/answer", post(answer))
+        .route("/api/undo", post(undo))
+        .route("/api/align", post(align))
+        .layer(DefaultBodyLimit::max(BODY_LIMIT))
+        .layer(middleware::from_fn_with_state(Arc::clone(desk), guard))
+        .with_state(Arc::clone(desk))
+}
+
+/// Why a request cannot be answered.
+#[derive(Debug, thiserror::Error)]
+enum Trouble {
+    #[error("there is no such card")]
+    NoCard,
+    #[error("answer it first")]
+    NotAnswered,
+    #[error("{0}")]
+    Body(#[from] JsonRejection),
+    #[error(transparent)]
+    Answer(#[from] BadAnswer),
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    #[error(transparent)]
+    Deck(#[from] DeckError),
+    #[error(transparent)]
+    Picture(#[from] PictureError),
+    #[error(transparent)]
+    Aligned(#[from] AlignedError),
+}
+
+impl Trouble {
+    fn status(&self) -> StatusCode {
+        match self {
+            Self::NoCard | Self::Catalog(CatalogError::NothingToUndo(_)) => StatusCode::NOT_FOUND,
+            Self::NotAnswered => StatusCode::FORBIDDEN,
+            Self::Body(rejection) => rejection.status(),
+            Self::Answer(_) => StatusCode::UNPROCESSABLE_ENTITY,
+            Self::Picture(PictureError::Gone(_)) => StatusCode::GONE,
+            // The page sends again what the server could not store.
+            Self::Catalog(_) | Self::Deck(_) | Self::Picture(_) | Self::Aligned(_) => {
+                StatusCode::SERVICE_UNAVAILABLE
+            }
+        }
+    }
+}
+
+impl IntoResponse for Trouble {
+    fn into_response(self) -> Response {
+        let status = self.status();
+        if status.is_server_error() {
+            tracing::warn!(error = %self, "the review page was not answered");
+        }
+        (status, Json(json!({ "error": self.to_string() }))).into_response()
+    }
+}
+
+type Answered<T = Json<Value>> = Result<T, Trouble>;
+
+/// Takes the token and gives the cookie. A page that goes on by itself, not a redirect: the cookie goes only with
+/// what begins on this site.
+async fn begin(State(desk): State<Arc<Desk>>, RawQuery(query): RawQuery) -> Response {
+    let query = query.unwrap_or_default();
+    let token = query.strip_prefix("token=").unwrap_or_default();
+    if desk.session.open(token) {
+        let cookie = [(header::SET_COOKIE, desk.session.set_cookie())];
+        return (cookie, Html(page::onward(desk.language).into_string())).into_response();
+    }
+    // An old address in the history of a browser that has the cookie leads on as well.
+    if token.is_empty() {
+        return Redirect::to("/").into_response();
+    }
+    let refused = page::refused(desk.language).into_string();
+    (StatusCode::FORBIDDEN, Html(refused)).into_response()
+}
+
+async fn index(State(desk): State<Arc<Desk>>, RawQuery(query): RawQuery) -> Html<String> {
+    let asked = query
+        .as_deref()
+        .and_then(|query| query.strip_prefix("lang="));
+    let language = asked
+        .and_then(|name| name.parse().ok())
+        .unwrap_or(desk.language);
+    Html(page::review(&desk, language).into_string())
+}
+
+async fn asset(Path(name): Path<String>) -> Response {
+    match assets::find(&name) {
+        Some((kind, text)) => ([(header::CONTENT_TYPE, kind)], text).into_response(),
+        None => StatusCode::NOT_FOUND.into_response(),
+    }
+}
+
+/// What the script starts from.
+async fn boot(State(desk): State<Arc<Desk>>) -> Json<Value> {
+    Json(json!({
+        "word": desk.session.csrf(),
+        "keys": desk.keys,
+        "queue": desk.deck_options.queue,
+        "min_view_ms": desk.min_view_ms,
+        "words": Language::ALL.map(|language| (language.name(), language.words()))
+            .into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+    }))
+}
+
+async fn deck(State(desk): State<Arc<Desk>>) -> Answered {
+    let deck = desk.deal().await?;
+    let items = deck.cards.iter().map(|card| {
+        let answer = deck.answers.to(card).map(|answer| {
+            json!({
+                "event": answer.event, "verdict": answer.verdict, "reason": answer.reason,
+                "note": answer.note, "at": answer.at,
+            })
+        });
+        json!({ "id": card.id, "pair": card.pair, "answer": answer })
+    });
+    Ok(Json(json!({ "items": items.collect::<Vec<_>>() })))
+}
+
+async fn picture(
+    State(desk): State<Arc<Desk>>,
+    Path((id, layer)): Path<(String, String)>,
+) -> Answered<Response> {
+    let card = card(&desk, &id)?;
+    let layer = Layer::named(&layer).ok_or(Trouble::NoCard)?;
+    let drawn = desk.pictures(&card).await?;
+    let kind = [(header::CONTENT_TYPE, "image/png")];
+    Ok((kind, drawn.layer(layer).to_vec()).into_response())
+}
+
+/// What is told of a card once it is answered: for planted faults and repeats as for all others.
+async fn about(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answered {
+    let card = card(&desk, &id)?;
+    let answers = Answers::read(&desk.catalog, &desk.deck_options.reader).await?;
+    if answers.to(&card).is_none() {
+        return Err(Trouble::NotAnswered);
+    }
+    let drawn = desk.pictures(&card).await?;
+    let agreement = correction::agreement(&drawn, &card.view.print_from_depth);
+    let metrics = card.results.iter().map(|(metric, _)| metric.title());
+    let others = match desk.deck_options.queue {
+        Queue::Adjudicate => others(&desk, &card).await?,
+        // What others said of a planted fault does not exist, so it cannot be shown for anything.
+        Queue::Random | Queue::Risk => Vec::new(),
+    };
+    Ok(Json(json!({
+        "metrics": metrics.collect::<Vec<_>>(), "iou": agreement.iou, "dice": agreement.dice, "others": others,
+    })))
+}
+
+/// What other readers said of a card's results.
+async fn others(desk: &Desk, card: &Card) -> Result<Vec<Value>, CatalogError> {
+    let log = desk.catalog.verdict_log(Some(&card.pair)).await?;
+    let is_on_card = |hash| card.results.iter().any(|(_, of_card)| *of_card == hash);
+    let mut said: Vec<Value> = Vec::new();
+    for event in log {
+        let is_other = event.reader != desk.deck_options.reader && event.undone_at.is_none();
+        let line = json!({
+            "reader": event.reader, "verdict": event.verdict, "reason": event.reason, "note": event.note,
+        });
+        if is_other && is_on_card(event.result_hash) && !said.contains(&line) {
+            said.push(line);
+        }
+    }
+    Ok(said)
+}
+
+async fn correction_start(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answered {
+    let card = card(&desk, &id)?;
+    let drawn = desk.pictures(&card).await?;
+    Ok(Json(json!(correction::start(&card, &drawn))))
+}
+
+async fn answer(
+    State(desk): State<Arc<Desk>>,
+    body: Result<Json<AnswerBody>, JsonRejection>,
+) -> Answered {
+    let Json(body) = body?;
+    let card = card(&desk, &body.item)?;
+    let verdict = body.verdict(&card, &desk)?;
+    let stored = desk.catalog.answer(verdict, card.shown(), (desk.now)());
+    let is_new = stored.await?;
+    Ok(Json(json!({ "stored": body.event, "new": is_new })))
+}
+
+async fn undo(
+    State(desk): State<Arc<Desk>>,
+    body: Result<Json<UndoBody>, JsonRejection>,
+) -> Answered {
+    let Json(body) = body?;
+    let reader = &desk.deck_options.reader;
+    let taken = desk.catalog.take_back(&body.event, reader, (desk.now)());
+    taken.await?;
+    Ok(Json(json!({ "undone": body.event })))
+}
+
+async fn align(
+    State(desk): State<Arc<Desk>>,
+    body: Result<Json<AlignBody>, JsonRejection>,
+) -> Answered {
+    let Json(body) = body?;
+    let card = card(&desk, &body.item)?;
+    let drawn = desk.pictures(&card).await?;
+    let map = body.print_from_depth(&drawn)?;
+    let agreement = correction::agreement(&drawn, &map);
+    let found = desk
+        .catalog
+        .pair(&card.pair)
+        .await?
+        .ok_or(Trouble::NoCard)?;
+    let reader = &desk.deck_options.reader;
+    let mut made = correction::made(
+        &desk.project,
+        &found.results,
+        &card,
+        reader,
+        map,
+        &agreement,
+    )?;
+    made.note = body.note()?;
+    made.event = body.event;
+    desk.catalog.hand_align(made, (desk.now)()).await?;
+    Ok(Json(json!(agreement)))
+}
+
+fn card(desk: &Desk, id: &str) -> Result<Arc<Card>, Trouble> {
+    desk.card(id).ok_or(Trouble::NoCard)
+}

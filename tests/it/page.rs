@@ -1,0 +1,231 @@
+//! The review page's server, started as a user does and spoken to byte by byte.
+
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::{SocketAddr, TcpStream};
+use std::process::{Child, Command, Stdio};
+use std::sync::OnceLock;
+
+use mocban::store::Project;
+use serde_json::{Value, json};
+
+use crate::cli::{binary, call};
+use crate::resume::{copy, project, run};
+
+/// Pairs of the project that is read; four results each or nearly so.
+const PAIRS: &str = "15";
+
+/// A project of its own in which every pair has results. They are computed once for all tests.
+pub(crate) fn read_project(dir: &tempfile::TempDir) -> Project {
+    static MADE: OnceLock<(tempfile::TempDir, Project)> = OnceLock::new();
+    let (_, made) = MADE.get_or_init(|| {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let made = project(dir.path(), "made", PAIRS);
+        call(&mut run(&made, &[])).expect(0);
+        (dir, made)
+    });
+    copy(made, &dir.path().join("p"))
+}
+
+/// What was answered.
+#[derive(Debug)]
+pub(crate) struct Reply {
+    pub(crate) status: u16,
+    pub(crate) head: String,
+    pub(crate) body: Vec<u8>,
+}
+
+impl Reply {
+    /// The body as JSON.
+    pub(crate) fn json(&self) -> Value {
+        serde_json::from_slice(&self.body).expect("JSON")
+    }
+
+    /// A header's value.
+    pub(crate) fn header(&self, name: &str) -> Option<&str> {
+        let lines = self.head.lines().filter_map(|line| line.split_once(": "));
+        let mut named = lines.filter(|(found, _)| found.eq_ignore_ascii_case(name));
+        named.next().map(|(_, value)| value)
+    }
+}
+
+/// A server, and what its page knows.
+pub(crate) struct Page {
+    child: Child,
+    site: Site,
+}
+
+/// What a page knows of its server.
+#[derive(Clone)]
+pub(crate) struct Site {
+    /// The address to open.
+    pub(crate) url: String,
+    /// Name and port.
+    pub(crate) host: String,
+    pub(crate) cookie: String,
+    pub(crate) word: String,
+}
+
+impl std::ops::Deref for Page {
+    type Target = Site;
+
+    fn deref(&self) -> &Site {
+        &self.site
+    }
+}
+
+impl Page {
+    /// Starts the server of a reader, without going in.
+    pub(crate) fn start(project: &Project, reader: &str, args: &[&str]) -> Self {
+        let mut command = review(project, reader);
+        let mut child = command
+            .args(args)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("the binary starts");
+        let mut line = String::new();
+        let out = child.stdout.take().expect("a pipe");
+        BufReader::new(out).read_line(&mut line).expect("a line");
+        let told: Value = serde_json::from_str(&line).expect("JSON on stdout");
+        let url = told["url"].as_str().expect("an address").to_owned();
+        let host = url["http://".len()..].split('/').next().expect("a host");
+        let site = Site {
+            host: host.to_owned(),
+            url,
+            cookie: String::new(),
+            word: String::new(),
+        };
+        Self { child, site }
+    }
+
+    /// Starts the server and goes in as a browser does.
+    pub(crate) fn open(project: &Project, reader: &str, args: &[&str]) -> Self {
+        let mut page = Self::start(project, reader, args);
+        let start = page.url["http://".len() + page.host.len()..].to_owned();
+        let reply = page.get(&start);
+        let cookie = reply.header("set-cookie").expect("a cookie");
+        cookie
+            .split(';')
+            .next()
+            .expect("a value")
+            .clone_into(&mut page.site.cookie);
+        let boot = page.get("/api/boot").json();
+        boot["word"]
+            .as_str()
+            .expect("a word")
+            .clone_into(&mut page.site.word);
+        page
+    }
+
+    /// Dies at once, as by `kill -9`.
+    pub(crate) fn kill(&mut self) {
+        self.child.kill().expect("killed");
+        self.child.wait().expect("dead");
+    }
+}
+
+impl Site {
+    /// The address that listens.
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.host.parse().expect("an address")
+    }
+
+    /// Headers of a write as the page sends it.
+    pub(crate) fn headers(&self) -> Vec<(&'static str, String)> {
+        vec![
+            ("host", self.host.clone()),
+            ("cookie", self.cookie.clone()),
+            ("origin", format!("http://{}", self.host)),
+            ("content-type", "application/json".to_owned()),
+            ("x-mocban-word", self.word.clone()),
+        ]
+    }
+
+    pub(crate) fn get(&self, path: &str) -> Reply {
+        let headers = [("host", self.host.clone()), ("cookie", self.cookie.clone())];
+        send(self.address(), "GET", path, &headers, b"").expect("a reply")
+    }
+
+    /// Writes as the page does; an error when the server is gone.
+    pub(crate) fn post(&self, path: &str, body: &Value) -> std::io::Result<Reply> {
+        let body = body.to_string();
+        send(
+            self.address(),
+            "POST",
+            path,
+            &self.headers(),
+            body.as_bytes(),
+        )
+    }
+
+    /// The cards in order.
+    pub(crate) fn deck(&self) -> Vec<Value> {
+        let deck = self.get("/api/deck").json();
+        deck["items"].as_array().expect("items").clone()
+    }
+}
+
+impl Drop for Page {
+    fn drop(&mut self) {
+        // One that was killed before cannot be killed again.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn review(project: &Project, reader: &str) -> Command {
+    let mut command = binary();
+    command.arg("-C").arg(project.dir());
+    command.args(["--json", "review", "--no-open", "--reader", reader]);
+    command
+}
+
+/// An answer as the page sends it.
+pub(crate) fn answer(event: &str, item: &Value, verdict: &str) -> Value {
+    json!({
+        "event": event, "item": item["id"], "verdict": verdict, "reason": null, "note": null,
+        "angle_read_deg": null, "shown_ms": 1200,
+    })
+}
+
+/// Sends a request with these headers and no others, and reads to the end.
+pub(crate) fn send(
+    to: SocketAddr,
+    method: &str,
+    path: &str,
+    headers: &[(&str, String)],
+    body: &[u8],
+) -> std::io::Result<Reply> {
+    let mut lines = vec![format!("{method} {path} HTTP/1.1")];
+    lines.push("connection: close".to_owned());
+    lines.extend(
+        headers
+            .iter()
+            .map(|(name, value)| format!("{name}: {value}")),
+    );
+    if method == "POST" {
+        lines.push(format!("content-length: {}", body.len()));
+    }
+    let mut stream = TcpStream::connect(to)?;
+    stream.write_all(format!("{}\r\n\r\n", lines.join("\r\n")).as_bytes())?;
+    // A server that refuses by the head may have closed before the body is through.
+    let _ = stream.write_all(body);
+    let mut bytes = Vec::new();
+    // And then the connection may end roughly behind a whole reply.
+    let _ = stream.read_to_end(&mut bytes);
+    whole(bytes).ok_or_else(|| std::io::ErrorKind::UnexpectedEof.into())
+}
+
+/// A reply that came to its end.
+fn whole(mut bytes: Vec<u8>) -> Option<Reply> {
+    let end = bytes.windows(4).position(|four| four == b"\r\n\r\n")?;
+    let body = bytes.split_off(end + 4);
+    let head = String::from_utf8(bytes).ok()?;
+    let reply = Reply {
+        status: head.split(' ').nth(1)?.parse().ok()?,
+        head,
+        body,
+    };
+    let wanted = reply.header("content-length").unwrap_or("0");
+    (reply.body.len() == wanted.parse::<usize>().ok()?).then_some(reply)
+}

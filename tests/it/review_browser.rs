@@ -1,0 +1,395 @@
+//! The review page in a browser: by keys only, over a reload, with two readers, without the server, by hand.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mocban::store::Project;
+use serde_json::Value;
+
+use crate::browser::{Browser, Tab};
+use crate::cli::mocban;
+use crate::page::{Page, read_project};
+
+/// No planted cards, so that what is pressed is what is logged; no least time, so that the test is not made to wait.
+const PLAIN: [&str; 6] = ["--controls", "0", "--repeats", "0", "--min-view-ms", "0"];
+
+/// Opens a reader's page in a tab and waits for its first card.
+fn enter<'a>(browser: &'a Browser, page: &Page, size: [u32; 2]) -> Tab<'a> {
+    let tab = browser.tab(size[0], size[1]);
+    tab.open(&page.url);
+    ready(&tab);
+    tab
+}
+
+fn ready(tab: &Tab<'_>) {
+    tab.wait("document.body?.dataset.ready && document.body.dataset.shown");
+}
+
+fn shown(tab: &Tab<'_>) -> String {
+    tab.eval("document.body.dataset.shown")
+        .as_str()
+        .expect("a card")
+        .to_owned()
+}
+
+/// Presses a key that judges, when the next cards are there, and waits for the next one.
+fn judge(tab: &Tab<'_>, key: &str) {
+    let before = shown(tab);
+    tab.wait("document.body.dataset.ahead === document.body.dataset.shown");
+    tab.key(key);
+    tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
+}
+
+fn saved(tab: &Tab<'_>) {
+    tab.wait("document.getElementById('saved').textContent.includes('✓')");
+}
+
+/// The acts that stand, of a reader: the verdict and the reason by number of the act.
+fn standing(project: &Project, reader: &str) -> BTreeMap<i64, (String, Option<String>)> {
+    let told = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
+    let events = told
+        .out
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    let events = events.filter(|event| event["reader"] == reader && event["undone_at"].is_null());
+    let text = |value: &Value| value.as_str().map(str::to_owned);
+    events
+        .map(|event| {
+            let verdict = text(&event["verdict"]).expect("a verdict");
+            (
+                event["act"].as_i64().expect("a number"),
+                (verdict, text(&event["reason"])),
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn fifty_cards_are_judged_by_keys_alone_over_a_reload_and_ten_undone() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::start(&project, "lan", &PLAIN);
+    let tab = enter(&browser, &page, [1440, 900]);
+    let keys = ["KeyP", "KeyP", "Digit1", "KeyU", "KeyF", "Digit6"];
+    let mut paints = Vec::new();
+    for i in 0..50 {
+        if i == 25 {
+            saved(&tab);
+            tab.reload();
+            ready(&tab);
+            assert_eq!(tab.eval("document.getElementById('bar').value"), 25);
+        }
+        judge(&tab, keys[i % keys.len()]);
+        let ms = tab.eval("document.body.dataset.paintMs");
+        paints.push(
+            ms.as_str()
+                .and_then(|ms| ms.parse::<u32>().ok())
+                .expect("a time"),
+        );
+    }
+    saved(&tab);
+    let said: Vec<_> = standing(&project, "lan").into_values().collect();
+    let wanted =
+        |verdict: &str, reason: Option<&str>| (verdict.to_owned(), reason.map(str::to_owned));
+    let of_key = [
+        wanted("pass", None),
+        wanted("pass", None),
+        wanted("fail", Some("angle")),
+        wanted("unsure", None),
+        wanted("fail", None),
+        wanted("fail", Some("wrong_pair")),
+    ];
+    let pressed: Vec<_> = (0..50).map(|i| of_key[i % keys.len()].clone()).collect();
+    assert_eq!(said, pressed);
+    for _ in 0..10 {
+        let before = shown(&tab);
+        saved(&tab);
+        tab.key("Backspace");
+        tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
+    }
+    saved(&tab);
+    assert_eq!(tab.eval("document.getElementById('bar').value"), 40);
+    let left: Vec<_> = standing(&project, "lan").into_values().collect();
+    assert_eq!(left, pressed[..40]);
+    judge(&tab, "KeyP");
+    saved(&tab);
+    assert_eq!(standing(&project, "lan").len(), 41);
+    paints.sort_unstable();
+    eprintln!(
+        "key to picture: median {} ms, worst {} ms",
+        paints[25], paints[49]
+    );
+    assert!(paints[25] <= 50, "{paints:?}");
+}
+
+#[test]
+fn every_way_to_look_is_a_picture_of_its_own() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let page = Page::start(&read_project(&dir), "lan", &PLAIN);
+    let tab = enter(&browser, &page, [1440, 900]);
+    let canvas = |tab: &Tab<'_>| {
+        tab.eval("document.getElementById('canvas').toDataURL()")
+            .to_string()
+    };
+    let mut seen = BTreeSet::from([canvas(&tab)]);
+    tab.shot("edges");
+    for mode in [
+        "two_up",
+        "overlay",
+        "onion",
+        "checker",
+        "difference",
+        "reveal",
+    ] {
+        tab.key(mode_key(mode));
+        assert!(seen.insert(canvas(&tab)), "{mode}");
+        assert_eq!(
+            tab.eval(&format!(
+                "document.querySelector('[data-do={mode}]').ariaPressed"
+            )),
+            "true"
+        );
+        tab.shot(mode);
+    }
+    tab.key("KeyE");
+    assert!(!seen.insert(canvas(&tab)), "the edges again");
+    for key in ["KeyD", "KeyS", "BracketRight", "KeyZ"] {
+        tab.key(key);
+        assert!(seen.insert(canvas(&tab)), "{key}");
+        tab.shot(key);
+    }
+    tab.key("KeyZ");
+    tab.key("KeyZ");
+    let still = canvas(&tab);
+    tab.key_down("Space");
+    assert_ne!(canvas(&tab), still);
+    tab.key_up("Space");
+    assert_eq!(canvas(&tab), still);
+    // To look is not to judge.
+    assert_eq!(tab.eval("document.getElementById('bar').value"), 0);
+}
+
+fn mode_key(mode: &str) -> &'static str {
+    match mode {
+        "two_up" => "KeyQ",
+        "overlay" => "KeyW",
+        "onion" => "KeyR",
+        "checker" => "KeyT",
+        "difference" => "KeyY",
+        _ => "KeyV",
+    }
+}
+
+#[test]
+fn two_readers_judge_at_once() {
+    let (Some(first), Some(second)) = (Browser::start(), Browser::start()) else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let pages = ["lan", "minh"].map(|reader| Page::start(&project, reader, &PLAIN));
+    let tabs = [(&first, &pages[0]), (&second, &pages[1])];
+    let tabs = tabs.map(|(browser, page)| enter(browser, page, [1024, 768]));
+    for _ in 0..12 {
+        judge(&tabs[0], "KeyP");
+        judge(&tabs[1], "Digit2");
+    }
+    tabs.iter().for_each(saved);
+    for (reader, verdict) in [("lan", "pass"), ("minh", "fail")] {
+        let acts = standing(&project, reader);
+        assert_eq!(acts.len(), 12, "{reader}");
+        assert!(acts.values().all(|(said, _)| said == verdict), "{acts:?}");
+    }
+    // The second reader's page says nothing of the first one's answers.
+    let history = tabs[1].eval("document.getElementById('history').textContent");
+    assert!(!history.to_string().contains('✓'), "{history}");
+}
+
+#[test]
+fn answers_wait_for_a_server_that_is_gone_and_three_are_enough() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let mut page = Page::start(&project, "lan", &PLAIN);
+    let port = page.address().port().to_string();
+    let tab = enter(&browser, &page, [1024, 768]);
+    judge(&tab, "KeyP");
+    saved(&tab);
+    tab.wait("document.body.dataset.ahead === document.body.dataset.shown");
+    page.kill();
+    for waiting in 1..=3 {
+        let before = shown(&tab);
+        tab.key("KeyP");
+        tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
+        tab.wait(&format!(
+            "document.getElementById('saved').textContent === '{waiting} not saved'"
+        ));
+    }
+    let blocked = shown(&tab);
+    tab.key("KeyP");
+    tab.wait("document.getElementById('alert').textContent.startsWith('3 answers are not saved')");
+    assert_eq!(shown(&tab), blocked);
+    let mut again = PLAIN.to_vec();
+    again.extend(["--port", &port]);
+    let next = Page::start(&project, "lan", &again);
+    let _other = enter(&browser, &next, [1024, 768]);
+    saved(&tab);
+    assert_eq!(standing(&project, "lan").len(), 4);
+    assert_eq!(tab.eval("document.getElementById('alert').hidden"), true);
+}
+
+#[test]
+fn a_relief_is_laid_by_keys_and_mouse() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::start(&project, "lan", &PLAIN);
+    let tab = enter(&browser, &page, [1440, 900]);
+    let pair = tab.eval("document.getElementById('pair').textContent");
+    tab.key("KeyC");
+    tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+    let iou = || {
+        let text = tab.eval("document.getElementById('legend').textContent.split(' ')[1]");
+        text.as_str()
+            .and_then(|text| text.parse::<f64>().ok())
+            .expect("a number")
+    };
+    let before = iou();
+    for _ in 0..5 {
+        tab.key("BracketRight");
+    }
+    let turned = iou();
+    assert!(turned < before, "{turned} {before}");
+    let middle = tab.eval(
+        "(({ left, top, width, height }) => [left + width / 2, top + height / 2])
+            (document.getElementById('canvas').getBoundingClientRect())",
+    );
+    let at = [0, 1].map(|i| middle[i].as_f64().expect("a number"));
+    tab.drag(at, [at[0] + 60.0, at[1]]);
+    assert!(iou() < turned);
+    tab.shot("correction");
+    tab.key("Digit0");
+    assert!((iou() - before).abs() < 1e-9);
+    for _ in 0..5 {
+        tab.key("BracketRight");
+    }
+    tab.key("Enter");
+    tab.wait(
+        "document.getElementById('live').textContent.startsWith('Saved as an alignment by hand')",
+    );
+    mocban(project.dir(), &["export", "-o", "out"]).expect(0);
+    let lines = std::fs::read_to_string(project.dir().join("out/pairs.jsonl")).expect("lines");
+    let lines = lines
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    let mine: Vec<Value> = lines.filter(|line| line["id"] == pair).collect();
+    let angle = |map: &Value| {
+        let at = |row: usize| map[row][0].as_f64().expect("a number");
+        at(1).atan2(at(0)).to_degrees()
+    };
+    let turns = mine.iter().map(|line| {
+        let turn = angle(&line["by_hand"]["print_from_depth"]) - angle(&line["print_from_depth"]);
+        (turn + 540.0).rem_euclid(360.0) - 180.0
+    });
+    let turns: Vec<f64> = turns.collect();
+    assert!(
+        turns.iter().any(|turn| (turn - 5.0).abs() < 1e-6),
+        "{turns:?}"
+    );
+    assert!(
+        standing(&project, "lan").is_empty(),
+        "a correction is no verdict"
+    );
+}
+
+#[test]
+fn a_note_is_typed_with_keys_that_judge_and_judges_nothing() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::start(&project, "lan", &[&PLAIN[..], &["--lang", "vi"]].concat());
+    let tab = enter(&browser, &page, [1024, 768]);
+    tab.shot("vietnamese");
+    tab.key("KeyN");
+    tab.wait("document.activeElement.id === 'note'");
+    tab.key("KeyP");
+    tab.text("nét mờ");
+    tab.key("Enter");
+    assert_eq!(tab.eval("document.getElementById('bar').value"), 0);
+    judge(&tab, "KeyP");
+    tab.wait("document.getElementById('saved').textContent === 'đã lưu ✓'");
+    let told = mocban(project.dir(), &["verdict", "log"]).expect(0);
+    assert!(
+        told.out.lines().all(|line| line.contains("nét mờ")),
+        "{}",
+        told.out
+    );
+    // The same place a second time is too soon where a least time is set.
+    let slow = [
+        "--controls",
+        "0",
+        "--repeats",
+        "0",
+        "--min-view-ms",
+        "60000",
+    ];
+    let page = Page::start(&project, "minh", &slow);
+    let tab = enter(&browser, &page, [1024, 768]);
+    tab.key("KeyP");
+    tab.wait("document.getElementById('live').textContent === 'Look first'");
+    assert!(standing(&project, "minh").is_empty());
+}
+
+#[test]
+fn axe_finds_nothing_serious() {
+    let Some(axe) = std::env::var_os("AXE_JS") else {
+        eprintln!("skipped: AXE_JS names no axe.min.js");
+        return;
+    };
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let axe = std::fs::read_to_string(axe).expect("axe.min.js");
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    for (language, size) in [("en", [1440, 900]), ("vi", [1024, 768])] {
+        let page = Page::start(
+            &project,
+            language,
+            &[&PLAIN[..], &["--lang", language]].concat(),
+        );
+        let tab = enter(&browser, &page, size);
+        judge(&tab, "Digit1");
+        judge(&tab, "KeyP");
+        tab.eval(&format!("{axe}; null"));
+        for opened in ["", "KeyH", "Escape", "KeyJ"] {
+            if !opened.is_empty() {
+                tab.key(opened);
+            }
+            let found = tab.eval(
+                "axe.run().then(({ passes, violations }) => ({
+                    passes: passes.length,
+                    serious: violations.filter(({ impact }) => ['serious', 'critical'].includes(impact)).map(
+                        ({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(' ')}`),
+                }))",
+            );
+            assert!(found["passes"].as_u64() > Some(10), "{found}");
+            assert_eq!(
+                found["serious"],
+                serde_json::json!([]),
+                "{language} after {opened:?}"
+            );
+        }
+    }
+}

@@ -1,0 +1,269 @@
+//! The review page under attack: what does not come from its own page is refused, each for its own reason.
+
+use mocban::store::Project;
+use serde_json::{Value, json};
+
+use crate::cli::mocban;
+use crate::page::{Page, Reply, answer, read_project, send};
+
+struct World {
+    page: Page,
+    item: Value,
+    project: Project,
+    _dir: tempfile::TempDir,
+}
+
+impl World {
+    fn new() -> Self {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let project = read_project(&dir);
+        let page = Page::open(&project, "lan", &[]);
+        let item = page.deck().remove(0);
+        Self {
+            page,
+            item,
+            project,
+            _dir: dir,
+        }
+    }
+
+    /// A verdict as the page sends it, but for one header: another value, or none.
+    fn with(&self, header: &str, value: Option<&str>) -> Reply {
+        let mut headers = self.page.headers();
+        headers.retain(|(name, _)| *name != header);
+        if let Some(value) = value {
+            let known = ["host", "cookie", "origin", "content-type", "x-mocban-word"];
+            let name = known
+                .into_iter()
+                .find(|name| *name == header)
+                .expect("a header");
+            headers.push((name, value.to_owned()));
+        }
+        let body = answer("e1", &self.item, "pass").to_string();
+        let to = self.page.address();
+        send(to, "POST", "/api/answer", &headers, body.as_bytes()).expect("a reply")
+    }
+
+    /// Nothing of all that was sent is stored; and then the same with everything right is.
+    fn nothing_is_stored(&self) {
+        let log = || mocban(self.project.dir(), &["verdict", "log"]).expect(0);
+        assert_eq!(log().out, "");
+        let body = answer("e1", &self.item, "pass");
+        let stored = self.page.post("/api/answer", &body).expect("a reply");
+        assert_eq!(stored.status, 200);
+    }
+}
+
+#[test]
+fn a_foreign_host_is_refused_before_all_else() {
+    let world = World::new();
+    let port = world.page.address().port();
+    for host in [
+        Some("evil.example"),
+        Some("127.0.0.1"),
+        Some("127.0.0.1:1"),
+        Some("localhost.evil.example"),
+        Some(""),
+        None,
+    ] {
+        let status = world.with("host", host).status;
+        assert!([400, 421].contains(&status), "{host:?}: {status}");
+    }
+    let rebound = format!("evil.example:{port}");
+    let same = [
+        ("host", rebound.clone()),
+        ("origin", format!("http://{rebound}")),
+    ];
+    for path in [
+        "/",
+        "/start?token=x",
+        "/api/deck",
+        "/assets/main.js",
+        "/picture/a/print",
+    ] {
+        let reply = send(world.page.address(), "GET", path, &same, b"").expect("a reply");
+        assert_eq!(reply.status, 421, "{path}");
+    }
+    world.nothing_is_stored();
+}
+
+#[test]
+fn localhost_by_name_is_ours() {
+    let world = World::new();
+    let named = format!("localhost:{}", world.page.address().port());
+    let headers = [("host", named), ("cookie", world.page.cookie.clone())];
+    let reply = send(world.page.address(), "GET", "/", &headers, b"").expect("a reply");
+    assert_eq!(reply.status, 200);
+}
+
+#[test]
+fn a_foreign_or_missing_origin_is_refused() {
+    let world = World::new();
+    let port = world.page.address().port();
+    let near = format!("http://127.0.0.1:{}", port.wrapping_add(1));
+    let secure = format!("https://127.0.0.1:{port}");
+    for origin in [
+        None,
+        Some("http://evil.example"),
+        Some("null"),
+        Some(&*near),
+        Some(&*secure),
+    ] {
+        assert_eq!(world.with("origin", origin).status, 403, "{origin:?}");
+    }
+    world.nothing_is_stored();
+}
+
+#[test]
+fn without_the_cookie_there_is_nothing() {
+    let world = World::new();
+    for cookie in [None, Some("mocban_review=x"), Some("")] {
+        assert_eq!(world.with("cookie", cookie).status, 401, "{cookie:?}");
+    }
+    let headers = [("host", world.page.host.clone())];
+    let picture = format!(
+        "/picture/{}/print",
+        world.item["id"].as_str().expect("an id")
+    );
+    for path in [
+        "/",
+        "/api/deck",
+        "/api/boot",
+        "/assets/main.js",
+        &picture,
+        "/nowhere",
+    ] {
+        let reply = send(world.page.address(), "GET", path, &headers, b"").expect("a reply");
+        assert_eq!(reply.status, 401, "{path}");
+    }
+    world.nothing_is_stored();
+}
+
+#[test]
+fn the_token_opens_once() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let page = Page::start(&read_project(&dir), "lan", &[]);
+    let start = &page.url["http://".len() + page.host.len()..];
+    assert_eq!(page.get("/start?token=guess").status, 403);
+    let first = page.get(start);
+    assert_eq!(first.status, 200);
+    let cookie = first.header("set-cookie").expect("a cookie");
+    for wanted in ["HttpOnly", "SameSite=Strict", "Path=/"] {
+        assert!(cookie.contains(wanted), "{cookie}");
+    }
+    let second = page.get(start);
+    assert_eq!(second.status, 403);
+    assert_eq!(second.header("set-cookie"), None);
+}
+
+#[test]
+fn a_write_without_the_pages_word_is_refused() {
+    let world = World::new();
+    for word in [None, Some(""), Some("guess")] {
+        assert_eq!(world.with("x-mocban-word", word).status, 403, "{word:?}");
+    }
+    world.nothing_is_stored();
+}
+
+#[test]
+fn a_body_that_a_form_can_send_is_refused() {
+    let world = World::new();
+    for kind in [
+        None,
+        Some("text/plain"),
+        Some("application/x-www-form-urlencoded"),
+        Some("text/plain; application/json"),
+        Some("application/ld+json"),
+    ] {
+        assert_eq!(world.with("content-type", kind).status, 415, "{kind:?}");
+    }
+    world.nothing_is_stored();
+}
+
+#[test]
+fn a_large_body_is_refused() {
+    let world = World::new();
+    let mut body = answer("e1", &world.item, "pass");
+    body["note"] = Value::String("x".repeat(1 << 20));
+    let reply = world.page.post("/api/answer", &body).expect("a reply");
+    assert_eq!(reply.status, 413);
+    world.nothing_is_stored();
+}
+
+#[test]
+fn paths_lead_nowhere_but_to_what_is_named() {
+    let world = World::new();
+    let id = world.item["id"].as_str().expect("an id");
+    let pair = world.item["pair"].as_str().expect("a name");
+    assert_eq!(world.page.get(&format!("/picture/{id}/print")).status, 200);
+    for path in [
+        "/assets/../Cargo.toml",
+        "/assets/..%2f..%2fcatalog.sqlite",
+        "/assets/%2e%2e/main.js",
+        "/assets//etc/passwd",
+        "/../catalog.sqlite",
+        "/catalog.sqlite",
+        &format!("/picture/{pair}/print"),
+        &format!("/picture/{id}/..%2f..%2fcatalog.sqlite"),
+        &format!("/picture/{id}/print.png"),
+        "/picture/..%2f..%2fetc/passwd",
+        "/picture/%00/print",
+    ] {
+        let status = world.page.get(path).status;
+        assert!([400, 404].contains(&status), "{path}: {status}");
+    }
+}
+
+#[test]
+fn other_methods_and_senseless_answers_are_refused() {
+    let world = World::new();
+    let headers = world.page.headers();
+    for method in ["PUT", "DELETE", "PATCH"] {
+        let reply = send(world.page.address(), method, "/api/answer", &headers, b"");
+        assert_eq!(reply.expect("a reply").status, 405, "{method}");
+    }
+    let good = answer("e1", &world.item, "pass");
+    for (field, value, status) in [
+        ("item", json!("nothing"), 404),
+        ("verdict", json!("maybe"), 422),
+        ("reason", json!("angle"), 422),
+        ("event", json!("a b"), 422),
+        ("event", json!(""), 422),
+        ("angle_read_deg", json!(900), 422),
+        ("note", json!("x".repeat(2001)), 422),
+        ("reader", json!("somebody else"), 422),
+    ] {
+        let mut body = good.clone();
+        body[field] = value;
+        let reply = world.page.post("/api/answer", &body).expect("a reply");
+        assert_eq!(reply.status, status, "{field}");
+    }
+    let others = world.page.post("/api/undo", &json!({ "event": "never" }));
+    assert_eq!(others.expect("a reply").status, 404);
+    world.nothing_is_stored();
+}
+
+#[test]
+fn every_answer_carries_the_policy() {
+    let world = World::new();
+    let refused = world.with("host", Some("evil.example"));
+    for reply in [world.page.get("/"), world.page.get("/api/deck"), refused] {
+        let policy = reply.header("content-security-policy").expect("a policy");
+        assert!(policy.starts_with("default-src 'none';"), "{policy}");
+        assert!(!policy.contains("unsafe"), "{policy}");
+        assert_eq!(reply.header("x-content-type-options"), Some("nosniff"));
+        assert_eq!(reply.header("referrer-policy"), Some("no-referrer"));
+        assert_eq!(reply.header("cache-control"), Some("no-store"));
+        assert_eq!(reply.header("access-control-allow-origin"), None);
+    }
+}
+
+#[test]
+fn a_readers_name_is_text_and_no_markup() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let name = "<script>alert('lan')</script>&\"";
+    let page = Page::open(&read_project(&dir), name, &[]);
+    let html = String::from_utf8(page.get("/").body).expect("UTF-8");
+    assert!(!html.contains("<script>alert"), "{html}");
+    assert!(html.contains("&lt;script&gt;alert('lan')&lt;/script&gt;&amp;&quot;"));
+}

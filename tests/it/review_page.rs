@@ -1,0 +1,351 @@
+//! What the review page's server stores and tells: bound to what was seen, blind, the same after a restart.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use mocban::catalog::{Catalog, ControlAnswer, StoredAlignment};
+use mocban::domain::{Reason, Verdict};
+use mocban::store::Project;
+use serde_json::{Value, json};
+
+use crate::cli::{Call, mocban};
+use crate::page::{Page, answer, read_project};
+
+/// Reads something of a project's catalog.
+fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -> T {
+    let runtime = tokio::runtime::Runtime::new().expect("a runtime");
+    runtime.block_on(async {
+        let catalog = Catalog::open_read_only(&project.catalog_path()).await;
+        let catalog = catalog.expect("the catalog");
+        let found = read(&catalog).await;
+        catalog.close().await;
+        found
+    })
+}
+
+fn controls(project: &Project) -> Vec<ControlAnswer> {
+    ask(project, async |catalog| {
+        catalog.control_answers().await.expect("answers")
+    })
+}
+
+fn alignments(project: &Project) -> Vec<StoredAlignment> {
+    ask(project, async |catalog| {
+        catalog.hand_alignments().await.expect("alignments")
+    })
+}
+
+fn log(project: &Project) -> Vec<Value> {
+    let told = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
+    let lines = told.out.lines().map(serde_json::from_str);
+    lines.collect::<Result<_, _>>().expect("JSON lines")
+}
+
+fn set(project: &Project, args: &[&str]) -> Call {
+    mocban(project.dir(), &[&["verdict", "set"], args].concat()).expect(0)
+}
+
+#[test]
+fn page_and_command_line_write_the_same_events() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::open(&project, "lan", &["--controls", "0", "--repeats", "0"]);
+    let item = page.deck().remove(0);
+    let mut body = answer("e1", &item, "fail");
+    body["reason"] = json!("strokes_lost");
+    body["note"] = json!(" mờ ở góc ");
+    body["angle_read_deg"] = json!(-4.5);
+    for is_new in [true, false] {
+        let reply = page.post("/api/answer", &body).expect("a reply");
+        assert_eq!((reply.status, &reply.json()["new"]), (200, &json!(is_new)));
+    }
+    let written = log(&project);
+    assert!((1..=4).contains(&written.len()), "{written:?}");
+    for event in &written {
+        assert_eq!(event["pair"], item["pair"]);
+        assert_eq!(event["reason"], "strokes_lost");
+        assert_eq!(event["note"], "mờ ở góc");
+        assert_eq!(event["angle_read_deg"], -4.5);
+        assert_eq!(event["shown_ms"], 1200);
+        assert_eq!(event["queue"], "random");
+        assert_eq!(event["current"], true);
+        assert!(event["seen"].is_string());
+    }
+    let answered = |page: &Page| page.deck()[0]["answer"]["verdict"].clone();
+    assert_eq!(answered(&page), "fail");
+    mocban(project.dir(), &["verdict", "undo", "--reader", "lan"]).expect(0);
+    assert_eq!(answered(&page), Value::Null);
+    let pair = item["pair"].as_str().expect("a name");
+    set(&project, &[pair, "pass", "--reader", "lan"]);
+    assert_eq!(answered(&page), "pass");
+    let event = page.deck()[0]["answer"]["event"].clone();
+    let undone = page
+        .post("/api/undo", &json!({ "event": event }))
+        .expect("a reply");
+    assert_eq!(undone.status, 200);
+    assert_eq!(answered(&page), Value::Null);
+}
+
+#[test]
+fn order_names_and_pictures_are_the_same_after_a_restart_and_others_for_another_reader() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let first = Page::open(&project, "lan", &[]);
+    let again = Page::open(&project, "lan", &[]);
+    let other = Page::open(&project, "minh", &[]);
+    assert_eq!(first.deck(), again.deck());
+    let ids = |page: &Page| -> BTreeSet<String> {
+        let deck = page.deck();
+        deck.iter().map(|item| item["id"].to_string()).collect()
+    };
+    assert!(ids(&first).is_disjoint(&ids(&other)));
+    let pairs = |page: &Page| -> Vec<Value> {
+        page.deck()
+            .iter()
+            .map(|item| item["pair"].clone())
+            .collect()
+    };
+    assert_ne!(pairs(&first), pairs(&other));
+}
+
+#[test]
+fn results_that_look_the_same_are_one_card() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::open(&project, "lan", &["--controls", "0", "--repeats", "0"]);
+    let deck = page.deck();
+    for (i, item) in deck.iter().enumerate() {
+        let reply = page.post("/api/answer", &answer(&format!("e{i}"), item, "pass"));
+        assert_eq!(reply.expect("a reply").status, 200);
+    }
+    // Every result has its verdict though some were shown together.
+    let report = mocban(project.dir(), &["report", "--format", "json"])
+        .expect(0)
+        .json();
+    let rows = report["rows"].as_array().expect("rows");
+    for row in rows {
+        assert_eq!(row["read"], 15, "{row}");
+    }
+    assert!(deck.len() < 15 * rows.len(), "{} cards", deck.len());
+}
+
+#[test]
+fn planted_faults_are_stored_apart_and_nothing_in_the_page_tells_them() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::open(&project, "lan", &["--controls", "50", "--repeats", "20"]);
+    let deck = page.deck();
+    let mut shapes: BTreeMap<bool, BTreeSet<String>> = BTreeMap::new();
+    for (i, item) in deck.iter().enumerate() {
+        let before = controls(&project).len();
+        let reply = page.post("/api/answer", &answer(&format!("e{i}"), item, "pass"));
+        let is_control = controls(&project).len() > before;
+        // The same fields of the same form, whatever it is.
+        let keys: Vec<_> = item.as_object().expect("fields").keys().cloned().collect();
+        let mut told = reply.expect("a reply").json();
+        told["stored"] = json!("");
+        shapes
+            .entry(is_control)
+            .or_default()
+            .insert(format!("{keys:?} {told}"));
+        if i % 9 == 0 {
+            let id = item["id"].as_str().expect("an id");
+            let about = page.get(&format!("/api/about/{id}")).json();
+            let fields: Vec<_> = about.as_object().expect("fields").keys().cloned().collect();
+            assert_eq!(fields, ["dice", "iou", "metrics", "others"]);
+            assert_eq!(about["others"], json!([]));
+        }
+    }
+    assert_eq!(shapes[&true], shapes[&false]);
+    let controls = controls(&project);
+    let faults = controls
+        .iter()
+        .filter(|answer| answer.control.is_fault())
+        .count();
+    assert!(
+        faults > 5 && controls.len() > faults,
+        "{faults} of {}",
+        controls.len()
+    );
+    assert_eq!(
+        log(&project)
+            .iter()
+            .filter(|event| event["current"] == false)
+            .count(),
+        0
+    );
+    let whole = [
+        page.get("/").body,
+        page.get("/api/deck").body,
+        page.get("/api/boot").body,
+    ]
+    .concat();
+    let whole = String::from_utf8(whole).expect("UTF-8");
+    for word in [
+        "control",
+        "planted",
+        "repeat",
+        "turned\"",
+        "nl_ssim",
+        "ensemble",
+        "confidence",
+    ] {
+        assert!(!whole.contains(word), "the page says {word}");
+    }
+    // Read again, everything is answered: controls and repeats as well.
+    assert!(
+        page.deck()
+            .iter()
+            .all(|item| item["answer"]["verdict"] == "pass")
+    );
+}
+
+#[test]
+fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let first = Page::open(&project, "lan", &["--controls", "0", "--repeats", "0"]);
+    let item = first.deck().remove(0);
+    first
+        .post("/api/answer", &answer("e1", &item, "pass"))
+        .expect("a reply");
+    let pair = item["pair"].as_str().expect("a name");
+    set(
+        &project,
+        &[pair, "fail", "--reader", "minh", "--reason", "angle"],
+    );
+    let adjudicate = |reader: &str| Page::open(&project, reader, &["--adjudicate"]);
+    assert!(
+        adjudicate("lan").deck().is_empty(),
+        "who is party cannot settle"
+    );
+    let third = adjudicate("hoa");
+    let deck = third.deck();
+    assert_eq!(deck.len(), 1);
+    let about = format!("/api/about/{}", deck[0]["id"].as_str().expect("an id"));
+    assert_eq!(third.get(&about).status, 403);
+    third
+        .post("/api/answer", &answer("h1", &deck[0], "fail"))
+        .expect("a reply");
+    let told = third.get(&about).json();
+    let said: BTreeSet<String> = told["others"]
+        .as_array()
+        .expect("others")
+        .iter()
+        .map(|other| format!("{} {}", other["reader"], other["verdict"]))
+        .collect();
+    let wanted = ["\"lan\" \"pass\"", "\"minh\" \"fail\""].map(str::to_owned);
+    assert_eq!(said, BTreeSet::from(wanted));
+    assert!(adjudicate("dung").deck().is_empty(), "it is settled");
+    let log = log(&project);
+    let word = log.iter().filter(|event| event["reader"] == "hoa");
+    assert!(word.clone().count() > 0);
+    for event in word {
+        assert_eq!(event["queue"], "adjudicate");
+    }
+    assert!(
+        log.iter()
+            .any(|event| event["reader"] == "lan" && event["undone_at"] == Value::Null)
+    );
+}
+
+#[test]
+fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::open(&project, "lan", &["--controls", "0"]);
+    let item = page.deck().remove(0);
+    let id = item["id"].as_str().expect("an id");
+    let start = page.get(&format!("/api/correction/{id}")).json();
+    let mut map = start["view_from_depth"].clone();
+    let body = |event: &str, map: &Value| json!({ "event": event, "item": id, "view_from_depth": map, "note": "x" });
+    let unmoved = page
+        .post("/api/align", &body("a0", &map))
+        .expect("a reply")
+        .json();
+    for flat in [
+        json!([[0, 0, 0], [0, 0, 0]]),
+        json!([[1, 0, 1e30], [0, 1, 0]]),
+    ] {
+        let refused = page
+            .post("/api/align", &body("a9", &flat))
+            .expect("a reply");
+        assert_eq!(refused.status, 422, "{flat}");
+    }
+    map[0][2] = json!(map[0][2].as_f64().expect("a number") + 40.0);
+    for _ in 0..2 {
+        let moved = page
+            .post("/api/align", &body("a1", &map))
+            .expect("a reply")
+            .json();
+        assert!(
+            moved["iou"].as_f64() < unmoved["iou"].as_f64(),
+            "{moved} {unmoved}"
+        );
+    }
+    let stored = alignments(&project);
+    assert_eq!(stored.len(), 2);
+    let [first, second] = [&stored[0].made, &stored[1].made];
+    assert!(
+        stored
+            .iter()
+            .all(|alignment| alignment.holds && alignment.on_current_depth)
+    );
+    let [a, b] = [first, second].map(|made| made.print_from_depth.apply([10.0, 20.0]));
+    assert!(
+        b[0] > a[0] + 1.0 && (a[1] - b[1]).abs() < 1e-9,
+        "{a:?} {b:?}"
+    );
+    mocban(project.dir(), &["export", "-o", "out"]).expect(0);
+    let log = std::fs::read_to_string(project.dir().join("out/alignments.jsonl")).expect("a log");
+    assert_eq!(log.lines().count(), 2);
+    // An export with all it may hold is replaced as any other.
+    mocban(project.dir(), &["export", "-o", "out"]).expect(0);
+    let lines = std::fs::read_to_string(project.dir().join("out/pairs.jsonl")).expect("lines");
+    let lines = lines
+        .lines()
+        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+    for line in lines {
+        if line["id"] != item["pair"] {
+            assert_eq!(line["by_hand"], Value::Null);
+            continue;
+        }
+        let by_hand = &line["by_hand"];
+        assert_eq!(by_hand["reader"], "lan");
+        assert_eq!(by_hand["print_from_mesh"], json!(second.print_from_mesh));
+        assert_ne!(by_hand["print_from_mesh"], line["print_from_mesh"]);
+    }
+    let undone = page
+        .post("/api/undo", &json!({ "event": "a1" }))
+        .expect("a reply");
+    assert_eq!(undone.status, 200);
+    assert!(alignments(&project)[1].undone_at.is_some());
+}
+
+#[test]
+fn a_result_that_changed_meanwhile_is_not_shown_but_what_was_seen_is_stored() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::open(&project, "lan", &["--controls", "0"]);
+    let item = page.deck().remove(0);
+    let smaller = ["--set", "depth.longest_px=80", "run", "--rerun", "stale"];
+    mocban(project.dir(), &smaller).expect(0);
+    let id = item["id"].as_str().expect("an id");
+    assert_eq!(page.get(&format!("/picture/{id}/print")).status, 410);
+    let mut body = answer("e1", &item, "fail");
+    body["reason"] = json!("wrong_pair");
+    assert_eq!(
+        page.post("/api/answer", &body).expect("a reply").status,
+        200
+    );
+    let log = log(&project);
+    assert!(!log.is_empty() && log.iter().all(|event| event["current"] == false));
+    let detail = ask(&project, async |catalog| {
+        let events = catalog.verdict_log(None).await.expect("a log");
+        events
+            .into_iter()
+            .map(|event| (event.verdict, event.reason))
+            .next()
+    });
+    assert_eq!(detail, Some((Verdict::Fail, Some(Reason::WrongPair))));
+    assert_ne!(page.deck()[0]["id"], item["id"]);
+}
