@@ -13,6 +13,7 @@ mod copy;
 mod counters;
 mod error;
 mod fail;
+mod gather;
 mod holder;
 mod lease;
 mod mend;
