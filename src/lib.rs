@@ -4,9 +4,9 @@
 //!
 //! A **pair** is one character: a mesh of the carved block and an image of its print. Its **job** is the way
 //! through four **stages**, `fit`, `depth`, `normalize` and `register`. A worker leases the pair, runs the stages
-//! that are left and writes a **checkpoint** after each: files first, then one short transaction. The stages are
-//! pure functions; the catalog is the only place with SQL, the store the only one with artifact files, and the
-//! runner ties the two to the stages.
+//! that are left and writes a **checkpoint** after each, while the next is computed: files first, then one short
+//! transaction. The stages are pure functions; the catalog is the only place with SQL, the store the only one with
+//! artifact files, and the runner ties the two to the stages.
 //!
 //! To follow one pair: [`manifest`] reads its line, [`catalog`] keeps it, [`runner`] leases it and calls
 //! [`stages`] with what [`mesh`] and [`raster`] decoded, [`store`] and [`catalog`] take the results, and

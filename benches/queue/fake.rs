@@ -88,14 +88,22 @@ impl Fake {
             outcome,
             files,
             metrics,
-            inputs: InputsSeen {
-                mesh: Some(self.mesh.clone()),
-                print: sees_print.then(|| self.print.clone()),
-            },
+            inputs: self.seen(stage),
             ms: 1,
             at: 1,
             next_deadline: 2_000,
             alive_since: 0,
+        }
+    }
+
+    /// Input files as a run tells of them: with the stage that reads them first.
+    fn seen(&self, stage: Stage) -> InputsSeen {
+        if stage > Stage::Fit {
+            return InputsSeen::default();
+        }
+        InputsSeen {
+            mesh: Some(self.mesh.clone()),
+            print: Some(self.print.clone()),
         }
     }
 }

@@ -68,3 +68,17 @@ pub(super) fn forget_peak() {
     // Where that is refused the peak is that of the whole life, which is no less.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
+
+/// Time that the threads of this process which live now have been on a core.
+pub(super) fn time_of_threads() -> anyhow::Result<Duration> {
+    let mut sum = Duration::ZERO;
+    for thread in std::fs::read_dir("/proc/self/task")? {
+        // One that ends meanwhile is none that lives.
+        let Ok(text) = std::fs::read_to_string(thread?.path().join("schedstat")) else {
+            continue;
+        };
+        let ns = text.split_whitespace().next().context("a time")?;
+        sum += Duration::from_nanos(ns.parse()?);
+    }
+    Ok(sum)
+}

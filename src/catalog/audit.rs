@@ -8,7 +8,7 @@ use sqlx::{ConnectOptions as _, Row as _, SqliteConnection};
 
 use super::alike::{misremembered, unnoted};
 use super::work::{self, KnownInputs};
-use super::{Catalog, Result, Trouble, connect, results, rows};
+use super::{Catalog, CatalogError, Result, Trouble, connect, results, rows};
 use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
 
 /// Lines of each check that are read at most.
@@ -100,11 +100,16 @@ impl Catalog {
     /// When the check cannot be made.
     pub async fn integrity(&self, quick: bool) -> Result<Vec<String>> {
         let mut conn = self.reader().await?;
-        let lines = integrity(&mut conn, quick).await;
-        lines.or_else(|error| match error.trouble() {
-            Some(Trouble::Damaged | Trouble::NotADatabase) => Ok(vec![error.to_string()]),
-            _ => Err(error),
-        })
+        match integrity(&mut conn, quick).await {
+            Ok(lines) if lines.iter().any(|line| is_unread(line)) => {
+                Err(CatalogError::Unread(self.path.to_path_buf()))
+            }
+            Err(error) => match error.trouble() {
+                Some(Trouble::Damaged | Trouble::NotADatabase) => Ok(vec![error.to_string()]),
+                _ => Err(error),
+            },
+            lines => lines,
+        }
     }
 
     /// Rows that name a row that is not there, at most 50.
@@ -229,6 +234,13 @@ pub(super) async fn integrity(conn: &mut SqliteConnection, quick: bool) -> Resul
     Ok(lines)
 }
 
+/// Whether a line of SQLite's check says that the disk refused to read a page: that tells nothing of the page.
+fn is_unread(line: &str) -> bool {
+    let code = line.rsplit_once("error code=").map(|(_, code)| code.trim());
+    let code: Option<i64> = code.and_then(|code| code.parse().ok());
+    code.and_then(Trouble::of_code) == Some(Trouble::Disk)
+}
+
 /// Tables, indexes and triggers by kind and name, with the statement that makes each.
 pub(super) async fn objects(conn: &mut SqliteConnection) -> Result<BTreeMap<String, String>> {
     let found: Vec<(String, String)> = sqlx::query_as(OBJECTS).fetch_all(conn).await?;
@@ -276,4 +288,23 @@ async fn stored(
         of_pair.insert(stage, result);
     }
     Ok(results)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_unread;
+
+    #[test]
+    fn a_page_that_the_disk_does_not_give_is_told_from_one_that_is_wrong() {
+        // SQLITE_IOERR_READ and SQLITE_CORRUPT.
+        assert!(is_unread(
+            "Tree 5 page 7: unable to get the page. error code=266"
+        ));
+        assert!(!is_unread(
+            "Tree 5 page 7: unable to get the page. error code=11"
+        ));
+        assert!(!is_unread(
+            "Tree 5 page 7: btreeInitPage() returns error code 11"
+        ));
+    }
 }

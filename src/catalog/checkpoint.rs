@@ -7,6 +7,7 @@ use super::batch::Request;
 use super::counters::{DONE, Deltas, cursor};
 use super::lease::{InputsSeen, Kept, Lease, StageDone};
 use super::script::Script;
+use super::writer::Message;
 use super::{Catalog, Result};
 use crate::breakpoint::{self, Point};
 use crate::domain::{ContentHash, JobStatus, MetricOutcome, PairId, UnixMillis};
@@ -98,7 +99,13 @@ pub(super) fn store(
     }
     over(script, &[RESULT], done.iter().map(|item| result(item)))?;
     let attempts = done.iter().map(|item| attempt(item));
-    over(script, &[ATTEMPT, CLEAR_FAILURE], attempts)?;
+    over(script, &[ATTEMPT], attempts)?;
+    let suspects = done.iter().filter(|(lease, _)| !lease.cleared);
+    over(
+        script,
+        &[CLEAR_FAILURE],
+        suspects.map(|(lease, _)| [lease.pair.0]),
+    )?;
     let metrics = done.iter().flat_map(|item| metrics(item));
     over(script, &[CLEAR_METRICS, METRICS], metrics)?;
     let seen = done.iter().map(|(lease, done)| (lease, &done.inputs));
@@ -259,15 +266,42 @@ impl Catalog {
     /// # Errors
     /// When the database refuses; then nothing is stored and the lease stands until it is rescued.
     pub async fn checkpoint(&self, lease: Lease, done: StageDone) -> Result<Kept> {
+        self.store(lease, done, Message::Grouped).await
+    }
+
+    /// [`Catalog::checkpoint`] that may take some milliseconds longer, for others to share its commit; until somebody
+    /// is in a [`Catalog::hurry`].
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn checkpoint_in_time(&self, lease: Lease, done: StageDone) -> Result<Kept> {
+        self.store(lease, done, Message::InTime).await
+    }
+
+    /// Has stored at once what was sent before.
+    ///
+    /// # Errors
+    /// When the catalog is closed.
+    pub async fn hurry(&self) -> Result<()> {
+        self.send(Message::Hurry).await
+    }
+
+    async fn store(
+        &self,
+        lease: Lease,
+        done: StageDone,
+        message: fn(Request) -> Message,
+    ) -> Result<Kept> {
         let next = done.stage.next();
         let moved = next.map(|cursor| Lease {
             cursor,
             attempt: 1,
             crashes: 0,
+            cleared: true,
             ..copy(&lease)
         });
         let kept = self
-            .grouped(|reply| Request::Checkpoint(Box::new((lease, done)), reply))
+            .answered(|reply| message(Request::Checkpoint(Box::new((lease, done)), reply)))
             .await?;
         Ok(match (kept, moved) {
             (false, _) => Kept::Lost,

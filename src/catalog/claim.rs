@@ -165,6 +165,7 @@ fn lease(row: &SqliteRow, worker: WorkerId) -> Result<Lease> {
         attempt: row.try_get("attempt")?,
         crashes: row.try_get("crashes")?,
         alone: row.try_get::<i64, _>("mem_class")? == 1,
+        cleared: false,
     })
 }
 
@@ -227,11 +228,20 @@ impl Catalog {
 
     /// Sends a request into the next group commit and waits for the answer.
     pub(super) async fn grouped<T>(&self, request: impl FnOnce(Reply<T>) -> Request) -> Result<T> {
-        let inbox = self.writer()?;
+        self.answered(|reply| Message::Grouped(request(reply)))
+            .await
+    }
+
+    /// Sends the writer a message and waits for the answer.
+    pub(super) async fn answered<T>(&self, message: impl FnOnce(Reply<T>) -> Message) -> Result<T> {
         let (sender, receiver) = oneshot::channel();
-        if inbox.send(Message::Grouped(request(sender))).await.is_err() {
-            return Err(CatalogError::Closed);
-        }
+        self.send(message(sender)).await?;
         receiver.await.unwrap_or(Err(CatalogError::Closed))
+    }
+
+    /// Sends the writer a message.
+    pub(super) async fn send(&self, message: Message) -> Result<()> {
+        let sent = self.writer()?.send(message).await;
+        sent.or(Err(CatalogError::Closed))
     }
 }

@@ -45,6 +45,11 @@ pub enum CatalogError {
         "{0} is damaged: some of it is not what the database wrote, or the disk cannot read it; `check` tells how far it can be read, and a backup can take its place"
     )]
     Damaged(PathBuf),
+    /// The disk would not give some of it.
+    #[error(
+        "{0}: the disk refused to read some of it, so it is not known whether it is whole; look after the disk and call again"
+    )]
+    Unread(PathBuf),
     /// There was no file, and none can be made.
     #[error("{0} cannot be made: its folder takes no new file, or the disk refuses")]
     NotMade(PathBuf),

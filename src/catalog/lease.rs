@@ -17,6 +17,8 @@ pub struct Lease {
     pub(super) attempt: u32,
     pub(super) crashes: u32,
     pub(super) alone: bool,
+    /// Whether a stage was stored under it, so that no failure is known of the pair any more.
+    pub(super) cleared: bool,
 }
 
 impl Lease {

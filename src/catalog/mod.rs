@@ -15,6 +15,7 @@ mod copy;
 mod counters;
 mod error;
 mod fail;
+mod gather;
 mod holder;
 mod lease;
 mod look;

@@ -13,6 +13,7 @@ mod staleness;
 mod verdicts;
 
 use serde_json::{Map, json};
+use tokio::sync::oneshot;
 
 use super::{
     Again, Catalog, ClaimRequest, Dead, ImportRow, InputSeen, InputsSeen, Kept, Lease,
@@ -22,6 +23,28 @@ use crate::domain::{
     Affine2, ArtifactSet, ContentHash, MetricOutcome, PairName, RegisterOutcome, Scores, Stage,
     ThresholdMetric, UnixMillis, WorkerId,
 };
+
+impl Catalog {
+    /// Keeps the writer busy from now on, until the sender is used or dropped.
+    pub(crate) async fn hold(&self) -> oneshot::Sender<()> {
+        let (held, is_held) = oneshot::channel();
+        let (release, released) = oneshot::channel();
+        let catalog = self.clone();
+        tokio::spawn(async move {
+            let wait = catalog.alone(move |_| {
+                Box::pin(async move {
+                    held.send(()).expect("somebody waits");
+                    // Dropped or used: both let go.
+                    let _ = released.await;
+                    Ok(())
+                })
+            });
+            wait.await.expect("an empty transaction");
+        });
+        is_held.await.expect("the writer is at work");
+        release
+    }
+}
 
 /// A catalog in a directory of its own.
 struct World {

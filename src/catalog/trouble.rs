@@ -25,7 +25,7 @@ pub enum Trouble {
 
 impl Trouble {
     /// By SQLite's result code, extended ones included.
-    const fn of_code(code: i64) -> Option<Self> {
+    pub(super) const fn of_code(code: i64) -> Option<Self> {
         match code & 0xff {
             // The last is of a reader that others kept out while the log was looked through.
             5 | 6 | 15 => Some(Self::Busy),

@@ -9,11 +9,10 @@ use sqlx::{Connection as _, SqliteConnection};
 use tokio::sync::{mpsc, oneshot};
 
 use super::batch::{Answers, Batch, Request};
+use super::gather::{COMPANY, gather};
 use super::patience::Patience;
 use super::{CatalogError, Result, Trouble};
 
-/// Most requests in one commit.
-const BATCH: usize = 256;
 /// Commits after which the write-ahead log is folded back even while there is work; about 4 MiB of log.
 const COMMITS_PER_CHECKPOINT: u32 = 128;
 /// How long nothing must come in before the log is folded back.
@@ -28,6 +27,10 @@ pub(super) type Alone = Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> Work
 pub(super) enum Message {
     /// Goes into the next group commit.
     Grouped(Request),
+    /// The same, but that commit may wait a little for others to share it.
+    InTime(Request),
+    /// Somebody waits for what was sent before: the next commit is to wait no longer.
+    Hurry,
     /// Runs in its own transaction.
     Alone(Alone),
     /// Ends the writer when all before it is done.
@@ -56,13 +59,15 @@ pub(super) async fn run(
             None => break None,
             Some(Message::Close(done)) => break Some(done),
             Some(Message::Alone(work)) => work(&mut conn).await,
-            Some(Message::Grouped(first)) => {
-                let (batch, after) = gather(first, &mut inbox).await;
+            // What it was sent for is stored already.
+            Some(Message::Hurry) => continue,
+            Some(first @ (Message::Grouped(_) | Message::InTime(_))) => {
+                let (batch, after) = gather(first, COMPANY, &mut inbox).await;
                 commit(&mut conn, &path, batch).await;
                 match after {
                     Some(Message::Close(done)) => break Some(done),
                     Some(Message::Alone(work)) => work(&mut conn).await,
-                    Some(Message::Grouped(_)) | None => {}
+                    Some(Message::Grouped(_) | Message::InTime(_) | Message::Hurry) | None => {}
                 }
             }
         }
@@ -79,27 +84,6 @@ pub(super) async fn run(
     if let Some(done) = closing {
         // Whoever asked may have gone; then nobody needs the answer.
         let _ = done.send(());
-    }
-}
-
-/// All requests that wait, up to the first message that is not one. Whoever was answered by the last commit is given
-/// the turn first: the next request is often already on its way.
-async fn gather(first: Request, inbox: &mut mpsc::Receiver<Message>) -> (Batch, Option<Message>) {
-    let mut batch = Batch::default();
-    batch.push(first);
-    loop {
-        tokio::task::yield_now().await;
-        let before = batch.len();
-        while batch.len() < BATCH {
-            match inbox.try_recv() {
-                Ok(Message::Grouped(request)) => batch.push(request),
-                Ok(other) => return (batch, Some(other)),
-                Err(_) => break,
-            }
-        }
-        if batch.len() == before || batch.len() == BATCH {
-            return (batch, None);
-        }
     }
 }
 

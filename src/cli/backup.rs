@@ -41,13 +41,19 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
         Ok(bytes) => Some(prepare(&settings_file, &bytes)?),
         Err(_) => None,
     };
-    // All of it is written before the first takes its name, and the catalog takes its name last.
-    place(&log, &verdicts_file(file))?;
-    match &settings {
-        Some(partial) => place(partial, &settings_file)?,
-        None => remove(&settings_file)?,
+    // All of it is written before the first takes its name, and the catalog takes its name last. When one is refused
+    // its name, those beside the catalog go back to what they were.
+    let earlier = [verdicts_file(file), settings_file.clone()].map(|file| Earlier::keep(&file));
+    let placed = place(&log, &verdicts_file(file))
+        .and_then(|()| match &settings {
+            Some(partial) => place(partial, &settings_file),
+            None => remove(&settings_file),
+        })
+        .and_then(|()| place(&partial, file));
+    if placed.is_err() {
+        earlier.iter().flatten().for_each(Earlier::put_back);
     }
-    place(&partial, file)?;
+    placed?;
     let bytes = std::fs::metadata(file)?.len();
     if context.global.json {
         talk::print_json(&json!({
@@ -88,6 +94,40 @@ impl Partial {
 impl Drop for Partial {
     fn drop(&mut self) {
         self.clear();
+    }
+}
+
+/// A file of an earlier backup, which has a second name until the new backup is whole.
+struct Earlier {
+    file: PathBuf,
+    kept: Partial,
+    was_there: bool,
+}
+
+impl Earlier {
+    /// `None` where the file cannot be kept; then a refused name leaves the new one there.
+    fn keep(file: &Path) -> Option<Self> {
+        let mut name = file.as_os_str().to_owned();
+        name.push(".earlier");
+        let kept = Partial::of(Path::new(&name));
+        let was_there = file.exists();
+        let is_kept = !was_there
+            || std::fs::hard_link(file, &kept.0).is_ok()
+            || std::fs::copy(file, &kept.0).is_ok();
+        is_kept.then(|| Self {
+            file: file.to_owned(),
+            kept,
+            was_there,
+        })
+    }
+
+    fn put_back(&self) {
+        // What was refused is told already; more than trying cannot be done about this.
+        let _ = if self.was_there {
+            std::fs::rename(&self.kept.0, &self.file)
+        } else {
+            std::fs::remove_file(&self.file)
+        };
     }
 }
 

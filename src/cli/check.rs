@@ -1,5 +1,9 @@
 //! `check`: the project held against itself, and mended where it is asked for.
 
+use std::fs::File;
+use std::io;
+use std::path::Path;
+
 use anyhow::Context as _;
 use clap::Args;
 
@@ -8,9 +12,10 @@ use super::exit::ExitCode;
 use super::table::{Align, columns, count};
 use super::talk::{self, Palette, Tone};
 use super::trouble;
+use crate::catalog::CatalogError;
 use crate::check::{CheckOptions, CheckSummary, Finding, Kind, Notes, Spare, check as look};
 use crate::runner::RunError;
-use crate::store::{LockError, Project, RunLock};
+use crate::store::{CATALOG_FILE, LockError, Project, RunLock};
 
 /// Arguments of `check`.
 #[derive(Debug, Args)]
@@ -27,11 +32,15 @@ pub(super) struct CheckArgs {
 const NAMED: usize = 5;
 
 pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let checked = if args.repair {
-        repair(&args, context).await
-    } else {
-        read(&args, context).await
-    };
+    let mut checked = once(&args, context).await;
+    if is_of_database(&checked) {
+        // The database calls some reads that the disk refused damage, so it is looked at twice, and at the disk itself.
+        checked = once(&args, context).await;
+    }
+    let path = context.dir().join(CATALOG_FILE);
+    if is_of_database(&checked) && !can_be_read(&path) {
+        return Err(CatalogError::Unread(path).into());
+    }
     let summary = match checked {
         Ok(summary) => summary,
         Err(error) => return unreadable(error, context),
@@ -49,6 +58,31 @@ pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
     } else {
         ExitCode::Done
     })
+}
+
+async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummary> {
+    if args.repair {
+        repair(args, context).await
+    } else {
+        read(args, context).await
+    }
+}
+
+/// Whether the database itself is said to be damaged.
+fn is_of_database(checked: &anyhow::Result<CheckSummary>) -> bool {
+    match checked {
+        Ok(summary) => summary.damage.contains_key(&Kind::Database) && summary.left() > 0,
+        Err(error) => {
+            let error = error.chain().find_map(trouble::of_catalog);
+            error.is_some_and(trouble::is_damaged_file)
+        }
+    }
+}
+
+/// Whether the disk gives every byte of a file.
+fn can_be_read(path: &Path) -> bool {
+    let read = File::open(path).and_then(|mut file| io::copy(&mut file, &mut io::sink()));
+    read.is_ok()
 }
 
 /// Looks without changing anything, also while a run goes on.

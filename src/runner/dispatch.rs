@@ -1,23 +1,23 @@
 //! The run's loop: keeps the slots filled, hears what comes back, looks after the queue.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
-use tokio::task::JoinSet;
+use tokio::task::{JoinError, JoinSet};
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
-use super::budget::{self, Budget};
+use super::ahead::InHand;
+use super::budget::Budget;
 use super::events::RunEvent;
 use super::options::RunOptions;
 use super::policy::{self, Liveness};
 use super::refresh;
 use super::stop::StopLevel;
-use super::worker::{PairEnd, PairReport, Shared, work};
+use super::worker::{Over, PairEnd, PairReport, Shared};
 use super::{RunError, this_process};
-use crate::catalog::{ClaimRequest, Dead, KnownInputs, Lease, Outstanding, PairSelection};
-use crate::domain::{PairId, UnixMillis, WorkerId};
+use crate::catalog::{Dead, Outstanding, PairSelection};
+use crate::domain::{PairName, UnixMillis, WorkerId};
 use crate::raster;
 
 /// Between two looks for pairs that others give back or whose back-off is over.
@@ -35,20 +35,23 @@ pub(super) struct Tally {
 /// The loop's own state.
 pub(super) struct Dispatch {
     pub(super) shared: Arc<Shared>,
-    worker: WorkerId,
+    pub(super) worker: WorkerId,
     pub(super) workers: usize,
     pub(super) among: Option<PairSelection>,
     pub(super) max_failures: Option<u64>,
-    images: raster::Limits,
-    /// Pairs in hand, each with the memory it was given.
-    tasks: JoinSet<(PairReport, u64)>,
-    budget: Budget,
+    pub(super) images: raster::Limits,
+    /// Pairs that are computed, each with its name and the memory it was given.
+    pub(super) tasks: JoinSet<(Over, PairName, u64)>,
+    /// Pairs whose last checkpoint is on its way.
+    endings: JoinSet<PairReport>,
+    pub(super) in_hand: InHand,
+    pub(super) budget: Budget,
     /// The next pair waits for memory that somebody must give back first.
-    short: bool,
+    pub(super) short: bool,
     /// A pair that nothing may run beside is in hand.
-    alone: bool,
+    pub(super) alone: bool,
     /// Whether a claim may find something that the last one did not.
-    look: bool,
+    pub(super) look: bool,
     /// When this worker last showed that it lives, by the run's clock.
     last_beat: UnixMillis,
     liveness: Liveness,
@@ -74,6 +77,8 @@ impl Dispatch {
             max_failures: options.max_failures,
             images: options.image_limits,
             tasks: JoinSet::new(),
+            endings: JoinSet::new(),
+            in_hand: InHand::default(),
             budget: Budget::new(options.memory),
             short: false,
             alone: false,
@@ -105,8 +110,12 @@ impl Dispatch {
                 biased;
                 () = shared.stop.reached(next_level(self.told)), if self.told < StopLevel::Now => self.tell_stop(),
                 _ = beats.tick() => self.beat().await?,
-                Some(event) = events.recv() => on_event(event),
-                Some(ended) = self.tasks.join_next() => self.take(ended),
+                Some(event) = events.recv() => {
+                    self.observe(&event);
+                    on_event(event);
+                }
+                Some(over) = self.tasks.join_next() => self.take(unwound(over)),
+                Some(report) = self.endings.join_next() => self.count(unwound(report)),
                 _ = rescues.tick() => self.rescue().await?,
                 _ = looks.tick(), if self.tasks.len() < self.workers => self.look_again().await?,
             }
@@ -123,87 +132,34 @@ impl Dispatch {
     /// Fills the slots; whether nothing is in hand and nothing can come.
     async fn is_over(&mut self) -> Result<bool, RunError> {
         if self.shared.is_draining() || self.fatal.is_some() {
-            return Ok(self.tasks.is_empty());
+            self.give_back().await?;
+            return Ok(self.is_idle());
         }
-        if !self.look || self.alone || self.short || self.tasks.len() >= self.workers {
+        if self.alone || self.short {
+            return Ok(false);
+        }
+        self.begin().await?;
+        let wanted = self.wanted();
+        if !self.look || self.short || wanted == 0 {
             return Ok(false);
         }
         self.look = false;
-        self.claim(false).await?;
-        if !self.tasks.is_empty() {
+        self.claim(wanted, false).await?;
+        if !self.is_idle() {
             return Ok(false);
         }
         // Nothing ordinary is left or in hand: now the pairs that must run by themselves, one at a time.
-        self.claim(true).await?;
-        if !self.tasks.is_empty() {
+        self.claim(1, true).await?;
+        if !self.is_idle() {
             return Ok(false);
         }
         let left = self.outstanding().await?;
         Ok(left.ready == 0 && left.leased == 0 && left.backoff == 0)
     }
 
-    async fn claim(&mut self, alone: bool) -> Result<(), RunError> {
-        let shared = &self.shared;
-        let slots = if alone {
-            1
-        } else {
-            self.workers - self.tasks.len()
-        };
-        let leases = shared
-            .catalog
-            .claim(ClaimRequest {
-                worker: self.worker,
-                slots,
-                until: shared.until,
-                alone,
-                among: self.among.clone(),
-                deadline: shared.deadline(),
-                alive_since: shared.alive_since(),
-            })
-            .await?;
-        self.alone = alone && !leases.is_empty();
-        let needs = self.needs(&leases).await?;
-        for lease in leases {
-            let need = needs.get(&lease.pair()).copied().unwrap_or(0);
-            // Those after one that must wait wait too, so that it is not passed over for ever.
-            self.short = self.short || !self.budget.give(need);
-            if self.short {
-                self.shared.catalog.release(lease).await?;
-            } else {
-                let work = work(Arc::clone(&self.shared), lease);
-                self.tasks.spawn(async move { (work.await, need) });
-            }
-        }
-        Ok(())
-    }
-
-    /// Memory that leased pairs may need.
-    async fn needs(&self, leases: &[Lease]) -> Result<BTreeMap<PairId, u64>, RunError> {
-        if leases.is_empty() || !self.budget.is_limited() {
-            return Ok(BTreeMap::new());
-        }
-        let pairs: Vec<_> = leases.iter().map(Lease::pair).collect();
-        let among = PairSelection::of(&pairs);
-        let catalog = &self.shared.catalog;
-        let inputs = catalog
-            .known_inputs(None, pairs.len(), Some(&among))
-            .await?;
-        let from: BTreeMap<_, _> = leases
-            .iter()
-            .map(|lease| (lease.pair(), lease.cursor()))
-            .collect();
-        let (project, images) = (self.shared.project.clone(), self.images);
-        let look = move || {
-            let need = |inputs: KnownInputs| {
-                let need = budget::need(&project, &inputs, from[&inputs.pair], &images);
-                (inputs.pair, need)
-            };
-            inputs.into_iter().map(need).collect()
-        };
-        match tokio::task::spawn_blocking(look).await {
-            Ok(needs) => Ok(needs),
-            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
-        }
+    /// Whether nothing is computed or on its way.
+    fn is_idle(&self) -> bool {
+        self.tasks.is_empty() && self.endings.is_empty()
     }
 
     async fn outstanding(&self) -> Result<Outstanding, RunError> {
@@ -214,16 +170,22 @@ impl Dispatch {
             .await?)
     }
 
-    /// Takes in how a pair ended.
-    fn take(&mut self, ended: Result<(PairReport, u64), tokio::task::JoinError>) {
+    /// Takes in that a pair's computing is over.
+    fn take(&mut self, (over, name, need): (Over, PairName, u64)) {
         self.alone = false;
         self.short = false;
         self.look = true;
-        let (report, need) = match ended {
-            Ok(ended) => ended,
-            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
-        };
         self.budget.take_back(need);
+        self.in_hand.over(&name);
+        match over {
+            Over::Ended(report) => self.count(report),
+            Over::Storing(held) => drop(self.endings.spawn(held.report(Ok(PairEnd::Done)))),
+        }
+    }
+
+    /// Takes in how a pair ended.
+    fn count(&mut self, report: PairReport) {
+        self.look = true;
         self.tally.stages += report.stages;
         match report.end {
             PairEnd::Done => self.tally.done += 1,
@@ -300,6 +262,7 @@ impl Dispatch {
     /// Takes a new number. What is in hand under the old one can no longer be stored; its pairs are ready again.
     async fn enter_anew(&mut self, now: UnixMillis) -> Result<(), RunError> {
         tracing::warn!("held up past the end of its leases: the stages in hand run again");
+        self.give_back().await?;
         let catalog = &self.shared.catalog;
         let old = self.worker;
         catalog.end_worker(old, now).await?;
@@ -334,6 +297,14 @@ impl Dispatch {
             self.shared.tell(RunEvent::Rescued { pairs: rescued });
         }
         Ok(())
+    }
+}
+
+/// What a task gave; its panic is ours.
+fn unwound<T>(ended: Result<T, JoinError>) -> T {
+    match ended {
+        Ok(ended) => ended,
+        Err(panic) => std::panic::resume_unwind(panic.into_panic()),
     }
 }
 

@@ -1,5 +1,7 @@
 //! What a run tells while it goes on, and at its end.
 
+use std::time::Duration;
+
 use crate::catalog::StatusCounts;
 use crate::domain::{Failure, PairName, Stage};
 
@@ -93,6 +95,8 @@ pub struct RunSummary {
     pub stopped: bool,
     /// Set when it drained because of `max_failures`.
     pub too_many_failures: bool,
+    /// Time that threads were at work on stages, computing and writing their files, all together.
+    pub at_work: Duration,
     /// Wall time in milliseconds.
     pub elapsed_ms: u64,
     /// Counts of the project at the end.

@@ -39,11 +39,27 @@ pub(super) enum Ended {
     NotFiled(ArtifactError),
 }
 
+/// How long a stage took.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Took {
+    /// To compute.
+    computing: Duration,
+    /// To compute and to file what it gave.
+    pub(super) all: Duration,
+}
+
+impl Took {
+    /// Computing time in milliseconds.
+    pub(super) const fn ms(&self) -> u64 {
+        self.computing.as_millis() as u64
+    }
+}
+
 /// What came back from the thread.
 #[derive(Debug)]
 pub(super) enum Computed {
-    /// The pair, how the stage ended, and the computing time in milliseconds.
-    Ended(Box<PairInHand>, Ended, u64),
+    /// The pair, how the stage ended, and how long it took.
+    Ended(Box<PairInHand>, Ended, Took),
     /// The stage panicked; the pair in hand is lost with it.
     Panicked(String),
     /// The system gave no thread for it; the pair in hand is lost.
@@ -78,7 +94,7 @@ pub(super) async fn compute(
     tokio::select! {
         biased;
         outcome = receiver => match outcome {
-            Ok(Ok((pair, ended, ms))) => Computed::Ended(pair, ended, ms),
+            Ok(Ok((pair, ended, took))) => Computed::Ended(pair, ended, took),
             Ok(Err(payload)) => Computed::Panicked(panic_text(&*payload)),
             Err(_) => Computed::Panicked("the stage's thread ended without a word".to_owned()),
         },
@@ -92,10 +108,10 @@ fn run(
     project: &Project,
     stage: Stage,
     mut pair: Box<PairInHand>,
-) -> (Box<PairInHand>, Ended, u64) {
+) -> (Box<PairInHand>, Ended, Took) {
     let begun = Instant::now();
     let outcome = steps.run(stage, &mut pair);
-    let ms = begun.elapsed().as_millis() as u64;
+    let computing = begun.elapsed();
     let ended = match outcome {
         Err(setback) => Ended::Setback(setback),
         Ok(output) => {
@@ -107,7 +123,8 @@ fn run(
             }
         }
     };
-    (pair, ended, ms)
+    let all = begun.elapsed();
+    (pair, ended, Took { computing, all })
 }
 
 /// Names what is on disk by its hashes, and keeps it in hand as later stages would find it stored.

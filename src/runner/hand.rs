@@ -32,6 +32,8 @@ pub(super) struct PairInHand {
     pub(super) stored: BTreeMap<Stage, Stored>,
     /// Input files as read by this worker.
     pub(super) inputs: InputsSeen,
+    /// What of those was given to the catalog with a stage.
+    pub(super) told: InputsSeen,
     /// The mesh, from fit to depth.
     pub(super) mesh: Option<Mesh>,
     /// The print, from the first stage that reads it to normalize.
@@ -61,12 +63,22 @@ impl PairInHand {
             facts_text: work.facts_text,
             stored: stored.collect(),
             inputs: InputsSeen::default(),
+            told: InputsSeen::default(),
             mesh: None,
             print: None,
             fit: None,
             depth: None,
             normalized: None,
         }
+    }
+
+    /// Input files as read, if the catalog was not given them with an earlier stage.
+    pub(super) fn news(&mut self) -> InputsSeen {
+        if self.told == self.inputs {
+            return InputsSeen::default();
+        }
+        self.told = self.inputs.clone();
+        self.told.clone()
     }
 
     /// The stored outcome of a stage; `None` when it is not there or not of this type any more.

@@ -1,14 +1,17 @@
 //! The run: workers that lease pairs, run the stages that are left, and checkpoint after each.
 //!
-//! [`run`] prepares (lock, dead workers' leases, changed inputs and settings), then `dispatch` keeps the slots filled,
-//! `worker` takes one pair through its stages, and `execute` is the one bridge to the threads that compute.
+//! [`run`] prepares (lock, dead workers' leases, changed inputs and settings), then `dispatch` keeps the slots filled
+//! with what `ahead` takes, `worker` takes one pair through its stages, `held` has each stored while the next is
+//! computed, and `execute` is the one bridge to the threads that compute.
 
+mod ahead;
 mod budget;
 mod clock;
 mod dispatch;
 mod events;
 mod execute;
 mod hand;
+mod held;
 mod options;
 mod outputs;
 mod pipeline;
@@ -22,6 +25,8 @@ mod timing;
 mod worker;
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
 
 use tokio::sync::mpsc;
 
@@ -178,8 +183,10 @@ async fn run_steps(
         until: options.until,
         stage_limit: options.stage_limit,
         events,
+        at_work_us: AtomicU64::new(0),
     };
-    let mut dispatch = Dispatch::new(Arc::new(shared), worker, among.clone(), options);
+    let shared = Arc::new(shared);
+    let mut dispatch = Dispatch::new(Arc::clone(&shared), worker, among.clone(), options);
     let outcome = dispatch.run(&mut received, &mut on_event).await;
     // Said also after an error, so that this worker's end is not taken for a crash.
     let ended = catalog.end_worker(dispatch.worker(), clock.now()).await;
@@ -187,7 +194,7 @@ async fn run_steps(
     ended?;
     let status = catalog.status(recipes).await?;
     let left = catalog.work_left(options.until, among.as_ref()).await?;
-    Ok(summary(&tally, left, status, clock, stop))
+    Ok(summary(&tally, left, status, &shared))
 }
 
 /// Sends back what changed and what is asked for, and makes ready what is due.
@@ -273,22 +280,17 @@ async fn selection(
     Ok(Some(catalog.select(names).await?))
 }
 
-fn summary(
-    tally: &Tally,
-    left: WorkLeft,
-    status: StatusCounts,
-    clock: Clock,
-    stop: &Stop,
-) -> RunSummary {
+fn summary(tally: &Tally, left: WorkLeft, status: StatusCounts, shared: &Shared) -> RunSummary {
     RunSummary {
         done: tally.done,
         failed: tally.failed,
         stages: tally.stages,
         left: left.pairs,
         failed_in_all: left.quarantined,
-        stopped: left.pairs > 0 && stop.level() > StopLevel::Go,
+        stopped: left.pairs > 0 && shared.stop.level() > StopLevel::Go,
         too_many_failures: tally.too_many_failures,
-        elapsed_ms: clock.elapsed_ms(),
+        at_work: Duration::from_micros(shared.at_work_us.load(Ordering::Relaxed)),
+        elapsed_ms: shared.clock.elapsed_ms(),
         status,
     }
 }

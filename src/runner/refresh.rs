@@ -18,20 +18,19 @@ pub(super) async fn inputs(
     catalog: &Catalog,
     among: Option<&PairSelection>,
 ) -> Result<(), RunError> {
-    let mut after = None;
-    loop {
-        let page = catalog.known_inputs(after, PAGE, among).await?;
-        let Some(last) = page.last() else {
-            return Ok(());
-        };
-        after = Some(last.pair);
+    let mut page = catalog.known_inputs(None, PAGE, among).await?;
+    while let Some(last) = page.last() {
+        let after = Some(last.pair);
         let project = project.clone();
         let look = move || -> Vec<_> {
             page.into_par_iter()
                 .filter_map(|known| changed(&project, &known))
                 .collect()
         };
-        let moved = match tokio::task::spawn_blocking(look).await {
+        // The next ones are read while the files of these are looked at.
+        let looking = tokio::task::spawn_blocking(look);
+        page = catalog.known_inputs(after, PAGE, among).await?;
+        let moved = match looking.await {
             Ok(moved) => moved,
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
@@ -39,6 +38,7 @@ pub(super) async fn inputs(
             catalog.store_inputs(moved).await?;
         }
     }
+    Ok(())
 }
 
 /// Notes what the files of pairs are that killed their workers before any stage could tell.

@@ -1,5 +1,6 @@
 //! The run with made-up stages: what becomes of pairs that fail, hang, panic, or are stopped.
 
+mod ahead;
 mod made_up;
 
 use std::sync::atomic::Ordering;

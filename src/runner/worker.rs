@@ -1,6 +1,7 @@
 //! One pair's way: the stages that are left, a checkpoint after each.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use tokio::sync::mpsc;
@@ -10,6 +11,7 @@ use super::clock::Clock;
 use super::events::RunEvent;
 use super::execute::{Computed, Ended, Filed, compute};
 use super::hand::PairInHand;
+use super::held::Held;
 use super::policy::{self, Try};
 use super::refresh;
 use super::steps::{Setback, Steps};
@@ -17,7 +19,7 @@ use super::stop::{Stop, StopLevel};
 use super::timing::Timing;
 use crate::breakpoint::{self, Point};
 use crate::catalog::{
-    Catalog, InputsSeen, Kept, Lease, RecipeIds, Sentence, StageDone, StageFailed,
+    Catalog, InputsSeen, Lease, PairWork, RecipeIds, Sentence, StageDone, StageFailed,
 };
 use crate::domain::{Failure, FailureClass, PairName, Stage, UnixMillis};
 use crate::store::Project;
@@ -36,6 +38,8 @@ pub(super) struct Shared {
     pub(super) until: Stage,
     pub(super) stage_limit: Duration,
     pub(super) events: mpsc::UnboundedSender<RunEvent>,
+    /// Microseconds that threads of stages were at work.
+    pub(super) at_work_us: AtomicU64,
 }
 
 /// How a pair left its worker.
@@ -111,34 +115,46 @@ impl Shared {
         self.clock.now() - self.timing.lease_ms()
     }
 
+    fn note(&self, computed: &Computed) {
+        if let Computed::Ended(_, _, took) = computed {
+            let us = took.all.as_micros() as u64;
+            self.at_work_us.fetch_add(us, Ordering::Relaxed);
+        }
+    }
+
     pub(super) fn tell(&self, event: RunEvent) {
         // The run may have ended by an error; then nobody listens any more.
         let _ = self.events.send(event);
     }
 }
 
-/// Takes a leased pair through the stages that are left.
-pub(super) async fn work(shared: Arc<Shared>, lease: Lease) -> PairReport {
-    let mut stages = 0;
-    match through(&shared, lease, &mut stages).await {
-        Ok(end) => PairReport {
-            end,
-            stages,
-            fatal: None,
-        },
-        Err(error) => PairReport {
-            end: PairEnd::GivenBack,
-            stages,
-            fatal: Some(error),
-        },
+/// A pair that its thread is done with.
+pub(super) enum Over {
+    /// All is stored.
+    Ended(PairReport),
+    /// Its last checkpoint is on its way: what is left is a [`Held::report`].
+    Storing(Held),
+}
+
+/// Takes a leased pair through the stages that are left. Each is computed while the checkpoint of the one before is on
+/// its way to the disk.
+pub(super) async fn work(shared: Arc<Shared>, lease: Lease, work: PairWork) -> Over {
+    let stage = lease.cursor();
+    let pair = Box::new(PairInHand::new(work));
+    breakpoint::reach(stage, Point::Claimed, Some(&pair.facts.name));
+    let mut held = Held::new(Arc::clone(&shared), pair.facts.name.clone(), lease);
+    match through(&shared, &mut held, stage, pair).await {
+        Ok(PairEnd::Done) if held.is_storing() => Over::Storing(held),
+        end => Over::Ended(held.report(end).await),
     }
 }
 
-async fn through(shared: &Shared, lease: Lease, stages: &mut u64) -> Result<PairEnd, RunError> {
-    let mut stage = lease.cursor();
-    let mut pair = Box::new(PairInHand::new(shared.catalog.work(&lease).await?));
-    let mut lease = lease;
-    breakpoint::reach(stage, Point::Claimed, Some(&pair.facts.name));
+async fn through(
+    shared: &Shared,
+    held: &mut Held,
+    mut stage: Stage,
+    mut pair: Box<PairInHand>,
+) -> Result<PairEnd, RunError> {
     loop {
         let known = Known::of(&pair);
         let (back, done) = match step(shared, stage, pair).await {
@@ -147,32 +163,18 @@ async fn through(shared: &Shared, lease: Lease, stages: &mut u64) -> Result<Pair
                 (pair, stage) = (back, earlier);
                 continue;
             }
-            Step::Failed(blame) => return fail(shared, lease, stage, known, blame).await,
-            Step::Stopped => {
-                shared.catalog.release(lease).await?;
-                return Ok(PairEnd::GivenBack);
-            }
-            Step::Refused(error) => {
-                shared.catalog.release(lease).await?;
-                return Err(error);
-            }
+            Step::Failed(blame) => return fail(shared, held, stage, known, blame).await,
+            Step::Stopped => return Ok(PairEnd::GivenBack),
+            Step::Refused(error) => return Err(error),
         };
-        let ms = done.ms;
-        let kept = shared.catalog.checkpoint(lease, *done).await?;
-        if !matches!(kept, Kept::Lost) {
-            *stages += 1;
-            finished(shared, known.name, stage, ms);
-        }
-        lease = match kept {
-            Kept::Lost => return Ok(PairEnd::Lost),
-            Kept::Done => return Ok(PairEnd::Done),
-            Kept::Lease(lease) => lease,
+        let Some(lease) = held.lease().await? else {
+            return Ok(PairEnd::Lost);
         };
-        if let Some(end) = rest(shared, stage) {
-            shared.catalog.release(lease).await?;
-            return Ok(end);
+        held.store(lease, *done);
+        match next(shared, stage) {
+            Ok(later) => (pair, stage) = (back, later),
+            Err(end) => return Ok(end),
         }
-        (pair, stage) = (back, lease.cursor());
     }
 }
 
@@ -184,20 +186,22 @@ async fn step(shared: &Shared, stage: Stage, pair: Box<PairInHand>) -> Step {
     });
     let (steps, project) = (&shared.steps, &shared.project);
     let limit = shared.stage_limit;
-    match compute(steps, project, stage, pair, limit, &shared.stop).await {
-        Computed::Ended(pair, Ended::Filed(filed), ms) => {
-            let done = done(shared, &pair, stage, filed, ms);
+    let computed = compute(steps, project, stage, pair, limit, &shared.stop).await;
+    shared.note(&computed);
+    match computed {
+        Computed::Ended(mut pair, Ended::Filed(filed), took) => {
+            let done = done(shared, &mut pair, stage, filed, took.ms());
             Step::Done(pair, Box::new(done))
         }
         Computed::Ended(pair, Ended::Setback(Setback::Back(earlier)), _) => {
             Step::Back(pair, earlier)
         }
-        Computed::Ended(pair, Ended::Setback(Setback::Failed { failure, may_pass }), ms) => {
+        Computed::Ended(pair, Ended::Setback(Setback::Failed { failure, may_pass }), took) => {
             Step::Failed(Blame {
                 failure,
                 may_pass,
                 inputs: Some(pair.inputs),
-                ms: Some(ms),
+                ms: Some(took.ms()),
             })
         }
         Computed::Ended(_, Ended::NotFiled(error), _) => Step::Refused(error.into()),
@@ -214,31 +218,17 @@ async fn step(shared: &Shared, stage: Stage, pair: Box<PairInHand>) -> Step {
     }
 }
 
-/// Whether the pair is put down here although stages are left.
-fn rest(shared: &Shared, done: Stage) -> Option<PairEnd> {
-    if done >= shared.until {
-        Some(PairEnd::Done)
-    } else if shared.is_draining() {
-        Some(PairEnd::GivenBack)
-    } else {
-        None
+/// The stage after this one, or how the pair is put down here.
+fn next(shared: &Shared, done: Stage) -> Result<Stage, PairEnd> {
+    match done.next() {
+        Some(next) if next <= shared.until && shared.is_draining() => Err(PairEnd::GivenBack),
+        Some(next) if next <= shared.until => Ok(next),
+        Some(_) | None => Err(PairEnd::Done),
     }
 }
 
-fn finished(shared: &Shared, pair: PairName, stage: Stage, ms: u64) {
-    breakpoint::reach(stage, Point::Stored, Some(&pair));
-    let last = stage == shared.until.min(Stage::Register);
-    shared.tell(RunEvent::StageFinished {
-        pair: pair.clone(),
-        stage,
-        ms,
-    });
-    if last {
-        shared.tell(RunEvent::PairDone { pair });
-    }
-}
-
-fn done(shared: &Shared, pair: &PairInHand, stage: Stage, filed: Filed, ms: u64) -> StageDone {
+fn done(shared: &Shared, pair: &mut PairInHand, stage: Stage, filed: Filed, ms: u64) -> StageDone {
+    let inputs = pair.news();
     let stored = &pair.stored[&stage];
     StageDone {
         stage,
@@ -250,7 +240,7 @@ fn done(shared: &Shared, pair: &PairInHand, stage: Stage, filed: Filed, ms: u64)
         files: filed.files,
         result_hash: filed.result_hash,
         metrics: filed.metrics,
-        inputs: pair.inputs.clone(),
+        inputs,
         ms,
         at: shared.clock.now(),
         next_deadline: shared.deadline(),
@@ -261,11 +251,14 @@ fn done(shared: &Shared, pair: &PairInHand, stage: Stage, filed: Filed, ms: u64)
 /// Stores a failure and tells of it.
 async fn fail(
     shared: &Shared,
-    lease: Lease,
+    held: &mut Held,
     stage: Stage,
     known: Known,
     blame: Blame,
 ) -> Result<PairEnd, RunError> {
+    let Some(lease) = held.lease().await? else {
+        return Ok(PairEnd::Lost);
+    };
     let inputs = match blame.inputs {
         Some(inputs) => inputs,
         None => known.inputs(&shared.project).await,

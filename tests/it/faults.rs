@@ -103,6 +103,12 @@ const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("read", CATALOG, EIO), End::Refused),
 ];
 
+/// Faults of a check: what cannot be read is not said to be damaged.
+const OF_A_CHECK: &[(Fault, End)] = &[
+    (Fault::once("read", CATALOG, EIO), End::Either),
+    (Fault::once("read", CATALOG, EIO).on(), End::Refused),
+];
+
 /// Faults of a repair.
 const OF_A_REPAIR: &[(Fault, End)] = &[
     (Fault::once("write", WAL, ENOSPC), End::Refused),
@@ -228,18 +234,23 @@ const BACKUP: Deed = Deed {
     before: |world, root| {
         put_done(world, root);
         call(&mut backup(root)).expect(0);
-        std::fs::copy(root.join("b.sqlite"), root.join("earlier")).expect("copied");
+        std::fs::create_dir(root.join("earlier")).expect("a folder");
+        for name in ["b.sqlite", "b.verdicts.jsonl"] {
+            std::fs::copy(root.join(name), root.join("earlier").join(name)).expect("copied");
+        }
         let set = ["-C", "p", "verdict", "set", "upright-0000", "pass"];
         mocban(root, &[&set[..], &["--reader", "lan"]].concat()).expect(0);
     },
     command: backup,
     after: |_, root, done| {
-        let (file, earlier) = (root.join("b.sqlite"), bytes(&root.join("earlier")));
+        let (file, earlier) = (root.join("b.sqlite"), bytes(&root.join("earlier/b.sqlite")));
         let names_are = |wanted: &[&str]| assert_eq!(names(root), wanted);
         let whole = ["b.sqlite", "b.verdicts.jsonl", "earlier", "p"];
         if !done {
             names_are(&whole);
             assert!(bytes(&file) == earlier, "another backup");
+            let [log, earlier] = ["b.verdicts.jsonl", "earlier/b.verdicts.jsonl"];
+            assert_eq!(bytes(&root.join(log)), bytes(&root.join(earlier)));
             call(&mut backup(root)).expect(0);
         }
         call(&mut backup(root)).expect(0);
@@ -261,6 +272,20 @@ fn repair(root: &Path) -> Command {
     command.args(["check", "--repair"]);
     command
 }
+
+fn check(root: &Path) -> Command {
+    let mut command = binary();
+    command.arg("-C").arg(root.join("p")).arg("check");
+    command
+}
+
+const CHECK: Deed = Deed {
+    before: put_done,
+    command: check,
+    after: |_, root, _| {
+        call(&mut check(root)).expect(0);
+    },
+};
 
 const REPAIR: Deed = Deed {
     before: |world, root| {
@@ -308,6 +333,11 @@ fn an_import_or_export_that_the_disk_refuses_leaves_nothing_half_made() {
 #[test]
 fn a_backup_that_the_disk_refuses_leaves_the_earlier_one_in_place() {
     BACKUP.survives_all(OF_A_BACKUP, moments());
+}
+
+#[test]
+fn a_check_that_the_disk_refuses_finds_no_damage() {
+    CHECK.survives_all(OF_A_CHECK, 4 * moments());
 }
 
 #[test]

@@ -69,6 +69,10 @@ impl MadeUp {
                 Ok(())
             }
             "loses" if stage == Stage::Register && tries == 1 => Err(Setback::Back(Stage::Depth)),
+            "lasts" if stage == Stage::Register => {
+                self.wait();
+                Ok(())
+            }
             "wait" => {
                 self.wait();
                 Ok(())

@@ -1,0 +1,98 @@
+//! What goes on while a checkpoint is on its way or a pair is nearly over.
+
+use super::{World, name, options};
+use crate::catalog::Dead;
+use crate::domain::{JobStatus, PairName, Stage, WorkerId};
+use crate::runner::{RunEvent, StopLevel};
+
+impl World {
+    /// Until a stage of a pair has begun.
+    async fn begun(&self, pair: &str, stage: Stage) {
+        while self.steps.count(pair, stage) == 0 {
+            tokio::task::yield_now().await;
+        }
+    }
+
+    /// Where among the events the first one is that is like this.
+    fn position(&self, like: impl Fn(&RunEvent) -> bool) -> Option<usize> {
+        let events = self.events.lock().expect("no panic holds it");
+        events.iter().position(like)
+    }
+}
+
+fn started(event: &RunEvent, wanted: Stage) -> bool {
+    matches!(event, RunEvent::StageStarted { stage, .. } if *stage == wanted)
+}
+
+fn finished(event: &RunEvent, wanted: Stage) -> bool {
+    matches!(event, RunEvent::StageFinished { stage, .. } if *stage == wanted)
+}
+
+#[tokio::test]
+async fn a_stage_is_computed_while_the_one_before_is_stored_and_only_what_is_stored_is_told() {
+    let world = World::new(&["wait_1"]).await;
+    let hold = async {
+        world.begun("wait_1", Stage::Fit).await;
+        let release = world.catalog.hold().await;
+        world.steps.open();
+        world.begun("wait_1", Stage::Depth).await;
+        assert_eq!(world.position(|event| finished(event, Stage::Fit)), None);
+        release.send(()).expect("the writer waits");
+    };
+    let options = options(1);
+    let (summary, ()) = tokio::join!(world.run(&options), hold);
+    assert_eq!((summary.done, summary.stages), (1, 4));
+    // One checkpoint at a time is on its way: the stage after the next waits for it.
+    let fit = world.position(|event| finished(event, Stage::Fit));
+    assert!(fit < world.position(|event| started(event, Stage::Normalize)));
+    assert!(world.position(|event| started(event, Stage::Depth)) < fit);
+}
+
+#[tokio::test]
+async fn nothing_is_stored_of_a_stage_that_was_computed_while_the_lease_was_lost() {
+    let world = World::new(&["wait_1"]).await;
+    let rob = async {
+        world.begun("wait_1", Stage::Fit).await;
+        let nobody = Dead::AllBut(WorkerId(99));
+        let rescued = world.catalog.rescue(nobody, 1).await.expect("a rescue");
+        assert_eq!(rescued.ready, 1);
+        world.steps.open();
+    };
+    let options = options(1);
+    let (summary, ()) = tokio::join!(world.run(&options), rob);
+    assert_eq!((summary.done, summary.stages), (1, 4));
+    assert_eq!(world.steps.count("wait_1", Stage::Fit), 2);
+    let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
+    let attempts = detail.expect("the pair").attempts;
+    let stored = attempts.iter().filter(|attempt| attempt.failure.is_none());
+    assert_eq!(stored.count(), 4);
+}
+
+#[tokio::test]
+async fn the_next_pair_is_taken_ahead_and_given_back_by_a_drain() {
+    let world = World::new(&["lasts_1", "next", "other"]).await;
+    let drain = async {
+        world.begun("lasts_1", Stage::Register).await;
+        while world.status("next").await != JobStatus::Leased {
+            tokio::task::yield_now().await;
+        }
+        assert_eq!(world.stop.escalate(), StopLevel::Drain);
+        while world.status("next").await != JobStatus::Ready {
+            tokio::task::yield_now().await;
+        }
+        world.steps.open();
+    };
+    let options = options(1);
+    let (summary, ()) = tokio::join!(world.run(&options), drain);
+    assert_eq!((summary.done, summary.left), (1, 2));
+    assert_eq!(world.steps.count("next", Stage::Fit), 0);
+    let attempt = async |pair: PairName| {
+        world
+            .catalog
+            .pair(&pair)
+            .await
+            .map(|pair| pair.expect("it").attempt)
+    };
+    assert_eq!(attempt(name("next")).await.expect("a read"), 0);
+    assert_eq!(world.status("other").await, JobStatus::Ready);
+}
