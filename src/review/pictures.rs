@@ -128,34 +128,39 @@ impl Subject {
 #[derive(Debug)]
 pub(super) struct Drawn {
     pub(super) subject: Subject,
-    layers: Vec<Vec<u8>>,
+    print: Vec<u8>,
+    print_mask: Vec<u8>,
+    relief: Vec<u8>,
+    depth_mask: Vec<u8>,
 }
 
 impl Drawn {
     fn of(subject: Subject, print_from_depth: &Affine2) -> Self {
         let view = subject.view();
-        let layers = Layer::ALL.map(|layer| match layer {
-            Layer::Print => png_rgb8(&view.print(&subject.print.picture)),
-            Layer::PrintMask => png_mask(&view.mask(&subject.print_mask, &Affine2::IDENTITY)),
-            Layer::Relief => png_rgb8(&view.relief(&subject.depth, print_from_depth)),
-            Layer::DepthMask => png_mask(&view.mask(&subject.strokes, print_from_depth)),
-            Layer::OwnRelief => {
-                let scale = &subject.depth.scale;
-                let slope = scale.height_per_level / scale.mesh_unit_per_px;
-                png_rgb8(&shaded(&subject.depth.levels, slope))
-            }
-            Layer::OwnMask => png_mask(&subject.strokes),
-        });
         Self {
+            print: png_rgb8(&view.print(&subject.print.picture)),
+            print_mask: png_mask(&view.mask(&subject.print_mask, &Affine2::IDENTITY)),
+            relief: png_rgb8(&view.relief(&subject.depth, print_from_depth)),
+            depth_mask: png_mask(&view.mask(&subject.strokes, print_from_depth)),
             subject,
-            layers: layers.into(),
         }
     }
 
-    /// A picture as PNG.
-    pub(super) fn layer(&self, wanted: Layer) -> &[u8] {
-        let place = Layer::ALL.iter().position(|layer| *layer == wanted);
-        place.map_or(&[], |place| &self.layers[place])
+    /// A picture as PNG. The two of the depth map's own frame are drawn when they are asked for: few cards are
+    /// corrected.
+    pub(super) fn layer(&self, wanted: Layer) -> Vec<u8> {
+        match wanted {
+            Layer::Print => self.print.clone(),
+            Layer::PrintMask => self.print_mask.clone(),
+            Layer::Relief => self.relief.clone(),
+            Layer::DepthMask => self.depth_mask.clone(),
+            Layer::OwnRelief => {
+                let depth = &self.subject.depth;
+                let slope = depth.scale.height_per_level / depth.scale.mesh_unit_per_px;
+                png_rgb8(&shaded(&depth.levels, slope))
+            }
+            Layer::OwnMask => png_mask(&self.subject.strokes),
+        }
     }
 }
 

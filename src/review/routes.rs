@@ -160,7 +160,7 @@ async fn picture(
     let layer = Layer::named(&layer).ok_or(Trouble::NoCard)?;
     let drawn = desk.pictures(&card).await?;
     let kind = [(header::CONTENT_TYPE, "image/png")];
-    Ok((kind, drawn.layer(layer).to_vec()).into_response())
+    Ok((kind, drawn.layer(layer)).into_response())
 }
 
 /// What is told of a card once it is answered: for planted faults and repeats as for all others.
