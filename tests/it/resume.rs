@@ -165,8 +165,9 @@ fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
             .output();
         let died = died.expect("the binary starts");
         assert_eq!(died.status.code(), None, "{point} was not reached");
-        let is_between = point.contains(":written");
-        assert_eq!(half_placed(&broken), usize::from(is_between), "{point}");
+        // The stage after it may have been on its way to the disk meanwhile.
+        let least = usize::from(point.contains(":written"));
+        assert!((least..=1).contains(&half_placed(&broken)), "{point}");
     }
     call(&mut run(&broken, &[])).expect(0);
     assert_eq!(half_placed(&broken), 0);
