@@ -11,7 +11,7 @@ use crate::domain::Affine2;
 use crate::raster::Grid;
 
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
-const SETTLED_PX: f64 = 0.01;
+const SETTLED_PX: f64 = 0.03;
 
 /// Two layers ready to be laid on each other many times.
 pub(in crate::stages) struct Refiner<'a> {
