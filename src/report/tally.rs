@@ -279,7 +279,7 @@ impl TruthColumn {
 }
 
 /// Sum over count; `None` of nothing.
-fn share(sum: f64, n: u64) -> Option<f64> {
+pub(super) fn share(sum: f64, n: u64) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
 

@@ -31,7 +31,7 @@ pub(super) fn render(report: &Report) -> String {
 }
 
 /// A table with its columns padded, words to the left and numbers to the right.
-fn aligned(table: &Table) -> String {
+pub(super) fn aligned(table: &Table) -> String {
     let widths: Vec<usize> = (0..table.columns.len())
         .map(|i| {
             let cells = table
@@ -103,7 +103,7 @@ fn failures(group: &FailureGroup) -> String {
 }
 
 /// Words laid into lines, the first after `mark`, the others under it.
-fn wrapped(mark: &str, words: &str) -> String {
+pub(super) fn wrapped(mark: &str, words: &str) -> String {
     let indent = " ".repeat(mark.chars().count());
     let (mut text, mut line) = (String::new(), mark.to_owned());
     let mut empty = true;
