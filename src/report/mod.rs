@@ -15,6 +15,7 @@ mod gather;
 mod model;
 mod rate;
 mod render;
+mod rules;
 pub(crate) mod standing;
 pub mod stats;
 mod tally;
@@ -30,5 +31,6 @@ pub use model::{
 };
 pub use rate::Rate;
 pub use render::{Format, agree_text, render};
+pub use rules::Rules;
 pub use standing::Standing;
 pub use tally::{Tally, TruthFinding};

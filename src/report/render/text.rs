@@ -74,7 +74,7 @@ fn comparisons(report: &Report) -> String {
 
 fn comparison(found: &Comparison) -> String {
     let (title, basis) = (table::title(found), table::basis(found.basis));
-    let said = format!("{title}, by {basis}: {}\n", found.words);
+    let said = wrapped("", &format!("{title}, by {basis}: {}", found.words));
     let (Some(p), Some(p_holm)) = (found.p, found.p_holm) else {
         return said;
     };
@@ -193,6 +193,22 @@ Angle, landmarks and mask IoU are medians.
         for line in text.lines() {
             assert!(line.chars().count() <= 80, "{line:?}");
         }
+    }
+
+    #[test]
+    fn three_rules_stand_side_by_side_where_two_have_read() {
+        let mut tally = Tally::default();
+        for (name, second) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
+            let pair = fixture::done(name, 0.75, &[Verdict::Pass, second]);
+            tally.add(&pair, &TruthFinding::default());
+        }
+        let text = render(&tally.finish());
+        let wanted = "\
+Rules              twice  either  n  settled  n   both  n
+Non-luminous SSIM      2   0.500  2    1.000  1  1.000  2
+";
+        assert!(text.contains(wanted), "{text}");
+        assert!(!render(&report()).contains("Rules"));
     }
 
     #[test]
