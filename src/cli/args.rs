@@ -7,8 +7,8 @@ use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 
 use super::exit::ExitCode;
 use super::{
-    backup, check, completions, config, demo, export, import, man, report, retry, review, run,
-    sheet, show, status, verdict,
+    agree, backup, check, completions, config, demo, export, import, man, report, retry, review,
+    run, sheet, show, status, verdict,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -163,6 +163,8 @@ pub(super) enum Command {
     Verdict(verdict::VerdictCommand),
     /// Judge results in the browser, by keys, and lay reliefs by hand
     Review(review::ReviewArgs),
+    /// Tell how far readers agree, with each other and with themselves, and which faults they catch
+    Agree(agree::AgreeArgs),
     /// Print the table of all results
     Report(report::ReportArgs),
     /// Write the aligned pairs for other tools

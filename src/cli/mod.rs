@@ -1,5 +1,6 @@
 //! The command line: one thin file a command.
 
+mod agree;
 mod args;
 mod backup;
 mod check;
@@ -156,6 +157,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Backup(args) => backup::backup(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
         Command::Review(args) => review::review(args, context).await,
+        Command::Agree(args) => agree::agree(args, context).await,
         Command::Report(args) => report::report(args, context).await,
         Command::Export(args) => export::export(args, context).await,
         Command::Sheet(args) => sheet::sheet(args, context).await,

@@ -2,7 +2,7 @@
 
 use serde::de::DeserializeOwned;
 
-use crate::catalog::{PairResults, StageRecord};
+use crate::catalog::{MetricRecord, PairResults, StageRecord};
 use crate::domain::role::{DEPTH, PRINT_MASK};
 use crate::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, PrintFromMesh, Stage,
@@ -150,4 +150,20 @@ impl<'a> Aligned<'a> {
 /// Whether two metrics came to the same threshold and place, so that all their pictures are the same.
 pub fn same_alignment(a: &MetricOutcome, b: &MetricOutcome) -> bool {
     a.threshold_level == b.threshold_level && a.print_from_depth == b.print_from_depth
+}
+
+/// Results with those that look the same in one group, each group in the place of its first.
+pub fn alike<'a>(
+    records: impl IntoIterator<Item = &'a MetricRecord>,
+) -> Vec<Vec<&'a MetricRecord>> {
+    let mut groups: Vec<Vec<&MetricRecord>> = Vec::new();
+    for record in records {
+        let is_alike =
+            |group: &&mut Vec<&MetricRecord>| same_alignment(&group[0].outcome, &record.outcome);
+        match groups.iter_mut().find(is_alike) {
+            Some(group) => group.push(record),
+            None => groups.push(vec![record]),
+        }
+    }
+    groups
 }

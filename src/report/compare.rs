@@ -1,7 +1,7 @@
 //! Metrics against each other on the same pairs.
 
 use super::model::{Basis, Comparison};
-use super::stats::{holm, mcnemar_exact};
+use super::stats::{MOST_PAIRS, holm, mcnemar_exact, pairs_needed};
 use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
 
 /// Level below which a difference is said to be there.
@@ -101,14 +101,44 @@ impl Duel {
                 "{} looks better, but not after correction for several comparisons",
                 better.title()
             ),
-            Some(_) => "cannot tell them apart".to_owned(),
+            Some(_) => format!("cannot tell them apart; {}", self.needed()),
+        }
+    }
+
+    /// How many pairs would tell them apart.
+    fn needed(&self) -> String {
+        if self.a_only == self.b_only {
+            return "as many are right for the one only as for the other".to_owned();
+        }
+        match pairs_needed(self.a_only, self.b_only, self.n, LEVEL) {
+            Some(pairs) => format!("at this rate about {} pairs would", grouped(rounded(pairs))),
+            None => format!("at this rate {} pairs would not", grouped(MOST_PAIRS)),
         }
     }
 }
 
+/// To three digits.
+fn rounded(number: u64) -> u64 {
+    let unit = 10_u64.pow(number.checked_ilog10().unwrap_or(0).saturating_sub(2));
+    (number + unit / 2) / unit * unit
+}
+
+/// With a comma before every three digits.
+fn grouped(number: u64) -> String {
+    let digits = number.to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
-    use super::Duels;
+    use super::{Duels, grouped, rounded};
     use crate::domain::ThresholdMetric;
     use crate::report::model::Basis;
 
@@ -134,10 +164,55 @@ mod tests {
         assert_eq!(found[0].a, ThresholdMetric::Ensemble);
         assert_eq!((found[0].n, found[0].a_only, found[0].b_only), (587, 3, 1));
         assert_eq!(found[0].p, Some(0.625));
-        assert_eq!(found[0].words, "cannot tell them apart");
+        assert_eq!(
+            found[0].words,
+            "cannot tell them apart; at this rate about 2,940 pairs would"
+        );
         assert!((found[1].p.expect("ten discordant") - 0.021_484_375).abs() < 1e-12);
         assert!((found[1].p_holm.expect("ten discordant") - 0.064_453_125).abs() < 1e-12);
         assert!(found[1].words.contains("not after correction"));
+    }
+
+    /// 3, 9 and 1 failures of 587, where the ensemble's is one of structure's, and structure's are of density's.
+    #[test]
+    fn the_papers_failures_one_within_the_other_need_three_times_as_many_pairs() {
+        let found = finish(&[
+            (578, [Some(true), Some(true), Some(true)]),
+            (1, [Some(false), Some(false), Some(false)]),
+            (2, [Some(false), Some(false), Some(true)]),
+            (6, [Some(true), Some(false), Some(true)]),
+        ]);
+        let said = "cannot tell them apart; at this rate about 1,760 pairs would";
+        assert_eq!((found[0].p, found[0].words.as_str()), (Some(0.5), said));
+        // statsmodels 0.15.0 `mcnemar(exact=True)` and `multipletests(method="holm")`.
+        let wanted = [(0.5, 0.5), (0.007_812_5, 0.023_437_5), (0.031_25, 0.062_5)];
+        for (found, (p, holm)) in found.iter().zip(wanted) {
+            assert!((found.p.expect("discordant pairs") - p).abs() < 1e-12);
+            assert!((found.p_holm.expect("discordant pairs") - holm).abs() < 1e-12);
+        }
+        assert_eq!(found[1].words, "Ensemble is better");
+    }
+
+    #[test]
+    fn where_no_number_of_pairs_would_tell_none_is_said() {
+        let found = finish(&[
+            (2, [Some(true), Some(false), Some(true)]),
+            (2, [Some(true), Some(true), Some(false)]),
+        ]);
+        assert_eq!(
+            found[1].words,
+            "cannot tell them apart; as many are right for the one only as for the other"
+        );
+    }
+
+    #[test]
+    fn numbers_are_rounded_to_three_digits_and_grouped() {
+        let said = |number| grouped(rounded(number));
+        assert_eq!(
+            [6, 999, 1761, 2935].map(said),
+            ["6", "999", "1,760", "2,940"]
+        );
+        assert_eq!(grouped(1_234_567), "1,234,567");
     }
 
     #[test]

@@ -142,6 +142,7 @@ pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> Row {
         stale: 0,
         acc: None,
         acc_ci95: None,
+        rules: None,
         ssim: Some(0.813),
         nl_ssim: Some(0.815),
         iou: Some(iou),

@@ -1,7 +1,10 @@
 //! From the catalog to a report as plain data, and from there to text, JSON, CSV, Markdown and LaTeX.
 //!
-//! [`gather()`] streams the pairs through a [`Tally`]; everything else is pure.
+//! [`gather()`] streams the pairs through a [`Tally`], [`agree()`] through counts of what readers say; everything else is
+//! pure.
 
+mod agree;
+mod agreement;
 pub mod aligned;
 mod compare;
 pub mod coverage;
@@ -10,18 +13,24 @@ pub(crate) mod fixture;
 pub mod gate;
 mod gather;
 mod model;
+mod rate;
 mod render;
-mod standing;
+mod rules;
+pub(crate) mod standing;
 pub mod stats;
 mod tally;
 pub mod truth;
 mod warnings;
 
+pub use agree::{Agree, ReaderRecord, TwoReaders, agree};
+pub use agreement::{Agreement, ENOUGH};
 pub use gather::{GatherError, PAGE, finding, gather, with_truth};
 pub use model::{
     Basis, Comparison, Coverage, CoveragePoint, FailedPair, FailureGroup, Progress, Report, Row,
     SCHEMA, TruthBlock,
 };
-pub use render::{Format, render};
+pub use rate::Rate;
+pub use render::{Format, agree_text, render};
+pub use rules::Rules;
 pub use standing::Standing;
 pub use tally::{Tally, TruthFinding};

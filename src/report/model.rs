@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::rules::Rules;
 use crate::domain::{FailureClass, PairName, Stage, ThresholdMetric};
 
 /// Version of the JSON form.
@@ -62,6 +63,9 @@ pub struct Row {
     pub acc: Option<f64>,
     /// Wilson's 95 % interval of `acc`.
     pub acc_ci95: Option<[f64; 2]>,
+    /// Acc under three rules, where somebody has read.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rules: Option<Rules>,
     /// Mean structural similarity.
     pub ssim: Option<f64>,
     /// Mean structural similarity without the luminance factor.

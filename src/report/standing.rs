@@ -1,7 +1,7 @@
 //! What all readers together say of one result.
 
-use crate::catalog::MetricRecord;
-use crate::domain::Verdict;
+use crate::catalog::{MetricRecord, ReaderVerdict};
+use crate::domain::{Queue, Verdict};
 
 /// Where a result stands with its readers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -10,20 +10,25 @@ pub enum Standing {
     Unread,
     /// An earlier result was read, this one was not.
     Stale,
-    /// Every reader who could tell passed it.
+    /// Every reader who could tell passed it, or who settled what they contradict each other on.
     Passed,
-    /// Every reader who could tell failed it.
+    /// Every reader who could tell failed it, or who settled what they contradict each other on.
     Failed,
     /// No reader could tell.
     Unsure,
-    /// Some passed it and some failed it; it counts as unsure until they agree.
+    /// Some passed it and some failed it; it counts as unsure until they agree or somebody has settled it.
     Conflict,
 }
 
 impl Standing {
     /// The standing of a current result.
     pub fn of(record: &MetricRecord) -> Self {
-        let says = |verdict| record.verdicts.iter().any(|read| read.verdict == verdict);
+        let (words, read) = split(record);
+        let all = || record.verdicts.iter().collect();
+        let is_settled =
+            contradict(&read) && words.iter().any(|word| word.verdict != Verdict::Unsure);
+        let deciding: Vec<&ReaderVerdict> = if is_settled { words } else { all() };
+        let says = |verdict| deciding.iter().any(|read| read.verdict == verdict);
         match (says(Verdict::Pass), says(Verdict::Fail)) {
             (true, true) => Self::Conflict,
             (true, false) => Self::Passed,
@@ -54,10 +59,22 @@ impl Standing {
     }
 }
 
+/// The words of those who were shown a conflict to settle it, and the verdicts of those who read by themselves.
+pub(crate) fn split(record: &MetricRecord) -> (Vec<&ReaderVerdict>, Vec<&ReaderVerdict>) {
+    let is_word = |read: &&ReaderVerdict| read.queue == Some(Queue::Adjudicate);
+    record.verdicts.iter().partition(is_word)
+}
+
+/// Whether one passes what another fails.
+pub(crate) fn contradict(verdicts: &[&ReaderVerdict]) -> bool {
+    let says = |verdict| verdicts.iter().any(|read| read.verdict == verdict);
+    says(Verdict::Pass) && says(Verdict::Fail)
+}
+
 #[cfg(test)]
 mod tests {
     use super::Standing;
-    use crate::domain::{ThresholdMetric, Verdict};
+    use crate::domain::{Queue, ThresholdMetric, Verdict};
     use crate::report::fixture;
 
     fn standing(verdicts: &[Verdict], older: u64) -> Standing {
@@ -84,6 +101,22 @@ mod tests {
         let both = standing(&[Verdict::Fail, Verdict::Pass], 0);
         assert_eq!(both, Standing::Conflict);
         assert_eq!(both.verdict(), Some(Verdict::Unsure));
+    }
+
+    #[test]
+    fn the_word_on_a_conflict_settles_it_unless_it_is_unsure_or_contradicted() {
+        let settled = |words: &[Verdict]| {
+            let verdicts = [&[Verdict::Pass, Verdict::Fail], words].concat();
+            let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &verdicts);
+            for word in &mut record.verdicts[2..] {
+                word.queue = Some(Queue::Adjudicate);
+            }
+            Standing::of(&record)
+        };
+        assert_eq!(settled(&[Verdict::Fail]), Standing::Failed);
+        assert_eq!(settled(&[Verdict::Pass, Verdict::Unsure]), Standing::Passed);
+        assert_eq!(settled(&[Verdict::Unsure]), Standing::Conflict);
+        assert_eq!(settled(&[Verdict::Pass, Verdict::Fail]), Standing::Conflict);
     }
 
     #[test]

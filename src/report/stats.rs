@@ -3,6 +3,9 @@
 /// The 97.5 % point of the standard normal distribution.
 const Z_95: f64 = 1.959_963_984_540_054;
 
+/// More pairs than these are as good as none.
+pub const MOST_PAIRS: u64 = 100_000;
+
 /// Wilson's 95 % score interval for `passed` of `n`, both bounds in 0..=1; `None` when `n` is 0.
 ///
 /// Source: Wilson 1927, doi:10.1080/01621459.1927.10502953, without continuity correction.
@@ -43,6 +46,30 @@ pub fn mcnemar_exact(a_only: u64, b_only: u64) -> Option<f64> {
         }
     }
     Some((2.0 * tail).min(1.0))
+}
+
+/// So many pairs of which `n` gave these discordant ones would give p below `level`, were the rate and the split the same;
+/// `None` where both are as many, or where more than [`MOST_PAIRS`] would be needed.
+///
+/// The lesser count is rounded up, so that the split is never more one-sided than what was seen.
+pub fn pairs_needed(a_only: u64, b_only: u64, n: u64, level: f64) -> Option<u64> {
+    let (fewer, discordant) = (a_only.min(b_only), a_only + b_only);
+    if a_only == b_only {
+        return None;
+    }
+    let mut wanted = 1;
+    loop {
+        let pairs = (wanted * n).div_ceil(discordant);
+        if pairs > MOST_PAIRS {
+            return None;
+        }
+        let lesser = (wanted * fewer).div_ceil(discordant);
+        if mcnemar_exact(wanted - lesser, lesser).is_some_and(|p| p < level) {
+            return Some(pairs);
+        }
+        // Large numbers need no exact answer.
+        wanted += 1 + wanted / 50;
+    }
 }
 
 /// Holm's step-down correction: each p made comparable with the level for the whole family, in the order given.
@@ -86,7 +113,7 @@ pub fn quantile(values: &mut [f64], share: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{holm, mcnemar_exact, median, quantile, wilson_95};
+    use super::{holm, mcnemar_exact, median, pairs_needed, quantile, wilson_95};
 
     /// Values of statsmodels 0.15.0 `proportion_confint(method="wilson")`.
     const WILSON: [(u64, u64, [f64; 2]); 8] = [
@@ -139,6 +166,16 @@ mod tests {
         // SciPy 1.17.1 `binomtest(1_000_000, 2_002_000)`.
         assert!((p - 0.157_714_452_813_144_67).abs() < 1e-7, "{p}");
         assert_eq!(mcnemar_exact(0, 100_000), Some(0.0));
+    }
+
+    #[test]
+    fn six_discordant_pairs_one_way_are_the_fewest_that_tell() {
+        assert_eq!(pairs_needed(2, 0, 587, 0.05), Some(1761));
+        assert_eq!(pairs_needed(0, 1, 587, 0.05), Some(3522));
+        // SciPy 1.17.1: 15 of 20 has p 0.041, 14 of 19 has 0.064.
+        assert_eq!(pairs_needed(3, 1, 587, 0.05), Some(2935));
+        assert_eq!(pairs_needed(4, 4, 587, 0.05), None);
+        assert_eq!(pairs_needed(1000, 1001, 100_000, 0.05), None);
     }
 
     #[test]

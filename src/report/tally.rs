@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 use super::compare::Duels;
 use super::coverage::Confidences;
 use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock};
+use super::rules::RuleSums;
 use super::standing::Standing;
 use super::stats::{median, wilson_95};
 use super::truth::{MAX_ANGLE_DEG, TruthErrors};
@@ -57,6 +58,7 @@ struct Column {
     unsure: u64,
     conflicts: u64,
     stale: u64,
+    rules: RuleSums,
     ssim: f64,
     nl_ssim: f64,
     iou: f64,
@@ -186,6 +188,7 @@ impl Column {
             unsure: 0,
             conflicts: 0,
             stale: 0,
+            rules: RuleSums::default(),
             ssim: 0.0,
             nl_ssim: 0.0,
             iou: 0.0,
@@ -208,6 +211,7 @@ impl Column {
         self.iou += scores.iou;
         self.iou_box += scores.iou_box;
         self.dice += scores.dice;
+        self.rules.add(record);
         self.count_standing(Standing::of(record));
         if let Some(errors) = truth {
             self.truth.add(errors);
@@ -242,6 +246,7 @@ impl Column {
             stale: self.stale,
             acc: share(self.passed as f64, told),
             acc_ci95: wilson_95(self.passed, told),
+            rules: (told + self.unsure > 0).then(|| self.rules.finish()),
             ssim: mean(self.ssim),
             nl_ssim: mean(self.nl_ssim),
             iou: mean(self.iou),
@@ -279,7 +284,7 @@ impl TruthColumn {
 }
 
 /// Sum over count; `None` of nothing.
-fn share(sum: f64, n: u64) -> Option<f64> {
+pub(super) fn share(sum: f64, n: u64) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
 

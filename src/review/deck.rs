@@ -8,7 +8,8 @@ use super::control::{self, Rates};
 use super::order::{self, Lots};
 use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, MetricRecord, PairResults};
 use crate::domain::{DepthOutcome, PairName, Queue, Stage, ThresholdMetric, Verdict};
-use crate::report::aligned::{Aligned, same_alignment};
+use crate::report::aligned::{Aligned, alike};
+use crate::report::standing::{contradict, split};
 use crate::store::Project;
 
 /// Pairs in memory at a time.
@@ -132,18 +133,10 @@ fn cards_of(pair: &PairResults, options: &DeckOptions) -> Vec<Card> {
     let (Ok(outcome), Some(print_hash)) = (depth.parse::<DepthOutcome>(), print.print_hash) else {
         return Vec::new();
     };
-    let mut groups: Vec<Vec<&MetricRecord>> = Vec::new();
     let asked = &options.metrics;
     let is_of_metric =
         |record: &&MetricRecord| asked.is_empty() || asked.contains(&record.outcome.metric);
-    for record in pair.metrics.iter().filter(is_of_metric) {
-        let alike =
-            |group: &&mut Vec<&MetricRecord>| same_alignment(&group[0].outcome, &record.outcome);
-        match groups.iter_mut().find(alike) {
-            Some(group) => group.push(record),
-            None => groups.push(vec![record]),
-        }
-    }
+    let mut groups = alike(pair.metrics.iter().filter(is_of_metric));
     let is_asked = |group: &Vec<&MetricRecord>| {
         options.queue != Queue::Adjudicate
             || group
@@ -196,16 +189,12 @@ fn is_good(record: &MetricRecord) -> bool {
 
 /// Whether others contradict each other on it and nobody else has settled it. Who is party to it cannot settle it.
 fn is_open_conflict(record: &MetricRecord, reader: &str) -> bool {
-    let (words, read): (Vec<_>, Vec<_>) = record
-        .verdicts
-        .iter()
-        .partition(|read| read.queue == Some(Queue::Adjudicate));
-    let says = |verdict| read.iter().any(|read| read.verdict == verdict);
+    let (words, read) = split(record);
     let is_party = read.iter().any(|read| read.reader == reader);
     let is_settled = words
         .iter()
         .any(|word| word.reader != reader && word.verdict != Verdict::Unsure);
-    says(Verdict::Pass) && says(Verdict::Fail) && !is_party && !is_settled
+    contradict(&read) && !is_party && !is_settled
 }
 
 /// Faults made from these cards. A pair whose files cannot be read gets none.

@@ -99,6 +99,7 @@ fn directory_without_project_is_code_10_with_a_way_on() {
         &["backup", "b.sqlite"],
         &["verdict", "log"],
         &["review", "--reader", "lan"],
+        &["agree"],
         &["report"],
         &["export", "-o", "out"],
         &["sheet", "-o", "sheet.png"],

@@ -1,5 +1,6 @@
 //! The forms a report can be printed in.
 
+mod agree;
 mod coverage;
 mod csv;
 mod latex;
@@ -8,6 +9,8 @@ mod table;
 mod text;
 
 use super::model::Report;
+
+pub use agree::agree_text;
 
 /// A form of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,8 @@
 //! The tables of a report with their cells as text: what text, Markdown and LaTeX have in common.
 
 use crate::report::model::{Basis, Comparison, Report, Row, TruthBlock};
+use crate::report::rate::Rate;
+use crate::report::rules::Rules;
 
 /// A table of text cells.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -61,6 +63,7 @@ pub(super) const fn number(head: &'static str, decimals: usize) -> Column {
 pub(super) fn tables(report: &Report) -> Vec<Table> {
     let mut tables = vec![scores(report)];
     tables.extend(report.anybody_read().then(|| verdicts(report)));
+    tables.extend(rules(report));
     tables.extend(report.has_truth().then(|| truth(report)));
     tables
 }
@@ -126,6 +129,45 @@ fn verdicts(report: &Report) -> Table {
         ],
         rows: report.rows.iter().map(cells).collect(),
     }
+}
+
+/// Acc under three rules, where two readers have told of the same result.
+fn rules(report: &Report) -> Option<Table> {
+    let told_twice = |row: &Row| row.rules.as_ref().is_some_and(|rules| rules.told_twice > 0);
+    report.rows.iter().any(told_twice).then(|| Table {
+        caption: "Acc if one reader who fails it is enough, if a third settles conflicts (the Acc above), and if both \
+                  must fail it; n are the results told of, twice those that two readers told of."
+            .to_owned(),
+        columns: vec![
+            words("Rules"),
+            number("twice", 0),
+            number("either", 3),
+            number("n", 0),
+            number("settled", 3),
+            number("n", 0),
+            number("both", 3),
+            number("n", 0),
+        ],
+        rows: report.rows.iter().map(rule_cells).collect(),
+    })
+}
+
+fn rule_cells(row: &Row) -> Vec<Option<String>> {
+    let rules = row.rules.as_ref();
+    let mut cells = vec![
+        Some(row.metric.title().to_owned()),
+        rules.map(|rules| count(rules.told_twice)),
+    ];
+    let rate = |read: fn(&Rules) -> Rate| rules.map(read);
+    for rate in [
+        rate(|rules| rules.either_fails),
+        rate(|rules| rules.adjudicated),
+        rate(|rules| rules.both_fail),
+    ] {
+        cells.push(fixed(rate.and_then(|rate| rate.share), 3));
+        cells.push(rate.map(|rate| count(rate.n)));
+    }
+    cells
 }
 
 /// Agreement with true alignments.

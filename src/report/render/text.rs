@@ -31,7 +31,7 @@ pub(super) fn render(report: &Report) -> String {
 }
 
 /// A table with its columns padded, words to the left and numbers to the right.
-fn aligned(table: &Table) -> String {
+pub(super) fn aligned(table: &Table) -> String {
     let widths: Vec<usize> = (0..table.columns.len())
         .map(|i| {
             let cells = table
@@ -74,7 +74,7 @@ fn comparisons(report: &Report) -> String {
 
 fn comparison(found: &Comparison) -> String {
     let (title, basis) = (table::title(found), table::basis(found.basis));
-    let said = format!("{title}, by {basis}: {}\n", found.words);
+    let said = wrapped("", &format!("{title}, by {basis}: {}", found.words));
     let (Some(p), Some(p_holm)) = (found.p, found.p_holm) else {
         return said;
     };
@@ -103,7 +103,7 @@ fn failures(group: &FailureGroup) -> String {
 }
 
 /// Words laid into lines, the first after `mark`, the others under it.
-fn wrapped(mark: &str, words: &str) -> String {
+pub(super) fn wrapped(mark: &str, words: &str) -> String {
     let indent = " ".repeat(mark.chars().count());
     let (mut text, mut line) = (String::new(), mark.to_owned());
     let mut empty = true;
@@ -193,6 +193,22 @@ Angle, landmarks and mask IoU are medians.
         for line in text.lines() {
             assert!(line.chars().count() <= 80, "{line:?}");
         }
+    }
+
+    #[test]
+    fn three_rules_stand_side_by_side_where_two_have_read() {
+        let mut tally = Tally::default();
+        for (name, second) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
+            let pair = fixture::done(name, 0.75, &[Verdict::Pass, second]);
+            tally.add(&pair, &TruthFinding::default());
+        }
+        let text = render(&tally.finish());
+        let wanted = "\
+Rules              twice  either  n  settled  n   both  n
+Non-luminous SSIM      2   0.500  2    1.000  1  1.000  2
+";
+        assert!(text.contains(wanted), "{text}");
+        assert!(!render(&report()).contains("Rules"));
     }
 
     #[test]

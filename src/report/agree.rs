@@ -1,0 +1,337 @@
+//! How far readers can be trusted: each with the others, with themselves, and on planted faults.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::agreement::{Agreement, Crosstab};
+use super::aligned::alike;
+use super::gather::PAGE;
+use super::rate::Rate;
+use super::standing::{Standing, split};
+use crate::catalog::{AnsweredOn, Catalog, CatalogError, ControlAnswer, MetricRecord, PairResults};
+use crate::domain::{ContentHash, Control, PairName, Verdict};
+
+/// Version of the JSON form.
+const SCHEMA: u32 = 1;
+
+/// Agreement of all readers of a project.
+///
+/// Results of one pair that look the same count once. Who settles what others contradict each other on has seen their
+/// verdicts and is not compared with them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Agree {
+    /// Version of this form.
+    pub schema: u32,
+    /// Pictures on which readers contradict each other and nobody has settled it.
+    pub conflicts: u64,
+    /// Every two readers who have read the same results, by name.
+    pub two_readers: Vec<TwoReaders>,
+    /// Every reader, by name.
+    pub readers: Vec<ReaderRecord>,
+    /// Planted faults that all readers together failed, of those that they answered.
+    pub caught: Rate,
+}
+
+/// Two readers on the same results.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TwoReaders {
+    /// The first by name.
+    pub a: String,
+    /// The second.
+    pub b: String,
+    /// How far they agree.
+    #[serde(flatten)]
+    pub agreement: Agreement,
+}
+
+/// What is known of one reader alone.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct ReaderRecord {
+    /// The reader.
+    pub reader: String,
+    /// Pictures of current results that they have judged.
+    pub read: u64,
+    /// Results shown a second time that got the same verdict again.
+    pub repeats: Rate,
+    /// Planted faults that they failed, of those that they answered; unsure is not caught.
+    pub caught: Rate,
+    /// The same by kind of fault.
+    pub caught_by_fault: BTreeMap<&'static str, Rate>,
+}
+
+/// Reads the agreement of a project as its catalog stands.
+///
+/// # Errors
+/// When the catalog cannot be read.
+pub async fn agree(catalog: &Catalog) -> Result<Agree, CatalogError> {
+    let mut counts = Counts::default();
+    let mut after = None;
+    loop {
+        let page = catalog.results_page(after.as_ref(), PAGE).await?;
+        let Some(last) = page.last() else {
+            break;
+        };
+        after = Some(last.facts.name.clone());
+        for pair in &page {
+            counts.add(pair);
+        }
+    }
+    let mut controls: BTreeMap<String, Vec<ControlAnswer>> = BTreeMap::new();
+    for answer in catalog.control_answers().await? {
+        if answer.undone_at.is_none() {
+            let of_reader = controls.entry(answer.reader.clone()).or_default();
+            of_reader.push(answer);
+        }
+    }
+    for (reader, answers) in &controls {
+        let own = own_verdicts(catalog, reader).await?;
+        counts.test(reader, answers, &own);
+    }
+    Ok(counts.finish())
+}
+
+/// A reader's newest verdicts on results.
+type OwnVerdicts = BTreeMap<(PairName, ContentHash), Verdict>;
+
+async fn own_verdicts(catalog: &Catalog, reader: &str) -> Result<OwnVerdicts, CatalogError> {
+    let answers = catalog.answers(reader).await?.into_iter();
+    // Oldest first, so that the newest stays.
+    Ok(answers
+        .filter_map(|answer| match answer.on {
+            AnsweredOn::Result(hash) => Some(((answer.pair, hash), answer.verdict)),
+            AnsweredOn::Control(_) => None,
+        })
+        .collect())
+}
+
+/// The sums so far.
+#[derive(Debug, Default)]
+struct Counts {
+    conflicts: u64,
+    two_readers: BTreeMap<(String, String), Crosstab>,
+    readers: BTreeMap<String, ReaderRecord>,
+}
+
+impl Counts {
+    /// Counts the pictures of one pair in.
+    fn add(&mut self, pair: &PairResults) {
+        for picture in pictures(pair) {
+            self.conflicts += u64::from(picture.is_conflict);
+            for (i, (a, first)) in picture.read.iter().enumerate() {
+                self.reader(a).read += 1;
+                for (b, second) in &picture.read[i + 1..] {
+                    let two = ((*a).to_owned(), (*b).to_owned());
+                    self.two_readers
+                        .entry(two)
+                        .or_default()
+                        .add(*first, *second);
+                }
+            }
+        }
+    }
+
+    /// Holds a reader's answers to controls against what they should be.
+    fn test(&mut self, reader: &str, answers: &[ControlAnswer], own: &OwnVerdicts) {
+        let answers = newest(answers);
+        let repeats = answers
+            .iter()
+            .filter(|answer| answer.control == Control::Repeat);
+        let same = repeats.filter_map(|answer| {
+            let first = own.get(&(answer.pair.clone(), answer.result_hash))?;
+            Some(*first == answer.verdict)
+        });
+        let record = self.reader(reader);
+        record.repeats = Rate::of(same);
+        record.caught = caught(answers.iter().copied());
+        for kind in answers.iter().filter(|answer| answer.control.is_fault()) {
+            let name = kind.control.name();
+            let of_kind = answers
+                .iter()
+                .filter(|answer| answer.control.name() == name);
+            let rate = || caught(of_kind.copied());
+            record.caught_by_fault.entry(name).or_insert_with(rate);
+        }
+    }
+
+    fn reader(&mut self, name: &str) -> &mut ReaderRecord {
+        let record = self.readers.entry(name.to_owned());
+        record.or_insert_with(|| ReaderRecord {
+            reader: name.to_owned(),
+            ..ReaderRecord::default()
+        })
+    }
+
+    fn finish(self) -> Agree {
+        let two_readers = self.two_readers.into_iter();
+        Agree {
+            schema: SCHEMA,
+            conflicts: self.conflicts,
+            two_readers: two_readers
+                .map(|((a, b), crosstab)| TwoReaders {
+                    a,
+                    b,
+                    agreement: crosstab.finish(),
+                })
+                .collect(),
+            caught: Rate::total(self.readers.values().map(|record| record.caught)),
+            readers: self.readers.into_values().collect(),
+        }
+    }
+}
+
+/// A picture with the verdicts of those who judged it by themselves, in the order of their names.
+struct Picture<'a> {
+    read: Vec<(&'a str, Verdict)>,
+    is_conflict: bool,
+}
+
+/// The pictures of a pair: results that look the same are one.
+fn pictures(pair: &PairResults) -> Vec<Picture<'_>> {
+    let groups = alike(&pair.metrics);
+    groups.iter().map(|group| Picture::of(group)).collect()
+}
+
+impl<'a> Picture<'a> {
+    fn of(group: &[&'a MetricRecord]) -> Self {
+        let mut read = BTreeMap::new();
+        for record in group {
+            for verdict in split(record).1 {
+                // The page gives all of them one verdict; where it was given one by one, the first stands.
+                read.entry(verdict.reader.as_str())
+                    .or_insert(verdict.verdict);
+            }
+        }
+        let is_conflict = |record: &&MetricRecord| Standing::of(record) == Standing::Conflict;
+        Self {
+            read: read.into_iter().collect(),
+            is_conflict: group.iter().any(is_conflict),
+        }
+    }
+}
+
+/// The newest answers to each thing that was shown; they come oldest first.
+fn newest(answers: &[ControlAnswer]) -> Vec<&ControlAnswer> {
+    let shown = |answer: &ControlAnswer| {
+        let hashes = (answer.result_hash, answer.look.seen);
+        (answer.pair.clone(), answer.control.name(), hashes)
+    };
+    let newest: BTreeMap<_, _> = answers
+        .iter()
+        .map(|answer| (shown(answer), answer))
+        .collect();
+    newest.into_values().collect()
+}
+
+/// How many of the faults among the answers were failed.
+fn caught<'a>(answers: impl Iterator<Item = &'a ControlAnswer>) -> Rate {
+    let faults = answers.filter(|answer| answer.control.is_fault());
+    Rate::of(faults.map(|answer| answer.verdict == Verdict::Fail))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Counts, OwnVerdicts};
+    use crate::catalog::{ControlAnswer, Look, MetricRecord, ReaderVerdict};
+    use crate::domain::{ContentHash, Control, PairName, Queue, ThresholdMetric, Verdict};
+    use crate::report::fixture;
+
+    fn answer(pair: &str, control: Control, verdict: Verdict) -> ControlAnswer {
+        ControlAnswer {
+            pair: PairName::new(pair).expect("test names are ids"),
+            metric: ThresholdMetric::Density,
+            result_hash: ContentHash::of(pair.as_bytes()),
+            control,
+            verdict,
+            reader: "lan".to_owned(),
+            reason: None,
+            note: None,
+            look: Look::default(),
+            at: 0,
+            undone_at: None,
+        }
+    }
+
+    #[test]
+    fn results_that_look_the_same_count_once() {
+        let mut counts = Counts::default();
+        counts.add(&fixture::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]));
+        let mut apart = fixture::done("b", 0.8, &[Verdict::Pass, Verdict::Pass]);
+        apart.metrics[0].outcome.threshold_level += 1;
+        counts.add(&apart);
+        let found = counts.finish();
+        assert_eq!((found.conflicts, found.readers[0].read), (1, 3));
+        let two = &found.two_readers[0];
+        assert_eq!((two.a.as_str(), two.b.as_str()), ("r0", "r1"));
+        assert_eq!((two.agreement.n, two.agreement.agreed), (3, 2));
+    }
+
+    #[test]
+    fn who_settles_a_conflict_is_compared_with_nobody() {
+        let mut counts = Counts::default();
+        let mut pair = fixture::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]);
+        let settle = |record: &mut MetricRecord| {
+            record.verdicts.push(ReaderVerdict {
+                reader: "third".to_owned(),
+                verdict: Verdict::Fail,
+                reason: None,
+                queue: Some(Queue::Adjudicate),
+            });
+        };
+        pair.metrics.iter_mut().for_each(settle);
+        counts.add(&pair);
+        let found = counts.finish();
+        assert_eq!((found.conflicts, found.two_readers.len()), (0, 1));
+        assert_eq!(found.readers.len(), 2);
+    }
+
+    #[test]
+    fn every_two_of_three_readers_are_compared() {
+        let mut counts = Counts::default();
+        counts.add(&fixture::done("a", 0.8, &[Verdict::Pass; 3]));
+        let found = counts.finish().two_readers;
+        let names: Vec<_> = found
+            .iter()
+            .map(|two| (two.a.as_str(), two.b.as_str()))
+            .collect();
+        assert_eq!(names, [("r0", "r1"), ("r0", "r2"), ("r1", "r2")]);
+    }
+
+    #[test]
+    fn a_fault_is_caught_by_a_fail_and_the_newest_answer_counts() {
+        let turned = Control::Turned { angle_deg: 9.0 };
+        let answers = [
+            answer("a", turned, Verdict::Pass),
+            answer("a", turned, Verdict::Fail),
+            answer("b", turned, Verdict::Unsure),
+            answer("b", Control::Mirrored, Verdict::Fail),
+        ];
+        let mut counts = Counts::default();
+        counts.test("lan", &answers, &OwnVerdicts::new());
+        let found = counts.finish();
+        let lan = &found.readers[0];
+        assert_eq!((lan.caught.count, lan.caught.n), (2, 3));
+        let turned = lan.caught_by_fault["turned"];
+        assert_eq!((turned.count, turned.n), (1, 2));
+        assert_eq!((lan.caught, lan.repeats.n), (found.caught, 0));
+    }
+
+    #[test]
+    fn a_repeat_is_held_against_the_readers_own_verdict() {
+        let own = OwnVerdicts::from(["a", "b"].map(|name| {
+            let first = answer(name, Control::Repeat, Verdict::Pass);
+            ((first.pair, first.result_hash), Verdict::Pass)
+        }));
+        let answers = [
+            answer("a", Control::Repeat, Verdict::Pass),
+            answer("b", Control::Repeat, Verdict::Fail),
+            // Its first look was taken back.
+            answer("c", Control::Repeat, Verdict::Pass),
+        ];
+        let mut counts = Counts::default();
+        counts.test("lan", &answers, &own);
+        let lan = counts.finish().readers.remove(0);
+        assert_eq!((lan.repeats.count, lan.repeats.n), (1, 2));
+        assert_eq!((lan.caught.n, lan.caught.share), (0, None));
+    }
+}
