@@ -10,7 +10,7 @@ use super::compare::side_by_side;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::talk;
-use crate::report::{Format, Report, gate, gather, render};
+use crate::report::{Format, Interval, Report, gate, gather, render};
 use crate::store::write_whole;
 
 /// Arguments of `report`.
@@ -22,6 +22,9 @@ pub(super) struct ReportArgs {
     /// Write it to this file instead of stdout
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
+    /// How the intervals of Acc are computed: wilson, or exact (Clopper and Pearson)
+    #[arg(long, value_name = "HOW", default_value = "wilson")]
+    pub(super) ci: Interval,
     /// Set another project's table beside this one; with the forms text and json
     #[arg(long, value_name = "DIR")]
     pub(super) compare: Option<PathBuf>,
@@ -44,7 +47,7 @@ fn share(text: &str) -> Result<f64, String> {
 pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.reader().await?;
     context.warn_of_stale(&catalog).await?;
-    let report = gather(&catalog, &project).await?;
+    let report = gather(&catalog, &project).await?.with_interval(args.ci);
     catalog.close().await;
     let format = chosen(args.format, context);
     let text = match &args.compare {
@@ -69,7 +72,7 @@ async fn compared(
     format: Format,
     context: &Context,
 ) -> anyhow::Result<String> {
-    let there = read(&context.at(other)).await?;
+    let there = read(&context.at(other)).await?.with_interval(here.interval);
     let names = [context.dir(), other.to_owned()].map(|dir| dir.display().to_string());
     match format {
         Format::Text => Ok(format!(

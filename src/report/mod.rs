@@ -12,6 +12,7 @@ pub mod coverage;
 pub(crate) mod fixture;
 pub mod gate;
 mod gather;
+mod interval;
 mod model;
 mod rate;
 mod render;
@@ -25,6 +26,7 @@ mod warnings;
 pub use agree::{Agree, ReaderRecord, TwoReaders, agree};
 pub use agreement::{Agreement, ENOUGH};
 pub use gather::{GatherError, PAGE, finding, gather, with_truth};
+pub use interval::Interval;
 pub use model::{
     Basis, Comparison, Coverage, CoveragePoint, FailedPair, FailureGroup, Progress, Report, Row,
     SCHEMA, TruthBlock,

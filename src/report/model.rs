@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::interval::Interval;
 use super::rules::Rules;
 use crate::domain::{FailureClass, PairName, Stage, ThresholdMetric};
 
@@ -15,6 +16,8 @@ pub struct Report {
     pub schema: u32,
     /// Pairs in the project, in whatever state.
     pub pairs: u64,
+    /// How the intervals are computed.
+    pub interval: Interval,
     /// How far they are.
     pub progress: Progress,
     /// One row a metric, in the order of the paper's table; `relief` last and only where there are results of it.
@@ -61,7 +64,7 @@ pub struct Row {
     pub stale: u64,
     /// `passed / (passed + failed)`; `None` where nobody has told.
     pub acc: Option<f64>,
-    /// Wilson's 95 % interval of `acc`.
+    /// The 95 % interval of `acc`, as the report's `interval` says.
     pub acc_ci95: Option<[f64; 2]>,
     /// Acc under three rules, where somebody has read.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -90,7 +93,7 @@ pub struct TruthBlock {
     pub passed: u64,
     /// `passed / n`.
     pub acc: Option<f64>,
-    /// Wilson's 95 % interval of `acc`.
+    /// The 95 % interval of `acc`, as the report's `interval` says.
     pub acc_ci95: Option<[f64; 2]>,
     /// Share with an angle error of at most 5 degrees.
     pub angle_le_5deg: Option<f64>,
@@ -169,7 +172,7 @@ pub struct CoveragePoint {
     pub passed: u64,
     /// `passed / n`; `None` where nothing is kept.
     pub acc: Option<f64>,
-    /// Wilson's 95 % interval of `acc`.
+    /// The 95 % interval of `acc`, as the report's `interval` says.
     pub acc_ci95: Option<[f64; 2]>,
     /// The least confidence that is kept.
     pub least_confidence: Option<f64>,
@@ -203,6 +206,23 @@ pub struct FailedPair {
 }
 
 impl Report {
+    /// The same with another interval.
+    #[must_use]
+    pub fn with_interval(mut self, interval: Interval) -> Self {
+        self.interval = interval;
+        for row in &mut self.rows {
+            row.acc_ci95 = interval.of(row.passed, row.passed + row.failed);
+            row.rules = row.rules.map(|rules| rules.with_interval(interval));
+            if let Some(truth) = &mut row.truth {
+                truth.acc_ci95 = interval.of(truth.passed, truth.n);
+            }
+        }
+        for point in self.coverage.iter_mut().flat_map(|curve| &mut curve.points) {
+            point.acc_ci95 = interval.of(point.passed, point.n);
+        }
+        self
+    }
+
     /// Whether anybody has judged a result.
     pub fn anybody_read(&self) -> bool {
         self.rows.iter().any(|row| row.read > 0)

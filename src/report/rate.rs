@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::stats::wilson_95;
+use super::interval::Interval;
 use super::tally::share;
 
 /// So many of so many.
@@ -14,7 +14,7 @@ pub struct Rate {
     pub count: u64,
     /// `count / n`; `None` of nothing.
     pub share: Option<f64>,
-    /// Wilson's 95 % interval of `share`.
+    /// 95 % interval of `share`: Wilson's, unless another is asked for.
     pub ci95: Option<[f64; 2]>,
 }
 
@@ -25,7 +25,16 @@ impl Rate {
             n,
             count,
             share: share(count as f64, n),
-            ci95: wilson_95(count, n),
+            ci95: Interval::Wilson.of(count, n),
+        }
+    }
+
+    /// The same with another interval.
+    #[must_use]
+    pub fn with_interval(self, interval: Interval) -> Self {
+        Self {
+            ci95: interval.of(self.count, self.n),
+            ..self
         }
     }
 

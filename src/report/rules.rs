@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::interval::Interval;
 use super::rate::Rate;
 use super::standing::{Standing, split};
 use crate::catalog::MetricRecord;
@@ -19,6 +20,18 @@ pub struct Rules {
     pub adjudicated: Rate,
     /// All readers who could tell fail it.
     pub both_fail: Rate,
+}
+
+impl Rules {
+    /// The same with another interval.
+    pub(super) fn with_interval(self, interval: Interval) -> Self {
+        Self {
+            told_twice: self.told_twice,
+            either_fails: self.either_fails.with_interval(interval),
+            adjudicated: self.adjudicated.with_interval(interval),
+            both_fail: self.both_fail.with_interval(interval),
+        }
+    }
 }
 
 /// The sums so far: passed and told under each rule.

@@ -3,6 +3,25 @@
 /// The 97.5 % point of the standard normal distribution.
 const Z_95: f64 = 1.959_963_984_540_054;
 
+/// Chance of at most `count` of `n` where each has the chance `p`, of 0..=1 without the ends; `count` is not above `p n`.
+pub(super) fn binomial_tail(count: u64, n: u64, p: f64) -> f64 {
+    let ln_choose: f64 = (0..count.min(n - count))
+        .map(|k| ((n - k) as f64 / (k + 1) as f64).ln())
+        .sum();
+    // From the largest term down, until a term adds nothing.
+    let odds = p / (1.0 - p);
+    let mut term = (ln_choose + (n as f64 * (-p).ln_1p() + count as f64 * odds.ln())).exp();
+    let mut tail = 0.0;
+    for k in (0..=count).rev() {
+        tail += term;
+        term *= k as f64 / (n - k + 1) as f64 / odds;
+        if term <= tail * f64::EPSILON {
+            break;
+        }
+    }
+    tail
+}
+
 /// More pairs than these are as good as none.
 pub const MOST_PAIRS: u64 = 100_000;
 
@@ -32,19 +51,7 @@ pub fn mcnemar_exact(a_only: u64, b_only: u64) -> Option<f64> {
     if n == 0 {
         return None;
     }
-    let ln_choose: f64 = (0..fewer)
-        .map(|k| ((n - k) as f64 / (k + 1) as f64).ln())
-        .sum();
-    // From the largest term down, until a term adds nothing.
-    let mut term = (ln_choose - n as f64 * std::f64::consts::LN_2).exp();
-    let mut tail = 0.0;
-    for k in (0..=fewer).rev() {
-        tail += term;
-        term *= k as f64 / (n - k + 1) as f64;
-        if term <= tail * f64::EPSILON {
-            break;
-        }
-    }
+    let tail = binomial_tail(fewer, n, 0.5);
     Some((2.0 * tail).min(1.0))
 }
 

@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 
 use super::compare::Duels;
 use super::coverage::Confidences;
+use super::interval::Interval;
 use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock};
 use super::rules::RuleSums;
 use super::standing::Standing;
@@ -168,6 +169,7 @@ impl Tally {
         Report {
             schema: SCHEMA,
             pairs: self.pairs,
+            interval: Interval::default(),
             progress: self.progress,
             warnings: warnings::of(self.progress, &rows, &self.truth_problems),
             rows,

@@ -29,7 +29,7 @@ pub(super) fn full(report: &Report) -> Vec<Table> {
             number("kept %", 0),
             number("n", 0),
             number("Acc", 3),
-            interval("95% Wilson"),
+            interval(report.interval.title()),
             number("least confidence", 3),
         ],
         rows: curves.iter().flat_map(|curve| full_rows(curve)).collect(),

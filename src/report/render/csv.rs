@@ -1,10 +1,11 @@
 //! The report as CSV (RFC 4180): one line a metric, numbers in full.
 
 use crate::report::coverage::{KEPT_PERCENT, LEAST_PERCENT};
+use crate::report::interval::Interval;
 use crate::report::model::{Basis, Coverage, CoveragePoint, Report, Row, TruthBlock};
 
 /// Names of the columns, in order; those of [`coverage_names`] follow, for readers and then for truth.
-const COLUMNS: [&str; 26] = [
+const COLUMNS: [&str; 27] = [
     "metric",
     "n",
     "read",
@@ -31,6 +32,7 @@ const COLUMNS: [&str; 26] = [
     "truth_tre_median_pct",
     "truth_mask_iou_median",
     "truth_mirrored",
+    "ci95",
 ];
 
 /// The report as CSV. What does not exist is an empty field.
@@ -40,7 +42,7 @@ pub(super) fn render(report: &Report) -> String {
     for row in &report.rows {
         let curves = BASES.map(|basis| report.coverage(basis, row.metric));
         let numbers = curves.into_iter().flat_map(coverage_fields);
-        text += &line(fields(row).into_iter().chain(numbers));
+        text += &line(fields(row, report.interval).into_iter().chain(numbers));
     }
     text
 }
@@ -96,7 +98,7 @@ fn point_fields(point: Option<&CoveragePoint>) -> [String; 4] {
     ]
 }
 
-fn fields(row: &Row) -> Vec<String> {
+fn fields(row: &Row, interval: Interval) -> Vec<String> {
     let [low, high] = bounds(row.acc_ci95);
     let mut fields = vec![
         field(row.metric.name()),
@@ -117,7 +119,15 @@ fn fields(row: &Row) -> Vec<String> {
         number(row.dice),
     ];
     fields.extend(truth_fields(row.truth.as_ref()));
+    fields.push(interval_name(row, interval));
     fields
+}
+
+/// What the intervals of the line are; nothing where it has none.
+fn interval_name(row: &Row, interval: Interval) -> String {
+    let of_truth = row.truth.as_ref().and_then(|truth| truth.acc_ci95);
+    let any = row.acc_ci95.or(of_truth);
+    any.map_or_else(String::new, |_| interval.name().to_owned())
 }
 
 fn truth_fields(truth: Option<&TruthBlock>) -> [String; 10] {
@@ -196,7 +206,11 @@ mod tests {
         let golden = "nl_ssim,2,1,1,0,0,0,0,1,0.20654931437723745,1,0.81,0.82,0.75,0.9,";
         assert!(lines[1].starts_with(golden), "{}", lines[1]);
         let truth: Vec<_> = lines[1].split(',').take(COLUMNS.len()).collect();
-        assert!(truth.join(",").ends_with(",1,1.5,2,0.9,0"), "{}", lines[1]);
+        assert!(
+            truth.join(",").ends_with(",1,1.5,2,0.9,0,wilson"),
+            "{}",
+            lines[1]
+        );
     }
 
     #[test]

@@ -90,7 +90,8 @@ fn json(report: &Report) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Format, render};
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::domain::Verdict;
+    use crate::report::{Interval, Tally, TruthFinding, fixture};
     use serde_json::{Value, json};
 
     #[test]
@@ -129,6 +130,33 @@ mod tests {
             assert!(row.get("truth").is_none());
         }
         assert_eq!(value["comparisons"], json!([]));
+    }
+
+    #[test]
+    fn every_form_names_the_interval_that_was_asked_for() {
+        let mut tally = Tally::default();
+        for (name, verdict) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
+            let pair = fixture::done(name, 0.75, &[verdict]);
+            tally.add(&pair, &fixture::truth(1.0, 2.0, 0.9));
+        }
+        let report = tally.finish().with_interval(Interval::Exact);
+        let row = &report.rows[0];
+        assert_eq!(row.acc_ci95, Interval::Exact.of(1, 2));
+        let truth = row.truth.as_ref().expect("both have truth");
+        assert_eq!(truth.acc_ci95, Interval::Exact.of(2, 2));
+        let rules = row.rules.expect("both are read");
+        assert_eq!(rules.adjudicated.ci95, Interval::Exact.of(1, 2));
+        for format in Format::ALL {
+            let text = render(&report, format);
+            let names = [
+                "95% exact",
+                r"95\% exact",
+                r#""interval": "exact""#,
+                ",exact",
+            ];
+            assert!(names.iter().any(|name| text.contains(name)), "{text}");
+            assert!(!text.to_lowercase().contains("wilson"), "{text}");
+        }
     }
 
     #[test]
