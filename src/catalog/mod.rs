@@ -21,6 +21,7 @@ mod lease;
 mod look;
 mod mend;
 mod network;
+mod pages;
 mod pairs;
 mod patience;
 mod plan;
@@ -61,6 +62,7 @@ pub use lease::{
     InputSeen, InputsSeen, Kept, Lease, MetricResult, RecipeId, Sentence, StageDone, StageFailed,
 };
 pub use look::Look;
+pub use pages::ResultPages;
 pub use pairs::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use plan::{FieldChange, Plan, PlanEntry, WorkReason};
 pub use read::{

@@ -47,7 +47,7 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn results_page(
+    pub(super) async fn results_page(
         &self,
         after: Option<&PairName>,
         limit: usize,

@@ -85,13 +85,8 @@ pub async fn to_jsonl(
     let mut lines = Lines::create(folder.path())?;
     let mut summary = ExportSummary::default();
     let by_hand = by_hand::newest(catalog).await?;
-    let mut after = None;
-    loop {
-        let page = catalog.results_page(after.as_ref(), PAGE).await?;
-        let Some(last) = page.last() else {
-            break;
-        };
-        after = Some(last.facts.name.clone());
+    let mut pages = catalog.result_pages(PAGE);
+    while let Some(page) = pages.next().await? {
         for mut pair in write_page(project, folder.path(), page, options).await? {
             for line in &mut pair.lines {
                 line.by_hand = by_hand.get(&line.id).cloned();

@@ -149,13 +149,9 @@ async fn choose(
     project: &Project,
     options: &SheetOptions,
 ) -> Result<(Vec<Candidate>, usize), SheetError> {
-    let (mut chosen, mut of, mut after) = (Vec::new(), 0, None);
-    loop {
-        let page = catalog.results_page(after.as_ref(), PAGE).await?;
-        let Some(last) = page.last() else {
-            return Ok((chosen, of));
-        };
-        after = Some(last.facts.name.clone());
+    let (mut chosen, mut of) = (Vec::new(), 0);
+    let mut pages = catalog.result_pages(PAGE);
+    while let Some(page) = pages.next().await? {
         let wanted = page.into_iter().filter(|pair| wants(options, pair));
         for (pair, truth) in with_truth(project, wanted.collect()).await? {
             of += 1;
@@ -165,6 +161,7 @@ async fn choose(
         chosen.sort_by(|a, b| a.rank.total_cmp(&b.rank));
         chosen.truncate(options.limit);
     }
+    Ok((chosen, of))
 }
 
 /// Whether a pair was asked for and has something to show.

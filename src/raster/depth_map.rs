@@ -21,6 +21,12 @@ impl DepthMap {
         }
     }
 
+    /// The levels of all pixels that hold data, row by row.
+    pub fn known_levels(&self) -> Vec<u16> {
+        let levels = self.levels.data().iter().copied();
+        levels.filter(|level| *level > 0).collect()
+    }
+
     /// The strokes at a threshold: levels from `level` up. No data is no stroke.
     pub fn strokes(&self, level: u16) -> Mask {
         self.levels.map(|found| *found >= level.max(1))

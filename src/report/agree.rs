@@ -66,13 +66,8 @@ pub struct ReaderRecord {
 /// When the catalog cannot be read.
 pub async fn agree(catalog: &Catalog) -> Result<Agree, CatalogError> {
     let mut counts = Counts::default();
-    let mut after = None;
-    loop {
-        let page = catalog.results_page(after.as_ref(), PAGE).await?;
-        let Some(last) = page.last() else {
-            break;
-        };
-        after = Some(last.facts.name.clone());
+    let mut pages = catalog.result_pages(PAGE);
+    while let Some(page) = pages.next().await? {
         for pair in &page {
             counts.add(pair);
         }

@@ -42,17 +42,13 @@ enum Unusable {
 /// When the catalog cannot be read.
 pub async fn gather(catalog: &Catalog, project: &Project) -> Result<Report, GatherError> {
     let mut tally = Tally::default();
-    let mut after = None;
-    loop {
-        let page = catalog.results_page(after.as_ref(), PAGE).await?;
-        let Some(last) = page.last() else {
-            return Ok(tally.finish());
-        };
-        after = Some(last.facts.name.clone());
+    let mut pages = catalog.result_pages(PAGE);
+    while let Some(page) = pages.next().await? {
         for (pair, truth) in with_truth(project, page).await? {
             tally.add(&pair, &truth);
         }
     }
+    Ok(tally.finish())
 }
 
 /// Pairs with what their truth says, on all cores.

@@ -81,13 +81,7 @@ fn is_symmetric(strokes: &Mask) -> bool {
 
 /// A level at which much of the stroke goes, or much ground comes in; `None` where the relief has no such level.
 fn broken_level(depth: &DepthMap, level: u16, loses: bool) -> Option<u16> {
-    let mut above: Vec<u16> = depth
-        .levels
-        .data()
-        .iter()
-        .copied()
-        .filter(|l| *l > 0)
-        .collect();
+    let mut above = depth.known_levels();
     above.sort_unstable_by(|a, b| b.cmp(a));
     let area = above.partition_point(|found| *found >= level);
     let share = if loses { LOST } else { FLOODED };

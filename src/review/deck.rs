@@ -7,7 +7,7 @@ use super::card::{Card, View};
 use super::control::{self, Rates};
 use super::order::{self, Lots};
 use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, MetricRecord, PairResults};
-use crate::domain::{DepthOutcome, PairName, Queue, Stage, ThresholdMetric, Verdict};
+use crate::domain::{DepthOutcome, Queue, Stage, ThresholdMetric, Verdict};
 use crate::report::aligned::{Aligned, alike};
 use crate::report::standing::{contradict, split};
 use crate::store::Project;
@@ -111,17 +111,13 @@ pub(super) enum DeckError {
 
 async fn all_cards(catalog: &Catalog, options: &DeckOptions) -> Result<Vec<Card>, CatalogError> {
     let mut cards = Vec::new();
-    let mut after: Option<PairName> = None;
-    loop {
-        let page = catalog.results_page(after.as_ref(), PAGE).await?;
-        let Some(last) = page.last() else {
-            return Ok(cards);
-        };
-        after = Some(last.facts.name.clone());
+    let mut pages = catalog.result_pages(PAGE);
+    while let Some(page) = pages.next().await? {
         for pair in &page {
             cards.extend(cards_of(pair, options));
         }
     }
+    Ok(cards)
 }
 
 /// The cards of one pair: one for each picture that its results make.

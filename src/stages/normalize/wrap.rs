@@ -22,13 +22,7 @@ struct Greys {
 
 impl Greys {
     fn of(depth: &DepthMap) -> Option<Self> {
-        let mut levels: Vec<u16> = depth
-            .levels
-            .data()
-            .iter()
-            .copied()
-            .filter(|l| *l > 0)
-            .collect();
+        let mut levels = depth.known_levels();
         if levels.is_empty() {
             return None;
         }

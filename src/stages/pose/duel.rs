@@ -79,24 +79,8 @@ mod tests {
     use super::super::ground::own_ground;
     use super::{Side, duel};
     use crate::domain::Affine2;
-    use crate::raster::{Grid, Mask};
-    use crate::stages::pose::{Base, Layer, Soft};
-
-    const SIDE: usize = 64;
-
-    /// Bars as boxes of left, top, right and bottom, right and bottom not in them.
-    fn layer(bars: &[[usize; 4]]) -> Layer {
-        let on = |x, y| {
-            bars.iter()
-                .any(|[l, t, r, b]| (*l..*r).contains(&x) && (*t..*b).contains(&y))
-        };
-        let soft = Soft {
-            amount: Grid::from_fn(SIDE, SIDE, |x, y| f32::from(u8::from(on(x, y)))),
-            known: Mask::new(SIDE, SIDE, true),
-        };
-        let base = Base::new(&soft, SIDE).expect("something is known");
-        base.layer(SIDE, 0.8)
-    }
+    use crate::stages::pose::Layer;
+    use crate::stages::pose::ground::tests::{SIDE, layer};
 
     fn scores(print: &Layer, relief: &Layer) -> [f64; 2] {
         let last = (relief.amount.width() - 1) as f64;

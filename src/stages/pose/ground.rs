@@ -161,13 +161,13 @@ fn without_band(weight: &Grid<f32>) -> Grid<f32> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::Surroundings;
     use crate::domain::Affine2;
     use crate::raster::{Grid, Mask};
     use crate::stages::pose::{Base, Layer, Soft};
 
-    const SIDE: usize = 64;
+    pub(in crate::stages::pose) const SIDE: usize = 64;
     /// A cross in the middle, and bars that run into the left and the right border.
     const CROSS: [[usize; 4]; 2] = [[16, 30, 48, 35], [30, 16, 35, 48]];
     const LEFT: [usize; 4] = [0, 0, 6, SIDE];
@@ -175,8 +175,8 @@ mod tests {
     /// Joins the cross to the left bar.
     const BRIDGE: [usize; 4] = [4, 30, 20, 35];
 
-    /// Bars as boxes of left, top, right and bottom.
-    fn layer(bars: &[[usize; 4]]) -> Layer {
+    /// Bars as boxes of left, top, right and bottom, right and bottom not in them.
+    pub(in crate::stages::pose) fn layer(bars: &[[usize; 4]]) -> Layer {
         let on = |x, y| {
             let mut bars = bars.iter();
             bars.any(|[l, t, r, b]| (*l..*r).contains(&x) && (*t..*b).contains(&y))
@@ -189,10 +189,9 @@ mod tests {
         base.layer(SIDE, 0.8)
     }
 
-    fn as_they_lie(fixed: &Layer, moving: &Layer) -> [Layer; 2] {
-        let same = Affine2::scale_shift(1.0, [0.0; 2]);
-        let around = Surroundings::of([fixed, moving], &same);
-        around.expect("the map can be turned round").without()
+    fn as_they_lie<'a>(fixed: &'a Layer, moving: &'a Layer) -> Surroundings<'a> {
+        let around = Surroundings::of([fixed, moving], &Affine2::IDENTITY);
+        around.expect("the map can be turned round")
     }
 
     fn amount(layer: &Layer, x: usize, y: usize) -> f32 {
@@ -203,7 +202,7 @@ mod tests {
     #[test]
     fn what_runs_into_the_border_is_left_out_of_both() {
         let with = |bar| layer(&[CROSS[0], CROSS[1], bar]);
-        let [ink, wood] = as_they_lie(&with(LEFT), &with(RIGHT));
+        let [ink, wood] = as_they_lie(&with(LEFT), &with(RIGHT)).without();
         for layer in [&ink, &wood] {
             assert!(amount(layer, 32, 32) > 0.9);
             assert_eq!(amount(layer, 2, 10) + amount(layer, SIDE - 3, 10), 0.0);
@@ -211,10 +210,17 @@ mod tests {
     }
 
     #[test]
+    fn surroundings_agree_where_they_stand_alike_only() {
+        let with = |bar| layer(&[CROSS[0], CROSS[1], bar]);
+        assert!(as_they_lie(&with(LEFT), &with(LEFT)).agree());
+        assert!(!as_they_lie(&with(LEFT), &with(RIGHT)).agree());
+    }
+
+    #[test]
     fn a_character_that_hangs_on_a_frame_line_in_one_picture_stays() {
         let bridged = layer(&[CROSS[0], CROSS[1], BRIDGE, LEFT]);
         let free = layer(&[CROSS[0], CROSS[1]]);
-        let [ink, wood] = as_they_lie(&bridged, &free);
+        let [ink, wood] = as_they_lie(&bridged, &free).without();
         assert!(amount(&ink, 32, 32) > 0.9 && amount(&ink, 32, 44) > 0.9);
         assert!(amount(&wood, 32, 32) > 0.9);
         assert_eq!(amount(&ink, 2, 10), 0.0);

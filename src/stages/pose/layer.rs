@@ -181,11 +181,10 @@ impl Layer {
     /// The same, known only on some ground: 1 there, 0 elsewhere.
     pub(super) fn known_on(&self, ground: Grid<f32>) -> Self {
         let over = |values: &Grid<f32>| {
-            let kept = values.data().iter().zip(ground.data()).map(|(v, g)| v * g);
-            let mut out = values.clone();
-            let kept: Vec<f32> = kept.collect();
-            out.data_mut().copy_from_slice(&kept);
-            out
+            let mut kept = values.clone();
+            let pairs = kept.data_mut().iter_mut().zip(ground.data());
+            pairs.for_each(|(value, ground)| *value *= ground);
+            kept
         };
         Self {
             value: over(&self.value),

@@ -207,7 +207,8 @@ impl Pictures {
     }
 
     /// The pose looked at once more, with the strokes of its cut, by the character alone: walls, frame lines and
-    /// neighbours need not stand alike around print and relief; where they do, with them. Says as well how far the answers lie apart.
+    /// neighbours need not stand alike around print and relief. Where they do, they are looked at too. Says as well how
+    /// far the answers lie apart.
     fn look(&self, best: &Settled) -> Option<(Affine2, f64)> {
         let (ink, woods) = self.layers(COMPARED, &[best.cut]);
         let both = [&ink, woods.first()?];
