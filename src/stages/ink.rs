@@ -2,7 +2,7 @@
 
 use super::components::{Components, without_specks};
 use super::otsu::{self, Split};
-use super::paper;
+use super::paper::{self, NARROW, STROKE};
 use super::pose::Soft;
 use crate::raster::{Grid, Mask, Picture};
 
@@ -18,6 +18,10 @@ const LEAST_WHITE: f64 = 0.004;
 /// than paper, as in rubbings: heavy ink within a frame passes for dark paper.
 const CLEAR: f64 = 0.8;
 const CLEAR_LIGHT: f64 = 1.6;
+/// This much of the way from the darkest to the paper is pale; least share of what is dark that is where there may be
+/// stains.
+const PALE: f64 = 0.35;
+const LEAST_PALE: f64 = 0.15;
 /// Least difference between ink and paper, as a share of the lighter of the two: scanners that fill but a part of
 /// their 16 bits leave dark pictures.
 const LEAST_CONTRAST: f64 = 0.08;
@@ -111,7 +115,7 @@ pub(super) fn fixed(picture: &Picture, grey: u8) -> Result<Ink, Error> {
 }
 
 /// Our masks: white beyond the cut left out, paper levelled, threshold found. One for each polarity that the picture
-/// leaves possible, the likelier first.
+/// leaves possible, the likelier first, and one that sees past small stains where there may be some.
 pub(super) fn readings(picture: &Picture) -> Result<Vec<Ink>, Error> {
     let grey = &grey_of(picture)?;
     let known = known(picture, grey);
@@ -123,28 +127,51 @@ pub(super) fn readings(picture: &Picture) -> Result<Vec<Ink>, Error> {
         });
     }
     let dark = grey.map(|g| f64::from(*g) < split.threshold);
-    let even = evened(grey, &known);
-    let levelled = otsu::split(&mut held(&even, &known));
+    let even = evened(grey, &known, NARROW);
+    let mut values = held(&even, &known);
+    let levelled = otsu::split(&mut values);
     let (likelier, clear) = polarity(&even, levelled, &dark, &known);
     let of = |light_on_dark| {
         if light_on_dark {
-            let turned = evened(&grey.map(|g| 1.0 - *g), &known);
+            let turned = evened(&grey.map(|g| 1.0 - *g), &known, NARROW);
             let split = otsu::split(&mut held(&turned, &known));
             read(grey, &turned, split, &known, light_on_dark)
         } else {
             read(grey, &even, levelled, &known, light_on_dark)
         }
     };
-    let first = of(likelier);
-    if clear {
-        return first.map(|ink| vec![ink]);
+    let polarities: &[bool] = if clear {
+        &[likelier]
+    } else {
+        &[likelier, !likelier]
+    };
+    let mut read: Vec<Result<Ink, Error>> = polarities.iter().map(|light| of(*light)).collect();
+    if polarities.contains(&false) && may_be_stained(&values, levelled) {
+        read.push(past_stains(grey, &known));
     }
-    let second = of(!likelier);
-    match (first, second) {
-        (Ok(first), Ok(second)) => Ok(vec![first, second]),
-        (Ok(only), Err(_)) | (Err(_), Ok(only)) => Ok(vec![only]),
-        (Err(error), Err(_)) => Err(error),
+    // If none holds ink, the likeliest says why.
+    if read.iter().all(Result::is_err) {
+        read.truncate(1);
+        return read.into_iter().collect();
     }
+    Ok(read.into_iter().flatten().collect())
+}
+
+/// Whether much of what is dark, of values in their order, is so little dark that it may be stains.
+fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
+    let Some(split) = split else { return false };
+    let below = |limit: f64| sorted.partition_point(|v| f64::from(*v) < limit);
+    let dark = below(split.threshold);
+    let darkest = f64::from(sorted[dark / 10]);
+    let pale = dark.saturating_sub(below(darkest + PALE * (split.high - darkest)));
+    pale as f64 > LEAST_PALE * dark as f64
+}
+
+/// The ink where what is wider than most strokes is a stain.
+fn past_stains(grey: &Grid<f32>, known: &Mask) -> Result<Ink, Error> {
+    let even = evened(grey, known, STROKE);
+    let split = otsu::split(&mut held(&even, known));
+    read(grey, &even, split, known, false)
 }
 
 /// The ink of one polarity, from the grey over the paper's around it.
@@ -219,8 +246,8 @@ fn grown(mask: &Mask) -> Mask {
 }
 
 /// Grey over the paper's around it.
-fn evened(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
-    let level = paper::level(grey, known);
+fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
+    let level = paper::level(grey, known, narrow);
     Grid::from_fn(grey.width(), grey.height(), |x, y| {
         (grey.at(x, y) / level.at(x, y).max(0.01)).min(1.5)
     })
@@ -348,6 +375,36 @@ mod tests {
             }
         });
         assert!(!read(&framed).expect("ink").light_on_dark);
+    }
+
+    #[test]
+    fn one_reading_sees_past_a_stain() {
+        let near = |at: usize, middle: i64| (at as i64 - middle).abs() < 6;
+        let thin = |x, y| near(x, 100) || near(y, 90);
+        let stain = |x: usize, y: usize| (x as f64 - 130.0).hypot(y as f64 - 120.0) < 22.0;
+        let print = |stain: &dyn Fn(usize, usize) -> bool| Picture {
+            rgb: Grid::from_fn(200, 200, |x, y| {
+                let plain = if thin(x, y) { 90.0 } else { 215.0 };
+                let grey = plain * if stain(x, y) { 0.7 } else { 1.0 };
+                [grey as u16 * 257; 3]
+            }),
+        };
+        let wrong = |ink: &Ink| {
+            let pixels = ink.mask.data().iter().enumerate();
+            pixels
+                .filter(|(i, ink)| **ink != thin(i % 200, i / 200))
+                .count()
+        };
+        let found: Vec<usize> = readings(&print(&stain))
+            .expect("ink")
+            .iter()
+            .map(wrong)
+            .collect();
+        assert!(
+            found.len() == 2 && found[0] > 1000 && found[1] < 150,
+            "{found:?}"
+        );
+        assert_eq!(readings(&print(&|_, _| false)).expect("ink").len(), 1);
     }
 
     #[test]

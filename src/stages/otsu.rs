@@ -16,6 +16,17 @@ pub(super) struct Split {
 /// Sorts the values.
 pub(super) fn split(values: &mut [f32]) -> Option<Split> {
     sort(values);
+    split_sorted(values)
+}
+
+/// The same without the lowest and the highest one in so many of the values.
+pub(super) fn split_inner(values: &mut [f32], one_in: usize) -> Option<Split> {
+    sort(values);
+    let cut = values.len() / one_in;
+    split_sorted(&values[cut..values.len() - cut])
+}
+
+fn split_sorted(values: &[f32]) -> Option<Split> {
     let count = values.len();
     if count < 2 {
         return None;
@@ -93,7 +104,7 @@ fn of_key(key: u32) -> f32 {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{DIGIT_VALUES, sort, split};
+    use super::{DIGIT_VALUES, sort, split, split_inner};
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20))]
@@ -117,5 +128,14 @@ mod tests {
         assert!((2.9..10.0).contains(&parted.threshold));
         assert!((parted.low - 1.5).abs() < 0.1 && (parted.high - 10.45).abs() < 0.1);
         assert!(split(&mut [1.0]).is_none());
+    }
+
+    #[test]
+    fn farthest_values_can_be_left_out() {
+        let mut values: Vec<f32> = (0..100).map(|i| if i < 60 { 1.0 } else { 2.0 }).collect();
+        values[0] = -5000.0;
+        values[99] = 9000.0;
+        let split = split_inner(&mut values, 50).expect("there are two classes");
+        assert_eq!((split.low, split.high), (1.0, 2.0));
     }
 }

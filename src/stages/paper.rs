@@ -6,15 +6,17 @@ use crate::raster::{Grid, Mask, resample};
 
 /// Paper changes slowly: it is looked at on this many cells along the longest side.
 const CELLS: f64 = 96.0;
-/// Half the width of what counts as narrow, as a share of the longest side.
-const NARROW: f64 = 0.12;
+/// Half the width of what counts as narrow, as a share of the longest side: no stroke is wider, and hardly any stroke.
+pub(super) const NARROW: f64 = 0.12;
+pub(super) const STROKE: f64 = 0.05;
 /// A cell that is known to less than this share says nothing.
 const LEAST_KNOWN: f32 = 0.3;
 /// A cell that says nothing: `f32::max` and `f32::min` pass over it.
 const EMPTY: f32 = f32::NAN;
 
-/// Brightness of the paper under and around each pixel, 0..=1: the grey closed by a square that strokes fit into.
-pub(super) fn level(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
+/// Brightness of the paper under and around each pixel, 0..=1: the grey closed by a square into which fits what is at
+/// most twice `narrow` wide, a share of the longest side.
+pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let (width, height) = (grey.width(), grey.height());
     let Some(bounds) = known.bounding_box() else {
         return grey.clone();
@@ -43,7 +45,7 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask) -> Grid<f32> {
             EMPTY
         }
     });
-    let reach = ((NARROW * longest * scale).round() as usize).max(1);
+    let reach = ((narrow * longest * scale).round() as usize).max(1);
     let closed = extreme(&extreme(&cells, reach, f32::max), reach, f32::min);
     let seen: Vec<f32> = closed
         .data()
@@ -96,7 +98,7 @@ fn doubled(row: &[f32], reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Vec<f3
 
 #[cfg(test)]
 mod tests {
-    use super::level;
+    use super::{NARROW, level};
     use crate::raster::{Grid, Mask};
 
     #[test]
@@ -105,7 +107,7 @@ mod tests {
             let paper = if x > 110 && y > 110 { 0.6 } else { 0.9 };
             if x % 40 < 12 { paper - 0.4 } else { paper }
         });
-        let level = level(&grey, &Mask::new(200, 200, true));
+        let level = level(&grey, &Mask::new(200, 200, true), NARROW);
         assert!(
             (level.at(60, 50) - 0.9).abs() < 0.03,
             "{}",

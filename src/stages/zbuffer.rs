@@ -1,5 +1,6 @@
 //! The highest surface under each pixel, looking straight down on a plane (orthographic z-buffer).
 
+mod moments;
 mod view;
 
 use super::bulk::{Bounds, bulk_along, room};
@@ -7,6 +8,7 @@ use crate::domain::Rigid3;
 use crate::mesh::Mesh;
 use crate::raster::Grid;
 
+pub(super) use moments::Moments;
 pub(super) use view::View;
 
 /// Height of a pixel that no surface covers.
@@ -26,7 +28,11 @@ const LANES: usize = 8;
 #[derive(Debug)]
 pub(super) struct Shell {
     middle: [f64; 3],
+    /// Box around the bulk.
+    room: Bounds<3>,
     blocks: Vec<Block>,
+    /// Triangles, or points, in the blocks.
+    count: usize,
     has_faces: bool,
 }
 
@@ -43,14 +49,18 @@ impl Row {
     #[inline]
     fn at(&self, [x, y, z]: &[Lanes; 3]) -> Lanes {
         let [a, b, c, d] = self.0;
-        std::array::from_fn(|k| a * x[k] + b * y[k] + c * z[k] + d)
+        let mut places = [0.0; LANES];
+        for (k, place) in places.iter_mut().enumerate() {
+            *place = a * x[k] + b * y[k] + c * z[k] + d;
+        }
+        places
     }
 }
 
 impl Shell {
     /// Takes the corners of a mesh's triangles, or its points when it has none.
     pub(super) fn new(mesh: &Mesh) -> Self {
-        let [low, high]: Bounds<3> = room(&mesh.vertices);
+        let room @ [low, high]: Bounds<3> = room(&mesh.vertices);
         let middle: [f64; 3] = std::array::from_fn(|k| f64::midpoint(low[k], high[k]));
         let points: Vec<[u32; 3]>;
         let triangles = if mesh.triangles.is_empty() {
@@ -61,6 +71,8 @@ impl Shell {
         };
         Self {
             middle,
+            room,
+            count: triangles.len(),
             blocks: triangles
                 .chunks(LANES)
                 .map(|few| block(few, &mesh.vertices, middle))
@@ -193,13 +205,15 @@ fn block(triangles: &[[u32; 3]], vertices: &[[f64; 3]], middle: [f64; 3]) -> Blo
 #[inline]
 fn holding([a, b, c]: &[Lanes; 3], side: usize) -> [bool; LANES] {
     let last = side as f32 - 1.0;
-    std::array::from_fn(|k| {
+    let mut holds = [false; LANES];
+    for (k, holds) in holds.iter_mut().enumerate() {
         let low = lower(lower(a[k], b[k]), c[k]);
         let high = higher(higher(a[k], b[k]), c[k]);
         // The last whole pixel at or below the upper end; a narrow cast rounds down from 0 up.
         let below = (lower(higher(high, -1.0), last) + 1.0) as i32 - 1;
-        below as f32 >= higher(low, 0.0)
-    })
+        *holds = below as f32 >= higher(low, 0.0);
+    }
+    holds
 }
 
 /// Plain comparisons, which are one instruction for many lanes; `f32::min` minds what is not a number.

@@ -16,7 +16,7 @@ use crate::mesh::Mesh;
 use crate::stages::Print;
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 6;
+pub const REVISION: u32 = 7;
 
 /// How the plane is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -6,12 +6,10 @@ use super::Error;
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
 use crate::stages::bulk::{Bounds, holds, room};
+use crate::stages::zbuffer::{Moments, Shell};
 
 /// A surface given by points alone needs this many: 25 along a side show a stroke or two at best.
 const LEAST_POINTS: usize = 600;
-
-/// Axes of the moments of second degree, each kept once.
-const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
 
 /// Centre and principal axes, longest first, with the variance along each.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,38 +37,14 @@ impl Axes {
         Self::from_moments(centre, spread / total)
     }
 
-    /// Of a surface, each triangle weighing its area (so repeated vertices and uneven density change nothing);
-    /// of the vertices where there is no area. Flecks far from the bulk do not count.
-    pub(super) fn of_surface(mesh: &Mesh) -> Self {
+    /// Of a surface; of the vertices where there is no area. Flecks far from the bulk do not count.
+    pub(super) fn of_surface(mesh: &Mesh, shell: &Shell) -> Self {
+        if let Some(moments) = Moments::of(shell) {
+            return Self::from_moments(moments.centre, moments.covariance);
+        }
         let bounds: Bounds<3> = room(&mesh.vertices);
-        let middle = (Vector3::from(bounds[0]) + Vector3::from(bounds[1])) * 0.5;
-        let (mut total, mut first, mut second) = (0.0, Vector3::zeros(), [0.0; 6]);
-        for t in &mesh.triangles {
-            let corners = t.map(|i| mesh.vertices[i as usize]);
-            if !corners.iter().all(|corner| holds(&bounds, corner)) {
-                continue;
-            }
-            // From the middle, so that little is lost when the centre's own share is taken off the moments.
-            let [a, b, c] = corners.map(|corner| Vector3::from(corner) - middle);
-            let area = (b - a).cross(&(c - a)).norm() * 0.5;
-            let sum = a + b + c;
-            total += area;
-            first += sum * (area / 3.0);
-            // Second moment of a triangle: (sum of corners' outer products + outer product of their sum) / 12.
-            for (moment, (i, j)) in second.iter_mut().zip(PAIRS) {
-                let outer = a[i] * a[j] + b[i] * b[j] + c[i] * c[j];
-                *moment += (outer + sum[i] * sum[j]) * (area / 12.0);
-            }
-        }
-        if total <= 0.0 || !total.is_finite() {
-            let kept = mesh.vertices.iter().filter(|v| holds(&bounds, v));
-            return Self::of_points(kept.map(|v| (*v, 1.0)));
-        }
-        let centre = first / total;
-        let [xx, xy, xz, yy, yz, zz] = second;
-        let second = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
-        let covariance = second / total - centre * centre.transpose();
-        Self::from_moments(middle + centre, covariance)
+        let kept = mesh.vertices.iter().filter(|v| holds(&bounds, v));
+        Self::of_points(kept.map(|v| (*v, 1.0)))
     }
 
     fn from_moments(centre: Vector3<f64>, covariance: Matrix3<f64>) -> Self {
@@ -136,6 +110,7 @@ mod tests {
 
     use super::{Axes, frame};
     use crate::mesh::Mesh;
+    use crate::stages::zbuffer::Shell;
 
     #[test]
     fn repeated_vertices_and_split_faces_change_nothing() {
@@ -155,7 +130,8 @@ mod tests {
             vertices,
             triangles: vec![[0, 1, 2], [3, 4, 5]],
         };
-        let (a, b) = (Axes::of_surface(&shared), Axes::of_surface(&soup));
+        let axes = |mesh: &Mesh| Axes::of_surface(mesh, &Shell::new(mesh));
+        let (a, b) = (axes(&shared), axes(&soup));
         assert!((a.centre - b.centre).norm() < 1e-12);
         assert!(a.normal().cross(&b.normal()).norm() < 1e-9);
     }

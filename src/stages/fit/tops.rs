@@ -26,6 +26,8 @@ const MOST_LOOKS: usize = 3;
 const PLAIN: f64 = 0.85;
 /// Where less than this share lies on the surface it stands on a rim of walls or on flecks, not on strokes.
 const SCANT: f64 = 0.05;
+/// One in so many pixels, highest and lowest each, says nothing of the depth of the carving.
+const FARTHEST: usize = 100;
 
 pub(super) fn fit(
     mesh: &Mesh,
@@ -33,9 +35,9 @@ pub(super) fn fit(
     scanned_face_down: Option<bool>,
     params: &Params,
 ) -> Result<FitOutcome, Error> {
-    let axes = Axes::of_surface(mesh);
-    axes.require_surface(mesh)?;
     let shell = Shell::new(mesh);
+    let axes = Axes::of_surface(mesh, &shell);
+    axes.require_surface(mesh)?;
     let faces = glances(&shell, &frame(axes.normal(), axes.centre), params.bow);
     let witness = Witness {
         mesh,
@@ -167,7 +169,7 @@ impl Seen {
         let bent = over_plane[3..].iter().any(|c| *c != 0.0);
         let bow = bent.then_some(Bow(over_plane));
         let relief = if (SCANT..=PLAIN).contains(&surface.tops) {
-            relief(samples.inner_residuals(surface))
+            relief(&samples.inner_residuals(surface))
         } else {
             0.0
         };
@@ -215,13 +217,8 @@ fn bow_height(bow: &Bow, view: &View) -> f64 {
     high - low
 }
 
-/// Depth of the carving: between the medians of tops and ground, the hundredth at either end left out.
-fn relief(mut residuals: Vec<f64>) -> f64 {
-    residuals.sort_by(f64::total_cmp);
-    let cut = residuals.len() / 100;
-    let mut kept: Vec<f32> = residuals[cut..residuals.len() - cut]
-        .iter()
-        .map(|r| *r as f32)
-        .collect();
-    otsu::split(&mut kept).map_or(0.0, |split| split.high - split.low)
+/// Depth of the carving: between the medians of tops and ground, what lies farthest from the surface left out.
+fn relief(residuals: &[f64]) -> f64 {
+    let mut residuals: Vec<f32> = residuals.iter().map(|r| *r as f32).collect();
+    otsu::split_inner(&mut residuals, FARTHEST).map_or(0.0, |split| split.high - split.low)
 }

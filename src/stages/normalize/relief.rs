@@ -12,6 +12,9 @@ const MARGIN: f64 = 0.15;
 /// Tops within this share of the relief of the fitted surface lie on it.
 const ANCHORED: f64 = 0.5;
 
+/// Share of the relief by which a cut is lowered to see whether it runs through tops.
+const A_BIT: f64 = 0.03;
+
 /// Heights of tops and ground over the fitted surface, mesh units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Relief {
@@ -66,6 +69,16 @@ impl Relief {
         (1.0 + steps.round()).clamp(1.0, 65_535.0) as u16
     }
 
+    /// How much the strokes of a level grow when it is lowered by [`A_BIT`]: the logarithm of their areas' ratio.
+    ///
+    /// Walls are steep, so much of it says that the cut runs through tops, worn or tilted ones.
+    pub(in crate::stages) fn growth(&self, depth: &DepthMap, level: u16) -> f64 {
+        let bit = A_BIT * self.depth() / depth.scale.height_per_level;
+        let lower = (f64::from(level) - bit).clamp(1.0, 65_535.0) as u16;
+        let area = |least: u16| depth.levels.data().iter().filter(|l| **l >= least).count();
+        (area(lower) as f64 / area(level.max(1)).max(1) as f64).ln()
+    }
+
     /// Depth of every pixel under the tops, a share of the relief between -1 and 2.
     pub(in crate::stages) fn depths(&self, depth: &DepthMap) -> Soft {
         let scale = &depth.scale;
@@ -102,4 +115,43 @@ fn heights(depth: &DepthMap, margin: f64) -> Vec<f32> {
     rows.flat_map(|y| inner(bounds.x0, bounds.x1).map(move |x| (x, y)))
         .filter_map(|(x, y)| depth.height(x, y).map(|h| h as f32))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Relief;
+    use crate::domain::{Affine2, DepthScale};
+    use crate::raster::{DepthMap, Grid};
+
+    const SIDE: usize = 80;
+
+    /// A bar on the ground, its top as many levels lower on the right as is said; the relief is 50,000 levels.
+    fn bar(tilt: f64) -> DepthMap {
+        let on_bar = |x, y| (20..60).contains(&x) && (30..50).contains(&y);
+        let top = |x: usize| 51_000.0 - tilt * (x as f64 - 40.0) / 40.0;
+        let level = |x, y| if on_bar(x, y) { top(x) as u16 } else { 1000 };
+        DepthMap {
+            levels: Grid::from_fn(SIDE, SIDE, level),
+            scale: DepthScale {
+                height_min: -1.0,
+                height_per_level: 2e-5,
+                mesh_unit_per_px: 0.1,
+                depth_from_plane: Affine2::IDENTITY,
+                bow: None,
+                unit: None,
+            },
+        }
+    }
+
+    #[test]
+    fn strokes_grow_where_a_cut_runs_through_tops() {
+        let relief = Relief {
+            top: 0.02,
+            ground: -0.98,
+            edge: 0.05,
+        };
+        let growth = |tilt| relief.growth(&bar(tilt), 51_000);
+        assert_eq!(growth(0.0), 0.0);
+        assert!(growth(6000.0) > 0.3, "{}", growth(6000.0));
+    }
 }

@@ -14,7 +14,7 @@ mod step;
 
 pub(super) use find::{Pass, find};
 pub(super) use ground::Surroundings;
-pub(super) use layer::{Base, Layer, Soft};
+pub(super) use layer::{Base, Layer, Sizer, Soft};
 pub(super) use overlap::Overlap;
 pub(super) use refine::Refiner;
 pub(super) use search::{Found, Keep, Limits};

@@ -11,7 +11,7 @@ mod turns;
 
 use serde::{Deserialize, Serialize};
 
-use super::normalize::Normalized;
+use super::normalize::{Normalized, Relief};
 use super::score::{self, SsimWindow, WindowMeans};
 use crate::domain::{
     Affine2, Evidence, FailureClass, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric,
@@ -19,7 +19,7 @@ use crate::domain::{
 use crate::raster::{DepthMap, Mask, warp_mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 7;
+pub const REVISION: u32 = 8;
 
 /// Mirrored must win by this factor to be named the cause: symmetric characters score alike both ways.
 const MIRROR_WINS: f64 = 1.06;
@@ -156,9 +156,10 @@ pub fn register(
     let canvas_print = warp_mask(&normalized.ink, &canvas_from_print, side, side);
     let (alignments, evidence) = match params.method {
         Method::Refine => {
-            let (alignments, evidence) = refined::align(depth, normalized, params)?;
+            let relief = Relief::of(depth).ok_or(Error::NoPose)?;
+            let (alignments, evidence) = refined::align(depth, &relief, normalized, params)?;
             require_match(&evidence, params)?;
-            (alignments, Some(evidence))
+            (alignments, Some((evidence, relief)))
         }
         Method::Turns => (
             turns::align(depth, &canvas_print, normalized, params)?,
@@ -192,18 +193,22 @@ pub fn register(
             depth: mask,
         });
     }
-    if let Some(evidence) = &evidence {
-        trust(&mut metrics, evidence);
+    if let Some((evidence, relief)) = &evidence {
+        trust(&mut metrics, evidence, |level| relief.growth(depth, level));
     }
     Ok(Registered {
-        outcome: RegisterOutcome { metrics, evidence },
+        outcome: RegisterOutcome {
+            metrics,
+            evidence: evidence.map(|(evidence, _)| evidence),
+        },
         canvas_print,
         canvases,
     })
 }
 
-/// Gives each metric its confidence: the pose's, and the mask's beside the one that the relief alone chose.
-fn trust(metrics: &mut [MetricOutcome], evidence: &Evidence) {
+/// Gives each metric its confidence: the pose's, and the mask's beside the one that the relief alone chose. `growth` is
+/// that of the strokes at a level.
+fn trust(metrics: &mut [MetricOutcome], evidence: &Evidence, growth: impl Fn(u16) -> f64) {
     let pose = confidence::of_pose(evidence);
     let own = metrics
         .iter()
@@ -215,6 +220,7 @@ fn trust(metrics: &mut [MetricOutcome], evidence: &Evidence) {
             mask: scores.density_depth,
             relief: own.unwrap_or(scores.density_depth),
             ink: scores.density_print,
+            growth: growth(outcome.threshold_level),
         };
         outcome.confidence = Some(pose * confidence::of_mask(evidence, areas));
     }

@@ -7,7 +7,7 @@ use super::{Alignment, Error, Params};
 use crate::domain::{Affine2, Evidence, Pose};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{Normalized, Relief, soft_stroke};
-use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Soft, Surroundings};
+use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Sizer, Soft, Surroundings};
 
 /// Poses closer in angle than this are one pose when the margin is taken.
 const SAME_POSE_DEG: f64 = 15.0;
@@ -31,16 +31,19 @@ const MOST_STEPS: usize = 15;
 /// One alignment a metric that has a threshold: thresholds differ, the pose does not, since it is found without one.
 pub(super) fn align(
     depth: &DepthMap,
+    relief: &Relief,
     normalized: &Normalized,
     params: &Params,
 ) -> Result<(Vec<Alignment>, Evidence), Error> {
-    let pictures = Pictures::new(depth, normalized, params).ok_or(Error::NoPose)?;
-    let mut rivals = Rivals::of(&pictures, normalized).ok_or(Error::NoPose)?;
+    let pictures = Pictures::new(depth, relief, normalized, params).ok_or(Error::NoPose)?;
+    let few = pictures.at(COMPARED);
+    let mut rivals = Rivals::of(&few, normalized).ok_or(Error::NoPose)?;
     let cuts = near(rivals.best.cut);
-    let (ink, woods) = pictures.layers(CLOSER, cuts);
-    let cuts = Cuts::new(cuts, &ink, &woods);
+    let closer = pictures.at(CLOSER);
+    let woods = closer.strokes(cuts);
+    let cuts = Cuts::new(cuts, &closer.ink, &woods);
     rivals.look_closer(&cuts).ok_or(Error::NoPose)?;
-    let (print_from_depth, spread) = pictures.look(&rivals.best).ok_or(Error::NoPose)?;
+    let (print_from_depth, spread) = pictures.look(&few, &rivals.best).ok_or(Error::NoPose)?;
     let choices = normalized.outcome.thresholds.iter();
     let alignments = choices.map(|choice| Alignment {
         metric: choice.metric,
@@ -83,9 +86,9 @@ struct Rivals {
 
 impl Rivals {
     /// Compares the poses that normalisation found.
-    fn of(pictures: &Pictures, normalized: &Normalized) -> Option<Self> {
-        let (ink, woods) = pictures.layers(COMPARED, &FEW_CUTS);
-        let tried = settle_all(&Cuts::new(&FEW_CUTS, &ink, &woods), normalized)?;
+    fn of(pictures: &Scaled, normalized: &Normalized) -> Option<Self> {
+        let woods = pictures.strokes(&FEW_CUTS);
+        let tried = settle_all(&Cuts::new(&FEW_CUTS, &pictures.ink, &woods), normalized)?;
         let best = *best_of(&tried, |pose| !pose.found.mirrored)?;
         let elsewhere = |pose: &Settled| {
             !pose.found.mirrored && pose.found.turn_from(&best.found) > SAME_POSE_DEG
@@ -178,7 +181,12 @@ struct Pictures {
 }
 
 impl Pictures {
-    fn new(depth: &DepthMap, normalized: &Normalized, params: &Params) -> Option<Self> {
+    fn new(
+        depth: &DepthMap,
+        relief: &Relief,
+        normalized: &Normalized,
+        params: &Params,
+    ) -> Option<Self> {
         let ink = Soft {
             amount: normalized.ink.map(|set| f32::from(u8::from(*set))),
             known: normalized.known.clone(),
@@ -186,7 +194,7 @@ impl Pictures {
         let px = params.working_px as usize;
         Some(Self {
             ink: Base::new(&ink, px)?,
-            depths: Base::new(&Relief::of(depth)?.depths(depth), px)?,
+            depths: Base::new(&relief.depths(depth), px)?,
             px,
             smoothing_px: params.smoothing_px,
             may_stretch: params.stretch,
@@ -194,30 +202,29 @@ impl Pictures {
         })
     }
 
-    /// The ink, and the strokes of cuts under the tops, at a share of the working size.
-    fn layers(&self, share: f64, cuts: &[f64]) -> (Layer, Vec<Layer>) {
+    /// They at a share of the working size.
+    fn at(&self, share: f64) -> Scaled<'_> {
         let px = (self.px as f64 * share).round() as usize;
         let sigma = self.smoothing_px * share.sqrt();
-        let depths = self.depths.at(px, sigma);
-        let strokes = |cut: &f64| depths.mapped(|d| soft_stroke(d, *cut, SOFTNESS));
-        (
-            self.ink.layer(px, sigma),
-            cuts.iter().map(strokes).collect(),
-        )
+        Scaled {
+            ink: self.ink.layer(px, sigma),
+            depths: self.depths.at(px, sigma),
+        }
     }
 
     /// The pose looked at once more, with the strokes of its cut, by the character alone: walls, frame lines and
     /// neighbours need not stand alike around print and relief. Where they do, they are looked at too. Says as well how
     /// far the answers lie apart.
-    fn look(&self, best: &Settled) -> Option<(Affine2, f64)> {
-        let (ink, woods) = self.layers(COMPARED, &[best.cut]);
-        let both = [&ink, woods.first()?];
+    fn look(&self, few: &Scaled, best: &Settled) -> Option<(Affine2, f64)> {
+        let wood = few.stroke(best.cut);
+        let both = [&few.ink, &wood];
         let around = Surroundings::of(both, &best.found.fixed_from_moving)?;
         let [ink, wood] = around.without();
         let (closer, spread) = self.steadied(&Refiner::new(&ink, &wood), &best.found);
         let agree = Surroundings::of(both, &closer.fixed_from_moving)?.agree();
-        let (ink, woods) = self.layers(1.0, &[best.cut]);
-        let both = [&ink, woods.first()?];
+        let full = self.at(1.0);
+        let wood = full.stroke(best.cut);
+        let both = [&full.ink, &wood];
         let alone = if agree {
             None
         } else {
@@ -268,6 +275,23 @@ impl Pictures {
         };
         let side = width.max(height) * one.fixed_from_moving.scale();
         corners.map(distance).iter().sum::<f64>() / 4.0 / side.max(1e-9)
+    }
+}
+
+/// Print and relief at one size.
+struct Scaled<'a> {
+    ink: Layer,
+    depths: Sizer<'a>,
+}
+
+impl Scaled<'_> {
+    /// The strokes of a cut under the tops.
+    fn stroke(&self, cut: f64) -> Layer {
+        self.depths.mapped(|d| soft_stroke(d, cut, SOFTNESS))
+    }
+
+    fn strokes(&self, cuts: &[f64]) -> Vec<Layer> {
+        cuts.iter().map(|cut| self.stroke(*cut)).collect()
     }
 }
 

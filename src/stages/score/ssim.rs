@@ -170,28 +170,45 @@ impl Taps {
         across
     }
 
-    /// Weighted means down the columns; weights that are alike share a product.
+    /// Weighted means down the columns.
     fn down(&self, across: &Grid<f64>) -> Grid<f64> {
         let width = across.width();
-        let last = self.weights.len() - 1;
-        let height = across.height().saturating_sub(last);
+        let height = across.height().saturating_sub(self.weights.len() - 1);
         let mut means = Grid::new(width, height, 0.0);
         for y in 0..height {
-            let out = &mut means.data_mut()[y * width..(y + 1) * width];
-            for (k, weight) in self.weights[..last / 2].iter().enumerate() {
-                let mirrored = across.row(y + k).iter().zip(across.row(y + last - k));
-                for (sum, (a, b)) in out.iter_mut().zip(mirrored) {
-                    *sum += weight * (a + b);
-                }
+            let row = &mut means.data_mut()[y * width..(y + 1) * width];
+            let (runs, rest) = row.as_chunks_mut();
+            for (k, run) in runs.iter_mut().enumerate() {
+                *run = self.below::<COLUMNS>(across, k * COLUMNS, y);
             }
-            let weight = self.weights[last / 2];
-            for (sum, value) in out.iter_mut().zip(across.row(y + last / 2)) {
-                *sum += weight * value;
+            let first = width - rest.len();
+            for (k, mean) in rest.iter_mut().enumerate() {
+                [*mean] = self.below(across, first + k, y);
             }
         }
         means
     }
+
+    /// The weighted means of some columns side by side; weights that are alike share a product.
+    #[inline]
+    fn below<const N: usize>(&self, across: &Grid<f64>, x: usize, y: usize) -> [f64; N] {
+        let last = self.weights.len() - 1;
+        let row = |k: usize| &across.row(y + k)[x..x + N];
+        let mut sums = [0.0; N];
+        for (k, weight) in self.weights[..last / 2].iter().enumerate() {
+            for (sum, (a, b)) in sums.iter_mut().zip(row(k).iter().zip(row(last - k))) {
+                *sum += weight * (a + b);
+            }
+        }
+        for (sum, value) in sums.iter_mut().zip(row(last / 2)) {
+            *sum += self.weights[last / 2] * value;
+        }
+        sums
+    }
 }
+
+/// Columns that are summed together.
+const COLUMNS: usize = 8;
 
 #[cfg(test)]
 mod tests {

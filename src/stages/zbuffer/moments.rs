@@ -1,0 +1,201 @@
+//! Area, centre and spread of a surface, each triangle weighing its area: repeated vertices and uneven density change
+//! nothing.
+
+use nalgebra::{Matrix3, Vector3};
+
+use super::{Block, LANES, Lanes, Shell};
+use crate::stages::bulk::Bounds;
+
+/// Products of two axes, each kept once.
+const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+/// Blocks summed in single precision before their sums go to the others.
+const RUN: usize = 32;
+
+/// Centre and covariance of a surface, in the mesh's frame and unit.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::stages) struct Moments {
+    pub(in crate::stages) centre: Vector3<f64>,
+    pub(in crate::stages) covariance: Matrix3<f64>,
+}
+
+impl Moments {
+    /// Of the triangles that lie in the bulk; `None` where they have no area.
+    pub(in crate::stages) fn of(shell: &Shell) -> Option<Self> {
+        if !shell.has_faces {
+            return None;
+        }
+        let around = Around::of(shell);
+        let mut sums = [0.0; SUMS];
+        for (run, blocks) in shell.blocks.chunks(RUN).enumerate() {
+            let mut part = [[0.0; LANES]; SUMS];
+            for (k, block) in blocks.iter().enumerate() {
+                let first = (run * RUN + k) * LANES;
+                around.add(block, shell.count - first, &mut part);
+            }
+            for (sum, part) in sums.iter_mut().zip(part) {
+                *sum += part.iter().map(|v| f64::from(*v)).sum::<f64>();
+            }
+        }
+        let [total, x, y, z, xx, xy, xz, yy, yz, zz] = sums;
+        if total <= 0.0 || !total.is_finite() {
+            return None;
+        }
+        let centre = Vector3::new(x, y, z) / (3.0 * total);
+        // Second moment of a triangle: (sum of corners' outer products + outer product of their sum) / 12.
+        let second = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) / (12.0 * total);
+        let unit = around.extent;
+        Some(Self {
+            centre: Vector3::from(shell.middle) + centre * unit,
+            covariance: (second - centre * centre.transpose()) * (unit * unit),
+        })
+    }
+}
+
+/// Sums kept: area, three of first degree, six of second.
+const SUMS: usize = 10;
+
+/// The bulk, its middle at zero.
+struct Around {
+    extent: f64,
+    /// Half its sides, a share of the extent.
+    half: [f32; 3],
+}
+
+impl Around {
+    fn of(shell: &Shell) -> Self {
+        let [low, high]: Bounds<3> = shell.room;
+        let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+        let extent = sides.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b));
+        Self {
+            extent,
+            half: sides.map(|side| (side / extent / 2.0 * (1.0 + f64::from(f32::EPSILON))) as f32),
+        }
+    }
+
+    /// Adds the first `count` triangles of a block that lie in the bulk.
+    fn add(&self, block: &Block, count: usize, sums: &mut [[f32; LANES]; SUMS]) {
+        let per_extent = (1.0 / self.extent) as f32;
+        let corners = block.map(|corner| corner.map(|axis: Lanes| axis.map(|v| v * per_extent)));
+        for lane in 0..LANES {
+            let [a, b, c] = corners
+                .each_ref()
+                .map(|corner| corner.each_ref().map(|axis| axis[lane]));
+            let mut inside = lane < count;
+            for axis in 0..3 {
+                let half = self.half[axis];
+                inside &= a[axis].abs() <= half;
+                inside &= b[axis].abs() <= half;
+                inside &= c[axis].abs() <= half;
+            }
+            let (p, q) = (
+                [0, 1, 2].map(|k| b[k] - a[k]),
+                [0, 1, 2].map(|k| c[k] - a[k]),
+            );
+            let cross = [
+                p[1] * q[2] - p[2] * q[1],
+                p[2] * q[0] - p[0] * q[2],
+                p[0] * q[1] - p[1] * q[0],
+            ];
+            let squared = cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2];
+            let area = if inside { squared.sqrt() } else { 0.0 };
+            let sum = [0, 1, 2].map(|k| a[k] + b[k] + c[k]);
+            sums[0][lane] += area;
+            for axis in 0..3 {
+                sums[1 + axis][lane] += area * sum[axis];
+            }
+            for (k, (i, j)) in PAIRS.into_iter().enumerate() {
+                let outer = a[i] * a[j] + b[i] * b[j] + c[i] * c[j] + sum[i] * sum[j];
+                sums[4 + k][lane] += area * outer;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::Moments;
+    use crate::mesh::Mesh;
+    use crate::stages::zbuffer::Shell;
+
+    /// Each triangle is cut into this many rows of small ones.
+    const ROWS: usize = 40;
+
+    /// The slow obvious twin: the middles of many small triangles, each with its area.
+    fn of_small_triangles(mesh: &Mesh) -> ([f64; 3], [[f64; 3]; 3]) {
+        let mut middles = Vec::new();
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|i| mesh.vertices[i as usize]);
+            let at =
+                |u: f64, v: f64| [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
+            let [p, q] = [b, c].map(|d| [0, 1, 2].map(|k| d[k] - a[k]));
+            let side = |i: usize, j: usize| p[i] * q[j] - p[j] * q[i];
+            let area = (side(0, 1).powi(2) + side(1, 2).powi(2) + side(2, 0).powi(2)).sqrt();
+            let step = 1.0 / ROWS as f64;
+            for i in 0..ROWS {
+                for j in 0..ROWS - i {
+                    let (u, v) = (i as f64 * step, j as f64 * step);
+                    middles.push((at(u + step / 3.0, v + step / 3.0), area));
+                    if i + j + 1 < ROWS {
+                        middles.push((at(u + step / 1.5, v + step / 1.5), area));
+                    }
+                }
+            }
+        }
+        let total: f64 = middles.iter().map(|(_, area)| area).sum();
+        let mean = |value: &dyn Fn(&[f64; 3]) -> f64| {
+            let sum: f64 = middles
+                .iter()
+                .map(|(place, area)| area * value(place))
+                .sum();
+            sum / total
+        };
+        let centre = [0, 1, 2].map(|k| mean(&|place| place[k]));
+        let spread = |i: usize, j: usize| mean(&|p| (p[i] - centre[i]) * (p[j] - centre[j]));
+        (centre, [0, 1, 2].map(|i| [0, 1, 2].map(|j| spread(i, j))))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+        #[test]
+        fn equal_those_of_many_small_triangles(
+            places in prop::collection::vec(prop::array::uniform3(-3.0..5.0_f64), 9..40),
+        ) {
+            let triangles = (0..places.len() as u32 - 2).map(|i| [i, i + 1, i + 2]).collect();
+            let mesh = Mesh { vertices: places, triangles };
+            let found = Moments::of(&Shell::new(&mesh)).expect("there is area");
+            let (centre, covariance) = of_small_triangles(&mesh);
+            for i in 0..3 {
+                prop_assert!((found.centre[i] - centre[i]).abs() < 1e-4);
+                for (j, two) in covariance[i].iter().enumerate() {
+                    let one = found.covariance[(i, j)];
+                    prop_assert!((one - two).abs() < 5e-3, "{one} {two}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_fleck_far_away_does_not_count() {
+        let grid = |i: u32| [f64::from(i % 60), f64::from(i / 60), 0.0];
+        let mut vertices: Vec<[f64; 3]> = (0..3600).map(grid).collect();
+        let mut triangles: Vec<[u32; 3]> = (0..3500)
+            .filter(|i| i % 60 < 59)
+            .map(|i| [i, i + 1, i + 60])
+            .collect();
+        let plain = Mesh {
+            vertices: vertices.clone(),
+            triangles: triangles.clone(),
+        };
+        vertices.extend([[5e4, 0.0, 0.0], [5e4, 9e3, 0.0], [6e4, 0.0, 9e3]]);
+        triangles.push([3600, 3601, 3602]);
+        let flecked = Mesh {
+            vertices,
+            triangles,
+        };
+        let of = |mesh: &Mesh| Moments::of(&Shell::new(mesh)).expect("there is area");
+        let apart = of(&plain).centre - of(&flecked).centre;
+        assert!(apart.norm() < 1e-3, "{apart}");
+    }
+}
