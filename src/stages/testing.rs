@@ -187,7 +187,7 @@ pub(super) fn settings() -> Settings {
             method: register::Method::Refine,
             working_px: 192,
             stretch: false,
-            least_confidence: 0.5,
+            least_confidence: 0.3,
             smoothing_px: 1.2,
             coarse_angles: 60,
             fine_angles: 60,
