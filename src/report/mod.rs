@@ -21,6 +21,7 @@ pub(crate) mod standing;
 pub mod stats;
 mod tally;
 pub mod truth;
+mod truth_sums;
 mod warnings;
 
 pub use agree::{Agree, ReaderRecord, TwoReaders, agree};
