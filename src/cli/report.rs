@@ -25,6 +25,9 @@ pub(super) struct ReportArgs {
     /// How the intervals of Acc are computed: wilson, or exact (Clopper and Pearson)
     #[arg(long, value_name = "HOW", default_value = "wilson")]
     pub(super) ci: Interval,
+    /// Tell computing times by stage too; the bytes then differ from run to run
+    #[arg(long)]
+    pub(super) with_times: bool,
     /// Set another project's table beside this one; with the forms text and json
     #[arg(long, value_name = "DIR")]
     pub(super) compare: Option<PathBuf>,
@@ -47,8 +50,11 @@ fn share(text: &str) -> Result<f64, String> {
 pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.reader().await?;
     context.warn_of_stale(&catalog).await?;
-    let report = gather(&catalog, &project).await?.with_interval(args.ci);
+    let mut report = gather(&catalog, &project).await?.with_interval(args.ci);
     catalog.close().await;
+    if !args.with_times {
+        report = report.without_times();
+    }
     let format = chosen(args.format, context);
     let text = match &args.compare {
         Some(other) => compared(&report, other, format, context).await?,
@@ -113,7 +119,7 @@ const fn chosen(format: Format, context: &Context) -> Format {
 
 async fn read(context: &Context) -> anyhow::Result<Report> {
     let (project, catalog) = context.reader().await?;
-    let report = gather(&catalog, &project).await?;
+    let report = gather(&catalog, &project).await?.without_times();
     catalog.close().await;
     Ok(report)
 }

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::aligned::{Aligned, AlignedError, same_alignment};
+use super::controls;
 use super::model::Report;
 use super::tally::{Tally, TruthFinding};
 use super::truth::{TruthError, TruthErrors, TruthRecord, tops_iou};
@@ -36,12 +37,13 @@ enum Unusable {
 
 /// The report of a project as its catalog stands.
 ///
-/// Memory stays the same whatever the number of pairs, but for a few numbers a pair and metric where there is truth.
+/// Memory stays the same whatever the number of pairs, but for a few numbers a pair and metric.
 ///
 /// # Errors
 /// When the catalog cannot be read.
 pub async fn gather(catalog: &Catalog, project: &Project) -> Result<Report, GatherError> {
     let mut tally = Tally::default();
+    tally.caught(controls::caught(catalog).await?);
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
         for (pair, truth) in with_truth(project, page).await? {

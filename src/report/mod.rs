@@ -7,6 +7,7 @@ mod agree;
 mod agreement;
 pub mod aligned;
 mod compare;
+mod controls;
 pub mod coverage;
 #[cfg(test)]
 pub(crate) mod fixture;
@@ -15,17 +16,21 @@ mod gather;
 mod interval;
 mod model;
 mod rate;
+mod reasons;
 mod render;
 mod rules;
 pub(crate) mod standing;
 pub mod stats;
 mod tally;
+mod thresholds;
+mod times;
 pub mod truth;
 mod truth_sums;
 mod warnings;
 
 pub use agree::{Agree, ReaderRecord, TwoReaders, agree};
 pub use agreement::{Agreement, ENOUGH};
+pub use controls::Caught;
 pub use gather::{GatherError, PAGE, finding, gather, with_truth};
 pub use interval::Interval;
 pub use model::{
@@ -33,7 +38,10 @@ pub use model::{
     SCHEMA, TruthBlock,
 };
 pub use rate::Rate;
+pub use reasons::ReasonCount;
 pub use render::{Format, agree_text, render};
 pub use rules::Rules;
 pub use standing::Standing;
 pub use tally::{Tally, TruthFinding};
+pub use thresholds::{BINS, Thresholds};
+pub use times::StageTime;

@@ -1,17 +1,21 @@
 //! Adds pairs up to a report, one at a time, without keeping them.
 //!
-//! What stays in memory a pair: three numbers a metric where there is truth, for the medians, and its confidence where
-//! it is judged; nothing otherwise.
+//! What stays in memory a pair, for medians and percentiles: the time of each stage, the threshold of each metric, three
+//! numbers a metric where there is truth, and its confidence where it is judged; nothing otherwise.
 
 use std::collections::BTreeMap;
 
 use super::compare::Duels;
+use super::controls::Caught;
 use super::coverage::Confidences;
 use super::interval::Interval;
 use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA};
+use super::reasons::Reasons;
 use super::rules::RuleSums;
 use super::standing::Standing;
 use super::stats::wilson_95;
+use super::thresholds::Cuts;
+use super::times::Times;
 use super::truth::TruthErrors;
 use super::truth_sums::TruthSums;
 use super::warnings;
@@ -38,6 +42,9 @@ pub struct Tally {
     sure_by_verdicts: Confidences,
     sure_by_truth: Confidences,
     failures: BTreeMap<FailureClass, FailureGroup>,
+    cuts: Cuts,
+    times: Times,
+    caught: Option<Caught>,
     truth_problems: TruthProblems,
 }
 
@@ -61,6 +68,7 @@ struct Column {
     conflicts: u64,
     stale: u64,
     rules: RuleSums,
+    reasons: Reasons,
     ssim: f64,
     nl_ssim: f64,
     iou: f64,
@@ -80,6 +88,9 @@ impl Default for Tally {
             sure_by_verdicts: Confidences::default(),
             sure_by_truth: Confidences::default(),
             failures: BTreeMap::new(),
+            cuts: Cuts::default(),
+            times: Times::default(),
+            caught: None,
             truth_problems: TruthProblems::default(),
         }
     }
@@ -91,6 +102,8 @@ impl Tally {
         self.pairs += 1;
         self.count_status(pair);
         self.count_truth_problem(pair, truth);
+        self.cuts.add(pair);
+        self.times.add(&pair.stages);
         for column in &mut self.columns {
             if let Some(record) = pair.metric(column.metric) {
                 column.add(record, truth.errors.get(&column.metric));
@@ -105,6 +118,11 @@ impl Tally {
             .add(|metric| sure(metric).zip(told(metric)));
         self.sure_by_truth
             .add(|metric| sure(metric).zip(right(metric)));
+    }
+
+    /// Takes in the planted faults that readers caught; none where none were answered.
+    pub fn caught(&mut self, caught: Caught) {
+        self.caught = (caught.all.n > 0).then_some(caught);
     }
 
     fn count_status(&mut self, pair: &PairResults) {
@@ -166,6 +184,9 @@ impl Tally {
             comparisons,
             coverage,
             failures: self.failures.into_values().collect(),
+            thresholds: self.cuts.finish(),
+            times: self.times.finish(),
+            caught: self.caught,
         }
     }
 }
@@ -181,6 +202,7 @@ impl Column {
             conflicts: 0,
             stale: 0,
             rules: RuleSums::default(),
+            reasons: Reasons::default(),
             ssim: 0.0,
             nl_ssim: 0.0,
             iou: 0.0,
@@ -204,6 +226,7 @@ impl Column {
         self.iou_box += scores.iou_box;
         self.dice += scores.dice;
         self.rules.add(record);
+        self.reasons.add(record);
         self.count_standing(Standing::of(record));
         if let Some(errors) = truth {
             self.truth.add(errors);
@@ -239,6 +262,7 @@ impl Column {
             acc: share(self.passed as f64, told),
             acc_ci95: wilson_95(self.passed, told),
             rules: (told + self.unsure > 0).then(|| self.rules.finish()),
+            failed_reasons: self.reasons.finish(),
             ssim: mean(self.ssim),
             nl_ssim: mean(self.nl_ssim),
             iou: mean(self.iou),

@@ -3,10 +3,13 @@
 mod agree;
 mod coverage;
 mod csv;
+mod csv_fields;
+mod failed;
 mod latex;
 mod markdown;
 mod table;
 mod text;
+mod work;
 
 use super::model::Report;
 

@@ -1,7 +1,7 @@
 //! The tables of a report with their cells as text: what text, Markdown and LaTeX have in common.
 
+use super::{failed, work};
 use crate::report::model::{Basis, Comparison, Report, Row, TruthBlock};
-use crate::report::rate::Rate;
 use crate::report::rules::Rules;
 
 /// A table of text cells.
@@ -64,7 +64,11 @@ pub(super) fn tables(report: &Report) -> Vec<Table> {
     let mut tables = vec![scores(report)];
     tables.extend(report.anybody_read().then(|| verdicts(report)));
     tables.extend(rules(report));
+    tables.extend(failed::reasons(report));
+    tables.extend(failed::caught(report));
     tables.extend(report.has_truth().then(|| truth(report)));
+    tables.extend(work::thresholds(report));
+    tables.extend(work::times(report));
     tables
 }
 
@@ -158,12 +162,8 @@ fn rule_cells(row: &Row) -> Vec<Option<String>> {
         Some(row.metric.title().to_owned()),
         rules.map(|rules| count(rules.told_twice)),
     ];
-    let rate = |read: fn(&Rules) -> Rate| rules.map(read);
-    for rate in [
-        rate(|rules| rules.either_fails),
-        rate(|rules| rules.adjudicated),
-        rate(|rules| rules.both_fail),
-    ] {
+    for i in 0..Rules::NAMES.len() {
+        let rate = rules.map(|rules| rules.rates()[i]);
         cells.push(fixed(rate.and_then(|rate| rate.share), 3));
         cells.push(rate.map(|rate| count(rate.n)));
     }

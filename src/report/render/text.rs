@@ -147,6 +147,10 @@ Ensemble              2       1       1       1       0      0
 Relief                2       1       1       1       0      0
 Verdicts by result; stale ones have a verdict for an older result only.
 
+Failed for       Non-luminous SSIM  Pixel density  Ensemble  Relief
+no reason given                  1              1         1       1
+Results that readers failed, by the reasons they gave; one may have several.
+
 Truth              n    Acc  95% Wilson   in 5°  angle °  landm. %  mask IoU
 Non-luminous SSIM  1  1.000  0.207-1.000  1.000     0.50      2.00     0.900
 Pixel density      1  1.000  0.207-1.000  1.000     0.50      2.00     0.900
