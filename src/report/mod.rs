@@ -1,4 +1,4 @@
-//! From the catalog to a report as plain data, and from there to text, JSON, CSV, Markdown and LaTeX.
+//! From the catalog to a report as plain data, and from there to text, JSON, CSV, Markdown, LaTeX and HTML.
 //!
 //! [`gather()`] streams the pairs through a [`Tally`], [`agree()`] through counts of what readers say; everything else is
 //! pure.
@@ -11,6 +11,7 @@ mod controls;
 pub mod coverage;
 #[cfg(test)]
 pub(crate) mod fixture;
+pub mod gallery;
 pub mod gate;
 mod gather;
 mod interval;
@@ -39,7 +40,7 @@ pub use model::{
 };
 pub use rate::Rate;
 pub use reasons::ReasonCount;
-pub use render::{Format, agree_text, render};
+pub use render::{Cover, Format, MOST_BYTES, agree_text, page, render};
 pub use rules::Rules;
 pub use standing::Standing;
 pub use tally::{Tally, TruthFinding};

@@ -7,7 +7,7 @@ use crate::catalog::PairResults;
 use crate::domain::ThresholdMetric;
 
 /// Bins of a distribution, each as wide as the others.
-pub const BINS: usize = 20;
+pub const BINS: usize = 40;
 /// Levels of a depth map, from the lowest point to the highest.
 const LEVELS: f64 = 65_534.0;
 
@@ -97,6 +97,6 @@ mod tests {
         assert_eq!((found[0].metric, found[0].n), (ThresholdMetric::NlSsim, 3));
         assert_eq!(found[0].median, 0.5);
         let filled = found[0].bins.iter().enumerate().filter(|(_, n)| **n > 0);
-        assert_eq!(filled.collect::<Vec<_>>(), [(0, &1), (10, &1), (19, &1)]);
+        assert_eq!(filled.collect::<Vec<_>>(), [(0, &1), (20, &1), (39, &1)]);
     }
 }

@@ -16,7 +16,9 @@ pub(super) fn reasons(report: &Report) -> Option<Table> {
         .map(|reason| (reason, given(reason)))
         .filter(|(_, counts)| counts.iter().any(|n| *n > 0))
         .map(|(reason, counts)| {
-            let mut cells = vec![Some(title(reason).to_owned())];
+            let mut cells = vec![Some(
+                reason.map_or("no reason given", Reason::title).to_owned(),
+            )];
             cells.extend(counts.into_iter().map(|n| Some(count(n))));
             cells
         })
@@ -28,19 +30,6 @@ pub(super) fn reasons(report: &Report) -> Option<Table> {
         columns: [words("Failed for")].into_iter().chain(heads).collect(),
         rows,
     })
-}
-
-/// A reason in words.
-const fn title(reason: Option<Reason>) -> &'static str {
-    match reason {
-        Some(Reason::Angle) => "angle",
-        Some(Reason::StrokesLost) => "strokes lost",
-        Some(Reason::BackgroundIn) => "ground in",
-        Some(Reason::ShiftOrScale) => "shift or scale",
-        Some(Reason::Mirrored) => "mirrored",
-        Some(Reason::WrongPair) => "wrong pair",
-        None => "no reason given",
-    }
 }
 
 /// Planted faults that readers caught; `None` where none were answered.

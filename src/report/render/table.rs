@@ -73,7 +73,7 @@ pub(super) fn tables(report: &Report) -> Vec<Table> {
 }
 
 /// The paper's table.
-fn scores(report: &Report) -> Table {
+pub(super) fn scores(report: &Report) -> Table {
     Table {
         caption:
             "Acc is the share passed of those passed or failed by readers; SSIM, IoU and Dice are \
@@ -107,7 +107,7 @@ fn score_cells(row: &Row) -> Vec<Option<String>> {
 }
 
 /// Who said what.
-fn verdicts(report: &Report) -> Table {
+pub(super) fn verdicts(report: &Report) -> Table {
     let cells = |row: &Row| {
         vec![
             Some(row.metric.title().to_owned()),
@@ -136,7 +136,7 @@ fn verdicts(report: &Report) -> Table {
 }
 
 /// Acc under three rules, where two readers have told of the same result.
-fn rules(report: &Report) -> Option<Table> {
+pub(super) fn rules(report: &Report) -> Option<Table> {
     let told_twice = |row: &Row| row.rules.as_ref().is_some_and(|rules| rules.told_twice > 0);
     report.rows.iter().any(told_twice).then(|| Table {
         caption: "Acc if one reader who fails it is enough, if a third settles conflicts (the Acc above), and if both \
@@ -171,7 +171,7 @@ fn rule_cells(row: &Row) -> Vec<Option<String>> {
 }
 
 /// Agreement with true alignments.
-fn truth(report: &Report) -> Table {
+pub(super) fn truth(report: &Report) -> Table {
     Table {
         caption: "Against the true alignments. Acc here: angle within 5 degrees, landmarks within 5 % of the \
                   character's height, mask IoU with the true stroke tops at least 0.7. Angle, landmarks and \
