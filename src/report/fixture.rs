@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::model::Row;
+use super::samples::MeanIntervals;
 use super::tally::TruthFinding;
 use super::truth::TruthErrors;
 use crate::catalog::{
@@ -168,6 +169,8 @@ pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> Row {
         iou: Some(iou),
         iou_box: Some(0.9),
         dice: Some(dice),
+        means_ci95: MeanIntervals::default(),
         truth: None,
+        by_hand: None,
     }
 }

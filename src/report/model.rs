@@ -2,10 +2,13 @@
 
 use serde::Serialize;
 
+use super::by_hand::ByHand;
 use super::controls::Caught;
 use super::interval::Interval;
 use super::reasons::ReasonCount;
 use super::rules::Rules;
+use super::samples::{Bootstrap, MeanIntervals};
+use super::score_duels::ScoreComparison;
 use super::thresholds::Thresholds;
 use super::times::StageTime;
 use crate::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
@@ -28,6 +31,11 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// Metrics against each other, pair by pair.
     pub comparisons: Vec<Comparison>,
+    /// Metrics against each other by their scores, pair by pair.
+    pub score_comparisons: Vec<ScoreComparison>,
+    /// How the intervals of means and of the score comparisons were drawn; `None` without results, and above 100,000
+    /// pairs, where chance hardly moves a mean.
+    pub bootstrap: Option<Bootstrap>,
     /// Accuracy against coverage, by readers and then by truth, for each metric that has confidences.
     pub coverage: Vec<Coverage>,
     /// Pairs without result because they failed, by class.
@@ -94,9 +102,14 @@ pub struct Row {
     pub iou_box: Option<f64>,
     /// Mean Dice coefficient of the masks by pixel.
     pub dice: Option<f64>,
+    /// Bootstrap intervals of the means.
+    pub means_ci95: MeanIntervals,
     /// Agreement with true alignments, where the project holds them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthBlock>,
+    /// Distance from alignments by hand, where people made any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub by_hand: Option<ByHand>,
 }
 
 /// A metric's agreement with the true alignments; never mixed with people's verdicts.

@@ -1,10 +1,12 @@
 //! Adds pairs up to a report, one at a time, without keeping them.
 //!
 //! What stays in memory a pair, for medians and percentiles: the time of each stage, the threshold of each metric, three
-//! numbers a metric where there is truth, and its confidence where it is judged; nothing otherwise.
+//! numbers a metric where there is truth, its confidence where it is judged, and sums of scores for the bootstrap up to a
+//! hundred thousand pairs or blocks.
 
 use std::collections::BTreeMap;
 
+use super::by_hand::{HandErrors, HandSums};
 use super::compare::Duels;
 use super::controls::Caught;
 use super::coverage::Confidences;
@@ -12,6 +14,7 @@ use super::interval::Interval;
 use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA};
 use super::reasons::Reasons;
 use super::rules::RuleSums;
+use super::samples::{Drawn, Samples};
 use super::standing::Standing;
 use super::stats::wilson_95;
 use super::thresholds::Cuts;
@@ -37,6 +40,7 @@ pub struct Tally {
     pairs: u64,
     progress: Progress,
     columns: [Column; ThresholdMetric::ALL.len()],
+    samples: Samples,
     by_verdicts: Duels,
     by_truth: Duels,
     sure_by_verdicts: Confidences,
@@ -75,6 +79,7 @@ struct Column {
     iou_box: f64,
     dice: f64,
     truth: TruthSums,
+    by_hand: HandSums,
 }
 
 impl Default for Tally {
@@ -83,6 +88,7 @@ impl Default for Tally {
             pairs: 0,
             progress: Progress::default(),
             columns: ThresholdMetric::ALL.map(Column::new),
+            samples: Samples::default(),
             by_verdicts: Duels::default(),
             by_truth: Duels::default(),
             sure_by_verdicts: Confidences::default(),
@@ -112,12 +118,22 @@ impl Tally {
         let told = |metric| Standing::of(pair.metric(metric)?).told();
         let right = |metric| truth.errors.get(&metric).map(TruthErrors::pass);
         let sure = |metric| pair.metric(metric)?.outcome.confidence;
+        self.samples.add(pair, told);
         self.by_verdicts.add(told);
         self.by_truth.add(right);
         self.sure_by_verdicts
             .add(|metric| sure(metric).zip(told(metric)));
         self.sure_by_truth
             .add(|metric| sure(metric).zip(right(metric)));
+    }
+
+    /// Counts in how far a pair's results are from its alignment by hand.
+    pub fn add_by_hand(&mut self, errors: &BTreeMap<ThresholdMetric, HandErrors>) {
+        for column in &mut self.columns {
+            if let Some(errors) = errors.get(&column.metric) {
+                column.by_hand.add(*errors);
+            }
+        }
     }
 
     /// Takes in the planted faults that readers caught; none where none were answered.
@@ -169,7 +185,8 @@ impl Tally {
     /// The report over all pairs counted.
     pub fn finish(self) -> Report {
         let told = self.columns.into_iter().filter(Column::is_told);
-        let rows: Vec<Row> = told.map(Column::finish).collect();
+        let drawn = self.samples.finish();
+        let rows: Vec<Row> = told.map(|column| column.finish(&drawn)).collect();
         let mut comparisons = self.by_verdicts.finish(Basis::Verdicts);
         comparisons.extend(self.by_truth.finish(Basis::Truth));
         let mut coverage = self.sure_by_verdicts.finish(Basis::Verdicts);
@@ -182,6 +199,8 @@ impl Tally {
             warnings: warnings::of(self.progress, &rows, &self.truth_problems),
             rows,
             comparisons,
+            score_comparisons: drawn.comparisons,
+            bootstrap: drawn.bootstrap,
             coverage,
             failures: self.failures.into_values().collect(),
             thresholds: self.cuts.finish(),
@@ -209,6 +228,7 @@ impl Column {
             iou_box: 0.0,
             dice: 0.0,
             truth: TruthSums::default(),
+            by_hand: HandSums::default(),
         }
     }
 
@@ -247,7 +267,7 @@ impl Column {
         }
     }
 
-    fn finish(self) -> Row {
+    fn finish(self, drawn: &Drawn) -> Row {
         let mean = |sum: f64| share(sum, self.n);
         let told = self.passed + self.failed;
         Row {
@@ -268,7 +288,9 @@ impl Column {
             iou: mean(self.iou),
             iou_box: mean(self.iou_box),
             dice: mean(self.dice),
+            means_ci95: drawn.means[self.metric as usize],
             truth: self.truth.finish(),
+            by_hand: self.by_hand.finish(),
         }
     }
 }

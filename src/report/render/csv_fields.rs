@@ -4,6 +4,7 @@ use super::csv::{bounds, number};
 use crate::domain::Reason;
 use crate::report::model::{Report, Row};
 use crate::report::rules::Rules;
+use crate::report::{ByHand, Score};
 
 /// What one column is called and how it is read.
 type Field = (String, String);
@@ -25,6 +26,8 @@ fn fields(report: Option<&Report>, row: Option<&Row>) -> Vec<Field> {
     let mut fields = rules(row.and_then(|row| row.rules.as_ref()));
     fields.extend(reasons(row));
     fields.extend(thresholds(report, row));
+    fields.extend(intervals(report, row));
+    fields.extend(by_hand(row.and_then(|row| row.by_hand.as_ref())));
     fields
 }
 
@@ -60,6 +63,48 @@ fn reasons(row: Option<&Row>) -> Vec<Field> {
             (format!("failed_{name}"), times)
         })
         .collect()
+}
+
+/// The bootstrap intervals of the means; `bootstrap_by` tells what was drawn.
+fn intervals(report: Option<&Report>, row: Option<&Row>) -> Vec<Field> {
+    let means = row.map(|row| row.means_ci95).unwrap_or_default();
+    let each = [
+        (Score::Ssim.name(), means.ssim),
+        (Score::Iou.name(), means.iou),
+        (Score::IouBox.name(), means.iou_box),
+        (Score::Dice.name(), means.dice),
+        ("acc_by_block", means.acc_by_block),
+    ];
+    let ends = each.into_iter().flat_map(|(name, ends)| {
+        let [low, high] = bounds(ends);
+        [
+            (format!("{name}_ci95_low"), low),
+            (format!("{name}_ci95_high"), high),
+        ]
+    });
+    let drawn = report.and_then(|report| report.bootstrap.filter(|_| means.ssim.is_some()));
+    let by = drawn.map_or_else(String::new, |how| how.by.plural().to_owned());
+    ends.chain([("bootstrap_by".to_owned(), by)]).collect()
+}
+
+fn by_hand(found: Option<&ByHand>) -> Vec<Field> {
+    let count =
+        |read: fn(&ByHand) -> u64| found.map_or_else(String::new, |found| read(found).to_string());
+    let value = |read: fn(&ByHand) -> Option<f64>| number(found.and_then(read));
+    let fields = [
+        ("n", count(|found| found.n)),
+        ("angle_le_5deg", value(|found| found.angle_le_5deg)),
+        ("angle_median_deg", value(|found| found.angle_median_deg)),
+        ("angle_p95_deg", value(|found| found.angle_p95_deg)),
+        ("shift_median_pct", value(|found| found.shift_median_pct)),
+        ("shift_p95_pct", value(|found| found.shift_p95_pct)),
+        ("scale_median_pct", value(|found| found.scale_median_pct)),
+        ("scale_p95_pct", value(|found| found.scale_p95_pct)),
+        ("mirrored", count(|found| found.mirrored)),
+    ];
+    fields
+        .map(|(name, value)| (format!("by_hand_{name}"), value))
+        .to_vec()
 }
 
 fn thresholds(report: Option<&Report>, row: Option<&Row>) -> Vec<Field> {

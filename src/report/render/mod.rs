@@ -8,6 +8,7 @@ mod failed;
 mod html;
 mod latex;
 mod markdown;
+mod scored;
 mod table;
 mod text;
 mod work;

@@ -1,6 +1,7 @@
 //! The tables of a report with their cells as text: what text, Markdown and LaTeX have in common.
 
-use super::{failed, work};
+use super::{failed, scored, work};
+use crate::report::by_hand::ByHand;
 use crate::report::model::{Basis, Comparison, Report, Row, TruthBlock};
 use crate::report::rules::Rules;
 
@@ -62,11 +63,13 @@ pub(super) const fn number(head: &'static str, decimals: usize) -> Column {
 /// The tables a report calls for: scores always, verdicts and truth where there are any.
 pub(super) fn tables(report: &Report) -> Vec<Table> {
     let mut tables = vec![scores(report)];
+    tables.extend(scored::intervals(report));
     tables.extend(report.anybody_read().then(|| verdicts(report)));
     tables.extend(rules(report));
     tables.extend(failed::reasons(report));
     tables.extend(failed::caught(report));
     tables.extend(report.has_truth().then(|| truth(report)));
+    tables.extend(by_hand(report));
     tables.extend(work::thresholds(report));
     tables.extend(work::times(report));
     tables
@@ -204,6 +207,46 @@ fn truth_cells(row: &Row) -> Vec<Option<String>> {
         fixed(value(|truth| truth.tre_median_pct), 2),
         fixed(value(|truth| truth.mask_iou_median), 3),
     ]
+}
+
+/// Distance from alignments by hand; `None` where people made none.
+pub(super) fn by_hand(report: &Report) -> Option<Table> {
+    let found: Vec<(&Row, &ByHand)> = report
+        .rows
+        .iter()
+        .filter_map(|row| Some((row, row.by_hand.as_ref()?)))
+        .collect();
+    let cells = |(row, by_hand): &(&Row, &ByHand)| {
+        vec![
+            Some(row.metric.title().to_owned()),
+            Some(count(by_hand.n)),
+            fixed(by_hand.angle_le_5deg, 3),
+            fixed(by_hand.angle_median_deg, 2),
+            fixed(by_hand.angle_p95_deg, 2),
+            fixed(by_hand.shift_median_pct, 2),
+            fixed(by_hand.shift_p95_pct, 2),
+            fixed(by_hand.scale_median_pct, 2),
+            fixed(by_hand.scale_p95_pct, 2),
+        ]
+    };
+    (!found.is_empty()).then(|| Table {
+        caption: "Against people's alignments by hand, on the n pairs that have one: share turned by at most 5 degrees; \
+                  turn, shift in percent of the relief's longer side and difference in scale, each as median and 95th \
+                  percentile."
+            .to_owned(),
+        columns: vec![
+            words("By hand"),
+            number("n", 0),
+            number("in 5\u{b0}", 3),
+            number("angle \u{b0}", 2),
+            number("95 %", 2),
+            number("shift %", 2),
+            number("95 %", 2),
+            number("scale %", 2),
+            number("95 %", 2),
+        ],
+        rows: found.iter().map(cells).collect(),
+    })
 }
 
 /// The comparisons as a table without their words; `None` when there are none.

@@ -1,8 +1,9 @@
 //! The report for a terminal of 80 columns.
 
-use super::coverage;
 use super::table::{self, Column, Kind, Table};
+use super::{coverage, scored};
 use crate::report::model::{Comparison, FailureGroup, Report};
+use crate::report::score_duels::in_words;
 
 /// Columns of the terminal.
 const WIDTH: usize = 80;
@@ -25,6 +26,13 @@ pub(super) fn render(report: &Report) -> String {
         ));
     }
     blocks.extend((!report.comparisons.is_empty()).then(|| comparisons(report)));
+    if let Some(found) = scored::comparisons(report) {
+        let said = in_words(&report.score_comparisons);
+        let said = said.iter().map(|words| wrapped("", words));
+        blocks.push(
+            said.collect::<String>() + "\n" + &aligned(&found) + &wrapped("", &found.caption),
+        );
+    }
     blocks.extend((!report.warnings.is_empty()).then(|| warnings(report)));
     blocks.extend(report.failures.iter().map(failures));
     blocks.join("\n")

@@ -7,7 +7,8 @@ use super::markup::table;
 use super::plots;
 use crate::report::model::{Basis, Comparison, FailureGroup, Report};
 use crate::report::render::table::{self as tables, basis, comparisons, p_value, title};
-use crate::report::render::{coverage, failed, work};
+use crate::report::render::{coverage, failed, scored, work};
+use crate::report::score_duels::in_words;
 
 /// Longest error that is told in full, letters.
 const LONGEST_ERROR: usize = 600;
@@ -25,17 +26,19 @@ pub(super) struct Section {
 /// Every section that has something to tell, in order.
 pub(super) fn all(report: &Report, album: &Album) -> Vec<Section> {
     let pictures = (!album.is_empty()).then(|| section("pictures", "Pictures", album.body()));
+    let is_compared = !(report.comparisons.is_empty() && report.score_comparisons.is_empty());
     let sections = [
         Some(section("result", "Result", result(report))),
         (!report.warnings.is_empty()).then(|| section("notes", "To be known", warnings(report))),
         report
             .anybody_read()
             .then(|| section("readers", "What readers said", readers(report))),
-        (!report.comparisons.is_empty())
-            .then(|| section("tests", "Methods compared", tests(report))),
+        is_compared.then(|| section("tests", "Methods compared", tests(report))),
         report
             .has_truth()
             .then(|| section("truth", "Against the truth", truth(report))),
+        tables::by_hand(report)
+            .map(|found| section("by-hand", "Against alignments by hand", table(&found))),
         confidence(report),
         work::thresholds(report).map(|found| {
             let body = html! { (plots::thresholds(report)) (table(&found)) };
@@ -69,6 +72,7 @@ fn confidence(report: &Report) -> Option<Section> {
 fn result(report: &Report) -> Markup {
     html! {
         (table(&tables::scores(report)))
+        @if let Some(found) = scored::intervals(report) { (table(&found)) }
         @if report.anybody_read() {
             (plots::accuracy(report, Basis::Verdicts))
         } @else {
@@ -99,13 +103,18 @@ fn truth(report: &Report) -> Markup {
 
 fn tests(report: &Report) -> Markup {
     html! {
-        ul.words { @for found in &report.comparisons { li { (in_words(found)) } } }
+        ul.words { @for found in &report.comparisons { li { (sentence(found)) } } }
         @if let Some(found) = comparisons(report) { (table(&found)) }
+        @if let Some(found) = scored::comparisons(report) {
+            h3 { "By their scores" }
+            ul.words { @for words in in_words(&report.score_comparisons) { li { (words) "." } } }
+            (table(&found))
+        }
     }
 }
 
 /// A comparison as a sentence.
-fn in_words(found: &Comparison) -> Markup {
+fn sentence(found: &Comparison) -> Markup {
     html! {
         strong { (title(found)) } ", by " (basis(found.basis)) ": " (found.words)
         @if let Some(p) = found.p_holm { " (p " (p_value(p)) " after Holm)" }
