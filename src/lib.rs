@@ -29,8 +29,8 @@
 //! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain`, `breakpoint` |
 //! | `runner` | workers, policy, execution of one pair, events | `domain`, `mesh`, `raster`, `stages`, `store`, `catalog`, `breakpoint` |
 //! | `check` | a project held against itself, and mended | `domain`, `store`, `catalog`, `runner` |
-//! | `report` | catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX | `domain`, `raster`, `store`, `catalog` |
-//! | `export` | aligned pairs for other tools, overlays, contact sheets | `domain`, `raster`, `store`, `catalog`, `report` |
+//! | `report` | catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX, HTML | `domain`, `raster`, `store`, `catalog` |
+//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of a report | `domain`, `raster`, `store`, `catalog`, `report` |
 //! | `review` | the review page: verdicts and alignments by hand, planted faults, a server on loopback | `domain`, `raster`, `store`, `catalog`, `report`, `export` |
 //! | `demo` | the built-in dataset: carved reliefs and prints with known truth, from one seed | `domain`, `mesh`, `raster` |
 //! | `config` | settings in layers, typed and checked, each with its origin | `domain`, `mesh`, `raster`, `stages`, `runner` |

@@ -1,5 +1,7 @@
 //! Alignments that people made by hand: append-only, beside the automatic ones, bound to what they were made on.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
@@ -109,6 +111,19 @@ impl Catalog {
         let mut conn = self.reader().await?;
         let found = sqlx::query(LOG).fetch_all(&mut *conn).await?;
         found.iter().map(stored).collect()
+    }
+
+    /// The newest alignment by hand of each pair, of those that hold and were not taken back.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn newest_hand_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
+        let stored = self.hand_alignments().await?.into_iter();
+        let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());
+        // Oldest first, so that the newest stays.
+        Ok(valid
+            .map(|stored| (stored.made.pair.clone(), stored))
+            .collect())
     }
 }
 

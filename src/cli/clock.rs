@@ -15,6 +15,11 @@ pub(super) fn utc(at: UnixMillis) -> String {
     )
 }
 
+/// `2026-11-21` in UTC.
+pub(super) fn day(at: UnixMillis) -> String {
+    utc(at).split(' ').take(1).collect()
+}
+
 /// A moment in UTC from `2026-11-21`, `2026-11-21 04:10:03` or `2026-11-21T04:10:03Z`; `None` for all else.
 pub(super) fn from_utc(text: &str) -> Option<UnixMillis> {
     let text = text.strip_suffix('Z').unwrap_or(text);

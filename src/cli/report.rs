@@ -6,17 +6,23 @@ use anyhow::Context as _;
 use clap::Args;
 use serde_json::json;
 
+use super::clock::day;
 use super::compare::side_by_side;
-use super::context::Context;
+use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::talk;
-use crate::report::{Format, Interval, Report, gate, gather, render};
-use crate::store::write_whole;
+use crate::catalog::Catalog;
+use crate::export::{GalleryOptions, draw_gallery};
+use crate::report::{Cover, Format, Interval, Report, gate, gather, page, render};
+use crate::store::{Project, write_whole};
+
+/// The seed of the pictures that are drawn by lot; the page tells it.
+const LOT_SEED: u64 = 1;
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
-    /// Form of the report: text, json, csv, markdown or latex
+    /// Form of the report: text, json, csv, markdown, latex, or html: one page with pictures of failures
     #[arg(long, short, default_value = "text")]
     pub(super) format: Format,
     /// Write it to this file instead of stdout
@@ -25,6 +31,9 @@ pub(super) struct ReportArgs {
     /// How the intervals of Acc are computed: wilson, or exact (Clopper and Pearson)
     #[arg(long, value_name = "HOW", default_value = "wilson")]
     pub(super) ci: Interval,
+    /// Tell computing times by stage too, as html always does; the bytes then differ from run to run
+    #[arg(long)]
+    pub(super) with_times: bool,
     /// Set another project's table beside this one; with the forms text and json
     #[arg(long, value_name = "DIR")]
     pub(super) compare: Option<PathBuf>,
@@ -47,13 +56,19 @@ fn share(text: &str) -> Result<f64, String> {
 pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.reader().await?;
     context.warn_of_stale(&catalog).await?;
-    let report = gather(&catalog, &project).await?.with_interval(args.ci);
-    catalog.close().await;
     let format = chosen(args.format, context);
-    let text = match &args.compare {
-        Some(other) => compared(&report, other, format, context).await?,
-        None => render(&report, format),
+    let mut report = gather(&catalog, &project).await?.with_interval(args.ci);
+    if !args.with_times && format != Format::Html {
+        report = report.without_times();
+    }
+    let text = match (&args.compare, format) {
+        (Some(other), _) => compared(&report, other, format, context).await?,
+        (None, Format::Html) => pictured(&report, (&project, &catalog), context).await?,
+        (None, Format::Text | Format::Json | Format::Csv | Format::Markdown | Format::Latex) => {
+            render(&report, format)
+        }
     };
+    catalog.close().await;
     match &args.output {
         Some(path) => {
             let shown = path.display();
@@ -63,6 +78,27 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
         None => talk::print(&text)?,
     }
     Ok(gates(&report, &args, context))
+}
+
+/// The report as a page with its pictures.
+async fn pictured(
+    report: &Report,
+    (project, catalog): (&Project, &Catalog),
+    context: &Context,
+) -> anyhow::Result<String> {
+    let options = GalleryOptions {
+        seed: LOT_SEED,
+        limits: context.settings()?.config.limits.image,
+    };
+    let gallery = draw_gallery(catalog, project, options).await?;
+    let name = std::path::absolute(project.dir()).unwrap_or_else(|_| project.dir().to_owned());
+    let cover = Cover {
+        project: name
+            .file_name()
+            .map(|name| name.to_string_lossy().into_owned()),
+        date: Some(day(now())),
+    };
+    Ok(page(report, &gallery, &cover))
 }
 
 /// This project's report with another's beside it.
@@ -85,7 +121,7 @@ async fn compared(
             value["compared_with"] = json!({"project": names[1], "report": there});
             Ok(serde_json::to_string_pretty(&value)?)
         }
-        Format::Csv | Format::Markdown | Format::Latex => {
+        Format::Csv | Format::Markdown | Format::Latex | Format::Html => {
             let text = format!("--compare goes with the forms text and json, not {format}");
             Err(Refusal::Usage(text).into())
         }
@@ -113,7 +149,7 @@ const fn chosen(format: Format, context: &Context) -> Format {
 
 async fn read(context: &Context) -> anyhow::Result<Report> {
     let (project, catalog) = context.reader().await?;
-    let report = gather(&catalog, &project).await?;
+    let report = gather(&catalog, &project).await?.without_times();
     catalog.close().await;
     Ok(report)
 }

@@ -8,6 +8,7 @@ mod file_kind;
 mod hash;
 mod ids;
 mod job;
+mod lots;
 mod metric;
 mod outcome;
 mod plain;
@@ -26,6 +27,7 @@ pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};
 pub use ids::{PairId, PairName, PairNameError, WorkerId};
 pub use job::{CRASH_LIMIT, Event, JobState, JobStatus, Refused, is_condemned, transition};
+pub use lots::Lots;
 pub use metric::ThresholdMetric;
 pub use outcome::{
     Bow, DepthOutcome, DepthScale, FitOutcome, MetricOutcome, NormalizeOutcome, Pose,

@@ -85,6 +85,18 @@ impl Reason {
             Self::WrongPair => "wrong_pair",
         }
     }
+
+    /// In words.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Angle => "angle",
+            Self::StrokesLost => "strokes lost",
+            Self::BackgroundIn => "ground in",
+            Self::ShiftOrScale => "shift or scale",
+            Self::Mirrored => "mirrored",
+            Self::WrongPair => "wrong pair",
+        }
+    }
 }
 
 impl std::fmt::Display for Reason {

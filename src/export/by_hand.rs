@@ -49,10 +49,8 @@ impl ByHand {
 /// # Errors
 /// When the catalog refuses.
 pub(super) async fn newest(catalog: &Catalog) -> Result<BTreeMap<PairName, ByHand>, CatalogError> {
-    let stored = catalog.hand_alignments().await?.into_iter();
-    let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());
-    // Oldest first, so that the newest stays.
-    Ok(valid
-        .map(|stored| (stored.made.pair.clone(), ByHand::of(stored)))
+    let newest = catalog.newest_hand_alignments().await?.into_iter();
+    Ok(newest
+        .map(|(pair, stored)| (pair, ByHand::of(stored)))
         .collect())
 }

@@ -2,12 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::files::Print;
-use super::pictures::{Rgb, SheetCell, View, contact_sheet, tile_side};
+use super::pictures::{Rgb, SheetCell, contact_sheet, tile_side};
+use super::tiles::tiles;
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{JobStatus, PairName, ThresholdMetric};
 use crate::raster;
-use crate::report::aligned::Aligned;
 use crate::report::truth::TruthErrors;
 use crate::report::{Standing, TruthFinding, with_truth};
 use crate::store::Project;
@@ -201,7 +200,8 @@ fn cell(project: &Project, candidate: &Candidate, options: &SheetOptions) -> She
     let pair = &candidate.pair;
     let standing = pair.metric(options.metric).map(Standing::of);
     let off_truth = candidate.truth.is_some_and(|errors| !errors.pass());
-    let (tiles, trouble) = tiles(project, pair, options);
+    let side = tile_side(options.columns);
+    let (tiles, trouble) = tiles(project, pair, options.metric, side, &options.limits);
     SheetCell {
         id: title(pair, options.metric),
         note: trouble.unwrap_or_else(|| note(candidate, options.metric)),
@@ -250,30 +250,6 @@ fn short(value: f64) -> String {
         format!("{value:.1}")
     } else {
         format!("{value:.0}")
-    }
-}
-
-/// The three pictures of a pair, and why one of them is missing.
-fn tiles(
-    project: &Project,
-    pair: &PairResults,
-    options: &SheetOptions,
-) -> ([Option<Rgb>; 3], Option<String>) {
-    let Ok(print) = Print::read(project, pair, &options.limits) else {
-        return ([None, None, None], None);
-    };
-    let view = View::of_side(&print.picture, tile_side(options.columns));
-    let plain = Some(view.print(&print.picture));
-    let Some(record) = pair.metric(options.metric) else {
-        return ([plain, None, None], None);
-    };
-    match Aligned::new(project, pair).depth() {
-        Ok(depth) => {
-            let relief = view.relief(&depth, &record.outcome.print_from_depth);
-            let overlay = view.overlay(&print.picture, &depth, &record.outcome);
-            ([plain, Some(relief), Some(overlay)], None)
-        }
-        Err(error) => ([plain, None, None], Some(error.to_string())),
     }
 }
 

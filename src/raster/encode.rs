@@ -1,6 +1,9 @@
-//! PNG files of our own artifacts, written and read back without loss. Same grid, same bytes.
+//! PNG files of our own artifacts, written and read back without loss, and JPEG for people. Same grid, same bytes.
 
 use std::io::Cursor;
+
+use image::ExtendedColorType;
+use image::codecs::jpeg::JpegEncoder;
 
 use super::{Grid, Mask};
 
@@ -62,6 +65,21 @@ pub fn png_rgb8(grid: &Grid<[u8; 3]>) -> Vec<u8> {
         png::BitDepth::Eight,
         grid.data().as_flattened(),
     )
+}
+
+/// An 8-bit RGB JPEG for people, quality 1..=100.
+pub fn jpeg_rgb8(grid: &Grid<[u8; 3]>, quality: u8) -> Vec<u8> {
+    let mut out = Vec::new();
+    let (width, height) = (grid.width() as u32, grid.height() as u32);
+    JpegEncoder::new_with_quality(&mut out, quality)
+        .encode(
+            grid.data().as_flattened(),
+            width,
+            height,
+            ExtendedColorType::Rgb8,
+        )
+        .expect("a grid with pixels is written to memory");
+    out
 }
 
 fn png_of(
@@ -146,8 +164,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{
-        ArtifactError, decode_grey8, decode_grey16, decode_mask, png_grey8, png_grey16, png_mask,
-        png_rgb8,
+        ArtifactError, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8, png_grey16,
+        png_mask, png_rgb8,
     };
     use crate::raster::{Grid, Limits, Mask, decode};
 
@@ -180,6 +198,22 @@ mod tests {
             picture.rgb,
             grid.map(|c| c.map(|value| u16::from(value) * 257))
         );
+    }
+
+    #[test]
+    fn a_jpeg_looks_like_what_it_was_made_from() {
+        let grid = Grid::from_fn(40, 24, |x, y| [x as u8 * 5, y as u8 * 9, 90]);
+        let picture = decode(&jpeg_rgb8(&grid, 85), &Limits::SUGGESTED).expect("reads");
+        assert_eq!((picture.rgb.width(), picture.rgb.height()), (40, 24));
+        let far = |(a, b): (&[u16; 3], &[u8; 3])| {
+            let apart = a
+                .iter()
+                .zip(b)
+                .map(|(a, b)| (a / 257).abs_diff(u16::from(*b)));
+            apart.max().unwrap_or(0)
+        };
+        let pixels = picture.rgb.data().iter().zip(grid.data());
+        assert!(pixels.map(far).max().expect("pixels") < 16);
     }
 
     #[test]

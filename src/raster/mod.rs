@@ -13,8 +13,8 @@ mod warp;
 pub use decode::{DecodeError, decode, pixels_by_header};
 pub use depth_map::DepthMap;
 pub use encode::{
-    ArtifactError, decode_grey8, decode_grey16, decode_mask, png_grey8, png_grey16, png_mask,
-    png_rgb8,
+    ArtifactError, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8, png_grey16,
+    png_mask, png_rgb8,
 };
 pub use grid::Grid;
 pub use limits::Limits;

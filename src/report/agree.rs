@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::agreement::{Agreement, Crosstab};
 use super::aligned::alike;
+use super::controls::{self, Caught};
 use super::gather::PAGE;
 use super::rate::Rate;
 use super::standing::{Standing, split};
@@ -72,14 +73,7 @@ pub async fn agree(catalog: &Catalog) -> Result<Agree, CatalogError> {
             counts.add(pair);
         }
     }
-    let mut controls: BTreeMap<String, Vec<ControlAnswer>> = BTreeMap::new();
-    for answer in catalog.control_answers().await? {
-        if answer.undone_at.is_none() {
-            let of_reader = controls.entry(answer.reader.clone()).or_default();
-            of_reader.push(answer);
-        }
-    }
-    for (reader, answers) in &controls {
+    for (reader, answers) in &controls::by_reader(catalog).await? {
         let own = own_verdicts(catalog, reader).await?;
         counts.test(reader, answers, &own);
     }
@@ -128,7 +122,7 @@ impl Counts {
 
     /// Holds a reader's answers to controls against what they should be.
     fn test(&mut self, reader: &str, answers: &[ControlAnswer], own: &OwnVerdicts) {
-        let answers = newest(answers);
+        let answers = controls::newest(answers);
         let repeats = answers
             .iter()
             .filter(|answer| answer.control == Control::Repeat);
@@ -138,15 +132,8 @@ impl Counts {
         });
         let record = self.reader(reader);
         record.repeats = Rate::of(same);
-        record.caught = caught(answers.iter().copied());
-        for kind in answers.iter().filter(|answer| answer.control.is_fault()) {
-            let name = kind.control.name();
-            let of_kind = answers
-                .iter()
-                .filter(|answer| answer.control.name() == name);
-            let rate = || caught(of_kind.copied());
-            record.caught_by_fault.entry(name).or_insert_with(rate);
-        }
+        let caught = Caught::of(answers.iter().copied());
+        (record.caught, record.caught_by_fault) = (caught.all, caught.by_fault);
     }
 
     fn reader(&mut self, name: &str) -> &mut ReaderRecord {
@@ -203,25 +190,6 @@ impl<'a> Picture<'a> {
             is_conflict: group.iter().any(is_conflict),
         }
     }
-}
-
-/// The newest answers to each thing that was shown; they come oldest first.
-fn newest(answers: &[ControlAnswer]) -> Vec<&ControlAnswer> {
-    let shown = |answer: &ControlAnswer| {
-        let hashes = (answer.result_hash, answer.look.seen);
-        (answer.pair.clone(), answer.control.name(), hashes)
-    };
-    let newest: BTreeMap<_, _> = answers
-        .iter()
-        .map(|answer| (shown(answer), answer))
-        .collect();
-    newest.into_values().collect()
-}
-
-/// How many of the faults among the answers were failed.
-fn caught<'a>(answers: impl Iterator<Item = &'a ControlAnswer>) -> Rate {
-    let faults = answers.filter(|answer| answer.control.is_fault());
-    Rate::of(faults.map(|answer| answer.verdict == Verdict::Fail))
 }
 
 #[cfg(test)]

@@ -129,6 +129,31 @@ impl<'a> Aligned<'a> {
             .map_err(|source| AlignedError::Picture { role, source })
     }
 
+    /// Depth-map pixels to print pixels under a map from the mesh, on the fitted plane; `None` where the depth map
+    /// flattens the plane.
+    ///
+    /// # Errors
+    /// When the results of fit or depth cannot be read.
+    pub fn print_from_depth(
+        &self,
+        print_from_mesh: &PrintFromMesh,
+    ) -> Result<Option<Affine2>, AlignedError> {
+        let fit: FitOutcome = self.outcome(Stage::Fit)?;
+        let depth: DepthOutcome = self.outcome(Stage::Depth)?;
+        let mesh_from_plane = fit.plane_from_mesh.inverse();
+        let print = |[x, y]: [f64; 2]| {
+            let [u, v, _] = print_from_mesh.apply(mesh_from_plane.apply([x, y, 0.0]));
+            [u, v]
+        };
+        let plane_from_depth = depth.scale.depth_from_plane.inverse();
+        Ok(plane_from_depth.map(|plane| {
+            let [origin, across, down] =
+                [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]].map(|px| print(plane.apply(px)));
+            let row = |i: usize| [across[i] - origin[i], down[i] - origin[i], origin[i]];
+            Affine2([row(0), row(1)])
+        }))
+    }
+
     /// The three maps of the pipeline put together, for a metric's `print_from_depth`.
     ///
     /// # Errors

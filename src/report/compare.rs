@@ -5,13 +5,21 @@ use super::stats::{MOST_PAIRS, holm, mcnemar_exact, pairs_needed};
 use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
 
 /// Level below which a difference is said to be there.
-const LEVEL: f64 = 0.05;
+pub(super) const LEVEL: f64 = 0.05;
 /// Name of the test, with what makes it that one.
 const TEST: &str = "McNemar, exact, two-sided";
 
-/// Counts of every two of the paper's metrics, and of the mask true to the wood against the one matched to the print.
+/// Metrics that are compared: every two of the paper's, and the mask true to the wood with the one matched to the print.
+pub(super) const PAIRS: [(ThresholdMetric, ThresholdMetric); 4] = [
+    (Ensemble, NlSsim),
+    (Ensemble, Density),
+    (NlSsim, Density),
+    (Relief, Ensemble),
+];
+
+/// Counts of the metrics of [`PAIRS`].
 #[derive(Debug, Clone)]
-pub(super) struct Duels([Duel; 4]);
+pub(super) struct Duels([Duel; PAIRS.len()]);
 
 /// Counts of two metrics.
 #[derive(Debug, Clone, Copy)]
@@ -25,13 +33,7 @@ struct Duel {
 
 impl Default for Duels {
     fn default() -> Self {
-        let pairs = [
-            (Ensemble, NlSsim),
-            (Ensemble, Density),
-            (NlSsim, Density),
-            (Relief, Ensemble),
-        ];
-        Self(pairs.map(|(a, b)| Duel {
+        Self(PAIRS.map(|(a, b)| Duel {
             a,
             b,
             n: 0,
@@ -56,19 +58,26 @@ impl Duels {
     /// The comparisons of all metrics that were judged on the same pairs.
     pub(super) fn finish(self, basis: Basis) -> Vec<Comparison> {
         let duels: Vec<Duel> = self.0.into_iter().filter(|duel| duel.n > 0).collect();
-        // Without discordant pairs there is nothing to tell apart: such a comparison is as sure as p = 1.
         let ps: Vec<Option<f64>> = duels
             .iter()
             .map(|duel| mcnemar_exact(duel.a_only, duel.b_only))
             .collect();
-        let corrected = holm(&ps.iter().map(|p| p.unwrap_or(1.0)).collect::<Vec<_>>());
+        let corrected = after_holm(&ps);
         let both = ps.into_iter().zip(corrected);
         duels
             .into_iter()
             .zip(both)
-            .map(|(duel, (p, p_holm))| duel.finish(basis, p.map(|p| (p, p_holm))))
+            .map(|(duel, (p, p_holm))| duel.finish(basis, p.zip(p_holm)))
             .collect()
     }
+}
+
+/// Holm's correction where there is a p. A comparison that has none, as without discordant pairs, has nothing to tell
+/// apart: it is as sure as p = 1.
+pub(super) fn after_holm(ps: &[Option<f64>]) -> Vec<Option<f64>> {
+    let all: Vec<f64> = ps.iter().map(|p| p.unwrap_or(1.0)).collect();
+    let corrected = ps.iter().zip(holm(&all));
+    corrected.map(|(p, p_holm)| p.map(|_| p_holm)).collect()
 }
 
 impl Duel {

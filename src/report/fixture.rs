@@ -3,9 +3,12 @@
 use std::collections::BTreeMap;
 
 use super::model::Row;
+use super::samples::MeanIntervals;
 use super::tally::TruthFinding;
 use super::truth::TruthErrors;
-use crate::catalog::{MetricRecord, PairFacts, PairResults, ReaderVerdict, StoredFailure};
+use crate::catalog::{
+    MetricRecord, PairFacts, PairResults, ReaderVerdict, StageRecord, StoredFailure,
+};
 use crate::domain::{
     Affine2, ContentHash, Failure, FailureClass, JobStatus, MetricOutcome, PairName, Scores, Stage,
     ThresholdMetric, Verdict,
@@ -93,6 +96,23 @@ pub(crate) fn failed(name: &str, class: FailureClass, message: &str) -> PairResu
     }
 }
 
+/// A stage's result that took so long, without numbers and files.
+pub(crate) fn stage(stage: Stage, ms: u64) -> StageRecord {
+    let hash = ContentHash::of(stage.name().as_bytes());
+    StageRecord {
+        stage,
+        outcome: serde_json::Value::Null,
+        files: BTreeMap::new(),
+        result_hash: hash,
+        recipe_hash: hash,
+        recipe_fields: serde_json::Value::Null,
+        mesh_hash: hash,
+        print_hash: Some(hash),
+        ms,
+        at: 0,
+    }
+}
+
 /// A pair nothing was done with.
 pub(crate) fn pending(name: &str) -> PairResults {
     PairResults {
@@ -143,11 +163,14 @@ pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> Row {
         acc: None,
         acc_ci95: None,
         rules: None,
+        failed_reasons: Vec::new(),
         ssim: Some(0.813),
         nl_ssim: Some(0.815),
         iou: Some(iou),
         iou_box: Some(0.9),
         dice: Some(dice),
+        means_ci95: MeanIntervals::default(),
         truth: None,
+        by_hand: None,
     }
 }

@@ -3,6 +3,8 @@
 use rayon::prelude::*;
 
 use super::aligned::{Aligned, AlignedError, same_alignment};
+use super::by_hand;
+use super::controls;
 use super::model::Report;
 use super::tally::{Tally, TruthFinding};
 use super::truth::{TruthError, TruthErrors, TruthRecord, tops_iou};
@@ -20,6 +22,9 @@ pub enum GatherError {
     /// The catalog refused.
     #[error(transparent)]
     Catalog(#[from] CatalogError),
+    /// A result that has an alignment by hand cannot be read.
+    #[error(transparent)]
+    Aligned(#[from] AlignedError),
     /// A thread of the comparison with truth was lost.
     #[error("comparing with the truth stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
@@ -36,16 +41,21 @@ enum Unusable {
 
 /// The report of a project as its catalog stands.
 ///
-/// Memory stays the same whatever the number of pairs, but for a few numbers a pair and metric where there is truth.
+/// Memory stays the same whatever the number of pairs, but for a few numbers a pair and metric.
 ///
 /// # Errors
 /// When the catalog cannot be read.
 pub async fn gather(catalog: &Catalog, project: &Project) -> Result<Report, GatherError> {
     let mut tally = Tally::default();
+    tally.caught(controls::caught(catalog).await?);
+    let laid = catalog.newest_hand_alignments().await?;
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
         for (pair, truth) in with_truth(project, page).await? {
             tally.add(&pair, &truth);
+            if let Some(laid) = laid.get(&pair.facts.name) {
+                tally.add_by_hand(&by_hand::errors(project, &pair, laid)?);
+            }
         }
     }
     Ok(tally.finish())

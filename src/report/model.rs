@@ -2,9 +2,16 @@
 
 use serde::Serialize;
 
+use super::by_hand::ByHand;
+use super::controls::Caught;
 use super::interval::Interval;
+use super::reasons::ReasonCount;
 use super::rules::Rules;
-use crate::domain::{FailureClass, PairName, Stage, ThresholdMetric};
+use super::samples::{Bootstrap, MeanIntervals};
+use super::score_duels::ScoreComparison;
+use super::thresholds::Thresholds;
+use super::times::StageTime;
+use crate::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
 
 /// Version of the JSON form.
 pub const SCHEMA: u32 = 1;
@@ -24,10 +31,23 @@ pub struct Report {
     pub rows: Vec<Row>,
     /// Metrics against each other, pair by pair.
     pub comparisons: Vec<Comparison>,
+    /// Metrics against each other by their scores, pair by pair.
+    pub score_comparisons: Vec<ScoreComparison>,
+    /// How the intervals of means and of the score comparisons were drawn; `None` without results, and above 100,000
+    /// pairs, where chance hardly moves a mean.
+    pub bootstrap: Option<Bootstrap>,
     /// Accuracy against coverage, by readers and then by truth, for each metric that has confidences.
     pub coverage: Vec<Coverage>,
     /// Pairs without result because they failed, by class.
     pub failures: Vec<FailureGroup>,
+    /// Where the metrics cut the relief.
+    pub thresholds: Vec<Thresholds>,
+    /// How long the stages took. Everything else is the same whenever the same results are told.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub times: Vec<StageTime>,
+    /// Planted faults that readers caught, where any were answered.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub caught: Option<Caught>,
     /// What a reader of the table must know, in whole sentences.
     pub warnings: Vec<String>,
 }
@@ -69,6 +89,9 @@ pub struct Row {
     /// Acc under three rules, where somebody has read.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rules: Option<Rules>,
+    /// Why readers failed the failed ones; a result counts for every reason given.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub failed_reasons: Vec<ReasonCount>,
     /// Mean structural similarity.
     pub ssim: Option<f64>,
     /// Mean structural similarity without the luminance factor.
@@ -79,9 +102,14 @@ pub struct Row {
     pub iou_box: Option<f64>,
     /// Mean Dice coefficient of the masks by pixel.
     pub dice: Option<f64>,
+    /// Bootstrap intervals of the means.
+    pub means_ci95: MeanIntervals,
     /// Agreement with true alignments, where the project holds them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthBlock>,
+    /// Distance from alignments by hand, where people made any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub by_hand: Option<ByHand>,
 }
 
 /// A metric's agreement with the true alignments; never mixed with people's verdicts.
@@ -205,11 +233,22 @@ pub struct FailedPair {
     pub error: String,
 }
 
+impl Row {
+    /// Failed results for which readers gave a reason, or none.
+    pub fn failed_for(&self, reason: Option<Reason>) -> u64 {
+        let mut given = self.failed_reasons.iter();
+        given
+            .find(|given| given.reason == reason)
+            .map_or(0, |given| given.count)
+    }
+}
+
 impl Report {
     /// The same with another interval.
     #[must_use]
     pub fn with_interval(mut self, interval: Interval) -> Self {
         self.interval = interval;
+        self.caught = self.caught.map(|caught| caught.with_interval(interval));
         for row in &mut self.rows {
             row.acc_ci95 = interval.of(row.passed, row.passed + row.failed);
             row.rules = row.rules.map(|rules| rules.with_interval(interval));
@@ -221,6 +260,15 @@ impl Report {
             point.acc_ci95 = interval.of(point.passed, point.n);
         }
         self
+    }
+
+    /// The same without computing times, which differ from run to run.
+    #[must_use]
+    pub fn without_times(self) -> Self {
+        Self {
+            times: Vec::new(),
+            ..self
+        }
     }
 
     /// Whether anybody has judged a result.

@@ -23,6 +23,14 @@ pub struct Rules {
 }
 
 impl Rules {
+    /// Names of the rules, in their order.
+    pub const NAMES: [&str; 3] = ["either_fails", "adjudicated", "both_fail"];
+
+    /// What follows from each rule, in the order of [`Self::NAMES`].
+    pub const fn rates(&self) -> [Rate; 3] {
+        [self.either_fails, self.adjudicated, self.both_fail]
+    }
+
     /// The same with another interval.
     pub(super) fn with_interval(self, interval: Interval) -> Self {
         Self {

@@ -1,18 +1,26 @@
 //! Adds pairs up to a report, one at a time, without keeping them.
 //!
-//! What stays in memory a pair: three numbers a metric where there is truth, for the medians, and its confidence where
-//! it is judged; nothing otherwise.
+//! What stays in memory a pair, for medians and percentiles: the time of each stage, the threshold of each metric, three
+//! numbers a metric where there is truth, its confidence where it is judged, and sums of scores for the bootstrap up to a
+//! hundred thousand pairs or blocks.
 
 use std::collections::BTreeMap;
 
+use super::by_hand::{HandErrors, HandSums};
 use super::compare::Duels;
+use super::controls::Caught;
 use super::coverage::Confidences;
 use super::interval::Interval;
-use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA, TruthBlock};
+use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA};
+use super::reasons::Reasons;
 use super::rules::RuleSums;
+use super::samples::{Drawn, Samples};
 use super::standing::Standing;
-use super::stats::{median, wilson_95};
-use super::truth::{MAX_ANGLE_DEG, TruthErrors};
+use super::stats::wilson_95;
+use super::thresholds::Cuts;
+use super::times::Times;
+use super::truth::TruthErrors;
+use super::truth_sums::TruthSums;
 use super::warnings;
 use crate::catalog::{MetricRecord, PairResults};
 use crate::domain::{FailureClass, JobStatus, ThresholdMetric};
@@ -32,11 +40,15 @@ pub struct Tally {
     pairs: u64,
     progress: Progress,
     columns: [Column; ThresholdMetric::ALL.len()],
+    samples: Samples,
     by_verdicts: Duels,
     by_truth: Duels,
     sure_by_verdicts: Confidences,
     sure_by_truth: Confidences,
     failures: BTreeMap<FailureClass, FailureGroup>,
+    cuts: Cuts,
+    times: Times,
+    caught: Option<Caught>,
     truth_problems: TruthProblems,
 }
 
@@ -60,23 +72,14 @@ struct Column {
     conflicts: u64,
     stale: u64,
     rules: RuleSums,
+    reasons: Reasons,
     ssim: f64,
     nl_ssim: f64,
     iou: f64,
     iou_box: f64,
     dice: f64,
-    truth: TruthColumn,
-}
-
-/// The truth of one metric.
-#[derive(Debug, Clone, Default)]
-struct TruthColumn {
-    passed: u64,
-    angle_right: u64,
-    mirrored: u64,
-    angles_deg: Vec<f64>,
-    tres_pct: Vec<f64>,
-    mask_ious: Vec<f64>,
+    truth: TruthSums,
+    by_hand: HandSums,
 }
 
 impl Default for Tally {
@@ -85,11 +88,15 @@ impl Default for Tally {
             pairs: 0,
             progress: Progress::default(),
             columns: ThresholdMetric::ALL.map(Column::new),
+            samples: Samples::default(),
             by_verdicts: Duels::default(),
             by_truth: Duels::default(),
             sure_by_verdicts: Confidences::default(),
             sure_by_truth: Confidences::default(),
             failures: BTreeMap::new(),
+            cuts: Cuts::default(),
+            times: Times::default(),
+            caught: None,
             truth_problems: TruthProblems::default(),
         }
     }
@@ -101,6 +108,8 @@ impl Tally {
         self.pairs += 1;
         self.count_status(pair);
         self.count_truth_problem(pair, truth);
+        self.cuts.add(pair);
+        self.times.add(&pair.stages);
         for column in &mut self.columns {
             if let Some(record) = pair.metric(column.metric) {
                 column.add(record, truth.errors.get(&column.metric));
@@ -109,12 +118,27 @@ impl Tally {
         let told = |metric| Standing::of(pair.metric(metric)?).told();
         let right = |metric| truth.errors.get(&metric).map(TruthErrors::pass);
         let sure = |metric| pair.metric(metric)?.outcome.confidence;
+        self.samples.add(pair, told);
         self.by_verdicts.add(told);
         self.by_truth.add(right);
         self.sure_by_verdicts
             .add(|metric| sure(metric).zip(told(metric)));
         self.sure_by_truth
             .add(|metric| sure(metric).zip(right(metric)));
+    }
+
+    /// Counts in how far a pair's results are from its alignment by hand.
+    pub fn add_by_hand(&mut self, errors: &BTreeMap<ThresholdMetric, HandErrors>) {
+        for column in &mut self.columns {
+            if let Some(errors) = errors.get(&column.metric) {
+                column.by_hand.add(*errors);
+            }
+        }
+    }
+
+    /// Takes in the planted faults that readers caught; none where none were answered.
+    pub fn caught(&mut self, caught: Caught) {
+        self.caught = (caught.all.n > 0).then_some(caught);
     }
 
     fn count_status(&mut self, pair: &PairResults) {
@@ -161,7 +185,8 @@ impl Tally {
     /// The report over all pairs counted.
     pub fn finish(self) -> Report {
         let told = self.columns.into_iter().filter(Column::is_told);
-        let rows: Vec<Row> = told.map(Column::finish).collect();
+        let drawn = self.samples.finish();
+        let rows: Vec<Row> = told.map(|column| column.finish(&drawn)).collect();
         let mut comparisons = self.by_verdicts.finish(Basis::Verdicts);
         comparisons.extend(self.by_truth.finish(Basis::Truth));
         let mut coverage = self.sure_by_verdicts.finish(Basis::Verdicts);
@@ -174,8 +199,13 @@ impl Tally {
             warnings: warnings::of(self.progress, &rows, &self.truth_problems),
             rows,
             comparisons,
+            score_comparisons: drawn.comparisons,
+            bootstrap: drawn.bootstrap,
             coverage,
             failures: self.failures.into_values().collect(),
+            thresholds: self.cuts.finish(),
+            times: self.times.finish(),
+            caught: self.caught,
         }
     }
 }
@@ -191,12 +221,14 @@ impl Column {
             conflicts: 0,
             stale: 0,
             rules: RuleSums::default(),
+            reasons: Reasons::default(),
             ssim: 0.0,
             nl_ssim: 0.0,
             iou: 0.0,
             iou_box: 0.0,
             dice: 0.0,
-            truth: TruthColumn::default(),
+            truth: TruthSums::default(),
+            by_hand: HandSums::default(),
         }
     }
 
@@ -214,6 +246,7 @@ impl Column {
         self.iou_box += scores.iou_box;
         self.dice += scores.dice;
         self.rules.add(record);
+        self.reasons.add(record);
         self.count_standing(Standing::of(record));
         if let Some(errors) = truth {
             self.truth.add(errors);
@@ -234,7 +267,7 @@ impl Column {
         }
     }
 
-    fn finish(self) -> Row {
+    fn finish(self, drawn: &Drawn) -> Row {
         let mean = |sum: f64| share(sum, self.n);
         let told = self.passed + self.failed;
         Row {
@@ -249,39 +282,16 @@ impl Column {
             acc: share(self.passed as f64, told),
             acc_ci95: wilson_95(self.passed, told),
             rules: (told + self.unsure > 0).then(|| self.rules.finish()),
+            failed_reasons: self.reasons.finish(),
             ssim: mean(self.ssim),
             nl_ssim: mean(self.nl_ssim),
             iou: mean(self.iou),
             iou_box: mean(self.iou_box),
             dice: mean(self.dice),
+            means_ci95: drawn.means[self.metric as usize],
             truth: self.truth.finish(),
+            by_hand: self.by_hand.finish(),
         }
-    }
-}
-
-impl TruthColumn {
-    fn add(&mut self, errors: &TruthErrors) {
-        self.passed += u64::from(errors.pass());
-        self.angle_right += u64::from(errors.angle_deg <= MAX_ANGLE_DEG);
-        self.mirrored += u64::from(errors.mirrored);
-        self.angles_deg.push(errors.angle_deg);
-        self.tres_pct.push(errors.tre_pct);
-        self.mask_ious.extend(errors.mask_iou);
-    }
-
-    fn finish(mut self) -> Option<TruthBlock> {
-        let n = self.angles_deg.len() as u64;
-        (n > 0).then(|| TruthBlock {
-            n,
-            passed: self.passed,
-            acc: share(self.passed as f64, n),
-            acc_ci95: wilson_95(self.passed, n),
-            angle_le_5deg: share(self.angle_right as f64, n),
-            angle_median_deg: median(&mut self.angles_deg),
-            tre_median_pct: median(&mut self.tres_pct),
-            mask_iou_median: median(&mut self.mask_ious),
-            mirrored: self.mirrored,
-        })
     }
 }
 
@@ -360,33 +370,6 @@ mod tests {
         assert_eq!(metrics, ThresholdMetric::PAPER);
         assert_eq!(report.comparisons.len(), 3);
         assert_eq!(report.warnings, [""; 0]);
-    }
-
-    #[test]
-    fn truth_is_counted_apart_from_verdicts() {
-        let mut tally = Tally::default();
-        tally.add(
-            &fixture::done("a", 0.8, &[]),
-            &fixture::truth(1.0, 2.0, 0.9),
-        );
-        tally.add(
-            &fixture::done("b", 0.8, &[]),
-            &fixture::truth(9.0, 2.0, 0.9),
-        );
-        tally.add(
-            &fixture::done("c", 0.8, &[]),
-            &fixture::truth(3.0, 4.0, 0.6),
-        );
-        let report = tally.finish();
-        let row = report
-            .row(ThresholdMetric::Ensemble)
-            .expect("every metric has a row");
-        let truth = row.truth.as_ref().expect("all pairs have truth");
-        assert_eq!((row.acc, truth.n, truth.passed), (None, 3, 1));
-        assert_eq!(truth.angle_le_5deg, Some(2.0 / 3.0));
-        assert_eq!(truth.angle_median_deg, Some(3.0));
-        assert_eq!(truth.tre_median_pct, Some(2.0));
-        assert_eq!(truth.mask_iou_median, Some(0.9));
     }
 
     #[test]

@@ -1,8 +1,7 @@
 //! Planted faults and repeats: how well a reader sees can be told only from what is known beforehand.
 
 use super::card::{Card, View};
-use super::order::Lots;
-use crate::domain::Control;
+use crate::domain::{Control, Lots};
 use crate::raster::{DepthMap, Mask};
 
 /// How often readers are tested.
@@ -127,11 +126,10 @@ pub(super) fn mixed(real: Vec<Card>, faults: Vec<Card>, rates: &Rates, lots: &Lo
 #[cfg(test)]
 mod tests {
     use super::{Rates, chosen, mixed, plant};
-    use crate::domain::{Affine2, Control, DepthScale};
+    use crate::domain::{Affine2, Control, DepthScale, Lots};
     use crate::raster::{DepthMap, Grid};
     use crate::review::card::Card;
     use crate::review::card::fixture::card;
-    use crate::review::order::Lots;
 
     const RATES: Rates = Rates {
         controls: 0.1,

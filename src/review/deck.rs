@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use super::card::{Card, View};
 use super::control::{self, Rates};
-use super::order::{self, Lots};
+use super::order;
 use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, MetricRecord, PairResults};
-use crate::domain::{DepthOutcome, Queue, Stage, ThresholdMetric, Verdict};
+use crate::domain::{DepthOutcome, Lots, Queue, Stage, ThresholdMetric, Verdict};
 use crate::report::aligned::{Aligned, alike};
 use crate::report::standing::{contradict, split};
 use crate::store::Project;

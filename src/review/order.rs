@@ -1,38 +1,8 @@
 //! In which order cards come: by lot from a seed and the reader's name, or the most doubtful first.
 
-use crate::domain::{ContentHash, Queue};
+use crate::domain::{Lots, Queue};
 
 use super::card::Card;
-
-/// A lot drawn for a thing: the same for the same seed, reader, thing and purpose.
-#[derive(Debug, Clone)]
-pub(super) struct Lots {
-    seed: u64,
-    reader: String,
-}
-
-impl Lots {
-    pub(super) fn new(seed: u64, reader: &str) -> Self {
-        Self {
-            seed,
-            reader: reader.to_owned(),
-        }
-    }
-
-    /// A number from 0 up to 1, evenly.
-    pub(super) fn draw(&self, thing: &ContentHash, purpose: &str) -> f64 {
-        let mut bytes = self.seed.to_le_bytes().to_vec();
-        for part in [self.reader.as_bytes(), thing.as_bytes(), purpose.as_bytes()] {
-            bytes.extend((part.len() as u64).to_le_bytes());
-            bytes.extend(part);
-        }
-        let hash = ContentHash::of(&bytes);
-        let mut head = [0; 8];
-        head.copy_from_slice(&hash.as_bytes()[..8]);
-        // 53 bits fill the fraction of an f64.
-        (u64::from_le_bytes(head) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 /// Sorts cards of results into the order in which they are shown.
 pub(super) fn sort(cards: &mut [Card], queue: Queue, lots: &Lots) {
@@ -70,8 +40,8 @@ impl Ord for OrderKey {
 
 #[cfg(test)]
 mod tests {
-    use super::{Lots, sort};
-    use crate::domain::{ContentHash, Queue};
+    use super::sort;
+    use crate::domain::{Lots, Queue};
     use crate::review::card::fixture::card;
 
     fn order(queue: Queue, seed: u64, reader: &str) -> Vec<String> {
@@ -102,16 +72,5 @@ mod tests {
             old.map(|card| card.pair.to_string()).collect::<Vec<_>>()
         };
         assert_eq!(names(30), names(31));
-    }
-
-    #[test]
-    fn lots_fall_evenly() {
-        let lots = Lots::new(7, "ana");
-        let low = (0..2000_u32).filter(|i| {
-            let thing = ContentHash::of(&i.to_le_bytes());
-            lots.draw(&thing, "control") < 0.25
-        });
-        let low = low.count();
-        assert!((430..570).contains(&low), "{low}");
     }
 }

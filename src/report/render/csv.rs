@@ -1,10 +1,12 @@
 //! The report as CSV (RFC 4180): one line a metric, numbers in full.
 
+use super::csv_fields;
 use crate::report::coverage::{KEPT_PERCENT, LEAST_PERCENT};
 use crate::report::interval::Interval;
 use crate::report::model::{Basis, Coverage, CoveragePoint, Report, Row, TruthBlock};
 
-/// Names of the columns, in order; those of [`coverage_names`] follow, for readers and then for truth.
+/// Names of the columns, in order; those of [`coverage_names`] follow, for readers and then for truth,
+/// and those of [`csv_fields`].
 const COLUMNS: [&str; 27] = [
     "metric",
     "n",
@@ -38,11 +40,14 @@ const COLUMNS: [&str; 27] = [
 /// The report as CSV. What does not exist is an empty field.
 pub(super) fn render(report: &Report) -> String {
     let names = COLUMNS.map(field).into_iter();
-    let mut text = line(names.chain(BASES.into_iter().flat_map(coverage_names)));
+    let later = csv_fields::names();
+    let coverage = BASES.into_iter().flat_map(coverage_names);
+    let mut text = line(names.chain(coverage).chain(later));
     for row in &report.rows {
         let curves = BASES.map(|basis| report.coverage(basis, row.metric));
         let numbers = curves.into_iter().flat_map(coverage_fields);
-        text += &line(fields(row, report.interval).into_iter().chain(numbers));
+        let first = fields(row, report.interval).into_iter().chain(numbers);
+        text += &line(first.chain(csv_fields::values(report, row)));
     }
     text
 }
@@ -150,13 +155,13 @@ fn truth_fields(truth: Option<&TruthBlock>) -> [String; 10] {
     ]
 }
 
-fn bounds(bounds: Option<[f64; 2]>) -> [String; 2] {
+pub(super) fn bounds(bounds: Option<[f64; 2]>) -> [String; 2] {
     bounds.map_or_else(Default::default, |bounds| {
         bounds.map(|bound| number(Some(bound)))
     })
 }
 
-fn number(value: Option<f64>) -> String {
+pub(super) fn number(value: Option<f64>) -> String {
     value.map_or_else(String::new, |value| value.to_string())
 }
 
@@ -180,7 +185,7 @@ fn line(fields: impl Iterator<Item = String>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{BASES, COLUMNS, coverage_names, field, render};
+    use super::{BASES, COLUMNS, coverage_names, csv_fields, field, render};
     use crate::domain::Verdict;
     use crate::report::{Tally, TruthFinding, fixture};
 
@@ -201,7 +206,8 @@ mod tests {
         assert_eq!(lines[5], "");
         for line in &lines[..5] {
             let coverage: usize = BASES.map(|basis| coverage_names(basis).len()).iter().sum();
-            assert_eq!(line.split(',').count(), COLUMNS.len() + coverage, "{line}");
+            let all = COLUMNS.len() + coverage + csv_fields::names().len();
+            assert_eq!(line.split(',').count(), all, "{line}");
         }
         let golden = "nl_ssim,2,1,1,0,0,0,0,1,0.20654931437723745,1,0.81,0.82,0.75,0.9,";
         assert!(lines[1].starts_with(golden), "{}", lines[1]);

@@ -1,7 +1,7 @@
 //! The report as LaTeX tables with `booktabs` rules and `siunitx` columns.
 
-use super::coverage;
 use super::table::{self, Column, Kind, Table};
+use super::{coverage, scored};
 use crate::report::model::Report;
 
 /// The report as LaTeX, to be read in by `\input`.
@@ -19,6 +19,7 @@ pub(super) fn render(report: &Report) -> String {
         tables
             .iter()
             .chain(table::comparisons(report).as_ref())
+            .chain(scored::comparisons(report).as_ref())
             .map(float),
     );
     blocks.join("\n")

@@ -1,8 +1,9 @@
 //! The report as Markdown tables.
 
-use super::coverage;
 use super::table::{self, Column, Kind, Table};
+use super::{coverage, scored};
 use crate::report::model::{FailureGroup, Report};
+use crate::report::score_duels::in_words;
 
 /// The report as Markdown.
 pub(super) fn render(report: &Report) -> String {
@@ -11,10 +12,17 @@ pub(super) fn render(report: &Report) -> String {
         .into_iter()
         .chain(coverage::full(report))
         .chain(table::comparisons_in_words(report))
+        .chain(scored::comparisons(report))
     {
         blocks.push(piped(&found));
         blocks.push(format!("{}\n", escape(&found.caption)));
     }
+    let said = in_words(&report.score_comparisons);
+    let said: Vec<String> = said
+        .iter()
+        .map(|words| format!("- {}\n", escape(words)))
+        .collect();
+    blocks.extend((!said.is_empty()).then(|| said.concat()));
     for warning in &report.warnings {
         blocks.push(format!("> **Note:** {}\n", escape(warning)));
     }

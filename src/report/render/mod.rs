@@ -3,14 +3,21 @@
 mod agree;
 mod coverage;
 mod csv;
+mod csv_fields;
+mod failed;
+mod html;
 mod latex;
 mod markdown;
+mod scored;
 mod table;
 mod text;
+mod work;
 
+use super::gallery::Gallery;
 use super::model::Report;
 
 pub use agree::agree_text;
+pub use html::{Cover, MOST_BYTES, page};
 
 /// A form of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,16 +32,19 @@ pub enum Format {
     Markdown,
     /// Tables with `booktabs` and `siunitx`.
     Latex,
+    /// One page with its pictures in it, which needs no script and no other file.
+    Html,
 }
 
 impl Format {
     /// Every form.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Text,
         Self::Json,
         Self::Csv,
         Self::Markdown,
         Self::Latex,
+        Self::Html,
     ];
 
     /// Name on the command line.
@@ -45,6 +55,7 @@ impl Format {
             Self::Csv => "csv",
             Self::Markdown => "markdown",
             Self::Latex => "latex",
+            Self::Html => "html",
         }
     }
 }
@@ -63,12 +74,12 @@ impl std::str::FromStr for Format {
             .into_iter()
             .find(|format| format.name() == text)
             .ok_or_else(|| {
-                format!("{text:?} is not a report format (text, json, csv, markdown, latex)")
+                format!("{text:?} is not a report format (text, json, csv, markdown, latex, html)")
             })
     }
 }
 
-/// The report in a form; ends with a line end.
+/// The report in a form; ends with a line end. [`page`] gives the page with pictures.
 pub fn render(report: &Report, format: Format) -> String {
     match format {
         Format::Text => text::render(report),
@@ -76,6 +87,7 @@ pub fn render(report: &Report, format: Format) -> String {
         Format::Csv => csv::render(report),
         Format::Markdown => markdown::render(report),
         Format::Latex => latex::render(report),
+        Format::Html => page(report, &Gallery::default(), &Cover::default()),
     }
 }
 
@@ -99,7 +111,7 @@ mod tests {
         for format in Format::ALL {
             assert_eq!(format.name().parse(), Ok(format));
         }
-        assert!("html".parse::<Format>().is_err());
+        assert!("pdf".parse::<Format>().is_err());
     }
 
     #[test]

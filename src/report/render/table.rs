@@ -1,7 +1,8 @@
 //! The tables of a report with their cells as text: what text, Markdown and LaTeX have in common.
 
+use super::{failed, scored, work};
+use crate::report::by_hand::ByHand;
 use crate::report::model::{Basis, Comparison, Report, Row, TruthBlock};
-use crate::report::rate::Rate;
 use crate::report::rules::Rules;
 
 /// A table of text cells.
@@ -62,14 +63,20 @@ pub(super) const fn number(head: &'static str, decimals: usize) -> Column {
 /// The tables a report calls for: scores always, verdicts and truth where there are any.
 pub(super) fn tables(report: &Report) -> Vec<Table> {
     let mut tables = vec![scores(report)];
+    tables.extend(scored::intervals(report));
     tables.extend(report.anybody_read().then(|| verdicts(report)));
     tables.extend(rules(report));
+    tables.extend(failed::reasons(report));
+    tables.extend(failed::caught(report));
     tables.extend(report.has_truth().then(|| truth(report)));
+    tables.extend(by_hand(report));
+    tables.extend(work::thresholds(report));
+    tables.extend(work::times(report));
     tables
 }
 
 /// The paper's table.
-fn scores(report: &Report) -> Table {
+pub(super) fn scores(report: &Report) -> Table {
     Table {
         caption:
             "Acc is the share passed of those passed or failed by readers; SSIM, IoU and Dice are \
@@ -103,7 +110,7 @@ fn score_cells(row: &Row) -> Vec<Option<String>> {
 }
 
 /// Who said what.
-fn verdicts(report: &Report) -> Table {
+pub(super) fn verdicts(report: &Report) -> Table {
     let cells = |row: &Row| {
         vec![
             Some(row.metric.title().to_owned()),
@@ -132,7 +139,7 @@ fn verdicts(report: &Report) -> Table {
 }
 
 /// Acc under three rules, where two readers have told of the same result.
-fn rules(report: &Report) -> Option<Table> {
+pub(super) fn rules(report: &Report) -> Option<Table> {
     let told_twice = |row: &Row| row.rules.as_ref().is_some_and(|rules| rules.told_twice > 0);
     report.rows.iter().any(told_twice).then(|| Table {
         caption: "Acc if one reader who fails it is enough, if a third settles conflicts (the Acc above), and if both \
@@ -158,12 +165,8 @@ fn rule_cells(row: &Row) -> Vec<Option<String>> {
         Some(row.metric.title().to_owned()),
         rules.map(|rules| count(rules.told_twice)),
     ];
-    let rate = |read: fn(&Rules) -> Rate| rules.map(read);
-    for rate in [
-        rate(|rules| rules.either_fails),
-        rate(|rules| rules.adjudicated),
-        rate(|rules| rules.both_fail),
-    ] {
+    for i in 0..Rules::NAMES.len() {
+        let rate = rules.map(|rules| rules.rates()[i]);
         cells.push(fixed(rate.and_then(|rate| rate.share), 3));
         cells.push(rate.map(|rate| count(rate.n)));
     }
@@ -171,7 +174,7 @@ fn rule_cells(row: &Row) -> Vec<Option<String>> {
 }
 
 /// Agreement with true alignments.
-fn truth(report: &Report) -> Table {
+pub(super) fn truth(report: &Report) -> Table {
     Table {
         caption: "Against the true alignments. Acc here: angle within 5 degrees, landmarks within 5 % of the \
                   character's height, mask IoU with the true stroke tops at least 0.7. Angle, landmarks and \
@@ -204,6 +207,46 @@ fn truth_cells(row: &Row) -> Vec<Option<String>> {
         fixed(value(|truth| truth.tre_median_pct), 2),
         fixed(value(|truth| truth.mask_iou_median), 3),
     ]
+}
+
+/// Distance from alignments by hand; `None` where people made none.
+pub(super) fn by_hand(report: &Report) -> Option<Table> {
+    let found: Vec<(&Row, &ByHand)> = report
+        .rows
+        .iter()
+        .filter_map(|row| Some((row, row.by_hand.as_ref()?)))
+        .collect();
+    let cells = |(row, by_hand): &(&Row, &ByHand)| {
+        vec![
+            Some(row.metric.title().to_owned()),
+            Some(count(by_hand.n)),
+            fixed(by_hand.angle_le_5deg, 3),
+            fixed(by_hand.angle_median_deg, 2),
+            fixed(by_hand.angle_p95_deg, 2),
+            fixed(by_hand.shift_median_pct, 2),
+            fixed(by_hand.shift_p95_pct, 2),
+            fixed(by_hand.scale_median_pct, 2),
+            fixed(by_hand.scale_p95_pct, 2),
+        ]
+    };
+    (!found.is_empty()).then(|| Table {
+        caption: "Against people's alignments by hand, on the n pairs that have one: share turned by at most 5 degrees; \
+                  turn, shift in percent of the relief's longer side and difference in scale, each as median and 95th \
+                  percentile."
+            .to_owned(),
+        columns: vec![
+            words("By hand"),
+            number("n", 0),
+            number("in 5\u{b0}", 3),
+            number("angle \u{b0}", 2),
+            number("95 %", 2),
+            number("shift %", 2),
+            number("95 %", 2),
+            number("scale %", 2),
+            number("95 %", 2),
+        ],
+        rows: found.iter().map(cells).collect(),
+    })
 }
 
 /// The comparisons as a table without their words; `None` when there are none.

@@ -1,8 +1,9 @@
 //! The report for a terminal of 80 columns.
 
-use super::coverage;
 use super::table::{self, Column, Kind, Table};
+use super::{coverage, scored};
 use crate::report::model::{Comparison, FailureGroup, Report};
+use crate::report::score_duels::in_words;
 
 /// Columns of the terminal.
 const WIDTH: usize = 80;
@@ -25,6 +26,13 @@ pub(super) fn render(report: &Report) -> String {
         ));
     }
     blocks.extend((!report.comparisons.is_empty()).then(|| comparisons(report)));
+    if let Some(found) = scored::comparisons(report) {
+        let said = in_words(&report.score_comparisons);
+        let said = said.iter().map(|words| wrapped("", words));
+        blocks.push(
+            said.collect::<String>() + "\n" + &aligned(&found) + &wrapped("", &found.caption),
+        );
+    }
     blocks.extend((!report.warnings.is_empty()).then(|| warnings(report)));
     blocks.extend(report.failures.iter().map(failures));
     blocks.join("\n")
@@ -146,6 +154,10 @@ Pixel density         2       1       1       1       0      0
 Ensemble              2       1       1       1       0      0
 Relief                2       1       1       1       0      0
 Verdicts by result; stale ones have a verdict for an older result only.
+
+Failed for       Non-luminous SSIM  Pixel density  Ensemble  Relief
+no reason given                  1              1         1       1
+Results that readers failed, by the reasons they gave; one may have several.
 
 Truth              n    Acc  95% Wilson   in 5°  angle °  landm. %  mask IoU
 Non-luminous SSIM  1  1.000  0.207-1.000  1.000     0.50      2.00     0.900

@@ -1,0 +1,36 @@
+//! The three pictures of one result that people look at.
+
+use super::files::Print;
+use super::pictures::{Rgb, View};
+use crate::catalog::PairResults;
+use crate::domain::ThresholdMetric;
+use crate::raster;
+use crate::report::aligned::Aligned;
+use crate::store::Project;
+
+/// Print, relief laid on it and overlay of a metric's result, each at most `side` pixels wide and high, as far as they
+/// can be drawn; and why one that should be there is not.
+pub(super) fn tiles(
+    project: &Project,
+    pair: &PairResults,
+    metric: ThresholdMetric,
+    side: usize,
+    limits: &raster::Limits,
+) -> ([Option<Rgb>; 3], Option<String>) {
+    let Ok(print) = Print::read(project, pair, limits) else {
+        return ([None, None, None], None);
+    };
+    let view = View::of_side(&print.picture, side);
+    let plain = Some(view.print(&print.picture));
+    let Some(record) = pair.metric(metric) else {
+        return ([plain, None, None], None);
+    };
+    match Aligned::new(project, pair).depth() {
+        Ok(depth) => {
+            let relief = view.relief(&depth, &record.outcome.print_from_depth);
+            let overlay = view.overlay(&print.picture, &depth, &record.outcome);
+            ([plain, Some(relief), Some(overlay)], None)
+        }
+        Err(error) => ([plain, None, None], Some(error.to_string())),
+    }
+}

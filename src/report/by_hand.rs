@@ -1,0 +1,197 @@
+//! The automatic results against the alignments that people made by hand, on the pairs that have one.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::aligned::{Aligned, AlignedError};
+use super::stats::{median, quantile};
+use super::tally::share;
+use super::truth::MAX_ANGLE_DEG;
+use crate::catalog::{PairResults, StoredAlignment};
+use crate::domain::{Affine2, DepthOutcome, Stage, ThresholdMetric};
+use crate::store::Project;
+
+/// How far one metric's results lie from the alignments by hand.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ByHand {
+    /// Results that have an alignment by hand.
+    pub n: u64,
+    /// Share turned by at most 5 degrees against it.
+    pub angle_le_5deg: Option<f64>,
+    /// Median turn against it, degrees.
+    pub angle_median_deg: Option<f64>,
+    /// 95th percentile of the turn, degrees.
+    pub angle_p95_deg: Option<f64>,
+    /// Median shift of the relief's centre, percent of the relief's longer side.
+    pub shift_median_pct: Option<f64>,
+    /// 95th percentile of the shift, percent.
+    pub shift_p95_pct: Option<f64>,
+    /// Median difference in scale, percent.
+    pub scale_median_pct: Option<f64>,
+    /// 95th percentile of the difference in scale, percent.
+    pub scale_p95_pct: Option<f64>,
+    /// Results in mirror writing against it; they count as turned by 180 degrees.
+    pub mirrored: u64,
+}
+
+/// One result's distance from the alignment by hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct HandErrors {
+    /// Turn, degrees in 0..=180; 180 when mirrored.
+    angle_deg: f64,
+    /// Shift of the relief's centre, percent of its longer side.
+    shift_pct: f64,
+    /// Difference in scale, percent.
+    scale_pct: f64,
+    /// Whether one of the two reads in mirror writing.
+    mirrored: bool,
+}
+
+impl HandErrors {
+    /// Between two ways of laying a relief of so many pixels on its print; `None` when one flattens it.
+    fn between(found: &Affine2, by_hand: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
+        let turn = by_hand.after(&found.inverse()?);
+        by_hand.inverse()?;
+        let mirrored = turn.determinant() < 0.0;
+        let [width, height] = depth_px.map(f64::from);
+        let centre = [(width - 1.0) / 2.0, (height - 1.0) / 2.0];
+        let ([x, y], [u, v]) = (found.apply(centre), by_hand.apply(centre));
+        Some(Self {
+            angle_deg: if mirrored {
+                180.0
+            } else {
+                turn.angle_deg().abs()
+            },
+            shift_pct: 100.0 * (x - u).hypot(y - v) / (by_hand.scale() * width.max(height)),
+            scale_pct: 100.0 * (turn.scale() - 1.0).abs(),
+            mirrored,
+        })
+    }
+}
+
+/// The distances of a pair's results from its alignment by hand, by metric.
+///
+/// # Errors
+/// When its results of fit or depth cannot be read.
+pub(super) fn errors(
+    project: &Project,
+    pair: &PairResults,
+    by_hand: &StoredAlignment,
+) -> Result<BTreeMap<ThresholdMetric, HandErrors>, AlignedError> {
+    if pair.metrics.is_empty() {
+        return Ok(BTreeMap::new());
+    }
+    let aligned = Aligned::new(project, pair);
+    let depth: DepthOutcome = aligned.outcome(Stage::Depth)?;
+    let Some(laid) = aligned.print_from_depth(&by_hand.made.print_from_mesh)? else {
+        return Ok(BTreeMap::new());
+    };
+    let outcomes = pair.metrics.iter().map(|record| &record.outcome);
+    let size = [depth.width, depth.height];
+    Ok(outcomes
+        .filter_map(|outcome| {
+            let errors = HandErrors::between(&outcome.print_from_depth, &laid, size)?;
+            Some((outcome.metric, errors))
+        })
+        .collect())
+}
+
+/// The distances so far of one metric.
+#[derive(Debug, Clone, Default)]
+pub(super) struct HandSums(Vec<HandErrors>);
+
+impl HandSums {
+    /// Counts one result in.
+    pub(super) fn add(&mut self, errors: HandErrors) {
+        self.0.push(errors);
+    }
+
+    /// What follows; `None` without any alignment by hand.
+    pub(super) fn finish(self) -> Option<ByHand> {
+        let n = self.0.len() as u64;
+        let of = |read: fn(&HandErrors) -> f64| -> [Option<f64>; 2] {
+            let mut values: Vec<f64> = self.0.iter().map(read).collect();
+            [median(&mut values), quantile(&mut values, 0.95)]
+        };
+        let count = |is: fn(&HandErrors) -> bool| self.0.iter().filter(|one| is(one)).count();
+        let right = count(|errors| errors.angle_deg <= MAX_ANGLE_DEG);
+        let [angle_median_deg, angle_p95_deg] = of(|errors| errors.angle_deg);
+        let [shift_median_pct, shift_p95_pct] = of(|errors| errors.shift_pct);
+        let [scale_median_pct, scale_p95_pct] = of(|errors| errors.scale_pct);
+        (n > 0).then(|| ByHand {
+            n,
+            angle_le_5deg: share(right as f64, n),
+            angle_median_deg,
+            angle_p95_deg,
+            shift_median_pct,
+            shift_p95_pct,
+            scale_median_pct,
+            scale_p95_pct,
+            mirrored: count(|errors| errors.mirrored) as u64,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HandErrors, HandSums};
+    use crate::domain::Affine2;
+
+    /// A relief of 101 x 51 px laid with its centre at (200, 100).
+    fn laid(scale: f64, angle_deg: f64, shift: [f64; 2]) -> Affine2 {
+        let back = Affine2::scale_shift(1.0, [-50.0, -25.0]);
+        let centre = [200.0 + shift[0], 100.0 + shift[1]];
+        Affine2::similarity(scale, angle_deg.to_radians(), centre).after(&back)
+    }
+
+    fn errors(found: &Affine2) -> HandErrors {
+        let by_hand = laid(2.0, 30.0, [0.0, 0.0]);
+        HandErrors::between(found, &by_hand, [101, 51]).expect("neither is flat")
+    }
+
+    #[test]
+    fn turn_shift_and_scale_are_told_apart() {
+        let near = |found: HandErrors, wanted: [f64; 3]| {
+            let told = [found.angle_deg, found.shift_pct, found.scale_pct];
+            for (told, wanted) in told.into_iter().zip(wanted) {
+                assert!((told - wanted).abs() < 1e-9, "{found:?}");
+            }
+        };
+        near(errors(&laid(2.0, 30.0, [0.0, 0.0])), [0.0, 0.0, 0.0]);
+        near(errors(&laid(2.0, 23.0, [0.0, 0.0])), [7.0, 0.0, 0.0]);
+        // 202 px is the relief's longer side on the print.
+        near(errors(&laid(2.0, 30.0, [6.06, 8.08])), [0.0, 5.0, 0.0]);
+        near(errors(&laid(1.6, 30.0, [0.0, 0.0])), [0.0, 0.0, 25.0]);
+        let flat = HandErrors::between(&Affine2([[0.0; 3]; 2]), &laid(1.0, 0.0, [0.0; 2]), [9, 9]);
+        assert_eq!(flat, None);
+    }
+
+    #[test]
+    fn a_mirrored_result_is_as_far_off_as_can_be() {
+        let mut mirrored = laid(2.0, 30.0, [0.0, 0.0]);
+        mirrored.0[0] = mirrored.0[0].map(|value| -value);
+        let found = errors(&mirrored);
+        assert_eq!((found.angle_deg, found.mirrored), (180.0, true));
+    }
+
+    #[test]
+    fn the_share_within_five_degrees_is_of_those_corrected() {
+        let mut sums = HandSums::default();
+        for angle_deg in [30.0, 31.0, 34.0, 40.0, 10.0] {
+            sums.add(errors(&laid(2.0, angle_deg, [0.0, 0.0])));
+        }
+        let found = sums.finish().expect("five");
+        assert_eq!(
+            (found.n, found.angle_le_5deg, found.mirrored),
+            (5, Some(0.6), 0)
+        );
+        let near = |found: Option<f64>, wanted: f64| {
+            assert!((found.expect("five") - wanted).abs() < 1e-9, "{found:?}");
+        };
+        near(found.angle_median_deg, 4.0);
+        // NumPy 2 `quantile([0, 1, 4, 10, 20], 0.95)`.
+        near(found.angle_p95_deg, 18.0);
+        assert_eq!(HandSums::default().finish(), None);
+    }
+}

@@ -1,0 +1,108 @@
+//! Answers to what only tests a reader: planted faults and repeats.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+
+use super::interval::Interval;
+use super::rate::Rate;
+use crate::catalog::{Catalog, CatalogError, ControlAnswer};
+use crate::domain::Verdict;
+
+/// Planted faults that readers failed, of those that they answered; unsure is not caught.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+pub struct Caught {
+    /// Of every kind.
+    #[serde(flatten)]
+    pub all: Rate,
+    /// By kind of fault.
+    pub by_fault: BTreeMap<&'static str, Rate>,
+}
+
+impl Caught {
+    /// Of a reader's answers; those to repeats are left out.
+    pub(super) fn of<'a>(answers: impl Iterator<Item = &'a ControlAnswer>) -> Self {
+        let mut told: BTreeMap<_, Vec<bool>> = BTreeMap::new();
+        for answer in answers.filter(|answer| answer.control.is_fault()) {
+            let of_kind = told.entry(answer.control.name()).or_default();
+            of_kind.push(answer.verdict == Verdict::Fail);
+        }
+        Self {
+            all: Rate::of(told.values().flatten().copied()),
+            by_fault: told
+                .into_iter()
+                .map(|(name, told)| (name, Rate::of(told)))
+                .collect(),
+        }
+    }
+
+    /// Of several readers together.
+    pub(super) fn total<'a>(readers: impl Iterator<Item = &'a Self> + Clone) -> Self {
+        let mut by_fault: BTreeMap<_, Vec<Rate>> = BTreeMap::new();
+        for (name, rate) in readers.clone().flat_map(|caught| &caught.by_fault) {
+            by_fault.entry(*name).or_default().push(*rate);
+        }
+        Self {
+            all: Rate::total(readers.map(|caught| caught.all)),
+            by_fault: by_fault
+                .into_iter()
+                .map(|(name, rates)| (name, Rate::total(rates.into_iter())))
+                .collect(),
+        }
+    }
+
+    /// The same with another interval.
+    #[must_use]
+    pub fn with_interval(self, interval: Interval) -> Self {
+        let by_fault = self.by_fault.into_iter();
+        Self {
+            all: self.all.with_interval(interval),
+            by_fault: by_fault
+                .map(|(name, rate)| (name, rate.with_interval(interval)))
+                .collect(),
+        }
+    }
+}
+
+/// Planted faults that all readers of a project caught.
+///
+/// # Errors
+/// When the catalog cannot be read.
+pub(super) async fn caught(catalog: &Catalog) -> Result<Caught, CatalogError> {
+    let answers = by_reader(catalog).await?;
+    let readers: Vec<Caught> = answers
+        .values()
+        .map(|answers| Caught::of(newest(answers).into_iter()))
+        .collect();
+    Ok(Caught::total(readers.iter()))
+}
+
+/// Answers that were not taken back, by reader, oldest first.
+///
+/// # Errors
+/// When the catalog cannot be read.
+pub(super) async fn by_reader(
+    catalog: &Catalog,
+) -> Result<BTreeMap<String, Vec<ControlAnswer>>, CatalogError> {
+    let mut controls: BTreeMap<String, Vec<ControlAnswer>> = BTreeMap::new();
+    for answer in catalog.control_answers().await? {
+        if answer.undone_at.is_none() {
+            let of_reader = controls.entry(answer.reader.clone()).or_default();
+            of_reader.push(answer);
+        }
+    }
+    Ok(controls)
+}
+
+/// The newest of a reader's answers to each thing that was shown; they come oldest first.
+pub(super) fn newest(answers: &[ControlAnswer]) -> Vec<&ControlAnswer> {
+    let shown = |answer: &ControlAnswer| {
+        let hashes = (answer.result_hash, answer.look.seen);
+        (answer.pair.clone(), answer.control.name(), hashes)
+    };
+    let newest: BTreeMap<_, _> = answers
+        .iter()
+        .map(|answer| (shown(answer), answer))
+        .collect();
+    newest.into_values().collect()
+}

@@ -1,0 +1,147 @@
+//! The pictures of the page, as many as there is room for.
+
+use maud::{Markup, PreEscaped, html};
+
+use super::base64::base64;
+use crate::report::gallery::{Gallery, Kind, Shot};
+
+/// What the three pictures of a shot are, for who cannot see them.
+const LAYERS: [&str; 3] = [
+    "print",
+    "relief laid on the print",
+    "edges of the relief's strokes over the print",
+];
+
+/// The groups that have something to show.
+pub(super) struct Album {
+    seed: u64,
+    groups: Vec<Page>,
+}
+
+struct Page {
+    kind: Kind,
+    of: u64,
+    shots: Vec<String>,
+}
+
+impl Album {
+    /// As many pictures as take at most `room` bytes, a kind having no more than the others while they all have some.
+    pub(super) fn new(gallery: &Gallery, room: usize) -> Self {
+        let page = |kind, of| Page {
+            kind,
+            of,
+            shots: Vec::new(),
+        };
+        let mut groups: Vec<Page> = gallery
+            .groups
+            .iter()
+            .map(|group| page(group.kind, group.of))
+            .collect();
+        let mut left = room;
+        let longest = gallery.groups.iter().map(|group| group.shots.len()).max();
+        for round in 0..longest.unwrap_or(0) {
+            for (page, group) in groups.iter_mut().zip(&gallery.groups) {
+                let Some(shot) = group.shots.get(round).filter(|shot| size(shot) <= left) else {
+                    continue;
+                };
+                let drawn = figure(shot).into_string();
+                if let Some(rest) = left.checked_sub(drawn.len()) {
+                    left = rest;
+                    page.shots.push(drawn);
+                }
+            }
+        }
+        Self {
+            seed: gallery.seed,
+            groups,
+        }
+    }
+
+    /// Whether there is nothing to show.
+    pub(super) const fn is_empty(&self) -> bool {
+        self.groups.is_empty()
+    }
+
+    /// All groups with what they are.
+    pub(super) fn body(&self) -> Markup {
+        html! {
+            p { "Each result three times: the print, the relief laid on it in raking light, and the edges of the relief's \
+                strokes over the print in orange. What looks the same under several methods is shown once." }
+            @for page in &self.groups { (self.group(page)) }
+        }
+    }
+
+    fn group(&self, page: &Page) -> Markup {
+        let (id, title, what) = words(page.kind);
+        html! {
+            h3 id={ "pictures-" (id) } { (title) }
+            p {
+                (what) " " (page.shots.len()) " of " (page.of) " are shown"
+                @if page.kind == Kind::Lot { ", drawn by lot with the seed " (self.seed) }
+                "."
+            }
+            ul.shots { @for shot in &page.shots { li { (PreEscaped(shot)) } } }
+        }
+    }
+}
+
+/// Name in addresses, title and sentence of a kind.
+const fn words(kind: Kind) -> (&'static str, &'static str, &'static str) {
+    match kind {
+        Kind::Failed => (
+            "failed",
+            "Failed by readers",
+            "Results that readers failed, in the order of names.",
+        ),
+        Kind::Conflict => (
+            "conflict",
+            "Readers contradict each other",
+            "Results that one passed and another failed, and nobody has settled.",
+        ),
+        Kind::OffTruth => (
+            "off-truth",
+            "Off the truth",
+            "Results that miss the true alignment or the true stroke tops.",
+        ),
+        Kind::Lot => (
+            "lot",
+            "By lot",
+            "Results of the ensemble, whatever was said of them.",
+        ),
+    }
+}
+
+/// Bytes that the pictures of a shot take at least.
+fn size(shot: &Shot) -> usize {
+    let pictures = shot.pictures.iter().flatten();
+    pictures.map(|picture| picture.len().div_ceil(3) * 4).sum()
+}
+
+fn figure(shot: &Shot) -> Markup {
+    let methods: Vec<&str> = shot.metrics.iter().map(|metric| metric.title()).collect();
+    let [mesh, print] = &shot.files;
+    html! {
+        figure class="shot" {
+            div.three {
+                @for (picture, layer) in shot.pictures.iter().zip(LAYERS) { (image(shot, picture.as_deref(), layer)) }
+            }
+            figcaption {
+                strong { (shot.pair) } @if let Some(character) = &shot.character { " " span.character { (character) } }
+                span.methods { (methods.join(", ")) }
+                @if !shot.numbers.is_empty() { span { (shot.numbers) } }
+                @for said in &shot.said { span.said { (said) } }
+                @if let Some(trouble) = &shot.trouble { span.said { "not drawn: " (trouble) } }
+                span.files { (mesh) " · " (print) }
+            }
+        }
+    }
+}
+
+fn image(shot: &Shot, picture: Option<&[u8]>, layer: &str) -> Markup {
+    let alt = format!("{}: {layer}", shot.pair);
+    let Some(bytes) = picture else {
+        return html! { span.missing { "no picture" } };
+    };
+    let source = format!("data:image/jpeg;base64,{}", base64(bytes));
+    html! { img alt=(alt) src=(source); }
+}
