@@ -319,6 +319,19 @@ mod tests {
     }
 
     #[test]
+    fn acc_that_never_fails_has_no_interval_by_block() {
+        let mut samples = Samples::default();
+        for i in 0..20 {
+            let mut pair = fixture::done(&format!("p{i:02}"), 0.8, &[]);
+            pair.facts.block = Some(format!("b{i}"));
+            samples.add(&pair, |_| Some(true));
+        }
+        let means = samples.finish().means[0];
+        assert_eq!(means.acc_by_block, None);
+        assert!(means.iou.is_some());
+    }
+
+    #[test]
     fn a_project_without_results_draws_nothing() {
         let mut samples = Samples::default();
         samples.add(&fixture::pending("a"), |_| None);

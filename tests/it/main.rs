@@ -1,5 +1,6 @@
 //! Integration tests in one binary.
 
+mod agree;
 mod backup;
 mod browser;
 mod check;

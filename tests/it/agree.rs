@@ -1,0 +1,183 @@
+//! `agree` and what `report` says of readers, on verdicts that came through the page and the command line.
+
+use mocban::store::Project;
+use serde_json::{Value, json};
+
+use crate::cli::mocban;
+use crate::page::{Page, answer, read_project};
+
+fn told(project: &Project, args: &[&str]) -> Value {
+    mocban(project.dir(), args).expect(0).json()
+}
+
+/// Judges every card of a deck the same.
+fn judge_all(page: &Page, deck: &[Value], verdict: &str) {
+    for (i, item) in deck.iter().enumerate() {
+        let reply = page.post("/api/answer", &answer(&format!("e{i}"), item, verdict));
+        assert_eq!(reply.expect("a reply").status, 200);
+    }
+}
+
+fn set(project: &Project, pair: &Value, verdict: &str, reader: &str) {
+    let pair = pair.as_str().expect("a name");
+    let args = ["verdict", "set", pair, verdict, "--reader", reader];
+    mocban(project.dir(), &args).expect(0);
+}
+
+/// `lan` fails all on the page, faults and repeats too; `minh` passes all pairs but the first.
+fn two_readers(project: &Project) -> Vec<Value> {
+    let page = Page::open(project, "lan", &["--controls", "50", "--repeats", "20"]);
+    let deck = page.deck();
+    judge_all(&page, &deck, "fail");
+    let mut pairs: Vec<Value> = deck.iter().map(|item| item["pair"].clone()).collect();
+    pairs.sort_by_key(Value::to_string);
+    pairs.dedup();
+    for (i, pair) in pairs.iter().enumerate() {
+        set(project, pair, if i == 0 { "fail" } else { "pass" }, "minh");
+    }
+    pairs
+}
+
+#[test]
+fn two_readers_are_compared_and_tested_and_a_third_settles() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    assert_eq!(told(&project, &["agree", "--json"])["readers"], json!([]));
+    let pairs = two_readers(&project);
+    let found = told(&project, &["agree", "--json"]);
+    let two = &found["two_readers"][0];
+    assert_eq!((&two["a"], &two["b"]), (&json!("lan"), &json!("minh")));
+    let count = |value: &Value| value.as_u64().expect("a count");
+    let (n, agreed) = (count(&two["n"]), count(&two["agreed"]));
+    assert!(n > agreed && (1..=4).contains(&agreed), "{two}");
+    assert_eq!(
+        (count(&two["flagged"]), count(&two["flagged_by_both"])),
+        (n, agreed)
+    );
+    // One who always says the same agrees as often as chance would.
+    assert!(two["kappa"].as_f64().expect("chance is not sure").abs() < 1e-12);
+    assert_eq!(two["enough"], json!(n >= 30));
+    assert_eq!(count(&found["conflicts"]), n - agreed);
+    let [lan, minh] = [0, 1].map(|i| &found["readers"][i]);
+    assert_eq!((count(&lan["read"]), count(&minh["read"])), (n, n));
+    let (caught, repeats) = (&lan["caught"], &lan["repeats"]);
+    assert!(count(&caught["n"]) > 5 && count(&repeats["n"]) > 0, "{lan}");
+    assert_eq!(
+        (&caught["share"], &repeats["share"]),
+        (&json!(1.0), &json!(1.0))
+    );
+    assert_eq!(minh["caught"]["n"], 0);
+    report_tells_the_same(&project, caught);
+
+    let page = Page::open(&project, "ba", &["--adjudicate"]);
+    let settled = page.deck().remove(0);
+    let reply = page.post("/api/answer", &answer("s1", &settled, "pass"));
+    assert_eq!(reply.expect("a reply").status, 200);
+    assert_ne!(settled["pair"], pairs[0], "on which they agree");
+    let after = told(&project, &["agree", "--json"]);
+    assert_eq!(count(&after["conflicts"]), n - agreed - 1);
+    assert_eq!(after["two_readers"], found["two_readers"]);
+    let text = mocban(project.dir(), &["agree"]).expect(0).out;
+    let waiting = format!("Conflicts waiting: {}\n", n - agreed - 1);
+    assert!(
+        text.contains(&waiting) && text.contains("lan, minh"),
+        "{text}"
+    );
+}
+
+fn report_tells_the_same(project: &Project, caught: &Value) {
+    let report = told(project, &["report", "-f", "json"]);
+    for name in ["n", "count", "share", "ci95"] {
+        assert_eq!(report["caught"][name], caught[name], "{name}");
+    }
+    for row in report["rows"].as_array().expect("rows") {
+        let rules = &row["rules"];
+        assert_eq!(rules["told_twice"], 15);
+        assert_eq!(rules["either_fails"]["count"], 0);
+        assert_eq!(
+            (&rules["adjudicated"]["n"], &row["failed"]),
+            (&json!(1), &json!(1))
+        );
+        assert_eq!(rules["both_fail"]["count"], 14);
+    }
+    let exact = told(project, &["report", "-f", "json", "--ci", "exact"]);
+    assert_ne!(exact["caught"]["ci95"], caught["ci95"]);
+    let csv = mocban(project.dir(), &["report", "-f", "csv"])
+        .expect(0)
+        .out;
+    let heads = csv.lines().next().expect("a line of heads");
+    assert!(
+        heads.contains(",both_fail_acc,") && heads.contains(",by_hand_n,"),
+        "{heads}"
+    );
+    let page = mocban(project.dir(), &["report", "-f", "html"])
+        .expect(0)
+        .out;
+    for part in [
+        "Failed by readers",
+        "Readers contradict each other",
+        "By lot",
+        "Planted faults",
+    ] {
+        assert!(page.contains(part), "{part}");
+    }
+    assert!(page.len() < 10_000_000 && page.contains("data:image/jpeg;base64,/9j/"));
+}
+
+#[test]
+fn results_are_measured_against_the_newest_alignment_by_hand() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let by_hand = || told(&project, &["report", "-f", "json"])["rows"][2]["by_hand"].clone();
+    assert_eq!(by_hand(), Value::Null);
+    let page = Page::open(
+        &project,
+        "lan",
+        &["--controls", "0", "--metric", "ensemble"],
+    );
+    let item = page.deck().remove(0);
+    let id = item["id"].as_str().expect("an id");
+    let start = page.get(&format!("/api/correction/{id}")).json();
+    let number = |value: &Value| value.as_f64().expect("a number");
+    let [[a, b, c], [d, e, f]] =
+        [0, 1].map(|i| [0, 1, 2].map(|j| number(&start["view_from_depth"][i][j])));
+    let laid = |event: &str, map: &Value| {
+        let body = json!({ "event": event, "item": id, "view_from_depth": map, "note": null });
+        let reply = page.post("/api/align", &body).expect("a reply");
+        assert_eq!(reply.status, 200, "{event}");
+    };
+    let is = |found: &Value, name: &str, wanted: f64| {
+        assert!(
+            (number(&found[name]) - wanted).abs() < 1e-6,
+            "{name}: {found}"
+        );
+    };
+    laid("h1", &start["view_from_depth"]);
+    let same = by_hand();
+    assert_eq!(
+        (&same["n"], &same["angle_le_5deg"]),
+        (&json!(1), &json!(1.0))
+    );
+    for name in ["angle_median_deg", "shift_median_pct", "scale_p95_pct"] {
+        is(&same, name, 0.0);
+    }
+    // Turned by 12 degrees about the corner of the picture, and a quarter larger.
+    let (sin, cos) = 12.0_f64.to_radians().sin_cos();
+    let turn = |x: f64, y: f64| [1.25 * (cos * x - sin * y), 1.25 * (sin * x + cos * y)];
+    let columns = [turn(a, d), turn(b, e), turn(c, f)];
+    let rows = [0, 1].map(|i| columns.map(|column| column[i]));
+    laid("h2", &json!(rows));
+    let turned = by_hand();
+    assert_eq!(
+        (&turned["n"], &turned["angle_le_5deg"]),
+        (&json!(1), &json!(0.0))
+    );
+    is(&turned, "angle_median_deg", 12.0);
+    is(&turned, "scale_median_pct", 25.0);
+    assert!(number(&turned["shift_p95_pct"]) > 1.0, "{turned}");
+    let text = mocban(project.dir(), &["report"]).expect(0).out;
+    assert!(
+        text.contains("\nBy hand ") && text.contains("  12.00  12.00  "),
+        "{text}"
+    );
+}
