@@ -3,7 +3,7 @@
 //! A logistic model. Its weights were fitted to 1,010 made pairs of two independent generators: right pairs of every
 //! kind, meshes with another character's print, mirrored meshes and uncarved plates, when walls and frame lines still
 //! counted. When they first did not, the least of 896 right pairs had 0.75 and the highest of 505 wrong ones 0.43. The
-//! weights of the spread and of the growth were chosen by hand, so that poses a few percent off and cuts through worn
+//! weights of the spread and of the rim were chosen by hand, so that poses a few percent off and cuts through worn
 //! or tilted tops come among the least sure.
 
 use crate::domain::Evidence;
@@ -12,8 +12,8 @@ use crate::domain::Evidence;
 const POSE: [f64; 6] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
 /// Weights of one; logarithm of the mask's area over that of the mask by relief alone, and its square; that of the
 /// ink's area over it, and its square; logarithm of the correlation; spread of the answers, by [`spread_out`]; square of
-/// the growth, which is 0.07 to 0.15 where the cut follows walls.
-const MASK: [f64; 8] = [4.98, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5, -40.0];
+/// the rim, which is 0.02 to 0.045 where the cut follows walls.
+const MASK: [f64; 8] = [5.13, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5, -500.0];
 /// A spread that nobody would see, as share of the depth map's longest side.
 const UNSEEN: f64 = 0.002;
 /// Shares below this are as bad as none.
@@ -45,8 +45,9 @@ pub(super) struct Areas {
     pub(super) relief: f64,
     /// The print's ink.
     pub(super) ink: f64,
-    /// How much the mask's grows with a slightly lower cut, as a logarithm.
-    pub(super) growth: f64,
+    /// What a slightly lower cut adds to the mask's, as a logarithm, times the mask's root: how wide the rim is that it
+    /// adds; the narrower of the mask's own and that of the mask by relief alone.
+    pub(super) rim: f64,
 }
 
 /// Chance, 0..=1, that a depth mask is true to the tops (intersection over union of 0.7 or more) when the pose is.
@@ -61,7 +62,7 @@ pub(super) fn of_mask(evidence: &Evidence, areas: Areas) -> f64 {
         ink * ink,
         evidence.correlation.max(FLOOR).ln(),
         spread_out(evidence.spread),
-        areas.growth * areas.growth,
+        areas.rim * areas.rim,
     ];
     logistic(MASK.iter().zip(features).map(|(w, f)| w * f).sum())
 }
@@ -124,7 +125,7 @@ mod tests {
         mask: 0.2,
         relief: 0.2,
         ink: 0.25,
-        growth: 0.09,
+        rim: 0.03,
     };
 
     #[test]
@@ -144,9 +145,9 @@ mod tests {
 
     #[test]
     fn a_cut_through_tops_is_trusted_less() {
-        let chance = |growth| of_mask(&PLAIN, Areas { growth, ..LIKE });
-        assert!(chance(0.12) > 0.95);
-        assert!(chance(0.29) < 0.8);
+        let chance = |rim| of_mask(&PLAIN, Areas { rim, ..LIKE });
+        assert!(chance(0.04) > 0.95);
+        assert!(chance(0.1) < 0.6);
     }
 
     #[test]

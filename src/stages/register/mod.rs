@@ -210,17 +210,21 @@ pub fn register(
 /// that of the strokes at a level.
 fn trust(metrics: &mut [MetricOutcome], evidence: &Evidence, growth: impl Fn(u16) -> f64) {
     let pose = confidence::of_pose(evidence);
+    let rim = |outcome: &MetricOutcome| {
+        growth(outcome.threshold_level) * outcome.scores.density_depth.sqrt()
+    };
     let own = metrics
         .iter()
         .find(|outcome| outcome.metric == ThresholdMetric::Relief);
-    let own = own.map(|outcome| outcome.scores.density_depth);
+    let own = own.map(|outcome| (outcome.scores.density_depth, rim(outcome)));
     for outcome in metrics {
         let scores = outcome.scores;
+        let (relief, relief_rim) = own.unwrap_or((scores.density_depth, f64::INFINITY));
         let areas = confidence::Areas {
             mask: scores.density_depth,
-            relief: own.unwrap_or(scores.density_depth),
+            relief,
             ink: scores.density_print,
-            growth: growth(outcome.threshold_level),
+            rim: rim(outcome).min(relief_rim),
         };
         outcome.confidence = Some(pose * confidence::of_mask(evidence, areas));
     }
