@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use crate::catalog::KnownInputs;
+use crate::catalog::PairFacts;
 use crate::domain::Stage;
 use crate::raster;
 use crate::store::Project;
@@ -61,17 +61,17 @@ impl Budget {
 /// What a pair may need at once from a stage on, in bytes. A file that is not there takes nothing: its pair fails soon.
 pub(super) fn need(
     project: &Project,
-    inputs: &KnownInputs,
+    pair: &PairFacts,
     from: Stage,
     images: &raster::Limits,
 ) -> u64 {
     let mesh = match from {
-        Stage::Fit | Stage::Depth => mesh_bytes(&project.input_path(&inputs.mesh_path)),
+        Stage::Fit | Stage::Depth => mesh_bytes(&project.input_path(&pair.mesh_path)),
         Stage::Normalize | Stage::Register => 0,
     };
     let print = match from {
         Stage::Fit | Stage::Depth | Stage::Normalize => {
-            print_bytes(&project.input_path(&inputs.print_path), images)
+            print_bytes(&project.input_path(&pair.print_path), images)
         }
         Stage::Register => 0,
     };
@@ -144,9 +144,10 @@ fn available(meminfo: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::{Budget, PAIR_BYTES, PIXEL_BYTES, available, need, print_bytes};
-    use crate::catalog::KnownInputs;
-    use crate::domain::{PairId, Stage};
+    use crate::catalog::PairFacts;
+    use crate::domain::Stage;
     use crate::raster;
+    use crate::report::fixture;
     use crate::store::Project;
 
     #[test]
@@ -190,18 +191,16 @@ mod tests {
         };
         write("1.obj", 1000);
         write("1.jpg", 100);
-        let inputs = KnownInputs {
-            pair: PairId(1),
+        let facts = PairFacts {
             mesh_path: "1.obj".to_owned(),
-            mesh: None,
             print_path: "1.jpg".to_owned(),
-            print: None,
+            ..fixture::pending("1").facts
         };
         let few = raster::Limits {
             max_pixels: 10,
             ..raster::Limits::SUGGESTED
         };
-        let from = |stage, limits| need(&project, &inputs, stage, limits) - PAIR_BYTES;
+        let from = |stage, limits| need(&project, &facts, stage, limits) - PAIR_BYTES;
         let print = 100 * 8 * 50 + 100;
         assert_eq!(from(Stage::Fit, &raster::Limits::SUGGESTED), 6000 + print);
         assert_eq!(from(Stage::Normalize, &raster::Limits::SUGGESTED), print);

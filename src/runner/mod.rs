@@ -14,6 +14,7 @@ mod hand;
 mod held;
 mod options;
 mod outputs;
+mod pace;
 mod pipeline;
 mod policy;
 mod refresh;
