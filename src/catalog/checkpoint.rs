@@ -289,11 +289,19 @@ impl Catalog {
     /// # Errors
     /// When the database refuses; then nothing is stored and the lease stands until it is rescued.
     pub async fn checkpoint(&self, lease: Lease, done: StageDone) -> Result<Kept> {
-        self.store(lease, vec![done], Message::Grouped).await
+        self.checkpoint_at_once(lease, vec![done]).await
     }
 
-    /// [`Catalog::checkpoint`] of stages in the order they were computed. It may take some time longer, for others to
-    /// share its commit; until somebody is in a [`Catalog::hurry`].
+    /// [`Catalog::checkpoint`] of stages in the order they were computed.
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn checkpoint_at_once(&self, lease: Lease, done: Vec<StageDone>) -> Result<Kept> {
+        self.store(lease, done, Message::Grouped).await
+    }
+
+    /// The same, but it may take some time longer, for others to share its commit; until somebody is in a
+    /// [`Catalog::hurry`].
     ///
     /// # Errors
     /// As there.

@@ -133,14 +133,12 @@ impl Dispatch {
     async fn is_over(&mut self) -> Result<bool, RunError> {
         if self.shared.is_draining() || self.fatal.is_some() {
             self.give_back().await?;
-            self.hurry().await?;
             return Ok(self.is_idle());
         }
         if self.alone || self.short {
             return Ok(false);
         }
         self.begin().await?;
-        self.hurry().await?;
         let wanted = self.wanted();
         if !self.look || self.short || wanted == 0 {
             return Ok(false);
@@ -157,14 +155,6 @@ impl Dispatch {
         }
         let left = self.outstanding().await?;
         Ok(left.ready == 0 && left.leased == 0 && left.backoff == 0)
-    }
-
-    /// Has the last stages stored at once when nothing is computed meanwhile.
-    async fn hurry(&self) -> Result<(), RunError> {
-        if self.tasks.is_empty() && !self.endings.is_empty() {
-            self.shared.catalog.hurry().await?;
-        }
-        Ok(())
     }
 
     /// Whether nothing is computed or on its way.
@@ -189,9 +179,7 @@ impl Dispatch {
         self.in_hand.over(&name);
         match over {
             Over::Ended(report) => self.count(report),
-            Over::Storing(held) => {
-                self.endings.spawn(held.report_in_time(PairEnd::Done));
-            }
+            Over::Storing(held) => drop(self.endings.spawn(held.report(Ok(PairEnd::Done)))),
         }
     }
 

@@ -55,9 +55,6 @@ impl Held {
 
     /// Takes out the lease as soon as nothing is on its way any more; `None` when it is lost or spent.
     pub(super) async fn lease(&mut self) -> Result<Option<Lease>, RunError> {
-        if self.is_storing() {
-            self.shared.catalog.hurry().await?;
-        }
         self.settle().await?;
         match std::mem::replace(&mut self.right, Right::Spent) {
             Right::Lease(lease) => Ok(Some(lease)),
@@ -117,12 +114,6 @@ impl Held {
         }
     }
 
-    /// Waits until all is stored in its own time.
-    pub(super) async fn report_in_time(mut self, end: PairEnd) -> PairReport {
-        let settled = self.settle().await;
-        self.report(settled.map(|()| end)).await
-    }
-
     async fn give_back(&mut self) -> Result<(), RunError> {
         if let Some(lease) = self.lease().await? {
             self.shared.catalog.release(lease).await?;
@@ -130,7 +121,7 @@ impl Held {
         Ok(())
     }
 
-    /// Waits for the stages that are on their way.
+    /// Has the stages that are on their way stored at once, and waits for it.
     async fn settle(&mut self) -> Result<(), RunError> {
         let right = std::mem::replace(&mut self.right, Right::Spent);
         let Right::Storing(sender, task) = right else {
@@ -138,6 +129,7 @@ impl Held {
             return Ok(());
         };
         drop(sender);
+        self.shared.catalog.hurry().await?;
         let Stored { kept, stages } = match task.await {
             Ok(stored) => stored?,
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
@@ -153,7 +145,8 @@ impl Held {
 }
 
 /// Stores stages as they come, those together that have come while others were on their way, until no more come or the
-/// lease is gone.
+/// lease is gone. The last ones are stored at once: when the process dies over the next pair, this one is to be known
+/// as done.
 async fn store(
     shared: Arc<Shared>,
     name: PairName,
@@ -167,7 +160,11 @@ async fn store(
             done.push(next);
         }
         let told: Vec<_> = done.iter().map(|done| (done.stage, done.ms)).collect();
-        let kept = shared.catalog.checkpoint_in_time(lease, done).await?;
+        let kept = if stages.is_closed() {
+            shared.catalog.checkpoint_at_once(lease, done).await?
+        } else {
+            shared.catalog.checkpoint_in_time(lease, done).await?
+        };
         if !matches!(kept, Kept::Lost) {
             stored += told.len() as u64;
             for (stage, ms) in told {

@@ -132,7 +132,7 @@ impl Shared {
 pub(super) enum Over {
     /// All is stored.
     Ended(PairReport),
-    /// Its last stages are on their way: what is left is a [`Held::report_in_time`].
+    /// Its last stages are on their way: what is left is a [`Held::report`].
     Storing(Held),
 }
 
