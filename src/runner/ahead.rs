@@ -134,9 +134,21 @@ impl Dispatch {
                 // Those after one that must wait wait too, so that it is not passed over for ever.
                 return self.give_back().await;
             }
+            self.warn(&taken);
             self.spawn(taken);
         }
         Ok(())
+    }
+
+    /// Says so when a pair may need more memory than pairs may take.
+    fn warn(&self, taken: &Taken) {
+        if let Some(limit) = self.budget.exceeded_by(taken.need) {
+            let (need, limit) = (taken.need >> 20, limit >> 20);
+            let pair = &taken.work.facts.name;
+            tracing::warn!(
+                "{pair} may need {need} MiB, more than the {limit} MiB of --memory: it runs with nothing beside it"
+            );
+        }
     }
 
     fn spawn(&mut self, taken: Taken) {
