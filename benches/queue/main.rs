@@ -34,7 +34,9 @@ use options::Options;
 
 fn main() -> anyhow::Result<()> {
     let options = Options::parse();
-    let runtime = tokio::runtime::Runtime::new()?;
+    // As the program's own for a run.
+    let mut runtime = tokio::runtime::Builder::new_current_thread();
+    let runtime = runtime.enable_all().build()?;
     let mut tables = runtime.block_on(scale::tables(&options))?;
     tables.push(runtime.block_on(queues::table(&options))?);
     if let Some(pairs) = options.real_pairs() {

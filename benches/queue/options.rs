@@ -20,6 +20,9 @@ pub(super) struct Options {
     /// Times each line of the comparison is measured; the median counts
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub(super) repeats: usize,
+    /// Measure our own queue only, as for a profiler
+    #[arg(long)]
+    pub(super) ours: bool,
     /// The program of benches/peers-queue, to compare with
     #[arg(long, value_name = "FILE")]
     pub(super) peer: Option<PathBuf>,

@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
+use rustix::time::{ClockId, clock_gettime};
 
 /// Between two looks at a process's memory.
 const LOOK_EVERY: Duration = Duration::from_millis(2);
@@ -69,16 +70,8 @@ pub(super) fn forget_peak() {
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Time that the threads of this process which live now have been on a core.
-pub(super) fn time_of_threads() -> anyhow::Result<Duration> {
-    let mut sum = Duration::ZERO;
-    for thread in std::fs::read_dir("/proc/self/task")? {
-        // One that ends meanwhile is none that lives.
-        let Ok(text) = std::fs::read_to_string(thread?.path().join("schedstat")) else {
-            continue;
-        };
-        let ns = text.split_whitespace().next().context("a time")?;
-        sum += Duration::from_nanos(ns.parse()?);
-    }
-    Ok(sum)
+/// Time that this process has had of all cores, its threads that have ended included.
+pub(super) fn time_of_cores() -> Duration {
+    let now = clock_gettime(ClockId::ProcessCPUTime);
+    Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
 }

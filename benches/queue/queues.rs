@@ -53,7 +53,10 @@ impl Queue {
 pub(super) async fn table(options: &Options) -> anyhow::Result<String> {
     let heads = ["workers", "queue", "pairs", "pairs/s", "jobs/s", "ours is"];
     let mut table = Table::new("Queues", &heads);
-    let mut queues = vec![Queue::Ours, Queue::Rows];
+    let mut queues = vec![Queue::Ours];
+    if !options.ours {
+        queues.push(Queue::Rows);
+    }
     if options.peer.is_some() {
         queues.extend(Queue::PEERS);
     }

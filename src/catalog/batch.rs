@@ -7,6 +7,7 @@ use sqlx::sqlite::SqliteRow;
 use sqlx::{Row as _, SqliteConnection};
 use tokio::sync::oneshot;
 
+use super::checkpoint::Steps;
 use super::claim::{self, ClaimRequest};
 use super::counters::Deltas;
 use super::lease::{Lease, StageDone, StageFailed};
@@ -28,7 +29,7 @@ pub(super) struct Beat {
 /// A request that may share a commit. The lease travels with it and comes back only if it still holds.
 pub(super) enum Request {
     Beat(Beat, Reply<bool>),
-    Checkpoint(Box<(Lease, StageDone)>, Reply<bool>),
+    Checkpoint(Box<Steps>, Reply<bool>),
     Fail(Box<(Lease, StageFailed)>, Reply<bool>),
     Release(Lease, Reply<bool>),
     Claim(ClaimRequest, Reply<Vec<Lease>>),
@@ -41,7 +42,7 @@ type Under<T> = (Box<(Lease, T)>, Reply<bool>);
 #[derive(Default)]
 pub(super) struct Batch {
     beats: Vec<(Beat, Reply<bool>)>,
-    checkpoints: Vec<Under<StageDone>>,
+    checkpoints: Vec<Under<Vec<StageDone>>>,
     failures: Vec<Under<StageFailed>>,
     releases: Vec<(Lease, Reply<bool>)>,
     claims: Vec<(ClaimRequest, Reply<Vec<Lease>>)>,

@@ -4,21 +4,24 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::batch::Request;
-use super::counters::{DONE, Deltas, cursor};
-use super::lease::{InputsSeen, Kept, Lease, StageDone};
+use super::counters::{Cursor, DONE, Deltas, cursor};
+use super::lease::{InputsSeen, Kept, Lease, RecipeId, StageDone};
 use super::script::Script;
 use super::writer::Message;
 use super::{Catalog, Result};
 use crate::breakpoint::{self, Point};
-use crate::domain::{ContentHash, JobStatus, MetricOutcome, PairId, UnixMillis};
+use crate::domain::{ContentHash, JobStatus, MetricOutcome, PairId, Stage, UnixMillis};
+
+/// A lease and the stages to be stored under it, in the order they were computed.
+pub(super) type Steps = (Lease, Vec<StageDone>);
 
 /// The job's step; only where the lease still holds and its worker has given a sign of life lately. Progress clears the pair of suspicion.
 pub(super) const STEP: &str = "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
     attempt = 1, crashes = 0, mem_class = 0, doubtful = item.value ->> 'doubtful',
-    made = iif(item.value ->> 'next' = 1 OR made = (SELECT upstream FROM recipe WHERE id = item.value ->> 'made'),
-        item.value ->> 'made', NULL)
+    made = iif((item.value ->> 'first') IS NULL
+        OR made = (SELECT upstream FROM recipe WHERE id = item.value ->> 'first'), item.value ->> 'made', NULL)
 FROM jsonb_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
@@ -76,40 +79,46 @@ const CLEAR_FAILURE: &str =
 pub(super) const ROWS: [&str; 6] = [RESULT, CLEAR_METRICS, METRICS, ATTEMPT, SEEN, CLEAR_FAILURE];
 
 /// Adds the steps of jobs to a script; those whose leases no longer hold stay where they are.
-pub(super) fn step<'i>(
-    script: &mut Script,
-    done: impl Iterator<Item = &'i (Lease, StageDone)>,
-) -> Result<()> {
-    over(script, &[STEP], done.map(job))
+pub(super) fn step<'i>(script: &mut Script, done: impl Iterator<Item = &'i Steps>) -> Result<()> {
+    over(script, &[STEP], done.filter_map(job))
 }
 
 /// Adds what is stored beside steps that were made.
-pub(super) fn store(
-    script: &mut Script,
-    done: &[&(Lease, StageDone)],
-    deltas: &mut Deltas,
-) -> Result<()> {
-    for (lease, done) in done.iter().map(|item| &**item) {
-        breakpoint::reach(done.stage, Point::Rowed, None);
-        let to = match done.stage.next() {
-            Some(next) => (cursor(next), JobStatus::Leased),
-            None => (DONE, JobStatus::Done),
-        };
-        deltas.moved((cursor(lease.cursor), JobStatus::Leased), to);
+pub(super) fn store(script: &mut Script, made: &[&Steps], deltas: &mut Deltas) -> Result<()> {
+    for (lease, done) in made.iter().map(|steps| &**steps) {
+        for one in done {
+            breakpoint::reach(one.stage, Point::Rowed, None);
+        }
+        if let Some(last) = done.last() {
+            deltas.moved((cursor(lease.cursor), JobStatus::Leased), after(last.stage));
+        }
     }
-    over(script, &[RESULT], done.iter().map(|item| result(item)))?;
-    let attempts = done.iter().map(|item| attempt(item));
-    over(script, &[ATTEMPT], attempts)?;
-    let suspects = done.iter().filter(|(lease, _)| !lease.cleared);
-    over(
-        script,
-        &[CLEAR_FAILURE],
-        suspects.map(|(lease, _)| [lease.pair.0]),
-    )?;
-    let metrics = done.iter().flat_map(|item| metrics(item));
-    over(script, &[CLEAR_METRICS, METRICS], metrics)?;
-    let seen = done.iter().map(|(lease, done)| (lease, &done.inputs));
+    let each = || made.iter().flat_map(|steps| each(steps));
+    over(script, &[RESULT], each().map(result))?;
+    over(script, &[ATTEMPT], each().map(attempt))?;
+    let suspects = made.iter().filter(|(lease, _)| !lease.cleared);
+    let suspects = suspects.map(|(lease, _)| [lease.pair.0]);
+    over(script, &[CLEAR_FAILURE], suspects)?;
+    over(script, &[CLEAR_METRICS, METRICS], each().flat_map(metrics))?;
+    let seen = made.iter().filter_map(|(lease, done)| {
+        // The last one tells all that those before it told.
+        let mut told = done.iter().rev().map(|one| &one.inputs);
+        Some((lease, told.find(|inputs| inputs.is_told())?))
+    });
     store_seen(script, seen)
+}
+
+/// Each stage with its lease.
+fn each((lease, done): &Steps) -> impl Iterator<Item = (&Lease, &StageDone)> {
+    done.iter().map(move |one| (lease, one))
+}
+
+/// Where a job stands when a stage is stored.
+fn after(stage: Stage) -> (Cursor, JobStatus) {
+    match stage.next() {
+        Some(next) => (cursor(next), JobStatus::Leased),
+        None => (DONE, JobStatus::Done),
+    }
 }
 
 /// One item of [`STEP`].
@@ -118,33 +127,47 @@ struct Job {
     pair: i64,
     worker: i64,
     epoch: i64,
-    next: usize,
+    next: Cursor,
     status: i64,
-    made: i64,
+    /// The recipe whose upstream must be that of the result before; none where there is none before.
+    first: Option<i64>,
+    /// The recipe of the last result; none where the results do not follow on each other.
+    made: Option<i64>,
     doubtful: i64,
     deadline: Option<UnixMillis>,
     alive_since: UnixMillis,
 }
 
-fn job((lease, done): &(Lease, StageDone)) -> Job {
-    let finished = done.stage.next().is_none();
-    let status = if finished {
-        JobStatus::Done
-    } else {
-        JobStatus::Leased
-    };
-    let metrics = &mut done.metrics.iter();
-    Job {
+/// The step over all stages that are stored at once; none for no stage.
+fn job((lease, done): &Steps) -> Option<Job> {
+    let last = done.last()?;
+    let (next, status) = after(last.stage);
+    let metrics = &mut last.metrics.iter();
+    let (first, made) = chain(done);
+    Some(Job {
         pair: lease.pair.0,
         worker: lease.worker.0,
         epoch: lease.epoch,
-        next: done.stage.index() + 1,
+        next,
         status: status.code(),
-        made: done.recipe.0,
+        first: first.map(|recipe| recipe.0),
+        made: made.map(|recipe| recipe.0),
         doubtful: i64::from(metrics.any(|metric| metric.outcome.is_doubtful())),
-        deadline: (!finished).then_some(done.next_deadline),
-        alive_since: done.alive_since,
-    }
+        deadline: (status == JobStatus::Leased).then_some(last.next_deadline),
+        alive_since: last.alive_since,
+    })
+}
+
+/// The recipes of the first and the last of the results that follow on each other up to the last; no first where that
+/// is the first stage of all. No last where some do not.
+fn chain(done: &[StageDone]) -> (Option<RecipeId>, Option<RecipeId>) {
+    let fresh = done.iter().rposition(|one| one.stage == Stage::Fit);
+    let chain = &done[fresh.unwrap_or(0)..];
+    let follows = |two: &[StageDone]| two[0].stage.next() == Some(two[1].stage);
+    let whole = chain.windows(2).all(follows);
+    let first = fresh.is_none().then(|| chain.first()).flatten();
+    let last = chain.last().filter(|_| whole);
+    (first.map(|one| one.recipe), last.map(|one| one.recipe))
 }
 
 /// One item of [`RESULT`].
@@ -164,7 +187,7 @@ struct ResultRow<'d> {
     at: UnixMillis,
 }
 
-fn result((lease, done): &(Lease, StageDone)) -> ResultRow<'_> {
+fn result<'d>((lease, done): (&Lease, &'d StageDone)) -> ResultRow<'d> {
     ResultRow {
         pair: lease.pair.0,
         stage: done.stage.index(),
@@ -184,7 +207,7 @@ fn result((lease, done): &(Lease, StageDone)) -> ResultRow<'_> {
 /// One item of [`ATTEMPT`]: pair, stage, worker, milliseconds, time.
 type Attempt = (i64, usize, i64, u64, UnixMillis);
 
-const fn attempt((lease, done): &(Lease, StageDone)) -> Attempt {
+const fn attempt((lease, done): (&Lease, &StageDone)) -> Attempt {
     let stage = done.stage.index();
     (lease.pair.0, stage, lease.worker.0, done.ms, done.at)
 }
@@ -197,7 +220,7 @@ struct MetricRow<'d> {
     result_hash: ContentHash,
 }
 
-fn metrics((lease, done): &(Lease, StageDone)) -> impl Iterator<Item = MetricRow<'_>> {
+fn metrics<'d>((lease, done): (&'d Lease, &'d StageDone)) -> impl Iterator<Item = MetricRow<'d>> {
     done.metrics.iter().map(|metric| MetricRow {
         pair: lease.pair.0,
         row: &metric.outcome,
@@ -210,7 +233,7 @@ pub(super) fn store_seen<'a>(
     script: &mut Script,
     seen: impl Iterator<Item = (&'a Lease, &'a InputsSeen)>,
 ) -> Result<()> {
-    let items = seen.filter(|(_, seen)| seen.mesh.is_some() || seen.print.is_some());
+    let items = seen.filter(|(_, seen)| seen.is_told());
     let items = items.map(|(lease, seen)| seen_row(lease.pair.0, seen));
     over(script, &[SEEN], items)
 }
@@ -266,15 +289,23 @@ impl Catalog {
     /// # Errors
     /// When the database refuses; then nothing is stored and the lease stands until it is rescued.
     pub async fn checkpoint(&self, lease: Lease, done: StageDone) -> Result<Kept> {
-        self.store(lease, done, Message::Grouped).await
+        self.checkpoint_at_once(lease, vec![done]).await
     }
 
-    /// [`Catalog::checkpoint`] that may take some milliseconds longer, for others to share its commit; until somebody
-    /// is in a [`Catalog::hurry`].
+    /// [`Catalog::checkpoint`] of stages in the order they were computed.
     ///
     /// # Errors
     /// As there.
-    pub async fn checkpoint_in_time(&self, lease: Lease, done: StageDone) -> Result<Kept> {
+    pub async fn checkpoint_at_once(&self, lease: Lease, done: Vec<StageDone>) -> Result<Kept> {
+        self.store(lease, done, Message::Grouped).await
+    }
+
+    /// The same, but it may take some time longer, for others to share its commit; until somebody is in a
+    /// [`Catalog::hurry`].
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn checkpoint_in_time(&self, lease: Lease, done: Vec<StageDone>) -> Result<Kept> {
         self.store(lease, done, Message::InTime).await
     }
 
@@ -289,10 +320,13 @@ impl Catalog {
     async fn store(
         &self,
         lease: Lease,
-        done: StageDone,
+        done: Vec<StageDone>,
         message: fn(Request) -> Message,
     ) -> Result<Kept> {
-        let next = done.stage.next();
+        let Some(last) = done.last() else {
+            return Ok(Kept::Lease(lease));
+        };
+        let next = last.stage.next();
         let moved = next.map(|cursor| Lease {
             cursor,
             attempt: 1,

@@ -78,12 +78,13 @@ impl PairSelection {
     }
 }
 
-/// Takes the first ready jobs in the order of the index `job_ready`.
+/// Takes the first ready jobs in the order of the index `job_ready`. A bare `?5` as the limit would have the statement
+/// prepared anew each time, because the planner looks at its value.
 pub(super) const CLAIM: &str = "
 UPDATE job SET status = 1, worker = ?1, deadline = ?2, epoch = epoch + 1, attempt = attempt + 1
 WHERE pair IN (
     SELECT pair FROM job WHERE status = 0 AND stage <= ?3 AND mem_class = ?4
-    ORDER BY prio, stage DESC, pair LIMIT ?5)
+    ORDER BY prio, stage DESC, pair LIMIT +?5)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND beat >= ?6)
 RETURNING pair, stage, attempt, epoch, crashes, mem_class";
 
@@ -93,7 +94,7 @@ UPDATE job SET status = 1, worker = ?1, deadline = ?2, epoch = epoch + 1, attemp
 WHERE pair IN (
     SELECT j.pair FROM json_each(?7) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
     WHERE j.status = 0 AND j.stage <= ?3 AND j.mem_class = ?4
-    ORDER BY j.prio, j.stage DESC, j.pair LIMIT ?5)
+    ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?5)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND beat >= ?6)
 RETURNING pair, stage, attempt, epoch, crashes, mem_class";
 

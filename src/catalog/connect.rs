@@ -144,6 +144,8 @@ async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identit
 async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
     let pool = SqlitePoolOptions::new()
         .max_connections(READERS)
+        // A connection to a file does not get lost, so none is asked whether it is still there.
+        .test_before_acquire(false)
         .connect_with(options)
         .await?;
     let found = identity(&mut *pool.acquire().await?).await?;

@@ -11,7 +11,7 @@ use super::writer::Message;
 /// Most requests in one commit.
 const BATCH: usize = 256;
 /// How long a request that can wait does so for others to share its commit.
-pub(super) const COMPANY: Duration = Duration::from_millis(20);
+pub(super) const COMPANY: Duration = Duration::from_millis(100);
 
 /// What has come so far.
 struct Gathering {

@@ -82,6 +82,13 @@ pub struct InputsSeen {
     pub print: Option<InputSeen>,
 }
 
+impl InputsSeen {
+    /// Whether anything is told of either.
+    pub(super) const fn is_told(&self) -> bool {
+        self.mesh.is_some() || self.print.is_some()
+    }
+}
+
 /// One metric's numbers with the hash that verdicts are bound to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MetricResult {

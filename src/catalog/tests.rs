@@ -10,6 +10,7 @@ mod plans;
 mod protocol;
 mod schema;
 mod staleness;
+mod together;
 mod verdicts;
 
 use serde_json::{Map, json};

@@ -1,13 +1,16 @@
 //! What a worker needs to know of the pair it leased, and of its inputs.
 
+use std::collections::BTreeMap;
+
 use sqlx::Row as _;
+use sqlx::sqlite::SqliteRow;
 
 use super::claim::PairSelection;
 use super::lease::{InputSeen, InputsSeen, Lease};
 use super::read::{PairFacts, StageRecord};
 use super::script::Script;
-use super::{Catalog, Result, checkpoint, pairs, results, rows};
-use crate::domain::{ContentHash, PairId};
+use super::{Catalog, CatalogError, Result, checkpoint, pairs, results, rows};
+use crate::domain::{ContentHash, PairId, Stage};
 
 /// A leased pair with what is known of it.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,8 +38,9 @@ pub struct KnownInputs {
     pub print: Option<InputSeen>,
 }
 
-const PAIR: &str = "
-SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, facts FROM pair WHERE id = ?1";
+pub(super) const LEASED: &str = "
+SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.facts
+FROM json_each(?1) AS wanted CROSS JOIN pair AS p ON p.id = wanted.value";
 
 /// Pairs of which at least one file has been read, in pages by number.
 pub(super) const INPUTS: &str = "
@@ -48,24 +52,34 @@ SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat
 FROM pair WHERE id > ?1 AND id IN (SELECT value FROM json_each(?3)) ORDER BY id LIMIT ?2";
 
 impl Catalog {
-    /// The leased pair with the results it has.
+    /// The leased pairs with the results they have, in the order of their leases.
     ///
     /// # Errors
     /// When the database refuses or holds what it must not.
-    pub async fn work(&self, lease: &Lease) -> Result<PairWork> {
+    pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
         let mut conn = self.reader().await?;
-        let row = sqlx::query(PAIR)
-            .bind(lease.pair.0)
-            .fetch_one(&mut *conn)
-            .await?;
-        let mut found = results::of_pairs(&mut conn, &[lease.pair.0]).await?;
-        let mut results = found.remove(&lease.pair.0).unwrap_or_default();
-        results.retain(|record| record.stage < lease.cursor);
-        Ok(PairWork {
-            facts: pairs::facts(&row)?,
-            facts_text: row.try_get("facts")?,
-            results,
-        })
+        let wanted = rows::array(leases.iter().map(|lease| lease.pair.0));
+        let leased = sqlx::query(LEASED).bind(wanted.to_string());
+        let leased = leased.fetch_all(&mut *conn).await?;
+        let begun = leases.iter().filter(|lease| lease.cursor > Stage::Fit);
+        let begun: Vec<_> = begun.map(|lease| lease.pair.0).collect();
+        let mut found = BTreeMap::new();
+        if !begun.is_empty() {
+            found = results::of_pairs(&mut conn, &begun).await?;
+        }
+        let mut works = BTreeMap::new();
+        for row in &leased {
+            let pair = row.try_get("id")?;
+            works.insert(pair, work_of(row, found.remove(&pair).unwrap_or_default())?);
+        }
+        let each = leases.iter().map(|lease| {
+            let mut work = works
+                .remove(&lease.pair.0)
+                .ok_or_else(|| gone(lease.pair))?;
+            work.results.retain(|record| record.stage < lease.cursor);
+            Ok(work)
+        });
+        each.collect()
     }
 
     /// Input files as last read, in pages by the pair's number; empty at the end.
@@ -108,7 +122,19 @@ impl Catalog {
     }
 }
 
-pub(super) fn known_inputs(row: &sqlx::sqlite::SqliteRow) -> Result<KnownInputs> {
+fn gone(pair: PairId) -> CatalogError {
+    CatalogError::Corrupt(format!("a job has no pair {}", pair.0))
+}
+
+fn work_of(row: &SqliteRow, results: Vec<StageRecord>) -> Result<PairWork> {
+    Ok(PairWork {
+        facts: pairs::facts(row)?,
+        facts_text: row.try_get("facts")?,
+        results,
+    })
+}
+
+pub(super) fn known_inputs(row: &SqliteRow) -> Result<KnownInputs> {
     let seen = |hash: &str, stat: &str| -> Result<Option<InputSeen>> {
         let hash: Option<Vec<u8>> = row.try_get(hash)?;
         let hash: Option<ContentHash> = rows::hash_option(hash.as_deref())?;

@@ -88,11 +88,11 @@ pub(super) async fn run(
 }
 
 /// Commits a batch and answers. When it fails, each request is tried alone, so that one that cannot be stored
-/// does not take the others with it. A lock that was waited for in vain is no request's fault.
+/// does not take the others with it. What lock or disk refuse is no request's fault.
 async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
     match attempt(conn, path, &batch).await {
         Ok(answers) => batch.answer(answers),
-        Err(error) if batch.len() == 1 || error.trouble() == Some(Trouble::Busy) => {
+        Err(error) if batch.len() == 1 || is_of_the_file(&error) => {
             batch.refuse(&Arc::new(error));
         }
         Err(_) => {
@@ -104,6 +104,12 @@ async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
             }
         }
     }
+}
+
+/// Whether the file is in trouble, whatever is written to it.
+fn is_of_the_file(error: &CatalogError) -> bool {
+    let trouble = error.trouble();
+    trouble.is_some_and(|trouble| trouble != Trouble::Contradiction)
 }
 
 async fn attempt(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Result<Answers> {

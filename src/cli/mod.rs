@@ -41,6 +41,7 @@ mod verdict_lines;
 use std::ffi::OsString;
 
 use clap::{ColorChoice, FromArgMatches};
+use tokio::runtime::{Builder, Runtime};
 
 use crate::catalog::CatalogError;
 use crate::config::ConfigError;
@@ -136,13 +137,20 @@ fn values_of(flag: &str, args: &[OsString]) -> Vec<String> {
 
 fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
     logging::start(&context.global, &context.screen)?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()?;
+    let runtime = runtime(&command)?;
     let result = runtime.block_on(dispatch(command, context));
     runtime.shutdown_background();
     result
+}
+
+/// A run computes on threads of its own, and what is left is many short tasks that hand things to each other: on one
+/// thread they need not wake another for it.
+fn runtime(command: &Command) -> std::io::Result<Runtime> {
+    let mut builder = match command {
+        Command::Run(_) | Command::Demo(_) => Builder::new_current_thread(),
+        _ => Builder::new_multi_thread(),
+    };
+    builder.worker_threads(2).enable_all().build()
 }
 
 async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCode> {

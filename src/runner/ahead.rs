@@ -1,15 +1,17 @@
-//! Taking pairs: for slots that are free, and one ahead for each that soon will be, so that no core waits for a claim.
+//! Taking pairs: for slots that are free, and ahead for those that soon will be, so that no core waits for a claim.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
+use std::time::Instant;
 
 use super::RunError;
 use super::budget;
 use super::dispatch::Dispatch;
 use super::events::RunEvent;
+use super::pace::Pace;
 use super::worker::work;
-use crate::catalog::{ClaimRequest, KnownInputs, Lease, PairSelection, PairWork};
-use crate::domain::{PairId, PairName};
+use crate::catalog::{ClaimRequest, Lease, PairWork};
+use crate::domain::PairName;
 
 /// A pair that is leased and not begun.
 #[derive(Debug)]
@@ -25,27 +27,48 @@ pub(super) struct Taken {
 pub(super) struct InHand {
     /// Taken ahead.
     ahead: VecDeque<Taken>,
-    /// Those begun, and whether they are at their last stage.
-    begun: BTreeMap<PairName, bool>,
+    begun: BTreeMap<PairName, Begun>,
+    pace: Pace,
+}
+
+/// A pair in a slot.
+#[derive(Debug)]
+struct Begun {
+    at: Instant,
+    /// Whether it is at its last stage.
+    is_last: bool,
 }
 
 impl InHand {
+    /// Notes that a pair is begun.
+    fn begin(&mut self, pair: PairName) {
+        let (at, is_last) = (Instant::now(), false);
+        self.begun.insert(pair, Begun { at, is_last });
+    }
+
     /// Notes that a pair is at its last stage, if it is one of ours.
     pub(super) fn nearly_over(&mut self, pair: &PairName) {
-        if let Some(last) = self.begun.get_mut(pair) {
-            *last = true;
+        if let Some(begun) = self.begun.get_mut(pair) {
+            begun.is_last = true;
         }
     }
 
     /// Notes that a pair's computing is over.
     pub(super) fn over(&mut self, pair: &PairName) {
-        self.begun.remove(pair);
+        if let Some(begun) = self.begun.remove(pair) {
+            self.pace.took(begun.at.elapsed());
+        }
     }
 
-    /// Pairs to take when so many slots are free.
+    /// Pairs to take when so many slots are free. None while there are enough; then at once as many as will be begun
+    /// soon.
     fn wanted(&self, free: usize) -> usize {
-        let nearly_over = self.begun.values().filter(|last| **last).count();
-        (free + nearly_over).saturating_sub(self.ahead.len())
+        let nearly_over = self.begun.values().filter(|begun| begun.is_last).count();
+        let taken = self.ahead.len();
+        match (free + nearly_over).saturating_sub(taken) {
+            0 => 0,
+            least => least + (free + self.begun.len()) * self.pace.ahead(),
+        }
     }
 }
 
@@ -90,11 +113,10 @@ impl Dispatch {
             })
             .await?;
         self.alone = alone && !leases.is_empty();
-        let needs = self.needs(&leases).await?;
-        for lease in leases {
-            let need = needs.get(&lease.pair()).copied().unwrap_or(0);
-            let work = self.shared.catalog.work(&lease).await?;
-            self.in_hand.ahead.push_back(Taken { lease, work, need });
+        if !leases.is_empty() {
+            let works = self.shared.catalog.work(&leases).await?;
+            let taken = leases.into_iter().zip(works);
+            self.in_hand.ahead.extend(self.with_needs(taken).await);
         }
         self.begin().await
     }
@@ -107,19 +129,32 @@ impl Dispatch {
             };
             if !self.budget.give(taken.need) {
                 self.short = true;
+                self.in_hand.pace.stay_single();
                 self.in_hand.ahead.push_front(taken);
                 // Those after one that must wait wait too, so that it is not passed over for ever.
                 return self.give_back().await;
             }
+            self.warn(&taken);
             self.spawn(taken);
         }
         Ok(())
     }
 
+    /// Says so when a pair may need more memory than pairs may take.
+    fn warn(&self, taken: &Taken) {
+        if let Some(limit) = self.budget.exceeded_by(taken.need) {
+            let (need, limit) = (taken.need >> 20, limit >> 20);
+            let pair = &taken.work.facts.name;
+            tracing::warn!(
+                "{pair} may need {need} MiB, more than the {limit} MiB of --memory: it runs with nothing beside it"
+            );
+        }
+    }
+
     fn spawn(&mut self, taken: Taken) {
         let Taken { lease, work, need } = taken;
         let name = work.facts.name.clone();
-        self.in_hand.begun.insert(name.clone(), false);
+        self.in_hand.begin(name.clone());
         let over = self::work(Arc::clone(&self.shared), lease, work);
         self.tasks.spawn(async move { (over.await, name, need) });
     }
@@ -132,32 +167,46 @@ impl Dispatch {
         Ok(())
     }
 
-    /// Memory that leased pairs may need.
-    async fn needs(&self, leases: &[Lease]) -> Result<BTreeMap<PairId, u64>, RunError> {
-        if leases.is_empty() || !self.budget.is_limited() {
-            return Ok(BTreeMap::new());
-        }
-        let pairs: Vec<_> = leases.iter().map(Lease::pair).collect();
-        let among = PairSelection::of(&pairs);
-        let catalog = &self.shared.catalog;
-        let inputs = catalog
-            .known_inputs(None, pairs.len(), Some(&among))
-            .await?;
-        let from: BTreeMap<_, _> = leases
-            .iter()
-            .map(|lease| (lease.pair(), lease.cursor()))
-            .collect();
+    /// Leased pairs with the memory that they may need.
+    async fn with_needs(
+        &self,
+        leased: impl Iterator<Item = (Lease, PairWork)> + Send + 'static,
+    ) -> Vec<Taken> {
+        let is_limited = self.budget.is_limited();
         let (project, images) = (self.shared.project.clone(), self.images);
-        let look = move || {
-            let need = |inputs: KnownInputs| {
-                let need = budget::need(&project, &inputs, from[&inputs.pair], &images);
-                (inputs.pair, need)
+        let look = move |(lease, work): (Lease, PairWork)| {
+            let need = if is_limited {
+                budget::need(&project, &work.facts, lease.cursor(), &images)
+            } else {
+                0
             };
-            inputs.into_iter().map(need).collect()
+            Taken { lease, work, need }
         };
-        match tokio::task::spawn_blocking(look).await {
-            Ok(needs) => Ok(needs),
+        match tokio::task::spawn_blocking(move || leased.map(look).collect()).await {
+            Ok(taken) => taken,
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::InHand;
+    use crate::domain::PairName;
+
+    #[test]
+    fn pairs_are_taken_ahead_when_one_is_nearly_over_and_several_where_they_are_short() {
+        let pair = PairName::new("1").expect("a name");
+        let mut in_hand = InHand::default();
+        assert_eq!(in_hand.wanted(2), 2);
+        in_hand.begin(pair.clone());
+        assert_eq!(in_hand.wanted(0), 0);
+        in_hand.nearly_over(&pair);
+        assert_eq!(in_hand.wanted(0), 1);
+        in_hand.pace.took(Duration::from_millis(100));
+        assert_eq!(in_hand.wanted(0), 1 + 2);
+        assert_eq!(in_hand.wanted(1), 2 + 4);
     }
 }

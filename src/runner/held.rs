@@ -1,8 +1,9 @@
-//! A pair's lease in a worker's hand. The thread that computes does not wait for the disk: one checkpoint may be on its
-//! way while the next stage is computed, and the lease comes back when it is stored.
+//! A pair's lease in a worker's hand. The thread that computes does not wait for the disk: stages are stored while those
+//! after them are computed, several at once where they are short, and the lease comes back when all are.
 
 use std::sync::Arc;
 
+use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
 use super::RunError;
@@ -24,12 +25,21 @@ pub(super) struct Held {
 enum Right {
     /// In hand.
     Lease(Lease),
-    /// Gone with a checkpoint that is not stored yet.
-    Storing(JoinHandle<Result<Kept, CatalogError>>),
+    /// With a task that stores the stages it is sent.
+    Storing(
+        mpsc::UnboundedSender<StageDone>,
+        JoinHandle<Result<Stored, CatalogError>>,
+    ),
     /// Spent: the pair is done, or the lease was given away.
     Spent,
     /// Lost to somebody else.
     Lost,
+}
+
+/// What became of the lease, and how many stages were stored under it.
+struct Stored {
+    kept: Kept,
+    stages: u64,
 }
 
 impl Held {
@@ -55,16 +65,37 @@ impl Held {
         }
     }
 
-    /// Sends a checkpoint on its way, and tells of it when it is stored. It needs the lease, so there is never more
-    /// than one on its way and they are stored in their order.
-    pub(super) fn store(&mut self, lease: Lease, done: StageDone) {
-        let stored = store(Arc::clone(&self.shared), self.name.clone(), lease, done);
-        self.right = Right::Storing(tokio::spawn(stored));
+    /// Sends a finished stage on its way, and tells of it when it is stored; `false` when the lease is known to be gone.
+    /// Stages are stored in their order.
+    pub(super) async fn store(&mut self, done: StageDone) -> Result<bool, RunError> {
+        if let Right::Lease(_) = self.right {
+            self.begin();
+        }
+        if let Right::Storing(sender, _) = &self.right
+            && sender.send(done).is_ok()
+        {
+            return Ok(true);
+        }
+        // It takes no more where the lease was lost or the catalog refused.
+        self.settle().await?;
+        Ok(false)
     }
 
-    /// Whether a checkpoint is on its way.
+    /// Gives the lease to a task that stores.
+    fn begin(&mut self) {
+        self.right = match std::mem::replace(&mut self.right, Right::Spent) {
+            Right::Lease(lease) => {
+                let (sender, stages) = mpsc::unbounded_channel();
+                let task = store(Arc::clone(&self.shared), self.name.clone(), lease, stages);
+                Right::Storing(sender, tokio::spawn(task))
+            }
+            right => right,
+        };
+    }
+
+    /// Whether a stage may be on its way.
     pub(super) const fn is_storing(&self) -> bool {
-        matches!(self.right, Right::Storing(_))
+        matches!(self.right, Right::Storing(..))
     }
 
     /// How the pair leaves its worker, when all is stored and a lease that is left has been given back.
@@ -90,41 +121,70 @@ impl Held {
         Ok(())
     }
 
-    /// Waits for the checkpoint that is on its way.
+    /// Has the stages that are on their way stored at once, and waits for it.
     async fn settle(&mut self) -> Result<(), RunError> {
-        let Right::Storing(stored) = &mut self.right else {
+        let right = std::mem::replace(&mut self.right, Right::Spent);
+        let Right::Storing(sender, task) = right else {
+            self.right = right;
             return Ok(());
         };
-        if !stored.is_finished() {
-            self.shared.catalog.hurry().await?;
-        }
-        let kept = match stored.await {
-            Ok(kept) => kept,
+        drop(sender);
+        self.shared.catalog.hurry().await?;
+        let Stored { kept, stages } = match task.await {
+            Ok(stored) => stored?,
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
-        self.right = Right::Spent;
-        self.right = match kept? {
+        self.stored += stages;
+        self.right = match kept {
             Kept::Lost => Right::Lost,
             Kept::Done => Right::Spent,
             Kept::Lease(lease) => Right::Lease(lease),
         };
-        self.stored += u64::from(!matches!(self.right, Right::Lost));
         Ok(())
     }
 }
 
+/// Stores stages as they come, those together that have come while others were on their way, until no more come or the
+/// lease is gone. The last ones are stored at once: when the process dies over the next pair, this one is to be known
+/// as done.
 async fn store(
     shared: Arc<Shared>,
     name: PairName,
-    lease: Lease,
-    done: StageDone,
-) -> Result<Kept, CatalogError> {
-    let (stage, ms) = (done.stage, done.ms);
-    let kept = shared.catalog.checkpoint_in_time(lease, done).await?;
-    if !matches!(kept, Kept::Lost) {
-        finished(&shared, name, stage, ms);
+    mut lease: Lease,
+    mut stages: mpsc::UnboundedReceiver<StageDone>,
+) -> Result<Stored, CatalogError> {
+    let mut stored = 0;
+    while let Some(first) = stages.recv().await {
+        let mut done = vec![first];
+        while let Ok(next) = stages.try_recv() {
+            done.push(next);
+        }
+        let told: Vec<_> = done.iter().map(|done| (done.stage, done.ms)).collect();
+        let kept = if stages.is_closed() {
+            shared.catalog.checkpoint_at_once(lease, done).await?
+        } else {
+            shared.catalog.checkpoint_in_time(lease, done).await?
+        };
+        if !matches!(kept, Kept::Lost) {
+            stored += told.len() as u64;
+            for (stage, ms) in told {
+                finished(&shared, name.clone(), stage, ms);
+            }
+        }
+        match kept {
+            Kept::Lease(next) => lease = next,
+            Kept::Done | Kept::Lost => {
+                return Ok(Stored {
+                    kept,
+                    stages: stored,
+                });
+            }
+        }
     }
-    Ok(kept)
+    Ok(Stored {
+        kept: Kept::Lease(lease),
+        stages: stored,
+    })
 }
 
 fn finished(shared: &Shared, pair: PairName, stage: Stage, ms: u64) {

@@ -5,6 +5,7 @@
 //! computed, and `execute` is the one bridge to the threads that compute.
 
 mod ahead;
+mod bare;
 mod budget;
 mod clock;
 mod dispatch;
@@ -14,6 +15,7 @@ mod hand;
 mod held;
 mod options;
 mod outputs;
+mod pace;
 mod pipeline;
 mod policy;
 mod refresh;
@@ -30,6 +32,7 @@ use std::time::Duration;
 
 use tokio::sync::mpsc;
 
+pub use bare::bare;
 pub use budget::free_memory;
 pub use events::{RunEvent, RunSummary};
 pub use options::{Rerun, RunOptions};
@@ -132,12 +135,7 @@ pub async fn run(
     stop: &Stop,
     on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
-    let steps = Arc::new(Pipeline {
-        project: project.clone(),
-        settings: settings.clone(),
-        mesh_limits: options.mesh_limits,
-        image_limits: options.image_limits,
-    });
+    let steps = Arc::new(Pipeline::new(project, settings, options));
     let recipes = recipes(settings);
     run_steps(project, catalog, &recipes, steps, options, stop, on_event).await
 }

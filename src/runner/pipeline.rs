@@ -4,6 +4,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::hand::PairInHand;
+use super::options::RunOptions;
 use super::outputs;
 use super::steps::{Setback, StageOutput, Steps};
 use crate::catalog::InputSeen;
@@ -17,10 +18,10 @@ use crate::store::{ArtifactError, InputError, InputFile, Project, read_input};
 /// The stages of one project with their settings.
 #[derive(Debug)]
 pub(super) struct Pipeline {
-    pub(super) project: Project,
-    pub(super) settings: Settings,
-    pub(super) mesh_limits: mesh::Limits,
-    pub(super) image_limits: raster::Limits,
+    project: Project,
+    settings: Settings,
+    mesh_limits: mesh::Limits,
+    image_limits: raster::Limits,
 }
 
 impl Steps for Pipeline {
@@ -35,6 +36,16 @@ impl Steps for Pipeline {
 }
 
 impl Pipeline {
+    /// The stages of a run.
+    pub(super) fn new(project: &Project, settings: &Settings, options: &RunOptions) -> Self {
+        Self {
+            project: project.clone(),
+            settings: settings.clone(),
+            mesh_limits: options.mesh_limits,
+            image_limits: options.image_limits,
+        }
+    }
+
     fn fit(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
         let mesh = self.read_mesh(pair)?;
         // The paper's fit does not look at the print, so a changed print need not send its results back so far.

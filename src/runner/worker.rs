@@ -132,12 +132,12 @@ impl Shared {
 pub(super) enum Over {
     /// All is stored.
     Ended(PairReport),
-    /// Its last checkpoint is on its way: what is left is a [`Held::report`].
+    /// Its last stages are on their way: what is left is a [`Held::report`].
     Storing(Held),
 }
 
-/// Takes a leased pair through the stages that are left. Each is computed while the checkpoint of the one before is on
-/// its way to the disk.
+/// Takes a leased pair through the stages that are left. Each is computed while those before it are on their way to the
+/// disk.
 pub(super) async fn work(shared: Arc<Shared>, lease: Lease, work: PairWork) -> Over {
     let stage = lease.cursor();
     let pair = Box::new(PairInHand::new(work));
@@ -167,10 +167,9 @@ async fn through(
             Step::Stopped => return Ok(PairEnd::GivenBack),
             Step::Refused(error) => return Err(error),
         };
-        let Some(lease) = held.lease().await? else {
+        if !held.store(*done).await? {
             return Ok(PairEnd::Lost);
-        };
-        held.store(lease, *done);
+        }
         match next(shared, stage) {
             Ok(later) => (pair, stage) = (back, later),
             Err(end) => return Ok(end),

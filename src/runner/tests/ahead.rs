@@ -29,23 +29,24 @@ fn finished(event: &RunEvent, wanted: Stage) -> bool {
 }
 
 #[tokio::test]
-async fn a_stage_is_computed_while_the_one_before_is_stored_and_only_what_is_stored_is_told() {
+async fn stages_are_computed_while_those_before_are_stored_and_only_what_is_stored_is_told() {
     let world = World::new(&["wait_1"]).await;
     let hold = async {
         world.begun("wait_1", Stage::Fit).await;
         let release = world.catalog.hold().await;
         world.steps.open();
-        world.begun("wait_1", Stage::Depth).await;
+        world.begun("wait_1", Stage::Register).await;
         assert_eq!(world.position(|event| finished(event, Stage::Fit)), None);
         release.send(()).expect("the writer waits");
     };
     let options = options(1);
     let (summary, ()) = tokio::join!(world.run(&options), hold);
     assert_eq!((summary.done, summary.stages), (1, 4));
-    // One checkpoint at a time is on its way: the stage after the next waits for it.
-    let fit = world.position(|event| finished(event, Stage::Fit));
-    assert!(fit < world.position(|event| started(event, Stage::Normalize)));
-    assert!(world.position(|event| started(event, Stage::Depth)) < fit);
+    let told = Stage::ALL.map(|stage| world.position(|event| finished(event, stage)));
+    assert!(told.is_sorted() && told[0].is_some(), "{told:?}");
+    assert!(world.position(|event| started(event, Stage::Register)) < told[0]);
+    let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
+    assert_eq!(detail.expect("the pair").attempts.len(), 4);
 }
 
 #[tokio::test]
