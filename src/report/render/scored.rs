@@ -61,9 +61,7 @@ pub(super) fn comparisons(report: &Report) -> Option<Table> {
             Some(format!("{} v. {}", found.a.title(), found.b.title())),
             Some(found.score.title().to_owned()),
             fixed(Some(found.difference), 3),
-            found
-                .ci95
-                .map(|[low, high]| format!("{low:+.3} to {high:+.3}")),
+            found.ci95.map(|[low, high]| format!("{low:.3}, {high:.3}")),
             found.p.map(p_value),
             found.p_holm.map(p_value),
         ]
@@ -90,6 +88,7 @@ pub(super) fn comparisons(report: &Report) -> Option<Table> {
 mod tests {
     use super::{comparisons, intervals};
     use crate::domain::ThresholdMetric;
+    use crate::report::render::text::aligned;
     use crate::report::{Tally, TruthFinding, fixture};
 
     #[test]
@@ -125,11 +124,32 @@ mod tests {
             "Ensemble v. Non-luminous SSIM",
             "IoU",
             "0.050",
-            "+0.050 to +0.050",
+            "0.050, 0.050",
             "<0.001",
             "0.001",
         ];
         assert_eq!(iou, wanted);
+    }
+
+    #[test]
+    fn lower_scores_fit_into_a_terminal_too() {
+        let mut tally = Tally::default();
+        for i in 0..20 {
+            let mut pair = fixture::done(&format!("p{i:02}"), 0.7, &[]);
+            for record in &mut pair.metrics {
+                let is_best = record.outcome.metric == ThresholdMetric::Density;
+                record.outcome.scores.iou = if is_best { 0.75 } else { 0.7 };
+            }
+            tally.add(&pair, &TruthFinding::default());
+        }
+        let table = comparisons(&tally.finish()).expect("three metrics");
+        let text = aligned(&table);
+        let found = text
+            .lines()
+            .find(|line| line.contains("Non-luminous SSIM v. Pixel density  IoU"));
+        let wanted = "  -0.050  -0.050, -0.050  <0.001  0.001";
+        assert!(found.expect("a line").ends_with(wanted), "{text}");
+        assert!(text.lines().all(|line| line.len() <= 80), "{text}");
     }
 
     #[test]
