@@ -31,4 +31,20 @@ impl DepthMap {
     pub fn strokes(&self, level: u16) -> Mask {
         self.levels.map(|found| *found >= level.max(1))
     }
+
+    /// A map from -1 to 0.3 mesh units of ten pixels each, for tests.
+    #[cfg(test)]
+    pub(crate) fn of_levels(levels: Grid<u16>) -> Self {
+        Self {
+            levels,
+            scale: DepthScale {
+                height_min: -1.0,
+                height_per_level: 2e-5,
+                mesh_unit_per_px: 0.1,
+                depth_from_plane: crate::domain::Affine2::IDENTITY,
+                bow: None,
+                unit: None,
+            },
+        }
+    }
 }

@@ -126,7 +126,7 @@ pub(super) fn mixed(real: Vec<Card>, faults: Vec<Card>, rates: &Rates, lots: &Lo
 #[cfg(test)]
 mod tests {
     use super::{Rates, chosen, mixed, plant};
-    use crate::domain::{Affine2, Control, DepthScale, Lots};
+    use crate::domain::{Control, Lots};
     use crate::raster::{DepthMap, Grid};
     use crate::review::card::Card;
     use crate::review::card::fixture::card;
@@ -137,17 +137,7 @@ mod tests {
     };
 
     fn depth(level: impl Fn(usize, usize) -> u16) -> DepthMap {
-        DepthMap {
-            levels: Grid::from_fn(101, 51, level),
-            scale: DepthScale {
-                height_min: -1.0,
-                height_per_level: 2e-5,
-                mesh_unit_per_px: 0.1,
-                depth_from_plane: Affine2::IDENTITY,
-                bow: None,
-                unit: None,
-            },
-        }
+        DepthMap::of_levels(Grid::from_fn(101, 51, level))
     }
 
     /// A wedge that leans to one side, on a slope.

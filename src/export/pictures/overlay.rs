@@ -125,29 +125,19 @@ fn edges(mask: &Mask, reach: usize) -> Grid<bool> {
 #[cfg(test)]
 mod tests {
     use super::{EDGE, TRUE_EDGE, View, edges};
-    use crate::domain::{Affine2, DepthScale, ThresholdMetric};
+    use crate::domain::{Affine2, ThresholdMetric};
     use crate::raster::{DepthMap, Grid, Mask, Picture};
     use crate::report::fixture;
 
     /// A bar of 4 x 20 px at (8, 5) over ground in a map of 30 x 30 px.
     fn depth() -> DepthMap {
-        DepthMap {
-            levels: Grid::from_fn(30, 30, |x, y| {
-                if (8..12).contains(&x) && (5..25).contains(&y) {
-                    60_000
-                } else {
-                    10_000
-                }
-            }),
-            scale: DepthScale {
-                height_min: -1.0,
-                height_per_level: 2e-5,
-                mesh_unit_per_px: 0.1,
-                depth_from_plane: Affine2::IDENTITY,
-                bow: None,
-                unit: None,
-            },
-        }
+        DepthMap::of_levels(Grid::from_fn(30, 30, |x, y| {
+            if (8..12).contains(&x) && (5..25).contains(&y) {
+                60_000
+            } else {
+                10_000
+            }
+        }))
     }
 
     fn paper() -> Picture {

@@ -120,7 +120,6 @@ fn heights(depth: &DepthMap, margin: f64) -> Vec<f32> {
 #[cfg(test)]
 mod tests {
     use super::Relief;
-    use crate::domain::{Affine2, DepthScale};
     use crate::raster::{DepthMap, Grid};
 
     const SIDE: usize = 80;
@@ -130,17 +129,7 @@ mod tests {
         let on_bar = |x, y| (20..60).contains(&x) && (30..50).contains(&y);
         let top = |x: usize| 51_000.0 - tilt * (x as f64 - 40.0) / 40.0;
         let level = |x, y| if on_bar(x, y) { top(x) as u16 } else { 1000 };
-        DepthMap {
-            levels: Grid::from_fn(SIDE, SIDE, level),
-            scale: DepthScale {
-                height_min: -1.0,
-                height_per_level: 2e-5,
-                mesh_unit_per_px: 0.1,
-                depth_from_plane: Affine2::IDENTITY,
-                bow: None,
-                unit: None,
-            },
-        }
+        DepthMap::of_levels(Grid::from_fn(SIDE, SIDE, level))
     }
 
     #[test]
