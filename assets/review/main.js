@@ -237,10 +237,14 @@ for (const mode of MODES) deeds[mode] = () => stage.setMode(mode);
 /** Holding a key down moves things, but judges nothing twice. */
 const MAY_REPEAT = new Set(["turn_left", "turn_right", "less", "more", "next", "previous", "larger", "smaller"]);
 
+/** What goes on to another picture, and would lose a correction that is not saved. */
+const LEAVES = new Set(["pass", "fail", "unsure", "undo", "next", "previous", "jump", ...REASONS]);
+
 function act(action, event) {
   const isArrow = event?.code?.startsWith("Arrow");
   if (event?.repeat && !MAY_REPEAT.has(action) && !isArrow) return;
   if (correction && event && correction.key(action, event)) return;
+  if (correction && LEAVES.has(action)) return screen.tell(say("correct_first"));
   deeds[action]?.(performance.now(), event);
   refresh();
 }

@@ -218,6 +218,8 @@ impl Subject {
                 errors.angle_deg, errors.tre_pct
             )
         }));
+        let mask = self.truth.and_then(|errors| errors.mask_iou);
+        words.extend(mask.map(|iou| format!(", IoU with the true tops {iou:.2}")));
         words
     }
 

@@ -29,7 +29,7 @@ pub struct DeckOptions {
     pub queue: Queue,
     /// Another seed, another order.
     pub seed: u64,
-    /// Only so many results, the first in order.
+    /// Only so many results, the same for all readers.
     pub sample: Option<usize>,
     /// How often the reader is tested; not when conflicts are settled.
     pub rates: Rates,
@@ -82,8 +82,10 @@ impl Deck {
         let key = catalog.review_key().await?;
         let lots = Lots::new(options.seed, &options.reader);
         let mut cards = all_cards(catalog, options).await?;
+        if let Some(most) = options.sample {
+            order::sample(&mut cards, options.queue, options.seed, most);
+        }
         order::sort(&mut cards, options.queue, &lots);
-        cards.truncate(options.sample.unwrap_or(usize::MAX));
         if options.queue != Queue::Adjudicate {
             let chosen = control::chosen(&cards, &options.rates, &lots);
             let faults = faults(catalog, project, chosen, &lots).await?;
@@ -132,14 +134,11 @@ fn cards_of(pair: &PairResults, options: &DeckOptions) -> Vec<Card> {
     let asked = &options.metrics;
     let is_of_metric =
         |record: &&MetricRecord| asked.is_empty() || asked.contains(&record.outcome.metric);
-    let mut groups = alike(pair.metrics.iter().filter(is_of_metric));
-    let is_asked = |group: &Vec<&MetricRecord>| {
-        options.queue != Queue::Adjudicate
-            || group
-                .iter()
-                .any(|record| is_open_conflict(record, &options.reader))
+    // What looks the same and nobody contradicts another on gets no word: such a choice would stand for nothing either.
+    let is_asked = |record: &&MetricRecord| {
+        options.queue != Queue::Adjudicate || is_open_conflict(record, &options.reader)
     };
-    groups.retain(is_asked);
+    let groups = alike(pair.metrics.iter().filter(is_of_metric).filter(is_asked));
     let card = |group: Vec<&MetricRecord>| {
         let outcome_of_metric = group[0].outcome;
         Card {

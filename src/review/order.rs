@@ -16,6 +16,12 @@ pub(super) fn sort(cards: &mut [Card], queue: Queue, lots: &Lots) {
     });
 }
 
+/// Keeps so many cards, the same whoever reads: what two are given the same number of, both have read.
+pub(super) fn sample(cards: &mut Vec<Card>, queue: Queue, seed: u64, most: usize) {
+    sort(cards, queue, &Lots::new(seed, "sample"));
+    cards.truncate(most);
+}
+
 /// By risk, then by lot.
 #[derive(Debug, PartialEq)]
 struct OrderKey {
@@ -40,7 +46,7 @@ impl Ord for OrderKey {
 
 #[cfg(test)]
 mod tests {
-    use super::sort;
+    use super::{sample, sort};
     use crate::domain::{Lots, Queue};
     use crate::review::card::fixture::card;
 
@@ -51,6 +57,23 @@ mod tests {
         }
         sort(&mut cards, queue, &Lots::new(seed, reader));
         cards.iter().map(|card| card.pair.to_string()).collect()
+    }
+
+    #[test]
+    fn two_readers_get_the_same_sample_in_orders_of_their_own() {
+        let read = |reader: &str| {
+            let mut cards: Vec<_> = (0..50).map(card).collect();
+            sample(&mut cards, Queue::Random, 1, 10);
+            sort(&mut cards, Queue::Random, &Lots::new(1, reader));
+            let names = cards.iter().map(|card| card.pair.to_string());
+            names.collect::<Vec<_>>()
+        };
+        let (mut ana, mut bo) = (read("ana"), read("bo"));
+        assert_ne!(ana, bo);
+        ana.sort();
+        bo.sort();
+        assert_eq!(ana, bo);
+        assert_eq!(ana.len(), 10);
     }
 
     #[test]

@@ -103,7 +103,7 @@ const WORDS: &[Row] = &[
         "Enter keeps it, Escape drops it",
         "Enter để giữ, Escape để bỏ",
     ),
-    ("why", "Fail because of", "Không đạt vì"),
+    ("why", "or fail for", "hoặc không đạt vì"),
     ("angle", "Angle", "Góc lệch"),
     ("strokes_lost", "Strokes lost", "Mất nét"),
     ("background_in", "Ground in", "Lẫn nền"),
@@ -152,6 +152,11 @@ const WORDS: &[Row] = &[
         "correct_hint",
         "Arrows or drag: shift · [ ]: turn · − =: scale · Shift: finer · Enter: save · Escape: leave",
         "Mũi tên hoặc kéo: dời · [ ]: xoay · − =: cỡ · Shift: tinh hơn · Enter: lưu · Escape: thoát",
+    ),
+    (
+        "correct_first",
+        "First save the correction (Enter) or leave it (Escape)",
+        "Hãy lưu bản chỉnh (Enter) hoặc thoát (Escape) trước",
     ),
     (
         "corrected",

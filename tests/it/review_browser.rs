@@ -282,6 +282,9 @@ fn a_relief_is_laid_by_keys_and_mouse() {
     for _ in 0..5 {
         tab.key("BracketRight");
     }
+    // A verdict would go on to the next and lose it.
+    tab.key("KeyP");
+    tab.wait("document.getElementById('live').textContent.startsWith('First save')");
     tab.key("Enter");
     tab.wait(
         "document.getElementById('live').textContent.startsWith('Saved as an alignment by hand')",
