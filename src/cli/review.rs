@@ -47,7 +47,7 @@ pub(super) struct ReviewArgs {
     /// Least time a picture is shown before a verdict is taken, milliseconds
     #[arg(long, value_name = "MS", default_value = "250", value_parser = clap::value_parser!(u64).range(0..=60_000))]
     min_view_ms: u64,
-    /// Port on this machine; 0 takes any that is free
+    /// Port on this machine; 0 takes one that is the same for a project and a reader, or any that is free
     #[arg(long, value_name = "N", default_value = "0")]
     port: u16,
     /// Listen on this address in the place of 127.0.0.1; whoever can reach it sees that there is a page

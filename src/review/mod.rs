@@ -26,7 +26,7 @@ use std::sync::Arc;
 use tokio::net::TcpListener;
 
 use crate::catalog::{Catalog, CatalogError};
-use crate::domain::UnixMillis;
+use crate::domain::{ContentHash, UnixMillis};
 use crate::raster;
 use crate::store::Project;
 
@@ -51,7 +51,7 @@ pub struct ReviewOptions {
     pub keys: BTreeMap<String, String>,
     /// How long a picture is shown at least before a verdict is taken, milliseconds.
     pub min_view_ms: u64,
-    /// Where to listen; port 0 takes any.
+    /// Where to listen; port 0 takes that of the project and the reader, and any where that is taken.
     pub listen: SocketAddr,
     /// Limits on the print images.
     pub limits: raster::Limits,
@@ -107,7 +107,8 @@ pub async fn open(
         address: options.listen,
         source,
     };
-    let listener = TcpListener::bind(options.listen).await.map_err(refused)?;
+    let usual = usual_port(&project, &options.deck.reader);
+    let listener = listen(options.listen, usual).await.map_err(refused)?;
     let address = listener.local_addr().map_err(refused)?;
     let desk = Desk {
         pictures: Pictures::new(catalog.clone(), project.clone(), options.limits),
@@ -173,6 +174,28 @@ impl Review {
     }
 }
 
+/// The first of the ports that are nobody's, and how many there are (RFC 6335).
+const FREE_PORTS: [u16; 2] = [49_152, 16_384];
+
+/// The same for a project and a reader every time: what a browser keeps for a page that is gone, it keeps for its port.
+fn usual_port(project: &Project, reader: &str) -> u16 {
+    let dir = project.dir();
+    let dir = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
+    let whose = format!("{}\0{reader}", dir.display());
+    let [first, second, ..] = *ContentHash::of(whose.as_bytes()).as_bytes();
+    FREE_PORTS[0] + u16::from_be_bytes([first, second]) % FREE_PORTS[1]
+}
+
+/// Binds; where any port will do, the usual one if it is free.
+async fn listen(address: SocketAddr, usual: u16) -> std::io::Result<TcpListener> {
+    if address.port() == 0
+        && let Ok(listener) = TcpListener::bind(SocketAddr::new(address.ip(), usual)).await
+    {
+        return Ok(listener);
+    }
+    TcpListener::bind(address).await
+}
+
 /// Names by which the page may be asked for.
 fn hosts(address: SocketAddr) -> Vec<String> {
     let port = address.port();
@@ -181,4 +204,25 @@ fn hosts(address: SocketAddr) -> Vec<String> {
         hosts.extend([format!("localhost:{port}"), format!("127.0.0.1:{port}")]);
     }
     hosts
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::SocketAddr;
+
+    use super::listen;
+
+    #[tokio::test]
+    async fn the_usual_port_is_taken_where_it_is_free_and_any_port_will_do() {
+        let any = SocketAddr::from(([127, 0, 0, 1], 0));
+        let port =
+            |listener: &tokio::net::TcpListener| listener.local_addr().expect("an address").port();
+        let probe = listen(any, 0).await.expect("a socket");
+        let usual = port(&probe);
+        let other = listen(any, usual).await.expect("a socket");
+        assert_ne!(port(&other), usual, "it is taken");
+        drop(probe);
+        let again = listen(any, usual).await.expect("a socket");
+        assert_eq!(port(&again), usual);
+    }
 }
