@@ -3,6 +3,8 @@
     python3 -m venv peers && peers/bin/pip install -r benches/peers/requirements.txt
     taskset -c 0 peers/bin/python benches/peers/compare.py
 
+Open3D needs the system's libusb-1.0 and libGL (Debian: libusb-1.0-0, libgl1, libgomp1).
+
 Rounds of one and of the other take turns, so that what else the machine does meets both. One core: `taskset` holds
 every thread of both to it. The files are those of `cargo bench --bench speed`, which makes them at the first round.
 """
