@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use mocban::catalog::Catalog;
-use mocban::config::{Preset, Sources, Start, load};
+use mocban::config::{Sources, load};
 use mocban::runner::{self, RunOptions, Stop};
 use mocban::stages::Settings;
 use mocban::store::{NewArtifact, Project};
@@ -99,11 +99,7 @@ pub(super) async fn table(options: &Options, pairs: u64) -> anyhow::Result<Strin
 
 /// What every run of this program is asked to do.
 fn asked(workers: usize) -> anyhow::Result<(Settings, RunOptions)> {
-    let loaded = load(&Sources {
-        start: Start::Preset(Preset::Default),
-        env: Vec::new(),
-        sets: Vec::new(),
-    })?;
+    let loaded = load(&Sources::default())?;
     let options = RunOptions {
         workers,
         memory: runner::free_memory(),

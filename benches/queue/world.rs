@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
 use mocban::catalog::{Catalog, Recipes};
-use mocban::config::{Preset, Sources, Start, load};
+use mocban::config::{Sources, load};
 use mocban::runner;
 use mocban::store::Project;
 
@@ -69,9 +69,8 @@ fn write_list(path: &Path, pairs: usize) -> anyhow::Result<()> {
 /// The recipes of the settings that the program runs with, and one other setting of the last stage where asked for.
 pub(super) fn recipes(set: Option<&str>) -> anyhow::Result<Recipes> {
     let loaded = load(&Sources {
-        start: Start::Preset(Preset::Default),
-        env: Vec::new(),
         sets: set.into_iter().map(str::to_owned).collect(),
+        ..Sources::default()
     })?;
     Ok(runner::recipes(&loaded.config.stages))
 }

@@ -9,10 +9,11 @@ pub(super) fn measure(criterion: &mut Criterion, scan: &Scan) -> anyhow::Result<
     for (ending, _) in MESHES {
         let path = scan.mesh(ending);
         let held = bytes(&path)?;
+        let name = format!("scan.{ending}");
         let mut group = criterion.benchmark_group(format!("read/{ending}"));
         group.throughput(Throughput::Bytes(held.len() as u64));
         group.bench_function(scan.size, |b| {
-            b.iter(|| mesh::read(&held, &format!("scan.{ending}"), &mesh::Limits::SUGGESTED));
+            b.iter(|| mesh::read(&held, &name, &mesh::Limits::SUGGESTED));
         });
         group.finish();
         let mut raw = criterion.benchmark_group(format!("read/raw_{ending}"));

@@ -1,6 +1,7 @@
 //! The four stages one by one, and a whole pair from its files' bytes.
 
 use criterion::{BatchSize, Criterion};
+use mocban::config::{Sources, load};
 use mocban::mesh::{self, Mesh};
 use mocban::raster::{self, Picture};
 use mocban::stages::{Aligned, Print, Settings, depth, fit, normalize, register};
@@ -8,7 +9,7 @@ use mocban::stages::{Aligned, Print, Settings, depth, fit, normalize, register};
 use super::scan::{Scan, bytes};
 
 pub(super) fn measure(criterion: &mut Criterion, scan: &Scan) -> anyhow::Result<()> {
-    let settings = settings()?;
+    let settings = load(&Sources::default())?.config.stages;
     let (stl, png) = (bytes(&scan.mesh("stl"))?, bytes(&scan.print())?);
     let mesh = read(&stl)?;
     let picture = decode(&png)?;
@@ -67,16 +68,4 @@ fn read(stl: &[u8]) -> anyhow::Result<Mesh> {
 
 fn decode(png: &[u8]) -> anyhow::Result<Picture> {
     Ok(raster::decode(png, &raster::Limits::SUGGESTED)?)
-}
-
-/// The default preset.
-fn settings() -> anyhow::Result<Settings> {
-    let preset = mocban::config::Preset::named("default");
-    let start = mocban::config::Start::Preset(preset.ok_or(anyhow::anyhow!("no default preset"))?);
-    let sources = mocban::config::Sources {
-        start,
-        env: Vec::new(),
-        sets: Vec::new(),
-    };
-    Ok(mocban::config::load(&sources)?.config.stages)
 }

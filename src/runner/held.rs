@@ -68,9 +68,7 @@ impl Held {
     /// Sends a finished stage on its way, and tells of it when it is stored; `false` when the lease is known to be gone.
     /// Stages are stored in their order.
     pub(super) async fn store(&mut self, done: StageDone) -> Result<bool, RunError> {
-        if let Right::Lease(_) = self.right {
-            self.begin();
-        }
+        self.begin();
         if let Right::Storing(sender, _) = &self.right
             && sender.send(done).is_ok()
         {
@@ -81,7 +79,7 @@ impl Held {
         Ok(false)
     }
 
-    /// Gives the lease to a task that stores.
+    /// Gives the lease, if it is in hand, to a task that stores.
     fn begin(&mut self) {
         self.right = match std::mem::replace(&mut self.right, Right::Spent) {
             Right::Lease(lease) => {

@@ -145,16 +145,16 @@ pub(super) fn readings(picture: &Picture) -> Result<Vec<Ink>, Error> {
     } else {
         &[likelier, !likelier]
     };
-    let mut read: Vec<Result<Ink, Error>> = polarities.iter().map(|light| of(*light)).collect();
+    let mut inks: Vec<Result<Ink, Error>> = polarities.iter().map(|light| of(*light)).collect();
     if polarities.contains(&false) && may_be_stained(&values, levelled) {
-        read.push(past_stains(grey, &known));
+        inks.push(past_stains(grey, &known));
     }
     // If none holds ink, the likeliest says why.
-    if read.iter().all(Result::is_err) {
-        read.truncate(1);
-        return read.into_iter().collect();
+    if inks.iter().all(Result::is_err) {
+        inks.truncate(1);
+        return inks.into_iter().collect();
     }
-    Ok(read.into_iter().flatten().collect())
+    Ok(inks.into_iter().flatten().collect())
 }
 
 /// Whether much of what is dark, of values in their order, is so little dark that it may be stains.

@@ -7,6 +7,7 @@ use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
 
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::{Value, json};
 
 /// Names under which it is installed.
@@ -278,28 +279,7 @@ impl Tab<'_> {
         let taken = self.call("Page.captureScreenshot", &json!({}));
         let text = taken["data"].as_str().expect("a picture");
         let path = PathBuf::from(folder).join(format!("{name}.png"));
-        std::fs::write(path, base64(text)).expect("written");
+        let bytes = BASE64_STANDARD.decode(text).expect("base 64");
+        std::fs::write(path, bytes).expect("written");
     }
-}
-
-/// The bytes of a text in base 64.
-fn base64(text: &str) -> Vec<u8> {
-    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let digits = text
-        .bytes()
-        .filter_map(|byte| DIGITS.iter().position(|digit| *digit == byte));
-    let digits: Vec<u32> = digits.map(|digit| digit as u32).collect();
-    let bytes = digits.chunks(4).flat_map(|four| {
-        let bits = four.iter().fold(0, |bits, digit| (bits << 6) | digit);
-        let bits = bits << (6 * (4 - four.len()));
-        bits.to_be_bytes()[1..four.len()].to_vec()
-    });
-    bytes.collect()
-}
-
-#[test]
-fn base_64_is_read() {
-    assert_eq!(base64("bW9jYmFu"), b"mocban");
-    assert_eq!(base64("bW9jYg=="), b"mocb");
-    assert_eq!(base64("bW9jYmE="), b"mocba");
 }

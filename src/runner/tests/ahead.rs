@@ -1,5 +1,9 @@
 //! What goes on while a checkpoint is on its way or a pair is nearly over.
 
+use std::time::Duration;
+
+use tokio::time::timeout;
+
 use super::{World, name, options};
 use crate::catalog::Dead;
 use crate::domain::{JobStatus, PairName, Stage, WorkerId};
@@ -47,6 +51,30 @@ async fn stages_are_computed_while_those_before_are_stored_and_only_what_is_stor
     assert!(world.position(|event| started(event, Stage::Register)) < told[0]);
     let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
     assert_eq!(detail.expect("the pair").attempts.len(), 4);
+}
+
+#[tokio::test]
+async fn what_is_finished_is_stored_while_a_long_stage_is_computed() {
+    let world = World::new(&["lasts_1"]).await;
+    let look = async {
+        world.begun("lasts_1", Stage::Register).await;
+        let stored = async {
+            while world
+                .position(|event| finished(event, Stage::Normalize))
+                .is_none()
+            {
+                tokio::task::yield_now().await;
+            }
+        };
+        let stored = timeout(Duration::from_mins(1), stored).await;
+        let detail = world.catalog.pair(&name("lasts_1")).await;
+        world.steps.open();
+        assert!(stored.is_ok(), "it waits for the end");
+        assert_eq!(detail.expect("a read").expect("the pair").attempts.len(), 3);
+    };
+    let options = options(1);
+    let (summary, ()) = tokio::join!(world.run(&options), look);
+    assert_eq!((summary.done, summary.stages), (1, 4));
 }
 
 #[tokio::test]

@@ -12,7 +12,7 @@ use crate::domain::Evidence;
 const POSE: [f64; 6] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
 /// Weights of one; logarithm of the mask's area over that of the mask by relief alone, and its square; that of the
 /// ink's area over it, and its square; logarithm of the correlation; spread of the answers, by [`spread_out`]; square of
-/// the rim, which is 0.02 to 0.045 where the cut follows walls.
+/// the rim, which is 0.03 in the median of made pairs of `hard`, and above 0.05 in three of a hundred.
 const MASK: [f64; 8] = [5.13, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5, -500.0];
 /// A spread that nobody would see, as share of the depth map's longest side.
 const UNSEEN: f64 = 0.002;

@@ -1,8 +1,8 @@
 //! The pictures of the page, as many as there is room for.
 
+use base64::prelude::{BASE64_STANDARD, Engine as _};
 use maud::{Markup, PreEscaped, html};
 
-use super::base64::base64;
 use crate::report::gallery::{Gallery, Kind, Shot};
 
 /// What the three pictures of a shot are, for who cannot see them.
@@ -142,6 +142,6 @@ fn image(shot: &Shot, picture: Option<&[u8]>, layer: &str) -> Markup {
     let Some(bytes) = picture else {
         return html! { span.missing { "no picture" } };
     };
-    let source = format!("data:image/jpeg;base64,{}", base64(bytes));
+    let source = format!("data:image/jpeg;base64,{}", BASE64_STANDARD.encode(bytes));
     html! { img alt=(alt) src=(source); }
 }

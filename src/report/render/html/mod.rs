@@ -1,7 +1,6 @@
 //! The report as one page that holds its style and pictures, and needs no script.
 
 mod album;
-mod base64;
 mod markup;
 mod plots;
 mod sections;
