@@ -164,7 +164,7 @@ impl Shell {
         let mut heights = Grid::new(view.width, view.height, NOTHING);
         self.raster(plane_from_mesh, view, |place, z| {
             let height = &mut heights.data_mut()[place];
-            *height = height.max(z);
+            *height = higher(z, *height);
         });
         heights
     }
@@ -174,8 +174,8 @@ impl Shell {
         let mut heights = Grid::new(view.width, view.height, [NOTHING; 2]);
         self.raster(plane_from_mesh, view, |place, z| {
             let [front, back] = &mut heights.data_mut()[place];
-            *front = front.max(z);
-            *back = back.max(-z);
+            *front = higher(z, *front);
+            *back = higher(-z, *back);
         });
         let last = view.height.saturating_sub(1);
         [
@@ -184,7 +184,8 @@ impl Shell {
         ]
     }
 
-    /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet.
+    /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet, and with what is no
+    /// number.
     fn raster(&self, plane_from_mesh: &Rigid3, view: &View, meet: impl FnMut(usize, f32)) {
         let [x, y, z] = self.rows(plane_from_mesh);
         let [[a, b, c], [d, e, f]] = view.px_from_plane.0;
