@@ -4,7 +4,7 @@
 //! N-th time (1 when left out, 0 for each time) that a pair, or that pair, reaches the point at that stage.
 //! `MOCBAN_STOP_AT` stops the process there instead, until it is sent SIGCONT. `MOCBAN_HOLD_AT` holds the thread up:
 //! it makes the file that `MOCBAN_HOLD_FILE` names and goes on when somebody has removed it; such a point must be one
-//! that a stage's own thread reaches: `computed`, `written` or `filed`. Only builds with debug assertions look.
+//! that a thread of its own reaches: `computed`, `written` or `filed`. Only builds with debug assertions look.
 
 use crate::domain::{PairName, Stage};
 

@@ -83,12 +83,13 @@ def ecc(fixed, moving, start, steps):
 
 def register(fixed, moving):
     """The affine motion from print to depth on canvases of 256 pixels: the best of starts all around."""
-    shrink = SMALL / CANVAS
+    shrink, half = SMALL / CANVAS, np.full(2, 0.5)
     small = [cv2.resize(mask, (SMALL, SMALL), interpolation=cv2.INTER_AREA) for mask in (fixed, moving)]
     middle = (SMALL - 1) / 2
     starts = [cv2.getRotationMatrix2D((middle, middle), k * 360 / STARTS, 1).astype(np.float32) for k in range(STARTS)]
     _, best = max((ecc(*small, start, 20) for start in starts), key=lambda found: found[0])
-    best[:, 2] = (best[:, 2] + best[:, :2].sum(1) * (0.5 - 0.5 * shrink) / shrink * 0) / shrink
+    turned = best[:, :2] @ half
+    best[:, 2] = turned + (best[:, 2] + half - turned) / shrink - half
     return ecc(fixed, moving, best, 30)[1]
 
 
@@ -102,9 +103,10 @@ def ssim(a, b):
 
 
 def pair(mesh_path, print_path, out):
-    """All four stages; returns the turn in degrees, and writes what they made."""
+    """All four stages, and what they made as files; gives the print's two axes in the mesh."""
     mesh = trimesh.load(mesh_path, process=False)
-    levels = depth(mesh, plane(mesh.vertices))
+    turn = plane(mesh.vertices)
+    levels = depth(mesh, turn)
     cv2.imwrite(str(out / "depth.png"), levels, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     grey = cv2.imread(str(print_path), cv2.IMREAD_GRAYSCALE)
     _, ink = cv2.threshold(grey, 0, 1, cv2.THRESH_BINARY_INV | cv2.THRESH_OTSU)
@@ -135,6 +137,7 @@ def pair(mesh_path, print_path, out):
         cv2.imwrite(str(out / f"mask.{metric}.png"), (masks[level] * 255).astype(np.uint8))
     cv2.imwrite(str(out / "print_mask.png"), (fixed * 255).astype(np.uint8))
     (out / "pair.json").write_text(json.dumps({"motion": motion.tolist(), "scores": scores}))
+    return np.linalg.inv(motion[:, :2]) @ -turn[:2]
 
 
 def prepared(work, pairs, seed):
@@ -158,24 +161,51 @@ def prepared(work, pairs, seed):
     return data
 
 
+def used():
+    """Seconds that have passed, and seconds of a core that this process and those before it have used."""
+    times = os.times()
+    return np.array([time.perf_counter(), times.user + times.system + times.children_user + times.children_system])
+
+
 def ours(work, data):
-    """Seconds of `run`, the project made before."""
-    project = work / "project"
+    """Seconds that `run` takes and uses, the project made before; and what it found."""
+    project, out = work / "project", work / "export"
     shutil.rmtree(project, ignore_errors=True)
     subprocess.run([PROGRAM, "-C", project, "import", data / "pairs.csv"], check=True, capture_output=True)
-    begin = time.perf_counter()
+    begin = used()
     subprocess.run([PROGRAM, "-C", project, "run", "--jobs", "1"], capture_output=True)
-    return time.perf_counter() - begin
+    spent = used() - begin
+    subprocess.run([PROGRAM, "-C", project, "export", "-o", out], check=True, capture_output=True)
+    found = [json.loads(line) for line in open(out / "pairs.jsonl", encoding="utf-8")]
+    return spent, {
+        line["id"]: np.array(line["print_from_mesh"])[:2, :3]
+        for line in found
+        if line["metric"] == "ensemble" and line["status"] == "done"
+    }
 
 
 def theirs(work, data):
-    out = work / "out"
-    begin = time.perf_counter()
-    for row in csv.DictReader(open(data / "pairs.csv")):
-        folder = out / row["id"]
+    begin, found = used(), {}
+    for row in csv.DictReader(open(data / "pairs.csv", encoding="utf-8")):
+        folder = work / "out" / row["id"]
         folder.mkdir(parents=True, exist_ok=True)
-        pair(data / row["mesh"], data / row["print"], folder)
-    return time.perf_counter() - begin
+        found[row["id"]] = pair(data / row["mesh"], data / row["print"], folder)
+    return used() - begin, found
+
+
+def wrong(found, work):
+    """How many results are missing, mirrored or turned by more than 5 degrees."""
+    count = 0
+    for line in open(work / "demo" / "data" / "truth.jsonl", encoding="utf-8"):
+        truth = json.loads(line)
+        if truth["id"] not in found:
+            count += 1
+            continue
+        axes = np.array(truth["print_from_mesh"])[:2, :3]
+        between = found[truth["id"]] @ axes.T
+        angle = np.degrees(np.arctan2(between[1, 0] - between[0, 1], between[0, 0] + between[1, 1]))
+        count += bool(np.linalg.det(between) <= 0 or abs(angle) > 5)
+    return count
 
 
 def main():
@@ -188,12 +218,16 @@ def main():
     os.environ["OMP_NUM_THREADS"] = "1"
     work = ROOT / "target" / "tmp" / f"peers-{options.pairs}-{options.seed}"
     data = prepared(work, options.pairs, options.seed)
-    times = {"mocban": [], "assembled": []}
+    times = {ours: [], theirs: []}
     for _ in range(options.rounds):
-        times["mocban"].append(ours(work, data))
-        times["assembled"].append(theirs(work, data))
-    one, two = (statistics.median(times[who]) / options.pairs * 1e3 for who in ("mocban", "assembled"))
-    print(f"{options.pairs} pairs: mocban {one:.1f} ms a pair, assembled {two:.1f} ms a pair, ratio {one / two:.3f}")
+        for who, spent in times.items():
+            seconds, found = who(work, data)
+            spent.append((*(seconds / options.pairs * 1e3), wrong(found, work)))
+    print("| | ms a pair | ms of a core | wrong |\n| --- | --- | --- | --- |")
+    medians = [[statistics.median(column) for column in zip(*spent)] for spent in times.values()]
+    for name, (passed, core, missed) in zip(("mocban", "assembled"), medians):
+        print(f"| {name} | {passed:.1f} | {core:.1f} | {missed:.0f} of {options.pairs} |")
+    print(f"\nratio {medians[0][0] / medians[1][0]:.3f}, of core time {medians[0][1] / medians[1][1]:.3f}")
 
 
 if __name__ == "__main__":

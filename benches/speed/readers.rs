@@ -1,4 +1,4 @@
-//! Reading meshes, beside reading their bytes.
+//! Reading meshes, beside reading their bytes, and the OBJ also by `tobj`.
 
 use criterion::{Criterion, Throughput};
 use mocban::mesh;
@@ -16,10 +16,24 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
             b.iter(|| mesh::read(&held, &name, &mesh::Limits::SUGGESTED));
         });
         group.finish();
+        if ending == "obj" {
+            criterion
+                .benchmark_group("read/tobj_obj")
+                .bench_function(files.size, |b| b.iter(|| by_tobj(&held)));
+        }
         let mut raw = criterion.benchmark_group(format!("read/raw_{ending}"));
         raw.throughput(Throughput::Bytes(held.len() as u64));
         raw.bench_function(files.size, |b| b.iter(|| bytes(&path)));
         raw.finish();
     }
     Ok(())
+}
+
+fn by_tobj(mut bytes: &[u8]) -> Result<Vec<tobj::Model>, tobj::LoadError> {
+    let options = tobj::LoadOptions {
+        triangulate: true,
+        ..Default::default()
+    };
+    let no_materials = |_: &std::path::Path| Ok(Default::default());
+    tobj::load_obj_buf(&mut bytes, &options, no_materials).map(|(models, _)| models)
 }

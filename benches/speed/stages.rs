@@ -17,7 +17,7 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
     // The ink is read and the surface made ready once for a pair, by fit. Depth alone makes the surface ready too.
     let fresh = |name: &str| match name {
         "fit" => (Scan::from(mesh.clone()), Print::from(picture.clone())),
-        "depth" => (Scan::from(mesh.clone()), print.clone()),
+        "depth" | "depth_1024" => (Scan::from(mesh.clone()), print.clone()),
         _ => (Scan::from(Mesh::default()), print.clone()),
     };
     let mut bench = |name: &str, run: &mut dyn FnMut(&Scan, &Print)| {
@@ -36,6 +36,13 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
     });
     bench("depth", &mut |scan, _| {
         drop(depth::depth(scan, &aligned.fit, None, &settings.depth));
+    });
+    let large = depth::Params {
+        longest_px: 1024,
+        ..settings.depth.clone()
+    };
+    bench("depth_1024", &mut |scan, _| {
+        drop(depth::depth(scan, &aligned.fit, None, &large));
     });
     bench("normalize", &mut |_, print| {
         drop(normalize::normalize(

@@ -123,7 +123,7 @@ impl Dispatch {
 
     /// Begins what was taken ahead, as far as slots are free and the memory goes.
     pub(super) async fn begin(&mut self) -> Result<(), RunError> {
-        while self.tasks.len() < self.workers {
+        while self.tasks.len() < self.workers && !self.is_disk_behind() {
             let Some(taken) = self.in_hand.ahead.pop_front() else {
                 break;
             };

@@ -1,10 +1,12 @@
 //! Pairs taken through their stages with no catalog beside them: what the cost of a run is measured against.
 
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::task::JoinSet;
 
 use super::execute::{Computed, Ended, compute};
+use super::filing::file;
 use super::hand::PairInHand;
 use super::options::RunOptions;
 use super::pipeline::Pipeline;
@@ -24,32 +26,58 @@ pub async fn bare(
     pairs: Vec<PairFacts>,
 ) -> usize {
     let steps: Arc<dyn Steps> = Arc::new(Pipeline::new(project, settings, options));
-    let mut slots = JoinSet::new();
-    let mut whole = 0;
+    let (mut slots, mut endings) = (JoinSet::new(), JoinSet::new());
     for facts in pairs {
         if slots.len() >= options.workers.max(1)
-            && let Some(Ok(true)) = slots.join_next().await
+            && let Some(Ok(filings)) = slots.join_next().await
         {
-            whole += 1;
+            endings.spawn(all_filed(filings));
         }
-        let limit = options.stage_limit;
         let (steps, project) = (Arc::clone(&steps), project.clone());
-        slots.spawn(async move {
-            let stop = Stop::new();
-            let mut pair = Box::new(PairInHand::new(PairWork {
-                facts,
-                facts_text: String::new(),
-                results: Vec::new(),
-            }));
-            for stage in Stage::ALL {
-                pair = match compute(&steps, &project, stage, pair, limit, &stop).await {
-                    Computed::Ended(pair, Ended::Filed(_), _) => pair,
-                    _ => return false,
-                };
-            }
-            true
-        });
+        slots.spawn(through(steps, project, options.stage_limit, facts));
     }
-    let rest = slots.join_all().await;
-    whole + rest.into_iter().filter(|done| *done).count()
+    for filings in slots.join_all().await {
+        endings.spawn(all_filed(filings));
+    }
+    let endings = endings.join_all().await;
+    endings.into_iter().filter(|whole| *whole).count()
+}
+
+/// Files on their way to disk, and whether they are there.
+type Filings = JoinSet<bool>;
+
+/// Takes a pair through its stages; `None` where one fails.
+async fn through(
+    steps: Arc<dyn Steps>,
+    project: Project,
+    limit: Duration,
+    facts: PairFacts,
+) -> Option<Filings> {
+    let (stop, name) = (Stop::new(), facts.name.clone());
+    let mut filings = JoinSet::new();
+    let mut pair = Box::new(PairInHand::new(PairWork {
+        facts,
+        facts_text: String::new(),
+        results: Vec::new(),
+    }));
+    for stage in Stage::ALL {
+        let computed = compute(&steps, stage, pair, limit, &stop).await;
+        let Computed::Ended(back, Ended::Given(given), _) = computed else {
+            return None;
+        };
+        let (project, name) = (project.clone(), name.clone());
+        filings.spawn(async move {
+            let filed = file(&project, (&name, stage), given.files, limit).await;
+            filed.is_ok()
+        });
+        pair = back;
+    }
+    Some(filings)
+}
+
+async fn all_filed(filings: Option<Filings>) -> bool {
+    match filings {
+        Some(filings) => filings.join_all().await.into_iter().all(|filed| filed),
+        None => false,
+    }
 }

@@ -23,6 +23,9 @@ use crate::raster;
 /// Between two looks for pairs that others give back or whose back-off is over.
 const LOOK_EVERY: Duration = Duration::from_millis(250);
 
+/// Pairs a slot that may be on their way to the disk before no more are begun: what they gave is in memory.
+const MOST_ENDINGS: usize = 4;
+
 /// What the loop has counted.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
@@ -42,7 +45,7 @@ pub(super) struct Dispatch {
     pub(super) images: raster::Limits,
     /// Pairs that are computed, each with its name and the memory it was given.
     pub(super) tasks: JoinSet<(Over, PairName, u64)>,
-    /// Pairs whose last checkpoint is on its way.
+    /// Pairs whose last files and checkpoint are on their way.
     endings: JoinSet<PairReport>,
     pub(super) in_hand: InHand,
     pub(super) budget: Budget,
@@ -155,6 +158,11 @@ impl Dispatch {
         }
         let left = self.outstanding().await?;
         Ok(left.ready == 0 && left.leased == 0 && left.backoff == 0)
+    }
+
+    /// Whether so many pairs are computed and not stored that the disk must catch up.
+    pub(super) fn is_disk_behind(&self) -> bool {
+        self.endings.len() >= self.workers * MOST_ENDINGS
     }
 
     /// Whether nothing is computed or on its way.

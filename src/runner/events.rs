@@ -95,7 +95,7 @@ pub struct RunSummary {
     pub stopped: bool,
     /// Set when it drained because of `max_failures`.
     pub too_many_failures: bool,
-    /// Time that threads were at work on stages, computing and writing their files, all together.
+    /// Time that threads were computing stages, all together.
     pub at_work: Duration,
     /// Wall time in milliseconds.
     pub elapsed_ms: u64,

@@ -1,4 +1,4 @@
-//! The one bridge from tokio to computing: a stage runs on a thread of its own, which files what it gave.
+//! The one bridge from tokio to computing: a stage runs on a thread of its own.
 //!
 //! A thread a stage, rather than a pool, so that one that hangs past its deadline can be left behind without taking
 //! a place from the others.
@@ -12,18 +12,20 @@ use tokio::sync::oneshot;
 
 use super::hand::{PairInHand, Stored};
 use super::outputs;
-use super::steps::{Setback, Steps};
+use super::steps::{Setback, StageOutput, Steps};
 use super::stop::{Stop, StopLevel};
 use crate::breakpoint::{self, Point};
 use crate::catalog::MetricResult;
 use crate::domain::{ArtifactSet, ContentHash, FailureClass, Stage, plain};
-use crate::store::{ArtifactError, Project};
+use crate::store::NewArtifact;
 
-/// A stage that is computed and whose files are on disk.
+/// What a stage gave, none of it on disk.
 #[derive(Debug)]
-pub(super) struct Filed {
+pub(super) struct Given {
     pub(super) outcome: String,
-    pub(super) files: ArtifactSet,
+    pub(super) files: Vec<NewArtifact>,
+    /// How the files will be named.
+    pub(super) named: ArtifactSet,
     pub(super) result_hash: ContentHash,
     pub(super) metrics: Vec<MetricResult>,
 }
@@ -31,35 +33,17 @@ pub(super) struct Filed {
 /// How a stage ended.
 #[derive(Debug)]
 pub(super) enum Ended {
-    /// Computed and filed.
-    Filed(Filed),
+    /// Computed.
+    Given(Given),
     /// Not computed.
     Setback(Setback),
-    /// Computed, but the disk refused.
-    NotFiled(ArtifactError),
-}
-
-/// How long a stage took.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Took {
-    /// To compute.
-    computing: Duration,
-    /// To compute and to file what it gave.
-    pub(super) all: Duration,
-}
-
-impl Took {
-    /// Computing time in milliseconds.
-    pub(super) const fn ms(&self) -> u64 {
-        self.computing.as_millis() as u64
-    }
 }
 
 /// What came back from the thread.
 #[derive(Debug)]
 pub(super) enum Computed {
     /// The pair, how the stage ended, and how long it took.
-    Ended(Box<PairInHand>, Ended, Took),
+    Ended(Box<PairInHand>, Ended, Duration),
     /// The stage panicked; the pair in hand is lost with it.
     Panicked(String),
     /// The system gave no thread for it; the pair in hand is lost.
@@ -70,21 +54,20 @@ pub(super) enum Computed {
     Stopped,
 }
 
-/// Runs a stage of a pair and files what it gives.
+/// Runs a stage of a pair.
 pub(super) async fn compute(
     steps: &Arc<dyn Steps>,
-    project: &Project,
     stage: Stage,
     pair: Box<PairInHand>,
     limit: Duration,
     stop: &Stop,
 ) -> Computed {
     let (sender, receiver) = oneshot::channel();
-    let (steps, project) = (Arc::clone(steps), project.clone());
+    let steps = Arc::clone(steps);
     let name = format!("{stage} {}", pair.facts.name);
     let thread = std::thread::Builder::new().name(name);
     let spawned = thread.spawn(move || {
-        let work = AssertUnwindSafe(|| run(&*steps, &project, stage, pair));
+        let work = AssertUnwindSafe(|| run(&*steps, stage, pair));
         // Nobody waits any more after a time limit or a stop; then the work is dropped.
         let _ = sender.send(catch_unwind(work));
     });
@@ -105,53 +88,47 @@ pub(super) async fn compute(
 
 fn run(
     steps: &dyn Steps,
-    project: &Project,
     stage: Stage,
     mut pair: Box<PairInHand>,
-) -> (Box<PairInHand>, Ended, Took) {
+) -> (Box<PairInHand>, Ended, Duration) {
     let begun = Instant::now();
     let outcome = steps.run(stage, &mut pair);
-    let computing = begun.elapsed();
+    let took = begun.elapsed();
     let ended = match outcome {
         Err(setback) => Ended::Setback(setback),
         Ok(output) => {
             breakpoint::reach(stage, Point::Computed, Some(&pair.facts.name));
-            let written = || breakpoint::reach(stage, Point::Written, Some(&pair.facts.name));
-            match project.write_artifacts_telling(&output.files, &written) {
-                Err(error) => Ended::NotFiled(error),
-                Ok(files) => filed(stage, &mut pair, output, files),
-            }
+            given(stage, &mut pair, output)
         }
     };
-    let all = begun.elapsed();
-    (pair, ended, Took { computing, all })
+    (pair, ended, took)
 }
 
-/// Names what is on disk by its hashes, and keeps it in hand as later stages would find it stored.
-fn filed(
-    stage: Stage,
-    pair: &mut PairInHand,
-    output: super::steps::StageOutput,
-    files: ArtifactSet,
-) -> Ended {
-    breakpoint::reach(stage, Point::Filed, Some(&pair.facts.name));
+/// Names what was given by its hashes, and keeps it in hand as later stages would find it stored.
+fn given(stage: Stage, pair: &mut PairInHand, output: StageOutput) -> Ended {
     let Some(mesh_hash) = pair.mesh_hash() else {
         let text = "a stage was done before the mesh was read";
         return Ended::Setback(Setback::failed(FailureClass::Bug, text));
     };
+    let named: ArtifactSet = output
+        .files
+        .iter()
+        .map(|file| (file.role.clone(), file.reference()))
+        .collect();
     let depth = pair.stored.get(&Stage::Depth).map(|stored| &stored.files);
-    let metrics = outputs::metric_results(&output.metrics, &files, depth);
+    let metrics = outputs::metric_results(&output.metrics, &named, depth);
     let stored = Stored {
         outcome: serde_json::from_str(&output.outcome).unwrap_or_default(),
-        files: files.clone(),
+        files: named.clone(),
         mesh_hash,
         print_hash: pair.print_hash(),
     };
     pair.stored.insert(stage, stored);
-    Ended::Filed(Filed {
-        result_hash: outputs::result_hash(&output.outcome, &files),
+    Ended::Given(Given {
+        result_hash: outputs::result_hash(&output.outcome, &named),
         outcome: output.outcome,
-        files,
+        files: output.files,
+        named,
         metrics,
     })
 }

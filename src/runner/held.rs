@@ -1,5 +1,6 @@
-//! A pair's lease in a worker's hand. The thread that computes does not wait for the disk: stages are stored while those
-//! after them are computed, several at once where they are short, and the lease comes back when all are.
+//! A pair's lease in a worker's hand. The thread that computes does not wait for the disk: files are written and stages
+//! stored while those after them are computed, several at once where they are short, and the lease comes back when all
+//! are.
 
 use std::sync::Arc;
 
@@ -8,10 +9,12 @@ use tokio::task::JoinHandle;
 
 use super::RunError;
 use super::events::RunEvent;
+use super::filing::file;
 use super::worker::{PairEnd, PairReport, Shared};
 use crate::breakpoint::{self, Point};
-use crate::catalog::{CatalogError, Kept, Lease, StageDone};
+use crate::catalog::{Kept, Lease, StageDone};
 use crate::domain::{PairName, Stage};
+use crate::store::NewArtifact;
 
 /// The right to a pair, and what has been stored under it.
 pub(super) struct Held {
@@ -27,13 +30,19 @@ enum Right {
     Lease(Lease),
     /// With a task that stores the stages it is sent.
     Storing(
-        mpsc::UnboundedSender<StageDone>,
-        JoinHandle<Result<Stored, CatalogError>>,
+        mpsc::UnboundedSender<Finished>,
+        JoinHandle<Result<Stored, RunError>>,
     ),
     /// Spent: the pair is done, or the lease was given away.
     Spent,
     /// Lost to somebody else.
     Lost,
+}
+
+/// A stage that is computed, and the files that must be on disk before a row names them.
+pub(super) struct Finished {
+    pub(super) done: StageDone,
+    pub(super) files: Vec<NewArtifact>,
 }
 
 /// What became of the lease, and how many stages were stored under it.
@@ -67,14 +76,14 @@ impl Held {
 
     /// Sends a finished stage on its way, and tells of it when it is stored; `false` when the lease is known to be gone.
     /// Stages are stored in their order.
-    pub(super) async fn store(&mut self, done: StageDone) -> Result<bool, RunError> {
+    pub(super) async fn store(&mut self, finished: Finished) -> Result<bool, RunError> {
         self.begin();
         if let Right::Storing(sender, _) = &self.right
-            && sender.send(done).is_ok()
+            && sender.send(finished).is_ok()
         {
             return Ok(true);
         }
-        // It takes no more where the lease was lost or the catalog refused.
+        // It takes no more where the lease was lost, or the disk or the catalog refused.
         self.settle().await?;
         Ok(false)
     }
@@ -149,13 +158,13 @@ async fn store(
     shared: Arc<Shared>,
     name: PairName,
     mut lease: Lease,
-    mut stages: mpsc::UnboundedReceiver<StageDone>,
-) -> Result<Stored, CatalogError> {
+    mut stages: mpsc::UnboundedReceiver<Finished>,
+) -> Result<Stored, RunError> {
     let mut stored = 0;
     while let Some(first) = stages.recv().await {
-        let mut done = vec![first];
+        let mut done = vec![filed(&shared, &name, first).await?];
         while let Ok(next) = stages.try_recv() {
-            done.push(next);
+            done.push(filed(&shared, &name, next).await?);
         }
         let told: Vec<_> = done.iter().map(|done| (done.stage, done.ms)).collect();
         let kept = if stages.is_closed() {
@@ -183,6 +192,14 @@ async fn store(
         kept: Kept::Lease(lease),
         stages: stored,
     })
+}
+
+/// Has a stage's files written; then a row may name them.
+async fn filed(shared: &Shared, pair: &PairName, stage: Finished) -> Result<StageDone, RunError> {
+    let Finished { done, files } = stage;
+    let (project, limit) = (&shared.project, shared.stage_limit);
+    file(project, (pair, done.stage), files, limit).await?;
+    Ok(done)
 }
 
 fn finished(shared: &Shared, pair: PairName, stage: Stage, ms: u64) {

@@ -11,6 +11,7 @@ mod clock;
 mod dispatch;
 mod events;
 mod execute;
+mod filing;
 mod hand;
 mod held;
 mod options;

@@ -9,9 +9,9 @@ use tokio::sync::mpsc;
 use super::RunError;
 use super::clock::Clock;
 use super::events::RunEvent;
-use super::execute::{Computed, Ended, Filed, compute};
+use super::execute::{Computed, Ended, Given, compute};
 use super::hand::PairInHand;
-use super::held::Held;
+use super::held::{Finished, Held};
 use super::policy::{self, Try};
 use super::refresh;
 use super::steps::{Setback, Steps};
@@ -38,7 +38,7 @@ pub(super) struct Shared {
     pub(super) until: Stage,
     pub(super) stage_limit: Duration,
     pub(super) events: mpsc::UnboundedSender<RunEvent>,
-    /// Microseconds that threads of stages were at work.
+    /// Microseconds that threads were computing stages.
     pub(super) at_work_us: AtomicU64,
 }
 
@@ -78,16 +78,14 @@ struct Known {
 
 /// How one stage of a pair went.
 enum Step {
-    /// Computed and on disk.
-    Done(Box<PairInHand>, Box<StageDone>),
+    /// Computed.
+    Done(Box<PairInHand>, Box<Finished>),
     /// An earlier stage must run again first.
     Back(Box<PairInHand>, Stage),
     /// Failed.
     Failed(Blame),
     /// The run is to stop now.
     Stopped,
-    /// The disk refused.
-    Refused(RunError),
 }
 
 /// What went wrong.
@@ -117,7 +115,7 @@ impl Shared {
 
     fn note(&self, computed: &Computed) {
         if let Computed::Ended(_, _, took) = computed {
-            let us = took.all.as_micros() as u64;
+            let us = took.as_micros() as u64;
             self.at_work_us.fetch_add(us, Ordering::Relaxed);
         }
     }
@@ -165,7 +163,6 @@ async fn through(
             }
             Step::Failed(blame) => return fail(shared, held, stage, known, blame).await,
             Step::Stopped => return Ok(PairEnd::GivenBack),
-            Step::Refused(error) => return Err(error),
         };
         if !held.store(*done).await? {
             return Ok(PairEnd::Lost);
@@ -183,14 +180,13 @@ async fn step(shared: &Shared, stage: Stage, pair: Box<PairInHand>) -> Step {
         pair: pair.facts.name.clone(),
         stage,
     });
-    let (steps, project) = (&shared.steps, &shared.project);
     let limit = shared.stage_limit;
-    let computed = compute(steps, project, stage, pair, limit, &shared.stop).await;
+    let computed = compute(&shared.steps, stage, pair, limit, &shared.stop).await;
     shared.note(&computed);
     match computed {
-        Computed::Ended(mut pair, Ended::Filed(filed), took) => {
-            let done = done(shared, &mut pair, stage, filed, took.ms());
-            Step::Done(pair, Box::new(done))
+        Computed::Ended(mut pair, Ended::Given(given), took) => {
+            let finished = finished(shared, &mut pair, stage, given, ms(took));
+            Step::Done(pair, Box::new(finished))
         }
         Computed::Ended(pair, Ended::Setback(Setback::Back(earlier)), _) => {
             Step::Back(pair, earlier)
@@ -200,10 +196,9 @@ async fn step(shared: &Shared, stage: Stage, pair: Box<PairInHand>) -> Step {
                 failure,
                 may_pass,
                 inputs: Some(pair.inputs),
-                ms: Some(took.ms()),
+                ms: Some(ms(took)),
             })
         }
-        Computed::Ended(_, Ended::NotFiled(error), _) => Step::Refused(error.into()),
         Computed::NoThread(error) => {
             let text = format!("the system gave no thread for {stage}: {error}");
             Step::Failed(Blame::bare(FailureClass::Resource, text))
@@ -226,25 +221,38 @@ fn next(shared: &Shared, done: Stage) -> Result<Stage, PairEnd> {
     }
 }
 
-fn done(shared: &Shared, pair: &mut PairInHand, stage: Stage, filed: Filed, ms: u64) -> StageDone {
+const fn ms(took: Duration) -> u64 {
+    took.as_millis() as u64
+}
+
+/// What is to be stored of a stage.
+fn finished(
+    shared: &Shared,
+    pair: &mut PairInHand,
+    stage: Stage,
+    given: Given,
+    ms: u64,
+) -> Finished {
     let inputs = pair.news();
     let stored = &pair.stored[&stage];
-    StageDone {
+    let done = StageDone {
         stage,
         recipe: shared.recipes.of(stage),
         mesh_hash: stored.mesh_hash,
         print_hash: stored.print_hash,
         facts: pair.facts_text.clone(),
-        outcome: filed.outcome,
-        files: filed.files,
-        result_hash: filed.result_hash,
-        metrics: filed.metrics,
+        outcome: given.outcome,
+        files: given.named,
+        result_hash: given.result_hash,
+        metrics: given.metrics,
         inputs,
         ms,
         at: shared.clock.now(),
         next_deadline: shared.deadline(),
         alive_since: shared.alive_since(),
-    }
+    };
+    let files = given.files;
+    Finished { done, files }
 }
 
 /// Stores a failure and tells of it.
