@@ -193,3 +193,20 @@ fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
     assert_eq!(results(&killed), wanted);
     assert_eq!(finished(&killed), [1; 16]);
 }
+
+#[test]
+fn stages_are_computed_while_files_of_those_before_are_on_their_way() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let broken = project(dir.path(), "broken", "1");
+    // It would wait for ever for the depth map's file if the stages after it did.
+    let died = run(&broken, &["-j", "1"])
+        .env("MOCBAN_HOLD_AT", "depth:written")
+        .env("MOCBAN_HOLD_FILE", dir.path().join("held"))
+        .env("MOCBAN_BREAK_AT", "register:computed")
+        .output()
+        .expect("the binary starts");
+    assert_eq!(died.status.code(), None);
+    assert!(stages_done(&broken) <= 1, "a row names what is not on disk");
+    call(&mut run(&broken, &[])).expect(0);
+    assert_eq!(finished(&broken), [1; 4]);
+}

@@ -125,3 +125,19 @@ async fn the_next_pair_is_taken_ahead_and_given_back_by_a_drain() {
     assert_eq!(attempt(name("next")).await.expect("a read"), 0);
     assert_eq!(world.status("other").await, JobStatus::Ready);
 }
+
+#[tokio::test]
+async fn no_more_pairs_are_begun_than_the_disk_keeps_up_with() {
+    let names: Vec<String> = (0..60).map(|number| format!("pair_{number}")).collect();
+    let world = World::new(&names.iter().map(String::as_str).collect::<Vec<_>>()).await;
+    world.run(&options(1)).await;
+    let events = world.events.lock().expect("no panic holds it");
+    let (mut in_memory, mut most) = (0_i32, 0);
+    for event in events.iter() {
+        in_memory += i32::from(started(event, Stage::Fit));
+        in_memory -= i32::from(matches!(event, RunEvent::PairDone { .. }));
+        most = most.max(in_memory);
+    }
+    assert!((1..=5).contains(&most), "{most}");
+    assert_eq!(in_memory, 0);
+}
