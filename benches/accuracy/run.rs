@@ -3,7 +3,7 @@
 use mocban::domain::FitOutcome;
 use mocban::mesh;
 use mocban::raster;
-use mocban::stages::{Aligned, Print, Settings, StageError, depth, fit, normalize, register};
+use mocban::stages::{Aligned, Print, Scan, Settings, StageError, depth, fit, normalize, register};
 
 use super::times::{Part, Times};
 
@@ -55,21 +55,21 @@ fn align(
     times: &mut Times,
     fit: &mut Option<FitOutcome>,
 ) -> Result<(Print, Aligned), Failed> {
-    let mesh = times.book(Part::ReadMesh, || {
-        mesh::read(&input.mesh, "mesh.stl", &mesh::Limits::SUGGESTED)
+    let scan = times.book(Part::ReadMesh, || {
+        mesh::read(&input.mesh, "mesh.stl", &mesh::Limits::SUGGESTED).map(Scan::from)
     })?;
     let print = times.book(Part::ReadPrint, || {
         raster::decode(&input.print, &raster::Limits::SUGGESTED).map(Print::from)
     })?;
     let plane = times
         .book(Part::Fit, || {
-            fit::fit(&mesh, Some(&print), None, &settings.fit)
+            fit::fit(&scan, Some(&print), None, &settings.fit)
         })
         .map_err(StageError::from)?;
     let plane = &*fit.insert(plane);
     let depth = times
         .book(Part::Depth, || {
-            depth::depth(&mesh, plane, None, &settings.depth)
+            depth::depth(&scan, plane, None, &settings.depth)
         })
         .map_err(StageError::from)?;
     let normalized = times

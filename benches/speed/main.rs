@@ -10,8 +10,8 @@
 //! other programs can be given the same (`benches/peers`). One thread, in memory: files are read before the clock starts,
 //! but for `read/raw`. `cargo test --all-targets` runs each once on the smallest, to see that the program works.
 
+mod files;
 mod readers;
-mod scan;
 mod scores;
 mod stages;
 
@@ -19,7 +19,7 @@ use std::time::Duration;
 
 use criterion::Criterion;
 
-use scan::Scan;
+use files::Files;
 
 /// About how many vertices the scans have, corners that triangles share counted once.
 const SIZES: [(&str, u32); 3] = [("60k", 54_100), ("500k", 480_000), ("2M", 1_950_000)];
@@ -37,9 +37,9 @@ fn main() -> anyhow::Result<()> {
         .measurement_time(Duration::from_secs(2))
         .configure_from_args();
     for (name, vertices) in sizes {
-        let scan = Scan::kept(name, *vertices)?;
-        readers::measure(&mut criterion, &scan)?;
-        stages::measure(&mut criterion, &scan)?;
+        let files = Files::kept(name, *vertices)?;
+        readers::measure(&mut criterion, &files)?;
+        stages::measure(&mut criterion, &files)?;
     }
     scores::measure(&mut criterion);
     criterion.final_summary();

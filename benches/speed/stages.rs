@@ -4,46 +4,47 @@ use criterion::{BatchSize, Criterion};
 use mocban::config::{Sources, load};
 use mocban::mesh::{self, Mesh};
 use mocban::raster::{self, Picture};
-use mocban::stages::{Aligned, Print, Settings, depth, fit, normalize, register};
+use mocban::stages::{Aligned, Print, Scan, Settings, depth, fit, normalize, register};
 
-use super::scan::{Scan, bytes};
+use super::files::{Files, bytes};
 
-pub(super) fn measure(criterion: &mut Criterion, scan: &Scan) -> anyhow::Result<()> {
+pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Result<()> {
     let settings = load(&Sources::default())?.config.stages;
-    let (stl, png) = (bytes(&scan.mesh("stl"))?, bytes(&scan.print())?);
-    let mesh = read(&stl)?;
-    let picture = decode(&png)?;
+    let (stl, png) = (bytes(&files.mesh("stl"))?, bytes(&files.print())?);
+    let (mesh, picture) = (read(&stl)?, decode(&png)?);
     let print = Print::from(picture.clone());
-    let aligned = Aligned::new(&mesh, &print, &settings)?;
-    let mut bench = |name: &str, run: &mut dyn FnMut(&Print)| {
+    let aligned = Aligned::new(&mesh.clone().into(), &print, &settings)?;
+    // The ink is read and the surface made ready once for a pair, by fit. Depth alone makes the surface ready too.
+    let fresh = |name: &str| match name {
+        "fit" => (Scan::from(mesh.clone()), Print::from(picture.clone())),
+        "depth" => (Scan::from(mesh.clone()), print.clone()),
+        _ => (Scan::from(Mesh::default()), print.clone()),
+    };
+    let mut bench = |name: &str, run: &mut dyn FnMut(&Scan, &Print)| {
         let mut group = criterion.benchmark_group(format!("stages/{name}"));
-        group.bench_function(scan.size, |b| {
-            // The ink is read once for a pair: by fit, which comes first.
-            let fresh = || {
-                if name == "fit" {
-                    Print::from(picture.clone())
-                } else {
-                    print.clone()
-                }
+        group.bench_function(files.size, |b| {
+            let run = |(scan, print): (Scan, Print)| {
+                run(&scan, &print);
+                (scan, print)
             };
-            b.iter_batched(fresh, |print| run(&print), BatchSize::LargeInput);
+            b.iter_batched(|| fresh(name), run, BatchSize::PerIteration);
         });
         group.finish();
     };
-    bench("fit", &mut |print| {
-        drop(fit::fit(&mesh, Some(print), None, &settings.fit));
+    bench("fit", &mut |scan, print| {
+        drop(fit::fit(scan, Some(print), None, &settings.fit));
     });
-    bench("depth", &mut |_| {
-        drop(depth::depth(&mesh, &aligned.fit, None, &settings.depth));
+    bench("depth", &mut |scan, _| {
+        drop(depth::depth(scan, &aligned.fit, None, &settings.depth));
     });
-    bench("normalize", &mut |print| {
+    bench("normalize", &mut |_, print| {
         drop(normalize::normalize(
             &aligned.depth,
             print,
             &settings.normalize,
         ));
     });
-    bench("register", &mut |_| {
+    bench("register", &mut |_, _| {
         drop(register::register(
             &aligned.depth,
             &aligned.normalized,
@@ -51,7 +52,7 @@ pub(super) fn measure(criterion: &mut Criterion, scan: &Scan) -> anyhow::Result<
         ));
     });
     let mut whole = criterion.benchmark_group("pair");
-    whole.bench_function(scan.size, |b| b.iter(|| pair(&stl, &png, &settings)));
+    whole.bench_function(files.size, |b| b.iter(|| pair(&stl, &png, &settings)));
     whole.finish();
     Ok(())
 }
@@ -59,7 +60,7 @@ pub(super) fn measure(criterion: &mut Criterion, scan: &Scan) -> anyhow::Result<
 /// A pair from its files' bytes to its alignment.
 fn pair(stl: &[u8], png: &[u8], settings: &Settings) -> anyhow::Result<Aligned> {
     let print = Print::from(decode(png)?);
-    Ok(Aligned::new(&read(stl)?, &print, settings)?)
+    Ok(Aligned::new(&read(stl)?.into(), &print, settings)?)
 }
 
 fn read(stl: &[u8]) -> anyhow::Result<Mesh> {

@@ -1,7 +1,9 @@
-//! Wavefront OBJ through `tobj`.
+//! Wavefront OBJ: plain files by our own pass over them, all others through `tobj`.
 //!
 //! `tobj` is handed the `v` and `f` lines alone: groups and materials would cut the mesh into parts with repeated
 //! vertices, normals and texture corners are not used, and names may be in any encoding.
+
+mod quick;
 
 use std::io::{BufRead, Read};
 
@@ -17,6 +19,10 @@ const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
 /// Reads an OBJ. With faces, its vertices are those the faces use, in the order of their first use; without
 /// faces it is a point set.
 pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
+    quick::read(bytes, limits).map_or_else(|| read_by_tobj(bytes, limits), Ok)
+}
+
+fn read_by_tobj(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
     let joined = join_continued_lines(bytes);
     let bytes = joined.as_deref().unwrap_or(bytes);
     let counts = count(bytes);

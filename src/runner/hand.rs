@@ -7,10 +7,9 @@ use serde_json::Value;
 
 use crate::catalog::{InputsSeen, PairFacts, PairWork};
 use crate::domain::{ArtifactSet, ContentHash, FitOutcome, Stage};
-use crate::mesh::Mesh;
 use crate::raster::DepthMap;
-use crate::stages::Print;
 use crate::stages::normalize::Normalized;
+use crate::stages::{Print, Scan};
 
 /// What an earlier stage stored.
 #[derive(Debug, Clone)]
@@ -34,8 +33,8 @@ pub(super) struct PairInHand {
     pub(super) inputs: InputsSeen,
     /// What of those was given to the catalog with a stage.
     pub(super) told: InputsSeen,
-    /// The mesh, from fit to depth.
-    pub(super) mesh: Option<Mesh>,
+    /// The scan, from fit to depth.
+    pub(super) scan: Option<Scan>,
     /// The print, from the first stage that reads it to normalize.
     pub(super) print: Option<Print>,
     /// From fit on.
@@ -64,7 +63,7 @@ impl PairInHand {
             stored: stored.collect(),
             inputs: InputsSeen::default(),
             told: InputsSeen::default(),
-            mesh: None,
+            scan: None,
             print: None,
             fit: None,
             depth: None,

@@ -9,10 +9,10 @@ use super::outputs;
 use super::steps::{Setback, StageOutput, Steps};
 use crate::catalog::InputSeen;
 use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
-use crate::mesh::{self, Mesh};
+use crate::mesh;
 use crate::raster::{self, DepthMap};
 use crate::stages::normalize::Normalized;
-use crate::stages::{Print, Settings, StageError, depth, fit, normalize, register};
+use crate::stages::{Print, Scan, Settings, StageError, depth, fit, normalize, register};
 use crate::store::{ArtifactError, InputError, InputFile, Project, read_input};
 
 /// The stages of one project with their settings.
@@ -47,26 +47,26 @@ impl Pipeline {
     }
 
     fn fit(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
-        let mesh = self.read_mesh(pair)?;
+        let scan = self.read_scan(pair)?;
         // The paper's fit does not look at the print, so a changed print need not send its results back so far.
         let print = match self.settings.fit.method {
             fit::Method::Tops => Some(self.read_print(pair)?),
             fit::Method::Paper => None,
         };
         let face_down = pair.facts.scanned_face_down;
-        let outcome = fit::fit(&mesh, print.as_ref(), face_down, &self.settings.fit)
+        let outcome = fit::fit(&scan, print.as_ref(), face_down, &self.settings.fit)
             .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;
         let (outcome, json) = settled(&outcome)?;
-        (pair.mesh, pair.print) = (Some(mesh), print);
+        (pair.scan, pair.print) = (Some(scan), print);
         pair.fit = Some(outcome);
         Ok(outputs::numbers(json))
     }
 
     fn depth(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
         let fit = Self::fitted(pair)?;
-        // The mesh is not needed after this stage; taking it out frees its memory.
-        let mesh = self.mesh_of_fit(pair)?;
-        let map = depth::depth(&mesh, &fit, pair.facts.unit, &self.settings.depth)
+        // The scan is not needed after this stage; taking it out frees its memory.
+        let scan = self.scan_of_fit(pair)?;
+        let map = depth::depth(&scan, &fit, pair.facts.unit, &self.settings.depth)
             .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;
         let (outcome, json) = settled(&outputs::depth_outcome(&map))?;
         let output = outputs::depth(json, &map);
@@ -115,17 +115,17 @@ impl Pipeline {
             .ok_or(Setback::Back(Stage::Fit))
     }
 
-    /// The mesh that was fitted. When the file is another one by now, the fit is no fit of it.
-    fn mesh_of_fit(&self, pair: &mut PairInHand) -> Result<Mesh, Setback> {
-        if let Some(mesh) = pair.mesh.take() {
-            return Ok(mesh);
+    /// The scan that was fitted. When the file is another one by now, the fit is no fit of it.
+    fn scan_of_fit(&self, pair: &mut PairInHand) -> Result<Scan, Setback> {
+        if let Some(scan) = pair.scan.take() {
+            return Ok(scan);
         }
         let fitted = pair.mesh_hash();
-        let mesh = self.read_mesh(pair)?;
+        let scan = self.read_scan(pair)?;
         if fitted == pair.mesh_hash() {
-            return Ok(mesh);
+            return Ok(scan);
         }
-        pair.mesh = Some(mesh);
+        pair.scan = Some(scan);
         Err(Setback::Back(Stage::Fit))
     }
 
@@ -193,16 +193,17 @@ impl Pipeline {
             })
     }
 
-    fn read_mesh(&self, pair: &mut PairInHand) -> Result<Mesh, Setback> {
+    fn read_scan(&self, pair: &mut PairInHand) -> Result<Scan, Setback> {
         let stored = &pair.facts.mesh_path;
         let path = self.project.input_path(stored);
         let limit = self.mesh_limits.max_bytes;
         let file = read_input(&path, limit, "limits.mesh.max_bytes").map_err(unread)?;
         pair.inputs.mesh = Some(seen(&file));
-        mesh::read(&file.bytes, stored, &self.mesh_limits).map_err(|error| {
+        let mesh = mesh::read(&file.bytes, stored, &self.mesh_limits).map_err(|error| {
             let message = format!("{stored}: {error}");
             Setback::failed(error.class(), message)
-        })
+        })?;
+        Ok(mesh.into())
     }
 
     fn read_print(&self, pair: &mut PairInHand) -> Result<Print, Setback> {

@@ -2,9 +2,8 @@
 
 use super::normalize::Normalized;
 use super::register::Registered;
-use super::{Print, Settings, StageError, depth, fit, normalize, register};
+use super::{Print, Scan, Settings, StageError, depth, fit, normalize, register};
 use crate::domain::{FitOutcome, MetricOutcome, PrintFromMesh, ThresholdMetric};
-use crate::mesh::Mesh;
 use crate::raster::DepthMap;
 
 /// What the four stages make of a mesh and a print.
@@ -25,9 +24,9 @@ impl Aligned {
     ///
     /// # Errors
     /// Those of the first stage that finds no result.
-    pub fn new(mesh: &Mesh, print: &Print, settings: &Settings) -> Result<Self, StageError> {
-        let fit = fit::fit(mesh, Some(print), None, &settings.fit)?;
-        let depth = depth::depth(mesh, &fit, None, &settings.depth)?;
+    pub fn new(scan: &Scan, print: &Print, settings: &Settings) -> Result<Self, StageError> {
+        let fit = fit::fit(scan, Some(print), None, &settings.fit)?;
+        let depth = depth::depth(scan, &fit, None, &settings.depth)?;
         let normalized = normalize::normalize(&depth, print, &settings.normalize)?;
         let registered = register::register(&depth, &normalized, &settings.register)?;
         Ok(Self {

@@ -12,26 +12,68 @@ pub(super) type Bounds<const N: usize> = [[f64; N]; 2];
 
 /// The first and the last of the values that belong to the bulk; a scan without flecks keeps all of its bounds.
 pub(super) fn bulk_along(values: &[f32]) -> [f64; 2] {
-    let limits = limits(values.len(), |k| f64::from(values[k]));
-    let [least, most] = limits.map(|limit| limit as f32);
-    let (mut low, mut high) = ([f32::INFINITY; LANES], [f32::NEG_INFINITY; LANES]);
+    let mut bulk = Bulk::of(values.len(), |k| values[k]);
     let (runs, rest) = values.as_chunks::<LANES>();
-    let rest = std::iter::once(padded(rest, f32::NAN));
-    for run in runs.iter().copied().chain(rest) {
-        for (k, v) in run.into_iter().enumerate() {
-            // Plain comparisons, which are one instruction for many lanes; nothing passes that is not a number.
-            low[k] = if v >= least && v < low[k] { v } else { low[k] };
-            high[k] = if v <= most && v > high[k] { v } else { high[k] };
-        }
+    for run in runs {
+        bulk.take(*run);
     }
-    [
-        f64::from(low.into_iter().fold(f32::INFINITY, f32::min)),
-        f64::from(high.into_iter().fold(f32::NEG_INFINITY, f32::max)),
-    ]
+    // Nothing passes that is not a number.
+    bulk.take(std::array::from_fn(|k| {
+        rest.get(k).copied().unwrap_or(f32::NAN)
+    }));
+    bulk.taken().map(f64::from)
 }
 
-fn padded(values: &[f32], with: f32) -> [f32; LANES] {
-    std::array::from_fn(|k| values.get(k).copied().unwrap_or(with))
+/// Values side by side.
+type Lanes = [f32; LANES];
+
+/// The ends of those values taken so far that belong to the bulk.
+pub(super) struct Bulk {
+    least: f32,
+    most: f32,
+    low: Lanes,
+    high: Lanes,
+}
+
+impl Bulk {
+    /// Of so many values, none taken yet; some are looked at to tell what belongs to the bulk.
+    pub(super) fn of(count: usize, value: impl Fn(usize) -> f32) -> Self {
+        let [least, most] = limits(count, |k| f64::from(value(k)));
+        Self {
+            least: least as f32,
+            most: most as f32,
+            low: [f32::INFINITY; LANES],
+            high: [f32::NEG_INFINITY; LANES],
+        }
+    }
+
+    /// Takes some of the values.
+    #[inline]
+    pub(super) fn take(&mut self, values: Lanes) {
+        for (k, v) in values.into_iter().enumerate() {
+            // Plain comparisons, which are one instruction for many lanes.
+            let (low, high) = (&mut self.low[k], &mut self.high[k]);
+            *low = if v >= self.least && v < *low { v } else { *low };
+            *high = if v <= self.most && v > *high {
+                v
+            } else {
+                *high
+            };
+        }
+    }
+
+    /// Whether a value belongs to the bulk.
+    pub(super) fn holds(&self, value: f32) -> bool {
+        (self.least..=self.most).contains(&value)
+    }
+
+    /// The first and the last of the values taken that belong to the bulk.
+    pub(super) fn taken(&self) -> [f32; 2] {
+        [
+            self.low.into_iter().fold(f32::INFINITY, f32::min),
+            self.high.into_iter().fold(f32::NEG_INFINITY, f32::max),
+        ]
+    }
 }
 
 /// Values that are compared side by side.

@@ -2,13 +2,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::zbuffer::{NOTHING, Shell, View};
+use super::Scan;
+use super::zbuffer::{NOTHING, View};
 use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
-use crate::mesh::Mesh;
 use crate::raster::{DepthMap, Grid};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 3;
+pub const REVISION: u32 = 4;
 
 /// A depth map's longest side in pixels may not pass this: 16-bit maps of 268 million pixels help nobody.
 const LONGEST_PX_LIMIT: f64 = 16_384.0;
@@ -74,12 +74,12 @@ impl Error {
 /// # Errors
 /// When the resolution cannot be had, or nothing is seen.
 pub fn depth(
-    mesh: &Mesh,
+    scan: &Scan,
     fit: &FitOutcome,
     unit: Option<LengthUnit>,
     params: &Params,
 ) -> Result<DepthMap, Error> {
-    let shell = Shell::new(mesh);
+    let shell = scan.shell();
     let bounds = shell.bounds(&fit.plane_from_mesh);
     let view = View::around(bounds, longest_px(bounds, unit, params)?, true);
     let plane_from_px = view.px_from_plane.inverse().ok_or(Error::NothingSeen)?;
@@ -147,6 +147,7 @@ mod tests {
     use super::{Error, Params, ResolutionBy, depth};
     use crate::domain::{Bow, FitOutcome, LengthUnit, Rigid3, SideEvidence};
     use crate::mesh::Mesh;
+    use crate::stages::Scan;
 
     fn params() -> Params {
         Params {
@@ -157,7 +158,7 @@ mod tests {
     }
 
     /// A 10 x 6 sheet whose height is `0.1 x`, in a grid of 21 x 13 vertices.
-    fn ramp() -> Mesh {
+    fn ramp() -> Scan {
         let mut mesh = Mesh::default();
         for j in 0..13_u32 {
             for i in 0..21_u32 {
@@ -170,7 +171,7 @@ mod tests {
                 }
             }
         }
-        mesh
+        mesh.into()
     }
 
     fn flat_fit(bow: Option<Bow>) -> FitOutcome {

@@ -17,6 +17,7 @@ mod paper;
 mod pose;
 mod print;
 pub mod register;
+mod scan;
 pub mod score;
 #[cfg(test)]
 mod testing;
@@ -24,6 +25,7 @@ mod zbuffer;
 
 pub use aligned::Aligned;
 pub use print::Print;
+pub use scan::Scan;
 
 use serde::{Deserialize, Serialize};
 

@@ -213,7 +213,7 @@ pub(super) fn run(
     print: &Print,
     settings: &Settings,
 ) -> Result<Vec<(PrintFromMesh, MetricOutcome)>, StageError> {
-    let aligned = Aligned::new(mesh, print, settings)?;
+    let aligned = Aligned::new(&mesh.clone().into(), print, settings)?;
     let of = |metric: &MetricOutcome| (aligned.print_from_mesh(metric), *metric);
     Ok(aligned.metrics().iter().map(of).collect())
 }

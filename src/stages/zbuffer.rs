@@ -1,14 +1,17 @@
 //! The highest surface under each pixel, looking straight down on a plane (orthographic z-buffer).
 
+mod boxes;
 mod moments;
 mod triangle;
 mod view;
+mod winding;
 
-use super::bulk::{Bounds, bulk_along, room};
+use super::bulk::{Bounds, Bulk, bulk_along, room};
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
 use crate::raster::Grid;
 
+use boxes::Boxes;
 pub(super) use moments::Moments;
 use triangle::{fill, higher, lower, pixels};
 pub(super) use view::View;
@@ -31,6 +34,8 @@ pub(super) struct Shell {
     /// Box around the bulk.
     room: Bounds<3>,
     blocks: Vec<Block>,
+    /// Around each [`LANES`] blocks.
+    boxes: Vec<Boxes>,
     /// Triangles, or points, in the blocks.
     count: usize,
     has_faces: bool,
@@ -46,12 +51,19 @@ type Lanes = [f32; LANES];
 struct Row([f32; 4]);
 
 impl Row {
+    /// Of one corner.
+    #[inline]
+    fn place(&self, [x, y, z]: [f32; 3]) -> f32 {
+        let [a, b, c, d] = self.0;
+        a * x + b * y + c * z + d
+    }
+
+    /// Of corners side by side.
     #[inline]
     fn at(&self, [x, y, z]: &[Lanes; 3]) -> Lanes {
-        let [a, b, c, d] = self.0;
         let mut places = [0.0; LANES];
         for (k, place) in places.iter_mut().enumerate() {
-            *place = a * x[k] + b * y[k] + c * z[k] + d;
+            *place = self.place([x[k], y[k], z[k]]);
         }
         places
     }
@@ -69,14 +81,19 @@ impl Shell {
         } else {
             &mesh.triangles
         };
+        let blocks: Vec<Block> = triangles
+            .chunks(LANES)
+            .map(|few| block(few, &mesh.vertices, middle))
+            .collect();
+        let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+        let extent = sides.into_iter().fold(0.0, f64::max) as f32;
+        let boxes = blocks.chunks(LANES);
         Self {
             middle,
             room,
             count: triangles.len(),
-            blocks: triangles
-                .chunks(LANES)
-                .map(|few| block(few, &mesh.vertices, middle))
-                .collect(),
+            boxes: boxes.map(|few| Boxes::around(few, extent)).collect(),
+            blocks,
             has_faces: !mesh.triangles.is_empty(),
         }
     }
@@ -93,13 +110,53 @@ impl Shell {
     /// Bounds in x and y of a frame of the bulk of the corners.
     pub(super) fn bounds(&self, plane_from_mesh: &Rigid3) -> Bounds<2> {
         let [x, y, _] = self.rows(plane_from_mesh);
-        let [x, y] = [x, y].map(|row| {
-            let row = Row(row.map(|v| v as f32));
-            let corners = self.blocks.iter().flatten();
-            let places: Vec<Lanes> = corners.map(|corner| row.at(corner)).collect();
-            bulk_along(places.as_flattened())
-        });
+        let [x, y] = [x, y].map(|row| self.along(&Row(row.map(|v| v as f32))));
         [[x[0], y[0]], [x[1], y[1]]]
+    }
+
+    /// The first and the last place of the bulk of the corners.
+    fn along(&self, row: &Row) -> [f64; 2] {
+        let mut bulk = Bulk::of(self.blocks.len() * 3 * LANES, |k| {
+            let corner = &self.blocks[k / (3 * LANES)][k / LANES % 3];
+            row.place([0, 1, 2].map(|axis| corner[axis][k % LANES]))
+        });
+        let take = |bulk: &mut Bulk, block: &Block| {
+            for corner in block {
+                bulk.take(row.at(corner));
+            }
+        };
+        // Those that reach farthest come first, so that few of the others have anything to add.
+        for place in self.farthest(row, &bulk) {
+            take(&mut bulk, &self.blocks[place]);
+        }
+        let [mut low, mut high] = bulk.taken();
+        for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
+            let [lows, highs] = boxes.reach(row);
+            for (k, block) in blocks.iter().enumerate() {
+                if lows[k] < low || highs[k] > high {
+                    take(&mut bulk, block);
+                    [low, high] = bulk.taken();
+                }
+            }
+        }
+        [low, high].map(f64::from)
+    }
+
+    /// The blocks whose boxes reach farthest down and up, those that reach out of the bulk left out.
+    fn farthest(&self, row: &Row, bulk: &Bulk) -> [usize; 2] {
+        let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
+        for (group, boxes) in self.boxes.iter().enumerate() {
+            let [lows, highs] = boxes.reach(row);
+            for k in 0..LANES {
+                if lows[k] < low && bulk.holds(lows[k]) {
+                    (low, places[0]) = (lows[k], group * LANES + k);
+                }
+                if highs[k] > high && bulk.holds(highs[k]) {
+                    (high, places[1]) = (highs[k], group * LANES + k);
+                }
+            }
+        }
+        places.map(|place| place.min(self.blocks.len() - 1))
     }
 
     /// The highest z of a frame under each pixel's centre; [`NOTHING`] where the ray meets no surface.
@@ -107,7 +164,7 @@ impl Shell {
         let mut heights = Grid::new(view.width, view.height, NOTHING);
         self.raster(plane_from_mesh, view, |place, z| {
             let height = &mut heights.data_mut()[place];
-            *height = height.max(z);
+            *height = higher(z, *height);
         });
         heights
     }
@@ -117,8 +174,8 @@ impl Shell {
         let mut heights = Grid::new(view.width, view.height, [NOTHING; 2]);
         self.raster(plane_from_mesh, view, |place, z| {
             let [front, back] = &mut heights.data_mut()[place];
-            *front = front.max(z);
-            *back = back.max(-z);
+            *front = higher(z, *front);
+            *back = higher(-z, *back);
         });
         let last = view.height.saturating_sub(1);
         [
@@ -127,7 +184,8 @@ impl Shell {
         ]
     }
 
-    /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet.
+    /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet, and with what is no
+    /// number.
     fn raster(&self, plane_from_mesh: &Rigid3, view: &View, meet: impl FnMut(usize, f32)) {
         let [x, y, z] = self.rows(plane_from_mesh);
         let [[a, b, c], [d, e, f]] = view.px_from_plane.0;
@@ -146,19 +204,14 @@ impl Shell {
 
     /// Fills the triangles that hold a pixel's centre.
     fn fill_all(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
-        let [u, v, z] = rows;
-        for block in &self.blocks {
-            let across = block.each_ref().map(|corner| u.at(corner));
-            let down = block.each_ref().map(|corner| v.at(corner));
-            let (wide, high) = (holding(&across, size[0]), holding(&down, size[1]));
-            let held: [bool; LANES] = std::array::from_fn(|k| wide[k] & high[k]);
-            if held == [false; LANES] {
-                continue;
-            }
-            let heights = block.each_ref().map(|corner| z.at(corner));
-            for k in (0..LANES).filter(|k| held[*k]) {
-                let corner = |c: usize| [across[c][k], down[c][k], heights[c][k]];
-                fill([corner(0), corner(1), corner(2)], size, &mut meet);
+        let [u, v, _] = rows;
+        for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
+            let [across, down] = [u, v].map(|row| boxes.reach(row));
+            let held = holding([&across, &down], size);
+            for (block, held) in blocks.iter().zip(held) {
+                if held {
+                    fill_block(block, rows, size, &mut meet);
+                }
             }
         }
     }
@@ -201,17 +254,53 @@ fn block(triangles: &[[u32; 3]], vertices: &[[f64; 3]], middle: [f64; 3]) -> Blo
     block
 }
 
-/// Which triangles may hold a pixel's centre along one axis of the grid, given their corners' places along it.
+/// Fills those of a few triangles that hold a pixel's centre.
 #[inline]
-fn holding([a, b, c]: &[Lanes; 3], side: usize) -> [bool; LANES] {
+fn fill_block(
+    block: &Block,
+    [u, v, z]: &[Row; 3],
+    size: [usize; 2],
+    meet: &mut impl FnMut(usize, f32),
+) {
+    let across = block.each_ref().map(|corner| u.at(corner));
+    let down = block.each_ref().map(|corner| v.at(corner));
+    let held = holding([&ends(&across), &ends(&down)], size);
+    if held == [false; LANES] {
+        return;
+    }
+    let heights = block.each_ref().map(|corner| z.at(corner));
+    for k in (0..LANES).filter(|k| held[*k]) {
+        let corner = |c: usize| [across[c][k], down[c][k], heights[c][k]];
+        fill([corner(0), corner(1), corner(2)], size, meet);
+    }
+}
+
+/// The lowest and the highest of three corners' places.
+#[inline]
+fn ends([a, b, c]: &[Lanes; 3]) -> [Lanes; 2] {
+    let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
+    for k in 0..LANES {
+        low[k] = lower(lower(a[k], b[k]), c[k]);
+        high[k] = higher(higher(a[k], b[k]), c[k]);
+    }
+    [low, high]
+}
+
+/// Which lanes may hold a pixel's centre, given how far they reach along each axis of the grid.
+#[inline]
+fn holding([across, down]: [&[Lanes; 2]; 2], [width, height]: [usize; 2]) -> [bool; LANES] {
+    let (wide, high) = (holding_along(across, width), holding_along(down, height));
+    std::array::from_fn(|k| wide[k] & high[k])
+}
+
+#[inline]
+fn holding_along([low, high]: &[Lanes; 2], side: usize) -> [bool; LANES] {
     let last = side as f32 - 1.0;
     let mut holds = [false; LANES];
     for (k, holds) in holds.iter_mut().enumerate() {
-        let low = lower(lower(a[k], b[k]), c[k]);
-        let high = higher(higher(a[k], b[k]), c[k]);
         // The last whole pixel at or below the upper end; a narrow cast rounds down from 0 up.
-        let below = (lower(higher(high, -1.0), last) + 1.0) as i32 - 1;
-        *holds = below as f32 >= higher(low, 0.0);
+        let below = (lower(higher(high[k], -1.0), last) + 1.0) as i32 - 1;
+        *holds = below as f32 >= higher(low[k], 0.0);
     }
     holds
 }

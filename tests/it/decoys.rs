@@ -13,7 +13,7 @@ const COUNT: u64 = 3;
 
 fn refusal(decoy: &DecoyPair, settings: &Settings) -> Result<(), StageError> {
     let print = raster::decode(&decoy.print, &raster::Limits::SUGGESTED).expect("a picture");
-    Aligned::new(&decoy.mesh, &print.into(), settings)?;
+    Aligned::new(&decoy.mesh.clone().into(), &print.into(), settings)?;
     Ok(())
 }
 

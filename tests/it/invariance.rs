@@ -54,7 +54,7 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
 
 fn align(mesh: &Mesh, print: &Picture) -> PrintFromMesh {
     let print = print.clone().into();
-    let aligned = Aligned::new(mesh, &print, &SETTINGS).expect("an alignment");
+    let aligned = Aligned::new(&mesh.clone().into(), &print, &SETTINGS).expect("an alignment");
     let best = aligned.metrics().first().expect("a metric");
     aligned.print_from_mesh(best)
 }

@@ -94,7 +94,12 @@ impl<S: Source> Body<'_, S> {
         }
         let most = self.source.most_rows(element).min(element.rows);
         self.mesh.vertices.reserve_exact(most as usize);
-        for row in 0..element.rows {
+        let plain = if element.is_plain_position() && places == [0, 1, 2] {
+            self.plain_vertices(element.rows)?
+        } else {
+            0
+        };
+        for row in plain..element.rows {
             self.values(element)
                 .map_err(|reason| self.no_number(element, row, reason))?;
             let position = places.map(|place| self.row[place]);
@@ -102,6 +107,19 @@ impl<S: Source> Body<'_, S> {
             self.mesh.vertices.push(error::finite(position, count)?);
         }
         Ok(())
+    }
+
+    /// Reads up to so many positions that are written as most programs do, and says how many.
+    fn plain_vertices(&mut self, rows: u64) -> Result<u64, Error> {
+        for row in 0..rows {
+            let Some(position) = self.source.plain_position() else {
+                return Ok(row);
+            };
+            let count = self.mesh.vertices.len() as u64 + 1;
+            let position = error::finite(position.map(f64::from), count)?;
+            self.mesh.vertices.push(position);
+        }
+        Ok(rows)
     }
 
     /// Reads a row into `self.row`, one value a property; a list counts as 0.
@@ -147,16 +165,68 @@ impl<S: Source> Body<'_, S> {
                 element.name
             ))
         })?;
+        let plain = element.plain_corners().filter(|_| joining == Joining::Fan);
+        let most = self.source.most_rows(element).min(element.rows);
+        if plain.is_some() {
+            self.mesh.triangles.reserve(most as usize);
+        }
         for row in 0..element.rows {
-            for (place, property) in element.properties.iter().enumerate() {
-                match property.shape {
-                    Shape::List { count, item } if place == corners => {
-                        self.corners(element, row, (count, item), joining)?;
-                    }
-                    other => self
-                        .skip(other)
-                        .map_err(|reason| self.no_number(element, row, reason))?,
+            if let Some(item) = plain
+                && let Some(triangle) = self.source.plain_triangle()
+            {
+                self.plain_triangle(element, row, item, triangle)?;
+            } else {
+                self.face(element, row, corners, joining)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes a triangle as most programs write it.
+    fn plain_triangle(
+        &mut self,
+        element: &Element,
+        row: u64,
+        item: Scalar,
+        triangle: [u32; 3],
+    ) -> Result<(), Error> {
+        for index in triangle {
+            if u64::from(index) >= self.declared_vertices {
+                let negative = f64::from(index.cast_signed());
+                let index = if item == Scalar::I32 {
+                    negative
+                } else {
+                    f64::from(index)
+                };
+                self.check_index(element, row, index)?;
+            }
+        }
+        self.push(triangle)
+    }
+
+    fn push(&mut self, triangle: [u32; 3]) -> Result<(), Error> {
+        let count = self.mesh.triangles.len() as u64 + 1;
+        self.limits.check_triangles(count)?;
+        self.mesh.triangles.push(triangle);
+        Ok(())
+    }
+
+    /// Reads one row of faces.
+    fn face(
+        &mut self,
+        element: &Element,
+        row: u64,
+        corners: usize,
+        joining: Joining,
+    ) -> Result<(), Error> {
+        for (place, property) in element.properties.iter().enumerate() {
+            match property.shape {
+                Shape::List { count, item } if place == corners => {
+                    self.corners(element, row, (count, item), joining)?;
                 }
+                other => self
+                    .skip(other)
+                    .map_err(|reason| self.no_number(element, row, reason))?,
             }
         }
         Ok(())
@@ -182,9 +252,7 @@ impl<S: Source> Body<'_, S> {
             }
             self.check_index(element, row, index)?;
             if let Some(triangle) = joined.corner(index as u32, joining) {
-                let count = self.mesh.triangles.len() as u64 + 1;
-                self.limits.check_triangles(count)?;
-                self.mesh.triangles.push(triangle);
+                self.push(triangle)?;
             }
         }
         Ok(())

@@ -112,6 +112,30 @@ impl Element {
         self.properties.iter().all(one).then(|| self.least_size())
     }
 
+    /// Whether a row is three 32-bit floats.
+    pub(super) fn is_plain_position(&self) -> bool {
+        let mut shapes = self.properties.iter().map(|property| property.shape);
+        self.properties.len() == 3 && shapes.all(|shape| shape == Shape::One(Scalar::F32))
+    }
+
+    /// Type of the corners where a row is a list of 32-bit indices that a byte counts.
+    pub(super) fn plain_corners(&self) -> Option<Scalar> {
+        let [
+            Property {
+                shape:
+                    Shape::List {
+                        count: Scalar::U8,
+                        item,
+                    },
+                ..
+            },
+        ] = self.properties[..]
+        else {
+            return None;
+        };
+        matches!(item, Scalar::I32 | Scalar::U32).then_some(item)
+    }
+
     /// Place of a property among the others.
     pub(super) fn place(&self, names: &[&str]) -> Option<usize> {
         self.properties

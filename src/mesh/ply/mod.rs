@@ -288,5 +288,42 @@ mod tests {
                 }
             }
         }
+
+        #[test]
+        fn rows_as_most_programs_write_them_are_read_as_others(
+            vertices in prop::collection::vec(prop::array::uniform3(prop_oneof![20 => -9.0..9.0_f32, 1 => Just(f32::NAN)]), 1..6),
+            faces in prop::collection::vec(prop_oneof![
+                6 => prop::collection::vec(0..6_i32, 3),
+                1 => prop::collection::vec(-2..6_i32, 0..5),
+            ], 0..6),
+            cut in 0..9_usize,
+            signed in any::<bool>(),
+        ) {
+            let item = if signed { "int" } else { "uint" };
+            let read = |position: &str, before: &[u8], count: &str, count_bytes: usize| {
+                let mut out = format!(
+                    "ply\nformat binary_little_endian 1.0\nelement vertex {}\n{position}element face {}\n\
+                     property list {count} {item} vertex_indices\nend_header\n",
+                    vertices.len(),
+                    faces.len(),
+                )
+                .into_bytes();
+                for vertex in &vertices {
+                    out.extend(before);
+                    out.extend(vertex.iter().flat_map(|value| value.to_le_bytes()));
+                }
+                for face in &faces {
+                    out.extend(&(face.len() as u32).to_le_bytes()[..count_bytes]);
+                    out.extend(face.iter().flat_map(|index| index.to_le_bytes()));
+                }
+                // No more than the last face's corners may be missing, so that the rows' own sizes do not show.
+                let missing = cut.min(faces.last().map_or(0, |face| 4 * face.len()));
+                out.truncate(out.len() - missing);
+                read(&out).map_err(|error| error.to_string())
+            };
+            let plain = read(XYZ, &[], "uchar", 1);
+            let flagged = format!("property uchar flag\n{XYZ}");
+            prop_assert_eq!(plain, read(&flagged, &[7], "uint", 4));
+        }
     }
 }

@@ -21,6 +21,18 @@ pub(super) trait Source {
 
     /// How many rows of an element the rest can hold at most.
     fn most_rows(&self, element: &Element) -> u64;
+
+    /// The next position, of a row that is nothing but three 32-bit floats; `None` from text and at the body's end, and then
+    /// nothing is taken.
+    fn plain_position(&mut self) -> Option<[f32; 3]> {
+        None
+    }
+
+    /// The next triangle, of rows that are nothing but a byte that counts and 32-bit indices; `None` also where the
+    /// byte does not say three.
+    fn plain_triangle(&mut self) -> Option<[u32; 3]> {
+        None
+    }
 }
 
 /// Words between white space; rows need not be lines.
@@ -72,6 +84,18 @@ impl<'a, const BIG_ENDIAN: bool> Binary<'a, BIG_ENDIAN> {
         Self { rest }
     }
 
+    /// The next three words, their lowest bytes first, and what comes after them.
+    #[inline]
+    fn words(&self) -> Option<([[u8; 4]; 3], &'a [u8])> {
+        let (bytes, rest) = self.rest.split_first_chunk::<12>()?;
+        let (words, _) = bytes.as_chunks::<4>();
+        let mut words = [words[0], words[1], words[2]];
+        if BIG_ENDIAN {
+            words = words.map(|[a, b, c, d]| [d, c, b, a]);
+        }
+        Some((words, rest))
+    }
+
     /// The next bytes, lowest first.
     #[inline]
     fn take<const N: usize>(&mut self) -> Result<[u8; N], NoNumber> {
@@ -111,5 +135,24 @@ impl<const BIG_ENDIAN: bool> Source for Binary<'_, BIG_ENDIAN> {
 
     fn most_rows(&self, element: &Element) -> u64 {
         (self.rest.len() / element.least_size().max(1)) as u64
+    }
+
+    #[inline]
+    fn plain_position(&mut self) -> Option<[f32; 3]> {
+        let (words, rest) = self.words()?;
+        self.rest = rest;
+        Some(words.map(f32::from_le_bytes))
+    }
+
+    #[inline]
+    fn plain_triangle(&mut self) -> Option<[u32; 3]> {
+        let whole = self.rest;
+        self.rest = whole.strip_prefix(&[3])?;
+        let Some((words, rest)) = self.words() else {
+            self.rest = whole;
+            return None;
+        };
+        self.rest = rest;
+        Some(words.map(u32::from_le_bytes))
     }
 }

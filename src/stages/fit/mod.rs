@@ -12,11 +12,10 @@ mod tops;
 use serde::{Deserialize, Serialize};
 
 use crate::domain::{FailureClass, FitOutcome};
-use crate::mesh::Mesh;
-use crate::stages::Print;
+use crate::stages::{Print, Scan};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 7;
+pub const REVISION: u32 = 8;
 
 /// How the plane is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -108,7 +107,7 @@ impl Error {
 
 /// Finds the plane on which the tops of the strokes lie, and the side of it that is carved.
 ///
-/// `mesh` is in its own frame and unit. `scanned_face_down` says which way the carved face looks along the mesh's z,
+/// `scan` is in its own frame and unit. `scanned_face_down` says which way the carved face looks along the mesh's z,
 /// where that is known; it decides only when nothing else tells. `print` helps to tell the carved side from the back
 /// of an open sheet, whose winding cannot be trusted; the plane itself does not depend on it. The outcome's plane frame keeps the
 /// mesh's x direction as far as it can, so an upright scan stays upright.
@@ -116,18 +115,18 @@ impl Error {
 /// # Errors
 /// When the vertices span no surface, nothing is carved, or no plane is found.
 pub fn fit(
-    mesh: &Mesh,
+    scan: &Scan,
     print: Option<&Print>,
     scanned_face_down: Option<bool>,
     params: &Params,
 ) -> Result<FitOutcome, Error> {
-    let count = mesh.vertices.len();
+    let count = scan.mesh().vertices.len();
     if count < 3 {
         return Err(Error::TooFewPoints(count));
     }
     match params.method {
-        Method::Paper => paper::fit(mesh, params),
-        Method::Tops => tops::fit(mesh, print, scanned_face_down, params),
+        Method::Paper => paper::fit(scan.mesh(), params),
+        Method::Tops => tops::fit(scan, print, scanned_face_down, params),
     }
 }
 

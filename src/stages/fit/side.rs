@@ -6,9 +6,9 @@
 
 use super::surface::{Samples, Surface, quantile};
 use crate::domain::{Bow, Rigid3, SideEvidence};
-use crate::mesh::Mesh;
 use crate::stages::Print;
 use crate::stages::pose::{Base, Keep, Limits, Pass, Refiner, Soft, find};
+use crate::stages::zbuffer::Shell;
 
 /// A side with less than this share of the other's relief is the back of the block.
 const BACK: f64 = 0.35;
@@ -79,7 +79,7 @@ pub(super) struct Face {
 /// What else is known of the side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Witness<'a> {
-    pub(super) mesh: &'a Mesh,
+    pub(super) shell: &'a Shell,
     pub(super) print: Option<&'a Print>,
     pub(super) scanned_face_down: Option<bool>,
 }
@@ -92,13 +92,13 @@ pub(super) fn choose(
     let (first, second) = match faces {
         [Some(a), Some(b)] => (a, b),
         [Some(only), None] | [None, Some(only)] => {
-            let winding = outward_share(witness.mesh, &only.plane_from_mesh);
+            let winding = witness.shell.outward_share(&only.plane_from_mesh);
             let evidence = evidence(&only, 1.0, winding);
             return Some((only, evidence));
         }
         [None, None] => return None,
     };
-    let winding = outward_share(witness.mesh, &first.plane_from_mesh);
+    let winding = witness.shell.outward_share(&first.plane_from_mesh);
     let odds = log_odds(&first, &second, winding, witness);
     let confidence = (odds.abs() / 2.0).tanh();
     // What looks out on one side looks in on the other.
@@ -195,24 +195,4 @@ pub(super) fn layer_width(samples: &Samples, surface: &Surface, relief: f64) -> 
     }
     let (low, high) = (quantile(&mut upper, 0.25), quantile(&mut upper, 0.75));
     ((high - low) / relief.max(f64::MIN_POSITIVE)).max(0.005)
-}
-
-/// Share of the area, as seen along the normal, whose winding looks out on this side; `None` without faces.
-fn outward_share(mesh: &Mesh, plane_from_mesh: &Rigid3) -> Option<f64> {
-    let [x, y, z, _] = plane_from_mesh.0[2];
-    let (mut out, mut all) = (0.0, 0.0);
-    for t in &mesh.triangles {
-        let [a, b, c] = t.map(|i| mesh.vertices[i as usize]);
-        let (p, q) = (minus(b, a), minus(c, a));
-        let facing = x * (p[1] * q[2] - p[2] * q[1])
-            + y * (p[2] * q[0] - p[0] * q[2])
-            + z * (p[0] * q[1] - p[1] * q[0]);
-        all += facing.abs();
-        out += facing.max(0.0);
-    }
-    (all > 0.0).then(|| out / all)
-}
-
-fn minus(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

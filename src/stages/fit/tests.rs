@@ -21,7 +21,7 @@ fn plane_and_side_of_any_pose() {
             ..World::default()
         };
         let found = fit(
-            &world.mesh(),
+            &world.mesh().into(),
             Some(&print(14.0, 2.0).0),
             None,
             &settings().fit,
@@ -42,7 +42,7 @@ fn bow_is_found_only_where_there_is_one() {
         ..World::default()
     };
     let found = fit(
-        &bent.mesh(),
+        &bent.mesh().into(),
         Some(&print(14.0, 2.0).0),
         None,
         &settings().fit,
@@ -58,7 +58,7 @@ fn bow_is_found_only_where_there_is_one() {
         ..World::default()
     };
     let found = fit(
-        &flat.mesh(),
+        &flat.mesh().into(),
         Some(&print(14.0, 2.0).0),
         None,
         &settings().fit,
@@ -76,7 +76,13 @@ fn the_papers_plane_is_close_on_an_open_mesh() {
             turn: some_turn(k),
             ..World::default()
         };
-        let found = fit(&world.mesh(), Some(&print(14.0, 2.0).0), None, &params).expect("a plane");
+        let found = fit(
+            &world.mesh().into(),
+            Some(&print(14.0, 2.0).0),
+            None,
+            &params,
+        )
+        .expect("a plane");
         let error = normal_error_deg(&world, &found);
         assert!(error < 3.0, "{error} degrees in pose {k}");
     }
@@ -94,7 +100,7 @@ fn points_that_span_no_surface_are_refused() {
             method,
             ..params.clone()
         };
-        let fit = |vertices| fit(&mesh(vertices), None, None, &params);
+        let fit = |vertices| fit(&mesh(vertices).into(), None, None, &params);
         assert_eq!(fit(vec![[0.0; 3]; 2]), Err(Error::TooFewPoints(2)));
         assert_eq!(fit(vec![[1.0, 2.0, 3.0]; 9]), Err(Error::OnePoint(9)));
         let line = (0..50)

@@ -8,10 +8,9 @@ use super::side::{self, Face, Witness, layer_width};
 use super::surface::{Samples, Surface};
 use super::{Error, Params};
 use crate::domain::{Bow, FitOutcome, Rigid3};
-use crate::mesh::Mesh;
 use crate::raster::Grid;
 use crate::stages::zbuffer::{Shell, View};
-use crate::stages::{Print, otsu};
+use crate::stages::{Print, Scan, otsu};
 
 /// Longest side of the rendering that tells the sides apart, and of the one that the surface is fitted to.
 const GLANCE_PX: usize = 96;
@@ -30,23 +29,23 @@ const SCANT: f64 = 0.05;
 const FARTHEST: usize = 100;
 
 pub(super) fn fit(
-    mesh: &Mesh,
+    scan: &Scan,
     print: Option<&Print>,
     scanned_face_down: Option<bool>,
     params: &Params,
 ) -> Result<FitOutcome, Error> {
-    let shell = Shell::new(mesh);
-    let axes = Axes::of_surface(mesh, &shell);
+    let (mesh, shell) = (scan.mesh(), scan.shell());
+    let axes = Axes::of_surface(mesh, shell);
     axes.require_surface(mesh)?;
-    let faces = glances(&shell, &frame(axes.normal(), axes.centre), params.bow);
+    let faces = glances(shell, &frame(axes.normal(), axes.centre), params.bow);
     let witness = Witness {
-        mesh,
+        shell,
         print,
         scanned_face_down,
     };
     let no_surface = || Error::NoSurface(mesh.vertices.len());
     let (face, side) = side::choose(faces, witness).ok_or_else(no_surface)?;
-    let face = look(&shell, face.plane_from_mesh, params.bow, LOOK).ok_or_else(no_surface)?;
+    let face = look(shell, face.plane_from_mesh, params.bow, LOOK).ok_or_else(no_surface)?;
     if face.relief < params.min_relief * face.extent {
         return Err(Error::NoRelief {
             relief: face.relief,

@@ -38,8 +38,9 @@ fn align(bytes: &[u8], print: &Picture) -> Result<(), StageError> {
     let Ok(mesh) = mesh::read(bytes, "scan.stl", &LIMITS) else {
         return Ok(());
     };
-    let fit = fit::fit(&mesh, Some(print), None, &settings.fit)?;
-    let map = depth::depth(&mesh, &fit, None, &settings.depth)?;
+    let scan = mesh.into();
+    let fit = fit::fit(&scan, Some(print), None, &settings.fit)?;
+    let map = depth::depth(&scan, &fit, None, &settings.depth)?;
     let masks = normalize::normalize(&map, print, &settings.normalize)?;
     register::register(&map, &masks, &settings.register)?;
     Ok(())

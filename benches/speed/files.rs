@@ -17,13 +17,13 @@ pub(super) const MESHES: [(&str, MeshFormat); 3] = [
 ];
 
 /// A pair of one size.
-pub(super) struct Scan {
+pub(super) struct Files {
     /// The size as it stands in the benchmarks' names.
     pub(super) size: &'static str,
     dir: PathBuf,
 }
 
-impl Scan {
+impl Files {
     /// The scan of a size from its folder, made if it is not there.
     pub(super) fn kept(size: &'static str, vertices: u32) -> anyhow::Result<Self> {
         let root = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");

@@ -1,0 +1,200 @@
+"""Times whole pairs, from files to files: `mocban run` beside the same work put together from Open3D, trimesh and OpenCV.
+
+    cargo build --release
+    taskset -c 0 peers/bin/python benches/peers/pair.py
+
+The pairs are those of `mocban demo`, their meshes rewritten as binary STL. Both programs take turns over the whole set,
+each with one core. The peer's steps are the quickest that were found for each, and do no more than the paper asks: the
+plane by RANSAC, the side by the sharper layer of heights, a depth map by casting rays, the ink by Otsu, the turn by ECC
+from starts all around, the threshold by SSIM and by density over the paper's 90 levels, PNG files. It keeps no catalog,
+syncs nothing, and checks nothing. A result is wrong when its turn is more than 5 degrees off the truth.
+"""
+
+import argparse
+import csv
+import json
+import os
+import pathlib
+import shutil
+import statistics
+import subprocess
+import time
+
+import cv2
+import numpy as np
+import open3d as o3d
+import trimesh
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = ROOT / "target" / "release" / "mocban"
+LONGEST, CANVAS, SMALL, STARTS = 512, 256, 96, 24
+LEVELS = range(50, 140)
+
+
+def plane(vertices):
+    """Rotation that lays the plane of most points on z = 0, and the heights in it."""
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(vertices))
+    extent = np.ptp(vertices, axis=0).max()
+    (a, b, c, _), _ = cloud.segment_plane(extent * 0.002, 3, 100)
+    normal = np.array([a, b, c]) / np.linalg.norm([a, b, c])
+    along = np.cross([0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0], normal)
+    along /= np.linalg.norm(along)
+    turn = np.stack([along, np.cross(normal, along), normal])
+    heights = vertices @ turn[2]
+    low, middle, high = np.quantile(heights, [0.02, 0.5, 0.98])
+    return turn if high - middle < middle - low else np.diag([1.0, -1.0, -1.0]) @ turn
+
+
+def depth(mesh, turn):
+    """Heights as 16 bits, mirrored as the print is, 0 where no ray hits; and pixels a unit."""
+    vertices = (mesh.vertices @ turn.T).astype(np.float32)
+    vertices[:, 0] *= -1
+    low, high = vertices.min(0), vertices.max(0)
+    scale = (LONGEST - 3) / (high - low)[:2].max()
+    width, height = (int(np.ceil(side * scale)) + 3 for side in (high - low)[:2])
+    scene = o3d.t.geometry.RaycastingScene(nthreads=1)
+    scene.add_triangles(vertices, mesh.faces.astype(np.uint32))
+    x, y = np.meshgrid(low[0] + (np.arange(width) - 1) / scale, high[1] - (np.arange(height) - 1) / scale)
+    rays = np.zeros((height, width, 6), np.float32)
+    rays[..., 0], rays[..., 1], rays[..., 2], rays[..., 5] = x, y, high[2] + 1, -1
+    hit = high[2] + 1 - scene.cast_rays(o3d.core.Tensor(rays), nthreads=1)["t_hit"].numpy()
+    seen = np.isfinite(hit)
+    span = max(hit[seen].max() - hit[seen].min(), 1e-9)
+    return np.where(seen, 1 + (hit - hit[seen].min()) / span * 65534, 0).astype(np.uint16)
+
+
+def squared(picture, side):
+    """The box of what is set, on a square canvas."""
+    rows, columns = np.flatnonzero(picture.any(1)), np.flatnonzero(picture.any(0))
+    cut = picture[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.float32)
+    scale = side * 0.7 / max(cut.shape)
+    to = np.float32([[scale, 0, (side - scale * cut.shape[1]) / 2], [0, scale, (side - scale * cut.shape[0]) / 2]])
+    return cv2.warpAffine(cut, to, (side, side), flags=cv2.INTER_AREA), scale, (rows[0], columns[0])
+
+
+def ecc(fixed, moving, start, steps):
+    stop = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, steps, 1e-5)
+    try:
+        score, found = cv2.findTransformECC(fixed, moving, start, cv2.MOTION_AFFINE, stop, None, 5)
+    except cv2.error:
+        return -1.0, start
+    return score, found
+
+
+def register(fixed, moving):
+    """The affine motion from print to depth on canvases of 256 pixels: the best of starts all around."""
+    shrink = SMALL / CANVAS
+    small = [cv2.resize(mask, (SMALL, SMALL), interpolation=cv2.INTER_AREA) for mask in (fixed, moving)]
+    middle = (SMALL - 1) / 2
+    starts = [cv2.getRotationMatrix2D((middle, middle), k * 360 / STARTS, 1).astype(np.float32) for k in range(STARTS)]
+    _, best = max((ecc(*small, start, 20) for start in starts), key=lambda found: found[0])
+    best[:, 2] = (best[:, 2] + best[:, :2].sum(1) * (0.5 - 0.5 * shrink) / shrink * 0) / shrink
+    return ecc(fixed, moving, best, 30)[1]
+
+
+def ssim(a, b):
+    def mean(picture):
+        return cv2.GaussianBlur(picture, (11, 11), 1.5)
+
+    ma, mb = mean(a), mean(b)
+    va, vb, vab = mean(a * a) - ma * ma, mean(b * b) - mb * mb, mean(a * b) - ma * mb
+    return (((2 * ma * mb + 1e-4) * (2 * vab + 9e-4)) / ((ma * ma + mb * mb + 1e-4) * (va + vb + 9e-4))).mean()
+
+
+def pair(mesh_path, print_path, out):
+    """All four stages; returns the turn in degrees, and writes what they made."""
+    mesh = trimesh.load(mesh_path, process=False)
+    levels = depth(mesh, plane(mesh.vertices))
+    cv2.imwrite(str(out / "depth.png"), levels, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    grey = cv2.imread(str(print_path), cv2.IMREAD_GRAYSCALE)
+    _, ink = cv2.threshold(grey, 0, 1, cv2.THRESH_BINARY_INV | cv2.THRESH_OTSU)
+    bytes_ = (levels >> 8).astype(np.uint8)
+    top, _ = cv2.threshold(bytes_[levels > 0].reshape(-1, 1), 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
+    fixed, _, _ = squared(ink, CANVAS)
+    moving, _, _ = squared(bytes_ > top, CANVAS)
+    motion = register(fixed, moving)
+    rows = np.flatnonzero((bytes_ > top).any(1))
+    columns = np.flatnonzero((bytes_ > top).any(0))
+    cut = bytes_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    scale = CANVAS * 0.7 / max(cut.shape)
+    to = np.float32(
+        [[scale, 0, (CANVAS - scale * cut.shape[1]) / 2], [0, scale, (CANVAS - scale * cut.shape[0]) / 2]]
+    )
+    canvas = cv2.warpAffine(cut, to, (CANVAS, CANVAS), flags=cv2.INTER_AREA)
+    canvas = cv2.warpAffine(canvas, motion, (CANVAS, CANVAS), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+    masks = {level: (canvas > level).astype(np.float32) for level in LEVELS}
+    best = {
+        "ssim": max(LEVELS, key=lambda level: ssim(fixed, masks[level])),
+        "nl_ssim": max(LEVELS, key=lambda level: ssim(fixed - fixed.mean(), masks[level] - masks[level].mean())),
+        "density": min(LEVELS, key=lambda level: abs(fixed.mean() - masks[level].mean())),
+    }
+    scores = {}
+    for metric, level in best.items():
+        both, either = (fixed * masks[level]).sum(), np.maximum(fixed, masks[level]).sum()
+        scores[metric] = {"ssim": float(ssim(fixed, masks[level])), "iou": float(both / max(either, 1))}
+        cv2.imwrite(str(out / f"mask.{metric}.png"), (masks[level] * 255).astype(np.uint8))
+    cv2.imwrite(str(out / "print_mask.png"), (fixed * 255).astype(np.uint8))
+    (out / "pair.json").write_text(json.dumps({"motion": motion.tolist(), "scores": scores}))
+
+
+def prepared(work, pairs, seed):
+    """Demo pairs with STL meshes, and their manifest."""
+    demo, data = work / "demo", work / "data"
+    if data.exists():
+        return data
+    command = [PROGRAM, "demo", demo, "--tier", "pose", "--pairs", str(pairs), "--seed", str(seed)]
+    subprocess.run(command, check=True, capture_output=True)
+    half = work / "half"
+    half.mkdir(parents=True, exist_ok=True)
+    with open(demo / "data" / "manifest.csv", encoding="utf-8") as rows, open(half / "pairs.csv", "w") as out:
+        out.write("id,mesh,print\n")
+        for row in csv.DictReader(rows):
+            mesh = trimesh.load(demo / "data" / row["mesh"], process=False)
+            mesh.export(half / f"{row['id']}.stl")
+            name = pathlib.Path(row["print"]).name
+            shutil.copy(demo / "data" / row["print"], half / name)
+            out.write(f"{row['id']},{row['id']}.stl,{name}\n")
+    half.rename(data)
+    return data
+
+
+def ours(work, data):
+    """Seconds of `run`, the project made before."""
+    project = work / "project"
+    shutil.rmtree(project, ignore_errors=True)
+    subprocess.run([PROGRAM, "-C", project, "import", data / "pairs.csv"], check=True, capture_output=True)
+    begin = time.perf_counter()
+    subprocess.run([PROGRAM, "-C", project, "run", "--jobs", "1"], capture_output=True)
+    return time.perf_counter() - begin
+
+
+def theirs(work, data):
+    out = work / "out"
+    begin = time.perf_counter()
+    for row in csv.DictReader(open(data / "pairs.csv")):
+        folder = out / row["id"]
+        folder.mkdir(parents=True, exist_ok=True)
+        pair(data / row["mesh"], data / row["print"], folder)
+    return time.perf_counter() - begin
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__)
+    options.add_argument("--pairs", type=int, default=24)
+    options.add_argument("--seed", type=int, default=11)
+    options.add_argument("--rounds", type=int, default=3)
+    options = options.parse_args()
+    cv2.setNumThreads(1)
+    os.environ["OMP_NUM_THREADS"] = "1"
+    work = ROOT / "target" / "tmp" / f"peers-{options.pairs}-{options.seed}"
+    data = prepared(work, options.pairs, options.seed)
+    times = {"mocban": [], "assembled": []}
+    for _ in range(options.rounds):
+        times["mocban"].append(ours(work, data))
+        times["assembled"].append(theirs(work, data))
+    one, two = (statistics.median(times[who]) / options.pairs * 1e3 for who in ("mocban", "assembled"))
+    print(f"{options.pairs} pairs: mocban {one:.1f} ms a pair, assembled {two:.1f} ms a pair, ratio {one / two:.3f}")
+
+
+if __name__ == "__main__":
+    main()
