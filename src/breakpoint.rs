@@ -4,7 +4,8 @@
 //! N-th time (1 when left out, 0 for each time) that a pair, or that pair, reaches the point at that stage.
 //! `MOCBAN_STOP_AT` stops the process there instead, until it is sent SIGCONT. `MOCBAN_HOLD_AT` holds the thread up:
 //! it makes the file that `MOCBAN_HOLD_FILE` names and goes on when somebody has removed it; such a point must be one
-//! that a thread of its own reaches: `computed`, `written` or `filed`. Only builds with debug assertions look.
+//! that a thread of its own reaches: `computed`, `written` or `filed`. At `MOCBAN_PANIC_AT`, of the same kind, that
+//! thread panics. Only builds with debug assertions look.
 
 use crate::domain::{PairName, Stage};
 
@@ -45,6 +46,9 @@ pub(crate) fn reach(stage: Stage, point: Point, pair: Option<&PairName>) {
     if hold.is_some_and(|at| at.is(stage, point, pair)) {
         test_build::hold();
     }
+    let panic = asked(&test_build::PANIC_AT, "MOCBAN_PANIC_AT");
+    let panics = panic.is_some_and(|at| at.is(stage, point, pair));
+    assert!(!panics, "asked for by a test");
 }
 
 /// Nothing to reach in a release build.
@@ -63,6 +67,7 @@ mod test_build {
     pub(super) static BREAK_AT: OnceLock<Option<Wanted>> = OnceLock::new();
     pub(super) static STOP_AT: OnceLock<Option<Wanted>> = OnceLock::new();
     pub(super) static HOLD_AT: OnceLock<Option<Wanted>> = OnceLock::new();
+    pub(super) static PANIC_AT: OnceLock<Option<Wanted>> = OnceLock::new();
 
     /// A place that a test names.
     #[derive(Debug)]

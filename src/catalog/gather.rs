@@ -83,7 +83,7 @@ mod tests {
     use tokio::sync::{mpsc, oneshot};
     use tokio::time::timeout;
 
-    use super::gather;
+    use super::{BATCH, gather};
     use crate::catalog::batch::{Beat, Request};
     use crate::catalog::writer::Message;
     use crate::domain::WorkerId;
@@ -99,10 +99,22 @@ mod tests {
 
     /// Requests in the batch that begins with the first of these, where nothing else ever comes.
     async fn gathered(messages: Vec<Message>) -> usize {
-        let (sender, mut inbox) = mpsc::channel(9);
+        gathered_later(messages, Vec::new()).await
+    }
+
+    /// The same, where some come when it is waited for more.
+    async fn gathered_later(messages: Vec<Message>, later: Vec<Message>) -> usize {
+        let (sender, mut inbox) = mpsc::channel(messages.len());
         for message in messages {
             sender.send(message).await.expect("room");
         }
+        let after = sender.clone();
+        tokio::spawn(async move {
+            for message in later {
+                tokio::task::yield_now().await;
+                after.send(message).await.expect("room");
+            }
+        });
         let first = inbox.recv().await.expect("a message");
         let batch = gather(first, Duration::from_hours(1), &mut inbox);
         let batch = timeout(Duration::from_secs(20), batch).await;
@@ -128,10 +140,29 @@ mod tests {
     }
 
     #[tokio::test]
+    async fn what_comes_while_something_waits_goes_with_it() {
+        let later = vec![
+            Message::InTime(request()),
+            Message::InTime(request()),
+            Message::Hurry,
+        ];
+        assert_eq!(
+            gathered_later(vec![Message::InTime(request())], later).await,
+            3
+        );
+    }
+
+    #[tokio::test]
     async fn nothing_is_waited_for_when_somebody_is_in_a_hurry_or_closes() {
         let waits = Message::InTime;
         assert_eq!(gathered(vec![waits(request()), Message::Hurry]).await, 1);
         let close = Message::Close(oneshot::channel().0);
         assert_eq!(gathered(vec![waits(request()), close]).await, 1);
+    }
+
+    #[tokio::test]
+    async fn a_full_commit_waits_for_no_more_and_leaves_the_rest() {
+        let messages = (0..=BATCH).map(|_| Message::InTime(request()));
+        assert_eq!(gathered(messages.collect()).await, BATCH);
     }
 }

@@ -46,6 +46,7 @@ mod writer;
 
 use std::path::Path;
 use std::sync::Arc;
+use std::time::Duration;
 
 use sqlx::pool::PoolConnection;
 use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
@@ -78,6 +79,7 @@ pub use upkeep::{Outstanding, WorkLeft, WorkerInfo};
 pub use verdicts::{NewVerdict, VerdictEvent};
 pub use work::{KnownInputs, PairWork};
 
+use gather::COMPANY;
 use writer::{Message, Work};
 
 /// Requests that may wait for the writer before senders do.
@@ -98,7 +100,7 @@ impl Catalog {
     /// # Errors
     /// When it is no catalog, the disk is a network's, or the database refuses.
     pub async fn create(path: &Path) -> Result<Self> {
-        Self::with_writer(path, true).await
+        Self::with_writer(path, true, COMPANY).await
     }
 
     /// Opens a catalog that is there, to read and write.
@@ -106,7 +108,7 @@ impl Catalog {
     /// # Errors
     /// When there is none, it is no catalog, the disk is a network's, or the database refuses.
     pub async fn open(path: &Path) -> Result<Self> {
-        Self::with_writer(path, false).await
+        Self::with_writer(path, false, COMPANY).await
     }
 
     /// Opens a catalog to read; works while a run goes on.
@@ -121,12 +123,12 @@ impl Catalog {
         })
     }
 
-    async fn with_writer(path: &Path, create: bool) -> Result<Self> {
+    async fn with_writer(path: &Path, create: bool, company: Duration) -> Result<Self> {
         let conn = connect::writer(path, create).await?;
         let readers = connect::readers(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();
-        tokio::spawn(writer::run(conn, Arc::clone(&path), inbox));
+        tokio::spawn(writer::run(conn, Arc::clone(&path), inbox, company));
         Ok(Self {
             readers,
             inbox: Some(sender),

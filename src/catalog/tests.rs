@@ -13,6 +13,9 @@ mod staleness;
 mod together;
 mod verdicts;
 
+use std::path::Path;
+use std::time::Duration;
+
 use serde_json::{Map, json};
 use tokio::sync::oneshot;
 
@@ -26,6 +29,11 @@ use crate::domain::{
 };
 
 impl Catalog {
+    /// A new catalog whose writer lets what can wait do so for ever.
+    pub(crate) async fn create_patient(path: &Path) -> super::Result<Self> {
+        Self::with_writer(path, true, Duration::from_hours(1)).await
+    }
+
     /// Keeps the writer busy from now on, until the sender is used or dropped.
     pub(crate) async fn hold(&self) -> oneshot::Sender<()> {
         let (held, is_held) = oneshot::channel();

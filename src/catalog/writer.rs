@@ -9,7 +9,7 @@ use sqlx::{Connection as _, SqliteConnection};
 use tokio::sync::{mpsc, oneshot};
 
 use super::batch::{Answers, Batch, Request};
-use super::gather::{COMPANY, gather};
+use super::gather::gather;
 use super::patience::Patience;
 use super::{CatalogError, Result, Trouble};
 
@@ -37,11 +37,12 @@ pub(super) enum Message {
     Close(oneshot::Sender<()>),
 }
 
-/// The writer's loop. Ends at `Close` or when nobody can send any more.
+/// The writer's loop. Ends at `Close` or when nobody can send any more. What can wait does so for as long as `company`.
 pub(super) async fn run(
     mut conn: SqliteConnection,
     path: Arc<Path>,
     mut inbox: mpsc::Receiver<Message>,
+    company: Duration,
 ) {
     let mut commits = 0_u32;
     let closing = loop {
@@ -62,7 +63,7 @@ pub(super) async fn run(
             // What it was sent for is stored already.
             Some(Message::Hurry) => continue,
             Some(first @ (Message::Grouped(_) | Message::InTime(_))) => {
-                let (batch, after) = gather(first, COMPANY, &mut inbox).await;
+                let (batch, after) = gather(first, company, &mut inbox).await;
                 commit(&mut conn, &path, batch).await;
                 match after {
                     Some(Message::Close(done)) => break Some(done),

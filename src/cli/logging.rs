@@ -16,7 +16,7 @@ use super::progress::Screen;
 /// When the log file cannot be opened.
 pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
     let (writer, to_file) = writer(global, screen)?;
-    let level = level(global, to_file);
+    let level = level(global.verbose, global.quiet, to_file);
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let builder = tracing_subscriber::fmt()
         .with_env_filter(filter)
@@ -44,11 +44,31 @@ fn writer(global: &Global, screen: &Screen) -> anyhow::Result<(BoxMakeWriter, bo
 }
 
 /// A log file is there to be read later, so it holds more than the screen.
-const fn level(global: &Global, to_file: bool) -> &'static str {
-    match (global.verbose, to_file, global.quiet) {
+const fn level(verbose: u8, quiet: bool, to_file: bool) -> &'static str {
+    match (verbose, to_file, quiet) {
         (0, false, true) => "mocban=error",
         (0, false, false) => "mocban=warn",
         (0, true, _) | (1, ..) => "mocban=info",
         (2.., ..) => "mocban=debug,sqlx=info",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::level;
+
+    #[test]
+    fn each_v_logs_more_and_a_file_more_than_the_screen() {
+        assert_eq!(level(0, true, false), "mocban=error");
+        assert_eq!(level(0, false, false), "mocban=warn");
+        for quiet in [false, true] {
+            assert_eq!(level(0, quiet, true), "mocban=info");
+            for to_file in [false, true] {
+                assert_eq!(level(1, quiet, to_file), "mocban=info");
+                for times in [2, 3, u8::MAX] {
+                    assert_eq!(level(times, quiet, to_file), "mocban=debug,sqlx=info");
+                }
+            }
+        }
     }
 }

@@ -168,6 +168,12 @@ fn a_backup_that_fails_leaves_the_earlier_one_and_nothing_half_made() {
     at(&project, &backup).expect(0);
     assert!(std::fs::read(&file).expect("read") != good);
     assert_eq!(files(dir.path()), names);
+    // Settings that the project has no more would not be its own.
+    std::fs::remove_file(project.settings_path()).expect("settings");
+    at(&project, &backup).expect(0);
+    let settings = "b.mocban.toml";
+    assert!(names.iter().any(|name| name == settings));
+    assert!(!dir.path().join(settings).exists());
 }
 
 #[test]

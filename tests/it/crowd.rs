@@ -61,7 +61,7 @@ fn write_lists(dir: &Path, hostile: &[HostilePair]) {
 }
 
 /// Calls the binary and looks at its memory while it works: the code and both streams, and the most it held in KiB.
-fn watched(dir: &Path, args: &[&str]) -> (Call, u64) {
+pub(crate) fn watched(dir: &Path, args: &[&str]) -> (Call, u64) {
     let mut command = binary();
     command
         .current_dir(dir)

@@ -99,6 +99,8 @@ const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("sync", "*", EIO).on(), End::Refused),
     (Fault::once("rename", "b.sqlite", EIO), End::Refused),
     (Fault::once("rename", "b.v*", EIO), End::Refused),
+    (Fault::once("rename", "b.m*", EIO), End::Refused),
+    (Fault::once("write", ".b.m*", ENOSPC), End::Refused),
     (Fault::once("unlink", ".b.*", EIO), End::Unmoved),
     (Fault::once("read", CATALOG, EIO), End::Refused),
 ];
@@ -230,34 +232,44 @@ fn names(root: &Path) -> Vec<String> {
     names
 }
 
+/// What a backup is.
+const BACKED_UP: [&str; 3] = ["b.mocban.toml", "b.sqlite", "b.verdicts.jsonl"];
+
 const BACKUP: Deed = Deed {
     before: |world, root| {
         put_done(world, root);
+        let settings = Project::at(&root.join("p")).settings_path();
+        std::fs::write(&settings, "[run]\nworkers = 1\n").expect("written");
         call(&mut backup(root)).expect(0);
         std::fs::create_dir(root.join("earlier")).expect("a folder");
-        for name in ["b.sqlite", "b.verdicts.jsonl"] {
+        for name in BACKED_UP {
             std::fs::copy(root.join(name), root.join("earlier").join(name)).expect("copied");
         }
+        std::fs::write(&settings, "[run]\nworkers = 2\n").expect("written");
         let set = ["-C", "p", "verdict", "set", "upright-0000", "pass"];
         mocban(root, &[&set[..], &["--reader", "lan"]].concat()).expect(0);
     },
     command: backup,
     after: |_, root, done| {
-        let (file, earlier) = (root.join("b.sqlite"), bytes(&root.join("earlier/b.sqlite")));
-        let names_are = |wanted: &[&str]| assert_eq!(names(root), wanted);
-        let whole = ["b.sqlite", "b.verdicts.jsonl", "earlier", "p"];
+        let whole = [&BACKED_UP[..], &["earlier", "p"]].concat();
+        let is_earlier = |name: &str| {
+            let earlier = root.join("earlier").join(name);
+            bytes(&root.join(name)) == bytes(&earlier)
+        };
         if !done {
-            names_are(&whole);
-            assert!(bytes(&file) == earlier, "another backup");
-            let [log, earlier] = ["b.verdicts.jsonl", "earlier/b.verdicts.jsonl"];
-            assert_eq!(bytes(&root.join(log)), bytes(&root.join(earlier)));
+            assert_eq!(names(root), whole);
+            for name in BACKED_UP {
+                assert!(is_earlier(name), "another {name}");
+            }
             call(&mut backup(root)).expect(0);
         }
         call(&mut backup(root)).expect(0);
-        names_are(&whole);
-        assert!(bytes(&file) != earlier, "the earlier backup");
+        assert_eq!(names(root), whole);
+        for name in BACKED_UP {
+            assert!(!is_earlier(name), "the earlier {name}");
+        }
         let catalog = root.join(CATALOG);
-        std::fs::copy(&file, &catalog).expect("copied");
+        std::fs::copy(root.join("b.sqlite"), &catalog).expect("copied");
         mocban(root, &["-C", "p", "check"]).expect(0);
         let log = ["-C", "p", "verdict", "log", "--json"];
         let log = mocban(root, &log).expect(0).out;

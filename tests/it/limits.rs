@@ -113,10 +113,45 @@ fn too_many_failures_stop_the_claiming_and_show_in_the_exit_code() {
 }
 
 #[test]
+fn a_stage_that_panics_fails_its_pair_and_shows_the_way_to_it_only_where_that_is_asked_for() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = project(dir.path(), "p", "2");
+    let panics = |args: &[&str]| {
+        let mut command = run(&project, args);
+        command.env("MOCBAN_PANIC_AT", "depth:computed:0@upright-0000");
+        call(&mut command).expect(3)
+    };
+    let plain = panics(&[]);
+    let verbose = panics(&["--rerun", "failed", "-v"]);
+    assert_eq!(status(&project), [JobStatus::Quarantined, JobStatus::Done]);
+    let failed = pairs(&project)[0].results.failure.clone();
+    let failure = failed.expect("a failure").failure;
+    assert_eq!(failure.class, FailureClass::Bug);
+    let told = "the stage panicked (asked for by a test): a defect of this program, please report it with what \
+        `run --rerun failed -v` tells";
+    assert_eq!(failure.message, told);
+    for words in ["thread '", "RUST_BACKTRACE", "breakpoint.rs"] {
+        assert!(!plain.err.contains(words), "{}", plain.err);
+    }
+    assert!(verbose.err.contains("breakpoint.rs"), "{}", verbose.err);
+}
+
+#[test]
 fn pairs_larger_than_the_memory_run_one_by_one_to_the_same_end() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "2");
-    call(&mut run(&project, &["-j", "2", "--memory", "1M"])).expect(0);
+    let small = call(&mut run(&project, &["-j", "2", "--memory", "1M"])).expect(0);
+    for pair in &pairs(&project) {
+        let needs = format!("{} may need ", pair.results.facts.name);
+        let told = small.err.split_once(&needs).map(|(_, rest)| rest);
+        let (mib, rest) = told
+            .and_then(|rest| rest.split_once(" MiB, "))
+            .unwrap_or_else(|| panic!("{}", small.err));
+        assert!(mib.parse::<u64>().is_ok_and(|mib| mib >= 32), "{mib}");
+        let way = "more than the 1 MiB of --memory: it runs with nothing beside it\n";
+        assert!(rest.starts_with(way), "{rest}");
+    }
+    assert_eq!(small.err.matches("of --memory").count(), 2);
     assert_eq!(finished(&project), [1; 8]);
     assert!(pairs(&project).iter().all(|pair| pair.attempt == 1));
     let refused = call(&mut run(&project, &["--memory", "much"])).expect(2);

@@ -22,6 +22,8 @@ mod invariance;
 mod kill;
 mod layers;
 mod limits;
+#[cfg(target_os = "linux")]
+mod memory;
 mod odd;
 mod one_pair;
 mod page;

@@ -70,6 +70,8 @@ async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothi
     let [late, again] = taken_twice(&world).await;
     let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
     assert!(matches!(kept, Ok(Kept::Lost)));
+    // Nor has it moved the job on.
+    world.counters_hold().await;
     let kept = world
         .catalog
         .checkpoint(again, world.done(Stage::Fit))
@@ -78,12 +80,14 @@ async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothi
     world.counters_hold().await;
 }
 
-/// Both are in one commit: what is told of the one must not be taken for the other.
+/// Both are in one commit: what is told of the one must not be taken for the other. A third lease keeps the counters
+/// from refusing the commit, after which each would be tried alone.
 #[tokio::test]
 async fn a_late_completion_beside_the_right_one_changes_nothing() {
-    let world = World::new(1).await;
+    let world = World::new(2).await;
     let late = world.claim(1).await.remove(0);
     let other = world.rescued_by_another(1).await;
+    assert_eq!(world.claim_as(other, 1).await.len(), 1);
     let lease = world.claim_alone(other).await.remove(0);
     let mut lost = world.done(Stage::Fit);
     lost.outcome = r#"{"late":true}"#.to_owned();

@@ -23,7 +23,7 @@ pub(super) struct Job {
     /// What each stage's result was computed with.
     results: [Option<RecipeIds>; 4],
     /// Where it failed, and with what.
-    failure: Option<(Stage, RecipeIds)>,
+    pub(super) failure: Option<(Stage, RecipeIds)>,
 }
 
 /// A worker's process.

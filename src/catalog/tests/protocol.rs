@@ -207,6 +207,8 @@ async fn progress_forgives_crashes() {
         panic!("the checkpoint was not kept")
     };
     assert_eq!(lease.crashes(), 0);
+    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
+    assert_eq!(detail.expect("the pair").crashes, 0);
 }
 
 #[tokio::test]

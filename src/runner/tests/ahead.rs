@@ -1,15 +1,22 @@
-//! What goes on while a checkpoint is on its way or a pair is nearly over.
+//! What goes on while a checkpoint is on its way or a pair is nearly over, and which pairs are taken then.
 
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use tokio::time::timeout;
 
 use super::{World, name, options};
-use crate::catalog::Dead;
+use crate::catalog::{Catalog, Dead};
 use crate::domain::{JobStatus, PairName, Stage, WorkerId};
-use crate::runner::{RunEvent, StopLevel};
+use crate::runner::clock::Clock;
+use crate::runner::{RunEvent, RunOptions, StopLevel};
 
 impl World {
+    /// With a catalog that stores nothing that can wait before it is told to.
+    async fn patient(pairs: &[&str]) -> Self {
+        Self::with(pairs, async |path| Catalog::create_patient(path).await).await
+    }
+
     /// Until a stage of a pair has begun.
     async fn begun(&self, pair: &str, stage: Stage) {
         while self.steps.count(pair, stage) == 0 {
@@ -77,6 +84,35 @@ async fn what_is_finished_is_stored_while_a_long_stage_is_computed() {
     assert_eq!((summary.done, summary.stages), (1, 4));
 }
 
+/// When the process dies over the next pair, that one alone is to be blamed.
+#[tokio::test]
+async fn the_last_stages_of_a_pair_do_not_wait_for_the_next_pair() {
+    let world = World::patient(&["a", "wait_1"]).await;
+    let look = async {
+        world.begun("wait_1", Stage::Fit).await;
+        let stored = async {
+            while world.status("a").await != JobStatus::Done {
+                tokio::task::yield_now().await;
+            }
+        };
+        let stored = timeout(Duration::from_secs(20), stored).await;
+        world.steps.open();
+        assert!(stored.is_ok(), "it waits for others");
+    };
+    let options = options(1);
+    let (summary, ()) = tokio::join!(world.run(&options), look);
+    assert_eq!(summary.done, 2);
+}
+
+#[tokio::test]
+async fn who_needs_the_lease_back_has_what_is_on_its_way_stored_at_once() {
+    let world = World::patient(&["breaks_1"]).await;
+    let options = options(1);
+    let ended = timeout(Duration::from_secs(20), world.run(&options)).await;
+    assert_eq!(ended.expect("it does not wait").done, 1);
+    assert_eq!(world.steps.count("breaks_1", Stage::Depth), 2);
+}
+
 #[tokio::test]
 async fn nothing_is_stored_of_a_stage_that_was_computed_while_the_lease_was_lost() {
     let world = World::new(&["wait_1"]).await;
@@ -140,4 +176,83 @@ async fn no_more_pairs_are_begun_than_the_disk_keeps_up_with() {
     }
     assert!((1..=5).contains(&most), "{most}");
     assert_eq!(in_memory, 0);
+}
+
+#[tokio::test]
+async fn no_more_are_taken_ahead_than_slots_will_be_free() {
+    let world = World::new(&["lasts_1", "lasts_2", "next_1", "next_2", "other"]).await;
+    let look = async {
+        while world.status("next_2").await != JobStatus::Leased {
+            tokio::task::yield_now().await;
+        }
+        assert_eq!(world.status("other").await, JobStatus::Ready);
+        world.steps.open();
+    };
+    let options = options(2);
+    let (summary, ()) = tokio::join!(world.run(&options), look);
+    assert_eq!(summary.done, 5);
+}
+
+/// It may have to wait for the one before it for as long as a stage may last, and then has its own time.
+#[tokio::test]
+async fn a_pair_taken_ahead_is_not_overdue_before_it_could_have_begun() {
+    let world = World::new(&["lasts_1", "next"]).await;
+    let options = options(1);
+    let limit = options.stage_limit.as_millis() as i64;
+    let clock = Clock::start();
+    let look = async {
+        world.begun("lasts_1", Stage::Register).await;
+        while world.status("next").await != JobStatus::Leased {
+            tokio::task::yield_now().await;
+        }
+        // As if its worker had gone on for one and a half times that long.
+        let (me, other) = (WorkerId(1), WorkerId(99));
+        let beat = world.catalog.beat(me, clock.now() + limit * 3 / 2, 0).await;
+        assert!(beat.expect("stored"));
+        let overdue = world.catalog.rescue_overdue(other, 0, 0).await;
+        assert_eq!(overdue.expect("a rescue").ready, 1);
+        assert_eq!(world.status("next").await, JobStatus::Leased);
+        world.steps.open();
+    };
+    let (summary, ()) = tokio::join!(world.run(&options), look);
+    assert_eq!(summary.done, 2);
+}
+
+/// Both are leased in one claim; the second is given back when it does not fit, before the first can end.
+#[tokio::test]
+async fn pairs_that_do_not_fit_together_run_one_after_the_other() {
+    let world = World::new(&["wait_1", "wait_2", "wait_3"]).await;
+    for (limit, together) in [(None, 3), (Some(80 << 20), 2), (Some(1), 1)] {
+        let world = if limit.is_none() {
+            &world
+        } else {
+            &World::new(&["wait_1", "wait_2", "wait_3"]).await
+        };
+        let options = RunOptions {
+            memory: limit,
+            ..options(3)
+        };
+        let open = async {
+            let settled = async || {
+                let pairs = ["wait_1", "wait_2", "wait_3"];
+                let begun = pairs
+                    .iter()
+                    .filter(|pair| world.steps.count(pair, Stage::Fit) > 0);
+                let begun = begun.count();
+                let mut ready = 0;
+                for pair in pairs {
+                    ready += usize::from(world.status(pair).await == JobStatus::Ready);
+                }
+                begun > 0 && begun + ready == 3
+            };
+            while !settled().await {
+                tokio::task::yield_now().await;
+            }
+            world.steps.open();
+        };
+        let (summary, ()) = tokio::join!(world.run(&options), open);
+        assert_eq!(summary.done, 3);
+        let most = world.steps.most.load(Ordering::SeqCst);
+        assert_eq!(most, together, "{limit:?}");
+    }
 }

@@ -40,7 +40,8 @@ impl Game {
     /// Every row is what the model says, no epoch falls, the counters are right, no verdict is lost.
     pub(super) async fn agrees(&mut self) {
         let rows = sqlx::query(
-            "SELECT pair, stage, status, epoch, attempt, crashes, mem_class, worker, deadline, run_at FROM job ORDER BY pair",
+            "SELECT j.*, f.stage AS failed_at, f.recipe AS failed_with FROM job AS j
+                LEFT JOIN failure AS f ON f.pair = j.pair ORDER BY j.pair",
         );
         let rows = rows.fetch_all(&mut self.conn).await.expect("a read");
         assert_eq!(rows.len(), self.model.jobs.len());
@@ -82,6 +83,15 @@ impl Game {
             assert_eq!(
                 (row.get("worker"), row.get("deadline"), row.get("run_at")),
                 (holder, when, run_at),
+                "pair {pair}"
+            );
+            let failed = job.failure.map(|(stage, then)| (stage, then.of(stage)));
+            assert_eq!(
+                (row.get("failed_at"), row.get("failed_with")),
+                (
+                    failed.map(|(stage, _)| stage.index() as i64),
+                    failed.map(|(_, recipe)| recipe.0)
+                ),
                 "pair {pair}"
             );
             assert!(job.epoch >= self.epochs[*pair as usize]);

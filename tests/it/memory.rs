@@ -1,0 +1,60 @@
+//! Memory of a run through the real binary: pairs with large prints stay within `--memory` together.
+
+use std::path::Path;
+
+use mocban::domain::JobStatus;
+use mocban::raster::{Grid, Limits, decode, jpeg_rgb8};
+use mocban::store::Project;
+
+use crate::crowd::watched;
+use crate::resume::{copy, pairs, project};
+
+/// Pairs with large prints.
+const PAIRS: u64 = 4;
+/// Pixels that each of these has at most, and little less.
+const PIXELS: usize = 5_000_000;
+/// What the pairs may take together: enough for one of them, at up to 50 bytes a pixel, and for no two.
+const MEMORY_MIB: u64 = 400;
+
+/// Makes a print as many times wider and higher as it may be, with the same picture on it.
+fn enlarge(path: &Path) {
+    let bytes = std::fs::read(path).expect("a print");
+    let small = decode(&bytes, &Limits::SUGGESTED).expect("a picture").rgb;
+    let times = (PIXELS / small.data().len()).isqrt();
+    let colour = |x: usize, y: usize| {
+        let of_16_bits = small.at(x / times, y / times);
+        of_16_bits.map(|channel| (channel >> 8) as u8)
+    };
+    let large = Grid::from_fn(small.width() * times, small.height() * times, colour);
+    std::fs::write(path, jpeg_rgb8(&large, 90)).expect("written");
+}
+
+/// Runs a project with as many workers as pairs; the most memory it held, in MiB.
+fn peak_mib(project: &Project, memory: &str) -> u64 {
+    let jobs = PAIRS.to_string();
+    let small = ["--set", "depth.longest_px=96"];
+    let run = ["-q", "run", "-j", &jobs, "--memory", memory];
+    let (ended, kib) = watched(project.dir(), &[&run[..], &small].concat());
+    ended.expect(0);
+    let done = |pair: &mocban::catalog::PairDetail| pair.results.status == JobStatus::Done;
+    assert!(pairs(project).iter().all(done));
+    kib >> 10
+}
+
+#[test]
+fn large_prints_stay_within_the_memory_together() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let bounded = project(dir.path(), "bounded", &PAIRS.to_string());
+    for pair in pairs(&bounded) {
+        enlarge(&bounded.input_path(&pair.results.facts.print_path));
+    }
+    let free = copy(&bounded, &dir.path().join("free"));
+    let within = peak_mib(&bounded, &format!("{MEMORY_MIB}M"));
+    let beyond = peak_mib(&free, "64G");
+    assert!(within <= MEMORY_MIB, "{within} MiB");
+    assert!(
+        beyond > MEMORY_MIB,
+        "{beyond} MiB where there is no limit: nothing was tried"
+    );
+    eprintln!("{MEMORY_MIB} MiB allowed: {within} MiB; no limit: {beyond} MiB");
+}
