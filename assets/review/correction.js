@@ -1,7 +1,7 @@
 // Laying the relief on the print by hand: turn, shift and scale, with the agreement of the masks as it goes.
 
 import { say } from "./boot.js";
-import { edges, bits, overlap, painted, pixels, sheet, RELIEF } from "./masks.js";
+import { edges, bits, overlap, painted, pixels, sheet, RELIEF, WHITE } from "./masks.js";
 import { ownPictures } from "./pictures.js";
 import { under } from "./lens.js";
 
@@ -32,7 +32,7 @@ export class Correction {
     this.start = after(after(HALF, [a, b, c, d, e, f]), BACK);
     const set = bits(own.mask);
     this.lines = edges(set, own.mask.width, own.mask.height, RELIEF);
-    this.strokes = painted(own.mask.width, own.mask.height, (i) => (set[i] ? [255, 255, 255] : null));
+    this.strokes = painted(own.mask.width, own.mask.height, (i) => (set[i] ? WHITE : 0));
     const scale = SMALL / Math.max(layers.width, layers.height);
     this.small = [scale, 0, 0, scale, 0, 0];
     this.size = [layers.width, layers.height].map((side) => Math.max(1, Math.round(side * scale)));

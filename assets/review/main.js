@@ -26,42 +26,52 @@ let correction = null;
 /** Shows the current card; it is there at once when it was decoded ahead. */
 async function show(pressedAt) {
   const item = deck.current;
-  if (!outbox.trouble) screen.calm();
   leaveCorrection();
   note = item?.answer?.note ?? null;
   shownAt = null;
-  screen.head(item, deck);
-  screen.history(deck.behind(HISTORY), item, go);
-  if (!item) {
-    stage.clear();
-    screen.sides(null);
-    refresh();
-    screen.tell(document.getElementById("pair").textContent);
-    return;
+  const found = item && pictures(item.id);
+  if (found?.ready) return picture(item, found.ready, pressedAt);
+  stage.clear();
+  around(item, null);
+  if (!item) return screen.tell(document.getElementById("pair").textContent);
+  try {
+    const layers = await found.loading;
+    if (deck.current === item) picture(item, layers, pressedAt);
+  } catch (error) {
+    if (deck.current === item) screen.alert(say("no_picture", { why: error.message }));
   }
-  const found = pictures(item.id);
-  if (!found.ready) {
-    stage.clear();
-    screen.sides(null);
-    try {
-      await found.loading;
-    } catch (error) {
-      if (deck.current === item) screen.alert(say("no_picture", { why: error.message }));
-      return;
-    }
+}
+
+/** The picture first; all that stands around it when it is on the screen. */
+function picture(item, layers, pressedAt) {
+  stage.show(layers);
+  afterPaint(() => {
     if (deck.current !== item) return;
-  }
-  stage.show(found.ready);
-  screen.sides(found.ready);
-  refresh();
-  requestAnimationFrame(() => {
     shownAt = performance.now();
     if (pressedAt) document.body.dataset.paintMs = String(Math.round(shownAt - pressedAt));
+    screen.measure(pressedAt ? say("painted", { ms: document.body.dataset.paintMs }) : "");
+    around(item, layers);
     document.body.dataset.shown = item.id;
-    screen.measure(pressedAt ? `${document.body.dataset.paintMs} ms` : "");
-    // After the paint: decoding must not hold it up.
-    setTimeout(() => lookAhead(item), 0);
+    lookAhead(item);
   });
+}
+
+/** Calls back when what was drawn in this turn is on its way to the screen. */
+function afterPaint(then) {
+  requestAnimationFrame(() => {
+    const { port1, port2 } = new MessageChannel();
+    port1.onmessage = then;
+    port2.postMessage(null);
+  });
+}
+
+function around(item, layers) {
+  if (!outbox.trouble) screen.calm();
+  screen.head(item, deck);
+  screen.history(deck.behind(HISTORY), item, go);
+  screen.sides(layers);
+  screen.pace(times.slice(-200));
+  refresh();
 }
 
 /** Decodes what comes next; the page tells when all of it is there. */
@@ -92,10 +102,10 @@ function give(verdict, reason, pressedAt) {
   if (shownAt === null || pressedAt - shownAt < leastViewMs) return screen.tell(say("too_soon"));
   const body = { ...answerTo(item, verdict, reason), shown_ms: Math.round(pressedAt - shownAt) };
   times.push(body.shown_ms);
-  screen.pace(times.slice(-200));
-  send(item, body);
+  deck.answer(item, body);
   deck.advance();
   show(pressedAt);
+  send(item, body);
 }
 
 /** An answer as it stands on the page now. */
@@ -105,7 +115,6 @@ function answerTo(item, verdict, reason) {
 }
 
 function send(item, body) {
-  deck.answer(item, body);
   screen.tell(`${item.pair}: ${screen.words(body)}`);
   outbox.put("/api/answer", body).then(() => {
     if (queue === "adjudicate") about(item);
@@ -117,10 +126,10 @@ function undo(pressedAt) {
   if (!act) return screen.tell(say("nothing_to_undo"));
   if (outbox.isFull) return screen.alert(say("blocked"));
   const item = deck.forget(act.event) ?? deck.items.find(({ id }) => id === act.id);
-  outbox.put("/api/undo", { event: act.event });
   if (item) deck.goTo(item);
-  screen.tell(`${say("undone")}: ${item?.pair ?? ""}`);
   show(pressedAt);
+  outbox.put("/api/undo", { event: act.event });
+  screen.tell(`${say("undone")}: ${item?.pair ?? ""}`);
 }
 
 /** The server will never take it: the card is open again, and why is said. */
@@ -197,7 +206,11 @@ async function takeNote() {
   if (text === null || deck.current !== item || (text || null) === note) return refresh();
   note = text || null;
   // On a card that is answered the note is an answer again, with the same verdict.
-  if (item.answer) send(item, { ...answerTo(item, item.answer.verdict, item.answer.reason), shown_ms: null });
+  if (item.answer) {
+    const body = { ...answerTo(item, item.answer.verdict, item.answer.reason), shown_ms: null };
+    deck.answer(item, body);
+    send(item, body);
+  }
   refresh();
 }
 
@@ -240,23 +253,24 @@ const MAY_REPEAT = new Set(["turn_left", "turn_right", "less", "more", "next", "
 /** What goes on to another picture, and would lose a correction that is not saved. */
 const LEAVES = new Set(["pass", "fail", "unsure", "undo", "next", "previous", "jump", ...REASONS]);
 
-function act(action, event) {
+function act(action, event, at) {
   const isArrow = event?.code?.startsWith("Arrow");
   if (event?.repeat && !MAY_REPEAT.has(action) && !isArrow) return;
   if (correction && event && correction.key(action, event)) return;
   if (correction && LEAVES.has(action)) return screen.tell(say("correct_first"));
-  deeds[action]?.(performance.now(), event);
-  refresh();
+  deeds[action]?.(at, event);
+  // What goes on to another picture marks things when that is on the screen.
+  if (!LEAVES.has(action)) refresh();
 }
 
 addEventListener("click", (event) => {
   const button = event.target.closest("[data-do]");
   if (!button) return;
-  act(button.dataset.do);
+  act(button.dataset.do, null, event.timeStamp);
   // After a click the keys are the page's again; who goes by Tab keeps the place.
   if (event.detail > 0) button.blur();
 });
-listen(act, (action) => action === "flicker" && !stage.rocking && stage.hold(false));
+listen((action, event) => act(action, event, event.timeStamp), (action) => action === "flicker" && !stage.rocking && stage.hold(false));
 label();
 
 try {

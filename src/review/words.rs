@@ -174,6 +174,7 @@ const WORDS: &[Row] = &[
     ),
     ("progress", "{done} of {all}", "{done} trên {all}"),
     ("median", "{s} s median", "trung vị {s} giây"),
+    ("painted", "picture after {ms} ms", "hiện hình sau {ms} ms"),
     ("saved", "saved", "đã lưu"),
     ("not_saved", "{n} not saved", "{n} chưa lưu"),
     (

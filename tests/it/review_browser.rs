@@ -118,8 +118,8 @@ fn fifty_cards_are_judged_by_keys_alone_over_a_reload_and_ten_undone() {
     assert_eq!(standing(&project, "lan").len(), 41);
     paints.sort_unstable();
     eprintln!(
-        "key to picture: median {} ms, worst {} ms",
-        paints[25], paints[49]
+        "key to picture: median {} ms, nine in ten {} ms, worst {} ms",
+        paints[25], paints[45], paints[49]
     );
     assert!(paints[25] <= 50, "{paints:?}");
 }
