@@ -26,6 +26,7 @@ mod run;
 mod select;
 mod sheet;
 mod show;
+mod show_hand;
 mod show_text;
 mod signals;
 mod status;
