@@ -196,7 +196,7 @@ impl Tally {
             pairs: self.pairs,
             interval: Interval::default(),
             progress: self.progress,
-            warnings: warnings::of(self.progress, &rows, &self.truth_problems),
+            warnings: warnings::of(self.progress, &rows, &self.truth_problems, drawn.lack),
             rows,
             comparisons,
             score_comparisons: drawn.comparisons,
