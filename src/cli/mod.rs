@@ -13,6 +13,7 @@ mod demo;
 mod exit;
 mod export;
 mod failures;
+mod given;
 mod import;
 mod logging;
 mod man;

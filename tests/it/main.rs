@@ -22,6 +22,8 @@ mod invariance;
 mod kill;
 mod layers;
 mod limits;
+#[cfg(unix)]
+mod manners;
 mod odd;
 mod one_pair;
 mod page;
