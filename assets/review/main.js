@@ -17,11 +17,17 @@ const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scale", "mi
 const deck = new Deck();
 const stage = new Stage(document.getElementById("canvas"));
 const reader = document.querySelector("header b").textContent;
-const outbox = new Outbox(reader, screen.saved, refused);
+const outbox = new Outbox(reader, saved, refused);
 const times = [];
 let shownAt = null;
 let note = null;
 let correction = null;
+
+/** What is on its way, and why it does not arrive; the end says whether everything did. */
+function saved(waiting, trouble) {
+  screen.saved(waiting, trouble);
+  if (!deck.current) screen.head(null, deck, waiting);
+}
 
 /** Shows the current card; it is there at once when it was decoded ahead. */
 async function show(pressedAt) {
@@ -67,8 +73,8 @@ function afterPaint(then) {
 
 function around(item, layers) {
   if (!outbox.trouble) screen.calm();
-  screen.head(item, deck);
-  screen.history(deck.behind(HISTORY), item, go);
+  screen.head(item, deck, outbox.waiting);
+  screen.history(deck, HISTORY, go);
   screen.sides(layers);
   screen.pace(times.slice(-200));
   refresh();
@@ -91,8 +97,15 @@ function refresh() {
   if (answer) on.add(answer.verdict).add(answer.reason);
   if (note) on.add("note");
   screen.pressed(on);
-  const turned = stage.turn ? say("turned_by", { deg: stage.turn.toFixed(2) }) : "";
-  screen.legend(correction ? [] : stage.legend(), correction ? `${correction.words()} — ${say("correct_hint")}` : turned);
+  screen.legend(correction ? [] : stage.legend(), underStage());
+}
+
+/** What is said under the picture, besides what colours mean. */
+function underStage() {
+  if (correction) return `${correction.words()} — ${say("correct_hint")}`;
+  if (stage.turn) return say("turned_by", { deg: stage.turn.toFixed(2) });
+  const corrected = stage.layers && deck.current?.corrected;
+  return corrected ? screen.laid(corrected) : "";
 }
 
 function give(verdict, reason, pressedAt) {
@@ -115,7 +128,7 @@ function answerTo(item, verdict, reason) {
 }
 
 function send(item, body) {
-  screen.tell(`${item.pair}: ${screen.words(body)}`);
+  screen.tell(`${deck.name(item)}: ${screen.words(body)}`);
   outbox.put("/api/answer", body).then(() => {
     if (queue === "adjudicate") about(item);
   });
@@ -129,7 +142,7 @@ function undo(pressedAt) {
   if (item) deck.goTo(item);
   show(pressedAt);
   outbox.put("/api/undo", { event: act.event });
-  screen.tell(`${say("undone")}: ${item?.pair ?? ""}`);
+  screen.tell(`${say("undone")}: ${item ? deck.name(item) : ""}`);
 }
 
 /** The server will never take it: the card is open again, and why is said. */
@@ -151,11 +164,11 @@ async function about(item = deck.current) {
   await outbox.sending;
   const answer = await fetch(`/api/about/${item.id}`);
   if (!answer.ok) return screen.tell(say("answer_first"));
-  const { metrics, iou, dice, others } = await answer.json();
-  const number = (value) => value.toLocaleString(language, { maximumFractionDigits: 3 });
+  const { pair, metrics, iou, dice, others } = await answer.json();
+  const number = (value) => value.toFixed(3);
   const said = others.map((other) => `${other.reader}: ${screen.words(other)}${other.note ? ` (${other.note})` : ""}`);
   const parts = [
-    item.pair,
+    pair,
     `${say("metrics")} ${metrics.join(", ")}`,
     `${say("iou")} ${number(iou)}`,
     `${say("dice")} ${number(dice)}`,
@@ -192,8 +205,9 @@ function leaveCorrection() {
 
 async function saveCorrection() {
   if (outbox.isFull) return screen.alert(say("blocked"));
-  const body = correction.body(crypto.randomUUID(), note);
-  const stored = await outbox.put("/api/align", body);
+  const { item, map } = correction;
+  const stored = await outbox.put("/api/align", correction.body(crypto.randomUUID(), note));
+  item.corrected = { ...stored, map };
   screen.tell(`${say("corrected")}: ${say("iou")} ${stored.iou.toFixed(3)}, ${say("dice")} ${stored.dice.toFixed(3)}`);
   leaveCorrection();
 }
@@ -233,8 +247,8 @@ const deeds = {
   reset: () => stage.turnBy(-stage.turn),
   next: (at) => deck.step(1) && show(at),
   previous: (at) => deck.step(-1) && show(at),
-  jump: () => screen.askPair([...new Set(deck.items.map(({ pair }) => pair))], (name) => {
-    const item = deck.ofPair(name);
+  jump: () => screen.askPair(deck.pairs, async (name) => {
+    const item = await deck.find(name);
     return Boolean(item) && go(item);
   }),
   info: () => about(),

@@ -197,6 +197,42 @@ export function derive({ print, printMask, relief, depthMask }) {
   };
 }
 
+/** Most looks along a side of a pixel, and how far apart they may lie in the source. */
+const [MOST_LOOKS, APART] = [8, 1.5];
+
+/**
+ * A mask laid on a picture of a size: a pixel is set when at least half of its square is covered. Maps are as in
+ * canvases, between pixel centres. It counts as the server does, so that both tell the same agreement.
+ */
+export function warped(set, width, height, [a, b, c, d, e, f], size) {
+  const out = new Uint8Array(size.width * size.height);
+  const det = a * d - b * c;
+  const [ia, ib, ic, id] = [d / det, -b / det, -c / det, a / det];
+  const looks = Math.min(MOST_LOOKS, Math.max(1, Math.ceil(1 / Math.sqrt(Math.abs(det)) / APART)));
+  const offsets = Array.from({ length: looks }, (_, i) => (i + 0.5) / looks - 0.5);
+  const at = (x, y) => (x >= 0 && y >= 0 && x < width && y < height ? set[y * width + x] : 0);
+  const cover = (x, y) => {
+    const [x0, y0] = [Math.floor(x), Math.floor(y)];
+    if (x0 < -1 || y0 < -1 || x0 >= width || y0 >= height) return 0;
+    const [fx, fy] = [x - x0, y - y0];
+    const above = at(x0, y0) * (1 - fx) + at(x0 + 1, y0) * fx;
+    const below = at(x0, y0 + 1) * (1 - fx) + at(x0 + 1, y0 + 1) * fx;
+    return above * (1 - fy) + below * fy;
+  };
+  for (let i = 0; i < out.length; i++) {
+    let sum = 0;
+    for (const down of offsets) {
+      for (const across of offsets) {
+        const x = (i % size.width) + across - e;
+        const y = Math.floor(i / size.width) + down - f;
+        sum += cover(ia * x + ic * y, ib * x + id * y);
+      }
+    }
+    out[i] = sum >= looks * looks * 0.5 ? 1 : 0;
+  }
+  return out;
+}
+
 /** How far two masks cover each other. */
 export function overlap(a, b) {
   let [both, sum] = [0, 0];

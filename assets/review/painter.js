@@ -23,10 +23,10 @@ const deeds = {
     const [print, printMask, relief, depthMask] = await bitmaps(id, LAYERS);
     return derive({ print, printMask, relief, depthMask });
   },
-  /** The relief and its strokes in the depth map's own frame. */
+  /** The relief and its strokes in the depth map's own frame, and the ink where the agreement is counted. */
   async own(id) {
-    const [relief, mask] = await bitmaps(id, ["own-relief", "own-mask"]);
-    return { relief, mask };
+    const [relief, mask, ink] = await bitmaps(id, ["own-relief", "own-mask", "canvas-ink"]);
+    return { relief, mask, ink };
   },
 };
 

@@ -52,5 +52,5 @@ function shut(made) {
   else if (made && typeof made === "object") Object.values(made).forEach(shut);
 }
 
-/** The relief and its strokes in the depth map's own frame. */
+/** What a correction by hand needs besides. */
 export const ownPictures = (id) => ask("own", id);

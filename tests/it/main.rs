@@ -1,5 +1,6 @@
 //! Integration tests in one binary.
 
+mod accessible;
 mod agree;
 mod backup;
 mod browser;
@@ -36,6 +37,7 @@ mod report;
 mod resume;
 mod review_browser;
 mod review_guard;
+mod review_hand;
 mod review_kill;
 mod review_page;
 mod seeds;
