@@ -26,7 +26,7 @@ let correction = null;
 /** What is on its way, and why it does not arrive; the end says whether everything did. */
 function saved(waiting, trouble) {
   screen.saved(waiting, trouble);
-  if (!deck.current) screen.head(null, deck, waiting);
+  if (deck.items.length > 0 && !deck.current) screen.head(null, deck, waiting);
 }
 
 /** Shows the current card; it is there at once when it was decoded ahead. */

@@ -34,9 +34,7 @@ fn nothing_drawn(lack: Lack) -> String {
         ),
         Lack::TooFew { units, by } => {
             let what = by.plural();
-            format!(
-                "the {what} are {units}, and fewer than {FEWEST_UNITS} {what} tell nothing of chance"
-            )
+            format!("that takes {FEWEST_UNITS} {what} at least; here: {units}")
         }
     };
     format!("Means have no intervals, and metrics are not compared by their scores: {why}.")
@@ -131,7 +129,8 @@ mod tests {
             by: Unit::Block,
         });
         assert!(
-            few.ends_with(": the blocks are 5, and fewer than 10 blocks tell nothing of chance.")
+            few.ends_with(": that takes 10 blocks at least; here: 5."),
+            "{few}"
         );
         let many = nothing_drawn(Lack::TooMany);
         assert!(many.contains("there are more than 100000"), "{many}");
