@@ -1,12 +1,10 @@
 // Laying the relief on the print by hand: turn, shift and scale, with the agreement of the masks as it goes.
 
 import { say } from "./boot.js";
-import { edges, bits, overlap, painted, pixels, sheet, RELIEF } from "./masks.js";
+import { bits, edges, overlap, warped, RELIEF } from "./masks.js";
 import { ownPictures } from "./pictures.js";
+import { fixed } from "./screen.js";
 import { under } from "./lens.js";
-
-/** Side of the small masks on which the agreement is counted while the relief moves. */
-const SMALL = 200;
 
 /** Maps as in canvases: [a, b, c, d, e, f] takes (x, y) to (a x + c y + e, b x + d y + f). */
 const after = (m, n) => [
@@ -18,6 +16,11 @@ const after = (m, n) => [
 const HALF = [1, 0, 0, 1, 0.5, 0.5];
 const BACK = [1, 0, 0, 1, -0.5, -0.5];
 
+/** A map of ours, rows of three between pixel centres, as a canvas has it. */
+const onCanvas = ([[a, c, e], [b, d, f]]) => after(after(HALF, [a, b, c, d, e, f]), BACK);
+/** The way back. */
+const ours = (map) => after(after(BACK, map), HALF);
+
 export class Correction {
   static async begin(item, layers, stage, changed) {
     const answer = await fetch(`/api/correction/${item.id}`);
@@ -28,25 +31,15 @@ export class Correction {
 
   constructor(item, layers, stage, changed, start, own) {
     Object.assign(this, { item, layers, stage, changed, own });
-    const [[a, c, e], [b, d, f]] = start.view_from_depth;
-    this.start = after(after(HALF, [a, b, c, d, e, f]), BACK);
-    const set = bits(own.mask);
-    this.lines = edges(set, own.mask.width, own.mask.height, RELIEF);
-    this.strokes = painted(own.mask.width, own.mask.height, (i) => (set[i] ? [255, 255, 255] : null));
-    const scale = SMALL / Math.max(layers.width, layers.height);
-    this.small = [scale, 0, 0, scale, 0, 0];
-    this.size = [layers.width, layers.height].map((side) => Math.max(1, Math.round(side * scale)));
-    this.ink = this.inkSmall();
-    this.map = this.start;
-    this.relief = false;
+    this.start = onCanvas(start.view_from_depth);
+    this.canvas = onCanvas(start.canvas_from_view);
+    this.strokes = bits(own.mask);
+    this.ink = bits(own.ink);
+    this.lines = edges(this.strokes, own.mask.width, own.mask.height, RELIEF);
+    // Where the reader left it before, if ever.
+    this.map = item.corrected?.map ?? (start.laid ? onCanvas(start.laid) : this.start);
     this.grab();
     this.moved();
-  }
-
-  inkSmall() {
-    const { canvas, brush } = sheet(...this.size);
-    brush.drawImage(this.layers.printMask, 0, 0, ...this.size);
-    return bits(canvas);
   }
 
   /** The middle of the relief on the picture. */
@@ -79,8 +72,14 @@ export class Correction {
     this.about(this.centre, [by, 0, 0, by, 0, 0]);
   }
 
+  /** Left and right of the relief itself, so that it stays turned as it was. */
   mirror() {
-    this.about(this.centre, [-1, 0, 0, 1, 0, 0]);
+    this.map = after(this.map, this.mirrored);
+    this.moved();
+  }
+
+  get mirrored() {
+    return [-1, 0, 0, 1, this.own.mask.width, 0];
   }
 
   reset() {
@@ -146,18 +145,13 @@ export class Correction {
     this.let.abort();
   }
 
+  /** Counts the agreement as the scores of results are counted. */
   moved() {
-    const { canvas, brush } = sheet(...this.size);
-    brush.setTransform(...after(this.small, this.map));
-    brush.drawImage(this.strokes, 0, 0);
-    this.agreement = overlap(this.ink, this.alpha(canvas));
+    const { width, height } = this.own.mask;
+    const laid = warped(this.strokes, width, height, ours(after(this.canvas, this.map)), this.own.ink);
+    this.agreement = overlap(this.ink, laid);
     this.stage.draw();
     this.changed(this);
-  }
-
-  alpha(canvas) {
-    const { data } = pixels(canvas);
-    return Uint8Array.from({ length: data.length / 4 }, (_, i) => (data[4 * i + 3] > 127 ? 1 : 0));
   }
 
   draw(brush, layers) {
@@ -171,14 +165,16 @@ export class Correction {
 
   /** What is sent: pixels of the depth map to pixels of the pictures, rows of three. */
   body(event, note) {
-    const [a, b, c, d, e, f] = after(after(BACK, this.map), HALF);
+    const [a, b, c, d, e, f] = ours(this.map);
     return { event, item: this.item.id, view_from_depth: [[a, c, e], [b, d, f]], note };
   }
 
   /** How far the relief is turned from where it was, degrees. */
   get turned() {
     const angle = ([a, b]) => (Math.atan2(b, a) * 180) / Math.PI;
-    return ((angle(this.map) - angle(this.start) + 540) % 360) - 180;
+    const sign = ([a, b, c, d]) => Math.sign(a * d - b * c);
+    const map = sign(this.map) === sign(this.start) ? this.map : after(this.map, this.mirrored);
+    return ((angle(map) - angle(this.start) + 540) % 360) - 180;
   }
 
   words() {
@@ -186,7 +182,7 @@ export class Correction {
     return [
       `${say("iou")} ${iou.toFixed(3)}`,
       `${say("dice")} ${dice.toFixed(3)}`,
-      say("turned_by", { deg: this.turned.toFixed(2) }),
+      say("turned_by", { deg: fixed(this.turned, 2) }),
     ].join(" · ");
   }
 }

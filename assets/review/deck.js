@@ -1,8 +1,12 @@
 // The cards in order, the reader's answers to them, and the way back through the answers.
 
+import { say } from "./boot.js";
+
 export class Deck {
   constructor() {
     this.items = [];
+    /** Names of all pairs that there are cards of. */
+    this.pairs = [];
     this.place = 0;
     /** Ids of answered cards, oldest first, with the number of each act. */
     this.acts = [];
@@ -12,7 +16,9 @@ export class Deck {
   async load(waiting) {
     const answer = await fetch("/api/deck");
     if (!answer.ok) throw new Error((await answer.json()).error);
-    this.items = (await answer.json()).items;
+    const { items, pairs } = await answer.json();
+    this.items = items;
+    this.pairs = pairs;
     const answered = this.items.filter((item) => item.answer);
     answered.sort((a, b) => a.answer.at - b.answer.at);
     this.acts = answered.map(({ id, answer }) => ({ id, event: answer.event }));
@@ -87,9 +93,19 @@ export class Deck {
     return place >= 0;
   }
 
-  /** The first card of a pair that is not answered, else the first. */
-  ofPair(name) {
+  /** What a card is called: by its pair, or by its number where knowing a pair again would tell too much. */
+  name(item) {
+    return item.pair ?? say("picture_n", { n: this.items.indexOf(item) + 1 });
+  }
+
+  /** The card of a number such as #7, or the first of a pair that is not answered, else the first. */
+  async find(name) {
+    if (/^#\d+$/.test(name)) return this.items[Number(name.slice(1)) - 1];
     const cards = this.items.filter((item) => item.pair === name);
-    return cards.find((item) => !item.answer) ?? cards[0];
+    if (cards.length > 0) return cards.find((item) => !item.answer) ?? cards[0];
+    const answer = await fetch(`/api/find/${encodeURIComponent(name)}`);
+    if (!answer.ok) return undefined;
+    const { id } = await answer.json();
+    return this.items.find((item) => item.id === id);
   }
 }

@@ -17,51 +17,67 @@ const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scale", "mi
 const deck = new Deck();
 const stage = new Stage(document.getElementById("canvas"));
 const reader = document.querySelector("header b").textContent;
-const outbox = new Outbox(reader, screen.saved, refused);
+const outbox = new Outbox(reader, saved, refused);
 const times = [];
 let shownAt = null;
 let note = null;
 let correction = null;
 
+/** What is on its way, and why it does not arrive; the end says whether everything did. */
+function saved(waiting, trouble) {
+  screen.saved(waiting, trouble);
+  if (deck.items.length > 0 && !deck.current) screen.head(null, deck, waiting);
+}
+
 /** Shows the current card; it is there at once when it was decoded ahead. */
 async function show(pressedAt) {
   const item = deck.current;
-  if (!outbox.trouble) screen.calm();
   leaveCorrection();
   note = item?.answer?.note ?? null;
   shownAt = null;
-  screen.head(item, deck);
-  screen.history(deck.behind(HISTORY), item, go);
-  if (!item) {
-    stage.clear();
-    screen.sides(null);
-    refresh();
-    screen.tell(document.getElementById("pair").textContent);
-    return;
+  const found = item && pictures(item.id);
+  if (found?.ready) return picture(item, found.ready, pressedAt);
+  stage.clear();
+  around(item, null);
+  if (!item) return screen.tell(document.getElementById("pair").textContent);
+  try {
+    const layers = await found.loading;
+    if (deck.current === item) picture(item, layers, pressedAt);
+  } catch (error) {
+    if (deck.current === item) screen.alert(say("no_picture", { why: error.message }));
   }
-  const found = pictures(item.id);
-  if (!found.ready) {
-    stage.clear();
-    screen.sides(null);
-    try {
-      await found.loading;
-    } catch (error) {
-      if (deck.current === item) screen.alert(say("no_picture", { why: error.message }));
-      return;
-    }
+}
+
+/** The picture first; all that stands around it when it is on the screen. */
+function picture(item, layers, pressedAt) {
+  stage.show(layers);
+  afterPaint(() => {
     if (deck.current !== item) return;
-  }
-  stage.show(found.ready);
-  screen.sides(found.ready);
-  refresh();
-  requestAnimationFrame(() => {
     shownAt = performance.now();
     if (pressedAt) document.body.dataset.paintMs = String(Math.round(shownAt - pressedAt));
+    screen.measure(pressedAt ? say("painted", { ms: document.body.dataset.paintMs }) : "");
+    around(item, layers);
     document.body.dataset.shown = item.id;
-    screen.measure(pressedAt ? `${document.body.dataset.paintMs} ms` : "");
-    // After the paint: decoding must not hold it up.
-    setTimeout(() => lookAhead(item), 0);
+    lookAhead(item);
   });
+}
+
+/** Calls back when what was drawn in this turn is on its way to the screen. */
+function afterPaint(then) {
+  requestAnimationFrame(() => {
+    const { port1, port2 } = new MessageChannel();
+    port1.onmessage = then;
+    port2.postMessage(null);
+  });
+}
+
+function around(item, layers) {
+  if (!outbox.trouble) screen.calm();
+  screen.head(item, deck, outbox.waiting);
+  screen.history(deck, HISTORY, go);
+  screen.sides(layers);
+  screen.pace(times.slice(-200));
+  refresh();
 }
 
 /** Decodes what comes next; the page tells when all of it is there. */
@@ -81,8 +97,15 @@ function refresh() {
   if (answer) on.add(answer.verdict).add(answer.reason);
   if (note) on.add("note");
   screen.pressed(on);
-  const turned = stage.turn ? say("turned_by", { deg: stage.turn.toFixed(2) }) : "";
-  screen.legend(correction ? [] : stage.legend(), correction ? `${correction.words()} — ${say("correct_hint")}` : turned);
+  screen.legend(correction ? [] : stage.legend(), underStage());
+}
+
+/** What is said under the picture, besides what colours mean. */
+function underStage() {
+  if (correction) return `${correction.words()} — ${say("correct_hint")}`;
+  if (stage.turn) return say("turned_by", { deg: stage.turn.toFixed(2) });
+  const corrected = stage.layers && deck.current?.corrected;
+  return corrected ? screen.laid(corrected) : "";
 }
 
 function give(verdict, reason, pressedAt) {
@@ -92,10 +115,10 @@ function give(verdict, reason, pressedAt) {
   if (shownAt === null || pressedAt - shownAt < leastViewMs) return screen.tell(say("too_soon"));
   const body = { ...answerTo(item, verdict, reason), shown_ms: Math.round(pressedAt - shownAt) };
   times.push(body.shown_ms);
-  screen.pace(times.slice(-200));
-  send(item, body);
+  deck.answer(item, body);
   deck.advance();
   show(pressedAt);
+  send(item, body);
 }
 
 /** An answer as it stands on the page now. */
@@ -105,8 +128,7 @@ function answerTo(item, verdict, reason) {
 }
 
 function send(item, body) {
-  deck.answer(item, body);
-  screen.tell(`${item.pair}: ${screen.words(body)}`);
+  screen.tell(`${deck.name(item)}: ${screen.words(body)}`);
   outbox.put("/api/answer", body).then(() => {
     if (queue === "adjudicate") about(item);
   });
@@ -117,10 +139,10 @@ function undo(pressedAt) {
   if (!act) return screen.tell(say("nothing_to_undo"));
   if (outbox.isFull) return screen.alert(say("blocked"));
   const item = deck.forget(act.event) ?? deck.items.find(({ id }) => id === act.id);
-  outbox.put("/api/undo", { event: act.event });
   if (item) deck.goTo(item);
-  screen.tell(`${say("undone")}: ${item?.pair ?? ""}`);
   show(pressedAt);
+  outbox.put("/api/undo", { event: act.event });
+  screen.tell(`${say("undone")}: ${item ? deck.name(item) : ""}`);
 }
 
 /** The server will never take it: the card is open again, and why is said. */
@@ -142,11 +164,11 @@ async function about(item = deck.current) {
   await outbox.sending;
   const answer = await fetch(`/api/about/${item.id}`);
   if (!answer.ok) return screen.tell(say("answer_first"));
-  const { metrics, iou, dice, others } = await answer.json();
-  const number = (value) => value.toLocaleString(language, { maximumFractionDigits: 3 });
+  const { pair, metrics, iou, dice, others } = await answer.json();
+  const number = (value) => value.toFixed(3);
   const said = others.map((other) => `${other.reader}: ${screen.words(other)}${other.note ? ` (${other.note})` : ""}`);
   const parts = [
-    item.pair,
+    pair,
     `${say("metrics")} ${metrics.join(", ")}`,
     `${say("iou")} ${number(iou)}`,
     `${say("dice")} ${number(dice)}`,
@@ -183,8 +205,9 @@ function leaveCorrection() {
 
 async function saveCorrection() {
   if (outbox.isFull) return screen.alert(say("blocked"));
-  const body = correction.body(crypto.randomUUID(), note);
-  const stored = await outbox.put("/api/align", body);
+  const { item, map } = correction;
+  const stored = await outbox.put("/api/align", correction.body(crypto.randomUUID(), note));
+  item.corrected = { ...stored, map };
   screen.tell(`${say("corrected")}: ${say("iou")} ${stored.iou.toFixed(3)}, ${say("dice")} ${stored.dice.toFixed(3)}`);
   leaveCorrection();
 }
@@ -197,7 +220,11 @@ async function takeNote() {
   if (text === null || deck.current !== item || (text || null) === note) return refresh();
   note = text || null;
   // On a card that is answered the note is an answer again, with the same verdict.
-  if (item.answer) send(item, { ...answerTo(item, item.answer.verdict, item.answer.reason), shown_ms: null });
+  if (item.answer) {
+    const body = { ...answerTo(item, item.answer.verdict, item.answer.reason), shown_ms: null };
+    deck.answer(item, body);
+    send(item, body);
+  }
   refresh();
 }
 
@@ -220,8 +247,8 @@ const deeds = {
   reset: () => stage.turnBy(-stage.turn),
   next: (at) => deck.step(1) && show(at),
   previous: (at) => deck.step(-1) && show(at),
-  jump: () => screen.askPair([...new Set(deck.items.map(({ pair }) => pair))], (name) => {
-    const item = deck.ofPair(name);
+  jump: () => screen.askPair(deck.pairs, async (name) => {
+    const item = await deck.find(name);
     return Boolean(item) && go(item);
   }),
   info: () => about(),
@@ -240,23 +267,24 @@ const MAY_REPEAT = new Set(["turn_left", "turn_right", "less", "more", "next", "
 /** What goes on to another picture, and would lose a correction that is not saved. */
 const LEAVES = new Set(["pass", "fail", "unsure", "undo", "next", "previous", "jump", ...REASONS]);
 
-function act(action, event) {
+function act(action, event, at) {
   const isArrow = event?.code?.startsWith("Arrow");
   if (event?.repeat && !MAY_REPEAT.has(action) && !isArrow) return;
   if (correction && event && correction.key(action, event)) return;
   if (correction && LEAVES.has(action)) return screen.tell(say("correct_first"));
-  deeds[action]?.(performance.now(), event);
-  refresh();
+  deeds[action]?.(at, event);
+  // What goes on to another picture marks things when that is on the screen.
+  if (!LEAVES.has(action)) refresh();
 }
 
 addEventListener("click", (event) => {
   const button = event.target.closest("[data-do]");
   if (!button) return;
-  act(button.dataset.do);
+  act(button.dataset.do, null, event.timeStamp);
   // After a click the keys are the page's again; who goes by Tab keeps the place.
   if (event.detail > 0) button.blur();
 });
-listen(act, (action) => action === "flicker" && !stage.rocking && stage.hold(false));
+listen((action, event) => act(action, event, event.timeStamp), (action) => action === "flicker" && !stage.rocking && stage.hold(false));
 label();
 
 try {

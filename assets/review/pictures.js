@@ -1,32 +1,37 @@
-// Pictures of cards, fetched and decoded ahead of time and kept for a while.
+// Pictures of cards, fetched, decoded and drawn ahead of time by a thread of their own, and kept for a while.
 
-import { derive } from "./masks.js";
+/** Cards whose pictures are kept: what comes next, and some to go back to. */
+const KEPT = 12;
 
-const LAYERS = ["print", "print-mask", "relief", "depth-mask"];
-/** Cards whose pictures are kept decoded. */
-const KEPT = 18;
+const painter = new Worker("/assets/painter.js", { type: "module" });
+const asked = new Map();
+let numbers = 0;
+
+painter.addEventListener("message", ({ data: { number, made, why } }) => {
+  const { resolve, reject } = asked.get(number);
+  asked.delete(number);
+  if (made) resolve(made);
+  else reject(new Error(why));
+});
+painter.addEventListener("error", ({ message }) => {
+  for (const { reject } of asked.values()) reject(new Error(message ?? "painter.js"));
+  asked.clear();
+});
+
+function ask(deed, id) {
+  return new Promise((resolve, reject) => {
+    asked.set(++numbers, { resolve, reject });
+    painter.postMessage({ number: numbers, deed, id });
+  });
+}
 
 const kept = new Map();
-
-async function bitmap(id, layer) {
-  const answer = await fetch(`/picture/${id}/${layer}`);
-  if (!answer.ok) {
-    const told = await answer.json().catch(() => ({}));
-    throw new Error(told.error ?? String(answer.status));
-  }
-  return createImageBitmap(await answer.blob());
-}
-
-async function load(id) {
-  const [print, printMask, relief, depthMask] = await Promise.all(LAYERS.map((layer) => bitmap(id, layer)));
-  return derive({ print, printMask, relief, depthMask });
-}
 
 /** The pictures of a card with all that is drawn from them; asked for once however often it is wanted. */
 export function pictures(id) {
   let found = kept.get(id);
   if (!found) {
-    const loading = load(id);
+    const loading = ask("card", id);
     found = { loading, ready: null };
     loading.then((layers) => (found.ready = layers), () => kept.delete(id));
   }
@@ -35,13 +40,17 @@ export function pictures(id) {
   kept.set(id, found);
   for (const old of kept.keys()) {
     if (kept.size <= KEPT) break;
+    shut(kept.get(old).ready);
     kept.delete(old);
   }
   return found;
 }
 
-/** The relief and its strokes in the depth map's own frame. */
-export async function ownPictures(id) {
-  const [relief, mask] = await Promise.all([bitmap(id, "own-relief"), bitmap(id, "own-mask")]);
-  return { relief, mask };
+/** Gives the memory of pictures back at once. */
+function shut(made) {
+  if (made instanceof ImageBitmap) made.close();
+  else if (made && typeof made === "object") Object.values(made).forEach(shut);
 }
+
+/** What a correction by hand needs besides. */
+export const ownPictures = (id) => ask("own", id);

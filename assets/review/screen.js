@@ -7,13 +7,18 @@ const SIGNS = { pass: "✓", fail: "✗", unsure: "?" };
 const SIDES = ["print", "print_mask", "relief", "depth_mask"];
 const LAYERS = { print: "print", print_mask: "printMask", relief: "relief", depth_mask: "depthMask" };
 
-export function head(item, deck) {
-  const none = queue === "adjudicate" ? say("empty_adjudicate") : say("empty");
-  at("pair").textContent = item?.pair ?? (deck.items.length > 0 ? say("done") : none);
+export function head(item, deck, waiting) {
+  at("pair").textContent = item ? deck.name(item) : ended(deck, waiting);
   const [done, all] = [deck.done, deck.items.length];
   at("progress").textContent = say("progress", { done, all });
   at("bar").max = Math.max(all, 1);
   at("bar").value = done;
+}
+
+/** What stands where no card is left. */
+function ended(deck, waiting) {
+  if (deck.items.length === 0) return queue === "adjudicate" ? say("empty_adjudicate") : say("empty");
+  return waiting > 0 ? say("done_not_saved", { n: waiting }) : say("done");
 }
 
 /** The four small pictures. */
@@ -48,17 +53,28 @@ export function words(answer) {
   return `${say(answer.verdict)}${reason}`;
 }
 
+/** A number with so many digits, and no sign on a zero. */
+export const fixed = (value, digits) => value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1");
+
+/** How a relief was laid by hand, in words. */
+export function laid({ reader, turned_deg: deg, shifted_px: [x, y], scaled, mirrored, iou }) {
+  return say("corrected_by", {
+    reader, deg: fixed(deg, 1), px: Math.hypot(x, y).toFixed(1), scale: scaled.toFixed(3),
+    mirrored: mirrored ? say("and_mirrored") : "", iou: iou.toFixed(3),
+  });
+}
+
 /** The last answers, newest first; a click goes there. */
-export function history(items, current, go) {
-  const rows = items.map((item) => {
+export function history(deck, count, go) {
+  const rows = deck.behind(count).map((item) => {
     const row = document.createElement("li");
     const button = document.createElement("button");
     button.type = "button";
     button.className = item.answer.verdict;
-    button.textContent = `${SIGNS[item.answer.verdict]} ${item.pair}`;
+    button.textContent = `${SIGNS[item.answer.verdict]} ${deck.name(item)}`;
     button.title = words(item.answer);
-    button.setAttribute("aria-label", `${item.pair}, ${words(item.answer)}`);
-    if (item === current) button.setAttribute("aria-current", "true");
+    button.setAttribute("aria-label", `${deck.name(item)}, ${words(item.answer)}`);
+    if (item === deck.current) button.setAttribute("aria-current", "true");
     button.addEventListener("click", () => go(item));
     row.append(button);
     return row;
@@ -123,18 +139,17 @@ export function askNote(before) {
   });
 }
 
-/** Asks for a pair by its id. */
+/** Asks for a card by the id of its pair or by its number. */
 export function askPair(names, go) {
   const [dialog, field] = [at("jump"), at("jump-to")];
   at("jump-error").textContent = "";
   at("pairs").replaceChildren(...names.slice(0, 2000).map((name) => new Option(name, name)));
   field.value = "";
-  dialog.onsubmit = (event) => {
+  dialog.onsubmit = async (event) => {
     if (event.submitter?.value !== "go") return;
-    if (!go(field.value.trim())) {
-      event.preventDefault();
-      at("jump-error").textContent = say("no_such_pair");
-    }
+    event.preventDefault();
+    if (await go(field.value.trim())) dialog.close();
+    else at("jump-error").textContent = say("no_such_pair");
   };
   dialog.showModal();
 }

@@ -1,7 +1,7 @@
 // The large picture: the ways to look at a print and a relief, drawn from layers of one size.
 
 import { say } from "./boot.js";
-import { INK, RELIEF, edges, strokeMap } from "./masks.js";
+import { INK, RELIEF } from "./masks.js";
 import { Lens, under } from "./lens.js";
 
 /** Flicker by itself shows each picture this long: 1 Hz, far below what may harm. */
@@ -239,7 +239,6 @@ export class Stage {
   lines() {
     const { brush, layers } = this;
     if (this.overlays.strokes) {
-      layers.missing ??= strokeMap(layers);
       brush.fillStyle = "rgb(255 255 255 / 45%)";
       brush.fillRect(0, 0, layers.width, layers.height);
       this.lay(layers.missing.map);
@@ -263,9 +262,6 @@ export class Stage {
   /** The edges also at -5 and +5 degrees, and the wedge between them. */
   protractor() {
     const { brush, layers } = this;
-    layers.ghosts ??= [INK, [130, 60, 150]].map((colour) =>
-      edges(layers.strokes, layers.width, layers.height, colour, false),
-    );
     this.turned(this.turn - 5, () => this.lay(layers.ghosts[0], 0.75));
     this.turned(this.turn + 5, () => this.lay(layers.ghosts[1], 0.75));
     this.turned(this.turn, () => this.lay(layers.edges));

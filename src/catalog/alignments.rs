@@ -31,7 +31,7 @@ pub struct HandAlignment {
     pub depth_hash: ContentHash,
     /// Hash of what was shown when the correction began.
     pub seen: ContentHash,
-    /// Intersection over union of the two masks in the print's frame, as laid by hand.
+    /// Intersection over union of the two masks as laid by hand, on the canvas of the pair's scores.
     pub iou: f64,
     /// Dice coefficient of the same.
     pub dice: f64,

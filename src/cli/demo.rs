@@ -6,16 +6,18 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::config::as_toml;
-use super::context::Context;
+use super::context::{Context, quoted};
 use super::exit::{ExitCode, Refusal};
 use super::import::{self, ImportArgs};
 use super::report;
 use super::run::{self, drive};
 use super::sheet::{self, SheetArgs};
+use super::signals;
 use super::talk::Palette;
 use crate::config::{Origin, Tree};
-use crate::demo::{DatasetFiles, DemoOptions, Tier, write_dataset};
+use crate::demo::{DatasetFiles, DemoOptions, Error as DatasetError, Tier, write_dataset};
 use crate::domain::JobStatus;
+use crate::runner::{Stop, StopLevel};
 use crate::store::{CATALOG_FILE, SETTINGS_FILE};
 
 /// Arguments of `demo`.
@@ -50,7 +52,12 @@ impl DemoArgs {
 pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let dir = demo_dir(&args, context);
     let context = &settled(&dir, &context.at(&dir))?;
-    let files = make(&dir, &args.options(), context)?;
+    let Some(files) = make(&dir, args.options(), context).await? else {
+        context.talk.say(
+            "stopped while the files were made; nothing is imported, and the same command makes them anew",
+        );
+        return Ok(ExitCode::Stopped);
+    };
     let manifest = ImportArgs {
         file: Some(files.manifest),
         truth: Some(files.truth),
@@ -100,14 +107,20 @@ fn demo_dir(args: &DemoArgs, context: &Context) -> PathBuf {
         .unwrap_or_else(|| PathBuf::from("mocban-demo"))
 }
 
-/// Makes the dataset below `DIR/data`, unless it is there.
-fn make(dir: &Path, options: &DemoOptions, context: &Context) -> anyhow::Result<DatasetFiles> {
+/// Makes the dataset below `DIR/data`, unless it is there; `None` when it was stopped meanwhile.
+async fn make(
+    dir: &Path,
+    options: DemoOptions,
+    context: &Context,
+) -> anyhow::Result<Option<DatasetFiles>> {
     let data = dir.join("data");
-    check_place(dir, &data, options)?;
+    check_place(dir, &data, &options)?;
     std::fs::create_dir_all(&data).with_context(|| format!("cannot make {}", data.display()))?;
     let note = data.join(NOTE);
     std::fs::write(&note, NOTE_TEXT).with_context(|| format!("cannot write {}", note.display()))?;
-    let files = write_dataset(&data, options)?;
+    let Some(files) = written(data.clone(), options).await? else {
+        return Ok(None);
+    };
     let made = if files.was_there { "found" } else { "made" };
     context.talk.say(&format!(
         "{made} {} of tier {}, seed {}, in {}",
@@ -116,7 +129,21 @@ fn make(dir: &Path, options: &DemoOptions, context: &Context) -> anyhow::Result<
         options.seed,
         data.display()
     ));
-    Ok(files)
+    Ok(Some(files))
+}
+
+/// Writes the dataset beside this thread, which listens for Ctrl-C; `None` when it came.
+async fn written(data: PathBuf, options: DemoOptions) -> anyhow::Result<Option<DatasetFiles>> {
+    let stop = Stop::default();
+    let signals = signals::watch(&stop)?;
+    let is_stopped = move || stop.level() != StopLevel::Go;
+    let writing = tokio::task::spawn_blocking(move || write_dataset(&data, &options, &is_stopped));
+    let written = writing.await?;
+    signals.abort();
+    match written {
+        Err(DatasetError::Stopped) => Ok(None),
+        written => Ok(Some(written?)),
+    }
 }
 
 const NOTE: &str = "README.txt";
@@ -131,18 +158,29 @@ fn check_place(dir: &Path, data: &Path, options: &DemoOptions) -> Result<(), Ref
             "{shown} {what}; name another directory for this demo"
         )))
     };
+    let go_on = || {
+        if !dir.join(CATALOG_FILE).exists() {
+            return String::new();
+        }
+        let dir = quoted(&dir.to_string_lossy());
+        format!("; `mocban -C {dir} run` goes on with it")
+    };
     let seal = std::fs::read(data.join("dataset.json")).ok();
     let found = seal.and_then(|bytes| serde_json::from_slice::<DemoOptions>(&bytes).ok());
     match found {
         Some(found) if found.tier != options.tier || found.seed != options.seed => {
             refuse(&format!(
-                "holds the demo of tier {} and seed {}",
-                found.tier, found.seed
+                "holds the demo of tier {} and seed {}{}",
+                found.tier,
+                found.seed,
+                go_on()
             ))
         }
-        Some(found) if found.pairs > options.pairs => {
-            refuse(&format!("holds a demo of {} pairs already", found.pairs))
-        }
+        Some(found) if found.pairs > options.pairs => refuse(&format!(
+            "holds a demo of {} pairs already{}",
+            found.pairs,
+            go_on()
+        )),
         None if data.exists() && !data.join(NOTE).is_file() => {
             refuse("has a data folder that no demo made")
         }

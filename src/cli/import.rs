@@ -8,7 +8,8 @@ use serde_json::{Value, json};
 use tokio::sync::mpsc;
 
 use super::context::{Context, now};
-use super::exit::ExitCode;
+use super::exit::{ExitCode, Refusal};
+use super::given;
 use super::manifest_file::Listing;
 use super::table::count;
 use super::talk;
@@ -181,8 +182,8 @@ async fn read_truths(
     listed: &Ids,
     dir: &Path,
 ) -> anyhow::Result<Vec<truth_file::Row>> {
-    let shown = file.display();
-    let text = std::fs::read_to_string(file).with_context(|| format!("cannot read {shown}"))?;
+    let text = String::from_utf8(given::read(file)?)
+        .map_err(|error| Refusal::Usage(format!("{}: {error}", file.display())))?;
     let truths = truth_file::parse(file, &text)?;
     let others: Vec<PairName> = truths
         .iter()

@@ -3,9 +3,8 @@
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-use anyhow::Context as _;
-
 use super::exit::Refusal;
+use super::given;
 use crate::domain::{ContentHash, LengthUnit, PairName};
 use crate::manifest::{Ids, ManifestError, ManifestRow, pair_folders, read_csv, read_jsonl};
 
@@ -64,7 +63,7 @@ impl Listing {
             let text = format!("{shown} is a directory; give two of them by --meshes and --prints");
             return Err(Refusal::Usage(text).into());
         }
-        let bytes = std::fs::read(file).with_context(|| format!("cannot read {shown}"))?;
+        let bytes = given::read(file)?;
         let read: Reader = if is_jsonl(file, &bytes) {
             read_jsonl
         } else {
@@ -211,17 +210,9 @@ pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
 }
 
 /// Plain files of a folder; what is below its own folders is not looked at.
-fn files(dir: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    let shown = dir.display();
-    let mut files = Vec::new();
-    for entry in std::fs::read_dir(dir).with_context(|| format!("cannot list {shown}"))? {
-        let path = entry
-            .with_context(|| format!("cannot list {shown}"))?
-            .path();
-        if !path.is_dir() {
-            files.push(path);
-        }
-    }
+fn files(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
+    let mut files = given::list(dir)?;
+    files.retain(|path| !path.is_dir());
     Ok(files)
 }
 

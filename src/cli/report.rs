@@ -12,8 +12,8 @@ use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::talk;
 use crate::catalog::Catalog;
-use crate::export::{GalleryOptions, draw_gallery};
-use crate::report::{Cover, Format, Interval, Report, gate, gather, page, render};
+use crate::export::{Chosen, draw_gallery};
+use crate::report::{Cover, Format, Interval, Report, gate, gather, gather_with, page, render};
 use crate::store::{Project, write_whole};
 
 /// The seed of the pictures that are drawn by lot; the page tells it.
@@ -57,13 +57,19 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     let (project, catalog) = context.reader().await?;
     context.warn_of_stale(&catalog).await?;
     let format = chosen(args.format, context);
-    let mut report = gather(&catalog, &project).await?.with_interval(args.ci);
+    let mut pictures = Chosen::new(LOT_SEED);
+    let report = if format == Format::Html {
+        gather_with(&catalog, &project, |pair, truth| pictures.add(pair, truth)).await?
+    } else {
+        gather(&catalog, &project).await?
+    };
+    let mut report = report.with_interval(args.ci);
     if !args.with_times && format != Format::Html {
         report = report.without_times();
     }
     let text = match (&args.compare, format) {
         (Some(other), _) => compared(&report, other, format, context).await?,
-        (None, Format::Html) => pictured(&report, (&project, &catalog), context).await?,
+        (None, Format::Html) => pictured(&report, pictures, (&project, &catalog), context).await?,
         (None, Format::Text | Format::Json | Format::Csv | Format::Markdown | Format::Latex) => {
             render(&report, format)
         }
@@ -83,14 +89,12 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
 /// The report as a page with its pictures.
 async fn pictured(
     report: &Report,
+    pictures: Chosen,
     (project, catalog): (&Project, &Catalog),
     context: &Context,
 ) -> anyhow::Result<String> {
-    let options = GalleryOptions {
-        seed: LOT_SEED,
-        limits: context.settings()?.config.limits.image,
-    };
-    let gallery = draw_gallery(catalog, project, options).await?;
+    let limits = context.settings()?.config.limits.image;
+    let gallery = draw_gallery(pictures, catalog, project, limits).await?;
     let name = std::path::absolute(project.dir()).unwrap_or_else(|_| project.dir().to_owned());
     let cover = Cover {
         project: name

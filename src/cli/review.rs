@@ -11,10 +11,11 @@ use serde_json::json;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::signals;
+use super::table::count;
 use super::talk;
 use super::verdict::reader_name;
 use crate::domain::{Queue, ThresholdMetric};
-use crate::review::{self, DeckOptions, Language, Rates, Review, ReviewOptions};
+use crate::review::{self, Cards, DeckOptions, Language, Rates, Review, ReviewOptions};
 use crate::runner::{Stop, StopLevel};
 
 /// Arguments of `review`.
@@ -102,6 +103,11 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         deck: deck(&args),
     };
     let page = review::open(catalog.clone(), project, options).await?;
+    if args.adjudicate && page.cards().all == 0 {
+        drop(page);
+        catalog.close().await;
+        return no_conflict(&args, context);
+    }
     let _file = tell(&page, &args, context)?;
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
@@ -139,6 +145,39 @@ fn deck(args: &ReviewArgs) -> DeckOptions {
     }
 }
 
+/// There is no page without anything to settle on it.
+fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    if context.global.json {
+        talk::print(&json!({"schema": 1, "url": null}).to_string())?;
+    }
+    let reader = &args.reader;
+    context.talk.say(&format!(
+        "no conflict waits for {reader}: no two others contradict each other on a result that nobody has settled"
+    ));
+    context.talk.next(&context.command("agree"));
+    Ok(ExitCode::Done)
+}
+
+/// How far a reader is, such as `lan has answered 0 of 54 pictures: 50 results, and 4 to test the reader`.
+fn progress(reader: &str, cards: Cards) -> String {
+    let Cards {
+        all,
+        results,
+        answered,
+    } = cards;
+    let told = format!(
+        "{reader} has answered {answered} of {}",
+        count(all as u64, "picture")
+    );
+    match all - results {
+        0 => told,
+        tests => format!(
+            "{told}: {}, and {tests} to test the reader",
+            count(results as u64, "result")
+        ),
+    }
+}
+
 /// Says where the page is, and opens it where a person sits. The file it is opened by lives as long as what is given
 /// back.
 fn tell(
@@ -152,10 +191,9 @@ fn tell(
     } else {
         talk::print(&url)?;
     }
-    let [all, answered] = page.cards();
-    let reader = &args.reader;
     context.talk.say(&format!(
-        "{reader} has answered {answered} of {all}; the address opens once, in one browser; Ctrl-C ends"
+        "{}; the address opens once, in one browser; Ctrl-C ends",
+        progress(&args.reader, page.cards())
     ));
     if address.ip().is_loopback() {
         let port = address.port();
@@ -216,7 +254,7 @@ fn language_of_system() -> Language {
 
 #[cfg(test)]
 mod tests {
-    use super::{order, percent};
+    use super::{Cards, order, percent, progress};
     use crate::config::{Sources, load};
     use crate::domain::Queue;
     use crate::review::key_map;
@@ -228,6 +266,23 @@ mod tests {
         let map = key_map(keys).expect("the default keys");
         assert_eq!((map.len(), keys.len()), (40, 40));
         assert_eq!(map["KeyP"], "pass");
+    }
+
+    #[test]
+    fn what_tests_the_reader_is_counted_apart() {
+        let cards = |all, results| Cards {
+            all,
+            results,
+            answered: 7,
+        };
+        assert_eq!(
+            progress("lan", cards(54, 50)),
+            "lan has answered 7 of 54 pictures: 50 results, and 4 to test the reader"
+        );
+        assert_eq!(
+            progress("lan", cards(50, 50)),
+            "lan has answered 7 of 50 pictures"
+        );
     }
 
     #[test]

@@ -6,9 +6,10 @@ use serde_json::{Value, json};
 use super::clock::utc;
 use super::context::Context;
 use super::exit::ExitCode;
+use super::show_hand::Laid;
 use super::show_text::Page;
 use super::talk::{self, Palette, Tone};
-use super::{select, verdict};
+use super::{select, show_hand, verdict};
 use crate::catalog::{PairDetail, PlanEntry};
 use crate::domain::JobStatus;
 use crate::runner;
@@ -26,13 +27,13 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
     let name = select::pair(&catalog, &args.pair).await?;
     let recipes = runner::recipes(&context.settings()?.config.stages);
     let why = catalog.why(&name, &recipes).await?;
-    let detail = catalog.pair(&name).await?;
-    catalog.close().await;
-    let Some(detail) = detail else {
+    let Some(detail) = catalog.pair(&name).await? else {
         anyhow::bail!("pair {name} went away while it was looked up");
     };
+    let laid = show_hand::of(&catalog, &detail.results).await?;
+    catalog.close().await;
     if context.global.json {
-        talk::print_json(&as_json(&detail, why.as_ref(), &project)?)?;
+        talk::print_json(&as_json(&detail, &laid, why.as_ref(), &project)?)?;
         return Ok(ExitCode::Done);
     }
     let page = Page {
@@ -41,8 +42,9 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
         palette: context.talk.out,
     };
     talk::print(&format!(
-        "{}{}",
+        "{}{}{}",
         page.text(),
+        show_hand::text(&laid, context.talk.out),
         tail(&detail, why.as_ref(), context.talk.out)
     ))?;
     for command in next_steps(&detail, why.is_some()) {
@@ -87,6 +89,7 @@ fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
 /// The catalog's record with the paths of its files and what a run would do.
 fn as_json(
     detail: &PairDetail,
+    laid: &[Laid],
     why: Option<&PlanEntry>,
     project: &Project,
 ) -> anyhow::Result<Value> {
@@ -100,6 +103,7 @@ fn as_json(
             }
         }
         fields.insert("files".to_owned(), Value::Object(paths));
+        fields.insert("by_hand".to_owned(), serde_json::to_value(laid)?);
         fields.insert("next_run".to_owned(), serde_json::to_value(why)?);
         fields.insert("schema".to_owned(), json!(1));
     }

@@ -6,12 +6,13 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use super::context::Context;
+use super::context::{Context, quoted};
 use super::exit::ExitCode;
 use super::failures::Failures;
 use super::progress::CLEAR;
 use super::table::{Align, columns, count};
 use super::talk::{self, Palette, Tone};
+use super::verdict::reader_name;
 use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict};
 use crate::runner;
@@ -23,6 +24,9 @@ pub(super) struct StatusArgs {
     /// Look again every two seconds until Ctrl-C
     #[arg(short, long)]
     pub(super) watch: bool,
+    /// Name every failed pair with its reason, not only the first of each class
+    #[arg(long)]
+    pub(super) failed: bool,
 }
 
 const EVERY: Duration = Duration::from_secs(2);
@@ -31,8 +35,13 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
     let (project, catalog) = context.reader().await?;
     loop {
         let recipes = runner::recipes(&context.settings()?.config.stages);
-        let view = View::read(&project, &catalog, &recipes).await?;
-        show(&view, args.watch, context)?;
+        let failures = if args.failed {
+            Failures::read_all(&catalog).await?
+        } else {
+            Failures::read(&catalog).await?
+        };
+        let view = View::read(&project, &catalog, &recipes, failures).await?;
+        show(&view, &args, context)?;
         if !args.watch {
             break;
         }
@@ -54,11 +63,15 @@ struct View {
 }
 
 impl View {
-    async fn read(project: &Project, catalog: &Catalog, recipes: &Recipes) -> anyhow::Result<Self> {
+    async fn read(
+        project: &Project,
+        catalog: &Catalog,
+        recipes: &Recipes,
+        failures: Failures,
+    ) -> anyhow::Result<Self> {
         // Before the counts: a run that ends in between leaves no leases.
         let running = RunLock::is_held(project);
         let counts = catalog.status(recipes).await?;
-        let failures = Failures::read(catalog).await?;
         Ok(Self {
             counts,
             running,
@@ -83,9 +96,12 @@ impl View {
         }
     }
 
-    fn json(&self) -> anyhow::Result<Value> {
+    fn json(&self, names_failed: bool) -> anyhow::Result<Value> {
         let mut json = serde_json::to_value(&self.counts)?;
         json["running"] = Value::from(self.running);
+        if names_failed {
+            json["failures"] = self.failures.json();
+        }
         Ok(json)
     }
 
@@ -94,14 +110,17 @@ impl View {
     }
 }
 
-fn show(view: &View, watched: bool, context: &Context) -> anyhow::Result<()> {
+fn show(view: &View, args: &StatusArgs, context: &Context) -> anyhow::Result<()> {
     let talk = &context.talk;
-    if context.global.json && watched {
-        talk::print(&view.json()?.to_string())?;
-    } else if context.global.json {
-        talk::print_json(&view.json()?)?;
+    if context.global.json {
+        let json = view.json(args.failed)?;
+        if args.watch {
+            talk::print(&json.to_string())?;
+        } else {
+            talk::print_json(&json)?;
+        }
     } else {
-        let clear = if watched && std::io::stdout().is_terminal() {
+        let clear = if args.watch && std::io::stdout().is_terminal() {
             CLEAR
         } else {
             ""
@@ -241,14 +260,28 @@ fn next_steps(view: &View) -> Vec<String> {
         steps.push("sheet --order confidence".to_owned());
     }
     if view.jobs(JobStatus::Done) > 0 && !running {
+        if view.counts.verdicts.values().sum::<u64>() == 0 {
+            let user = std::env::var("USER").ok();
+            steps.push(review_step(user.as_deref()));
+        }
         steps.push("report".to_owned());
     }
     steps
 }
 
+/// How to judge what nobody has read, under the name of who asks.
+fn review_step(user: Option<&str>) -> String {
+    let name = user.and_then(|user| reader_name(user).ok());
+    let name = name.unwrap_or_else(|| "me".to_owned());
+    format!("review --reader {}", quoted(&name))
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{JobStatus, Palette, Stage, StageCounts, StatusCounts, View, next_steps, screen};
+    use super::{
+        JobStatus, Palette, Stage, StageCounts, StatusCounts, Verdict, View, next_steps,
+        review_step, screen,
+    };
 
     fn view(done: u64, ready: u64) -> View {
         let stage = StageCounts {
@@ -288,8 +321,9 @@ mod tests {
         assert!(next_steps(&view).is_empty());
         view.running = false;
         assert_eq!(headline(&view), told("cut off"));
-        assert_eq!(next_steps(&view), ["run", "report"]);
-        assert_eq!(view.json().expect("JSON")["running"], false);
+        let steps = next_steps(&view);
+        assert_eq!([&steps[0], &steps[steps.len() - 1]], ["run", "report"]);
+        assert_eq!(view.json(false).expect("JSON")["running"], false);
     }
 
     #[test]
@@ -309,7 +343,14 @@ mod tests {
     fn next_step_follows_from_the_counts() {
         assert_eq!(next_steps(&view(0, 0)), ["import pairs.csv"]);
         assert_eq!(next_steps(&view(0, 2)), ["run"]);
-        assert_eq!(next_steps(&view(2, 0)), ["report"]);
+        let mut done = view(2, 0);
+        let steps = next_steps(&done);
+        assert!(steps[0].starts_with("review --reader "), "{steps:?}");
+        assert_eq!(steps[1..], ["report"]);
+        done.counts.verdicts.insert(Verdict::Pass, 1);
+        assert_eq!(next_steps(&done), ["report"]);
+        assert_eq!(review_step(Some("lê văn")), "review --reader 'lê văn'");
+        assert_eq!(review_step(None), "review --reader me");
     }
 
     #[test]

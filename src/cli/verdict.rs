@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
@@ -13,7 +12,7 @@ use super::manifest_file::is_jsonl;
 use super::table::{Align, columns, count};
 use super::talk::{self, Palette, Tone};
 use super::verdict_file::Row;
-use super::{select, verdict_file, verdict_lines};
+use super::{given, select, verdict_file, verdict_lines};
 use crate::catalog::{Catalog, Look, NewVerdict, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 
@@ -133,8 +132,7 @@ fn on(metric: Option<ThresholdMetric>) -> &'static str {
 }
 
 async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let path = args.file.display();
-    let bytes = std::fs::read(&args.file).with_context(|| format!("cannot read {path}"))?;
+    let bytes = given::read(&args.file)?;
     let (_project, catalog) = context.writer().await?;
     let parse = if is_jsonl(&args.file, &bytes) {
         verdict_lines::parse

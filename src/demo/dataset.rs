@@ -61,6 +61,9 @@ pub enum Error {
         /// What the encoder said.
         source: image::ImageError,
     },
+    /// Asked to stop before it was whole.
+    #[error("stopped while the demo's files were made")]
+    Stopped,
     /// A row could not be put into text.
     #[error("{}: {reason}", path.display())]
     Text {
@@ -97,11 +100,15 @@ struct Row {
 /// Writes the dataset below `dir`, or finds it there whole, made with the same options.
 ///
 /// `manifest.csv`, `truth.jsonl`, `meshes/`, `prints/` and `tops/` are ordinary files; `dataset.json` is written
-/// last, so what a killed run left behind is made anew.
+/// last, so what a killed run left behind is made anew. `is_stopped` is asked before each pair.
 ///
 /// # Errors
-/// When a file cannot be written.
-pub fn write_dataset(dir: &Path, options: &DemoOptions) -> Result<DatasetFiles, Error> {
+/// When a file cannot be written, or it was asked to stop.
+pub fn write_dataset(
+    dir: &Path,
+    options: &DemoOptions,
+    is_stopped: &(dyn Fn() -> bool + Sync),
+) -> Result<DatasetFiles, Error> {
     let options = DemoOptions {
         pairs: options
             .pairs
@@ -115,7 +122,7 @@ pub fn write_dataset(dir: &Path, options: &DemoOptions) -> Result<DatasetFiles, 
     };
     let was_there = is_sealed(dir, &seal);
     if !was_there {
-        make(dir, &options)?;
+        make(dir, &options, is_stopped)?;
         write(&dir.join(SEAL), &json_line(&dir.join(SEAL), &seal)?)?;
     }
     Ok(DatasetFiles {
@@ -133,7 +140,11 @@ fn is_sealed(dir: &Path, seal: &Seal) -> bool {
         .is_some_and(|found| found == *seal)
 }
 
-fn make(dir: &Path, options: &DemoOptions) -> Result<(), Error> {
+fn make(
+    dir: &Path,
+    options: &DemoOptions,
+    is_stopped: &(dyn Fn() -> bool + Sync),
+) -> Result<(), Error> {
     for folder in ["meshes", "prints", "tops"] {
         // What another dataset left here would not be in the new manifest.
         remove_folder(&dir.join(folder))?;
@@ -142,7 +153,12 @@ fn make(dir: &Path, options: &DemoOptions) -> Result<(), Error> {
     let pairs = Pairs::new(options.tier, options.seed);
     let lines = (0..options.pairs)
         .into_par_iter()
-        .map(|index| one(dir, &pairs, index))
+        .map(|index| {
+            if is_stopped() {
+                return Err(Error::Stopped);
+            }
+            one(dir, &pairs, index)
+        })
         .collect::<Result<Vec<_>, Error>>()?;
     let (rows, truths): (Vec<Row>, Vec<Vec<u8>>) = lines.into_iter().unzip();
     write_manifest(&dir.join("manifest.csv"), &rows)?;

@@ -66,6 +66,11 @@ impl Affine2 {
         ]))
     }
 
+    /// Pixels of a picture so wide to those of its mirror image, left and right changed.
+    pub fn mirror(width_px: u32) -> Self {
+        Self([[-1.0, 0.0, f64::from(width_px) - 1.0], [0.0, 1.0, 0.0]])
+    }
+
     /// Square root of the area factor.
     pub fn scale(&self) -> f64 {
         self.determinant().abs().sqrt()

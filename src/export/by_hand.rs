@@ -18,7 +18,7 @@ pub struct ByHand {
     pub print_from_mesh: PrintFromMesh,
     /// 3x3: depth-map pixel to print pixel; null where the depth map is another since.
     pub print_from_depth: Option<[[f64; 3]; 3]>,
-    /// Intersection over union of the masks in the print's frame.
+    /// Intersection over union of the masks on the canvas of the line's scores.
     pub iou: f64,
     /// Dice coefficient of the same.
     pub dice: f64,

@@ -11,7 +11,7 @@ use crate::raster::{self, jpeg_rgb8};
 use crate::report::aligned::alike;
 use crate::report::gallery::{Gallery, Group, Kind, Shot, said};
 use crate::report::truth::TruthErrors;
-use crate::report::{PAGE, Standing, TruthFinding, with_truth};
+use crate::report::{Standing, TruthFinding};
 use crate::store::Project;
 
 /// Longest side of a picture in pixels.
@@ -25,16 +25,8 @@ const BY_LOT: usize = 20;
 /// Whose result of a pair is drawn by lot.
 const LOT_METRIC: ThresholdMetric = ThresholdMetric::Ensemble;
 
-/// What to draw.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct GalleryOptions {
-    /// The seed of the lot.
-    pub seed: u64,
-    /// Limits on the print images.
-    pub limits: raster::Limits,
-}
-
 /// A result to be drawn: of one metric, or of several that came to the same.
+#[derive(Debug)]
 struct Subject {
     pair: PairResults,
     metrics: Vec<ThresholdMetric>,
@@ -42,8 +34,11 @@ struct Subject {
     log: Vec<VerdictEvent>,
 }
 
-/// What was chosen so far.
-struct Chosen {
+/// The results to draw: at most 80 that readers failed, 80 on which they contradict each other, 80 off the truth,
+/// and 20 by lot.
+#[derive(Debug)]
+pub struct Chosen {
+    seed: u64,
     lots: Lots,
     found: [(u64, Vec<Subject>); 3],
     by_lot: Vec<(f64, Subject)>,
@@ -53,33 +48,27 @@ struct Chosen {
 /// Kinds that are chosen for what was found, in the order of [`Chosen::found`].
 const FOUND: [Kind; 3] = [Kind::Failed, Kind::Conflict, Kind::OffTruth];
 
-/// Draws the pictures of a project's report as its catalog stands, at most 80 of a kind and 20 by lot.
-///
-/// A picture that cannot be made is left out, with the reason.
+/// Draws the pictures of a project's report. One that cannot be made is left out, with the reason.
 ///
 /// # Errors
 /// When the catalog cannot be read.
 pub async fn draw_gallery(
+    mut chosen: Chosen,
     catalog: &Catalog,
     project: &Project,
-    options: GalleryOptions,
+    limits: raster::Limits,
 ) -> Result<Gallery, SheetError> {
-    let mut chosen = Chosen::new(options.seed);
-    let mut pages = catalog.result_pages(PAGE);
-    while let Some(page) = pages.next().await? {
-        for (pair, truth) in with_truth(project, page).await? {
-            chosen.add(&pair, &truth);
-        }
-    }
     chosen.read_log(catalog).await?;
     let project = project.clone();
-    let draw = move || chosen.draw(&project, &options);
+    let draw = move || chosen.draw(&project, &limits);
     Ok(tokio::task::spawn_blocking(draw).await?)
 }
 
 impl Chosen {
-    fn new(seed: u64) -> Self {
+    /// Nothing yet; the seed is that of the lot.
+    pub fn new(seed: u64) -> Self {
         Self {
+            seed,
             lots: Lots::new(seed, "report"),
             found: Default::default(),
             by_lot: Vec::new(),
@@ -87,7 +76,8 @@ impl Chosen {
         }
     }
 
-    fn add(&mut self, pair: &PairResults, truth: &TruthFinding) {
+    /// Takes a pair's results in, where they are to be drawn. Pairs come in the order of their names.
+    pub fn add(&mut self, pair: &PairResults, truth: &TruthFinding) {
         for records in alike(&pair.metrics) {
             for ((of, subjects), kind) in self.found.iter_mut().zip(FOUND) {
                 let is_of_kind = |record: &&MetricRecord| is_of(kind, record, truth);
@@ -131,7 +121,7 @@ impl Chosen {
         Ok(())
     }
 
-    fn draw(self, project: &Project, options: &GalleryOptions) -> Gallery {
+    fn draw(self, project: &Project, limits: &raster::Limits) -> Gallery {
         let mut by_lot: Vec<Subject> = self.by_lot.into_iter().map(|(_, lot)| lot).collect();
         by_lot.sort_by(|a, b| a.pair.facts.name.cmp(&b.pair.facts.name));
         let found = FOUND.into_iter().zip(self.found);
@@ -140,14 +130,14 @@ impl Chosen {
             .chain([(Kind::Lot, self.pairs, by_lot)]);
         let groups = all.filter(|(_, of, _)| *of > 0);
         Gallery {
-            seed: options.seed,
+            seed: self.seed,
             groups: groups
                 .map(|(kind, of, subjects)| Group {
                     kind,
                     of,
                     shots: subjects
                         .par_iter()
-                        .map(|subject| subject.shot(project, options))
+                        .map(|subject| subject.shot(project, limits))
                         .collect(),
                 })
                 .collect(),
@@ -189,9 +179,9 @@ impl Subject {
             .is_some_and(|record| !record.verdicts.is_empty())
     }
 
-    fn shot(&self, project: &Project, options: &GalleryOptions) -> Shot {
+    fn shot(&self, project: &Project, limits: &raster::Limits) -> Shot {
         let facts = &self.pair.facts;
-        let (tiles, trouble) = tiles(project, &self.pair, self.metrics[0], SIDE, &options.limits);
+        let (tiles, trouble) = tiles(project, &self.pair, self.metrics[0], SIDE, limits);
         Shot {
             pair: facts.name.clone(),
             character: facts.character.clone(),

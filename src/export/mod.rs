@@ -13,7 +13,7 @@ mod tiles;
 pub use by_hand::ByHand;
 pub use files::{Files, FilesError, Print};
 pub use folder::FolderError;
-pub use gallery::{GalleryOptions, draw_gallery};
+pub use gallery::{Chosen, draw_gallery};
 pub use jsonl::{ExportError, ExportSummary, JsonlOptions, json_lines, to_jsonl};
 pub use line::{Hashes, Line, LineStatus, Maps, Numbers};
 pub use sheet::{Sheet, SheetError, SheetOptions, SheetOrder, draw_sheet};

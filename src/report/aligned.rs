@@ -3,7 +3,7 @@
 use serde::de::DeserializeOwned;
 
 use crate::catalog::{MetricRecord, PairResults, StageRecord};
-use crate::domain::role::{DEPTH, PRINT_MASK};
+use crate::domain::role::{CANVAS_PRINT_MASK, DEPTH, PRINT_MASK};
 use crate::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, PrintFromMesh, Stage,
 };
@@ -121,6 +121,15 @@ impl<'a> Aligned<'a> {
     /// When the result or its picture cannot be read.
     pub fn print_mask(&self) -> Result<Mask, AlignedError> {
         let grey = self.grey(Stage::Normalize, PRINT_MASK)?;
+        Ok(grey.map(|value| *value == INK))
+    }
+
+    /// The ink of the print on the canvas of the scores.
+    ///
+    /// # Errors
+    /// When the result or its picture cannot be read.
+    pub fn canvas_print_mask(&self) -> Result<Mask, AlignedError> {
+        let grey = self.grey(Stage::Register, CANVAS_PRINT_MASK)?;
         Ok(grey.map(|value| *value == INK))
     }
 

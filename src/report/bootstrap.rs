@@ -17,6 +17,9 @@ const FEWEST_RESAMPLES: usize = 1000;
 /// About so many draws in all, so that many units do not take minutes.
 const DRAWS: usize = 50_000_000;
 
+/// Resamples that are added up together.
+const TOGETHER: usize = 8;
+
 /// What a unit, a pair or a block, adds to each quantity: its sum there, and over how many results.
 pub(super) type Sums = Vec<[f64; 2]>;
 
@@ -40,9 +43,11 @@ pub(super) const fn resamples(units: usize) -> usize {
 /// All quantities are of the same draws, so that differences of them are paired. The order of the units counts, the
 /// number of threads does not.
 pub(super) fn resampled_means(units: &[Sums], width: usize) -> Vec<Vec<f64>> {
-    let drawn: Vec<Sums> = (0..resamples(units.len()) as u64)
-        .into_par_iter()
-        .map(|stream| draw(units, width, stream))
+    let flat = units.concat();
+    let streams: Vec<u64> = (0..resamples(units.len()) as u64).collect();
+    let drawn: Vec<Sums> = streams
+        .par_chunks(TOGETHER)
+        .flat_map_iter(|streams| draw(&flat, width, streams))
         .collect();
     let mean = |quantity: usize| {
         let all = drawn.iter().map(move |sums| sums[quantity]);
@@ -53,19 +58,36 @@ pub(super) fn resampled_means(units: &[Sums], width: usize) -> Vec<Vec<f64>> {
     (0..width).map(mean).collect()
 }
 
-/// As many units as there are, drawn with replacement and added up.
-fn draw(units: &[Sums], width: usize, stream: u64) -> Sums {
-    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
-    rng.set_stream(stream);
-    let mut total = vec![[0.0; 2]; width];
-    for _ in 0..units.len() {
-        let unit = &units[rng.random_range(0..units.len())];
-        for ([sum, n], [more, times]) in total.iter_mut().zip(unit) {
-            *sum += more;
-            *n += times;
+/// For each stream as many units as there are, drawn with replacement and added up. All units lie one after another,
+/// and each is read once for all streams: where there are many, reading them is what takes the time.
+fn draw(units: &[[f64; 2]], width: usize, streams: &[u64]) -> Vec<Sums> {
+    let count = units.len() / width.max(1);
+    let drawn: Vec<Vec<u32>> = streams.iter().map(|stream| times(count, *stream)).collect();
+    let mut totals = vec![vec![[0.0; 2]; width]; streams.len()];
+    for (i, unit) in units.chunks_exact(width.max(1)).enumerate() {
+        for (total, drawn) in totals.iter_mut().zip(&drawn) {
+            let times = f64::from(drawn[i]);
+            if times == 0.0 {
+                continue;
+            }
+            for ([sum, n], [more, results]) in total.iter_mut().zip(unit) {
+                *sum += times * more;
+                *n += times * results;
+            }
         }
     }
-    total
+    totals
+}
+
+/// How often each of so many units is drawn.
+fn times(count: usize, stream: u64) -> Vec<u32> {
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    rng.set_stream(stream);
+    let mut times = vec![0; count];
+    for _ in 0..count {
+        times[rng.random_range(0..count)] += 1;
+    }
+    times
 }
 
 /// The middle 95 % of resampled means; `None` of none. Reorders them.
@@ -87,8 +109,12 @@ pub(super) fn two_sided_p(differences: &[f64]) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt as _, SeedableRng as _};
+    use rand_chacha::ChaCha8Rng;
+
     use super::{
-        FEWEST_RESAMPLES, RESAMPLES, Sums, middle_95, resampled_means, resamples, two_sided_p,
+        FEWEST_RESAMPLES, RESAMPLES, SEED, Sums, draw, middle_95, resampled_means, resamples,
+        two_sided_p,
     };
 
     /// Differences of 40 pairs, unevenly spread around 0.01.
@@ -97,6 +123,35 @@ mod tests {
         pairs
             .map(|i| (0.8 + 0.1 * i.sin()) - (0.79 + 0.1 * i.sin() + 0.03 * (3.0 * i).cos()))
             .collect()
+    }
+
+    /// Units drawn one after another, as the text books say it.
+    fn slow(units: &[Sums], width: usize, stream: u64) -> Sums {
+        let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+        rng.set_stream(stream);
+        let mut total = vec![[0.0; 2]; width];
+        for _ in 0..units.len() {
+            let unit = &units[rng.random_range(0..units.len())];
+            for ([sum, n], [more, results]) in total.iter_mut().zip(unit) {
+                *sum += more;
+                *n += results;
+            }
+        }
+        total
+    }
+
+    #[test]
+    fn resamples_added_up_together_are_those_drawn_one_by_one() {
+        let sums = |i: f64| vec![[i.sin(), 1.0], [i.cos(), 1.0 + (i % 3.0)], [0.0, 0.0]];
+        let units: Vec<Sums> = (0..50).map(|i| sums(f64::from(i))).collect();
+        let streams = [4, 0, 7];
+        let found = draw(&units.concat(), 3, &streams);
+        for (found, stream) in found.iter().zip(streams) {
+            for (found, wanted) in found.iter().zip(slow(&units, 3, stream)) {
+                assert!((found[0] - wanted[0]).abs() < 1e-9, "{found:?} {wanted:?}");
+                assert_eq!(found[1], wanted[1]);
+            }
+        }
     }
 
     /// Whether bounds are those of a million resamples, within four standard errors of a bound of ten thousand.

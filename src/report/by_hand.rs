@@ -35,6 +35,42 @@ pub struct ByHand {
     pub mirrored: u64,
 }
 
+/// What somebody did who laid a relief anew.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct HandMove {
+    /// By how much it was turned, degrees in (-180, 180], clockwise on the screen.
+    pub turned_deg: f64,
+    /// By how much its centre was shifted, print pixels, x right and y down.
+    pub shifted_px: [f64; 2],
+    /// By what it was enlarged.
+    pub scaled: f64,
+    /// Whether it was mirrored as well, left and right of the relief before it was turned.
+    pub mirrored: bool,
+}
+
+impl HandMove {
+    /// From one way of laying a relief of so many pixels on its print to another; `None` when one flattens it.
+    pub fn between(found: &Affine2, by_hand: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
+        let back = found.inverse()?;
+        by_hand.inverse()?;
+        let mirrored = by_hand.after(&back).determinant() < 0.0;
+        let read_alike = if mirrored {
+            by_hand.after(&Affine2::mirror(depth_px[0]))
+        } else {
+            *by_hand
+        };
+        let turn = read_alike.after(&back);
+        let centre = depth_px.map(|side| (f64::from(side) - 1.0) / 2.0);
+        let ([x, y], [u, v]) = (found.apply(centre), by_hand.apply(centre));
+        Some(Self {
+            turned_deg: turn.angle_deg(),
+            shifted_px: [u - x, v - y],
+            scaled: turn.scale(),
+            mirrored,
+        })
+    }
+}
+
 /// One result's distance from the alignment by hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HandErrors {
@@ -51,21 +87,18 @@ pub struct HandErrors {
 impl HandErrors {
     /// Between two ways of laying a relief of so many pixels on its print; `None` when one flattens it.
     fn between(found: &Affine2, by_hand: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
-        let turn = by_hand.after(&found.inverse()?);
-        by_hand.inverse()?;
-        let mirrored = turn.determinant() < 0.0;
-        let [width, height] = depth_px.map(f64::from);
-        let centre = [(width - 1.0) / 2.0, (height - 1.0) / 2.0];
-        let ([x, y], [u, v]) = (found.apply(centre), by_hand.apply(centre));
+        let moved = HandMove::between(found, by_hand, depth_px)?;
+        let [x, y] = moved.shifted_px;
+        let longer = f64::from(depth_px[0].max(depth_px[1]));
         Some(Self {
-            angle_deg: if mirrored {
+            angle_deg: if moved.mirrored {
                 180.0
             } else {
-                turn.angle_deg().abs()
+                moved.turned_deg.abs()
             },
-            shift_pct: 100.0 * (x - u).hypot(y - v) / (by_hand.scale() * width.max(height)),
-            scale_pct: 100.0 * (turn.scale() - 1.0).abs(),
-            mirrored,
+            shift_pct: 100.0 * x.hypot(y) / (by_hand.scale() * longer),
+            scale_pct: 100.0 * (moved.scaled - 1.0).abs(),
+            mirrored: moved.mirrored,
         })
     }
 }
@@ -135,7 +168,7 @@ impl HandSums {
 
 #[cfg(test)]
 mod tests {
-    use super::{HandErrors, HandSums};
+    use super::{HandErrors, HandMove, HandSums};
     use crate::domain::Affine2;
 
     /// A relief of 101 x 51 px laid with its centre at (200, 100).
@@ -165,6 +198,23 @@ mod tests {
         near(errors(&laid(1.6, 30.0, [0.0, 0.0])), [0.0, 0.0, 25.0]);
         let flat = HandErrors::between(&Affine2([[0.0; 3]; 2]), &laid(1.0, 0.0, [0.0; 2]), [9, 9]);
         assert_eq!(flat, None);
+    }
+
+    #[test]
+    fn a_turn_is_told_the_same_whether_the_relief_was_mirrored_or_not() {
+        let found = laid(2.0, 30.0, [0.0, 0.0]);
+        let turned = laid(2.0, 42.5, [3.0, -4.0]);
+        let moved = |by_hand: &Affine2| {
+            HandMove::between(&found, by_hand, [101, 51]).expect("neither is flat")
+        };
+        for (by_hand, mirrored) in [(turned, false), (turned.after(&Affine2::mirror(101)), true)] {
+            let told = moved(&by_hand);
+            assert_eq!(told.mirrored, mirrored);
+            assert!((told.turned_deg - 12.5).abs() < 1e-9, "{told:?}");
+            assert!((told.shifted_px[0] - 3.0).abs() < 1e-9, "{told:?}");
+            assert!((told.shifted_px[1] + 4.0).abs() < 1e-9, "{told:?}");
+            assert!((told.scaled - 1.0).abs() < 1e-9, "{told:?}");
+        }
     }
 
     #[test]

@@ -46,6 +46,18 @@ enum Unusable {
 /// # Errors
 /// When the catalog cannot be read.
 pub async fn gather(catalog: &Catalog, project: &Project) -> Result<Report, GatherError> {
+    gather_with(catalog, project, |_, _| {}).await
+}
+
+/// The same; every pair is shown to `see` on the way, with what its truth says.
+///
+/// # Errors
+/// When the catalog cannot be read.
+pub async fn gather_with(
+    catalog: &Catalog,
+    project: &Project,
+    mut see: impl FnMut(&PairResults, &TruthFinding),
+) -> Result<Report, GatherError> {
     let mut tally = Tally::default();
     tally.caught(controls::caught(catalog).await?);
     let laid = catalog.newest_hand_alignments().await?;
@@ -53,6 +65,7 @@ pub async fn gather(catalog: &Catalog, project: &Project) -> Result<Report, Gath
     while let Some(page) = pages.next().await? {
         for (pair, truth) in with_truth(project, page).await? {
             tally.add(&pair, &truth);
+            see(&pair, &truth);
             if let Some(laid) = laid.get(&pair.facts.name) {
                 tally.add_by_hand(&by_hand::errors(project, &pair, laid)?);
             }

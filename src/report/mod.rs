@@ -36,9 +36,9 @@ mod warnings;
 
 pub use agree::{Agree, ReaderRecord, TwoReaders, agree};
 pub use agreement::{Agreement, ENOUGH};
-pub use by_hand::{ByHand, HandErrors};
+pub use by_hand::{ByHand, HandErrors, HandMove};
 pub use controls::Caught;
-pub use gather::{GatherError, PAGE, finding, gather, with_truth};
+pub use gather::{GatherError, PAGE, finding, gather, gather_with, with_truth};
 pub use interval::Interval;
 pub use model::{
     Basis, Comparison, Coverage, CoveragePoint, FailedPair, FailureGroup, Progress, Report, Row,

@@ -16,7 +16,7 @@ use crate::domain::ThresholdMetric;
 /// Units that a quantity needs before an interval is told; of fewer it would be too narrow.
 pub const FEWEST_UNITS: usize = 10;
 /// Units that are kept; with more pairs chance hardly moves a mean, and nothing is drawn.
-const MOST_UNITS: usize = 100_000;
+pub(super) const MOST_UNITS: usize = 100_000;
 
 const METRICS: usize = ThresholdMetric::ALL.len();
 const SCORES: usize = Score::ALL.len();
@@ -82,14 +82,42 @@ pub(super) struct Drawn {
     pub(super) means: [MeanIntervals; METRICS],
     /// Metrics compared by their scores.
     pub(super) comparisons: Vec<ScoreComparison>,
+    /// Why means have no intervals and metrics are not compared by their scores.
+    pub(super) lack: Option<Lack>,
+}
+
+/// Why nothing follows from drawing anew.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lack {
+    /// More units than are kept.
+    TooMany,
+    /// Fewer units than an interval takes.
+    TooFew {
+        /// How many there are.
+        units: usize,
+        /// Of what.
+        by: Unit,
+    },
 }
 
 /// The sums so far, by unit.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Samples {
     units: Vec<Sums>,
     blocks: BTreeMap<String, usize>,
+    most: usize,
     is_over: bool,
+}
+
+impl Default for Samples {
+    fn default() -> Self {
+        Self {
+            units: Vec::new(),
+            blocks: BTreeMap::new(),
+            most: MOST_UNITS,
+            is_over: false,
+        }
+    }
 }
 
 impl Samples {
@@ -135,7 +163,7 @@ impl Samples {
         if let Some(known) = block.and_then(|block| self.blocks.get(block)) {
             return Some(*known);
         }
-        if self.units.len() == MOST_UNITS {
+        if self.units.len() == self.most {
             self.is_over = true;
             return None;
         }
@@ -154,8 +182,10 @@ impl Samples {
                 bootstrap: None,
                 means: Default::default(),
                 comparisons: Vec::new(),
+                lack: self.is_over.then_some(Lack::TooMany),
             };
         }
+        let units = self.units.len();
         let by = if self.blocks.is_empty() {
             Unit::Pair
         } else {
@@ -172,6 +202,7 @@ impl Samples {
             }),
             means: std::array::from_fn(|metric| quantities.intervals(metric, by)),
             comparisons: compared(&quantities.differences(), by),
+            lack: (units < FEWEST_UNITS).then_some(Lack::TooFew { units, by }),
         }
     }
 }

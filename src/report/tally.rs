@@ -196,7 +196,7 @@ impl Tally {
             pairs: self.pairs,
             interval: Interval::default(),
             progress: self.progress,
-            warnings: warnings::of(self.progress, &rows, &self.truth_problems),
+            warnings: warnings::of(self.progress, &rows, &self.truth_problems, drawn.lack),
             rows,
             comparisons,
             score_comparisons: drawn.comparisons,
@@ -369,7 +369,9 @@ mod tests {
         let metrics: Vec<_> = report.rows.iter().map(|row| row.metric).collect();
         assert_eq!(metrics, ThresholdMetric::PAPER);
         assert_eq!(report.comparisons.len(), 3);
-        assert_eq!(report.warnings, [""; 0]);
+        // But that one pair is few.
+        assert_eq!(report.warnings.len(), 1, "{:?}", report.warnings);
+        assert!(report.warnings[0].contains("takes 10 pairs at least"));
     }
 
     #[test]

@@ -1,13 +1,19 @@
 //! What a reader of the table must know, in whole sentences.
 
 use super::model::{Progress, Row};
+use super::samples::{FEWEST_UNITS, Lack, MOST_UNITS};
 use super::tally::TruthProblems;
 
 /// Slack for rounding in sums before a mean is called impossible.
 const ROUNDING: f64 = 1e-9;
 
 /// Every warning that the numbers call for.
-pub(super) fn of(progress: Progress, rows: &[Row], truth: &TruthProblems) -> Vec<String> {
+pub(super) fn of(
+    progress: Progress,
+    rows: &[Row],
+    truth: &TruthProblems,
+    lack: Option<Lack>,
+) -> Vec<String> {
     let mut warnings = Vec::new();
     warnings.extend(missing_pairs(progress));
     for row in rows {
@@ -16,7 +22,22 @@ pub(super) fn of(progress: Progress, rows: &[Row], truth: &TruthProblems) -> Vec
         warnings.extend(mirrored(row));
     }
     warnings.extend(unusable_truth(truth));
+    warnings.extend(lack.map(nothing_drawn));
     warnings
+}
+
+/// Why means have no intervals and metrics are not compared by their scores.
+fn nothing_drawn(lack: Lack) -> String {
+    let why = match lack {
+        Lack::TooMany => format!(
+            "there are more than {MOST_UNITS}, and chance hardly moves a mean over so many pairs"
+        ),
+        Lack::TooFew { units, by } => {
+            let what = by.plural();
+            format!("that takes {FEWEST_UNITS} {what} at least; here: {units}")
+        }
+    };
+    format!("Means have no intervals, and metrics are not compared by their scores: {why}.")
 }
 
 /// Pairs that are in no row.
@@ -95,10 +116,25 @@ fn unusable_truth(truth: &TruthProblems) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{impossible_dice, missing_pairs};
+    use super::{impossible_dice, missing_pairs, nothing_drawn};
     use crate::domain::ThresholdMetric;
     use crate::report::fixture;
     use crate::report::model::Progress;
+    use crate::report::samples::{Lack, Unit};
+
+    #[test]
+    fn why_nothing_was_drawn_is_said() {
+        let few = nothing_drawn(Lack::TooFew {
+            units: 5,
+            by: Unit::Block,
+        });
+        assert!(
+            few.ends_with(": that takes 10 blocks at least; here: 5."),
+            "{few}"
+        );
+        let many = nothing_drawn(Lack::TooMany);
+        assert!(many.contains("there are more than 100000"), "{many}");
+    }
 
     #[test]
     fn the_papers_density_row_is_impossible_and_its_others_are_not() {

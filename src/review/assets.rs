@@ -5,7 +5,7 @@ const STYLE: &str = "text/css; charset=utf-8";
 const ICON: &str = "image/svg+xml";
 
 /// Name, type and text.
-const ASSETS: [(&str, &str, &str); 13] = [
+const ASSETS: [(&str, &str, &str); 14] = [
     (
         "review.css",
         STYLE,
@@ -40,6 +40,11 @@ const ASSETS: [(&str, &str, &str); 13] = [
         "pictures.js",
         SCRIPT,
         include_str!("../../assets/review/pictures.js"),
+    ),
+    (
+        "painter.js",
+        SCRIPT,
+        include_str!("../../assets/review/painter.js"),
     ),
     (
         "masks.js",
@@ -97,7 +102,8 @@ mod tests {
     #[test]
     fn every_module_that_is_imported_is_there() {
         for (name, _, text) in ASSETS {
-            for after in text.split("from \"./").skip(1) {
+            let named = ["from \"./", "Worker(\"/assets/"].into_iter();
+            for after in named.flat_map(|start| text.split(start).skip(1)) {
                 let module = after.split('"').next().unwrap_or_default();
                 assert!(super::find(module).is_some(), "{name} imports {module}");
             }

@@ -60,10 +60,7 @@ impl View {
 
     /// The same picture with the relief in mirror writing.
     pub(super) fn mirrored(&self) -> Self {
-        let flip = Affine2([
-            [-1.0, 0.0, f64::from(self.depth_px[0]) - 1.0],
-            [0.0, 1.0, 0.0],
-        ]);
+        let flip = Affine2::mirror(self.depth_px[0]);
         Self {
             print_from_depth: self.print_from_depth.after(&flip),
             ..self.clone()

@@ -1,13 +1,16 @@
 //! An alignment by hand: where the page laid the relief, as a map from the mesh, with how well the masks agree there.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::answer::{BadAnswer, check_event, note};
-use super::card::Card;
-use super::pictures::{Drawn, SIDE};
-use crate::catalog::{HandAlignment, PairResults};
-use crate::domain::{Affine2, Stage};
+use super::card::{Card, View};
+use super::pictures::{Drawn, SIDE, Subject};
+use crate::catalog::{Catalog, CatalogError, HandAlignment, PairResults};
+use crate::domain::{Affine2, ContentHash, Stage};
 use crate::raster::{Overlap, warp_mask};
+use crate::report::HandMove;
 use crate::report::aligned::{Aligned, AlignedError};
 use crate::store::Project;
 
@@ -17,10 +20,12 @@ const SCALES: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 /// Where the page begins.
 #[derive(Debug, Serialize)]
 pub(super) struct Start {
-    /// Pixels of the depth map to pixels of the pictures.
+    /// Pixels of the depth map to pixels of the pictures, as the card shows it.
     view_from_depth: Affine2,
-    /// Size of the depth map in pixels.
-    depth_px: [u32; 2],
+    /// The same as the reader laid it before.
+    laid: Option<Affine2>,
+    /// Pixels of the pictures to the canvas on which the agreement is counted.
+    canvas_from_view: Option<Affine2>,
 }
 
 /// An alignment as the page sends it.
@@ -39,7 +44,7 @@ pub(super) struct AlignBody {
 /// How well the masks agree.
 #[derive(Debug, Serialize)]
 pub(super) struct Agreement {
-    /// Intersection over union in the print's frame.
+    /// Intersection over union on the canvas of the scores.
     pub(super) iou: f64,
     /// Dice coefficient there.
     pub(super) dice: f64,
@@ -54,25 +59,84 @@ impl From<Overlap> for Agreement {
     }
 }
 
-/// Where the correction of a card begins: at what was shown.
-pub(super) fn start(card: &Card, drawn: &Drawn) -> Start {
+/// Where the correction of a card begins: at what was shown, or where the reader left it before.
+pub(super) fn start(card: &Card, drawn: &Drawn, before: Option<&HandAlignment>) -> Start {
     let view = drawn.subject.view();
+    let in_view = |map: &Affine2| view.from_print().after(map);
+    let print_from_view = view.from_print().inverse();
     Start {
-        view_from_depth: view.from_print().after(&card.view.print_from_depth),
-        depth_px: card.view.depth_px,
+        view_from_depth: in_view(&card.view.print_from_depth),
+        laid: before.map(|made| in_view(&made.print_from_depth)),
+        canvas_from_view: print_from_view.map(|map| drawn.subject.canvas.from_print.after(&map)),
     }
 }
 
-/// How well the masks of a card agree under a map, counted in the print's own pixels.
+/// How well the masks of a card agree under a map, counted as the scores of results are.
 pub(super) fn agreement(drawn: &Drawn, print_from_depth: &Affine2) -> Agreement {
-    let ink = &drawn.subject.print_mask;
-    let laid = warp_mask(
-        &drawn.subject.strokes,
-        print_from_depth,
-        ink.width(),
-        ink.height(),
-    );
-    laid.overlap(ink).into()
+    let Subject {
+        canvas, strokes, ..
+    } = &drawn.subject;
+    let map = canvas.from_print.after(print_from_depth);
+    let (width, height) = (canvas.ink.width(), canvas.ink.height());
+    let laid = warp_mask(strokes, &map, width, height);
+    laid.overlap(&canvas.ink).into()
+}
+
+/// What is told of a correction.
+#[derive(Debug, Serialize)]
+pub(super) struct Corrected {
+    reader: String,
+    #[serde(flatten)]
+    moved: HandMove,
+    iou: f64,
+    dice: f64,
+}
+
+impl Corrected {
+    /// Against what the card shows; `None` where one of the two maps is flat.
+    pub(super) fn of(card: &Card, made: &HandAlignment) -> Option<Self> {
+        let View {
+            print_from_depth,
+            depth_px,
+            ..
+        } = &card.view;
+        let moved = HandMove::between(print_from_depth, &made.print_from_depth, *depth_px)?;
+        Some(Self {
+            reader: made.reader.clone(),
+            moved,
+            iou: made.iou,
+            dice: made.dice,
+        })
+    }
+}
+
+/// The newest correction by one reader of each thing seen, of those that hold.
+#[derive(Debug, Default)]
+pub(super) struct Corrections(BTreeMap<ContentHash, HandAlignment>);
+
+impl Corrections {
+    /// Reads those that were not taken back.
+    ///
+    /// # Errors
+    /// When the catalog refuses.
+    pub(super) async fn read(catalog: &Catalog, reader: &str) -> Result<Self, CatalogError> {
+        let stored = catalog.hand_alignments().await?.into_iter();
+        let ours = stored.filter(|stored| {
+            stored.made.reader == reader
+                && stored.holds
+                && stored.on_current_depth
+                && stored.undone_at.is_none()
+        });
+        // Oldest first, so that the newest stays.
+        Ok(Self(
+            ours.map(|stored| (stored.made.seen, stored.made)).collect(),
+        ))
+    }
+
+    /// The correction of what a card shows.
+    pub(super) fn of(&self, card: &Card) -> Option<&HandAlignment> {
+        self.0.get(&card.view.seen())
+    }
 }
 
 impl AlignBody {

@@ -1,12 +1,12 @@
 //! The deck: all that a reader is to judge, in order, results that look the same as one card.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::card::{Card, View};
 use super::control::{self, Rates};
+use super::known::Known;
 use super::order;
-use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, MetricRecord, PairResults};
+use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use crate::domain::{DepthOutcome, Lots, Queue, Stage, ThresholdMetric, Verdict};
 use crate::report::aligned::{Aligned, alike};
 use crate::report::standing::{contradict, split};
@@ -35,38 +35,20 @@ pub struct DeckOptions {
     pub rates: Rates,
 }
 
-/// A reader's answers: the newest to each thing.
-#[derive(Debug, Default)]
-pub(super) struct Answers(BTreeMap<AnsweredOn, Answer>);
-
-impl Answers {
-    /// Reads those that were not taken back.
-    ///
-    /// # Errors
-    /// When the catalog refuses.
-    pub(super) async fn read(catalog: &Catalog, reader: &str) -> Result<Self, CatalogError> {
-        let answers = catalog.answers(reader).await?.into_iter();
-        // Oldest first, so that the newest stays.
-        Ok(Self(answers.map(|answer| (answer.on, answer)).collect()))
-    }
-
-    /// The answer to a card, if there is one.
-    pub(super) fn to(&self, card: &Card) -> Option<&Answer> {
-        if card.control.is_some() {
-            return self.0.get(&AnsweredOn::Control(card.view.seen()));
-        }
-        let on_results = card.results.iter();
-        on_results
-            .filter_map(|(_, hash)| self.0.get(&AnsweredOn::Result(*hash)))
-            .max_by_key(|answer| answer.at)
+impl DeckOptions {
+    /// Whether some cards are there to test the reader. Then no card tells its pair before it is answered: a pair met
+    /// twice would give itself away.
+    pub(super) fn tests_the_reader(&self) -> bool {
+        let Rates { controls, repeats } = self.rates;
+        self.queue != Queue::Adjudicate && (controls > 0.0 || repeats > 0.0)
     }
 }
 
-/// Cards in order, with a reader's answers.
+/// Cards in order, with what the reader has done.
 #[derive(Debug, Default)]
 pub(super) struct Deck {
     pub(super) cards: Vec<Arc<Card>>,
-    pub(super) answers: Answers,
+    pub(super) known: Known,
 }
 
 impl Deck {
@@ -86,7 +68,7 @@ impl Deck {
             order::sample(&mut cards, options.queue, options.seed, most);
         }
         order::sort(&mut cards, options.queue, &lots);
-        if options.queue != Queue::Adjudicate {
+        if options.tests_the_reader() {
             let chosen = control::chosen(&cards, &options.rates, &lots);
             let faults = faults(catalog, project, chosen, &lots).await?;
             cards = control::mixed(cards, faults, &options.rates, &lots);
@@ -95,7 +77,7 @@ impl Deck {
         let cards = cards.map(|card| Arc::new(card.named(&key, &options.reader)));
         Ok(Self {
             cards: cards.collect(),
-            answers: Answers::read(catalog, &options.reader).await?,
+            known: Known::read(catalog, options).await?,
         })
     }
 }
@@ -216,10 +198,21 @@ async fn faults(
 
 #[cfg(test)]
 mod tests {
-    use super::{cards_of, is_good, is_open_conflict};
+    use super::{DeckOptions, Rates, cards_of, is_good, is_open_conflict};
     use crate::catalog::ReaderVerdict;
     use crate::domain::{Queue, ThresholdMetric, Verdict};
     use crate::report::fixture;
+
+    fn options(queue: Queue, controls: f64, repeats: f64) -> DeckOptions {
+        DeckOptions {
+            reader: "ana".to_owned(),
+            metrics: Vec::new(),
+            queue,
+            seed: 1,
+            sample: None,
+            rates: Rates { controls, repeats },
+        }
+    }
 
     fn read(reader: &str, verdict: Verdict, queue: Queue) -> ReaderVerdict {
         ReaderVerdict {
@@ -260,17 +253,15 @@ mod tests {
 
     #[test]
     fn a_pair_without_results_has_no_card() {
-        let options = super::DeckOptions {
-            reader: "ana".to_owned(),
-            metrics: Vec::new(),
-            queue: Queue::Random,
-            seed: 1,
-            sample: None,
-            rates: super::Rates {
-                controls: 0.0,
-                repeats: 0.0,
-            },
-        };
+        let options = options(Queue::Random, 0.0, 0.0);
         assert_eq!(cards_of(&fixture::pending("a"), &options), []);
+    }
+
+    #[test]
+    fn a_deck_tests_the_reader_by_faults_or_repeats_but_not_over_conflicts() {
+        let tests = |queue, controls, repeats| options(queue, controls, repeats).tests_the_reader();
+        assert!(tests(Queue::Random, 0.04, 0.0) && tests(Queue::Risk, 0.0, 0.05));
+        assert!(!tests(Queue::Random, 0.0, 0.0));
+        assert!(!tests(Queue::Adjudicate, 0.04, 0.05));
     }
 }

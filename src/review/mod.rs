@@ -12,6 +12,7 @@ mod deck;
 mod desk;
 mod guard;
 mod keys;
+mod known;
 mod order;
 mod page;
 mod pictures;
@@ -35,6 +36,7 @@ pub use deck::DeckOptions;
 pub use keys::{KeyError, key_map};
 pub use words::Language;
 
+use card::Card;
 use desk::Desk;
 use guard::START;
 use pictures::Pictures;
@@ -90,8 +92,18 @@ pub struct Review {
     listener: TcpListener,
     desk: Arc<Desk>,
     address: SocketAddr,
-    /// Cards in the deck, and how many of them the reader has answered.
-    cards: [usize; 2],
+    cards: Cards,
+}
+
+/// How much there is to judge.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Cards {
+    /// Pictures in the deck.
+    pub all: usize,
+    /// Of these, those of results; the others test the reader.
+    pub results: usize,
+    /// Those that the reader has answered.
+    pub answered: usize,
 }
 
 /// Binds and reads the deck.
@@ -126,12 +138,13 @@ pub async fn open(
     // An answer that was not acknowledged before a restart may come before anybody asks for the deck.
     let deck = desk.deal().await;
     let deck = deck.map_err(|error| ReviewError::Deck(error.to_string()))?;
-    let answered = deck
-        .cards
-        .iter()
-        .filter(|card| deck.answers.to(card).is_some());
+    let count = |is: &dyn Fn(&Card) -> bool| deck.cards.iter().filter(|card| is(card)).count();
     Ok(Review {
-        cards: [deck.cards.len(), answered.count()],
+        cards: Cards {
+            all: deck.cards.len(),
+            results: count(&|card| card.control.is_none()),
+            answered: count(&|card| deck.known.answer(card).is_some()),
+        },
         listener,
         desk: Arc::new(desk),
         address,
@@ -153,8 +166,8 @@ impl Review {
         self.address
     }
 
-    /// Cards in the deck, planted ones and repeats too, and how many of them the reader has answered.
-    pub const fn cards(&self) -> [usize; 2] {
+    /// How much there is to judge.
+    pub const fn cards(&self) -> Cards {
         self.cards
     }
 

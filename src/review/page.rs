@@ -85,7 +85,7 @@ pub(super) fn review(desk: &Desk, language: Language) -> Markup {
             }
         }
         (verdict_bar(language))
-        (help(language))
+        (help(language, desk.deck_options.tests_the_reader()))
         (jump(language))
         p #live .quiet aria-live="polite" {}
     };
@@ -199,7 +199,7 @@ fn verdict(action: &'static str, sign: &str, language: Language) -> Markup {
     }
 }
 
-fn help(language: Language) -> Markup {
+fn help(language: Language, tests_the_reader: bool) -> Markup {
     let list = |actions: &[&'static str]| {
         html! {
             dl {
@@ -226,7 +226,8 @@ fn help(language: Language) -> Markup {
                     section { h3 { (Language::say(language, name)) } (list(actions)) }
                 }
             }
-            p { (language.say("correct_hint")) }
+            p { (language.say("by_hand")) ": " (language.say("correct_hint")) }
+            @if tests_the_reader { p { (language.say("tested")) } }
         }
     }
 }

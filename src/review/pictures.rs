@@ -7,7 +7,7 @@ use tokio::sync::{Mutex, OnceCell};
 
 use super::card::Card;
 use crate::catalog::{Catalog, CatalogError, PairResults};
-use crate::domain::{Affine2, Stage};
+use crate::domain::{Affine2, NormalizeOutcome, Stage};
 use crate::export::pictures::{View, shaded};
 use crate::export::{FilesError, Print};
 use crate::raster::{self, DepthMap, Mask, png_mask, png_rgb8};
@@ -34,17 +34,20 @@ pub(super) enum Layer {
     OwnRelief,
     /// Its strokes in that frame.
     OwnMask,
+    /// The ink on the canvas of the scores.
+    CanvasInk,
 }
 
 impl Layer {
     /// Every layer.
-    pub(super) const ALL: [Self; 6] = [
+    pub(super) const ALL: [Self; 7] = [
         Self::Print,
         Self::PrintMask,
         Self::Relief,
         Self::DepthMask,
         Self::OwnRelief,
         Self::OwnMask,
+        Self::CanvasInk,
     ];
 
     /// Name in the picture's address.
@@ -56,6 +59,7 @@ impl Layer {
             Self::DepthMask => "depth-mask",
             Self::OwnRelief => "own-relief",
             Self::OwnMask => "own-mask",
+            Self::CanvasInk => "canvas-ink",
         }
     }
 
@@ -78,18 +82,36 @@ pub(super) enum PictureError {
     #[error(transparent)]
     Print(#[from] FilesError),
     /// Another result has come since.
-    #[error("pair {0} was aligned anew meanwhile; reload the page")]
-    Gone(String),
+    #[error("this pair was aligned anew meanwhile; reload the page")]
+    Gone,
     /// A thread was lost.
     #[error("drawing stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
+}
+
+/// Where the scores of a pair are counted.
+#[derive(Debug)]
+pub(super) struct Canvas {
+    pub(super) ink: Mask,
+    pub(super) from_print: Affine2,
+}
+
+impl Canvas {
+    fn read(aligned: &Aligned<'_>) -> Result<Self, PictureError> {
+        let normalized: NormalizeOutcome = aligned.outcome(Stage::Normalize)?;
+        Ok(Self {
+            ink: aligned.canvas_print_mask()?,
+            from_print: normalized.canvas_from_print,
+        })
+    }
 }
 
 /// All that a card shows, read from the project.
 #[derive(Debug)]
 pub(super) struct Subject {
     pub(super) print: Print,
-    pub(super) print_mask: Mask,
+    print_mask: Mask,
+    pub(super) canvas: Canvas,
     pub(super) depth: DepthMap,
     pub(super) strokes: Mask,
 }
@@ -107,12 +129,13 @@ impl Subject {
             aligned.stage(Stage::Normalize)?.print_hash,
         );
         if hashes != (card.view.depth_hash, Some(card.view.print_hash)) {
-            return Err(PictureError::Gone(card.pair.to_string()));
+            return Err(PictureError::Gone);
         }
         let depth = aligned.depth()?;
         Ok(Self {
             print: Print::read(project, pair, limits)?,
             print_mask: aligned.print_mask()?,
+            canvas: Canvas::read(&aligned)?,
             strokes: depth.strokes(card.view.level),
             depth,
         })
@@ -146,8 +169,7 @@ impl Drawn {
         }
     }
 
-    /// A picture as PNG. The two of the depth map's own frame are drawn when they are asked for: few cards are
-    /// corrected.
+    /// A picture as PNG. Those of other frames are drawn when they are asked for: few cards are corrected.
     pub(super) fn layer(&self, wanted: Layer) -> Vec<u8> {
         match wanted {
             Layer::Print => self.print.clone(),
@@ -160,6 +182,7 @@ impl Drawn {
                 png_rgb8(&shaded(&depth.levels, slope))
             }
             Layer::OwnMask => png_mask(&self.subject.strokes),
+            Layer::CanvasInk => png_mask(&self.subject.canvas.ink),
         }
     }
 }
@@ -217,8 +240,7 @@ impl Pictures {
 
     async fn draw(&self, card: &Arc<Card>) -> Result<Arc<Drawn>, PictureError> {
         let found = self.catalog.pair(&card.pair).await?;
-        let gone = || PictureError::Gone(card.pair.to_string());
-        let pair = found.ok_or_else(gone)?.results;
+        let pair = found.ok_or(PictureError::Gone)?.results;
         let (project, limits, card) = (self.project.clone(), self.limits, Arc::clone(card));
         tokio::task::spawn_blocking(move || {
             let subject = Subject::read(&project, &pair, &card, &limits)?;

@@ -1,5 +1,6 @@
 //! What the server answers, address by address. Whoever comes here has passed the guard.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use axum::extract::rejection::JsonRejection;
@@ -13,15 +14,16 @@ use serde_json::{Value, json};
 use super::answer::{AnswerBody, BadAnswer, UndoBody};
 use super::assets;
 use super::card::Card;
-use super::correction::{self, AlignBody};
-use super::deck::{Answers, DeckError};
+use super::correction::{self, AlignBody, Corrected};
+use super::deck::DeckError;
 use super::desk::Desk;
 use super::guard::{BODY_LIMIT, START, guard};
+use super::known::Known;
 use super::page;
 use super::pictures::{Layer, PictureError};
 use super::words::Language;
 use crate::catalog::CatalogError;
-use crate::domain::Queue;
+use crate::domain::{PairName, Queue};
 use crate::report::aligned::AlignedError;
 
 /// Everything there is, behind the guard.
@@ -34,6 +36,7 @@ pub(super) fn router(desk: &Arc<Desk>) -> Router {
         .route("/api/boot", get(boot))
         .route("/api/deck", get(deck))
         .route("/api/about/{id}", get(about))
+        .route("/api/find/{pair}", get(find))
         .route("/api/correction/{id}", get(correction_start))
         .route("/api/answer", post(answer))
         .route("/api/undo", post(undo))
@@ -71,7 +74,7 @@ impl Trouble {
             Self::NotAnswered => StatusCode::FORBIDDEN,
             Self::Body(rejection) => rejection.status(),
             Self::Answer(_) => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::Picture(PictureError::Gone(_)) => StatusCode::GONE,
+            Self::Picture(PictureError::Gone) => StatusCode::GONE,
             // The page sends again what the server could not store.
             Self::Catalog(_) | Self::Deck(_) | Self::Picture(_) | Self::Aligned(_) => {
                 StatusCode::SERVICE_UNAVAILABLE
@@ -140,16 +143,34 @@ async fn boot(State(desk): State<Arc<Desk>>) -> Json<Value> {
 
 async fn deck(State(desk): State<Arc<Desk>>) -> Answered {
     let deck = desk.deal().await?;
+    let hides_pairs = desk.deck_options.tests_the_reader();
     let items = deck.cards.iter().map(|card| {
-        let answer = deck.answers.to(card).map(|answer| {
+        let answer = deck.known.answer(card).map(|answer| {
             json!({
                 "event": answer.event, "verdict": answer.verdict, "reason": answer.reason,
                 "note": answer.note, "at": answer.at,
             })
         });
-        json!({ "id": card.id, "pair": card.pair, "answer": answer })
+        let correction = deck.known.correction(card);
+        json!({
+            "id": card.id,
+            "pair": (!hides_pairs).then_some(&card.pair),
+            "answer": answer,
+            "corrected": correction.and_then(|made| Corrected::of(card, made)),
+        })
     });
-    Ok(Json(json!({ "items": items.collect::<Vec<_>>() })))
+    let pairs: BTreeSet<&PairName> = deck.cards.iter().map(|card| &card.pair).collect();
+    Ok(Json(
+        json!({ "items": items.collect::<Vec<_>>(), "pairs": pairs }),
+    ))
+}
+
+/// The first card of a pair, for who jumps to it; never one of its others, so that none tells that there are any.
+async fn find(State(desk): State<Arc<Desk>>, Path(pair): Path<String>) -> Answered {
+    let deck = desk.deal().await?;
+    let mut cards = deck.cards.iter();
+    let first = cards.find(|card| card.pair.as_str() == pair);
+    Ok(Json(json!({ "id": first.ok_or(Trouble::NoCard)?.id })))
 }
 
 async fn picture(
@@ -166,8 +187,8 @@ async fn picture(
 /// What is told of a card once it is answered: for planted faults and repeats as for all others.
 async fn about(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answered {
     let card = card(&desk, &id)?;
-    let answers = Answers::read(&desk.catalog, &desk.deck_options.reader).await?;
-    if answers.to(&card).is_none() {
+    let known = Known::read(&desk.catalog, &desk.deck_options).await?;
+    if known.answer(&card).is_none() {
         return Err(Trouble::NotAnswered);
     }
     let drawn = desk.pictures(&card).await?;
@@ -179,7 +200,7 @@ async fn about(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answere
         Queue::Random | Queue::Risk => Vec::new(),
     };
     Ok(Json(json!({
-        "metrics": metrics.collect::<Vec<_>>(), "iou": agreement.iou, "dice": agreement.dice, "others": others,
+        "pair": card.pair, "metrics": metrics.collect::<Vec<_>>(), "iou": agreement.iou, "dice": agreement.dice, "others": others,
     })))
 }
 
@@ -203,7 +224,9 @@ async fn others(desk: &Desk, card: &Card) -> Result<Vec<Value>, CatalogError> {
 async fn correction_start(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answered {
     let card = card(&desk, &id)?;
     let drawn = desk.pictures(&card).await?;
-    Ok(Json(json!(correction::start(&card, &drawn))))
+    let known = Known::read(&desk.catalog, &desk.deck_options).await?;
+    let before = known.correction(&card);
+    Ok(Json(json!(correction::start(&card, &drawn, before))))
 }
 
 async fn answer(
@@ -254,8 +277,9 @@ async fn align(
     )?;
     made.note = body.note()?;
     made.event = body.event;
+    let told = json!(Corrected::of(&card, &made));
     desk.catalog.hand_align(made, (desk.now)()).await?;
-    Ok(Json(json!(agreement)))
+    Ok(Json(told))
 }
 
 fn card(desk: &Desk, id: &str) -> Result<Arc<Card>, Trouble> {

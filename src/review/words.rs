@@ -135,7 +135,11 @@ const WORDS: &[Row] = &[
     ("next", "Next", "Tiếp"),
     ("previous", "Back", "Trước"),
     ("jump", "Jump to a pair", "Đến một cặp"),
-    ("jump_hint", "Id of a pair", "Mã của cặp"),
+    (
+        "jump_hint",
+        "Id of a pair, or #7 for the seventh picture",
+        "Mã của cặp, hoặc #7 cho hình thứ bảy",
+    ),
     (
         "no_such_pair",
         "There is no such pair here",
@@ -150,8 +154,8 @@ const WORDS: &[Row] = &[
     ("smaller", "Smaller", "Nhỏ hơn"),
     (
         "correct_hint",
-        "Arrows or drag: shift · [ ]: turn · − =: scale · Shift: finer · Enter: save · Escape: leave",
-        "Mũi tên hoặc kéo: dời · [ ]: xoay · − =: cỡ · Shift: tinh hơn · Enter: lưu · Escape: thoát",
+        "arrows or drag: shift · [ ] or Shift and wheel: turn · − = or wheel: scale · Shift and key: finer · M: mirror · 0: as it was · Enter: save · Escape: leave",
+        "mũi tên hoặc kéo: dời · [ ] hoặc Shift và bánh xe: xoay · − = hoặc bánh xe: cỡ · Shift và phím: tinh hơn · M: lật gương · 0: như cũ · Enter: lưu · Escape: thoát",
     ),
     (
         "correct_first",
@@ -163,6 +167,12 @@ const WORDS: &[Row] = &[
         "Saved as an alignment by hand",
         "Đã lưu bản chỉnh tay",
     ),
+    (
+        "corrected_by",
+        "corrected by hand by {reader}: turned {deg}°, shifted {px} px, scaled {scale}{mirrored}, IoU {iou}",
+        "{reader} đã chỉnh tay: xoay {deg}°, dời {px} px, cỡ {scale}{mirrored}, IoU {iou}",
+    ),
+    ("and_mirrored", ", mirrored", ", lật gương"),
     ("iou", "IoU", "IoU"),
     ("dice", "Dice", "Dice"),
     ("metrics", "Threshold by", "Ngưỡng theo"),
@@ -172,8 +182,21 @@ const WORDS: &[Row] = &[
         "Answer first; then it is told",
         "Hãy trả lời trước",
     ),
-    ("progress", "{done} of {all}", "{done} trên {all}"),
+    (
+        "progress",
+        "{done} of {all} pictures",
+        "{done} trên {all} hình",
+    ),
+    ("picture_n", "Picture {n}", "Hình {n}"),
+    (
+        "tested",
+        "Some pictures test the reader: results spoilt on purpose, and some that come a second time. \
+         So there are more pictures than results, and a picture tells its pair only when it is answered (I).",
+        "Một số hình dùng để thử người đọc: kết quả bị làm hỏng có chủ ý, và kết quả xuất hiện lần thứ hai. \
+         Vì vậy số hình nhiều hơn số kết quả, và mã của cặp chỉ hiện sau khi trả lời (I).",
+    ),
     ("median", "{s} s median", "trung vị {s} giây"),
+    ("painted", "picture after {ms} ms", "hiện hình sau {ms} ms"),
     ("saved", "saved", "đã lưu"),
     ("not_saved", "{n} not saved", "{n} chưa lưu"),
     (
@@ -200,6 +223,11 @@ const WORDS: &[Row] = &[
     ),
     ("undone", "Taken back", "Đã hoàn tác"),
     ("done", "All is read. Thank you.", "Đã đọc hết. Xin cảm ơn."),
+    (
+        "done_not_saved",
+        "All is read, but {n} not saved yet: keep this page open",
+        "Đã đọc hết, nhưng {n} chưa lưu: hãy giữ trang này mở",
+    ),
     (
         "empty",
         "There is nothing to judge: no pair has a result yet",

@@ -29,9 +29,8 @@ fn two_readers(project: &Project) -> Vec<Value> {
     let page = Page::open(project, "lan", &["--controls", "50", "--repeats", "20"]);
     let deck = page.deck();
     judge_all(&page, &deck, "fail");
-    let mut pairs: Vec<Value> = deck.iter().map(|item| item["pair"].clone()).collect();
-    pairs.sort_by_key(Value::to_string);
-    pairs.dedup();
+    let told = page.get("/api/deck").json();
+    let pairs = told["pairs"].as_array().expect("names").clone();
     for (i, pair) in pairs.iter().enumerate() {
         set(project, pair, if i == 0 { "fail" } else { "pass" }, "minh");
     }

@@ -189,6 +189,16 @@ impl Tab<'_> {
         self.call("Page.reload", &json!({}));
     }
 
+    /// Asks for dark pages or light ones.
+    pub(crate) fn dark(&self, dark: bool) {
+        let scheme = if dark { "dark" } else { "light" };
+        let features = json!([{ "name": "prefers-color-scheme", "value": scheme }]);
+        self.call(
+            "Emulation.setEmulatedMedia",
+            &json!({ "features": features }),
+        );
+    }
+
     /// The value of an expression; what is promised is waited for.
     pub(crate) fn eval(&self, expression: &str) -> Value {
         let params =
@@ -246,10 +256,12 @@ impl Tab<'_> {
         let key = letter.unwrap_or(code).to_lowercase();
         let named = matches!(code, "Enter" | "Escape" | "Backspace" | "Tab");
         let key = if named { code } else { &key };
-        self.call(
-            "Input.dispatchKeyEvent",
-            &json!({ "type": kind, "code": code, "key": key }),
-        );
+        let mut event = json!({ "type": kind, "code": code, "key": key });
+        if code == "Escape" {
+            // A dialog goes by the old number.
+            event["windowsVirtualKeyCode"] = json!(27);
+        }
+        self.call("Input.dispatchKeyEvent", &event);
     }
 
     /// Types text into what has the focus.

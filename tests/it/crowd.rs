@@ -31,7 +31,7 @@ fn good_pairs(dir: &Path) -> Vec<ManifestRow> {
         seed: 5,
         tier: Tier::Upright,
     };
-    let files = write_dataset(dir, &options).expect("a dataset");
+    let files = write_dataset(dir, &options, &|| false).expect("a dataset");
     parse_csv(&fs::read(files.manifest).expect("a manifest")).expect("rows")
 }
 

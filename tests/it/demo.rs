@@ -32,7 +32,8 @@ fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
 
 fn made(tier: Tier, pairs: u64, seed: u64) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
     let dir = tempfile::tempdir().expect("a folder for the test");
-    write_dataset(dir.path(), &DemoOptions { pairs, seed, tier }).expect("the dataset is written");
+    write_dataset(dir.path(), &DemoOptions { pairs, seed, tier }, &|| false)
+        .expect("the dataset is written");
     let found = files(dir.path());
     (dir, found)
 }
@@ -96,14 +97,18 @@ fn whole_dataset_is_left_alone_and_a_broken_one_made_anew() {
     };
     let (dir, found) = made(options.tier, options.pairs, options.seed);
     assert!(
-        write_dataset(dir.path(), &options)
+        write_dataset(dir.path(), &options, &|| false)
             .expect("found")
             .was_there
     );
     fs::remove_file(dir.path().join("dataset.json")).expect("the seal is there");
     fs::write(dir.path().join("truth.jsonl"), "half a li").expect("the truth can be spoilt");
     fs::write(dir.path().join("meshes/stray.stl"), "of a killed run").expect("a stray file");
-    assert!(!write_dataset(dir.path(), &options).expect("made").was_there);
+    assert!(
+        !write_dataset(dir.path(), &options, &|| false)
+            .expect("made")
+            .was_there
+    );
     assert!(files(dir.path()) == found, "the dataset made anew differs");
 }
 
@@ -115,7 +120,7 @@ fn real_tier_has_twenty_pairs_at_most_and_its_prints_are_the_photographs() {
         seed: 1,
         tier: Tier::Real,
     };
-    let dataset = write_dataset(dir.path(), &options).expect("the dataset is written");
+    let dataset = write_dataset(dir.path(), &options, &|| false).expect("the dataset is written");
     assert_eq!(dataset.pairs, 20);
     let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/calligraphy");
     for index in 0..20 {

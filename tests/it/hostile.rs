@@ -187,7 +187,7 @@ fn good_pair(dir: &Path) -> ManifestRow {
         seed: 5,
         tier: Tier::Upright,
     };
-    let files = write_dataset(dir, &options).expect("a dataset");
+    let files = write_dataset(dir, &options, &|| false).expect("a dataset");
     let manifest = fs::read(files.manifest).expect("a manifest");
     parse_csv(&manifest).expect("rows").remove(0)
 }

@@ -1,5 +1,6 @@
 //! Integration tests in one binary.
 
+mod accessible;
 mod agree;
 mod backup;
 mod browser;
@@ -22,6 +23,8 @@ mod invariance;
 mod kill;
 mod layers;
 mod limits;
+#[cfg(unix)]
+mod manners;
 #[cfg(target_os = "linux")]
 mod memory;
 mod odd;
@@ -36,6 +39,7 @@ mod report;
 mod resume;
 mod review_browser;
 mod review_guard;
+mod review_hand;
 mod review_kill;
 mod review_page;
 mod seeds;

@@ -64,7 +64,7 @@ impl World {
             seed: 11,
             tier: Tier::Upright,
         };
-        let files = write_dataset(&data, &options).expect("the demo is written");
+        let files = write_dataset(&data, &options, &|| false).expect("the demo is written");
         let manifest = std::fs::read(&files.manifest).expect("the demo has a manifest");
         let rows = parse_csv(&manifest).expect("the demo's manifest is sound");
         std::fs::write(data.join(&rows[2].mesh), "").expect("the third mesh can be emptied");

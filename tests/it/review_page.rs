@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mocban::catalog::{Catalog, ControlAnswer, StoredAlignment};
+use mocban::catalog::{Catalog, ControlAnswer};
 use mocban::domain::{Reason, Verdict};
 use mocban::store::Project;
 use serde_json::{Value, json};
@@ -11,7 +11,7 @@ use crate::cli::{Call, mocban};
 use crate::page::{Page, answer, read_project};
 
 /// Reads something of a project's catalog.
-fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -> T {
+pub(crate) fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -> T {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
         let catalog = Catalog::open_read_only(&project.catalog_path()).await;
@@ -25,12 +25,6 @@ fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -> T {
 fn controls(project: &Project) -> Vec<ControlAnswer> {
     ask(project, async |catalog| {
         catalog.control_answers().await.expect("answers")
-    })
-}
-
-fn alignments(project: &Project) -> Vec<StoredAlignment> {
-    ask(project, async |catalog| {
-        catalog.hand_alignments().await.expect("alignments")
     })
 }
 
@@ -89,9 +83,10 @@ fn page_and_command_line_write_the_same_events() {
 fn order_names_and_pictures_are_the_same_after_a_restart_and_others_for_another_reader() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let first = Page::open(&project, "lan", &[]);
-    let again = Page::open(&project, "lan", &[]);
-    let other = Page::open(&project, "minh", &[]);
+    let untested = ["--controls", "0", "--repeats", "0"];
+    let first = Page::open(&project, "lan", &untested);
+    let again = Page::open(&project, "lan", &untested);
+    let other = Page::open(&project, "minh", &untested);
     assert_eq!(first.deck(), again.deck());
     let ids = |page: &Page| -> BTreeSet<String> {
         let deck = page.deck();
@@ -139,7 +134,8 @@ fn planted_faults_are_stored_apart_and_nothing_in_the_page_tells_them() {
         let before = controls(&project).len();
         let reply = page.post("/api/answer", &answer(&format!("e{i}"), item, "pass"));
         let is_control = controls(&project).len() > before;
-        // The same fields of the same form, whatever it is.
+        // No pair, which would be known again; the same fields of the same form, whatever it is.
+        assert_eq!(item["pair"], Value::Null);
         let keys: Vec<_> = item.as_object().expect("fields").keys().cloned().collect();
         let mut told = reply.expect("a reply").json();
         told["stored"] = json!("");
@@ -151,7 +147,7 @@ fn planted_faults_are_stored_apart_and_nothing_in_the_page_tells_them() {
             let id = item["id"].as_str().expect("an id");
             let about = page.get(&format!("/api/about/{id}")).json();
             let fields: Vec<_> = about.as_object().expect("fields").keys().cloned().collect();
-            assert_eq!(fields, ["dice", "iou", "metrics", "others"]);
+            assert_eq!(fields, ["dice", "iou", "metrics", "others", "pair"]);
             assert_eq!(about["others"], json!([]));
         }
     }
@@ -213,12 +209,18 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
         &project,
         &[pair, "fail", "--reader", "minh", "--reason", "angle"],
     );
-    let adjudicate = |reader: &str| Page::open(&project, reader, &["--adjudicate"]);
-    assert!(
-        adjudicate("lan").deck().is_empty(),
-        "who is party cannot settle"
-    );
-    let third = adjudicate("hoa");
+    let idle = |reader: &str| {
+        let told = mocban(
+            project.dir(),
+            &["review", "--reader", reader, "--adjudicate"],
+        );
+        let told = told.expect(0);
+        assert!(told.err.contains("no conflict waits"), "{}", told.err);
+        assert_eq!(told.out, "", "no address");
+    };
+    // Who is party cannot settle.
+    idle("lan");
+    let third = Page::open(&project, "hoa", &["--adjudicate"]);
     let deck = third.deck();
     assert_eq!(deck.len(), 1);
     let about = format!("/api/about/{}", deck[0]["id"].as_str().expect("an id"));
@@ -235,7 +237,8 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
         .collect();
     let wanted = ["\"lan\" \"pass\"", "\"minh\" \"fail\""].map(str::to_owned);
     assert_eq!(said, BTreeSet::from(wanted));
-    assert!(adjudicate("dung").deck().is_empty(), "it is settled");
+    // It is settled.
+    idle("dung");
     let log = log(&project);
     let word = log.iter().filter(|event| event["reader"] == "hoa");
     assert!(word.clone().count() > 0);
@@ -249,76 +252,33 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
 }
 
 #[test]
-fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
+fn a_jump_leads_to_the_first_picture_of_a_pair_alone() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let page = Page::open(&project, "lan", &["--controls", "0"]);
-    let item = page.deck().remove(0);
-    let id = item["id"].as_str().expect("an id");
-    let start = page.get(&format!("/api/correction/{id}")).json();
-    let mut map = start["view_from_depth"].clone();
-    let body = |event: &str, map: &Value| json!({ "event": event, "item": id, "view_from_depth": map, "note": "x" });
-    let unmoved = page
-        .post("/api/align", &body("a0", &map))
-        .expect("a reply")
-        .json();
-    for flat in [
-        json!([[0, 0, 0], [0, 0, 0]]),
-        json!([[1, 0, 1e30], [0, 1, 0]]),
-    ] {
-        let refused = page
-            .post("/api/align", &body("a9", &flat))
+    let many = ["--controls", "50", "--repeats", "50", "--metric", "density"];
+    let page = Page::open(&project, "lan", &many);
+    let told = page.get("/api/deck").json();
+    let pairs = told["pairs"].as_array().expect("names");
+    assert_eq!(pairs.len(), 15);
+    let cards = told["items"].as_array().expect("cards");
+    assert!(cards.len() > pairs.len(), "{}", cards.len());
+    let place = |id: &Value| cards.iter().position(|card| card["id"] == *id);
+    let pair_of = |card: &Value, event: &str| {
+        page.post("/api/answer", &answer(event, card, "pass"))
             .expect("a reply");
-        assert_eq!(refused.status, 422, "{flat}");
+        let id = card["id"].as_str().expect("an id");
+        page.get(&format!("/api/about/{id}")).json()["pair"].clone()
+    };
+    let of_card: Vec<Value> = (0..cards.len())
+        .map(|i| pair_of(&cards[i], &format!("e{i}")))
+        .collect();
+    for pair in pairs {
+        let name = pair.as_str().expect("a name");
+        let found = page.get(&format!("/api/find/{name}")).json();
+        let first = of_card.iter().position(|of| of == pair);
+        assert_eq!(place(&found["id"]), first, "{name}");
     }
-    map[0][2] = json!(map[0][2].as_f64().expect("a number") + 40.0);
-    for _ in 0..2 {
-        let moved = page
-            .post("/api/align", &body("a1", &map))
-            .expect("a reply")
-            .json();
-        assert!(
-            moved["iou"].as_f64() < unmoved["iou"].as_f64(),
-            "{moved} {unmoved}"
-        );
-    }
-    let stored = alignments(&project);
-    assert_eq!(stored.len(), 2);
-    let [first, second] = [&stored[0].made, &stored[1].made];
-    assert!(
-        stored
-            .iter()
-            .all(|alignment| alignment.holds && alignment.on_current_depth)
-    );
-    let [a, b] = [first, second].map(|made| made.print_from_depth.apply([10.0, 20.0]));
-    assert!(
-        b[0] > a[0] + 1.0 && (a[1] - b[1]).abs() < 1e-9,
-        "{a:?} {b:?}"
-    );
-    mocban(project.dir(), &["export", "-o", "out"]).expect(0);
-    let log = std::fs::read_to_string(project.dir().join("out/alignments.jsonl")).expect("a log");
-    assert_eq!(log.lines().count(), 2);
-    // An export with all it may hold is replaced as any other.
-    mocban(project.dir(), &["export", "-o", "out"]).expect(0);
-    let lines = std::fs::read_to_string(project.dir().join("out/pairs.jsonl")).expect("lines");
-    let lines = lines
-        .lines()
-        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
-    for line in lines {
-        if line["id"] != item["pair"] {
-            assert_eq!(line["by_hand"], Value::Null);
-            continue;
-        }
-        let by_hand = &line["by_hand"];
-        assert_eq!(by_hand["reader"], "lan");
-        assert_eq!(by_hand["print_from_mesh"], json!(second.print_from_mesh));
-        assert_ne!(by_hand["print_from_mesh"], line["print_from_mesh"]);
-    }
-    let undone = page
-        .post("/api/undo", &json!({ "event": "a1" }))
-        .expect("a reply");
-    assert_eq!(undone.status, 200);
-    assert!(alignments(&project)[1].undone_at.is_some());
+    assert_eq!(page.get("/api/find/nobody").status, 404);
 }
 
 #[test]

@@ -17,12 +17,14 @@ pub(super) fn render(report: &Report) -> String {
         blocks.push(piped(&found));
         blocks.push(format!("{}\n", escape(&found.caption)));
     }
-    let said = in_words(&report.score_comparisons);
-    let said: Vec<String> = said
-        .iter()
-        .map(|words| format!("- {}\n", escape(words)))
-        .collect();
-    blocks.extend((!said.is_empty()).then(|| said.concat()));
+    if scored::comparisons(report).is_some() {
+        let said = in_words(&report.score_comparisons);
+        let said: Vec<String> = said
+            .iter()
+            .map(|words| format!("- {}\n", escape(words)))
+            .collect();
+        blocks.push(said.concat());
+    }
     for warning in &report.warnings {
         blocks.push(format!("> **Note:** {}\n", escape(warning)));
     }

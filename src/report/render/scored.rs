@@ -53,7 +53,7 @@ fn said(how: &Bootstrap) -> String {
     )
 }
 
-/// The metrics compared by their scores; `None` where there is nothing to compare.
+/// The metrics compared by their scores; `None` where there is nothing to compare, or too little.
 pub(super) fn comparisons(report: &Report) -> Option<Table> {
     let how = report.bootstrap.as_ref()?;
     let cells = |found: &ScoreComparison| {
@@ -66,7 +66,9 @@ pub(super) fn comparisons(report: &Report) -> Option<Table> {
             found.p_holm.map(p_value),
         ]
     };
-    (!report.score_comparisons.is_empty()).then(|| Table {
+    let mut found = report.score_comparisons.iter();
+    // Without any interval there is one sentence among the warnings, and no table of dashes.
+    found.any(|found| found.ci95.is_some()).then(|| Table {
         caption: format!(
             "First less second on the same pairs, by {}; p two-sided, Holm's correction over the comparisons by one \
              score. A higher score is not a righter result: a mask that copies the ink scores best.",

@@ -78,10 +78,11 @@ pub(super) fn tables(report: &Report) -> Vec<Table> {
 /// The paper's table.
 pub(super) fn scores(report: &Report) -> Table {
     Table {
-        caption:
-            "Acc is the share passed of those passed or failed by readers; SSIM, IoU and Dice are \
-                  means over the n finished pairs, by pixel; IoU box is of bounding boxes."
-                .to_owned(),
+        caption: format!(
+            "Acc is the share passed of those passed or failed by readers{}; SSIM, IoU and Dice are means over the \
+             n finished pairs, by pixel; IoU box is of bounding boxes.",
+            passed(report)
+        ),
         columns: vec![
             words("Method"),
             number("n", 0),
@@ -94,6 +95,19 @@ pub(super) fn scores(report: &Report) -> Table {
         ],
         rows: report.rows.iter().map(score_cells).collect(),
     }
+}
+
+/// Of how many results Acc is the share, such as ` (Ensemble 586 of 587)`.
+fn passed(report: &Report) -> String {
+    let told = |row: &Row| row.passed + row.failed;
+    let read = report.rows.iter().filter(|row| told(row) > 0);
+    let counts: Vec<String> = read
+        .map(|row| format!("{} {} of {}", row.metric.title(), row.passed, told(row)))
+        .collect();
+    if counts.is_empty() {
+        return String::new();
+    }
+    format!(" ({})", counts.join(", "))
 }
 
 fn score_cells(row: &Row) -> Vec<Option<String>> {

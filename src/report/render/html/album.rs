@@ -126,7 +126,7 @@ fn figure(shot: &Shot) -> Markup {
                 @for (picture, layer) in shot.pictures.iter().zip(LAYERS) { (image(shot, picture.as_deref(), layer)) }
             }
             figcaption {
-                strong { (shot.pair) } @if let Some(character) = &shot.character { " " span.character { (character) } }
+                strong { (shot.pair) } @if let Some(character) = &shot.character { " " span.character title=(code_points(character)) { (character) } }
                 span.methods { (methods.join(", ")) }
                 @if !shot.numbers.is_empty() { span { (shot.numbers) } }
                 @for said in &shot.said { span.said { (said) } }
@@ -135,6 +135,12 @@ fn figure(shot: &Shot) -> Markup {
             }
         }
     }
+}
+
+/// A character by its numbers, such as `U+20041`, for who has no font with it.
+fn code_points(character: &str) -> String {
+    let points = character.chars().map(|c| format!("U+{:04X}", u32::from(c)));
+    points.collect::<Vec<_>>().join(" ")
 }
 
 fn image(shot: &Shot, picture: Option<&[u8]>, layer: &str) -> Markup {

@@ -26,7 +26,7 @@ pub(super) struct Section {
 /// Every section that has something to tell, in order.
 pub(super) fn all(report: &Report, album: &Album) -> Vec<Section> {
     let pictures = (!album.is_empty()).then(|| section("pictures", "Pictures", album.body()));
-    let is_compared = !(report.comparisons.is_empty() && report.score_comparisons.is_empty());
+    let is_compared = !report.comparisons.is_empty() || scored::comparisons(report).is_some();
     let sections = [
         Some(section("result", "Result", result(report))),
         (!report.warnings.is_empty()).then(|| section("notes", "To be known", warnings(report))),

@@ -1,0 +1,97 @@
+//! What axe-core finds in the pages, where `AXE_JS` names its file and there is a browser.
+
+use crate::browser::{Browser, Tab};
+use crate::cli::mocban;
+use crate::page::{Page, read_project};
+use crate::review_browser::{PLAIN, enter, judge};
+
+/// The text of axe-core; `None` where there is none, which is said.
+#[expect(
+    clippy::print_stderr,
+    reason = "the one line that says why a test was skipped"
+)]
+fn axe() -> Option<String> {
+    let Some(path) = std::env::var_os("AXE_JS") else {
+        eprintln!("skipped: AXE_JS names no axe.min.js");
+        return None;
+    };
+    Some(std::fs::read_to_string(path).expect("axe.min.js"))
+}
+
+/// Fails where something serious is found; `what` says what is open.
+fn nothing_serious(tab: &Tab<'_>, what: &str) {
+    let found = tab.eval(
+        "axe.run().then(({ passes, violations }) => ({
+            passes: passes.length,
+            serious: violations.filter(({ impact }) => ['serious', 'critical'].includes(impact)).map(
+                ({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(' ')}`),
+        }))",
+    );
+    assert!(found["passes"].as_u64() > Some(10), "{found}");
+    assert_eq!(found["serious"], serde_json::json!([]), "{what}");
+}
+
+#[test]
+fn axe_finds_nothing_serious_in_the_review_page() {
+    let (Some(axe), Some(browser)) = (axe(), Browser::start()) else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let few = [&PLAIN[..], &["--metric", "density", "--sample", "3"]].concat();
+    for (language, size, dark) in [("en", [1440, 900], false), ("vi", [400, 800], true)] {
+        let page = Page::start(
+            &project,
+            language,
+            &[&few[..], &["--lang", language]].concat(),
+        );
+        let tab = enter(&browser, &page, size);
+        tab.dark(dark);
+        judge(&tab, "Digit1");
+        judge(&tab, "KeyP");
+        tab.eval(&format!("{axe}; null"));
+        nothing_serious(&tab, &format!("{language}, a card"));
+        for key in ["KeyH", "KeyJ"] {
+            tab.key(key);
+            tab.wait("document.querySelector('dialog[open]')");
+            nothing_serious(&tab, &format!("{language} after {key}"));
+            tab.key("Escape");
+            tab.wait("!document.querySelector('dialog[open]')");
+        }
+        tab.key("KeyC");
+        tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+        nothing_serious(&tab, &format!("{language}, a correction"));
+        tab.key("Enter");
+        tab.wait("!document.querySelector('[data-do=correct]').classList.contains('on')");
+        tab.key("KeyP");
+        tab.wait("document.getElementById('bar').value === 3");
+        nothing_serious(&tab, &format!("{language}, the end"));
+    }
+}
+
+#[test]
+fn axe_finds_nothing_serious_in_a_report() {
+    let (Some(axe), Some(browser)) = (axe(), Browser::start()) else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    for (pair, verdict) in [("upright-0001", "fail"), ("upright-0002", "pass")] {
+        let set = ["verdict", "set", pair, verdict, "--reader", "lan"];
+        mocban(project.dir(), &set).expect(0);
+    }
+    let file = project.dir().join("report.html");
+    mocban(
+        project.dir(),
+        &["report", "-f", "html", "-o", "report.html"],
+    )
+    .expect(0);
+    for (size, dark) in [([1200, 900], false), ([400, 800], true)] {
+        let tab = browser.tab(size[0], size[1]);
+        tab.dark(dark);
+        tab.open(&format!("file://{}", file.display()));
+        tab.wait("document.querySelector('.shots')");
+        tab.eval(&format!("{axe}; null"));
+        nothing_serious(&tab, &format!("{size:?}"));
+    }
+}
