@@ -13,7 +13,8 @@
 //! [`report`] and [`export`] tell them. `benches/accuracy` gives pairs of [`demo`] straight to the stages and prints how
 //! often they are right, how far off, and how long each takes.
 //!
-//! `benches/queue` measures what the catalog costs on many pairs, beside other queues.
+//! `benches/queue` measures what the catalog costs on many pairs, beside other queues; `benches/speed` how long readers
+//! and stages take by the size of a scan, and `benches/peers` runs other libraries on the same files.
 //!
 //! The table below is kept by `tests/it/layers.rs`: a room imports those of its line and no others.
 //!
