@@ -1,5 +1,6 @@
 //! The highest surface under each pixel, looking straight down on a plane (orthographic z-buffer).
 
+mod block;
 mod boxes;
 mod moments;
 mod triangle;
@@ -11,9 +12,10 @@ use crate::domain::Rigid3;
 use crate::mesh::Mesh;
 use crate::raster::Grid;
 
+use block::{Block, LANES, Lanes, Row, block, fill_block, holding};
 use boxes::Boxes;
 pub(super) use moments::Moments;
-use triangle::{fill, higher, lower, pixels};
+use triangle::{higher, pixels};
 pub(super) use view::View;
 
 /// Height of a pixel that no surface covers.
@@ -21,8 +23,6 @@ pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
 
 /// Points of a set without faces are grown to this many times half their mean spacing, so that no holes stay.
 const POINT_GROWTH: f64 = 1.5;
-/// Triangles that are asked together whether they hold a pixel's centre: most of a scan's are too small.
-const LANES: usize = 8;
 
 /// A surface ready to be looked at along any direction.
 ///
@@ -39,34 +39,6 @@ pub(super) struct Shell {
     /// Triangles, or points, in the blocks.
     count: usize,
     has_faces: bool,
-}
-
-/// A few triangles side by side: x, y and z of their first corners, then of their second and third. The last block
-/// repeats its last triangle; a point is a triangle whose corners are one.
-type Block = [[Lanes; 3]; 3];
-type Lanes = [f32; LANES];
-
-/// A linear function of a corner's place relative to the middle.
-#[derive(Debug, Clone, Copy)]
-struct Row([f32; 4]);
-
-impl Row {
-    /// Of one corner.
-    #[inline]
-    fn place(&self, [x, y, z]: [f32; 3]) -> f32 {
-        let [a, b, c, d] = self.0;
-        a * x + b * y + c * z + d
-    }
-
-    /// Of corners side by side.
-    #[inline]
-    fn at(&self, [x, y, z]: &[Lanes; 3]) -> Lanes {
-        let mut places = [0.0; LANES];
-        for (k, place) in places.iter_mut().enumerate() {
-            *place = self.place([x[k], y[k], z[k]]);
-        }
-        places
-    }
 }
 
 impl Shell {
@@ -237,72 +209,6 @@ impl Shell {
             }
         }
     }
-}
-
-/// Up to [`LANES`] triangles, the last repeated.
-fn block(triangles: &[[u32; 3]], vertices: &[[f64; 3]], middle: [f64; 3]) -> Block {
-    let mut block = [[[0.0; LANES]; 3]; 3];
-    for lane in 0..LANES {
-        let triangle = triangles[lane.min(triangles.len() - 1)];
-        for (corner, i) in block.iter_mut().zip(triangle) {
-            let vertex = vertices[i as usize];
-            for axis in 0..3 {
-                corner[axis][lane] = (vertex[axis] - middle[axis]) as f32;
-            }
-        }
-    }
-    block
-}
-
-/// Fills those of a few triangles that hold a pixel's centre.
-#[inline]
-fn fill_block(
-    block: &Block,
-    [u, v, z]: &[Row; 3],
-    size: [usize; 2],
-    meet: &mut impl FnMut(usize, f32),
-) {
-    let across = block.each_ref().map(|corner| u.at(corner));
-    let down = block.each_ref().map(|corner| v.at(corner));
-    let held = holding([&ends(&across), &ends(&down)], size);
-    if held == [false; LANES] {
-        return;
-    }
-    let heights = block.each_ref().map(|corner| z.at(corner));
-    for k in (0..LANES).filter(|k| held[*k]) {
-        let corner = |c: usize| [across[c][k], down[c][k], heights[c][k]];
-        fill([corner(0), corner(1), corner(2)], size, meet);
-    }
-}
-
-/// The lowest and the highest of three corners' places.
-#[inline]
-fn ends([a, b, c]: &[Lanes; 3]) -> [Lanes; 2] {
-    let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
-    for k in 0..LANES {
-        low[k] = lower(lower(a[k], b[k]), c[k]);
-        high[k] = higher(higher(a[k], b[k]), c[k]);
-    }
-    [low, high]
-}
-
-/// Which lanes may hold a pixel's centre, given how far they reach along each axis of the grid.
-#[inline]
-fn holding([across, down]: [&[Lanes; 2]; 2], [width, height]: [usize; 2]) -> [bool; LANES] {
-    let (wide, high) = (holding_along(across, width), holding_along(down, height));
-    std::array::from_fn(|k| wide[k] & high[k])
-}
-
-#[inline]
-fn holding_along([low, high]: &[Lanes; 2], side: usize) -> [bool; LANES] {
-    let last = side as f32 - 1.0;
-    let mut holds = [false; LANES];
-    for (k, holds) in holds.iter_mut().enumerate() {
-        // The last whole pixel at or below the upper end; a narrow cast rounds down from 0 up.
-        let below = (lower(higher(high[k], -1.0), last) + 1.0) as i32 - 1;
-        *holds = below as f32 >= higher(low[k], 0.0);
-    }
-    holds
 }
 
 #[cfg(test)]

@@ -1,0 +1,103 @@
+//! A few triangles side by side, and which of them may hold a pixel's centre.
+
+use super::triangle::{fill, higher, lower};
+
+/// Triangles that are asked together whether they hold a pixel's centre: most of a scan's are too small.
+pub(super) const LANES: usize = 8;
+
+/// A few triangles side by side: x, y and z of their first corners, then of their second and third. The last block
+/// repeats its last triangle; a point is a triangle whose corners are one.
+pub(super) type Block = [[Lanes; 3]; 3];
+pub(super) type Lanes = [f32; LANES];
+
+/// A linear function of a corner's place relative to the middle.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row(pub(super) [f32; 4]);
+
+impl Row {
+    /// Of one corner.
+    #[inline]
+    pub(super) fn place(&self, [x, y, z]: [f32; 3]) -> f32 {
+        let [a, b, c, d] = self.0;
+        a * x + b * y + c * z + d
+    }
+
+    /// Of corners side by side.
+    #[inline]
+    pub(super) fn at(&self, [x, y, z]: &[Lanes; 3]) -> Lanes {
+        let mut places = [0.0; LANES];
+        for (k, place) in places.iter_mut().enumerate() {
+            *place = self.place([x[k], y[k], z[k]]);
+        }
+        places
+    }
+}
+
+/// Up to [`LANES`] triangles, the last repeated.
+pub(super) fn block(triangles: &[[u32; 3]], vertices: &[[f64; 3]], middle: [f64; 3]) -> Block {
+    let mut block = [[[0.0; LANES]; 3]; 3];
+    for lane in 0..LANES {
+        let triangle = triangles[lane.min(triangles.len() - 1)];
+        for (corner, i) in block.iter_mut().zip(triangle) {
+            let vertex = vertices[i as usize];
+            for axis in 0..3 {
+                corner[axis][lane] = (vertex[axis] - middle[axis]) as f32;
+            }
+        }
+    }
+    block
+}
+
+/// Fills those of a few triangles that hold a pixel's centre.
+#[inline]
+pub(super) fn fill_block(
+    block: &Block,
+    [u, v, z]: &[Row; 3],
+    size: [usize; 2],
+    meet: &mut impl FnMut(usize, f32),
+) {
+    let across = block.each_ref().map(|corner| u.at(corner));
+    let down = block.each_ref().map(|corner| v.at(corner));
+    let held = holding([&ends(&across), &ends(&down)], size);
+    if held == [false; LANES] {
+        return;
+    }
+    let heights = block.each_ref().map(|corner| z.at(corner));
+    for k in (0..LANES).filter(|k| held[*k]) {
+        let corner = |c: usize| [across[c][k], down[c][k], heights[c][k]];
+        fill([corner(0), corner(1), corner(2)], size, meet);
+    }
+}
+
+/// The lowest and the highest of three corners' places.
+#[inline]
+fn ends([a, b, c]: &[Lanes; 3]) -> [Lanes; 2] {
+    let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
+    for k in 0..LANES {
+        low[k] = lower(lower(a[k], b[k]), c[k]);
+        high[k] = higher(higher(a[k], b[k]), c[k]);
+    }
+    [low, high]
+}
+
+/// Which lanes may hold a pixel's centre, given how far they reach along each axis of the grid.
+#[inline]
+pub(super) fn holding(
+    [across, down]: [&[Lanes; 2]; 2],
+    [width, height]: [usize; 2],
+) -> [bool; LANES] {
+    let (wide, high) = (holding_along(across, width), holding_along(down, height));
+    std::array::from_fn(|k| wide[k] & high[k])
+}
+
+#[inline]
+fn holding_along([low, high]: &[Lanes; 2], side: usize) -> [bool; LANES] {
+    let last = side as f32 - 1.0;
+    let mut holds = [false; LANES];
+    for (k, holds) in holds.iter_mut().enumerate() {
+        // The last whole pixel at or below the upper end; a narrow cast rounds down from 0 up.
+        let below = (lower(higher(high[k], -1.0), last) + 1.0) as i32 - 1;
+        *holds = below as f32 >= higher(low[k], 0.0);
+    }
+    holds
+}
