@@ -9,12 +9,12 @@ use tokio::task::JoinHandle;
 
 use super::RunError;
 use super::events::RunEvent;
+use super::execute::Given;
 use super::filing::file;
 use super::worker::{PairEnd, PairReport, Shared};
 use crate::breakpoint::{self, Point};
-use crate::catalog::{Kept, Lease, StageDone};
-use crate::domain::{PairName, Stage};
-use crate::store::NewArtifact;
+use crate::catalog::{InputsSeen, Kept, Lease, StageDone};
+use crate::domain::{ContentHash, PairName, Stage};
 
 /// The right to a pair, and what has been stored under it.
 pub(super) struct Held {
@@ -41,8 +41,13 @@ enum Right {
 
 /// A stage that is computed, and the files that must be on disk before a row names them.
 pub(super) struct Finished {
-    pub(super) done: StageDone,
-    pub(super) files: Vec<NewArtifact>,
+    pub(super) stage: Stage,
+    pub(super) given: Given,
+    pub(super) mesh_hash: ContentHash,
+    pub(super) print_hash: Option<ContentHash>,
+    pub(super) facts: String,
+    pub(super) inputs: InputsSeen,
+    pub(super) ms: u64,
 }
 
 /// What became of the lease, and how many stages were stored under it.
@@ -196,10 +201,25 @@ async fn store(
 
 /// Has a stage's files written; then a row may name them.
 async fn filed(shared: &Shared, pair: &PairName, stage: Finished) -> Result<StageDone, RunError> {
-    let Finished { done, files } = stage;
-    let (project, limit) = (&shared.project, shared.stage_limit);
-    file(project, (pair, done.stage), files, limit).await?;
-    Ok(done)
+    let (given, limit) = (stage.given, shared.stage_limit);
+    file(&shared.project, (pair, stage.stage), given.files, limit).await?;
+    // The disk may have taken long: whether the lease still stands is asked as of now.
+    Ok(StageDone {
+        stage: stage.stage,
+        recipe: shared.recipes.of(stage.stage),
+        mesh_hash: stage.mesh_hash,
+        print_hash: stage.print_hash,
+        facts: stage.facts,
+        outcome: given.outcome,
+        files: given.named,
+        result_hash: given.result_hash,
+        metrics: given.metrics,
+        inputs: stage.inputs,
+        ms: stage.ms,
+        at: shared.clock.now(),
+        next_deadline: shared.deadline(),
+        alive_since: shared.alive_since(),
+    })
 }
 
 fn finished(shared: &Shared, pair: PairName, stage: Stage, ms: u64) {

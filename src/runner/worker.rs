@@ -18,9 +18,7 @@ use super::steps::{Setback, Steps};
 use super::stop::{Stop, StopLevel};
 use super::timing::Timing;
 use crate::breakpoint::{self, Point};
-use crate::catalog::{
-    Catalog, InputsSeen, Lease, PairWork, RecipeIds, Sentence, StageDone, StageFailed,
-};
+use crate::catalog::{Catalog, InputsSeen, Lease, PairWork, RecipeIds, Sentence, StageFailed};
 use crate::domain::{Failure, FailureClass, PairName, Stage, UnixMillis};
 use crate::store::Project;
 
@@ -185,7 +183,7 @@ async fn step(shared: &Shared, stage: Stage, pair: Box<PairInHand>) -> Step {
     shared.note(&computed);
     match computed {
         Computed::Ended(mut pair, Ended::Given(given), took) => {
-            let finished = finished(shared, &mut pair, stage, given, ms(took));
+            let finished = finished(&mut pair, stage, given, ms(took));
             Step::Done(pair, Box::new(finished))
         }
         Computed::Ended(pair, Ended::Setback(Setback::Back(earlier)), _) => {
@@ -226,33 +224,18 @@ const fn ms(took: Duration) -> u64 {
 }
 
 /// What is to be stored of a stage.
-fn finished(
-    shared: &Shared,
-    pair: &mut PairInHand,
-    stage: Stage,
-    given: Given,
-    ms: u64,
-) -> Finished {
+fn finished(pair: &mut PairInHand, stage: Stage, given: Given, ms: u64) -> Finished {
     let inputs = pair.news();
     let stored = &pair.stored[&stage];
-    let done = StageDone {
+    Finished {
         stage,
-        recipe: shared.recipes.of(stage),
+        given,
         mesh_hash: stored.mesh_hash,
         print_hash: stored.print_hash,
         facts: pair.facts_text.clone(),
-        outcome: given.outcome,
-        files: given.named,
-        result_hash: given.result_hash,
-        metrics: given.metrics,
         inputs,
         ms,
-        at: shared.clock.now(),
-        next_deadline: shared.deadline(),
-        alive_since: shared.alive_since(),
-    };
-    let files = given.files;
-    Finished { done, files }
+    }
 }
 
 /// Stores a failure and tells of it.

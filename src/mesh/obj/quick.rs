@@ -1,5 +1,4 @@
-//! OBJ files as nearly all programs write them, in one pass over their bytes; `tobj` takes three to four times as long
-//! for the lines alone.
+//! OBJ files as nearly all programs write them, in one pass over their bytes; `tobj` takes about five times as long.
 //!
 //! Whatever is unusual (continued lines, a word that is no number, an index that names no vertex) is left to `tobj`,
 //! which reads it or stumbles over it. What is read here is read as `tobj` would have.
