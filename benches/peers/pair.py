@@ -4,7 +4,7 @@
     taskset -c 0 peers/bin/python benches/peers/pair.py
 
 The pairs are those of `mocban demo`, their meshes rewritten as binary STL. Both programs take turns over the whole set,
-each with one core. The peer's steps are the quickest that were found for each, and do no more than the paper asks: the
+each with one core. The peer's steps are quick ones, and do no more than the paper asks: the
 plane by RANSAC, the side by the sharper layer of heights, a depth map by casting rays, the ink by Otsu, the turn by ECC
 from starts all around, the threshold by SSIM and by density over the paper's 90 levels, PNG files. It keeps no catalog,
 syncs nothing, and checks nothing. A result is wrong when its turn is more than 5 degrees off the truth.
@@ -63,13 +63,13 @@ def depth(mesh, turn):
     return np.where(seen, 1 + (hit - hit[seen].min()) / span * 65534, 0).astype(np.uint16)
 
 
-def squared(picture, side):
-    """The box of what is set, on a square canvas."""
-    rows, columns = np.flatnonzero(picture.any(1)), np.flatnonzero(picture.any(0))
+def squared(picture, mask, side):
+    """What lies in the box of a mask, on a square canvas."""
+    rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     cut = picture[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.float32)
     scale = side * 0.7 / max(cut.shape)
     to = np.float32([[scale, 0, (side - scale * cut.shape[1]) / 2], [0, scale, (side - scale * cut.shape[0]) / 2]])
-    return cv2.warpAffine(cut, to, (side, side), flags=cv2.INTER_AREA), scale, (rows[0], columns[0])
+    return cv2.warpAffine(cut, to, (side, side), flags=cv2.INTER_AREA)
 
 
 def ecc(fixed, moving, start, steps):
@@ -112,17 +112,10 @@ def pair(mesh_path, print_path, out):
     _, ink = cv2.threshold(grey, 0, 1, cv2.THRESH_BINARY_INV | cv2.THRESH_OTSU)
     bytes_ = (levels >> 8).astype(np.uint8)
     top, _ = cv2.threshold(bytes_[levels > 0].reshape(-1, 1), 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
-    fixed, _, _ = squared(ink, CANVAS)
-    moving, _, _ = squared(bytes_ > top, CANVAS)
-    motion = register(fixed, moving)
-    rows = np.flatnonzero((bytes_ > top).any(1))
-    columns = np.flatnonzero((bytes_ > top).any(0))
-    cut = bytes_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-    scale = CANVAS * 0.7 / max(cut.shape)
-    to = np.float32(
-        [[scale, 0, (CANVAS - scale * cut.shape[1]) / 2], [0, scale, (CANVAS - scale * cut.shape[0]) / 2]]
-    )
-    canvas = cv2.warpAffine(cut, to, (CANVAS, CANVAS), flags=cv2.INTER_AREA)
+    tops = bytes_ > top
+    fixed = squared(ink, ink, CANVAS)
+    motion = register(fixed, squared(tops, tops, CANVAS))
+    canvas = squared(bytes_, tops, CANVAS)
     canvas = cv2.warpAffine(canvas, motion, (CANVAS, CANVAS), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
     masks = {level: (canvas > level).astype(np.float32) for level in LEVELS}
     best = {

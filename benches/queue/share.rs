@@ -179,11 +179,7 @@ fn artifacts_part(project: &Project) -> anyhow::Result<Duration> {
     let mut time = Duration::ZERO;
     for path in files(&project.artifacts_dir())? {
         let bytes = std::fs::read(&path)?;
-        let file = NewArtifact {
-            role: "file".to_owned(),
-            ext: "bin",
-            bytes,
-        };
+        let file = NewArtifact::new("file", "bin", bytes);
         let start = Instant::now();
         other.write_artifacts(&[file])?;
         time += start.elapsed();

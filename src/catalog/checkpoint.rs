@@ -289,32 +289,16 @@ impl Catalog {
     /// # Errors
     /// When the database refuses; then nothing is stored and the lease stands until it is rescued.
     pub async fn checkpoint(&self, lease: Lease, done: StageDone) -> Result<Kept> {
-        self.checkpoint_at_once(lease, vec![done]).await
+        self.store(lease, vec![done], Message::Grouped).await
     }
 
-    /// [`Catalog::checkpoint`] of stages in the order they were computed.
-    ///
-    /// # Errors
-    /// As there.
-    pub async fn checkpoint_at_once(&self, lease: Lease, done: Vec<StageDone>) -> Result<Kept> {
-        self.store(lease, done, Message::Grouped).await
-    }
-
-    /// The same, but it may take some time longer, for others to share its commit; until somebody is in a
-    /// [`Catalog::hurry`].
+    /// The same for stages in the order they were computed, but it may take some time longer, for others to share its
+    /// commit; not while somebody is [`Catalog::waiting`].
     ///
     /// # Errors
     /// As there.
     pub async fn checkpoint_in_time(&self, lease: Lease, done: Vec<StageDone>) -> Result<Kept> {
         self.store(lease, done, Message::InTime).await
-    }
-
-    /// Has stored at once what was sent before.
-    ///
-    /// # Errors
-    /// When the catalog is closed.
-    pub async fn hurry(&self) -> Result<()> {
-        self.send(Message::Hurry).await
     }
 
     async fn store(

@@ -1,17 +1,14 @@
 //! Requests that share a commit: all that wait, and where those can wait a little, what comes meanwhile.
 
-use std::time::Duration;
-
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout_at};
 
 use super::batch::Batch;
+use super::company::Company;
 use super::writer::Message;
 
 /// Most requests in one commit.
 const BATCH: usize = 256;
-/// How long a request that can wait does so for others to share its commit.
-pub(super) const COMPANY: Duration = Duration::from_millis(100);
 
 /// What has come so far.
 struct Gathering {
@@ -44,12 +41,12 @@ impl Gathering {
 /// last commit is given the turn first: the next request is often already on its way.
 pub(super) async fn gather(
     first: Message,
-    company: Duration,
+    company: &Company,
     inbox: &mut mpsc::Receiver<Message>,
 ) -> (Batch, Option<Message>) {
     let mut gathering = Gathering {
         batch: Batch::default(),
-        until: Some(Instant::now() + company),
+        until: company.until(),
         other: None,
     };
     gathering.take(first);
@@ -84,7 +81,9 @@ mod tests {
     use tokio::time::timeout;
 
     use super::{BATCH, gather};
+    use crate::catalog::Catalog;
     use crate::catalog::batch::{Beat, Request};
+    use crate::catalog::company::Company;
     use crate::catalog::writer::Message;
     use crate::domain::WorkerId;
 
@@ -104,6 +103,8 @@ mod tests {
 
     /// The same, where some come when it is waited for more.
     async fn gathered_later(messages: Vec<Message>, later: Vec<Message>) -> usize {
+        let company = Company::of(Duration::from_hours(1));
+
         let (sender, mut inbox) = mpsc::channel(messages.len());
         for message in messages {
             sender.send(message).await.expect("room");
@@ -116,7 +117,7 @@ mod tests {
             }
         });
         let first = inbox.recv().await.expect("a message");
-        let batch = gather(first, Duration::from_hours(1), &mut inbox);
+        let batch = gather(first, &company, &mut inbox);
         let batch = timeout(Duration::from_secs(20), batch).await;
         batch.expect("it does not wait").0.len()
     }
@@ -158,6 +159,21 @@ mod tests {
         assert_eq!(gathered(vec![waits(request()), Message::Hurry]).await, 1);
         let close = Message::Close(oneshot::channel().0);
         assert_eq!(gathered(vec![waits(request()), close]).await, 1);
+    }
+
+    #[tokio::test]
+    async fn nothing_is_waited_for_while_somebody_waits() {
+        let catalog = tempfile::tempdir().expect("a temporary directory");
+        let path = catalog.path().join("catalog.sqlite");
+        let catalog = Catalog::create_patient(&path).await.expect("a catalog");
+        let until = || catalog.company.until();
+        assert!(until().is_some());
+        let waiting = [catalog.waiting().await, catalog.waiting().await];
+        let [one, other] = waiting.map(|waiting| waiting.expect("it is open"));
+        drop(one);
+        assert_eq!(until(), None);
+        drop(other);
+        assert!(until().is_some());
     }
 
     #[tokio::test]

@@ -10,6 +10,7 @@ mod audit;
 mod batch;
 mod checkpoint;
 mod claim;
+mod company;
 mod connect;
 mod copy;
 mod counters;
@@ -46,7 +47,6 @@ mod writer;
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Duration;
 
 use sqlx::pool::PoolConnection;
 use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
@@ -56,6 +56,7 @@ pub use alignments::{HandAlignment, StoredAlignment};
 pub use answers::{Answer, AnsweredOn, ControlAnswer, Shown};
 pub use audit::{AuditedPair, AuditedResult, Drift};
 pub use claim::{ClaimRequest, PairSelection};
+pub use company::Waiting;
 pub use counters::Counts;
 pub use error::{CatalogError, Result};
 pub use holder::{Holder, holder};
@@ -79,7 +80,7 @@ pub use upkeep::{Outstanding, WorkLeft, WorkerInfo};
 pub use verdicts::{NewVerdict, VerdictEvent};
 pub use work::{KnownInputs, PairWork};
 
-use gather::COMPANY;
+use company::Company;
 use writer::{Message, Work};
 
 /// Requests that may wait for the writer before senders do.
@@ -91,6 +92,7 @@ pub struct Catalog {
     readers: SqlitePool,
     /// `None` when opened to read only.
     inbox: Option<mpsc::Sender<Message>>,
+    company: Arc<Company>,
     path: Arc<Path>,
 }
 
@@ -100,7 +102,7 @@ impl Catalog {
     /// # Errors
     /// When it is no catalog, the disk is a network's, or the database refuses.
     pub async fn create(path: &Path) -> Result<Self> {
-        Self::with_writer(path, true, COMPANY).await
+        Self::with_writer(path, true, Company::new()).await
     }
 
     /// Opens a catalog that is there, to read and write.
@@ -108,7 +110,7 @@ impl Catalog {
     /// # Errors
     /// When there is none, it is no catalog, the disk is a network's, or the database refuses.
     pub async fn open(path: &Path) -> Result<Self> {
-        Self::with_writer(path, false, COMPANY).await
+        Self::with_writer(path, false, Company::new()).await
     }
 
     /// Opens a catalog to read; works while a run goes on.
@@ -119,19 +121,22 @@ impl Catalog {
         Ok(Self {
             readers: connect::readers(path).await?,
             inbox: None,
+            company: Company::new(),
             path: path.into(),
         })
     }
 
-    async fn with_writer(path: &Path, create: bool, company: Duration) -> Result<Self> {
+    async fn with_writer(path: &Path, create: bool, company: Arc<Company>) -> Result<Self> {
         let conn = connect::writer(path, create).await?;
         let readers = connect::readers(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();
-        tokio::spawn(writer::run(conn, Arc::clone(&path), inbox, company));
+        let shared = (Arc::clone(&path), Arc::clone(&company));
+        tokio::spawn(writer::run(conn, shared.0, inbox, shared.1));
         Ok(Self {
             readers,
             inbox: Some(sender),
+            company,
             path,
         })
     }

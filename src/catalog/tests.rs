@@ -19,6 +19,7 @@ use std::time::Duration;
 use serde_json::{Map, json};
 use tokio::sync::oneshot;
 
+use super::company::Company;
 use super::{
     Again, Catalog, ClaimRequest, Dead, ImportRow, InputSeen, InputsSeen, Kept, Lease,
     MetricResult, RecipeIds, Recipes, StageDone, WorkerInfo,
@@ -31,7 +32,7 @@ use crate::domain::{
 impl Catalog {
     /// A new catalog whose writer lets what can wait do so for ever.
     pub(crate) async fn create_patient(path: &Path) -> super::Result<Self> {
-        Self::with_writer(path, true, Duration::from_hours(1)).await
+        Self::with_writer(path, true, Company::of(Duration::from_hours(1))).await
     }
 
     /// Keeps the writer busy from now on, until the sender is used or dropped.

@@ -9,6 +9,7 @@ use sqlx::{Connection as _, SqliteConnection};
 use tokio::sync::{mpsc, oneshot};
 
 use super::batch::{Answers, Batch, Request};
+use super::company::Company;
 use super::gather::gather;
 use super::patience::Patience;
 use super::{CatalogError, Result, Trouble};
@@ -29,7 +30,7 @@ pub(super) enum Message {
     Grouped(Request),
     /// The same, but that commit may wait a little for others to share it.
     InTime(Request),
-    /// Somebody waits for what was sent before: the next commit is to wait no longer.
+    /// Somebody waits: the next commit is to wait no longer.
     Hurry,
     /// Runs in its own transaction.
     Alone(Alone),
@@ -37,12 +38,12 @@ pub(super) enum Message {
     Close(oneshot::Sender<()>),
 }
 
-/// The writer's loop. Ends at `Close` or when nobody can send any more. What can wait does so for as long as `company`.
+/// The writer's loop. Ends at `Close` or when nobody can send any more.
 pub(super) async fn run(
     mut conn: SqliteConnection,
     path: Arc<Path>,
     mut inbox: mpsc::Receiver<Message>,
-    company: Duration,
+    company: Arc<Company>,
 ) {
     let mut commits = 0_u32;
     let closing = loop {
@@ -63,7 +64,7 @@ pub(super) async fn run(
             // What it was sent for is stored already.
             Some(Message::Hurry) => continue,
             Some(first @ (Message::Grouped(_) | Message::InTime(_))) => {
-                let (batch, after) = gather(first, company, &mut inbox).await;
+                let (batch, after) = gather(first, &company, &mut inbox).await;
                 commit(&mut conn, &path, batch).await;
                 match after {
                     Some(Message::Close(done)) => break Some(done),

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use tokio::task::JoinSet;
 
-use super::execute::{Computed, Ended, compute};
+use super::execute::{Computed, Computing};
 use super::filing::file;
 use super::hand::PairInHand;
 use super::options::RunOptions;
@@ -55,22 +55,27 @@ async fn through(
 ) -> Option<Filings> {
     let (stop, name) = (Stop::new(), facts.name.clone());
     let mut filings = JoinSet::new();
-    let mut pair = Box::new(PairInHand::new(PairWork {
+    let pair = Box::new(PairInHand::new(PairWork {
         facts,
         facts_text: String::new(),
         results: Vec::new(),
     }));
-    for stage in Stage::ALL {
-        let computed = compute(&steps, stage, pair, limit, &stop).await;
-        let Computed::Ended(back, Ended::Given(given), _) = computed else {
-            return None;
+    let mut computing = Computing::begin(&steps, Stage::Fit, pair, Stage::next).ok()?;
+    loop {
+        let (finished, next) = match computing.next(limit, &stop).await {
+            Computed::Begun(..) => continue,
+            Computed::Finished(finished, next) => (finished, next),
+            _ => return None,
         };
-        let (project, name) = (project.clone(), name.clone());
+        let (project, name, stop) = (project.clone(), name.clone(), stop.clone());
         filings.spawn(async move {
-            let filed = file(&project, (&name, stage), given.files, limit).await;
-            filed.is_ok()
+            let of = (&name, finished.stage);
+            let filed = file(&project, of, finished.files, limit, &stop).await;
+            matches!(filed, Ok(true))
         });
-        pair = back;
+        if next.is_none() {
+            break;
+        }
     }
     Some(filings)
 }

@@ -16,7 +16,7 @@ use super::refresh;
 use super::stop::StopLevel;
 use super::worker::{Over, PairEnd, PairReport, Shared};
 use super::{RunError, this_process};
-use crate::catalog::{Dead, Outstanding, PairSelection};
+use crate::catalog::{Dead, Outstanding, PairSelection, Waiting};
 use crate::domain::{PairName, UnixMillis, WorkerId};
 use crate::raster;
 
@@ -47,6 +47,8 @@ pub(super) struct Dispatch {
     pub(super) tasks: JoinSet<(Over, PairName, u64)>,
     /// Pairs whose last files and checkpoint are on their way.
     endings: JoinSet<PairReport>,
+    /// Held while a slot has nothing to do and pairs are not stored yet.
+    waiting: Option<Waiting>,
     pub(super) in_hand: InHand,
     pub(super) budget: Budget,
     /// The next pair waits for memory that somebody must give back first.
@@ -81,6 +83,7 @@ impl Dispatch {
             images: options.image_limits,
             tasks: JoinSet::new(),
             endings: JoinSet::new(),
+            waiting: None,
             in_hand: InHand::default(),
             budget: Budget::new(options.memory),
             short: false,
@@ -108,6 +111,7 @@ impl Dispatch {
         let mut rescues = every(timing.rescue_every);
         let mut beats = every(timing.beat_every);
         while !self.is_over().await? {
+            self.wait().await?;
             let shared = Arc::clone(&self.shared);
             tokio::select! {
                 biased;
@@ -160,6 +164,20 @@ impl Dispatch {
         Ok(left.ready == 0 && left.leased == 0 && left.backoff == 0)
     }
 
+    /// While all slots are busy, what is finished may wait for company. Else it is stored at once: the next pair may
+    /// wait for it, or the end, and a pair that nothing may run beside is to be blamed by itself if it kills.
+    async fn wait(&mut self) -> Result<(), RunError> {
+        let is_waiting = self.tasks.len() < self.workers && !self.endings.is_empty();
+        if is_waiting != self.waiting.is_some() {
+            self.waiting = if is_waiting {
+                Some(self.shared.catalog.waiting().await?)
+            } else {
+                None
+            };
+        }
+        Ok(())
+    }
+
     /// Whether so many pairs are computed and not stored that the disk must catch up.
     pub(super) fn is_disk_behind(&self) -> bool {
         self.endings.len() >= self.workers * MOST_ENDINGS
@@ -187,7 +205,7 @@ impl Dispatch {
         self.in_hand.over(&name);
         match over {
             Over::Ended(report) => self.count(report),
-            Over::Storing(held) => drop(self.endings.spawn(held.report(Ok(PairEnd::Done)))),
+            Over::Storing(held) => drop(self.endings.spawn(held.done())),
         }
     }
 

@@ -1,119 +1,175 @@
-//! The one bridge from tokio to computing: a stage runs on a thread of its own.
+//! The one bridge from tokio to computing: the stages of a pair run one after another on a thread of their own.
 //!
-//! A thread a stage, rather than a pool, so that one that hangs past its deadline can be left behind without taking
-//! a place from the others.
+//! A thread a pair, rather than a pool, so that one that hangs past its deadline can be left behind without taking a
+//! place from the others. And not a thread a stage: a core that waits for a thread to be handed its work is idle for
+//! as long as the system takes to see it, often until its next tick some milliseconds later.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use tokio::sync::oneshot;
+use tokio::sync::mpsc;
 
 use super::hand::{PairInHand, Stored};
 use super::outputs;
 use super::steps::{Setback, StageOutput, Steps};
 use super::stop::{Stop, StopLevel};
 use crate::breakpoint::{self, Point};
-use crate::catalog::MetricResult;
-use crate::domain::{ArtifactSet, ContentHash, FailureClass, Stage, plain};
+use crate::catalog::{InputsSeen, MetricResult};
+use crate::domain::{ArtifactSet, ContentHash, Failure, FailureClass, Stage, plain};
 use crate::store::NewArtifact;
 
-/// What a stage gave, none of it on disk.
+/// A stage that is computed, and the files that must be on disk before a row names them.
 #[derive(Debug)]
-pub(super) struct Given {
+pub(super) struct Finished {
+    pub(super) stage: Stage,
     pub(super) outcome: String,
     pub(super) files: Vec<NewArtifact>,
     /// How the files will be named.
     pub(super) named: ArtifactSet,
     pub(super) result_hash: ContentHash,
     pub(super) metrics: Vec<MetricResult>,
+    pub(super) mesh_hash: ContentHash,
+    pub(super) print_hash: Option<ContentHash>,
+    pub(super) facts: String,
+    /// Input files as read, if no stage before told them.
+    pub(super) inputs: InputsSeen,
+    pub(super) took: Duration,
 }
 
-/// How a stage ended.
-#[derive(Debug)]
-pub(super) enum Ended {
-    /// Computed.
-    Given(Given),
-    /// Not computed.
-    Setback(Setback),
-}
-
-/// What came back from the thread.
+/// What happens on a pair's thread.
 #[derive(Debug)]
 pub(super) enum Computed {
-    /// The pair, how the stage ended, and how long it took.
-    Ended(Box<PairInHand>, Ended, Duration),
-    /// The stage panicked; the pair in hand is lost with it.
+    /// A stage begins; the input files as read until now.
+    Begun(Stage, InputsSeen),
+    /// A stage is computed; which one comes next, unless it was the last one.
+    Finished(Box<Finished>, Option<Stage>),
+    /// A stage failed; the last that comes.
+    Failed {
+        /// Class and sentence.
+        failure: Failure,
+        /// Whether another try may go better.
+        may_pass: bool,
+        /// Input files as read.
+        inputs: InputsSeen,
+        /// How long it took.
+        took: Duration,
+    },
+    /// A stage panicked; the pair in hand is lost with it.
     Panicked(String),
-    /// The system gave no thread for it; the pair in hand is lost.
-    NoThread(std::io::Error),
     /// It took too long; its thread is left behind.
     TimedOut,
-    /// The run is to stop now; its thread is left behind.
+    /// The run is to stop now; the thread is left behind.
     Stopped,
 }
 
-/// Runs a stage of a pair.
-pub(super) async fn compute(
-    steps: &Arc<dyn Steps>,
-    stage: Stage,
-    pair: Box<PairInHand>,
-    limit: Duration,
-    stop: &Stop,
-) -> Computed {
-    let (sender, receiver) = oneshot::channel();
-    let steps = Arc::clone(steps);
-    let name = format!("{stage} {}", pair.facts.name);
-    let thread = std::thread::Builder::new().name(name);
-    let spawned = thread.spawn(move || {
-        let work = AssertUnwindSafe(|| run(&*steps, stage, pair));
-        // Nobody waits any more after a time limit or a stop; then the work is dropped.
-        let _ = sender.send(catch_unwind(work));
-    });
-    if let Err(error) = spawned {
-        return Computed::NoThread(error);
+/// A pair whose stages are computed. When it is dropped, the stage in hand is the last.
+#[derive(Debug)]
+pub(super) struct Computing(mpsc::UnboundedReceiver<Computed>);
+
+impl Computing {
+    /// Computes stages of a pair from this one on. What comes after a stage is asked on the pair's thread.
+    ///
+    /// # Errors
+    /// When the system gives no thread; then the pair in hand is lost.
+    pub(super) fn begin(
+        steps: &Arc<dyn Steps>,
+        stage: Stage,
+        pair: Box<PairInHand>,
+        next: impl Fn(Stage) -> Option<Stage> + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let (sender, receiver) = mpsc::unbounded_channel();
+        let steps = Arc::clone(steps);
+        let thread = std::thread::Builder::new().name(pair.facts.name.to_string());
+        thread.spawn(move || through(&*steps, stage, pair, next, &sender))?;
+        Ok(Self(receiver))
     }
-    tokio::select! {
-        biased;
-        outcome = receiver => match outcome {
-            Ok(Ok((pair, ended, took))) => Computed::Ended(pair, ended, took),
-            Ok(Err(payload)) => Computed::Panicked(panic_text(&*payload)),
-            Err(_) => Computed::Panicked("the stage's thread ended without a word".to_owned()),
-        },
-        () = stop.reached(StopLevel::Now) => Computed::Stopped,
-        () = tokio::time::sleep(limit) => Computed::TimedOut,
+
+    /// What happens next. No stage may take longer than the limit.
+    pub(super) async fn next(&mut self, limit: Duration, stop: &Stop) -> Computed {
+        tokio::select! {
+            biased;
+            computed = self.0.recv() => computed.unwrap_or_else(|| {
+                Computed::Panicked("the thread of the stages ended without a word".to_owned())
+            }),
+            () = stop.reached(StopLevel::Now) => Computed::Stopped,
+            () = tokio::time::sleep(limit) => Computed::TimedOut,
+        }
     }
+}
+
+/// Takes a pair through its stages, until there is none left or nobody listens any more.
+fn through(
+    steps: &dyn Steps,
+    mut stage: Stage,
+    mut pair: Box<PairInHand>,
+    next: impl Fn(Stage) -> Option<Stage>,
+    to: &mpsc::UnboundedSender<Computed>,
+) {
+    let last = loop {
+        if to
+            .send(Computed::Begun(stage, pair.inputs.clone()))
+            .is_err()
+        {
+            return;
+        }
+        let begun = Instant::now();
+        let work = AssertUnwindSafe(|| run(steps, stage, &mut pair, begun));
+        match catch_unwind(work) {
+            Ok(Ok(finished)) => match next(stage) {
+                Some(later) => {
+                    // Whether somebody listens is seen when the next stage begins.
+                    let _ = to.send(Computed::Finished(Box::new(finished), Some(later)));
+                    stage = later;
+                }
+                None => break Computed::Finished(Box::new(finished), None),
+            },
+            Ok(Err(Setback::Back(earlier))) => stage = earlier,
+            Ok(Err(Setback::Failed { failure, may_pass })) => {
+                break Computed::Failed {
+                    failure,
+                    may_pass,
+                    inputs: pair.inputs.clone(),
+                    took: begun.elapsed(),
+                };
+            }
+            Err(payload) => break Computed::Panicked(panic_text(&*payload)),
+        }
+    };
+    // Before the word is out that there is memory for another pair.
+    drop(pair);
+    let _ = to.send(last);
 }
 
 fn run(
     steps: &dyn Steps,
     stage: Stage,
-    mut pair: Box<PairInHand>,
-) -> (Box<PairInHand>, Ended, Duration) {
-    let begun = Instant::now();
-    let outcome = steps.run(stage, &mut pair);
+    pair: &mut PairInHand,
+    begun: Instant,
+) -> Result<Finished, Setback> {
+    let output = steps.run(stage, pair)?;
     let took = begun.elapsed();
-    let ended = match outcome {
-        Err(setback) => Ended::Setback(setback),
-        Ok(output) => {
-            breakpoint::reach(stage, Point::Computed, Some(&pair.facts.name));
-            given(stage, &mut pair, output)
-        }
-    };
-    (pair, ended, took)
+    breakpoint::reach(stage, Point::Computed, Some(&pair.facts.name));
+    finished(stage, pair, output, took)
 }
 
 /// Names what was given by its hashes, and keeps it in hand as later stages would find it stored.
-fn given(stage: Stage, pair: &mut PairInHand, output: StageOutput) -> Ended {
+fn finished(
+    stage: Stage,
+    pair: &mut PairInHand,
+    output: StageOutput,
+    took: Duration,
+) -> Result<Finished, Setback> {
     let Some(mesh_hash) = pair.mesh_hash() else {
         let text = "a stage was done before the mesh was read";
-        return Ended::Setback(Setback::failed(FailureClass::Bug, text));
+        return Err(Setback::failed(FailureClass::Bug, text));
     };
+    let print_hash = pair.print_hash();
     let named: ArtifactSet = output
         .files
         .iter()
-        .map(|file| (file.role.clone(), file.reference()))
+        .map(|file| (file.role().to_owned(), file.reference().clone()))
         .collect();
     let depth = pair.stored.get(&Stage::Depth).map(|stored| &stored.files);
     let metrics = outputs::metric_results(&output.metrics, &named, depth);
@@ -121,15 +177,21 @@ fn given(stage: Stage, pair: &mut PairInHand, output: StageOutput) -> Ended {
         outcome: serde_json::from_str(&output.outcome).unwrap_or_default(),
         files: named.clone(),
         mesh_hash,
-        print_hash: pair.print_hash(),
+        print_hash,
     };
     pair.stored.insert(stage, stored);
-    Ended::Given(Given {
+    Ok(Finished {
+        stage,
         result_hash: outputs::result_hash(&output.outcome, &named),
         outcome: output.outcome,
         files: output.files,
         named,
         metrics,
+        mesh_hash,
+        print_hash,
+        facts: pair.facts_text.clone(),
+        inputs: pair.news(),
+        took,
     })
 }
 

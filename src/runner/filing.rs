@@ -3,11 +3,12 @@
 use std::io;
 use std::time::Duration;
 
+use super::stop::{Stop, StopLevel};
 use crate::breakpoint::{self, Point};
 use crate::domain::{PairName, Stage};
 use crate::store::{ArtifactError, NewArtifact, Project};
 
-/// Has a stage's files on disk for good when it returns.
+/// Has a stage's files on disk for good when it returns; `false` when the run is to stop now, which waits for no disk.
 ///
 /// # Errors
 /// When the disk refuses, or has not answered within the limit.
@@ -16,18 +17,23 @@ pub(super) async fn file(
     (pair, stage): (&PairName, Stage),
     files: Vec<NewArtifact>,
     limit: Duration,
-) -> Result<(), ArtifactError> {
+    stop: &Stop,
+) -> Result<bool, ArtifactError> {
     let (to, name) = (project.clone(), pair.clone());
     let writing = tokio::task::spawn_blocking(move || {
         let written = || breakpoint::reach(stage, Point::Written, Some(&name));
         to.write_artifacts_telling(&files, &written)?;
         breakpoint::reach(stage, Point::Filed, Some(&name));
-        Ok(())
+        Ok(true)
     });
-    match tokio::time::timeout(limit, writing).await {
-        Ok(Ok(written)) => written,
-        Ok(Err(panic)) => std::panic::resume_unwind(panic.into_panic()),
-        Err(_) => {
+    tokio::select! {
+        biased;
+        written = writing => match written {
+            Ok(written) => written,
+            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
+        },
+        () = stop.reached(StopLevel::Now) => Ok(false),
+        () = tokio::time::sleep(limit) => {
             let text = format!("the disk took longer than {} s", limit.as_secs_f64());
             Err(ArtifactError::Io {
                 path: project.artifacts_dir(),

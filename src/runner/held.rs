@@ -9,12 +9,12 @@ use tokio::task::JoinHandle;
 
 use super::RunError;
 use super::events::RunEvent;
-use super::execute::Given;
+use super::execute::Finished;
 use super::filing::file;
 use super::worker::{PairEnd, PairReport, Shared};
 use crate::breakpoint::{self, Point};
-use crate::catalog::{InputsSeen, Kept, Lease, StageDone};
-use crate::domain::{ContentHash, PairName, Stage};
+use crate::catalog::{Kept, Lease, StageDone};
+use crate::domain::{PairName, Stage};
 
 /// The right to a pair, and what has been stored under it.
 pub(super) struct Held {
@@ -22,6 +22,8 @@ pub(super) struct Held {
     name: PairName,
     right: Right,
     stored: u64,
+    /// Whether all that was sent on its way is stored or will be.
+    is_whole: bool,
 }
 
 /// Where the lease is.
@@ -39,21 +41,11 @@ enum Right {
     Lost,
 }
 
-/// A stage that is computed, and the files that must be on disk before a row names them.
-pub(super) struct Finished {
-    pub(super) stage: Stage,
-    pub(super) given: Given,
-    pub(super) mesh_hash: ContentHash,
-    pub(super) print_hash: Option<ContentHash>,
-    pub(super) facts: String,
-    pub(super) inputs: InputsSeen,
-    pub(super) ms: u64,
-}
-
 /// What became of the lease, and how many stages were stored under it.
 struct Stored {
     kept: Kept,
     stages: u64,
+    is_whole: bool,
 }
 
 impl Held {
@@ -64,12 +56,17 @@ impl Held {
             name,
             right: Right::Lease(lease),
             stored: 0,
+            is_whole: true,
         }
     }
 
-    /// Takes out the lease as soon as nothing is on its way any more; `None` when it is lost or spent.
+    /// Has what is on its way stored at once and takes out the lease; `None` when it is lost or spent.
     pub(super) async fn lease(&mut self) -> Result<Option<Lease>, RunError> {
-        self.settle().await?;
+        if self.is_storing() {
+            let catalog = self.shared.catalog.clone();
+            let _waiting = catalog.waiting().await?;
+            self.settle().await?;
+        }
         match std::mem::replace(&mut self.right, Right::Spent) {
             Right::Lease(lease) => Ok(Some(lease)),
             right => {
@@ -110,6 +107,12 @@ impl Held {
         matches!(self.right, Right::Storing(..))
     }
 
+    /// How a pair that is done leaves its worker, when all is stored. Nobody waits for it.
+    pub(super) async fn done(mut self) -> PairReport {
+        let settled = self.settle().await;
+        self.report(settled.map(|()| PairEnd::Done)).await
+    }
+
     /// How the pair leaves its worker, when all is stored and a lease that is left has been given back.
     pub(super) async fn report(mut self, end: Result<PairEnd, RunError>) -> PairReport {
         let given_back = self.give_back().await;
@@ -117,6 +120,7 @@ impl Held {
         let (end, fatal) = match (end, given_back) {
             (Err(error), _) | (Ok(_), Err(error)) => (PairEnd::GivenBack, Some(error)),
             (Ok(_), Ok(())) if lost => (PairEnd::Lost, None),
+            (Ok(_), Ok(())) if !self.is_whole => (PairEnd::GivenBack, None),
             (Ok(end), Ok(())) => (end, None),
         };
         PairReport {
@@ -133,7 +137,7 @@ impl Held {
         Ok(())
     }
 
-    /// Has the stages that are on their way stored at once, and waits for it.
+    /// Waits until the stages that are on their way are stored.
     async fn settle(&mut self) -> Result<(), RunError> {
         let right = std::mem::replace(&mut self.right, Right::Spent);
         let Right::Storing(sender, task) = right else {
@@ -141,12 +145,16 @@ impl Held {
             return Ok(());
         };
         drop(sender);
-        self.shared.catalog.hurry().await?;
-        let Stored { kept, stages } = match task.await {
+        let Stored {
+            kept,
+            stages,
+            is_whole,
+        } = match task.await {
             Ok(stored) => stored?,
             Err(panic) => std::panic::resume_unwind(panic.into_panic()),
         };
         self.stored += stages;
+        self.is_whole &= is_whole;
         self.right = match kept {
             Kept::Lost => Right::Lost,
             Kept::Done => Right::Spent,
@@ -157,8 +165,7 @@ impl Held {
 }
 
 /// Stores stages as they come, those together that have come while others were on their way, until no more come or the
-/// lease is gone. The last ones are stored at once: when the process dies over the next pair, this one is to be known
-/// as done.
+/// lease is gone.
 async fn store(
     shared: Arc<Shared>,
     name: PairName,
@@ -167,16 +174,21 @@ async fn store(
 ) -> Result<Stored, RunError> {
     let mut stored = 0;
     while let Some(first) = stages.recv().await {
-        let mut done = vec![filed(&shared, &name, first).await?];
-        while let Ok(next) = stages.try_recv() {
-            done.push(filed(&shared, &name, next).await?);
+        let Some(first) = filed(&shared, &name, first).await? else {
+            return Ok(Stored {
+                kept: Kept::Lease(lease),
+                stages: stored,
+                is_whole: false,
+            });
+        };
+        let (mut done, mut is_whole) = (vec![first], true);
+        while is_whole && let Ok(next) = stages.try_recv() {
+            let next = filed(&shared, &name, next).await?;
+            is_whole = next.is_some();
+            done.extend(next);
         }
         let told: Vec<_> = done.iter().map(|done| (done.stage, done.ms)).collect();
-        let kept = if stages.is_closed() {
-            shared.catalog.checkpoint_at_once(lease, done).await?
-        } else {
-            shared.catalog.checkpoint_in_time(lease, done).await?
-        };
+        let kept = shared.catalog.checkpoint_in_time(lease, done).await?;
         if !matches!(kept, Kept::Lost) {
             stored += told.len() as u64;
             for (stage, ms) in told {
@@ -184,11 +196,13 @@ async fn store(
             }
         }
         match kept {
-            Kept::Lease(next) => lease = next,
-            Kept::Done | Kept::Lost => {
+            // What comes after a stage that is not on disk must not be stored without it.
+            Kept::Lease(next) if is_whole => lease = next,
+            kept => {
                 return Ok(Stored {
                     kept,
                     stages: stored,
+                    is_whole,
                 });
             }
         }
@@ -196,30 +210,37 @@ async fn store(
     Ok(Stored {
         kept: Kept::Lease(lease),
         stages: stored,
+        is_whole: true,
     })
 }
 
-/// Has a stage's files written; then a row may name them.
-async fn filed(shared: &Shared, pair: &PairName, stage: Finished) -> Result<StageDone, RunError> {
-    let (given, limit) = (stage.given, shared.stage_limit);
-    file(&shared.project, (pair, stage.stage), given.files, limit).await?;
+/// Has a stage's files written; then a row may name them. `None` when the run is to stop now.
+async fn filed(
+    shared: &Shared,
+    pair: &PairName,
+    stage: Finished,
+) -> Result<Option<StageDone>, RunError> {
+    let (of, limit) = ((pair, stage.stage), shared.stage_limit);
+    if !file(&shared.project, of, stage.files, limit, &shared.stop).await? {
+        return Ok(None);
+    }
     // The disk may have taken long: whether the lease still stands is asked as of now.
-    Ok(StageDone {
+    Ok(Some(StageDone {
         stage: stage.stage,
         recipe: shared.recipes.of(stage.stage),
         mesh_hash: stage.mesh_hash,
         print_hash: stage.print_hash,
         facts: stage.facts,
-        outcome: given.outcome,
-        files: given.named,
-        result_hash: given.result_hash,
-        metrics: given.metrics,
+        outcome: stage.outcome,
+        files: stage.named,
+        result_hash: stage.result_hash,
+        metrics: stage.metrics,
         inputs: stage.inputs,
-        ms: stage.ms,
+        ms: stage.took.as_millis() as u64,
         at: shared.clock.now(),
         next_deadline: shared.deadline(),
         alive_since: shared.alive_since(),
-    })
+    }))
 }
 
 fn finished(shared: &Shared, pair: PairName, stage: Stage, ms: u64) {

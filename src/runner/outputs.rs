@@ -96,11 +96,7 @@ pub(super) fn registered(
 }
 
 fn png(role: &str, bytes: Vec<u8>) -> NewArtifact {
-    NewArtifact {
-        role: role.to_owned(),
-        ext: "png",
-        bytes,
-    }
+    NewArtifact::new(role, "png", bytes)
 }
 
 /// Hash of a stage's result: its numbers and its files, no times.

@@ -9,12 +9,12 @@ use tokio::sync::mpsc;
 use super::RunError;
 use super::clock::Clock;
 use super::events::RunEvent;
-use super::execute::{Computed, Ended, Given, compute};
+use super::execute::{Computed, Computing};
 use super::hand::PairInHand;
-use super::held::{Finished, Held};
+use super::held::Held;
 use super::policy::{self, Try};
 use super::refresh;
-use super::steps::{Setback, Steps};
+use super::steps::Steps;
 use super::stop::{Stop, StopLevel};
 use super::timing::Timing;
 use crate::breakpoint::{self, Point};
@@ -74,18 +74,6 @@ struct Known {
     inputs: InputsSeen,
 }
 
-/// How one stage of a pair went.
-enum Step {
-    /// Computed.
-    Done(Box<PairInHand>, Box<Finished>),
-    /// An earlier stage must run again first.
-    Back(Box<PairInHand>, Stage),
-    /// Failed.
-    Failed(Blame),
-    /// The run is to stop now.
-    Stopped,
-}
-
 /// What went wrong.
 struct Blame {
     failure: Failure,
@@ -111,11 +99,9 @@ impl Shared {
         self.clock.now() - self.timing.lease_ms()
     }
 
-    fn note(&self, computed: &Computed) {
-        if let Computed::Ended(_, _, took) = computed {
-            let us = took.as_micros() as u64;
-            self.at_work_us.fetch_add(us, Ordering::Relaxed);
-        }
+    fn note(&self, took: Duration) {
+        let us = took.as_micros() as u64;
+        self.at_work_us.fetch_add(us, Ordering::Relaxed);
     }
 
     pub(super) fn tell(&self, event: RunEvent) {
@@ -128,7 +114,7 @@ impl Shared {
 pub(super) enum Over {
     /// All is stored.
     Ended(PairReport),
-    /// Its last stages are on their way: what is left is a [`Held::report`].
+    /// Its last stages are on their way: what is left is to wait until it is [`Held::done`].
     Storing(Held),
 }
 
@@ -146,96 +132,70 @@ pub(super) async fn work(shared: Arc<Shared>, lease: Lease, work: PairWork) -> O
 }
 
 async fn through(
-    shared: &Shared,
+    shared: &Arc<Shared>,
     held: &mut Held,
     mut stage: Stage,
-    mut pair: Box<PairInHand>,
+    pair: Box<PairInHand>,
 ) -> Result<PairEnd, RunError> {
+    let mut known = Known::of(&pair);
+    let (limit, asked) = (shared.stage_limit, Arc::clone(shared));
+    let next = move |done| next(&asked, done);
+    let mut computing = match Computing::begin(&shared.steps, stage, pair, next) {
+        Ok(computing) => computing,
+        Err(error) => {
+            let text = format!("the system gave no thread for {stage}: {error}");
+            let blame = Blame::bare(FailureClass::Resource, text);
+            return fail(shared, held, stage, known, blame).await;
+        }
+    };
     loop {
-        let known = Known::of(&pair);
-        let (back, done) = match step(shared, stage, pair).await {
-            Step::Done(back, done) => (back, done),
-            Step::Back(back, earlier) => {
-                (pair, stage) = (back, earlier);
+        let blame = match computing.next(limit, &shared.stop).await {
+            Computed::Begun(begun, inputs) => {
+                (stage, known.inputs) = (begun, inputs);
+                let pair = known.name.clone();
+                shared.tell(RunEvent::StageStarted { pair, stage });
                 continue;
             }
-            Step::Failed(blame) => return fail(shared, held, stage, known, blame).await,
-            Step::Stopped => return Ok(PairEnd::GivenBack),
-        };
-        if !held.store(*done).await? {
-            return Ok(PairEnd::Lost);
-        }
-        match next(shared, stage) {
-            Ok(later) => (pair, stage) = (back, later),
-            Err(end) => return Ok(end),
-        }
-    }
-}
-
-/// Runs one stage.
-async fn step(shared: &Shared, stage: Stage, pair: Box<PairInHand>) -> Step {
-    shared.tell(RunEvent::StageStarted {
-        pair: pair.facts.name.clone(),
-        stage,
-    });
-    let limit = shared.stage_limit;
-    let computed = compute(&shared.steps, stage, pair, limit, &shared.stop).await;
-    shared.note(&computed);
-    match computed {
-        Computed::Ended(mut pair, Ended::Given(given), took) => {
-            let finished = finished(&mut pair, stage, given, ms(took));
-            Step::Done(pair, Box::new(finished))
-        }
-        Computed::Ended(pair, Ended::Setback(Setback::Back(earlier)), _) => {
-            Step::Back(pair, earlier)
-        }
-        Computed::Ended(pair, Ended::Setback(Setback::Failed { failure, may_pass }), took) => {
-            Step::Failed(Blame {
+            Computed::Finished(finished, next) => {
+                shared.note(finished.took);
+                if !held.store(*finished).await? {
+                    return Ok(PairEnd::Lost);
+                }
+                match next {
+                    Some(_) => continue,
+                    None if stage < shared.until => return Ok(PairEnd::GivenBack),
+                    None => return Ok(PairEnd::Done),
+                }
+            }
+            Computed::Failed {
                 failure,
                 may_pass,
-                inputs: Some(pair.inputs),
-                ms: Some(ms(took)),
-            })
-        }
-        Computed::NoThread(error) => {
-            let text = format!("the system gave no thread for {stage}: {error}");
-            Step::Failed(Blame::bare(FailureClass::Resource, text))
-        }
-        Computed::Panicked(text) => Step::Failed(Blame::bare(FailureClass::Bug, text)),
-        Computed::TimedOut => {
-            let text = format!("{stage} took longer than {} s", limit.as_secs_f64());
-            Step::Failed(Blame::bare(FailureClass::Resource, text))
-        }
-        Computed::Stopped => Step::Stopped,
+                inputs,
+                took,
+            } => {
+                shared.note(took);
+                Blame {
+                    failure,
+                    may_pass,
+                    inputs: Some(inputs),
+                    ms: Some(took.as_millis() as u64),
+                }
+            }
+            Computed::Panicked(text) => Blame::bare(FailureClass::Bug, text),
+            Computed::TimedOut => {
+                let text = format!("{stage} took longer than {} s", limit.as_secs_f64());
+                Blame::bare(FailureClass::Resource, text)
+            }
+            Computed::Stopped => return Ok(PairEnd::GivenBack),
+        };
+        return fail(shared, held, stage, known, blame).await;
     }
 }
 
-/// The stage after this one, or how the pair is put down here.
-fn next(shared: &Shared, done: Stage) -> Result<Stage, PairEnd> {
-    match done.next() {
-        Some(next) if next <= shared.until && shared.is_draining() => Err(PairEnd::GivenBack),
-        Some(next) if next <= shared.until => Ok(next),
-        Some(_) | None => Err(PairEnd::Done),
-    }
-}
-
-const fn ms(took: Duration) -> u64 {
-    took.as_millis() as u64
-}
-
-/// What is to be stored of a stage.
-fn finished(pair: &mut PairInHand, stage: Stage, given: Given, ms: u64) -> Finished {
-    let inputs = pair.news();
-    let stored = &pair.stored[&stage];
-    Finished {
-        stage,
-        given,
-        mesh_hash: stored.mesh_hash,
-        print_hash: stored.print_hash,
-        facts: pair.facts_text.clone(),
-        inputs,
-        ms,
-    }
+/// The stage after this one, if the run goes so far.
+fn next(shared: &Shared, done: Stage) -> Option<Stage> {
+    done.next()
+        .filter(|next| *next <= shared.until && !shared.is_draining())
 }
 
 /// Stores a failure and tells of it.

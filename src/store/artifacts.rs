@@ -13,22 +13,34 @@ use crate::domain::{ArtifactRef, ArtifactSet, ContentHash};
 /// An artifact that is not on disk yet.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct NewArtifact {
-    /// What it is for its stage, such as `depth.png`.
-    pub role: String,
-    /// Ending of the file name without the dot.
-    pub ext: &'static str,
-    /// The bytes.
-    pub bytes: Vec<u8>,
+    role: String,
+    reference: ArtifactRef,
+    bytes: Vec<u8>,
 }
 
 impl NewArtifact {
-    /// How it will be named.
-    pub fn reference(&self) -> ArtifactRef {
-        ArtifactRef {
-            hash: ContentHash::of(&self.bytes),
-            ext: self.ext.to_owned(),
-            bytes: self.bytes.len() as u64,
+    /// Bytes with what they are for their stage, such as `depth.png`, and the ending of the file name without the dot.
+    pub fn new(role: &str, ext: &str, bytes: Vec<u8>) -> Self {
+        let reference = ArtifactRef {
+            hash: ContentHash::of(&bytes),
+            ext: ext.to_owned(),
+            bytes: bytes.len() as u64,
+        };
+        Self {
+            role: role.to_owned(),
+            reference,
+            bytes,
         }
+    }
+
+    /// What it is for its stage.
+    pub fn role(&self) -> &str {
+        &self.role
+    }
+
+    /// How it will be named.
+    pub const fn reference(&self) -> &ArtifactRef {
+        &self.reference
     }
 }
 
@@ -128,15 +140,14 @@ impl Project {
         let mut written = ArtifactSet::new();
         let mut folders = std::collections::BTreeSet::new();
         for file in files {
-            let artifact = file.reference();
-            let path = self.artifact_path(&artifact);
+            let path = self.artifact_path(&file.reference);
             let folder = folder_of(&path);
             make_folder(&folder)?;
-            if self.read_artifact(&artifact).is_err() {
+            if self.read_artifact(&file.reference).is_err() {
                 self.place(&path, &file.bytes, tell)?;
             }
             folders.insert(folder);
-            written.insert(file.role.clone(), artifact);
+            written.insert(file.role.clone(), file.reference.clone());
         }
         for folder in &folders {
             sync(folder)?;
@@ -214,11 +225,7 @@ mod tests {
     }
 
     fn picture(bytes: &[u8]) -> NewArtifact {
-        NewArtifact {
-            role: "depth.png".to_owned(),
-            ext: "png",
-            bytes: bytes.to_owned(),
-        }
+        NewArtifact::new("depth.png", "png", bytes.to_owned())
     }
 
     #[test]
@@ -253,9 +260,9 @@ mod tests {
     #[test]
     fn a_missing_artifact_is_told() {
         let (_dir, project) = project();
-        let outcome = project.read_artifact(&picture(b"a").reference());
+        let outcome = project.read_artifact(picture(b"a").reference());
         assert!(matches!(outcome, Err(ArtifactError::Missing(_))));
-        let outcome = project.check_artifact(&picture(b"a").reference(), true);
+        let outcome = project.check_artifact(picture(b"a").reference(), true);
         assert!(matches!(outcome, Err(ArtifactError::Missing(_))));
     }
 }

@@ -203,11 +203,7 @@ mod tests {
     use crate::store::{NewArtifact, Project};
 
     fn file(bytes: &[u8]) -> NewArtifact {
-        NewArtifact {
-            role: "depth.png".to_owned(),
-            ext: "png",
-            bytes: bytes.to_owned(),
-        }
+        NewArtifact::new("depth.png", "png", bytes.to_owned())
     }
 
     #[test]

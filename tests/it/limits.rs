@@ -31,12 +31,12 @@ fn deaths(project: &Project, jobs: &str, point: &str) -> (u32, Option<i32>) {
 
 #[test]
 fn a_pair_that_kills_its_process_is_quarantined_after_three_and_stops_nobody() {
-    // The first death may be shared with a pair beside it.
-    for (jobs, most) in [("1", 3), ("2", 4)] {
+    for jobs in ["1", "2"] {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = project(dir.path(), "p", "3");
         let (deaths, code) = deaths(&project, jobs, "fit:computed@upright-0001");
-        assert!((3..=most).contains(&deaths), "{deaths} deaths");
+        // The first may be shared with a pair beside it, or with one that waits for company to be stored.
+        assert!((3..=4).contains(&deaths), "{deaths} deaths");
         assert_eq!(code, Some(3));
         let all = pairs(&project);
         let stand: Vec<_> = all.iter().map(|pair| pair.results.status).collect();

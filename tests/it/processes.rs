@@ -345,3 +345,21 @@ fn a_second_signal_stops_at_once_and_leaves_all_resumable() {
         world.is_as_unbroken();
     }
 }
+
+#[test]
+fn a_second_signal_does_not_wait_for_a_disk_that_hangs() {
+    let world = World::new("1");
+    let (mut child, _file) = world.held("depth:written");
+    child.send(Signal::INT);
+    child.wait_until("it drains", || world.stops() == 1);
+    child.send(Signal::INT);
+    let (code, json, said) = child.end();
+    // The fit has no files: it is stored. Nothing is, that comes after files which are not on disk.
+    assert_eq!((code, &json["stages"]), (Some(130), &1.into()), "{said}");
+    let pair = &pairs(&world.project)[0];
+    let state = (pair.results.status, pair.attempt, pair.crashes);
+    assert_eq!(state, (JobStatus::Ready, 0, 0));
+    assert_eq!(pair.results.next_stage, Some(Stage::Depth));
+    call(&mut run(&world.project, &[])).expect(0);
+    world.is_as_unbroken();
+}

@@ -7,7 +7,7 @@ use crate::domain::Stage;
 /// Stores stages under a lease in one commit.
 async fn store(world: &World, lease: Lease, stages: &[Stage]) -> Kept {
     let done = stages.iter().map(|stage| world.done(*stage)).collect();
-    let kept = world.catalog.checkpoint_at_once(lease, done).await;
+    let kept = world.catalog.checkpoint_in_time(lease, done).await;
     kept.expect("stored")
 }
 

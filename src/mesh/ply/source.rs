@@ -86,8 +86,8 @@ impl<'a, const BIG_ENDIAN: bool> Binary<'a, BIG_ENDIAN> {
 
     /// The next three words, their lowest bytes first, and what comes after them.
     #[inline]
-    fn words(&self) -> Option<([[u8; 4]; 3], &'a [u8])> {
-        let (bytes, rest) = self.rest.split_first_chunk::<12>()?;
+    fn words(rest: &'a [u8]) -> Option<([[u8; 4]; 3], &'a [u8])> {
+        let (bytes, rest) = rest.split_first_chunk::<12>()?;
         let (words, _) = bytes.as_chunks::<4>();
         let mut words = [words[0], words[1], words[2]];
         if BIG_ENDIAN {
@@ -139,19 +139,14 @@ impl<const BIG_ENDIAN: bool> Source for Binary<'_, BIG_ENDIAN> {
 
     #[inline]
     fn plain_position(&mut self) -> Option<[f32; 3]> {
-        let (words, rest) = self.words()?;
+        let (words, rest) = Self::words(self.rest)?;
         self.rest = rest;
         Some(words.map(f32::from_le_bytes))
     }
 
     #[inline]
     fn plain_triangle(&mut self) -> Option<[u32; 3]> {
-        let whole = self.rest;
-        self.rest = whole.strip_prefix(&[3])?;
-        let Some((words, rest)) = self.words() else {
-            self.rest = whole;
-            return None;
-        };
+        let (words, rest) = Self::words(self.rest.strip_prefix(&[3])?)?;
         self.rest = rest;
         Some(words.map(u32::from_le_bytes))
     }

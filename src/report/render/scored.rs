@@ -91,20 +91,25 @@ mod tests {
     use super::{comparisons, intervals};
     use crate::domain::ThresholdMetric;
     use crate::report::render::text::aligned;
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::report::{Report, Tally, TruthFinding, fixture};
 
-    #[test]
-    fn means_have_intervals_and_metrics_their_differences() {
+    /// Twenty pairs on which this metric has the best IoU.
+    fn with_best(best: ThresholdMetric) -> Report {
         let mut tally = Tally::default();
         for i in 0..20 {
             let mut pair = fixture::done(&format!("p{i:02}"), 0.7, &[]);
             for record in &mut pair.metrics {
-                let is_best = record.outcome.metric == ThresholdMetric::Ensemble;
+                let is_best = record.outcome.metric == best;
                 record.outcome.scores.iou = if is_best { 0.75 } else { 0.7 };
             }
             tally.add(&pair, &TruthFinding::default());
         }
-        let report = tally.finish();
+        tally.finish()
+    }
+
+    #[test]
+    fn means_have_intervals_and_metrics_their_differences() {
+        let report = with_best(ThresholdMetric::Ensemble);
         let cells = |row: &[Option<String>]| -> Vec<String> {
             row.iter()
                 .map(|cell| cell.clone().unwrap_or_default())
@@ -135,16 +140,7 @@ mod tests {
 
     #[test]
     fn lower_scores_fit_into_a_terminal_too() {
-        let mut tally = Tally::default();
-        for i in 0..20 {
-            let mut pair = fixture::done(&format!("p{i:02}"), 0.7, &[]);
-            for record in &mut pair.metrics {
-                let is_best = record.outcome.metric == ThresholdMetric::Density;
-                record.outcome.scores.iou = if is_best { 0.75 } else { 0.7 };
-            }
-            tally.add(&pair, &TruthFinding::default());
-        }
-        let table = comparisons(&tally.finish()).expect("three metrics");
+        let table = comparisons(&with_best(ThresholdMetric::Density)).expect("three metrics");
         let text = aligned(&table);
         let found = text
             .lines()

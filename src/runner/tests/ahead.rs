@@ -97,6 +97,24 @@ async fn who_needs_the_lease_back_has_what_is_on_its_way_stored_at_once() {
 }
 
 #[tokio::test]
+async fn what_is_finished_is_stored_at_once_when_a_slot_has_nothing_to_do() {
+    let world = World::patient(&["lasts_1", "a"]).await;
+    let look = async {
+        while world.status("a").await != JobStatus::Done {
+            tokio::task::yield_now().await;
+        }
+    };
+    let options = options(2);
+    let run = async {
+        let stored = timeout(SOON, look).await;
+        world.steps.open();
+        stored.expect("it does not wait");
+    };
+    let (summary, ()) = tokio::join!(world.run(&options), run);
+    assert_eq!(summary.done, 2);
+}
+
+#[tokio::test]
 async fn nothing_is_stored_of_a_stage_that_was_computed_while_the_lease_was_lost() {
     let world = World::new(&["wait_1"]).await;
     let rob = async {

@@ -115,11 +115,11 @@ impl Steps for MadeUp {
             } else {
                 json!({ "stage": stage, "pair": name }).to_string()
             },
-            files: vec![NewArtifact {
-                role: "note.txt".to_owned(),
-                ext: "txt",
-                bytes: format!("{stage} of {name}").into_bytes(),
-            }],
+            files: vec![NewArtifact::new(
+                "note.txt",
+                "txt",
+                format!("{stage} of {name}").into_bytes(),
+            )],
             metrics: if last { register.metrics } else { Vec::new() },
         })
     }
