@@ -5,7 +5,7 @@ use std::path::Path;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions as _, Connection as _};
 
-const COPIES: [&str; 6] = [
+const COPIES: [&str; 5] = [
     "INSERT INTO stage_result (pair, stage, recipe, mesh_hash, print_hash, facts, outcome, files, result_hash, ms,
         worker, at)
     SELECT j.pair, r.stage, r.recipe, r.mesh_hash, r.print_hash, r.facts, r.outcome, r.files, r.result_hash, r.ms,
@@ -26,9 +26,13 @@ const COPIES: [&str; 6] = [
     FROM (SELECT * FROM pair WHERE id = 1) AS one WHERE pair.id > ?1 AND pair.id <= ?2",
     "UPDATE job SET stage = 4, status = 3, attempt = 1, epoch = 1, made = (SELECT made FROM job WHERE pair = 1)
     WHERE pair > ?1 AND pair <= ?2",
-    "UPDATE counter SET n = (SELECT count(*) FROM job AS j WHERE j.stage = counter.stage AND j.status = counter.status)
-    WHERE ?1 < ?2",
 ];
+
+const COUNT: &str = "
+UPDATE counter SET n = (SELECT count(*) FROM job AS j WHERE j.stage = counter.stage AND j.status = counter.status)";
+
+/// Pairs of one transaction: the log holds each until it is folded back.
+const CHUNK: usize = 100_000;
 
 /// Makes the pairs after one up to another as finished as the first pair is.
 pub(super) async fn copy(catalog: &Path, after: usize, last: usize) -> anyhow::Result<()> {
@@ -36,10 +40,14 @@ pub(super) async fn copy(catalog: &Path, after: usize, last: usize) -> anyhow::R
         .filename(catalog)
         .synchronous(SqliteSynchronous::Off);
     let mut conn = options.connect().await?;
-    for sql in COPIES {
-        let query = sqlx::query(sql).bind(after as i64).bind(last as i64);
-        query.execute(&mut conn).await?;
+    for from in (after..last).step_by(CHUNK) {
+        let to = last.min(from + CHUNK);
+        for sql in COPIES {
+            let query = sqlx::query(sql).bind(from as i64).bind(to as i64);
+            query.execute(&mut conn).await?;
+        }
     }
+    sqlx::query(COUNT).execute(&mut conn).await?;
     sqlx::query("PRAGMA wal_checkpoint(TRUNCATE)")
         .execute(&mut conn)
         .await?;

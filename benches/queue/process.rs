@@ -1,6 +1,7 @@
 //! The program as a process of its own: how long it takes and how much memory it needs.
 
-use std::ffi::OsStr;
+use std::collections::BTreeMap;
+use std::ffi::{OsStr, OsString};
 use std::io::Read as _;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -74,4 +75,19 @@ pub(super) fn forget_peak() {
 pub(super) fn time_of_cores() -> Duration {
     let now = clock_gettime(ClockId::ProcessCPUTime);
     Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
+}
+
+/// Nanoseconds that each thread of this process has had of a core, by its number; of those that live.
+pub(super) fn time_of_threads() -> anyhow::Result<BTreeMap<OsString, u64>> {
+    let mut times = BTreeMap::new();
+    for entry in std::fs::read_dir("/proc/self/task")? {
+        let entry = entry?;
+        // It may have ended meanwhile.
+        let Ok(text) = std::fs::read_to_string(entry.path().join("schedstat")) else {
+            continue;
+        };
+        let time = text.split_whitespace().next().context("a number")?;
+        times.insert(entry.file_name(), time.parse()?);
+    }
+    Ok(times)
 }

@@ -1,5 +1,7 @@
 //! What catalog and artifacts cost beside the stages, on the built-in dataset.
 
+use std::collections::BTreeMap;
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -18,38 +20,33 @@ use super::spread::Spread;
 const NOTE: &str = "\
 Medians. Run: pairs of `demo` by the library in this process, from the open catalog to the summary. Without: the same \
 stages of the same pairs on as many threads, with the same artifacts, and nothing noted of them; in turns with the run. \
-Difference: what the catalog, the queue and the run's loop cost. Cores: time of all cores that the process took. Idle: \
-what is left of the run's time when no thread of a stage is at work, its start and its end included. Artifacts: the \
-files of the run stored anew one after another by one thread, each synced; a part of both.";
+Cores: time of all cores that the process took. Beside stages: the part of both in which no thread computes a stage, \
+start and end included; of cores, what threads took that compute none: they write files, and in a run keep the catalog \
+and the queue. Differences are medians of those of each round. That of the whole has in it how much the machine changed \
+between the two; that beside stages has not. Artifacts: the files of the run stored anew one after another by one \
+thread, each synced; a part of both.";
 
-/// What a run took.
+/// What a run took, in milliseconds; of the whole time and of all cores together.
 #[derive(Debug, Clone, Copy)]
 struct Took {
-    wall: Duration,
-    /// Of all cores together.
-    cores: Duration,
+    whole: [f64; 2],
+    /// When no thread computed a stage; by threads that compute none.
+    beside: [f64; 2],
 }
 
-/// What is measured over the rounds.
+/// What is measured over the rounds: of the time that passed, and of all cores.
 #[derive(Debug, Default)]
-struct Measured {
-    wall: Spread,
-    cores: Spread,
-}
+struct Measured([Spread; 2]);
 
 impl Measured {
-    fn add(&mut self, took: Took) {
-        self.wall.add(took.wall);
-        self.cores.add(took.cores);
+    fn push(&mut self, ms: [f64; 2]) {
+        for (spread, ms) in self.0.iter_mut().zip(ms) {
+            spread.push(ms);
+        }
     }
 
-    /// Median milliseconds: wall, cores.
-    fn medians(&mut self) -> anyhow::Result<[f64; 2]> {
-        let medians = [self.wall.median(), self.cores.median()];
-        let [Some(wall), Some(cores)] = medians else {
-            anyhow::bail!("nothing was measured");
-        };
-        Ok([wall, cores])
+    fn medians(&mut self) -> [Option<f64>; 2] {
+        self.0.each_mut().map(Spread::median)
     }
 }
 
@@ -61,41 +58,70 @@ pub(super) async fn table(options: &Options, pairs: u64) -> anyhow::Result<Strin
     let number_of = pairs.to_string();
     process::mocban(&["demo", path, "--pairs", &number_of, "--no-run"])?;
     let workers = options.workers.first().copied().unwrap_or(2).max(1);
-    let (mut run, mut bare, mut idle) =
-        (Measured::default(), Measured::default(), Spread::default());
+    let mut parts = PARTS.map(|part| (part, Measured::default()));
+    let mut artifacts = Spread::default();
     for round in 0..options.repeats.max(1) {
         let project = |name: &str| {
             let to = dir.path().join(format!("{name}-{round}"));
             copy(&fresh, &to)?;
             Ok::<_, anyhow::Error>(Project::open(&to)?)
         };
-        let (with, rest) = with_catalog(&project("with")?, workers).await?;
-        run.add(with);
-        idle.add(rest);
-        bare.add(without(&project("without")?, workers).await?);
+        let (with, without) = (project("with")?, project("without")?);
+        let (run, bare) = if round % 2 == 0 {
+            let run = with_catalog(&with, workers).await?;
+            (run, self::without(&without, workers).await?)
+        } else {
+            let bare = self::without(&without, workers).await?;
+            (with_catalog(&with, workers).await?, bare)
+        };
+        let less = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
+        let measured = [
+            run.whole,
+            bare.whole,
+            less(run.whole, bare.whole),
+            run.beside,
+            bare.beside,
+            less(run.beside, bare.beside),
+        ];
+        for ((_, part), ms) in parts.iter_mut().zip(measured) {
+            part.push(ms);
+        }
+        if round == 0 {
+            artifacts.add(artifacts_part(&with)?);
+        }
+        for project in [&with, &without] {
+            std::fs::remove_dir_all(project.dir())?;
+        }
     }
-    let artifacts = artifacts_part(&Project::open(&dir.path().join("with-0"))?)?;
-    let (run, bare) = (run.medians()?, bare.medians()?);
-    let rows = [
-        ("run", run.map(Some)),
-        ("without a catalog", bare.map(Some)),
-        ("difference", [0, 1].map(|of| Some(run[of] - bare[of]))),
-        ("idle", [idle.median(), None]),
-        ("artifacts", [Some(artifacts.as_secs_f64() * 1e3), None]),
-    ];
+    let mut rows: Vec<_> = parts
+        .iter_mut()
+        .map(|(part, measured)| (*part, measured.medians()))
+        .collect();
+    rows.push(("artifacts", [artifacts.median(), None]));
+    let whole = rows[0].1;
     let heads = ["part", "workers", "ms a pair", "share", "cores", "share"];
     let mut table = Table::new("Share of a run", &heads);
     for (part, times) in rows {
         let mut cells = vec![part.to_owned(), workers.to_string()];
-        for (time, whole) in times.iter().zip(run) {
+        for (time, whole) in times.into_iter().zip(whole) {
             cells.push(number(time.map(|time| time / pairs as f64), 3));
-            let share = time.map(|time| format!("{:.2} %", 100.0 * time / whole));
-            cells.push(share.unwrap_or_default());
+            let share = time.zip(whole).map(|(time, whole)| 100.0 * time / whole);
+            cells.push(share.map_or_else(String::new, |share| format!("{share:.2} %")));
         }
         table.push(cells);
     }
     Ok(table.render(NOTE))
 }
+
+/// Rows of the table but for the last.
+const PARTS: [&str; 6] = [
+    "run",
+    "without a catalog",
+    "difference",
+    "run, beside stages",
+    "without, beside stages",
+    "difference beside stages",
+];
 
 /// What every run of this program is asked to do.
 fn asked(workers: usize) -> anyhow::Result<(Settings, RunOptions)> {
@@ -108,18 +134,17 @@ fn asked(workers: usize) -> anyhow::Result<(Settings, RunOptions)> {
     Ok((loaded.config.stages, options))
 }
 
-/// Runs the project: what that took, and for how much of it a core was idle.
-async fn with_catalog(project: &Project, workers: usize) -> anyhow::Result<(Took, Duration)> {
+/// Runs the project.
+async fn with_catalog(project: &Project, workers: usize) -> anyhow::Result<Took> {
     let (settings, options) = asked(workers)?;
     let catalog = Catalog::open(&project.catalog_path()).await?;
-    let watch = Watch::start();
+    let watch = Watch::start()?;
     let stop = Stop::new();
     let summary = runner::run(project, &catalog, &settings, &options, &stop, |_| {}).await?;
-    let took = watch.stop();
+    let took = watch.stop(summary.at_work / workers as u32)?;
     catalog.close().await;
     anyhow::ensure!(summary.left == 0, "{} pairs left", summary.left);
-    let idle = took.wall.saturating_sub(summary.at_work / workers as u32);
-    Ok((took, idle))
+    Ok(took)
 }
 
 /// Computes the same and files it.
@@ -133,9 +158,9 @@ async fn without(project: &Project, workers: usize) -> anyhow::Result<Took> {
     }
     catalog.close().await;
     let wanted = pairs.len();
-    let watch = Watch::start();
-    let done = runner::bare(project, &settings, &options, pairs).await;
-    let took = watch.stop();
+    let watch = Watch::start()?;
+    let (done, at_work) = runner::bare(project, &settings, &options, pairs).await;
+    let took = watch.stop(at_work / workers as u32)?;
     anyhow::ensure!(done == wanted, "{done} pairs done of {wanted}");
     Ok(took)
 }
@@ -144,21 +169,29 @@ async fn without(project: &Project, workers: usize) -> anyhow::Result<Took> {
 struct Watch {
     start: Instant,
     cores: Duration,
+    threads: BTreeMap<OsString, u64>,
 }
 
 impl Watch {
-    fn start() -> Self {
-        Self {
-            start: Instant::now(),
+    fn start() -> anyhow::Result<Self> {
+        Ok(Self {
+            threads: process::time_of_threads()?,
             cores: process::time_of_cores(),
-        }
+            start: Instant::now(),
+        })
     }
 
-    fn stop(self) -> Took {
-        Took {
-            wall: self.start.elapsed(),
-            cores: process::time_of_cores().saturating_sub(self.cores),
-        }
+    /// When all threads that computed stages have ended, which they did for so long in each slot.
+    fn stop(self, at_work: Duration) -> anyhow::Result<Took> {
+        let (wall, cores) = (self.start.elapsed(), process::time_of_cores());
+        let threads = process::time_of_threads()?.into_iter();
+        let since = |(thread, time)| time - self.threads.get(&thread).copied().unwrap_or(0);
+        let beside: u64 = threads.map(since).sum();
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        Ok(Took {
+            whole: [ms(wall), ms(cores.saturating_sub(self.cores))],
+            beside: [ms(wall) - ms(at_work), beside as f64 / 1e6],
+        })
     }
 }
 

@@ -32,7 +32,12 @@ impl Spread {
 
     /// Adds a time.
     pub(super) fn add(&mut self, time: Duration) {
-        self.0.push(time.as_secs_f64() * 1e3);
+        self.push(time.as_secs_f64() * 1e3);
+    }
+
+    /// Adds milliseconds, which may be fewer than none where they are a difference.
+    pub(super) fn push(&mut self, ms: f64) {
+        self.0.push(ms);
     }
 
     /// The middle one.

@@ -18,13 +18,13 @@ use crate::stages::Settings;
 use crate::store::Project;
 
 /// Takes pairs through all their stages and files what they give, on as many threads as a run would, and notes nothing
-/// anywhere. Says how many were taken to the end.
+/// anywhere. Says how many were taken to the end, and for how long stages were computed, all threads together.
 pub async fn bare(
     project: &Project,
     settings: &Settings,
     options: &RunOptions,
     pairs: Vec<PairFacts>,
-) -> usize {
+) -> (usize, Duration) {
     let steps: Arc<dyn Steps> = Arc::new(Pipeline::new(project, settings, options));
     let (mut slots, mut endings) = (JoinSet::new(), JoinSet::new());
     for facts in pairs {
@@ -39,12 +39,16 @@ pub async fn bare(
     for filings in slots.join_all().await {
         endings.spawn(all_filed(filings));
     }
-    let endings = endings.join_all().await;
-    endings.into_iter().filter(|whole| *whole).count()
+    let (mut done, mut at_work) = (0, Duration::ZERO);
+    for (whole, took) in endings.join_all().await {
+        done += usize::from(whole);
+        at_work += took;
+    }
+    (done, at_work)
 }
 
-/// Files on their way to disk, and whether they are there.
-type Filings = JoinSet<bool>;
+/// Files on their way to disk, whether they are there, and how long their stages took.
+type Filings = (JoinSet<bool>, Duration);
 
 /// Takes a pair through its stages; `None` where one fails.
 async fn through(
@@ -54,7 +58,7 @@ async fn through(
     facts: PairFacts,
 ) -> Option<Filings> {
     let (stop, name) = (Stop::new(), facts.name.clone());
-    let mut filings = JoinSet::new();
+    let (mut filings, mut at_work) = (JoinSet::new(), Duration::ZERO);
     let pair = Box::new(PairInHand::new(PairWork {
         facts,
         facts_text: String::new(),
@@ -67,6 +71,7 @@ async fn through(
             Computed::Finished(finished, next) => (finished, next),
             _ => return None,
         };
+        at_work += finished.took;
         let (project, name, stop) = (project.clone(), name.clone(), stop.clone());
         filings.spawn(async move {
             let of = (&name, finished.stage);
@@ -77,12 +82,15 @@ async fn through(
             break;
         }
     }
-    Some(filings)
+    Some((filings, at_work))
 }
 
-async fn all_filed(filings: Option<Filings>) -> bool {
+async fn all_filed(filings: Option<Filings>) -> (bool, Duration) {
     match filings {
-        Some(filings) => filings.join_all().await.into_iter().all(|filed| filed),
-        None => false,
+        Some((filings, at_work)) => {
+            let filed = filings.join_all().await;
+            (filed.into_iter().all(|filed| filed), at_work)
+        }
+        None => (false, Duration::ZERO),
     }
 }

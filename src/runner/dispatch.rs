@@ -24,7 +24,7 @@ use crate::raster;
 const LOOK_EVERY: Duration = Duration::from_millis(250);
 
 /// Pairs a slot that may be on their way to the disk before no more are begun: what they gave is in memory.
-const MOST_ENDINGS: usize = 4;
+const MOST_ENDINGS: usize = 8;
 
 /// What the loop has counted.
 #[derive(Debug, Default)]
@@ -164,10 +164,12 @@ impl Dispatch {
         Ok(left.ready == 0 && left.leased == 0 && left.backoff == 0)
     }
 
-    /// While all slots are busy, what is finished may wait for company. Else it is stored at once: the next pair may
-    /// wait for it, or the end, and a pair that nothing may run beside is to be blamed by itself if it kills.
+    /// While all slots are busy, what is finished may wait for company, until it is much. Else it is stored at once: the
+    /// next pair may wait for it, or the end, and a pair that nothing may run beside is to be blamed by itself if it
+    /// kills.
     async fn wait(&mut self) -> Result<(), RunError> {
-        let is_waiting = self.tasks.len() < self.workers && !self.endings.is_empty();
+        let is_free = self.tasks.len() < self.workers && !self.endings.is_empty();
+        let is_waiting = is_free || self.endings.len() > self.workers * MOST_ENDINGS / 2;
         if is_waiting != self.waiting.is_some() {
             self.waiting = if is_waiting {
                 Some(self.shared.catalog.waiting().await?)
