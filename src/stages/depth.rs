@@ -85,11 +85,12 @@ pub fn depth(
     let plane_from_px = view.px_from_plane.inverse().ok_or(Error::NothingSeen)?;
     let mut heights = shell.render(&fit.plane_from_mesh, &view);
     if let Some(bow) = &fit.bow {
-        for y in 0..view.height {
-            for x in 0..view.width {
-                let [u, v] = plane_from_px.apply([x as f64, y as f64]);
-                let over_surface = heights.at(x, y) - bow.height(u, v) as f32;
-                heights.set(x, y, over_surface);
+        let rows = heights.data_mut().chunks_exact_mut(view.width);
+        for (y, row) in rows.enumerate() {
+            // Integers of 32 bits become floats several at a time.
+            for (x, height) in (0_i32..).zip(row) {
+                let [u, v] = plane_from_px.apply([f64::from(x), y as f64]);
+                *height -= bow.height(u, v) as f32;
             }
         }
     }
@@ -128,25 +129,50 @@ fn longest_px(
 
 /// Heights to levels 1..=65535 over their whole range; `None` when no pixel holds data.
 fn quantise(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
-    let seen = || heights.data().iter().copied().filter(|z| *z != NOTHING);
-    let low = f64::from(seen().reduce(f32::min)?);
-    let high = f64::from(seen().reduce(f32::max)?);
+    let [low, high] = range(heights.data())?.map(f64::from);
     let step = ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE));
     let levels = heights.map(|z| {
-        if *z == NOTHING {
-            0
-        } else {
-            1 + ((f64::from(*z) - low) / step).round().clamp(0.0, 65_534.0) as u16
-        }
+        let steps = ((f64::from(*z) - low) / step).clamp(0.0, 65_534.0);
+        // Half up: a call of `round` takes longer than all else here.
+        let whole = steps as i32;
+        let level = 1 + whole + i32::from(steps - f64::from(whole) >= 0.5);
+        if *z == NOTHING { 0 } else { level as u16 }
     });
     Some((levels, low, step))
 }
 
+/// The lowest and the highest; `None` when no pixel holds data.
+fn range(heights: &[f32]) -> Option<[f32; 2]> {
+    // Side by side, which a minimum over all one after another cannot be.
+    const LANES: usize = 16;
+    let (mut lows, mut highs) = ([f32::INFINITY; LANES], [NOTHING; LANES]);
+    let mut take = |lane: usize, z: f32| {
+        let low = if z == NOTHING { f32::INFINITY } else { z };
+        lows[lane] = if low < lows[lane] { low } else { lows[lane] };
+        highs[lane] = if z > highs[lane] { z } else { highs[lane] };
+    };
+    let (chunks, rest) = heights.as_chunks::<LANES>();
+    for chunk in chunks {
+        for (lane, z) in chunk.iter().enumerate() {
+            take(lane, *z);
+        }
+    }
+    for (lane, z) in rest.iter().enumerate() {
+        take(lane, *z);
+    }
+    let low = lows.into_iter().fold(f32::INFINITY, f32::min);
+    let high = highs.into_iter().fold(NOTHING, f32::max);
+    (high != NOTHING).then_some([low, high])
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{Error, Params, ResolutionBy, depth};
+    use proptest::prelude::*;
+
+    use super::{Error, NOTHING, Params, ResolutionBy, depth, quantise};
     use crate::domain::{Bow, FitOutcome, LengthUnit, Rigid3, SideEvidence};
     use crate::mesh::Mesh;
+    use crate::raster::Grid;
     use crate::stages::Scan;
 
     fn params() -> Params {
@@ -192,6 +218,27 @@ mod tests {
             },
             vertices: 0,
             triangles: 0,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn levels_are_those_of_the_obvious_way(
+            heights in proptest::collection::vec(prop_oneof![4 => -3.0..5.0_f32, 1 => Just(NOTHING)], 1..90),
+        ) {
+            let seen: Vec<f64> = heights.iter().filter(|z| **z != NOTHING).map(|z| f64::from(*z)).collect();
+            let grid = Grid::from_vec(heights.len(), 1, heights.clone()).expect("a row");
+            let Some((levels, low, step)) = quantise(&grid) else {
+                prop_assert!(seen.is_empty());
+                return Ok(());
+            };
+            prop_assert_eq!(low, seen.iter().copied().fold(f64::INFINITY, f64::min));
+            let high = seen.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            prop_assert_eq!(step, ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE)));
+            for (z, level) in heights.iter().zip(levels.data()) {
+                let rounded = ((f64::from(*z) - low) / step).round().clamp(0.0, 65_534.0) as u16;
+                prop_assert_eq!(*level, if *z == NOTHING { 0 } else { 1 + rounded });
+            }
         }
     }
 
