@@ -97,24 +97,6 @@ async fn who_needs_the_lease_back_has_what_is_on_its_way_stored_at_once() {
 }
 
 #[tokio::test]
-async fn what_is_finished_is_stored_at_once_when_a_slot_has_nothing_to_do() {
-    let world = World::patient(&["lasts_1", "a"]).await;
-    let look = async {
-        while world.status("a").await != JobStatus::Done {
-            tokio::task::yield_now().await;
-        }
-    };
-    let options = options(2);
-    let run = async {
-        let stored = timeout(SOON, look).await;
-        world.steps.open();
-        stored.expect("it does not wait");
-    };
-    let (summary, ()) = tokio::join!(world.run(&options), run);
-    assert_eq!(summary.done, 2);
-}
-
-#[tokio::test]
 async fn nothing_is_stored_of_a_stage_that_was_computed_while_the_lease_was_lost() {
     let world = World::new(&["wait_1"]).await;
     let rob = async {
@@ -163,11 +145,14 @@ async fn the_next_pair_is_taken_ahead_and_given_back_by_a_drain() {
     assert_eq!(world.status("other").await, JobStatus::Ready);
 }
 
+/// Nor does the run wait for company when it could begin them.
 #[tokio::test]
 async fn no_more_pairs_are_begun_than_the_disk_keeps_up_with() {
     let names: Vec<String> = (0..60).map(|number| format!("pair_{number}")).collect();
-    let world = World::new(&names.iter().map(String::as_str).collect::<Vec<_>>()).await;
-    world.run(&options(1)).await;
+    let world = World::patient(&names.iter().map(String::as_str).collect::<Vec<_>>()).await;
+    let options = options(1);
+    let ended = timeout(SOON, world.run(&options)).await;
+    assert_eq!(ended.expect("it does not wait").done, 60);
     let events = world.events.lock().expect("no panic holds it");
     let (mut in_memory, mut most) = (0_i32, 0);
     for event in events.iter() {
