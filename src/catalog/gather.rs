@@ -104,7 +104,6 @@ mod tests {
     /// The same, where some come when it is waited for more.
     async fn gathered_later(messages: Vec<Message>, later: Vec<Message>) -> usize {
         let company = Company::of(Duration::from_hours(1));
-
         let (sender, mut inbox) = mpsc::channel(messages.len());
         for message in messages {
             sender.send(message).await.expect("room");

@@ -131,8 +131,8 @@ impl Catalog {
         let readers = connect::readers(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();
-        let shared = (Arc::clone(&path), Arc::clone(&company));
-        tokio::spawn(writer::run(conn, shared.0, inbox, shared.1));
+        let commits_with = Arc::clone(&company);
+        tokio::spawn(writer::run(conn, Arc::clone(&path), inbox, commits_with));
         Ok(Self {
             readers,
             inbox: Some(sender),

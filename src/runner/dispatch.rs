@@ -47,7 +47,7 @@ pub(super) struct Dispatch {
     pub(super) tasks: JoinSet<(Over, PairName, u64)>,
     /// Pairs whose last files and checkpoint are on their way.
     endings: JoinSet<PairReport>,
-    /// Held while a slot has nothing to do and pairs are not stored yet.
+    /// Held while pairs are not stored yet and a slot has nothing to do, or they are many.
     waiting: Option<Waiting>,
     pub(super) in_hand: InHand,
     pub(super) budget: Budget,
