@@ -24,7 +24,9 @@ export function label() {
   }
 }
 
-const isTyping = (target) => target.closest?.("input, textarea, select, dialog");
+/** What stood in a dialog has the focus for a moment after that is shut, and types nothing any more. */
+const isTyping = (target) =>
+  target.closest?.("input, textarea, select, dialog") && !target.closest("dialog:not([open])");
 /** Keys that a focused control needs for itself. */
 const isControls = (event) =>
   ["Enter", "Space"].includes(event.code) && event.target.closest?.("button, a, summary");

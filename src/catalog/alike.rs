@@ -7,9 +7,10 @@
 use std::collections::BTreeMap;
 
 use serde_json::Value;
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::SqliteConnection;
 
 use super::Result;
+use super::census::{RANGE, census, counted};
 use super::claim::PairSelection;
 use super::recipes::{Recipes, current_json};
 use super::staleness::{PAGE, Seen, look};
@@ -57,12 +58,8 @@ macro_rules! alike {
     };
 }
 
-/// Jobs that are alike, how many, and one of them. Where jobs go back to is a group that comes before their own.
-pub(super) const GROUPS: &str = concat!(
-    "SELECT j.stage, j.status, j.made, count(*) AS n, min(j.pair) AS pair FROM job AS j WHERE ",
-    alike!(),
-    " GROUP BY j.stage, j.status, j.made ORDER BY j.stage, j.status, j.made"
-);
+/// Jobs that are alike, how many, and one of them.
+pub(super) const GROUPS: &str = counted!(alike!());
 
 /// Those of a group, in pages by number.
 pub(super) const MEMBERS: &str = concat!(
@@ -132,21 +129,20 @@ pub(super) struct Group {
     made: Option<i64>,
 }
 
-/// All groups; those with earlier stages first.
+/// All groups; those with earlier stages first, so that where jobs go back to is a group that comes before their own.
 pub(super) async fn groups(conn: &mut SqliteConnection, current: &str) -> Result<Vec<Group>> {
-    let found = sqlx::query(GROUPS).fetch_all(&mut *conn).await?;
-    let one_of_each = found.iter().map(|row| row.try_get("pair"));
-    let one_of_each = one_of_each.collect::<Result<Vec<i64>, _>>()?;
+    let found = census(conn, GROUPS, RANGE).await?;
+    let one_of_each: Vec<i64> = found.values().map(|alike| alike.first).collect();
     let seen = look(conn, current, 0, &these(&one_of_each)).await?;
     let seen: BTreeMap<i64, Seen> = seen.into_iter().map(|seen| (seen.pair, seen)).collect();
     let mut groups = Vec::with_capacity(found.len());
-    for (row, pair) in found.iter().zip(one_of_each) {
+    for (standing, alike) in found {
         // In one transaction the look finds what the groups were made of.
-        if let Some(seen) = seen.get(&pair) {
+        if let Some(seen) = seen.get(&alike.first) {
             groups.push(Group {
                 seen: *seen,
-                pairs: row.try_get::<i64, _>("n")?.unsigned_abs(),
-                made: row.try_get("made")?,
+                pairs: alike.jobs,
+                made: standing.made,
             });
         }
     }

@@ -7,6 +7,8 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteRow};
 use sqlx::{ConnectOptions as _, Row as _, SqliteConnection};
 
 use super::alike::{misremembered, unnoted};
+use super::census::{self, RANGE, by_recipe, by_status, census};
+use super::counters::standings;
 use super::work::{self, KnownInputs};
 use super::{Catalog, CatalogError, Result, Trouble, connect, results, rows};
 use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
@@ -24,7 +26,7 @@ pub struct Drift {
     /// What the counter says; `None` when there is none.
     pub kept: Option<i64>,
     /// Jobs that there are.
-    pub counted: i64,
+    pub counted: u64,
 }
 
 /// A pair with all that is stored of it, as it is stored.
@@ -63,20 +65,9 @@ const OBJECTS: &str = "
 SELECT type || ' ' || name, sql FROM sqlite_schema
 WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name <> '_sqlx_migrations' ORDER BY 1";
 
-const DRIFT: &str = "
-SELECT stage.value AS stage, status.value AS status, c.n AS kept, coalesce(k.n, 0) AS counted
-FROM json_each('[0,1,2,3,4]') AS stage CROSS JOIN json_each('[0,1,2,3,4,5]') AS status
-    LEFT JOIN counter AS c ON c.stage = stage.value AND c.status = status.value
-    LEFT JOIN (SELECT stage, status, count(*) AS n FROM job GROUP BY stage, status) AS k
-        ON k.stage = stage.value AND k.status = status.value
-WHERE c.n IS NOT coalesce(k.n, 0)";
+const COUNTERS: &str = "SELECT stage, status, n FROM counter";
 
-const MADE_DRIFT: &str = "
-SELECT 'the counter of recipe ' || coalesce(m.recipe, k.recipe) || ' says ' || coalesce(m.n, 0) || ', there are '
-    || coalesce(k.n, 0)
-FROM made AS m FULL JOIN (SELECT made AS recipe, count(*) AS n FROM job WHERE made IS NOT NULL GROUP BY made) AS k
-    ON k.recipe = m.recipe
-WHERE coalesce(m.n, 0) <> coalesce(k.n, 0) ORDER BY 1";
+const MADE: &str = "SELECT recipe, n FROM made";
 
 const KEPT_DRIFT: &str = concat!("SELECT count(*) FROM job WHERE ", misremembered!());
 
@@ -147,20 +138,24 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn counter_drift(&self) -> Result<Vec<Drift>> {
-        // One statement sees one moment, so a run that goes on beside it does not look like drift.
-        let mut conn = self.reader().await?;
-        let found = sqlx::query(DRIFT).fetch_all(&mut *conn).await?;
-        found
-            .iter()
-            .map(|row| {
-                Ok(Drift {
-                    cursor: row.try_get("stage")?,
-                    status: rows::status(row.try_get("status")?)?,
-                    kept: row.try_get("kept")?,
-                    counted: row.try_get("counted")?,
-                })
+        // All of one moment, so that a run that goes on beside it does not look like drift.
+        let mut conn = self.snapshot().await?;
+        let kept: Vec<(i64, i64, i64)> = sqlx::query_as(COUNTERS).fetch_all(&mut *conn).await?;
+        let counted = by_status(&census(&mut conn, census::ALL, RANGE).await?)?;
+        let drift = standings().filter_map(|(cursor, status)| {
+            let counted = counted.get(&(cursor, status)).copied().unwrap_or(0);
+            let mut kept = kept.iter();
+            let kept = kept.find(|(at, code, _)| (*at, *code) == (cursor, status.code()));
+            let kept = kept.map(|(.., n)| *n);
+            let is_right = kept.is_some_and(|kept| u64::try_from(kept) == Ok(counted));
+            (!is_right).then_some(Drift {
+                cursor,
+                status,
+                kept,
+                counted,
             })
-            .collect()
+        });
+        Ok(drift.collect())
     }
 
     /// What is kept to tell stale pairs without a look at each, and does not agree with the rows, a line each; empty
@@ -170,8 +165,7 @@ impl Catalog {
     /// When the database refuses.
     pub async fn shortcut_drift(&self, quick: bool) -> Result<Vec<String>> {
         let mut conn = self.snapshot().await?;
-        let counts = sqlx::query_scalar(MADE_DRIFT).fetch_all(&mut *conn).await?;
-        let mut lines: Vec<String> = counts;
+        let mut lines = made_drift(&mut conn).await?;
         for (sql, what) in [
             (
                 KEPT_DRIFT,
@@ -220,6 +214,21 @@ impl Catalog {
         }
         Ok(pairs)
     }
+}
+
+/// Counters of recipes that are off, a line each.
+async fn made_drift(conn: &mut SqliteConnection) -> Result<Vec<String>> {
+    let kept: Vec<(i64, i64)> = sqlx::query_as(MADE).fetch_all(&mut *conn).await?;
+    let kept: BTreeMap<i64, i64> = kept.into_iter().collect();
+    let counted = by_recipe(&census(conn, census::ALL, RANGE).await?);
+    let recipes: BTreeSet<_> = kept.keys().chain(counted.keys()).collect();
+    let lines = recipes.into_iter().filter_map(|recipe| {
+        let kept = kept.get(recipe).copied().unwrap_or(0);
+        let counted = counted.get(recipe).copied().unwrap_or(0);
+        let is_off = u64::try_from(kept) != Ok(counted);
+        is_off.then(|| format!("the counter of recipe {recipe} says {kept}, there are {counted}"))
+    });
+    Ok(lines.collect())
 }
 
 /// See [`Catalog::integrity`].

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use sqlx::{Row as _, SqliteConnection};
 
+use super::census::{self, RANGE, by_status, census};
 use super::script::Script;
 use super::{Catalog, Result};
 use crate::domain::{JobStatus, Stage};
@@ -12,6 +13,9 @@ use crate::domain::{JobStatus, Stage};
 const CHANGE: &str = "
 UPDATE counter SET n = n + (d.value ->> 2) FROM jsonb_each(?1) AS d
 WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1";
+
+/// The counts as kept, for [`counts`].
+pub(super) const KEPT: &str = "SELECT stage, status, n FROM counter WHERE n <> 0";
 
 /// Cursor of a job: its next stage 0..4, or 4 when done.
 pub(super) type Cursor = i64;
@@ -65,6 +69,11 @@ impl Deltas {
     }
 }
 
+/// Every place that has a counter.
+pub(super) fn standings() -> impl Iterator<Item = (Cursor, JobStatus)> {
+    (0..=DONE).flat_map(|cursor| JobStatus::ALL.map(|status| (cursor, status)))
+}
+
 /// Jobs by cursor and status; only what is not 0.
 pub type Counts = BTreeMap<(i64, JobStatus), u64>;
 
@@ -75,11 +84,7 @@ impl Catalog {
     /// When the database refuses.
     pub async fn counters(&self) -> Result<Counts> {
         let mut conn = self.reader().await?;
-        counts(
-            &mut conn,
-            "SELECT stage, status, n FROM counter WHERE n <> 0",
-        )
-        .await
+        counts(&mut conn, KEPT).await
     }
 
     /// The counts as they are when every job is counted: equal to [`Catalog::counters`], or the catalog is damaged.
@@ -87,12 +92,8 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn recount(&self) -> Result<Counts> {
-        let mut conn = self.reader().await?;
-        counts(
-            &mut conn,
-            "SELECT stage, status, count(*) FROM job GROUP BY stage, status",
-        )
-        .await
+        let mut conn = self.snapshot().await?;
+        by_status(&census(&mut conn, census::ALL, RANGE).await?)
     }
 }
 

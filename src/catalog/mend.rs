@@ -1,13 +1,14 @@
 //! Mending what a check found. Only while no run goes on; verdicts and the history of results are never touched.
 
-use serde_json::{Value, json};
+use serde_json::json;
 use sqlx::{AssertSqlSafe, Row as _, SqliteConnection};
 
 use super::alike::{made, misremembered, unnoted};
 use super::audit::{integrity, objects, wanted_objects};
-use super::counters::{Deltas, cursor};
+use super::census::{self, RANGE, by_recipe, by_status, census};
+use super::counters::{Deltas, cursor, standings};
 use super::script::Script;
-use super::{Catalog, Result, rows};
+use super::{Catalog, Result, rows, rows::array};
 use crate::domain::{JobStatus, PairId, Stage};
 
 const STANDING: &str = "
@@ -33,11 +34,7 @@ FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0"
 const FORGET: &str = "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
 
 const RECOUNT: &str = "
-INSERT INTO counter (stage, status, n)
-SELECT stage.value, status.value, coalesce(k.n, 0)
-FROM json_each('[0,1,2,3,4]') AS stage CROSS JOIN json_each('[0,1,2,3,4,5]') AS status
-    LEFT JOIN (SELECT stage, status, count(*) AS n FROM job GROUP BY stage, status) AS k
-        ON k.stage = stage.value AND k.status = status.value
+INSERT INTO counter (stage, status, n) SELECT value ->> 0, value ->> 1, value ->> 2 FROM json_each(?1)
 WHERE true ON CONFLICT (stage, status) DO UPDATE SET n = excluded.n";
 
 const REMAKE: &str = concat!(
@@ -47,10 +44,10 @@ const REMAKE: &str = concat!(
     misremembered!()
 );
 
-/// The trigger has counted along; what was off before is off still.
+/// The trigger counts along, and what was off is off still.
 const RECOUNT_MADE: [&str; 2] = [
     "DELETE FROM made",
-    "INSERT INTO made SELECT made, count(*) FROM job WHERE made IS NOT NULL GROUP BY made",
+    "INSERT INTO made SELECT value ->> 0, value ->> 1 FROM json_each(?1)",
 ];
 
 /// One too many does no harm: a run takes out those that it has looked after.
@@ -74,11 +71,19 @@ impl Catalog {
     pub async fn mend_counters(&self) -> Result<()> {
         self.alone(|conn| {
             Box::pin(async move {
+                sqlx::query(REMAKE).execute(&mut *conn).await?;
+                let counted = census(conn, census::ALL, RANGE).await?;
+                let by_status = by_status(&counted)?;
+                let counters = standings().map(|(cursor, status)| {
+                    let jobs = by_status.get(&(cursor, status)).copied().unwrap_or(0);
+                    json!([cursor, status.code(), jobs])
+                });
+                let made = by_recipe(&counted).into_iter();
+                let made = made.map(|(recipe, jobs)| json!([recipe, jobs]));
                 let mut script = Script::default();
-                script
-                    .add(&[RECOUNT, REMAKE])
-                    .add(&RECOUNT_MADE)
-                    .add(&[NOTE_MOVED]);
+                script.add(&[RECOUNT]).bind(array(counters).to_string())?;
+                script.add(&RECOUNT_MADE).bind(array(made).to_string())?;
+                script.add(&[NOTE_MOVED]);
                 script.run(conn).await?;
                 Ok(())
             })
@@ -123,10 +128,8 @@ impl Catalog {
 }
 
 async fn put_back(conn: &mut SqliteConnection, pairs: &[(PairId, Stage)]) -> Result<()> {
-    let items = pairs
-        .iter()
-        .map(|(pair, stage)| json!([pair.0, stage.index()]));
-    let items = Value::from(items.collect::<Vec<_>>()).to_string();
+    let items = pairs.iter();
+    let items = array(items.map(|(pair, stage)| json!([pair.0, stage.index()]))).to_string();
     let standing = sqlx::query(STANDING)
         .bind(&items)
         .fetch_all(&mut *conn)

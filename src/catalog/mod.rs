@@ -8,6 +8,7 @@ mod alike;
 mod answers;
 mod audit;
 mod batch;
+mod census;
 mod checkpoint;
 mod claim;
 mod company;

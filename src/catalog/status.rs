@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use sqlx::{Row as _, SqliteConnection};
 
-use super::counters::{Counts, counts};
+use super::counters::{Counts, KEPT, counts};
 use super::read::{StageCounts, StatusCounts};
 use super::recipes::Recipes;
 use super::{Catalog, Result, alike, query, rows};
@@ -30,11 +30,7 @@ impl Catalog {
     /// When the database refuses.
     pub async fn status(&self, recipes: &Recipes) -> Result<StatusCounts> {
         let mut conn = self.snapshot().await?;
-        let counted = counts(
-            &mut conn,
-            "SELECT stage, status, n FROM counter WHERE n <> 0",
-        )
-        .await?;
+        let counted = counts(&mut conn, KEPT).await?;
         Ok(StatusCounts {
             schema: 1,
             pairs: counted.values().sum(),

@@ -230,7 +230,12 @@ impl Tab<'_> {
             let result = &told["result"];
             // An error: the page went away while it was asked.
             if told["error"].is_null() && result["exceptionDetails"].is_null() {
-                assert_eq!(result["result"]["value"], true, "never: {condition}");
+                assert_eq!(
+                    result["result"]["value"],
+                    true,
+                    "never: {condition}; the page says {}",
+                    self.eval("[document.activeElement?.id, document.body.innerText]"),
+                );
                 return;
             }
         }

@@ -276,6 +276,26 @@ fn the_end_says_what_is_not_saved() {
 }
 
 #[test]
+fn keys_are_the_pages_again_as_soon_as_a_dialog_is_shut() {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::start(&project, "lan", &PLAIN);
+    let tab = enter(&browser, &page, [1440, 900]);
+    tab.key("KeyJ");
+    tab.wait("document.activeElement.id === 'jump-to'");
+    // In one turn of the script: what has the focus is still the dialog's, which no screen shows any more.
+    tab.eval(
+        "document.getElementById('jump').close();
+        document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyC', bubbles: true }));
+        null",
+    );
+    tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+}
+
+#[test]
 fn a_relief_is_laid_by_keys_and_mouse() {
     let Some(browser) = Browser::start() else {
         return;

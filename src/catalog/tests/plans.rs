@@ -4,7 +4,7 @@ use sqlx::{AssertSqlSafe, Row as _};
 
 use super::World;
 use crate::catalog::{
-    alike, audit, checkpoint, claim, connect, fail, mend, query, requeue, rescue, results,
+    alike, audit, census, checkpoint, claim, connect, fail, mend, query, requeue, rescue, results,
     staleness, status, upkeep, verdicts, work,
 };
 
@@ -114,10 +114,18 @@ async fn stale_pairs_are_counted_without_a_look_at_every_pair() {
 }
 
 #[tokio::test]
-async fn a_plan_scans_the_jobs_once_and_nothing_else() {
-    let all = plan(alike::GROUPS).await;
-    let scans: Vec<_> = all.iter().filter(|line| line.starts_with("SCAN")).collect();
-    assert_eq!(scans, ["SCAN j"]);
+async fn jobs_are_counted_by_ranges_of_their_key() {
+    for sql in [alike::GROUPS, census::ALL] {
+        let ranges = plan(sql).await;
+        let searched = "SEARCH j USING INTEGER PRIMARY KEY (rowid>? AND rowid<?)";
+        assert!(ranges.iter().any(|line| line == searched), "{ranges:?}");
+        assert_only(&ranges, &[]);
+    }
+    assert_only(&plan(census::NEXT).await, &[]);
+}
+
+#[tokio::test]
+async fn a_look_goes_through_keys() {
     let among = plan(staleness::LOOK).await;
     assert_only(&among, &["VIRTUAL TABLE", "SCAN seen"]);
 }
