@@ -33,6 +33,9 @@ pub(super) struct Options {
     /// Import and ask only: no pair is run
     #[arg(long)]
     pub(super) import_only: bool,
+    /// Pairs of the largest catalog that is checked: a check reads all of it several times
+    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
+    pub(super) check_up_to: usize,
     /// Given by `cargo bench`
     #[arg(long, hide = true)]
     bench: bool,

@@ -1,5 +1,7 @@
 //! One catalog after another, each larger: does the cost of a question grow with the pairs?
 
+use std::io::Write as _;
+
 use mocban::catalog::{Again, Catalog, Recipes};
 
 use super::claims::{self, MANY};
@@ -72,9 +74,9 @@ async fn size(options: &Options, pairs: usize, tables: &mut Tables) -> anyhow::R
     let (world, needed) = World::import(pairs)?;
     let seconds = needed.time.as_secs_f64();
     let numbers = [(seconds, 2), (pairs as f64 / seconds, 0), (needed.mib, 0)];
-    tables.import.push(row(pairs, &numbers));
+    push(&mut tables.import, row(pairs, &numbers));
     let catalog = world.catalog().await?;
-    at(&world, &catalog, pairs, "new", tables).await?;
+    at(options, &world, &catalog, pairs, "new", tables).await?;
     if options.import_only {
         catalog.close().await;
         return Ok(());
@@ -90,11 +92,17 @@ async fn size(options: &Options, pairs: usize, tables: &mut Tables) -> anyhow::R
     let catalog = world.catalog().await?;
     let size = world.bytes()? as f64 / 1_048_576.0;
     let numbers = [(rate, 0), (rate * 4.0, 0), (peak, 0), (size, 0)];
-    tables.fill.push(row(pairs, &numbers));
-    at(&world, &catalog, pairs, "done but few", tables).await?;
+    push(&mut tables.fill, row(pairs, &numbers));
+    at(options, &world, &catalog, pairs, "done but few", tables).await?;
     changed(&world, &catalog, pairs, tables).await?;
     catalog.close().await;
     Ok(())
+}
+
+/// Adds a row to a table, and tells it at once: large catalogs take long, and may be stopped.
+fn push(table: &mut Table, cells: Vec<String>) {
+    let _ = writeln!(std::io::stderr(), "{}", cells.join(" | "));
+    table.push(cells);
 }
 
 fn row(pairs: usize, numbers: &[(f64, usize)]) -> Vec<String> {
@@ -105,6 +113,7 @@ fn row(pairs: usize, numbers: &[(f64, usize)]) -> Vec<String> {
 
 /// Claims and questions in one state of the catalog.
 async fn at(
+    options: &Options,
     world: &World,
     catalog: &Catalog,
     pairs: usize,
@@ -113,21 +122,21 @@ async fn at(
 ) -> anyhow::Result<()> {
     if pairs / 3 >= MANY {
         let [one, many] = claims::times(world, catalog).await?;
-        tables
-            .claims
-            .push(vec![pairs.to_string(), state.to_owned(), one, many]);
+        let cells = vec![pairs.to_string(), state.to_owned(), one, many];
+        push(&mut tables.claims, cells);
     }
     let now = recipes(None)?;
     let mut asked = |what: &str, (library, process): (Spread, (Spread, f64))| {
-        tables
-            .asked
-            .push(line(pairs, state, what, library, process));
+        let cells = line(pairs, state, what, library, process);
+        push(&mut tables.asked, cells);
     };
     asked("status", status(world, catalog, &now, &["status"]).await?);
     let plan = plan(world, catalog, &now, &["run", "--dry-run"]).await?;
     asked("run --dry-run", plan);
-    let check = ask(world, &["check", "--quick"], 1)?;
-    asked("check --quick", (Spread::default(), check));
+    if pairs <= options.check_up_to {
+        let check = ask(world, &["check", "--quick"], 1)?;
+        asked("check --quick", (Spread::default(), check));
+    }
     Ok(())
 }
 
@@ -141,11 +150,11 @@ async fn changed(
     let now = recipes(Some(OTHER))?;
     let (library, process) = status(world, catalog, &now, &["--set", OTHER, "status"]).await?;
     let asked = line(pairs, "changed", "status", library, process);
-    tables.asked.push(asked);
+    push(&mut tables.asked, asked);
     let args = ["--set", OTHER, "run", "--dry-run"];
     let (library, process) = plan(world, catalog, &now, &args).await?;
     let asked = line(pairs, "changed", "run --dry-run", library, process);
-    tables.asked.push(asked);
+    push(&mut tables.asked, asked);
     Ok(())
 }
 
