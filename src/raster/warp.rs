@@ -22,7 +22,7 @@ pub fn warp_mask(mask: &Mask, to_from: &Affine2, width: usize, height: usize) ->
         return Mask::new(width, height, false);
     };
     let looks = Looks::new(&from_to);
-    let counts = Counts::of(mask);
+    let bits = Bits::of(mask);
     let look = |x, y| {
         let set = |p| Some(coverage(mask, p));
         looks.mean(x, y, set) >= Some(0.5)
@@ -31,9 +31,9 @@ pub fn warp_mask(mask: &Mask, to_from: &Affine2, width: usize, height: usize) ->
     for y in 0..height {
         for first in (0..width).step_by(RUN) {
             let run = first..(first + RUN).min(width);
-            let alike = counts.alike(looks.reach(&run, y));
+            let alike = bits.alike(looks.reach(&run, y));
             for x in run {
-                let one = || counts.alike(looks.reach(&(x..x + 1), y));
+                let one = || bits.alike(looks.reach(&(x..x + 1), y));
                 out.set(x, y, alike.or_else(one).unwrap_or_else(|| look(x, y)));
             }
         }
@@ -110,29 +110,21 @@ impl Looks {
     }
 }
 
-/// How many pixels of a mask are set above and to the left of each corner of its pixels.
-struct Counts {
-    sums: Vec<u32>,
+/// A mask with 64 pixels of a row in a word, to ask for many of them at a time.
+struct Bits {
+    words: Vec<u64>,
+    per_row: usize,
     width: usize,
     height: usize,
 }
 
-impl Counts {
+impl Bits {
     fn of(mask: &Mask) -> Self {
         let (width, height) = (mask.width(), mask.height());
-        let stride = width + 1;
-        let mut sums = vec![0_u32; stride * (height + 1)];
-        for y in 0..height {
-            let (above, below) = sums[y * stride..].split_at_mut(stride);
-            let mut in_row = 0;
-            let columns = below[1..].iter_mut().zip(&above[1..]);
-            for ((sum, above), set) in columns.zip(mask.row(y)) {
-                in_row += u32::from(*set);
-                *sum = above + in_row;
-            }
-        }
+        let rows = (0..height).map(|y| mask.row(y));
         Self {
-            sums,
+            words: rows.flat_map(|row| row.chunks(64).map(word)).collect(),
+            per_row: width.div_ceil(64),
             width,
             height,
         }
@@ -142,16 +134,46 @@ impl Counts {
     fn alike(&self, [[x0, x1], [y0, y1]]: [[i64; 2]; 2]) -> Option<bool> {
         let cut = |low: i64, high: i64, side: usize| {
             let side = side as i64;
-            [low.clamp(0, side), (high + 1).clamp(0, side)]
+            low.clamp(0, side) as usize..(high + 1).clamp(0, side) as usize
         };
-        let ([left, right], [top, bottom]) = (cut(x0, x1, self.width), cut(y0, y1, self.height));
-        let at = |x: i64, y: i64| self.sums[y as usize * (self.width + 1) + x as usize];
-        let set = at(right, bottom) + at(left, top) - at(right, top) - at(left, bottom);
-        if set == 0 {
+        let (columns, rows) = (cut(x0, x1, self.width), cut(y0, y1, self.height));
+        if columns.is_empty() || rows.is_empty() {
             return Some(false);
         }
-        (i64::from(set) == (x1 - x0 + 1) * (y1 - y0 + 1)).then_some(true)
+        let area = (x1 - x0 + 1) * (y1 - y0 + 1);
+        let is_cut = area != (columns.len() * rows.len()) as i64;
+        let words = columns.start / 64..(columns.end - 1) / 64 + 1;
+        let (mut set, mut clear) = (0, 0);
+        for place in words {
+            let within =
+                columns.start.saturating_sub(place * 64)..(columns.end - place * 64).min(64);
+            let wanted = (u64::MAX >> (64 - within.len())) << within.start;
+            for row in rows.clone() {
+                let word = self.words[row * self.per_row + place];
+                set |= word & wanted;
+                clear |= !word & wanted;
+            }
+        }
+        match (set, clear) {
+            (0, _) => Some(false),
+            (_, 0) if !is_cut => Some(true),
+            _ => None,
+        }
     }
+}
+
+/// Up to 64 pixels of a row, the first one lowest.
+fn word(pixels: &[bool]) -> u64 {
+    // One in each byte times this gives the bytes' lowest bits side by side in the highest byte.
+    const GATHER: u64 = 0x0102_0408_1020_4080;
+    let eights = pixels.chunks(8).enumerate();
+    eights.fold(0, |word, (k, eight)| {
+        let mut bytes = [0; 8];
+        for (byte, set) in bytes.iter_mut().zip(eight) {
+            *byte = u8::from(*set);
+        }
+        word | (u64::from_le_bytes(bytes).wrapping_mul(GATHER) >> 56) << (8 * k)
+    })
 }
 
 /// The whole number below; a plain cast and a comparison, where `f64::floor` would be a call.
@@ -164,16 +186,15 @@ fn floor(value: f64) -> i64 {
 fn coverage(mask: &Mask, [x, y]: [f64; 2]) -> f64 {
     let (x0, y0) = (floor(x), floor(y));
     let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-    let at = |dx: i64, dy: i64| f64::from(u8::from(mask.get(x0 + dx, y0 + dy).unwrap_or(false)));
-    (at(0, 0) * (1.0 - fx) + at(1, 0) * fx) * (1.0 - fy)
-        + (at(0, 1) * (1.0 - fx) + at(1, 1) * fx) * fy
+    let near = neighbours(mask, x0, y0, false).map(|set| f64::from(u8::from(set)));
+    (near[0] * (1.0 - fx) + near[1] * fx) * (1.0 - fy) + (near[2] * (1.0 - fx) + near[3] * fx) * fy
 }
 
 /// Bilinear level among the neighbours that hold data; `None` when they weigh less than half.
 fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
     let (x0, y0) = (floor(x), floor(y));
     let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-    let near = neighbours(levels, x0, y0).map(f64::from);
+    let near = neighbours(levels, x0, y0, 0).map(f64::from);
     if near == [0.0; 4] {
         return None;
     }
@@ -190,16 +211,16 @@ fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
     (weight >= 0.5).then(|| level / weight)
 }
 
-/// Levels of a pixel and of those to its right and below, row after row; 0 outside.
+/// A pixel and those to its right and below, row after row; `outside` where there are none.
 #[inline]
-fn neighbours(levels: &Grid<u16>, x: i64, y: i64) -> [u16; 4] {
-    let width = levels.width();
+fn neighbours<T: Copy>(grid: &Grid<T>, x: i64, y: i64, outside: T) -> [T; 4] {
+    let width = grid.width();
     let inside = |i: i64, side: usize| i >= 0 && i + 1 < side as i64;
-    if inside(x, width) && inside(y, levels.height()) {
-        let from = &levels.data()[y as usize * width + x as usize..][..width + 2];
+    if inside(x, width) && inside(y, grid.height()) {
+        let from = &grid.data()[y as usize * width + x as usize..][..width + 2];
         [from[0], from[1], from[width], from[width + 1]]
     } else {
-        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| levels.get(x + dx, y + dy).unwrap_or(0))
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| grid.get(x + dx, y + dy).unwrap_or(outside))
     }
 }
 
