@@ -348,19 +348,25 @@ fn a_second_signal_stops_at_once_and_leaves_all_resumable() {
 
 #[test]
 fn a_second_signal_does_not_wait_for_a_disk_that_hangs() {
-    let world = World::new("1");
-    let (mut child, _file) = world.held("depth:written");
-    child.send(Signal::INT);
-    child.wait_until("it drains", || world.stops() == 1);
-    child.send(Signal::INT);
-    let (code, json, said) = child.end();
-    // The fit has no files: it is stored. Nothing is, that comes after files which are not on disk.
-    let told = (code, &json["stages"], &json["done"]);
-    assert_eq!(told, (Some(130), &1.into(), &0.into()), "{said}");
-    let pair = &pairs(&world.project)[0];
-    let state = (pair.results.status, pair.attempt, pair.crashes);
-    assert_eq!(state, (JobStatus::Ready, 0, 0));
-    assert_eq!(pair.results.next_stage, Some(Stage::Depth));
-    call(&mut run(&world.project, &[])).expect(0);
-    world.is_as_unbroken();
+    // With the last stage's files nothing is left to compute, and yet the pair is not done.
+    for (at, stored, next) in [
+        ("depth:written", 1, Stage::Depth),
+        ("register:written", 3, Stage::Register),
+    ] {
+        let world = World::new("1");
+        let (mut child, _file) = world.held(at);
+        child.send(Signal::INT);
+        child.wait_until("it drains", || world.stops() == 1);
+        child.send(Signal::INT);
+        let (code, json, said) = child.end();
+        // What has its files is stored; nothing is, that comes after files which are not on disk.
+        let told = (code, &json["stages"], &json["done"]);
+        assert_eq!(told, (Some(130), &stored.into(), &0.into()), "{said}");
+        let pair = &pairs(&world.project)[0];
+        let state = (pair.results.status, pair.attempt, pair.crashes);
+        assert_eq!(state, (JobStatus::Ready, 0, 0));
+        assert_eq!(pair.results.next_stage, Some(next));
+        call(&mut run(&world.project, &[])).expect(0);
+        world.is_as_unbroken();
+    }
 }
