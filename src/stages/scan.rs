@@ -2,14 +2,14 @@
 
 use std::sync::OnceLock;
 
-use super::zbuffer::Shell;
+use super::zbuffer::{Shell, Skin};
 use crate::mesh::Mesh;
 
 /// A scan as the stages see it: the mesh as read, and its surface once somebody has looked at it.
 #[derive(Debug)]
 pub struct Scan {
     mesh: Mesh,
-    shell: OnceLock<Shell>,
+    skin: OnceLock<Skin>,
 }
 
 impl Scan {
@@ -19,8 +19,9 @@ impl Scan {
     }
 
     /// The surface ready to be looked at along any direction.
-    pub(super) fn shell(&self) -> &Shell {
-        self.shell.get_or_init(|| Shell::new(&self.mesh))
+    pub(super) fn shell(&self) -> Shell<'_> {
+        let skin = self.skin.get_or_init(|| Skin::of(&self.mesh));
+        Shell::new(&self.mesh, skin)
     }
 }
 
@@ -28,7 +29,7 @@ impl From<Mesh> for Scan {
     fn from(mesh: Mesh) -> Self {
         Self {
             mesh,
-            shell: OnceLock::new(),
+            skin: OnceLock::new(),
         }
     }
 }
