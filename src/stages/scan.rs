@@ -2,14 +2,14 @@
 
 use std::sync::OnceLock;
 
-use super::zbuffer::{Shell, Skin};
+use super::zbuffer::Shell;
 use crate::mesh::Mesh;
 
 /// A scan as the stages see it: the mesh as read, and its surface once somebody has looked at it.
 #[derive(Debug)]
 pub struct Scan {
     mesh: Mesh,
-    skin: OnceLock<Skin>,
+    shell: OnceLock<Shell>,
 }
 
 impl Scan {
@@ -19,9 +19,8 @@ impl Scan {
     }
 
     /// The surface ready to be looked at along any direction.
-    pub(super) fn shell(&self) -> Shell<'_> {
-        let skin = self.skin.get_or_init(|| Skin::of(&self.mesh));
-        Shell::new(&self.mesh, skin)
+    pub(super) fn shell(&self) -> &Shell {
+        self.shell.get_or_init(|| Shell::new(&self.mesh))
     }
 }
 
@@ -29,7 +28,7 @@ impl From<Mesh> for Scan {
     fn from(mesh: Mesh) -> Self {
         Self {
             mesh,
-            skin: OnceLock::new(),
+            shell: OnceLock::new(),
         }
     }
 }

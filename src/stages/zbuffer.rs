@@ -12,10 +12,9 @@ use crate::domain::Rigid3;
 use crate::mesh::Mesh;
 use crate::raster::Grid;
 
-use block::{Block, LANES, Lanes, Row, block, fill_block, holding, relative};
+use block::{Block, LANES, Lanes, Row, block, fill_block, holding};
 use boxes::Boxes;
 pub(super) use moments::Moments;
-use moments::Summing;
 use triangle::{higher, pixels};
 pub(super) use view::View;
 
@@ -25,110 +24,55 @@ pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
 /// Points of a set without faces are grown to this many times half their mean spacing, so that no holes stay.
 const POINT_GROWTH: f64 = 1.5;
 
-/// What is known of a surface without a look at its triangles.
-#[derive(Debug)]
-pub(super) struct Skin {
-    middle: [f64; 3],
-    /// Around each [`LANES`] blocks.
-    boxes: Vec<Boxes>,
-    moments: Option<Moments>,
-}
-
-impl Skin {
-    /// Looks at each of a mesh's triangles once, or at its points when it has none.
-    pub(super) fn of(mesh: &Mesh) -> Self {
-        let room @ [low, high]: Bounds<3> = room(&mesh.vertices);
-        let mut skin = Self {
-            middle: std::array::from_fn(|k| f64::midpoint(low[k], high[k])),
-            boxes: Vec::new(),
-            moments: None,
-        };
-        let shell = Shell { mesh, skin: &skin };
-        let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
-        let extent = sides.into_iter().fold(0.0, f64::max) as f32;
-        let (mut boxes, mut summing) = (Vec::new(), Summing::new(room));
-        let mut few = Vec::with_capacity(LANES);
-        for first in (0..shell.blocks()).step_by(LANES) {
-            few.clear();
-            few.extend((first..shell.blocks().min(first + LANES)).map(|place| shell.block(place)));
-            boxes.push(Boxes::around(&few, extent));
-            if shell.has_faces() {
-                summing.add(&few, shell.count() - first * LANES);
-            }
-        }
-        skin.moments = summing.end(skin.middle);
-        skin.boxes = boxes;
-        skin
-    }
-}
-
 /// A surface ready to be looked at along any direction.
 ///
-/// Few of a scan's triangles hold a pixel's centre, so they are gathered from the mesh when their boxes do. Corners are
-/// taken relative to the middle of the bulk, which single precision resolves to a ten-millionth of its extent.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Shell<'a> {
-    mesh: &'a Mesh,
-    skin: &'a Skin,
+/// Corners are kept relative to the middle of the bulk, which single precision resolves to a ten-millionth of its
+/// extent.
+#[derive(Debug)]
+pub(super) struct Shell {
+    middle: [f64; 3],
+    /// Box around the bulk.
+    room: Bounds<3>,
+    blocks: Vec<Block>,
+    /// Around each [`LANES`] blocks.
+    boxes: Vec<Boxes>,
+    /// Triangles, or points, in the blocks.
+    count: usize,
+    has_faces: bool,
 }
 
-impl<'a> Shell<'a> {
-    /// The surface of a mesh, with the skin of the same mesh.
-    pub(super) const fn new(mesh: &'a Mesh, skin: &'a Skin) -> Self {
-        Self { mesh, skin }
-    }
-
-    /// Area, centre and spread; `None` without faces or area.
-    pub(super) const fn moments(&self) -> Option<&'a Moments> {
-        self.skin.moments.as_ref()
-    }
-
-    const fn has_faces(&self) -> bool {
-        !self.mesh.triangles.is_empty()
-    }
-
-    /// Triangles, or points where there are no triangles.
-    const fn count(&self) -> usize {
-        if self.has_faces() {
-            self.mesh.triangles.len()
+impl Shell {
+    /// Takes the corners of a mesh's triangles, or its points when it has none.
+    pub(super) fn new(mesh: &Mesh) -> Self {
+        let room @ [low, high]: Bounds<3> = room(&mesh.vertices);
+        let middle: [f64; 3] = std::array::from_fn(|k| f64::midpoint(low[k], high[k]));
+        let points: Vec<[u32; 3]>;
+        let triangles = if mesh.triangles.is_empty() {
+            points = (0..mesh.vertices.len() as u32).map(|i| [i; 3]).collect();
+            &points
         } else {
-            self.mesh.vertices.len()
-        }
-    }
-
-    const fn blocks(&self) -> usize {
-        self.count().div_ceil(LANES)
-    }
-
-    /// Gathers a block.
-    #[inline]
-    fn block(&self, place: usize) -> Block {
-        let first = place * LANES;
-        let (mesh, middle) = (self.mesh, self.skin.middle);
-        if self.has_faces() {
-            let few = first..self.count().min(first + LANES);
-            block(&mesh.triangles[few], &mesh.vertices, middle)
-        } else {
-            let last = self.count() - 1;
-            let few: [_; LANES] = std::array::from_fn(|k| [last.min(first + k) as u32; 3]);
-            block(&few, &mesh.vertices, middle)
-        }
-    }
-
-    /// A corner by its number: those of a block come one after the other, corner by corner.
-    fn corner(&self, number: usize) -> [f32; 3] {
-        let (place, corner, lane) = (number / (3 * LANES), number / LANES % 3, number % LANES);
-        let triangle = (place * LANES + lane).min(self.count() - 1);
-        let vertex = match self.mesh.triangles.get(triangle) {
-            Some(triangle) => triangle[corner] as usize,
-            None => triangle,
+            &mesh.triangles
         };
-        relative(self.mesh.vertices[vertex], self.skin.middle)
+        let blocks: Vec<Block> = triangles
+            .chunks(LANES)
+            .map(|few| block(few, &mesh.vertices, middle))
+            .collect();
+        let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
+        let extent = sides.into_iter().fold(0.0, f64::max) as f32;
+        let boxes = blocks.chunks(LANES);
+        Self {
+            middle,
+            room,
+            count: triangles.len(),
+            boxes: boxes.map(|few| Boxes::around(few, extent)).collect(),
+            blocks,
+            has_faces: !mesh.triangles.is_empty(),
+        }
     }
 
     /// Rows that give a place in a frame: x, y, z.
     fn rows(&self, frame: &Rigid3) -> [[f64; 4]; 3] {
-        let origin = frame.apply(self.skin.middle);
+        let origin = frame.apply(self.middle);
         std::array::from_fn(|k| {
             let [a, b, c, _] = frame.0[k];
             [a, b, c, origin[k]]
@@ -144,23 +88,25 @@ impl<'a> Shell<'a> {
 
     /// The first and the last place of the bulk of the corners.
     fn along(&self, row: &Row) -> [f64; 2] {
-        let corners = self.blocks() * 3 * LANES;
-        let mut bulk = Bulk::of(corners, |k| row.place(self.corner(k)));
-        let take = |bulk: &mut Bulk, place: usize| {
-            for corner in &self.block(place) {
+        let mut bulk = Bulk::of(self.blocks.len() * 3 * LANES, |k| {
+            let corner = &self.blocks[k / (3 * LANES)][k / LANES % 3];
+            row.place([0, 1, 2].map(|axis| corner[axis][k % LANES]))
+        });
+        let take = |bulk: &mut Bulk, block: &Block| {
+            for corner in block {
                 bulk.take(row.at(corner));
             }
         };
         // Those that reach farthest come first, so that few of the others have anything to add.
         for place in self.farthest(row, &bulk) {
-            take(&mut bulk, place);
+            take(&mut bulk, &self.blocks[place]);
         }
         let [mut low, mut high] = bulk.taken();
-        for (group, boxes) in self.skin.boxes.iter().enumerate() {
+        for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
             let [lows, highs] = boxes.reach(row);
-            for (k, place) in self.places(group).enumerate() {
+            for (k, block) in blocks.iter().enumerate() {
                 if lows[k] < low || highs[k] > high {
-                    take(&mut bulk, place);
+                    take(&mut bulk, block);
                     [low, high] = bulk.taken();
                 }
             }
@@ -171,7 +117,7 @@ impl<'a> Shell<'a> {
     /// The blocks whose boxes reach farthest down and up, those that reach out of the bulk left out.
     fn farthest(&self, row: &Row, bulk: &Bulk) -> [usize; 2] {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
-        for (group, boxes) in self.skin.boxes.iter().enumerate() {
+        for (group, boxes) in self.boxes.iter().enumerate() {
             let [lows, highs] = boxes.reach(row);
             for k in 0..LANES {
                 if lows[k] < low && bulk.holds(lows[k]) {
@@ -182,7 +128,7 @@ impl<'a> Shell<'a> {
                 }
             }
         }
-        places.map(|place| place.min(self.blocks() - 1))
+        places.map(|place| place.min(self.blocks.len() - 1))
     }
 
     /// The highest z of a frame under each pixel's centre; [`NOTHING`] where the ray meets no surface.
@@ -221,27 +167,22 @@ impl<'a> Shell<'a> {
         let rows =
             [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| Row(row.map(|v| v as f32)));
         let size = [view.width, view.height];
-        if self.has_faces() {
+        if self.has_faces {
             self.fill_all(&rows, size, meet);
         } else {
             self.splat(&rows, size, meet);
         }
     }
 
-    /// Places of the blocks in a group of boxes.
-    fn places(&self, group: usize) -> std::ops::Range<usize> {
-        group * LANES..self.blocks().min((group + 1) * LANES)
-    }
-
     /// Fills the triangles that hold a pixel's centre.
     fn fill_all(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
         let [u, v, _] = rows;
-        for (group, boxes) in self.skin.boxes.iter().enumerate() {
+        for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
             let [across, down] = [u, v].map(|row| boxes.reach(row));
             let held = holding([&across, &down], size);
-            for (place, held) in self.places(group).zip(held) {
+            for (block, held) in blocks.iter().zip(held) {
                 if held {
-                    fill_block(&self.block(place), rows, size, &mut meet);
+                    fill_block(block, rows, size, &mut meet);
                 }
             }
         }
@@ -250,7 +191,7 @@ impl<'a> Shell<'a> {
     /// Each point as a small square.
     fn splat(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
         let of_row = |row: &Row| -> Vec<f32> {
-            let blocks = (0..self.blocks()).map(|place| self.block(place));
+            let blocks = self.blocks.iter();
             blocks.flat_map(|block| row.at(&block[0])).collect()
         };
         let [xs, ys, zs] = rows.each_ref().map(of_row);
@@ -274,10 +215,9 @@ impl<'a> Shell<'a> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{NOTHING, View};
+    use super::{NOTHING, Shell, View};
     use crate::domain::{Affine2, Rigid3};
     use crate::mesh::Mesh;
-    use crate::stages::Scan;
 
     const UPRIGHT: Rigid3 = Rigid3([
         [1.0, 0.0, 0.0, 0.0],
@@ -336,7 +276,7 @@ mod tests {
         #[test]
         fn equals_a_ray_caster(mesh in soup()) {
             let view = View::around([[0.0, 0.0], [10.0, 10.0]], 24, true);
-            let heights = Scan::from(mesh.clone()).shell().render(&UPRIGHT, &view);
+            let heights = Shell::new(&mesh).render(&UPRIGHT, &view);
             for y in 0..view.height {
                 for x in 0..view.width {
                     let got = heights.at(x, y);
@@ -371,7 +311,7 @@ mod tests {
             height: 121,
             unit_per_px: 0.1,
         };
-        let heights = Scan::from(mesh.clone()).shell().render(&UPRIGHT, &view);
+        let heights = Shell::new(&mesh).render(&UPRIGHT, &view);
         for y in 0..121_i64 {
             for x in 0..121_i64 {
                 let inside = (x - 60).pow(2) + (y - 60).pow(2) < 49 * 49;
@@ -400,8 +340,7 @@ mod tests {
             vertices,
             triangles: Vec::new(),
         };
-        let scan = Scan::from(mesh);
-        let shell = scan.shell();
+        let shell = Shell::new(&mesh);
         let view = View::around(shell.bounds(&UPRIGHT), 128, false);
         let heights = shell.render(&UPRIGHT, &view);
         let covered = heights.data().iter().filter(|z| **z == 1.0).count();

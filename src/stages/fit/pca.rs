@@ -6,7 +6,7 @@ use super::Error;
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
 use crate::stages::bulk::{Bounds, holds, room};
-use crate::stages::zbuffer::Shell;
+use crate::stages::zbuffer::{Moments, Shell};
 
 /// A surface given by points alone needs this many: 25 along a side show a stroke or two at best.
 const LEAST_POINTS: usize = 600;
@@ -38,8 +38,8 @@ impl Axes {
     }
 
     /// Of a surface; of the vertices where there is no area. Flecks far from the bulk do not count.
-    pub(super) fn of_surface(mesh: &Mesh, shell: Shell<'_>) -> Self {
-        if let Some(moments) = shell.moments() {
+    pub(super) fn of_surface(mesh: &Mesh, shell: &Shell) -> Self {
+        if let Some(moments) = Moments::of(shell) {
             return Self::from_moments(moments.centre, moments.covariance);
         }
         let bounds: Bounds<3> = room(&mesh.vertices);
@@ -110,7 +110,7 @@ mod tests {
 
     use super::{Axes, frame};
     use crate::mesh::Mesh;
-    use crate::stages::Scan;
+    use crate::stages::zbuffer::Shell;
 
     #[test]
     fn repeated_vertices_and_split_faces_change_nothing() {
@@ -130,11 +130,8 @@ mod tests {
             vertices,
             triangles: vec![[0, 1, 2], [3, 4, 5]],
         };
-        let axes = |mesh: Mesh| {
-            let scan = Scan::from(mesh);
-            Axes::of_surface(scan.mesh(), scan.shell())
-        };
-        let (a, b) = (axes(shared), axes(soup));
+        let axes = |mesh: &Mesh| Axes::of_surface(mesh, &Shell::new(mesh));
+        let (a, b) = (axes(&shared), axes(&soup));
         assert!((a.centre - b.centre).norm() < 1e-12);
         assert!(a.normal().cross(&b.normal()).norm() < 1e-9);
     }

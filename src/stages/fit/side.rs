@@ -79,7 +79,7 @@ pub(super) struct Face {
 /// What else is known of the side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Witness<'a> {
-    pub(super) shell: Shell<'a>,
+    pub(super) shell: &'a Shell,
     pub(super) print: Option<&'a Print>,
     pub(super) scanned_face_down: Option<bool>,
 }

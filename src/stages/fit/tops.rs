@@ -86,7 +86,7 @@ const LOOK: Care = Care {
 };
 
 /// Glances at both sides of a frame's plane.
-fn glances(shell: Shell<'_>, front: &Rigid3, bow: bool) -> [Option<Face>; 2] {
+fn glances(shell: &Shell, front: &Rigid3, bow: bool) -> [Option<Face>; 2] {
     let view = View::around(shell.bounds(front), GLANCE.px, false);
     let frames = [*front, turned_about_x(front)];
     let [front, back] = shell.render_both(front, &view);
@@ -112,7 +112,7 @@ fn turned_about_x(frame: &Rigid3) -> Rigid3 {
 }
 
 /// Fits the tops as seen along a frame's z, turning the view until it stands square on them.
-fn look(shell: Shell<'_>, start: Rigid3, bow: bool, care: Care) -> Option<Face> {
+fn look(shell: &Shell, start: Rigid3, bow: bool, care: Care) -> Option<Face> {
     let mut frame = start;
     for round in 1.. {
         let view = View::around(shell.bounds(&frame), care.px, false);

@@ -33,22 +33,15 @@ impl Row {
     }
 }
 
-/// A place relative to the middle.
-#[inline]
-pub(super) fn relative(place: [f64; 3], middle: [f64; 3]) -> [f32; 3] {
-    [0, 1, 2].map(|axis| (place[axis] - middle[axis]) as f32)
-}
-
 /// Up to [`LANES`] triangles, the last repeated.
-#[inline]
 pub(super) fn block(triangles: &[[u32; 3]], vertices: &[[f64; 3]], middle: [f64; 3]) -> Block {
     let mut block = [[[0.0; LANES]; 3]; 3];
     for lane in 0..LANES {
         let triangle = triangles[lane.min(triangles.len() - 1)];
         for (corner, i) in block.iter_mut().zip(triangle) {
             let vertex = vertices[i as usize];
-            for (axis, value) in corner.iter_mut().zip(relative(vertex, middle)) {
-                axis[lane] = value;
+            for axis in 0..3 {
+                corner[axis][lane] = (vertex[axis] - middle[axis]) as f32;
             }
         }
     }

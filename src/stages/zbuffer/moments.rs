@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Block, LANES, Lanes};
+use super::{Block, LANES, Lanes, Shell};
 use crate::stages::bulk::Bounds;
 
 /// Products of two axes, each kept once.
@@ -18,56 +18,34 @@ pub(in crate::stages) struct Moments {
     pub(in crate::stages) covariance: Matrix3<f64>,
 }
 
-/// Sums over blocks as they come.
-pub(super) struct Summing {
-    around: Around,
-    sums: [f64; SUMS],
-    /// Of the blocks since the last run of them ended.
-    part: [[f32; LANES]; SUMS],
-    taken: usize,
-}
-
-impl Summing {
-    pub(super) fn new(room: Bounds<3>) -> Self {
-        Self {
-            around: Around::of(room),
-            sums: [0.0; SUMS],
-            part: [[0.0; LANES]; SUMS],
-            taken: 0,
+impl Moments {
+    /// Of the triangles that lie in the bulk; `None` where they have no area.
+    pub(in crate::stages) fn of(shell: &Shell) -> Option<Self> {
+        if !shell.has_faces {
+            return None;
         }
-    }
-
-    /// Adds the first `count` triangles of some blocks that lie in the bulk.
-    pub(super) fn add(&mut self, blocks: &[Block], count: usize) {
-        for (k, block) in blocks.iter().enumerate() {
-            self.around.add(block, count - k * LANES, &mut self.part);
-            self.taken += 1;
-            if self.taken.is_multiple_of(RUN) {
-                self.drain();
+        let around = Around::of(shell);
+        let mut sums = [0.0; SUMS];
+        for (run, blocks) in shell.blocks.chunks(RUN).enumerate() {
+            let mut part = [[0.0; LANES]; SUMS];
+            for (k, block) in blocks.iter().enumerate() {
+                let first = (run * RUN + k) * LANES;
+                around.add(block, shell.count - first, &mut part);
+            }
+            for (sum, part) in sums.iter_mut().zip(part) {
+                *sum += part.iter().map(|v| f64::from(*v)).sum::<f64>();
             }
         }
-    }
-
-    fn drain(&mut self) {
-        for (sum, part) in self.sums.iter_mut().zip(&mut self.part) {
-            *sum += part.iter().map(|v| f64::from(*v)).sum::<f64>();
-            *part = [0.0; LANES];
-        }
-    }
-
-    /// What they amount to; `None` where there is no area.
-    pub(super) fn end(mut self, middle: [f64; 3]) -> Option<Moments> {
-        self.drain();
-        let [total, x, y, z, xx, xy, xz, yy, yz, zz] = self.sums;
+        let [total, x, y, z, xx, xy, xz, yy, yz, zz] = sums;
         if total <= 0.0 || !total.is_finite() {
             return None;
         }
         let centre = Vector3::new(x, y, z) / (3.0 * total);
         // Second moment of a triangle: (sum of corners' outer products + outer product of their sum) / 12.
         let second = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) / (12.0 * total);
-        let unit = self.around.extent;
-        Some(Moments {
-            centre: Vector3::from(middle) + centre * unit,
+        let unit = around.extent;
+        Some(Self {
+            centre: Vector3::from(shell.middle) + centre * unit,
             covariance: (second - centre * centre.transpose()) * (unit * unit),
         })
     }
@@ -84,7 +62,8 @@ struct Around {
 }
 
 impl Around {
-    fn of([low, high]: Bounds<3>) -> Self {
+    fn of(shell: &Shell) -> Self {
+        let [low, high]: Bounds<3> = shell.room;
         let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
         let extent = sides.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b));
         Self {
@@ -136,8 +115,9 @@ impl Around {
 mod tests {
     use proptest::prelude::*;
 
+    use super::Moments;
     use crate::mesh::Mesh;
-    use crate::stages::zbuffer::Skin;
+    use crate::stages::zbuffer::Shell;
 
     /// Each triangle is cut into this many rows of small ones.
     const ROWS: usize = 40;
@@ -184,7 +164,7 @@ mod tests {
         ) {
             let triangles = (0..places.len() as u32 - 2).map(|i| [i, i + 1, i + 2]).collect();
             let mesh = Mesh { vertices: places, triangles };
-            let found = Skin::of(&mesh).moments.expect("there is area");
+            let found = Moments::of(&Shell::new(&mesh)).expect("there is area");
             let (centre, covariance) = of_small_triangles(&mesh);
             for i in 0..3 {
                 prop_assert!((found.centre[i] - centre[i]).abs() < 1e-4);
@@ -214,7 +194,7 @@ mod tests {
             vertices,
             triangles,
         };
-        let of = |mesh: &Mesh| Skin::of(mesh).moments.expect("there is area");
+        let of = |mesh: &Mesh| Moments::of(&Shell::new(mesh)).expect("there is area");
         let apart = of(&plain).centre - of(&flecked).centre;
         assert!(apart.norm() < 1e-3, "{apart}");
     }

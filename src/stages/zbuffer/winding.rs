@@ -6,20 +6,19 @@ use crate::domain::Rigid3;
 /// About so many blocks are looked at: a share is told well enough by tens of thousands of triangles.
 const LOOKED_AT: usize = 8_192;
 
-impl Shell<'_> {
+impl Shell {
     /// Share of the area, as seen along z of a frame, whose winding looks up; `None` without faces.
     pub(in crate::stages) fn outward_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
-        if !self.has_faces() {
+        if !self.has_faces {
             return None;
         }
         let normal = [0, 1, 2].map(|k| plane_from_mesh.0[2][k] as f32);
         let (mut out, mut all) = (0.0, 0.0);
-        let stride = self.blocks().div_ceil(LOOKED_AT);
-        for place in (0..self.blocks()).step_by(stride) {
-            let [a, b, c] = &self.block(place);
+        let stride = self.blocks.len().div_ceil(LOOKED_AT);
+        for (place, [a, b, c]) in self.blocks.iter().enumerate().step_by(stride) {
             let facing = facing(normal, a, b, c);
             // The last block repeats its last triangle.
-            let count = self.count() - place * LANES;
+            let count = self.count - place * LANES;
             for facing in facing.into_iter().take(count).map(f64::from) {
                 all += facing.abs();
                 out += facing.max(0.0);
