@@ -22,11 +22,12 @@
 //! |---|---|---|
 //! | `domain` | nouns: ids, stages, job states, transforms, outcomes, verdicts | |
 //! | `raster` | grids, masks, depth maps, pictures, warps; readers of PNG, JPEG, TIFF | `domain` |
-//! | `mesh` | triangles and points in their own frame; readers of OBJ, PLY, STL, XYZ | `domain` |
+//! | `large` | vectors of millions of numbers | |
+//! | `mesh` | triangles and points in their own frame; readers of OBJ, PLY, STL, XYZ | `domain`, `large` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two folders | `domain` |
-//! | `stages` | fit, depth, normalize, register as pure functions, and the scores | `domain`, `mesh`, `raster` |
+//! | `stages` | fit, depth, normalize, register as pure functions, and the scores | `domain`, `large`, `mesh`, `raster` |
 //! | `breakpoint` | named points where a test makes the process die | `domain` |
-//! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `mesh`, `raster` |
+//! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `large`, `mesh`, `raster` |
 //! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain`, `breakpoint` |
 //! | `runner` | workers, policy, execution of one pair, events | `domain`, `mesh`, `raster`, `stages`, `store`, `catalog`, `breakpoint` |
 //! | `check` | a project held against itself, and mended | `domain`, `store`, `catalog`, `runner` |
@@ -45,6 +46,7 @@ pub mod config;
 pub mod demo;
 pub mod domain;
 pub mod export;
+pub mod large;
 pub mod manifest;
 pub mod mesh;
 pub mod raster;

@@ -203,7 +203,7 @@ fn add_spikes(mesh: &mut Mesh, spikes: u32, rng: &mut ChaCha8Rng) {
 
 /// Adds side walls and a foot.
 fn close(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
-    let top: Vec<[u32; 3]> = mesh.triangles.clone();
+    let top = mesh.triangles.clone();
     let rim = rim_edges(&top);
     let foot_start = mesh.vertices.len() as u32;
     let foot: Vec<[f64; 3]> = mesh

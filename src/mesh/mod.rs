@@ -14,13 +14,15 @@ pub use error::Error;
 pub use format::Format;
 pub use limits::Limits;
 
+use crate::large::Large;
+
 /// Triangles over vertices, in the mesh's own frame and unit. A point set has no triangles.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Mesh {
     /// Positions, all finite.
-    pub vertices: Vec<[f64; 3]>,
+    pub vertices: Large<[f64; 3]>,
     /// Indices into `vertices`, wound as in the file.
-    pub triangles: Vec<[u32; 3]>,
+    pub triangles: Large<[u32; 3]>,
 }
 
 /// Reads a mesh or point set from a file's bytes.

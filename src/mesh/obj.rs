@@ -124,8 +124,8 @@ fn read_points(bytes: &[u8]) -> Result<Mesh, Error> {
         }
     }
     Ok(Mesh {
-        vertices,
-        triangles: Vec::new(),
+        vertices: vertices.into(),
+        ..Mesh::default()
     })
 }
 

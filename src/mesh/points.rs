@@ -23,8 +23,8 @@ pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
         vertices.push(error::finite(position, count)?);
     }
     Ok(Mesh {
-        vertices,
-        triangles: Vec::new(),
+        vertices: vertices.into(),
+        ..Mesh::default()
     })
 }
 

@@ -1,9 +1,12 @@
 //! STL, binary and ascii: a soup of triangles, in which each vertex is repeated as often as it is used.
 
 use super::{Error, Format, Limits, Mesh, error, text};
+use crate::large::Large;
 
 const HEADER: usize = 84;
 const FACET: usize = 50;
+/// Facets that are read at a time.
+const FEW: usize = 1024;
 
 /// Triangles by a binary header; `None` when the file ends before the count.
 pub(super) fn binary_count(bytes: &[u8]) -> Option<u32> {
@@ -33,11 +36,15 @@ pub(super) fn read_binary(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> 
     }
     limits.check_triangles(u64::from(count))?;
     limits.check_vertices(3 * u64::from(count))?;
-    let mut vertices = Vec::with_capacity(3 * count as usize);
-    for facet in &facets[..count as usize] {
-        for corner in corners(facet) {
-            vertices.push(error::finite(corner, vertices.len() as u64 + 1)?);
+    let mut vertices = Large::with_capacity(3 * count as usize);
+    let mut few = Vec::with_capacity(3 * FEW);
+    for facets in facets[..count as usize].chunks(FEW) {
+        few.clear();
+        for corner in facets.iter().flat_map(corners) {
+            let number = vertices.len() + few.len() + 1;
+            few.push(error::finite(corner, number as u64)?);
         }
+        vertices.extend_from_slice(&few);
     }
     soup(vertices)
 }
@@ -50,7 +57,7 @@ fn corners(facet: &[u8; FACET]) -> [[f64; 3]; 3] {
 }
 
 /// Every three vertices in a row are a triangle.
-fn soup(vertices: Vec<[f64; 3]>) -> Result<Mesh, Error> {
+fn soup(vertices: Large<[f64; 3]>) -> Result<Mesh, Error> {
     if vertices.is_empty() {
         return Err(Error::NoFaces);
     }
@@ -79,7 +86,7 @@ pub(super) fn read_ascii(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
             missing: reader.open.end(),
         });
     }
-    soup(reader.vertices)
+    soup(reader.vertices.into())
 }
 
 /// What the reader is inside of.

@@ -9,6 +9,7 @@ mod winding;
 
 use super::bulk::{Bounds, Bulk, bulk_along, room};
 use crate::domain::Rigid3;
+use crate::large::Large;
 use crate::mesh::Mesh;
 use crate::raster::Grid;
 
@@ -33,7 +34,7 @@ pub(super) struct Shell {
     middle: [f64; 3],
     /// Box around the bulk.
     room: Bounds<3>,
-    blocks: Vec<Block>,
+    blocks: Large<Block>,
     /// Around each [`LANES`] blocks.
     boxes: Vec<Boxes>,
     /// Triangles, or points, in the blocks.
@@ -46,14 +47,14 @@ impl Shell {
     pub(super) fn new(mesh: &Mesh) -> Self {
         let room @ [low, high]: Bounds<3> = room(&mesh.vertices);
         let middle: [f64; 3] = std::array::from_fn(|k| f64::midpoint(low[k], high[k]));
-        let points: Vec<[u32; 3]>;
+        let points: Large<[u32; 3]>;
         let triangles = if mesh.triangles.is_empty() {
             points = (0..mesh.vertices.len() as u32).map(|i| [i; 3]).collect();
             &points
         } else {
             &mesh.triangles
         };
-        let blocks: Vec<Block> = triangles
+        let blocks: Large<Block> = triangles
             .chunks(LANES)
             .map(|few| block(few, &mesh.vertices, middle))
             .collect();
@@ -295,8 +296,8 @@ mod tests {
     #[test]
     fn a_fan_without_gaps_leaves_no_hole() {
         let mut mesh = Mesh {
-            vertices: vec![[0.03, -0.07, 0.0]],
-            triangles: Vec::new(),
+            vertices: vec![[0.03, -0.07, 0.0]].into(),
+            triangles: Vec::new().into(),
         };
         let n = 97_u32;
         for k in 0..n {
@@ -338,7 +339,7 @@ mod tests {
             .collect();
         let mesh = Mesh {
             vertices,
-            triangles: Vec::new(),
+            triangles: Vec::new().into(),
         };
         let shell = Shell::new(&mesh);
         let view = View::around(shell.bounds(&UPRIGHT), 128, false);

@@ -5,6 +5,7 @@ use std::io::{ErrorKind, Read as _};
 use std::path::{Path, PathBuf};
 
 use crate::domain::{ContentHash, FailureClass};
+use crate::large::Large;
 
 /// Size, modification time and number of a file: when all are as they were, the content is taken to be too.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -40,7 +41,7 @@ const fn inode(_meta: &std::fs::Metadata) -> u64 {
 #[derive(Debug)]
 pub struct InputFile {
     /// All its bytes.
-    pub bytes: Vec<u8>,
+    pub bytes: Large<u8>,
     /// Their hash.
     pub hash: ContentHash,
     /// What the file looked like when it was opened.
@@ -143,11 +144,10 @@ pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<Inpu
     if meta.len() > limit {
         return Err(too_large(meta.len()));
     }
-    let mut bytes = Vec::with_capacity(meta.len() as usize);
     // A file that grows while it is read must not get past the limit either.
-    file.take(limit.saturating_add(1))
-        .read_to_end(&mut bytes)
-        .map_err(|error| InputError::io(path, error))?;
+    let file = file.take(limit.saturating_add(1));
+    let bytes =
+        Large::read(file, meta.len() as usize).map_err(|error| InputError::io(path, error))?;
     if bytes.len() as u64 > limit {
         return Err(too_large(bytes.len() as u64));
     }

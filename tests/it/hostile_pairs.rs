@@ -123,8 +123,8 @@ impl HostilePairs {
             6 => stl(relief(|[x, y, _]| [x, y, 0.0])),
             7 => Bad::file("obj", self.images[3].1.clone()),
             8 => stl(Mesh {
-                vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
-                triangles: vec![[0, 1, 2]],
+                vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].into(),
+                triangles: vec![[0, 1, 2]].into(),
             }),
             9 => stl(relief(|[x, ..]| [x, 2.0 * x, -x])),
             10 => stl(relief(|vertex| vertex.map(|c| c * 1e30))),

@@ -145,7 +145,7 @@ fn shuffled(mesh: &Mesh) -> Mesh {
     triangles.shuffle(&mut rng);
     Mesh {
         vertices,
-        triangles,
+        triangles: triangles.into(),
     }
 }
 

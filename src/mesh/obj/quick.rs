@@ -4,6 +4,7 @@
 //! which reads it or stumbles over it. What is read here is read as `tobj` would have.
 
 use super::super::{Limits, Mesh, text};
+use crate::large::Large;
 
 /// Digits that a 64-bit mantissa surely holds, and the largest one that a float holds exactly.
 const DIGITS: usize = 19;
@@ -25,8 +26,8 @@ pub(super) fn read(bytes: &[u8], limits: &Limits) -> Option<Mesh> {
         return None;
     }
     let mut mesh = Mesh {
-        vertices: Vec::with_capacity(bytes.len() / BYTES_PER_VERTEX),
-        triangles: Vec::with_capacity(bytes.len() / BYTES_PER_TRIANGLE),
+        vertices: Large::with_capacity(bytes.len() / BYTES_PER_VERTEX),
+        triangles: Large::with_capacity(bytes.len() / BYTES_PER_TRIANGLE),
     };
     let mut line = Line { rest: bytes };
     while !line.rest.is_empty() {
@@ -191,7 +192,7 @@ const fn is_end_of_word(byte: u8) -> bool {
 fn in_order_of_use(mesh: Mesh) -> Option<Mesh> {
     const UNUSED: u32 = u32::MAX;
     let mut place_of = vec![UNUSED; mesh.vertices.len()];
-    let mut vertices = Vec::with_capacity(mesh.vertices.len());
+    let mut vertices = Large::with_capacity(mesh.vertices.len());
     let mut triangles = mesh.triangles;
     for index in triangles.as_flattened_mut() {
         let place = place_of.get_mut(*index as usize)?;
@@ -310,8 +311,8 @@ mod tests {
         assert_eq!(
             points,
             Mesh {
-                vertices: vec![[0.0; 3], [1.0, 0.0, 0.0]],
-                triangles: vec![]
+                vertices: vec![[0.0; 3], [1.0, 0.0, 0.0]].into(),
+                triangles: vec![].into()
             }
         );
     }

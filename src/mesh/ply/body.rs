@@ -3,6 +3,7 @@
 use super::super::{Error, Limits, Mesh, error, text};
 use super::header::{Element, Header, Scalar, Shape};
 use super::source::{NoNumber, Source};
+use crate::large::Large;
 
 /// Names under which programs write a face's corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -93,7 +94,9 @@ impl<S: Source> Body<'_, S> {
             })?;
         }
         let most = self.source.most_rows(element).min(element.rows);
-        self.mesh.vertices.reserve_exact(most as usize);
+        if self.mesh.vertices.is_empty() {
+            self.mesh.vertices = Large::with_capacity(most as usize);
+        }
         let plain = if element.is_plain_position() && places == [0, 1, 2] {
             self.plain_vertices(element.rows)?
         } else {
@@ -167,8 +170,8 @@ impl<S: Source> Body<'_, S> {
         })?;
         let plain = element.plain_corners().filter(|_| joining == Joining::Fan);
         let most = self.source.most_rows(element).min(element.rows);
-        if plain.is_some() {
-            self.mesh.triangles.reserve(most as usize);
+        if plain.is_some() && self.mesh.triangles.is_empty() {
+            self.mesh.triangles = Large::with_capacity(most as usize);
         }
         for row in 0..element.rows {
             if let Some(item) = plain

@@ -121,14 +121,14 @@ mod tests {
             [0.0, 2.0, 0.0],
         ];
         let shared = Mesh {
-            vertices: corners.clone(),
-            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            vertices: corners.clone().into(),
+            triangles: vec![[0, 1, 2], [0, 2, 3]].into(),
         };
         let mut vertices: Vec<[f64; 3]> = [0, 1, 2, 0, 2, 3].iter().map(|i| corners[*i]).collect();
         vertices.extend([[9.0, 9.0, 9.0]; 0]);
         let soup = Mesh {
-            vertices,
-            triangles: vec![[0, 1, 2], [3, 4, 5]],
+            vertices: vertices.into(),
+            triangles: vec![[0, 1, 2], [3, 4, 5]].into(),
         };
         let axes = |mesh: &Mesh| Axes::of_surface(mesh, &Shell::new(mesh));
         let (a, b) = (axes(&shared), axes(&soup));

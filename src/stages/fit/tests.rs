@@ -91,8 +91,8 @@ fn the_papers_plane_is_close_on_an_open_mesh() {
 #[test]
 fn points_that_span_no_surface_are_refused() {
     let mesh = |vertices: Vec<[f64; 3]>| Mesh {
-        vertices,
-        triangles: Vec::new(),
+        vertices: vertices.into(),
+        triangles: Vec::new().into(),
     };
     let params = settings().fit;
     for method in [Method::Paper, Method::Tops] {

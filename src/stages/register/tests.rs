@@ -131,7 +131,7 @@ fn as_shuffled_soup(mesh: &Mesh) -> Mesh {
     let triangles = (0..count as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
     Mesh {
         triangles: triangles.collect(),
-        vertices,
+        vertices: vertices.into(),
     }
 }
 

@@ -163,7 +163,7 @@ mod tests {
             places in prop::collection::vec(prop::array::uniform3(-3.0..5.0_f64), 9..40),
         ) {
             let triangles = (0..places.len() as u32 - 2).map(|i| [i, i + 1, i + 2]).collect();
-            let mesh = Mesh { vertices: places, triangles };
+            let mesh = Mesh { vertices: places.into(), triangles };
             let found = Moments::of(&Shell::new(&mesh)).expect("there is area");
             let (centre, covariance) = of_small_triangles(&mesh);
             for i in 0..3 {
@@ -185,14 +185,14 @@ mod tests {
             .map(|i| [i, i + 1, i + 60])
             .collect();
         let plain = Mesh {
-            vertices: vertices.clone(),
-            triangles: triangles.clone(),
+            vertices: vertices.clone().into(),
+            triangles: triangles.clone().into(),
         };
         vertices.extend([[5e4, 0.0, 0.0], [5e4, 9e3, 0.0], [6e4, 0.0, 9e3]]);
         triangles.push([3600, 3601, 3602]);
         let flecked = Mesh {
-            vertices,
-            triangles,
+            vertices: vertices.into(),
+            triangles: triangles.into(),
         };
         let of = |mesh: &Mesh| Moments::of(&Shell::new(mesh)).expect("there is area");
         let apart = of(&plain).centre - of(&flecked).centre;

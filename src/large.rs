@@ -1,0 +1,275 @@
+//! Vectors that may hold millions of numbers, on large pages of memory where they do.
+//!
+//! The system clears memory page by page as it is first touched. For a vector of many megabytes that takes longer than
+//! filling it, unless the pages are large.
+
+use std::fmt;
+use std::io::{self, ErrorKind, Read};
+use std::ops::{Deref, DerefMut};
+
+use bytemuck::Pod;
+use memmap2::MmapMut;
+
+/// Bytes from which on a vector lies on pages of its own. Allocators keep smaller ones and give them out again, pages
+/// and all; glibc's does up to this size.
+const LARGE: usize = 32 << 20;
+
+/// A vector of plain numbers that may be large. What it cannot do a slice can, or [`Vec`] before it is turned into one.
+pub struct Large<T>(Place<T>);
+
+enum Place<T> {
+    Small(Vec<T>),
+    Pages { pages: MmapMut, len: usize },
+}
+
+impl<T: Pod> Large<T> {
+    /// Without elements, and with room for so many.
+    pub fn with_capacity(capacity: usize) -> Self {
+        let bytes = capacity.saturating_mul(size_of::<T>());
+        let is_large = cfg!(target_os = "linux") && bytes >= LARGE;
+        let pages = is_large.then(|| Self::on_pages(bytes)).flatten();
+        pages.unwrap_or_else(|| Self(Place::Small(Vec::with_capacity(capacity))))
+    }
+
+    /// On pages of its own; `None` where the system gives none.
+    fn on_pages(bytes: usize) -> Option<Self> {
+        let pages = MmapMut::map_anon(bytes).ok()?;
+        #[cfg(target_os = "linux")]
+        {
+            // Where there are no large pages, small ones do.
+            let _ = pages.advise(memmap2::Advice::HugePage);
+        }
+        Some(Self(Place::Pages { pages, len: 0 }))
+    }
+
+    /// How many elements there is room for.
+    pub fn capacity(&self) -> usize {
+        match &self.0 {
+            Place::Small(vec) => vec.capacity(),
+            Place::Pages { pages, .. } => pages.len() / size_of::<T>(),
+        }
+    }
+
+    /// Adds an element at the end.
+    pub fn push(&mut self, element: T) {
+        if let Place::Pages { pages, len } = &mut self.0 {
+            if let Some(place) = slots(pages).get_mut(*len) {
+                *place = element;
+                *len += 1;
+                return;
+            }
+            self.grow();
+        }
+        match &mut self.0 {
+            Place::Small(vec) => vec.push(element),
+            Place::Pages { .. } => self.push(element),
+        }
+    }
+
+    /// Adds elements at the end.
+    pub fn extend_from_slice(&mut self, elements: &[T]) {
+        self.extend(elements.iter().copied());
+    }
+
+    /// Makes twice the room.
+    fn grow(&mut self) {
+        let mut larger = Self::with_capacity(2 * self.capacity().max(1));
+        for element in &*self {
+            larger.push(*element);
+        }
+        *self = larger;
+    }
+}
+
+impl Large<u8> {
+    /// All bytes to the end, of which there are about so many.
+    ///
+    /// # Errors
+    /// When they cannot be read.
+    pub fn read(mut from: impl Read, about: usize) -> io::Result<Self> {
+        let mut bytes = Self::with_capacity(about);
+        match &mut bytes.0 {
+            Place::Small(vec) => {
+                from.read_to_end(vec)?;
+            }
+            Place::Pages { pages, len } => {
+                while *len < pages.len() {
+                    match from.read(&mut pages[*len..]) {
+                        Ok(0) => return Ok(bytes),
+                        Ok(more) => *len += more,
+                        Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                        Err(error) => return Err(error),
+                    }
+                }
+                let mut rest = Vec::new();
+                from.read_to_end(&mut rest)?;
+                bytes.extend(rest);
+            }
+        }
+        Ok(bytes)
+    }
+}
+
+/// Pages as elements; what is left of their end is none.
+fn slots<T: Pod>(pages: &mut MmapMut) -> &mut [T] {
+    let whole = pages.len() - pages.len() % size_of::<T>();
+    bytemuck::cast_slice_mut(&mut pages[..whole])
+}
+
+impl<T: Pod> Deref for Large<T> {
+    type Target = [T];
+
+    fn deref(&self) -> &[T] {
+        match &self.0 {
+            Place::Small(vec) => vec,
+            Place::Pages { pages, len } => bytemuck::cast_slice(&pages[..len * size_of::<T>()]),
+        }
+    }
+}
+
+impl<T: Pod> DerefMut for Large<T> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        match &mut self.0 {
+            Place::Small(vec) => vec,
+            Place::Pages { pages, len } => &mut slots(pages)[..*len],
+        }
+    }
+}
+
+impl<T: Pod> Extend<T> for Large<T> {
+    fn extend<I: IntoIterator<Item = T>>(&mut self, elements: I) {
+        let mut elements = elements.into_iter();
+        match &mut self.0 {
+            Place::Small(vec) => return vec.extend(elements),
+            Place::Pages { pages, len } => {
+                for place in &mut slots(pages)[*len..] {
+                    let Some(element) = elements.next() else {
+                        return;
+                    };
+                    *place = element;
+                    *len += 1;
+                }
+            }
+        }
+        elements.for_each(|element| self.push(element));
+    }
+}
+
+impl<T: Pod> FromIterator<T> for Large<T> {
+    fn from_iter<I: IntoIterator<Item = T>>(elements: I) -> Self {
+        let elements = elements.into_iter();
+        let mut large = Self::with_capacity(elements.size_hint().0);
+        large.extend(elements);
+        large
+    }
+}
+
+impl<T> From<Vec<T>> for Large<T> {
+    fn from(vec: Vec<T>) -> Self {
+        Self(Place::Small(vec))
+    }
+}
+
+impl<T> Default for Large<T> {
+    fn default() -> Self {
+        Vec::new().into()
+    }
+}
+
+impl<T: Pod> Clone for Large<T> {
+    fn clone(&self) -> Self {
+        self.iter().copied().collect()
+    }
+}
+
+impl<T: Pod + PartialEq> PartialEq for Large<T> {
+    fn eq(&self, other: &Self) -> bool {
+        **self == **other
+    }
+}
+
+impl<T: Pod + PartialEq, const N: usize> PartialEq<[T; N]> for Large<T> {
+    fn eq(&self, other: &[T; N]) -> bool {
+        **self == *other
+    }
+}
+
+impl<T: Pod + fmt::Debug> fmt::Debug for Large<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (**self).fmt(f)
+    }
+}
+
+impl<'a, T: Pod> IntoIterator for &'a Large<T> {
+    type Item = &'a T;
+    type IntoIter = std::slice::Iter<'a, T>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter()
+    }
+}
+
+impl<'a, T: Pod> IntoIterator for &'a mut Large<T> {
+    type Item = &'a mut T;
+    type IntoIter = std::slice::IterMut<'a, T>;
+
+    fn into_iter(self) -> Self::IntoIter {
+        self.iter_mut()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::{LARGE, Large, Place};
+
+    type Element = [u32; 3];
+
+    #[test]
+    fn what_is_large_lies_on_pages_of_its_own() {
+        let count = LARGE / size_of::<Element>() + 1;
+        let zeros = Large::<Element>::zeroed(count);
+        assert_eq!(
+            matches!(zeros.0, Place::Pages { .. }),
+            cfg!(target_os = "linux")
+        );
+        assert_eq!((zeros.len(), zeros[count - 1]), (count, [0; 3]));
+        assert!(matches!(Large::<Element>::zeroed(9).0, Place::Small(_)));
+    }
+
+    #[test]
+    fn what_was_longer_or_shorter_than_told_is_read_whole() {
+        let source: Vec<u8> = (0..LARGE + 9).map(|k| (k % 251) as u8).collect();
+        for (len, told) in [(5, 0), (5, 9), (LARGE, LARGE + 7), (LARGE + 9, LARGE)] {
+            let read = Large::read(&source[..len], told).expect("memory refuses nothing");
+            assert!(*read == source[..len], "{len} {told}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn pages_hold_what_a_vector_holds(
+            room in 12_usize..200,
+            first: Vec<Element>,
+            more: Vec<Element>,
+        ) {
+            let mut pages = Large::on_pages(room).expect("a page");
+            let mut vec = Vec::new();
+            for element in first {
+                pages.push(element);
+                vec.push(element);
+            }
+            pages.extend(more.iter().copied());
+            vec.extend(more);
+            prop_assert!(pages.capacity() >= pages.len());
+            for (one, other) in pages.iter_mut().zip(&mut vec) {
+                one[1] ^= 7;
+                other[1] ^= 7;
+            }
+            prop_assert_eq!(&*pages, &*vec);
+            prop_assert_eq!(&pages, &Large::from(vec));
+            prop_assert_eq!(&pages.clone(), &pages);
+        }
+    }
+}
