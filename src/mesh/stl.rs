@@ -6,7 +6,7 @@ use crate::large::Large;
 const HEADER: usize = 84;
 const FACET: usize = 50;
 /// Facets that are read at a time.
-const FEW: usize = 1024;
+const FEW: usize = 128;
 
 /// Triangles by a binary header; `None` when the file ends before the count.
 pub(super) fn binary_count(bytes: &[u8]) -> Option<u32> {
@@ -40,9 +40,11 @@ pub(super) fn read_binary(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> 
     let mut few = Vec::with_capacity(3 * FEW);
     for facets in facets[..count as usize].chunks(FEW) {
         few.clear();
-        for corner in facets.iter().flat_map(corners) {
-            let number = vertices.len() + few.len() + 1;
-            few.push(error::finite(corner, number as u64)?);
+        for facet in facets {
+            for corner in corners(facet) {
+                let number = vertices.len() + few.len() + 1;
+                few.push(error::finite(corner, number as u64)?);
+            }
         }
         vertices.extend_from_slice(&few);
     }
