@@ -84,9 +84,7 @@ impl<T: Pod> Large<T> {
     /// Makes twice the room.
     fn grow(&mut self) {
         let mut larger = Self::with_capacity(2 * self.capacity().max(1));
-        for element in &*self {
-            larger.push(*element);
-        }
+        larger.extend_from_slice(self);
         *self = larger;
     }
 }

@@ -4,12 +4,12 @@
     taskset -c 0 peers/bin/python benches/peers/pair.py
 
 The pairs are those of `mocban demo`, their meshes rewritten as binary STL. The programs take turns over the whole set,
-each with one core. The peer's steps are quick ones, and do no more than the paper asks: the plane by RANSAC, a depth map
-by casting rays, the ink by Otsu, the turn by ECC from starts all around, the threshold by SSIM and by density over the
-paper's 90 levels, PNG files. It keeps no catalog, syncs nothing, and checks nothing. Which side is carved it guesses from
-the heights, which is wrong for one scan in four; or it aligns both sides and keeps the one that agrees better, since
-neither heights nor winding tell (of 60 scans six are wound inside out, six are closed). A result is wrong when its turn
-is more than 5 degrees off the truth.
+each with one core. The peer's steps are quick ones, and do no more than the paper asks: the plane by RANSAC, a depth
+map by casting rays, the ink by Otsu, the turn by ECC from starts all around, the threshold by SSIM and by density over
+the paper's 90 levels, PNG files. It keeps no catalog, syncs nothing, and checks nothing. Which side is carved it
+guesses from the heights, which is wrong for more than one scan in four; or it aligns both sides and keeps the one that
+agrees better, since neither heights nor winding tell (of 60 scans six are wound inside out, six are closed). A result
+is wrong when its turn is more than 5 degrees off the truth.
 """
 
 import argparse

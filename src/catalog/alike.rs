@@ -10,7 +10,7 @@ use serde_json::Value;
 use sqlx::SqliteConnection;
 
 use super::Result;
-use super::census::{RANGE, census, counted};
+use super::census::{census, counted};
 use super::claim::PairSelection;
 use super::recipes::{Recipes, current_json};
 use super::staleness::{PAGE, Seen, look};
@@ -131,7 +131,7 @@ pub(super) struct Group {
 
 /// All groups; those with earlier stages first, so that where jobs go back to is a group that comes before their own.
 pub(super) async fn groups(conn: &mut SqliteConnection, current: &str) -> Result<Vec<Group>> {
-    let found = census(conn, GROUPS, RANGE).await?;
+    let found = census(conn, GROUPS).await?;
     let one_of_each: Vec<i64> = found.values().map(|alike| alike.first).collect();
     let seen = look(conn, current, 0, &these(&one_of_each)).await?;
     let seen: BTreeMap<i64, Seen> = seen.into_iter().map(|seen| (seen.pair, seen)).collect();

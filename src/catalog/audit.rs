@@ -7,7 +7,7 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteRow};
 use sqlx::{ConnectOptions as _, Row as _, SqliteConnection};
 
 use super::alike::{misremembered, unnoted};
-use super::census::{self, RANGE, by_recipe, by_status, census};
+use super::census::{self, Census, by_recipe, by_status, census};
 use super::counters::standings;
 use super::work::{self, KnownInputs};
 use super::{Catalog, CatalogError, Result, Trouble, connect, results, rows};
@@ -16,9 +16,18 @@ use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMe
 /// Lines of each check that are read at most.
 const LINES: usize = 50;
 
+/// What is kept beside the rows and does not agree with them; empty when all does.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Drift {
+    /// Counters that are off.
+    pub counters: Vec<CounterDrift>,
+    /// What is kept to tell stale pairs without a look at each, a line each.
+    pub shortcuts: Vec<String>,
+}
+
 /// A counter that does not say how many jobs there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Drift {
+pub struct CounterDrift {
     /// Number of the next stage, 0 to 4.
     pub cursor: i64,
     /// The status.
@@ -133,40 +142,17 @@ impl Catalog {
         Ok(gone.chain(other).collect())
     }
 
-    /// Counters that are off.
+    /// What is kept beside the rows and does not agree with them. `quick` leaves out what a look at each pair would tell.
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn counter_drift(&self) -> Result<Vec<Drift>> {
+    pub async fn drift(&self, quick: bool) -> Result<Drift> {
         // All of one moment, so that a run that goes on beside it does not look like drift.
         let mut conn = self.snapshot().await?;
-        let kept: Vec<(i64, i64, i64)> = sqlx::query_as(COUNTERS).fetch_all(&mut *conn).await?;
-        let counted = by_status(&census(&mut conn, census::ALL, RANGE).await?)?;
-        let drift = standings().filter_map(|(cursor, status)| {
-            let counted = counted.get(&(cursor, status)).copied().unwrap_or(0);
-            let mut kept = kept.iter();
-            let kept = kept.find(|(at, code, _)| (*at, *code) == (cursor, status.code()));
-            let kept = kept.map(|(.., n)| *n);
-            let is_right = kept.is_some_and(|kept| u64::try_from(kept) == Ok(counted));
-            (!is_right).then_some(Drift {
-                cursor,
-                status,
-                kept,
-                counted,
-            })
-        });
-        Ok(drift.collect())
-    }
-
-    /// What is kept to tell stale pairs without a look at each, and does not agree with the rows, a line each; empty
-    /// when it does. `quick` leaves out what a look at each pair would tell.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn shortcut_drift(&self, quick: bool) -> Result<Vec<String>> {
-        let mut conn = self.snapshot().await?;
-        let mut lines = made_drift(&mut conn).await?;
-        for (sql, what) in [
+        let counted = census(&mut conn, census::ALL).await?;
+        let counters = counter_drift(&mut conn, &counted).await?;
+        let mut shortcuts = made_drift(&mut conn, &counted).await?;
+        let looks = [
             (
                 KEPT_DRIFT,
                 "keep another recipe than that of their last result",
@@ -175,16 +161,17 @@ impl Catalog {
                 MOVED_DRIFT,
                 "are not noted, though their files or facts changed since",
             ),
-        ] {
-            if quick {
-                break;
-            }
+        ];
+        for (sql, what) in looks.into_iter().filter(|_| !quick) {
             let pairs: i64 = sqlx::query_scalar(sql).fetch_one(&mut *conn).await?;
             if pairs > 0 {
-                lines.push(format!("{pairs} pairs {what}"));
+                shortcuts.push(format!("{pairs} pairs {what}"));
             }
         }
-        Ok(lines)
+        Ok(Drift {
+            counters,
+            shortcuts,
+        })
     }
 
     /// The next pairs after one, by number, at most `limit`; empty at the end.
@@ -216,11 +203,31 @@ impl Catalog {
     }
 }
 
+/// Counters that are off.
+async fn counter_drift(conn: &mut SqliteConnection, counted: &Census) -> Result<Vec<CounterDrift>> {
+    let kept: Vec<(i64, i64, i64)> = sqlx::query_as(COUNTERS).fetch_all(conn).await?;
+    let counted = by_status(counted)?;
+    let drift = standings().filter_map(|(cursor, status)| {
+        let counted = counted.get(&(cursor, status)).copied().unwrap_or(0);
+        let mut kept = kept.iter();
+        let kept = kept.find(|(at, code, _)| (*at, *code) == (cursor, status.code()));
+        let kept = kept.map(|(.., n)| *n);
+        let is_right = kept.is_some_and(|kept| u64::try_from(kept) == Ok(counted));
+        (!is_right).then_some(CounterDrift {
+            cursor,
+            status,
+            kept,
+            counted,
+        })
+    });
+    Ok(drift.collect())
+}
+
 /// Counters of recipes that are off, a line each.
-async fn made_drift(conn: &mut SqliteConnection) -> Result<Vec<String>> {
-    let kept: Vec<(i64, i64)> = sqlx::query_as(MADE).fetch_all(&mut *conn).await?;
+async fn made_drift(conn: &mut SqliteConnection, counted: &Census) -> Result<Vec<String>> {
+    let kept: Vec<(i64, i64)> = sqlx::query_as(MADE).fetch_all(conn).await?;
     let kept: BTreeMap<i64, i64> = kept.into_iter().collect();
-    let counted = by_recipe(&census(conn, census::ALL, RANGE).await?);
+    let counted = by_recipe(counted);
     let recipes: BTreeSet<_> = kept.keys().chain(counted.keys()).collect();
     let lines = recipes.into_iter().filter_map(|recipe| {
         let kept = kept.get(recipe).copied().unwrap_or(0);

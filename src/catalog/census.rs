@@ -9,7 +9,7 @@ use super::Result;
 use super::counters::{Counts, Cursor};
 
 /// Numbers of pairs that are counted in one statement.
-pub(super) const RANGE: i64 = 100_000;
+const RANGE: i64 = 100_000;
 
 /// A statement for [`census`]: the jobs `j` of a range for which a condition holds.
 macro_rules! counted {
@@ -47,13 +47,15 @@ pub(super) struct Alike {
     pub(super) first: i64,
 }
 
-/// Counts the jobs that a statement by `counted` finds, so many numbers at a time. In a transaction the counts are of one
-/// moment.
-pub(super) async fn census(
-    conn: &mut SqliteConnection,
-    sql: &'static str,
-    range: i64,
-) -> Result<BTreeMap<Standing, Alike>> {
+/// Jobs by where they stand.
+pub(super) type Census = BTreeMap<Standing, Alike>;
+
+/// Counts the jobs that a statement by `counted` finds. In a transaction the counts are of one moment.
+pub(super) async fn census(conn: &mut SqliteConnection, sql: &'static str) -> Result<Census> {
+    in_ranges(conn, sql, RANGE).await
+}
+
+async fn in_ranges(conn: &mut SqliteConnection, sql: &'static str, range: i64) -> Result<Census> {
     let mut all = BTreeMap::new();
     let mut after = i64::MIN;
     loop {
@@ -78,7 +80,7 @@ pub(super) async fn census(
 }
 
 /// Every job by cursor and status.
-pub(super) fn by_status(census: &BTreeMap<Standing, Alike>) -> Result<Counts> {
+pub(super) fn by_status(census: &Census) -> Result<Counts> {
     let mut counts = Counts::new();
     for (standing, alike) in census {
         let status = super::rows::status(standing.status)?;
@@ -88,7 +90,7 @@ pub(super) fn by_status(census: &BTreeMap<Standing, Alike>) -> Result<Counts> {
 }
 
 /// Every job that keeps a recipe, by recipe.
-pub(super) fn by_recipe(census: &BTreeMap<Standing, Alike>) -> BTreeMap<i64, u64> {
+pub(super) fn by_recipe(census: &Census) -> BTreeMap<i64, u64> {
     let mut counts = BTreeMap::new();
     for (standing, alike) in census {
         if let Some(made) = standing.made {
@@ -104,7 +106,7 @@ mod tests {
     use proptest::prelude::*;
     use sqlx::{Connection as _, SqliteConnection};
 
-    use super::{ALL, RANGE, census};
+    use super::{ALL, RANGE, in_ranges};
 
     /// Stage, status, recipe, how many, first number.
     type Row = (i64, i64, Option<i64>, i64, i64);
@@ -128,7 +130,7 @@ mod tests {
             .fetch_all(&mut conn)
             .await
             .expect("rows");
-        let ranges = census(&mut conn, ALL, range).await.expect("a census");
+        let ranges = in_ranges(&mut conn, ALL, range).await.expect("a census");
         let ranges = ranges.into_iter().map(|(at, alike)| {
             let jobs = i64::try_from(alike.jobs).expect("few");
             (at.cursor, at.status, at.made, jobs, alike.first)

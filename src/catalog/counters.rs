@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use sqlx::{Row as _, SqliteConnection};
 
-use super::census::{self, RANGE, by_status, census};
+use super::census::{self, by_status, census};
 use super::script::Script;
 use super::{Catalog, Result};
 use crate::domain::{JobStatus, Stage};
@@ -93,7 +93,7 @@ impl Catalog {
     /// When the database refuses.
     pub async fn recount(&self) -> Result<Counts> {
         let mut conn = self.snapshot().await?;
-        by_status(&census(&mut conn, census::ALL, RANGE).await?)
+        by_status(&census(&mut conn, census::ALL).await?)
     }
 }
 

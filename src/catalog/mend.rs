@@ -5,7 +5,7 @@ use sqlx::{AssertSqlSafe, Row as _, SqliteConnection};
 
 use super::alike::{made, misremembered, unnoted};
 use super::audit::{integrity, objects, wanted_objects};
-use super::census::{self, RANGE, by_recipe, by_status, census};
+use super::census::{self, by_recipe, by_status, census};
 use super::counters::{Deltas, cursor, standings};
 use super::script::Script;
 use super::{Catalog, Result, rows, rows::array};
@@ -72,7 +72,7 @@ impl Catalog {
         self.alone(|conn| {
             Box::pin(async move {
                 sqlx::query(REMAKE).execute(&mut *conn).await?;
-                let counted = census(conn, census::ALL, RANGE).await?;
+                let counted = census(conn, census::ALL).await?;
                 let by_status = by_status(&counted)?;
                 let counters = standings().map(|(cursor, status)| {
                     let jobs = by_status.get(&(cursor, status)).copied().unwrap_or(0);

@@ -55,7 +55,7 @@ use tokio::sync::{mpsc, oneshot};
 
 pub use alignments::{HandAlignment, StoredAlignment};
 pub use answers::{Answer, AnsweredOn, ControlAnswer, Shown};
-pub use audit::{AuditedPair, AuditedResult, Drift};
+pub use audit::{AuditedPair, AuditedResult, CounterDrift, Drift};
 pub use claim::{ClaimRequest, PairSelection};
 pub use company::Waiting;
 pub use counters::Counts;

@@ -3,7 +3,7 @@
 use sqlx::{Row as _, SqliteConnection};
 
 use super::claim::PairSelection;
-use super::counters::{Deltas, cursor};
+use super::counters::{Deltas, KEPT, cursor};
 use super::recipes::RecipeIds;
 use super::{Catalog, Result, rows};
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
@@ -176,7 +176,7 @@ impl Catalog {
     pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
         let mut conn = self.reader().await?;
         let query = match among {
-            None => sqlx::query("SELECT stage, status, n FROM counter WHERE n > 0"),
+            None => sqlx::query(KEPT),
             Some(among) => sqlx::query(COUNT_AMONG).bind(&among.json),
         };
         let mut left = WorkLeft::default();

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::catalog::Drift;
+use crate::catalog::CounterDrift;
 use crate::domain::{PairName, Stage};
 
 /// What kind of damage it is.
@@ -112,7 +112,7 @@ impl Finding {
         Self::bare(Kind::Reference, what)
     }
 
-    pub(super) fn counter(drift: &Drift) -> Self {
+    pub(super) fn counter(drift: &CounterDrift) -> Self {
         let kept = match drift.kept {
             Some(kept) => format!("says {kept}"),
             None => "is gone".to_owned(),

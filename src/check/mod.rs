@@ -12,7 +12,7 @@ pub use summary::{CheckSummary, Found, Notes, Repaired, Spare};
 
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
-use crate::catalog::{AuditedPair, Catalog, CatalogError, Trouble};
+use crate::catalog::{AuditedPair, Catalog, CatalogError, Drift, Trouble};
 use crate::store::{NamedArtifacts, Project, UnnamedKind};
 use pairs::Look;
 
@@ -168,13 +168,12 @@ async fn counters(
     options: CheckOptions,
     summary: &mut CheckSummary,
 ) -> Result<(), CheckError> {
-    let drift = catalog.counter_drift().await?;
-    for drift in &drift {
+    let drift = catalog.drift(options.quick).await?;
+    let is_off = drift != Drift::default();
+    for drift in &drift.counters {
         summary.add(Finding::counter(drift));
     }
-    let lines = catalog.shortcut_drift(options.quick).await?;
-    let is_off = !drift.is_empty() || !lines.is_empty();
-    for line in lines {
+    for line in drift.shortcuts {
         summary.add(Finding::shortcut(line));
     }
     if options.repair && is_off {

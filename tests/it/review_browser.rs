@@ -20,6 +20,18 @@ pub(crate) fn enter<'a>(browser: &'a Browser, page: &Page, size: [u32; 2]) -> Ta
     tab
 }
 
+/// Opens a page on a project of its own, where there is a browser.
+fn on_a_page(look: impl FnOnce(&Project, &Tab<'_>)) {
+    let Some(browser) = Browser::start() else {
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::start(&project, "lan", &PLAIN);
+    let tab = enter(&browser, &page, [1440, 900]);
+    look(&project, &tab);
+}
+
 fn ready(tab: &Tab<'_>) {
     tab.wait("document.body?.dataset.ready && document.body.dataset.shown");
 }
@@ -65,63 +77,58 @@ fn standing(project: &Project, reader: &str) -> BTreeMap<i64, (String, Option<St
 
 #[test]
 fn fifty_cards_are_judged_by_keys_alone_over_a_reload_and_ten_undone() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::start(&project, "lan", &PLAIN);
-    let tab = enter(&browser, &page, [1440, 900]);
-    let keys = ["KeyP", "KeyP", "Digit1", "KeyU", "KeyF", "Digit6"];
-    let mut paints = Vec::new();
-    for i in 0..50 {
-        if i == 25 {
-            saved(&tab);
-            tab.reload();
-            ready(&tab);
-            assert_eq!(tab.eval("document.getElementById('bar').value"), 25);
+    on_a_page(|project, tab| {
+        let keys = ["KeyP", "KeyP", "Digit1", "KeyU", "KeyF", "Digit6"];
+        let mut paints = Vec::new();
+        for i in 0..50 {
+            if i == 25 {
+                saved(tab);
+                tab.reload();
+                ready(tab);
+                assert_eq!(tab.eval("document.getElementById('bar').value"), 25);
+            }
+            judge(tab, keys[i % keys.len()]);
+            let ms = tab.eval("document.body.dataset.paintMs");
+            paints.push(
+                ms.as_str()
+                    .and_then(|ms| ms.parse::<u32>().ok())
+                    .expect("a time"),
+            );
         }
-        judge(&tab, keys[i % keys.len()]);
-        let ms = tab.eval("document.body.dataset.paintMs");
-        paints.push(
-            ms.as_str()
-                .and_then(|ms| ms.parse::<u32>().ok())
-                .expect("a time"),
+        saved(tab);
+        let said: Vec<_> = standing(project, "lan").into_values().collect();
+        let wanted =
+            |verdict: &str, reason: Option<&str>| (verdict.to_owned(), reason.map(str::to_owned));
+        let of_key = [
+            wanted("pass", None),
+            wanted("pass", None),
+            wanted("fail", Some("angle")),
+            wanted("unsure", None),
+            wanted("fail", None),
+            wanted("fail", Some("wrong_pair")),
+        ];
+        let pressed: Vec<_> = (0..50).map(|i| of_key[i % keys.len()].clone()).collect();
+        assert_eq!(said, pressed);
+        for _ in 0..10 {
+            let before = shown(tab);
+            saved(tab);
+            tab.key("Backspace");
+            tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
+        }
+        saved(tab);
+        assert_eq!(tab.eval("document.getElementById('bar').value"), 40);
+        let left: Vec<_> = standing(project, "lan").into_values().collect();
+        assert_eq!(left, pressed[..40]);
+        judge(tab, "KeyP");
+        saved(tab);
+        assert_eq!(standing(project, "lan").len(), 41);
+        paints.sort_unstable();
+        eprintln!(
+            "key to picture: median {} ms, nine in ten {} ms, worst {} ms",
+            paints[25], paints[45], paints[49]
         );
-    }
-    saved(&tab);
-    let said: Vec<_> = standing(&project, "lan").into_values().collect();
-    let wanted =
-        |verdict: &str, reason: Option<&str>| (verdict.to_owned(), reason.map(str::to_owned));
-    let of_key = [
-        wanted("pass", None),
-        wanted("pass", None),
-        wanted("fail", Some("angle")),
-        wanted("unsure", None),
-        wanted("fail", None),
-        wanted("fail", Some("wrong_pair")),
-    ];
-    let pressed: Vec<_> = (0..50).map(|i| of_key[i % keys.len()].clone()).collect();
-    assert_eq!(said, pressed);
-    for _ in 0..10 {
-        let before = shown(&tab);
-        saved(&tab);
-        tab.key("Backspace");
-        tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
-    }
-    saved(&tab);
-    assert_eq!(tab.eval("document.getElementById('bar').value"), 40);
-    let left: Vec<_> = standing(&project, "lan").into_values().collect();
-    assert_eq!(left, pressed[..40]);
-    judge(&tab, "KeyP");
-    saved(&tab);
-    assert_eq!(standing(&project, "lan").len(), 41);
-    paints.sort_unstable();
-    eprintln!(
-        "key to picture: median {} ms, nine in ten {} ms, worst {} ms",
-        paints[25], paints[45], paints[49]
-    );
-    assert!(paints[25] <= 50, "{paints:?}");
+        assert!(paints[25] <= 50, "{paints:?}");
+    });
 }
 
 #[test]
@@ -277,113 +284,106 @@ fn the_end_says_what_is_not_saved() {
 
 #[test]
 fn keys_are_the_pages_again_as_soon_as_a_dialog_is_shut() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::start(&project, "lan", &PLAIN);
-    let tab = enter(&browser, &page, [1440, 900]);
-    tab.key("KeyJ");
-    tab.wait("document.activeElement.id === 'jump-to'");
-    // In one turn of the script: what has the focus is still the dialog's, which no screen shows any more.
-    tab.eval(
+    on_a_page(|_, tab| {
+        tab.key("KeyJ");
+        tab.wait("document.activeElement.id === 'jump-to'");
+        // In one turn of the script: what has the focus is still the dialog's, which no screen shows any more.
+        tab.eval(
         "document.getElementById('jump').close();
         document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyC', bubbles: true }));
         null",
     );
-    tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+        tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+    });
 }
 
 #[test]
 fn a_relief_is_laid_by_keys_and_mouse() {
-    let Some(browser) = Browser::start() else {
-        return;
-    };
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::start(&project, "lan", &PLAIN);
-    let tab = enter(&browser, &page, [1440, 900]);
-    let pair = tab.eval("document.getElementById('pair').textContent");
-    tab.key("KeyC");
-    tab.wait("document.getElementById('legend').textContent.includes('IoU')");
-    let iou = || {
-        let text = tab.eval("document.getElementById('legend').textContent.split(' ')[1]");
-        text.as_str()
-            .and_then(|text| text.parse::<f64>().ok())
-            .expect("a number")
-    };
-    let before = iou();
-    for _ in 0..5 {
-        tab.key("BracketRight");
-    }
-    let turned = iou();
-    assert!(turned < before, "{turned} {before}");
-    let middle = tab.eval(
-        "(({ left, top, width, height }) => [left + width / 2, top + height / 2])
+    on_a_page(|project, tab| {
+        let pair = tab.eval("document.getElementById('pair').textContent");
+        tab.key("KeyC");
+        tab.wait("document.getElementById('legend').textContent.includes('IoU')");
+        let iou = || {
+            let text = tab.eval("document.getElementById('legend').textContent.split(' ')[1]");
+            text.as_str()
+                .and_then(|text| text.parse::<f64>().ok())
+                .expect("a number")
+        };
+        let before = iou();
+        for _ in 0..5 {
+            tab.key("BracketRight");
+        }
+        let turned = iou();
+        assert!(turned < before, "{turned} {before}");
+        let middle = tab.eval(
+            "(({ left, top, width, height }) => [left + width / 2, top + height / 2])
             (document.getElementById('canvas').getBoundingClientRect())",
-    );
-    let at = [0, 1].map(|i| middle[i].as_f64().expect("a number"));
-    tab.drag(at, [at[0] + 60.0, at[1]]);
-    assert!(iou() < turned);
-    tab.shot("correction");
-    tab.key("Digit0");
-    assert!((iou() - before).abs() < 1e-9);
-    for _ in 0..5 {
-        tab.key("BracketRight");
-    }
-    let legend = || {
-        tab.eval("document.getElementById('legend').textContent")
-            .to_string()
-    };
-    // Mirrored, it is still turned by as much.
-    for _ in 0..2 {
-        tab.key("KeyM");
-        assert!(legend().contains("turned by 5.00°"), "{}", legend());
-    }
-    let laid = iou();
-    // A verdict would go on to the next and lose it.
-    tab.key("KeyP");
-    tab.wait("document.getElementById('live').textContent.startsWith('First save')");
-    tab.key("Enter");
-    tab.wait(
+        );
+        let at = [0, 1].map(|i| middle[i].as_f64().expect("a number"));
+        tab.drag(at, [at[0] + 60.0, at[1]]);
+        assert!(iou() < turned);
+        tab.shot("correction");
+        tab.key("Digit0");
+        assert!((iou() - before).abs() < 1e-9);
+        for _ in 0..5 {
+            tab.key("BracketRight");
+        }
+        let legend = || {
+            tab.eval("document.getElementById('legend').textContent")
+                .to_string()
+        };
+        // Mirrored, it is still turned by as much.
+        for _ in 0..2 {
+            tab.key("KeyM");
+            assert!(legend().contains("turned by 5.00°"), "{}", legend());
+        }
+        let laid = iou();
+        // A verdict would go on to the next and lose it.
+        tab.key("KeyP");
+        tab.wait("document.getElementById('live').textContent.startsWith('First save')");
+        tab.key("Enter");
+        tab.wait(
         "document.getElementById('live').textContent.startsWith('Saved as an alignment by hand')",
     );
-    // It is told where it was made, and goes on from there.
-    tab.wait("document.getElementById('legend').textContent.includes('corrected by hand by lan: turned 5.0°')");
-    assert!(legend().contains(&format!("IoU {laid:.3}")), "{}", legend());
-    tab.reload();
-    ready(&tab);
-    tab.wait("document.getElementById('legend').textContent.includes('corrected by hand by lan')");
-    tab.key("KeyC");
-    tab.wait("document.getElementById('legend').textContent.includes('turned by 5.00°')");
-    assert!((iou() - laid).abs() < 1e-9, "{}", legend());
-    tab.key("Digit0");
-    assert!((iou() - before).abs() < 1e-9);
-    tab.key("Escape");
-    mocban(project.dir(), &["export", "-o", "out"]).expect(0);
-    let lines = std::fs::read_to_string(project.dir().join("out/pairs.jsonl")).expect("lines");
-    let lines = lines
-        .lines()
-        .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
-    let mine: Vec<Value> = lines.filter(|line| line["id"] == pair).collect();
-    let angle = |map: &Value| {
-        let at = |row: usize| map[row][0].as_f64().expect("a number");
-        at(1).atan2(at(0)).to_degrees()
-    };
-    let turns = mine.iter().map(|line| {
-        let turn = angle(&line["by_hand"]["print_from_depth"]) - angle(&line["print_from_depth"]);
-        (turn + 540.0).rem_euclid(360.0) - 180.0
+        // It is told where it was made, and goes on from there.
+        tab.wait("document.getElementById('legend').textContent.includes('corrected by hand by lan: turned 5.0°')");
+        assert!(legend().contains(&format!("IoU {laid:.3}")), "{}", legend());
+        tab.reload();
+        ready(tab);
+        tab.wait(
+            "document.getElementById('legend').textContent.includes('corrected by hand by lan')",
+        );
+        tab.key("KeyC");
+        tab.wait("document.getElementById('legend').textContent.includes('turned by 5.00°')");
+        assert!((iou() - laid).abs() < 1e-9, "{}", legend());
+        tab.key("Digit0");
+        assert!((iou() - before).abs() < 1e-9);
+        tab.key("Escape");
+        mocban(project.dir(), &["export", "-o", "out"]).expect(0);
+        let lines = std::fs::read_to_string(project.dir().join("out/pairs.jsonl")).expect("lines");
+        let lines = lines
+            .lines()
+            .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
+        let mine: Vec<Value> = lines.filter(|line| line["id"] == pair).collect();
+        let angle = |map: &Value| {
+            let at = |row: usize| map[row][0].as_f64().expect("a number");
+            at(1).atan2(at(0)).to_degrees()
+        };
+        let turns = mine.iter().map(|line| {
+            let turn =
+                angle(&line["by_hand"]["print_from_depth"]) - angle(&line["print_from_depth"]);
+            (turn + 540.0).rem_euclid(360.0) - 180.0
+        });
+        let turns: Vec<f64> = turns.collect();
+        assert!(
+            turns.iter().any(|turn| (turn - 5.0).abs() < 1e-6),
+            "{turns:?}"
+        );
+        assert!(
+            standing(project, "lan").is_empty(),
+            "a correction is no verdict"
+        );
     });
-    let turns: Vec<f64> = turns.collect();
-    assert!(
-        turns.iter().any(|turn| (turn - 5.0).abs() < 1e-6),
-        "{turns:?}"
-    );
-    assert!(
-        standing(&project, "lan").is_empty(),
-        "a correction is no verdict"
-    );
 }
 
 #[test]
