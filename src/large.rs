@@ -11,8 +11,8 @@ use bytemuck::Pod;
 use memmap2::MmapMut;
 
 /// Bytes from which on a vector lies on pages of its own. Allocators keep smaller ones and give them out again, pages
-/// and all; glibc's does up to this size.
-const LARGE: usize = 32 << 20;
+/// and all; glibc's does up to 32 MiB, but of several such vectors it gives the pages back.
+const LARGE: usize = 10 << 20;
 
 /// A vector of plain numbers that may be large. What it cannot do a slice can, or [`Vec`] before it is turned into one.
 pub struct Large<T>(Place<T>);

@@ -107,3 +107,15 @@ pub(super) fn finite(position: [f64; 3], vertex: u64) -> Result<[f64; 3], Error>
         None => Ok(position),
     }
 }
+
+/// Checks that vertices are finite, of which `before` came before.
+pub(super) fn all_finite(positions: &[[f64; 3]], before: usize) -> Result<(), Error> {
+    let values = positions.as_flattened().iter();
+    if values.fold(true, |finite, value| finite & value.is_finite()) {
+        return Ok(());
+    }
+    for (vertex, position) in (before as u64 + 1..).zip(positions) {
+        finite(*position, vertex)?;
+    }
+    Ok(())
+}

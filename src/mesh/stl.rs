@@ -41,11 +41,9 @@ pub(super) fn read_binary(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> 
     for facets in facets[..count as usize].chunks(FEW) {
         few.clear();
         for facet in facets {
-            for corner in corners(facet) {
-                let number = vertices.len() + few.len() + 1;
-                few.push(error::finite(corner, number as u64)?);
-            }
+            few.extend(corners(facet));
         }
+        error::all_finite(&few, vertices.len())?;
         vertices.extend_from_slice(&few);
     }
     soup(vertices)

@@ -8,6 +8,9 @@ use crate::large::Large;
 /// Names under which programs write a face's corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
+/// Rows that are read at a time.
+const FEW: usize = 256;
+
 /// Reads all elements in the order of the header.
 pub(super) fn read(header: &Header, source: impl Source, limits: &Limits) -> Result<Mesh, Error> {
     let vertices = header.rows("vertex");
@@ -114,13 +117,18 @@ impl<S: Source> Body<'_, S> {
 
     /// Reads up to so many positions that are written as most programs do, and says how many.
     fn plain_vertices(&mut self, rows: u64) -> Result<u64, Error> {
-        for row in 0..rows {
-            let Some(position) = self.source.plain_position() else {
+        let mut few = Vec::with_capacity(FEW);
+        let mut row = 0;
+        while row < rows {
+            few.clear();
+            let most = (rows - row).min(FEW as u64) as usize;
+            self.source.plain_positions(most, &mut few);
+            if few.is_empty() {
                 return Ok(row);
-            };
-            let count = self.mesh.vertices.len() as u64 + 1;
-            let position = error::finite(position.map(f64::from), count)?;
-            self.mesh.vertices.push(position);
+            }
+            error::all_finite(&few, self.mesh.vertices.len())?;
+            self.mesh.vertices.extend_from_slice(&few);
+            row += few.len() as u64;
         }
         Ok(rows)
     }
@@ -173,14 +181,46 @@ impl<S: Source> Body<'_, S> {
         if plain.is_some() && self.mesh.triangles.is_empty() {
             self.mesh.triangles = Large::with_capacity(most as usize);
         }
-        for row in 0..element.rows {
+        let mut few = Vec::with_capacity(FEW);
+        let mut row = 0;
+        while row < element.rows {
+            few.clear();
+            if plain.is_some() {
+                let most = (element.rows - row).min(FEW as u64) as usize;
+                self.source.plain_triangles(most, &mut few);
+            }
             if let Some(item) = plain
-                && let Some(triangle) = self.source.plain_triangle()
+                && !few.is_empty()
             {
-                self.plain_triangle(element, row, item, triangle)?;
+                self.plain_triangles(element, row, item, &few)?;
+                row += few.len() as u64;
             } else {
                 self.face(element, row, corners, joining)?;
+                row += 1;
             }
+        }
+        Ok(())
+    }
+
+    /// Takes triangles as most programs write them.
+    fn plain_triangles(
+        &mut self,
+        element: &Element,
+        first_row: u64,
+        item: Scalar,
+        few: &[[u32; 3]],
+    ) -> Result<(), Error> {
+        let declared = self.declared_vertices;
+        let corners = few.as_flattened().iter();
+        let is_sound = corners.fold(true, |sound, index| sound & (u64::from(*index) < declared));
+        let count = (self.mesh.triangles.len() + few.len()) as u64;
+        if is_sound && self.limits.check_triangles(count).is_ok() {
+            self.mesh.triangles.extend_from_slice(few);
+            return Ok(());
+        }
+        // One by one, to tell which is wrong.
+        for (row, triangle) in (first_row..).zip(few) {
+            self.plain_triangle(element, row, item, *triangle)?;
         }
         Ok(())
     }

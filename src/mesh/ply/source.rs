@@ -22,17 +22,13 @@ pub(super) trait Source {
     /// How many rows of an element the rest can hold at most.
     fn most_rows(&self, element: &Element) -> u64;
 
-    /// The next position, of a row that is nothing but three 32-bit floats; `None` from text and at the body's end, and then
-    /// nothing is taken.
-    fn plain_position(&mut self) -> Option<[f32; 3]> {
-        None
-    }
+    /// The next positions, up to `most`, of rows that are nothing but three 32-bit floats; none from text and at the
+    /// body's end.
+    fn plain_positions(&mut self, _most: usize, _into: &mut Vec<[f64; 3]>) {}
 
-    /// The next triangle, of rows that are nothing but a byte that counts and 32-bit indices; `None` also where the
-    /// byte does not say three.
-    fn plain_triangle(&mut self) -> Option<[u32; 3]> {
-        None
-    }
+    /// The next triangles, up to `most`, of rows that are nothing but a byte that counts and 32-bit indices; none also
+    /// where a byte does not say three.
+    fn plain_triangles(&mut self, _most: usize, _into: &mut Vec<[u32; 3]>) {}
 }
 
 /// Words between white space; rows need not be lines.
@@ -84,16 +80,20 @@ impl<'a, const BIG_ENDIAN: bool> Binary<'a, BIG_ENDIAN> {
         Self { rest }
     }
 
-    /// The next three words, their lowest bytes first, and what comes after them.
-    #[inline]
-    fn words(rest: &'a [u8]) -> Option<([[u8; 4]; 3], &'a [u8])> {
-        let (bytes, rest) = rest.split_first_chunk::<12>()?;
-        let (words, _) = bytes.as_chunks::<4>();
-        let mut words = [words[0], words[1], words[2]];
+    /// The next few rows of so many bytes, as far as there are any; nothing is taken.
+    fn rows<const SIZE: usize>(&self, most: usize) -> &'a [[u8; SIZE]] {
+        let (rows, _) = self.rest.as_chunks();
+        &rows[..most.min(rows.len())]
+    }
+
+    fn word(bytes: &[u8], place: usize) -> u32 {
+        let bytes = &bytes[place..place + 4];
+        let bytes = [bytes[0], bytes[1], bytes[2], bytes[3]];
         if BIG_ENDIAN {
-            words = words.map(|[a, b, c, d]| [d, c, b, a]);
+            u32::from_be_bytes(bytes)
+        } else {
+            u32::from_le_bytes(bytes)
         }
-        Some((words, rest))
     }
 
     /// The next bytes, lowest first.
@@ -137,17 +137,24 @@ impl<const BIG_ENDIAN: bool> Source for Binary<'_, BIG_ENDIAN> {
         (self.rest.len() / element.least_size().max(1)) as u64
     }
 
-    #[inline]
-    fn plain_position(&mut self) -> Option<[f32; 3]> {
-        let (words, rest) = Self::words(self.rest)?;
-        self.rest = rest;
-        Some(words.map(f32::from_le_bytes))
+    fn plain_positions(&mut self, most: usize, into: &mut Vec<[f64; 3]>) {
+        let rows = self.rows::<12>(most);
+        self.rest = &self.rest[rows.as_flattened().len()..];
+        into.extend(
+            rows.iter().map(|row| {
+                [0, 4, 8].map(|place| f64::from(f32::from_bits(Self::word(row, place))))
+            }),
+        );
     }
 
-    #[inline]
-    fn plain_triangle(&mut self) -> Option<[u32; 3]> {
-        let (words, rest) = Self::words(self.rest.strip_prefix(&[3])?)?;
-        self.rest = rest;
-        Some(words.map(u32::from_le_bytes))
+    fn plain_triangles(&mut self, most: usize, into: &mut Vec<[u32; 3]>) {
+        let rows = self.rows::<13>(most);
+        let count = rows.iter().take_while(|row| row[0] == 3).count();
+        let rows = &rows[..count];
+        self.rest = &self.rest[rows.as_flattened().len()..];
+        into.extend(
+            rows.iter()
+                .map(|row| [1, 5, 9].map(|place| Self::word(row, place))),
+        );
     }
 }
