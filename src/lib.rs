@@ -21,11 +21,12 @@
 //! | room | what it is for | may import |
 //! |---|---|---|
 //! | `domain` | nouns: ids, stages, job states, transforms, outcomes, verdicts | |
-//! | `raster` | grids, masks, depth maps, pictures, warps; readers of PNG, JPEG, TIFF | `domain` |
+//! | `wide` | loops over numbers, with the widest instructions that the processor has | |
+//! | `raster` | grids, masks, depth maps, pictures, warps; readers of PNG, JPEG, TIFF | `domain`, `wide` |
 //! | `large` | vectors of millions of numbers | |
 //! | `mesh` | triangles and points in their own frame; readers of OBJ, PLY, STL, XYZ | `domain`, `large` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two folders | `domain` |
-//! | `stages` | fit, depth, normalize, register as pure functions, and the scores | `domain`, `large`, `mesh`, `raster` |
+//! | `stages` | fit, depth, normalize, register as pure functions, and the scores | `domain`, `wide`, `large`, `mesh`, `raster` |
 //! | `breakpoint` | named points where a test makes the process die | `domain` |
 //! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `large`, `mesh`, `raster` |
 //! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain`, `breakpoint` |
@@ -55,3 +56,4 @@ pub mod review;
 pub mod runner;
 pub mod stages;
 pub mod store;
+mod wide;

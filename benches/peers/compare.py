@@ -101,9 +101,9 @@ def scores():
         yield f"png_grey16/{side}", "OpenCV", lambda h=heights: cv2.imencode(".png", h)
 
 
-def registration(size="60k"):
-    """From a start near the answer, on masks of 256 pixels: what is left once somebody has found the angle."""
-    side = 256
+def registration(side, size="60k"):
+    """From a start near the answer: what is left once somebody has found the angle. Ours has up to four angles to tell
+    from each other, and the mirror."""
     print_mask = rings(side, 0.0).astype(np.float32)
     turn = cv2.getRotationMatrix2D((side / 2, side / 2), 3.0, 1.03)
     depth_mask = cv2.warpAffine(print_mask, turn, (side, side))
@@ -121,8 +121,8 @@ def registration(size="60k"):
         method.SetGlobalDefaultNumberOfThreads(1)
         method.Execute(sitk.GetImageFromArray(print_mask), sitk.GetImageFromArray(depth_mask))
 
-    yield f"stages/register/{size}", "OpenCV ECC, started 3 degrees off", ecc
-    yield f"stages/register/{size}", "SimpleITK, started 3 degrees off", itk
+    yield f"stages/register_one_{side}/{size}", "OpenCV ECC, started 3 degrees off", ecc
+    yield f"stages/register_one_{side}/{size}", "SimpleITK, started 3 degrees off", itk
 
 
 def main():
@@ -136,7 +136,7 @@ def main():
     for size in sizes:
         rust(f"read/raw_stl/{size}")
     cases = [case for size in sizes for make in (readers, stages) for case in make(size)]
-    cases += [*scores(), *registration()]
+    cases += [*scores(), *registration(256), *registration(512)]
     cases = [case for case in cases if options.only in case[0]]
     times = {}
     for _ in range(options.rounds):

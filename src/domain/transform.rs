@@ -112,6 +112,13 @@ impl Rigid3 {
         [dot(self.0[0]), dot(self.0[1]), dot(self.0[2])]
     }
 
+    /// This motion after another.
+    #[must_use]
+    pub fn after(&self, first: &Self) -> Self {
+        let cell = |i: usize, j: usize| (0..4).map(|k| self.0[i][k] * first.0[k][j]).sum();
+        Self(std::array::from_fn(|i| std::array::from_fn(|j| cell(i, j))))
+    }
+
     /// The motion back: the transpose of the rotation.
     #[must_use]
     pub fn inverse(&self) -> Self {
@@ -188,6 +195,9 @@ mod tests {
         let point = [0.3, -0.2, 9.0];
         assert!(close(&motion.inverse().apply(motion.apply(point)), &point));
         assert!(close(&motion.apply([1.0, 2.0, 3.0]), &[0.0; 3]));
+        assert!(close(&motion.inverse().after(&motion).apply(point), &point));
+        let twice = motion.apply(motion.apply(point));
+        assert!(close(&motion.after(&motion).apply(point), &twice));
     }
 
     #[test]

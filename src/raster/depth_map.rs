@@ -1,7 +1,8 @@
 //! The depth map: heights over the fitted surface, seen as the print is read.
 
+use super::warp::warp_strokes;
 use super::{Grid, Mask};
-use crate::domain::DepthScale;
+use crate::domain::{Affine2, DepthScale};
 
 /// A 16-bit depth map. Level 0 holds no data; 1..=65535 are linear in height.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,9 +28,28 @@ impl DepthMap {
         levels.filter(|level| *level > 0).collect()
     }
 
+    /// Number of pixels from a level up.
+    pub fn area(&self, level: u16) -> usize {
+        // Few enough for a narrow sum, of which more fit side by side.
+        let runs = self.levels.data().chunks(usize::from(u16::MAX));
+        let set = |run: &[u16]| run.iter().map(|l| u16::from(*l >= level)).sum::<u16>();
+        runs.map(|run| usize::from(set(run))).sum()
+    }
+
     /// The strokes at a threshold: levels from `level` up. No data is no stroke.
     pub fn strokes(&self, level: u16) -> Mask {
         self.levels.map(|found| *found >= level.max(1))
+    }
+
+    /// The strokes at some thresholds in another frame; `to_from` maps depth-map pixels to its pixels.
+    pub fn strokes_in(
+        &self,
+        to_from: &Affine2,
+        [width, height]: [usize; 2],
+        levels: &[u16],
+    ) -> Vec<Mask> {
+        let levels: Vec<u16> = levels.iter().map(|level| (*level).max(1)).collect();
+        warp_strokes(&self.levels, &levels, to_from, width, height)
     }
 
     /// A map from -1 to 0.3 mesh units of ten pixels each, for tests.

@@ -11,6 +11,20 @@ pub struct Grid<T> {
     data: Vec<T>,
 }
 
+/// Side of the squares that are turned over one by one, so that rows of either side stay at hand.
+const TILE: usize = 8;
+
+/// Turns the square at the beginning of rows `from_width` long into that at the beginning of rows `to_width` long.
+fn turn_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usize) {
+    let rows: [&[T]; TILE] = std::array::from_fn(|y| &from[y * from_width..][..TILE]);
+    for x in 0..TILE {
+        let column = &mut to[x * to_width..][..TILE];
+        for (value, row) in column.iter_mut().zip(rows) {
+            *value = row[x];
+        }
+    }
+}
+
 impl<T: Copy> Grid<T> {
     /// A grid of one value.
     pub fn new(width: usize, height: usize, fill: T) -> Self {
@@ -51,6 +65,33 @@ impl<T: Copy> Grid<T> {
             width: self.width,
             height: self.height,
             data: self.data.iter().map(value).collect(),
+        }
+    }
+
+    /// Rows turned into columns.
+    #[must_use]
+    pub fn transposed(&self) -> Self {
+        let (width, height) = (self.width, self.height);
+        let mut data = self.data.clone();
+        for top in (0..height).step_by(TILE) {
+            let rows = &self.data[top * width..];
+            for left in (0..width).step_by(TILE) {
+                let columns = &mut data[left * height..];
+                if top + TILE <= height && left + TILE <= width {
+                    turn_tile(&rows[left..], width, &mut columns[top..], height);
+                    continue;
+                }
+                for y in 0..TILE.min(height - top) {
+                    for x in 0..TILE.min(width - left) {
+                        columns[x * height + top + y] = rows[y * width + left + x];
+                    }
+                }
+            }
+        }
+        Self {
+            width: height,
+            height: width,
+            data,
         }
     }
 

@@ -28,7 +28,21 @@ impl PixelBox {
     pub const fn height(&self) -> usize {
         self.y1 - self.y0 + 1
     }
+
+    /// The box around two.
+    #[must_use]
+    pub fn around(self, other: Self) -> Self {
+        Self {
+            x0: self.x0.min(other.x0),
+            y0: self.y0.min(other.y0),
+            x1: self.x1.max(other.x1),
+            y1: self.y1.max(other.y1),
+        }
+    }
 }
+
+/// Pixels that are counted in a narrow sum, of which more fit side by side.
+const RUN: usize = 255;
 
 /// How far two masks of the same size cover each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -42,8 +56,12 @@ pub struct Overlap {
 impl Mask {
     /// How far this mask and another of the same size cover each other.
     pub fn overlap(&self, other: &Self) -> Overlap {
-        let pixels = self.data().iter().zip(other.data());
-        let both = pixels.filter(|(a, b)| **a && **b).count() as f64;
+        let runs = self.data().chunks(RUN).zip(other.data().chunks(RUN));
+        let set = |(one, other): (&[bool], &[bool])| {
+            let pairs = one.iter().zip(other);
+            usize::from(pairs.map(|(a, b)| u8::from(*a & *b)).sum::<u8>())
+        };
+        let both = runs.map(set).sum::<usize>() as f64;
         let sum = (self.count() + other.count()) as f64;
         let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
         Overlap {
@@ -54,7 +72,11 @@ impl Mask {
 
     /// Number of set pixels.
     pub fn count(&self) -> usize {
-        self.data().iter().filter(|set| **set).count()
+        let set = |run: &[bool]| run.iter().map(|set| u8::from(*set)).sum::<u8>();
+        self.data()
+            .chunks(RUN)
+            .map(|run| usize::from(set(run)))
+            .sum()
     }
 
     /// Share of set pixels, 0..=1; 0 for an empty grid.
@@ -70,21 +92,20 @@ impl Mask {
         let mut found: Option<PixelBox> = None;
         for y in 0..self.height() {
             let row = self.row(y);
-            let (Some(first), Some(last)) = (
-                row.iter().position(|set| *set),
-                row.iter().rposition(|set| *set),
-            ) else {
+            // Many at a time, where a search would ask one by one.
+            if !row.iter().fold(false, |any, set| any | *set) {
                 continue;
-            };
-            let grown = found.get_or_insert(PixelBox {
+            }
+            let (x0, x1) = found.map_or((row.len(), 0), |so_far| (so_far.x0, so_far.x1 + 1));
+            let first = row[..x0].iter().position(|set| *set).unwrap_or(x0);
+            let last = row[x1..].iter().rposition(|set| *set).map(|k| x1 + k);
+            let row = PixelBox {
                 x0: first,
                 y0: y,
-                x1: last,
+                x1: last.unwrap_or(x1.saturating_sub(1)),
                 y1: y,
-            });
-            grown.x0 = grown.x0.min(first);
-            grown.x1 = grown.x1.max(last);
-            grown.y1 = y;
+            };
+            found = Some(found.map_or(row, |so_far| so_far.around(row)));
         }
         found
     }
@@ -107,7 +128,34 @@ impl Mask {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::{Mask, PixelBox};
+
+    proptest! {
+        #[test]
+        fn counts_are_those_of_one_by_one(bits in prop::collection::vec(any::<[bool; 2]>(), 1..900)) {
+            let mask = |k: usize| {
+                let set = bits.iter().map(|pair| pair[k]).collect();
+                Mask::from_vec(bits.len(), 1, set).expect("a row")
+            };
+            let count = |of: &dyn Fn(&[bool; 2]) -> bool| bits.iter().filter(|pair| of(pair)).count();
+            let (one, two) = (mask(0), mask(1));
+            prop_assert_eq!(one.count(), count(&|pair| pair[0]));
+            let [both, either] = [count(&|p| p[0] && p[1]), count(&|p| p[0] || p[1])];
+            let found = one.overlap(&two);
+            let share = if either == 0 { 0.0 } else { both as f64 / either as f64 };
+            prop_assert_eq!(found.iou, share);
+            let wide = Mask::from_fn(30, bits.len() / 30 + 1, |x, y| {
+                bits.get(y * 30 + x).is_some_and(|pair| pair[0] && pair[1])
+            });
+            let set = |x: usize, y: usize| wide.at(x, y).then_some(PixelBox { x0: x, y0: y, x1: x, y1: y });
+            let places = (0..wide.height()).flat_map(|y| (0..30).map(move |x| (x, y)));
+            let around = places.filter_map(|(x, y)| set(x, y)).reduce(PixelBox::around);
+            prop_assert_eq!(wide.bounding_box(), around);
+            prop_assert!((found.dice - 2.0 * share / (1.0 + share)).abs() < 1e-12);
+        }
+    }
 
     #[test]
     fn overlap_of_halves_and_of_nothing() {

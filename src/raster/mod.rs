@@ -3,6 +3,7 @@
 mod decode;
 mod depth_map;
 pub mod encode;
+mod extremes;
 mod grid;
 mod limits;
 mod mask;

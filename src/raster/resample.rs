@@ -1,19 +1,12 @@
 //! Bringing values to another size along the axes: exact area means where the map shrinks, linear where it grows.
 
 use super::Grid;
+use crate::wide::widely;
 
 /// How far along one axis an output pixel reaches in the source.
 struct Reach {
     first: usize,
     weights: Vec<f32>,
-}
-
-impl Reach {
-    /// The first pixel and the weights of it and its right neighbour, where no more are reached.
-    fn pair(&self) -> Option<(usize, [f32; 2])> {
-        let weight = |k: usize| self.weights.get(k).copied().unwrap_or(0.0);
-        (self.weights.len() <= 2).then(|| (self.first, [weight(0), weight(1)]))
-    }
 }
 
 /// Values under an upright map `to = scale * from + shift` (pixels, per axis), `width` x `height` pixels large.
@@ -28,31 +21,27 @@ pub fn resample(
 ) -> Grid<f32> {
     let rows = reaches(values.height(), height, scale, shift[1]);
     let columns = reaches(values.width(), width, scale, shift[0]);
-    // Where the map grows, a pixel reaches over two: without a loop that is much faster.
-    let pairs: Option<Vec<(usize, [f32; 2])>> = columns.iter().map(Reach::pair).collect();
-    let mut out = Grid::new(width, height, 0.0_f32);
-    // Longer than a row, so that a reach that begins at its end has a pixel and a right neighbour.
-    let mut line = vec![0.0_f32; values.width() + 2];
-    for (y, reach) in rows.iter().enumerate() {
-        line.fill(0.0);
-        for (k, weight) in reach.weights.iter().enumerate() {
-            for (sum, value) in line.iter_mut().zip(values.row(reach.first + k)) {
-                *sum += weight * value;
+    // Whole rows are summed side by side, so columns are turned into rows for their turn.
+    mixed(&mixed(values, &rows).transposed(), &columns).transposed()
+}
+
+/// Rows mixed from those that each reaches.
+fn mixed(values: &Grid<f32>, reaches: &[Reach]) -> Grid<f32> {
+    let width = values.width();
+    let mut out = Grid::new(width, reaches.len(), 0.0_f32);
+    let rows = out.data_mut().chunks_exact_mut(width.max(1)).zip(reaches);
+    widely(
+        #[inline(always)]
+        || {
+            for (row, reach) in rows {
+                for (k, weight) in reach.weights.iter().enumerate() {
+                    for (sum, value) in row.iter_mut().zip(values.row(reach.first + k)) {
+                        *sum += weight * value;
+                    }
+                }
             }
-        }
-        let row = &mut out.data_mut()[y * width..(y + 1) * width];
-        if let Some(pairs) = &pairs {
-            for (value, (first, [left, right])) in row.iter_mut().zip(pairs) {
-                let under = &line[*first..first + 2];
-                *value = under[0] * left + under[1] * right;
-            }
-            continue;
-        }
-        for (value, reach) in row.iter_mut().zip(&columns) {
-            let under = &line[reach.first..reach.first + reach.weights.len()];
-            *value = under.iter().zip(&reach.weights).map(|(v, w)| v * w).sum();
-        }
-    }
+        },
+    );
     out
 }
 

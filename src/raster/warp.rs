@@ -4,6 +4,7 @@
 
 use std::ops::Range;
 
+use super::extremes::Extremes;
 use super::{DepthMap, Grid, Mask};
 use crate::domain::Affine2;
 
@@ -11,34 +12,122 @@ use crate::domain::Affine2;
 const MAX_LOOKS: usize = 8;
 /// A look mixes the pixels around it, so looks this far apart in the source miss nothing between them.
 const APART_PX: f64 = 1.5;
-/// So many output pixels of a row are first asked for together whether what they see is all alike.
-const RUN: usize = 8;
+/// Side of the squares of output pixels that are first asked for together whether what they see is all alike; where it
+/// is not, their quarters are asked, down to the smallest.
+const LARGEST_PX: usize = 32;
+const SMALLEST_PX: usize = 2;
+/// Side of the squares of output pixels that are asked together whether all that they see holds data.
+const TOGETHER_PX: usize = 4;
 
 /// A mask in another frame: a pixel is set when at least half of its square is covered.
 ///
 /// `to_from` maps source pixels to output pixels. A map without inverse gives an empty mask.
 pub fn warp_mask(mask: &Mask, to_from: &Affine2, width: usize, height: usize) -> Mask {
-    let Some(from_to) = to_from.inverse() else {
-        return Mask::new(width, height, false);
+    let set = mask.map(|set| u8::from(*set));
+    let mut warped = warp_strokes(&set, &[1], to_from, width, height);
+    warped.swap_remove(0)
+}
+
+/// The masks of what reaches each of some levels, in another frame, as [`warp_mask`] brings them there: what they have
+/// in common is looked at once.
+pub(super) fn warp_strokes<T: Copy + Ord + Default>(
+    values: &Grid<T>,
+    levels: &[T],
+    to_from: &Affine2,
+    width: usize,
+    height: usize,
+) -> Vec<Mask> {
+    let mut masks = vec![Mask::new(width, height, false); levels.len()];
+    let Some(from_to) = to_from.inverse().filter(|_| !levels.is_empty()) else {
+        return masks;
     };
-    let looks = Looks::new(&from_to);
-    let bits = Bits::of(mask);
-    let look = |x, y| {
-        let set = |p| Some(coverage(mask, p));
-        looks.mean(x, y, set) >= Some(0.5)
+    let mut order: Vec<usize> = (0..levels.len()).collect();
+    order.sort_by_key(|k| levels[*k]);
+    let sorted: Vec<T> = order.iter().map(|k| levels[*k]).collect();
+    let mut warp = Warp {
+        looks: Looks::new(&from_to),
+        extremes: Extremes::of(values),
+        values,
+        levels: &sorted,
+        masks: vec![Mask::new(width, height, false); levels.len()],
+        covered: vec![0.0; levels.len()],
     };
-    let mut out = Mask::new(width, height, false);
-    for y in 0..height {
-        for first in (0..width).step_by(RUN) {
-            let run = first..(first + RUN).min(width);
-            let alike = bits.alike(looks.reach(&run, y));
-            for x in run {
-                let one = || bits.alike(looks.reach(&(x..x + 1), y));
-                out.set(x, y, alike.or_else(one).unwrap_or_else(|| look(x, y)));
+    for y in (0..height).step_by(LARGEST_PX) {
+        for x in (0..width).step_by(LARGEST_PX) {
+            warp.square(x, y, LARGEST_PX, 0..levels.len());
+        }
+    }
+    for (k, mask) in order.into_iter().zip(warp.masks) {
+        masks[k] = mask;
+    }
+    masks
+}
+
+/// Masks on their way into another frame.
+struct Warp<'a, T> {
+    looks: Looks,
+    extremes: Extremes<T>,
+    values: &'a Grid<T>,
+    /// The lowest first.
+    levels: &'a [T],
+    masks: Vec<Mask>,
+    /// How much of the pixel in hand each level covers.
+    covered: Vec<f64>,
+}
+
+impl<T: Copy + Ord + Default> Warp<'_, T> {
+    /// Settles a square of output pixels for those levels of which it is not known yet.
+    fn square(&mut self, x: usize, y: usize, side: usize, open: Range<usize>) {
+        let (width, height) = (self.masks[0].width(), self.masks[0].height());
+        let (columns, rows) = (x..(x + side).min(width), y..(y + side).min(height));
+        if columns.is_empty() || rows.is_empty() {
+            return;
+        }
+        let reach = self.looks.reach(&columns, &rows);
+        let [low, high] = self.extremes.within(reach, T::default());
+        let levels = &self.levels[open.clone()];
+        // All reach the levels up to the lowest of what is seen, none those above the highest.
+        let all = open.start + levels.partition_point(|level| *level <= low);
+        let some = open.start + levels.partition_point(|level| *level <= high);
+        for mask in &mut self.masks[open.start..all] {
+            for row in rows.clone() {
+                mask.data_mut()[row * width..][columns.clone()].fill(true);
+            }
+        }
+        if all == some {
+            return;
+        }
+        if side > SMALLEST_PX {
+            let half = side / 2;
+            for (x, y) in [(x, y), (x + half, y), (x, y + half), (x + half, y + half)] {
+                self.square(x, y, half, all..some);
+            }
+            return;
+        }
+        for row in rows {
+            for column in columns.clone() {
+                self.pixel(column, row, all..some);
             }
         }
     }
-    out
+
+    /// Settles one pixel, look by look.
+    fn pixel(&mut self, x: usize, y: usize, open: Range<usize>) {
+        let levels = &self.levels[open.clone()];
+        let covered = &mut self.covered[open.clone()];
+        covered.fill(0.0);
+        self.looks.each(x, y, |place| {
+            let (near, within) = look(self.values, place);
+            for (covered, level) in covered.iter_mut().zip(levels) {
+                let reach = near.map(|value| f64::from(u8::from(value >= *level)));
+                *covered += between(reach, within);
+            }
+        });
+        let count = self.looks.count() as f64;
+        for (mask, covered) in self.masks[open].iter_mut().zip(covered) {
+            mask.set(x, y, *covered / count >= 0.5);
+        }
+    }
 }
 
 /// Heights in another frame as levels of the same scale; 0 where less than half of a pixel's square holds data.
@@ -48,12 +137,31 @@ pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usi
     let Some(from_to) = to_from.inverse() else {
         return Grid::new(width, height, 0);
     };
-    let looks = Looks::new(&from_to);
-    Grid::from_fn(width, height, |x, y| {
-        looks
-            .mean(x, y, |p| level_at(&depth.levels, p))
-            .map_or(0, |level| level.round().clamp(1.0, 65535.0) as u16)
-    })
+    let levels = &depth.levels;
+    let (looks, extremes) = (Looks::new(&from_to), Extremes::of(levels));
+    let rounded = |level: f64| level.round().clamp(1.0, 65535.0) as u16;
+    let mut out = Grid::new(width, height, 0);
+    for top in (0..height).step_by(TOGETHER_PX) {
+        for left in (0..width).step_by(TOGETHER_PX) {
+            let columns = left..(left + TOGETHER_PX).min(width);
+            let rows = top..(top + TOGETHER_PX).min(height);
+            let [low, high] = extremes.within(looks.reach(&columns, &rows), 0);
+            if high == 0 {
+                continue;
+            }
+            for y in rows {
+                for x in columns.clone() {
+                    let mean = if low > 0 {
+                        Some(looks.mean_inside(x, y, levels))
+                    } else {
+                        looks.mean(x, y, |p| level_at(levels, p))
+                    };
+                    out.set(x, y, mean.map_or(0, rounded));
+                }
+            }
+        }
+    }
+    out
 }
 
 /// Where an output pixel looks in the source.
@@ -80,100 +188,66 @@ impl Looks {
         }
     }
 
-    /// Mean of what the looks find; `None` when half of them or more find nothing.
-    fn mean(&self, x: usize, y: usize, value: impl Fn([f64; 2]) -> Option<f64>) -> Option<f64> {
-        let n = self.per_side;
-        let offsets = &self.offsets[..n];
-        let (mut sum, mut found) = (0.0, 0_usize);
+    /// Calls `look` with where they fall for an output pixel, row by row, source pixels.
+    #[inline(always)]
+    fn each(&self, x: usize, y: usize, mut look: impl FnMut([f64; 2])) {
+        let offsets = &self.offsets[..self.per_side];
         for down in offsets {
             for across in offsets {
-                let p = [x as f64 + across, y as f64 + down];
-                if let Some(v) = value(self.from_to.apply(p)) {
-                    sum += v;
-                    found += 1;
-                }
+                look(self.from_to.apply([x as f64 + across, y as f64 + down]));
             }
         }
-        (2 * found > n * n || (n == 1 && found == 1)).then(|| sum / found as f64)
     }
 
-    /// Source pixels that the looks of a run may touch: first and last column and row, rather more than less.
-    fn reach(&self, run: &Range<usize>, y: usize) -> [[i64; 2]; 2] {
+    fn count(&self) -> usize {
+        self.per_side * self.per_side
+    }
+
+    /// Mean of what the looks find; `None` when half of them or more find nothing.
+    fn mean(&self, x: usize, y: usize, value: impl Fn([f64; 2]) -> Option<f64>) -> Option<f64> {
+        let (mut sum, mut found) = (0.0, 0_usize);
+        self.each(x, y, |place| {
+            if let Some(v) = value(place) {
+                sum += v;
+                found += 1;
+            }
+        });
+        let count = self.count();
+        (2 * found > count || (count == 1 && found == 1)).then(|| sum / found as f64)
+    }
+
+    /// Mean level where all pixels around the looks are within the grid and hold data.
+    fn mean_inside(&self, x: usize, y: usize, levels: &Grid<u16>) -> f64 {
+        let mut sum = 0.0;
+        self.each(x, y, |[x, y]| {
+            // Not below zero, so a cast rounds down.
+            let (column, row) = (x as i32, y as i32);
+            let (fx, fy) = (x - f64::from(column), y - f64::from(row));
+            let from = row as usize * levels.width() + column as usize;
+            let near = &levels.data()[from..from + levels.width() + 2];
+            let [a, b] = [near[0], near[1]].map(f64::from);
+            let [c, d] = [near[levels.width()], near[levels.width() + 1]].map(f64::from);
+            let (above, below) = (a + (b - a) * fx, c + (d - c) * fx);
+            sum += above + (below - above) * fy;
+        });
+        sum / self.count() as f64
+    }
+
+    /// Source pixels that the looks of a box of output pixels may touch: first and last column and row, rather more than
+    /// less.
+    fn reach(&self, columns: &Range<usize>, rows: &Range<usize>) -> [[i64; 2]; 2] {
         const SLACK: f64 = 1e-6;
-        let first = self.from_to.apply([run.start as f64, y as f64]);
-        let last = self.from_to.apply([run.end as f64 - 1.0, y as f64]);
+        let ends = |range: &Range<usize>| [range.start as f64, range.end as f64 - 1.0];
+        let ([left, right], [top, bottom]) = (ends(columns), ends(rows));
+        let middle = [f64::midpoint(left, right), f64::midpoint(top, bottom)];
+        let middle = self.from_to.apply(middle);
+        let [across, down] = [(right - left) / 2.0, (bottom - top) / 2.0];
         [0, 1].map(|k| {
-            let reach = self.spread[k] + SLACK;
-            let (low, high) = (first[k].min(last[k]), first[k].max(last[k]));
-            [floor(low - reach), floor(high + reach) + 1]
+            let [a, b, _] = self.from_to.0[k].map(f64::abs);
+            let reach = a * across + b * down + self.spread[k] + SLACK;
+            [floor(middle[k] - reach), floor(middle[k] + reach) + 1]
         })
     }
-}
-
-/// A mask with 64 pixels of a row in a word, to ask for many of them at a time.
-struct Bits {
-    words: Vec<u64>,
-    per_row: usize,
-    width: usize,
-    height: usize,
-}
-
-impl Bits {
-    fn of(mask: &Mask) -> Self {
-        let (width, height) = (mask.width(), mask.height());
-        let rows = (0..height).map(|y| mask.row(y));
-        Self {
-            words: rows.flat_map(|row| row.chunks(64).map(word)).collect(),
-            per_row: width.div_ceil(64),
-            width,
-            height,
-        }
-    }
-
-    /// What all pixels of a box are, if they are all alike; what is outside the mask is not set.
-    fn alike(&self, [[x0, x1], [y0, y1]]: [[i64; 2]; 2]) -> Option<bool> {
-        let cut = |low: i64, high: i64, side: usize| {
-            let side = side as i64;
-            low.clamp(0, side) as usize..(high + 1).clamp(0, side) as usize
-        };
-        let (columns, rows) = (cut(x0, x1, self.width), cut(y0, y1, self.height));
-        if columns.is_empty() || rows.is_empty() {
-            return Some(false);
-        }
-        let area = (x1 - x0 + 1) * (y1 - y0 + 1);
-        let is_cut = area != (columns.len() * rows.len()) as i64;
-        let words = columns.start / 64..(columns.end - 1) / 64 + 1;
-        let (mut set, mut clear) = (0, 0);
-        for place in words {
-            let within =
-                columns.start.saturating_sub(place * 64)..(columns.end - place * 64).min(64);
-            let wanted = (u64::MAX >> (64 - within.len())) << within.start;
-            for row in rows.clone() {
-                let word = self.words[row * self.per_row + place];
-                set |= word & wanted;
-                clear |= !word & wanted;
-            }
-        }
-        match (set, clear) {
-            (0, _) => Some(false),
-            (_, 0) if !is_cut => Some(true),
-            _ => None,
-        }
-    }
-}
-
-/// Up to 64 pixels of a row, the first one lowest.
-fn word(pixels: &[bool]) -> u64 {
-    // One in each byte times this gives the bytes' lowest bits side by side in the highest byte.
-    const GATHER: u64 = 0x0102_0408_1020_4080;
-    let eights = pixels.chunks(8).enumerate();
-    eights.fold(0, |word, (k, eight)| {
-        let mut bytes = [0; 8];
-        for (byte, set) in bytes.iter_mut().zip(eight) {
-            *byte = u8::from(*set);
-        }
-        word | (u64::from_le_bytes(bytes).wrapping_mul(GATHER) >> 56) << (8 * k)
-    })
 }
 
 /// The whole number below; a plain cast and a comparison, where `f64::floor` would be a call.
@@ -182,11 +256,17 @@ fn floor(value: f64) -> i64 {
     cut - i64::from(cut as f64 > value)
 }
 
-/// Bilinear coverage at a point; pixels outside the mask are not set.
-fn coverage(mask: &Mask, [x, y]: [f64; 2]) -> f64 {
+/// The four pixels around a place, and where between them it lies; outside the grid there is the least of values.
+#[inline(always)]
+fn look<T: Copy + Default>(values: &Grid<T>, [x, y]: [f64; 2]) -> ([T; 4], [f64; 2]) {
     let (x0, y0) = (floor(x), floor(y));
-    let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-    let near = neighbours(mask, x0, y0, false).map(|set| f64::from(u8::from(set)));
+    let near = neighbours(values, x0, y0, T::default());
+    (near, [x - x0 as f64, y - y0 as f64])
+}
+
+/// Bilinear value between a pixel, the next in its row and the two below.
+#[inline(always)]
+fn between(near: [f64; 4], [fx, fy]: [f64; 2]) -> f64 {
     (near[0] * (1.0 - fx) + near[1] * fx) * (1.0 - fy) + (near[2] * (1.0 - fx) + near[3] * fx) * fy
 }
 
@@ -212,7 +292,7 @@ fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
 }
 
 /// A pixel and those to its right and below, row after row; `outside` where there are none.
-#[inline]
+#[inline(always)]
 fn neighbours<T: Copy>(grid: &Grid<T>, x: i64, y: i64, outside: T) -> [T; 4] {
     let width = grid.width();
     let inside = |i: i64, side: usize| i >= 0 && i + 1 < side as i64;
@@ -226,9 +306,9 @@ fn neighbours<T: Copy>(grid: &Grid<T>, x: i64, y: i64, outside: T) -> [T; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Looks, coverage, warp_mask};
+    use super::{Looks, between, look, warp_mask, warp_strokes};
     use crate::domain::Affine2;
-    use crate::raster::Mask;
+    use crate::raster::{Grid, Mask};
 
     fn blob() -> Mask {
         Mask::from_fn(40, 30, |x, y| {
@@ -270,15 +350,26 @@ mod tests {
 
     #[test]
     fn what_is_alike_all_over_equals_look_by_look() {
-        let mask = Mask::from_fn(90, 70, |x, y| (x / 9 + y / 14) % 2 == 0 || x * y % 31 == 0);
+        let levels = Grid::from_fn(90, 70, |x, y| {
+            ((x / 9 + y / 14) % 4 * 1000 + x * y % 31) as u16
+        });
+        let chosen = [2010, 1, 1030, 3000, 1];
         for (scale, angle) in [(0.3, 0.4), (0.8, 2.0), (1.7, -1.0)] {
             let map = Affine2::similarity(scale, angle, [20.0, 9.0]);
             let looks = Looks::new(&map.inverse().expect("a similarity has an inverse"));
-            let plain = Mask::from_fn(50, 60, |x, y| {
-                let set = |p| Some(coverage(&mask, p));
-                looks.mean(x, y, set) >= Some(0.5)
-            });
-            assert_eq!(warp_mask(&mask, &map, 50, 60), plain);
+            let warped = warp_strokes(&levels, &chosen, &map, 50, 60);
+            for (level, warped) in chosen.into_iter().zip(warped) {
+                let mask = levels.map(|l| *l >= level);
+                let plain = Mask::from_fn(50, 60, |x, y| {
+                    let set = |p| {
+                        let (near, within) = look(&mask, p);
+                        Some(between(near.map(|set| f64::from(u8::from(set))), within))
+                    };
+                    looks.mean(x, y, set) >= Some(0.5)
+                });
+                assert_eq!(warped, plain);
+                assert_eq!(warp_mask(&mask, &map, 50, 60), plain);
+            }
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Gaussian smoothing of values, by three box means (the classic approximation), zero beyond the rim.
 
 use crate::raster::Grid;
+use crate::wide::widely;
 
 /// Values smoothed with a gaussian of `sigma` pixels; unchanged when `sigma` is below half a pixel.
 ///
@@ -15,7 +16,7 @@ pub(super) fn blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
     let whole = |pass: u32| (half * f64::from(pass)).round() as usize;
     let radii = [0, 1, 2].map(|pass| whole(pass + 1) - whole(pass));
     // Columns are summed side by side, so rows are turned into columns for their turn.
-    transposed(&down(transposed(&down(values.clone(), radii)), radii))
+    down(down(values.clone(), radii).transposed(), radii).transposed()
 }
 
 /// Box means down the columns, one after the other.
@@ -32,46 +33,32 @@ fn box_columns(values: &Grid<f32>, radius: usize, means: &mut Grid<f32>) {
     let (width, height) = (values.width(), values.height());
     let mut sums = vec![0.0_f32; width];
     let scale = 1.0 / (2 * radius + 1) as f32;
-    for y in 0..height + radius {
-        if y < height {
-            add(&mut sums, values.row(y), 1.0);
-        }
-        if y > 2 * radius {
-            add(&mut sums, values.row(y - 2 * radius - 1), -1.0);
-        }
-        if y >= radius {
-            let row = &mut means.data_mut()[(y - radius) * width..(y - radius + 1) * width];
-            for (out, sum) in row.iter_mut().zip(&sums) {
-                *out = sum * scale;
+    widely(
+        #[inline(always)]
+        || {
+            for y in 0..height + radius {
+                if y < height {
+                    add(&mut sums, values.row(y), 1.0);
+                }
+                if y > 2 * radius {
+                    add(&mut sums, values.row(y - 2 * radius - 1), -1.0);
+                }
+                if y >= radius {
+                    let row = &mut means.data_mut()[(y - radius) * width..][..width];
+                    for (out, sum) in row.iter_mut().zip(&sums) {
+                        *out = sum * scale;
+                    }
+                }
             }
-        }
-    }
+        },
+    );
 }
 
+#[inline(always)]
 fn add(sums: &mut [f32], row: &[f32], sign: f32) {
     for (sum, value) in sums.iter_mut().zip(row) {
         *sum += sign * value;
     }
-}
-
-/// Side of the squares that are turned over one by one, so that rows of either side stay at hand.
-const TILE: usize = 16;
-
-fn transposed(values: &Grid<f32>) -> Grid<f32> {
-    let (width, height) = (values.width(), values.height());
-    let mut out = Grid::new(height, width, 0.0);
-    let to = out.data_mut();
-    for top in (0..height).step_by(TILE) {
-        for left in (0..width).step_by(TILE) {
-            for y in top..(top + TILE).min(height) {
-                let from = &values.row(y)[left..(left + TILE).min(width)];
-                for (x, value) in from.iter().enumerate() {
-                    to[(left + x) * height + y] = *value;
-                }
-            }
-        }
-    }
-    out
 }
 
 #[cfg(test)]

@@ -13,52 +13,15 @@ use crate::raster::{Mask, PixelBox};
 pub fn measure(print: &WindowMeans, depth: &Mask) -> Scores {
     let structure = print.against(depth);
     let print = print.mask();
-    let overlap = Overlap::of(print, depth);
+    let overlap = print.overlap(depth);
     Scores {
         ssim: structure.ssim,
         nl_ssim: structure.nl_ssim,
-        iou: overlap.iou(),
+        iou: overlap.iou,
         iou_box: box_iou(print.bounding_box(), depth.bounding_box()),
-        dice: overlap.dice(),
+        dice: overlap.dice,
         density_print: print.density(),
         density_depth: depth.density(),
-    }
-}
-
-/// How many pixels two masks set together and apart.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Overlap {
-    /// Set in both.
-    pub both: usize,
-    /// Set in the first.
-    pub first: usize,
-    /// Set in the second.
-    pub second: usize,
-}
-
-impl Overlap {
-    /// Counts two masks of one size.
-    pub fn of(a: &Mask, b: &Mask) -> Self {
-        Self {
-            both: a
-                .data()
-                .iter()
-                .zip(b.data())
-                .filter(|(p, q)| **p && **q)
-                .count(),
-            first: a.count(),
-            second: b.count(),
-        }
-    }
-
-    /// Intersection over union; 0 for two empty masks, which agree on nothing.
-    pub fn iou(self) -> f64 {
-        ratio(self.both, self.first + self.second - self.both)
-    }
-
-    /// Dice coefficient: twice the intersection over the sum; 0 for two empty masks.
-    pub fn dice(self) -> f64 {
-        ratio(2 * self.both, self.first + self.second)
     }
 }
 
@@ -85,7 +48,7 @@ fn box_iou(a: Option<PixelBox>, b: Option<PixelBox>) -> f64 {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Overlap, SsimWindow, WindowMeans, box_iou, measure};
+    use super::{SsimWindow, WindowMeans, box_iou, measure};
     use crate::raster::Mask;
 
     fn masks() -> impl Strategy<Value = (Mask, Mask)> {
@@ -98,14 +61,6 @@ mod tests {
     }
 
     proptest! {
-        #[test]
-        fn dice_follows_from_iou((a, b) in masks()) {
-            let overlap = Overlap::of(&a, &b);
-            let j = overlap.iou();
-            prop_assert!((overlap.dice() - 2.0 * j / (1.0 + j)).abs() < 1e-12);
-            prop_assert!((0.0..=1.0).contains(&j));
-        }
-
         #[test]
         fn scores_do_not_care_which_mask_is_first((a, b) in masks()) {
             let means = |mask| WindowMeans::new(mask, SsimWindow::Gaussian);

@@ -3,6 +3,7 @@
 mod block;
 mod boxes;
 mod moments;
+mod small;
 mod triangle;
 mod view;
 mod winding;
@@ -12,6 +13,7 @@ use crate::domain::Rigid3;
 use crate::large::Large;
 use crate::mesh::Mesh;
 use crate::raster::Grid;
+use crate::wide::widely;
 
 use block::{Block, LANES, Lanes, Row, block, fill_block, holding};
 use boxes::Boxes;
@@ -54,18 +56,27 @@ impl Shell {
         } else {
             &mesh.triangles
         };
-        let blocks: Large<Block> = triangles
-            .chunks(LANES)
-            .map(|few| block(few, &mesh.vertices, middle))
-            .collect();
         let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
         let extent = sides.into_iter().fold(0.0, f64::max) as f32;
-        let boxes = blocks.chunks(LANES);
+        let mut blocks = Large::with_capacity(triangles.len().div_ceil(LANES));
+        let mut boxes = Vec::with_capacity(triangles.len().div_ceil(LANES * LANES));
+        widely(
+            #[inline(always)]
+            || {
+                for group in triangles.chunks(LANES * LANES) {
+                    let first = blocks.len();
+                    for few in group.chunks(LANES) {
+                        blocks.push(block(few, &mesh.vertices, middle));
+                    }
+                    boxes.push(Boxes::around(&blocks[first..], extent));
+                }
+            },
+        );
         Self {
             middle,
             room,
             count: triangles.len(),
-            boxes: boxes.map(|few| Boxes::around(few, extent)).collect(),
+            boxes,
             blocks,
             has_faces: !mesh.triangles.is_empty(),
         }
@@ -103,32 +114,42 @@ impl Shell {
             take(&mut bulk, &self.blocks[place]);
         }
         let [mut low, mut high] = bulk.taken();
-        for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
-            let [lows, highs] = boxes.reach(row);
-            for (k, block) in blocks.iter().enumerate() {
-                if lows[k] < low || highs[k] > high {
-                    take(&mut bulk, block);
-                    [low, high] = bulk.taken();
+        widely(
+            #[inline(always)]
+            || {
+                for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
+                    let [lows, highs] = boxes.reach(row);
+                    for (k, block) in blocks.iter().enumerate() {
+                        if lows[k] < low || highs[k] > high {
+                            take(&mut bulk, block);
+                            [low, high] = bulk.taken();
+                        }
+                    }
                 }
-            }
-        }
+            },
+        );
         [low, high].map(f64::from)
     }
 
     /// The blocks whose boxes reach farthest down and up, those that reach out of the bulk left out.
     fn farthest(&self, row: &Row, bulk: &Bulk) -> [usize; 2] {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
-        for (group, boxes) in self.boxes.iter().enumerate() {
-            let [lows, highs] = boxes.reach(row);
-            for k in 0..LANES {
-                if lows[k] < low && bulk.holds(lows[k]) {
-                    (low, places[0]) = (lows[k], group * LANES + k);
+        widely(
+            #[inline(always)]
+            || {
+                for (group, boxes) in self.boxes.iter().enumerate() {
+                    let [lows, highs] = boxes.reach(row);
+                    for k in 0..LANES {
+                        if lows[k] < low && bulk.holds(lows[k]) {
+                            (low, places[0]) = (lows[k], group * LANES + k);
+                        }
+                        if highs[k] > high && bulk.holds(highs[k]) {
+                            (high, places[1]) = (highs[k], group * LANES + k);
+                        }
+                    }
                 }
-                if highs[k] > high && bulk.holds(highs[k]) {
-                    (high, places[1]) = (highs[k], group * LANES + k);
-                }
-            }
-        }
+            },
+        );
         places.map(|place| place.min(self.blocks.len() - 1))
     }
 
@@ -178,15 +199,20 @@ impl Shell {
     /// Fills the triangles that hold a pixel's centre.
     fn fill_all(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
         let [u, v, _] = rows;
-        for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
-            let [across, down] = [u, v].map(|row| boxes.reach(row));
-            let held = holding([&across, &down], size);
-            for (block, held) in blocks.iter().zip(held) {
-                if held {
-                    fill_block(block, rows, size, &mut meet);
+        widely(
+            #[inline(always)]
+            || {
+                for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
+                    let (across, down) = (boxes.reach(u), boxes.reach(v));
+                    let held = holding([&across, &down], size);
+                    for (block, held) in blocks.iter().zip(held) {
+                        if held {
+                            fill_block(block, rows, size, &mut meet);
+                        }
+                    }
                 }
-            }
-        }
+            },
+        );
     }
 
     /// Each point as a small square.

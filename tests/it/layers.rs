@@ -12,6 +12,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("indicatif", &["cli"]),
     ("anyhow", &["cli"]),
     ("toml", &["cli", "config"]),
+    ("pulp", &["wide"]),
     ("nalgebra", &["stages", "demo", "mesh", "raster", "report"]),
 ];
 

@@ -3,8 +3,8 @@
 //! Tops of strokes are the original face of the block: much lies below them, nothing above. So a point above the
 //! surface costs much, one far below it nothing at all.
 
-use nalgebra::{Matrix6, Vector6};
-
+use super::points::{Belief, Coefficients, OPEN, Points, value};
+use crate::domain::Rigid3;
 use crate::raster::{Grid, Mask};
 use crate::stages::components::Components;
 use crate::stages::pose::Soft;
@@ -19,8 +19,12 @@ const WINDOWS: [f64; 5] = [0.35, 0.22, 0.14, 0.10, 0.08];
 /// Passes of the first kind, and of each window.
 const ENVELOPE_PASSES: usize = 8;
 const NARROW_PASSES: usize = 2;
+/// So many of the windows are wide: few points are enough.
+const AFAR: usize = 3;
 /// Tops this close to the cut, in pixels of the rendering, run into it.
 const CUT_PX: i64 = 2;
+/// Weight of a point that is no top of the character's.
+const HARDLY: f64 = 1e-6;
 /// Without the tops at the cut at least this share of all must be left.
 const LEAST_OWN: f64 = 0.4;
 /// Margin of the view, a share of each side, that the depth of the carving is not read from.
@@ -50,7 +54,11 @@ const BOW_GAIN: f64 = 1.04;
 /// Heights of a view as points, scaled by the extent: u, v in about -0.5..0.5.
 #[derive(Debug)]
 pub(super) struct Samples {
-    points: Vec<[f64; 3]>,
+    points: Points,
+    /// Those of every other row and column: enough to come near the surface.
+    few: Points,
+    /// The plane through the middle of all heights.
+    mean_plane: Coefficients,
     /// Where each point lies in the rendering, and the rendering's size.
     places: Vec<usize>,
     size: [usize; 2],
@@ -62,7 +70,7 @@ pub(super) struct Samples {
 /// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in scaled units, and how well it holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Surface {
-    coefficients: [f64; 6],
+    coefficients: Coefficients,
     /// Share of the seen area that supports it, less what stands above it.
     pub(super) support: f64,
     /// Share of the seen area within the last window.
@@ -80,12 +88,13 @@ impl Samples {
             (heights.width() - 1) as f64 / 2.0,
             (heights.height() - 1) as f64 / 2.0,
         ]);
-        let (mut points, mut places) = (Vec::new(), Vec::new());
-        for y in 0..heights.height() {
+        let size = [heights.width(), heights.height()];
+        let (mut points, mut places) = (Points::default(), Vec::new());
+        for y in 0..size[1] {
             for (x, z) in heights.row(y).iter().enumerate() {
                 if *z != NOTHING {
                     let [u, v] = back.apply([x as f64, y as f64]);
-                    places.push(y * heights.width() + x);
+                    places.push(y * size[0] + x);
                     points.push([
                         (u - centre[0]) / extent,
                         (v - centre[1]) / extent,
@@ -94,52 +103,76 @@ impl Samples {
                 }
             }
         }
-        (points.len() >= 16).then(|| {
-            let mut samples = Self {
-                points,
-                places,
-                size: [heights.width(), heights.height()],
-                centre,
-                extent,
-                range: 0.0,
-            };
-            samples.range = samples.height_range();
-            samples
-        })
+        (points.len() >= 16).then(|| Self::of(points, places, size, centre, extent))
     }
 
-    /// Nearly all of the heights over their mean plane, in units of the extent.
-    fn height_range(&self) -> f64 {
-        let plane = self.mean_plane();
-        let mut residuals: Vec<f64> = self
-            .points
-            .iter()
-            .map(|p| p[2] - value(&plane, p))
-            .collect();
-        (quantile(&mut residuals, 0.97) - quantile(&mut residuals, 0.03)).max(1e-9)
+    fn of(
+        points: Points,
+        places: Vec<usize>,
+        size: [usize; 2],
+        centre: [f64; 2],
+        extent: f64,
+    ) -> Self {
+        let mut few = Points::default();
+        for (point, place) in points.iter().zip(&places) {
+            if (place % size[0]).is_multiple_of(2) && (place / size[0]).is_multiple_of(2) {
+                few.push(point);
+            }
+        }
+        let mean_plane = points.solve::<3>(&[0.0; 6], |_| 1.0, &OPEN);
+        Self {
+            range: height_range(points.residuals(&mean_plane)),
+            points,
+            few,
+            mean_plane,
+            places,
+            size,
+            centre,
+            extent,
+        }
     }
 
-    fn mean_plane(&self) -> [f64; 6] {
-        solve::<3>(self.points.iter().map(|p| (*p, 1.0)), None)
+    /// The same points in another frame that leans little from this one.
+    pub(super) fn turned(&self, other_from_this: &Rigid3) -> Self {
+        let at = |[u, v, z]: [f64; 3]| {
+            let [x, y] = [
+                self.centre[0] + u * self.extent,
+                self.centre[1] + v * self.extent,
+            ];
+            other_from_this.apply([x, y, z * self.extent])
+        };
+        let [x, y, _] = at([0.0; 3]);
+        let mut points = Points::default();
+        for point in self.points.iter() {
+            let there = at(point);
+            points.push([
+                (there[0] - x) / self.extent,
+                (there[1] - y) / self.extent,
+                there[2] / self.extent,
+            ]);
+        }
+        Self::of(points, self.places.clone(), self.size, [x, y], self.extent)
     }
 
     /// The surface over the tops; second-degree only when allowed and earned.
     pub(super) fn fit(&self, allow_bow: bool) -> Surface {
-        let ground = self.mean_plane();
+        let ground = self.mean_plane;
         let envelope = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
+        let beliefs = self.beliefs(ground, BOW_SIGMA);
+        let (few, few_beliefs) = self.seen_from_afar(&beliefs);
         let mut start = ground;
         for _ in 0..ENVELOPE_PASSES {
-            start = solve::<3>(self.weighed(&start, envelope), Some(self.prior(ground)));
+            start = few.solve::<3>(&start, envelope, &few_beliefs);
         }
-        let plane = self.narrow::<3>(start, self.prior(ground));
+        let plane = self.narrow::<3>(start, &beliefs);
         if !allow_bow {
             return plane;
         }
-        let free = self.narrow::<6>(start, self.prior(ground));
+        let free = self.narrow::<6>(start, &beliefs);
         let sparse = free.support < SPARSE;
-        let prior = sparse.then(|| self.prior_along_ground(ground)).flatten();
-        let bent = prior
-            .map(|prior| self.narrow::<6>(start, prior))
+        let along = sparse.then(|| self.beliefs_along_ground()).flatten();
+        let bent = along
+            .map(|beliefs| self.narrow::<6>(start, &beliefs))
             .filter(|along| along.support > free.support)
             .unwrap_or(free);
         if bent.support > plane.support * BOW_GAIN {
@@ -150,23 +183,37 @@ impl Samples {
     }
 
     /// Passes with a shrinking window below the surface.
-    fn narrow<const TERMS: usize>(&self, start: [f64; 6], prior: Prior) -> Surface {
+    fn narrow<const TERMS: usize>(&self, start: Coefficients, beliefs: &[Belief; 6]) -> Surface {
+        let few = self.seen_from_afar(beliefs);
         let mut c = start;
-        for window in WINDOWS.map(|w| w * self.range) {
+        for (k, window) in WINDOWS.map(|w| w * self.range).into_iter().enumerate() {
+            let weight = |r| one_sided_weight(r, window);
             for _ in 0..NARROW_PASSES {
-                let points = self.weighed(&c, |r| one_sided_weight(r, window));
-                c = solve::<TERMS>(points, Some(prior));
+                c = if k < AFAR {
+                    few.0.solve::<TERMS>(&c, weight, &few.1)
+                } else {
+                    self.points.solve::<TERMS>(&c, weight, beliefs)
+                };
             }
         }
         self.judge(c)
     }
 
+    /// The few points with beliefs that weigh as much beside them as those given do beside all.
+    fn seen_from_afar(&self, beliefs: &[Belief; 6]) -> (&Points, [Belief; 6]) {
+        let share = self.few.len() as f64 / self.points.len() as f64;
+        let lighter = |belief: Belief| Belief {
+            precision: belief.precision * share,
+            ..belief
+        };
+        (&self.few, beliefs.map(lighter))
+    }
+
     /// How well a surface holds at the narrowest window.
-    fn judge(&self, coefficients: [f64; 6]) -> Surface {
+    fn judge(&self, coefficients: Coefficients) -> Surface {
         let w = WINDOWS[WINDOWS.len() - 1] * self.range;
         let (mut support, mut tops, mut squares) = (0.0, 0.0, 0.0);
-        for p in &self.points {
-            let r = p[2] - value(&coefficients, p);
+        for r in self.points.residuals(&coefficients) {
             if r.abs() < w {
                 support += 1.0 - (r / w).powi(2);
                 tops += 1.0;
@@ -188,61 +235,52 @@ impl Samples {
         }
     }
 
-    /// Points with the weight that their residual over a surface earns.
-    fn weighed<'a>(
-        &'a self,
-        c: &'a [f64; 6],
-        weight: impl Fn(f64) -> f64 + 'a,
-    ) -> impl Iterator<Item = ([f64; 3], f64)> + 'a {
-        self.points
-            .iter()
-            .map(move |p| (*p, weight(p[2] - value(c, p))))
-    }
-
-    /// The prior: tilt near the ground's, little bow.
-    fn prior(&self, ground: [f64; 6]) -> Prior {
-        Prior {
-            mean: ground,
-            bow_sigma: BOW_SIGMA,
-            noise: CORRELATED_PX * (TOP_SIGMA * self.range).powi(2),
-        }
+    /// What the coefficients are taken to be where the tops say little: tilted and bent as `mean` is, the second degree
+    /// within `bow_sigma`.
+    fn beliefs(&self, mean: Coefficients, bow_sigma: f64) -> [Belief; 6] {
+        let noise = CORRELATED_PX * (TOP_SIGMA * self.range).powi(2);
+        std::array::from_fn(|k| {
+            let sigma = if k < 3 { TILT_SIGMA } else { bow_sigma };
+            let precision = if k == 0 { 0.0 } else { noise / (sigma * sigma) };
+            Belief {
+                mean: mean[k],
+                precision,
+            }
+        })
     }
 
     /// The same where much of the ground is seen: a block bends as a whole, so the tops bend as the ground does. Few
     /// strokes would bend the surface as they like.
-    fn prior_along_ground(&self, mean_plane: [f64; 6]) -> Option<Prior> {
-        let [a, b, c, ..] = mean_plane;
-        let [_, _, _, bow @ ..] = self.ground(mean_plane)?;
-        Some(Prior {
-            mean: [a, b, c, bow[0], bow[1], bow[2]],
-            bow_sigma: GROUND_BOW_SIGMA,
-            ..self.prior(mean_plane)
-        })
+    fn beliefs_along_ground(&self) -> Option<[Belief; 6]> {
+        let [a, b, c, ..] = self.mean_plane;
+        let [_, _, _, p, q, r] = self.ground()?;
+        Some(self.beliefs([a, b, c, p, q, r], GROUND_BOW_SIGMA))
     }
 
     /// The second-degree surface of the carved ground, where enough of it is seen.
-    fn ground(&self, mean_plane: [f64; 6]) -> Option<[f64; 6]> {
-        let mut c = mean_plane;
-        let mut residuals: Vec<f64> = self.points.iter().map(|p| p[2] - value(&c, p)).collect();
-        c[0] += quantile(&mut residuals, GROUND_START);
+    fn ground(&self) -> Option<Coefficients> {
+        let mut c = self.mean_plane;
+        c[0] += quantile(&mut self.points.residuals(&c), GROUND_START);
+        let beliefs = self.beliefs(self.mean_plane, BOW_SIGMA);
         for window in GROUND_WINDOWS.map(|w| w * self.range) {
             for _ in 0..NARROW_PASSES {
-                let weight = |r: f64| (1.0 - (r / window).powi(2)).max(0.0).powi(2);
-                c = solve::<6>(self.weighed(&c, weight), Some(self.prior(mean_plane)));
+                let weight = |r| smooth_weight(r, window);
+                c = self.points.solve::<6>(&c, weight, &beliefs);
             }
         }
         let window = GROUND_WINDOWS[GROUND_WINDOWS.len() - 1] * self.range;
-        let near = |p: &&[f64; 3]| (p[2] - value(&c, p)).abs() < window;
-        let share = self.points.iter().filter(near).count() as f64 / self.points.len() as f64;
-        (share > LEAST_GROUND).then_some(c)
+        let residuals = self.points.residuals(&c);
+        let near = residuals.iter().filter(|r| r.abs() < window).count();
+        (near as f64 / residuals.len() as f64 > LEAST_GROUND).then_some(c)
     }
 
     /// Residual of every seen pixel over a surface, mesh units.
     pub(super) fn residuals(&self, surface: &Surface) -> Vec<f64> {
-        self.points
-            .iter()
-            .map(|p| (p[2] - value(&surface.coefficients, p)) * self.extent)
-            .collect()
+        let mut residuals = self.points.residuals(&surface.coefficients);
+        for r in &mut residuals {
+            *r *= self.extent;
+        }
+        residuals
     }
 
     /// The same without a margin of the view: side walls, and a foot that juts out, are neither tops nor ground.
@@ -281,27 +319,41 @@ impl Samples {
     /// Tops that run into the cut belong to neighbours: they tell the surface, but not where on it the character is.
     pub(super) fn plane_of_tops(&self, surface: &Surface) -> [f64; 3] {
         let c = surface.coefficients;
-        let own = self.own_tops(&c);
-        let on_surface = self.points.iter().zip(&self.places).map(|(p, place)| {
-            let weight = if own.data()[*place] { 1.0 } else { 1e-6 };
-            ([p[0], p[1], value(&c, p)], weight)
-        });
-        let plane = solve::<3>(on_surface, None);
+        let is_bent = c[3..].iter().any(|c| *c != 0.0);
+        let plane = if is_bent { self.plane_in(&c) } else { c };
         let (b, c) = (plane[1], plane[2]);
         let a = plane[0] * self.extent - b * self.centre[0] - c * self.centre[1];
         [a, b, c]
     }
 
+    /// The plane that lies best in a bent surface where the tops of the character are; where all else lies hardly
+    /// counts.
+    fn plane_in(&self, c: &Coefficients) -> Coefficients {
+        let own = self.own_tops(c);
+        let (mut all, mut tops) = (Points::default(), Points::default());
+        for ([u, v, _], place) in self.points.iter().zip(&self.places) {
+            let on_surface = [u, v, value(c, [u, v])];
+            all.push(on_surface);
+            if own.data()[*place] {
+                tops.push(on_surface);
+            }
+        }
+        let plane_of = |points: &Points, beliefs| points.solve::<3>(&[0.0; 6], |_| 1.0, beliefs);
+        let precision = HARDLY * all.len() as f64;
+        let beliefs = plane_of(&all, &OPEN).map(|mean| Belief { mean, precision });
+        plane_of(&tops, &beliefs)
+    }
+
     /// Where the tops of the character itself are; all tops where hardly any are left without those at the cut.
-    fn own_tops(&self, c: &[f64; 6]) -> Mask {
+    fn own_tops(&self, c: &Coefficients) -> Mask {
         let window = WINDOWS[WINDOWS.len() - 1] * self.range;
         let [width, height] = self.size;
         let (mut tops, mut unknown) = (
             Mask::new(width, height, false),
             Mask::new(width, height, true),
         );
-        for (p, place) in self.points.iter().zip(&self.places) {
-            tops.data_mut()[*place] = (p[2] - value(c, p)).abs() < window;
+        for (r, place) in self.points.residuals(c).into_iter().zip(&self.places) {
+            tops.data_mut()[*place] = r.abs() < window;
             unknown.data_mut()[*place] = false;
         }
         let cut_off = Components::of(&tops).near(&unknown, CUT_PX);
@@ -331,53 +383,9 @@ impl Samples {
     }
 }
 
-/// What a surface is taken to be where the tops say little.
-#[derive(Debug, Clone, Copy)]
-struct Prior {
-    mean: [f64; 6],
-    /// Of the second-degree coefficients.
-    bow_sigma: f64,
-    noise: f64,
-}
-
-/// Weighted least squares over the first `TERMS` (3 or 6) of the basis.
-fn solve<const TERMS: usize>(
-    points: impl Iterator<Item = ([f64; 3], f64)>,
-    prior: Option<Prior>,
-) -> [f64; 6] {
-    let mut sums = [[0.0_f64; TERMS]; TERMS];
-    let mut right = [0.0_f64; TERMS];
-    for (p, w) in points.filter(|(_, w)| *w > 0.0) {
-        let basis = basis(&p);
-        for i in 0..TERMS {
-            let weighed = w * basis[i];
-            right[i] += weighed * p[2];
-            for j in 0..=i {
-                sums[i][j] += weighed * basis[j];
-            }
-        }
-    }
-    if let Some(prior) = prior {
-        for k in 1..TERMS {
-            let sigma = if k < 3 { TILT_SIGMA } else { prior.bow_sigma };
-            let precision = prior.noise / (sigma * sigma);
-            sums[k][k] += precision;
-            right[k] += precision * prior.mean[k];
-        }
-    }
-    let mut normal = Matrix6::<f64>::identity();
-    let mut side = Vector6::<f64>::zeros();
-    for i in 0..TERMS {
-        side[i] = right[i];
-        for j in 0..=i {
-            normal[(i, j)] = sums[i][j];
-            normal[(j, i)] = sums[i][j];
-        }
-        normal[(i, i)] += 1e-12;
-    }
-    normal
-        .cholesky()
-        .map_or([0.0; 6], |factor| factor.solve(&side).into())
+/// Nearly all of heights over their mean plane.
+fn height_range(mut residuals: Vec<f64>) -> f64 {
+    (quantile(&mut residuals, 0.97) - quantile(&mut residuals, 0.03)).max(1e-9)
 }
 
 /// The value below which a share of the values lies; reorders them.
@@ -386,25 +394,20 @@ pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
     *values.select_nth_unstable_by(k, f64::total_cmp).1
 }
 
-fn basis(p: &[f64; 3]) -> [f64; 6] {
-    let [u, v, _] = *p;
-    [1.0, u, v, u * u, u * v, v * v]
-}
-
-fn value(c: &[f64; 6], p: &[f64; 3]) -> f64 {
-    let b = basis(p);
-    (0..6).map(|i| c[i] * b[i]).sum()
-}
-
 /// Full weight just under the surface, fading to none at `window` below; above it heavier, but a spike of more
-/// than three windows is not believed.
+/// than three windows is not believed. Plain comparisons, so that several are weighed at a time.
+#[inline(always)]
 fn one_sided_weight(r: f64, window: f64) -> f64 {
-    if r > 3.0 * window {
-        0.0
-    } else if r > 0.0 {
-        ABOVE
-    } else {
-        let t = r / window;
-        if t > -1.0 { (1.0 - t * t).powi(2) } else { 0.0 }
-    }
+    let below = smooth_weight(r, window);
+    let near = if r > 0.0 { ABOVE } else { below };
+    if r > 3.0 * window { 0.0 } else { near }
+}
+
+/// Full weight on the surface, fading to none at `window` from it.
+#[inline(always)]
+fn smooth_weight(r: f64, window: f64) -> f64 {
+    let t = r / window;
+    let near = 1.0 - t * t;
+    let near = if near > 0.0 { near } else { 0.0 };
+    near * near
 }

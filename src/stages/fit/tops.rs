@@ -15,9 +15,14 @@ use crate::stages::{Print, Scan, otsu};
 /// Longest side of the rendering that tells the sides apart, and of the one that the surface is fitted to.
 const GLANCE_PX: usize = 96;
 const LOOK_PX: usize = 144;
-/// The view is turned to the tops' plane and rendered again until it turns by less than this slope.
+/// The view is turned to the tops' plane until it turns by less than this slope.
 const GLANCE_SLOPE: f64 = 0.05;
 const LOOK_SLOPE: f64 = 0.01;
+/// Up to this slope what was seen is turned; beyond it walls hide too much, and the surface is rendered again.
+const GLANCE_TURNED: f64 = 0.15;
+const LOOK_TURNED: f64 = 0.05;
+/// Most turns of one rendering.
+const MOST_TURNS: usize = 3;
 /// Most renderings of each kind.
 const MOST_GLANCES: usize = 4;
 const MOST_LOOKS: usize = 3;
@@ -71,17 +76,20 @@ pub(super) fn fit(
 struct Care {
     px: usize,
     slope: f64,
+    turned: f64,
     most: usize,
 }
 
 const GLANCE: Care = Care {
     px: GLANCE_PX,
     slope: GLANCE_SLOPE,
+    turned: GLANCE_TURNED,
     most: MOST_GLANCES,
 };
 const LOOK: Care = Care {
     px: LOOK_PX,
     slope: LOOK_SLOPE,
+    turned: LOOK_TURNED,
     most: MOST_LOOKS,
 };
 
@@ -95,7 +103,7 @@ fn glances(shell: &Shell, front: &Rigid3, bow: bool) -> [Option<Face>; 2] {
         ..GLANCE
     };
     let glance = |heights: Grid<f32>, frame: &Rigid3| {
-        let seen = Seen::new(frame, &heights, view, bow)?;
+        let seen = Seen::new(frame, &heights, view, bow)?.settled(bow, GLANCE);
         if seen.slope() < GLANCE.slope {
             Some(seen.face())
         } else {
@@ -117,6 +125,7 @@ fn look(shell: &Shell, start: Rigid3, bow: bool, care: Care) -> Option<Face> {
     for round in 1.. {
         let view = View::around(shell.bounds(&frame), care.px, false);
         let seen = Seen::new(&frame, &shell.render(&frame, &view), view, bow)?;
+        let seen = seen.settled(bow, care);
         if seen.slope() < care.slope || round >= care.most {
             return Some(seen.face());
         }
@@ -137,15 +146,34 @@ struct Seen {
 
 impl Seen {
     fn new(frame: &Rigid3, heights: &Grid<f32>, view: View, bow: bool) -> Option<Self> {
-        let samples = Samples::new(heights, &view)?;
+        Some(Self::of(*frame, Samples::new(heights, &view)?, view, bow))
+    }
+
+    fn of(frame: Rigid3, samples: Samples, view: View, bow: bool) -> Self {
         let surface = samples.fit(bow);
-        Some(Self {
-            frame: *frame,
+        Self {
+            frame,
             view,
             plane: samples.plane_of_tops(&surface),
             samples,
             surface,
-        })
+        }
+    }
+
+    /// Turned until it stands square on the tops, or as far as it may be turned.
+    fn settled(mut self, bow: bool, care: Care) -> Self {
+        let seen_from = self.frame.inverse();
+        for _ in 0..MOST_TURNS {
+            let frame = self.plane_from_mesh();
+            let lean = frame.after(&seen_from).0[2][2].clamp(-1.0, 1.0).acos();
+            if self.slope() < care.slope || lean > care.turned {
+                break;
+            }
+            let other_from_this = frame.after(&self.frame.inverse());
+            let samples = self.samples.turned(&other_from_this);
+            self = Self::of(frame, samples, self.view, bow);
+        }
+        self
     }
 
     /// How far the tops' plane leans in the view.

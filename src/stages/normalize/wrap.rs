@@ -9,7 +9,7 @@ use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::components::without_specks;
 use crate::stages::ink::Ink;
-use crate::stages::score::{Overlap, WindowMeans};
+use crate::stages::score::WindowMeans;
 
 /// Greys of the two percentiles, and the percentiles.
 const STRETCH: [(f64, f64); 2] = [(0.01, 49.0), (0.95, 201.0)];
@@ -120,7 +120,7 @@ fn attempt(
     let mut turned = wrapped.clone();
     let mut best: Option<(f64, Mask)> = None;
     for _ in 0..4 {
-        let iou = Overlap::of(canvas.mask(), &turned).iou();
+        let iou = canvas.mask().overlap(&turned).iou;
         if best.as_ref().is_none_or(|(other, _)| iou > *other) {
             best = Some((iou, turned.clone()));
         }

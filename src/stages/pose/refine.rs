@@ -1,6 +1,7 @@
 //! Sub-pixel refinement of one pose: robust Gauss-Newton on what both layers know.
 
 use std::cell::OnceCell;
+use std::rc::Rc;
 
 use super::duel::{Side, duel};
 use super::ground::own_ground;
@@ -9,20 +10,19 @@ use super::step::{Loss, Room, Step};
 use super::{Layer, Overlap};
 use crate::domain::Affine2;
 use crate::raster::Grid;
+use crate::wide::widely;
 
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
-const SETTLED_PX: f64 = 0.03;
+const SETTLED_PX: f64 = 0.05;
+
+/// Layers with more pixels along a side have enough in half of their rows.
+const MANY_PX: usize = 160;
 
 /// Two layers ready to be laid on each other many times.
 pub(in crate::stages) struct Refiner<'a> {
     fixed: &'a Layer,
     moving: &'a Layer,
-    /// Known pixels of the fixed layer: place relative to its middle, and value. One colour of a chessboard is
-    /// enough: layers are smooth, neighbours say nearly the same.
-    places: Vec<[f32; 2]>,
-    values: Vec<f32>,
-    /// Share of the known pixels that are in these lists.
-    looked_at: f64,
+    looked_at: Rc<LookedAt>,
     /// The moving layer's value, slope in x and y, and weight, pixel by pixel.
     cells: Vec<[f32; 4]>,
     size: [usize; 2],
@@ -36,27 +36,25 @@ pub(in crate::stages) struct Refiner<'a> {
 impl<'a> Refiner<'a> {
     /// Prepares the two layers.
     pub(in crate::stages) fn new(fixed: &'a Layer, moving: &'a Layer) -> Self {
+        Self::with(Rc::new(LookedAt::of(fixed)), fixed, moving)
+    }
+
+    /// Prepares several layers to be laid on one.
+    pub(in crate::stages) fn each(fixed: &'a Layer, moving: &'a [Layer]) -> Vec<Self> {
+        let looked_at = Rc::new(LookedAt::of(fixed));
+        let with = |moving| Self::with(Rc::clone(&looked_at), fixed, moving);
+        moving.iter().map(with).collect()
+    }
+
+    fn with(looked_at: Rc<LookedAt>, fixed: &'a Layer, moving: &'a Layer) -> Self {
         let centre = fixed.centre();
-        let (width, height) = (fixed.value.width(), fixed.value.height());
-        let (mut places, mut values) = (Vec::new(), Vec::new());
-        for y in 0..height {
-            for x in (y % 2..width).step_by(2) {
-                if fixed.weight.at(x, y) > 0.0 {
-                    places.push([x as f32 - centre[0] as f32, y as f32 - centre[1] as f32]);
-                    values.push(fixed.value.at(x, y));
-                }
-            }
-        }
-        let known = fixed.weight.data().iter().filter(|w| **w > 0.0).count();
         Self {
-            looked_at: places.len().max(1) as f64 / known.max(1) as f64,
-            places,
-            values,
             cells: cells(moving),
             size: [moving.value.width(), moving.value.height()],
             centre,
             rim: centre[0].max(centre[1]).max(1.0),
-            energies: [fixed.energy(), moving.energy()],
+            energies: [looked_at.energy, moving.energy()],
+            looked_at,
             grounds: Default::default(),
             fixed,
             moving,
@@ -183,36 +181,38 @@ impl<'a> Refiner<'a> {
 
     /// What each known pixel of the fixed layer meets in the moving one.
     fn look(&self, from_fixed: &Affine2, room: &mut Room) {
-        room.clear(self.places.len());
+        room.clear(self.looked_at.places.len());
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
-        for (place, value) in self.places.iter().zip(&self.values) {
-            let [x, y] = *place;
-            let u = a[0] * x + a[1] * y + a[2];
-            let v = b[0] * x + b[1] * y + b[2];
-            if let Some(cell) = self.cell(u, v) {
-                room.put(*value, cell, [x, y]);
-            }
-        }
+        widely(
+            #[inline(always)]
+            || {
+                for (place, value) in self.looked_at.places.iter().zip(&self.looked_at.values) {
+                    let [x, y] = *place;
+                    let u = a[0] * x + a[1] * y + a[2];
+                    let v = b[0] * x + b[1] * y + b[2];
+                    if let Some(cell) = self.cell(u, v) {
+                        room.put(*value, cell, [x, y]);
+                    }
+                }
+            },
+        );
         room.close();
     }
 
     /// Bilinear look into the moving layer; `None` outside.
-    #[inline]
+    #[inline(always)]
     fn cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
         let (from, [fx, fy]) = self.corner(u, v)?;
         let (above, below) = (
             &self.cells[from..from + 2],
             &self.cells[from + self.size[0]..][..2],
         );
-        let mix = |a: [f32; 4], b: [f32; 4], share: f32| -> [f32; 4] {
-            std::array::from_fn(|k| a[k] + (b[k] - a[k]) * share)
-        };
         let (top, bottom) = (mix(above[0], above[1], fx), mix(below[0], below[1], fx));
         Some(mix(top, bottom, fy))
     }
 
     /// The value alone.
-    #[inline]
+    #[inline(always)]
     fn value(&self, u: f32, v: f32) -> f32 {
         let Some((from, [fx, fy])) = self.corner(u, v) else {
             return 0.0;
@@ -225,7 +225,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// The cell of the moving layer up and left of a place, and where beyond it the place lies; `None` outside.
-    #[inline]
+    #[inline(always)]
     fn corner(&self, u: f32, v: f32) -> Option<(usize, [f32; 2])> {
         let [width, height] = self.size;
         if !(u >= 0.0 && v >= 0.0 && u < (width - 1) as f32 && v < (height - 1) as f32) {
@@ -246,21 +246,74 @@ impl<'a> Refiner<'a> {
     fn score(&self, from_fixed: &Affine2) -> f64 {
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
         let mut both = 0.0_f64;
-        for (places, values) in self.places.chunks(256).zip(self.values.chunks(256)) {
-            let mut part = 0.0_f32;
-            for ([x, y], value) in places.iter().zip(values) {
-                let u = a[0] * x + a[1] * y + a[2];
-                let v = b[0] * x + b[1] * y + b[2];
-                part += self.value(u, v) * value;
-            }
-            both += f64::from(part);
-        }
+        let LookedAt { places, values, .. } = &*self.looked_at;
+        let runs = places.chunks(256).zip(values.chunks(256));
+        widely(
+            #[inline(always)]
+            || {
+                for (places, values) in runs {
+                    let mut part = 0.0_f32;
+                    for ([x, y], value) in places.iter().zip(values) {
+                        let u = a[0] * x + a[1] * y + a[2];
+                        let v = b[0] * x + b[1] * y + b[2];
+                        part += self.value(u, v) * value;
+                    }
+                    both += f64::from(part);
+                }
+            },
+        );
         // A moving pixel covers this many fixed ones.
         let area = from_fixed.determinant().abs().max(1e-12);
-        both / self.looked_at
+        both / self.looked_at.share
             / (self.energies[0] * self.energies[1] / area)
                 .sqrt()
                 .max(1e-12)
+    }
+}
+
+/// From one to the other by a share; a loop, since what is not inlined gains nothing by wide instructions.
+#[inline(always)]
+fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
+    let mut mixed = a;
+    for k in 0..4 {
+        mixed[k] += (b[k] - a[k]) * share;
+    }
+    mixed
+}
+
+/// What is looked at of a fixed layer.
+struct LookedAt {
+    /// Known pixels: place relative to its middle, and value. One colour of a chessboard is enough, and of large layers
+    /// every other row of it: layers are smooth, neighbours say nearly the same.
+    places: Vec<[f32; 2]>,
+    values: Vec<f32>,
+    /// Share of the known pixels that are in these lists.
+    share: f64,
+    /// That of the whole layer.
+    energy: f64,
+}
+
+impl LookedAt {
+    fn of(layer: &Layer) -> Self {
+        let centre = layer.centre().map(|c| c as f32);
+        let (width, height) = (layer.value.width(), layer.value.height());
+        let (mut places, mut values) = (Vec::new(), Vec::new());
+        let apart = if width.max(height) > MANY_PX { 2 } else { 1 };
+        for y in (0..height).step_by(apart) {
+            for x in (y / apart % 2..width).step_by(2) {
+                if layer.weight.at(x, y) > 0.0 {
+                    places.push([x as f32 - centre[0], y as f32 - centre[1]]);
+                    values.push(layer.value.at(x, y));
+                }
+            }
+        }
+        let known = layer.weight.data().iter().filter(|w| **w > 0.0).count();
+        Self {
+            share: places.len().max(1) as f64 / known.max(1) as f64,
+            places,
+            values,
+            energy: layer.energy(),
+        }
     }
 }
 
@@ -280,14 +333,14 @@ fn cells(layer: &Layer) -> Vec<[f32; 4]> {
     let (width, height) = (layer.value.width(), layer.value.height());
     let mut cells = Vec::with_capacity(width * height);
     for y in 0..height {
-        let row = layer.value.row(y);
-        let above = layer.value.row(y.saturating_sub(1));
-        let below = layer.value.row((y + 1).min(height - 1));
-        for x in 0..width {
+        let [above, row, below] =
+            [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| layer.value.row(y));
+        let sides = (0..width).map(|x| {
             let slope_x = (row[(x + 1).min(width - 1)] - row[x.saturating_sub(1)]) * 0.5;
             let slope_y = (below[x] - above[x]) * 0.5;
-            cells.push([row[x], slope_x, slope_y, layer.weight.at(x, y)]);
-        }
+            [row[x], slope_x, slope_y, layer.weight.at(x, y)]
+        });
+        cells.extend(sides);
     }
     cells
 }

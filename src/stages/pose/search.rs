@@ -1,10 +1,10 @@
 //! Every angle and scale of a band, the best shift of each by FFT: which few poses deserve a closer look.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
-use rustfft::algorithm::Radix4;
 use rustfft::num_complex::Complex32;
-use rustfft::{Fft, FftDirection};
+use rustfft::{Fft, FftPlanner};
 
 use super::Layer;
 use super::layer::sample;
@@ -238,8 +238,8 @@ fn highest(surface: &[Complex32], part: usize) -> ([f64; 2], f32) {
 ///
 /// Spectra are kept column by column, which saves a transposition each way.
 struct Transform {
-    forward: Radix4<f32>,
-    inverse: Radix4<f32>,
+    forward: Arc<dyn Fft<f32>>,
+    inverse: Arc<dyn Fft<f32>>,
     scratch: Vec<Complex32>,
     spectrum: Vec<Complex32>,
     product: Vec<Complex32>,
@@ -247,9 +247,9 @@ struct Transform {
 
 impl Transform {
     fn new() -> Self {
-        // The square's side is a power of two. A planner would compile every algorithm it could choose from.
-        let forward = Radix4::new(SQUARE, FftDirection::Forward);
-        let inverse = Radix4::new(SQUARE, FftDirection::Inverse);
+        let mut planner = FftPlanner::new();
+        let forward = planner.plan_fft_forward(SQUARE);
+        let inverse = planner.plan_fft_inverse(SQUARE);
         let room = forward
             .get_inplace_scratch_len()
             .max(inverse.get_inplace_scratch_len());
@@ -268,7 +268,7 @@ impl Transform {
         for (out, value) in self.spectrum.iter_mut().zip(values) {
             *out = Complex32::new(*value, 0.0);
         }
-        both_ways(&self.forward, &mut self.spectrum, &mut self.scratch);
+        both_ways(&*self.forward, &mut self.spectrum, &mut self.scratch);
         let scale = 1.0 / (SQUARE * SQUARE) as f32;
         self.spectrum.iter().map(|v| v.conj() * scale).collect()
     }
@@ -282,7 +282,7 @@ impl Transform {
                 self.spectrum[y * SQUARE + x] = Complex32::new(values[y * SQUARE + x], opposite);
             }
         }
-        both_ways(&self.forward, &mut self.spectrum, &mut self.scratch);
+        both_ways(&*self.forward, &mut self.spectrum, &mut self.scratch);
     }
 
     /// Turns what was taken in by a quarter turn, x to y: a turn of the square is the same turn of its spectrum.
@@ -310,13 +310,13 @@ impl Transform {
                 *out = a * b;
             }
         }
-        both_ways(&self.inverse, &mut self.product, &mut self.scratch);
+        both_ways(&*self.inverse, &mut self.product, &mut self.scratch);
         &self.product
     }
 }
 
 /// Along one axis, then along the other: rows become columns.
-fn both_ways(fft: &Radix4<f32>, data: &mut [Complex32], scratch: &mut [Complex32]) {
+fn both_ways(fft: &dyn Fft<f32>, data: &mut [Complex32], scratch: &mut [Complex32]) {
     fft.process_with_scratch(data, scratch);
     transpose(data);
     fft.process_with_scratch(data, scratch);

@@ -2,12 +2,16 @@
 
 use nalgebra::{Matrix6, Vector6};
 
+use crate::wide::widely;
+
 /// Residuals beyond this many of their median count less: what stands on one side only must not decide.
 const ROBUST: f32 = 2.5;
 /// Residuals beyond this share of full ink belong to what is lost or was added: they do not count at all.
 const FAR: f32 = 0.5;
 /// Pixels whose sums are kept apart, so that they are added side by side.
 const LANES: usize = 8;
+/// Looks summed in single precision before their sums go to the others, in [`LANES`].
+const RUN: usize = 128;
 /// Products of a row of the normal equations with itself, lower triangle, then with the residual.
 const SUMS: usize = 21 + 6;
 
@@ -48,7 +52,7 @@ impl Room {
     }
 
     /// Takes in a look if the moving layer is known there.
-    #[inline]
+    #[inline(always)]
     pub(super) fn put(&mut self, fixed: f32, met: [f32; 4], [x, y]: [f32; 2]) {
         let lane = self.count % LANES;
         let looks = &mut self.looks[self.count / LANES];
@@ -116,17 +120,26 @@ impl Step {
             Loss::Huber => ROBUST * room.median_residual(gain, offset).max(1e-4),
             Loss::Tukey => FAR,
         };
-        let mut sums = [[0.0_f32; LANES]; SUMS + 1];
-        let mut totals = [0.0_f64; SUMS + 1];
-        for (k, looks) in room.looks.iter().enumerate() {
-            let held = LANES.min(room.count - k * LANES);
-            let fit = [gain, offset, limit];
-            add(&mut sums, looks, held, mirrored, fit, loss);
-            if k % 128 == 127 {
-                drain(&mut sums, &mut totals);
-            }
-        }
-        drain(&mut sums, &mut totals);
+        let (looks, count, fit) = (&room.looks, room.count, [gain, offset, limit]);
+        // Sums and looks of its own: what may lie in one place is not computed side by side.
+        let totals = widely(
+            #[inline(always)]
+            || {
+                let mut totals = [0.0_f64; SUMS + 1];
+                for (run, looks) in looks.chunks(RUN).enumerate() {
+                    let mut sums = [[0.0_f32; LANES]; SUMS + 1];
+                    for (k, looks) in looks.iter().enumerate() {
+                        let held = LANES.min(count - (run * RUN + k) * LANES);
+                        let looks = *looks;
+                        add(&mut sums, &looks, held, mirrored, fit, loss);
+                    }
+                    for (lanes, total) in sums.iter().zip(&mut totals) {
+                        *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+                    }
+                }
+                totals
+            },
+        );
         let mean = totals[SUMS] / room.count as f64;
         Self {
             cost: if room.count == 0 { f64::INFINITY } else { mean },
@@ -161,6 +174,7 @@ fn median(values: &mut [f32]) -> f32 {
 }
 
 /// Adds the products of a few looks, side by side, to the sums of the normal equations and of the cost.
+#[inline(always)]
 fn add(
     sums: &mut [[f32; LANES]; SUMS + 1],
     looks: &Looks,
@@ -170,25 +184,28 @@ fn add(
     loss: Loss,
 ) {
     let s = if mirrored { -1.0 } else { 1.0 };
-    let [x, y] = looks.place;
-    let [m, gx, gy]: [[f32; LANES]; 3] =
-        std::array::from_fn(|part| looks.met.map(|cell| cell[part]));
-    let residual: [f32; LANES] = std::array::from_fn(|k| looks.fixed[k] - gain * m[k] - offset);
-    let (mut weight, mut cost) = ([0.0; LANES], [0.0; LANES]);
-    for k in 0..held {
-        (weight[k], cost[k]) = loss.at(residual[k].abs(), limit);
+    let [x, y] = &looks.place;
+    let (mut residual, mut weight, mut cost) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+    // In the order of the unknowns: two of turn and scale, two of shift, gain and offset.
+    let mut row = [[1.0; LANES]; 6];
+    for k in 0..LANES {
+        let [m, gx, gy, _] = looks.met[k];
+        residual[k] = looks.fixed[k] - gain * m - offset;
+        row[0][k] = gain * (gx * x[k] + gy * y[k] * s);
+        row[1][k] = gain * (gy * x[k] - gx * y[k] * s);
+        row[2][k] = gain * gx;
+        row[3][k] = gain * gy;
+        row[4][k] = m;
     }
-    let row: [[f32; LANES]; 6] = [
-        std::array::from_fn(|k| gain * (gx[k] * x[k] + gy[k] * y[k] * s)),
-        std::array::from_fn(|k| gain * (gy[k] * x[k] - gx[k] * y[k] * s)),
-        gx.map(|v| gain * v),
-        gy.map(|v| gain * v),
-        m,
-        [1.0; LANES],
-    ];
+    loss.weigh(&residual, limit, &mut weight, &mut cost);
+    weight[held..].fill(0.0);
+    cost[held..].fill(0.0);
     let mut at = 0;
     for i in 0..6 {
-        let weighed: [f32; LANES] = std::array::from_fn(|k| weight[k] * row[i][k]);
+        let mut weighed = [0.0; LANES];
+        for k in 0..LANES {
+            weighed[k] = weight[k] * row[i][k];
+        }
         for other in &row[..=i] {
             for k in 0..LANES {
                 sums[at][k] += weighed[k] * other[k];
@@ -204,24 +221,34 @@ fn add(
     }
 }
 
-fn drain(sums: &mut [[f32; LANES]; SUMS + 1], totals: &mut [f64; SUMS + 1]) {
-    for (lanes, total) in sums.iter_mut().zip(totals) {
-        *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
-        *lanes = [0.0; LANES];
-    }
-}
-
 impl Loss {
-    /// Weight of a residual and its cost, so that steps are judged by what they minimise.
-    #[inline]
-    fn at(self, size: f32, limit: f32) -> (f32, f32) {
+    /// Weights of residuals and their costs, so that steps are judged by what they minimise.
+    #[inline(always)]
+    fn weigh(
+        self,
+        residual: &[f32; LANES],
+        limit: f32,
+        weight: &mut [f32; LANES],
+        cost: &mut [f32; LANES],
+    ) {
         match self {
-            Self::Huber if size > limit => (limit / size, limit * (2.0 * size - limit)),
-            Self::Huber => (1.0, size * size),
+            Self::Huber => {
+                for k in 0..LANES {
+                    let size = residual[k].abs();
+                    let is_far = size > limit;
+                    weight[k] = if is_far { limit / size } else { 1.0 };
+                    let far = limit * (2.0 * size - limit);
+                    cost[k] = if is_far { far } else { size * size };
+                }
+            }
             Self::Tukey => {
-                let near = (1.0 - (size / limit).powi(2)).max(0.0);
-                let cost = limit * limit / 3.0 * (1.0 - near * near * near);
-                (near * near, cost)
+                for k in 0..LANES {
+                    let share = residual[k].abs() / limit;
+                    let near = 1.0 - share * share;
+                    let near = if near > 0.0 { near } else { 0.0 };
+                    weight[k] = near * near;
+                    cost[k] = limit * limit / 3.0 * (1.0 - near * near * near);
+                }
             }
         }
     }

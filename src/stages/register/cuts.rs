@@ -47,7 +47,7 @@ impl<'a> Cuts<'a> {
     pub(super) fn new(cuts: &'a [f64], ink: &'a Layer, woods: &'a [Layer]) -> Self {
         Self {
             cuts,
-            refiners: woods.iter().map(|wood| Refiner::new(ink, wood)).collect(),
+            refiners: Refiner::each(ink, woods),
         }
     }
 

@@ -19,7 +19,7 @@ use crate::domain::{
 use crate::raster::{DepthMap, Mask, warp_mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 8;
+pub const REVISION: u32 = 9;
 
 /// Mirrored must win by this factor to be named the cause: symmetric characters score alike both ways.
 const MIRROR_WINS: f64 = 1.06;
@@ -167,31 +167,22 @@ pub fn register(
         ),
     };
     let print_means = WindowMeans::new(&canvas_print, params.window);
-    let mut metrics = Vec::new();
-    let mut canvases = Vec::new();
-    for (k, alignment) in alignments.iter().enumerate() {
-        // Metrics often choose the same threshold.
-        let twin = alignments[..k]
-            .iter()
-            .position(|other| other.is_as(alignment));
-        let (mask, scores) = if let Some(twin) = twin {
-            let (canvas, outcome): (&CanvasMasks, &MetricOutcome) =
-                (&canvases[twin], &metrics[twin]);
-            (canvas.depth.clone(), outcome.scores)
-        } else {
-            let to_canvas = canvas_from_print.after(&alignment.print_from_depth);
-            let mask = warp_mask(&depth.strokes(alignment.level), &to_canvas, side, side);
-            let scores = score::measure(&print_means, &mask);
-            (mask, scores)
-        };
+    let masks = masks(&alignments, |pose, levels| {
+        depth.strokes_in(&canvas_from_print.after(pose), [side; 2], levels)
+    });
+    let mut metrics: Vec<MetricOutcome> = Vec::new();
+    for (k, (alignment, mask)) in alignments.iter().zip(&masks).enumerate() {
         if mask.count() == 0 {
             return Err(Error::NoStrokes(alignment.metric));
         }
+        // Metrics often choose the same threshold.
+        let mut before = alignments[..k].iter();
+        let twin = before.position(|other| other.is_as(alignment));
+        let scores = twin.map_or_else(
+            || score::measure(&print_means, mask),
+            |twin| metrics[twin].scores,
+        );
         metrics.push(outcome(depth, normalized, alignment, scores));
-        canvases.push(CanvasMasks {
-            metric: alignment.metric,
-            depth: mask,
-        });
     }
     if let Some((evidence, relief)) = &evidence {
         trust(&mut metrics, evidence, |level| relief.growth(depth, level));
@@ -202,8 +193,25 @@ pub fn register(
             evidence: evidence.map(|(evidence, _)| evidence),
         },
         canvas_print,
-        canvases,
+        canvases: alignments
+            .iter()
+            .zip(masks)
+            .map(|(alignment, depth)| CanvasMasks {
+                metric: alignment.metric,
+                depth,
+            })
+            .collect(),
     })
+}
+
+/// The mask of each alignment; `strokes` makes those of some levels at one pose.
+fn masks(alignments: &[Alignment], strokes: impl Fn(&Affine2, &[u16]) -> Vec<Mask>) -> Vec<Mask> {
+    let mut masks = Vec::new();
+    for alike in alignments.chunk_by(|one, other| one.print_from_depth == other.print_from_depth) {
+        let levels: Vec<u16> = alike.iter().map(|alignment| alignment.level).collect();
+        masks.extend(strokes(&alike[0].print_from_depth, &levels));
+    }
+    masks
 }
 
 /// Gives each metric its confidence: the pose's, and the mask's beside the one that the relief alone chose. `growth` is

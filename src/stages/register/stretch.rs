@@ -4,7 +4,7 @@ use crate::domain::Affine2;
 use crate::stages::pose::{Found, Loss, Refiner};
 
 /// Rounds of stretching and refining; each is a fraction of the last.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 2;
 /// Steps of a refinement between two rounds.
 const STEPS: usize = 6;
 /// Stretch that is tried to either side, and the most that a round takes.

@@ -1,8 +1,11 @@
 //! Structural similarity of masks: Wang, Bovik, Sheikh and Simoncelli 2004, doi:10.1109/TIP.2003.819861.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
-use crate::raster::{Grid, Mask};
+use crate::raster::{Grid, Mask, PixelBox};
+use crate::wide::widely;
 
 /// Stabilising constants for a data range of 1: `C1 = (0.01)^2`, `C2 = (0.03)^2`.
 const C1: f64 = 0.01 * 0.01;
@@ -56,6 +59,8 @@ pub struct Structure {
 #[derive(Debug, Clone)]
 pub struct WindowMeans {
     mask: Mask,
+    /// Where the mask is set.
+    bounds: Option<PixelBox>,
     taps: Taps,
     /// Means over the windows that lie wholly in the mask: a rim of half a window is left out.
     means: Grid<f64>,
@@ -70,6 +75,7 @@ impl WindowMeans {
             means: taps.means(mask),
             taps,
             mask: mask.clone(),
+            bounds: mask.bounding_box(),
             covariance_factor: window.covariance_factor(),
         }
     }
@@ -81,47 +87,98 @@ impl WindowMeans {
 
     /// Structure of this mask against another of the same size.
     pub fn against(&self, other: &Mask) -> Structure {
-        let pairs = self.mask.data().iter().zip(other.data());
+        let count = self.means.data().len();
         let mut both = other.clone();
+        let pairs = self.mask.data().iter().zip(other.data());
         for (both, (a, b)) in both.data_mut().iter_mut().zip(pairs) {
             *both = *a && *b;
         }
-        self.fold(&self.taps.means(other), &self.taps.means(&both))
+        let windows = self.touched(other);
+        let mut sums = Sums::default();
+        let rows = |y: usize, [other, both]: [&[f64]; 2]| {
+            let own = &self.means.row(y)[windows.columns.clone()];
+            sums.add_row(own, other, both, self.covariance_factor);
+        };
+        widely(
+            #[inline(always)]
+            || self.taps.each_row([other, &both], &windows, rows),
+        );
+        // Windows that see nothing in either mask agree wholly.
+        let alike = count - windows.columns.len() * windows.rows.len();
+        sums.mean(alike, count)
     }
 
-    /// Since a mask is its own square, `E[x^2] = E[x]`: three windowed means hold all there is.
-    fn fold(&self, mean_other: &Grid<f64>, mean_both: &Grid<f64>) -> Structure {
-        let factor = self.covariance_factor;
-        let (mut ssim, mut nl_ssim) = ([0.0; LANES], [0.0; LANES]);
-        let mut add = |u: [f64; LANES], v: [f64; LANES], both: [f64; LANES], count: usize| {
-            for k in 0..count {
-                let (u, v) = (u[k], v[k]);
-                let variances = factor * (u - u * u + v - v * v);
-                let covariance = factor * (both[k] - u * v);
-                let structure = (2.0 * covariance + C2) / (variances + C2);
-                let luminance = (2.0 * u * v + C1) / (u * u + v * v + C1);
-                ssim[k] += luminance * structure;
-                nl_ssim[k] += structure;
-            }
+    /// The windows that see something of this mask or of another.
+    fn touched(&self, other: &Mask) -> Windows {
+        let boxes = [self.bounds, other.bounding_box()];
+        let Some(bounds) = boxes.into_iter().flatten().reduce(PixelBox::around) else {
+            return Windows::default();
         };
-        let parts = [&self.means, mean_other, mean_both].map(|means| means.data().as_chunks());
-        let [(first, first_rest), (other, other_rest), (both, both_rest)] = parts;
-        for ((u, v), both) in first.iter().zip(other).zip(both) {
-            add(*u, *v, *both, LANES);
-        }
-        let padded = |rest: &[f64]| std::array::from_fn(|k| rest.get(k).copied().unwrap_or(0.0));
-        let rest = [first_rest, other_rest, both_rest].map(padded);
-        add(rest[0], rest[1], rest[2], first_rest.len());
-        let n = self.means.data().len().max(1) as f64;
-        Structure {
-            ssim: ssim.iter().sum::<f64>() / n,
-            nl_ssim: nl_ssim.iter().sum::<f64>() / n,
+        let lost = self.taps.lost();
+        let seeing = |first: usize, last: usize, count: usize| {
+            let end = (last + 1).min(count);
+            first.saturating_sub(lost).min(end)..end
+        };
+        Windows {
+            columns: seeing(bounds.x0, bounds.x1, self.means.width()),
+            rows: seeing(bounds.y0, bounds.y1, self.means.height()),
         }
     }
 }
 
 /// Sums kept apart, so that one addition need not wait for the last.
 const LANES: usize = 4;
+
+/// Sums over windows. Since a mask is its own square, `E[x^2] = E[x]`: three windowed means hold all there is.
+#[derive(Default)]
+struct Sums {
+    ssim: [f64; LANES],
+    nl_ssim: [f64; LANES],
+}
+
+impl Sums {
+    /// Adds a row of windows: the means of one mask, of the other, and of what both have.
+    #[inline(always)]
+    fn add_row(&mut self, own: &[f64], other: &[f64], both: &[f64], factor: f64) {
+        let parts = [own, other, both].map(|means| means.as_chunks());
+        let [(own, own_rest), (other, other_rest), (both, both_rest)] = parts;
+        for ((u, v), both) in own.iter().zip(other).zip(both) {
+            self.add([u, v, both], LANES, factor);
+        }
+        let padded = |rest: &[f64]| std::array::from_fn(|k| rest.get(k).copied().unwrap_or(0.0));
+        let rest = [own_rest, other_rest, both_rest].map(padded);
+        self.add(rest.each_ref(), own_rest.len(), factor);
+    }
+
+    #[inline(always)]
+    fn add(&mut self, [u, v, both]: [&[f64; LANES]; 3], count: usize, factor: f64) {
+        for k in 0..count {
+            let (u, v) = (u[k], v[k]);
+            let variances = factor * (u - u * u + v - v * v);
+            let covariance = factor * (both[k] - u * v);
+            let structure = (2.0 * covariance + C2) / (variances + C2);
+            let luminance = (2.0 * u * v + C1) / (u * u + v * v + C1);
+            self.ssim[k] += luminance * structure;
+            self.nl_ssim[k] += structure;
+        }
+    }
+
+    /// Means over `count` windows, of which some that were not added agree wholly.
+    fn mean(&self, alike: usize, count: usize) -> Structure {
+        let mean = |sums: &[f64]| (sums.iter().sum::<f64>() + alike as f64) / count.max(1) as f64;
+        Structure {
+            ssim: mean(&self.ssim),
+            nl_ssim: mean(&self.nl_ssim),
+        }
+    }
+}
+
+/// Windows by their first column and row in the mask.
+#[derive(Debug, Default)]
+struct Windows {
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
 
 /// The weights of a window along one axis.
 #[derive(Debug, Clone)]
@@ -144,71 +201,87 @@ impl Taps {
         Self { weights, of_bits }
     }
 
+    /// By how many a row or column of windows is shorter than that of the mask.
+    fn lost(&self) -> usize {
+        self.weights.len() - 1
+    }
+
     /// Weighted means of a mask over the windows that lie wholly in it.
     fn means(&self, mask: &Mask) -> Grid<f64> {
-        self.down(&self.across(mask))
-    }
-
-    fn across(&self, mask: &Mask) -> Grid<f64> {
-        let lost = self.weights.len() - 1;
-        let width = mask.width().saturating_sub(lost);
-        let mut across = Grid::new(width, mask.height(), 0.0);
-        for y in 0..mask.height() {
-            let row = mask.row(y);
-            let shift_in =
-                |bits: usize, set: bool| (bits << 1 | usize::from(set)) & (self.of_bits.len() - 1);
-            let mut bits = row
-                .iter()
-                .take(lost)
-                .fold(0, |bits, set| shift_in(bits, *set));
-            let means = &mut across.data_mut()[y * width..(y + 1) * width];
-            for (mean, set) in means.iter_mut().zip(row.iter().skip(lost)) {
-                bits = shift_in(bits, *set);
-                *mean = self.of_bits[bits];
-            }
-        }
-        across
-    }
-
-    /// Weighted means down the columns.
-    fn down(&self, across: &Grid<f64>) -> Grid<f64> {
-        let width = across.width();
-        let height = across.height().saturating_sub(self.weights.len() - 1);
+        let [width, height] =
+            [mask.width(), mask.height()].map(|side| side.saturating_sub(self.lost()));
         let mut means = Grid::new(width, height, 0.0);
-        for y in 0..height {
-            let row = &mut means.data_mut()[y * width..(y + 1) * width];
-            let (runs, rest) = row.as_chunks_mut();
-            for (k, run) in runs.iter_mut().enumerate() {
-                *run = self.below::<COLUMNS>(across, k * COLUMNS, y);
-            }
-            let first = width - rest.len();
-            for (k, mean) in rest.iter_mut().enumerate() {
-                [*mean] = self.below(across, first + k, y);
-            }
-        }
+        let all = Windows {
+            columns: 0..width,
+            rows: 0..height,
+        };
+        self.each_row([mask], &all, |y, [row]| {
+            means.data_mut()[y * width..(y + 1) * width].copy_from_slice(row);
+        });
         means
     }
 
-    /// The weighted means of some columns side by side; weights that are alike share a product.
-    #[inline]
-    fn below<const N: usize>(&self, across: &Grid<f64>, x: usize, y: usize) -> [f64; N] {
-        let last = self.weights.len() - 1;
-        let row = |k: usize| &across.row(y + k)[x..x + N];
-        let mut sums = [0.0; N];
-        for (k, weight) in self.weights[..last / 2].iter().enumerate() {
-            for (sum, (a, b)) in sums.iter_mut().zip(row(k).iter().zip(row(last - k))) {
-                *sum += weight * (a + b);
+    /// Hands `take` each row of windows with the weighted means of some masks of one size. Only as many rows of the
+    /// masks as a window sees are kept, so all stays in the cache.
+    #[inline(always)]
+    fn each_row<const MASKS: usize>(
+        &self,
+        masks: [&Mask; MASKS],
+        windows: &Windows,
+        mut take: impl FnMut(usize, [&[f64]; MASKS]),
+    ) {
+        let width = windows.columns.len();
+        if windows.rows.is_empty() || width == 0 {
+            return;
+        }
+        let (lost, seen) = (self.lost(), self.weights.len());
+        let mut across = masks.map(|_| vec![0.0; seen * width]);
+        let mut means = masks.map(|_| vec![0.0; width]);
+        for y in windows.rows.start..windows.rows.end + lost {
+            for (mask, across) in masks.iter().zip(&mut across) {
+                let pixels = &mask.row(y)[windows.columns.start..windows.columns.end + lost];
+                self.across(pixels, &mut across[y % seen * width..][..width]);
+            }
+            if y >= windows.rows.start + lost {
+                for (across, means) in across.iter().zip(&mut means) {
+                    self.down(across, y - lost, means);
+                }
+                take(y - lost, means.each_ref().map(Vec::as_slice));
             }
         }
-        for (sum, value) in sums.iter_mut().zip(row(last / 2)) {
-            *sum += self.weights[last / 2] * value;
+    }
+
+    /// Weighted means along a row of pixels.
+    #[inline(always)]
+    fn across(&self, pixels: &[bool], means: &mut [f64]) {
+        let (first, rest) = pixels.split_at(self.lost());
+        let shift_in =
+            |bits: usize, set: bool| (bits << 1 | usize::from(set)) & (self.of_bits.len() - 1);
+        let mut bits = first.iter().fold(0, |bits, set| shift_in(bits, *set));
+        for (mean, set) in means.iter_mut().zip(rest) {
+            bits = shift_in(bits, *set);
+            *mean = self.of_bits[bits];
         }
-        sums
+    }
+
+    /// Weighted means down the columns, of the rows from `y` on: each lies at its number's remainder.
+    #[inline(always)]
+    fn down(&self, across: &[f64], y: usize, means: &mut [f64]) {
+        let (seen, width) = (self.weights.len(), means.len());
+        let row = |k: usize| &across[(y + k) % seen * width..][..width];
+        let last = self.lost();
+        let middle = self.weights[last / 2];
+        for (mean, value) in means.iter_mut().zip(row(last / 2)) {
+            *mean = middle * value;
+        }
+        // Weights that are alike share a product.
+        for (k, weight) in self.weights[..last / 2].iter().enumerate() {
+            for ((mean, a), b) in means.iter_mut().zip(row(k)).zip(row(last - k)) {
+                *mean += weight * (a + b);
+            }
+        }
     }
 }
-
-/// Columns that are summed together.
-const COLUMNS: usize = 8;
 
 #[cfg(test)]
 mod tests {

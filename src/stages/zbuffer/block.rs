@@ -1,6 +1,7 @@
 //! A few triangles side by side, and which of them may hold a pixel's centre.
 
-use super::triangle::{fill, higher, lower};
+use super::small::Small;
+use super::triangle::{fill, higher, lower, whole_below};
 
 /// Triangles that are asked together whether they hold a pixel's centre: most of a scan's are too small.
 pub(super) const LANES: usize = 8;
@@ -16,24 +17,26 @@ pub(super) struct Row(pub(super) [f32; 4]);
 
 impl Row {
     /// Of one corner.
-    #[inline]
+    #[inline(always)]
     pub(super) fn place(&self, [x, y, z]: [f32; 3]) -> f32 {
         let [a, b, c, d] = self.0;
         a * x + b * y + c * z + d
     }
 
     /// Of corners side by side.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(&self, [x, y, z]: &[Lanes; 3]) -> Lanes {
+        let [a, b, c, d] = self.0;
         let mut places = [0.0; LANES];
-        for (k, place) in places.iter_mut().enumerate() {
-            *place = self.place([x[k], y[k], z[k]]);
+        for k in 0..LANES {
+            places[k] = a * x[k] + b * y[k] + c * z[k] + d;
         }
         places
     }
 }
 
 /// Up to [`LANES`] triangles, the last repeated.
+#[inline(always)]
 pub(super) fn block(triangles: &[[u32; 3]], vertices: &[[f64; 3]], middle: [f64; 3]) -> Block {
     let mut block = [[[0.0; LANES]; 3]; 3];
     for lane in 0..LANES {
@@ -49,28 +52,36 @@ pub(super) fn block(triangles: &[[u32; 3]], vertices: &[[f64; 3]], middle: [f64;
 }
 
 /// Fills those of a few triangles that hold a pixel's centre.
-#[inline]
+#[inline(always)]
 pub(super) fn fill_block(
     block: &Block,
     [u, v, z]: &[Row; 3],
     size: [usize; 2],
     meet: &mut impl FnMut(usize, f32),
 ) {
-    let across = block.each_ref().map(|corner| u.at(corner));
-    let down = block.each_ref().map(|corner| v.at(corner));
-    let held = holding([&ends(&across), &ends(&down)], size);
+    // A copy of its own: what may lie where `meet` writes is not computed side by side.
+    let block = *block;
+    let [a, b, c] = &block;
+    let (across, down) = ([u.at(a), u.at(b), u.at(c)], [v.at(a), v.at(b), v.at(c)]);
+    let ends = [ends(&across), ends(&down)];
+    let held = holding([&ends[0], &ends[1]], size);
     if held == [false; LANES] {
         return;
     }
-    let heights = block.each_ref().map(|corner| z.at(corner));
-    for k in (0..LANES).filter(|k| held[*k]) {
+    let heights = [z.at(a), z.at(b), z.at(c)];
+    let corners = [across, down, heights];
+    let small = Small::of(&ends, held, size);
+    if !small.is_empty() {
+        small.fill(&corners, size, meet);
+    }
+    for k in (0..LANES).filter(|k| held[*k] && !small.lanes[*k]) {
         let corner = |c: usize| [across[c][k], down[c][k], heights[c][k]];
         fill([corner(0), corner(1), corner(2)], size, meet);
     }
 }
 
 /// The lowest and the highest of three corners' places.
-#[inline]
+#[inline(always)]
 fn ends([a, b, c]: &[Lanes; 3]) -> [Lanes; 2] {
     let (mut low, mut high) = ([0.0; LANES], [0.0; LANES]);
     for k in 0..LANES {
@@ -81,23 +92,26 @@ fn ends([a, b, c]: &[Lanes; 3]) -> [Lanes; 2] {
 }
 
 /// Which lanes may hold a pixel's centre, given how far they reach along each axis of the grid.
-#[inline]
+#[inline(always)]
 pub(super) fn holding(
     [across, down]: [&[Lanes; 2]; 2],
     [width, height]: [usize; 2],
 ) -> [bool; LANES] {
     let (wide, high) = (holding_along(across, width), holding_along(down, height));
-    std::array::from_fn(|k| wide[k] & high[k])
+    let mut held = [false; LANES];
+    for k in 0..LANES {
+        held[k] = wide[k] & high[k];
+    }
+    held
 }
 
-#[inline]
+#[inline(always)]
 fn holding_along([low, high]: &[Lanes; 2], side: usize) -> [bool; LANES] {
     let last = side as f32 - 1.0;
     let mut holds = [false; LANES];
-    for (k, holds) in holds.iter_mut().enumerate() {
-        // The last whole pixel at or below the upper end; a narrow cast rounds down from 0 up.
-        let below = (lower(higher(high[k], -1.0), last) + 1.0) as i32 - 1;
-        *holds = below as f32 >= higher(low[k], 0.0);
+    for k in 0..LANES {
+        let below = whole_below(lower(higher(high[k], -1.0), last));
+        holds[k] = below >= higher(low[k], 0.0);
     }
     holds
 }

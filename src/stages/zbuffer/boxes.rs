@@ -16,6 +16,7 @@ pub(super) struct Boxes {
 
 impl Boxes {
     /// Around each of up to [`LANES`] blocks; lanes without one repeat the last.
+    #[inline(always)]
     pub(super) fn around(blocks: &[Block], extent: f32) -> Self {
         let mut boxes = Self {
             middle: [[0.0; LANES]; 3],
@@ -34,7 +35,7 @@ impl Boxes {
     }
 
     /// Lowest and highest places that a corner in each of the boxes may have.
-    #[inline]
+    #[inline(always)]
     pub(super) fn reach(&self, row: &Row) -> [Lanes; 2] {
         let Row([a, b, c, _]) = *row;
         let middle = row.at(&self.middle);
@@ -50,6 +51,7 @@ impl Boxes {
 }
 
 /// The least and the greatest coordinate along an axis.
+#[inline(always)]
 fn ends(block: &Block, axis: usize) -> [f32; 2] {
     let (mut low, mut high) = (block[0][axis], block[0][axis]);
     for corner in &block[1..] {
@@ -58,8 +60,9 @@ fn ends(block: &Block, axis: usize) -> [f32; 2] {
             high[k] = higher(high[k], corner[axis][k]);
         }
     }
-    [
-        low.into_iter().fold(f32::INFINITY, lower),
-        high.into_iter().fold(f32::NEG_INFINITY, higher),
-    ]
+    let mut all = [low[0], high[0]];
+    for k in 1..LANES {
+        all = [lower(all[0], low[k]), higher(all[1], high[k])];
+    }
+    all
 }

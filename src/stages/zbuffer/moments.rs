@@ -5,6 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Block, LANES, Lanes, Shell};
 use crate::stages::bulk::Bounds;
+use crate::wide::widely;
 
 /// Products of two axes, each kept once.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
@@ -26,16 +27,21 @@ impl Moments {
         }
         let around = Around::of(shell);
         let mut sums = [0.0; SUMS];
-        for (run, blocks) in shell.blocks.chunks(RUN).enumerate() {
-            let mut part = [[0.0; LANES]; SUMS];
-            for (k, block) in blocks.iter().enumerate() {
-                let first = (run * RUN + k) * LANES;
-                around.add(block, shell.count - first, &mut part);
-            }
-            for (sum, part) in sums.iter_mut().zip(part) {
-                *sum += part.iter().map(|v| f64::from(*v)).sum::<f64>();
-            }
-        }
+        widely(
+            #[inline(always)]
+            || {
+                for (run, blocks) in shell.blocks.chunks(RUN).enumerate() {
+                    let mut part = [[0.0; LANES]; SUMS];
+                    for (k, block) in blocks.iter().enumerate() {
+                        let first = (run * RUN + k) * LANES;
+                        around.add(block, shell.count - first, &mut part);
+                    }
+                    for (sum, part) in sums.iter_mut().zip(part) {
+                        *sum += part.iter().map(|v| f64::from(*v)).sum::<f64>();
+                    }
+                }
+            },
+        );
         let [total, x, y, z, xx, xy, xz, yy, yz, zz] = sums;
         if total <= 0.0 || !total.is_finite() {
             return None;
@@ -73,13 +79,23 @@ impl Around {
     }
 
     /// Adds the first `count` triangles of a block that lie in the bulk.
+    #[inline(always)]
     fn add(&self, block: &Block, count: usize, sums: &mut [[f32; LANES]; SUMS]) {
         let per_extent = (1.0 / self.extent) as f32;
-        let corners = block.map(|corner| corner.map(|axis: Lanes| axis.map(|v| v * per_extent)));
+        let corner = |corner: &[Lanes; 3], lane: usize| {
+            [
+                corner[0][lane] * per_extent,
+                corner[1][lane] * per_extent,
+                corner[2][lane] * per_extent,
+            ]
+        };
+        let [first, second, third] = block;
         for lane in 0..LANES {
-            let [a, b, c] = corners
-                .each_ref()
-                .map(|corner| corner.each_ref().map(|axis| axis[lane]));
+            let [a, b, c] = [
+                corner(first, lane),
+                corner(second, lane),
+                corner(third, lane),
+            ];
             let mut inside = lane < count;
             for axis in 0..3 {
                 let half = self.half[axis];
@@ -87,10 +103,8 @@ impl Around {
                 inside &= b[axis].abs() <= half;
                 inside &= c[axis].abs() <= half;
             }
-            let (p, q) = (
-                [0, 1, 2].map(|k| b[k] - a[k]),
-                [0, 1, 2].map(|k| c[k] - a[k]),
-            );
+            let p = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
+            let q = [c[0] - a[0], c[1] - a[1], c[2] - a[2]];
             let cross = [
                 p[1] * q[2] - p[2] * q[1],
                 p[2] * q[0] - p[0] * q[2],
@@ -98,7 +112,7 @@ impl Around {
             ];
             let squared = cross[0] * cross[0] + cross[1] * cross[1] + cross[2] * cross[2];
             let area = if inside { squared.sqrt() } else { 0.0 };
-            let sum = [0, 1, 2].map(|k| a[k] + b[k] + c[k]);
+            let sum = [a[0] + b[0] + c[0], a[1] + b[1] + c[1], a[2] + b[2] + c[2]];
             sums[0][lane] += area;
             for axis in 0..3 {
                 sums[1 + axis][lane] += area * sum[axis];

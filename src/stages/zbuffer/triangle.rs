@@ -4,12 +4,37 @@
 const WIDE_COLUMNS: usize = 12;
 
 /// Plain comparisons, which are one instruction for many lanes; `f32::min` minds what is not a number.
+#[inline(always)]
 pub(super) fn lower(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
+#[inline(always)]
 pub(super) fn higher(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
+}
+
+/// Numbers of this size have no bits for parts of one.
+const WHOLE: f32 = 12_582_912.0;
+
+/// The whole number at or below one that is small beside [`WHOLE`]. Casts and `floor` are not computed side by side.
+#[inline(always)]
+pub(super) fn whole_below(v: f32) -> f32 {
+    let nearest = (v + WHOLE) - WHOLE;
+    if nearest > v { nearest - 1.0 } else { nearest }
+}
+
+/// The whole number at or above one that is small beside [`WHOLE`].
+#[inline(always)]
+pub(super) fn whole_above(v: f32) -> f32 {
+    let nearest = (v + WHOLE) - WHOLE;
+    if nearest < v { nearest + 1.0 } else { nearest }
+}
+
+/// A whole number from 0 up that is small beside [`WHOLE`].
+#[inline(always)]
+pub(super) fn index(whole: f32) -> u32 {
+    (whole + WHOLE).to_bits() - WHOLE.to_bits()
 }
 
 /// Hands `meet` the place of each pixel around the triangle and the height there of the plane through its corners, not
@@ -19,7 +44,7 @@ pub(super) fn higher(a: f32, b: f32) -> f32 {
 /// same number with the other sign, so two triangles that share an edge agree on it to the last bit and no pixel
 /// between them stays empty. Nothing here asks before it computes: most scans' triangles hold a pixel or two, and a
 /// wrong guess of the processor takes longer than the sums.
-#[inline]
+#[inline(always)]
 pub(super) fn fill(
     corners: [[f32; 3]; 3],
     [width, height]: [usize; 2],
@@ -59,7 +84,7 @@ pub(super) fn fill(
 }
 
 /// A row's columns; where they are many those between the edges, and one more on each side.
-#[inline]
+#[inline(always)]
 fn cut(
     columns: &std::ops::Range<usize>,
     corners: &[[f32; 3]; 3],
@@ -79,6 +104,7 @@ fn cut(
 }
 
 /// Where an edge meets a row; level edges meet none.
+#[inline(always)]
 fn crossing(p: &[f32; 3], q: &[f32; 3], y: f32) -> Option<f32> {
     let share = (y - p[1]) / (q[1] - p[1]);
     (0.0..=1.0)
@@ -89,7 +115,7 @@ fn crossing(p: &[f32; 3], q: &[f32; 3], y: f32) -> Option<f32> {
 /// Whole pixels from `low` to `high`, bounds included, cut to the grid.
 ///
 /// Casts to narrow integers do the rounding: `ceil` and `floor` are calls.
-#[inline]
+#[inline(always)]
 pub(super) fn pixels(low: f32, high: f32, len: usize) -> std::ops::Range<usize> {
     let cut = |v: f32| v.max(-1.0).min(len as f32) as i32;
     let (first, last) = (cut(low), cut(high));

@@ -1,0 +1,275 @@
+//! Points of a height map, and weighted least squares over them.
+//!
+//! A surface is fitted in some thirty passes, each over all points: they are kept side by side, so that several are
+//! weighed and summed at a time.
+
+use nalgebra::{Matrix6, Vector6};
+
+use crate::wide::widely;
+
+/// Points that are looked at together.
+const LANES: usize = 4;
+type Lanes = [f64; LANES];
+
+/// Coefficients of 1, u, v, u^2, u v, v^2.
+pub(super) type Coefficients = [f64; 6];
+
+/// Points u, v, z.
+#[derive(Debug, Default)]
+pub(super) struct Points {
+    /// u, v and z of a few points each; zeros after the last point.
+    blocks: Vec<[Lanes; 3]>,
+    count: usize,
+}
+
+/// What a coefficient is taken to be before any point is seen: all but the first.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Belief {
+    pub(super) mean: f64,
+    /// Weight of the belief.
+    pub(super) precision: f64,
+}
+
+impl Points {
+    pub(super) fn push(&mut self, point: [f64; 3]) {
+        let lane = self.count % LANES;
+        if lane == 0 {
+            self.blocks.push([[0.0; LANES]; 3]);
+        }
+        if let Some(last) = self.blocks.last_mut() {
+            for (axis, value) in last.iter_mut().zip(point) {
+                axis[lane] = value;
+            }
+        }
+        self.count += 1;
+    }
+
+    pub(super) const fn len(&self) -> usize {
+        self.count
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = [f64; 3]> {
+        let points = self.blocks.iter();
+        points
+            .flat_map(|block| (0..LANES).map(move |k| [0, 1, 2].map(|axis: usize| block[axis][k])))
+            .take(self.count)
+    }
+
+    /// How high each point lies over a surface.
+    pub(super) fn residuals(&self, c: &Coefficients) -> Vec<f64> {
+        let mut residuals: Vec<f64> = self.blocks.iter().flat_map(|b| over::<6>(b, c)).collect();
+        residuals.truncate(self.count);
+        residuals
+    }
+
+    /// The surface of the first `TERMS` (3 or 6) coefficients that fits best where each point weighs what its height
+    /// over another one, `from`, earns.
+    pub(super) fn solve<const TERMS: usize>(
+        &self,
+        from: &Coefficients,
+        weight: impl Fn(f64) -> f64,
+        beliefs: &[Belief; 6],
+    ) -> Coefficients {
+        let (blocks, whole) = (&self.blocks, self.count / LANES);
+        // Sums and points of its own: what may lie in one place is not computed side by side.
+        let mut sums = widely(
+            #[inline(always)]
+            || {
+                let mut sums = Sums::default();
+                for block in &blocks[..whole] {
+                    let block = *block;
+                    let mut weights = over::<TERMS>(&block, from);
+                    for over in &mut weights {
+                        *over = weight(*over);
+                    }
+                    sums.add::<TERMS>(&block, weights);
+                }
+                sums
+            },
+        );
+        if let Some(block) = self.blocks.get(whole) {
+            let mut weights = over::<TERMS>(block, from).map(&weight);
+            weights[self.count % LANES..].fill(0.0);
+            sums.add::<TERMS>(block, weights);
+        }
+        sums.solve(TERMS, beliefs)
+    }
+}
+
+/// Nothing is known before.
+pub(super) const OPEN: [Belief; 6] = [Belief {
+    mean: 0.0,
+    precision: 0.0,
+}; 6];
+
+/// Height of a surface.
+pub(super) fn value(c: &Coefficients, [u, v]: [f64; 2]) -> f64 {
+    c[0] + c[1] * u + c[2] * v + c[3] * (u * u) + c[4] * (u * v) + c[5] * (v * v)
+}
+
+/// How high points lie over a surface of which only the first `TERMS` coefficients count.
+#[inline(always)]
+fn over<const TERMS: usize>([u, v, z]: &[Lanes; 3], c: &Coefficients) -> Lanes {
+    let mut over = [0.0; LANES];
+    for k in 0..LANES {
+        let mut height = c[0] + c[1] * u[k] + c[2] * v[k];
+        if TERMS == 6 {
+            height += c[3] * (u[k] * u[k]) + c[4] * (u[k] * v[k]) + c[5] * (v[k] * v[k]);
+        }
+        over[k] = z[k] - height;
+    }
+    over
+}
+
+/// Products lane by lane; a loop, since what is not inlined gains nothing by wide instructions.
+#[inline(always)]
+fn times(a: &Lanes, b: &Lanes) -> Lanes {
+    let mut products = [0.0; LANES];
+    for k in 0..LANES {
+        products[k] = a[k] * b[k];
+    }
+    products
+}
+
+/// Powers of u and v up to the second, and up to the fourth: as products of two of the former.
+const SECOND: usize = 6;
+const FOURTH: usize = 15;
+
+/// Weighted sums over points of `u^i v^j`, by degree, and of the first six of them times z.
+#[derive(Default)]
+struct Sums {
+    powers: [Lanes; FOURTH],
+    heights: [Lanes; SECOND],
+}
+
+impl Sums {
+    #[inline(always)]
+    fn add<const TERMS: usize>(&mut self, [u, v, z]: &[Lanes; 3], weights: Lanes) {
+        let mut put = |place: usize, product: &Lanes| {
+            for k in 0..LANES {
+                self.powers[place][k] += product[k];
+                if place < TERMS {
+                    self.heights[place][k] += product[k] * z[k];
+                }
+            }
+        };
+        // Each degree from the one before: all times u, and the last times v.
+        let (one, first) = (weights, [times(&weights, u), times(&weights, v)]);
+        let second = [
+            times(&first[0], u),
+            times(&first[1], u),
+            times(&first[1], v),
+        ];
+        put(0, &one);
+        put(1, &first[0]);
+        put(2, &first[1]);
+        for (k, product) in second.iter().enumerate() {
+            put(3 + k, product);
+        }
+        if TERMS < SECOND {
+            return;
+        }
+        let [uu, uv, vv] = second;
+        let third = [times(&uu, u), times(&uv, u), times(&vv, u), times(&vv, v)];
+        for (k, product) in third.iter().enumerate() {
+            put(6 + k, product);
+        }
+        let [uuu, uuv, uvv, vvv] = third;
+        let fourth = [
+            times(&uuu, u),
+            times(&uuv, u),
+            times(&uvv, u),
+            times(&vvv, u),
+            times(&vvv, v),
+        ];
+        for (k, product) in fourth.iter().enumerate() {
+            put(10 + k, product);
+        }
+    }
+
+    /// The normal equations of the first few coefficients, solved; zeros where they say nothing.
+    fn solve(&self, terms: usize, beliefs: &[Belief; 6]) -> Coefficients {
+        let total = |lanes: &Lanes| lanes.iter().sum::<f64>();
+        let mut normal = Matrix6::<f64>::identity();
+        let mut side = Vector6::<f64>::zeros();
+        for i in 0..terms {
+            let Belief { mean, precision } = beliefs[i];
+            side[i] = total(&self.heights[i]) + precision * mean;
+            for j in 0..terms {
+                normal[(i, j)] = total(&self.powers[product(i, j)]);
+            }
+            normal[(i, i)] += precision + 1e-12;
+        }
+        normal
+            .cholesky()
+            .map_or([0.0; 6], |factor| factor.solve(&side).into())
+    }
+}
+
+/// Place among the powers of the product of two of the first six.
+fn product(i: usize, j: usize) -> usize {
+    // Exponents of v; the degree is that of the row of 1, u v, uu uv vv that holds the place.
+    let of = |k: usize| [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)][k];
+    let ((a, p), (b, q)) = (of(i), of(j));
+    let degree: usize = a + b;
+    degree * (degree + 1) / 2 + p + q
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::{Belief, OPEN, Points, value};
+
+    fn scattered(count: usize, height: impl Fn([f64; 2]) -> f64) -> Points {
+        let mut points = Points::default();
+        for k in 0..count {
+            let at = [7, 13].map(|step| (k * step % 31) as f64 / 31.0 - 0.5);
+            points.push([at[0], at[1], height(at)]);
+        }
+        points
+    }
+
+    proptest! {
+        #[test]
+        fn a_surface_is_found_again(
+            c in prop::array::uniform6(-2.0..2.0_f64),
+            count in 40_usize..90,
+            tilt in 0.0..0.9_f64,
+        ) {
+            let points = scattered(count, |at| value(&c, at));
+            let found = points.solve::<6>(&[0.0; 6], |r| 1.0 + tilt * r.sin(), &OPEN);
+            for (one, two) in found.iter().zip(c) {
+                prop_assert!((one - two).abs() < 1e-7, "{found:?} {c:?}");
+            }
+            let over = points.residuals(&c);
+            prop_assert_eq!(over.len(), count);
+            prop_assert!(over.iter().all(|r| r.abs() < 1e-12));
+        }
+    }
+
+    #[test]
+    fn points_that_weigh_nothing_count_for_nothing() {
+        let plane = [0.3, -0.1, 0.2, 0.0, 0.0, 0.0];
+        let spiked = |at: [f64; 2]| value(&plane, at) + if at[0] > 0.3 { 5.0 } else { 0.0 };
+        let weight = |r: f64| f64::from(u8::from(r < 1.0));
+        let found = scattered(61, spiked).solve::<3>(&plane, weight, &OPEN);
+        for (one, two) in found.iter().zip(plane) {
+            assert!((one - two).abs() < 1e-9, "{found:?}");
+        }
+    }
+
+    #[test]
+    fn a_belief_holds_where_points_say_nothing() {
+        let mut points = Points::default();
+        (0..20).for_each(|k| points.push([f64::from(k) / 20.0, 0.0, 1.0]));
+        let mut beliefs = OPEN;
+        beliefs[2] = Belief {
+            mean: 0.7,
+            precision: 1.0,
+        };
+        let found = points.solve::<3>(&[0.0; 6], |_| 1.0, &beliefs);
+        assert!((found[2] - 0.7).abs() < 1e-6, "{found:?}");
+        assert!((found[0] - 1.0).abs() < 1e-6, "{found:?}");
+    }
+}

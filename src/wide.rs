@@ -1,0 +1,44 @@
+//! Loops over numbers side by side, on as many at a time as the processor can.
+//!
+//! The program is built for the oldest processors of its kind. What is called here is built a second time for newer
+//! ones, and chosen when it runs. Both compute the same to the bit: nothing is fused or reordered.
+
+/// Runs `work` with the widest instructions that the processor has. Only what is inlined into it gains: mark it, and the
+/// functions that it calls, `#[inline(always)]`.
+#[inline(always)]
+pub(crate) fn widely<R>(work: impl FnOnce() -> R) -> R {
+    pulp::Arch::new().dispatch(work)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::widely;
+
+    #[inline(always)]
+    fn sums(values: &[f32]) -> [u32; 8] {
+        let mut sums = [0.1_f32; 8];
+        for run in values.as_chunks::<8>().0 {
+            for k in 0..8 {
+                sums[k] += run[k] * run[k] * 1.1 + run[7 - k] / 3.0;
+            }
+        }
+        sums.map(f32::to_bits)
+    }
+
+    #[test]
+    fn wide_and_narrow_give_the_same_bits() {
+        let values: Vec<f32> = (0..4096).map(|k| (k as f32 * 0.7).sin()).collect();
+        let wide = widely(
+            #[inline(always)]
+            || sums(&values),
+        );
+        assert_eq!(wide, sums(&values));
+    }
+
+    #[test]
+    fn a_panic_comes_through() {
+        let none: Vec<f32> = Vec::new();
+        let caught = std::panic::catch_unwind(|| widely(|| none[3]));
+        assert!(caught.is_err());
+    }
+}
