@@ -25,7 +25,8 @@ let correction = null;
 
 /** What is on its way, and why it does not arrive; the end says whether everything did. */
 function saved(waiting, trouble) {
-  screen.saved(waiting, trouble);
+  // A try that fails again must not cover why no more is taken.
+  screen.saved(waiting, trouble === "lost" && outbox.isFull ? "blocked" : trouble);
   if (deck.items.length > 0 && !deck.current) screen.head(null, deck, waiting);
 }
 

@@ -13,10 +13,7 @@ use crate::raster::Grid;
 use crate::wide::widely;
 
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
-const SETTLED_PX: f64 = 0.05;
-
-/// Layers with more pixels along a side have enough in half of their rows.
-const MANY_PX: usize = 160;
+const SETTLED_PX: f64 = 0.03;
 
 /// Two layers ready to be laid on each other many times.
 pub(in crate::stages) struct Refiner<'a> {
@@ -283,8 +280,8 @@ fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
 
 /// What is looked at of a fixed layer.
 struct LookedAt {
-    /// Known pixels: place relative to its middle, and value. One colour of a chessboard is enough, and of large layers
-    /// every other row of it: layers are smooth, neighbours say nearly the same.
+    /// Known pixels: place relative to its middle, and value. One colour of a chessboard is enough: layers are smooth,
+    /// neighbours say nearly the same.
     places: Vec<[f32; 2]>,
     values: Vec<f32>,
     /// Share of the known pixels that are in these lists.
@@ -298,9 +295,8 @@ impl LookedAt {
         let centre = layer.centre().map(|c| c as f32);
         let (width, height) = (layer.value.width(), layer.value.height());
         let (mut places, mut values) = (Vec::new(), Vec::new());
-        let apart = if width.max(height) > MANY_PX { 2 } else { 1 };
-        for y in (0..height).step_by(apart) {
-            for x in (y / apart % 2..width).step_by(2) {
+        for y in 0..height {
+            for x in (y % 2..width).step_by(2) {
                 if layer.weight.at(x, y) > 0.0 {
                     places.push([x as f32 - centre[0], y as f32 - centre[1]]);
                     values.push(layer.value.at(x, y));
