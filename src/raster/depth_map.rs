@@ -28,14 +28,6 @@ impl DepthMap {
         levels.filter(|level| *level > 0).collect()
     }
 
-    /// Number of pixels from a level up.
-    pub fn area(&self, level: u16) -> usize {
-        // Few enough for a narrow sum, of which more fit side by side.
-        let runs = self.levels.data().chunks(usize::from(u16::MAX));
-        let set = |run: &[u16]| run.iter().map(|l| u16::from(*l >= level)).sum::<u16>();
-        runs.map(|run| usize::from(set(run))).sum()
-    }
-
     /// The strokes at a threshold: levels from `level` up. No data is no stroke.
     pub fn strokes(&self, level: u16) -> Mask {
         self.levels.map(|found| *found >= level.max(1))

@@ -18,16 +18,16 @@ impl<T: Copy + Ord> Extremes<T> {
         let mut cells = Vec::with_capacity(across * down);
         for y in 0..down {
             let last = ((y + 1) * FINEST_PX).min(size[1]);
-            let mut lines = values.row(y * FINEST_PX).to_vec();
-            let mut highest = lines.clone();
+            let mut lowest = values.row(y * FINEST_PX).to_vec();
+            let mut highest = lowest.clone();
             for row in y * FINEST_PX + 1..last {
-                let pairs = lines.iter_mut().zip(&mut highest).zip(values.row(row));
+                let pairs = lowest.iter_mut().zip(&mut highest).zip(values.row(row));
                 for ((low, high), value) in pairs {
                     *low = (*low).min(*value);
                     *high = (*high).max(*value);
                 }
             }
-            let (lows, highs) = (lines.chunks(FINEST_PX), highest.chunks(FINEST_PX));
+            let (lows, highs) = (lowest.chunks(FINEST_PX), highest.chunks(FINEST_PX));
             cells.extend(lows.zip(highs).map(|(low, high)| {
                 let low = low.iter().fold(low[0], |a, b| a.min(*b));
                 let high = high.iter().fold(high[0], |a, b| a.max(*b));

@@ -25,6 +25,16 @@ fn turn_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usi
     }
 }
 
+impl Grid<u16> {
+    /// How many values reach a level.
+    pub fn reaching(&self, level: u16) -> usize {
+        // Few enough for a narrow sum, of which more fit side by side.
+        let runs = self.data.chunks(usize::from(u16::MAX));
+        let set = |run: &[u16]| run.iter().map(|l| u16::from(*l >= level)).sum::<u16>();
+        runs.map(|run| usize::from(set(run))).sum()
+    }
+}
+
 impl<T: Copy> Grid<T> {
     /// A grid of one value.
     pub fn new(width: usize, height: usize, fill: T) -> Self {
@@ -142,5 +152,27 @@ impl<T: Copy> Grid<T> {
     /// The values themselves.
     pub fn into_vec(self) -> Vec<T> {
         self.data
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Grid;
+
+    #[test]
+    fn more_values_than_a_narrow_sum_holds_are_counted() {
+        let grid = Grid::from_fn(400, 300, |x, _| x as u16);
+        assert_eq!(grid.reaching(0), 120_000);
+        assert_eq!(grid.reaching(100), 300 * 300);
+        assert_eq!(grid.reaching(400), 0);
+    }
+
+    #[test]
+    fn rows_become_columns() {
+        for (width, height) in [(1, 5), (8, 8), (19, 11), (24, 7)] {
+            let grid = Grid::from_fn(width, height, |x, y| 100 * x + y);
+            let turned = Grid::from_fn(height, width, |x, y| 100 * y + x);
+            assert_eq!(grid.transposed(), turned);
+        }
     }
 }

@@ -44,6 +44,11 @@ impl PixelBox {
 /// Pixels that are counted in a narrow sum, of which more fit side by side.
 const RUN: usize = 255;
 
+/// How many of up to [`RUN`] pixels are set.
+fn set(pixels: impl Iterator<Item = bool>) -> usize {
+    usize::from(pixels.map(u8::from).sum::<u8>())
+}
+
 /// How far two masks of the same size cover each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Overlap {
@@ -57,11 +62,8 @@ impl Mask {
     /// How far this mask and another of the same size cover each other.
     pub fn overlap(&self, other: &Self) -> Overlap {
         let runs = self.data().chunks(RUN).zip(other.data().chunks(RUN));
-        let set = |(one, other): (&[bool], &[bool])| {
-            let pairs = one.iter().zip(other);
-            usize::from(pairs.map(|(a, b)| u8::from(*a & *b)).sum::<u8>())
-        };
-        let both = runs.map(set).sum::<usize>() as f64;
+        let both = runs.map(|(one, other)| set(one.iter().zip(other).map(|(a, b)| *a & *b)));
+        let both = both.sum::<usize>() as f64;
         let sum = (self.count() + other.count()) as f64;
         let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
         Overlap {
@@ -72,11 +74,8 @@ impl Mask {
 
     /// Number of set pixels.
     pub fn count(&self) -> usize {
-        let set = |run: &[bool]| run.iter().map(|set| u8::from(*set)).sum::<u8>();
-        self.data()
-            .chunks(RUN)
-            .map(|run| usize::from(set(run)))
-            .sum()
+        let runs = self.data().chunks(RUN);
+        runs.map(|run| set(run.iter().copied())).sum()
     }
 
     /// Share of set pixels, 0..=1; 0 for an empty grid.

@@ -37,7 +37,7 @@ pub(super) fn warp_strokes<T: Copy + Ord + Default>(
     width: usize,
     height: usize,
 ) -> Vec<Mask> {
-    let mut masks = vec![Mask::new(width, height, false); levels.len()];
+    let masks = vec![Mask::new(width, height, false); levels.len()];
     let Some(from_to) = to_from.inverse().filter(|_| !levels.is_empty()) else {
         return masks;
     };
@@ -49,7 +49,7 @@ pub(super) fn warp_strokes<T: Copy + Ord + Default>(
         extremes: Extremes::of(values),
         values,
         levels: &sorted,
-        masks: vec![Mask::new(width, height, false); levels.len()],
+        masks,
         covered: vec![0.0; levels.len()],
     };
     for y in (0..height).step_by(LARGEST_PX) {
@@ -57,10 +57,9 @@ pub(super) fn warp_strokes<T: Copy + Ord + Default>(
             warp.square(x, y, LARGEST_PX, 0..levels.len());
         }
     }
-    for (k, mask) in order.into_iter().zip(warp.masks) {
-        masks[k] = mask;
-    }
-    masks
+    let mut masks: Vec<(usize, Mask)> = order.into_iter().zip(warp.masks).collect();
+    masks.sort_unstable_by_key(|(k, _)| *k);
+    masks.into_iter().map(|(_, mask)| mask).collect()
 }
 
 /// Masks on their way into another frame.

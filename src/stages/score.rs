@@ -12,13 +12,13 @@ use crate::raster::{Mask, PixelBox};
 /// `ssim` and `nl_ssim` use the print's window; masks count as 0 and 1 with data range 1.
 pub fn measure(print: &WindowMeans, depth: &Mask) -> Scores {
     let structure = print.against(depth);
-    let print = print.mask();
+    let (print, print_bounds) = (print.mask(), print.bounds);
     let overlap = print.overlap(depth);
     Scores {
         ssim: structure.ssim,
         nl_ssim: structure.nl_ssim,
         iou: overlap.iou,
-        iou_box: box_iou(print.bounding_box(), depth.bounding_box()),
+        iou_box: box_iou(print_bounds, depth.bounding_box()),
         dice: overlap.dice,
         density_print: print.density(),
         density_depth: depth.density(),

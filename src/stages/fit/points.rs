@@ -1,7 +1,7 @@
 //! Points of a height map, and weighted least squares over them.
 //!
-//! A surface is fitted in some thirty passes, each over all points: they are kept side by side, so that several are
-//! weighed and summed at a time.
+//! A surface is fitted in some thirty passes: points are kept side by side, so that several are weighed and summed at a
+//! time.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -22,7 +22,7 @@ pub(super) struct Points {
     count: usize,
 }
 
-/// What a coefficient is taken to be before any point is seen: all but the first.
+/// What a coefficient is taken to be before any point is seen.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Belief {
     pub(super) mean: f64,

@@ -75,7 +75,7 @@ impl Relief {
     pub(in crate::stages) fn growth(&self, depth: &DepthMap, level: u16) -> f64 {
         let bit = A_BIT * self.depth() / depth.scale.height_per_level;
         let lower = (f64::from(level) - bit).clamp(1.0, 65_535.0) as u16;
-        let area = |least: u16| depth.area(least);
+        let area = |least: u16| depth.levels.reaching(least);
         (area(lower) as f64 / area(level.max(1)).max(1) as f64).ln()
     }
 

@@ -57,7 +57,7 @@ impl Canvas {
 
     /// Number of pixels of the strokes at a level above 0.
     fn area(&self, level: u16) -> f64 {
-        self.levels.data().iter().filter(|l| **l >= level).count() as f64
+        self.levels.reaching(level) as f64
     }
 }
 

@@ -247,6 +247,7 @@ struct Transform {
 
 impl Transform {
     fn new() -> Self {
+        // Its last digits differ between processors, which only the order of equal peaks could tell.
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(SQUARE);
         let inverse = planner.plan_fft_inverse(SQUARE);

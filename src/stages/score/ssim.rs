@@ -60,7 +60,7 @@ pub struct Structure {
 pub struct WindowMeans {
     mask: Mask,
     /// Where the mask is set.
-    bounds: Option<PixelBox>,
+    pub(super) bounds: Option<PixelBox>,
     taps: Taps,
     /// Means over the windows that lie wholly in the mask: a rim of half a window is left out.
     means: Grid<f64>,

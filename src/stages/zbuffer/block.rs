@@ -26,10 +26,9 @@ impl Row {
     /// Of corners side by side.
     #[inline(always)]
     pub(super) fn at(&self, [x, y, z]: &[Lanes; 3]) -> Lanes {
-        let [a, b, c, d] = self.0;
         let mut places = [0.0; LANES];
         for k in 0..LANES {
-            places[k] = a * x[k] + b * y[k] + c * z[k] + d;
+            places[k] = self.place([x[k], y[k], z[k]]);
         }
         places
     }
