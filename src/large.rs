@@ -77,7 +77,14 @@ impl<T: Pod> Large<T> {
     pub fn extend_from_slice(&mut self, elements: &[T]) {
         match &mut self.0 {
             Place::Small(vec) => vec.extend_from_slice(elements),
-            Place::Pages { .. } => self.extend(elements.iter().copied()),
+            Place::Pages { pages, len } => {
+                if let Some(room) = slots(pages)[*len..].get_mut(..elements.len()) {
+                    room.copy_from_slice(elements);
+                    *len += elements.len();
+                } else {
+                    self.extend(elements.iter().copied());
+                }
+            }
         }
     }
 

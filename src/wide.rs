@@ -10,6 +10,40 @@ pub(crate) fn widely<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
 }
 
+/// Plain comparisons, which are one instruction for many lanes; `f32::min` minds what is not a number.
+#[inline(always)]
+pub(crate) fn lower(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+pub(crate) fn higher(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Numbers of this size have no bits for parts of one.
+const WHOLE: f32 = 12_582_912.0;
+
+/// The whole number at or below one that is small beside [`WHOLE`]. Casts and `floor` are not computed side by side.
+#[inline(always)]
+pub(crate) fn whole_below(v: f32) -> f32 {
+    let nearest = (v + WHOLE) - WHOLE;
+    if nearest > v { nearest - 1.0 } else { nearest }
+}
+
+/// The whole number at or above one that is small beside [`WHOLE`].
+#[inline(always)]
+pub(crate) fn whole_above(v: f32) -> f32 {
+    let nearest = (v + WHOLE) - WHOLE;
+    if nearest < v { nearest + 1.0 } else { nearest }
+}
+
+/// A whole number from 0 up that is small beside [`WHOLE`].
+#[inline(always)]
+pub(crate) fn index(whole: f32) -> u32 {
+    (whole + WHOLE).to_bits() - WHOLE.to_bits()
+}
+
 #[cfg(test)]
 mod tests {
     use super::widely;

@@ -101,18 +101,14 @@ impl Pairs {
         let style = ScanStyle::draw(self.tier().is_damaged(), self.vertices(), &mut rng);
         let mut mesh = scan(&surface, &outline, &style, &mut rng);
         let pose = Pose::draw(self.tier(), &mut rng);
-        for vertex in &mut mesh.vertices {
-            *vertex = pose.mesh_from_block(*vertex);
-        }
+        mesh.vertices.change(|vertex| pose.mesh_from_block(vertex));
         mesh
     }
 }
 
 /// The mesh reflected in x. Faces turn their corners round, so that outside stays outside.
 fn mirrored(mut mesh: Mesh) -> Mesh {
-    for [x, _, _] in &mut mesh.vertices {
-        *x = -*x;
-    }
+    mesh.vertices.change(|[x, y, z]| [-x, y, z]);
     for [_, b, c] in &mut mesh.triangles {
         std::mem::swap(b, c);
     }
@@ -126,7 +122,7 @@ mod tests {
     use crate::mesh::Mesh;
 
     fn area_vector(mesh: &Mesh, triangle: [u32; 3]) -> [f64; 3] {
-        let [a, b, c] = triangle.map(|corner| mesh.vertices[corner as usize]);
+        let [a, b, c] = triangle.map(|corner| mesh.vertices.at(corner as usize));
         let side = |p: [f64; 3]| [0, 1, 2].map(|i| p[i] - a[i]);
         let (u, v) = (side(b), side(c));
         [0, 1, 2].map(|i| u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3])

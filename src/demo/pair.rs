@@ -159,9 +159,7 @@ impl Scene {
         let style = ScanStyle::draw(self.tier.is_damaged(), vertices, rng);
         let mut mesh = scan(&surface, &cut(&self.artwork, rng), &style, rng);
         let pose = Pose::draw(self.tier, rng);
-        for vertex in &mut mesh.vertices {
-            *vertex = pose.mesh_from_block(*vertex);
-        }
+        mesh.vertices.change(|vertex| pose.mesh_from_block(vertex));
         let known = Known {
             strokes: &self.artwork.strokes,
             remaining: &remaining,
@@ -272,8 +270,8 @@ mod tests {
             let pair = pair(tier, 1);
             let tops = without_rims(&pair.tops);
             let (mut tops_high, mut tops_all, mut ground_low, mut ground_all) = (0, 0, 0, 0);
-            for vertex in &pair.mesh.vertices {
-                match seen(&pair, &tops, *vertex) {
+            for vertex in pair.mesh.vertices.iter() {
+                match seen(&pair, &tops, vertex) {
                     // Below the ground there are only side walls and foot.
                     Some((_, height)) if height < -0.175 => {}
                     Some((TOP, height)) => {

@@ -197,7 +197,9 @@ fn add_spikes(mesh: &mut Mesh, spikes: u32, rng: &mut ChaCha8Rng) {
             return;
         }
         let index = rng.random_range(0..mesh.vertices.len());
-        mesh.vertices[index][2] += rng.random_range(-0.25..0.35);
+        let [x, y, z] = mesh.vertices.at(index);
+        let spike = z + rng.random_range(-0.25..0.35);
+        mesh.vertices.set(index, [x, y, spike]);
     }
 }
 
@@ -209,7 +211,7 @@ fn close(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
     let foot: Vec<[f64; 3]> = mesh
         .vertices
         .iter()
-        .map(|[x, y, _]| [*x, *y, -BODY_MM + noise_mm * normal(rng)])
+        .map(|[x, y, _]| [x, y, -BODY_MM + noise_mm * normal(rng)])
         .collect();
     mesh.vertices.extend(foot);
     let under = top
@@ -252,7 +254,7 @@ fn post(
     if let Some(known) = posts.get(&rim) {
         return known.clone();
     }
-    let [x, y, z] = mesh.vertices[rim as usize];
+    let [x, y, z] = mesh.vertices.at(rim as usize);
     let mut column = vec![rim];
     for row in 1..WALL_ROWS {
         let share = f64::from(row) / f64::from(WALL_ROWS);
@@ -306,7 +308,7 @@ mod tests {
         mesh.triangles
             .iter()
             .map(|t| {
-                let [a, b, c] = t.map(|corner| mesh.vertices[corner as usize]);
+                let [a, b, c] = t.map(|corner| mesh.vertices.at(corner as usize));
                 a[0] * (b[1] * c[2] - b[2] * c[1])
                     + a[1] * (b[2] * c[0] - b[0] * c[2])
                     + a[2] * (b[0] * c[1] - b[1] * c[0])
@@ -330,7 +332,7 @@ mod tests {
             mesh.vertices.len()
         );
         let up = mesh.triangles.iter().all(|t| {
-            let [a, b, c] = t.map(|corner| mesh.vertices[corner as usize]);
+            let [a, b, c] = t.map(|corner| mesh.vertices.at(corner as usize));
             (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
         });
         assert!(up);

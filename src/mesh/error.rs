@@ -109,13 +109,16 @@ pub(super) fn finite(position: [f64; 3], vertex: u64) -> Result<[f64; 3], Error>
 }
 
 /// Checks that vertices are finite, of which `before` came before.
-pub(super) fn all_finite(positions: &[[f64; 3]], before: usize) -> Result<(), Error> {
+pub(super) fn all_finite<T: Copy + Into<f64>>(
+    positions: &[[T; 3]],
+    before: usize,
+) -> Result<(), Error> {
     let values = positions.as_flattened().iter();
-    if values.fold(true, |finite, value| finite & value.is_finite()) {
+    if values.fold(true, |finite, value| finite & (*value).into().is_finite()) {
         return Ok(());
     }
     for (vertex, position) in (before as u64 + 1..).zip(positions) {
-        finite(*position, vertex)?;
+        finite(position.map(Into::into), vertex)?;
     }
     Ok(())
 }

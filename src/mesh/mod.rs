@@ -8,19 +8,21 @@ mod ply;
 mod points;
 mod stl;
 mod text;
+mod vertices;
 pub mod write;
 
 pub use error::Error;
 pub use format::Format;
 pub use limits::Limits;
+pub use vertices::Vertices;
 
 use crate::large::Large;
 
 /// Triangles over vertices, in the mesh's own frame and unit. A point set has no triangles.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Mesh {
-    /// Positions, all finite.
-    pub vertices: Large<[f64; 3]>,
+    /// Positions of corners and points.
+    pub vertices: Vertices,
     /// Indices into `vertices`, wound as in the file.
     pub triangles: Large<[u32; 3]>,
 }
@@ -184,7 +186,7 @@ mod tests {
             }
             if let Ok(mesh) = read(&bytes, name, &LIMITS) {
                 prop_assert!(mesh.vertices.capacity() <= 2 * bytes.len());
-                prop_assert!(mesh.vertices.as_flattened().iter().all(|v| v.is_finite()));
+                prop_assert!(mesh.vertices.iter().flatten().all(f64::is_finite));
                 let count = mesh.vertices.len() as u32;
                 prop_assert!(mesh.triangles.as_flattened().iter().all(|index| *index < count));
             }

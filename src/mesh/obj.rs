@@ -36,7 +36,7 @@ fn read_by_tobj(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
     let (models, _) = tobj::load_obj_buf(&mut reader, &OPTIONS, no_materials)
         .map_err(|reason| find_fault(bytes, reason))?;
     let mesh = joined_models(models);
-    if mesh.vertices.as_flattened().iter().any(|v| !v.is_finite()) {
+    if !mesh.vertices.iter().flatten().all(f64::is_finite) {
         return Err(find_fault(bytes, tobj::LoadError::PositionParseError));
     }
     Ok(mesh)
@@ -50,7 +50,7 @@ fn joined_models(models: Vec<tobj::Model>) -> Mesh {
         let offset = mesh.vertices.len() as u32;
         let (positions, _) = model.mesh.positions.as_chunks::<3>();
         let (triangles, _) = model.mesh.indices.as_chunks::<3>();
-        mesh.vertices.extend_from_slice(positions);
+        mesh.vertices.extend(positions.iter().copied());
         mesh.triangles
             .extend(triangles.iter().map(|t| t.map(|index| index + offset)));
     }
@@ -279,7 +279,7 @@ mod tests {
     #[test]
     fn vertex_colours_and_weights_are_left_out() {
         let mesh = read("v 0 0 0 255 0 0\nv 2 0 0 2\nv 0 1 0 1 1 1 1\nf 1 2 3\n").expect("reads");
-        assert_eq!(mesh.vertices[1], [2.0, 0.0, 0.0]);
+        assert_eq!(mesh.vertices.at(1), [2.0, 0.0, 0.0]);
         assert_eq!(mesh.vertices.len(), 3);
     }
 
@@ -303,7 +303,7 @@ mod tests {
     #[test]
     fn positions_keep_all_their_digits() {
         let mesh = read("v 1234567.123456789 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").expect("reads");
-        assert_eq!(mesh.vertices[0][0], 1_234_567.123_456_789);
+        assert_eq!(mesh.vertices.at(0)[0], 1_234_567.123_456_789);
     }
 
     #[test]

@@ -68,7 +68,10 @@ mod tests {
     #[test]
     fn titles_counts_comments_and_further_columns_are_left_out() {
         let plain = open("1 2 3\n4 5 6\n").expect("reads");
-        assert_eq!(plain.vertices, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+        assert_eq!(
+            plain.vertices,
+            vec![[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]].into()
+        );
         assert!(plain.triangles.is_empty());
         for text in [
             "2\n1 2 3 255 0 0\n4 5 6 255 0 0\n",

@@ -1,6 +1,6 @@
 //! STL, binary and ascii: a soup of triangles, in which each vertex is repeated as often as it is used.
 
-use super::{Error, Format, Limits, Mesh, error, text};
+use super::{Error, Format, Limits, Mesh, Vertices, error, text};
 use crate::large::Large;
 
 const HEADER: usize = 84;
@@ -46,18 +46,18 @@ pub(super) fn read_binary(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> 
         error::all_finite(&few, vertices.len())?;
         vertices.extend_from_slice(&few);
     }
-    soup(vertices)
+    soup(Vertices::Single(vertices))
 }
 
 /// The three corners of a facet: twelve little-endian 32-bit floats, the first three of them the normal.
-fn corners(facet: &[u8; FACET]) -> [[f64; 3]; 3] {
+fn corners(facet: &[u8; FACET]) -> [[f32; 3]; 3] {
     let (floats, _) = facet[12..48].as_chunks::<4>();
-    let at = |i: usize| f64::from(f32::from_le_bytes(floats[i]));
+    let at = |i: usize| f32::from_le_bytes(floats[i]);
     [0, 3, 6].map(|i| [at(i), at(i + 1), at(i + 2)])
 }
 
 /// Every three vertices in a row are a triangle.
-fn soup(vertices: Large<[f64; 3]>) -> Result<Mesh, Error> {
+fn soup(vertices: Vertices) -> Result<Mesh, Error> {
     if vertices.is_empty() {
         return Err(Error::NoFaces);
     }
@@ -226,7 +226,7 @@ mod tests {
         for header in [b"solid made by a scanner".as_slice(), b"", b"COLOR=...."] {
             let mesh = open(&binary(header, &CORNERS)).expect("reads");
             assert_eq!(mesh.vertices.len(), 6);
-            assert_eq!(mesh.vertices[5], [1.0, 1.0, 0.25]);
+            assert_eq!(mesh.vertices.at(5), [1.0, 1.0, 0.25]);
             assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
         }
     }
@@ -287,7 +287,7 @@ mod tests {
     fn ascii_loops_of_four_become_two_triangles() {
         let mesh = open(ASCII.as_bytes()).expect("reads");
         assert_eq!(mesh.triangles.len(), 2);
-        assert_eq!(mesh.vertices[2], [1.0, 1.0, 0.1]);
+        assert_eq!(mesh.vertices.at(2), [1.0, 1.0, 0.1]);
         let two = open(ASCII.repeat(2).as_bytes()).expect("reads");
         assert_eq!(two.triangles.len(), 4);
     }

@@ -69,7 +69,7 @@ fn single(point: [f64; 3]) -> [f32; 3] {
 }
 
 fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [[f32; 3]; 3] {
-    triangle.map(|corner| single(mesh.vertices[corner as usize]))
+    triangle.map(|corner| single(mesh.vertices.at(corner as usize)))
 }
 
 /// Unit normal by winding; zero for a triangle without area, as STL writers do.
@@ -133,7 +133,7 @@ fn ply_header(mesh: &Mesh, format: &str) -> String {
 
 fn ply_ascii(mesh: &Mesh) -> Vec<u8> {
     let mut out = ply_header(mesh, "ascii");
-    for [x, y, z] in mesh.vertices.iter().copied().map(single) {
+    for [x, y, z] in mesh.vertices.iter().map(single) {
         push(&mut out, format_args!("{x} {y} {z}\n"));
     }
     for [a, b, c] in &mesh.triangles {
@@ -150,7 +150,7 @@ fn ply_binary(
 ) -> Vec<u8> {
     let mut out = ply_header(mesh, format).into_bytes();
     out.reserve(12 * mesh.vertices.len() + 13 * mesh.triangles.len());
-    for value in mesh.vertices.iter().copied().flat_map(single) {
+    for value in mesh.vertices.iter().flat_map(single) {
         out.extend(float(value));
     }
     for triangle in &mesh.triangles {
@@ -164,7 +164,7 @@ fn ply_binary(
 
 fn obj(mesh: &Mesh) -> Vec<u8> {
     let mut out = String::from("# scan\no scan\n");
-    for [x, y, z] in mesh.vertices.iter().copied().map(single) {
+    for [x, y, z] in mesh.vertices.iter().map(single) {
         push(&mut out, format_args!("v {x} {y} {z}\n"));
     }
     for triangle in &mesh.triangles {
@@ -198,7 +198,7 @@ mod tests {
 
     /// Corners of all triangles, as singles.
     fn soup(mesh: &Mesh) -> Vec<[f32; 3]> {
-        let corner = |index: &u32| mesh.vertices[*index as usize].map(|c| c as f32);
+        let corner = |index: &u32| mesh.vertices.at(*index as usize).map(|c| c as f32);
         mesh.triangles.iter().flatten().map(corner).collect()
     }
 

@@ -82,7 +82,10 @@ impl<T: Copy> Grid<T> {
     #[must_use]
     pub fn transposed(&self) -> Self {
         let (width, height) = (self.width, self.height);
-        let mut data = self.data.clone();
+        let mut data: Vec<T> = match self.data.first() {
+            Some(any) => vec![*any; self.data.len()],
+            None => Vec::new(),
+        };
         for top in (0..height).step_by(TILE) {
             let rows = &self.data[top * width..];
             for left in (0..width).step_by(TILE) {

@@ -3,12 +3,6 @@
 use super::Grid;
 use crate::wide::widely;
 
-/// How far along one axis an output pixel reaches in the source.
-struct Reach {
-    first: usize,
-    weights: Vec<f32>,
-}
-
 /// Values under an upright map `to = scale * from + shift` (pixels, per axis), `width` x `height` pixels large.
 ///
 /// Each output pixel is the mean of the source over its own square, or over a source pixel's where that is larger.
@@ -19,56 +13,105 @@ pub fn resample(
     shift: [f64; 2],
     [width, height]: [usize; 2],
 ) -> Grid<f32> {
-    let rows = reaches(values.height(), height, scale, shift[1]);
-    let columns = reaches(values.width(), width, scale, shift[0]);
+    if scale <= 1.0 {
+        return resample_turned(values, scale, shift, [width, height]).transposed();
+    }
+    // What grows is turned while it is small.
+    let columns = Reaches::new(values.width(), width, scale, shift[0]);
+    let rows = Reaches::new(values.height(), height, scale, shift[1]);
+    rows.mix(&columns.mix(&values.transposed()).transposed())
+}
+
+/// The same with rows and columns changed for each other: `height` x `width` pixels large.
+pub fn resample_turned(
+    values: &Grid<f32>,
+    scale: f64,
+    shift: [f64; 2],
+    [width, height]: [usize; 2],
+) -> Grid<f32> {
+    let rows = Reaches::new(values.height(), height, scale, shift[1]);
+    let columns = Reaches::new(values.width(), width, scale, shift[0]);
     // Whole rows are summed side by side, so columns are turned into rows for their turn.
-    mixed(&mixed(values, &rows).transposed(), &columns).transposed()
+    columns.mix(&rows.mix(values).transposed())
 }
 
-/// Rows mixed from those that each reaches.
-fn mixed(values: &Grid<f32>, reaches: &[Reach]) -> Grid<f32> {
-    let width = values.width();
-    let mut out = Grid::new(width, reaches.len(), 0.0_f32);
-    let rows = out.data_mut().chunks_exact_mut(width.max(1)).zip(reaches);
-    widely(
-        #[inline(always)]
-        || {
-            for (row, reach) in rows {
-                for (k, weight) in reach.weights.iter().enumerate() {
-                    for (sum, value) in row.iter_mut().zip(values.row(reach.first + k)) {
-                        *sum += weight * value;
-                    }
-                }
-            }
-        },
-    );
-    out
+/// How far along one axis the output pixels reach in the source.
+struct Reaches {
+    /// First source pixel of each, and where its weights end among all.
+    each: Vec<(usize, usize)>,
+    weights: Vec<f32>,
 }
 
-/// The reach of each of `to` output pixels over `from` source pixels.
-fn reaches(from: usize, to: usize, scale: f64, shift: f64) -> Vec<Reach> {
-    let length = (1.0 / scale).max(1.0);
-    (0..to)
-        .map(|i| {
+impl Reaches {
+    /// The reach of each of `to` output pixels over `from` source pixels.
+    fn new(from: usize, to: usize, scale: f64, shift: f64) -> Self {
+        let length = (1.0 / scale).max(1.0);
+        let mut weights = Vec::with_capacity(to * (length as usize + 2));
+        let reach = |i| {
             let centre = (i as f64 - shift) / scale;
             let (low, high) = (centre - length / 2.0, centre + length / 2.0);
             let first = (low + 0.5).floor().clamp(0.0, from as f64) as usize;
             let end = ((high + 0.5).ceil().clamp(0.0, from as f64) as usize).max(first);
-            let overlap = |j: usize| {
+            weights.extend((first..end).map(|j| {
                 let j = j as f64;
                 ((high.min(j + 0.5) - low.max(j - 0.5)).max(0.0) / length) as f32
-            };
-            Reach {
-                first,
-                weights: (first..end).map(overlap).collect(),
-            }
-        })
-        .collect()
+            }));
+            (first, weights.len())
+        };
+        Self {
+            each: (0..to).map(reach).collect(),
+            weights,
+        }
+    }
+
+    /// Rows mixed from those that each reaches.
+    fn mix(&self, values: &Grid<f32>) -> Grid<f32> {
+        let width = values.width();
+        let mut out = Grid::new(width, self.each.len(), 0.0_f32);
+        let mut rows = out.data_mut().chunks_exact_mut(width.max(1));
+        let mut start = 0;
+        widely(
+            #[inline(always)]
+            || {
+                for ((first, end), row) in self.each.iter().zip(&mut rows) {
+                    let weights = &self.weights[start..*end];
+                    start = *end;
+                    let (fours, rest) = weights.as_chunks::<4>();
+                    for (k, weights) in fours.iter().enumerate() {
+                        add(row, values, first + 4 * k, *weights);
+                    }
+                    let first = first + 4 * fours.len();
+                    match *rest {
+                        [a, b, c] => add(row, values, first, [a, b, c]),
+                        [a, b] => add(row, values, first, [a, b]),
+                        [a] => add(row, values, first, [a]),
+                        _ => {}
+                    }
+                }
+            },
+        );
+        out
+    }
+}
+
+/// Adds some weighed rows to a row, one after the other.
+#[inline(always)]
+fn add<const N: usize>(row: &mut [f32], values: &Grid<f32>, first: usize, weights: [f32; N]) {
+    let width = row.len();
+    let rows = &values.data()[first * width..][..N * width];
+    let rows: [&[f32]; N] = std::array::from_fn(|k| &rows[k * width..][..width]);
+    for x in 0..width {
+        let mut sum = row[x];
+        for k in 0..N {
+            sum += weights[k] * rows[k][x];
+        }
+        row[x] = sum;
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::resample;
+    use super::{resample, resample_turned};
     use crate::raster::Grid;
 
     #[test]
@@ -77,6 +120,8 @@ mod tests {
         let half = resample(&ramp, 0.5, [-0.25, -0.25], [6, 4]);
         assert!((half.at(0, 0) - (0.0 + 1.0 + 10.0 + 11.0) / 4.0).abs() < 1e-5);
         assert!((half.at(5, 3) - (70.0 + 71.0 + 80.0 + 81.0) / 4.0).abs() < 1e-4);
+        let turned = resample_turned(&ramp, 0.5, [-0.25, -0.25], [6, 4]);
+        assert_eq!(turned.transposed(), half);
         let double = resample(&ramp, 2.0, [0.5, 0.5], [24, 16]);
         assert!((double.at(6, 4) - (2.75 + 17.5)).abs() < 1e-5);
     }

@@ -7,11 +7,14 @@ use std::ops::Range;
 use super::extremes::Extremes;
 use super::{DepthMap, Grid, Mask};
 use crate::domain::Affine2;
+use crate::wide::widely;
 
 /// Most looks along one side of an output pixel; beyond this a shrinking map begins to alias.
 const MAX_LOOKS: usize = 8;
 /// A look mixes the pixels around it, so looks this far apart in the source miss nothing between them.
 const APART_PX: f64 = 1.5;
+/// So much of a pixel must be covered: half of it, whatever the order in which the parts were added.
+const HALF: f64 = 0.5 - 1e-9;
 /// Side of the squares of output pixels that are first asked for together whether what they see is all alike; where it
 /// is not, their quarters are asked, down to the smallest.
 const LARGEST_PX: usize = 32;
@@ -30,7 +33,7 @@ pub fn warp_mask(mask: &Mask, to_from: &Affine2, width: usize, height: usize) ->
 
 /// The masks of what reaches each of some levels, in another frame, as [`warp_mask`] brings them there: what they have
 /// in common is looked at once.
-pub(super) fn warp_strokes<T: Copy + Ord + Default>(
+pub(super) fn warp_strokes<T: Copy + Ord + Default + Into<f64>>(
     values: &Grid<T>,
     levels: &[T],
     to_from: &Affine2,
@@ -50,13 +53,14 @@ pub(super) fn warp_strokes<T: Copy + Ord + Default>(
         values,
         levels: &sorted,
         masks,
-        covered: vec![0.0; levels.len()],
+        open: Vec::new(),
     };
     for y in (0..height).step_by(LARGEST_PX) {
         for x in (0..width).step_by(LARGEST_PX) {
             warp.square(x, y, LARGEST_PX, 0..levels.len());
         }
     }
+    warp.close();
     let mut masks: Vec<(usize, Mask)> = order.into_iter().zip(warp.masks).collect();
     masks.sort_unstable_by_key(|(k, _)| *k);
     masks.into_iter().map(|(_, mask)| mask).collect()
@@ -70,11 +74,23 @@ struct Warp<'a, T> {
     /// The lowest first.
     levels: &'a [T],
     masks: Vec<Mask>,
-    /// How much of the pixel in hand each level covers.
-    covered: Vec<f64>,
+    /// The smallest squares that are not settled yet.
+    open: Vec<Open>,
 }
 
-impl<T: Copy + Ord + Default> Warp<'_, T> {
+/// A square of output pixels, and the levels of which it is not known yet.
+struct Open {
+    columns: Range<usize>,
+    rows: Range<usize>,
+    levels: Range<usize>,
+    /// Whether all that it sees lies within the grid.
+    is_inside: bool,
+}
+
+/// Levels that are looked at side by side.
+const LANES: usize = 4;
+
+impl<T: Copy + Ord + Default + Into<f64>> Warp<'_, T> {
     /// Settles a square of output pixels for those levels of which it is not known yet.
     fn square(&mut self, x: usize, y: usize, side: usize, open: Range<usize>) {
         let (width, height) = (self.masks[0].width(), self.masks[0].height());
@@ -103,29 +119,56 @@ impl<T: Copy + Ord + Default> Warp<'_, T> {
             }
             return;
         }
-        for row in rows {
-            for column in columns.clone() {
-                self.pixel(column, row, all..some);
-            }
-        }
+        let inside = |[first, last]: [i64; 2], side: usize| first >= 0 && last < side as i64;
+        let is_inside =
+            inside(reach[0], self.values.width()) && inside(reach[1], self.values.height());
+        self.open.push(Open {
+            columns,
+            rows,
+            levels: all..some,
+            is_inside,
+        });
     }
 
-    /// Settles one pixel, look by look.
-    fn pixel(&mut self, x: usize, y: usize, open: Range<usize>) {
-        let levels = &self.levels[open.clone()];
-        let covered = &mut self.covered[open.clone()];
-        covered.fill(0.0);
-        self.looks.each(x, y, |place| {
-            let (near, within) = look(self.values, place);
-            for (covered, level) in covered.iter_mut().zip(levels) {
-                let reach = near.map(|value| f64::from(u8::from(value >= *level)));
-                *covered += between(reach, within);
-            }
-        });
-        let count = self.looks.count() as f64;
-        for (mask, covered) in self.masks[open].iter_mut().zip(covered) {
-            mask.set(x, y, *covered / count >= 0.5);
-        }
+    /// Settles what is open, pixel by pixel and look by look.
+    fn close(&mut self) {
+        let Self {
+            looks,
+            values,
+            levels,
+            masks,
+            open,
+            ..
+        } = self;
+        let half = HALF * looks.count() as f64;
+        widely(
+            #[inline(always)]
+            || {
+                for square in open.iter() {
+                    let mut first = square.levels.start;
+                    while first < square.levels.end {
+                        let end = (first + LANES).min(square.levels.end);
+                        let mut least = [f64::INFINITY; LANES];
+                        for k in first..end {
+                            least[k - first] = levels[k].into();
+                        }
+                        for y in square.rows.clone() {
+                            for x in square.columns.clone() {
+                                let covered = if square.is_inside {
+                                    looks.covered(x, y, values, &least, look_inside)
+                                } else {
+                                    looks.covered(x, y, values, &least, look)
+                                };
+                                for k in first..end {
+                                    masks[k].set(x, y, covered[k - first] >= half);
+                                }
+                            }
+                        }
+                        first = end;
+                    }
+                }
+            },
+        );
     }
 }
 
@@ -198,6 +241,30 @@ impl Looks {
         }
     }
 
+    /// How much of the looks of an output pixel falls on what reaches each of some levels.
+    #[inline(always)]
+    fn covered<T: Copy + Default + Into<f64>>(
+        &self,
+        x: usize,
+        y: usize,
+        values: &Grid<T>,
+        least: &[f64; LANES],
+        look: impl Fn(&Grid<T>, [f64; 2]) -> ([T; 4], [f64; 2]),
+    ) -> [f64; LANES] {
+        let mut covered = [0.0; LANES];
+        self.each(x, y, |place| {
+            let (near, within) = look(values, place);
+            let weights = weights(within);
+            for i in 0..4 {
+                let value: f64 = near[i].into();
+                for k in 0..LANES {
+                    covered[k] += if value >= least[k] { weights[i] } else { 0.0 };
+                }
+            }
+        });
+        covered
+    }
+
     fn count(&self) -> usize {
         self.per_side * self.per_side
     }
@@ -218,14 +285,9 @@ impl Looks {
     /// Mean level where all pixels around the looks are within the grid and hold data.
     fn mean_inside(&self, x: usize, y: usize, levels: &Grid<u16>) -> f64 {
         let mut sum = 0.0;
-        self.each(x, y, |[x, y]| {
-            // Not below zero, so a cast rounds down.
-            let (column, row) = (x as i32, y as i32);
-            let (fx, fy) = (x - f64::from(column), y - f64::from(row));
-            let from = row as usize * levels.width() + column as usize;
-            let near = &levels.data()[from..from + levels.width() + 2];
-            let [a, b] = [near[0], near[1]].map(f64::from);
-            let [c, d] = [near[levels.width()], near[levels.width() + 1]].map(f64::from);
+        self.each(x, y, |place| {
+            let (near, [fx, fy]) = look_inside(levels, place);
+            let [a, b, c, d] = near.map(f64::from);
             let (above, below) = (a + (b - a) * fx, c + (d - c) * fx);
             sum += above + (below - above) * fy;
         });
@@ -263,10 +325,23 @@ fn look<T: Copy + Default>(values: &Grid<T>, [x, y]: [f64; 2]) -> ([T; 4], [f64;
     (near, [x - x0 as f64, y - y0 as f64])
 }
 
-/// Bilinear value between a pixel, the next in its row and the two below.
+/// The same where all four pixels are within the grid.
 #[inline(always)]
-fn between(near: [f64; 4], [fx, fy]: [f64; 2]) -> f64 {
-    (near[0] * (1.0 - fx) + near[1] * fx) * (1.0 - fy) + (near[2] * (1.0 - fx) + near[3] * fx) * fy
+fn look_inside<T: Copy>(values: &Grid<T>, [x, y]: [f64; 2]) -> ([T; 4], [f64; 2]) {
+    // Not below zero, so a cast rounds down.
+    let (column, row) = (x as i32, y as i32);
+    let width = values.width();
+    let from = row as usize * width + column as usize;
+    let near = &values.data()[from..from + width + 2];
+    let near = [near[0], near[1], near[width], near[width + 1]];
+    (near, [x - f64::from(column), y - f64::from(row)])
+}
+
+/// How much a pixel, the next in its row and the two below have to say at a place between them.
+#[inline(always)]
+fn weights([fx, fy]: [f64; 2]) -> [f64; 4] {
+    let (left, above) = (1.0 - fx, 1.0 - fy);
+    [left * above, fx * above, left * fy, fx * fy]
 }
 
 /// Bilinear level among the neighbours that hold data; `None` when they weigh less than half.
@@ -305,7 +380,7 @@ fn neighbours<T: Copy>(grid: &Grid<T>, x: i64, y: i64, outside: T) -> [T; 4] {
 
 #[cfg(test)]
 mod tests {
-    use super::{Looks, between, look, warp_mask, warp_strokes};
+    use super::{HALF, Looks, look, warp_mask, warp_strokes, weights};
     use crate::domain::Affine2;
     use crate::raster::{Grid, Mask};
 
@@ -362,9 +437,14 @@ mod tests {
                 let plain = Mask::from_fn(50, 60, |x, y| {
                     let set = |p| {
                         let (near, within) = look(&mask, p);
-                        Some(between(near.map(|set| f64::from(u8::from(set))), within))
+                        let pairs = near.into_iter().zip(weights(within));
+                        Some(
+                            pairs
+                                .map(|(set, weight)| if set { weight } else { 0.0 })
+                                .sum(),
+                        )
                     };
-                    looks.mean(x, y, set) >= Some(0.5)
+                    looks.mean(x, y, set) >= Some(HALF)
                 });
                 assert_eq!(warped, plain);
                 assert_eq!(warp_mask(&mask, &map, 50, 60), plain);

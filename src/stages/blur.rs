@@ -7,16 +7,21 @@ use crate::wide::widely;
 ///
 /// Beyond the rim values are taken to be zero, so divide by the smoothed weight where that matters.
 pub(super) fn blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
+    blur_turned(values.transposed(), sigma)
+}
+
+/// The same of values whose rows and columns were changed for each other, which they are changed back.
+pub(super) fn blur_turned(turned: Grid<f32>, sigma: f64) -> Grid<f32> {
     if sigma < 0.5 {
-        return values.clone();
+        return turned.transposed();
     }
     // Three boxes of half-width r have the variance r (r + 1) of one gaussian: three whole half-widths whose mean is
     // as close to that as it can be.
     let half = ((1.0 + 4.0 * sigma * sigma).sqrt() - 1.0) / 2.0;
     let whole = |pass: u32| (half * f64::from(pass)).round() as usize;
     let radii = [0, 1, 2].map(|pass| whole(pass + 1) - whole(pass));
-    // Columns are summed side by side, so rows are turned into columns for their turn.
-    down(down(values.clone(), radii).transposed(), radii).transposed()
+    // Columns are summed side by side.
+    down(down(turned, radii).transposed(), radii)
 }
 
 /// Box means down the columns, one after the other.
@@ -29,35 +34,71 @@ fn down(mut values: Grid<f32>, radii: [usize; 3]) -> Grid<f32> {
     values
 }
 
+/// Columns that are summed side by side: many at a time, so that no sum waits for the last, and few at a time for the
+/// rest.
+const MANY: usize = 32;
+const FEW: usize = 8;
+
 fn box_columns(values: &Grid<f32>, radius: usize, means: &mut Grid<f32>) {
-    let (width, height) = (values.width(), values.height());
-    let mut sums = vec![0.0_f32; width];
-    let scale = 1.0 / (2 * radius + 1) as f32;
+    let width = values.width();
+    let (values, means) = (values.data(), means.data_mut());
     widely(
         #[inline(always)]
         || {
-            for y in 0..height + radius {
-                if y < height {
-                    add(&mut sums, values.row(y), 1.0);
-                }
-                if y > 2 * radius {
-                    add(&mut sums, values.row(y - 2 * radius - 1), -1.0);
-                }
-                if y >= radius {
-                    let row = &mut means.data_mut()[(y - radius) * width..][..width];
-                    for (out, sum) in row.iter_mut().zip(&sums) {
-                        *out = sum * scale;
-                    }
-                }
+            let mut left = 0;
+            while left + MANY <= width {
+                columns::<MANY>(values, width, left, radius, means);
+                left += MANY;
+            }
+            // The last few may be summed twice.
+            while left < width && width >= FEW {
+                let from = left.min(width - FEW);
+                columns::<FEW>(values, width, from, radius, means);
+                left = from + FEW;
+            }
+            for left in left..width {
+                columns::<1>(values, width, left, radius, means);
             }
         },
     );
 }
 
+/// Means down `N` columns from `left` on.
 #[inline(always)]
-fn add(sums: &mut [f32], row: &[f32], sign: f32) {
-    for (sum, value) in sums.iter_mut().zip(row) {
-        *sum += sign * value;
+fn columns<const N: usize>(
+    values: &[f32],
+    width: usize,
+    left: usize,
+    radius: usize,
+    means: &mut [f32],
+) {
+    let height = values.len() / width;
+    let row = |y: usize| values[y * width + left..].first_chunk::<N>();
+    let nothing = [0.0_f32; N];
+    let scale = 1.0 / (2 * radius + 1) as f32;
+    let mut sums = nothing;
+    for y in 0..radius.min(height) {
+        let comes = row(y).unwrap_or(&nothing);
+        for k in 0..N {
+            sums[k] += comes[k];
+        }
+    }
+    for y in 0..height {
+        let last = y + radius;
+        let comes = if last < height { row(last) } else { None }.unwrap_or(&nothing);
+        let goes = if y > radius {
+            row(y - radius - 1)
+        } else {
+            None
+        }
+        .unwrap_or(&nothing);
+        let Some(means) = means[y * width + left..].first_chunk_mut::<N>() else {
+            return;
+        };
+        for k in 0..N {
+            sums[k] += comes[k] - goes[k];
+            means[k] = sums[k] * scale;
+        }
     }
 }
 

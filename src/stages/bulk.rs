@@ -80,8 +80,8 @@ impl Bulk {
 const LANES: usize = 8;
 
 /// A box somewhat wider than the bulk: points outside it along an axis are flecks.
-pub(super) fn room(points: &[[f64; 3]]) -> Bounds<3> {
-    let along = [0, 1, 2].map(|axis| limits(points.len(), |k| points[k][axis]));
+pub(super) fn room<T: Copy + Into<f64>>(points: &[[T; 3]]) -> Bounds<3> {
+    let along = [0, 1, 2].map(|axis| limits(points.len(), |k| points[k][axis].into()));
     [0, 1].map(|end| along.map(|limits| limits[end]))
 }
 

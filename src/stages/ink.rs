@@ -239,10 +239,26 @@ fn known(picture: &Picture, grey: &Grid<f32>) -> Mask {
 
 /// The mask with every pixel that touches it: the cut's edge mixes paper with white.
 fn grown(mask: &Mask) -> Mask {
-    Mask::from_fn(mask.width(), mask.height(), |x, y| {
-        let (x, y) = (x as i64, y as i64);
-        (-1..=1).any(|dy| (-1..=1).any(|dx| mask.get(x + dx, y + dy).unwrap_or(false)))
-    })
+    let (width, height) = (mask.width(), mask.height());
+    let mut across = mask.clone();
+    for (y, row) in across.data_mut().chunks_exact_mut(width).enumerate() {
+        let from = mask.row(y);
+        for (grown, left) in row[1..].iter_mut().zip(from) {
+            *grown |= *left;
+        }
+        for (grown, right) in row.iter_mut().zip(&from[1..]) {
+            *grown |= *right;
+        }
+    }
+    let mut grown = across.clone();
+    for (y, row) in grown.data_mut().chunks_exact_mut(width).enumerate() {
+        for near in [y.saturating_sub(1), (y + 1).min(height - 1)] {
+            for (grown, near) in row.iter_mut().zip(across.row(near)) {
+                *grown |= *near;
+            }
+        }
+    }
+    grown
 }
 
 /// Grey over the paper's around it.
@@ -278,19 +294,22 @@ fn paper_darkness(dark: &Mask, known: &Mask) -> f64 {
 /// Share of dark pixels in the rim of what is known.
 fn rim_share(dark: &Mask, known: &Mask) -> f64 {
     let (width, height) = (known.width(), known.height());
-    let reach = ((width.min(height) as f64 * RIM).round() as i64).max(1);
+    let reach = ((width.min(height) as f64 * RIM).round() as usize).max(1);
     let (mut rim, mut of_it) = (0_usize, 0_usize);
+    let mut inner = vec![false; width];
     for y in 0..height {
-        for x in 0..width {
-            let (i, j) = (x as i64, y as i64);
-            let near = [(reach, 0), (-reach, 0), (0, reach), (0, -reach)];
-            let at_rim = near
-                .iter()
-                .any(|(dx, dy)| !known.get(i + dx, j + dy).unwrap_or(false));
-            if known.at(x, y) && at_rim {
-                rim += 1;
-                of_it += usize::from(dark.at(x, y));
+        let row = known.row(y);
+        inner.fill(false);
+        if y >= reach && y + reach < height && width > 2 * reach {
+            let (above, below) = (known.row(y - reach), known.row(y + reach));
+            for x in reach..width - reach {
+                inner[x] = row[x - reach] & row[x + reach] & above[x] & below[x];
             }
+        }
+        let at_rim = row.iter().zip(&inner).map(|(known, inner)| known & !inner);
+        for (at_rim, dark) in at_rim.zip(dark.row(y)) {
+            rim += usize::from(at_rim);
+            of_it += usize::from(at_rim & dark);
         }
     }
     if rim == 0 {

@@ -32,11 +32,13 @@ fn split_sorted(values: &[f32]) -> Option<Split> {
         return None;
     }
     let total: f64 = values.iter().map(|v| f64::from(*v)).sum();
+    let all = count as f64;
     let (mut below, mut best, mut cut) = (0.0, -1.0, 1);
     for (k, v) in values.iter().enumerate().take(count - 1) {
         below += f64::from(*v);
         let (n, m) = ((k + 1) as f64, (count - k - 1) as f64);
-        let apart = n * m * (below / n - (total - below) / m).powi(2);
+        // n m (below / n - (total - below) / m)^2, with one division.
+        let apart = (below * all - total * n).powi(2) / (n * m);
         if apart > best {
             (best, cut) = (apart, k + 1);
         }
@@ -60,9 +62,15 @@ fn sort(values: &mut [f32]) {
         return;
     }
     let mut keys: Vec<u32> = values.iter().map(|v| key(*v)).collect();
+    let mut counts = vec![[0_u32; DIGIT_VALUES]; DIGITS.len()];
+    for key in &keys {
+        for (counts, shift) in counts.iter_mut().zip(DIGITS) {
+            counts[digit(*key, shift)] += 1;
+        }
+    }
     let mut sorted = vec![0; keys.len()];
-    for shift in DIGITS {
-        by_digit(&keys, &mut sorted, shift);
+    for (counts, shift) in counts.iter().zip(DIGITS) {
+        by_digit(&keys, &mut sorted, counts, shift);
         std::mem::swap(&mut keys, &mut sorted);
     }
     for (value, key) in values.iter_mut().zip(keys) {
@@ -70,20 +78,20 @@ fn sort(values: &mut [f32]) {
     }
 }
 
-/// Orders keys by one digit; those alike in it keep their order.
-fn by_digit(keys: &[u32], sorted: &mut [u32], shift: u32) {
-    let digit = |key: u32| (key >> shift) as usize % DIGIT_VALUES;
-    let mut places = [0_usize; DIGIT_VALUES];
-    for key in keys {
-        places[digit(*key)] += 1;
-    }
+const fn digit(key: u32, shift: u32) -> usize {
+    (key >> shift) as usize % DIGIT_VALUES
+}
+
+/// Orders keys by one digit, of whose values there are so many each; those alike in it keep their order.
+fn by_digit(keys: &[u32], sorted: &mut [u32], counts: &[u32; DIGIT_VALUES], shift: u32) {
+    let mut places = *counts;
     let mut next = 0;
     for place in &mut places {
         next += std::mem::replace(place, next);
     }
     for key in keys {
-        let place = &mut places[digit(*key)];
-        sorted[*place] = *key;
+        let place = &mut places[digit(*key, shift)];
+        sorted[*place as usize] = *key;
         *place += 1;
     }
 }

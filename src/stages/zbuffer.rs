@@ -11,14 +11,14 @@ mod winding;
 use super::bulk::{Bounds, Bulk, bulk_along, room};
 use crate::domain::Rigid3;
 use crate::large::Large;
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Vertices};
 use crate::raster::Grid;
-use crate::wide::widely;
+use crate::wide::{higher, widely};
 
 use block::{Block, LANES, Lanes, Row, block, fill_block, holding};
 use boxes::Boxes;
 pub(super) use moments::Moments;
-use triangle::{higher, pixels};
+use triangle::pixels;
 pub(super) use view::View;
 
 /// Height of a pixel that no surface covers.
@@ -47,11 +47,18 @@ pub(super) struct Shell {
 impl Shell {
     /// Takes the corners of a mesh's triangles, or its points when it has none.
     pub(super) fn new(mesh: &Mesh) -> Self {
-        let room @ [low, high]: Bounds<3> = room(&mesh.vertices);
+        match &mesh.vertices {
+            Vertices::Single(vertices) => Self::of(mesh, vertices),
+            Vertices::Double(vertices) => Self::of(mesh, vertices),
+        }
+    }
+
+    fn of<T: Copy + Into<f64>>(mesh: &Mesh, vertices: &[[T; 3]]) -> Self {
+        let room @ [low, high]: Bounds<3> = room(vertices);
         let middle: [f64; 3] = std::array::from_fn(|k| f64::midpoint(low[k], high[k]));
         let points: Large<[u32; 3]>;
         let triangles = if mesh.triangles.is_empty() {
-            points = (0..mesh.vertices.len() as u32).map(|i| [i; 3]).collect();
+            points = (0..vertices.len() as u32).map(|i| [i; 3]).collect();
             &points
         } else {
             &mesh.triangles
@@ -66,7 +73,7 @@ impl Shell {
                 for group in triangles.chunks(LANES * LANES) {
                     let first = blocks.len();
                     for few in group.chunks(LANES) {
-                        blocks.push(block(few, &mesh.vertices, middle));
+                        blocks.push(block(few, vertices, middle));
                     }
                     boxes.push(Boxes::around(&blocks[first..], extent));
                 }
@@ -80,6 +87,11 @@ impl Shell {
             blocks,
             has_faces: !mesh.triangles.is_empty(),
         }
+    }
+
+    /// Box around the bulk, in the mesh's frame.
+    pub(super) const fn room(&self) -> Bounds<3> {
+        self.room
     }
 
     /// Rows that give a place in a frame: x, y, z.
@@ -260,7 +272,7 @@ mod tests {
         let (mut tolerance, mut near_edge) = (1e-5_f64, false);
         for t in &mesh.triangles {
             let corner = |k: usize| {
-                let v = mesh.vertices[t[k] as usize];
+                let v = mesh.vertices.at(t[k] as usize);
                 let [px, py] = view.px_from_plane.apply([v[0], v[1]]);
                 [px - x as f64, py - y as f64, v[2]]
             };

@@ -99,9 +99,7 @@ impl HostilePairs {
         let stl = |mesh: Mesh| Bad::file("stl", MeshFormat::StlBinary.encode(&mesh));
         let relief = |change: fn([f64; 3]) -> [f64; 3]| {
             let mut mesh = seeds::relief(20);
-            mesh.vertices
-                .iter_mut()
-                .for_each(|vertex| *vertex = change(*vertex));
+            mesh.vertices.change(change);
             mesh
         };
         match number % cases {

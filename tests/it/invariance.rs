@@ -82,7 +82,7 @@ impl Motion {
 
     fn mesh(&self, mesh: &Mesh) -> Mesh {
         Mesh {
-            vertices: mesh.vertices.iter().map(|v| self.point(*v)).collect(),
+            vertices: mesh.vertices.iter().map(|v| self.point(v)).collect(),
             triangles: mesh.triangles.clone(),
         }
     }
@@ -119,8 +119,8 @@ impl Case {
     }
 
     fn extent(&self) -> f64 {
-        let first = Vector3::from(self.mesh.vertices[0]);
-        let far = |v: &[f64; 3]| (Vector3::from(*v) - first).norm();
+        let first = Vector3::from(self.mesh.vertices.at(0));
+        let far = |v: [f64; 3]| (Vector3::from(v) - first).norm();
         self.mesh.vertices.iter().map(far).fold(0.0, f64::max)
     }
 }
@@ -131,7 +131,7 @@ fn shuffled(mesh: &Mesh) -> Mesh {
     order.shuffle(&mut rng);
     let mut vertices = mesh.vertices.clone();
     for (old, new) in order.iter().enumerate() {
-        vertices[*new as usize] = mesh.vertices[old];
+        vertices.set(*new as usize, mesh.vertices.at(old));
     }
     let mut triangles: Vec<[u32; 3]> = mesh
         .triangles
@@ -152,7 +152,7 @@ fn shuffled(mesh: &Mesh) -> Mesh {
 fn soup(mesh: &Mesh) -> Mesh {
     let corners = mesh.triangles.iter().flatten();
     Mesh {
-        vertices: corners.map(|i| mesh.vertices[*i as usize]).collect(),
+        vertices: corners.map(|i| mesh.vertices.at(*i as usize)).collect(),
         triangles: (0..mesh.triangles.len() as u32)
             .map(|k| [3 * k, 3 * k + 1, 3 * k + 2])
             .collect(),
@@ -161,7 +161,7 @@ fn soup(mesh: &Mesh) -> Mesh {
 
 fn repeated(mesh: &Mesh) -> Mesh {
     Mesh {
-        vertices: mesh.vertices.iter().flat_map(|v| [*v; 3]).collect(),
+        vertices: mesh.vertices.iter().flat_map(|v| [v; 3]).collect(),
         triangles: mesh
             .triangles
             .iter()

@@ -23,10 +23,7 @@ const IMAGE: raster::Limits = raster::Limits {
 
 fn read_mesh(name: &str, bytes: &[u8]) -> Result<(), String> {
     let mesh = mesh::read(bytes, name, &MESH).map_err(|error| error.to_string())?;
-    assert!(
-        mesh.vertices.as_flattened().iter().all(|v| v.is_finite()),
-        "{name}"
-    );
+    assert!(mesh.vertices.iter().flatten().all(f64::is_finite), "{name}");
     assert!(mesh.triangles.len() as u64 <= MESH.max_triangles, "{name}");
     let count = mesh.vertices.len() as u32;
     assert!(

@@ -58,7 +58,7 @@ pub(crate) fn meshes() -> Vec<Named> {
             )
         })
         .collect();
-    let line = |[x, y, z]: &[f64; 3]| format!("{x} {y} {z}\n");
+    let line = |[x, y, z]: [f64; 3]| format!("{x} {y} {z}\n");
     let points: Vec<_> = mesh.vertices.iter().map(line).collect();
     files.push(named("points.xyz", points.concat()));
     files.push(named("rich.obj", RICH_OBJ));

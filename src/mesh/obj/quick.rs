@@ -3,7 +3,7 @@
 //! Whatever is unusual (continued lines, a word that is no number, an index that names no vertex) is left to `tobj`,
 //! which reads it or stumbles over it. What is read here is read as `tobj` would have.
 
-use super::super::{Limits, Mesh, text};
+use super::super::{Limits, Mesh, Vertices, text};
 use crate::large::Large;
 
 /// Digits that a 64-bit mantissa surely holds, and the largest one that a float holds exactly.
@@ -25,34 +25,35 @@ pub(super) fn read(bytes: &[u8], limits: &Limits) -> Option<Mesh> {
     if !bytes.contains(&b'\n') && bytes.contains(&b'\r') {
         return None;
     }
-    let mut mesh = Mesh {
-        vertices: Large::with_capacity(bytes.len() / BYTES_PER_VERTEX),
-        triangles: Large::with_capacity(bytes.len() / BYTES_PER_TRIANGLE),
-    };
+    let mut vertices: Large<[f64; 3]> = Large::with_capacity(bytes.len() / BYTES_PER_VERTEX);
+    let mut triangles = Large::with_capacity(bytes.len() / BYTES_PER_TRIANGLE);
     let mut line = Line { rest: bytes };
     while !line.rest.is_empty() {
         line.skip_space();
         match line.rest {
             [b'v', space, rest @ ..] if is_space(*space) => {
                 line.rest = rest;
-                mesh.vertices.push(line.position()?);
+                vertices.push(line.position()?);
             }
             [b'f', space, rest @ ..] if is_space(*space) => {
                 line.rest = rest;
-                line.face(&mut mesh)?;
+                line.face(vertices.len(), &mut triangles)?;
             }
             _ => {}
         }
         line.end()?;
     }
     limits
-        .check_vertices(mesh.vertices.len() as u64)
-        .and_then(|()| limits.check_triangles(mesh.triangles.len() as u64))
+        .check_vertices(vertices.len() as u64)
+        .and_then(|()| limits.check_triangles(triangles.len() as u64))
         .ok()?;
-    if mesh.triangles.is_empty() {
-        return Some(mesh);
+    if !triangles.is_empty() {
+        vertices = in_order_of_use(&vertices, &mut triangles)?;
     }
-    in_order_of_use(mesh)
+    Some(Mesh {
+        vertices: Vertices::Double(vertices),
+        triangles,
+    })
 }
 
 /// What is left of a file, from somewhere in a line on.
@@ -128,19 +129,20 @@ impl Line<'_> {
         self.rest.first().is_none_or(|byte| is_end_of_word(*byte))
     }
 
-    /// The corners of a polygon as a fan around its first; fewer than three are no face.
-    fn face(&mut self, mesh: &mut Mesh) -> Option<()> {
+    /// The corners of a polygon, vertices of so many until here, as a fan around its first; fewer than three are no
+    /// face.
+    fn face(&mut self, vertices: usize, triangles: &mut Large<[u32; 3]>) -> Option<()> {
         let (mut first, mut last) = (0, 0);
         for count in 0.. {
             self.skip_space();
             if let [] | [b'\n' | b'#', ..] = self.rest {
                 break;
             }
-            let corner = self.corner(mesh.vertices.len())?;
+            let corner = self.corner(vertices)?;
             match count {
                 0 => first = corner,
                 1 => {}
-                _ => mesh.triangles.push([first, last, corner]),
+                _ => triangles.push([first, last, corner]),
             }
             last = corner;
         }
@@ -188,24 +190,21 @@ const fn is_end_of_word(byte: u8) -> bool {
     byte.is_ascii_whitespace() || byte == b'#'
 }
 
-/// The vertices that faces use, in the order of their first use; `None` when one is not there.
-fn in_order_of_use(mesh: Mesh) -> Option<Mesh> {
+/// The vertices that faces use, in the order of their first use, which the faces name then; `None` when one is not
+/// there.
+fn in_order_of_use(all: &[[f64; 3]], triangles: &mut Large<[u32; 3]>) -> Option<Large<[f64; 3]>> {
     const UNUSED: u32 = u32::MAX;
-    let mut place_of = vec![UNUSED; mesh.vertices.len()];
-    let mut vertices = Large::with_capacity(mesh.vertices.len());
-    let mut triangles = mesh.triangles;
+    let mut place_of = vec![UNUSED; all.len()];
+    let mut vertices = Large::with_capacity(all.len());
     for index in triangles.as_flattened_mut() {
         let place = place_of.get_mut(*index as usize)?;
         if *place == UNUSED {
             *place = vertices.len() as u32;
-            vertices.push(mesh.vertices[*index as usize]);
+            vertices.push(all[*index as usize]);
         }
         *index = *place;
     }
-    Some(Mesh {
-        vertices,
-        triangles,
-    })
+    Some(vertices)
 }
 
 #[cfg(test)]
@@ -287,7 +286,7 @@ mod tests {
             let file = format!("v {text} 0 0\n");
             let mesh = read(file.as_bytes(), &Limits::SUGGESTED);
             let value: f64 = text.parse().expect("a number");
-            prop_assert_eq!(mesh.map(|m| m.vertices[0][0].to_bits()), value.is_finite().then(|| value.to_bits()));
+            prop_assert_eq!(mesh.map(|m| m.vertices.at(0)[0].to_bits()), value.is_finite().then(|| value.to_bits()));
         }
     }
 
@@ -305,7 +304,7 @@ mod tests {
             .join(end);
             let mesh = read(text.as_bytes(), &Limits::SUGGESTED).expect("it is plain");
             assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
-            assert_eq!(mesh.vertices[0], [0.0, 1.0, 0.0]);
+            assert_eq!(mesh.vertices.at(0), [0.0, 1.0, 0.0]);
         }
         let points = read(b"v 0 0 0\nv 1 0 0", &Limits::SUGGESTED).expect("it is plain");
         assert_eq!(

@@ -1,6 +1,6 @@
 //! The rows of a PLY body into a mesh.
 
-use super::super::{Error, Limits, Mesh, error, text};
+use super::super::{Error, Limits, Mesh, Vertices, error, text};
 use super::header::{Element, Header, Scalar, Shape};
 use super::source::{NoNumber, Source};
 use crate::large::Large;
@@ -96,9 +96,13 @@ impl<S: Source> Body<'_, S> {
                 Error::Header(format!("element \"vertex\" has no property {name:?}"))
             })?;
         }
-        let most = self.source.most_rows(element).min(element.rows);
+        let most = self.source.most_rows(element).min(element.rows) as usize;
         if self.mesh.vertices.is_empty() {
-            self.mesh.vertices = Large::with_capacity(most as usize);
+            self.mesh.vertices = if self.header.has_single_vertices() {
+                Vertices::Single(Large::with_capacity(most))
+            } else {
+                Vertices::Double(Large::with_capacity(most))
+            };
         }
         let plain = if element.is_plain_position() && places == [0, 1, 2] {
             self.plain_vertices(element.rows)?
@@ -108,9 +112,12 @@ impl<S: Source> Body<'_, S> {
         for row in plain..element.rows {
             self.values(element)
                 .map_err(|reason| self.no_number(element, row, reason))?;
-            let position = places.map(|place| self.row[place]);
             let count = self.mesh.vertices.len() as u64 + 1;
-            self.mesh.vertices.push(error::finite(position, count)?);
+            let position = error::finite(places.map(|place| self.row[place]), count)?;
+            match &mut self.mesh.vertices {
+                Vertices::Single(vertices) => vertices.push(position.map(|v| v as f32)),
+                Vertices::Double(vertices) => vertices.push(position),
+            }
         }
         Ok(())
     }
@@ -127,7 +134,12 @@ impl<S: Source> Body<'_, S> {
                 return Ok(row);
             }
             error::all_finite(&few, self.mesh.vertices.len())?;
-            self.mesh.vertices.extend_from_slice(&few);
+            match &mut self.mesh.vertices {
+                Vertices::Single(vertices) => vertices.extend_from_slice(&few),
+                Vertices::Double(vertices) => {
+                    vertices.extend(few.iter().map(|v| v.map(f64::from)));
+                }
+            }
             row += few.len() as u64;
         }
         Ok(rows)

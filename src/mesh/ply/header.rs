@@ -51,6 +51,14 @@ impl Scalar {
         }
     }
 
+    /// Whether a 32-bit float holds every such number of a binary body.
+    const fn is_single(self) -> bool {
+        matches!(
+            self,
+            Self::I8 | Self::U8 | Self::I16 | Self::U16 | Self::F32
+        )
+    }
+
     const fn is_float(self) -> bool {
         matches!(self, Self::F32 | Self::F64)
     }
@@ -118,6 +126,15 @@ impl Element {
         self.properties.len() == 3 && shapes.all(|shape| shape == Shape::One(Scalar::F32))
     }
 
+    /// Whether 32-bit floats hold all of the position's coordinates.
+    fn is_single_position(&self) -> bool {
+        let is_single = |name: &str| {
+            let property = self.place(&[name]).map(|place| &self.properties[place]);
+            property.is_none_or(|p| matches!(p.shape, Shape::One(kind) if kind.is_single()))
+        };
+        ["x", "y", "z"].into_iter().all(is_single)
+    }
+
     /// Type of the corners where a row is a list of 32-bit indices that a byte counts.
     pub(super) fn plain_corners(&self) -> Option<Scalar> {
         let [
@@ -182,6 +199,12 @@ impl Header {
             }
         }
         Err(wrong("the file ends before end_header"))
+    }
+
+    /// Whether 32-bit floats hold all vertices as the body has them.
+    pub(super) fn has_single_vertices(&self) -> bool {
+        let mut vertices = self.elements.iter().filter(|e| e.name == "vertex");
+        self.encoding != Encoding::Ascii && vertices.all(Element::is_single_position)
     }
 
     /// Rows of the elements of this name.

@@ -49,8 +49,8 @@ mod tests {
              1 4 0 1 2 3 0\n1 2 0 1 0\n1 3 3 2 1 6 0 0 0 0 0 0\n",
         );
         let mesh = read(&bytes).expect("reads");
-        assert_eq!(mesh.vertices[0], [1.0, 2.0, 0.5]);
-        assert_eq!(mesh.vertices[3], [7.0, 8.0, 0.0]);
+        assert_eq!(mesh.vertices.at(0), [1.0, 2.0, 0.5]);
+        assert_eq!(mesh.vertices.at(3), [7.0, 8.0, 0.0]);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [3, 2, 1]]);
     }
 
@@ -248,11 +248,11 @@ mod tests {
                 out.extend(little);
             }
         };
-        for value in mesh.vertices.as_flattened() {
+        for value in mesh.vertices.iter().flatten() {
             if wide {
                 put(&value.to_le_bytes(), value.to_string());
             } else {
-                put(&(*value as f32).to_le_bytes(), value.to_string());
+                put(&(value as f32).to_le_bytes(), value.to_string());
             }
         }
         for triangle in &mesh.triangles {

@@ -24,7 +24,7 @@ pub(super) trait Source {
 
     /// The next positions, up to `most`, of rows that are nothing but three 32-bit floats; none from text and at the
     /// body's end.
-    fn plain_positions(&mut self, _most: usize, _into: &mut Vec<[f64; 3]>) {}
+    fn plain_positions(&mut self, _most: usize, _into: &mut Vec<[f32; 3]>) {}
 
     /// The next triangles, up to `most`, of rows that are nothing but a byte that counts and 32-bit indices; none also
     /// where a byte does not say three.
@@ -137,13 +137,12 @@ impl<const BIG_ENDIAN: bool> Source for Binary<'_, BIG_ENDIAN> {
         (self.rest.len() / element.least_size().max(1)) as u64
     }
 
-    fn plain_positions(&mut self, most: usize, into: &mut Vec<[f64; 3]>) {
+    fn plain_positions(&mut self, most: usize, into: &mut Vec<[f32; 3]>) {
         let rows = self.rows::<12>(most);
         self.rest = &self.rest[rows.as_flattened().len()..];
         into.extend(
-            rows.iter().map(|row| {
-                [0, 4, 8].map(|place| f64::from(f32::from_bits(Self::word(row, place))))
-            }),
+            rows.iter()
+                .map(|row| [0, 4, 8].map(|place| f32::from_bits(Self::word(row, place)))),
         );
     }
 

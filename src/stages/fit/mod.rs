@@ -16,7 +16,7 @@ use crate::domain::{FailureClass, FitOutcome};
 use crate::stages::{Print, Scan};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 9;
+pub const REVISION: u32 = 10;
 
 /// How the plane is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -10,7 +10,7 @@ use super::pca::{Axes, frame};
 use super::surface::quantile;
 use super::{Error, Params};
 use crate::domain::{FitOutcome, SideEvidence};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, Vertices};
 
 pub(super) fn fit(mesh: &Mesh, params: &Params) -> Result<FitOutcome, Error> {
     let points = distinct(&mesh.vertices);
@@ -57,8 +57,8 @@ pub(super) fn fit(mesh: &Mesh, params: &Params) -> Result<FitOutcome, Error> {
 }
 
 /// Each place once, so that a triangle soup and an indexed mesh give the same plane.
-fn distinct(vertices: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let mut points = vertices.to_vec();
+fn distinct(vertices: &Vertices) -> Vec<[f64; 3]> {
+    let mut points: Vec<[f64; 3]> = vertices.iter().collect();
     points.sort_by(|a, b| {
         a.iter()
             .zip(b)

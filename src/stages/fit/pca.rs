@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use super::Error;
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
-use crate::stages::bulk::{Bounds, holds, room};
+use crate::stages::bulk::{Bounds, holds};
 use crate::stages::zbuffer::{Moments, Shell};
 
 /// A surface given by points alone needs this many: 25 along a side show a stroke or two at best.
@@ -42,9 +42,9 @@ impl Axes {
         if let Some(moments) = Moments::of(shell) {
             return Self::from_moments(moments.centre, moments.covariance);
         }
-        let bounds: Bounds<3> = room(&mesh.vertices);
+        let bounds: Bounds<3> = shell.room();
         let kept = mesh.vertices.iter().filter(|v| holds(&bounds, v));
-        Self::of_points(kept.map(|v| (*v, 1.0)))
+        Self::of_points(kept.map(|v| (v, 1.0)))
     }
 
     fn from_moments(centre: Vector3<f64>, covariance: Matrix3<f64>) -> Self {

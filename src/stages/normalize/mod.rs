@@ -23,7 +23,7 @@ use crate::domain::{Affine2, FailureClass, NormalizeOutcome, Pose, ThresholdMetr
 use crate::raster::{DepthMap, Mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 8;
+pub const REVISION: u32 = 9;
 
 /// When thresholds are chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

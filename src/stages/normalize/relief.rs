@@ -1,7 +1,7 @@
 //! How deep the carving is, and soft tops: relief without a threshold.
 
 use super::heap::Heap;
-use crate::raster::DepthMap;
+use crate::raster::{DepthMap, PixelBox};
 use crate::stages::otsu;
 use crate::stages::pose::Soft;
 
@@ -32,7 +32,9 @@ impl Relief {
     /// The tops are where most heights crowd near the upper class's median: worn rims and walls are in that class
     /// too, and pull its median down.
     pub fn of(depth: &DepthMap) -> Option<Self> {
-        let split = |margin| otsu::split(&mut heights(depth, margin)).filter(|s| s.high > s.low);
+        let known = known_box(depth)?;
+        let heights = |margin| heights(depth, known, margin);
+        let split = |margin| otsu::split(&mut heights(margin)).filter(|s| s.high > s.low);
         let split = split(MARGIN).or_else(|| split(0.0))?;
         let classes = Self {
             // Heights are over the fitted surface, which lies on the tops, unless the paper's plane was asked for.
@@ -44,7 +46,7 @@ impl Relief {
             ground: split.low,
             edge: 0.0,
         };
-        let heights = heights(depth, 0.0);
+        let heights = heights(0.0);
         let peak = Heap::of(&heights, &classes).peak();
         let tops = Self {
             top: classes.top - peak * classes.depth(),
@@ -99,22 +101,28 @@ pub(in crate::stages) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32
     (0.5 + (cut as f32 - depth) / softness as f32).clamp(0.0, 1.0)
 }
 
+/// Box around what holds data.
+fn known_box(depth: &DepthMap) -> Option<PixelBox> {
+    depth.levels.map(|level| *level != 0).bounding_box()
+}
+
 /// Every few heights, without a margin of the known box on each side (a share of its length).
-fn heights(depth: &DepthMap, margin: f64) -> Vec<f32> {
-    let known = depth.levels.map(|level| *level != 0);
-    let Some(bounds) = known.bounding_box() else {
-        return Vec::new();
-    };
+fn heights(depth: &DepthMap, bounds: PixelBox, margin: f64) -> Vec<f32> {
     let inner = |low: usize, high: usize| {
         let cut = ((high - low) as f64 * margin) as usize;
         // As far from one end as from the other: a map turned about must give the same heights.
         let rest = 2 * (high - low - 2 * cut) % STRIDE;
         (low + cut + rest..=high - cut).step_by(STRIDE)
     };
-    let rows = inner(bounds.y0, bounds.y1);
-    rows.flat_map(|y| inner(bounds.x0, bounds.x1).map(move |x| (x, y)))
-        .filter_map(|(x, y)| depth.height(x, y).map(|h| h as f32))
-        .collect()
+    let mut heights = Vec::new();
+    for y in inner(bounds.y0, bounds.y1) {
+        let row = depth.levels.row(y);
+        let known = inner(bounds.x0, bounds.x1)
+            .map(|x| row[x])
+            .filter(|level| *level > 0);
+        heights.extend(known.map(|level| depth.scale.height(level) as f32));
+    }
+    heights
 }
 
 #[cfg(test)]

@@ -3,7 +3,7 @@
 //! What only one of them lays on known paper would decide between poses that are else alike, so it does not count.
 
 use super::Layer;
-use super::layer::sample;
+use super::layer::Between;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
@@ -25,13 +25,18 @@ pub(super) fn duel(fixed: &Layer, paper: &Grid<f32>, sides: &[Side<'_>; 2]) -> [
             }
             let place = [x as f64, y as f64];
             let there = [0, 1].map(|k: usize| sides[k].moving_from_fixed.apply(place));
-            if (0..2).any(|k| sample(sides[k].ground, there[k]) < 0.5) {
+            let there = [0, 1].map(|k: usize| {
+                let ground = sides[k].ground;
+                Between::of([ground.width(), ground.height()], there[k])
+                    .filter(|at| at.value(ground) >= 0.5)
+            });
+            let [Some(one), Some(two)] = there else {
                 continue;
-            }
+            };
             let ink = [fixed.value.at(x, y), fixed.amount.at(x, y)];
-            for (k, sums) in sums.iter_mut().enumerate() {
-                let Layer { value, amount, .. } = sides[k].moving;
-                sums.add(ink, [value, amount].map(|of| sample(of, there[k])));
+            for ((at, side), sums) in [one, two].iter().zip(sides).zip(&mut sums) {
+                let Layer { value, amount, .. } = side.moving;
+                sums.add(ink, [value, amount].map(|of| at.value(of)));
             }
         }
     }

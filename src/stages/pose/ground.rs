@@ -4,7 +4,7 @@
 //! character, yet would decide where a symmetric one reads as well turned or in the mirror.
 
 use super::Layer;
-use super::layer::sample;
+use super::layer::{Between, sample};
 use crate::domain::Affine2;
 use crate::raster::{Grid, Mask};
 use crate::stages::components::Components;
@@ -71,14 +71,16 @@ impl<'a> Surroundings<'a> {
             .strays
             .map(|stray| f32::from(u8::from(*stray)));
         let mut sums = [[0.0_f64; 2]; 2];
+        let size = [moving.weight.width(), moving.weight.height()];
         for y in 0..fixed.weight.height() {
             for x in (0..fixed.weight.width()).filter(|x| fixed.weight.at(*x, y) > 0.0) {
                 let there = self.moving_from_fixed.apply([x as f64, y as f64]);
-                if sample(&moving.weight, there) < 0.5 {
+                let there = Between::of(size, there).filter(|at| at.value(&moving.weight) >= 0.5);
+                let Some(there) = there else {
                     continue;
-                }
-                let stray = self.strokes[0].strays.at(x, y) || sample(&strays, there) > 0.5;
-                let (ink, wood) = (fixed.amount.at(x, y), sample(&moving.amount, there));
+                };
+                let stray = self.strokes[0].strays.at(x, y) || there.value(&strays) > 0.5;
+                let (ink, wood) = (fixed.amount.at(x, y), there.value(&moving.amount));
                 let [met, all] = &mut sums[usize::from(stray)];
                 *met += f64::from(ink.min(wood));
                 *all += f64::from(ink.max(wood));

@@ -1,8 +1,9 @@
 //! A picture brought to working size, its slow variation taken out.
 
 use crate::domain::Affine2;
-use crate::raster::{Grid, Mask, PixelBox, resample};
-use crate::stages::blur::blur;
+use crate::raster::{Grid, Mask, PixelBox, resample, resample_turned};
+use crate::stages::blur::{blur, blur_turned};
+use crate::wide::widely;
 
 /// How much of something each pixel holds, 0..=1, and where that is known.
 #[derive(Debug, Clone)]
@@ -73,13 +74,29 @@ impl Base {
     }
 
     /// The same with each known pixel's amount replaced.
-    pub(in crate::stages) fn map(&self, amount: impl Fn(f32) -> f32) -> Self {
-        let pairs = self.present.data().iter().zip(self.known.data());
-        let replaced = pairs.map(|(p, k)| if *k > 0.0 { k * amount(p / k) } else { 0.0 });
-        let mut out = self.clone();
-        let values: Vec<f32> = replaced.collect();
-        out.present.data_mut().copy_from_slice(&values);
-        out
+    pub(in crate::stages) fn map(self, amount: impl Fn(f32) -> f32) -> Self {
+        Self {
+            present: self.replaced(amount),
+            ..self
+        }
+    }
+
+    /// What is present with each known pixel's amount replaced.
+    fn replaced(&self, amount: impl Fn(f32) -> f32) -> Grid<f32> {
+        let mut present = self.present.clone();
+        let pairs = present.data_mut().iter_mut().zip(self.known.data());
+        widely(
+            #[inline(always)]
+            || {
+                for (present, known) in pairs {
+                    let is_known = *known > 0.0;
+                    let share = if is_known { *known } else { 1.0 };
+                    let replaced = share * amount(*present / share);
+                    *present = if is_known { replaced } else { 0.0 };
+                }
+            },
+        );
+        present
     }
 
     /// The layer of `size` pixels along the longest side of what is known, smoothed by `sigma` pixels.
@@ -112,7 +129,7 @@ impl<'a> Sizer<'a> {
         let sides = [base.known.width(), base.known.height()];
         let middle = sides.map(|side| (side - 1) as f64 / 2.0);
         let (sides, shift) = framed(sides, middle, scale);
-        let weight = blur(&resample(&base.known, scale, shift, sides), sigma);
+        let weight = blur_turned(resample_turned(&base.known, scale, shift, sides), sigma);
         Self {
             slow_weight: slow(&weight, size),
             base,
@@ -127,26 +144,33 @@ impl<'a> Sizer<'a> {
 
     /// The layer of the picture with each known pixel's amount replaced.
     pub(in crate::stages) fn mapped(&self, amount: impl Fn(f32) -> f32) -> Layer {
-        self.layer(&self.base.map(amount).present)
+        self.layer(&self.base.replaced(amount))
     }
 
     fn layer(&self, present: &Grid<f32>) -> Layer {
-        let sum = blur(
-            &resample(present, self.scale, self.shift, self.sides),
-            self.sigma,
-        );
-        let slow = slow(&sum, self.size);
+        let turned = resample_turned(present, self.scale, self.shift, self.sides);
+        let mut amount = blur_turned(turned, self.sigma);
+        // What is slow becomes the value without it.
+        let mut value = slow(&amount, self.size);
         let mut held = self.weight.clone();
-        let (mut amount, mut value) = (sum.clone(), sum.clone());
-        let means = slow.data().iter().zip(self.slow_weight.data());
-        let weights = held.data_mut().iter_mut();
-        let made = amount.data_mut().iter_mut().zip(value.data_mut());
-        for ((held, (slow, slow_weight)), (amount, value)) in weights.zip(means).zip(made) {
-            let known = if *held >= LEAST_KNOWN { 1.0 } else { 0.0 };
-            *amount *= known / held.max(1e-6);
-            *value = *amount - known * slow / slow_weight.max(1e-6);
-            *held = known;
-        }
+        let [width, height] = self.sides;
+        widely(
+            #[inline(always)]
+            || {
+                let count = width * height;
+                let slow_weight = &self.slow_weight.data()[..count];
+                let amount = &mut amount.data_mut()[..count];
+                let value = &mut value.data_mut()[..count];
+                let held = &mut held.data_mut()[..count];
+                for k in 0..count {
+                    let known = if held[k] >= LEAST_KNOWN { 1.0 } else { 0.0 };
+                    let whole = amount[k] * (known / least(held[k]));
+                    amount[k] = whole;
+                    value[k] = whole - known * value[k] / least(slow_weight[k]);
+                    held[k] = known;
+                }
+            },
+        );
         Layer {
             value,
             amount,
@@ -155,6 +179,12 @@ impl<'a> Sizer<'a> {
                 .after(&self.base.from_image),
         }
     }
+}
+
+/// So much at least, to divide by.
+#[inline(always)]
+fn least(weight: f32) -> f32 {
+    if weight > 1e-6 { weight } else { 1e-6 }
 }
 
 /// The slow variation of a layer of `size` pixels along the longest side of what is known.
@@ -166,7 +196,8 @@ fn slow(values: &Grid<f32>, size: usize) -> Grid<f32> {
     let middle = sides.map(|side| (side - 1) as f64 / 2.0);
     let scale = SLOW_PX as f64 / size as f64;
     let (few, shift) = framed(sides, middle, scale);
-    let small = blur(&resample(values, scale, shift, few), SLOW * SLOW_PX as f64);
+    let small = resample_turned(values, scale, shift, few);
+    let small = blur_turned(small, SLOW * SLOW_PX as f64);
     resample(&small, 1.0 / scale, shift.map(|s| -s / scale), sides)
 }
 
@@ -211,17 +242,42 @@ impl Layer {
 
 /// Bilinear value; zero outside.
 #[inline]
-pub(super) fn sample(values: &Grid<f32>, [x, y]: [f64; 2]) -> f32 {
-    let (width, height) = (values.width(), values.height());
-    // Also says no to what is not a number; below, casts round down, where `floor` would be a call.
-    if !(x >= 0.0 && y >= 0.0 && x < (width - 1) as f64 && y < (height - 1) as f64) {
-        return 0.0;
+pub(super) fn sample(values: &Grid<f32>, place: [f64; 2]) -> f32 {
+    Between::of([values.width(), values.height()], place).map_or(0.0, |at| at.value(values))
+}
+
+/// A place between four pixels of grids of one size.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Between {
+    /// The pixel up and left of it, and how far beyond it the place lies.
+    from: usize,
+    beyond: [f32; 2],
+    width: usize,
+}
+
+impl Between {
+    /// `None` outside.
+    #[inline]
+    pub(super) fn of([width, height]: [usize; 2], [x, y]: [f64; 2]) -> Option<Self> {
+        // Also says no to what is not a number; below, casts round down, where `floor` would be a call.
+        if !(x >= 0.0 && y >= 0.0 && x < (width - 1) as f64 && y < (height - 1) as f64) {
+            return None;
+        }
+        let (column, row) = (x as i32, y as i32);
+        Some(Self {
+            from: row as usize * width + column as usize,
+            beyond: [(x - f64::from(column)) as f32, (y - f64::from(row)) as f32],
+            width,
+        })
     }
-    let (column, row) = (x as i32, y as i32);
-    let (fx, fy) = ((x - f64::from(column)) as f32, (y - f64::from(row)) as f32);
-    let from = row as usize * width + column as usize;
-    let near = &values.data()[from..from + width + 2];
-    let a = near[0] + (near[1] - near[0]) * fx;
-    let b = near[width] + (near[width + 1] - near[width]) * fx;
-    a + (b - a) * fy
+
+    /// Bilinear value.
+    #[inline]
+    pub(super) fn value(&self, values: &Grid<f32>) -> f32 {
+        let (width, [fx, fy]) = (self.width, self.beyond);
+        let near = &values.data()[self.from..self.from + width + 2];
+        let a = near[0] + (near[1] - near[0]) * fx;
+        let b = near[width] + (near[width + 1] - near[width]) * fx;
+        a + (b - a) * fy
+    }
 }

@@ -1,7 +1,7 @@
 //! How much of each picture the other explains, where both are known.
 
 use super::Layer;
-use super::layer::sample;
+use super::layer::Between;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
@@ -23,16 +23,16 @@ impl Overlap {
         moving_from_fixed: &Affine2,
     ) -> Self {
         let (mut both, mut ink, mut wood) = (0.0, 0.0, 0.0);
+        let size = [ground.width(), ground.height()];
         for y in 0..fixed.amount.height() {
-            for x in 0..fixed.amount.width() {
-                if paper.at(x, y) == 0.0 {
-                    continue;
-                }
+            let row = paper.row(y).iter().zip(fixed.amount.row(y)).enumerate();
+            for (x, (_, a)) in row.filter(|(_, (paper, _))| **paper != 0.0) {
                 let there = moving_from_fixed.apply([x as f64, y as f64]);
-                if sample(ground, there) < 0.5 {
+                let there = Between::of(size, there).filter(|at| at.value(ground) >= 0.5);
+                let Some(there) = there else {
                     continue;
-                }
-                let (a, b) = (fixed.amount.at(x, y), sample(&moving.amount, there));
+                };
+                let (a, b) = (*a, there.value(&moving.amount));
                 both += f64::from(a.min(b));
                 ink += f64::from(a);
                 wood += f64::from(b);

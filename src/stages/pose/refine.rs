@@ -14,6 +14,8 @@ use crate::wide::widely;
 
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
 const SETTLED_PX: f64 = 0.03;
+/// Products summed in single precision before their sum goes to the others.
+const RUN: usize = 256;
 
 /// Two layers ready to be laid on each other many times.
 pub(in crate::stages) struct Refiner<'a> {
@@ -89,8 +91,10 @@ impl<'a> Refiner<'a> {
                 break;
             }
         }
-        let Some((_, at)) = best else { return *start };
-        let score = self.score(&at);
+        let Some((kept, at)) = best else {
+            return *start;
+        };
+        let score = self.share(kept.explained, &at);
         match self.to_images(&at) {
             Some(fixed_from_moving) => Found {
                 fixed_from_moving,
@@ -178,22 +182,29 @@ impl<'a> Refiner<'a> {
 
     /// What each known pixel of the fixed layer meets in the moving one.
     fn look(&self, from_fixed: &Affine2, room: &mut Room) {
-        room.clear(self.looked_at.places.len());
+        let LookedAt { places, values, .. } = &*self.looked_at;
+        room.clear(places.len());
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
+        let runs = places.chunks(RUN).zip(values.chunks(RUN));
+        let mut explained = 0.0_f64;
         widely(
             #[inline(always)]
             || {
-                for (place, value) in self.looked_at.places.iter().zip(&self.looked_at.values) {
-                    let [x, y] = *place;
-                    let u = a[0] * x + a[1] * y + a[2];
-                    let v = b[0] * x + b[1] * y + b[2];
-                    if let Some(cell) = self.cell(u, v) {
-                        room.put(*value, cell, [x, y]);
+                for (places, values) in runs {
+                    let mut part = 0.0_f32;
+                    for ([x, y], value) in places.iter().zip(values) {
+                        let u = a[0] * x + a[1] * y + a[2];
+                        let v = b[0] * x + b[1] * y + b[2];
+                        if let Some(cell) = self.cell(u, v) {
+                            part += cell[0] * value;
+                            room.put(*value, cell, [*x, *y]);
+                        }
                     }
+                    explained += f64::from(part);
                 }
             },
         );
-        room.close();
+        room.close(explained);
     }
 
     /// Bilinear look into the moving layer; `None` outside.
@@ -242,9 +253,9 @@ impl<'a> Refiner<'a> {
     /// Correlation over what both know, over the whole of what each holds.
     fn score(&self, from_fixed: &Affine2) -> f64 {
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
-        let mut both = 0.0_f64;
+        let mut explained = 0.0_f64;
         let LookedAt { places, values, .. } = &*self.looked_at;
-        let runs = places.chunks(256).zip(values.chunks(256));
+        let runs = places.chunks(RUN).zip(values.chunks(RUN));
         widely(
             #[inline(always)]
             || {
@@ -255,13 +266,19 @@ impl<'a> Refiner<'a> {
                         let v = b[0] * x + b[1] * y + b[2];
                         part += self.value(u, v) * value;
                     }
-                    both += f64::from(part);
+                    explained += f64::from(part);
                 }
             },
         );
+        self.share(explained, from_fixed)
+    }
+
+    /// That score, given the sum of the products of the values that meet.
+    fn share(&self, explained: f64, from_fixed: &Affine2) -> f64 {
         // A moving pixel covers this many fixed ones.
         let area = from_fixed.determinant().abs().max(1e-12);
-        both / self.looked_at.share
+        explained
+            / self.looked_at.share
             / (self.energies[0] * self.energies[1] / area)
                 .sqrt()
                 .max(1e-12)

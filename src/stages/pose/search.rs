@@ -7,9 +7,11 @@ use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
 use super::Layer;
-use super::layer::sample;
 use crate::domain::Affine2;
+use crate::wide::{index, whole_below, widely};
 
+/// Pixels that are looked at side by side.
+const LANES: usize = 8;
 /// Side of the square on which layers are correlated.
 const SQUARE: usize = 32;
 /// Working size for layers that go into the search; at the widest scales only their corners leave the square.
@@ -196,17 +198,49 @@ fn centred(layer: &Layer, turn: Option<(f64, f64)>) -> Vec<f32> {
     let Some(back) = place.inverse() else {
         return vec![0.0; SQUARE * SQUARE];
     };
+    let (width, height) = (layer.value.width(), layer.value.height());
+    let data = layer.value.data();
+    let [to_right, to_end] = [width - 1, height - 1].map(|last| last as f32);
+    let [x_of, y_of] = back.0.map(|row| row.map(|v| v as f32));
+    let mut values = vec![0.0; SQUARE * SQUARE];
+    let (runs, _) = values.as_chunks_mut::<LANES>();
     // Layers are smooth at this size, so one look a pixel does even where the scale shrinks them.
-    let (dx, dy) = (back.0[0][0], back.0[1][0]);
-    let mut values = Vec::with_capacity(SQUARE * SQUARE);
-    for row in 0..SQUARE {
-        let [mut x, mut y] = back.apply([0.0, row as f64]);
-        for _ in 0..SQUARE {
-            values.push(sample(&layer.value, [x, y]));
-            x += dx;
-            y += dy;
-        }
-    }
+    widely(
+        #[inline(always)]
+        || {
+            for (run, values) in runs.iter_mut().enumerate() {
+                let (row, column) = (run * LANES / SQUARE, run * LANES % SQUARE);
+                let (mut from, mut beyond) = ([0; LANES], [[0.0; LANES]; 2]);
+                let mut inside = [0.0; LANES];
+                for k in 0..LANES {
+                    let (column, row) = ((column + k) as f32, row as f32);
+                    let x = x_of[0] * column + x_of[1] * row + x_of[2];
+                    let y = y_of[0] * column + y_of[1] * row + y_of[2];
+                    let is_inside = (x >= 0.0) & (y >= 0.0) & (x < to_right) & (y < to_end);
+                    inside[k] = if is_inside { 1.0 } else { 0.0 };
+                    let (x, y) = if is_inside { (x, y) } else { (0.0, 0.0) };
+                    let (left, top) = (whole_below(x), whole_below(y));
+                    beyond[0][k] = x - left;
+                    beyond[1][k] = y - top;
+                    from[k] = index(top) * width as u32 + index(left);
+                }
+                let mut near = [[0.0; LANES]; 4];
+                for k in 0..LANES {
+                    let from = from[k] as usize;
+                    let above = &data[from..from + width + 2];
+                    near[0][k] = above[0];
+                    near[1][k] = above[1];
+                    near[2][k] = above[width];
+                    near[3][k] = above[width + 1];
+                }
+                for k in 0..LANES {
+                    let a = near[0][k] + (near[1][k] - near[0][k]) * beyond[0][k];
+                    let b = near[2][k] + (near[3][k] - near[2][k]) * beyond[0][k];
+                    values[k] = inside[k] * (a + (b - a) * beyond[1][k]);
+                }
+            }
+        },
+    );
     values
 }
 

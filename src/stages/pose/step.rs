@@ -41,6 +41,8 @@ pub(super) struct Room {
     /// The last one may be filled only in part, with zeros after.
     looks: Vec<Looks>,
     count: usize,
+    /// Sum of the products of all values that met.
+    explained: f64,
     sizes: Vec<f32>,
 }
 
@@ -63,8 +65,9 @@ impl Room {
         self.count += usize::from(met[3] >= 0.5);
     }
 
-    /// Leaves only what was taken in.
-    pub(super) fn close(&mut self) {
+    /// Leaves only what was taken in; `explained` is the sum of the products of all values that met.
+    pub(super) fn close(&mut self, explained: f64) {
+        self.explained = explained;
         self.looks.truncate(self.count.div_ceil(LANES));
         let held = (self.count + LANES - 1) % LANES + 1;
         if let Some(last) = self.looks.last_mut() {
@@ -77,17 +80,31 @@ impl Room {
 
     /// Least-squares gain and offset of the fixed values over the moving ones; the gain never below a trifle.
     fn gain_and_offset(&self) -> (f32, f32) {
-        let mut sums = [[0.0_f64; LANES]; 4];
-        for looks in &self.looks {
-            for k in 0..LANES {
-                let (a, b) = (f64::from(looks.fixed[k]), f64::from(looks.met[k][0]));
-                for (sum, value) in sums.iter_mut().zip([a, b, a * b, b * b]) {
-                    sum[k] += value;
+        let looks = &self.looks;
+        let totals = widely(
+            #[inline(always)]
+            || {
+                let mut totals = [0.0_f64; 4];
+                for looks in looks.chunks(RUN) {
+                    let mut sums = [[0.0_f32; LANES]; 4];
+                    for looks in looks {
+                        for k in 0..LANES {
+                            let (a, b) = (looks.fixed[k], looks.met[k][0]);
+                            sums[0][k] += a;
+                            sums[1][k] += b;
+                            sums[2][k] += a * b;
+                            sums[3][k] += b * b;
+                        }
+                    }
+                    for (lanes, total) in sums.iter().zip(&mut totals) {
+                        *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+                    }
                 }
-            }
-        }
+                totals
+            },
+        );
         let n = self.count.max(1) as f64;
-        let [f, m, fm, mm] = sums.map(|lanes| lanes.iter().sum::<f64>() / n);
+        let [f, m, fm, mm] = totals.map(|total| total / n);
         let gain = ((fm - f * m) / (mm - m * m).max(1e-9)).max(0.05);
         (gain as f32, (f - gain * m) as f32)
     }
@@ -110,6 +127,8 @@ pub(super) struct Step {
     /// The last is the cost before it was shared out.
     sums: [f64; SUMS + 1],
     pub(super) cost: f64,
+    /// Sum of the products of all values that met.
+    pub(super) explained: f64,
 }
 
 impl Step {
@@ -144,6 +163,7 @@ impl Step {
         Self {
             cost: if room.count == 0 { f64::INFINITY } else { mean },
             sums: totals,
+            explained: room.explained,
         }
     }
 

@@ -19,7 +19,7 @@ use crate::domain::{
 use crate::raster::{DepthMap, Mask, warp_mask};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 9;
+pub const REVISION: u32 = 10;
 
 /// Mirrored must win by this factor to be named the cause: symmetric characters score alike both ways.
 const MIRROR_WINS: f64 = 1.06;

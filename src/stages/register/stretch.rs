@@ -17,18 +17,17 @@ const MOST: f64 = 0.012;
 pub(super) fn stretched(refiner: &Refiner, pose: &Found, middle: [f64; 2]) -> Found {
     let mut best = *pose;
     for _ in 0..ROUNDS {
+        let mut is_judged = true;
         for along in [[1.0, 0.0], [0.0, 1.0]] {
             let by = |amount: f64| stretch(&best, middle, along.map(|share| share * amount));
             let score = |amount: f64| refiner.judged(&by(amount)).score;
-            best = by(summit(score(-TRIED), score(0.0), score(TRIED)) * TRIED);
+            let at = if is_judged { best.score } else { score(0.0) };
+            best = by(summit(score(-TRIED), at, score(TRIED)) * TRIED);
+            is_judged = false;
         }
         best = refiner.refine(&best, STEPS, Loss::Tukey);
     }
-    if best.score > refiner.judged(pose).score {
-        best
-    } else {
-        *pose
-    }
+    if best.score > pose.score { best } else { *pose }
 }
 
 /// Place of the top of a parabola through values at -1, 0 and 1, within the most that a round takes.

@@ -127,7 +127,7 @@ fn a_fleck_far_away_changes_nothing() {
 fn as_shuffled_soup(mesh: &Mesh) -> Mesh {
     let count = mesh.triangles.len();
     let corners = (0..count).flat_map(|k| mesh.triangles[(k * 7919) % count]);
-    let vertices: Vec<[f64; 3]> = corners.map(|i| mesh.vertices[i as usize]).collect();
+    let vertices: Vec<[f64; 3]> = corners.map(|i| mesh.vertices.at(i as usize)).collect();
     let triangles = (0..count as u32).map(|k| [3 * k, 3 * k + 1, 3 * k + 2]);
     Mesh {
         triangles: triangles.collect(),

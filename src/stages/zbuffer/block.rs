@@ -1,7 +1,8 @@
 //! A few triangles side by side, and which of them may hold a pixel's centre.
 
 use super::small::Small;
-use super::triangle::{fill, higher, lower, whole_below};
+use super::triangle::fill;
+use crate::wide::{higher, lower, whole_below};
 
 /// Triangles that are asked together whether they hold a pixel's centre: most of a scan's are too small.
 pub(super) const LANES: usize = 8;
@@ -36,14 +37,18 @@ impl Row {
 
 /// Up to [`LANES`] triangles, the last repeated.
 #[inline(always)]
-pub(super) fn block(triangles: &[[u32; 3]], vertices: &[[f64; 3]], middle: [f64; 3]) -> Block {
+pub(super) fn block<T: Copy + Into<f64>>(
+    triangles: &[[u32; 3]],
+    vertices: &[[T; 3]],
+    middle: [f64; 3],
+) -> Block {
     let mut block = [[[0.0; LANES]; 3]; 3];
     for lane in 0..LANES {
         let triangle = triangles[lane.min(triangles.len() - 1)];
         for (corner, i) in block.iter_mut().zip(triangle) {
             let vertex = vertices[i as usize];
             for axis in 0..3 {
-                corner[axis][lane] = (vertex[axis] - middle[axis]) as f32;
+                corner[axis][lane] = (vertex[axis].into() - middle[axis]) as f32;
             }
         }
     }

@@ -140,7 +140,7 @@ mod tests {
     fn of_small_triangles(mesh: &Mesh) -> ([f64; 3], [[f64; 3]; 3]) {
         let mut middles = Vec::new();
         for t in &mesh.triangles {
-            let [a, b, c] = t.map(|i| mesh.vertices[i as usize]);
+            let [a, b, c] = t.map(|i| mesh.vertices.at(i as usize));
             let at =
                 |u: f64, v: f64| [0, 1, 2].map(|k| a[k] + u * (b[k] - a[k]) + v * (c[k] - a[k]));
             let [p, q] = [b, c].map(|d| [0, 1, 2].map(|k| d[k] - a[k]));

@@ -4,7 +4,7 @@
 //! (but for the sign of a zero that two triangles share).
 
 use super::block::{LANES, Lanes};
-use super::triangle::{higher, index, lower, whole_above, whole_below};
+use crate::wide::{higher, index, lower, whole_above, whole_below};
 
 /// Triangles that reach over more columns or rows of pixels are filled one by one.
 const MOST_PX: f32 = 4.0;
@@ -154,7 +154,8 @@ mod tests {
     use proptest::prelude::*;
 
     use super::super::block::{Block, LANES, Row, fill_block};
-    use super::super::triangle::{fill, higher};
+    use super::super::triangle::fill;
+    use crate::wide::higher;
 
     const SIZE: [usize; 2] = [9, 7];
     const AS_THEY_ARE: [Row; 3] = [

@@ -1,41 +1,9 @@
 //! One triangle on a grid: which pixels' centres it holds, and how high it is there.
 
+use crate::wide::{higher, lower};
+
 /// In triangles wider than this each row is cut to where the edges cross it before its pixels are asked.
 const WIDE_COLUMNS: usize = 12;
-
-/// Plain comparisons, which are one instruction for many lanes; `f32::min` minds what is not a number.
-#[inline(always)]
-pub(super) fn lower(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-#[inline(always)]
-pub(super) fn higher(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-/// Numbers of this size have no bits for parts of one.
-const WHOLE: f32 = 12_582_912.0;
-
-/// The whole number at or below one that is small beside [`WHOLE`]. Casts and `floor` are not computed side by side.
-#[inline(always)]
-pub(super) fn whole_below(v: f32) -> f32 {
-    let nearest = (v + WHOLE) - WHOLE;
-    if nearest > v { nearest - 1.0 } else { nearest }
-}
-
-/// The whole number at or above one that is small beside [`WHOLE`].
-#[inline(always)]
-pub(super) fn whole_above(v: f32) -> f32 {
-    let nearest = (v + WHOLE) - WHOLE;
-    if nearest < v { nearest + 1.0 } else { nearest }
-}
-
-/// A whole number from 0 up that is small beside [`WHOLE`].
-#[inline(always)]
-pub(super) fn index(whole: f32) -> u32 {
-    (whole + WHOLE).to_bits() - WHOLE.to_bits()
-}
 
 /// Hands `meet` the place of each pixel around the triangle and the height there of the plane through its corners, not
 /// a number where the triangle does not hold the pixel's centre; its borders are its own.

@@ -19,7 +19,7 @@ fuzz_target!(|bytes: &[u8]| {
                 assert!(mesh.vertices.capacity() <= 2 * bytes.len() + 64);
                 assert!(mesh.vertices.len() as u64 <= LIMITS.max_vertices);
                 assert!(mesh.triangles.len() as u64 <= LIMITS.max_triangles);
-                assert!(mesh.vertices.as_flattened().iter().all(|v| v.is_finite()));
+                assert!(mesh.vertices.iter().flatten().all(f64::is_finite));
                 let count = mesh.vertices.len() as u32;
                 assert!(mesh.triangles.as_flattened().iter().all(|i| *i < count));
             }
