@@ -1,25 +1,111 @@
 //! Vectors that may hold millions of numbers, on large pages of memory where they do.
 //!
 //! The system clears memory page by page as it is first touched. For a vector of many megabytes that takes longer than
-//! filling it, unless the pages are large.
+//! filling it, unless the pages are large; so pages that are not needed any more are kept for the next vector.
 
 use std::fmt;
 use std::io::{self, ErrorKind, Read};
 use std::ops::{Deref, DerefMut};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use bytemuck::Pod;
 use memmap2::MmapMut;
 
-/// Bytes from which on a vector lies on pages of its own. Allocators keep smaller ones and give them out again, pages
-/// and all; glibc's does up to 32 MiB, but of several such vectors it gives the pages back.
-const LARGE: usize = 10 << 20;
+/// Bytes from which on a vector lies on pages of its own.
+const LARGE: usize = 1 << 20;
+/// Most bytes of pages that are kept, by the whole program.
+const MOST_KEPT: usize = 128 << 20;
+/// Pages are not taken for a vector that needs less than one in so many of them.
+const ROOMY: usize = 8;
+
+/// Pages that are not needed any more, the least first.
+struct Kept(Vec<MmapMut>);
+
+static KEPT: Mutex<Kept> = Mutex::new(Kept(Vec::new()));
+
+impl Kept {
+    /// Those that fit so many bytes best. If none do, some that fitted nobody are given back instead: vectors of one run
+    /// are much of a size.
+    fn take(&mut self, bytes: usize) -> Option<MmapMut> {
+        let fits = |pages: &MmapMut| (bytes..=bytes.saturating_mul(ROOMY)).contains(&pages.len());
+        if let Some(found) = self.0.iter().position(fits) {
+            return Some(self.0.remove(found));
+        }
+        self.0.pop();
+        None
+    }
+
+    /// Keeps some if there is room.
+    fn put(&mut self, pages: MmapMut) {
+        let held: usize = self.0.iter().map(|pages| pages.len()).sum();
+        if held + pages.len() <= MOST_KEPT {
+            let place = self.0.partition_point(|other| other.len() < pages.len());
+            self.0.insert(place, pages);
+        }
+    }
+}
+
+/// Those of the whole program. Nothing that can fail is done with them.
+fn kept() -> MutexGuard<'static, Kept> {
+    KEPT.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Pages of memory that hold anything.
+struct Pages(Option<MmapMut>);
+
+impl Pages {
+    /// For so many bytes; `None` where the system gives none.
+    fn of(bytes: usize) -> Option<Self> {
+        if let Some(pages) = kept().take(bytes) {
+            return Some(Self(Some(pages)));
+        }
+        let pages = MmapMut::map_anon(bytes).ok()?;
+        #[cfg(target_os = "linux")]
+        {
+            // Where there are no large pages, small ones do.
+            let _ = pages.advise(memmap2::Advice::HugePage);
+        }
+        Some(Self(Some(pages)))
+    }
+}
+
+impl Drop for Pages {
+    fn drop(&mut self) {
+        if let Some(pages) = self.0.take() {
+            kept().put(pages);
+        }
+    }
+}
+
+impl Deref for Pages {
+    type Target = [u8];
+
+    fn deref(&self) -> &[u8] {
+        self.0.as_deref().unwrap_or_default()
+    }
+}
+
+impl DerefMut for Pages {
+    fn deref_mut(&mut self) -> &mut [u8] {
+        self.0.as_deref_mut().unwrap_or_default()
+    }
+}
+
+/// Makes the allocator keep the memory of what is not large.
+///
+/// That of glibc gives back what lies free at its end when that is more than twice the largest block it ever gave out
+/// whole; the next stage of the next pair would have it cleared again. Nothing of this block is ever touched.
+pub fn keep_memory() {
+    const WHOLE: usize = 31 << 20;
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(WHOLE)));
+}
 
 /// A vector of plain numbers that may be large. What it cannot do a slice can, or [`Vec`] before it is turned into one.
 pub struct Large<T>(Place<T>);
 
 enum Place<T> {
     Small(Vec<T>),
-    Pages { pages: MmapMut, len: usize },
+    Pages { pages: Pages, len: usize },
 }
 
 impl<T: Pod> Large<T> {
@@ -33,12 +119,7 @@ impl<T: Pod> Large<T> {
 
     /// On pages of its own; `None` where the system gives none.
     fn on_pages(bytes: usize) -> Option<Self> {
-        let pages = MmapMut::map_anon(bytes).ok()?;
-        #[cfg(target_os = "linux")]
-        {
-            // Where there are no large pages, small ones do.
-            let _ = pages.advise(memmap2::Advice::HugePage);
-        }
+        let pages = Pages::of(bytes)?;
         Some(Self(Place::Pages { pages, len: 0 }))
     }
 
@@ -126,7 +207,7 @@ impl Large<u8> {
 }
 
 /// Pages as elements; what is left of their end is none.
-fn slots<T: Pod>(pages: &mut MmapMut) -> &mut [T] {
+fn slots<T: Pod>(pages: &mut Pages) -> &mut [T] {
     let whole = pages.len() - pages.len() % size_of::<T>();
     bytemuck::cast_slice_mut(&mut pages[..whole])
 }
@@ -237,7 +318,7 @@ impl<'a, T: Pod> IntoIterator for &'a mut Large<T> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{LARGE, Large, Place};
+    use super::{Kept, LARGE, Large, MmapMut, Place};
 
     type Element = [u32; 3];
 
@@ -251,6 +332,26 @@ mod tests {
         };
         assert_eq!(is_on_pages(count), cfg!(target_os = "linux"));
         assert!(!is_on_pages(9));
+    }
+
+    #[test]
+    fn pages_that_fit_are_used_again_and_none_beyond_the_limit_are_kept() {
+        let mut kept = Kept(Vec::new());
+        let pages = |mebibytes: usize| MmapMut::map_anon(mebibytes << 20).expect("pages");
+        let held = |kept: &Kept| {
+            kept.0
+                .iter()
+                .map(|pages| pages.len() >> 20)
+                .collect::<Vec<_>>()
+        };
+        for mebibytes in [30, 2, 11, 13, 40] {
+            kept.put(pages(mebibytes));
+        }
+        assert_eq!(held(&kept), [2, 11, 13, 30]);
+        let fitting = kept.take((11 << 20) - 5).expect("pages");
+        assert_eq!(fitting.len(), 11 << 20);
+        assert!(kept.take(4096).is_none(), "too large for so little");
+        assert_eq!(held(&kept), [2, 13]);
     }
 
     #[test]

@@ -30,7 +30,7 @@
 //! | `breakpoint` | named points where a test makes the process die | `domain` |
 //! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `large`, `mesh`, `raster` |
 //! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain`, `breakpoint` |
-//! | `runner` | workers, policy, execution of one pair, events | `domain`, `mesh`, `raster`, `stages`, `store`, `catalog`, `breakpoint` |
+//! | `runner` | workers, policy, execution of one pair, events | `domain`, `large`, `mesh`, `raster`, `stages`, `store`, `catalog`, `breakpoint` |
 //! | `check` | a project held against itself, and mended | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX, HTML | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of a report | `domain`, `raster`, `store`, `catalog`, `report` |

@@ -1,7 +1,10 @@
 //! Reading meshes, beside reading their bytes, and the OBJ also by `tobj`.
 
+use std::fs::File;
+use std::path::Path;
+
 use criterion::{Criterion, Throughput};
-use mocban::mesh;
+use mocban::mesh::{self, Mesh};
 
 use super::files::{Files, MESHES, bytes};
 
@@ -21,12 +24,27 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
                 .benchmark_group("read/tobj_obj")
                 .bench_function(files.size, |b| b.iter(|| by_tobj(&held)));
         }
+        criterion
+            .benchmark_group(format!("read/file_{ending}"))
+            .bench_function(files.size, |b| b.iter(|| from_file(&path, &name)));
         let mut raw = criterion.benchmark_group(format!("read/raw_{ending}"));
         raw.throughput(Throughput::Bytes(held.len() as u64));
         raw.bench_function(files.size, |b| b.iter(|| bytes(&path)));
         raw.finish();
     }
     Ok(())
+}
+
+/// From the file itself, as a run reads it.
+fn from_file(path: &Path, name: &str) -> anyhow::Result<Mesh> {
+    let mut file = File::open(path)?;
+    let about = file.metadata()?.len();
+    Ok(mesh::read_from(
+        &mut file,
+        about,
+        name,
+        &mesh::Limits::SUGGESTED,
+    )?)
 }
 
 fn by_tobj(mut bytes: &[u8]) -> Result<Vec<tobj::Model>, tobj::LoadError> {

@@ -2,6 +2,17 @@
 
 use crate::domain::{FailureClass, FileKind};
 
+/// Why a mesh could not be read from a file.
+#[derive(Debug, thiserror::Error)]
+pub enum ReadError {
+    /// Reading failed half-way.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+    /// What was read is no mesh.
+    #[error(transparent)]
+    Mesh(#[from] Error),
+}
+
 /// Why a mesh could not be read. The messages leave the file's name to the caller.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {

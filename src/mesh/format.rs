@@ -1,6 +1,6 @@
 //! Which format some bytes are, by their content.
 
-use super::{Error, text};
+use super::{Error, stl, text};
 use crate::domain::FileKind;
 
 /// The formats that are read.
@@ -44,7 +44,9 @@ impl Format {
         let kind = FileKind::of(bytes);
         match kind {
             FileKind::Ply => Ok(Self::Ply),
-            _ if is_whole_binary_stl(bytes) => Ok(Self::StlBinary),
+            _ if stl::whole_binary_count(bytes, bytes.len() as u64).is_some() => {
+                Ok(Self::StlBinary)
+            }
             FileKind::Text => text_format(bytes, name).ok_or(Error::NotAMesh(kind)),
             FileKind::Binary if has_extension(name, "stl") => Ok(Self::StlBinary),
             // Names in another encoding or a stray control character do not make a text binary.
@@ -69,12 +71,6 @@ fn has_extension(name: &str, wanted: &str) -> bool {
     std::path::Path::new(name)
         .extension()
         .is_some_and(|ext| ext.eq_ignore_ascii_case(wanted))
-}
-
-/// 80 bytes of anything, a count, 50 bytes a triangle and nothing after them: even if it begins with `solid`.
-fn is_whole_binary_stl(bytes: &[u8]) -> bool {
-    super::stl::binary_count(bytes)
-        .is_some_and(|count| bytes.len() as u64 == 84 + 50 * u64::from(count))
 }
 
 fn text_format(bytes: &[u8], name: &str) -> Option<Format> {

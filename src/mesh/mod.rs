@@ -11,11 +11,14 @@ mod text;
 mod vertices;
 pub mod write;
 
-pub use error::Error;
+pub use error::{Error, ReadError};
 pub use format::Format;
 pub use limits::Limits;
 pub use vertices::Vertices;
 
+use std::io::Read;
+
+use crate::domain::FileKind;
 use crate::large::Large;
 
 /// Triangles over vertices, in the mesh's own frame and unit. A point set has no triangles.
@@ -38,7 +41,7 @@ pub struct Mesh {
 /// or exceed the limits.
 pub fn read(bytes: &[u8], name: &str, limits: &Limits) -> Result<Mesh, Error> {
     limits.check_bytes(bytes.len() as u64)?;
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let mesh = match Format::of(bytes, name)? {
         Format::Obj => obj::read(bytes, limits),
         Format::Ply => ply::read(bytes, limits),
@@ -52,11 +55,38 @@ pub fn read(bytes: &[u8], name: &str, limits: &Limits) -> Result<Mesh, Error> {
     Ok(mesh)
 }
 
+/// Some programs put it before text.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// Reads a mesh or point set of about so many bytes as [`read`] does. The bytes of a whole binary STL are not kept.
+///
+/// # Errors
+/// As those of [`read`], and when the source fails.
+pub fn read_from(
+    source: &mut impl Read,
+    about: u64,
+    name: &str,
+    limits: &Limits,
+) -> Result<Mesh, ReadError> {
+    limits.check_bytes(about)?;
+    let mut head = Vec::with_capacity(stl::HEADER);
+    source
+        .by_ref()
+        .take(stl::HEADER as u64)
+        .read_to_end(&mut head)?;
+    let is_other = head.starts_with(BYTE_ORDER_MARK) || FileKind::of(&head) == FileKind::Ply;
+    if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
+        return stl::read_facets(source, count, limits);
+    }
+    let bytes = Large::read(head.as_slice().chain(source), about as usize)?;
+    Ok(read(&bytes, name, limits)?)
+}
+
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Error, Limits, read};
+    use super::{Error, Limits, Mesh, read, read_from};
     use crate::domain::FileKind;
 
     const LIMITS: Limits = Limits {
@@ -96,6 +126,58 @@ mod tests {
             ("b.stl", solid.to_vec()),
             ("a.xyz", b"0 0 0\n1 0 0\n0 1 0\n".to_vec()),
         ]
+    }
+
+    /// A source that gives a few bytes at a time.
+    struct Slow<'a>(&'a [u8]);
+
+    impl std::io::Read for Slow<'_> {
+        fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+            let most = into.len().min(37);
+            self.0.read(&mut into[..most])
+        }
+    }
+
+    /// As read from a file of so many bytes that is another one by now.
+    fn from_file(bytes: &[u8], about: usize, name: &str) -> Result<Mesh, String> {
+        read_from(&mut Slow(bytes), about as u64, name, &LIMITS).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_file_gives_what_its_bytes_give() {
+        let mut many = samples();
+        let mut long = vec![b' '; 80];
+        long.extend(300_u32.to_le_bytes());
+        long.extend((0..300 * 50).map(|k| (k % 60) as u8));
+        many.push(("long.stl", long.clone()));
+        long[84 + 50 * 250 + 14..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+        many.push(("nan.stl", long));
+        many.push(("none.stl", vec![0; 84]));
+        many.push(("ply.stl", [&b"ply\n"[..], &[0; 80]].concat()));
+        many.push(("mark.stl", [&b"\xef\xbb\xbf"[..], &[0; 81]].concat()));
+        many.push(("empty.stl", Vec::new()));
+        for (name, bytes) in many {
+            for len in (0..bytes.len()).rev().step_by(13).chain([bytes.len()]) {
+                let bytes = &bytes[..len];
+                let held = read(bytes, name, &LIMITS).map_err(|error| error.to_string());
+                assert_eq!(from_file(bytes, len, name), held, "{name} {len}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_that_grows_or_shrinks_while_it_is_read_is_no_mesh() {
+        let (_, bytes) = samples().swap_remove(3);
+        let grown = [&bytes[..], b"more"].concat();
+        assert_eq!(
+            from_file(&grown, bytes.len(), "a.stl"),
+            Err("it grew while it was read".into())
+        );
+        let shrunk = &bytes[..bytes.len() - 51];
+        assert_eq!(
+            from_file(shrunk, bytes.len(), "a.stl"),
+            Err("the binary STL is truncated: it holds 0 of 2 triangles".into())
+        );
     }
 
     #[test]

@@ -1,12 +1,16 @@
 //! STL, binary and ascii: a soup of triangles, in which each vertex is repeated as often as it is used.
 
-use super::{Error, Format, Limits, Mesh, Vertices, error, text};
+use std::io::{self, Read};
+
+use super::{Error, Format, Limits, Mesh, ReadError, Vertices, error, text};
 use crate::large::Large;
 
-const HEADER: usize = 84;
+/// Bytes of the header, the count included.
+pub(super) const HEADER: usize = 84;
 const FACET: usize = 50;
-/// Facets that are read at a time.
+/// Facets that are read at a time, and that a file is asked for.
 const FEW: usize = 128;
+const MANY: usize = 1280;
 
 /// Triangles by a binary header; `None` when the file ends before the count.
 pub(super) fn binary_count(bytes: &[u8]) -> Option<u32> {
@@ -14,6 +18,62 @@ pub(super) fn binary_count(bytes: &[u8]) -> Option<u32> {
         .get(80..HEADER)
         .and_then(|count| count.try_into().ok())
         .map(u32::from_le_bytes)
+}
+
+/// Triangles of a file that begins with these bytes and has so many, where it is 80 bytes of anything, a count, 50 bytes
+/// a triangle and nothing after them: a binary STL even if it begins with `solid`.
+pub(super) fn whole_binary_count(bytes: &[u8], len: u64) -> Option<u32> {
+    let holds = |count: &u32| len == (HEADER + FACET * *count as usize) as u64;
+    binary_count(bytes).filter(holds)
+}
+
+/// Reads the triangles of a whole binary STL from behind its header, few bytes at a time.
+pub(super) fn read_facets(
+    source: &mut impl Read,
+    count: u32,
+    limits: &Limits,
+) -> Result<Mesh, ReadError> {
+    let mut facets = Facets::of(count, limits)?;
+    let mut bytes = vec![0; FACET * (count as usize).min(MANY)];
+    let mut left = count as usize;
+    while left > 0 {
+        let most = bytes.len().min(FACET * left);
+        let bytes = &mut bytes[..most];
+        let have = fill(source, bytes)?;
+        let (whole, _) = bytes[..have].as_chunks();
+        facets.take(whole)?;
+        left -= whole.len();
+        if have < bytes.len() {
+            return Err(truncated(u64::from(count) - left as u64, count).into());
+        }
+    }
+    if fill(source, &mut [0])? > 0 {
+        return Err(io::Error::other("it grew while it was read").into());
+    }
+    Ok(facets.soup()?)
+}
+
+/// Reads until some bytes are full or the source ends; says how many are.
+fn fill(source: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
+    let mut full = 0;
+    while full < bytes.len() {
+        match source.read(&mut bytes[full..]) {
+            Ok(0) => break,
+            Ok(more) => full += more,
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(full)
+}
+
+fn truncated(have: u64, count: u32) -> Error {
+    Error::Truncated {
+        format: Format::StlBinary.name(),
+        what: "triangles".into(),
+        have,
+        want: u64::from(count),
+    }
 }
 
 /// Reads a binary STL; bytes after the last triangle are left out, as are normals and attributes.
@@ -27,26 +87,45 @@ pub(super) fn read_binary(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> 
     let (facets, _) = bytes[HEADER..].as_chunks::<FACET>();
     let have = facets.len() as u64;
     if have < u64::from(count) {
-        return Err(Error::Truncated {
-            format: Format::StlBinary.name(),
-            what: "triangles".into(),
-            have,
-            want: u64::from(count),
-        });
+        return Err(truncated(have, count));
     }
-    limits.check_triangles(u64::from(count))?;
-    limits.check_vertices(3 * u64::from(count))?;
-    let mut vertices = Large::with_capacity(3 * count as usize);
-    let mut few = Vec::with_capacity(3 * FEW);
-    for facets in facets[..count as usize].chunks(FEW) {
-        few.clear();
-        for facet in facets {
-            few.extend(corners(facet));
+    let mut taken = Facets::of(count, limits)?;
+    taken.take(&facets[..count as usize])?;
+    taken.soup()
+}
+
+/// Facets on their way into a mesh.
+struct Facets {
+    vertices: Large<[f32; 3]>,
+    few: Vec<[f32; 3]>,
+}
+
+impl Facets {
+    /// With room for so many, if that is within the limits.
+    fn of(count: u32, limits: &Limits) -> Result<Self, Error> {
+        limits.check_triangles(u64::from(count))?;
+        limits.check_vertices(3 * u64::from(count))?;
+        Ok(Self {
+            vertices: Large::with_capacity(3 * count as usize),
+            few: Vec::with_capacity(3 * FEW),
+        })
+    }
+
+    fn take(&mut self, facets: &[[u8; FACET]]) -> Result<(), Error> {
+        for facets in facets.chunks(FEW) {
+            self.few.clear();
+            for facet in facets {
+                self.few.extend(corners(facet));
+            }
+            error::all_finite(&self.few, self.vertices.len())?;
+            self.vertices.extend_from_slice(&self.few);
         }
-        error::all_finite(&few, vertices.len())?;
-        vertices.extend_from_slice(&few);
+        Ok(())
     }
-    soup(Vertices::Single(vertices))
+
+    fn soup(self) -> Result<Mesh, Error> {
+        soup(Vertices::Single(self.vertices))
+    }
 }
 
 /// The three corners of a facet: twelve little-endian 32-bit floats, the first three of them the normal.

@@ -21,5 +21,5 @@ pub use grid::Grid;
 pub use limits::Limits;
 pub use mask::{Mask, Overlap, PixelBox};
 pub use picture::Picture;
-pub use resample::{resample, resample_turned};
+pub use resample::{resample, resample_made, resample_turned};
 pub use warp::{warp_depth, warp_mask};

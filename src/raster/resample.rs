@@ -35,6 +35,19 @@ pub fn resample_turned(
     columns.mix(&rows.mix(values).transposed())
 }
 
+/// The same of values that `make` writes, row by row and some rows twice, when they are asked for.
+pub fn resample_made(
+    [from_width, from_height]: [usize; 2],
+    make: impl FnMut(usize, &mut [f32]),
+    scale: f64,
+    shift: [f64; 2],
+    [width, height]: [usize; 2],
+) -> Grid<f32> {
+    let rows = Reaches::new(from_height, height, scale, shift[1]);
+    let columns = Reaches::new(from_width, width, scale, shift[0]);
+    columns.mix(&rows.mix_made(from_width, make).transposed())
+}
+
 /// How far along one axis the output pixels reach in the source.
 struct Reaches {
     /// First source pixel of each, and where its weights end among all.
@@ -94,6 +107,31 @@ impl Reaches {
     }
 }
 
+impl Reaches {
+    /// Rows mixed from those that each reaches, `width` pixels long, which `make` writes.
+    fn mix_made(&self, width: usize, mut make: impl FnMut(usize, &mut [f32])) -> Grid<f32> {
+        let mut out = Grid::new(width, self.each.len(), 0.0_f32);
+        let mut rows = out.data_mut().chunks_exact_mut(width.max(1));
+        let mut made = vec![0.0_f32; width];
+        let mut start = 0;
+        widely(
+            #[inline(always)]
+            || {
+                for ((first, end), row) in self.each.iter().zip(&mut rows) {
+                    for (k, weight) in self.weights[start..*end].iter().enumerate() {
+                        make(first + k, &mut made);
+                        for (sum, value) in row.iter_mut().zip(&made) {
+                            *sum += weight * value;
+                        }
+                    }
+                    start = *end;
+                }
+            },
+        );
+        out
+    }
+}
+
 /// Adds some weighed rows to a row, one after the other.
 #[inline(always)]
 fn add<const N: usize>(row: &mut [f32], values: &Grid<f32>, first: usize, weights: [f32; N]) {
@@ -111,7 +149,7 @@ fn add<const N: usize>(row: &mut [f32], values: &Grid<f32>, first: usize, weight
 
 #[cfg(test)]
 mod tests {
-    use super::{resample, resample_turned};
+    use super::{resample, resample_made, resample_turned};
     use crate::raster::Grid;
 
     #[test]
@@ -122,6 +160,11 @@ mod tests {
         assert!((half.at(5, 3) - (70.0 + 71.0 + 80.0 + 81.0) / 4.0).abs() < 1e-4);
         let turned = resample_turned(&ramp, 0.5, [-0.25, -0.25], [6, 4]);
         assert_eq!(turned.transposed(), half);
+        let row = |y: usize, row: &mut [f32]| row.copy_from_slice(ramp.row(y));
+        assert_eq!(
+            resample_made([12, 8], row, 0.5, [-0.25, -0.25], [6, 4]),
+            turned
+        );
         let double = resample(&ramp, 2.0, [0.5, 0.5], [24, 16]);
         assert!((double.at(6, 4) - (2.75 + 17.5)).abs() < 1e-5);
     }

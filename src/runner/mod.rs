@@ -45,6 +45,7 @@ use crate::catalog::{
     WorkLeft, WorkerInfo,
 };
 use crate::domain::{PairName, WorkerId};
+use crate::large;
 use crate::stages::Settings;
 use crate::store::{ArtifactError, LockError, Project, RunLock, StoreError};
 use clock::Clock;
@@ -136,6 +137,7 @@ pub async fn run(
     stop: &Stop,
     on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
+    large::keep_memory();
     let steps = Arc::new(Pipeline::new(project, settings, options));
     let recipes = recipes(settings);
     run_steps(project, catalog, &recipes, steps, options, stop, on_event).await

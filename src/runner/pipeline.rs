@@ -13,7 +13,7 @@ use crate::mesh;
 use crate::raster::{self, DepthMap};
 use crate::stages::normalize::Normalized;
 use crate::stages::{Print, Scan, Settings, StageError, depth, fit, normalize, register};
-use crate::store::{ArtifactError, InputError, InputFile, Project, read_input};
+use crate::store::{ArtifactError, InputError, Project, Seen, open_input, read_input};
 
 /// The stages of one project with their settings.
 #[derive(Debug)]
@@ -197,9 +197,15 @@ impl Pipeline {
         let stored = &pair.facts.mesh_path;
         let path = self.project.input_path(stored);
         let limit = self.mesh_limits.max_bytes;
-        let file = read_input(&path, limit, "limits.mesh.max_bytes").map_err(unread)?;
-        pair.inputs.mesh = Some(seen(&file));
-        let mesh = mesh::read(&file.bytes, stored, &self.mesh_limits).map_err(|error| {
+        let mut file = open_input(&path, limit, "limits.mesh.max_bytes").map_err(unread)?;
+        let about = file.size();
+        let mesh = match mesh::read_from(&mut file, about, stored, &self.mesh_limits) {
+            Err(mesh::ReadError::Io(error)) => return Err(unread(file.error(error))),
+            Err(mesh::ReadError::Mesh(error)) => Err(error),
+            Ok(mesh) => Ok(mesh),
+        };
+        pair.inputs.mesh = Some(seen(file.finish().map_err(unread)?));
+        let mesh = mesh.map_err(|error| {
             let message = format!("{stored}: {error}");
             Setback::failed(error.class(), message)
         })?;
@@ -211,7 +217,7 @@ impl Pipeline {
         let path = self.project.input_path(stored);
         let limit = self.image_limits.max_bytes;
         let file = read_input(&path, limit, "limits.image.max_bytes").map_err(unread)?;
-        pair.inputs.print = Some(seen(&file));
+        pair.inputs.print = Some(seen(file.seen));
         let picture = raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
             let message = format!("{stored}: {error}");
             Setback::failed(error.class(), message)
@@ -220,10 +226,10 @@ impl Pipeline {
     }
 }
 
-fn seen(file: &InputFile) -> InputSeen {
+fn seen(Seen { hash, stat }: Seen) -> InputSeen {
     InputSeen {
-        hash: file.hash,
-        stat: file.stat.as_str().to_owned(),
+        hash,
+        stat: stat.as_str().to_owned(),
     }
 }
 

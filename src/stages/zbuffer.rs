@@ -15,7 +15,7 @@ use crate::mesh::{Mesh, Vertices};
 use crate::raster::Grid;
 use crate::wide::{higher, widely};
 
-use block::{Block, LANES, Lanes, Row, block, fill_block, holding};
+use block::{Block, Coordinate, LANES, Lanes, Row, block, fill_block, holding};
 use boxes::Boxes;
 pub(super) use moments::Moments;
 use triangle::pixels;
@@ -53,9 +53,9 @@ impl Shell {
         }
     }
 
-    fn of<T: Copy + Into<f64>>(mesh: &Mesh, vertices: &[[T; 3]]) -> Self {
+    fn of<T: Coordinate>(mesh: &Mesh, vertices: &[[T; 3]]) -> Self {
         let room @ [low, high]: Bounds<3> = room(vertices);
-        let middle: [f64; 3] = std::array::from_fn(|k| f64::midpoint(low[k], high[k]));
+        let middle: [f64; 3] = std::array::from_fn(|k| T::middle(f64::midpoint(low[k], high[k])));
         let points: Large<[u32; 3]>;
         let triangles = if mesh.triangles.is_empty() {
             points = (0..vertices.len() as u32).map(|i| [i; 3]).collect();

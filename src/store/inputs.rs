@@ -1,7 +1,7 @@
 //! Input files: read whole within a limit, hashed, and told apart from what they were.
 
 use std::fs::File;
-use std::io::{ErrorKind, Read as _};
+use std::io::{self, ErrorKind, Read, Take};
 use std::path::{Path, PathBuf};
 
 use crate::domain::{ContentHash, FailureClass};
@@ -42,10 +42,76 @@ const fn inode(_meta: &std::fs::Metadata) -> u64 {
 pub struct InputFile {
     /// All its bytes.
     pub bytes: Large<u8>,
-    /// Their hash.
+    /// What was seen of it.
+    pub seen: Seen,
+}
+
+/// What was seen of an input file that was read to its end.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seen {
+    /// Hash of its bytes.
     pub hash: ContentHash,
-    /// What the file looked like when it was opened.
+    /// What it looked like when it was opened.
     pub stat: FileStat,
+}
+
+/// An input file that is being read; its bytes are hashed while they are at hand.
+#[derive(Debug)]
+pub struct InputReader {
+    path: PathBuf,
+    file: Take<File>,
+    /// How many bytes it had when it was opened.
+    len: u64,
+    /// How many it may have, and the name of the setting that says so.
+    limit: (u64, &'static str),
+    hasher: blake3::Hasher,
+    stat: FileStat,
+}
+
+/// Bytes that are read and hashed at a time at most: they stay in the cache meanwhile.
+const AT_HAND: usize = 1 << 17;
+
+impl Read for InputReader {
+    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
+        let most = into.len().min(AT_HAND);
+        let count = self.file.read(&mut into[..most])?;
+        self.hasher.update(&into[..count]);
+        Ok(count)
+    }
+}
+
+impl InputReader {
+    /// How many bytes it had when it was opened.
+    pub const fn size(&self) -> u64 {
+        self.len
+    }
+
+    /// The error that reading it gave.
+    pub fn error(&self, source: io::Error) -> InputError {
+        InputError::io(&self.path, source)
+    }
+
+    /// Reads what is left, and says what was seen.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is larger than the limit by now.
+    pub fn finish(mut self) -> Result<Seen, InputError> {
+        io::copy(&mut self, &mut io::sink()).map_err(|error| self.error(error))?;
+        // A file that grows while it is read must not get past the limit either.
+        let (limit, setting) = self.limit;
+        if self.file.limit() == 0 {
+            return Err(InputError::TooLarge {
+                path: self.path,
+                bytes: limit.saturating_add(1),
+                limit,
+                setting,
+            });
+        }
+        Ok(Seen {
+            hash: ContentHash::from_bytes(*self.hasher.finalize().as_bytes()),
+            stat: self.stat,
+        })
+    }
 }
 
 /// Why an input file could not be read.
@@ -129,32 +195,45 @@ pub fn stat_input(path: &Path) -> Result<FileStat, InputError> {
     Ok(FileStat::of(&check_file(path, meta)?))
 }
 
+/// Opens a file that must not be larger than `limit` bytes; `setting` names that limit to the user.
+///
+/// # Errors
+/// When it is not there, no file, not to be read, or too large.
+pub fn open_input(
+    path: &Path,
+    limit: u64,
+    setting: &'static str,
+) -> Result<InputReader, InputError> {
+    let (file, meta) = open(path)?;
+    if meta.len() > limit {
+        return Err(InputError::TooLarge {
+            path: path.to_owned(),
+            bytes: meta.len(),
+            limit,
+            setting,
+        });
+    }
+    Ok(InputReader {
+        path: path.to_owned(),
+        file: file.take(limit.saturating_add(1)),
+        len: meta.len(),
+        limit: (limit, setting),
+        hasher: blake3::Hasher::new(),
+        stat: FileStat::of(&meta),
+    })
+}
+
 /// Reads a file that must not be larger than `limit` bytes; `setting` names that limit to the user.
 ///
 /// # Errors
 /// When it is not there, no file, not to be read, or too large.
 pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<InputFile, InputError> {
-    let too_large = |bytes| InputError::TooLarge {
-        path: path.to_owned(),
-        bytes,
-        limit,
-        setting,
-    };
-    let (file, meta) = open(path)?;
-    if meta.len() > limit {
-        return Err(too_large(meta.len()));
-    }
-    // A file that grows while it is read must not get past the limit either.
-    let file = file.take(limit.saturating_add(1));
-    let bytes =
-        Large::read(file, meta.len() as usize).map_err(|error| InputError::io(path, error))?;
-    if bytes.len() as u64 > limit {
-        return Err(too_large(bytes.len() as u64));
-    }
+    let mut file = open_input(path, limit, setting)?;
+    let about = file.size() as usize;
+    let bytes = Large::read(&mut file, about).map_err(|error| file.error(error))?;
     Ok(InputFile {
-        hash: ContentHash::of(&bytes),
         bytes,
-        stat: FileStat::of(&meta),
+        seen: file.finish()?,
     })
 }
 
@@ -242,7 +321,7 @@ mod tests {
         std::fs::write(&path, b"print").expect("a file");
         let read = read_input(&path, 10, "x").expect("a file");
         let (hash, stat) = hash_input(&path).expect("a file");
-        assert_eq!((read.hash, &read.stat), (hash, &stat));
+        assert_eq!((read.seen.hash, &read.seen.stat), (hash, &stat));
         assert_eq!(hash, ContentHash::of(b"print"));
         assert_eq!(stat_input(&path).expect("a file"), stat);
     }

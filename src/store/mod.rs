@@ -8,7 +8,10 @@ mod project;
 mod whole;
 
 pub use artifacts::{ArtifactError, NewArtifact};
-pub use inputs::{FileStat, InputError, InputFile, hash_input, read_input, stat_input};
+pub use inputs::{
+    FileStat, InputError, InputFile, InputReader, Seen, hash_input, open_input, read_input,
+    stat_input,
+};
 pub use lock::{LockError, RunLock};
 pub use named::{NamedArtifacts, Unnamed, UnnamedKind};
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};

@@ -97,6 +97,7 @@ impl Relief {
 
 /// Soft stroke of a depth under the tops: 1 well above the cut, 0 well below, in between over `softness`; all are
 /// shares of the relief.
+#[inline(always)]
 pub(in crate::stages) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
     (0.5 + (cut as f32 - depth) / softness as f32).clamp(0.0, 1.0)
 }

@@ -174,7 +174,7 @@ impl<'a> Structure<'a> {
             return score;
         }
         let mask = self.canvas.mask(self.candidates[k].level);
-        let score = self.means.against(&mask).nl_ssim;
+        let score = self.means.nl_ssim(&mask);
         self.known[k] = Some(score);
         score
     }

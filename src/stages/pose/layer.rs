@@ -1,7 +1,7 @@
 //! A picture brought to working size, its slow variation taken out.
 
 use crate::domain::Affine2;
-use crate::raster::{Grid, Mask, PixelBox, resample, resample_turned};
+use crate::raster::{Grid, Mask, PixelBox, resample, resample_made, resample_turned};
 use crate::stages::blur::{blur, blur_turned};
 use crate::wide::widely;
 
@@ -61,47 +61,52 @@ impl Base {
             (bounds.y0 + bounds.y1) as f64 / 2.0,
         ];
         let (sides, shift) = framed([bounds.width(), bounds.height()], middle, scale);
-        let known = soft.known.map(|k| f32::from(u8::from(*k)));
-        let pairs = soft.amount.data().iter().zip(known.data());
-        let present = pairs.map(|(amount, known)| amount * known).collect();
-        let present = Grid::from_vec(known.width(), known.height(), present)?;
+        let from = [soft.known.width(), soft.known.height()];
+        let present = resample_made(
+            from,
+            #[inline(always)]
+            |y, row| {
+                let pairs = soft.amount.row(y).iter().zip(soft.known.row(y));
+                for (present, (amount, known)) in row.iter_mut().zip(pairs) {
+                    *present = amount * f32::from(u8::from(*known));
+                }
+            },
+            scale,
+            shift,
+            sides,
+        );
+        let known = resample_made(
+            from,
+            #[inline(always)]
+            |y, row| {
+                for (known, is_known) in row.iter_mut().zip(soft.known.row(y)) {
+                    *known = f32::from(u8::from(*is_known));
+                }
+            },
+            scale,
+            shift,
+            sides,
+        );
         Some(Self {
-            present: resample(&present, scale, shift, sides),
-            known: resample(&known, scale, shift, sides),
+            present: present.transposed(),
+            known: known.transposed(),
             from_image: Affine2::scale_shift(scale, shift),
             size: size as f64,
         })
     }
 
     /// The same with each known pixel's amount replaced.
-    pub(in crate::stages) fn map(self, amount: impl Fn(f32) -> f32) -> Self {
-        Self {
-            present: self.replaced(amount),
-            ..self
+    pub(in crate::stages) fn map(mut self, amount: impl Fn(f32) -> f32) -> Self {
+        let pairs = self.present.data_mut().iter_mut().zip(self.known.data());
+        for (present, known) in pairs {
+            *present = replaced(*present, *known, &amount);
         }
-    }
-
-    /// What is present with each known pixel's amount replaced.
-    fn replaced(&self, amount: impl Fn(f32) -> f32) -> Grid<f32> {
-        let mut present = self.present.clone();
-        let pairs = present.data_mut().iter_mut().zip(self.known.data());
-        widely(
-            #[inline(always)]
-            || {
-                for (present, known) in pairs {
-                    let is_known = *known > 0.0;
-                    let share = if is_known { *known } else { 1.0 };
-                    let replaced = share * amount(*present / share);
-                    *present = if is_known { replaced } else { 0.0 };
-                }
-            },
-        );
-        present
+        self
     }
 
     /// The layer of `size` pixels along the longest side of what is known, smoothed by `sigma` pixels.
     pub(in crate::stages) fn layer(&self, size: usize, sigma: f64) -> Layer {
-        self.at(size, sigma).layer(&self.present)
+        self.at(size, sigma).plain()
     }
 
     /// Ready to make layers of one size and smoothing.
@@ -144,11 +149,29 @@ impl<'a> Sizer<'a> {
 
     /// The layer of the picture with each known pixel's amount replaced.
     pub(in crate::stages) fn mapped(&self, amount: impl Fn(f32) -> f32) -> Layer {
-        self.layer(&self.base.replaced(amount))
+        let Base { present, known, .. } = self.base;
+        self.layer(resample_made(
+            [present.width(), present.height()],
+            #[inline(always)]
+            |y, row| {
+                let pairs = present.row(y).iter().zip(known.row(y));
+                for (made, (present, known)) in row.iter_mut().zip(pairs) {
+                    *made = replaced(*present, *known, &amount);
+                }
+            },
+            self.scale,
+            self.shift,
+            self.sides,
+        ))
     }
 
-    fn layer(&self, present: &Grid<f32>) -> Layer {
-        let turned = resample_turned(present, self.scale, self.shift, self.sides);
+    fn plain(&self) -> Layer {
+        let present = &self.base.present;
+        self.layer(resample_turned(present, self.scale, self.shift, self.sides))
+    }
+
+    /// Of amounts at its size, their rows and columns changed for each other.
+    fn layer(&self, turned: Grid<f32>) -> Layer {
         let mut amount = blur_turned(turned, self.sigma);
         // What is slow becomes the value without it.
         let mut value = slow(&amount, self.size);
@@ -179,6 +202,15 @@ impl<'a> Sizer<'a> {
                 .after(&self.base.from_image),
         }
     }
+}
+
+/// What is present in a pixel, of which so much is known, with the known part's amount replaced.
+#[inline(always)]
+fn replaced(present: f32, known: f32, amount: impl Fn(f32) -> f32) -> f32 {
+    let is_known = known > 0.0;
+    let share = if is_known { known } else { 1.0 };
+    let replaced = share * amount(present / share);
+    if is_known { replaced } else { 0.0 }
 }
 
 /// So much at least, to divide by.

@@ -87,6 +87,16 @@ impl WindowMeans {
 
     /// Structure of this mask against another of the same size.
     pub fn against(&self, other: &Mask) -> Structure {
+        self.compared::<true>(other)
+    }
+
+    /// Its part without luminance alone, which takes less time.
+    pub fn nl_ssim(&self, other: &Mask) -> f64 {
+        self.compared::<false>(other).nl_ssim
+    }
+
+    /// Without `LUMINANCE` the first of the two means is not computed.
+    fn compared<const LUMINANCE: bool>(&self, other: &Mask) -> Structure {
         let count = self.means.data().len();
         let mut both = other.clone();
         let pairs = self.mask.data().iter().zip(other.data());
@@ -97,7 +107,7 @@ impl WindowMeans {
         let mut sums = Sums::default();
         let rows = |y: usize, [other, both]: [&[f64]; 2]| {
             let own = &self.means.row(y)[windows.columns.clone()];
-            sums.add_row(own, other, both, self.covariance_factor);
+            sums.add_row::<LUMINANCE>(own, other, both, self.covariance_factor);
         };
         widely(
             #[inline(always)]
@@ -139,27 +149,40 @@ struct Sums {
 impl Sums {
     /// Adds a row of windows: the means of one mask, of the other, and of what both have.
     #[inline(always)]
-    fn add_row(&mut self, own: &[f64], other: &[f64], both: &[f64], factor: f64) {
+    fn add_row<const LUMINANCE: bool>(
+        &mut self,
+        own: &[f64],
+        other: &[f64],
+        both: &[f64],
+        factor: f64,
+    ) {
         let parts = [own, other, both].map(|means| means.as_chunks());
         let [(own, own_rest), (other, other_rest), (both, both_rest)] = parts;
         for ((u, v), both) in own.iter().zip(other).zip(both) {
-            self.add([u, v, both], LANES, factor);
+            self.add::<LUMINANCE>([u, v, both], LANES, factor);
         }
         let padded = |rest: &[f64]| std::array::from_fn(|k| rest.get(k).copied().unwrap_or(0.0));
         let rest = [own_rest, other_rest, both_rest].map(padded);
-        self.add(rest.each_ref(), own_rest.len(), factor);
+        self.add::<LUMINANCE>(rest.each_ref(), own_rest.len(), factor);
     }
 
     #[inline(always)]
-    fn add(&mut self, [u, v, both]: [&[f64; LANES]; 3], count: usize, factor: f64) {
+    fn add<const LUMINANCE: bool>(
+        &mut self,
+        [u, v, both]: [&[f64; LANES]; 3],
+        count: usize,
+        factor: f64,
+    ) {
         for k in 0..count {
             let (u, v) = (u[k], v[k]);
             let variances = factor * (u - u * u + v - v * v);
             let covariance = factor * (both[k] - u * v);
             let structure = (2.0 * covariance + C2) / (variances + C2);
-            let luminance = (2.0 * u * v + C1) / (u * u + v * v + C1);
-            self.ssim[k] += luminance * structure;
             self.nl_ssim[k] += structure;
+            if LUMINANCE {
+                let luminance = (2.0 * u * v + C1) / (u * u + v * v + C1);
+                self.ssim[k] += luminance * structure;
+            }
         }
     }
 
@@ -267,19 +290,27 @@ impl Taps {
     /// Weighted means down the columns, of the rows from `y` on: each lies at its number's remainder.
     #[inline(always)]
     fn down(&self, across: &[f64], y: usize, means: &mut [f64]) {
-        let (seen, width) = (self.weights.len(), means.len());
-        let row = |k: usize| &across[(y + k) % seen * width..][..width];
-        let last = self.lost();
-        let middle = self.weights[last / 2];
-        for (mean, value) in means.iter_mut().zip(row(last / 2)) {
-            *mean = middle * value;
+        match *self.weights.as_slice() {
+            [a, b, c, d, _, _, _] => mixed([a, b, c, d], across, y, means),
+            [a, b, c, d, e, f, ..] => mixed([a, b, c, d, e, f], across, y, means),
+            _ => {}
         }
-        // Weights that are alike share a product.
-        for (k, weight) in self.weights[..last / 2].iter().enumerate() {
-            for ((mean, a), b) in means.iter_mut().zip(row(k)).zip(row(last - k)) {
-                *mean += weight * (a + b);
-            }
+    }
+}
+
+/// Rows mixed by the first half of their weights, the middle one included: those alike share a product.
+#[inline(always)]
+fn mixed<const HALF: usize>(weights: [f64; HALF], across: &[f64], y: usize, means: &mut [f64]) {
+    let (last, width) = (2 * HALF - 2, means.len());
+    let row = |k: usize| &across[(y + k) % (last + 1) * width..][..width];
+    let above: [&[f64]; HALF] = std::array::from_fn(row);
+    let below: [&[f64]; HALF] = std::array::from_fn(|k| row(last - k));
+    for x in 0..width {
+        let mut mean = weights[HALF - 1] * above[HALF - 1][x];
+        for k in 0..HALF - 1 {
+            mean += weights[k] * (above[k][x] + below[k][x]);
         }
+        means[x] = mean;
     }
 }
 
@@ -318,10 +349,10 @@ mod tests {
     #[test]
     fn structure_part_equals_the_formula_in_numpy() {
         let (a, b) = reference_masks();
-        let got = WindowMeans::new(&a, SsimWindow::Gaussian)
-            .against(&b)
-            .nl_ssim;
+        let means = WindowMeans::new(&a, SsimWindow::Gaussian);
+        let got = means.against(&b).nl_ssim;
         assert!((got - STRUCTURE).abs() < 1e-9, "{got}");
+        assert_eq!(means.nl_ssim(&b), got);
     }
 
     // scikit-image 0.26 structural_similarity(a, b, data_range=1.0, ...) on the masks above as float64, and the structure

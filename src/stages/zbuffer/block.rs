@@ -35,24 +35,81 @@ impl Row {
     }
 }
 
+/// A number of a vertex as its file has it.
+pub(super) trait Coordinate: Copy + Into<f64> {
+    /// The place that others are told from, near the one asked for.
+    fn middle(near: f64) -> f64;
+    /// How far it lies from a middle.
+    fn from_middle(self, middle: f64) -> f32;
+}
+
+impl Coordinate for f32 {
+    fn middle(near: f64) -> f64 {
+        f64::from(near as f32)
+    }
+
+    #[inline(always)]
+    fn from_middle(self, middle: f64) -> f32 {
+        self - middle as f32
+    }
+}
+
+impl Coordinate for f64 {
+    fn middle(near: f64) -> f64 {
+        near
+    }
+
+    #[inline(always)]
+    fn from_middle(self, middle: f64) -> f32 {
+        (self - middle) as f32
+    }
+}
+
 /// Up to [`LANES`] triangles, the last repeated.
 #[inline(always)]
-pub(super) fn block<T: Copy + Into<f64>>(
+pub(super) fn block<T: Coordinate>(
     triangles: &[[u32; 3]],
     vertices: &[[T; 3]],
     middle: [f64; 3],
 ) -> Block {
     let mut block = [[[0.0; LANES]; 3]; 3];
+    if let Some(corners) = in_a_row(triangles, vertices) {
+        for lane in 0..LANES {
+            for corner in 0..3 {
+                for axis in 0..3 {
+                    let place = corners[3 * lane + corner][axis];
+                    block[corner][axis][lane] = place.from_middle(middle[axis]);
+                }
+            }
+        }
+        return block;
+    }
     for lane in 0..LANES {
         let triangle = triangles[lane.min(triangles.len() - 1)];
         for (corner, i) in block.iter_mut().zip(triangle) {
             let vertex = vertices[i as usize];
             for axis in 0..3 {
-                corner[axis][lane] = (vertex[axis].into() - middle[axis]) as f32;
+                corner[axis][lane] = vertex[axis].from_middle(middle[axis]);
             }
         }
     }
     block
+}
+
+/// The vertices of [`LANES`] triangles, where they lie one after the other, as in a soup.
+#[inline(always)]
+fn in_a_row<'a, T>(
+    triangles: &[[u32; 3]],
+    vertices: &'a [[T; 3]],
+) -> Option<&'a [[T; 3]; 3 * LANES]> {
+    let triangles = triangles.first_chunk::<LANES>()?;
+    let first = triangles[0][0];
+    let mut is_in_a_row = true;
+    for (k, corner) in (0_u32..).zip(triangles.as_flattened()) {
+        is_in_a_row &= *corner == first.wrapping_add(k);
+    }
+    let vertices = vertices.get(first as usize..)?;
+    vertices.first_chunk().filter(|_| is_in_a_row)
 }
 
 /// Fills those of a few triangles that hold a pixel's centre.
