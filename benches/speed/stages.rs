@@ -18,7 +18,7 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
     // The ink is read and the surface made ready once for a pair, by fit. Depth alone makes the surface ready too.
     let fresh = |name: &str| match name {
         "fit" => (Scan::from(mesh.clone()), Print::from(picture.clone())),
-        "plane" | "depth" | "depth_1024" => (Scan::from(mesh.clone()), print.clone()),
+        "depth" | "depth_1024" => (Scan::from(mesh.clone()), print.clone()),
         _ => (Scan::from(Mesh::default()), print.clone()),
     };
     let mut bench = |name: &str, run: &mut dyn FnMut(&Scan, &Print)| {
@@ -34,10 +34,6 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
     };
     bench("fit", &mut |scan, print| {
         drop(fit::fit(scan, Some(print), None, &settings.fit));
-    });
-    // Which side is carved is told without the print, and the print's ink is not read.
-    bench("plane", &mut |scan, _| {
-        drop(fit::fit(scan, None, None, &settings.fit));
     });
     bench("depth", &mut |scan, _| {
         drop(depth::depth(scan, &aligned.fit, None, &settings.depth));

@@ -8,7 +8,7 @@ use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
 use crate::raster::{DepthMap, Grid};
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 4;
+pub const REVISION: u32 = 5;
 
 /// A depth map's longest side in pixels may not pass this: 16-bit maps of 268 million pixels help nobody.
 const LONGEST_PX_LIMIT: f64 = 16_384.0;

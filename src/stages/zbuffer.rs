@@ -24,6 +24,9 @@ pub(super) use view::View;
 /// Height of a pixel that no surface covers.
 pub(super) const NOTHING: f32 = f32::NEG_INFINITY;
 
+/// Where so many triangles come to a pixel, few blocks hold one's centre.
+const MANY_A_PIXEL: usize = 16;
+
 /// Points of a set without faces are grown to this many times half their mean spacing, so that no holes stay.
 const POINT_GROWTH: f64 = 1.5;
 
@@ -190,21 +193,27 @@ impl Shell {
         ]
     }
 
-    /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet, and with what is no
-    /// number.
-    fn raster(&self, plane_from_mesh: &Rigid3, view: &View, meet: impl FnMut(usize, f32)) {
+    /// Rows that give a column and a row of a view, and a height.
+    fn view_rows(&self, plane_from_mesh: &Rigid3, view: &View) -> [Row; 3] {
         let [x, y, z] = self.rows(plane_from_mesh);
         let [[a, b, c], [d, e, f]] = view.px_from_plane.0;
         let mixed = |p: f64, q: f64, r: f64| {
             std::array::from_fn(|k| p * x[k] + q * y[k] + if k == 3 { r } else { 0.0 })
         };
-        let rows =
-            [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| Row(row.map(|v| v as f32)));
+        [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| Row(row.map(|v| v as f32)))
+    }
+
+    /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet, and with what is no
+    /// number.
+    fn raster(&self, plane_from_mesh: &Rigid3, view: &View, meet: impl FnMut(usize, f32)) {
+        let rows = self.view_rows(plane_from_mesh, view);
         let size = [view.width, view.height];
-        if self.has_faces {
-            self.fill_all(&rows, size, meet);
-        } else {
+        if !self.has_faces {
             self.splat(&rows, size, meet);
+        } else if self.count / MANY_A_PIXEL > size[0] * size[1] {
+            self.fill_few(&rows, size, meet);
+        } else {
+            self.fill_all(&rows, size, meet);
         }
     }
 
@@ -221,6 +230,39 @@ impl Shell {
                         if held {
                             fill_block(block, rows, size, &mut meet);
                         }
+                    }
+                }
+            },
+        );
+    }
+
+    /// The same where most blocks hold no pixel's centre. Those that do lie too far apart for the processor to fetch
+    /// them ahead by itself: a look at each of some brings them nearer while the others are on their way.
+    fn fill_few(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
+        const GROUPS: usize = 16;
+        let [u, v, _] = rows;
+        let mut few: Vec<&Block> = Vec::with_capacity(GROUPS * LANES);
+        widely(
+            #[inline(always)]
+            || {
+                let blocks = self.blocks.chunks(GROUPS * LANES);
+                for (boxes, blocks) in self.boxes.chunks(GROUPS).zip(blocks) {
+                    few.clear();
+                    for (boxes, blocks) in boxes.iter().zip(blocks.chunks(LANES)) {
+                        let (across, down) = (boxes.reach(u), boxes.reach(v));
+                        let held = holding([&across, &down], size);
+                        let pairs = blocks.iter().zip(held);
+                        few.extend(pairs.filter(|(_, held)| *held).map(|(block, _)| block));
+                    }
+                    let mut seen = 0.0;
+                    for block in &few {
+                        // One number of each line of the cache.
+                        let numbers = block.as_flattened().as_flattened();
+                        seen += numbers.iter().step_by(16).sum::<f32>();
+                    }
+                    std::hint::black_box(seen);
+                    for block in &few {
+                        fill_block(block, rows, size, &mut meet);
                     }
                 }
             },
@@ -328,6 +370,34 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn few_blocks_fill_what_all_do(mesh in soup(), turn in 0.0..3.0_f64, more in 1..300_usize) {
+            // Many small copies side by side, so that most hold no pixel's centre.
+            let mut many = Mesh::default();
+            for copy in 0..more {
+                let at = |[x, y, z]: [f64; 3]| {
+                    [(copy % 17) as f64 + x / 9.0, (copy / 17) as f64 + y / 9.0, z]
+                };
+                let first = many.vertices.len() as u32;
+                many.vertices.extend(mesh.vertices.iter().map(at));
+                many.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + first)));
+            }
+            let frame = Rigid3::to_frame(
+                [[turn.cos(), turn.sin(), 0.0], [-turn.sin(), turn.cos(), 0.0], [0.0, 0.0, 1.0]],
+                [0.0; 3],
+            );
+            let shell = Shell::new(&many);
+            let view = View::around(shell.bounds(&frame), 16, false);
+            let rows = shell.view_rows(&frame, &view);
+            let size = [view.width, view.height];
+            let mut filled = [Vec::new(), Vec::new()];
+            shell.fill_all(&rows, size, |place, z| filled[0].push((place, z.to_bits())));
+            shell.fill_few(&rows, size, |place, z| filled[1].push((place, z.to_bits())));
+            prop_assert_eq!(&filled[0], &filled[1]);
         }
     }
 

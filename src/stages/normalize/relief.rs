@@ -4,6 +4,7 @@ use super::heap::Heap;
 use crate::raster::{DepthMap, PixelBox};
 use crate::stages::otsu;
 use crate::stages::pose::Soft;
+use crate::wide::widely;
 
 /// Every how many pixels the heights are looked at when tops and ground are told apart.
 const STRIDE: usize = 3;
@@ -84,14 +85,16 @@ impl Relief {
     /// Depth of every pixel under the tops, a share of the relief between -1 and 2.
     pub(in crate::stages) fn depths(&self, depth: &DepthMap) -> Soft {
         let scale = &depth.scale;
-        let per_level = scale.height_per_level / self.depth();
-        let first = (self.top - scale.height(1)) / self.depth();
-        Soft {
-            amount: depth.levels.map(|level| {
-                (first - per_level * (f64::from(*level) - 1.0)).clamp(-1.0, 2.0) as f32
-            }),
-            known: depth.levels.map(|level| *level != 0),
-        }
+        let per_level = (scale.height_per_level / self.depth()) as f32;
+        let none = ((self.top - scale.height(1)) / self.depth()) as f32 + per_level;
+        let of_level = |level: u16| (none - per_level * f32::from(level)).clamp(-1.0, 2.0);
+        widely(
+            #[inline(always)]
+            || Soft {
+                amount: depth.levels.map(|level| of_level(*level)),
+                known: depth.levels.map(|level| *level != 0),
+            },
+        )
     }
 }
 

@@ -60,9 +60,16 @@ fn ends(block: &Block, axis: usize) -> [f32; 2] {
             high[k] = higher(high[k], corner[axis][k]);
         }
     }
-    let mut all = [low[0], high[0]];
-    for k in 1..LANES {
-        all = [lower(all[0], low[k]), higher(all[1], high[k])];
+    // Half with half, so that lanes are compared side by side.
+    let (mut lows, mut highs) = ([0.0; LANES / 2], [0.0; LANES / 2]);
+    for k in 0..LANES / 2 {
+        lows[k] = lower(low[k], low[k + LANES / 2]);
+        highs[k] = higher(high[k], high[k + LANES / 2]);
     }
-    all
+    let [a, b, c, d] = lows;
+    let [e, f, g, h] = highs;
+    [
+        lower(lower(a, b), lower(c, d)),
+        higher(higher(e, f), higher(g, h)),
+    ]
 }
