@@ -40,7 +40,7 @@ pub(super) trait Coordinate: Copy + Into<f64> {
     /// The place that others are told from, near the one asked for.
     fn middle(near: f64) -> f64;
     /// How far it lies from a middle.
-    fn from_middle(self, middle: f64) -> f32;
+    fn beyond(self, middle: f64) -> f32;
 }
 
 impl Coordinate for f32 {
@@ -49,7 +49,7 @@ impl Coordinate for f32 {
     }
 
     #[inline(always)]
-    fn from_middle(self, middle: f64) -> f32 {
+    fn beyond(self, middle: f64) -> f32 {
         self - middle as f32
     }
 }
@@ -60,7 +60,7 @@ impl Coordinate for f64 {
     }
 
     #[inline(always)]
-    fn from_middle(self, middle: f64) -> f32 {
+    fn beyond(self, middle: f64) -> f32 {
         (self - middle) as f32
     }
 }
@@ -78,7 +78,7 @@ pub(super) fn block<T: Coordinate>(
             for corner in 0..3 {
                 for axis in 0..3 {
                     let place = corners[3 * lane + corner][axis];
-                    block[corner][axis][lane] = place.from_middle(middle[axis]);
+                    block[corner][axis][lane] = place.beyond(middle[axis]);
                 }
             }
         }
@@ -89,7 +89,7 @@ pub(super) fn block<T: Coordinate>(
         for (corner, i) in block.iter_mut().zip(triangle) {
             let vertex = vertices[i as usize];
             for axis in 0..3 {
-                corner[axis][lane] = vertex[axis].from_middle(middle[axis]);
+                corner[axis][lane] = vertex[axis].beyond(middle[axis]);
             }
         }
     }
