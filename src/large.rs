@@ -1,4 +1,4 @@
-//! Vectors that may hold millions of numbers, on large pages of memory where they do.
+//! Vectors that may hold millions of numbers, on pages of memory of their own where they do, large ones if there are.
 //!
 //! The system clears memory page by page as it is first touched. For a vector of many megabytes that takes longer than
 //! filling it, unless the pages are large; so pages that are not needed any more are kept for the next vector.
@@ -16,32 +16,44 @@ const LARGE: usize = 1 << 20;
 /// Most bytes of pages that are kept, by the whole program.
 const MOST_KEPT: usize = 128 << 20;
 /// Pages are not taken for a vector that needs less than one in so many of them.
-const ROOMY: usize = 8;
+const ROOMY: usize = 2;
 
-/// Pages that are not needed any more, the least first.
-struct Kept(Vec<MmapMut>);
+/// Pages that are not needed any more.
+struct Kept {
+    /// The least first.
+    pages: Vec<MmapMut>,
+    /// Most bytes of them.
+    most: usize,
+}
 
-static KEPT: Mutex<Kept> = Mutex::new(Kept(Vec::new()));
+static KEPT: Mutex<Kept> = Mutex::new(Kept {
+    pages: Vec::new(),
+    most: MOST_KEPT,
+});
 
 impl Kept {
-    /// Those that fit so many bytes best. If none do, some that fitted nobody are given back instead: vectors of one run
-    /// are much of a size.
+    /// Those that fit so many bytes best.
     fn take(&mut self, bytes: usize) -> Option<MmapMut> {
         let fits = |pages: &MmapMut| (bytes..=bytes.saturating_mul(ROOMY)).contains(&pages.len());
-        if let Some(found) = self.0.iter().position(fits) {
-            return Some(self.0.remove(found));
-        }
-        self.0.pop();
-        None
+        let found = self.pages.iter().position(fits)?;
+        Some(self.pages.remove(found))
     }
 
-    /// Keeps some if there is room.
-    fn put(&mut self, pages: MmapMut) {
-        let held: usize = self.0.iter().map(|pages| pages.len()).sum();
-        if held + pages.len() <= MOST_KEPT {
-            let place = self.0.partition_point(|other| other.len() < pages.len());
-            self.0.insert(place, pages);
-        }
+    /// Keeps some; where that is too much, gives back the least.
+    #[must_use = "what is given back is so when it is dropped"]
+    fn put(&mut self, pages: MmapMut) -> Vec<MmapMut> {
+        let place = self
+            .pages
+            .partition_point(|other| other.len() < pages.len());
+        self.pages.insert(place, pages);
+        let mut held = self.pages.iter().map(|pages| pages.len()).sum::<usize>();
+        let back = self.pages.iter().take_while(|pages| {
+            let is_over = held > self.most;
+            held -= pages.len();
+            is_over
+        });
+        let back = back.count();
+        self.pages.drain(..back).collect()
     }
 }
 
@@ -72,7 +84,8 @@ impl Pages {
 impl Drop for Pages {
     fn drop(&mut self) {
         if let Some(pages) = self.0.take() {
-            kept().put(pages);
+            let back = kept().put(pages);
+            drop(back);
         }
     }
 }
@@ -91,12 +104,16 @@ impl DerefMut for Pages {
     }
 }
 
-/// Makes the allocator keep the memory of what is not large.
+/// Makes the program keep memory from one pair to the next, but no more than an eighth of its limit: by so much at least
+/// pairs are taken for larger than they are.
 ///
-/// That of glibc gives back what lies free at its end when that is more than twice the largest block it ever gave out
+/// The allocator of glibc gives back what lies free at its end when that is more than twice the largest block it ever gave out
 /// whole; the next stage of the next pair would have it cleared again. Nothing of this block is ever touched.
-pub fn keep_memory() {
+pub fn keep_memory(limit: Option<u64>) {
     const WHOLE: usize = 31 << 20;
+    if let Some(limit) = limit {
+        kept().most = MOST_KEPT.min(limit as usize / 8);
+    }
     drop(std::hint::black_box(Vec::<u8>::with_capacity(WHOLE)));
 }
 
@@ -318,7 +335,7 @@ impl<'a, T: Pod> IntoIterator for &'a mut Large<T> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Kept, LARGE, Large, MmapMut, Place};
+    use super::{Kept, LARGE, Large, MOST_KEPT, MmapMut, Place};
 
     type Element = [u32; 3];
 
@@ -336,22 +353,27 @@ mod tests {
 
     #[test]
     fn pages_that_fit_are_used_again_and_none_beyond_the_limit_are_kept() {
-        let mut kept = Kept(Vec::new());
+        let mut kept = Kept {
+            pages: Vec::new(),
+            most: MOST_KEPT,
+        };
         let pages = |mebibytes: usize| MmapMut::map_anon(mebibytes << 20).expect("pages");
         let held = |kept: &Kept| {
-            kept.0
+            kept.pages
                 .iter()
                 .map(|pages| pages.len() >> 20)
                 .collect::<Vec<_>>()
         };
-        for mebibytes in [30, 2, 11, 13, 40] {
-            kept.put(pages(mebibytes));
+        for mebibytes in [30, 2, 11, 13] {
+            assert!(kept.put(pages(mebibytes)).is_empty());
         }
-        assert_eq!(held(&kept), [2, 11, 13, 30]);
         let fitting = kept.take((11 << 20) - 5).expect("pages");
         assert_eq!(fitting.len(), 11 << 20);
         assert!(kept.take(4096).is_none(), "too large for so little");
-        assert_eq!(held(&kept), [2, 13]);
+        assert_eq!(held(&kept), [2, 13, 30]);
+        assert_eq!(kept.put(pages(90)).len(), 2);
+        assert_eq!(held(&kept), [30, 90]);
+        assert_eq!(kept.put(pages(200)).len(), 3);
     }
 
     #[test]

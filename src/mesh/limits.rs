@@ -10,7 +10,7 @@ use super::Error;
 pub struct Limits {
     /// Largest file in bytes; 2 GiB holds any scan of one character.
     pub max_bytes: u64,
-    /// Most vertices; 50 million take 1.2 GB.
+    /// Most vertices; 50 million take 0.6 GB in single precision, 1.2 in double.
     pub max_vertices: u64,
     /// Most triangles after polygons are cut into fans; 100 million take 1.2 GB.
     pub max_triangles: u64,

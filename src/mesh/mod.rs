@@ -147,11 +147,26 @@ mod tests {
     fn a_file_gives_what_its_bytes_give() {
         let mut many = samples();
         let mut long = vec![b' '; 80];
-        long.extend(300_u32.to_le_bytes());
-        long.extend((0..300 * 50).map(|k| (k % 60) as u8));
-        many.push(("long.stl", long.clone()));
-        long[84 + 50 * 250 + 14..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
-        many.push(("nan.stl", long));
+        // Three times as many as are read at a time, but for some.
+        let count = 2 * 1280 + 7_u32;
+        long.extend(count.to_le_bytes());
+        long.extend((0..count * 50).map(|k| (k % 60) as u8));
+        let at_end = long.len() - 50 + 14;
+        let mut nan = long.clone();
+        nan[at_end..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+        for bytes in [long, nan] {
+            for len in [bytes.len(), bytes.len() - 7, bytes.len() - 50 * 900 - 3] {
+                let held = read(&bytes[..len], "a.stl", &Limits::SUGGESTED);
+                let read = read_from(
+                    &mut Slow(&bytes[..len]),
+                    bytes.len() as u64,
+                    "a.stl",
+                    &Limits::SUGGESTED,
+                );
+                let read = read.map_err(|error| error.to_string());
+                assert_eq!(read, held.map_err(|error| error.to_string()), "{len}");
+            }
+        }
         many.push(("none.stl", vec![0; 84]));
         many.push(("ply.stl", [&b"ply\n"[..], &[0; 80]].concat()));
         many.push(("mark.stl", [&b"\xef\xbb\xbf"[..], &[0; 81]].concat()));

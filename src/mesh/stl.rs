@@ -23,7 +23,7 @@ pub(super) fn binary_count(bytes: &[u8]) -> Option<u32> {
 /// Triangles of a file that begins with these bytes and has so many, where it is 80 bytes of anything, a count, 50 bytes
 /// a triangle and nothing after them: a binary STL even if it begins with `solid`.
 pub(super) fn whole_binary_count(bytes: &[u8], len: u64) -> Option<u32> {
-    let holds = |count: &u32| len == (HEADER + FACET * *count as usize) as u64;
+    let holds = |count: &u32| len == HEADER as u64 + FACET as u64 * u64::from(*count);
     binary_count(bytes).filter(holds)
 }
 

@@ -35,7 +35,7 @@ pub fn resample_turned(
     columns.mix(&rows.mix(values).transposed())
 }
 
-/// The same of values that `make` writes, row by row and some rows twice, when they are asked for.
+/// The same of values that `make` writes, row by row as they are asked for; some rows more than once.
 pub fn resample_made(
     [from_width, from_height]: [usize; 2],
     make: impl FnMut(usize, &mut [f32]),
@@ -59,7 +59,7 @@ impl Reaches {
     /// The reach of each of `to` output pixels over `from` source pixels.
     fn new(from: usize, to: usize, scale: f64, shift: f64) -> Self {
         let length = (1.0 / scale).max(1.0);
-        let mut weights = Vec::with_capacity(to * (length as usize + 2));
+        let mut weights = Vec::with_capacity(to * ((length as usize).min(from) + 2));
         let reach = |i| {
             let centre = (i as f64 - shift) / scale;
             let (low, high) = (centre - length / 2.0, centre + length / 2.0);
@@ -105,9 +105,7 @@ impl Reaches {
         );
         out
     }
-}
 
-impl Reaches {
     /// Rows mixed from those that each reaches, `width` pixels long, which `make` writes.
     fn mix_made(&self, width: usize, mut make: impl FnMut(usize, &mut [f32])) -> Grid<f32> {
         let mut out = Grid::new(width, self.each.len(), 0.0_f32);

@@ -59,8 +59,8 @@ pub(super) fn warp_strokes<T: Copy + Ord + Default + Into<f64>>(
         for x in (0..width).step_by(LARGEST_PX) {
             warp.square(x, y, LARGEST_PX, 0..levels.len());
         }
+        warp.close();
     }
-    warp.close();
     let mut masks: Vec<(usize, Mask)> = order.into_iter().zip(warp.masks).collect();
     masks.sort_unstable_by_key(|(k, _)| *k);
     masks.into_iter().map(|(_, mask)| mask).collect()
@@ -144,7 +144,7 @@ impl<T: Copy + Ord + Default + Into<f64>> Warp<'_, T> {
         widely(
             #[inline(always)]
             || {
-                for square in open.iter() {
+                for square in open.drain(..) {
                     let mut first = square.levels.start;
                     while first < square.levels.end {
                         let end = (first + LANES).min(square.levels.end);

@@ -137,7 +137,7 @@ pub async fn run(
     stop: &Stop,
     on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
-    large::keep_memory();
+    large::keep_memory(options.memory);
     let steps = Arc::new(Pipeline::new(project, settings, options));
     let recipes = recipes(settings);
     run_steps(project, catalog, &recipes, steps, options, stop, on_event).await

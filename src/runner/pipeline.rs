@@ -64,7 +64,7 @@ impl Pipeline {
 
     fn depth(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
         let fit = Self::fitted(pair)?;
-        // The scan is not needed after this stage; taking it out frees its memory.
+        // The scan is not needed after this stage; taken out, its memory is the next pair's.
         let scan = self.scan_of_fit(pair)?;
         let map = depth::depth(&scan, &fit, pair.facts.unit, &self.settings.depth)
             .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;

@@ -3,16 +3,22 @@
 use crate::raster::Grid;
 use crate::wide::widely;
 
+/// Less is not smoothed, pixels.
+const LEAST_SIGMA: f64 = 0.5;
+
 /// Values smoothed with a gaussian of `sigma` pixels; unchanged when `sigma` is below half a pixel.
 ///
 /// Beyond the rim values are taken to be zero, so divide by the smoothed weight where that matters.
 pub(super) fn blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
+    if sigma < LEAST_SIGMA {
+        return values.clone();
+    }
     blur_turned(values.transposed(), sigma)
 }
 
 /// The same of values whose rows and columns were changed for each other, which they are changed back.
 pub(super) fn blur_turned(turned: Grid<f32>, sigma: f64) -> Grid<f32> {
-    if sigma < 0.5 {
+    if sigma < LEAST_SIGMA {
         return turned.transposed();
     }
     // Three boxes of half-width r have the variance r (r + 1) of one gaussian: three whole half-widths whose mean is

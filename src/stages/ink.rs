@@ -241,7 +241,7 @@ fn known(picture: &Picture, grey: &Grid<f32>) -> Mask {
 fn grown(mask: &Mask) -> Mask {
     let (width, height) = (mask.width(), mask.height());
     let mut across = mask.clone();
-    for (y, row) in across.data_mut().chunks_exact_mut(width).enumerate() {
+    for (y, row) in across.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
         let from = mask.row(y);
         for (grown, left) in row[1..].iter_mut().zip(from) {
             *grown |= *left;
@@ -251,7 +251,7 @@ fn grown(mask: &Mask) -> Mask {
         }
     }
     let mut grown = across.clone();
-    for (y, row) in grown.data_mut().chunks_exact_mut(width).enumerate() {
+    for (y, row) in grown.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
         for near in [y.saturating_sub(1), (y + 1).min(height - 1)] {
             for (grown, near) in row.iter_mut().zip(across.row(near)) {
                 *grown |= *near;

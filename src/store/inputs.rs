@@ -1,4 +1,4 @@
-//! Input files: read whole within a limit, hashed, and told apart from what they were.
+//! Input files: read within a limit, at once or bit by bit, hashed, and told apart from what they were.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Take};
@@ -94,7 +94,7 @@ impl InputReader {
     /// Reads what is left, and says what was seen.
     ///
     /// # Errors
-    /// When it cannot be read, or is larger than the limit by now.
+    /// When it cannot be read, is larger than the limit by now, or has changed since it was opened.
     pub fn finish(mut self) -> Result<Seen, InputError> {
         io::copy(&mut self, &mut io::sink()).map_err(|error| self.error(error))?;
         // A file that grows while it is read must not get past the limit either.
@@ -106,6 +106,12 @@ impl InputReader {
                 limit,
                 setting,
             });
+        }
+        // Else the hash might be of bytes that were not there yet when the others were taken for the whole.
+        let meta = self.file.get_ref().metadata();
+        let now = FileStat::of(&meta.map_err(|error| self.error(error))?);
+        if now != self.stat {
+            return Err(InputError::Changed(self.path));
         }
         Ok(Seen {
             hash: ContentHash::from_bytes(*self.hasher.finalize().as_bytes()),
@@ -143,6 +149,9 @@ pub enum InputError {
         /// Name of the setting.
         setting: &'static str,
     },
+    /// It is being written.
+    #[error("{0} changed while it was read")]
+    Changed(PathBuf),
     /// Reading failed half-way; it may go well another time.
     #[error("{path}: {source}")]
     Io {
@@ -172,9 +181,11 @@ impl InputError {
     /// What the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
-            Self::NotThere(_) | Self::NotAFile { .. } | Self::Denied(_) | Self::Io { .. } => {
-                FailureClass::Io
-            }
+            Self::NotThere(_)
+            | Self::NotAFile { .. }
+            | Self::Denied(_)
+            | Self::Changed(_)
+            | Self::Io { .. } => FailureClass::Io,
             Self::TooLarge { .. } => FailureClass::BadInput,
         }
     }
@@ -182,7 +193,7 @@ impl InputError {
     /// Whether trying again by itself may help. A file that is not there is told at once instead: whoever brings
     /// it says `retry`.
     pub const fn may_pass(&self) -> bool {
-        matches!(self, Self::Io { .. })
+        matches!(self, Self::Changed(_) | Self::Io { .. })
     }
 }
 
@@ -279,7 +290,9 @@ fn check_file(path: &Path, meta: std::fs::Metadata) -> Result<std::fs::Metadata,
 
 #[cfg(test)]
 mod tests {
-    use super::{InputError, hash_input, read_input, stat_input};
+    use std::io::{Read, Write as _};
+
+    use super::{InputError, hash_input, open_input, read_input, stat_input};
     use crate::domain::{ContentHash, FailureClass};
 
     #[test]
@@ -312,6 +325,30 @@ mod tests {
             assert_eq!(error.class(), FailureClass::Io);
             assert!(!error.may_pass());
         }
+    }
+
+    #[test]
+    fn a_file_that_changes_while_it_is_read_is_told_and_may_be_tried_again() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("1.obj");
+        std::fs::write(&path, "v 0 0 0\n").expect("a file");
+        let mut reader = open_input(&path, 100, "x").expect("a file");
+        let mut bytes = Vec::new();
+        reader.read_to_end(&mut bytes).expect("it is read");
+        // All was read, as far as the reader knows.
+        let mut file = std::fs::OpenOptions::new().append(true).open(&path);
+        let more = file.as_mut().map(|file| file.write_all(b"v 1 0 0\n"));
+        more.expect("opened").expect("written");
+        let error = reader.finish().expect_err("it grew");
+        assert!(
+            error
+                .to_string()
+                .ends_with("1.obj changed while it was read")
+        );
+        assert!(error.may_pass());
+        let again = open_input(&path, 100, "x").expect("a file");
+        let seen = again.finish().expect("it stays as it is");
+        assert_eq!(seen.hash, ContentHash::of(b"v 0 0 0\nv 1 0 0\n"));
     }
 
     #[test]

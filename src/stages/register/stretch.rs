@@ -13,7 +13,7 @@ const MOST: f64 = 0.012;
 
 /// The pose with the stretch that fits best, in two directions that make any: along an axis, and along a diagonal.
 ///
-/// `middle` is that of the relief, in the moving image's pixels.
+/// `middle` is that of the relief, in the moving image's pixels; the pose's score is the refiner's.
 pub(super) fn stretched(refiner: &Refiner, pose: &Found, middle: [f64; 2]) -> Found {
     let mut best = *pose;
     for _ in 0..ROUNDS {

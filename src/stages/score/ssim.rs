@@ -292,8 +292,8 @@ impl Taps {
     fn down(&self, across: &[f64], y: usize, means: &mut [f64]) {
         match *self.weights.as_slice() {
             [a, b, c, d, _, _, _] => mixed([a, b, c, d], across, y, means),
-            [a, b, c, d, e, f, ..] => mixed([a, b, c, d, e, f], across, y, means),
-            _ => {}
+            [a, b, c, d, e, f, _, _, _, _, _] => mixed([a, b, c, d, e, f], across, y, means),
+            _ => unreachable!("windows have 7 or 11 taps"),
         }
     }
 }

@@ -37,9 +37,9 @@ impl Row {
 
 /// A number of a vertex as its file has it.
 pub(super) trait Coordinate: Copy + Into<f64> {
-    /// The place that others are told from, near the one asked for.
+    /// The place that others are told from, near the one asked for, mesh units.
     fn middle(near: f64) -> f64;
-    /// How far it lies from a middle.
+    /// How far it lies beyond a middle, mesh units.
     fn beyond(self, middle: f64) -> f32;
 }
 

@@ -9,8 +9,6 @@ use crate::wide::widely;
 
 /// Products of two axes, each kept once.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-/// About so many blocks are looked at: a quarter of a million triangles tell a surface's axes well enough.
-const LOOKED_AT: usize = 32_768;
 /// Blocks summed in single precision before their sums go to the others.
 const RUN: usize = 32;
 
@@ -22,22 +20,21 @@ pub(in crate::stages) struct Moments {
 }
 
 impl Moments {
-    /// Of the triangles that lie in the bulk, or of some of them where there are very many; `None` where they have no area.
+    /// Of the triangles that lie in the bulk; `None` where they have no area.
     pub(in crate::stages) fn of(shell: &Shell) -> Option<Self> {
         if !shell.has_faces {
             return None;
         }
         let around = Around::of(shell);
-        let stride = shell.blocks.len().div_ceil(LOOKED_AT).max(1);
         let mut sums = [0.0; SUMS];
         widely(
             #[inline(always)]
             || {
-                for run in (0..shell.blocks.len()).step_by(RUN * stride) {
+                for (run, blocks) in shell.blocks.chunks(RUN).enumerate() {
                     let mut part = [[0.0; LANES]; SUMS];
-                    let blocks = shell.blocks.iter().enumerate().skip(run);
-                    for (k, block) in blocks.step_by(stride).take(RUN) {
-                        around.add(block, shell.count - k * LANES, &mut part);
+                    for (k, block) in blocks.iter().enumerate() {
+                        let first = (run * RUN + k) * LANES;
+                        around.add(block, shell.count - first, &mut part);
                     }
                     for (sum, part) in sums.iter_mut().zip(part) {
                         *sum += part.iter().map(|v| f64::from(*v)).sum::<f64>();
