@@ -32,14 +32,25 @@ static KEPT: Mutex<Kept> = Mutex::new(Kept {
 });
 
 impl Kept {
-    /// Those that fit so many bytes best.
-    fn take(&mut self, bytes: usize) -> Option<MmapMut> {
+    /// Those that fit so many bytes best; else as many as make up for those that must be had of the system, which are to
+    /// be given back.
+    fn take(&mut self, bytes: usize) -> Result<MmapMut, Vec<MmapMut>> {
         let fits = |pages: &MmapMut| (bytes..=bytes.saturating_mul(ROOMY)).contains(&pages.len());
-        let found = self.pages.iter().position(fits)?;
-        Some(self.pages.remove(found))
+        if let Some(found) = self.pages.iter().position(fits) {
+            return Ok(self.pages.remove(found));
+        }
+        let mut back = Vec::new();
+        let mut made_up = 0;
+        while made_up < bytes
+            && let Some(pages) = self.pages.pop()
+        {
+            made_up += pages.len();
+            back.push(pages);
+        }
+        Err(back)
     }
 
-    /// Keeps some; where that is too much, gives back the least.
+    /// Keeps some; where that is too much, the least are to be given back.
     #[must_use = "what is given back is so when it is dropped"]
     fn put(&mut self, pages: MmapMut) -> Vec<MmapMut> {
         let place = self
@@ -68,8 +79,10 @@ struct Pages(Option<MmapMut>);
 impl Pages {
     /// For so many bytes; `None` where the system gives none.
     fn of(bytes: usize) -> Option<Self> {
-        if let Some(pages) = kept().take(bytes) {
-            return Some(Self(Some(pages)));
+        let found = kept().take(bytes);
+        match found {
+            Ok(pages) => return Some(Self(Some(pages))),
+            Err(back) => drop(back),
         }
         let pages = MmapMut::map_anon(bytes).ok()?;
         #[cfg(target_os = "linux")]
@@ -369,11 +382,15 @@ mod tests {
         }
         let fitting = kept.take((11 << 20) - 5).expect("pages");
         assert_eq!(fitting.len(), 11 << 20);
-        assert!(kept.take(4096).is_none(), "too large for so little");
         assert_eq!(held(&kept), [2, 13, 30]);
         assert_eq!(kept.put(pages(90)).len(), 2);
         assert_eq!(held(&kept), [30, 90]);
-        assert_eq!(kept.put(pages(200)).len(), 3);
+        assert_eq!(kept.put(pages(8)).len(), 0);
+        let too_large = kept.take(4096).expect_err("too large for so little");
+        assert_eq!(too_large[0].len(), 90 << 20);
+        let too_small = kept.take(50 << 20).expect_err("all are too small");
+        assert_eq!((too_small.len(), held(&kept)), (2, Vec::new()));
+        assert_eq!(kept.put(pages(200)).len(), 1);
     }
 
     #[test]
