@@ -16,7 +16,9 @@ const LARGE: usize = 1 << 20;
 /// Most bytes of pages that are kept, by the whole program.
 const MOST_KEPT: usize = 128 << 20;
 /// Pages are not taken for a vector that needs less than one in so many of them.
-const ROOMY: usize = 2;
+const ROOMY: usize = 4;
+/// So many bytes are kept although others are had of the system.
+const FREELY: usize = 32 << 20;
 
 /// Pages that are not needed any more.
 struct Kept {
@@ -32,22 +34,27 @@ static KEPT: Mutex<Kept> = Mutex::new(Kept {
 });
 
 impl Kept {
-    /// Those that fit so many bytes best; else as many as make up for those that must be had of the system, which are to
-    /// be given back.
+    /// Those that fit so many bytes best. Else as many as make up for those that must be had of the system, which are to
+    /// be given back: scans of one run differ in size, and one that is larger than all before must not add to them.
     fn take(&mut self, bytes: usize) -> Result<MmapMut, Vec<MmapMut>> {
         let fits = |pages: &MmapMut| (bytes..=bytes.saturating_mul(ROOMY)).contains(&pages.len());
         if let Some(found) = self.pages.iter().position(fits) {
             return Ok(self.pages.remove(found));
         }
+        let mut over = (self.held() + bytes).saturating_sub(FREELY).min(bytes);
         let mut back = Vec::new();
-        let mut made_up = 0;
-        while made_up < bytes
+        while over > 0
             && let Some(pages) = self.pages.pop()
         {
-            made_up += pages.len();
+            over = over.saturating_sub(pages.len());
             back.push(pages);
         }
         Err(back)
+    }
+
+    /// Bytes of all.
+    fn held(&self) -> usize {
+        self.pages.iter().map(|pages| pages.len()).sum()
     }
 
     /// Keeps some; where that is too much, the least are to be given back.
@@ -57,7 +64,7 @@ impl Kept {
             .pages
             .partition_point(|other| other.len() < pages.len());
         self.pages.insert(place, pages);
-        let mut held = self.pages.iter().map(|pages| pages.len()).sum::<usize>();
+        let mut held = self.held();
         let back = self.pages.iter().take_while(|pages| {
             let is_over = held > self.most;
             held -= pages.len();
@@ -390,7 +397,10 @@ mod tests {
         assert_eq!(too_large[0].len(), 90 << 20);
         let too_small = kept.take(50 << 20).expect_err("all are too small");
         assert_eq!((too_small.len(), held(&kept)), (2, Vec::new()));
-        assert_eq!(kept.put(pages(200)).len(), 1);
+        assert!(kept.put(pages(3)).is_empty());
+        let few = kept.take(14 << 20).expect_err("too small");
+        assert_eq!((few.len(), held(&kept)), (0, vec![3]));
+        assert_eq!(kept.put(pages(200)).len(), 2);
     }
 
     #[test]
