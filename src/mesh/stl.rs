@@ -3,7 +3,7 @@
 use std::io::{self, Read};
 
 use super::{Error, Format, Limits, Mesh, ReadError, Vertices, error, text};
-use crate::large::Large;
+use crate::large::{Large, fill};
 
 /// Bytes of the header, the count included.
 pub(super) const HEADER: usize = 84;
@@ -51,20 +51,6 @@ pub(super) fn read_facets(
         return Err(io::Error::other("it grew while it was read").into());
     }
     Ok(facets.soup()?)
-}
-
-/// Reads until some bytes are full or the source ends; says how many are.
-fn fill(source: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
-    let mut full = 0;
-    while full < bytes.len() {
-        match source.read(&mut bytes[full..]) {
-            Ok(0) => break,
-            Ok(more) => full += more,
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return Err(error),
-        }
-    }
-    Ok(full)
 }
 
 fn truncated(have: u64, count: u32) -> Error {

@@ -109,6 +109,31 @@ impl Mask {
         found
     }
 
+    /// The mask with every pixel that touches it, by a side or a corner.
+    #[must_use]
+    pub fn grown(&self) -> Self {
+        let (width, height) = (self.width(), self.height());
+        let mut across = self.clone();
+        for (y, row) in across.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
+            let from = self.row(y);
+            for (grown, left) in row[1..].iter_mut().zip(from) {
+                *grown |= *left;
+            }
+            for (grown, right) in row.iter_mut().zip(&from[1..]) {
+                *grown |= *right;
+            }
+        }
+        let mut grown = across.clone();
+        for (y, row) in grown.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
+            for near in [y.saturating_sub(1), (y + 1).min(height - 1)] {
+                for (grown, near) in row.iter_mut().zip(across.row(near)) {
+                    *grown |= *near;
+                }
+            }
+        }
+        grown
+    }
+
     /// Mean position of the set pixels; `None` when none is set.
     pub fn centroid(&self) -> Option<[f64; 2]> {
         let (mut n, mut sum_x, mut sum_y) = (0_u64, 0_u64, 0_u64);
@@ -153,6 +178,22 @@ mod tests {
             let around = places.filter_map(|(x, y)| set(x, y)).reduce(PixelBox::around);
             prop_assert_eq!(wide.bounding_box(), around);
             prop_assert!((found.dice - 2.0 * share / (1.0 + share)).abs() < 1e-12);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn grown_by_what_touches_it(
+            width in 1_usize..20,
+            bits in prop::collection::vec(prop::bool::weighted(0.1), 1..200),
+        ) {
+            let height = bits.len() / width;
+            let mask = Mask::from_fn(width, height, |x, y| bits[y * width + x]);
+            let touches = |x: usize, y: usize| {
+                let near = |dx: i64, dy: i64| mask.get(x as i64 + dx, y as i64 + dy) == Some(true);
+                (-1..=1).any(|dy| (-1..=1).any(|dx| near(dx, dy)))
+            };
+            prop_assert_eq!(mask.grown(), Mask::from_fn(width, height, touches));
         }
     }
 

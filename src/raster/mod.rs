@@ -6,6 +6,7 @@ pub mod encode;
 mod extremes;
 mod grid;
 mod limits;
+mod looks;
 mod mask;
 mod picture;
 mod resample;

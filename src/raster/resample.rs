@@ -3,49 +3,43 @@
 use super::Grid;
 use crate::wide::widely;
 
-/// Values under an upright map `to = scale * from + shift` (pixels, per axis), `width` x `height` pixels large.
+/// Values under an upright map `to = scale * from + shift` (pixels, per axis), of so many columns and rows.
 ///
 /// Each output pixel is the mean of the source over its own square, or over a source pixel's where that is larger.
 /// Beyond the source values are zero.
-pub fn resample(
-    values: &Grid<f32>,
-    scale: f64,
-    shift: [f64; 2],
-    [width, height]: [usize; 2],
-) -> Grid<f32> {
+pub fn resample(values: &Grid<f32>, scale: f64, shift: [f64; 2], to: [usize; 2]) -> Grid<f32> {
     if scale <= 1.0 {
-        return resample_turned(values, scale, shift, [width, height]).transposed();
+        return resample_turned(values, scale, shift, to).transposed();
     }
     // What grows is turned while it is small.
-    let columns = Reaches::new(values.width(), width, scale, shift[0]);
-    let rows = Reaches::new(values.height(), height, scale, shift[1]);
+    let from = [values.width(), values.height()];
+    let [columns, rows] = Reaches::both(from, to, scale, shift);
     rows.mix(&columns.mix(&values.transposed()).transposed())
 }
 
-/// The same with rows and columns changed for each other: `height` x `width` pixels large.
+/// The same with rows and columns changed for each other.
 pub fn resample_turned(
     values: &Grid<f32>,
     scale: f64,
     shift: [f64; 2],
-    [width, height]: [usize; 2],
+    to: [usize; 2],
 ) -> Grid<f32> {
-    let rows = Reaches::new(values.height(), height, scale, shift[1]);
-    let columns = Reaches::new(values.width(), width, scale, shift[0]);
+    let from = [values.width(), values.height()];
+    let [columns, rows] = Reaches::both(from, to, scale, shift);
     // Whole rows are summed side by side, so columns are turned into rows for their turn.
     columns.mix(&rows.mix(values).transposed())
 }
 
 /// The same of values that `make` writes, row by row as they are asked for; some rows more than once.
 pub fn resample_made(
-    [from_width, from_height]: [usize; 2],
+    from: [usize; 2],
     make: impl FnMut(usize, &mut [f32]),
     scale: f64,
     shift: [f64; 2],
-    [width, height]: [usize; 2],
+    to: [usize; 2],
 ) -> Grid<f32> {
-    let rows = Reaches::new(from_height, height, scale, shift[1]);
-    let columns = Reaches::new(from_width, width, scale, shift[0]);
-    columns.mix(&rows.mix_made(from_width, make).transposed())
+    let [columns, rows] = Reaches::both(from, to, scale, shift);
+    columns.mix(&rows.mix_made(from[0], make).transposed())
 }
 
 /// How far along one axis the output pixels reach in the source.
@@ -56,6 +50,11 @@ struct Reaches {
 }
 
 impl Reaches {
+    /// Those of columns and of rows.
+    fn both(from: [usize; 2], to: [usize; 2], scale: f64, shift: [f64; 2]) -> [Self; 2] {
+        [0, 1].map(|k: usize| Self::new(from[k], to[k], scale, shift[k]))
+    }
+
     /// The reach of each of `to` output pixels over `from` source pixels.
     fn new(from: usize, to: usize, scale: f64, shift: f64) -> Self {
         let length = (1.0 / scale).max(1.0);
@@ -147,6 +146,8 @@ fn add<const N: usize>(row: &mut [f32], values: &Grid<f32>, first: usize, weight
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::{resample, resample_made, resample_turned};
     use crate::raster::Grid;
 
@@ -165,6 +166,37 @@ mod tests {
         );
         let double = resample(&ramp, 2.0, [0.5, 0.5], [24, 16]);
         assert!((double.at(6, 4) - (2.75 + 17.5)).abs() < 1e-5);
+    }
+
+    proptest! {
+        #[test]
+        fn equals_the_mean_over_each_square(
+            [width, height] in [1_usize..30, 1_usize..30],
+            [columns, rows] in [1_usize..30, 1_usize..30],
+            scale in 0.08..2.5_f64,
+            shift in prop::array::uniform2(-4.0..9.0_f64),
+        ) {
+            let from = Grid::from_fn(width, height, |x, y| ((x * 7 + y * 13) % 17) as f32);
+            let found = resample(&from, scale, shift, [columns, rows]);
+            let length = (1.0 / scale).max(1.0);
+            let share = |i: usize, shift: f64, j: usize| {
+                let (centre, j) = ((i as f64 - shift) / scale, j as f64);
+                let (low, high) = (centre - length / 2.0, centre + length / 2.0);
+                ((high.min(j + 0.5) - low.max(j - 0.5)) / length).max(0.0)
+            };
+            for y in 0..rows {
+                for x in 0..columns {
+                    let mut mean = 0.0;
+                    for j in 0..height {
+                        for i in 0..width {
+                            let weight = share(x, shift[0], i) * share(y, shift[1], j);
+                            mean += weight * f64::from(from.at(i, j));
+                        }
+                    }
+                    prop_assert!((f64::from(found.at(x, y)) - mean).abs() < 1e-4);
+                }
+            }
+        }
     }
 
     #[test]

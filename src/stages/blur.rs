@@ -110,8 +110,29 @@ fn columns<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::blur;
+    use proptest::prelude::*;
+
+    use super::{blur, down};
     use crate::raster::Grid;
+
+    proptest! {
+        #[test]
+        fn means_are_those_of_one_by_one(
+            [width, height] in [1_usize..90, 1_usize..24],
+            radius in 1_usize..30,
+        ) {
+            let grid = Grid::from_fn(width, height, |x, y| ((x * 7 + y * 13) % 17) as f32);
+            let means = down(grid.clone(), [0, radius, 0]);
+            for y in 0..height {
+                for x in 0..width {
+                    let rows = y.saturating_sub(radius)..(y + radius + 1).min(height);
+                    let sum: f32 = rows.map(|row| grid.at(x, row)).sum();
+                    let mean = sum / (2 * radius + 1) as f32;
+                    prop_assert!((means.at(x, y) - mean).abs() < 1e-4);
+                }
+            }
+        }
+    }
 
     #[test]
     fn keeps_the_sum_and_has_the_variance() {

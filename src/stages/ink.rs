@@ -3,6 +3,7 @@
 use super::components::{Components, without_specks};
 use super::otsu::{self, Split};
 use super::paper::{self, NARROW, STROKE};
+use super::polarity::polarity;
 use super::pose::Soft;
 use crate::raster::{Grid, Mask, Picture};
 
@@ -14,10 +15,6 @@ const PAPER_TELLABLE: f64 = 0.945;
 const LEAST_PAPER: f64 = 0.2;
 /// White must cover at least this share of the image to count as "beyond the cut".
 const LEAST_WHITE: f64 = 0.004;
-/// Both witnesses of the polarity must speak this loudly together for it to be clear; louder for ink that is lighter
-/// than paper, as in rubbings: heavy ink within a frame passes for dark paper.
-const CLEAR: f64 = 0.8;
-const CLEAR_LIGHT: f64 = 1.6;
 /// This much of the way from the darkest to the paper is pale; least share of what is dark that is where there may be
 /// stains.
 const PALE: f64 = 0.35;
@@ -29,8 +26,6 @@ const LEAST_CONTRAST: f64 = 0.08;
 const NOISE: f64 = 0.012;
 /// Least share of ink in a print.
 const LEAST_INK: f64 = 0.002;
-/// Width of the rim that tells paper from ink, as a share of the shorter side.
-const RIM: f64 = 0.06;
 
 /// A print must have at least this many pixels each way.
 const LEAST_PRINT_PX: usize = 16;
@@ -219,8 +214,8 @@ fn known(picture: &Picture, grey: &Grid<f32>) -> Mask {
     if beyond.density() < LEAST_WHITE {
         return all;
     }
-    let grown = grown(&beyond);
-    let inside = grown.map(|b| !b);
+    // The cut's edge mixes paper with white.
+    let inside = beyond.grown().map(|b| !b);
     let mut values = held(grey, &inside);
     let Some(split) = otsu::split(&mut values) else {
         return all;
@@ -237,30 +232,6 @@ fn known(picture: &Picture, grey: &Grid<f32>) -> Mask {
     }
 }
 
-/// The mask with every pixel that touches it: the cut's edge mixes paper with white.
-fn grown(mask: &Mask) -> Mask {
-    let (width, height) = (mask.width(), mask.height());
-    let mut across = mask.clone();
-    for (y, row) in across.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
-        let from = mask.row(y);
-        for (grown, left) in row[1..].iter_mut().zip(from) {
-            *grown |= *left;
-        }
-        for (grown, right) in row.iter_mut().zip(&from[1..]) {
-            *grown |= *right;
-        }
-    }
-    let mut grown = across.clone();
-    for (y, row) in grown.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
-        for near in [y.saturating_sub(1), (y + 1).min(height - 1)] {
-            for (grown, near) in row.iter_mut().zip(across.row(near)) {
-                *grown |= *near;
-            }
-        }
-    }
-    grown
-}
-
 /// Grey over the paper's around it.
 fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let level = paper::level(grey, known, narrow);
@@ -269,59 +240,9 @@ fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     })
 }
 
-/// Whether ink is likelier to be lighter than paper, and whether that is clear. Stains and frame lines mislead: where
-/// the picture as it is and what is dark beside its surroundings do not both say so, the other way stays possible.
-fn polarity(even: &Grid<f32>, levelled: Option<Split>, dark: &Mask, known: &Mask) -> (bool, bool) {
-    let plain = paper_darkness(dark, known);
-    let levelled = levelled.map_or(plain, |split| {
-        paper_darkness(&even.map(|g| f64::from(*g) < split.threshold), known)
-    });
-    let sum = plain + levelled;
-    let clear = if sum > 0.0 { CLEAR_LIGHT } else { CLEAR };
-    (sum > 0.0, plain * levelled > 0.0 && sum.abs() > clear)
-}
-
-/// How much speaks for the dark class being the paper; below zero it is ink. Ink is the smaller class, and paper
-/// reaches the rim. Heavy ink bends the first rule and border lines the second, so both have a say, the first a
-/// double one.
-fn paper_darkness(dark: &Mask, known: &Mask) -> f64 {
-    let of_known = known.count().max(1) as f64;
-    let pairs = dark.data().iter().zip(known.data());
-    let share = pairs.filter(|(d, k)| **d && **k).count() as f64 / of_known;
-    2.0 * (share - 0.5) + (rim_share(dark, known) - 0.5)
-}
-
-/// Share of dark pixels in the rim of what is known.
-fn rim_share(dark: &Mask, known: &Mask) -> f64 {
-    let (width, height) = (known.width(), known.height());
-    let reach = ((width.min(height) as f64 * RIM).round() as usize).max(1);
-    let (mut rim, mut of_it) = (0_usize, 0_usize);
-    let mut inner = vec![false; width];
-    for y in 0..height {
-        let row = known.row(y);
-        inner.fill(false);
-        if y >= reach && y + reach < height && width > 2 * reach {
-            let (above, below) = (known.row(y - reach), known.row(y + reach));
-            for x in reach..width - reach {
-                inner[x] = row[x - reach] & row[x + reach] & above[x] & below[x];
-            }
-        }
-        let at_rim = row.iter().zip(&inner).map(|(known, inner)| known & !inner);
-        for (at_rim, dark) in at_rim.zip(dark.row(y)) {
-            rim += usize::from(at_rim);
-            of_it += usize::from(at_rim & dark);
-        }
-    }
-    if rim == 0 {
-        0.0
-    } else {
-        of_it as f64 / rim as f64
-    }
-}
-
 /// 0 at paper, 1 at ink, by the classes' medians; nothing but where the cleaned mask, or its rim, has ink.
 fn amount(even: &Grid<f32>, ink: &Mask, split: Split) -> Grid<f32> {
-    let near = grown(ink);
+    let near = ink.grown();
     let span = (split.high - split.low).max(1e-6);
     Grid::from_fn(even.width(), even.height(), |x, y| {
         if near.at(x, y) {

@@ -14,6 +14,7 @@ mod ink;
 pub mod normalize;
 mod otsu;
 mod paper;
+mod polarity;
 mod pose;
 mod print;
 pub mod register;

@@ -24,7 +24,7 @@ pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::{Error, Limits, Mesh};
+    use super::super::{Error, Limits, Mesh, Vertices};
 
     fn read(bytes: &[u8]) -> Result<Mesh, Error> {
         super::read(bytes, &Limits::SUGGESTED)
@@ -52,6 +52,31 @@ mod tests {
         assert_eq!(mesh.vertices.at(0), [1.0, 2.0, 0.5]);
         assert_eq!(mesh.vertices.at(3), [7.0, 8.0, 0.0]);
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [3, 2, 1]]);
+    }
+
+    #[test]
+    fn coordinates_keep_the_precision_of_their_file() {
+        let place = [0.1, 1e9 + 0.25, -3.0];
+        let of = |kind: &str, coordinates: Vec<u8>| {
+            let header = format!(
+                "ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty float x\n\
+                 property {kind} y\nproperty float z\nend_header\n"
+            );
+            read(&[header.as_bytes(), &coordinates].concat())
+                .expect("reads")
+                .vertices
+        };
+        let [x, y, z] = place.map(|v: f64| (v as f32).to_le_bytes().to_vec());
+        let wide = [x.clone(), place[1].to_le_bytes().to_vec(), z.clone()].concat();
+        assert_eq!(
+            of("double", wide).at(0),
+            [f64::from(0.1_f32), place[1], -3.0]
+        );
+        let single = of("float", [x, y, z].concat());
+        assert_eq!(single.at(0), place.map(|v| f64::from(v as f32)));
+        assert!(matches!(single, Vertices::Single(_)));
+        let whole = [0.5_f32.to_le_bytes(), 16_777_217_i32.to_le_bytes(), [0; 4]].concat();
+        assert_eq!(of("int", whole).at(0), [0.5, 16_777_217.0, 0.0]);
     }
 
     #[test]

@@ -182,8 +182,29 @@ impl<'a> Refiner<'a> {
 
     /// What each known pixel of the fixed layer meets in the moving one.
     fn look(&self, from_fixed: &Affine2, room: &mut Room) {
+        room.clear(self.looked_at.places.len());
+        let explained = self.explained(
+            from_fixed,
+            #[inline(always)]
+            |[u, v], place, value| {
+                self.cell(u, v).map_or(0.0, |cell| {
+                    room.put(value, cell, place);
+                    cell[0]
+                })
+            },
+        );
+        room.close(explained);
+    }
+
+    /// Sum of the products of the fixed values with those that `meet` finds, given where in the moving layer, the pixel's
+    /// place in the fixed one, and its value.
+    #[inline(always)]
+    fn explained(
+        &self,
+        from_fixed: &Affine2,
+        mut meet: impl FnMut([f32; 2], [f32; 2], f32) -> f32,
+    ) -> f64 {
         let LookedAt { places, values, .. } = &*self.looked_at;
-        room.clear(places.len());
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
         let runs = places.chunks(RUN).zip(values.chunks(RUN));
         let mut explained = 0.0_f64;
@@ -195,16 +216,13 @@ impl<'a> Refiner<'a> {
                     for ([x, y], value) in places.iter().zip(values) {
                         let u = a[0] * x + a[1] * y + a[2];
                         let v = b[0] * x + b[1] * y + b[2];
-                        if let Some(cell) = self.cell(u, v) {
-                            part += cell[0] * value;
-                            room.put(*value, cell, [*x, *y]);
-                        }
+                        part += meet([u, v], [*x, *y], *value) * value;
                     }
                     explained += f64::from(part);
                 }
             },
         );
-        room.close(explained);
+        explained
     }
 
     /// Bilinear look into the moving layer; `None` outside.
@@ -252,23 +270,10 @@ impl<'a> Refiner<'a> {
 
     /// Correlation over what both know, over the whole of what each holds.
     fn score(&self, from_fixed: &Affine2) -> f64 {
-        let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
-        let mut explained = 0.0_f64;
-        let LookedAt { places, values, .. } = &*self.looked_at;
-        let runs = places.chunks(RUN).zip(values.chunks(RUN));
-        widely(
+        let explained = self.explained(
+            from_fixed,
             #[inline(always)]
-            || {
-                for (places, values) in runs {
-                    let mut part = 0.0_f32;
-                    for ([x, y], value) in places.iter().zip(values) {
-                        let u = a[0] * x + a[1] * y + a[2];
-                        let v = b[0] * x + b[1] * y + b[2];
-                        part += self.value(u, v) * value;
-                    }
-                    explained += f64::from(part);
-                }
-            },
+            |[u, v], _, _| self.value(u, v),
         );
         self.share(explained, from_fixed)
     }

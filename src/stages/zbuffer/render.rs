@@ -1,0 +1,312 @@
+//! A shell seen along a direction: what the ray of each pixel meets, the highest first.
+
+use super::block::{Block, LANES, Row, fill_block, holding};
+use super::triangle::pixels;
+use super::{Shell, View};
+use crate::domain::Rigid3;
+use crate::raster::Grid;
+use crate::stages::bulk::bulk_along;
+use crate::wide::{higher, widely};
+
+/// Height of a pixel that no surface covers.
+pub(in crate::stages) const NOTHING: f32 = f32::NEG_INFINITY;
+
+/// Where so many triangles come to a pixel, few blocks hold one's centre.
+const MANY_A_PIXEL: usize = 16;
+
+/// Points of a set without faces are grown to this many times half their mean spacing, so that no holes stay.
+const POINT_GROWTH: f64 = 1.5;
+
+impl Shell {
+    /// The highest z of a frame under each pixel's centre; [`NOTHING`] where the ray meets no surface.
+    pub(in crate::stages) fn render(&self, plane_from_mesh: &Rigid3, view: &View) -> Grid<f32> {
+        let mut heights = Grid::new(view.width, view.height, NOTHING);
+        self.raster(plane_from_mesh, view, |place, z| {
+            let height = &mut heights.data_mut()[place];
+            *height = higher(z, *height);
+        });
+        heights
+    }
+
+    /// The highest z, and seen from the other side the highest of -z: of `plane_from_mesh` turned about its x axis.
+    pub(in crate::stages) fn render_both(
+        &self,
+        plane_from_mesh: &Rigid3,
+        view: &View,
+    ) -> [Grid<f32>; 2] {
+        let mut heights = Grid::new(view.width, view.height, [NOTHING; 2]);
+        self.raster(plane_from_mesh, view, |place, z| {
+            let [front, back] = &mut heights.data_mut()[place];
+            *front = higher(z, *front);
+            *back = higher(-z, *back);
+        });
+        let last = view.height.saturating_sub(1);
+        [
+            heights.map(|[front, _]| *front),
+            Grid::from_fn(view.width, view.height, |x, y| heights.at(x, last - y)[1]),
+        ]
+    }
+
+    /// Rows that give a column and a row of a view, and a height.
+    fn view_rows(&self, plane_from_mesh: &Rigid3, view: &View) -> [Row; 3] {
+        let [x, y, z] = self.rows(plane_from_mesh);
+        let [[a, b, c], [d, e, f]] = view.px_from_plane.0;
+        let mixed = |p: f64, q: f64, r: f64| {
+            std::array::from_fn(|k| p * x[k] + q * y[k] + if k == 3 { r } else { 0.0 })
+        };
+        [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| Row(row.map(|v| v as f32)))
+    }
+
+    /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet, and with what is no
+    /// number.
+    fn raster(&self, plane_from_mesh: &Rigid3, view: &View, meet: impl FnMut(usize, f32)) {
+        let rows = self.view_rows(plane_from_mesh, view);
+        let size = [view.width, view.height];
+        if !self.has_faces {
+            self.splat(&rows, size, meet);
+        } else if self.count / MANY_A_PIXEL > size[0] * size[1] {
+            self.fill_few(&rows, size, meet);
+        } else {
+            self.fill_all(&rows, size, meet);
+        }
+    }
+
+    /// Fills the triangles that hold a pixel's centre.
+    fn fill_all(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
+        let [u, v, _] = rows;
+        widely(
+            #[inline(always)]
+            || {
+                for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
+                    let (across, down) = (boxes.reach(u), boxes.reach(v));
+                    let held = holding([&across, &down], size);
+                    for (block, held) in blocks.iter().zip(held) {
+                        if held {
+                            fill_block(block, rows, size, &mut meet);
+                        }
+                    }
+                }
+            },
+        );
+    }
+
+    /// The same where most blocks hold no pixel's centre. Those that do lie too far apart for the processor to fetch
+    /// them ahead by itself: a look at each of some brings them nearer while the others are on their way.
+    fn fill_few(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
+        const GROUPS: usize = 16;
+        let [u, v, _] = rows;
+        let mut few: Vec<&Block> = Vec::with_capacity(GROUPS * LANES);
+        widely(
+            #[inline(always)]
+            || {
+                let blocks = self.blocks.chunks(GROUPS * LANES);
+                for (boxes, blocks) in self.boxes.chunks(GROUPS).zip(blocks) {
+                    few.clear();
+                    for (boxes, blocks) in boxes.iter().zip(blocks.chunks(LANES)) {
+                        let (across, down) = (boxes.reach(u), boxes.reach(v));
+                        let held = holding([&across, &down], size);
+                        let pairs = blocks.iter().zip(held);
+                        few.extend(pairs.filter(|(_, held)| *held).map(|(block, _)| block));
+                    }
+                    let mut seen = 0.0;
+                    for block in &few {
+                        // One number of each line of the cache.
+                        let numbers = block.as_flattened().as_flattened();
+                        seen += numbers.iter().step_by(16).sum::<f32>();
+                    }
+                    std::hint::black_box(seen);
+                    for block in &few {
+                        fill_block(block, rows, size, &mut meet);
+                    }
+                }
+            },
+        );
+    }
+
+    /// Each point as a small square.
+    fn splat(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
+        let of_row = |row: &Row| -> Vec<f32> {
+            let blocks = self.blocks.iter();
+            blocks.flat_map(|block| row.at(&block[0])).collect()
+        };
+        let [xs, ys, zs] = rows.each_ref().map(of_row);
+        let length = |places: &[f32]| {
+            let [low, high] = bulk_along(places);
+            high - low
+        };
+        let spacing_px = (length(&xs) * length(&ys) / xs.len().max(1) as f64).sqrt();
+        let reach = (spacing_px * 0.5 * POINT_GROWTH).max(0.5) as f32;
+        for ((x, y), z) in xs.iter().zip(&ys).zip(zs) {
+            for row in pixels(y - reach, y + reach, size[1]) {
+                for column in pixels(x - reach, x + reach, size[0]) {
+                    meet(row * size[0] + column, z);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::{NOTHING, Shell, View};
+    use crate::domain::{Affine2, Rigid3};
+    use crate::mesh::Mesh;
+
+    const UPRIGHT: Rigid3 = Rigid3([
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, 0.0],
+        [0.0, 0.0, 0.0, 1.0],
+    ]);
+
+    /// The slow obvious twin: one ray at a time against every triangle. Also says how true single precision can be
+    /// there, which is less on slivers, and whether the ray passes too near to an edge to tell.
+    fn cast(mesh: &Mesh, view: &View, x: usize, y: usize) -> (Option<f64>, f64, bool) {
+        let mut best: Option<f64> = None;
+        let (mut tolerance, mut near_edge) = (1e-5_f64, false);
+        for t in &mesh.triangles {
+            let corner = |k: usize| {
+                let v = mesh.vertices.at(t[k] as usize);
+                let [px, py] = view.px_from_plane.apply([v[0], v[1]]);
+                [px - x as f64, py - y as f64, v[2]]
+            };
+            let p = [corner(0), corner(1), corner(2)];
+            let cross = |a: [f64; 3], b: [f64; 3]| a[0] * b[1] - a[1] * b[0];
+            let w = [cross(p[1], p[2]), cross(p[2], p[0]), cross(p[0], p[1])];
+            let area: f64 = w.iter().sum();
+            if area.abs() < 1e-9 {
+                continue;
+            }
+            let w = w.map(|one| one / area);
+            let unsure = 5e-4 / area.abs();
+            near_edge |= w.iter().any(|one| one.abs() < unsure.max(1e-4));
+            if w.iter().all(|one| *one >= 0.0) {
+                let z = w[0] * p[0][2] + w[1] * p[1][2] + w[2] * p[2][2];
+                best = Some(best.map_or(z, |b: f64| b.max(z)));
+                tolerance = tolerance.max(2.0 * unsure);
+            }
+        }
+        (best, tolerance, near_edge)
+    }
+
+    fn soup() -> impl Strategy<Value = Mesh> {
+        let coordinate = (0.0..10.0_f64, 0.0..10.0_f64, -1.0..1.0_f64);
+        proptest::collection::vec((coordinate.clone(), coordinate.clone(), coordinate), 1..12)
+            .prop_map(|triangles| {
+                let mut mesh = Mesh::default();
+                for (a, b, c) in triangles {
+                    let first = mesh.vertices.len() as u32;
+                    for (x, y, z) in [a, b, c] {
+                        mesh.vertices.push([x, y, z]);
+                    }
+                    mesh.triangles.push([first, first + 1, first + 2]);
+                }
+                mesh
+            })
+    }
+
+    proptest! {
+        #[test]
+        fn equals_a_ray_caster(mesh in soup()) {
+            let view = View::around([[0.0, 0.0], [10.0, 10.0]], 24, true);
+            let heights = Shell::new(&mesh).render(&UPRIGHT, &view);
+            for y in 0..view.height {
+                for x in 0..view.width {
+                    let got = heights.at(x, y);
+                    match cast(&mesh, &view, x, y) {
+                        (_, _, true) => {}
+                        (Some(z), tolerance, false) => {
+                            prop_assert!((f64::from(got) - z).abs() < tolerance);
+                        }
+                        (None, _, false) => prop_assert!(got == NOTHING),
+                    }
+                }
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn few_blocks_fill_what_all_do(mesh in soup(), turn in 0.0..3.0_f64, more in 1..300_usize) {
+            // Many small copies side by side, so that most hold no pixel's centre.
+            let mut many = Mesh::default();
+            for copy in 0..more {
+                let at = |[x, y, z]: [f64; 3]| {
+                    [(copy % 17) as f64 + x / 9.0, (copy / 17) as f64 + y / 9.0, z]
+                };
+                let first = many.vertices.len() as u32;
+                many.vertices.extend(mesh.vertices.iter().map(at));
+                many.triangles.extend(mesh.triangles.iter().map(|t| t.map(|i| i + first)));
+            }
+            let frame = Rigid3::to_frame(
+                [[turn.cos(), turn.sin(), 0.0], [-turn.sin(), turn.cos(), 0.0], [0.0, 0.0, 1.0]],
+                [0.0; 3],
+            );
+            let shell = Shell::new(&many);
+            let view = View::around(shell.bounds(&frame), 16, false);
+            let rows = shell.view_rows(&frame, &view);
+            let size = [view.width, view.height];
+            let mut filled = [Vec::new(), Vec::new()];
+            shell.fill_all(&rows, size, |place, z| filled[0].push((place, z.to_bits())));
+            shell.fill_few(&rows, size, |place, z| filled[1].push((place, z.to_bits())));
+            prop_assert_eq!(&filled[0], &filled[1]);
+        }
+    }
+
+    #[test]
+    fn a_fan_without_gaps_leaves_no_hole() {
+        let mut mesh = Mesh {
+            vertices: vec![[0.03, -0.07, 0.0]].into(),
+            triangles: Vec::new().into(),
+        };
+        let n = 97_u32;
+        for k in 0..n {
+            let angle = f64::from(k) * std::f64::consts::TAU / f64::from(n);
+            mesh.vertices
+                .push([angle.cos() * 5.0, angle.sin() * 5.0, 0.0]);
+            mesh.triangles.push([0, 1 + k, 1 + (k + 1) % n]);
+        }
+        let view = View {
+            px_from_plane: Affine2::scale_shift(10.0, [60.0, 60.0]),
+            width: 121,
+            height: 121,
+            unit_per_px: 0.1,
+        };
+        let heights = Shell::new(&mesh).render(&UPRIGHT, &view);
+        for y in 0..121_i64 {
+            for x in 0..121_i64 {
+                let inside = (x - 60).pow(2) + (y - 60).pow(2) < 49 * 49;
+                assert!(!inside || heights.at(x as usize, y as usize) == 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn mirrored_view_reflects_x_only() {
+        let plain = View::around([[0.0, 0.0], [10.0, 6.0]], 64, false);
+        let mirrored = View::around([[0.0, 0.0], [10.0, 6.0]], 64, true);
+        let [x, y] = plain.px_from_plane.apply([2.0, 1.0]);
+        let [u, v] = mirrored.px_from_plane.apply([8.0, 1.0]);
+        assert!((x - u).abs() < 1e-9 && (y - v).abs() < 1e-9);
+        assert!(plain.px_from_plane.determinant() < 0.0);
+        assert!(mirrored.px_from_plane.determinant() > 0.0);
+    }
+
+    #[test]
+    fn points_without_faces_cover_their_area() {
+        let vertices = (0..40 * 40)
+            .map(|i| [f64::from(i % 40), f64::from(i / 40), 1.0])
+            .collect();
+        let mesh = Mesh {
+            vertices,
+            triangles: Vec::new().into(),
+        };
+        let shell = Shell::new(&mesh);
+        let view = View::around(shell.bounds(&UPRIGHT), 128, false);
+        let heights = shell.render(&UPRIGHT, &view);
+        let covered = heights.data().iter().filter(|z| **z == 1.0).count();
+        assert!(covered > 120 * 120, "{covered}");
+    }
+}
