@@ -21,16 +21,16 @@
 //! | room | what it is for | may import |
 //! |---|---|---|
 //! | `domain` | nouns: ids, stages, job states, transforms, outcomes, verdicts | |
-//! | `wide` | loops over numbers, with the widest instructions that the processor has | |
-//! | `raster` | grids, masks, depth maps, pictures, warps; readers of PNG, JPEG, TIFF | `domain`, `wide` |
-//! | `large` | vectors of millions of numbers | |
-//! | `mesh` | triangles and points in their own frame; readers of OBJ, PLY, STL, XYZ | `domain`, `large` |
+//! | `simd` | loops over numbers, with the widest instructions that the processor has | |
+//! | `raster` | grids, masks, depth maps, pictures, warps; readers of PNG, JPEG, TIFF | `domain`, `simd` |
+//! | `page_vec` | vectors of millions of numbers | |
+//! | `mesh` | triangles and points in their own frame; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
 //! | `manifest` | lists of pairs: CSV, JSON Lines, two folders | `domain` |
-//! | `stages` | fit, depth, normalize, register as pure functions, and the scores | `domain`, `wide`, `large`, `mesh`, `raster` |
-//! | `breakpoint` | named points where a test makes the process die | `domain` |
-//! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `large`, `mesh`, `raster` |
-//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain`, `breakpoint` |
-//! | `runner` | workers, policy, execution of one pair, events | `domain`, `large`, `mesh`, `raster`, `stages`, `store`, `catalog`, `breakpoint` |
+//! | `stages` | fit, depth, normalize, register as pure functions, and the scores | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
+//! | `failpoint` | named points where a test makes the process die | `domain` |
+//! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster` |
+//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain`, `failpoint` |
+//! | `runner` | workers, policy, execution of one pair, events | `domain`, `page_vec`, `mesh`, `raster`, `stages`, `store`, `catalog`, `failpoint` |
 //! | `check` | a project held against itself, and mended | `domain`, `store`, `catalog`, `runner` |
 //! | `report` | catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX, HTML | `domain`, `raster`, `store`, `catalog` |
 //! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of a report | `domain`, `raster`, `store`, `catalog`, `report` |
@@ -39,7 +39,6 @@
 //! | `config` | settings in layers, typed and checked, each with its origin | `domain`, `mesh`, `raster`, `stages`, `runner` |
 //! | `cli` | one thin file a command; exit codes, progress, log | all |
 
-mod breakpoint;
 pub mod catalog;
 pub mod check;
 pub mod cli;
@@ -47,13 +46,14 @@ pub mod config;
 pub mod demo;
 pub mod domain;
 pub mod export;
-pub mod large;
+mod failpoint;
 pub mod manifest;
 pub mod mesh;
+pub mod page_vec;
 pub mod raster;
 pub mod report;
 pub mod review;
 pub mod runner;
+mod simd;
 pub mod stages;
 pub mod store;
-mod wide;

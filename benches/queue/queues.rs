@@ -25,14 +25,14 @@ apalis-sqlite fetches nothing until its heartbeat after 30 s, as it would for it
 
 /// A queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Queue {
+enum ReviewOrder {
     Ours,
     Rows,
     /// The other program with its load and set-up.
     Peer(&'static str, &'static str),
 }
 
-impl Queue {
+impl ReviewOrder {
     const PEERS: [Self; 4] = [
         Self::Peer("stages", "plain"),
         Self::Peer("stages", "tuned"),
@@ -53,12 +53,12 @@ impl Queue {
 pub(super) async fn table(options: &Options) -> anyhow::Result<String> {
     let heads = ["workers", "queue", "pairs", "pairs/s", "jobs/s", "ours is"];
     let mut table = Table::new("Queues", &heads);
-    let mut queues = vec![Queue::Ours];
+    let mut queues = vec![ReviewOrder::Ours];
     if !options.ours {
-        queues.push(Queue::Rows);
+        queues.push(ReviewOrder::Rows);
     }
     if options.peer.is_some() {
-        queues.extend(Queue::PEERS);
+        queues.extend(ReviewOrder::PEERS);
     }
     for workers in &options.workers {
         let times = times(options, &queues, *workers).await?;
@@ -79,7 +79,11 @@ pub(super) async fn table(options: &Options) -> anyhow::Result<String> {
 }
 
 /// Median milliseconds of each queue.
-async fn times(options: &Options, queues: &[Queue], workers: usize) -> anyhow::Result<Vec<f64>> {
+async fn times(
+    options: &Options,
+    queues: &[ReviewOrder],
+    workers: usize,
+) -> anyhow::Result<Vec<f64>> {
     let mut spreads: Vec<_> = queues.iter().map(|_| Spread::default()).collect();
     for _ in 0..options.repeats.max(1) {
         for (queue, spread) in queues.iter().zip(&mut spreads) {
@@ -91,17 +95,17 @@ async fn times(options: &Options, queues: &[Queue], workers: usize) -> anyhow::R
     medians.context("nothing was measured")
 }
 
-async fn time(options: &Options, queue: Queue, workers: usize) -> anyhow::Result<Duration> {
+async fn time(options: &Options, queue: ReviewOrder, workers: usize) -> anyhow::Result<Duration> {
     let pairs = options.queue_pairs();
     match queue {
-        Queue::Ours => {
+        ReviewOrder::Ours => {
             let (world, _) = World::import(pairs)?;
             let catalog = world.catalog().await?;
             let time = work(&world, &catalog, pairs, workers).await?;
             catalog.close().await;
             Ok(time)
         }
-        Queue::Rows => {
+        ReviewOrder::Rows => {
             let (world, _) = World::import(pairs)?;
             let path = world.project.catalog_path();
             let catalog = Catalog::open(&path).await?;
@@ -109,7 +113,7 @@ async fn time(options: &Options, queue: Queue, workers: usize) -> anyhow::Result
             catalog.close().await;
             loops::work(&path, &fake, pairs, workers).await
         }
-        Queue::Peer(load, set_up) => peer(options, pairs, workers, [load, set_up]),
+        ReviewOrder::Peer(load, set_up) => peer(options, pairs, workers, [load, set_up]),
     }
 }
 

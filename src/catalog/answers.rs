@@ -7,7 +7,9 @@ use sqlx::{Row as _, SqliteConnection};
 use super::look::Look;
 use super::verdicts::{self, NewVerdict};
 use super::{Catalog, CatalogError, Result, rows};
-use crate::domain::{ContentHash, Control, PairName, Reason, ThresholdMetric, UnixMillis, Verdict};
+use crate::domain::{
+    AttentionCheck, ContentHash, PairName, Reason, ThresholdMetric, UnixMillis, Verdict,
+};
 
 /// What was shown to a reader.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,9 +17,9 @@ pub enum Shown {
     /// The result of one metric, or of several that came to the same; each with its hash.
     Results(Vec<(ThresholdMetric, ContentHash)>),
     /// Something that tests the reader, made from a metric's result.
-    Control {
+    AttentionCheck {
         /// What it is.
-        control: Control,
+        control: AttentionCheck,
         /// The metric it was made from.
         metric: ThresholdMetric,
         /// The result it was made from.
@@ -50,12 +52,12 @@ pub enum AnsweredOn {
     /// A result, by its hash.
     Result(ContentHash),
     /// What tests a reader, by the hash of what was shown.
-    Control(ContentHash),
+    AttentionCheck(ContentHash),
 }
 
 /// An answer to something that tests the reader, taken back or not.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ControlAnswer {
+pub struct AttentionCheckAnswer {
     /// The pair.
     pub pair: PairName,
     /// The metric whose result it was made from.
@@ -63,7 +65,7 @@ pub struct ControlAnswer {
     /// That result.
     pub result_hash: ContentHash,
     /// What was shown.
-    pub control: Control,
+    pub control: AttentionCheck,
     /// The judgement.
     pub verdict: Verdict,
     /// Who read it.
@@ -152,7 +154,7 @@ impl Catalog {
                             None => Err(CatalogError::NoResult(given.pair)),
                         }
                     }
-                    Shown::Control {
+                    Shown::AttentionCheck {
                         control,
                         metric,
                         result_hash,
@@ -215,7 +217,7 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn control_answers(&self) -> Result<Vec<ControlAnswer>> {
+    pub async fn control_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.reader().await?;
         let found = sqlx::query(CONTROLS).fetch_all(&mut *conn).await?;
         found.iter().map(control_answer).collect()
@@ -252,7 +254,7 @@ async fn insert_control(
     conn: &mut SqliteConnection,
     given: &NewVerdict,
     (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
-    control: &Control,
+    control: &AttentionCheck,
     now: UnixMillis,
 ) -> Result<()> {
     let look = &given.look;
@@ -282,7 +284,7 @@ fn answer(row: &SqliteRow) -> Result<Answer> {
         event: row.try_get("event")?,
         pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
         on: if row.try_get("is_control")? {
-            AnsweredOn::Control(hash)
+            AnsweredOn::AttentionCheck(hash)
         } else {
             AnsweredOn::Result(hash)
         },
@@ -293,8 +295,8 @@ fn answer(row: &SqliteRow) -> Result<Answer> {
     })
 }
 
-fn control_answer(row: &SqliteRow) -> Result<ControlAnswer> {
-    Ok(ControlAnswer {
+fn control_answer(row: &SqliteRow) -> Result<AttentionCheckAnswer> {
+    Ok(AttentionCheckAnswer {
         pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
         metric: rows::name(&row.try_get::<String, _>("metric")?)?,
         result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,

@@ -9,8 +9,8 @@ use super::lease::{InputsSeen, Kept, Lease, RecipeId, StageDone};
 use super::script::Script;
 use super::writer::Message;
 use super::{Catalog, Result};
-use crate::breakpoint::{self, Point};
 use crate::domain::{ContentHash, JobStatus, MetricOutcome, PairId, Stage, UnixMillis};
+use crate::failpoint::{self, Point};
 
 /// A lease and the stages to be stored under it, in the order they were computed.
 pub(super) type Steps = (Lease, Vec<StageDone>);
@@ -87,7 +87,7 @@ pub(super) fn step<'i>(script: &mut Script, done: impl Iterator<Item = &'i Steps
 pub(super) fn store(script: &mut Script, made: &[&Steps], deltas: &mut Deltas) -> Result<()> {
     for (lease, done) in made.iter().map(|steps| &**steps) {
         for one in done {
-            breakpoint::reach(one.stage, Point::Rowed, None);
+            failpoint::hit(one.stage, Point::Rowed, None);
         }
         if let Some(last) = done.last() {
             deltas.moved((cursor(lease.cursor), JobStatus::Leased), after(last.stage));

@@ -12,8 +12,8 @@ use super::lease::Lease;
 use super::script::Script;
 use super::writer::Message;
 use super::{Catalog, CatalogError, Result, rows};
-use crate::breakpoint::{self, Point};
 use crate::domain::{JobStatus, PairId, Stage, UnixMillis, WorkerId};
+use crate::failpoint::{self, Point};
 
 /// What a worker wants to take.
 #[derive(Debug, Clone)]
@@ -152,7 +152,7 @@ pub(super) fn taken(
     for lease in &leases {
         let at = cursor(lease.cursor);
         deltas.moved((at, JobStatus::Ready), (at, JobStatus::Leased));
-        breakpoint::reach(lease.cursor, Point::Claiming, None);
+        failpoint::hit(lease.cursor, Point::Claiming, None);
     }
     Ok(leases)
 }

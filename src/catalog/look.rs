@@ -5,7 +5,7 @@ use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
 
 use super::{Result, rows};
-use crate::domain::{ContentHash, Queue};
+use crate::domain::{ContentHash, ReviewOrder};
 
 /// What is known of a verdict besides what it says; nothing of one that came from elsewhere.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
@@ -19,7 +19,7 @@ pub struct Look {
     /// How far the reader had to turn the relief until it lay on the print, degrees clockwise.
     pub angle_read_deg: Option<f64>,
     /// The order in which results came.
-    pub queue: Option<Queue>,
+    pub queue: Option<ReviewOrder>,
 }
 
 impl Look {

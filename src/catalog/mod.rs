@@ -54,7 +54,7 @@ use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
 use tokio::sync::{mpsc, oneshot};
 
 pub use alignments::{HandAlignment, StoredAlignment};
-pub use answers::{Answer, AnsweredOn, ControlAnswer, Shown};
+pub use answers::{Answer, AnsweredOn, AttentionCheckAnswer, Shown};
 pub use audit::{AuditedPair, AuditedResult, CounterDrift, Drift};
 pub use claim::{ClaimRequest, PairSelection};
 pub use company::Waiting;

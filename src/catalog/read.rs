@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use crate::domain::{
     ArtifactSet, ContentHash, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome,
-    PairName, Queue, Reason, Stage, ThresholdMetric, UnixMillis, Verdict,
+    PairName, Reason, ReviewOrder, Stage, ThresholdMetric, UnixMillis, Verdict,
 };
 
 /// Counts of the whole project; `status --json` prints them with whether a process is at work.
@@ -109,8 +109,8 @@ pub struct ReaderVerdict {
     pub verdict: Verdict,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// The order in which results came to the reader; [`Queue::Adjudicate`] marks a word on a conflict.
-    pub queue: Option<Queue>,
+    /// The order in which results came to the reader; [`ReviewOrder::Adjudicate`] marks a word on a conflict.
+    pub queue: Option<ReviewOrder>,
 }
 
 /// One metric's current result of one pair.

@@ -9,7 +9,9 @@ use sqlx::{Row as _, SqliteConnection};
 
 use super::look::Look;
 use super::{Catalog, CatalogError, Result, rows};
-use crate::domain::{ContentHash, PairName, Queue, Reason, ThresholdMetric, UnixMillis, Verdict};
+use crate::domain::{
+    ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
+};
 
 /// A verdict to store.
 #[derive(Debug, Clone, PartialEq)]
@@ -71,7 +73,7 @@ pub(super) struct Counted {
     pub(super) verdict: Verdict,
     pub(super) reader: String,
     pub(super) reason: Option<Reason>,
-    pub(super) queue: Option<Queue>,
+    pub(super) queue: Option<ReviewOrder>,
 }
 
 /// Results that a verdict on a pair judges: those of a job that is done.
@@ -224,7 +226,7 @@ pub(super) async fn insert(
         .bind(look.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
         .bind(look.shown_ms.map(u64::cast_signed))
         .bind(look.angle_read_deg)
-        .bind(look.queue.map(Queue::name))
+        .bind(look.queue.map(ReviewOrder::name))
         .fetch_optional(conn)
         .await?;
     Ok(act)

@@ -14,7 +14,7 @@ use super::signals;
 use super::table::count;
 use super::talk;
 use super::verdict::reader_name;
-use crate::domain::{Queue, ThresholdMetric};
+use crate::domain::{ReviewOrder, ThresholdMetric};
 use crate::review::{self, Cards, DeckOptions, Language, Rates, Review, ReviewOptions};
 use crate::runner::{Stop, StopLevel};
 
@@ -26,7 +26,7 @@ pub(super) struct ReviewArgs {
     reader: String,
     /// What comes first: random stands for all; risk, the most doubtful, finds failures but does not
     #[arg(long, default_value = "random", value_parser = order)]
-    order: Queue,
+    order: ReviewOrder,
     /// Only what two other readers contradict each other on
     #[arg(long, conflicts_with = "order")]
     adjudicate: bool,
@@ -63,10 +63,10 @@ pub(super) struct ReviewArgs {
 }
 
 /// An order that can be asked for by name.
-fn order(text: &str) -> Result<Queue, String> {
+fn order(text: &str) -> Result<ReviewOrder, String> {
     match text.parse() {
-        Ok(queue @ (Queue::Random | Queue::Risk)) => Ok(queue),
-        Ok(Queue::Adjudicate) | Err(_) => Err("an order is random or risk".to_owned()),
+        Ok(queue @ (ReviewOrder::Random | ReviewOrder::Risk)) => Ok(queue),
+        Ok(ReviewOrder::Adjudicate) | Err(_) => Err("an order is random or risk".to_owned()),
     }
 }
 
@@ -132,7 +132,7 @@ fn deck(args: &ReviewArgs) -> DeckOptions {
         reader: args.reader.clone(),
         metrics: args.metric.clone(),
         queue: if args.adjudicate {
-            Queue::Adjudicate
+            ReviewOrder::Adjudicate
         } else {
             args.order
         },
@@ -256,7 +256,7 @@ fn language_of_system() -> Language {
 mod tests {
     use super::{Cards, order, percent, progress};
     use crate::config::{Sources, load};
-    use crate::domain::Queue;
+    use crate::domain::ReviewOrder;
     use crate::review::key_map;
 
     #[test]
@@ -290,7 +290,7 @@ mod tests {
         assert_eq!(percent("4"), Ok(0.04));
         assert_eq!(percent("12.5%"), Ok(0.125));
         assert!(percent("101").is_err() && percent("-1").is_err() && percent("NaN").is_err());
-        assert_eq!(order("risk"), Ok(Queue::Risk));
+        assert_eq!(order("risk"), Ok(ReviewOrder::Risk));
         assert!(order("adjudicate").is_err());
     }
 }

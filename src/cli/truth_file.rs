@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::domain::{PairName, plain};
+use crate::domain::{PairName, sanitize};
 use crate::report::truth::TruthRecord;
 
 /// One true alignment and the line it stands on.
@@ -65,7 +65,7 @@ pub(super) fn refusal(file: &Path, line: usize, reason: &str) -> TruthFileError 
     TruthFileError {
         file: file.to_owned(),
         line,
-        reason: plain(reason, 300),
+        reason: sanitize(reason, 300),
     }
 }
 

@@ -8,7 +8,7 @@ use csv::StringRecord;
 use super::clock::from_utc;
 use crate::catalog::{Look, NewVerdict};
 use crate::config::hint;
-use crate::domain::{ContentHash, PairName, UnixMillis, plain};
+use crate::domain::{ContentHash, PairName, UnixMillis, sanitize};
 use crate::manifest::{LineCounter, as_utf8, delimiter};
 
 const COLUMNS: [&str; 7] = [
@@ -39,7 +39,7 @@ impl VerdictFileError {
         Self {
             file: None,
             line,
-            reason: plain(reason, 300),
+            reason: sanitize(reason, 300),
         }
     }
 

@@ -4,7 +4,9 @@ use serde::Deserialize;
 
 use super::verdict_file::{Row, VerdictFileError};
 use crate::catalog::{Look, NewVerdict};
-use crate::domain::{ContentHash, PairName, Queue, Reason, ThresholdMetric, UnixMillis, Verdict};
+use crate::domain::{
+    ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
+};
 use crate::manifest::as_utf8;
 
 /// A line; what else it has, such as numbers of the other log, means nothing here.
@@ -21,7 +23,7 @@ struct Line {
     seen: Option<ContentHash>,
     shown_ms: Option<u64>,
     angle_read_deg: Option<f64>,
-    queue: Option<Queue>,
+    queue: Option<ReviewOrder>,
     at: Option<UnixMillis>,
     undone_at: Option<UnixMillis>,
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::Origin;
-use crate::domain::plain;
+use crate::domain::sanitize;
 
 /// Characters shown of what somebody wrote.
 const LONGEST: usize = 160;
@@ -20,7 +20,7 @@ pub enum ConfigError {
         source: std::io::Error,
     },
     /// The text is not TOML.
-    #[error("{origin}: line {line}: {}", plain(reason, LONGEST))]
+    #[error("{origin}: line {line}: {}", sanitize(reason, LONGEST))]
     Syntax {
         /// Whose text.
         origin: Origin,
@@ -30,7 +30,7 @@ pub enum ConfigError {
         reason: String,
     },
     /// A section or key that does not exist.
-    #[error("{origin}: there is no setting {}{hint}", plain(key, LONGEST))]
+    #[error("{origin}: there is no setting {}{hint}", sanitize(key, LONGEST))]
     Unknown {
         /// Where it stands.
         origin: Origin,
@@ -42,7 +42,7 @@ pub enum ConfigError {
     /// A section where a value stands, or the other way round.
     #[error(
         "{origin}: {} is a section; give its keys one by one",
-        plain(key, LONGEST)
+        sanitize(key, LONGEST)
     )]
     NotASection {
         /// Where it stands.
@@ -53,9 +53,9 @@ pub enum ConfigError {
     /// A value of the wrong type, or one that the setting does not know.
     #[error(
         "{origin}: {} = {}: {}",
-        plain(key, LONGEST),
-        plain(value, LONGEST),
-        plain(reason, LONGEST)
+        sanitize(key, LONGEST),
+        sanitize(value, LONGEST),
+        sanitize(reason, LONGEST)
     )]
     Value {
         /// Where it stands.
@@ -70,8 +70,8 @@ pub enum ConfigError {
     /// A number outside its range.
     #[error(
         "{origin}: {} = {} is outside {min} to {max}",
-        plain(key, LONGEST),
-        plain(value, LONGEST)
+        sanitize(key, LONGEST),
+        sanitize(value, LONGEST)
     )]
     Range {
         /// Where it stands.
@@ -88,7 +88,7 @@ pub enum ConfigError {
     /// A preset that does not exist.
     #[error(
         "{origin}: there is no preset \"{}\", only default and paper{hint}",
-        plain(name, LONGEST)
+        sanitize(name, LONGEST)
     )]
     UnknownPreset {
         /// Where it stands.
@@ -101,7 +101,7 @@ pub enum ConfigError {
     /// `--set` without `=`, or without a section.
     #[error(
         "--set \"{}\" is not of the form section.key=value",
-        plain(text, LONGEST)
+        sanitize(text, LONGEST)
     )]
     SetForm {
         /// As typed.

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::domain::plain;
+use crate::domain::sanitize;
 
 /// A layer of settings; later variants win over earlier ones.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -25,7 +25,7 @@ impl std::fmt::Display for Origin {
             Self::Default => f.write_str("default"),
             Self::Preset(name) => write!(f, "preset {name}"),
             Self::File(path) => write!(f, "{}", path.display()),
-            Self::Env(name) => f.write_str(&plain(name, 160)),
+            Self::Env(name) => f.write_str(&sanitize(name, 160)),
             Self::Flag => f.write_str("--set"),
         }
     }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::plain;
+use super::sanitize;
 
 /// A pair's number in the catalog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -24,7 +24,7 @@ pub enum PairNameError {
     #[error("the id is empty")]
     Empty,
     /// A character outside `[A-Za-z0-9_-]`.
-    #[error("id \"{shown}\" holds {1:?}; an id is made of letters A-Z, digits, _ and -", shown = plain(.0, 48))]
+    #[error("id \"{shown}\" holds {1:?}; an id is made of letters A-Z, digits, _ and -", shown = sanitize(.0, 48))]
     Character(String, char),
     /// Longer than a file name may be with our endings.
     #[error("id of {0} characters is longer than 128")]

@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Affine2, Evidence, LengthUnit, Rigid3, ThresholdMetric};
+use super::{Affine2, LengthUnit, Rigid3, ThresholdMetric};
 
 /// A second-degree surface over the tops: height over the plane at plane (x, y), all in mesh units.
 ///
@@ -156,6 +156,25 @@ pub struct Scores {
     pub density_depth: f64,
 }
 
+/// How well relief and print agree at the best pose, and how well at the best of the others.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct PoseFeatures {
+    /// Correlation of relief and ink over what both know, over what each holds; at most 1.
+    pub correlation: f64,
+    /// Share of the tops that have printed, 0..=1.
+    pub tops_met: f64,
+    /// Share of the ink that has tops under it, 0..=1.
+    pub ink_met: f64,
+    /// Score of the best pose at another angle, over that of the best pose.
+    pub other_angle: f64,
+    /// Score of the best pose of the mirrored relief, over that of the best pose.
+    pub mirrored: f64,
+    /// How far the answers lie apart that are found from smaller and larger poses, a share of the depth map's longest
+    /// side.
+    #[serde(default)]
+    pub spread: f64,
+}
+
 /// One metric's aligned result: a row of the catalog, of the export and, summed up, of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MetricOutcome {
@@ -202,5 +221,5 @@ pub struct RegisterOutcome {
     pub metrics: Vec<MetricOutcome>,
     /// What speaks for and against the pose that all metrics share, where the method gathers it.
     #[serde(default)]
-    pub evidence: Option<Evidence>,
+    pub evidence: Option<PoseFeatures>,
 }

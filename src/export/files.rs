@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::pictures::View;
 use crate::catalog::PairResults;
-use crate::domain::role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
+use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
 use crate::domain::{ContentHash, DepthScale, FileKind, MetricOutcome, Stage, ThresholdMetric};
 use crate::raster::{
     self, DecodeError, DepthMap, Mask, Picture, png_grey16, png_mask, png_rgb8, warp_depth,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::sheet::SheetError;
 use super::tiles::tiles;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults, VerdictEvent};
-use crate::domain::{ContentHash, Lots, ThresholdMetric};
+use crate::domain::{ContentHash, SeededRandom, ThresholdMetric};
 use crate::raster::{self, jpeg_rgb8};
 use crate::report::aligned::alike;
 use crate::report::gallery::{Gallery, Group, Kind, Shot, said};
@@ -39,7 +39,7 @@ struct Subject {
 #[derive(Debug)]
 pub struct Chosen {
     seed: u64,
-    lots: Lots,
+    lots: SeededRandom,
     found: [(u64, Vec<Subject>); 3],
     by_lot: Vec<(f64, Subject)>,
     pairs: u64,
@@ -69,7 +69,7 @@ impl Chosen {
     pub fn new(seed: u64) -> Self {
         Self {
             seed,
-            lots: Lots::new(seed, "report"),
+            lots: SeededRandom::new(seed, "report"),
             found: Default::default(),
             by_lot: Vec::new(),
             pairs: 0,

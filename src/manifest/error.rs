@@ -3,7 +3,7 @@
 use std::fmt;
 use std::path::PathBuf;
 
-use crate::domain::plain;
+use crate::domain::sanitize;
 
 /// Characters of a problem that are shown.
 const LONGEST: usize = 300;
@@ -26,7 +26,7 @@ impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Line(line) => write!(f, "line {line}: "),
-            Self::File(path) => write!(f, "{}: ", plain(&path.to_string_lossy(), 4096)),
+            Self::File(path) => write!(f, "{}: ", sanitize(&path.to_string_lossy(), 4096)),
             Self::Whole => Ok(()),
         }
     }
@@ -46,7 +46,7 @@ impl Problem {
     pub(super) fn line(line: usize, reason: impl Into<String>) -> Self {
         Self {
             place: Place::Line(line),
-            reason: plain(&reason.into(), LONGEST),
+            reason: sanitize(&reason.into(), LONGEST),
         }
     }
 
@@ -54,7 +54,7 @@ impl Problem {
     pub(super) fn whole(reason: impl Into<String>) -> Self {
         Self {
             place: Place::Whole,
-            reason: plain(&reason.into(), LONGEST),
+            reason: sanitize(&reason.into(), LONGEST),
         }
     }
 }

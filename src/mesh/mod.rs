@@ -19,7 +19,7 @@ pub use vertices::Vertices;
 use std::io::Read;
 
 use crate::domain::FileKind;
-use crate::large::Large;
+use crate::page_vec::PageVec;
 
 /// Triangles over vertices, in the mesh's own frame and unit. A point set has no triangles.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -27,7 +27,7 @@ pub struct Mesh {
     /// Positions of corners and points.
     pub vertices: Vertices,
     /// Indices into `vertices`, wound as in the file.
-    pub triangles: Large<[u32; 3]>,
+    pub triangles: PageVec<[u32; 3]>,
 }
 
 /// Reads a mesh or point set from a file's bytes.
@@ -78,7 +78,7 @@ pub fn read_from(
     if let Some(count) = stl::whole_binary_count(&head, about).filter(|_| !is_other) {
         return stl::read_facets(source, count, limits);
     }
-    let bytes = Large::read(head.as_slice().chain(source), about as usize)?;
+    let bytes = PageVec::read(head.as_slice().chain(source), about as usize)?;
     Ok(read(&bytes, name, limits)?)
 }
 

@@ -3,7 +3,7 @@
 use std::io::{self, Read};
 
 use super::{Error, Format, Limits, Mesh, ReadError, Vertices, error, text};
-use crate::large::{Large, fill};
+use crate::page_vec::{PageVec, fill};
 
 /// Bytes of the header, the count included.
 pub(super) const HEADER: usize = 84;
@@ -82,7 +82,7 @@ pub(super) fn read_binary(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> 
 
 /// Facets on their way into a mesh.
 struct Facets {
-    vertices: Large<[f32; 3]>,
+    vertices: PageVec<[f32; 3]>,
     few: Vec<[f32; 3]>,
 }
 
@@ -92,7 +92,7 @@ impl Facets {
         limits.check_triangles(u64::from(count))?;
         limits.check_vertices(3 * u64::from(count))?;
         Ok(Self {
-            vertices: Large::with_capacity(3 * count as usize),
+            vertices: PageVec::with_capacity(3 * count as usize),
             few: Vec::with_capacity(3 * FEW),
         })
     }

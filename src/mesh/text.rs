@@ -47,22 +47,22 @@ pub(super) fn not_a_number(word: &[u8]) -> String {
 /// The beginning of a word in quotes, without what would be lost or do harm on a screen.
 pub(super) fn shown(word: &[u8]) -> String {
     let beginning = &word[..word.len().min(200)];
-    format!("\"{}\"", plain(&String::from_utf8_lossy(beginning)))
+    format!("\"{}\"", sanitize(&String::from_utf8_lossy(beginning)))
 }
 
 /// The same of a text, without quotes.
-pub(super) fn plain(text: &str) -> String {
-    crate::domain::plain(text, 48)
+pub(super) fn sanitize(text: &str) -> String {
+    crate::domain::sanitize(text, 48)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{plain, shown};
+    use super::{sanitize, shown};
 
     #[test]
     fn words_of_a_mesh_come_plain_and_short() {
         for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(49)] {
-            for said in [shown(rude.as_bytes()), plain(&rude)] {
+            for said in [shown(rude.as_bytes()), sanitize(&rude)] {
                 assert!(!said.contains(&rude), "{said:?}");
             }
         }

@@ -1,15 +1,15 @@
 //! Where the corners of a surface lie.
 
-use crate::large::Large;
+use crate::page_vec::PageVec;
 
 /// Positions in the mesh's own frame and unit, all finite, each kept as precisely as its file says it and no more: what
 /// lies in memory is what most of the time goes into.
 #[derive(Debug, Clone)]
 pub enum Vertices {
     /// Of files that hold 32-bit floats, as scanners' do.
-    Single(Large<[f32; 3]>),
+    Single(PageVec<[f32; 3]>),
     /// Of text and of 64-bit floats.
-    Double(Large<[f64; 3]>),
+    Double(PageVec<[f64; 3]>),
 }
 
 impl Vertices {
@@ -66,7 +66,7 @@ impl Vertices {
     }
 
     /// In double precision, so that any can be written.
-    fn double(&mut self) -> &mut Large<[f64; 3]> {
+    fn double(&mut self) -> &mut PageVec<[f64; 3]> {
         if let Self::Single(_) = self {
             *self = self.iter().collect();
         }
@@ -79,7 +79,7 @@ impl Vertices {
 
 impl Default for Vertices {
     fn default() -> Self {
-        Self::Double(Large::default())
+        Self::Double(PageVec::default())
     }
 }
 

@@ -1,7 +1,7 @@
 //! Bringing values to another size along the axes: exact area means where the map shrinks, linear where it grows.
 
 use super::Grid;
-use crate::wide::widely;
+use crate::simd::dispatch;
 
 /// Values under an upright map `to = scale * from + shift` (pixels, per axis), of so many columns and rows.
 ///
@@ -82,7 +82,7 @@ impl Reaches {
         let mut out = Grid::new(width, self.each.len(), 0.0_f32);
         let mut rows = out.data_mut().chunks_exact_mut(width.max(1));
         let mut start = 0;
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 for ((first, end), row) in self.each.iter().zip(&mut rows) {
@@ -111,7 +111,7 @@ impl Reaches {
         let mut rows = out.data_mut().chunks_exact_mut(width.max(1));
         let mut made = vec![0.0_f32; width];
         let mut start = 0;
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 for ((first, end), row) in self.each.iter().zip(&mut rows) {

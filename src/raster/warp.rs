@@ -8,7 +8,7 @@ use super::extremes::Extremes;
 use super::looks::{Looks, floor, look, look_inside, neighbours};
 use super::{DepthMap, Grid, Mask};
 use crate::domain::Affine2;
-use crate::wide::widely;
+use crate::simd::dispatch;
 
 /// So much of a pixel must be covered: half of it, whatever the order in which the parts were added.
 const HALF: f64 = 0.5 - 1e-9;
@@ -132,7 +132,7 @@ impl<T: Copy + Ord + Default + Into<f64>> Warp<'_, T> {
         let (looks, values, levels) = (&self.looks, self.values, self.levels);
         let masks = &mut self.masks;
         let open = self.open.drain(..);
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 for square in open {

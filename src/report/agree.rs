@@ -10,8 +10,10 @@ use super::controls::{self, Caught};
 use super::gather::PAGE;
 use super::rate::Rate;
 use super::standing::{Standing, split};
-use crate::catalog::{AnsweredOn, Catalog, CatalogError, ControlAnswer, MetricRecord, PairResults};
-use crate::domain::{ContentHash, Control, PairName, Verdict};
+use crate::catalog::{
+    AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults,
+};
+use crate::domain::{AttentionCheck, ContentHash, PairName, Verdict};
 
 /// Version of the JSON form.
 const SCHEMA: u32 = 1;
@@ -89,7 +91,7 @@ async fn own_verdicts(catalog: &Catalog, reader: &str) -> Result<OwnVerdicts, Ca
     Ok(answers
         .filter_map(|answer| match answer.on {
             AnsweredOn::Result(hash) => Some(((answer.pair, hash), answer.verdict)),
-            AnsweredOn::Control(_) => None,
+            AnsweredOn::AttentionCheck(_) => None,
         })
         .collect())
 }
@@ -121,11 +123,11 @@ impl Counts {
     }
 
     /// Holds a reader's answers to controls against what they should be.
-    fn test(&mut self, reader: &str, answers: &[ControlAnswer], own: &OwnVerdicts) {
+    fn test(&mut self, reader: &str, answers: &[AttentionCheckAnswer], own: &OwnVerdicts) {
         let answers = controls::newest(answers);
         let repeats = answers
             .iter()
-            .filter(|answer| answer.control == Control::Repeat);
+            .filter(|answer| answer.control == AttentionCheck::Repeat);
         let same = repeats.filter_map(|answer| {
             let first = own.get(&(answer.pair.clone(), answer.result_hash))?;
             Some(*first == answer.verdict)
@@ -195,12 +197,14 @@ impl<'a> Picture<'a> {
 #[cfg(test)]
 mod tests {
     use super::{Counts, OwnVerdicts};
-    use crate::catalog::{ControlAnswer, Look, MetricRecord, ReaderVerdict};
-    use crate::domain::{ContentHash, Control, PairName, Queue, ThresholdMetric, Verdict};
+    use crate::catalog::{AttentionCheckAnswer, Look, MetricRecord, ReaderVerdict};
+    use crate::domain::{
+        AttentionCheck, ContentHash, PairName, ReviewOrder, ThresholdMetric, Verdict,
+    };
     use crate::report::fixture;
 
-    fn answer(pair: &str, control: Control, verdict: Verdict) -> ControlAnswer {
-        ControlAnswer {
+    fn answer(pair: &str, control: AttentionCheck, verdict: Verdict) -> AttentionCheckAnswer {
+        AttentionCheckAnswer {
             pair: PairName::new(pair).expect("test names are ids"),
             metric: ThresholdMetric::Density,
             result_hash: ContentHash::of(pair.as_bytes()),
@@ -238,7 +242,7 @@ mod tests {
                 reader: "third".to_owned(),
                 verdict: Verdict::Fail,
                 reason: None,
-                queue: Some(Queue::Adjudicate),
+                queue: Some(ReviewOrder::Adjudicate),
             });
         };
         pair.metrics.iter_mut().for_each(settle);
@@ -262,12 +266,12 @@ mod tests {
 
     #[test]
     fn a_fault_is_caught_by_a_fail_and_the_newest_answer_counts() {
-        let turned = Control::Turned { angle_deg: 9.0 };
+        let turned = AttentionCheck::Turned { angle_deg: 9.0 };
         let answers = [
             answer("a", turned, Verdict::Pass),
             answer("a", turned, Verdict::Fail),
             answer("b", turned, Verdict::Unsure),
-            answer("b", Control::Mirrored, Verdict::Fail),
+            answer("b", AttentionCheck::Mirrored, Verdict::Fail),
         ];
         let mut counts = Counts::default();
         counts.test("lan", &answers, &OwnVerdicts::new());
@@ -282,14 +286,14 @@ mod tests {
     #[test]
     fn a_repeat_is_held_against_the_readers_own_verdict() {
         let own = OwnVerdicts::from(["a", "b"].map(|name| {
-            let first = answer(name, Control::Repeat, Verdict::Pass);
+            let first = answer(name, AttentionCheck::Repeat, Verdict::Pass);
             ((first.pair, first.result_hash), Verdict::Pass)
         }));
         let answers = [
-            answer("a", Control::Repeat, Verdict::Pass),
-            answer("b", Control::Repeat, Verdict::Fail),
+            answer("a", AttentionCheck::Repeat, Verdict::Pass),
+            answer("b", AttentionCheck::Repeat, Verdict::Fail),
             // Its first look was taken back.
-            answer("c", Control::Repeat, Verdict::Pass),
+            answer("c", AttentionCheck::Repeat, Verdict::Pass),
         ];
         let mut counts = Counts::default();
         counts.test("lan", &answers, &own);

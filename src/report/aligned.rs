@@ -3,7 +3,7 @@
 use serde::de::DeserializeOwned;
 
 use crate::catalog::{MetricRecord, PairResults, StageRecord};
-use crate::domain::role::{CANVAS_PRINT_MASK, DEPTH, PRINT_MASK};
+use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, PRINT_MASK};
 use crate::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, PrintFromMesh, Stage,
 };

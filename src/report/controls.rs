@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::interval::Interval;
 use super::rate::Rate;
-use crate::catalog::{Catalog, CatalogError, ControlAnswer};
+use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
 use crate::domain::Verdict;
 
 /// Planted faults that readers failed, of those that they answered; unsure is not caught.
@@ -21,7 +21,7 @@ pub struct Caught {
 
 impl Caught {
     /// Of a reader's answers; those to repeats are left out.
-    pub(super) fn of<'a>(answers: impl Iterator<Item = &'a ControlAnswer>) -> Self {
+    pub(super) fn of<'a>(answers: impl Iterator<Item = &'a AttentionCheckAnswer>) -> Self {
         let mut told: BTreeMap<_, Vec<bool>> = BTreeMap::new();
         for answer in answers.filter(|answer| answer.control.is_fault()) {
             let of_kind = told.entry(answer.control.name()).or_default();
@@ -83,8 +83,8 @@ pub(super) async fn caught(catalog: &Catalog) -> Result<Caught, CatalogError> {
 /// When the catalog cannot be read.
 pub(super) async fn by_reader(
     catalog: &Catalog,
-) -> Result<BTreeMap<String, Vec<ControlAnswer>>, CatalogError> {
-    let mut controls: BTreeMap<String, Vec<ControlAnswer>> = BTreeMap::new();
+) -> Result<BTreeMap<String, Vec<AttentionCheckAnswer>>, CatalogError> {
+    let mut controls: BTreeMap<String, Vec<AttentionCheckAnswer>> = BTreeMap::new();
     for answer in catalog.control_answers().await? {
         if answer.undone_at.is_none() {
             let of_reader = controls.entry(answer.reader.clone()).or_default();
@@ -95,8 +95,8 @@ pub(super) async fn by_reader(
 }
 
 /// The newest of a reader's answers to each thing that was shown; they come oldest first.
-pub(super) fn newest(answers: &[ControlAnswer]) -> Vec<&ControlAnswer> {
-    let shown = |answer: &ControlAnswer| {
+pub(super) fn newest(answers: &[AttentionCheckAnswer]) -> Vec<&AttentionCheckAnswer> {
+    let shown = |answer: &AttentionCheckAnswer| {
         let hashes = (answer.result_hash, answer.look.seen);
         (answer.pair.clone(), answer.control.name(), hashes)
     };

@@ -88,7 +88,7 @@ fn count([passed, told]: &mut [u64; 2], is_passed: bool) {
 mod tests {
     use super::{RuleSums, Rules};
     use crate::domain::Verdict::{self, Fail, Pass, Unsure};
-    use crate::domain::{Queue, ThresholdMetric};
+    use crate::domain::{ReviewOrder, ThresholdMetric};
     use crate::report::fixture;
 
     fn of(results: &[(&[Verdict], Option<Verdict>)]) -> Rules {
@@ -97,7 +97,7 @@ mod tests {
             let verdicts: Vec<Verdict> = own.iter().copied().chain(*word).collect();
             let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &verdicts);
             for settled in &mut record.verdicts[own.len()..] {
-                settled.queue = Some(Queue::Adjudicate);
+                settled.queue = Some(ReviewOrder::Adjudicate);
             }
             sums.add(&record);
         }

@@ -1,7 +1,7 @@
 //! What all readers together say of one result.
 
 use crate::catalog::{MetricRecord, ReaderVerdict};
-use crate::domain::{Queue, Verdict};
+use crate::domain::{ReviewOrder, Verdict};
 
 /// Where a result stands with its readers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,7 +61,7 @@ impl Standing {
 
 /// The words of those who were shown a conflict to settle it, and the verdicts of those who read by themselves.
 pub(crate) fn split(record: &MetricRecord) -> (Vec<&ReaderVerdict>, Vec<&ReaderVerdict>) {
-    let is_word = |read: &&ReaderVerdict| read.queue == Some(Queue::Adjudicate);
+    let is_word = |read: &&ReaderVerdict| read.queue == Some(ReviewOrder::Adjudicate);
     record.verdicts.iter().partition(is_word)
 }
 
@@ -74,7 +74,7 @@ pub(crate) fn contradict(verdicts: &[&ReaderVerdict]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::Standing;
-    use crate::domain::{Queue, ThresholdMetric, Verdict};
+    use crate::domain::{ReviewOrder, ThresholdMetric, Verdict};
     use crate::report::fixture;
 
     fn standing(verdicts: &[Verdict], older: u64) -> Standing {
@@ -109,7 +109,7 @@ mod tests {
             let verdicts = [&[Verdict::Pass, Verdict::Fail], words].concat();
             let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &verdicts);
             for word in &mut record.verdicts[2..] {
-                word.queue = Some(Queue::Adjudicate);
+                word.queue = Some(ReviewOrder::Adjudicate);
             }
             Standing::of(&record)
         };

@@ -1,7 +1,9 @@
 //! A card: one picture that a reader judges, and what is known of it on our side only.
 
 use crate::catalog::Shown;
-use crate::domain::{Affine2, ContentHash, Control, DepthOutcome, PairName, ThresholdMetric};
+use crate::domain::{
+    Affine2, AttentionCheck, ContentHash, DepthOutcome, PairName, ThresholdMetric,
+};
 
 /// What the picture of a card is made from.
 #[derive(Debug, Clone, PartialEq)]
@@ -78,7 +80,7 @@ pub(super) struct Card {
     /// The results that look like this, of one metric or of several.
     pub(super) results: Vec<(ThresholdMetric, ContentHash)>,
     /// What it is when it only tests the reader.
-    pub(super) control: Option<Control>,
+    pub(super) control: Option<AttentionCheck>,
     /// What its picture is made from.
     pub(super) view: View,
     /// How much speaks against the result, for the order by risk.
@@ -91,7 +93,7 @@ impl Card {
     /// What an answer to it is stored as.
     pub(super) fn shown(&self) -> Shown {
         match (self.control, self.results.first()) {
-            (Some(control), Some((metric, result_hash))) => Shown::Control {
+            (Some(control), Some((metric, result_hash))) => Shown::AttentionCheck {
                 control,
                 metric: *metric,
                 result_hash: *result_hash,
@@ -148,7 +150,7 @@ pub(super) mod fixture {
 #[cfg(test)]
 mod tests {
     use super::fixture::card;
-    use crate::domain::{ContentHash, Control};
+    use crate::domain::{AttentionCheck, ContentHash};
 
     #[test]
     fn a_turned_relief_keeps_its_centre() {
@@ -175,7 +177,7 @@ mod tests {
         let key = ContentHash::of(b"key");
         let plain = card(1);
         let mut repeat = plain.clone();
-        repeat.control = Some(Control::Repeat);
+        repeat.control = Some(AttentionCheck::Repeat);
         let names = [
             plain.clone().named(&key, "ana").id,
             plain.clone().named(&key, "bo").id,

@@ -1,7 +1,7 @@
 //! Planted faults and repeats: how well a reader sees can be told only from what is known beforehand.
 
 use super::card::{Card, View};
-use crate::domain::{Control, Lots};
+use crate::domain::{AttentionCheck, SeededRandom};
 use crate::raster::{DepthMap, Mask};
 
 /// How often readers are tested.
@@ -26,7 +26,7 @@ const REPEAT_AFTER: f64 = 10.0;
 const REPEAT_SPREAD: f64 = 30.0;
 
 /// Cards that get a fault planted beside them.
-pub(super) fn chosen<'a>(cards: &'a [Card], rates: &Rates, lots: &Lots) -> Vec<&'a Card> {
+pub(super) fn chosen<'a>(cards: &'a [Card], rates: &Rates, lots: &SeededRandom) -> Vec<&'a Card> {
     let rate = rates.controls;
     let good = cards.iter().filter(|card| card.is_good);
     good.filter(|card| lots.draw(&card.view.seen(), "control") < rate)
@@ -34,14 +34,14 @@ pub(super) fn chosen<'a>(cards: &'a [Card], rates: &Rates, lots: &Lots) -> Vec<&
 }
 
 /// A fault made from a good result. What would be no fault, such as a symmetric relief in the mirror, is turned.
-pub(super) fn plant(card: &Card, depth: &DepthMap, lots: &Lots) -> Card {
+pub(super) fn plant(card: &Card, depth: &DepthMap, lots: &SeededRandom) -> Card {
     let draw = |purpose| lots.draw(&card.view.seen(), purpose);
     let strokes = depth.strokes(card.view.level);
     let (control, view) = match draw("kind") {
-        ..0.2 if !is_symmetric(&strokes) => (Control::Mirrored, card.view.mirrored()),
+        ..0.2 if !is_symmetric(&strokes) => (AttentionCheck::Mirrored, card.view.mirrored()),
         0.2..0.5 => match broken_level(depth, card.view.level, draw("cut") < 0.5) {
             Some(level) => (
-                Control::Cut { level },
+                AttentionCheck::Cut { level },
                 View {
                     level,
                     ..card.view.clone()
@@ -58,12 +58,15 @@ pub(super) fn plant(card: &Card, depth: &DepthMap, lots: &Lots) -> Card {
     }
 }
 
-fn turned(card: &Card, lot: f64) -> (Control, View) {
+fn turned(card: &Card, lot: f64) -> (AttentionCheck, View) {
     let [least, most] = TURN_DEG;
     let sign = if lot < 0.5 { -1.0 } else { 1.0 };
     let share = (2.0 * lot).fract();
     let angle_deg = sign * (least + share * (most - least));
-    (Control::Turned { angle_deg }, card.view.turned(angle_deg))
+    (
+        AttentionCheck::Turned { angle_deg },
+        card.view.turned(angle_deg),
+    )
 }
 
 /// Whether the strokes cover about the same in the mirror, about the middle of their own box.
@@ -96,7 +99,12 @@ fn broken_level(depth: &DepthMap, level: u16, loses: bool) -> Option<u16> {
 }
 
 /// Puts faults and repeats among results, so that nothing in the place of a card tells what it is.
-pub(super) fn mixed(real: Vec<Card>, faults: Vec<Card>, rates: &Rates, lots: &Lots) -> Vec<Card> {
+pub(super) fn mixed(
+    real: Vec<Card>,
+    faults: Vec<Card>,
+    rates: &Rates,
+    lots: &SeededRandom,
+) -> Vec<Card> {
     let count = real.len() as f64;
     let mut placed: Vec<(f64, Card)> = Vec::with_capacity(real.len() + faults.len());
     for (place, card) in real.into_iter().enumerate() {
@@ -107,7 +115,7 @@ pub(super) fn mixed(real: Vec<Card>, faults: Vec<Card>, rates: &Rates, lots: &Lo
             let at = (place as f64 + after).min(count) + 0.25;
             if at - place as f64 > REPEAT_AFTER / 2.0 {
                 let repeat = Card {
-                    control: Some(Control::Repeat),
+                    control: Some(AttentionCheck::Repeat),
                     ..card.clone()
                 };
                 placed.push((at, repeat));
@@ -126,7 +134,7 @@ pub(super) fn mixed(real: Vec<Card>, faults: Vec<Card>, rates: &Rates, lots: &Lo
 #[cfg(test)]
 mod tests {
     use super::{Rates, chosen, mixed, plant};
-    use crate::domain::{Control, Lots};
+    use crate::domain::{AttentionCheck, SeededRandom};
     use crate::raster::{DepthMap, Grid};
     use crate::review::card::Card;
     use crate::review::card::fixture::card;
@@ -146,7 +154,7 @@ mod tests {
     }
 
     fn planted(depth: &DepthMap) -> Vec<Card> {
-        let lots = Lots::new(3, "ana");
+        let lots = SeededRandom::new(3, "ana");
         (0..300).map(|n| plant(&card(n), depth, &lots)).collect()
     }
 
@@ -167,16 +175,18 @@ mod tests {
         }
         for fault in &faults {
             match fault.control.expect("a control") {
-                Control::Turned { angle_deg } => {
+                AttentionCheck::Turned { angle_deg } => {
                     assert!((7.0..=15.0).contains(&angle_deg.abs()), "{angle_deg}");
                 }
-                Control::Mirrored => assert!(fault.view.print_from_depth.determinant() < 0.0),
-                Control::Cut { level } => {
+                AttentionCheck::Mirrored => {
+                    assert!(fault.view.print_from_depth.determinant() < 0.0);
+                }
+                AttentionCheck::Cut { level } => {
                     let area = |level| wedge().strokes(level).count() as f64;
                     let share = area(level) / area(good.level);
                     assert!(!(0.7..=1.5).contains(&share), "{share}");
                 }
-                Control::Repeat => unreachable!("repeats are not planted here"),
+                AttentionCheck::Repeat => unreachable!("repeats are not planted here"),
             }
         }
     }
@@ -185,13 +195,13 @@ mod tests {
     fn a_symmetric_relief_is_never_mirrored() {
         let bar = depth(|x, _| if (40..61).contains(&x) { 900 } else { 100 });
         for fault in planted(&bar) {
-            assert_ne!(fault.control, Some(Control::Mirrored));
+            assert_ne!(fault.control, Some(AttentionCheck::Mirrored));
         }
     }
 
     #[test]
     fn repeats_come_well_after_their_results_and_faults_anywhere() {
-        let lots = Lots::new(5, "ana");
+        let lots = SeededRandom::new(5, "ana");
         let real: Vec<Card> = (0..400).map(card).collect();
         let faults: Vec<Card> = chosen(&real, &RATES, &lots)
             .into_iter()
@@ -201,7 +211,7 @@ mod tests {
         assert!((20..70).contains(&planted), "{planted}");
         let deck = mixed(real, faults, &RATES, &lots);
         let repeats: Vec<usize> = (0..deck.len())
-            .filter(|i| deck[*i].control == Some(Control::Repeat))
+            .filter(|i| deck[*i].control == Some(AttentionCheck::Repeat))
             .collect();
         assert!((20..70).contains(&repeats.len()), "{}", repeats.len());
         assert_eq!(deck.len(), 400 + planted + repeats.len());
@@ -215,7 +225,7 @@ mod tests {
         let halves = deck.split_at(deck.len() / 2);
         for half in [halves.0, halves.1] {
             let faults = half.iter().filter_map(|card| card.control);
-            assert!(faults.filter(Control::is_fault).count() > planted / 4);
+            assert!(faults.filter(AttentionCheck::is_fault).count() > planted / 4);
         }
     }
 
@@ -225,6 +235,6 @@ mod tests {
         for card in &mut doubtful {
             card.is_good = false;
         }
-        assert!(chosen(&doubtful, &RATES, &Lots::new(5, "ana")).is_empty());
+        assert!(chosen(&doubtful, &RATES, &SeededRandom::new(5, "ana")).is_empty());
     }
 }

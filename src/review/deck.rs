@@ -7,7 +7,7 @@ use super::control::{self, Rates};
 use super::known::Known;
 use super::order;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
-use crate::domain::{DepthOutcome, Lots, Queue, Stage, ThresholdMetric, Verdict};
+use crate::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, ThresholdMetric, Verdict};
 use crate::report::aligned::{Aligned, alike};
 use crate::report::standing::{contradict, split};
 use crate::store::Project;
@@ -26,7 +26,7 @@ pub struct DeckOptions {
     /// where it looks the same: the accuracy of such a choice would stand for nothing.
     pub metrics: Vec<ThresholdMetric>,
     /// What comes first.
-    pub queue: Queue,
+    pub queue: ReviewOrder,
     /// Another seed, another order.
     pub seed: u64,
     /// Only so many results, the same for all readers.
@@ -40,7 +40,7 @@ impl DeckOptions {
     /// twice would give itself away.
     pub(super) fn tests_the_reader(&self) -> bool {
         let Rates { controls, repeats } = self.rates;
-        self.queue != Queue::Adjudicate && (controls > 0.0 || repeats > 0.0)
+        self.queue != ReviewOrder::Adjudicate && (controls > 0.0 || repeats > 0.0)
     }
 }
 
@@ -62,7 +62,7 @@ impl Deck {
         options: &DeckOptions,
     ) -> Result<Self, DeckError> {
         let key = catalog.review_key().await?;
-        let lots = Lots::new(options.seed, &options.reader);
+        let lots = SeededRandom::new(options.seed, &options.reader);
         let mut cards = all_cards(catalog, options).await?;
         if let Some(most) = options.sample {
             order::sample(&mut cards, options.queue, options.seed, most);
@@ -118,7 +118,7 @@ fn cards_of(pair: &PairResults, options: &DeckOptions) -> Vec<Card> {
         |record: &&MetricRecord| asked.is_empty() || asked.contains(&record.outcome.metric);
     // What looks the same and nobody contradicts another on gets no word: such a choice would stand for nothing either.
     let is_asked = |record: &&MetricRecord| {
-        options.queue != Queue::Adjudicate || is_open_conflict(record, &options.reader)
+        options.queue != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reader)
     };
     let groups = alike(pair.metrics.iter().filter(is_of_metric).filter(is_asked));
     let card = |group: Vec<&MetricRecord>| {
@@ -179,7 +179,7 @@ async fn faults(
     catalog: &Catalog,
     project: &Project,
     chosen: Vec<&Card>,
-    lots: &Lots,
+    lots: &SeededRandom,
 ) -> Result<Vec<Card>, DeckError> {
     let mut faults = Vec::with_capacity(chosen.len());
     for card in chosen {
@@ -200,10 +200,10 @@ async fn faults(
 mod tests {
     use super::{DeckOptions, Rates, cards_of, is_good, is_open_conflict};
     use crate::catalog::ReaderVerdict;
-    use crate::domain::{Queue, ThresholdMetric, Verdict};
+    use crate::domain::{ReviewOrder, ThresholdMetric, Verdict};
     use crate::report::fixture;
 
-    fn options(queue: Queue, controls: f64, repeats: f64) -> DeckOptions {
+    fn options(queue: ReviewOrder, controls: f64, repeats: f64) -> DeckOptions {
         DeckOptions {
             reader: "ana".to_owned(),
             metrics: Vec::new(),
@@ -214,7 +214,7 @@ mod tests {
         }
     }
 
-    fn read(reader: &str, verdict: Verdict, queue: Queue) -> ReaderVerdict {
+    fn read(reader: &str, verdict: Verdict, queue: ReviewOrder) -> ReaderVerdict {
         ReaderVerdict {
             reader: reader.to_owned(),
             verdict,
@@ -226,16 +226,16 @@ mod tests {
     #[test]
     fn a_conflict_is_for_a_third_reader_until_one_has_settled_it() {
         let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &[]);
-        record.verdicts = vec![read("ana", Verdict::Pass, Queue::Random)];
+        record.verdicts = vec![read("ana", Verdict::Pass, ReviewOrder::Random)];
         assert!(!is_open_conflict(&record, "chi"));
         record
             .verdicts
-            .push(read("bo", Verdict::Fail, Queue::Random));
+            .push(read("bo", Verdict::Fail, ReviewOrder::Random));
         assert!(is_open_conflict(&record, "chi"));
         assert!(!is_open_conflict(&record, "ana"));
         record
             .verdicts
-            .push(read("chi", Verdict::Fail, Queue::Adjudicate));
+            .push(read("chi", Verdict::Fail, ReviewOrder::Adjudicate));
         assert!(
             is_open_conflict(&record, "chi"),
             "it stays with its adjudicator"
@@ -253,15 +253,15 @@ mod tests {
 
     #[test]
     fn a_pair_without_results_has_no_card() {
-        let options = options(Queue::Random, 0.0, 0.0);
+        let options = options(ReviewOrder::Random, 0.0, 0.0);
         assert_eq!(cards_of(&fixture::pending("a"), &options), []);
     }
 
     #[test]
     fn a_deck_tests_the_reader_by_faults_or_repeats_but_not_over_conflicts() {
         let tests = |queue, controls, repeats| options(queue, controls, repeats).tests_the_reader();
-        assert!(tests(Queue::Random, 0.04, 0.0) && tests(Queue::Risk, 0.0, 0.05));
-        assert!(!tests(Queue::Random, 0.0, 0.0));
-        assert!(!tests(Queue::Adjudicate, 0.04, 0.05));
+        assert!(tests(ReviewOrder::Random, 0.04, 0.0) && tests(ReviewOrder::Risk, 0.0, 0.05));
+        assert!(!tests(ReviewOrder::Random, 0.0, 0.0));
+        assert!(!tests(ReviewOrder::Adjudicate, 0.04, 0.05));
     }
 }

@@ -37,7 +37,9 @@ impl Known {
     /// The answer to a card, if there is one.
     pub(super) fn answer(&self, card: &Card) -> Option<&Answer> {
         if card.control.is_some() {
-            return self.answers.get(&AnsweredOn::Control(card.view.seen()));
+            return self
+                .answers
+                .get(&AnsweredOn::AttentionCheck(card.view.seen()));
         }
         let on_results = card.results.iter();
         on_results

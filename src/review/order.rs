@@ -1,24 +1,24 @@
 //! In which order cards come: by lot from a seed and the reader's name, or the most doubtful first.
 
-use crate::domain::{Lots, Queue};
+use crate::domain::{ReviewOrder, SeededRandom};
 
 use super::card::Card;
 
 /// Sorts cards of results into the order in which they are shown.
-pub(super) fn sort(cards: &mut [Card], queue: Queue, lots: &Lots) {
+pub(super) fn sort(cards: &mut [Card], queue: ReviewOrder, lots: &SeededRandom) {
     let lot = |card: &Card| lots.draw(&card.view.seen(), "order");
     cards.sort_by_cached_key(|card| OrderKey {
         risk: match queue {
-            Queue::Random | Queue::Adjudicate => 0.0,
-            Queue::Risk => -card.risk,
+            ReviewOrder::Random | ReviewOrder::Adjudicate => 0.0,
+            ReviewOrder::Risk => -card.risk,
         },
         lot: lot(card),
     });
 }
 
 /// Keeps so many cards, the same whoever reads: what two are given the same number of, both have read.
-pub(super) fn sample(cards: &mut Vec<Card>, queue: Queue, seed: u64, most: usize) {
-    sort(cards, queue, &Lots::new(seed, "sample"));
+pub(super) fn sample(cards: &mut Vec<Card>, queue: ReviewOrder, seed: u64, most: usize) {
+    sort(cards, queue, &SeededRandom::new(seed, "sample"));
     cards.truncate(most);
 }
 
@@ -47,15 +47,15 @@ impl Ord for OrderKey {
 #[cfg(test)]
 mod tests {
     use super::{sample, sort};
-    use crate::domain::{Lots, Queue};
+    use crate::domain::{ReviewOrder, SeededRandom};
     use crate::review::card::fixture::card;
 
-    fn order(queue: Queue, seed: u64, reader: &str) -> Vec<String> {
+    fn order(queue: ReviewOrder, seed: u64, reader: &str) -> Vec<String> {
         let mut cards: Vec<_> = (0..50).map(card).collect();
         for (i, card) in cards.iter_mut().enumerate() {
             card.risk = i as f64;
         }
-        sort(&mut cards, queue, &Lots::new(seed, reader));
+        sort(&mut cards, queue, &SeededRandom::new(seed, reader));
         cards.iter().map(|card| card.pair.to_string()).collect()
     }
 
@@ -63,8 +63,12 @@ mod tests {
     fn two_readers_get_the_same_sample_in_orders_of_their_own() {
         let read = |reader: &str| {
             let mut cards: Vec<_> = (0..50).map(card).collect();
-            sample(&mut cards, Queue::Random, 1, 10);
-            sort(&mut cards, Queue::Random, &Lots::new(1, reader));
+            sample(&mut cards, ReviewOrder::Random, 1, 10);
+            sort(
+                &mut cards,
+                ReviewOrder::Random,
+                &SeededRandom::new(1, reader),
+            );
             let names = cards.iter().map(|card| card.pair.to_string());
             names.collect::<Vec<_>>()
         };
@@ -78,19 +82,19 @@ mod tests {
 
     #[test]
     fn order_is_by_seed_and_reader() {
-        let first = order(Queue::Random, 1, "ana");
-        assert_eq!(first, order(Queue::Random, 1, "ana"));
-        assert_ne!(first, order(Queue::Random, 2, "ana"));
-        assert_ne!(first, order(Queue::Random, 1, "bo"));
-        assert_eq!(order(Queue::Risk, 1, "ana")[..2], ["p49", "p48"]);
+        let first = order(ReviewOrder::Random, 1, "ana");
+        assert_eq!(first, order(ReviewOrder::Random, 1, "ana"));
+        assert_ne!(first, order(ReviewOrder::Random, 2, "ana"));
+        assert_ne!(first, order(ReviewOrder::Random, 1, "bo"));
+        assert_eq!(order(ReviewOrder::Risk, 1, "ana")[..2], ["p49", "p48"]);
     }
 
     #[test]
     fn a_new_card_leaves_the_order_of_the_others() {
-        let lots = Lots::new(1, "ana");
+        let lots = SeededRandom::new(1, "ana");
         let names = |count: u16| {
             let mut cards: Vec<_> = (0..count).map(card).collect();
-            sort(&mut cards, Queue::Random, &lots);
+            sort(&mut cards, ReviewOrder::Random, &lots);
             let old = cards.iter().filter(|card| card.pair.as_str() != "p30");
             old.map(|card| card.pair.to_string()).collect::<Vec<_>>()
         };

@@ -4,7 +4,7 @@ use maud::{DOCTYPE, Markup, html};
 
 use super::desk::Desk;
 use super::words::Language;
-use crate::domain::{Queue, Reason};
+use crate::domain::{Reason, ReviewOrder};
 
 /// Ways to look that have a button, in the order of their keys.
 const MODES: [&str; 7] = [
@@ -95,9 +95,9 @@ pub(super) fn review(desk: &Desk, language: Language) -> Markup {
 fn top(desk: &Desk, language: Language) -> Markup {
     let other = language.other();
     let label = match desk.deck_options.queue {
-        Queue::Random => None,
-        Queue::Risk => Some(language.say("risk_label")),
-        Queue::Adjudicate => Some(language.say("adjudicate_label")),
+        ReviewOrder::Random => None,
+        ReviewOrder::Risk => Some(language.say("risk_label")),
+        ReviewOrder::Adjudicate => Some(language.say("adjudicate_label")),
     };
     html! {
         header {

@@ -23,7 +23,7 @@ use super::page;
 use super::pictures::{Layer, PictureError};
 use super::words::Language;
 use crate::catalog::CatalogError;
-use crate::domain::{PairName, Queue};
+use crate::domain::{PairName, ReviewOrder};
 use crate::report::aligned::AlignedError;
 
 /// Everything there is, behind the guard.
@@ -195,9 +195,9 @@ async fn about(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answere
     let agreement = correction::agreement(&drawn, &card.view.print_from_depth);
     let metrics = card.results.iter().map(|(metric, _)| metric.title());
     let others = match desk.deck_options.queue {
-        Queue::Adjudicate => others(&desk, &card).await?,
+        ReviewOrder::Adjudicate => others(&desk, &card).await?,
         // What others said of a planted fault does not exist, so it cannot be shown for anything.
-        Queue::Random | Queue::Risk => Vec::new(),
+        ReviewOrder::Random | ReviewOrder::Risk => Vec::new(),
     };
     Ok(Json(json!({
         "pair": card.pair, "metrics": metrics.collect::<Vec<_>>(), "iou": agreement.iou, "dice": agreement.dice, "others": others,

@@ -15,9 +15,9 @@ use super::hand::{PairInHand, Stored};
 use super::outputs;
 use super::steps::{Setback, StageOutput, Steps};
 use super::stop::{Stop, StopLevel};
-use crate::breakpoint::{self, Point};
 use crate::catalog::{InputsSeen, MetricResult};
-use crate::domain::{ArtifactSet, ContentHash, Failure, FailureClass, Stage, plain};
+use crate::domain::{ArtifactSet, ContentHash, Failure, FailureClass, Stage, sanitize};
+use crate::failpoint::{self, Point};
 use crate::store::NewArtifact;
 
 /// A stage that is computed, and the files that must be on disk before a row names them.
@@ -150,7 +150,7 @@ fn run(
 ) -> Result<Finished, Setback> {
     let output = steps.run(stage, pair)?;
     let took = begun.elapsed();
-    breakpoint::reach(stage, Point::Computed, Some(&pair.facts.name));
+    failpoint::hit(stage, Point::Computed, Some(&pair.facts.name));
     finished(stage, pair, output, took)
 }
 
@@ -204,7 +204,9 @@ fn panic_text(payload: &(dyn Any + Send)) -> String {
         .downcast_ref::<&str>()
         .map(|text| (*text).to_owned())
         .or_else(|| payload.downcast_ref::<String>().cloned());
-    let said = said.map_or_else(String::new, |text| format!(" ({})", plain(&text, LONGEST)));
+    let said = said.map_or_else(String::new, |text| {
+        format!(" ({})", sanitize(&text, LONGEST))
+    });
     format!(
         "the stage panicked{said}: a defect of this program, please report it with what `run --rerun failed -v` tells"
     )

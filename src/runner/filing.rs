@@ -4,8 +4,8 @@ use std::io;
 use std::time::Duration;
 
 use super::stop::{Stop, StopLevel};
-use crate::breakpoint::{self, Point};
 use crate::domain::{PairName, Stage};
+use crate::failpoint::{self, Point};
 use crate::store::{ArtifactError, NewArtifact, Project};
 
 /// Has a stage's files on disk for good when it returns; `false` when the run is to stop now, which waits for no disk.
@@ -21,9 +21,9 @@ pub(super) async fn file(
 ) -> Result<bool, ArtifactError> {
     let (to, name) = (project.clone(), pair.clone());
     let writing = tokio::task::spawn_blocking(move || {
-        let written = || breakpoint::reach(stage, Point::Written, Some(&name));
+        let written = || failpoint::hit(stage, Point::Written, Some(&name));
         to.write_artifacts_telling(&files, &written)?;
-        breakpoint::reach(stage, Point::Filed, Some(&name));
+        failpoint::hit(stage, Point::Filed, Some(&name));
         Ok(true)
     });
     tokio::select! {

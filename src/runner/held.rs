@@ -12,9 +12,9 @@ use super::events::RunEvent;
 use super::execute::Finished;
 use super::filing::file;
 use super::worker::{PairEnd, PairReport, Shared};
-use crate::breakpoint::{self, Point};
 use crate::catalog::{Kept, Lease, StageDone};
 use crate::domain::{PairName, Stage};
+use crate::failpoint::{self, Point};
 
 /// The right to a pair, and what has been stored under it.
 pub(super) struct Held {
@@ -244,7 +244,7 @@ async fn filed(
 }
 
 fn finished(shared: &Shared, pair: PairName, stage: Stage, ms: u64) {
-    breakpoint::reach(stage, Point::Stored, Some(&pair));
+    failpoint::hit(stage, Point::Stored, Some(&pair));
     let last = stage == shared.until.min(Stage::Register);
     shared.tell(RunEvent::StageFinished {
         pair: pair.clone(),

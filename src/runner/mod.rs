@@ -45,7 +45,7 @@ use crate::catalog::{
     WorkLeft, WorkerInfo,
 };
 use crate::domain::{PairName, WorkerId};
-use crate::large;
+use crate::page_vec;
 use crate::stages::Settings;
 use crate::store::{ArtifactError, LockError, Project, RunLock, StoreError};
 use clock::Clock;
@@ -137,7 +137,7 @@ pub async fn run(
     stop: &Stop,
     on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
-    large::keep_memory(options.memory);
+    page_vec::keep_memory(options.memory);
     let steps = Arc::new(Pipeline::new(project, settings, options));
     let recipes = recipes(settings);
     run_steps(project, catalog, &recipes, steps, options, stop, on_event).await

@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 
 use super::steps::StageOutput;
 use crate::catalog::MetricResult;
-use crate::domain::role::{CANVAS_PRINT_MASK, canvas_depth_mask};
-pub(super) use crate::domain::role::{DEPTH, PRINT_MASK};
+use crate::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask};
+pub(super) use crate::domain::artifact_role::{DEPTH, PRINT_MASK};
 use crate::domain::{
     ArtifactSet, ContentHash, DepthOutcome, MetricOutcome, NormalizeOutcome, RegisterOutcome,
 };

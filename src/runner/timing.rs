@@ -25,10 +25,10 @@ impl Timing {
         deadline_margin: Duration::from_mins(1),
     };
 
-    /// As it is; in builds with debug assertions `MOCBAN_HASTE=N` makes it N times as fast, for tests.
+    /// As it is; in builds with debug assertions `MOCBAN_TIME_SCALE=N` makes it N times as fast, for tests.
     pub(super) fn of_this_build() -> Self {
         let haste = cfg!(debug_assertions)
-            .then(|| std::env::var("MOCBAN_HASTE").ok()?.parse().ok())
+            .then(|| std::env::var("MOCBAN_TIME_SCALE").ok()?.parse().ok())
             .flatten();
         Self::REAL.hastened(haste.unwrap_or(1))
     }

@@ -17,9 +17,9 @@ use super::refresh;
 use super::steps::Steps;
 use super::stop::{Stop, StopLevel};
 use super::timing::Timing;
-use crate::breakpoint::{self, Point};
 use crate::catalog::{Catalog, InputsSeen, Lease, PairWork, RecipeIds, Sentence, StageFailed};
 use crate::domain::{Failure, FailureClass, PairName, Stage, UnixMillis};
+use crate::failpoint::{self, Point};
 use crate::store::Project;
 
 /// What the pairs of a run have in common.
@@ -123,7 +123,7 @@ pub(super) enum Over {
 pub(super) async fn work(shared: Arc<Shared>, lease: Lease, work: PairWork) -> Over {
     let stage = lease.cursor();
     let pair = Box::new(PairInHand::new(work));
-    breakpoint::reach(stage, Point::Claimed, Some(&pair.facts.name));
+    failpoint::hit(stage, Point::Claimed, Some(&pair.facts.name));
     let mut held = Held::new(Arc::clone(&shared), pair.facts.name.clone(), lease);
     match through(&shared, &mut held, stage, pair).await {
         Ok(PairEnd::Done) if held.is_storing() => Over::Storing(held),

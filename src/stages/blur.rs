@@ -1,7 +1,7 @@
 //! Gaussian smoothing of values, by three box means (the classic approximation), zero beyond the rim.
 
 use crate::raster::Grid;
-use crate::wide::widely;
+use crate::simd::dispatch;
 
 /// Less is not smoothed, pixels.
 const LEAST_SIGMA: f64 = 0.5;
@@ -48,7 +48,7 @@ const FEW: usize = 8;
 fn box_columns(values: &Grid<f32>, radius: usize, means: &mut Grid<f32>) {
     let width = values.width();
     let (values, means) = (values.data(), means.data_mut());
-    widely(
+    dispatch(
         #[inline(always)]
         || {
             let mut left = 0;

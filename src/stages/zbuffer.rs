@@ -11,9 +11,9 @@ mod winding;
 
 use super::bulk::{Bounds, Bulk, room};
 use crate::domain::Rigid3;
-use crate::large::Large;
 use crate::mesh::{Mesh, Vertices};
-use crate::wide::widely;
+use crate::page_vec::PageVec;
+use crate::simd::dispatch;
 
 use block::{Block, Coordinate, LANES, Lanes, Row, block};
 use boxes::Boxes;
@@ -30,7 +30,7 @@ pub(super) struct Shell {
     middle: [f64; 3],
     /// Box around the bulk.
     room: Bounds<3>,
-    blocks: Large<Block>,
+    blocks: PageVec<Block>,
     /// Around each [`LANES`] blocks.
     boxes: Vec<Boxes>,
     /// Triangles, or points, in the blocks.
@@ -50,7 +50,7 @@ impl Shell {
     fn of<T: Coordinate>(mesh: &Mesh, vertices: &[[T; 3]]) -> Self {
         let room @ [low, high]: Bounds<3> = room(vertices);
         let middle: [f64; 3] = std::array::from_fn(|k| T::middle(f64::midpoint(low[k], high[k])));
-        let points: Large<[u32; 3]>;
+        let points: PageVec<[u32; 3]>;
         let triangles = if mesh.triangles.is_empty() {
             points = (0..vertices.len() as u32).map(|i| [i; 3]).collect();
             &points
@@ -59,9 +59,9 @@ impl Shell {
         };
         let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
         let extent = sides.into_iter().fold(0.0, f64::max) as f32;
-        let mut blocks = Large::with_capacity(triangles.len().div_ceil(LANES));
+        let mut blocks = PageVec::with_capacity(triangles.len().div_ceil(LANES));
         let mut boxes = Vec::with_capacity(triangles.len().div_ceil(LANES * LANES));
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 for group in triangles.chunks(LANES * LANES) {
@@ -120,7 +120,7 @@ impl Shell {
             take(&mut bulk, &self.blocks[place]);
         }
         let [mut low, mut high] = bulk.taken();
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
@@ -140,7 +140,7 @@ impl Shell {
     /// The blocks whose boxes reach farthest down and up, those that reach out of the bulk left out.
     fn farthest(&self, row: &Row, bulk: &Bulk) -> [usize; 2] {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 for (group, boxes) in self.boxes.iter().enumerate() {

@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind, Read, Take};
 use std::path::{Path, PathBuf};
 
 use crate::domain::{ContentHash, FailureClass};
-use crate::large::Large;
+use crate::page_vec::PageVec;
 
 /// Size, modification time and number of a file: when all are as they were, the content is taken to be too.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -41,7 +41,7 @@ const fn inode(_meta: &std::fs::Metadata) -> u64 {
 #[derive(Debug)]
 pub struct InputFile {
     /// All its bytes.
-    pub bytes: Large<u8>,
+    pub bytes: PageVec<u8>,
     /// What was seen of it.
     pub seen: Seen,
 }
@@ -241,7 +241,7 @@ pub fn open_input(
 pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<InputFile, InputError> {
     let mut file = open_input(path, limit, setting)?;
     let about = file.size() as usize;
-    let bytes = Large::read(&mut file, about).map_err(|error| file.error(error))?;
+    let bytes = PageVec::read(&mut file, about).map_err(|error| file.error(error))?;
     Ok(InputFile {
         bytes,
         seen: file.finish()?,

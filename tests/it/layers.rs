@@ -12,7 +12,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("indicatif", &["cli"]),
     ("anyhow", &["cli"]),
     ("toml", &["cli", "config"]),
-    ("pulp", &["wide"]),
+    ("pulp", &["simd"]),
     ("nalgebra", &["stages", "demo", "mesh", "raster", "report"]),
 ];
 

@@ -130,10 +130,10 @@ fn a_stage_that_panics_fails_its_pair_and_shows_the_way_to_it_only_where_that_is
     let told = "the stage panicked (asked for by a test): a defect of this program, please report it with what \
         `run --rerun failed -v` tells";
     assert_eq!(failure.message, told);
-    for words in ["thread '", "RUST_BACKTRACE", "breakpoint.rs"] {
+    for words in ["thread '", "RUST_BACKTRACE", "failpoint.rs"] {
         assert!(!plain.err.contains(words), "{}", plain.err);
     }
-    assert!(verbose.err.contains("breakpoint.rs"), "{}", verbose.err);
+    assert!(verbose.err.contains("failpoint.rs"), "{}", verbose.err);
 }
 
 #[test]

@@ -16,7 +16,7 @@ use crate::cli::{call, mocban};
 use crate::resume::{finished, pairs, project, results, run, run_telling, stages_done};
 
 /// Makes leases last a second instead of nearly a minute, and everything else that goes with them as much shorter.
-const HASTE: (&str, &str) = ("MOCBAN_HASTE", "50");
+const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "50");
 
 /// Most pairs of a test here.
 const MOST: &str = "4";
@@ -65,7 +65,7 @@ impl World {
     fn stopped(count: &str) -> (Self, Running) {
         loop {
             let world = Self::new(count);
-            let stopped = world.stopped_at("fit:filed", &[HASTE]);
+            let stopped = world.stopped_at("fit:filed", &[TIME_SCALE]);
             if holder(&world.project.catalog_path()).is_none() {
                 return (world, stopped);
             }
@@ -215,7 +215,7 @@ fn who_joins_with_other_settings_is_refused_and_told_which() {
 fn what_a_stopped_process_stores_too_late_changes_nothing() {
     let (world, mut stopped) = World::stopped("2");
 
-    let second = Running::start(joined(&world.project).envs([HASTE]));
+    let second = Running::start(joined(&world.project).envs([TIME_SCALE]));
     let (code, json, said) = second.end();
     assert_eq!(code, Some(0), "{said}");
     assert_eq!(json["stages"], 8);
@@ -273,7 +273,7 @@ fn pairs_of_a_dead_process_come_back_to_one_that_lives() {
     let world = World::new("3");
     let (mut owner, _file) = world.held("fit:computed");
     let mut command = joined(&world.project);
-    let mut second = Running::start(command.envs([HASTE]));
+    let mut second = Running::start(command.envs([TIME_SCALE]));
     second.wait_until("the others are done", || stages_done(&world.project) == 8);
     owner.send(Signal::KILL);
     let (code, json, said) = second.end();

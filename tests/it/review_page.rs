@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use mocban::catalog::{Catalog, ControlAnswer};
+use mocban::catalog::{AttentionCheckAnswer, Catalog};
 use mocban::domain::{Reason, Verdict};
 use mocban::store::Project;
 use serde_json::{Value, json};
@@ -22,7 +22,7 @@ pub(crate) fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -
     })
 }
 
-fn controls(project: &Project) -> Vec<ControlAnswer> {
+fn controls(project: &Project) -> Vec<AttentionCheckAnswer> {
     ask(project, async |catalog| {
         catalog.control_answers().await.expect("answers")
     })

@@ -5,7 +5,8 @@ use crate::catalog::{
     AnsweredOn, Catalog, CatalogError, HandAlignment, Look, NewVerdict, Shown, connect,
 };
 use crate::domain::{
-    Affine2, ContentHash, Control, PrintFromMesh, Queue, Reason, ThresholdMetric, Verdict,
+    Affine2, AttentionCheck, ContentHash, PrintFromMesh, Reason, ReviewOrder, ThresholdMetric,
+    Verdict,
 };
 
 fn given(event: &str, verdict: Verdict) -> NewVerdict {
@@ -21,7 +22,7 @@ fn given(event: &str, verdict: Verdict) -> NewVerdict {
             seen: Some(ContentHash::of(b"seen")),
             shown_ms: Some(1_900),
             angle_read_deg: Some(-4.5),
-            queue: Some(Queue::Random),
+            queue: Some(ReviewOrder::Random),
         },
         at: None,
     }
@@ -37,8 +38,8 @@ fn two() -> Shown {
 }
 
 fn turned() -> Shown {
-    Shown::Control {
-        control: Control::Turned { angle_deg: 9.5 },
+    Shown::AttentionCheck {
+        control: AttentionCheck::Turned { angle_deg: 9.5 },
         metric: ThresholdMetric::Density,
         result_hash: ContentHash::of(b"density"),
     }
@@ -98,7 +99,10 @@ async fn answers_to_controls_are_no_verdicts() {
     assert!(counted(&world.catalog).await.iter().all(Vec::is_empty));
     let controls = world.catalog.control_answers().await.expect("controls");
     assert_eq!(controls.len(), 1);
-    assert_eq!(controls[0].control, Control::Turned { angle_deg: 9.5 });
+    assert_eq!(
+        controls[0].control,
+        AttentionCheck::Turned { angle_deg: 9.5 }
+    );
     assert!(controls[0].control.is_fault());
     assert_eq!(controls[0].look.shown_ms, Some(1_900));
 }

@@ -3,7 +3,9 @@
 use sqlx::Connection as _;
 
 use super::World;
-use crate::domain::{FailureClass, JobStatus, LengthUnit, Queue, Reason, ThresholdMetric, Verdict};
+use crate::domain::{
+    FailureClass, JobStatus, LengthUnit, Reason, ReviewOrder, ThresholdMetric, Verdict,
+};
 
 /// Every name that the schema's checks allow is one of ours, and the other way round.
 #[tokio::test]
@@ -38,7 +40,7 @@ async fn checks_of_the_schema_and_our_enums_agree() {
             metric,
             ThresholdMetric::ALL.map(ThresholdMetric::name).to_vec(),
         ),
-        (queue, Queue::ALL.map(Queue::name).to_vec()),
+        (queue, ReviewOrder::ALL.map(ReviewOrder::name).to_vec()),
         (class, FailureClass::ALL.map(FailureClass::name).to_vec()),
         (unit, LengthUnit::ALL.map(LengthUnit::name).to_vec()),
     ] {

@@ -4,7 +4,7 @@
 //! which reads it or stumbles over it. What is read here is read as `tobj` would have.
 
 use super::super::{Limits, Mesh, Vertices, text};
-use crate::large::Large;
+use crate::page_vec::PageVec;
 
 /// Digits that a 64-bit mantissa surely holds, and the largest one that a float holds exactly.
 const DIGITS: usize = 19;
@@ -25,8 +25,8 @@ pub(super) fn read(bytes: &[u8], limits: &Limits) -> Option<Mesh> {
     if !bytes.contains(&b'\n') && bytes.contains(&b'\r') {
         return None;
     }
-    let mut vertices: Large<[f64; 3]> = Large::with_capacity(bytes.len() / BYTES_PER_VERTEX);
-    let mut triangles = Large::with_capacity(bytes.len() / BYTES_PER_TRIANGLE);
+    let mut vertices: PageVec<[f64; 3]> = PageVec::with_capacity(bytes.len() / BYTES_PER_VERTEX);
+    let mut triangles = PageVec::with_capacity(bytes.len() / BYTES_PER_TRIANGLE);
     let mut line = Line { rest: bytes };
     while !line.rest.is_empty() {
         line.skip_space();
@@ -131,7 +131,7 @@ impl Line<'_> {
 
     /// The corners of a polygon, vertices of so many until here, as a fan around its first; fewer than three are no
     /// face.
-    fn face(&mut self, vertices: usize, triangles: &mut Large<[u32; 3]>) -> Option<()> {
+    fn face(&mut self, vertices: usize, triangles: &mut PageVec<[u32; 3]>) -> Option<()> {
         let (mut first, mut last) = (0, 0);
         for count in 0.. {
             self.skip_space();
@@ -192,10 +192,13 @@ const fn is_end_of_word(byte: u8) -> bool {
 
 /// The vertices that faces use, in the order of their first use, which the faces name then; `None` when one is not
 /// there.
-fn in_order_of_use(all: &[[f64; 3]], triangles: &mut Large<[u32; 3]>) -> Option<Large<[f64; 3]>> {
+fn in_order_of_use(
+    all: &[[f64; 3]],
+    triangles: &mut PageVec<[u32; 3]>,
+) -> Option<PageVec<[f64; 3]>> {
     const UNUSED: u32 = u32::MAX;
     let mut place_of = vec![UNUSED; all.len()];
-    let mut vertices = Large::with_capacity(all.len());
+    let mut vertices = PageVec::with_capacity(all.len());
     for index in triangles.as_flattened_mut() {
         let place = place_of.get_mut(*index as usize)?;
         if *place == UNUSED {

@@ -3,7 +3,7 @@
 use super::super::{Error, Limits, Mesh, Vertices, error, text};
 use super::header::{Element, Header, Scalar, Shape};
 use super::source::{NoNumber, Source};
-use crate::large::Large;
+use crate::page_vec::PageVec;
 
 /// Names under which programs write a face's corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -74,7 +74,7 @@ impl<S: Source> Body<'_, S> {
             what: match element.name.as_str() {
                 "vertex" => "vertices".into(),
                 "face" => "faces".into(),
-                other => format!("rows of {}", text::plain(other)),
+                other => format!("rows of {}", text::sanitize(other)),
             },
             have,
             want: element.rows,
@@ -99,9 +99,9 @@ impl<S: Source> Body<'_, S> {
         let most = self.source.most_rows(element).min(element.rows) as usize;
         if self.mesh.vertices.is_empty() {
             self.mesh.vertices = if self.header.has_single_vertices() {
-                Vertices::Single(Large::with_capacity(most))
+                Vertices::Single(PageVec::with_capacity(most))
             } else {
-                Vertices::Double(Large::with_capacity(most))
+                Vertices::Double(PageVec::with_capacity(most))
             };
         }
         let plain = if element.is_plain_position() && places == [0, 1, 2] {
@@ -191,7 +191,7 @@ impl<S: Source> Body<'_, S> {
         let plain = element.plain_corners().filter(|_| joining == Joining::Fan);
         let most = self.source.most_rows(element).min(element.rows);
         if plain.is_some() && self.mesh.triangles.is_empty() {
-            self.mesh.triangles = Large::with_capacity(most as usize);
+            self.mesh.triangles = PageVec::with_capacity(most as usize);
         }
         let mut few = Vec::with_capacity(FEW);
         let mut row = 0;
@@ -382,7 +382,7 @@ fn length(count: f64) -> Result<u64, NoNumber> {
 
 fn wrong_row(element: &Element, row: u64, reason: String) -> Error {
     Error::Row {
-        element: text::plain(&element.name),
+        element: text::sanitize(&element.name),
         row: row + 1,
         reason,
     }

@@ -8,7 +8,7 @@ use std::io::{BufRead, Cursor, Seek};
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
 use super::{Grid, Limits, Picture};
-use crate::domain::{FileKind, plain};
+use crate::domain::{FileKind, sanitize};
 
 pub use error::DecodeError;
 
@@ -153,7 +153,7 @@ fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {
 fn broken(kind: FileKind, reason: &str) -> DecodeError {
     DecodeError::Broken {
         kind,
-        reason: plain(reason, 160),
+        reason: sanitize(reason, 160),
     }
 }
 

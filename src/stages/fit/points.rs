@@ -5,7 +5,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::wide::widely;
+use crate::simd::dispatch;
 
 /// Points that are looked at together.
 const LANES: usize = 4;
@@ -72,7 +72,7 @@ impl Points {
     ) -> Coefficients {
         let (blocks, whole) = (&self.blocks, self.count / LANES);
         // Sums and points of its own: what may lie in one place is not computed side by side.
-        let mut sums = widely(
+        let mut sums = dispatch(
             #[inline(always)]
             || {
                 let mut sums = Sums::default();

@@ -2,9 +2,9 @@
 
 use super::heap::Heap;
 use crate::raster::{DepthMap, PixelBox};
+use crate::simd::dispatch;
 use crate::stages::otsu;
 use crate::stages::pose::Soft;
-use crate::wide::widely;
 
 /// Every how many pixels the heights are looked at when tops and ground are told apart.
 const STRIDE: usize = 3;
@@ -88,7 +88,7 @@ impl Relief {
         let per_level = (scale.height_per_level / self.depth()) as f32;
         let none = ((self.top - scale.height(1)) / self.depth()) as f32 + per_level;
         let of_level = |level: u16| (none - per_level * f32::from(level)).clamp(-1.0, 2.0);
-        widely(
+        dispatch(
             #[inline(always)]
             || Soft {
                 amount: depth.levels.map(|level| of_level(*level)),

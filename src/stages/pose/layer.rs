@@ -2,8 +2,8 @@
 
 use crate::domain::Affine2;
 use crate::raster::{Grid, Mask, PixelBox, resample, resample_made, resample_turned};
+use crate::simd::dispatch;
 use crate::stages::blur::{blur, blur_turned};
-use crate::wide::widely;
 
 /// How much of something each pixel holds, 0..=1, and where that is known.
 #[derive(Debug, Clone)]
@@ -177,7 +177,7 @@ impl<'a> Sizer<'a> {
         let mut value = slow(&amount, self.size);
         let mut held = self.weight.clone();
         let [width, height] = self.sides;
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 let count = width * height;

@@ -10,7 +10,7 @@ use super::step::{Loss, Room, Step};
 use super::{Layer, Overlap};
 use crate::domain::Affine2;
 use crate::raster::Grid;
-use crate::wide::widely;
+use crate::simd::dispatch;
 
 /// A step that moves the layer's rim by less than this many pixels ends the refinement.
 const SETTLED_PX: f64 = 0.03;
@@ -208,7 +208,7 @@ impl<'a> Refiner<'a> {
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
         let runs = places.chunks(RUN).zip(values.chunks(RUN));
         let mut explained = 0.0_f64;
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 for (places, values) in runs {

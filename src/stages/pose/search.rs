@@ -8,7 +8,7 @@ use rustfft::{Fft, FftPlanner};
 
 use super::Layer;
 use crate::domain::Affine2;
-use crate::wide::{index, whole_below, widely};
+use crate::simd::{dispatch, index, whole_below};
 
 /// Pixels that are looked at side by side.
 const LANES: usize = 8;
@@ -205,7 +205,7 @@ fn centred(layer: &Layer, turn: Option<(f64, f64)>) -> Vec<f32> {
     let mut values = vec![0.0; SQUARE * SQUARE];
     let (runs, _) = values.as_chunks_mut::<LANES>();
     // Layers are smooth at this size, so one look a pixel does even where the scale shrinks them.
-    widely(
+    dispatch(
         #[inline(always)]
         || {
             for (run, values) in runs.iter_mut().enumerate() {

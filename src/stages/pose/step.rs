@@ -2,7 +2,7 @@
 
 use nalgebra::{Matrix6, Vector6};
 
-use crate::wide::widely;
+use crate::simd::dispatch;
 
 /// Residuals beyond this many of their median count less: what stands on one side only must not decide.
 const ROBUST: f32 = 2.5;
@@ -81,7 +81,7 @@ impl Room {
     /// Least-squares gain and offset of the fixed values over the moving ones; the gain never below a trifle.
     fn gain_and_offset(&self) -> (f32, f32) {
         let looks = &self.looks;
-        let totals = widely(
+        let totals = dispatch(
             #[inline(always)]
             || {
                 let mut totals = [0.0_f64; 4];
@@ -141,7 +141,7 @@ impl Step {
         };
         let (looks, count, fit) = (&room.looks, room.count, [gain, offset, limit]);
         // Sums and looks of its own: what may lie in one place is not computed side by side.
-        let totals = widely(
+        let totals = dispatch(
             #[inline(always)]
             || {
                 let mut totals = [0.0_f64; SUMS + 1];

@@ -6,7 +6,7 @@
 //! weights of the spread and of the rim were chosen by hand, so that poses a few percent off and cuts through worn
 //! or tilted tops come among the least sure.
 
-use crate::domain::Evidence;
+use crate::domain::PoseFeatures;
 
 /// Weights of the logarithms of correlation, tops met, ink met, other angle and mirrored; the first stands alone.
 const POSE: [f64; 6] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
@@ -22,7 +22,7 @@ const FLOOR: f64 = 0.02;
 const RATIO: [f64; 2] = [0.2, 1.5];
 
 /// Chance, 0..=1, that the pose is right: turned within 5 degrees, landmarks within 5 % of the character's height.
-pub(super) fn of_pose(evidence: &Evidence) -> f64 {
+pub(super) fn of_pose(evidence: &PoseFeatures) -> f64 {
     let share = |value: f64| value.max(FLOOR).ln();
     let ratio = |value: f64| value.clamp(RATIO[0], RATIO[1]).ln();
     let features = [
@@ -51,7 +51,7 @@ pub(super) struct Areas {
 }
 
 /// Chance, 0..=1, that a depth mask is true to the tops (intersection over union of 0.7 or more) when the pose is.
-pub(super) fn of_mask(evidence: &Evidence, areas: Areas) -> f64 {
+pub(super) fn of_mask(evidence: &PoseFeatures, areas: Areas) -> f64 {
     let over_relief = |area: f64| (area.max(1e-6) / areas.relief.max(1e-6)).ln();
     let (mask, ink) = (over_relief(areas.mask), over_relief(areas.ink));
     let features = [
@@ -79,9 +79,9 @@ fn logistic(value: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::{Areas, of_mask, of_pose};
-    use crate::domain::Evidence;
+    use crate::domain::PoseFeatures;
 
-    const PLAIN: Evidence = Evidence {
+    const PLAIN: PoseFeatures = PoseFeatures {
         correlation: 0.88,
         tops_met: 0.94,
         ink_met: 0.91,
@@ -95,23 +95,23 @@ mod tests {
         let plain = of_pose(&PLAIN);
         assert!(plain > 0.99);
         let worse = [
-            Evidence {
+            PoseFeatures {
                 correlation: 0.4,
                 ..PLAIN
             },
-            Evidence {
+            PoseFeatures {
                 tops_met: 0.5,
                 ..PLAIN
             },
-            Evidence {
+            PoseFeatures {
                 ink_met: 0.4,
                 ..PLAIN
             },
-            Evidence {
+            PoseFeatures {
                 other_angle: 0.95,
                 ..PLAIN
             },
-            Evidence {
+            PoseFeatures {
                 mirrored: 1.1,
                 ..PLAIN
             },
@@ -138,7 +138,7 @@ mod tests {
 
     #[test]
     fn a_pose_that_hangs_on_its_start_is_trusted_less() {
-        let chance = |spread| of_mask(&Evidence { spread, ..PLAIN }, LIKE);
+        let chance = |spread| of_mask(&PoseFeatures { spread, ..PLAIN }, LIKE);
         assert!(chance(0.0005) > 0.95);
         assert!(chance(0.02) < 0.7);
     }
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn another_characters_print_is_not_believed() {
-        let wrong = Evidence {
+        let wrong = PoseFeatures {
             correlation: 0.34,
             tops_met: 0.65,
             ink_met: 0.68,

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use super::normalize::{Normalized, Relief};
 use super::score::{self, SsimWindow, WindowMeans};
 use crate::domain::{
-    Affine2, Evidence, FailureClass, MetricOutcome, RegisterOutcome, Scores, ThresholdMetric,
+    Affine2, FailureClass, MetricOutcome, PoseFeatures, RegisterOutcome, Scores, ThresholdMetric,
 };
 use crate::raster::{DepthMap, Mask, warp_mask};
 
@@ -216,7 +216,7 @@ fn masks(alignments: &[Alignment], strokes: impl Fn(&Affine2, &[u16]) -> Vec<Mas
 
 /// Gives each metric its confidence: the pose's, and the mask's beside the one that the relief alone chose. `growth` is
 /// that of the strokes at a level.
-fn trust(metrics: &mut [MetricOutcome], evidence: &Evidence, growth: impl Fn(u16) -> f64) {
+fn trust(metrics: &mut [MetricOutcome], evidence: &PoseFeatures, growth: impl Fn(u16) -> f64) {
     let pose = confidence::of_pose(evidence);
     let rim = |outcome: &MetricOutcome| {
         growth(outcome.threshold_level) * outcome.scores.density_depth.sqrt()
@@ -239,7 +239,7 @@ fn trust(metrics: &mut [MetricOutcome], evidence: &Evidence, growth: impl Fn(u16
 }
 
 /// Refuses what cannot be told to be the same character.
-fn require_match(evidence: &Evidence, params: &Params) -> Result<(), Error> {
+fn require_match(evidence: &PoseFeatures, params: &Params) -> Result<(), Error> {
     let confidence = confidence::of_pose(evidence);
     if evidence.mirrored > MIRROR_WINS && params.least_confidence > 0.0 {
         Err(Error::Mirrored {

@@ -4,7 +4,7 @@
 use super::cuts::{Cuts, FEW_CUTS, near};
 use super::stretch::stretched;
 use super::{Alignment, Error, Params};
-use crate::domain::{Affine2, Evidence, Pose};
+use crate::domain::{Affine2, Pose, PoseFeatures};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{Normalized, Relief, soft_stroke};
 use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Sizer, Soft, Surroundings};
@@ -34,7 +34,7 @@ pub(super) fn align(
     relief: &Relief,
     normalized: &Normalized,
     params: &Params,
-) -> Result<(Vec<Alignment>, Evidence), Error> {
+) -> Result<(Vec<Alignment>, PoseFeatures), Error> {
     let pictures = Pictures::new(depth, relief, normalized, params).ok_or(Error::NoPose)?;
     let few = pictures.at(COMPARED);
     let mut rivals = Rivals::of(&few, normalized).ok_or(Error::NoPose)?;
@@ -139,9 +139,9 @@ impl Rivals {
     }
 
     /// What speaks for and against the best pose.
-    fn evidence(&self, spread: f64) -> Evidence {
+    fn evidence(&self, spread: f64) -> PoseFeatures {
         let [other_angle, mirrored] = self.shares;
-        Evidence {
+        PoseFeatures {
             correlation: self.best.found.score,
             tops_met: self.best.overlap.moving_met,
             ink_met: self.best.overlap.fixed_met,

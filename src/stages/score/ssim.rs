@@ -5,7 +5,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::raster::{Grid, Mask, PixelBox};
-use crate::wide::widely;
+use crate::simd::dispatch;
 
 /// Stabilising constants for a data range of 1: `C1 = (0.01)^2`, `C2 = (0.03)^2`.
 const C1: f64 = 0.01 * 0.01;
@@ -109,7 +109,7 @@ impl WindowMeans {
             let own = &self.means.row(y)[windows.columns.clone()];
             sums.add_row::<LUMINANCE>(own, other, both, self.covariance_factor);
         };
-        widely(
+        dispatch(
             #[inline(always)]
             || self.taps.each_row([other, &both], &windows, rows),
         );

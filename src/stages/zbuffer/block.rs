@@ -2,7 +2,7 @@
 
 use super::small::Small;
 use super::triangle::fill;
-use crate::wide::{higher, lower, whole_below};
+use crate::simd::{higher, lower, whole_below};
 
 /// Triangles that are asked together whether they hold a pixel's centre: most of a scan's are too small.
 pub(super) const LANES: usize = 8;

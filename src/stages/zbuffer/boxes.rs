@@ -1,7 +1,7 @@
 //! Boxes around blocks of triangles: a block that cannot matter is passed over without a look at its triangles.
 
 use super::{Block, LANES, Lanes, Row};
-use crate::wide::{higher, lower};
+use crate::simd::{higher, lower};
 
 /// The boxes are wider than the blocks by this share of the surface's extent and of their own places, so that rounding
 /// never leaves a corner outside.

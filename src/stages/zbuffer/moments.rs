@@ -4,8 +4,8 @@
 use nalgebra::{Matrix3, Vector3};
 
 use super::{Block, LANES, Lanes, Shell};
+use crate::simd::dispatch;
 use crate::stages::bulk::Bounds;
-use crate::wide::widely;
 
 /// Products of two axes, each kept once.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
@@ -27,7 +27,7 @@ impl Moments {
         }
         let around = Around::of(shell);
         let mut sums = [0.0; SUMS];
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 for (run, blocks) in shell.blocks.chunks(RUN).enumerate() {

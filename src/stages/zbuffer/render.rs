@@ -5,8 +5,8 @@ use super::triangle::pixels;
 use super::{Shell, View};
 use crate::domain::Rigid3;
 use crate::raster::Grid;
+use crate::simd::{dispatch, higher};
 use crate::stages::bulk::bulk_along;
-use crate::wide::{higher, widely};
 
 /// Height of a pixel that no surface covers.
 pub(in crate::stages) const NOTHING: f32 = f32::NEG_INFINITY;
@@ -74,7 +74,7 @@ impl Shell {
     /// Fills the triangles that hold a pixel's centre.
     fn fill_all(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
         let [u, v, _] = rows;
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
@@ -96,7 +96,7 @@ impl Shell {
         const GROUPS: usize = 16;
         let [u, v, _] = rows;
         let mut few: Vec<&Block> = Vec::with_capacity(GROUPS * LANES);
-        widely(
+        dispatch(
             #[inline(always)]
             || {
                 let blocks = self.blocks.chunks(GROUPS * LANES);

@@ -4,7 +4,7 @@
 //! (but for the sign of a zero that two triangles share).
 
 use super::block::{LANES, Lanes};
-use crate::wide::{higher, index, lower, whole_above, whole_below};
+use crate::simd::{higher, index, lower, whole_above, whole_below};
 
 /// Triangles that reach over more columns or rows of pixels are filled one by one.
 const MOST_PX: f32 = 4.0;
@@ -155,7 +155,7 @@ mod tests {
 
     use super::super::block::{Block, LANES, Row, fill_block};
     use super::super::triangle::fill;
-    use crate::wide::higher;
+    use crate::simd::higher;
 
     const SIZE: [usize; 2] = [9, 7];
     const AS_THEY_ARE: [Row; 3] = [

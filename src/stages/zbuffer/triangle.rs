@@ -1,6 +1,6 @@
 //! One triangle on a grid: which pixels' centres it holds, and how high it is there.
 
-use crate::wide::{higher, lower};
+use crate::simd::{higher, lower};
 
 /// In triangles wider than this each row is cut to where the edges cross it before its pixels are asked.
 const WIDE_COLUMNS: usize = 12;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// The order of a review.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Queue {
+pub enum ReviewOrder {
     /// By lot from a seed: what was read so far stands for all.
     Random,
     /// The most doubtful first, to find failures: what was read so far does not stand for all.
@@ -14,7 +14,7 @@ pub enum Queue {
     Adjudicate,
 }
 
-impl Queue {
+impl ReviewOrder {
     /// Every order.
     pub const ALL: [Self; 3] = [Self::Random, Self::Risk, Self::Adjudicate];
 
@@ -28,13 +28,13 @@ impl Queue {
     }
 }
 
-impl std::fmt::Display for Queue {
+impl std::fmt::Display for ReviewOrder {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
     }
 }
 
-impl std::str::FromStr for Queue {
+impl std::str::FromStr for ReviewOrder {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {

@@ -30,7 +30,7 @@ pub(crate) enum Point {
 
 /// Dies, stops or waits here if a test asks for it.
 #[cfg(debug_assertions)]
-pub(crate) fn reach(stage: Stage, point: Point, pair: Option<&PairName>) {
+pub(crate) fn hit(stage: Stage, point: Point, pair: Option<&PairName>) {
     use test_build::{Wanted, asked};
 
     if asked(&test_build::BREAK_AT, "MOCBAN_BREAK_AT").is_some_and(|at| at.is(stage, point, pair)) {
@@ -53,7 +53,7 @@ pub(crate) fn reach(stage: Stage, point: Point, pair: Option<&PairName>) {
 
 /// Nothing to reach in a release build.
 #[cfg(not(debug_assertions))]
-pub(crate) const fn reach(_stage: Stage, _point: Point, _pair: Option<&PairName>) {}
+pub(crate) const fn hit(_stage: Stage, _point: Point, _pair: Option<&PairName>) {}
 
 /// What only a build with debug assertions looks at.
 #[cfg(debug_assertions)]

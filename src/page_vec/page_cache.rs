@@ -13,19 +13,19 @@ const ROOMY: usize = 4;
 const FREELY: usize = 32 << 20;
 
 /// Pages that are not needed any more.
-struct Kept {
+struct PageCache {
     /// The least first.
     pages: Vec<MmapMut>,
     /// Most bytes of them.
     most: usize,
 }
 
-static KEPT: Mutex<Kept> = Mutex::new(Kept {
+static PAGE_CACHE: Mutex<PageCache> = Mutex::new(PageCache {
     pages: Vec::new(),
     most: MOST_KEPT,
 });
 
-impl Kept {
+impl PageCache {
     /// Those that fit so many bytes best. Else as many as make up for those that must be had of the system, which are to
     /// be given back: scans of one run differ in size, and one that is larger than all before must not add to them.
     fn take(&mut self, bytes: usize) -> Result<MmapMut, Vec<MmapMut>> {
@@ -68,14 +68,14 @@ impl Kept {
 }
 
 /// Those of the whole program. Nothing that can fail is done with them.
-fn kept() -> MutexGuard<'static, Kept> {
-    KEPT.lock().unwrap_or_else(PoisonError::into_inner)
+fn kept() -> MutexGuard<'static, PageCache> {
+    PAGE_CACHE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Pages of memory that hold anything.
-pub(super) struct Pages(Option<MmapMut>);
+pub(super) struct PageBuffer(Option<MmapMut>);
 
-impl Pages {
+impl PageBuffer {
     /// For so many bytes; `None` where the system gives none.
     pub(super) fn of(bytes: usize) -> Option<Self> {
         let found = kept().take(bytes);
@@ -93,7 +93,7 @@ impl Pages {
     }
 }
 
-impl Drop for Pages {
+impl Drop for PageBuffer {
     fn drop(&mut self) {
         if let Some(pages) = self.0.take() {
             let back = kept().put(pages);
@@ -102,7 +102,7 @@ impl Drop for Pages {
     }
 }
 
-impl Deref for Pages {
+impl Deref for PageBuffer {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
@@ -110,7 +110,7 @@ impl Deref for Pages {
     }
 }
 
-impl DerefMut for Pages {
+impl DerefMut for PageBuffer {
     fn deref_mut(&mut self) -> &mut [u8] {
         self.0.as_deref_mut().unwrap_or_default()
     }
@@ -130,16 +130,16 @@ pub fn keep_memory(limit: Option<u64>) {
 
 #[cfg(test)]
 mod tests {
-    use super::{Kept, MOST_KEPT, MmapMut};
+    use super::{MOST_KEPT, MmapMut, PageCache};
 
     #[test]
     fn pages_that_fit_are_used_again_and_none_beyond_the_limit_are_kept() {
-        let mut kept = Kept {
+        let mut kept = PageCache {
             pages: Vec::new(),
             most: MOST_KEPT,
         };
         let pages = |mebibytes: usize| MmapMut::map_anon(mebibytes << 20).expect("pages");
-        let held = |kept: &Kept| {
+        let held = |kept: &PageCache| {
             kept.pages
                 .iter()
                 .map(|pages| pages.len() >> 20)

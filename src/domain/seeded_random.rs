@@ -4,13 +4,13 @@ use super::ContentHash;
 
 /// A lot drawn for a thing: the same for the same seed, person, thing and purpose.
 #[derive(Debug, Clone)]
-pub struct Lots {
+pub struct SeededRandom {
     seed: u64,
     who: String,
 }
 
-impl Lots {
-    /// Lots of a seed for a reader, or for whoever draws.
+impl SeededRandom {
+    /// Random numbers of a seed for a reader, or for whoever draws.
     pub fn new(seed: u64, who: &str) -> Self {
         Self {
             seed,
@@ -35,12 +35,12 @@ impl Lots {
 
 #[cfg(test)]
 mod tests {
-    use super::Lots;
+    use super::SeededRandom;
     use crate::domain::ContentHash;
 
     #[test]
     fn lots_fall_evenly() {
-        let lots = Lots::new(7, "ana");
+        let lots = SeededRandom::new(7, "ana");
         let low = (0..2000_u32).filter(|i| {
             let thing = ContentHash::of(&i.to_le_bytes());
             lots.draw(&thing, "control") < 0.25

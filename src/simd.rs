@@ -6,7 +6,7 @@
 /// Runs `work` with the widest instructions that the processor has. Only what is inlined into it gains: mark it, and the
 /// functions that it calls, `#[inline(always)]`.
 #[inline(always)]
-pub(crate) fn widely<R>(work: impl FnOnce() -> R) -> R {
+pub(crate) fn dispatch<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
 }
 
@@ -46,7 +46,7 @@ pub(crate) fn index(whole: f32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::widely;
+    use super::dispatch;
 
     #[inline(always)]
     fn sums(values: &[f32]) -> [u32; 8] {
@@ -62,7 +62,7 @@ mod tests {
     #[test]
     fn wide_and_narrow_give_the_same_bits() {
         let values: Vec<f32> = (0..4096).map(|k| (k as f32 * 0.7).sin()).collect();
-        let wide = widely(
+        let wide = dispatch(
             #[inline(always)]
             || sums(&values),
         );
@@ -72,7 +72,7 @@ mod tests {
     #[test]
     fn a_panic_comes_through() {
         let none: Vec<f32> = Vec::new();
-        let caught = std::panic::catch_unwind(|| widely(|| none[3]));
+        let caught = std::panic::catch_unwind(|| dispatch(|| none[3]));
         assert!(caught.is_err());
     }
 }

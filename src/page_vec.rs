@@ -3,7 +3,7 @@
 //! The system clears memory page by page as it is first touched. For a vector of many megabytes that takes longer than
 //! filling it, unless the pages are large; so pages that are not needed any more are kept for the next vector.
 
-mod pages;
+mod page_cache;
 
 use std::fmt;
 use std::io::{self, ErrorKind, Read};
@@ -11,20 +11,20 @@ use std::ops::{Deref, DerefMut};
 
 use bytemuck::Pod;
 
-use pages::Pages;
-pub use pages::keep_memory;
+use page_cache::PageBuffer;
+pub use page_cache::keep_memory;
 
 /// Bytes from which on a vector lies on pages of its own.
 const LARGE: usize = 1 << 20;
 /// A vector of plain numbers that may be large. What it cannot do a slice can, or [`Vec`] before it is turned into one.
-pub struct Large<T>(Place<T>);
+pub struct PageVec<T>(Place<T>);
 
 enum Place<T> {
     Small(Vec<T>),
-    Pages { pages: Pages, len: usize },
+    PageBuffer { pages: PageBuffer, len: usize },
 }
 
-impl<T: Pod> Large<T> {
+impl<T: Pod> PageVec<T> {
     /// Without elements, and with room for so many.
     pub fn with_capacity(capacity: usize) -> Self {
         let bytes = capacity.saturating_mul(size_of::<T>());
@@ -35,15 +35,15 @@ impl<T: Pod> Large<T> {
 
     /// On pages of its own; `None` where the system gives none.
     fn on_pages(bytes: usize) -> Option<Self> {
-        let pages = Pages::of(bytes)?;
-        Some(Self(Place::Pages { pages, len: 0 }))
+        let pages = PageBuffer::of(bytes)?;
+        Some(Self(Place::PageBuffer { pages, len: 0 }))
     }
 
     /// How many elements there is room for.
     pub fn capacity(&self) -> usize {
         match &self.0 {
             Place::Small(vec) => vec.capacity(),
-            Place::Pages { pages, .. } => pages.len() / size_of::<T>(),
+            Place::PageBuffer { pages, .. } => pages.len() / size_of::<T>(),
         }
     }
 
@@ -52,14 +52,14 @@ impl<T: Pod> Large<T> {
     pub fn push(&mut self, element: T) {
         match &mut self.0 {
             Place::Small(vec) => vec.push(element),
-            Place::Pages { .. } => self.push_on_pages(element),
+            Place::PageBuffer { .. } => self.push_on_pages(element),
         }
     }
 
     /// Apart, so that what is small is pushed without a call.
     #[inline(never)]
     fn push_on_pages(&mut self, element: T) {
-        if let Place::Pages { pages, len } = &mut self.0
+        if let Place::PageBuffer { pages, len } = &mut self.0
             && let Some(place) = slots(pages).get_mut(*len)
         {
             *place = element;
@@ -74,7 +74,7 @@ impl<T: Pod> Large<T> {
     pub fn extend_from_slice(&mut self, elements: &[T]) {
         match &mut self.0 {
             Place::Small(vec) => vec.extend_from_slice(elements),
-            Place::Pages { pages, len } => {
+            Place::PageBuffer { pages, len } => {
                 if let Some(room) = slots(pages)[*len..].get_mut(..elements.len()) {
                     room.copy_from_slice(elements);
                     *len += elements.len();
@@ -93,7 +93,7 @@ impl<T: Pod> Large<T> {
     }
 }
 
-impl Large<u8> {
+impl PageVec<u8> {
     /// All bytes to the end, of which there are about so many.
     ///
     /// # Errors
@@ -104,7 +104,7 @@ impl Large<u8> {
             Place::Small(vec) => {
                 from.read_to_end(vec)?;
             }
-            Place::Pages { pages, len } => {
+            Place::PageBuffer { pages, len } => {
                 *len = fill(&mut from, pages)?;
                 if *len == pages.len() {
                     let mut rest = Vec::new();
@@ -135,37 +135,39 @@ pub fn fill(source: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
 }
 
 /// Pages as elements; what is left of their end is none.
-fn slots<T: Pod>(pages: &mut Pages) -> &mut [T] {
+fn slots<T: Pod>(pages: &mut PageBuffer) -> &mut [T] {
     let whole = pages.len() - pages.len() % size_of::<T>();
     bytemuck::cast_slice_mut(&mut pages[..whole])
 }
 
-impl<T: Pod> Deref for Large<T> {
+impl<T: Pod> Deref for PageVec<T> {
     type Target = [T];
 
     fn deref(&self) -> &[T] {
         match &self.0 {
             Place::Small(vec) => vec,
-            Place::Pages { pages, len } => bytemuck::cast_slice(&pages[..len * size_of::<T>()]),
+            Place::PageBuffer { pages, len } => {
+                bytemuck::cast_slice(&pages[..len * size_of::<T>()])
+            }
         }
     }
 }
 
-impl<T: Pod> DerefMut for Large<T> {
+impl<T: Pod> DerefMut for PageVec<T> {
     fn deref_mut(&mut self) -> &mut [T] {
         match &mut self.0 {
             Place::Small(vec) => vec,
-            Place::Pages { pages, len } => &mut slots(pages)[..*len],
+            Place::PageBuffer { pages, len } => &mut slots(pages)[..*len],
         }
     }
 }
 
-impl<T: Pod> Extend<T> for Large<T> {
+impl<T: Pod> Extend<T> for PageVec<T> {
     fn extend<I: IntoIterator<Item = T>>(&mut self, elements: I) {
         let mut elements = elements.into_iter();
         match &mut self.0 {
             Place::Small(vec) => return vec.extend(elements),
-            Place::Pages { pages, len } => {
+            Place::PageBuffer { pages, len } => {
                 for place in &mut slots(pages)[*len..] {
                     let Some(element) = elements.next() else {
                         return;
@@ -179,7 +181,7 @@ impl<T: Pod> Extend<T> for Large<T> {
     }
 }
 
-impl<T: Pod> FromIterator<T> for Large<T> {
+impl<T: Pod> FromIterator<T> for PageVec<T> {
     fn from_iter<I: IntoIterator<Item = T>>(elements: I) -> Self {
         let elements = elements.into_iter();
         let mut large = Self::with_capacity(elements.size_hint().0);
@@ -188,43 +190,43 @@ impl<T: Pod> FromIterator<T> for Large<T> {
     }
 }
 
-impl<T> From<Vec<T>> for Large<T> {
+impl<T> From<Vec<T>> for PageVec<T> {
     fn from(vec: Vec<T>) -> Self {
         Self(Place::Small(vec))
     }
 }
 
-impl<T> Default for Large<T> {
+impl<T> Default for PageVec<T> {
     fn default() -> Self {
         Vec::new().into()
     }
 }
 
-impl<T: Pod> Clone for Large<T> {
+impl<T: Pod> Clone for PageVec<T> {
     fn clone(&self) -> Self {
         self.iter().copied().collect()
     }
 }
 
-impl<T: Pod + PartialEq> PartialEq for Large<T> {
+impl<T: Pod + PartialEq> PartialEq for PageVec<T> {
     fn eq(&self, other: &Self) -> bool {
         **self == **other
     }
 }
 
-impl<T: Pod + PartialEq, const N: usize> PartialEq<[T; N]> for Large<T> {
+impl<T: Pod + PartialEq, const N: usize> PartialEq<[T; N]> for PageVec<T> {
     fn eq(&self, other: &[T; N]) -> bool {
         **self == *other
     }
 }
 
-impl<T: Pod + fmt::Debug> fmt::Debug for Large<T> {
+impl<T: Pod + fmt::Debug> fmt::Debug for PageVec<T> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         (**self).fmt(f)
     }
 }
 
-impl<'a, T: Pod> IntoIterator for &'a Large<T> {
+impl<'a, T: Pod> IntoIterator for &'a PageVec<T> {
     type Item = &'a T;
     type IntoIter = std::slice::Iter<'a, T>;
 
@@ -233,7 +235,7 @@ impl<'a, T: Pod> IntoIterator for &'a Large<T> {
     }
 }
 
-impl<'a, T: Pod> IntoIterator for &'a mut Large<T> {
+impl<'a, T: Pod> IntoIterator for &'a mut PageVec<T> {
     type Item = &'a mut T;
     type IntoIter = std::slice::IterMut<'a, T>;
 
@@ -246,7 +248,7 @@ impl<'a, T: Pod> IntoIterator for &'a mut Large<T> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{LARGE, Large, Place};
+    use super::{LARGE, PageVec, Place};
 
     type Element = [u32; 3];
 
@@ -254,9 +256,9 @@ mod tests {
     fn what_is_large_lies_on_pages_of_its_own() {
         let count = LARGE / size_of::<Element>() + 1;
         let is_on_pages = |count| {
-            let empty = Large::<Element>::with_capacity(count);
+            let empty = PageVec::<Element>::with_capacity(count);
             assert!(empty.is_empty() && empty.capacity() >= count);
-            matches!(empty.0, Place::Pages { .. })
+            matches!(empty.0, Place::PageBuffer { .. })
         };
         assert_eq!(is_on_pages(count), cfg!(target_os = "linux"));
         assert!(!is_on_pages(9));
@@ -266,7 +268,7 @@ mod tests {
     fn what_was_longer_or_shorter_than_told_is_read_whole() {
         let source: Vec<u8> = (0..LARGE + 9).map(|k| (k % 251) as u8).collect();
         for (len, told) in [(5, 0), (5, 9), (LARGE, LARGE + 7), (LARGE + 9, LARGE)] {
-            let read = Large::read(&source[..len], told).expect("memory refuses nothing");
+            let read = PageVec::read(&source[..len], told).expect("memory refuses nothing");
             assert!(*read == source[..len], "{len} {told}");
         }
     }
@@ -278,7 +280,7 @@ mod tests {
             first: Vec<Element>,
             more: Vec<Element>,
         ) {
-            let mut pages = Large::on_pages(room).expect("a page");
+            let mut pages = PageVec::on_pages(room).expect("a page");
             let mut vec = Vec::new();
             for element in first {
                 pages.push(element);
@@ -292,7 +294,7 @@ mod tests {
                 other[1] ^= 7;
             }
             prop_assert_eq!(&*pages, &*vec);
-            prop_assert_eq!(&pages, &Large::from(vec));
+            prop_assert_eq!(&pages, &PageVec::from(vec));
             prop_assert_eq!(&pages.clone(), &pages);
         }
     }

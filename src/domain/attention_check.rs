@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// A planted fault, or a result shown a second time. Answers to them are no verdicts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
-pub enum Control {
+pub enum AttentionCheck {
     /// A good result turned by so much, degrees clockwise on the screen.
     Turned {
         /// How far.
@@ -22,7 +22,7 @@ pub enum Control {
     Repeat,
 }
 
-impl Control {
+impl AttentionCheck {
     /// Name in JSON and in the catalog.
     pub const fn name(&self) -> &'static str {
         match self {
@@ -44,20 +44,23 @@ impl Control {
 
 #[cfg(test)]
 mod tests {
-    use super::Control;
+    use super::AttentionCheck;
     use serde_json::json;
 
     #[test]
     fn name_is_the_one_in_json() {
         for control in [
-            Control::Turned { angle_deg: -9.5 },
-            Control::Mirrored,
-            Control::Cut { level: 7 },
-            Control::Repeat,
+            AttentionCheck::Turned { angle_deg: -9.5 },
+            AttentionCheck::Mirrored,
+            AttentionCheck::Cut { level: 7 },
+            AttentionCheck::Repeat,
         ] {
             let value = json!(control);
             assert_eq!(value["kind"], control.name());
-            assert_eq!(serde_json::from_value::<Control>(value).ok(), Some(control));
+            assert_eq!(
+                serde_json::from_value::<AttentionCheck>(value).ok(),
+                Some(control)
+            );
         }
     }
 }
