@@ -7,8 +7,8 @@ use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 
 use super::exit::ExitCode;
 use super::{
-    agree, backup, check, completions, config, demo, export, import, man, report, retry, review,
-    run, sheet, show, status, verdict,
+    agreement, backup, check, completions, config, demo, export, import, man, report, retry, review,
+    run, contact_sheet, show, status, verdict,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -164,13 +164,13 @@ pub(super) enum Command {
     /// Judge results in the browser, by keys, and lay reliefs by hand
     Review(review::ReviewArgs),
     /// Tell how far readers agree, with each other and with themselves, and which faults they catch
-    Agree(agree::AgreeArgs),
+    Agreement(agreement::AgreementArgs),
     /// Print the table of all results
     Report(report::ReportArgs),
     /// Write the aligned pairs for other tools
     Export(export::ExportArgs),
     /// Lay many overlays on one PNG, worst first
-    Sheet(sheet::SheetArgs),
+    ContactSheet(contact_sheet::ContactSheetArgs),
     /// Show the settings in force
     #[command(subcommand)]
     Config(config::ConfigCommand),

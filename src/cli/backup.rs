@@ -9,7 +9,7 @@ use serde_json::json;
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::table::count;
-use super::talk;
+use super::output;
 use crate::catalog::{Catalog, VerdictEvent};
 use crate::export::json_lines;
 use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of, write_synced};
@@ -56,12 +56,12 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
     placed?;
     let bytes = std::fs::metadata(file)?.len();
     if context.global.json {
-        talk::print_json(&json!({
+        output::print_json(&json!({
             "schema": 1, "file": file, "bytes": bytes, "pairs": pairs, "verdicts": verdicts,
             "verdicts_file": verdicts_file(file),
         }))?;
     }
-    context.talk.say(&format!(
+    context.output.say(&format!(
         "{} and {} are in {shown}, {:.1} MB; pictures are not in it, `run` makes them again",
         count(pairs, "pair"),
         count(verdicts, "verdict"),

@@ -10,8 +10,8 @@ use clap::Args;
 use super::context::Context;
 use super::exit::ExitCode;
 use super::table::{Align, columns, count};
-use super::talk::{self, Palette, Tone};
-use super::trouble;
+use super::output::{self, Palette, Tone};
+use super::error_text;
 use crate::catalog::CatalogError;
 use crate::check::{CheckOptions, CheckSummary, Finding, Kind, Notes, Spare, check as look};
 use crate::runner::RunError;
@@ -46,12 +46,12 @@ pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
         Err(error) => return unreadable(error, context),
     };
     if context.global.json {
-        talk::print_json(&summary)?;
+        output::print_json(&summary)?;
     } else {
-        talk::print(&text(&summary, args.repair, context.talk.out))?;
+        output::print(&text(&summary, args.repair, context.output.out))?;
     }
     for command in next_steps(&summary, args.repair) {
-        context.talk.next(&context.command(command));
+        context.output.next(&context.command(command));
     }
     Ok(if summary.left() > 0 {
         ExitCode::Damaged
@@ -73,8 +73,8 @@ fn is_of_database(checked: &anyhow::Result<CheckSummary>) -> bool {
     match checked {
         Ok(summary) => summary.damage.contains_key(&Kind::Database) && summary.left() > 0,
         Err(error) => {
-            let error = error.chain().find_map(trouble::of_catalog);
-            error.is_some_and(trouble::is_damaged_file)
+            let error = error.chain().find_map(error_text::of_catalog);
+            error.is_some_and(error_text::is_damaged_file)
         }
     }
 }
@@ -124,20 +124,20 @@ fn alone(project: &Project) -> Result<RunLock, RunError> {
 
 /// A catalog that cannot even be opened is damage too.
 fn unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<ExitCode> {
-    let of_catalog = error.chain().find_map(trouble::of_catalog);
-    let Some(found) = of_catalog.filter(|error| trouble::is_damage(error)) else {
+    let of_catalog = error.chain().find_map(error_text::of_catalog);
+    let Some(found) = of_catalog.filter(|error| error_text::is_damage(error)) else {
         return Err(error);
     };
     let dir = context.dir();
-    let said = match trouble::sentence(found, &dir) {
-        Some(said) if !trouble::is_damaged_file(found) => said,
-        None if !trouble::is_damaged_file(found) => found.to_string(),
+    let said = match error_text::sentence(found, &dir) {
+        Some(said) if !error_text::is_damaged_file(found) => said,
+        None if !error_text::is_damaged_file(found) => found.to_string(),
         Some(_) | None => format!(
             "{} is damaged so far that it cannot be read; put a backup in its place, then `check --repair`",
-            trouble::file(&dir)
+            error_text::file(&dir)
         ),
     };
-    context.talk.error(&said, ExitCode::Damaged);
+    context.output.error(&said, ExitCode::Damaged);
     Ok(ExitCode::Damaged)
 }
 

@@ -5,7 +5,7 @@ use clap_complete::Shell;
 
 use super::args;
 use super::exit::ExitCode;
-use super::talk;
+use super::output;
 
 /// Arguments of `completions`.
 #[derive(Debug, Args)]
@@ -17,6 +17,6 @@ pub(super) struct CompletionsArgs {
 pub(super) fn completions(args: &CompletionsArgs) -> anyhow::Result<ExitCode> {
     let mut script = Vec::new();
     clap_complete::generate(args.shell, &mut args::command(), "mocban", &mut script);
-    talk::print(&String::from_utf8(script)?)?;
+    output::print(&String::from_utf8(script)?)?;
     Ok(ExitCode::Done)
 }

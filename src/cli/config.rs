@@ -5,7 +5,7 @@ use serde_json::{Map, json};
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::talk::{self, Palette, Tone};
+use super::output::{self, Palette, Tone};
 use crate::config::{Origin, Setting};
 
 /// What to do with settings.
@@ -27,9 +27,9 @@ pub(super) fn config(command: &ConfigCommand, context: &Context) -> anyhow::Resu
     let ConfigCommand::Show(args) = command;
     let settings = context.settings()?.tree.settings();
     if context.global.json {
-        talk::print_json(&as_json(&settings))?;
+        output::print_json(&as_json(&settings))?;
     } else {
-        talk::print(&as_toml(&settings, args.origin, context.talk.out))?;
+        output::print(&as_toml(&settings, args.origin, context.output.out))?;
     }
     Ok(ExitCode::Done)
 }

@@ -13,14 +13,14 @@ use crate::store::{Project, SETTINGS_FILE, StoreError};
 use super::args::Global;
 use super::progress::Screen;
 use super::table::count;
-use super::talk::Talk;
+use super::output::Output;
 
 /// The global flags and what follows from them.
 #[derive(Debug, Clone)]
 pub(super) struct Context {
     pub(super) global: Global,
     pub(super) screen: Screen,
-    pub(super) talk: Talk,
+    pub(super) output: Output,
     program: String,
 }
 
@@ -29,7 +29,7 @@ impl Context {
     pub(super) fn new(global: Global, program: Option<&OsString>) -> Self {
         let screen = Screen::new();
         Self {
-            talk: Talk::new(&global, screen.clone()),
+            output: Output::new(&global, screen.clone()),
             screen,
             program: program_name(program),
             global,
@@ -117,7 +117,7 @@ impl Context {
         if stale > 0 {
             let pairs = count(stale, "pair");
             let verb = if stale == 1 { "is" } else { "are" };
-            self.talk.warn(&format!(
+            self.output.warn(&format!(
                 "{pairs} {verb} stale: made with other settings or files than those of now; `run` brings them up to date"
             ));
         }

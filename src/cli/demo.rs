@@ -11,9 +11,9 @@ use super::exit::{ExitCode, Refusal};
 use super::import::{self, ImportArgs};
 use super::report;
 use super::run::{self, drive};
-use super::sheet::{self, SheetArgs};
+use super::contact_sheet::{self, ContactSheetArgs};
 use super::signals;
-use super::talk::Palette;
+use super::output::Palette;
 use crate::config::{Origin, Tree};
 use crate::demo::{DatasetFiles, DemoOptions, Error as DatasetError, Tier, write_dataset};
 use crate::domain::JobStatus;
@@ -53,7 +53,7 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
     let dir = demo_dir(&args, context);
     let context = &settled(&dir, &context.at(&dir))?;
     let Some(files) = make(&dir, args.options(), context).await? else {
-        context.talk.say(
+        context.output.say(
             "stopped while the files were made; nothing is imported, and the same command makes them anew",
         );
         return Ok(ExitCode::Stopped);
@@ -66,7 +66,7 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
     let taken = import::take(&manifest, context).await?;
     import::tell(&taken, context);
     if args.no_run {
-        context.talk.next(&context.command("run"));
+        context.output.next(&context.command("run"));
         return Ok(ExitCode::Done);
     }
     align(&dir, context).await
@@ -82,20 +82,20 @@ async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
     let done = summary.status.jobs.get(&JobStatus::Done).copied();
     if summary.stopped || done.unwrap_or(0) == 0 {
         for command in run::next_steps(&summary, &failures) {
-            context.talk.next(&context.command(&command));
+            context.output.next(&context.command(&command));
         }
         return Ok(run::code(&summary));
     }
     report::print(context).await?;
-    let (picture, _) = sheet::write(&SheetArgs::default(), context).await?;
-    let talk = &context.talk;
-    talk.say(&format!(
+    let (picture, _) = contact_sheet::write(&ContactSheetArgs::default(), context).await?;
+    let output = &context.output;
+    output.say(&format!(
         "meshes, prints and truth  {}",
         dir.join("data").display()
     ));
-    talk.say(&format!("all pairs on one picture  {}", picture.display()));
+    output.say(&format!("all pairs on one picture  {}", picture.display()));
     for command in ["status", "export -o export"] {
-        talk.next(&context.command(command));
+        output.next(&context.command(command));
     }
     Ok(run::code(&summary))
 }
@@ -122,7 +122,7 @@ async fn make(
         return Ok(None);
     };
     let made = if files.was_there { "found" } else { "made" };
-    context.talk.say(&format!(
+    context.output.say(&format!(
         "{made} {} of tier {}, seed {}, in {}",
         super::table::count(files.pairs, "pair"),
         options.tier,
@@ -205,7 +205,7 @@ fn settled(dir: &Path, context: &Context) -> anyhow::Result<Context> {
     match std::fs::read_to_string(&file) {
         Ok(there) if there == text => {}
         Ok(_) => {
-            context.talk.warn(&format!(
+            context.output.warn(&format!(
                 "{shown} stays as it is; the flags hold for this call alone"
             ));
             return Ok(context.clone());
@@ -214,7 +214,7 @@ fn settled(dir: &Path, context: &Context) -> anyhow::Result<Context> {
             std::fs::create_dir_all(dir)
                 .with_context(|| format!("cannot make {}", dir.display()))?;
             std::fs::write(&file, text).with_context(|| format!("cannot write {shown}"))?;
-            context.talk.say(&format!("settings are kept in {shown}"));
+            context.output.say(&format!("settings are kept in {shown}"));
         }
     }
     Ok(context.with_own_settings())

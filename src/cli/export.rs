@@ -8,7 +8,7 @@ use serde_json::json;
 use super::context::Context;
 use super::exit::ExitCode;
 use super::table::count;
-use super::talk;
+use super::output;
 use crate::export::{ExportSummary, JsonlOptions, to_jsonl};
 
 /// Arguments of `export`.
@@ -60,7 +60,7 @@ fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow
             .iter()
             .map(|(pair, why)| json!({"id": pair, "error": why}))
             .collect();
-        talk::print_json(&json!({
+        output::print_json(&json!({
             "schema": 1,
             "done": summary.done,
             "without_result": summary.without_result,
@@ -70,13 +70,13 @@ fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow
     }
     for (pair, why) in &summary.unreadable {
         context
-            .talk
+            .output
             .warn(&format!("{pair} has no files in the export: {why}"));
     }
     let shown = args.output.display();
     if summary.kept_earlier {
         let lost = count(summary.unreadable.len() as u64, "pair");
-        context.talk.say(&format!(
+        context.output.say(&format!(
             "the earlier export in {shown} stays: the new one would lack the files of {lost}; mend them, or export to a new folder"
         ));
     } else {
@@ -84,8 +84,8 @@ fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow
     }
     if !summary.unreadable.is_empty() {
         // A run trusts what the catalog says is done; a check does not.
-        context.talk.next(&context.command("check --repair"));
-        context.talk.next(&context.command("run"));
+        context.output.next(&context.command("check --repair"));
+        context.output.next(&context.command("run"));
     }
     Ok(())
 }
@@ -95,7 +95,7 @@ fn tell_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
         0 => String::new(),
         lost => format!(", {lost} whose files are gone or changed"),
     };
-    context.talk.say(&format!(
+    context.output.say(&format!(
         "{} exported to {}, {} without result{unreadable}",
         count(summary.done, "pair"),
         args.output.display(),

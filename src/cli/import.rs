@@ -9,10 +9,10 @@ use tokio::sync::mpsc;
 
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
-use super::given;
+use super::files;
 use super::manifest_file::Listing;
 use super::table::count;
-use super::talk;
+use super::output;
 use super::truth_file::{self, refusal};
 use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
 use crate::domain::{LengthUnit, PairName};
@@ -47,10 +47,10 @@ pub(super) struct ImportArgs {
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let taken = take(&args, context).await?;
     if context.global.json {
-        talk::print_json(&as_json(&taken))?;
+        output::print_json(&as_json(&taken))?;
     }
     tell(&taken, context);
-    context.talk.next(&context.command("run"));
+    context.output.next(&context.command("run"));
     Ok(ExitCode::Done)
 }
 
@@ -182,7 +182,7 @@ async fn read_truths(
     listed: &Ids,
     dir: &Path,
 ) -> anyhow::Result<Vec<truth_file::Row>> {
-    let text = String::from_utf8(given::read(file)?)
+    let text = String::from_utf8(files::read(file)?)
         .map_err(|error| Refusal::Usage(format!("{}: {error}", file.display())))?;
     let truths = truth_file::parse(file, &text)?;
     let others: Vec<PairName> = truths
@@ -244,18 +244,18 @@ fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow>
 pub(super) fn tell(taken: &Taken, context: &Context) {
     const WARNED: usize = 20;
     const NAMED: usize = 10;
-    let talk = &context.talk;
+    let output = &context.output;
     for line in taken.missing.iter().take(WARNED) {
-        talk.warn(line);
+        output.warn(line);
     }
     if let Some(more) = taken.missing.len().checked_sub(WARNED + 1) {
-        talk.warn(&format!("{} more files are not there", more + 1));
+        output.warn(&format!("{} more files are not there", more + 1));
     }
     for line in &taken.remarks {
-        talk.warn(line);
+        output.warn(line);
     }
     let summary = &taken.summary;
-    talk.say(&format!(
+    output.say(&format!(
         "{} added, {} changed, {} unchanged{}",
         count(summary.added, "pair"),
         summary.changed.len(),
@@ -266,14 +266,14 @@ pub(super) fn tell(taken: &Taken, context: &Context) {
         }
     ));
     for change in summary.changed.iter().take(NAMED) {
-        talk.say(&format!(
+        output.say(&format!(
             "  {}: {} changed",
             change.name,
             change.fields.join(", ")
         ));
     }
     if let Some(more) = summary.changed.len().checked_sub(NAMED + 1) {
-        talk.say(&format!("  and {} more", more + 1));
+        output.say(&format!("  and {} more", more + 1));
     }
 }
 

@@ -21,9 +21,9 @@ pub(super) fn man(args: &ManArgs, context: &Context) -> anyhow::Result<ExitCode>
     std::fs::create_dir_all(&args.dir).with_context(|| format!("cannot make {dir}"))?;
     clap_mangen::generate_to(args::command(), &args.dir)
         .with_context(|| format!("cannot write manual pages to {dir}"))?;
-    context.talk.say(&format!("manual pages are in {dir}"));
+    context.output.say(&format!("manual pages are in {dir}"));
     let page = args.dir.join("mocban.1");
     let page = super::context::quoted(&page.to_string_lossy());
-    context.talk.next(&format!("man -l {page}"));
+    context.output.next(&format!("man -l {page}"));
     Ok(ExitCode::Done)
 }

@@ -4,7 +4,7 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
-use super::given;
+use super::files;
 use crate::domain::{ContentHash, LengthUnit, PairName};
 use crate::manifest::{Ids, ManifestError, ManifestRow, pair_folders, read_csv, read_jsonl};
 
@@ -63,7 +63,7 @@ impl Listing {
             let text = format!("{shown} is a directory; give two of them by --meshes and --prints");
             return Err(Refusal::Usage(text).into());
         }
-        let bytes = given::read(file)?;
+        let bytes = files::read(file)?;
         let read: Reader = if is_jsonl(file, &bytes) {
             read_jsonl
         } else {
@@ -211,7 +211,7 @@ pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
 
 /// Plain files of a folder; what is below its own folders is not looked at.
 fn files(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
-    let mut files = given::list(dir)?;
+    let mut files = files::list(dir)?;
     files.retain(|path| !path.is_dir());
     Ok(files)
 }

@@ -1,10 +1,10 @@
 //! The command line: one thin file a command.
 
-mod agree;
+mod agreement;
 mod args;
 mod backup;
 mod check;
-mod clock;
+mod time_text;
 mod compare;
 mod completions;
 mod config;
@@ -13,7 +13,7 @@ mod demo;
 mod exit;
 mod export;
 mod failures;
-mod given;
+mod files;
 mod import;
 mod logging;
 mod man;
@@ -25,16 +25,16 @@ mod retry;
 mod review;
 mod run;
 mod select;
-mod sheet;
+mod contact_sheet;
 mod show;
 mod show_hand;
 mod show_text;
 mod signals;
 mod status;
 mod table;
-mod talk;
-mod tally;
-mod trouble;
+mod output;
+mod run_progress;
+mod error_text;
 mod truth_file;
 mod verdict;
 mod verdict_file;
@@ -81,7 +81,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(code) => code,
         Err(error) => conclude(&error, &context),
     };
-    panics::caught(work, |text| context.talk.error(text, ExitCode::Error))
+    panics::caught(work, |text| context.output.error(text, ExitCode::Error))
 }
 
 fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
@@ -167,10 +167,10 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Backup(args) => backup::backup(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
         Command::Review(args) => review::review(args, context).await,
-        Command::Agree(args) => agree::agree(args, context).await,
+        Command::Agreement(args) => agreement::agreement(args, context).await,
         Command::Report(args) => report::report(args, context).await,
         Command::Export(args) => export::export(args, context).await,
-        Command::Sheet(args) => sheet::sheet(args, context).await,
+        Command::ContactSheet(args) => contact_sheet::contact_sheet(args, context).await,
         Command::Config(command) => config::config(&command, context),
         Command::Completions(args) => completions::completions(&args),
         Command::Man(args) => man::man(&args, context),
@@ -183,17 +183,17 @@ fn conclude(error: &anyhow::Error, context: &Context) -> ExitCode {
         return ExitCode::Done;
     }
     let code = code_of(error);
-    let of_catalog = error.chain().find_map(trouble::of_catalog);
-    let explained = of_catalog.and_then(|found| trouble::sentence(found, &context.dir()));
+    let of_catalog = error.chain().find_map(error_text::of_catalog);
+    let explained = of_catalog.and_then(|found| error_text::sentence(found, &context.dir()));
     context
-        .talk
+        .output
         .error(&explained.unwrap_or_else(|| sentence(error)), code);
     match code {
         ExitCode::NoProject => {
-            context.talk.next(&context.command("import pairs.csv"));
-            context.talk.next(&context.program_with("demo"));
+            context.output.next(&context.command("import pairs.csv"));
+            context.output.next(&context.program_with("demo"));
         }
-        ExitCode::InUse => context.talk.next(&context.command("status --watch")),
+        ExitCode::InUse => context.output.next(&context.command("status --watch")),
         ExitCode::Done
         | ExitCode::Error
         | ExitCode::Usage
@@ -235,7 +235,7 @@ fn code_of(error: &anyhow::Error) -> ExitCode {
             Some(RunError::NoSuchPair(_)) => return ExitCode::NothingSelected,
             Some(_) | None => {}
         }
-        match trouble::of_catalog(cause) {
+        match error_text::of_catalog(cause) {
             Some(CatalogError::Missing(_)) => return ExitCode::NoProject,
             Some(CatalogError::NetworkFileSystem { .. }) => return ExitCode::Usage,
             Some(

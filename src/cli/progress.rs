@@ -7,9 +7,9 @@ use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::args::ProgressMode;
-use super::clock::span;
-use super::talk::{Palette, Tone, dumb_terminal};
-use super::tally::Tally;
+use super::time_text::span;
+use super::output::{Palette, Tone, dumb_terminal};
+use super::run_progress::RunProgress;
 use crate::domain::{Failure, PairName, Stage};
 use crate::runner::{RunEvent, StopLevel};
 
@@ -50,7 +50,7 @@ pub(super) const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
 pub(super) struct Progress {
     screen: Screen,
     palette: Palette,
-    tally: Tally,
+    counts: RunProgress,
     started: Instant,
     form: Form,
 }
@@ -76,7 +76,7 @@ impl Progress {
         Self {
             screen: screen.clone(),
             palette,
-            tally: Tally::default(),
+            counts: RunProgress::default(),
             started: now,
             form: form(mode, quiet, screen, now),
         }
@@ -84,21 +84,21 @@ impl Progress {
 
     /// Shows what has happened.
     pub(super) fn event(&mut self, event: &RunEvent) {
-        self.tally.observe(event);
+        self.counts.observe(event);
         match &mut self.form {
             Form::None => return,
             Form::Json => {
                 self.screen.line(&as_json(event).to_string());
                 return;
             }
-            Form::Bar(bar) => draw(bar, &self.tally),
+            Form::Bar(bar) => draw(bar, &self.counts),
             Form::Plain { at, percent } => {
-                let enough = self.tally.percent() >= *percent + PLAIN_PERCENT;
+                let enough = self.counts.percent() >= *percent + PLAIN_PERCENT;
                 let due = at.elapsed() >= PLAIN_EVERY || enough && at.elapsed() >= PLAIN_LEAST;
                 if due {
-                    (*at, *percent) = (Instant::now(), self.tally.percent());
+                    (*at, *percent) = (Instant::now(), self.counts.percent());
                     let elapsed = self.started.elapsed().as_millis() as u64;
-                    self.screen.line(&self.tally.line(elapsed));
+                    self.screen.line(&self.counts.line(elapsed));
                 }
             }
         }
@@ -149,12 +149,12 @@ fn bar(screen: &Screen) -> Form {
     Form::Bar(bar)
 }
 
-fn draw(bar: &ProgressBar, tally: &Tally) {
-    if bar.length() != Some(tally.stages) {
-        bar.set_length(tally.stages);
+fn draw(bar: &ProgressBar, counts: &RunProgress) {
+    if bar.length() != Some(counts.stages) {
+        bar.set_length(counts.stages);
     }
-    bar.set_position(tally.passed);
-    bar.set_message(tally.by_stage_line());
+    bar.set_position(counts.passed);
+    bar.set_message(counts.by_stage_line());
 }
 
 /// What deserves a line of its own.

@@ -6,11 +6,11 @@ use anyhow::Context as _;
 use clap::Args;
 use serde_json::json;
 
-use super::clock::day;
+use super::time_text::day;
 use super::compare::side_by_side;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
-use super::talk;
+use super::output;
 use crate::catalog::Catalog;
 use crate::export::{Chosen, draw_gallery};
 use crate::report::{Cover, Format, Interval, Report, gate, gather, gather_with, page, render};
@@ -79,9 +79,9 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
         Some(path) => {
             let shown = path.display();
             write_whole(path, text.as_bytes()).with_context(|| format!("cannot write {shown}"))?;
-            context.talk.say(&format!("report is in {shown}"));
+            context.output.say(&format!("report is in {shown}"));
         }
-        None => talk::print(&text)?,
+        None => output::print(&text)?,
     }
     Ok(gates(&report, &args, context))
 }
@@ -138,7 +138,7 @@ async fn compared(
 /// When the catalog cannot be read or stdout is closed.
 pub(super) async fn print(context: &Context) -> anyhow::Result<()> {
     let format = chosen(Format::Text, context);
-    talk::print(&render(&read(context).await?, format))?;
+    output::print(&render(&read(context).await?, format))?;
     Ok(())
 }
 
@@ -175,7 +175,7 @@ fn gates(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
         (true, true) => ExitCode::Done,
     };
     for reason in missing.iter().chain(&below) {
-        context.talk.warn(reason);
+        context.output.warn(reason);
     }
     code
 }

@@ -7,7 +7,7 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::count;
-use super::talk;
+use super::output;
 use crate::catalog::{Catalog, RetrySelection};
 use crate::domain::FailureClass;
 
@@ -31,12 +31,12 @@ pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<
         return Err(Refusal::NothingSelected(nothing(&selection)).into());
     }
     if context.global.json {
-        talk::print_json(&json!({"schema": 1, "retried": retried}))?;
+        output::print_json(&json!({"schema": 1, "retried": retried}))?;
     }
     context
-        .talk
+        .output
         .say(&format!("{} will run again", count(retried, "pair")));
-    context.talk.next(&context.command("run"));
+    context.output.next(&context.command("run"));
     Ok(ExitCode::Done)
 }
 

@@ -12,7 +12,7 @@ use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::signals;
 use super::table::count;
-use super::talk;
+use super::output;
 use super::verdict::reader_name;
 use crate::domain::{ReviewOrder, ThresholdMetric};
 use crate::review::{self, Cards, DeckOptions, Language, Rates, Review, ReviewOptions};
@@ -121,9 +121,9 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     signals.abort();
     catalog.close().await;
     context
-        .talk
+        .output
         .say("the page is closed; every answer is stored");
-    context.talk.next(&context.command("report"));
+    context.output.next(&context.command("report"));
     Ok(ExitCode::Done)
 }
 
@@ -148,13 +148,13 @@ fn deck(args: &ReviewArgs) -> DeckOptions {
 /// There is no page without anything to settle on it.
 fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
     if context.global.json {
-        talk::print(&json!({"schema": 1, "url": null}).to_string())?;
+        output::print(&json!({"schema": 1, "url": null}).to_string())?;
     }
     let reader = &args.reader;
-    context.talk.say(&format!(
+    context.output.say(&format!(
         "no conflict waits for {reader}: no two others contradict each other on a result that nobody has settled"
     ));
-    context.talk.next(&context.command("agree"));
+    context.output.next(&context.command("agree"));
     Ok(ExitCode::Done)
 }
 
@@ -187,21 +187,21 @@ fn tell(
 ) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
     let (url, address) = (page.url(), page.address());
     if context.global.json {
-        talk::print(&json!({"schema": 1, "url": url}).to_string())?;
+        output::print(&json!({"schema": 1, "url": url}).to_string())?;
     } else {
-        talk::print(&url)?;
+        output::print(&url)?;
     }
-    context.talk.say(&format!(
+    context.output.say(&format!(
         "{}; the address opens once, in one browser; Ctrl-C ends",
         progress(&args.reader, page.cards())
     ));
     if address.ip().is_loopback() {
         let port = address.port();
-        context.talk.say(&format!(
+        context.output.say(&format!(
             "on a far machine, first: ssh -L {port}:127.0.0.1:{port} THAT-MACHINE"
         ));
     } else {
-        context.talk.warn(&format!(
+        context.output.warn(&format!(
             "the page listens on {address}, not only for this machine, and what it sends is not encrypted"
         ));
     }

@@ -5,13 +5,13 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::clock::span;
+use super::time_text::span;
 use super::context::Context;
 use super::exit::ExitCode;
 use super::failures::Failures;
 use super::progress::Progress;
 use super::table::{Align, columns, count};
-use super::talk;
+use super::output;
 use super::{select, signals};
 use crate::catalog::{Catalog, Plan};
 use crate::config::Config;
@@ -80,11 +80,11 @@ pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<Exit
     }
     let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
     if context.global.json {
-        talk::print_json(&as_json(&summary))?;
+        output::print_json(&as_json(&summary))?;
     }
     tell_end(&summary, &failures, context);
     for command in next_steps(&summary, &failures) {
-        context.talk.next(&context.command(&command));
+        context.output.next(&context.command(&command));
     }
     Ok(code(&summary))
 }
@@ -162,7 +162,7 @@ pub(super) async fn drive(
         global.progress,
         global.quiet,
         &context.screen,
-        context.talk.err,
+        context.output.err,
     );
     let ended = runner::run(project, &catalog, &config.stages, options, &stop, |event| {
         progress.event(&event);
@@ -188,11 +188,11 @@ pub(super) const fn code(summary: &RunSummary) -> ExitCode {
 
 /// Says how a run ended and which pairs failed.
 pub(super) fn tell_end(summary: &RunSummary, failures: &Failures, context: &Context) {
-    let talk = &context.talk;
-    talk.say(&headline(summary));
+    let output = &context.output;
+    output.say(&headline(summary));
     if summary.failed_in_all > 0 {
         let number = count(summary.failed_in_all, "pair");
-        talk.say(&format!("{number} failed:\n{}", failures.text().trim_end()));
+        output.say(&format!("{number} failed:\n{}", failures.text().trim_end()));
     }
 }
 
@@ -267,12 +267,12 @@ fn as_json(summary: &RunSummary) -> Value {
 
 fn tell_plan(plan: &Plan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
     if context.global.json {
-        talk::print_json(&json!({"schema": 1, "pairs": plan.pairs(), "plan": plan}))?;
+        output::print_json(&json!({"schema": 1, "pairs": plan.pairs(), "plan": plan}))?;
         return Ok(ExitCode::Done);
     }
-    talk::print(&plan_text(plan, running))?;
+    output::print(&plan_text(plan, running))?;
     if plan.pairs() > 0 || plan.leased > 0 && !running {
-        context.talk.next(&context.command("run"));
+        context.output.next(&context.command("run"));
     }
     Ok(ExitCode::Done)
 }

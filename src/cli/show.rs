@@ -3,12 +3,12 @@
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::clock::utc;
+use super::time_text::utc;
 use super::context::Context;
 use super::exit::ExitCode;
 use super::show_hand::Laid;
 use super::show_text::Page;
-use super::talk::{self, Palette, Tone};
+use super::output::{self, Palette, Tone};
 use super::{select, show_hand, verdict};
 use crate::catalog::{PairDetail, PlanEntry};
 use crate::domain::JobStatus;
@@ -33,22 +33,22 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
     let laid = show_hand::of(&catalog, &detail.results).await?;
     catalog.close().await;
     if context.global.json {
-        talk::print_json(&as_json(&detail, &laid, why.as_ref(), &project)?)?;
+        output::print_json(&as_json(&detail, &laid, why.as_ref(), &project)?)?;
         return Ok(ExitCode::Done);
     }
     let page = Page {
         detail: &detail,
         project: &project,
-        palette: context.talk.out,
+        palette: context.output.out,
     };
-    talk::print(&format!(
+    output::print(&format!(
         "{}{}{}",
         page.text(),
-        show_hand::text(&laid, context.talk.out),
-        tail(&detail, why.as_ref(), context.talk.out)
+        show_hand::text(&laid, context.output.out),
+        tail(&detail, why.as_ref(), context.output.out)
     ))?;
     for command in next_steps(&detail, why.is_some()) {
-        context.talk.next(&context.command(&command));
+        context.output.next(&context.command(&command));
     }
     Ok(ExitCode::Done)
 }

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::clock::utc;
+use super::time_text::utc;
 use super::show_text::heading;
-use super::talk::Palette;
+use super::output::Palette;
 use crate::catalog::{Catalog, CatalogError, PairResults, StoredAlignment};
 use crate::domain::{DepthOutcome, MetricOutcome, Stage, ThresholdMetric};
 use crate::report::HandMove;

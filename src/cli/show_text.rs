@@ -1,8 +1,8 @@
 //! The page that `show` prints of one pair.
 
-use super::clock::{span, utc};
+use super::time_text::{span, utc};
 use super::table::{Align, columns};
-use super::talk::{Palette, Tone};
+use super::output::{Palette, Tone};
 use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
 use crate::domain::{DepthOutcome, FitOutcome, JobStatus, NormalizeOutcome, Stage, Verdict};
 use crate::store::Project;

@@ -11,7 +11,7 @@ use super::exit::ExitCode;
 use super::failures::Failures;
 use super::progress::CLEAR;
 use super::table::{Align, columns, count};
-use super::talk::{self, Palette, Tone};
+use super::output::{self, Palette, Tone};
 use super::verdict::reader_name;
 use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict};
@@ -111,13 +111,13 @@ impl View {
 }
 
 fn show(view: &View, args: &StatusArgs, context: &Context) -> anyhow::Result<()> {
-    let talk = &context.talk;
+    let output = &context.output;
     if context.global.json {
         let json = view.json(args.failed)?;
         if args.watch {
-            talk::print(&json.to_string())?;
+            output::print(&json.to_string())?;
         } else {
-            talk::print_json(&json)?;
+            output::print_json(&json)?;
         }
     } else {
         let clear = if args.watch && std::io::stdout().is_terminal() {
@@ -126,9 +126,9 @@ fn show(view: &View, args: &StatusArgs, context: &Context) -> anyhow::Result<()>
             ""
         };
         let dir = context.dir().display().to_string();
-        talk::print(&format!("{clear}{}", screen(view, &dir, talk.out)))?;
+        output::print(&format!("{clear}{}", screen(view, &dir, output.out)))?;
         for command in next_steps(view) {
-            talk.next(&context.command(&command));
+            output.next(&context.command(&command));
         }
     }
     Ok(())

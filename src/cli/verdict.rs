@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::clock::{span, utc};
+use super::time_text::{span, utc};
 use super::context::{Context, now};
 use super::exit::ExitCode;
 use super::manifest_file::is_jsonl;
 use super::table::{Align, columns, count};
-use super::talk::{self, Palette, Tone};
+use super::output::{self, Palette, Tone};
 use super::verdict_file::Row;
 use super::{given, select, verdict_file, verdict_lines};
 use crate::catalog::{Catalog, Look, NewVerdict, VerdictEvent};
@@ -123,7 +123,7 @@ async fn set(args: SetArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let said = format!("{} of {}: {}", new.pair, on(new.metric), new.verdict);
     catalog.verdict_set(vec![new], now()).await?;
     catalog.close().await;
-    context.talk.say(&said);
+    context.output.say(&said);
     Ok(ExitCode::Done)
 }
 
@@ -132,7 +132,7 @@ fn on(metric: Option<ThresholdMetric>) -> &'static str {
 }
 
 async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let bytes = given::read(&args.file)?;
+    let bytes = files::read(&args.file)?;
     let (_project, catalog) = context.writer().await?;
     let parse = if is_jsonl(&args.file, &bytes) {
         verdict_lines::parse
@@ -150,23 +150,23 @@ async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode>
     let number = catalog.verdict_set(verdicts, now()).await?;
     catalog.close().await;
     if context.global.json {
-        talk::print_json(
+        output::print_json(
             &json!({"schema": 1, "recorded": number, "left_out": all - kept, "known": kept - number}),
         )?;
     }
     if all > kept {
         let left_out = count(all - kept, "verdict");
         let why = "on a result that the pair does not have here";
-        context.talk.warn(&format!("{left_out} left out: {why}"));
+        context.output.warn(&format!("{left_out} left out: {why}"));
     }
     if kept > number {
         let known = count(kept - number, "verdict");
-        context.talk.say(&format!("{known} there already"));
+        context.output.say(&format!("{known} there already"));
     }
     context
-        .talk
+        .output
         .say(&format!("{} recorded", count(number, "verdict")));
-    context.talk.next(&context.command("report"));
+    context.output.next(&context.command("report"));
     Ok(ExitCode::Done)
 }
 
@@ -201,12 +201,12 @@ async fn log(args: LogArgs, context: &Context) -> anyhow::Result<ExitCode> {
     catalog.close().await;
     if context.global.json {
         for event in &events {
-            talk::print(&serde_json::to_string(event)?)?;
+            output::print(&serde_json::to_string(event)?)?;
         }
     } else if events.is_empty() {
-        context.talk.say("no verdicts yet");
+        context.output.say("no verdicts yet");
     } else {
-        talk::print(&log_text(&events, context.talk.out))?;
+        output::print(&log_text(&events, context.output.out))?;
     }
     Ok(ExitCode::Done)
 }
@@ -216,10 +216,10 @@ async fn undo(args: UndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let undone = catalog.verdict_undo(args.reader.as_deref(), now()).await?;
     catalog.close().await;
     if context.global.json {
-        talk::print_json(&json!({"schema": 1, "undone": undone}))?;
+        output::print_json(&json!({"schema": 1, "undone": undone}))?;
     }
     for event in &undone {
-        context.talk.say(&format!(
+        context.output.say(&format!(
             "taken back: {} of {} {} by {}",
             event.verdict, event.pair, event.metric, event.reader
         ));

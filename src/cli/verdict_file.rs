@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use csv::StringRecord;
 
-use super::clock::from_utc;
+use super::time_text::from_utc;
 use crate::catalog::{Look, NewVerdict};
 use crate::config::hint;
 use crate::domain::{ContentHash, PairName, UnixMillis, sanitize};

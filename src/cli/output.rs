@@ -79,7 +79,7 @@ fn no_color() -> bool {
 
 /// The two streams of a command.
 #[derive(Debug, Clone)]
-pub(super) struct Talk {
+pub(super) struct Output {
     quiet: bool,
     json: bool,
     screen: Screen,
@@ -89,7 +89,7 @@ pub(super) struct Talk {
     pub(super) err: Palette,
 }
 
-impl Talk {
+impl Output {
     /// Streams as the flags ask.
     pub(super) fn new(global: &Global, screen: Screen) -> Self {
         Self {

@@ -5,7 +5,7 @@ use crate::runner::RunEvent;
 
 /// Counts of a run so far.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct Tally {
+pub(super) struct RunProgress {
     /// Stages to do in all.
     pub(super) stages: u64,
     /// Stages done, or that will not run because their pair failed.
@@ -22,7 +22,7 @@ pub(super) struct Tally {
     pub(super) by_stage: [(u64, u64); 4],
 }
 
-impl Tally {
+impl RunProgress {
     /// Takes in one event.
     pub(super) fn observe(&mut self, event: &RunEvent) {
         match event {
@@ -83,7 +83,7 @@ impl Tally {
         match self.rate(elapsed_ms) {
             Some(rate) => {
                 let left_ms = self.stages.saturating_sub(self.passed) as f64 / rate * 1000.0;
-                let left = super::clock::rough(left_ms as u64);
+                let left = super::time_text::rough(left_ms as u64);
                 format!("{counts} · {rate:.1} stages/s · about {left} left")
             }
             None => counts,
@@ -107,7 +107,7 @@ impl Tally {
 
 #[cfg(test)]
 mod tests {
-    use super::Tally;
+    use super::RunProgress;
     use crate::domain::{Failure, FailureClass, PairName, Stage};
     use crate::runner::RunEvent;
 
@@ -117,46 +117,46 @@ mod tests {
 
     #[test]
     fn failed_pair_takes_its_stages_off_the_list() {
-        let mut tally = Tally::default();
-        tally.observe(&RunEvent::Started {
+        let mut counts = RunProgress::default();
+        counts.observe(&RunEvent::Started {
             pairs: 2,
             stages: 8,
             by_stage: [2; 4],
             workers: 1,
         });
         for stage in Stage::ALL {
-            tally.observe(&RunEvent::StageFinished {
+            counts.observe(&RunEvent::StageFinished {
                 pair: pair(),
                 stage,
                 ms: 5,
             });
         }
-        tally.observe(&RunEvent::PairDone { pair: pair() });
-        assert_eq!(tally.percent(), 50);
-        tally.observe(&RunEvent::StageFinished {
+        counts.observe(&RunEvent::PairDone { pair: pair() });
+        assert_eq!(counts.percent(), 50);
+        counts.observe(&RunEvent::StageFinished {
             pair: pair(),
             stage: Stage::Fit,
             ms: 5,
         });
-        tally.observe(&RunEvent::PairFailed {
+        counts.observe(&RunEvent::PairFailed {
             pair: pair(),
             stage: Stage::Depth,
             failure: Failure::new(FailureClass::NoSolution, "flat"),
             skipped: 3,
         });
-        assert_eq!(tally.percent(), 100);
+        assert_eq!(counts.percent(), 100);
         assert_eq!(
-            tally.by_stage_line(),
+            counts.by_stage_line(),
             "fit 2/2  depth 1/1  normalize 1/1  register 1/1  1 failed"
         );
         assert_eq!(
-            tally.line(1000),
+            counts.line(1000),
             "100 % · 1 of 2 pairs done, 1 failed · 5.0 stages/s · about 0 s left"
         );
     }
 
     #[test]
     fn nothing_to_do_is_all_done() {
-        assert_eq!(Tally::default().percent(), 100);
+        assert_eq!(RunProgress::default().percent(), 100);
     }
 }

@@ -10,7 +10,7 @@ use super::context::Context;
 use super::exit::{ExitCode, Refusal};
 use super::select;
 use super::table::count;
-use super::talk;
+use super::output;
 use crate::domain::ThresholdMetric;
 use crate::export::{Sheet, SheetOptions, SheetOrder, draw_sheet};
 use crate::raster::png_rgb8;
@@ -18,7 +18,7 @@ use crate::store::write_whole;
 
 /// Arguments of `sheet`.
 #[derive(Debug, Args)]
-pub(super) struct SheetArgs {
+pub(super) struct ContactSheetArgs {
     /// Only these pairs
     pub(super) pairs: Vec<String>,
     /// The PNG to write [default: sheet.png in the project]
@@ -38,7 +38,7 @@ pub(super) struct SheetArgs {
     pub(super) columns: u16,
 }
 
-impl Default for SheetArgs {
+impl Default for ContactSheetArgs {
     fn default() -> Self {
         Self {
             pairs: Vec::new(),
@@ -51,14 +51,14 @@ impl Default for SheetArgs {
     }
 }
 
-pub(super) async fn sheet(args: SheetArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(super) async fn contact_sheet(args: ContactSheetArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (path, sheet) = write(&args, context).await?;
     if context.global.json {
-        talk::print_json(
+        output::print_json(
             &json!({"schema": 1, "file": path, "shown": sheet.shown, "of": sheet.of}),
         )?;
     }
-    context.talk.say(&format!(
+    context.output.say(&format!(
         "{} of {} on {}",
         count(sheet.shown as u64, "pair"),
         sheet.of,
@@ -71,7 +71,7 @@ pub(super) async fn sheet(args: SheetArgs, context: &Context) -> anyhow::Result<
 ///
 /// # Errors
 /// When no pair is finished, or catalog or disk refuse.
-pub(super) async fn write(args: &SheetArgs, context: &Context) -> anyhow::Result<(PathBuf, Sheet)> {
+pub(super) async fn write(args: &ContactSheetArgs, context: &Context) -> anyhow::Result<(PathBuf, Sheet)> {
     let (project, catalog) = context.reader().await?;
     let pairs = match args.pairs.as_slice() {
         [] => None,

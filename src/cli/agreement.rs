@@ -4,25 +4,25 @@ use clap::Args;
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::talk;
+use super::output;
 use crate::report;
 
 /// Arguments of `agree`: none but those of every command.
 #[derive(Debug, Args)]
-pub(super) struct AgreeArgs {}
+pub(super) struct AgreementArgs {}
 
-pub(super) async fn agree(_: AgreeArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(super) async fn agreement(_: AgreementArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.reader().await?;
     let found = report::agree(&catalog).await?;
     catalog.close().await;
     if context.global.json {
-        talk::print_json(&serde_json::to_value(&found)?)?;
+        output::print_json(&serde_json::to_value(&found)?)?;
     } else {
-        talk::print(&report::agree_text(&found))?;
+        output::print(&report::agree_text(&found))?;
     }
     if found.conflicts > 0 {
         let next = "review --adjudicate --reader NAME";
-        context.talk.next(&context.command(next));
+        context.output.next(&context.command(next));
     }
     Ok(ExitCode::Done)
 }
