@@ -1,4 +1,4 @@
-//! `agree`: how far readers can be trusted.
+//! `agreement`: how far reviewers can be trusted.
 
 use clap::Args;
 
@@ -7,7 +7,7 @@ use super::exit::ExitCode;
 use super::output;
 use crate::report;
 
-/// Arguments of `agree`: none but those of every command.
+/// Arguments of `agreement`: none but those of every command.
 #[derive(Debug, Args)]
 pub(super) struct AgreementArgs {}
 

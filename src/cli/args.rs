@@ -7,8 +7,8 @@ use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
 
 use super::exit::ExitCode;
 use super::{
-    agreement, backup, check, completions, config, demo, export, import, man, report, retry, review,
-    run, contact_sheet, show, status, verdict,
+    agreement, backup, check, completions, config, contact_sheet, demo, export, import, man,
+    report, retry, review, run, show, status, verdict,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -163,13 +163,14 @@ pub(super) enum Command {
     Verdict(verdict::VerdictCommand),
     /// Judge results in the browser, by keys, and lay reliefs by hand
     Review(review::ReviewArgs),
-    /// Tell how far readers agree, with each other and with themselves, and which faults they catch
+    /// Measure how far reviewers agree with each other and with themselves, and which planted errors they catch
     Agreement(agreement::AgreementArgs),
     /// Print the table of all results
     Report(report::ReportArgs),
     /// Write the aligned pairs for other tools
     Export(export::ExportArgs),
-    /// Lay many overlays on one PNG, worst first
+    /// Draw many overlays on one PNG, worst first
+    #[command(visible_alias = "sheet")]
     ContactSheet(contact_sheet::ContactSheetArgs),
     /// Show the settings in force
     #[command(subcommand)]

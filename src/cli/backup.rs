@@ -8,8 +8,8 @@ use serde_json::json;
 
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
-use super::table::count;
 use super::output;
+use super::table::count;
 use crate::catalog::{Catalog, VerdictEvent};
 use crate::export::json_lines;
 use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of, write_synced};

@@ -8,10 +8,10 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::context::Context;
-use super::exit::ExitCode;
-use super::table::{Align, columns, count};
-use super::output::{self, Palette, Tone};
 use super::error_text;
+use super::exit::ExitCode;
+use super::output::{self, Palette, Tone};
+use super::table::{Align, columns, count};
 use crate::catalog::CatalogError;
 use crate::check::{CheckOptions, CheckSummary, Finding, Kind, Notes, Spare, check as look};
 use crate::runner::RunError;

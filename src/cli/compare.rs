@@ -66,11 +66,11 @@ fn lines(here: &Row, there: &Row) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::side_by_side;
-    use crate::report::RunProgress;
+    use crate::report::Tally;
 
     #[test]
     fn empty_projects_have_counts_only() {
-        let report = RunProgress::default().finish();
+        let report = Tally::default().finish();
         let text = side_by_side(&report, &report, ["a", "b"]);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 1 + report.rows.len());

@@ -1,4 +1,4 @@
-//! `sheet`: the contact sheet, many pairs on one PNG, worst first.
+//! `contact-sheet`: many pairs on one PNG, worst first.
 
 use std::path::{Path, PathBuf};
 
@@ -8,15 +8,15 @@ use serde_json::json;
 
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
+use super::output;
 use super::select;
 use super::table::count;
-use super::output;
 use crate::domain::ThresholdMetric;
 use crate::export::{Sheet, SheetOptions, SheetOrder, draw_sheet};
 use crate::raster::png_rgb8;
 use crate::store::write_whole;
 
-/// Arguments of `sheet`.
+/// Arguments of `contact-sheet`.
 #[derive(Debug, Args)]
 pub(super) struct ContactSheetArgs {
     /// Only these pairs
@@ -51,7 +51,10 @@ impl Default for ContactSheetArgs {
     }
 }
 
-pub(super) async fn contact_sheet(args: ContactSheetArgs, context: &Context) -> anyhow::Result<ExitCode> {
+pub(super) async fn contact_sheet(
+    args: ContactSheetArgs,
+    context: &Context,
+) -> anyhow::Result<ExitCode> {
     let (path, sheet) = write(&args, context).await?;
     if context.global.json {
         output::print_json(
@@ -71,7 +74,10 @@ pub(super) async fn contact_sheet(args: ContactSheetArgs, context: &Context) -> 
 ///
 /// # Errors
 /// When no pair is finished, or catalog or disk refuse.
-pub(super) async fn write(args: &ContactSheetArgs, context: &Context) -> anyhow::Result<(PathBuf, Sheet)> {
+pub(super) async fn write(
+    args: &ContactSheetArgs,
+    context: &Context,
+) -> anyhow::Result<(PathBuf, Sheet)> {
     let (project, catalog) = context.reader().await?;
     let pairs = match args.pairs.as_slice() {
         [] => None,

@@ -11,9 +11,9 @@ use crate::runner;
 use crate::store::{Project, SETTINGS_FILE, StoreError};
 
 use super::args::Global;
+use super::output::Output;
 use super::progress::Screen;
 use super::table::count;
-use super::output::Output;
 
 /// The global flags and what follows from them.
 #[derive(Debug, Clone)]

@@ -6,14 +6,14 @@ use anyhow::Context as _;
 use clap::Args;
 
 use super::config::as_toml;
+use super::contact_sheet::{self, ContactSheetArgs};
 use super::context::{Context, quoted};
 use super::exit::{ExitCode, Refusal};
 use super::import::{self, ImportArgs};
+use super::output::Palette;
 use super::report;
 use super::run::{self, drive};
-use super::contact_sheet::{self, ContactSheetArgs};
 use super::signals;
-use super::output::Palette;
 use crate::config::{Origin, Tree};
 use crate::demo::{DatasetFiles, DemoOptions, Error as DatasetError, Tier, write_dataset};
 use crate::domain::JobStatus;

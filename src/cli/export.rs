@@ -7,8 +7,8 @@ use serde_json::json;
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::table::count;
 use super::output;
+use super::table::count;
 use crate::export::{ExportSummary, JsonlOptions, to_jsonl};
 
 /// Arguments of `export`.

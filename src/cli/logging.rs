@@ -20,7 +20,12 @@ pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
     let builder = tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_ansi(!to_file && super::output::Output::new(global, screen.clone()).err.is_on())
+        .with_ansi(
+            !to_file
+                && super::output::Output::new(global, screen.clone())
+                    .err
+                    .is_on(),
+        )
         .with_writer(writer);
     // A second start in one process can only be a test's; the first log stays.
     let _ = match global.log_format {

@@ -7,9 +7,9 @@ use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 
 use super::args::ProgressMode;
-use super::time_text::span;
 use super::output::{Palette, Tone, dumb_terminal};
 use super::run_progress::RunProgress;
+use super::time_text::span;
 use crate::domain::{Failure, PairName, Stage};
 use crate::runner::{RunEvent, StopLevel};
 

@@ -6,11 +6,11 @@ use anyhow::Context as _;
 use clap::Args;
 use serde_json::json;
 
-use super::time_text::day;
 use super::compare::side_by_side;
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
 use super::output;
+use super::time_text::day;
 use crate::catalog::Catalog;
 use crate::export::{Chosen, draw_gallery};
 use crate::report::{Cover, Format, Interval, Report, gate, gather, gather_with, page, render};

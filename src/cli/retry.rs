@@ -5,9 +5,9 @@ use serde_json::json;
 
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
+use super::output;
 use super::select;
 use super::table::count;
-use super::output;
 use crate::catalog::{Catalog, RetrySelection};
 use crate::domain::FailureClass;
 

@@ -10,9 +10,9 @@ use serde_json::json;
 
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
+use super::output;
 use super::signals;
 use super::table::count;
-use super::output;
 use super::verdict::reader_name;
 use crate::domain::{ReviewOrder, ThresholdMetric};
 use crate::review::{self, Cards, DeckOptions, Language, Rates, Review, ReviewOptions};
@@ -154,7 +154,7 @@ fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode>
     context.output.say(&format!(
         "no conflict waits for {reader}: no two others contradict each other on a result that nobody has settled"
     ));
-    context.output.next(&context.command("agree"));
+    context.output.next(&context.command("agreement"));
     Ok(ExitCode::Done)
 }
 

@@ -5,13 +5,13 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use super::time_text::span;
 use super::context::Context;
 use super::exit::ExitCode;
 use super::failures::Failures;
+use super::output;
 use super::progress::Progress;
 use super::table::{Align, columns, count};
-use super::output;
+use super::time_text::span;
 use super::{select, signals};
 use crate::catalog::{Catalog, Plan};
 use crate::config::Config;

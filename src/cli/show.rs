@@ -3,12 +3,12 @@
 use clap::Args;
 use serde_json::{Value, json};
 
-use super::time_text::utc;
 use super::context::Context;
 use super::exit::ExitCode;
+use super::output::{self, Palette, Tone};
 use super::show_hand::Laid;
 use super::show_text::Page;
-use super::output::{self, Palette, Tone};
+use super::time_text::utc;
 use super::{select, show_hand, verdict};
 use crate::catalog::{PairDetail, PlanEntry};
 use crate::domain::JobStatus;

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::time_text::utc;
-use super::show_text::heading;
 use super::output::Palette;
+use super::show_text::heading;
+use super::time_text::utc;
 use crate::catalog::{Catalog, CatalogError, PairResults, StoredAlignment};
 use crate::domain::{DepthOutcome, MetricOutcome, Stage, ThresholdMetric};
 use crate::report::HandMove;

@@ -1,8 +1,8 @@
 //! The page that `show` prints of one pair.
 
-use super::time_text::{span, utc};
-use super::table::{Align, columns};
 use super::output::{Palette, Tone};
+use super::table::{Align, columns};
+use super::time_text::{span, utc};
 use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
 use crate::domain::{DepthOutcome, FitOutcome, JobStatus, NormalizeOutcome, Stage, Verdict};
 use crate::store::Project;

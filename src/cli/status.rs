@@ -9,9 +9,9 @@ use serde_json::Value;
 use super::context::{Context, quoted};
 use super::exit::ExitCode;
 use super::failures::Failures;
+use super::output::{self, Palette, Tone};
 use super::progress::CLEAR;
 use super::table::{Align, columns, count};
-use super::output::{self, Palette, Tone};
 use super::verdict::reader_name;
 use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict};
@@ -257,7 +257,7 @@ fn next_steps(view: &View) -> Vec<String> {
         steps.push(format!("show {}", first.name));
     }
     if view.counts.doubtful > 0 {
-        steps.push("sheet --order confidence".to_owned());
+        steps.push("contact-sheet --order confidence".to_owned());
     }
     if view.jobs(JobStatus::Done) > 0 && !running {
         if view.counts.verdicts.values().sum::<u64>() == 0 {
@@ -361,6 +361,6 @@ mod tests {
         let text = screen(&doubtful, "demo", Palette::PLAIN);
         let line = "doubtful   1 done pair with a confidence below 0.5\n";
         assert!(text.ends_with(line), "{text}");
-        assert_eq!(next_steps(&doubtful)[0], "sheet --order confidence");
+        assert_eq!(next_steps(&doubtful)[0], "contact-sheet --order confidence");
     }
 }

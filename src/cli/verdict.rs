@@ -5,14 +5,14 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde_json::json;
 
-use super::time_text::{span, utc};
 use super::context::{Context, now};
 use super::exit::ExitCode;
 use super::manifest_file::is_jsonl;
-use super::table::{Align, columns, count};
 use super::output::{self, Palette, Tone};
+use super::table::{Align, columns, count};
+use super::time_text::{span, utc};
 use super::verdict_file::Row;
-use super::{given, select, verdict_file, verdict_lines};
+use super::{files, select, verdict_file, verdict_lines};
 use crate::catalog::{Catalog, Look, NewVerdict, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 

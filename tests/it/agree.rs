@@ -41,9 +41,12 @@ fn two_readers(project: &Project) -> Vec<Value> {
 fn two_readers_are_compared_and_tested_and_a_third_settles() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    assert_eq!(told(&project, &["agree", "--json"])["readers"], json!([]));
+    assert_eq!(
+        told(&project, &["agreement", "--json"])["readers"],
+        json!([])
+    );
     let pairs = two_readers(&project);
-    let found = told(&project, &["agree", "--json"]);
+    let found = told(&project, &["agreement", "--json"]);
     let two = &found["two_readers"][0];
     assert_eq!((&two["a"], &two["b"]), (&json!("lan"), &json!("minh")));
     let count = |value: &Value| value.as_u64().expect("a count");
@@ -73,10 +76,10 @@ fn two_readers_are_compared_and_tested_and_a_third_settles() {
     let reply = page.post("/api/answer", &answer("s1", &settled, "pass"));
     assert_eq!(reply.expect("a reply").status, 200);
     assert_ne!(settled["pair"], pairs[0], "on which they agree");
-    let after = told(&project, &["agree", "--json"]);
+    let after = told(&project, &["agreement", "--json"]);
     assert_eq!(count(&after["conflicts"]), n - agreed - 1);
     assert_eq!(after["two_readers"], found["two_readers"]);
-    let text = mocban(project.dir(), &["agree"]).expect(0).out;
+    let text = mocban(project.dir(), &["agreement"]).expect(0).out;
     let waiting = format!("Conflicts waiting: {}\n", n - agreed - 1);
     assert!(
         text.contains(&waiting) && text.contains("lan, minh"),

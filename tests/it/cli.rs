@@ -99,10 +99,10 @@ fn directory_without_project_is_code_10_with_a_way_on() {
         &["backup", "b.sqlite"],
         &["verdict", "log"],
         &["review", "--reader", "lan"],
-        &["agree"],
+        &["agreement"],
         &["report"],
         &["export", "-o", "out"],
-        &["sheet", "-o", "sheet.png"],
+        &["contact-sheet", "-o", "sheet.png"],
     ] {
         let refused = mocban(dir.path(), command).expect(10);
         assert!(

@@ -134,7 +134,7 @@ fn the_papers_preset_keeps_to_its_three_metrics() {
     at(&["export", "--to", "jsonl", "-o", "out"]).expect(0);
     let exported = Value::Array(lines(&dir.path().join("out/pairs.jsonl")));
     assert_eq!(metrics(&exported), paper);
-    let none = at(&["sheet", "--metric", "relief"]).expect(4);
+    let none = at(&["contact-sheet", "--metric", "relief"]).expect(4);
     assert!(none.err.contains("has a result of relief"), "{}", none.err);
 }
 
