@@ -19,7 +19,7 @@ use std::time::Duration;
 use serde_json::{Map, json};
 use tokio::sync::oneshot;
 
-use super::company::Company;
+use super::db::commit_delay::Company;
 use super::{
     Again, Catalog, ClaimRequest, Dead, ImportRow, InputSeen, InputsSeen, Kept, Lease,
     MetricResult, RecipeIds, Recipes, StageDone, WorkerInfo,
@@ -175,7 +175,7 @@ impl World {
     /// Looks at every result of every pair.
     async fn count_stale(&self, recipes: &Recipes) -> u64 {
         let mut conn = self.catalog.reader().await.expect("a reader");
-        let current = super::recipes::current_json(&mut conn, recipes).await;
+        let current = super::queue::fingerprint::current_json(&mut conn, recipes).await;
         let n: i64 = sqlx::query_scalar(
             "SELECT count(*) FROM job AS j JOIN pair AS p ON p.id = j.pair WHERE EXISTS (
                 SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (

@@ -1,9 +1,8 @@
 //! Answers of the review page: bound to what was shown, stored once, taken back by number, controls apart.
 
 use super::{World, name};
-use crate::catalog::{
-    AnsweredOn, Catalog, CatalogError, HandAlignment, Look, NewVerdict, Shown, connect,
-};
+use crate::catalog::db::open;
+use crate::catalog::{AnsweredOn, Catalog, CatalogError, HandAlignment, Look, NewVerdict, Shown};
 use crate::domain::{
     Affine2, AttentionCheck, ContentHash, PrintFromMesh, Reason, ReviewOrder, ThresholdMetric,
     Verdict,
@@ -277,7 +276,7 @@ async fn the_database_itself_refuses_to_change_answers_and_alignments() {
             .expect("taken back");
     }
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = connect::writer(&path, false).await.expect("a connection");
+    let mut conn = open::writer(&path, false).await.expect("a connection");
     for sql in [
         "UPDATE control_answer SET reader = 'bo'",
         "DELETE FROM control_answer",

@@ -1,8 +1,9 @@
 //! What breaks other queues, each by name: late workers, worn-out identities, busy databases, jumping clocks.
 
 use super::{World, done, enter, inputs, name, recipes, register, row};
+use crate::catalog::db::open;
 use crate::catalog::{
-    Again, Catalog, ClaimRequest, Dead, Kept, Lease, RecipeIds, Sentence, StageFailed, connect,
+    Again, Catalog, ClaimRequest, Dead, Kept, Lease, RecipeIds, Sentence, StageFailed,
 };
 use crate::domain::{CRASH_LIMIT, Failure, FailureClass, JobStatus, PairId, Stage, WorkerId};
 
@@ -35,7 +36,7 @@ async fn a_reused_worker_identity_cannot_complete() {
     let rescued = world.catalog.rescue(Dead::AllBut(me), 60).await;
     assert_eq!(rescued.expect("a rescue").ready, 1);
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = connect::writer(&path, false).await.expect("a connection");
+    let mut conn = open::writer(&path, false).await.expect("a connection");
     let removed = sqlx::query("DELETE FROM worker WHERE id = ?1").bind(first.0);
     removed.execute(&mut conn).await.expect("removed");
 

@@ -9,9 +9,8 @@ use sqlx::SqliteConnection;
 
 use super::model::{LEASE, Process, Queue};
 use super::{World, done, enter, inputs, recipes};
-use crate::catalog::{
-    ClaimRequest, Kept, Lease, RecipeIds, Recipes, Sentence, StageFailed, connect,
-};
+use crate::catalog::db::open;
+use crate::catalog::{ClaimRequest, Kept, Lease, RecipeIds, Recipes, Sentence, StageFailed};
 use crate::domain::{Failure, FailureClass, Stage};
 
 /// Pairs at first, and at most.
@@ -49,7 +48,7 @@ impl Game {
     async fn new(seed: u64) -> Self {
         let world = World::new(PAIRS).await;
         let path = world.dir.path().join("catalog.sqlite");
-        let conn = connect::writer(&path, false).await.expect("a connection");
+        let conn = open::writer(&path, false).await.expect("a connection");
         let mut game = Self {
             settings: (recipes([1; 4]), world.recipes),
             conn,

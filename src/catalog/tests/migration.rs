@@ -7,7 +7,8 @@ use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions as _, Connection as _, SqliteConnection};
 
 use super::{metric, name, row};
-use crate::catalog::{Catalog, Look, NewVerdict, connect};
+use crate::catalog::db::open;
+use crate::catalog::{Catalog, Look, NewVerdict};
 use crate::domain::{MetricOutcome, ThresholdMetric, Verdict};
 
 /// What version 1 of the schema could hold of metrics.
@@ -45,7 +46,7 @@ async fn connection(path: &Path) -> SqliteConnection {
 async fn old_catalog(dir: &Path) -> PathBuf {
     let path = dir.join("catalog.sqlite");
     let mut conn = connection(&path).await;
-    let made = connect::MIGRATOR.run_to(1, &mut conn).await;
+    let made = open::MIGRATOR.run_to(1, &mut conn).await;
     made.expect("the first schema");
     sqlx::raw_sql(ROWS).execute(&mut conn).await.expect("rows");
     let metrics = OLD.map(|kind| {

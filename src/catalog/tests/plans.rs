@@ -3,16 +3,29 @@
 use sqlx::{AssertSqlSafe, Row as _};
 
 use super::World;
-use crate::catalog::{
-    alike, audit, census, checkpoint, claim, connect, fail, mend, query, requeue, rescue, results,
-    staleness, status, upkeep, verdicts, work,
-};
+use crate::catalog::audit::integrity;
+use crate::catalog::audit::repair;
+use crate::catalog::db::open;
+use crate::catalog::queue::alike;
+use crate::catalog::queue::checkpoint;
+use crate::catalog::queue::claim;
+use crate::catalog::queue::fail;
+use crate::catalog::queue::job_counts;
+use crate::catalog::queue::recovery;
+use crate::catalog::queue::requeue;
+use crate::catalog::queue::staleness;
+use crate::catalog::queue::workers;
+use crate::catalog::records::pair_results;
+use crate::catalog::records::pair_work;
+use crate::catalog::records::stage_results;
+use crate::catalog::records::status;
+use crate::catalog::records::verdicts;
 
 /// Lines of the query plan.
 async fn plan(sql: &str) -> Vec<String> {
     let world = World::new(0).await;
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = connect::writer(&path, false).await.expect("a connection");
+    let mut conn = open::writer(&path, false).await.expect("a connection");
     let rows = sqlx::query(AssertSqlSafe(format!("EXPLAIN QUERY PLAN {sql}")))
         .fetch_all(&mut conn)
         .await
@@ -49,7 +62,7 @@ async fn fenced_writes_find_their_jobs_by_key() {
         fail::FAIL,
         claim::RELEASE,
         requeue::SEND_BACK,
-        mend::PUT_BACK,
+        repair::PUT_BACK,
     ] {
         let plan = plan(sql).await;
         assert!(
@@ -64,11 +77,11 @@ async fn fenced_writes_find_their_jobs_by_key() {
 #[tokio::test]
 async fn rescue_and_holders_use_the_index_of_leases() {
     for sql in [
-        rescue::RESCUE,
-        rescue::LEFT_BY,
-        rescue::OVERDUE,
-        rescue::HOLDERS,
-        rescue::VICTIMS,
+        recovery::RESCUE,
+        recovery::LEFT_BY,
+        recovery::OVERDUE,
+        recovery::HOLDERS,
+        recovery::VICTIMS,
     ] {
         let plan = plan(sql).await;
         assert!(
@@ -82,7 +95,7 @@ async fn rescue_and_holders_use_the_index_of_leases() {
 
 #[tokio::test]
 async fn due_pairs_come_from_the_index_of_back_offs() {
-    let plan = plan(upkeep::DUE).await;
+    let plan = plan(workers::DUE).await;
     assert!(
         plan.iter().any(|line| line.contains("INDEX job_backoff")),
         "{plan:?}"
@@ -115,13 +128,13 @@ async fn stale_pairs_are_counted_without_a_look_at_every_pair() {
 
 #[tokio::test]
 async fn jobs_are_counted_by_ranges_of_their_key() {
-    for sql in [alike::GROUPS, census::ALL] {
+    for sql in [alike::GROUPS, job_counts::ALL] {
         let ranges = plan(sql).await;
         let searched = "SEARCH j USING INTEGER PRIMARY KEY (rowid>? AND rowid<?)";
         assert!(ranges.iter().any(|line| line == searched), "{ranges:?}");
         assert_only(&ranges, &[]);
     }
-    assert_only(&plan(census::NEXT).await, &[]);
+    assert_only(&plan(job_counts::NEXT).await, &[]);
 }
 
 #[tokio::test]
@@ -145,25 +158,28 @@ async fn what_a_checkpoint_writes_is_found_by_key() {
 
 #[tokio::test]
 async fn what_a_run_asks_of_inputs_and_counts_is_paged_or_small() {
-    assert_only(&plan(work::INPUTS).await, &[]);
+    assert_only(&plan(pair_work::INPUTS).await, &[]);
     assert_only(
-        &plan(upkeep::LEFT_ALL).await,
+        &plan(workers::LEFT_ALL).await,
         &["INDEX job_", "CONSTANT ROW", "SCAN (subquery"],
     );
-    assert_only(&plan(query::FAILED).await, &["INDEX job_bad"]);
-    assert_only(&plan(query::FAILED_BY_CLASS).await, &["INDEX job_bad"]);
+    assert_only(&plan(pair_results::FAILED).await, &["INDEX job_bad"]);
+    assert_only(
+        &plan(pair_results::FAILED_BY_CLASS).await,
+        &["INDEX job_bad"],
+    );
 }
 
 #[tokio::test]
 async fn pages_and_their_parts_are_searched_by_key() {
-    for sql in [query::PAGE, audit::PAGE] {
+    for sql in [pair_results::PAGE, integrity::PAGE] {
         let page = plan(sql).await;
         assert_only(&page, &[]);
     }
     for sql in [
-        results::STAGE_RESULTS,
-        audit::RESULTS,
-        results::METRIC_HASHES,
+        stage_results::STAGE_RESULTS,
+        integrity::RESULTS,
+        stage_results::METRIC_HASHES,
         verdicts::COUNTED,
     ] {
         let plan = plan(sql).await;

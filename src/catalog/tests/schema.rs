@@ -12,7 +12,7 @@ use crate::domain::{
 async fn checks_of_the_schema_and_our_enums_agree() {
     let world = World::new(1).await;
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::connect::writer(&path, false)
+    let mut conn = crate::catalog::db::open::writer(&path, false)
         .await
         .expect("a connection");
     let mut accepts = async |sql: &'static str, value: &str| {
@@ -56,7 +56,7 @@ async fn checks_of_the_schema_and_our_enums_agree() {
 async fn a_job_row_that_is_no_state_is_refused() {
     let world = World::new(1).await;
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::connect::writer(&path, false)
+    let mut conn = crate::catalog::db::open::writer(&path, false)
         .await
         .expect("a connection");
     for status in 0..=6 {

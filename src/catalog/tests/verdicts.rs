@@ -179,7 +179,7 @@ async fn the_database_itself_refuses_to_change_a_verdict() {
     let given = vec![verdict("ana", Verdict::Pass)];
     world.catalog.verdict_set(given, 5).await.expect("stored");
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::connect::writer(&path, false)
+    let mut conn = crate::catalog::db::open::writer(&path, false)
         .await
         .expect("a connection");
     for sql in ["UPDATE verdict SET reader = 'bo'", "DELETE FROM verdict"] {

@@ -1,0 +1,332 @@
+//! What the catalog says of itself: the database's own checks, its schema, counters against rows, pages of rows.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
+use sqlx::sqlite::{SqliteConnectOptions, SqliteRow};
+use sqlx::{ConnectOptions as _, Row as _, SqliteConnection};
+
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::error_kind::Trouble;
+use crate::catalog::db::open;
+use crate::catalog::db::rows;
+use crate::catalog::handle::Catalog;
+use crate::catalog::queue::alike::{misremembered, unnoted};
+use crate::catalog::queue::counters::standings;
+use crate::catalog::queue::job_counts::{self, Census, by_recipe, by_status, census};
+use crate::catalog::records::pair_work::{self, KnownInputs};
+use crate::catalog::records::stage_results;
+use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
+
+/// Lines of each check that are read at most.
+const LINES: usize = 50;
+
+/// What is kept beside the rows and does not agree with them; empty when all does.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Drift {
+    /// Counters that are off.
+    pub counters: Vec<CounterDrift>,
+    /// What is kept to tell stale pairs without a look at each, a line each.
+    pub shortcuts: Vec<String>,
+}
+
+/// A counter that does not say how many jobs there are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct CounterDrift {
+    /// Number of the next stage, 0 to 4.
+    pub cursor: i64,
+    /// The status.
+    pub status: JobStatus,
+    /// What the counter says; `None` when there is none.
+    pub kept: Option<i64>,
+    /// Jobs that there are.
+    pub counted: u64,
+}
+
+/// A pair with all that is stored of it, as it is stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditedPair {
+    /// The user's id.
+    pub name: PairName,
+    /// Paths and content of its files as last read, with its number.
+    pub inputs: KnownInputs,
+    /// Where its job stands: status and number of the next stage; `None` when it has no job.
+    pub job: Option<(JobStatus, i64)>,
+    /// Whether a failure is stored.
+    pub has_failure: bool,
+    /// Every stage's stored result, also of stages that are to run again.
+    pub results: BTreeMap<Stage, AuditedResult>,
+    /// Metrics that have a row.
+    pub metrics: BTreeSet<ThresholdMetric>,
+}
+
+/// A result as it is stored.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AuditedResult {
+    /// The stage's numbers as JSON text.
+    pub outcome: String,
+    /// Its artifacts as JSON text.
+    pub files: String,
+    /// Hash over both.
+    pub result_hash: ContentHash,
+}
+
+const REFERENCES: &str = "
+SELECT \"table\" || coalesce(' row ' || rowid, '') || ' names a ' || parent || ' that is not there'
+FROM pragma_foreign_key_check LIMIT ?1";
+
+const OBJECTS: &str = "
+SELECT type || ' ' || name, sql FROM sqlite_schema
+WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name <> '_sqlx_migrations' ORDER BY 1";
+
+const COUNTERS: &str = "SELECT stage, status, n FROM counter";
+
+const MADE: &str = "SELECT recipe, n FROM made";
+
+const KEPT_DRIFT: &str = concat!("SELECT count(*) FROM job WHERE ", misremembered!());
+
+const MOVED_DRIFT: &str = concat!("SELECT count(*) FROM (", unnoted!(), ")");
+
+pub(crate) const PAGE: &str = "
+SELECT p.id, p.name, p.mesh_path, p.mesh_hash, p.mesh_stat, p.print_path, p.print_hash, p.print_stat,
+    j.stage, j.status, f.pair IS NOT NULL AS has_failure
+FROM pair AS p LEFT JOIN job AS j ON j.pair = p.id LEFT JOIN failure AS f ON f.pair = p.id
+WHERE p.id > ?1 ORDER BY p.id LIMIT ?2";
+
+pub(crate) const RESULTS: &str = "
+SELECT r.pair, r.stage, r.outcome, r.files, r.result_hash
+FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value";
+
+impl Catalog {
+    /// What SQLite finds wrong with the file, at most 50 lines; empty when it is sound. `quick` leaves out whether
+    /// indexes agree with their tables.
+    ///
+    /// # Errors
+    /// When the check cannot be made.
+    pub async fn integrity(&self, quick: bool) -> Result<Vec<String>> {
+        let mut conn = self.reader().await?;
+        match integrity(&mut conn, quick).await {
+            Ok(lines) if lines.iter().any(|line| is_unread(line)) => {
+                Err(CatalogError::Unread(self.path.to_path_buf()))
+            }
+            Err(error) => match error.trouble() {
+                Some(Trouble::Damaged | Trouble::NotADatabase) => Ok(vec![error.to_string()]),
+                _ => Err(error),
+            },
+            lines => lines,
+        }
+    }
+
+    /// Rows that name a row that is not there, at most 50.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn broken_references(&self) -> Result<Vec<String>> {
+        let mut conn = self.reader().await?;
+        let lines = sqlx::query_scalar(REFERENCES).bind(LINES as i64);
+        Ok(lines.fetch_all(&mut *conn).await?)
+    }
+
+    /// Tables, indexes and triggers that are not as this program makes them: gone, changed or added.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn schema_differences(&self) -> Result<Vec<String>> {
+        let mut conn = self.reader().await?;
+        let found = objects(&mut conn).await?;
+        let wanted = wanted_objects().await?;
+        let gone = wanted.keys().filter(|name| !found.contains_key(*name));
+        let gone = gone.map(|name| format!("{name} is gone"));
+        let other = found
+            .iter()
+            .filter_map(|(name, sql)| match wanted.get(name) {
+                None => Some(format!("{name} is not of this program")),
+                Some(wanted) if wanted != sql => Some(format!("{name} is not as it was made")),
+                Some(_) => None,
+            });
+        Ok(gone.chain(other).collect())
+    }
+
+    /// What is kept beside the rows and does not agree with them. `quick` leaves out what a look at each pair would tell.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn drift(&self, quick: bool) -> Result<Drift> {
+        // All of one moment, so that a run that goes on beside it does not look like drift.
+        let mut conn = self.snapshot().await?;
+        let counted = census(&mut conn, job_counts::ALL).await?;
+        let counters = counter_drift(&mut conn, &counted).await?;
+        let mut shortcuts = made_drift(&mut conn, &counted).await?;
+        let looks = [
+            (
+                KEPT_DRIFT,
+                "keep another recipe than that of their last result",
+            ),
+            (
+                MOVED_DRIFT,
+                "are not noted, though their files or facts changed since",
+            ),
+        ];
+        for (sql, what) in looks.into_iter().filter(|_| !quick) {
+            let pairs: i64 = sqlx::query_scalar(sql).fetch_one(&mut *conn).await?;
+            if pairs > 0 {
+                shortcuts.push(format!("{pairs} pairs {what}"));
+            }
+        }
+        Ok(Drift {
+            counters,
+            shortcuts,
+        })
+    }
+
+    /// The next pairs after one, by number, at most `limit`; empty at the end.
+    ///
+    /// # Errors
+    /// When the database refuses or holds what it must not.
+    pub async fn audit_page(
+        &self,
+        after: Option<PairId>,
+        limit: usize,
+    ) -> Result<Vec<AuditedPair>> {
+        let mut conn = self.snapshot().await?;
+        let found = sqlx::query(PAGE)
+            .bind(after.map_or(0, |pair| pair.0))
+            .bind(limit as i64)
+            .fetch_all(&mut *conn)
+            .await?;
+        let mut pairs = found.iter().map(pair).collect::<Result<Vec<_>>>()?;
+        let ids: Vec<i64> = pairs.iter().map(|pair| pair.inputs.pair.0).collect();
+        let mut results = stored(&mut conn, &ids).await?;
+        let metrics = stage_results::metric_hashes(&mut conn, &ids).await?;
+        for pair in &mut pairs {
+            let id = pair.inputs.pair.0;
+            pair.results = results.remove(&id).unwrap_or_default();
+            let of_pair = metrics.keys().filter(|(of, _)| *of == id);
+            pair.metrics = of_pair.map(|(_, metric)| *metric).collect();
+        }
+        Ok(pairs)
+    }
+}
+
+/// Counters that are off.
+async fn counter_drift(conn: &mut SqliteConnection, counted: &Census) -> Result<Vec<CounterDrift>> {
+    let kept: Vec<(i64, i64, i64)> = sqlx::query_as(COUNTERS).fetch_all(conn).await?;
+    let counted = by_status(counted)?;
+    let drift = standings().filter_map(|(cursor, status)| {
+        let counted = counted.get(&(cursor, status)).copied().unwrap_or(0);
+        let mut kept = kept.iter();
+        let kept = kept.find(|(at, code, _)| (*at, *code) == (cursor, status.code()));
+        let kept = kept.map(|(.., n)| *n);
+        let is_right = kept.is_some_and(|kept| u64::try_from(kept) == Ok(counted));
+        (!is_right).then_some(CounterDrift {
+            cursor,
+            status,
+            kept,
+            counted,
+        })
+    });
+    Ok(drift.collect())
+}
+
+/// Counters of recipes that are off, a line each.
+async fn made_drift(conn: &mut SqliteConnection, counted: &Census) -> Result<Vec<String>> {
+    let kept: Vec<(i64, i64)> = sqlx::query_as(MADE).fetch_all(conn).await?;
+    let kept: BTreeMap<i64, i64> = kept.into_iter().collect();
+    let counted = by_recipe(counted);
+    let recipes: BTreeSet<_> = kept.keys().chain(counted.keys()).collect();
+    let lines = recipes.into_iter().filter_map(|recipe| {
+        let kept = kept.get(recipe).copied().unwrap_or(0);
+        let counted = counted.get(recipe).copied().unwrap_or(0);
+        let is_off = u64::try_from(kept) != Ok(counted);
+        is_off.then(|| format!("the counter of recipe {recipe} says {kept}, there are {counted}"))
+    });
+    Ok(lines.collect())
+}
+
+/// See [`Catalog::integrity`].
+pub(crate) async fn integrity(conn: &mut SqliteConnection, quick: bool) -> Result<Vec<String>> {
+    let sql = if quick {
+        "PRAGMA quick_check(50)"
+    } else {
+        "PRAGMA integrity_check(50)"
+    };
+    let mut lines: Vec<String> = sqlx::query_scalar(sql).fetch_all(conn).await?;
+    lines.retain(|line| line != "ok");
+    Ok(lines)
+}
+
+/// Whether a line of SQLite's check says that the disk refused to read a page: that tells nothing of the page.
+fn is_unread(line: &str) -> bool {
+    let code = line.rsplit_once("error code=").map(|(_, code)| code.trim());
+    let code: Option<i64> = code.and_then(|code| code.parse().ok());
+    code.and_then(Trouble::of_code) == Some(Trouble::Disk)
+}
+
+/// Tables, indexes and triggers by kind and name, with the statement that makes each.
+pub(crate) async fn objects(conn: &mut SqliteConnection) -> Result<BTreeMap<String, String>> {
+    let found: Vec<(String, String)> = sqlx::query_as(OBJECTS).fetch_all(conn).await?;
+    Ok(found.into_iter().collect())
+}
+
+/// [`objects`] of a new catalog.
+pub(crate) async fn wanted_objects() -> Result<BTreeMap<String, String>> {
+    let options = SqliteConnectOptions::new().in_memory(true);
+    let mut conn = options.connect().await?;
+    open::MIGRATOR.run(&mut conn).await?;
+    objects(&mut conn).await
+}
+
+fn pair(row: &SqliteRow) -> Result<AuditedPair> {
+    let status: Option<i64> = row.try_get("status")?;
+    let cursor: Option<i64> = row.try_get("stage")?;
+    Ok(AuditedPair {
+        name: rows::pair_name(&row.try_get::<String, _>("name")?)?,
+        inputs: pair_work::known_inputs(row)?,
+        job: status.map(rows::status).transpose()?.zip(cursor),
+        has_failure: row.try_get("has_failure")?,
+        results: BTreeMap::new(),
+        metrics: BTreeSet::new(),
+    })
+}
+
+async fn stored(
+    conn: &mut SqliteConnection,
+    pairs: &[i64],
+) -> Result<BTreeMap<i64, BTreeMap<Stage, AuditedResult>>> {
+    let found = sqlx::query(RESULTS)
+        .bind(Value::from(pairs).to_string())
+        .fetch_all(conn)
+        .await?;
+    let mut results: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
+    for row in &found {
+        let stage = rows::stage(row.try_get("stage")?)?;
+        let result = AuditedResult {
+            outcome: row.try_get("outcome")?,
+            files: row.try_get("files")?,
+            result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
+        };
+        let of_pair = results.entry(row.try_get("pair")?).or_default();
+        of_pair.insert(stage, result);
+    }
+    Ok(results)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::is_unread;
+
+    #[test]
+    fn a_page_that_the_disk_does_not_give_is_told_from_one_that_is_wrong() {
+        // SQLITE_IOERR_READ and SQLITE_CORRUPT.
+        assert!(is_unread(
+            "Tree 5 page 7: unable to get the page. error code=266"
+        ));
+        assert!(!is_unread(
+            "Tree 5 page 7: unable to get the page. error code=11"
+        ));
+        assert!(!is_unread(
+            "Tree 5 page 7: btreeInitPage() returns error code 11"
+        ));
+    }
+}

@@ -1,0 +1,183 @@
+//! Requests that share a commit: all that wait, and where those can wait a little, what comes meanwhile.
+
+use tokio::sync::mpsc;
+use tokio::time::{Instant, timeout_at};
+
+use crate::catalog::db::commit_delay::Company;
+use crate::catalog::db::group_commit::Batch;
+use crate::catalog::db::writer::Message;
+
+/// Most requests in one commit.
+const BATCH: usize = 256;
+
+/// What has come so far.
+struct Gathering {
+    batch: Batch,
+    /// Until when to wait for more; `None` where somebody waits for an answer.
+    until: Option<Instant>,
+    /// A message that is no request ends the batch.
+    other: Option<Message>,
+}
+
+impl Gathering {
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::InTime(request) => self.batch.push(request),
+            Message::Grouped(request) => {
+                self.batch.push(request);
+                self.until = None;
+            }
+            Message::Hurry => self.until = None,
+            other @ (Message::Alone(_) | Message::Close(_)) => self.other = Some(other),
+        }
+    }
+
+    fn is_full(&self) -> bool {
+        self.other.is_some() || self.batch.len() >= BATCH
+    }
+}
+
+/// The batch that begins with this message, and the message after it that is no request. Whoever was answered by the
+/// last commit is given the turn first: the next request is often already on its way.
+pub(crate) async fn gather(
+    first: Message,
+    company: &Company,
+    inbox: &mut mpsc::Receiver<Message>,
+) -> (Batch, Option<Message>) {
+    let mut gathering = Gathering {
+        batch: Batch::default(),
+        until: company.until(),
+        other: None,
+    };
+    gathering.take(first);
+    loop {
+        tokio::task::yield_now().await;
+        let before = gathering.batch.len();
+        while !gathering.is_full()
+            && let Ok(message) = inbox.try_recv()
+        {
+            gathering.take(message);
+        }
+        if gathering.is_full() {
+            break;
+        }
+        match gathering.until {
+            Some(until) => match timeout_at(until, inbox.recv()).await {
+                Ok(Some(message)) => gathering.take(message),
+                Ok(None) | Err(_) => break,
+            },
+            None if gathering.batch.len() == before => break,
+            None => {}
+        }
+    }
+    (gathering.batch, gathering.other)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use tokio::sync::{mpsc, oneshot};
+    use tokio::time::timeout;
+
+    use super::{BATCH, gather};
+    use crate::catalog::Catalog;
+    use crate::catalog::db::commit_delay::Company;
+    use crate::catalog::db::group_commit::{Beat, Request};
+    use crate::catalog::db::writer::Message;
+    use crate::domain::WorkerId;
+
+    fn request() -> Request {
+        let beat = Beat {
+            worker: WorkerId(1),
+            now: 1,
+            alive_since: 1,
+        };
+        Request::Beat(beat, oneshot::channel().0)
+    }
+
+    /// Requests in the batch that begins with the first of these, where nothing else ever comes.
+    async fn gathered(messages: Vec<Message>) -> usize {
+        gathered_later(messages, Vec::new()).await
+    }
+
+    /// The same, where some come when it is waited for more.
+    async fn gathered_later(messages: Vec<Message>, later: Vec<Message>) -> usize {
+        let company = Company::of(Duration::from_hours(1));
+        let (sender, mut inbox) = mpsc::channel(messages.len());
+        for message in messages {
+            sender.send(message).await.expect("room");
+        }
+        let after = sender.clone();
+        tokio::spawn(async move {
+            for message in later {
+                tokio::task::yield_now().await;
+                after.send(message).await.expect("room");
+            }
+        });
+        let first = inbox.recv().await.expect("a message");
+        let batch = gather(first, &company, &mut inbox);
+        let batch = timeout(Duration::from_secs(20), batch).await;
+        batch.expect("it does not wait").0.len()
+    }
+
+    #[tokio::test]
+    async fn what_can_wait_goes_with_what_cannot() {
+        let waits = Message::InTime;
+        assert_eq!(
+            gathered(vec![
+                waits(request()),
+                waits(request()),
+                Message::Grouped(request())
+            ])
+            .await,
+            3
+        );
+        assert_eq!(
+            gathered(vec![Message::Grouped(request()), waits(request())]).await,
+            2
+        );
+    }
+
+    #[tokio::test]
+    async fn what_comes_while_something_waits_goes_with_it() {
+        let later = vec![
+            Message::InTime(request()),
+            Message::InTime(request()),
+            Message::Hurry,
+        ];
+        assert_eq!(
+            gathered_later(vec![Message::InTime(request())], later).await,
+            3
+        );
+    }
+
+    #[tokio::test]
+    async fn nothing_is_waited_for_when_somebody_is_in_a_hurry_or_closes() {
+        let waits = Message::InTime;
+        assert_eq!(gathered(vec![waits(request()), Message::Hurry]).await, 1);
+        let close = Message::Close(oneshot::channel().0);
+        assert_eq!(gathered(vec![waits(request()), close]).await, 1);
+    }
+
+    #[tokio::test]
+    async fn nothing_is_waited_for_while_somebody_waits() {
+        let catalog = tempfile::tempdir().expect("a temporary directory");
+        let path = catalog.path().join("catalog.sqlite");
+        let catalog = Catalog::create_patient(&path).await.expect("a catalog");
+        let until = || catalog.company.until();
+        assert!(until().is_some());
+        let waiting = [catalog.waiting().await, catalog.waiting().await];
+        let [one, other] = waiting.map(|waiting| waiting.expect("it is open"));
+        drop(one);
+        assert_eq!(until(), None);
+        drop(other);
+        assert!(until().is_some());
+    }
+
+    #[tokio::test]
+    async fn a_full_commit_waits_for_no_more_and_leaves_the_rest() {
+        let messages = (0..=BATCH).map(|_| Message::InTime(request()));
+        assert_eq!(gathered(messages.collect()).await, BATCH);
+    }
+}

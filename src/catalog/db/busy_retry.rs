@@ -1,0 +1,147 @@
+//! Waiting for what other processes have locked, over and above the database's own waiting.
+
+use std::path::Path;
+use std::time::Duration;
+
+use tokio::time::{Instant, Sleep, sleep};
+
+use crate::catalog::db::error::Result;
+use crate::catalog::db::error_kind::Trouble;
+use crate::catalog::db::lock_owner::holder;
+
+/// How long in all.
+const PATIENCE: Duration = Duration::from_mins(1);
+/// After so long it is said who is waited for.
+const SILENCE: Duration = Duration::from_secs(5);
+/// Between two tries: some locks are refused at once.
+const BETWEEN: Duration = Duration::from_millis(5);
+
+/// Tries again for as long as others have the catalog locked, so that "busy" reaches no caller before its time.
+pub(crate) struct Patience<'p> {
+    catalog: &'p Path,
+    begun: Instant,
+    is_told: bool,
+}
+
+impl<'p> Patience<'p> {
+    /// From now on, with this catalog.
+    pub(crate) fn begin(catalog: &'p Path) -> Self {
+        Self {
+            catalog,
+            begun: Instant::now(),
+            is_told: false,
+        }
+    }
+
+    /// What to wait for before the next try; `None` where this was the last one.
+    pub(crate) fn wait<T>(&mut self, outcome: &Result<T>) -> Option<Sleep> {
+        let error = outcome.as_ref().err()?;
+        let waited = self.begun.elapsed();
+        if error.trouble() != Some(Trouble::Busy) || waited >= PATIENCE {
+            return None;
+        }
+        tracing::debug!(%error, "the catalog is busy, waiting");
+        if waited >= SILENCE && !self.is_told {
+            self.is_told = true;
+            self.tell();
+        }
+        Some(sleep(BETWEEN))
+    }
+
+    fn tell(&self) {
+        let catalog = self.catalog.display();
+        let by = holder(self.catalog)
+            .map_or_else(|| "another process".to_owned(), |holder| holder.to_string());
+        tracing::warn!("{catalog} is kept locked by {by}; waiting");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    use std::time::Duration;
+
+    use sqlx::sqlite::SqliteConnectOptions;
+    use sqlx::{ConnectOptions as _, Connection as _, SqliteConnection};
+    use tracing::span::{Attributes, Id, Record};
+    use tracing::{Event, Level, Metadata, Subscriber, subscriber};
+
+    use super::{PATIENCE, Patience, SILENCE};
+    use crate::catalog::{CatalogError, Result};
+
+    async fn connect(path: &Path) -> SqliteConnection {
+        let options = SqliteConnectOptions::new().filename(path);
+        let options = options.create_if_missing(true).busy_timeout(Duration::ZERO);
+        options.connect().await.expect("a connection")
+    }
+
+    /// What a write comes to while another connection has the database locked.
+    async fn busy() -> Result<()> {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("catalog.sqlite");
+        let (mut first, mut second) = (connect(&path).await, connect(&path).await);
+        let begin = sqlx::query("BEGIN IMMEDIATE").execute(&mut first).await;
+        begin.expect("the lock");
+        let refused = sqlx::query("BEGIN IMMEDIATE").execute(&mut second).await;
+        first.close().await.expect("closed");
+        Err(refused.expect_err("locked").into())
+    }
+
+    /// One that has waited for so long.
+    fn after(waited: Duration) -> Patience<'static> {
+        let mut patience = Patience::begin(Path::new("catalog.sqlite"));
+        patience.begun -= waited;
+        patience
+    }
+
+    /// A log that counts its warnings.
+    #[derive(Default)]
+    struct Warnings(Arc<AtomicUsize>);
+
+    impl Subscriber for Warnings {
+        fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+            *metadata.level() == Level::WARN
+        }
+
+        fn event(&self, _: &Event<'_>) {
+            self.0.fetch_add(1, Ordering::SeqCst);
+        }
+
+        fn new_span(&self, _: &Attributes<'_>) -> Id {
+            Id::from_u64(1)
+        }
+
+        fn record(&self, _: &Id, _: &Record<'_>) {}
+
+        fn record_follows_from(&self, _: &Id, _: &Id) {}
+
+        fn enter(&self, _: &Id) {}
+
+        fn exit(&self, _: &Id) {}
+    }
+
+    #[tokio::test]
+    async fn who_is_waited_for_is_told_after_a_while_and_the_wait_ends() {
+        let busy = busy().await;
+        let warnings = Warnings::default();
+        let told = Arc::clone(&warnings.0);
+        let _log = subscriber::set_default(warnings);
+        assert!(after(Duration::ZERO).wait(&busy).is_some());
+        assert_eq!(told.load(Ordering::SeqCst), 0);
+        let mut patience = after(SILENCE);
+        for _ in 0..3 {
+            assert!(patience.wait(&busy).is_some());
+            assert_eq!(told.load(Ordering::SeqCst), 1);
+        }
+        assert!(after(PATIENCE).wait(&busy).is_none());
+    }
+
+    #[tokio::test]
+    async fn what_is_done_or_refused_for_good_is_not_waited_for() {
+        assert!(after(Duration::ZERO).wait(&Ok(())).is_none());
+        let closed: Result<()> = Err(CatalogError::Closed);
+        assert!(after(Duration::ZERO).wait(&closed).is_none());
+    }
+}

@@ -1,0 +1,67 @@
+//! A copy of the catalog as it is at one moment, made while a run may be writing.
+
+use std::path::Path;
+
+use sqlx::sqlite::SqliteConnectOptions;
+use sqlx::{ConnectOptions as _, Connection as _};
+
+use crate::catalog::audit::integrity;
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::error_kind::Trouble;
+use crate::catalog::db::open::{Identity, identity};
+use crate::catalog::handle::Catalog;
+
+impl Catalog {
+    /// Copies the catalog to a file that is not there yet, and reads the copy back. All in it is of one moment. Nothing
+    /// is synced to disk.
+    ///
+    /// # Errors
+    /// When the database or the disk refuse, or the copy is not sound; what was written of it stays.
+    pub async fn copy_to(&self, file: &Path) -> Result<()> {
+        let Some(name) = file.to_str() else {
+            return Err(CatalogError::NotUtf8(file.to_owned()));
+        };
+        // A connection that may only query may not copy either, so one is taken out of the pool.
+        let mut conn = self.reader().await?.detach();
+        sqlx::query("PRAGMA query_only = 0")
+            .execute(&mut conn)
+            .await?;
+        sqlx::query("VACUUM INTO ?1")
+            .bind(name)
+            .execute(&mut conn)
+            .await
+            .map_err(|error| not_copied(file, error))?;
+        conn.close().await?;
+        let options = SqliteConnectOptions::new()
+            .filename(file)
+            .read_only(true)
+            .immutable(true);
+        let mut copy = options.connect().await?;
+        let found = identity(&mut copy).await?;
+        let faults = integrity::integrity(&mut copy, true).await?;
+        copy.close().await?;
+        if found == Identity::Current && faults.is_empty() {
+            Ok(())
+        } else {
+            Err(CatalogError::Damaged(file.to_owned()))
+        }
+    }
+}
+
+/// Blames the copy for what the disk refused: the catalog itself is only read.
+fn not_copied(file: &Path, error: sqlx::Error) -> CatalogError {
+    let reason = match Trouble::of(&error) {
+        Some(Trouble::Full) => "the disk is full",
+        Some(Trouble::ReadOnly | Trouble::CannotOpen) => "it cannot be written",
+        Some(Trouble::Disk) => "the disk refused",
+        Some(Trouble::Damaged | Trouble::NotADatabase | Trouble::Busy | Trouble::Contradiction)
+        | None => {
+            return error.into();
+        }
+    };
+    CatalogError::Io {
+        path: file.to_owned(),
+        source: std::io::Error::other(reason),
+    }
+}

@@ -1,0 +1,89 @@
+//! Who keeps others from writing to the catalog, as the system tells it.
+
+use std::fmt;
+use std::os::unix::fs::MetadataExt as _;
+use std::path::Path;
+
+use crate::catalog::db::open::beside;
+
+/// The byte of the index beside the log that whoever writes has locked (SQLite's file format, "WAL-index locks").
+const WRITE_LOCK: &str = "120";
+
+/// A process that writes to the catalog.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Holder {
+    /// Its number.
+    pub pid: u32,
+    /// Whether a signal has stopped it, so that it keeps what it has for as long as nobody lets it go on.
+    pub is_stopped: bool,
+}
+
+impl fmt::Display for Holder {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { pid, is_stopped } = self;
+        write!(f, "pid {pid}")?;
+        if *is_stopped {
+            write!(f, ", which is stopped (`kill -CONT {pid}` lets it go on)")?;
+        }
+        Ok(())
+    }
+}
+
+/// The process that has the catalog locked for writing; `None` where there is none, or the system does not tell. No
+/// file of the catalog is opened: closing it again would drop the locks of this process's own connections.
+pub fn holder(catalog: &Path) -> Option<Holder> {
+    let index = std::fs::metadata(beside(catalog, "-shm")).ok()?;
+    let device = index.dev();
+    let (major, minor) = (rustix::fs::major(device), rustix::fs::minor(device));
+    let file = format!("{major:02x}:{minor:02x}:{}", index.ino());
+    let locks = std::fs::read_to_string("/proc/locks").ok()?;
+    let pid = locks.lines().find_map(|line| writer(line, &file))?;
+    let state = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
+    Some(Holder {
+        pid,
+        is_stopped: is_stopped(&state),
+    })
+}
+
+/// Whose lock a line of `/proc/locks` tells of, when it is the one for writing to this catalog.
+fn writer(line: &str, file: &str) -> Option<u32> {
+    let words: Vec<_> = line.split_whitespace().collect();
+    let [_, "POSIX", _, "WRITE", pid, of, WRITE_LOCK, _] = words[..] else {
+        return None;
+    };
+    (of == file).then(|| pid.parse().ok())?
+}
+
+/// By `/proc/PID/stat`: the state follows the name in brackets.
+fn is_stopped(stat: &str) -> bool {
+    let state = stat.rsplit(") ").next();
+    state.is_some_and(|state| state.starts_with('T'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{is_stopped, writer};
+
+    #[test]
+    fn only_the_lock_for_writing_to_this_file_tells_who_writes() {
+        let file = "fe:00:827";
+        let line = "1: POSIX  ADVISORY  WRITE 8118 fe:00:827 120 120";
+        assert_eq!(writer(line, file), Some(8118));
+        for other in [
+            "1: POSIX  ADVISORY  READ 8118 fe:00:827 120 120",
+            "1: POSIX  ADVISORY  WRITE 8118 fe:00:827 121 121",
+            "1: POSIX  ADVISORY  WRITE 8118 fe:00:828 120 120",
+            "1: FLOCK  ADVISORY  WRITE 8118 fe:00:827 0 EOF",
+            "1: -> POSIX  ADVISORY  WRITE 8118 fe:00:827 120 120",
+        ] {
+            assert_eq!(writer(other, file), None, "{other}");
+        }
+    }
+
+    #[test]
+    fn a_stopped_process_is_told_whatever_its_name() {
+        assert!(is_stopped("12 (a) R b) T 1 12"));
+        assert!(!is_stopped("12 (a) T b) S 1 12"));
+        assert!(!is_stopped(""));
+    }
+}

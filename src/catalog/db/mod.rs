@@ -1,0 +1,15 @@
+//! The database file: opening, the writer task, errors, and reading columns.
+
+pub(crate) mod batch_collector;
+pub(crate) mod busy_retry;
+pub(crate) mod commit_delay;
+pub(crate) mod copy;
+pub(crate) mod error;
+pub(crate) mod error_kind;
+pub(crate) mod group_commit;
+pub(crate) mod lock_owner;
+pub(crate) mod network_fs;
+pub(crate) mod open;
+pub(crate) mod rows;
+pub(crate) mod script;
+pub(crate) mod writer;

@@ -1,0 +1,161 @@
+//! Whether a directory is on a network file system, where the write-ahead log's shared memory does not work.
+
+use std::path::Path;
+
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+
+/// File systems by the number that `statfs` gives (statfs(2) and the kernels' `magic.h`).
+const MAGICS: [(u64, &str); 20] = [
+    (0x6969, "nfs"),
+    (0x517b, "smb"),
+    (0xff53_4d42, "cifs"),
+    (0xfe53_4d42, "smb2"),
+    (0x0102_1997, "9p"),
+    (0x564c, "ncp"),
+    (0x7375_7245, "coda"),
+    (0x5346_414f, "afs"),
+    (0x6b41_4653, "afs"),
+    (0x00c3_6400, "ceph"),
+    (0x0bd0_0bd0, "lustre"),
+    (0x4750_4653, "gpfs"),
+    (0x1983_0326, "beegfs"),
+    (0x2003_0528, "orangefs"),
+    (0xaad7_aaea, "panfs"),
+    (0x7461_636f, "ocfs2"),
+    (0x0116_1970, "gfs2"),
+    (0x786f_4256, "vboxsf"),
+    (0xbacb_acbc, "vmhgfs"),
+    (0x7c7c_6673, "prl_fs"),
+];
+
+/// The number all file systems share that run outside the kernel.
+const FUSE: u64 = 0x6573_5546;
+
+/// Those of them that reach over a network, by the name after `fuse.` in the table of mounts.
+const FUSE_NETWORKS: [&str; 18] = [
+    "sshfs",
+    "rclone",
+    "s3fs",
+    "gcsfuse",
+    "glusterfs",
+    "ceph-fuse",
+    "davfs",
+    "curlftpfs",
+    "smbnetfs",
+    "juicefs",
+    "mfs",
+    "lizardfs",
+    "goofys",
+    "blobfuse",
+    "blobfuse2",
+    "gvfsd-fuse",
+    "onedriver",
+    "google-drive-ocamlfuse",
+];
+
+/// Refuses the directory of a catalog that is on a network file system.
+///
+/// # Errors
+/// When it is. Where it cannot be told, it is taken to be local.
+pub(crate) fn refuse(catalog: &Path) -> Result<()> {
+    let dir = catalog.parent().filter(|dir| !dir.as_os_str().is_empty());
+    let dir = dir.unwrap_or(Path::new("."));
+    match found(dir) {
+        Some(kind) => Err(CatalogError::NetworkFileSystem {
+            path: dir.to_owned(),
+            kind,
+        }),
+        None => Ok(()),
+    }
+}
+
+#[cfg(target_os = "linux")]
+fn found(dir: &Path) -> Option<&'static str> {
+    let magic = rustix::fs::statfs(dir).ok()?.f_type;
+    let magic = u64::try_from(magic).ok()? & 0xffff_ffff;
+    let mount = (magic == FUSE).then(|| mount_type(dir)).flatten();
+    network_kind(magic, mount.as_deref())
+}
+
+#[cfg(not(target_os = "linux"))]
+fn found(_dir: &Path) -> Option<&'static str> {
+    None
+}
+
+/// The type in the table of mounts of the file system a directory is on.
+#[cfg(target_os = "linux")]
+fn mount_type(dir: &Path) -> Option<String> {
+    use std::os::unix::fs::MetadataExt as _;
+    let device = std::fs::metadata(dir).ok()?.dev();
+    let number = format!(
+        "{}:{}",
+        rustix::fs::major(device),
+        rustix::fs::minor(device)
+    );
+    let table = std::fs::read_to_string("/proc/self/mountinfo").ok()?;
+    type_of_device(&table, &number).map(ToOwned::to_owned)
+}
+
+/// Looks a device up in `/proc/self/mountinfo`: its number is the third field, the type the first after a lone `-`.
+fn type_of_device<'a>(table: &'a str, number: &str) -> Option<&'a str> {
+    let line = table
+        .lines()
+        .rfind(|line| line.split(' ').nth(2) == Some(number))?;
+    line.split_once(" - ")?.1.split(' ').next()
+}
+
+/// Name of a network file system by its number, and for those outside the kernel by its type; `None` for a local one.
+fn network_kind(magic: u64, mount: Option<&str>) -> Option<&'static str> {
+    if magic == FUSE {
+        let name = mount?.strip_prefix("fuse.")?;
+        return FUSE_NETWORKS.into_iter().find(|known| *known == name);
+    }
+    let known = MAGICS.iter().find(|(known, _)| *known == magic);
+    known.map(|(_, name)| *name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FUSE, network_kind, type_of_device};
+
+    #[test]
+    fn networks_are_told_by_their_number_and_local_disks_let_through() {
+        for (magic, name) in [
+            (0x6969, "nfs"),
+            (0xff53_4d42, "cifs"),
+            (0xfe53_4d42, "smb2"),
+            (0x0102_1997, "9p"),
+        ] {
+            assert_eq!(network_kind(magic, None), Some(name));
+        }
+        // ext4, xfs, btrfs, tmpfs, overlay, zfs.
+        for magic in [
+            0xef53,
+            0x5846_5342,
+            0x9123_683e,
+            0x0102_1994,
+            0x794c_7630,
+            0x2fc1_2fc1,
+        ] {
+            assert_eq!(network_kind(magic, None), None);
+        }
+    }
+
+    #[test]
+    fn outside_the_kernel_the_type_decides() {
+        assert_eq!(network_kind(FUSE, Some("fuse.sshfs")), Some("sshfs"));
+        assert_eq!(network_kind(FUSE, Some("fuse.gocryptfs")), None);
+        assert_eq!(network_kind(FUSE, Some("fuseblk")), None);
+        assert_eq!(network_kind(FUSE, None), None);
+    }
+
+    #[test]
+    fn the_table_of_mounts_is_read_by_device() {
+        let table = "22 1 8:1 / / rw,relatime shared:1 - ext4 /dev/sda1 rw\n\
+                     90 22 0:51 / /mnt/far rw,nosuid shared:7 master:2 - fuse.sshfs lan@far:/srv rw\n";
+        assert_eq!(type_of_device(table, "0:51"), Some("fuse.sshfs"));
+        assert_eq!(type_of_device(table, "8:1"), Some("ext4"));
+        assert_eq!(type_of_device(table, "0:5"), None);
+    }
+}

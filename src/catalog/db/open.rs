@@ -1,0 +1,340 @@
+//! Opening the database: the right file, the right disk, the right settings, read back.
+
+use std::io::Read as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use sqlx::sqlite::{
+    SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
+};
+use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
+
+use crate::catalog::db::busy_retry::Patience;
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::error_kind::Trouble;
+use crate::catalog::db::network_fs;
+use crate::domain::FileKind;
+
+/// How long a connection waits for another process's write.
+const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
+/// Marks a database as a catalog: "mocb".
+const APPLICATION_ID: i64 = 1_836_016_482;
+/// Version of the schema, raised by each migration.
+const SCHEMA_VERSION: i64 = 5;
+/// Read connections of a process.
+const READERS: u32 = 4;
+
+pub(crate) static MIGRATOR: sqlx::migrate::Migrator = sqlx::migrate!("./migrations");
+
+/// What every connection has in common.
+fn options(path: &Path) -> SqliteConnectOptions {
+    SqliteConnectOptions::new()
+        .filename(path)
+        .create_if_missing(false)
+        .foreign_keys(true)
+        .busy_timeout(BUSY_TIMEOUT)
+        .synchronous(SqliteSynchronous::Full)
+        .pragma("temp_store", "MEMORY")
+}
+
+/// The write connection, with the schema brought up to date. Makes the file when `create` is set.
+pub(crate) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection> {
+    network_fs::refuse(path)?;
+    look(path, create)?;
+    let is_new = create && !path.exists();
+    let mut conn = connect(path, create)
+        .await
+        .map_err(|error| match error.trouble() {
+            Some(Trouble::CannotOpen) if is_new => CatalogError::NotMade(path.to_owned()),
+            _ => not_writable(path, error),
+        })?;
+    for (name, sql, wanted) in [
+        (
+            "journal_mode",
+            "SELECT CAST(journal_mode AS TEXT) FROM pragma_journal_mode",
+            "wal",
+        ),
+        (
+            "synchronous",
+            "SELECT CAST(synchronous AS TEXT) FROM pragma_synchronous",
+            "2",
+        ),
+        (
+            "foreign_keys",
+            "SELECT CAST(foreign_keys AS TEXT) FROM pragma_foreign_keys",
+            "1",
+        ),
+        (
+            "busy_timeout",
+            "SELECT CAST(timeout AS TEXT) FROM pragma_busy_timeout",
+            "10000",
+        ),
+    ] {
+        assert_pragma(&mut conn, name, sql, wanted).await?;
+    }
+    Ok(conn)
+}
+
+async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
+    let mut patience = Patience::begin(path);
+    loop {
+        let outcome = try_connect(path, create).await;
+        match patience.wait(&outcome) {
+            Some(moment) => moment.await,
+            None => return outcome,
+        }
+    }
+}
+
+async fn try_connect(path: &Path, create: bool) -> Result<SqliteConnection> {
+    // The writer runs the checkpoints itself, so that no commit is made to wait for one.
+    let mut conn = options(path)
+        .create_if_missing(create)
+        .journal_mode(SqliteJournalMode::Wal)
+        .pragma("wal_autocheckpoint", "0")
+        .pragma("journal_size_limit", "67108864")
+        .connect()
+        .await?;
+    migrate(&mut conn, path).await?;
+    Ok(conn)
+}
+
+/// Connections that only read. They never wait for the writer, nor the writer for them. The catalog of an older
+/// version of the program is brought up to date first. Where nothing can be written, not even the files that readers
+/// share, the catalog is read as it lies.
+pub(crate) async fn readers(path: &Path) -> Result<SqlitePool> {
+    look(path, false)?;
+    let (pool, found) = match shared(path).await {
+        Err(error) if is_kept_out(&error) => frozen(path, error).await?,
+        outcome => outcome.map_err(|error| unreadable(path, error))?,
+    };
+    match found {
+        Identity::Current => Ok(pool),
+        Identity::Older => {
+            pool.close().await;
+            writer(path, false).await?.close().await?;
+            Ok(shared(path).await?.0)
+        }
+        Identity::Other(number) => Err(wrong_identity(path, number)),
+    }
+}
+
+/// Readers beside writers.
+async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
+    let mut patience = Patience::begin(path);
+    loop {
+        let outcome = pool(options(path).pragma("query_only", "1")).await;
+        match patience.wait(&outcome) {
+            Some(moment) => moment.await,
+            None => return outcome,
+        }
+    }
+}
+
+/// Readers of a file that nobody can change. Only a log that was folded back can be left out of sight.
+async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identity)> {
+    let log = beside(path, "-wal");
+    match std::fs::metadata(&log) {
+        Ok(meta) if meta.len() > 0 => Err(CatalogError::UnfoldedLog(log)),
+        Ok(_) | Err(_) if std::fs::File::open(path).is_err() => Err(error),
+        Ok(_) | Err(_) => pool(options(path).read_only(true).immutable(true))
+            .await
+            .map_err(|error| unreadable(path, error)),
+    }
+}
+
+async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
+    let pool = SqlitePoolOptions::new()
+        .max_connections(READERS)
+        // A connection to a file does not get lost, so none is asked whether it is still there.
+        .test_before_acquire(false)
+        .connect_with(options)
+        .await?;
+    let found = identity(&mut *pool.acquire().await?).await?;
+    Ok((pool, found))
+}
+
+/// A file that SQLite keeps beside the catalog.
+pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    PathBuf::from(name)
+}
+
+/// What lies where the catalog should be, before the database is let near it: an empty file would pass for a new
+/// catalog. The file is not opened, because closing it again would drop the locks of this process's connections.
+fn look(path: &Path, create: bool) -> Result<()> {
+    match std::fs::metadata(path) {
+        Ok(meta) if meta.is_dir() => Err(CatalogError::IsDirectory(path.to_owned())),
+        Ok(meta) if meta.len() == 0 && !create => Err(CatalogError::Empty(path.to_owned())),
+        Ok(_) => Ok(()),
+        Err(_) if create => Ok(()),
+        Err(_) => Err(CatalogError::Missing(path.to_owned())),
+    }
+}
+
+/// Brings the schema up to date.
+async fn migrate(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
+    match identity(conn).await? {
+        Identity::Current => return Ok(()),
+        Identity::Older => {}
+        Identity::Other(number) => return Err(wrong_identity(path, number)),
+    }
+    let outcome = MIGRATOR.run(&mut *conn).await;
+    // Another process may have made the schema at the same time; then ours failed and all is well.
+    if identity(conn).await? == Identity::Current {
+        return Ok(());
+    }
+    Ok(outcome?)
+}
+
+/// Whose database it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Identity {
+    /// A catalog as this program writes it.
+    Current,
+    /// A catalog of an earlier version, or one whose making was cut short.
+    Older,
+    /// Something else, by application id and version.
+    Other((i64, i64)),
+}
+
+/// Reads whose database it is.
+pub(crate) async fn identity(conn: &mut SqliteConnection) -> Result<Identity> {
+    let id = sqlx::query_scalar("PRAGMA application_id")
+        .fetch_one(&mut *conn)
+        .await?;
+    let version = sqlx::query_scalar("PRAGMA user_version")
+        .fetch_one(&mut *conn)
+        .await?;
+    Ok(match (id, version) {
+        (APPLICATION_ID, SCHEMA_VERSION) => Identity::Current,
+        (APPLICATION_ID, version) if version < SCHEMA_VERSION => Identity::Older,
+        (0, 0) if is_empty(conn).await? => Identity::Older,
+        number => Identity::Other(number),
+    })
+}
+
+async fn is_empty(conn: &mut SqliteConnection) -> Result<bool> {
+    let tables: i64 =
+        sqlx::query_scalar("SELECT count(*) FROM sqlite_schema WHERE name <> '_sqlx_migrations'")
+            .fetch_one(conn)
+            .await?;
+    Ok(tables == 0)
+}
+
+fn wrong_identity(path: &Path, (id, version): (i64, i64)) -> CatalogError {
+    let path = path.to_owned();
+    if id == APPLICATION_ID {
+        return CatalogError::Newer {
+            path,
+            found: version,
+            known: SCHEMA_VERSION,
+        };
+    }
+    CatalogError::Foreign {
+        path,
+        reason: "another program's database".to_owned(),
+    }
+}
+
+/// Whether the file or its directory cannot be written to, as readers beside writers need it.
+fn is_kept_out(error: &CatalogError) -> bool {
+    matches!(
+        error.trouble(),
+        Some(Trouble::ReadOnly | Trouble::CannotOpen)
+    )
+}
+
+fn not_writable(path: &Path, error: CatalogError) -> CatalogError {
+    if is_kept_out(&error) {
+        CatalogError::NotWritable(path.to_owned())
+    } else {
+        unreadable(path, error)
+    }
+}
+
+/// Says plainly when the file is no database, or no longer a whole one.
+fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
+    match error.trouble() {
+        // No connection can be open on a file that is no database, so it may be looked into.
+        Some(Trouble::NotADatabase) => CatalogError::Foreign {
+            path: path.to_owned(),
+            reason: kind(path).to_owned(),
+        },
+        Some(Trouble::Damaged) => CatalogError::Damaged(path.to_owned()),
+        _ => error,
+    }
+}
+
+/// What a file is that is no database.
+fn kind(path: &Path) -> &'static str {
+    let mut head = [0; 512];
+    let read = std::fs::File::open(path).and_then(|mut file| file.read(&mut head));
+    let read = read.unwrap_or(0);
+    match FileKind::of(&head[..read]) {
+        FileKind::Other("an SQLite database") => "a database cut short or encrypted",
+        kind => kind.description(),
+    }
+}
+
+async fn assert_pragma(
+    conn: &mut SqliteConnection,
+    name: &'static str,
+    sql: &'static str,
+    wanted: &'static str,
+) -> Result<()> {
+    let found: String = sqlx::query_scalar(sql).fetch_one(conn).await?;
+    if found == wanted {
+        return Ok(());
+    }
+    Err(CatalogError::Pragma {
+        name,
+        wanted,
+        found,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{readers, writer};
+    use crate::catalog::CatalogError;
+
+    #[tokio::test]
+    async fn a_text_file_is_no_catalog() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("catalog.sqlite");
+        std::fs::write(&path, "id,mesh,print\n".repeat(100)).expect("a file");
+        let outcome = writer(&path, true).await;
+        assert!(
+            matches!(outcome, Err(CatalogError::Foreign { .. })),
+            "{outcome:?}"
+        );
+    }
+
+    #[tokio::test]
+    async fn another_programs_database_is_refused_and_left_alone() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("catalog.sqlite");
+        let mut conn = sqlx::ConnectOptions::connect(
+            &sqlx::sqlite::SqliteConnectOptions::new()
+                .filename(&path)
+                .create_if_missing(true),
+        )
+        .await
+        .expect("a database");
+        sqlx::query("CREATE TABLE note (text TEXT)")
+            .execute(&mut conn)
+            .await
+            .expect("a table");
+        assert!(matches!(
+            writer(&path, true).await,
+            Err(CatalogError::Foreign { .. })
+        ));
+        assert!(matches!(
+            readers(&path).await,
+            Err(CatalogError::Foreign { .. })
+        ));
+    }
+}

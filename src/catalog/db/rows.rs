@@ -1,0 +1,66 @@
+//! Reading columns back into our own types, loudly.
+
+use serde_json::Value;
+
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+use crate::domain::{ContentHash, JobStatus, PairName, Stage};
+
+/// The status of a code.
+pub(crate) fn status(code: i64) -> Result<JobStatus> {
+    JobStatus::from_code(code)
+        .ok_or_else(|| CatalogError::Corrupt(format!("job status {code} is unknown")))
+}
+
+/// The stage of a cursor; `None` at the end.
+pub(crate) fn next_stage(cursor: i64) -> Result<Option<Stage>> {
+    let index = usize::try_from(cursor)
+        .ok()
+        .filter(|index| *index <= Stage::ALL.len());
+    match index {
+        Some(index) => Ok(Stage::from_index(index)),
+        None => Err(CatalogError::Corrupt(format!("stage {cursor} is unknown"))),
+    }
+}
+
+/// The stage of a number.
+pub(crate) fn stage(index: i64) -> Result<Stage> {
+    next_stage(index)?
+        .ok_or_else(|| CatalogError::Corrupt(format!("stage {index} is past the last")))
+}
+
+/// A hash from its column.
+pub(crate) fn hash(bytes: &[u8]) -> Result<ContentHash> {
+    match <[u8; 32]>::try_from(bytes) {
+        Ok(bytes) => Ok(ContentHash::from_bytes(bytes)),
+        Err(_) => Err(CatalogError::Corrupt(format!(
+            "a hash of {} bytes",
+            bytes.len()
+        ))),
+    }
+}
+
+/// A hash from a column that may be empty.
+pub(crate) fn hash_option(bytes: Option<&[u8]>) -> Result<Option<ContentHash>> {
+    bytes.map(hash).transpose()
+}
+
+/// A value of one of our enums from its name.
+pub(crate) fn name<T: std::str::FromStr<Err = String>>(text: &str) -> Result<T> {
+    text.parse().map_err(CatalogError::Corrupt)
+}
+
+/// A pair's name from its column.
+pub(crate) fn pair_name(text: &str) -> Result<PairName> {
+    PairName::new(text).map_err(|error| CatalogError::Corrupt(error.to_string()))
+}
+
+/// Names as a JSON array for `json_each`.
+pub(crate) fn names_json(names: &[PairName]) -> String {
+    array(names.iter().map(PairName::as_str)).to_string()
+}
+
+/// A JSON array for `json_each`.
+pub(crate) fn array<T: Into<Value>>(items: impl IntoIterator<Item = T>) -> Value {
+    Value::Array(items.into_iter().map(Into::into).collect())
+}

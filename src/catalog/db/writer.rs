@@ -1,0 +1,201 @@
+//! The one task that writes: takes all requests that wait, commits them together, answers after the commit.
+
+use std::path::Path;
+use std::pin::Pin;
+use std::sync::Arc;
+use std::time::Duration;
+
+use sqlx::{Connection as _, SqliteConnection};
+use tokio::sync::{mpsc, oneshot};
+
+use crate::catalog::db::batch_collector::gather;
+use crate::catalog::db::busy_retry::Patience;
+use crate::catalog::db::commit_delay::Company;
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::error_kind::Trouble;
+use crate::catalog::db::group_commit::{Answers, Batch, Request};
+
+/// Commits after which the write-ahead log is folded back even while there is work; about 4 MiB of log.
+const COMMITS_PER_CHECKPOINT: u32 = 128;
+/// How long nothing must come in before the log is folded back.
+const IDLE: Duration = Duration::from_millis(250);
+
+/// A future that borrows the write connection.
+pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
+/// A transaction of its own; it sends its own answer.
+pub(crate) type Alone = Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, ()> + Send>;
+
+/// What the writer is told.
+pub(crate) enum Message {
+    /// Goes into the next group commit.
+    Grouped(Request),
+    /// The same, but that commit may wait a little for others to share it.
+    InTime(Request),
+    /// Somebody waits: the next commit is to wait no longer.
+    Hurry,
+    /// Runs in its own transaction.
+    Alone(Alone),
+    /// Ends the writer when all before it is done.
+    Close(oneshot::Sender<()>),
+}
+
+/// The writer's loop. Ends at `Close` or when nobody can send any more.
+pub(crate) async fn run(
+    mut conn: SqliteConnection,
+    path: Arc<Path>,
+    mut inbox: mpsc::Receiver<Message>,
+    company: Arc<Company>,
+) {
+    let mut commits = 0_u32;
+    let closing = loop {
+        let message = if commits == 0 {
+            inbox.recv().await
+        } else {
+            let Ok(message) = tokio::time::timeout(IDLE, inbox.recv()).await else {
+                fold_log(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
+                commits = 0;
+                continue;
+            };
+            message
+        };
+        match message {
+            None => break None,
+            Some(Message::Close(done)) => break Some(done),
+            Some(Message::Alone(work)) => work(&mut conn).await,
+            // What it was sent for is stored already.
+            Some(Message::Hurry) => continue,
+            Some(first @ (Message::Grouped(_) | Message::InTime(_))) => {
+                let (batch, after) = gather(first, &company, &mut inbox).await;
+                commit(&mut conn, &path, batch).await;
+                match after {
+                    Some(Message::Close(done)) => break Some(done),
+                    Some(Message::Alone(work)) => work(&mut conn).await,
+                    Some(Message::Grouped(_) | Message::InTime(_) | Message::Hurry) | None => {}
+                }
+            }
+        }
+        commits += 1;
+        if commits >= COMMITS_PER_CHECKPOINT {
+            fold_log(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
+            commits = 0;
+        }
+    };
+    fold_log(&mut conn, "PRAGMA wal_checkpoint(TRUNCATE)").await;
+    if let Err(error) = conn.close().await {
+        tracing::warn!(%error, "the catalog did not close cleanly");
+    }
+    if let Some(done) = closing {
+        // Whoever asked may have gone; then nobody needs the answer.
+        let _ = done.send(());
+    }
+}
+
+/// Commits a batch and answers. When it fails, each request is tried alone, so that one that cannot be stored
+/// does not take the others with it. What lock or disk refuse is no request's fault.
+async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
+    match attempt(conn, path, &batch).await {
+        Ok(answers) => batch.answer(answers),
+        Err(error) if batch.len() == 1 || is_of_the_file(&error) => {
+            batch.refuse(&Arc::new(error));
+        }
+        Err(_) => {
+            for single in batch.split() {
+                match attempt(conn, path, &single).await {
+                    Ok(answers) => single.answer(answers),
+                    Err(error) => single.refuse(&Arc::new(error)),
+                }
+            }
+        }
+    }
+}
+
+/// Whether the file is in trouble, whatever is written to it.
+fn is_of_the_file(error: &CatalogError) -> bool {
+    let trouble = error.trouble();
+    trouble.is_some_and(|trouble| trouble != Trouble::Contradiction)
+}
+
+async fn attempt(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Result<Answers> {
+    let mut patience = Patience::begin(path);
+    loop {
+        let outcome = batch.apply(conn).await;
+        if outcome.is_err() {
+            take_back(conn).await;
+        }
+        match patience.wait(&outcome) {
+            Some(moment) => moment.await,
+            None => return outcome,
+        }
+    }
+}
+
+/// Begins a write transaction, when no other process has one.
+async fn begin(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
+    let mut patience = Patience::begin(path);
+    loop {
+        let begun = sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await;
+        let outcome = begun.map(|_| ()).map_err(CatalogError::from);
+        match patience.wait(&outcome) {
+            Some(moment) => moment.await,
+            None => return outcome,
+        }
+    }
+}
+
+/// Commits what went well and takes back what did not.
+async fn end<T>(conn: &mut SqliteConnection, outcome: Result<T>) -> Result<T> {
+    let outcome = match outcome {
+        Ok(value) => match sqlx::query("COMMIT").execute(&mut *conn).await {
+            Ok(_) => return Ok(value),
+            Err(error) => Err(error.into()),
+        },
+        failed => failed,
+    };
+    take_back(conn).await;
+    outcome
+}
+
+/// Takes back what a transaction did that went wrong.
+async fn take_back(conn: &mut SqliteConnection) {
+    // Some errors, such as a full disk, have rolled back already; then there is nothing to take back.
+    if let Err(error) = sqlx::query("ROLLBACK").execute(conn).await {
+        tracing::debug!(%error, "nothing to roll back");
+    }
+}
+
+async fn fold_log(conn: &mut SqliteConnection, pragma: &'static str) {
+    // Readers may hold it back; then the next one does it.
+    if let Err(error) = sqlx::query(pragma).execute(conn).await {
+        tracing::debug!(%error, "the write-ahead log was not folded back");
+    }
+}
+
+/// Runs `work` in its own transaction through the writer.
+pub(crate) async fn alone<T: Send + 'static>(
+    inbox: &mpsc::Sender<Message>,
+    path: &Arc<Path>,
+    work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
+) -> Result<T> {
+    let (sender, receiver) = oneshot::channel();
+    let path = Arc::clone(path);
+    let task: Alone = Box::new(move |conn| {
+        Box::pin(async move {
+            let _ = sender.send(in_transaction(conn, &path, work).await);
+        })
+    });
+    if inbox.send(Message::Alone(task)).await.is_err() {
+        return Err(CatalogError::Closed);
+    }
+    receiver.await.unwrap_or(Err(CatalogError::Closed))
+}
+
+async fn in_transaction<T>(
+    conn: &mut SqliteConnection,
+    path: &Path,
+    work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>>,
+) -> Result<T> {
+    begin(conn, path).await?;
+    let outcome = work(&mut *conn).await;
+    end(conn, outcome).await
+}

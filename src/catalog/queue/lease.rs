@@ -1,0 +1,173 @@
+//! The right to work on one pair, and what is stored under it.
+
+use crate::domain::{
+    ArtifactSet, ContentHash, Failure, MetricOutcome, PairId, Stage, UnixMillis, WorkerId,
+};
+
+/// The right to work on one pair. Only a claim makes one, and only its holder can store anything for the pair.
+///
+/// `epoch` fences it: each claim and each rescue raises the job's epoch, so that a lease that was taken away
+/// changes nothing any more.
+#[derive(Debug)]
+pub struct Lease {
+    pub(crate) pair: PairId,
+    pub(crate) worker: WorkerId,
+    pub(crate) epoch: i64,
+    pub(crate) cursor: Stage,
+    pub(crate) attempt: u32,
+    pub(crate) crashes: u32,
+    pub(crate) alone: bool,
+    /// Whether a stage was stored under it, so that no failure is known of the pair any more.
+    pub(crate) cleared: bool,
+}
+
+impl Lease {
+    /// The pair.
+    pub const fn pair(&self) -> PairId {
+        self.pair
+    }
+
+    /// First stage that has no result yet.
+    pub const fn cursor(&self) -> Stage {
+        self.cursor
+    }
+
+    /// Which try of this stage it is, from 1.
+    pub const fn attempt(&self) -> u32 {
+        self.attempt
+    }
+
+    /// Workers that died over the pair since its last finished stage.
+    pub const fn crashes(&self) -> u32 {
+        self.crashes
+    }
+
+    /// Whether nothing else may run beside it, because it needed too much or a worker died over it.
+    pub const fn alone(&self) -> bool {
+        self.alone
+    }
+
+    /// The fence: of two leases on a pair the one with the higher epoch is the later.
+    pub const fn epoch(&self) -> i64 {
+        self.epoch
+    }
+}
+
+/// What became of a lease when something was stored under it.
+#[derive(Debug)]
+pub enum Kept {
+    /// Stored; the lease goes on with the next stage.
+    Lease(Lease),
+    /// Stored; the pair is done.
+    Done,
+    /// The lease is lost: nothing was stored, the work is dropped.
+    Lost,
+}
+
+/// An input file as a stage read it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct InputSeen {
+    /// Hash of its bytes.
+    pub hash: ContentHash,
+    /// Size, time and number of the file at that moment, as the store writes them.
+    pub stat: String,
+}
+
+/// The input files of a pair as its worker read them; `None` for one that was not read.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct InputsSeen {
+    /// The mesh.
+    pub mesh: Option<InputSeen>,
+    /// The print.
+    pub print: Option<InputSeen>,
+}
+
+impl InputsSeen {
+    /// Whether anything is told of either.
+    pub(crate) const fn is_told(&self) -> bool {
+        self.mesh.is_some() || self.print.is_some()
+    }
+}
+
+/// One metric's numbers with the hash that verdicts are bound to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MetricResult {
+    /// The numbers.
+    pub outcome: MetricOutcome,
+    /// Hash over the numbers and the pictures a reader sees.
+    pub result_hash: ContentHash,
+}
+
+/// A stage that is done: everything its checkpoint stores.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageDone {
+    /// Which stage.
+    pub stage: Stage,
+    /// Number of the recipe it was computed with.
+    pub recipe: RecipeId,
+    /// Content of the mesh it was computed from.
+    pub mesh_hash: ContentHash,
+    /// Content of the print, for stages that see it.
+    pub print_hash: Option<ContentHash>,
+    /// What the manifest said that it depends on.
+    pub facts: String,
+    /// The numbers as JSON.
+    pub outcome: String,
+    /// The artifacts by role.
+    pub files: ArtifactSet,
+    /// Hash over outcome and files.
+    pub result_hash: ContentHash,
+    /// The metrics' results, for the last stage.
+    pub metrics: Vec<MetricResult>,
+    /// Input files as read for this pair.
+    pub inputs: InputsSeen,
+    /// Computing time in milliseconds.
+    pub ms: u64,
+    /// When it was done.
+    pub at: UnixMillis,
+    /// When the next stage should be over.
+    pub next_deadline: UnixMillis,
+    /// The lease stands only if the worker's last sign of life is of then or later, by its own clock.
+    pub alive_since: UnixMillis,
+}
+
+/// What a failure means for the job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sentence {
+    /// Again at this time.
+    BackOff {
+        /// When.
+        run_at: UnixMillis,
+    },
+    /// Again at once, with nothing beside it.
+    Alone,
+    /// Not again until somebody asks.
+    Quarantine,
+}
+
+/// A stage that failed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StageFailed {
+    /// Which stage.
+    pub stage: Stage,
+    /// Class and sentence.
+    pub failure: Failure,
+    /// What it means for the job.
+    pub sentence: Sentence,
+    /// Number of the recipe it was run with.
+    pub recipe: RecipeId,
+    /// What the manifest said.
+    pub facts: String,
+    /// Input files as read for this pair.
+    pub inputs: InputsSeen,
+    /// Computing time in milliseconds, where something was computed.
+    pub ms: Option<u64>,
+    /// When it failed.
+    pub at: UnixMillis,
+    /// The lease stands only if the worker's last sign of life is of then or later, by its own clock.
+    pub alive_since: UnixMillis,
+}
+
+/// A recipe's number in the catalog.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct RecipeId(pub(crate) i64);

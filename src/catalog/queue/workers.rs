@@ -1,0 +1,209 @@
+//! Upkeep of the queue: workers, back-off times, what is left.
+
+use sqlx::{Row as _, SqliteConnection};
+
+use crate::catalog::db::error::Result;
+use crate::catalog::db::rows;
+use crate::catalog::handle::Catalog;
+use crate::catalog::queue::claim::PairSelection;
+use crate::catalog::queue::counters::{Deltas, KEPT, cursor};
+use crate::catalog::queue::fingerprint::RecipeIds;
+use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
+
+/// The process a worker runs in.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct WorkerInfo {
+    /// Name of the machine.
+    pub host: String,
+    /// Process number.
+    pub pid: u32,
+    /// Which start of the machine, where it can be told.
+    pub boot_id: Option<String>,
+}
+
+/// Work that is left among some pairs or all.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Outstanding {
+    /// Ready pairs with a stage to run.
+    pub ready: u64,
+    /// Pairs leased by anybody, with such a stage.
+    pub leased: u64,
+    /// Pairs that back off from such a stage.
+    pub backoff: u64,
+    /// When the first of those is due.
+    pub next_due: Option<UnixMillis>,
+}
+
+/// Stages that are left among some pairs or all.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct WorkLeft {
+    /// Pairs with a stage before them that is not kept back by a failure.
+    pub pairs: u64,
+    /// Those stages by stage.
+    pub by_stage: [u64; 4],
+    /// Pairs that failed for good.
+    pub quarantined: u64,
+}
+
+/// Back-off times that are over, or so far ahead that the clock must have jumped.
+pub(crate) const DUE: &str = "
+UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
+RETURNING stage";
+
+pub(crate) const LEFT_ALL: &str = "
+SELECT
+    (SELECT count(*) FROM (SELECT 1 FROM job WHERE status = 0 AND stage <= ?1 LIMIT 1000)),
+    (SELECT count(*) FROM job WHERE status = 1 AND stage <= ?1),
+    (SELECT count(*) FROM job WHERE status = 2 AND stage <= ?1),
+    (SELECT min(run_at) FROM job WHERE status = 2 AND stage <= ?1)";
+
+const LEFT_AMONG: &str = "
+SELECT count(*) FILTER (WHERE j.status = 0), count(*) FILTER (WHERE j.status = 1),
+    count(*) FILTER (WHERE j.status = 2), min(j.run_at)
+FROM json_each(?2) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value WHERE j.stage <= ?1";
+
+const COUNT_AMONG: &str = "
+SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+GROUP BY j.stage, j.status";
+
+impl Catalog {
+    /// Enters a process that will work with these recipes; its number is never used again.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn register_worker(
+        &self,
+        info: WorkerInfo,
+        recipes: RecipeIds,
+        now: UnixMillis,
+    ) -> Result<WorkerId> {
+        self.alone(move |conn| Box::pin(enter(conn, info, recipes, now)))
+            .await
+    }
+
+    /// Says that a worker ended in order.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn end_worker(&self, worker: WorkerId, now: UnixMillis) -> Result<()> {
+        self.alone(move |conn| {
+            Box::pin(async move {
+                sqlx::query("UPDATE worker SET ended = ?2 WHERE id = ?1")
+                    .bind(worker.0)
+                    .bind(now)
+                    .execute(conn)
+                    .await?;
+                Ok(())
+            })
+        })
+        .await
+    }
+
+    /// Makes pairs ready whose back-off is over; also those due more than `longest` ahead, which only a clock
+    /// that jumped can bring about. Says how many.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn stage_due(&self, now: UnixMillis, longest: i64) -> Result<u64> {
+        self.alone(move |conn| {
+            Box::pin(async move {
+                let stages: Vec<i64> = sqlx::query_scalar(DUE)
+                    .bind(now)
+                    .bind(now + longest)
+                    .fetch_all(&mut *conn)
+                    .await?;
+                let mut deltas = Deltas::default();
+                for stage in &stages {
+                    deltas.moved((*stage, JobStatus::Backoff), (*stage, JobStatus::Ready));
+                }
+                deltas.apply(conn).await?;
+                Ok(stages.len() as u64)
+            })
+        })
+        .await
+    }
+
+    /// What is left to do up to a stage; `ready` stops counting at 1000.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn outstanding(
+        &self,
+        until: Stage,
+        among: Option<&PairSelection>,
+    ) -> Result<Outstanding> {
+        let mut conn = self.reader().await?;
+        let query = match among {
+            None => sqlx::query(LEFT_ALL).bind(cursor(until)),
+            Some(among) => sqlx::query(LEFT_AMONG)
+                .bind(cursor(until))
+                .bind(&among.json),
+        };
+        let row = query.fetch_one(&mut *conn).await?;
+        let count = |index: usize| row.try_get::<i64, _>(index).map(i64::unsigned_abs);
+        Ok(Outstanding {
+            ready: count(0)?,
+            leased: count(1)?,
+            backoff: count(2)?,
+            next_due: row.try_get(3)?,
+        })
+    }
+}
+
+async fn enter(
+    conn: &mut SqliteConnection,
+    info: WorkerInfo,
+    recipes: RecipeIds,
+    now: UnixMillis,
+) -> Result<WorkerId> {
+    let id: i64 = sqlx::query_scalar(
+        "INSERT INTO worker (host, pid, boot_id, started, beat, recipes)
+        VALUES (?1, ?2, ?3, ?4, ?4, ?5) RETURNING id",
+    )
+    .bind(info.host)
+    .bind(info.pid)
+    .bind(info.boot_id)
+    .bind(now)
+    .bind(recipes.json())
+    .fetch_one(conn)
+    .await?;
+    Ok(WorkerId(id))
+}
+
+impl Catalog {
+    /// What is left to do up to a stage, from the counters, or counted among some pairs.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
+        let mut conn = self.reader().await?;
+        let query = match among {
+            None => sqlx::query(KEPT),
+            Some(among) => sqlx::query(COUNT_AMONG).bind(&among.json),
+        };
+        let mut left = WorkLeft::default();
+        for row in query.fetch_all(&mut *conn).await? {
+            let (at, n): (i64, i64) = (row.try_get(0)?, row.try_get(2)?);
+            let n = n.unsigned_abs();
+            match rows::status(row.try_get(1)?)? {
+                JobStatus::Quarantined => left.quarantined += n,
+                JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff
+                    if at <= cursor(until) =>
+                {
+                    left.pairs += n;
+                    for stage in Stage::ALL {
+                        if (at..=cursor(until)).contains(&cursor(stage)) {
+                            left.by_stage[stage.index()] += n;
+                        }
+                    }
+                }
+                JobStatus::Ready
+                | JobStatus::Leased
+                | JobStatus::Backoff
+                | JobStatus::Done
+                | JobStatus::Held => {}
+            }
+        }
+        Ok(left)
+    }
+}

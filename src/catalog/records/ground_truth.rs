@@ -1,0 +1,67 @@
+//! True alignments, where a dataset has them: stored as given, read by the report.
+
+use serde_json::{Value, json};
+use sqlx::SqliteConnection;
+
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::rows;
+use crate::catalog::handle::Catalog;
+use crate::domain::PairName;
+
+const SET: &str = "
+INSERT INTO truth (pair, body)
+SELECT p.id, item.value ->> 'body' FROM json_each(?1) AS item CROSS JOIN pair AS p ON p.name = item.value ->> 'name'
+WHERE true
+ON CONFLICT (pair) DO UPDATE SET body = excluded.body
+RETURNING pair";
+
+const UNKNOWN: &str = "
+SELECT item.value ->> 'name' FROM json_each(?1) AS item
+WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.name = item.value ->> 'name') LIMIT 1";
+
+impl Catalog {
+    /// Stores true alignments as given, replacing earlier ones; says how many.
+    ///
+    /// # Errors
+    /// When a pair is not there; then nothing is stored.
+    pub async fn set_truth(&self, truths: Vec<(PairName, Value)>) -> Result<u64> {
+        self.alone(move |conn| Box::pin(async move { set(conn, &truths).await }))
+            .await
+    }
+
+    /// Whether any pair has a true alignment.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn has_truth(&self) -> Result<bool> {
+        let mut conn = self.reader().await?;
+        Ok(sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM truth)")
+            .fetch_one(&mut *conn)
+            .await?)
+    }
+}
+
+/// Stores true alignments in the transaction that is open; says how many.
+pub(crate) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)]) -> Result<u64> {
+    let mut stored = 0;
+    for chunk in truths.chunks(500) {
+        let items = chunk
+            .iter()
+            .map(|(name, body)| json!({ "name": name, "body": body.to_string() }));
+        let items = rows::array(items).to_string();
+        let unknown: Option<String> = sqlx::query_scalar(UNKNOWN)
+            .bind(&items)
+            .fetch_optional(&mut *conn)
+            .await?;
+        if let Some(name) = unknown {
+            return Err(CatalogError::UnknownPair(rows::pair_name(&name)?));
+        }
+        stored += sqlx::query(SET)
+            .bind(items)
+            .fetch_all(&mut *conn)
+            .await?
+            .len() as u64;
+    }
+    Ok(stored)
+}

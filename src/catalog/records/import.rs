@@ -1,0 +1,265 @@
+//! Pairs as imported: their names, paths and what is known of them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::{Value, json};
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row as _, SqliteConnection};
+use tokio::sync::mpsc;
+
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::rows;
+use crate::catalog::handle::Catalog;
+use crate::catalog::queue::claim::PairSelection;
+use crate::catalog::queue::counters::{Deltas, cursor};
+use crate::catalog::records::ground_truth;
+use crate::catalog::records::model::PairFacts;
+use crate::domain::{JobStatus, PairName, Stage, UnixMillis};
+
+/// A row to import.
+pub type ImportRow = PairFacts;
+
+/// Rows in one statement.
+const CHUNK: usize = 2_000;
+
+/// A part of what is imported.
+#[derive(Debug)]
+pub enum ImportChunk {
+    /// The next rows.
+    Rows(Vec<ImportRow>),
+    /// That was all of them.
+    End,
+}
+
+/// What an import changed.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct ImportSummary {
+    /// Pairs that were not there.
+    pub added: u64,
+    /// Pairs that were there with other values, and which fields differ, by name.
+    pub changed: Vec<PairChange>,
+    /// Pairs that were there just so.
+    pub unchanged: u64,
+}
+
+/// A pair whose values an import changed.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PairChange {
+    /// The pair.
+    pub name: PairName,
+    /// Names of the columns that differ, in the order of the manifest's columns.
+    pub fields: Vec<&'static str>,
+}
+
+/// Columns of a pair's facts, in the order of [`facts`].
+const SELECT: &str = "
+SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta
+FROM pair WHERE name IN (SELECT value FROM json_each(?1))";
+
+/// A path that changed forgets what the file looked like, so that the next run reads it.
+const UPSERT: &str = "
+INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, facts, imported)
+SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', value ->> 'face_down',
+    value ->> 'character', value ->> 'block', value ->> 'meta', value ->> 'facts', ?2
+FROM json_each(?1) WHERE true
+ON CONFLICT (name) DO UPDATE SET
+    mesh_stat = iif(mesh_path = excluded.mesh_path, mesh_stat, ''), mesh_path = excluded.mesh_path,
+    print_stat = iif(print_path = excluded.print_path, print_stat, ''), print_path = excluded.print_path,
+    unit = excluded.unit, scanned_face_down = excluded.scanned_face_down, character = excluded.character,
+    block = excluded.block, meta = excluded.meta, facts = excluded.facts";
+
+const NEW_JOBS: &str = "
+INSERT INTO job (pair, stage, status)
+SELECT id, 0, 0 FROM pair WHERE name IN (SELECT value FROM json_each(?1))
+    AND NOT EXISTS (SELECT 1 FROM job WHERE job.pair = pair.id)";
+
+impl Catalog {
+    /// Imports rows in one transaction: new ones are added, others take the new values. Of two rows with the
+    /// same name the later one counts.
+    ///
+    /// # Errors
+    /// When the database refuses; then nothing is imported.
+    pub async fn import(&self, rows: Vec<ImportRow>, now: UnixMillis) -> Result<ImportSummary> {
+        let (sender, chunks) = mpsc::channel(2);
+        for chunk in [ImportChunk::Rows(rows), ImportChunk::End] {
+            // There is room for both, and the receiver is at hand.
+            let _ = sender.try_send(chunk);
+        }
+        let (summary, _) = self.import_all(chunks, Vec::new(), now).await?;
+        Ok(summary)
+    }
+
+    /// Imports rows as they come, and true alignments, in one transaction; also says how many of those were stored.
+    ///
+    /// # Errors
+    /// When the rows stop without an end, a pair of a true alignment is not there even now, or the database refuses;
+    /// then nothing is imported.
+    pub async fn import_all(
+        &self,
+        mut chunks: mpsc::Receiver<ImportChunk>,
+        truths: Vec<(PairName, Value)>,
+        now: UnixMillis,
+    ) -> Result<(ImportSummary, u64)> {
+        self.alone(move |conn| {
+            Box::pin(async move {
+                let mut summary = ImportSummary::default();
+                loop {
+                    match chunks.recv().await {
+                        Some(ImportChunk::Rows(rows)) => {
+                            for chunk in rows.chunks(CHUNK) {
+                                import_chunk(conn, chunk, now, &mut summary).await?;
+                            }
+                        }
+                        Some(ImportChunk::End) => break,
+                        None => return Err(CatalogError::CutShort),
+                    }
+                }
+                let mut deltas = Deltas::default();
+                let at = (cursor(Stage::Fit), JobStatus::Ready);
+                deltas.add(at, summary.added as i64);
+                deltas.apply(conn).await?;
+                summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
+                let stored = ground_truth::set(conn, &truths).await?;
+                Ok((summary, stored))
+            })
+        })
+        .await
+    }
+
+    /// Names of all pairs, sorted.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn pair_names(&self) -> Result<Vec<PairName>> {
+        let mut conn = self.reader().await?;
+        let names: Vec<String> = sqlx::query_scalar("SELECT name FROM pair ORDER BY name")
+            .fetch_all(&mut *conn)
+            .await?;
+        names.iter().map(|name| rows::pair_name(name)).collect()
+    }
+
+    /// Those of the names that are no pairs, in the order given.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
+        let mut conn = self.reader().await?;
+        let found: Vec<String> = sqlx::query_scalar(
+            "SELECT name FROM pair WHERE name IN (SELECT value FROM json_each(?1))",
+        )
+        .bind(rows::names_json(names))
+        .fetch_all(&mut *conn)
+        .await?;
+        let found: BTreeSet<_> = found.into_iter().collect();
+        let unknown = names.iter().filter(|name| !found.contains(name.as_str()));
+        Ok(unknown.cloned().collect())
+    }
+
+    /// Pairs by their names; unknown names are left out.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
+        let mut conn = self.reader().await?;
+        select(&mut conn, names).await
+    }
+}
+
+pub(crate) async fn select(
+    conn: &mut SqliteConnection,
+    names: &[PairName],
+) -> Result<PairSelection> {
+    let ids: Vec<i64> = sqlx::query_scalar(
+        "SELECT id FROM pair WHERE name IN (SELECT value FROM json_each(?1)) ORDER BY id",
+    )
+    .bind(rows::names_json(names))
+    .fetch_all(conn)
+    .await?;
+    Ok(PairSelection {
+        len: ids.len(),
+        json: Value::from(ids).to_string(),
+    })
+}
+
+async fn import_chunk(
+    conn: &mut SqliteConnection,
+    chunk: &[ImportRow],
+    now: UnixMillis,
+    summary: &mut ImportSummary,
+) -> Result<()> {
+    let names = rows::array(chunk.iter().map(|row| row.name.as_str())).to_string();
+    let known = sqlx::query(SELECT)
+        .bind(&names)
+        .fetch_all(&mut *conn)
+        .await?;
+    let mut known = known
+        .iter()
+        .map(|row| facts(row).map(|facts| (facts.name.clone(), facts)))
+        .collect::<Result<BTreeMap<_, _>>>()?;
+    for row in chunk {
+        match known.insert(row.name.clone(), row.clone()) {
+            None => summary.added += 1,
+            Some(old) if old == *row => summary.unchanged += 1,
+            Some(old) => summary.changed.push(PairChange {
+                name: row.name.clone(),
+                fields: differing(&old, row),
+            }),
+        }
+    }
+    let items = rows::array(chunk.iter().map(item)).to_string();
+    sqlx::query(UPSERT)
+        .bind(items)
+        .bind(now)
+        .execute(&mut *conn)
+        .await?;
+    sqlx::query(NEW_JOBS).bind(names).execute(conn).await?;
+    Ok(())
+}
+
+fn item(row: &ImportRow) -> Value {
+    json!({
+        "name": row.name, "mesh": row.mesh_path, "print": row.print_path, "unit": row.unit,
+        "face_down": row.scanned_face_down.map(i64::from), "character": row.character, "block": row.block,
+        "meta": json!(row.meta).to_string(), "facts": result_facts(row),
+    })
+}
+
+/// What the manifest says that results depend on, as the catalog compares it.
+fn result_facts(row: &ImportRow) -> String {
+    json!({ "scanned_face_down": row.scanned_face_down, "unit": row.unit }).to_string()
+}
+
+fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
+    [
+        ("mesh", old.mesh_path != new.mesh_path),
+        ("print", old.print_path != new.print_path),
+        ("character", old.character != new.character),
+        ("block", old.block != new.block),
+        ("unit", old.unit != new.unit),
+        (
+            "scanned_face_down",
+            old.scanned_face_down != new.scanned_face_down,
+        ),
+        ("metadata", old.meta != new.meta),
+    ]
+    .into_iter()
+    .filter_map(|(name, differs)| differs.then_some(name))
+    .collect()
+}
+
+/// A pair's facts from a row that has the columns of [`SELECT`] by name.
+pub(crate) fn facts(row: &SqliteRow) -> Result<PairFacts> {
+    let unit: Option<String> = row.try_get("unit")?;
+    let meta: String = row.try_get("meta")?;
+    Ok(PairFacts {
+        name: rows::pair_name(&row.try_get::<String, _>("name")?)?,
+        mesh_path: row.try_get("mesh_path")?,
+        print_path: row.try_get("print_path")?,
+        unit: unit.map(|unit| rows::name(&unit)).transpose()?,
+        scanned_face_down: row.try_get("scanned_face_down")?,
+        character: row.try_get("character")?,
+        block: row.try_get("block")?,
+        meta: serde_json::from_str(&meta)?,
+    })
+}

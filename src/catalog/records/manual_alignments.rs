@@ -1,0 +1,155 @@
+//! Alignments that people made by hand: append-only, beside the automatic ones, bound to what they were made on.
+
+use std::collections::BTreeMap;
+
+use serde::Serialize;
+use sqlx::Row as _;
+use sqlx::sqlite::SqliteRow;
+
+use crate::catalog::db::error::Result;
+use crate::catalog::db::rows;
+use crate::catalog::handle::Catalog;
+use crate::catalog::records::review_answers::pair_id;
+use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
+
+/// An alignment by hand.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct HandAlignment {
+    /// The client's number of the act: sent twice, it is stored once.
+    pub event: String,
+    /// The pair.
+    pub pair: PairName,
+    /// Who made it.
+    pub reader: String,
+    /// Depth-map pixels to print pixels, for the depth map of `depth_hash`.
+    pub print_from_depth: Affine2,
+    /// Mesh points to print pixels and height: true whatever becomes of the depth map.
+    pub print_from_mesh: PrintFromMesh,
+    /// Content of the mesh.
+    pub mesh_hash: ContentHash,
+    /// Content of the print.
+    pub print_hash: ContentHash,
+    /// Result of the depth stage on which it was made.
+    pub depth_hash: ContentHash,
+    /// Hash of what was shown when the correction began.
+    pub seen: ContentHash,
+    /// Intersection over union of the two masks as laid by hand, on the canvas of the pair's scores.
+    pub iou: f64,
+    /// Dice coefficient of the same.
+    pub dice: f64,
+    /// In the reader's words.
+    pub note: Option<String>,
+}
+
+/// An alignment by hand as stored.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct StoredAlignment {
+    /// What was made.
+    #[serde(flatten)]
+    pub made: HandAlignment,
+    /// When.
+    pub at: UnixMillis,
+    /// When it was taken back, if it was.
+    pub undone_at: Option<UnixMillis>,
+    /// Whether mesh and print are still those it was made for, so that `print_from_mesh` holds.
+    pub holds: bool,
+    /// Whether the depth map is still that one too, so that `print_from_depth` holds.
+    pub on_current_depth: bool,
+}
+
+const INSERT: &str = "
+INSERT INTO manual_alignment (event, pair, mesh_hash, print_hash, depth_hash, seen, print_from_depth, print_from_mesh,
+    iou, dice, reader, note, at)
+VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) ON CONFLICT (event) DO NOTHING";
+
+const LOG: &str = "
+SELECT a.event, p.name, a.reader, a.print_from_depth, a.print_from_mesh, a.mesh_hash, a.print_hash, a.depth_hash, a.seen,
+    a.iou, a.dice, a.note, a.at, u.at AS undone_at,
+    coalesce(d.mesh_hash = a.mesh_hash AND n.print_hash = a.print_hash, 0) AS holds,
+    coalesce(d.result_hash = a.depth_hash, 0) AS on_current_depth
+FROM manual_alignment AS a JOIN pair AS p ON p.id = a.pair
+    LEFT JOIN manual_alignment_undo AS u ON u.alignment = a.id
+    LEFT JOIN stage_result AS d ON d.pair = a.pair AND d.stage = 1
+    LEFT JOIN stage_result AS n ON n.pair = a.pair AND n.stage = 2
+ORDER BY a.id";
+
+impl Catalog {
+    /// Appends an alignment by hand. It is on the disk when this returns; sent again, it is left alone. Says whether
+    /// it is new.
+    ///
+    /// # Errors
+    /// When there is no such pair or the database refuses.
+    pub async fn hand_align(&self, made: HandAlignment, now: UnixMillis) -> Result<bool> {
+        self.alone(move |conn| {
+            Box::pin(async move {
+                let pair = pair_id(conn, &made.pair).await?;
+                let stored = sqlx::query(INSERT)
+                    .bind(&made.event)
+                    .bind(pair)
+                    .bind(&made.mesh_hash.as_bytes()[..])
+                    .bind(&made.print_hash.as_bytes()[..])
+                    .bind(&made.depth_hash.as_bytes()[..])
+                    .bind(&made.seen.as_bytes()[..])
+                    .bind(serde_json::to_string(&made.print_from_depth)?)
+                    .bind(serde_json::to_string(&made.print_from_mesh)?)
+                    .bind(made.iou)
+                    .bind(made.dice)
+                    .bind(&made.reader)
+                    .bind(&made.note)
+                    .bind(now)
+                    .execute(conn)
+                    .await?;
+                Ok(stored.rows_affected() > 0)
+            })
+        })
+        .await
+    }
+
+    /// Every alignment by hand, oldest first, those taken back too.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn hand_alignments(&self) -> Result<Vec<StoredAlignment>> {
+        let mut conn = self.reader().await?;
+        let found = sqlx::query(LOG).fetch_all(&mut *conn).await?;
+        found.iter().map(stored).collect()
+    }
+
+    /// The newest alignment by hand of each pair, of those that hold and were not taken back.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn newest_hand_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
+        let stored = self.hand_alignments().await?.into_iter();
+        let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());
+        // Oldest first, so that the newest stays.
+        Ok(valid
+            .map(|stored| (stored.made.pair.clone(), stored))
+            .collect())
+    }
+}
+
+fn stored(row: &SqliteRow) -> Result<StoredAlignment> {
+    let hash =
+        |column: &str| -> Result<ContentHash> { rows::hash(&row.try_get::<Vec<u8>, _>(column)?) };
+    Ok(StoredAlignment {
+        made: HandAlignment {
+            event: row.try_get("event")?,
+            pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
+            reader: row.try_get("reader")?,
+            print_from_depth: serde_json::from_str(&row.try_get::<String, _>("print_from_depth")?)?,
+            print_from_mesh: serde_json::from_str(&row.try_get::<String, _>("print_from_mesh")?)?,
+            mesh_hash: hash("mesh_hash")?,
+            print_hash: hash("print_hash")?,
+            depth_hash: hash("depth_hash")?,
+            seen: hash("seen")?,
+            iou: row.try_get("iou")?,
+            dice: row.try_get("dice")?,
+            note: row.try_get("note")?,
+        },
+        at: row.try_get("at")?,
+        undone_at: row.try_get("undone_at")?,
+        holds: row.try_get("holds")?,
+        on_current_depth: row.try_get("on_current_depth")?,
+    })
+}

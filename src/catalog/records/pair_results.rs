@@ -1,0 +1,284 @@
+//! Read models put together from their tables: pages of results, one pair, failures.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+use sqlx::sqlite::SqliteRow;
+use sqlx::{Row as _, SqliteConnection};
+
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::rows;
+use crate::catalog::handle::Catalog;
+use crate::catalog::queue::counters::Counts;
+use crate::catalog::records::import;
+use crate::catalog::records::model::{
+    AttemptRecord, FailedPair, MetricRecord, PairDetail, PairResults, ReaderVerdict, StageRecord,
+    StoredFailure,
+};
+use crate::catalog::records::stage_results;
+use crate::catalog::records::verdicts;
+use crate::domain::{
+    ContentHash, Failure, FailureClass, JobStatus, PairName, RegisterOutcome, Stage,
+    ThresholdMetric,
+};
+
+pub(crate) const PAGE: &str = "
+SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta,
+    j.stage, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at, t.body AS truth
+FROM pair AS p JOIN job AS j ON j.pair = p.id
+    LEFT JOIN failure AS f ON f.pair = p.id AND j.status IN (2, 4)
+    LEFT JOIN truth AS t ON t.pair = p.id
+WHERE p.name > ?1 ORDER BY p.name LIMIT ?2";
+
+const ONE: &str = "
+SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta,
+    j.stage, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at, t.body AS truth,
+    p.mesh_hash, p.print_hash, j.attempt, j.crashes, j.run_at
+FROM pair AS p JOIN job AS j ON j.pair = p.id
+    LEFT JOIN failure AS f ON f.pair = p.id AND j.status IN (2, 4)
+    LEFT JOIN truth AS t ON t.pair = p.id
+WHERE p.name = ?1";
+
+pub(crate) const FAILED: &str = "
+SELECT p.name, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at
+FROM job AS j JOIN pair AS p ON p.id = j.pair JOIN failure AS f ON f.pair = j.pair
+WHERE j.status IN (4, 5) AND j.status = 4 ORDER BY p.name LIMIT ?1";
+
+pub(crate) const FAILED_BY_CLASS: &str = "
+SELECT f.class, count(*) FROM job AS j JOIN failure AS f ON f.pair = j.pair
+WHERE j.status IN (4, 5) AND j.status = 4 GROUP BY f.class";
+
+impl Catalog {
+    /// The next pairs after a name, in the order of names, at most `limit`; empty at the end.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub(crate) async fn results_page(
+        &self,
+        after: Option<&PairName>,
+        limit: usize,
+    ) -> Result<Vec<PairResults>> {
+        // One read transaction, so that job, results and verdicts belong together while a run goes on.
+        let mut conn = self.snapshot().await?;
+        let found = sqlx::query(PAGE)
+            .bind(after.map_or("", PairName::as_str))
+            .bind(limit as i64)
+            .fetch_all(&mut *conn)
+            .await?;
+        assemble(&mut conn, &found).await
+    }
+
+    /// Everything about one pair; `None` when there is no such pair.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn pair(&self, name: &PairName) -> Result<Option<PairDetail>> {
+        let mut conn = self.snapshot().await?;
+        let found = sqlx::query(ONE)
+            .bind(name.as_str())
+            .fetch_all(&mut *conn)
+            .await?;
+        let Some(results) = assemble(&mut conn, &found).await?.pop() else {
+            return Ok(None);
+        };
+        let row = &found[0];
+        let pair: i64 = row.try_get("id")?;
+        let hash = |column: &str| -> Result<Option<ContentHash>> {
+            rows::hash_option(row.try_get::<Option<Vec<u8>>, _>(column)?.as_deref())
+        };
+        Ok(Some(PairDetail {
+            results,
+            mesh_hash: hash("mesh_hash")?,
+            print_hash: hash("print_hash")?,
+            attempt: row.try_get("attempt")?,
+            crashes: row.try_get("crashes")?,
+            run_at: row.try_get("run_at")?,
+            attempts: attempts(&mut conn, pair).await?,
+            verdict_log: verdicts::log(&mut conn, Some(name)).await?,
+        }))
+    }
+
+    /// Pairs that failed for good, in the order of names, at most `limit`.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
+        let mut conn = self.reader().await?;
+        let found = sqlx::query(FAILED)
+            .bind(limit as i64)
+            .fetch_all(&mut *conn)
+            .await?;
+        found
+            .iter()
+            .map(|row| {
+                Ok(FailedPair {
+                    name: rows::pair_name(&row.try_get::<String, _>("name")?)?,
+                    status: rows::status(row.try_get("status")?)?,
+                    failure: stored_failure(row)?.ok_or_else(|| {
+                        CatalogError::Corrupt("a failure without a stage".to_owned())
+                    })?,
+                })
+            })
+            .collect()
+    }
+
+    /// Pairs that failed for good by class, every class with at least one.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
+        let mut conn = self.reader().await?;
+        let found = sqlx::query(FAILED_BY_CLASS).fetch_all(&mut *conn).await?;
+        let mut counts = found
+            .iter()
+            .map(|row| {
+                let class = rows::name(&row.try_get::<String, _>(0)?)?;
+                Ok((class, row.try_get::<i64, _>(1)?.unsigned_abs()))
+            })
+            .collect::<Result<Vec<_>>>()?;
+        counts.sort_unstable();
+        Ok(counts)
+    }
+}
+
+/// Adds results, metrics and verdicts to rows of pairs.
+async fn assemble(conn: &mut SqliteConnection, found: &[SqliteRow]) -> Result<Vec<PairResults>> {
+    let ids = found
+        .iter()
+        .map(|row| row.try_get("id"))
+        .collect::<Result<Vec<i64>, _>>()?;
+    let mut stages = stage_results::of_pairs(conn, &ids).await?;
+    let hashes = stage_results::metric_hashes(conn, &ids).await?;
+    let verdicts = verdicts::of_pairs(conn, &ids).await?;
+    found
+        .iter()
+        .zip(ids)
+        .map(|(row, id)| {
+            let cursor: i64 = row.try_get("stage")?;
+            let mut records = stages.remove(&id).unwrap_or_default();
+            records.retain(|record| (record.stage.index() as i64) < cursor);
+            let metrics = metrics(id, &records, &hashes, &verdicts)?;
+            pair_results(row, cursor, records, metrics)
+        })
+        .collect()
+}
+
+fn pair_results(
+    row: &SqliteRow,
+    cursor: i64,
+    stages: Vec<StageRecord>,
+    metrics: Vec<MetricRecord>,
+) -> Result<PairResults> {
+    let truth: Option<String> = row.try_get("truth")?;
+    Ok(PairResults {
+        facts: import::facts(row)?,
+        status: rows::status(row.try_get("status")?)?,
+        next_stage: rows::next_stage(cursor)?,
+        failure: stored_failure(row)?,
+        stages,
+        metrics,
+        truth: truth
+            .map(|body| serde_json::from_str::<Value>(&body))
+            .transpose()?,
+    })
+}
+
+fn stored_failure(row: &SqliteRow) -> Result<Option<StoredFailure>> {
+    let Some(stage) = row.try_get::<Option<i64>, _>("failed_stage")? else {
+        return Ok(None);
+    };
+    let class = rows::name(&row.try_get::<String, _>("class")?)?;
+    Ok(Some(StoredFailure {
+        stage: rows::stage(stage)?,
+        failure: Failure::new(class, row.try_get::<String, _>("message")?),
+        at: row.try_get("failed_at")?,
+    }))
+}
+
+/// The metrics of a pair that is through, with the verdicts on exactly these results.
+fn metrics(
+    pair: i64,
+    stages: &[StageRecord],
+    hashes: &BTreeMap<(i64, ThresholdMetric), ContentHash>,
+    verdicts: &BTreeMap<(i64, ThresholdMetric), Vec<verdicts::Counted>>,
+) -> Result<Vec<MetricRecord>> {
+    let Some(record) = stages.iter().find(|record| record.stage == Stage::Register) else {
+        return Ok(Vec::new());
+    };
+    let outcome: RegisterOutcome = record.parse()?;
+    let mut found = Vec::with_capacity(outcome.metrics.len());
+    for outcome in outcome.metrics {
+        let key = (pair, outcome.metric);
+        let Some(result_hash) = hashes.get(&key).copied() else {
+            let text = format!("pair {pair} has no row of {}", outcome.metric);
+            return Err(CatalogError::Corrupt(text));
+        };
+        let (current, older): (Vec<_>, Vec<_>) = verdicts
+            .get(&key)
+            .into_iter()
+            .flatten()
+            .partition(|counted| counted.result_hash == result_hash);
+        found.push(MetricRecord {
+            outcome,
+            result_hash,
+            verdicts: current.into_iter().map(reader_verdict).collect(),
+            older_verdicts: older.len() as u64,
+        });
+    }
+    found.sort_by_key(|record| {
+        ThresholdMetric::ALL
+            .iter()
+            .position(|metric| *metric == record.outcome.metric)
+    });
+    Ok(found)
+}
+
+fn reader_verdict(counted: &verdicts::Counted) -> ReaderVerdict {
+    ReaderVerdict {
+        reader: counted.reader.clone(),
+        verdict: counted.verdict,
+        reason: counted.reason,
+        queue: counted.queue,
+    }
+}
+
+async fn attempts(conn: &mut SqliteConnection, pair: i64) -> Result<Vec<AttemptRecord>> {
+    let found = sqlx::query(
+        "SELECT stage, class, message, ms, at FROM attempt WHERE pair = ?1 ORDER BY id",
+    )
+    .bind(pair)
+    .fetch_all(conn)
+    .await?;
+    found
+        .iter()
+        .map(|row| {
+            let class: Option<String> = row.try_get("class")?;
+            let message: Option<String> = row.try_get("message")?;
+            let failure = class
+                .zip(message)
+                .map(|(class, message)| {
+                    Ok::<_, CatalogError>(Failure::new(rows::name(&class)?, message))
+                })
+                .transpose()?;
+            Ok(AttemptRecord {
+                stage: rows::stage(row.try_get("stage")?)?,
+                failure,
+                ms: row.try_get::<Option<i64>, _>("ms")?.map(i64::unsigned_abs),
+                at: row.try_get("at")?,
+            })
+        })
+        .collect()
+}
+
+/// Jobs by status from the counters.
+pub(crate) fn by_status(counts: &Counts) -> BTreeMap<JobStatus, u64> {
+    let mut jobs: BTreeMap<_, _> = JobStatus::ALL
+        .into_iter()
+        .map(|status| (status, 0))
+        .collect();
+    for ((_, status), n) in counts {
+        *jobs.entry(*status).or_default() += n;
+    }
+    jobs
+}

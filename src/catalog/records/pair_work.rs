@@ -1,0 +1,157 @@
+//! What a worker needs to know of the pair it leased, and of its inputs.
+
+use std::collections::BTreeMap;
+
+use sqlx::Row as _;
+use sqlx::sqlite::SqliteRow;
+
+use crate::catalog::db::error::CatalogError;
+use crate::catalog::db::error::Result;
+use crate::catalog::db::rows;
+use crate::catalog::db::script::Script;
+use crate::catalog::handle::Catalog;
+use crate::catalog::queue::checkpoint;
+use crate::catalog::queue::claim::PairSelection;
+use crate::catalog::queue::lease::{InputSeen, InputsSeen, Lease};
+use crate::catalog::records::import;
+use crate::catalog::records::model::{PairFacts, StageRecord};
+use crate::catalog::records::stage_results;
+use crate::domain::{ContentHash, PairId, Stage};
+
+/// A leased pair with what is known of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PairWork {
+    /// As imported.
+    pub facts: PairFacts,
+    /// What the manifest says that results depend on; stored with each result.
+    pub facts_text: String,
+    /// Results of the stages behind it, in order; none missing.
+    pub results: Vec<StageRecord>,
+}
+
+/// An input file as last read, to tell whether it changed since.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct KnownInputs {
+    /// The pair.
+    pub pair: PairId,
+    /// Path of the mesh as stored.
+    pub mesh_path: String,
+    /// The mesh as last read.
+    pub mesh: Option<InputSeen>,
+    /// Path of the print as stored.
+    pub print_path: String,
+    /// The print as last read.
+    pub print: Option<InputSeen>,
+}
+
+pub(crate) const LEASED: &str = "
+SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.facts
+FROM json_each(?1) AS wanted CROSS JOIN pair AS p ON p.id = wanted.value";
+
+/// Pairs of which at least one file has been read, in pages by number.
+pub(crate) const INPUTS: &str = "
+SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat FROM pair
+WHERE id > ?1 ORDER BY id LIMIT ?2";
+
+const INPUTS_AMONG: &str = "
+SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat
+FROM pair WHERE id > ?1 AND id IN (SELECT value FROM json_each(?3)) ORDER BY id LIMIT ?2";
+
+impl Catalog {
+    /// The leased pairs with the results they have, in the order of their leases.
+    ///
+    /// # Errors
+    /// When the database refuses or holds what it must not.
+    pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
+        let mut conn = self.reader().await?;
+        let wanted = rows::array(leases.iter().map(|lease| lease.pair.0));
+        let leased = sqlx::query(LEASED).bind(wanted.to_string());
+        let leased = leased.fetch_all(&mut *conn).await?;
+        let begun = leases.iter().filter(|lease| lease.cursor > Stage::Fit);
+        let begun: Vec<_> = begun.map(|lease| lease.pair.0).collect();
+        let mut found = BTreeMap::new();
+        if !begun.is_empty() {
+            found = stage_results::of_pairs(&mut conn, &begun).await?;
+        }
+        let mut works = BTreeMap::new();
+        for row in &leased {
+            let pair = row.try_get("id")?;
+            works.insert(pair, work_of(row, found.remove(&pair).unwrap_or_default())?);
+        }
+        let each = leases.iter().map(|lease| {
+            let mut work = works
+                .remove(&lease.pair.0)
+                .ok_or_else(|| gone(lease.pair))?;
+            work.results.retain(|record| record.stage < lease.cursor);
+            Ok(work)
+        });
+        each.collect()
+    }
+
+    /// Input files as last read, in pages by the pair's number; empty at the end.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn known_inputs(
+        &self,
+        after: Option<PairId>,
+        limit: usize,
+        among: Option<&PairSelection>,
+    ) -> Result<Vec<KnownInputs>> {
+        let mut conn = self.reader().await?;
+        let after = after.map_or(0, |pair| pair.0);
+        let query = match among {
+            None => sqlx::query(INPUTS).bind(after).bind(limit as i64),
+            Some(among) => sqlx::query(INPUTS_AMONG)
+                .bind(after)
+                .bind(limit as i64)
+                .bind(&among.json),
+        };
+        let found = query.fetch_all(&mut *conn).await?;
+        found.iter().map(known_inputs).collect()
+    }
+
+    /// Stores what input files look like now.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn store_inputs(&self, seen: Vec<(PairId, InputsSeen)>) -> Result<()> {
+        self.alone(move |conn| {
+            Box::pin(async move {
+                let mut script = Script::default();
+                checkpoint::store_inputs(&mut script, &seen)?;
+                script.run(conn).await?;
+                Ok(())
+            })
+        })
+        .await
+    }
+}
+
+fn gone(pair: PairId) -> CatalogError {
+    CatalogError::Corrupt(format!("a job has no pair {}", pair.0))
+}
+
+fn work_of(row: &SqliteRow, results: Vec<StageRecord>) -> Result<PairWork> {
+    Ok(PairWork {
+        facts: import::facts(row)?,
+        facts_text: row.try_get("facts")?,
+        results,
+    })
+}
+
+pub(crate) fn known_inputs(row: &SqliteRow) -> Result<KnownInputs> {
+    let seen = |hash: &str, stat: &str| -> Result<Option<InputSeen>> {
+        let hash: Option<Vec<u8>> = row.try_get(hash)?;
+        let hash: Option<ContentHash> = rows::hash_option(hash.as_deref())?;
+        let stat: Option<String> = row.try_get(stat)?;
+        Ok(hash.zip(stat).map(|(hash, stat)| InputSeen { hash, stat }))
+    };
+    Ok(KnownInputs {
+        pair: PairId(row.try_get("id")?),
+        mesh_path: row.try_get("mesh_path")?,
+        mesh: seen("mesh_hash", "mesh_stat")?,
+        print_path: row.try_get("print_path")?,
+        print: seen("print_hash", "print_stat")?,
+    })
+}

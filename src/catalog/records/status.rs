@@ -1,0 +1,113 @@
+//! The counts of the whole project.
+
+use std::collections::BTreeMap;
+
+use sqlx::{Row as _, SqliteConnection};
+
+use crate::catalog::db::error::Result;
+use crate::catalog::db::rows;
+use crate::catalog::handle::Catalog;
+use crate::catalog::queue::alike;
+use crate::catalog::queue::counters::{Counts, KEPT, counts};
+use crate::catalog::queue::fingerprint::Recipes;
+use crate::catalog::records::model::{StageCounts, StatusCounts};
+use crate::catalog::records::pair_results;
+use crate::domain::{JobStatus, Stage, Verdict};
+
+/// Newest verdict of each reader on each current result, by verdict.
+const VERDICTS: &str = "
+SELECT v.verdict, count(*) FROM verdict AS v
+    JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
+WHERE v.id = (
+    SELECT max(n.id) FROM verdict AS n
+    WHERE n.pair = v.pair AND n.metric = v.metric AND n.reader = v.reader AND n.result_hash = v.result_hash
+        AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act))
+GROUP BY v.verdict";
+
+/// Finished pairs with a metric that is unsure of itself.
+pub(crate) const DOUBTFUL: &str = "SELECT count(*) FROM job WHERE doubtful = 1 AND status = 3";
+
+impl Catalog {
+    /// Counts for `status`; `recipes` are the current ones, to tell what is stale.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn status(&self, recipes: &Recipes) -> Result<StatusCounts> {
+        let mut conn = self.snapshot().await?;
+        let counted = counts(&mut conn, KEPT).await?;
+        Ok(StatusCounts {
+            schema: 1,
+            pairs: counted.values().sum(),
+            jobs: pair_results::by_status(&counted),
+            stages: by_stage(&counted),
+            stale: alike::stale(&mut conn, recipes).await?,
+            doubtful: sqlx::query_scalar::<_, i64>(DOUBTFUL)
+                .fetch_one(&mut *conn)
+                .await?
+                .unsigned_abs(),
+            verdicts: verdicts(&mut conn).await?,
+        })
+    }
+}
+
+/// Pairs by stage from the counters. A pair that failed at a stage is still pending at the later ones.
+fn by_stage(counted: &Counts) -> BTreeMap<Stage, StageCounts> {
+    let mut stages: BTreeMap<_, _> = Stage::ALL
+        .into_iter()
+        .map(|stage| (stage, StageCounts::default()))
+        .collect();
+    for ((cursor, status), n) in counted {
+        for (stage, count) in &mut stages {
+            let index = stage.index() as i64;
+            match status {
+                _ if *cursor > index => count.done += n,
+                JobStatus::Quarantined | JobStatus::Held if *cursor == index => count.failed += n,
+                JobStatus::Ready
+                | JobStatus::Leased
+                | JobStatus::Backoff
+                | JobStatus::Done
+                | JobStatus::Quarantined
+                | JobStatus::Held => count.pending += n,
+            }
+        }
+    }
+    stages
+}
+
+async fn verdicts(conn: &mut SqliteConnection) -> Result<BTreeMap<Verdict, u64>> {
+    let mut found: BTreeMap<_, _> = Verdict::ALL
+        .into_iter()
+        .map(|verdict| (verdict, 0))
+        .collect();
+    for row in sqlx::query(VERDICTS).fetch_all(conn).await? {
+        let verdict: Verdict = rows::name(&row.try_get::<String, _>(0)?)?;
+        found.insert(verdict, row.try_get::<i64, _>(1)?.unsigned_abs());
+    }
+    Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::by_stage;
+    use crate::catalog::StageCounts;
+    use crate::domain::{JobStatus, Stage};
+
+    #[test]
+    fn every_pair_is_counted_once_at_every_stage() {
+        let counted = [
+            ((0, JobStatus::Ready), 5),
+            ((2, JobStatus::Quarantined), 3),
+            ((4, JobStatus::Done), 7),
+        ];
+        let stages = by_stage(&counted.into_iter().collect());
+        for count in stages.values() {
+            assert_eq!(count.done + count.pending + count.failed, 15);
+        }
+        let expected = StageCounts {
+            done: 7,
+            pending: 5,
+            failed: 3,
+        };
+        assert_eq!(stages[&Stage::Normalize], expected);
+    }
+}
