@@ -5,11 +5,11 @@ use std::time::Duration;
 
 use tokio::task::JoinSet;
 
-use super::execute::{Computed, Computing};
+use super::compute_thread::{Computed, Computing};
 use super::filing::file;
-use super::hand::PairInHand;
 use super::options::RunOptions;
-use super::pipeline::Pipeline;
+use super::pair_context::PairInHand;
+use super::stage_executor::Pipeline;
 use super::steps::Steps;
 use super::stop::Stop;
 use crate::catalog::{PairFacts, PairWork};

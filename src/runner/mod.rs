@@ -4,28 +4,28 @@
 //! with what `ahead` takes, `worker` takes one pair through its stages, `held` has each stored while the next is
 //! computed, and `execute` is the one bridge to the threads that compute.
 
-mod ahead;
 mod bare;
-mod budget;
+mod checkpointer;
 mod clock;
-mod dispatch;
+mod compute_thread;
 mod events;
-mod execute;
 mod filing;
-mod hand;
-mod held;
+mod input_changes;
+mod memory_budget;
 mod options;
-mod outputs;
 mod pace;
-mod pipeline;
+mod pair_context;
+mod pair_task;
 mod policy;
-mod refresh;
+mod prefetch;
+mod scheduler;
+mod stage_executor;
+mod stage_output;
 mod steps;
 mod stop;
 #[cfg(test)]
 mod tests;
 mod timing;
-mod worker;
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -34,10 +34,10 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 
 pub use bare::bare;
-pub use budget::free_memory;
 pub use events::{RunEvent, RunSummary};
+pub use memory_budget::free_memory;
 pub use options::{Rerun, RunOptions};
-pub use outputs::result_hash;
+pub use stage_output::result_hash;
 pub use stop::{Stop, StopLevel};
 
 use crate::catalog::{
@@ -49,11 +49,11 @@ use crate::page_vec;
 use crate::stages::Settings;
 use crate::store::{ArtifactError, LockError, Project, RunLock, StoreError};
 use clock::Clock;
-use dispatch::{Dispatch, Tally};
-use pipeline::Pipeline;
+use pair_task::Shared;
+use scheduler::{Dispatch, Tally};
+use stage_executor::Pipeline;
 use steps::Steps;
 use timing::Timing;
-use worker::Shared;
 
 /// Why a run could not go on. Pairs that fail are no error: they are in the summary.
 #[derive(Debug, thiserror::Error)]
@@ -118,7 +118,7 @@ pub async fn plan(
     options: &RunOptions,
 ) -> Result<Plan, RunError> {
     let among = selection(catalog, options).await?;
-    refresh::inputs(project, catalog, among.as_ref()).await?;
+    input_changes::inputs(project, catalog, among.as_ref()).await?;
     let names = options.pairs.as_deref();
     Ok(catalog
         .plan(&recipes(settings), names, options.again())
@@ -207,7 +207,7 @@ async fn find_work(
     among: Option<&PairSelection>,
     clock: Clock,
 ) -> Result<(), RunError> {
-    refresh::inputs(project, catalog, among).await?;
+    input_changes::inputs(project, catalog, among).await?;
     catalog.send_back(recipes, among, options.again()).await?;
     let longest = policy::longest_backoff_ms();
     catalog.stage_due(clock.now(), longest).await?;
@@ -261,7 +261,7 @@ async fn take_over(
         return Ok(0);
     }
     let rescued = catalog.rescue(Dead::AllBut(me), clock.now()).await?;
-    refresh::condemned(project, catalog, &rescued.condemned).await?;
+    input_changes::condemned(project, catalog, &rescued.condemned).await?;
     project.clear_temporary()?;
     lock.admit()?;
     Ok(rescued.ready)

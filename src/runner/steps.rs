@@ -1,6 +1,6 @@
 //! What a run does with a pair at each stage, apart from how the work is shared out.
 
-use super::hand::PairInHand;
+use super::pair_context::PairInHand;
 use crate::domain::{Failure, FailureClass, MetricOutcome, Stage};
 use crate::store::NewArtifact;
 

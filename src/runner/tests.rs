@@ -1,7 +1,7 @@
 //! The run with made-up stages: what becomes of pairs that fail, hang, panic, or are stopped.
 
-mod ahead;
-mod made_up;
+mod fake_executor;
+mod prefetch;
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use serde_json::{Map, json};
 
-use made_up::MadeUp;
+use fake_executor::MadeUp;
 
 use super::{Rerun, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel, run_steps};
 use crate::catalog::{Catalog, ClaimRequest, ImportRow, Recipes, WorkerInfo};

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Project;
-use super::whole::{folder_of, sync_folder, write_synced};
+use super::atomic_write::{folder_of, sync_folder, write_synced};
 use crate::domain::{ArtifactRef, ArtifactSet, ContentHash};
 
 /// An artifact that is not on disk yet.

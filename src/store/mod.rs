@@ -1,18 +1,18 @@
 //! A project on disk: its directory, its input files, its artifacts, and the lock of its run.
 
 mod artifacts;
+mod atomic_write;
 mod inputs;
 mod lock;
-mod named;
 mod project;
-mod whole;
+mod referenced;
 
 pub use artifacts::{ArtifactError, NewArtifact};
+pub use atomic_write::{finish_whole, partial_of, write_synced, write_whole};
 pub use inputs::{
     FileStat, InputError, InputFile, InputReader, Seen, hash_input, open_input, read_input,
     stat_input,
 };
 pub use lock::{LockError, RunLock};
-pub use named::{NamedArtifacts, Unnamed, UnnamedKind};
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
-pub use whole::{finish_whole, partial_of, write_synced, write_whole};
+pub use referenced::{NamedArtifacts, Unnamed, UnnamedKind};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::whole::{folder_of, sync_folder};
+use super::atomic_write::{folder_of, sync_folder};
 
 /// Name of the catalog file in a project.
 pub const CATALOG_FILE: &str = "catalog.sqlite";

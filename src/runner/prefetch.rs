@@ -5,11 +5,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::RunError;
-use super::budget;
-use super::dispatch::Dispatch;
 use super::events::RunEvent;
+use super::memory_budget;
 use super::pace::Pace;
-use super::worker::work;
+use super::pair_task::work;
+use super::scheduler::Dispatch;
 use crate::catalog::{ClaimRequest, Lease, PairWork};
 use crate::domain::PairName;
 
@@ -176,7 +176,7 @@ impl Dispatch {
         let (project, images) = (self.shared.project.clone(), self.images);
         let look = move |(lease, work): (Lease, PairWork)| {
             let need = if is_limited {
-                budget::need(&project, &work.facts, lease.cursor(), &images)
+                memory_budget::need(&project, &work.facts, lease.cursor(), &images)
             } else {
                 0
             };

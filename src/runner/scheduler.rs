@@ -7,14 +7,14 @@ use tokio::sync::mpsc;
 use tokio::task::{JoinError, JoinSet};
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
-use super::ahead::InHand;
-use super::budget::Budget;
 use super::events::RunEvent;
+use super::input_changes;
+use super::memory_budget::Budget;
 use super::options::RunOptions;
+use super::pair_task::{Over, PairEnd, PairReport, Shared};
 use super::policy::{self, Liveness};
-use super::refresh;
+use super::prefetch::InHand;
 use super::stop::StopLevel;
-use super::worker::{Over, PairEnd, PairReport, Shared};
 use super::{RunError, this_process};
 use crate::catalog::{Dead, Outstanding, PairSelection, Waiting};
 use crate::domain::{PairName, UnixMillis, WorkerId};
@@ -312,7 +312,7 @@ impl Dispatch {
         let mut rescued = 0;
         if !dead.is_empty() {
             let found = catalog.rescue(Dead::Workers(dead), now).await?;
-            refresh::condemned(&self.shared.project, catalog, &found.condemned).await?;
+            input_changes::condemned(&self.shared.project, catalog, &found.condemned).await?;
             rescued += found.ready;
         }
         if holders.iter().any(|holder| holder.worker != self.worker) {

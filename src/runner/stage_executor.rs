@@ -3,9 +3,9 @@
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-use super::hand::PairInHand;
 use super::options::RunOptions;
-use super::outputs;
+use super::pair_context::PairInHand;
+use super::stage_output;
 use super::steps::{Setback, StageOutput, Steps};
 use crate::catalog::InputSeen;
 use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
@@ -59,7 +59,7 @@ impl Pipeline {
         let (outcome, json) = settled(&outcome)?;
         (pair.scan, pair.print) = (Some(scan), print);
         pair.fit = Some(outcome);
-        Ok(outputs::numbers(json))
+        Ok(stage_output::numbers(json))
     }
 
     fn depth(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
@@ -68,8 +68,8 @@ impl Pipeline {
         let scan = self.scan_of_fit(pair)?;
         let map = depth::depth(&scan, &fit, pair.facts.unit, &self.settings.depth)
             .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;
-        let (outcome, json) = settled(&outputs::depth_outcome(&map))?;
-        let output = outputs::depth(json, &map);
+        let (outcome, json) = settled(&stage_output::depth_outcome(&map))?;
+        let output = stage_output::depth(json, &map);
         pair.depth = Some(DepthMap {
             scale: outcome.scale,
             ..map
@@ -93,9 +93,9 @@ impl Pipeline {
             })?;
         pair.depth = Some(depth);
         let (outcome, json) = settled(&normalized.outcome)?;
-        let grey = outputs::print_mask(&normalized.ink, &normalized.known);
-        let output = outputs::normalized(json, &grey);
-        pair.normalized = Some(outputs::from_print_mask(outcome, &grey));
+        let grey = stage_output::print_mask(&normalized.ink, &normalized.known);
+        let output = stage_output::normalized(json, &grey);
+        pair.normalized = Some(stage_output::from_print_mask(outcome, &grey));
         Ok(output)
     }
 
@@ -105,7 +105,7 @@ impl Pipeline {
         let registered = register::register(&depth, &normalized, &self.settings.register)
             .map_err(|error| in_file(&pair.facts.print_path, &error.into()))?;
         let (outcome, json) = settled(&registered.outcome)?;
-        Ok(outputs::registered(json, outcome, &registered))
+        Ok(stage_output::registered(json, outcome, &registered))
     }
 
     /// The fit's outcome, from memory or as stored.
@@ -152,7 +152,7 @@ impl Pipeline {
         }
         let back = || Setback::Back(Stage::Depth);
         let outcome: DepthOutcome = pair.outcome(Stage::Depth).ok_or_else(back)?;
-        let bytes = self.artifact(pair, Stage::Depth, outputs::DEPTH)?;
+        let bytes = self.artifact(pair, Stage::Depth, stage_output::DEPTH)?;
         let levels = raster::decode_grey16(&bytes).ok().ok_or_else(back)?;
         Ok(DepthMap {
             levels,
@@ -167,9 +167,9 @@ impl Pipeline {
         }
         let back = || Setback::Back(Stage::Normalize);
         let outcome: NormalizeOutcome = pair.outcome(Stage::Normalize).ok_or_else(back)?;
-        let bytes = self.artifact(pair, Stage::Normalize, outputs::PRINT_MASK)?;
+        let bytes = self.artifact(pair, Stage::Normalize, stage_output::PRINT_MASK)?;
         let grey = raster::decode_grey8(&bytes).ok().ok_or_else(back)?;
-        Ok(outputs::from_print_mask(outcome, &grey))
+        Ok(stage_output::from_print_mask(outcome, &grey))
     }
 
     /// An artifact of an earlier stage. When it is gone or changed, that stage runs again.

@@ -9,7 +9,7 @@ use serde_json::json;
 use crate::catalog::InputSeen;
 use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric};
 use crate::report::fixture;
-use crate::runner::hand::PairInHand;
+use crate::runner::pair_context::PairInHand;
 use crate::runner::steps::{Setback, StageOutput, Steps};
 use crate::store::NewArtifact;
 

@@ -11,8 +11,8 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
 
-use super::hand::{PairInHand, Stored};
-use super::outputs;
+use super::pair_context::{PairInHand, Stored};
+use super::stage_output;
 use super::steps::{Setback, StageOutput, Steps};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputsSeen, MetricResult};
@@ -172,7 +172,7 @@ fn finished(
         .map(|file| (file.role().to_owned(), file.reference().clone()))
         .collect();
     let depth = pair.stored.get(&Stage::Depth).map(|stored| &stored.files);
-    let metrics = outputs::metric_results(&output.metrics, &named, depth);
+    let metrics = stage_output::metric_results(&output.metrics, &named, depth);
     let stored = Stored {
         outcome: serde_json::from_str(&output.outcome).unwrap_or_default(),
         files: named.clone(),
@@ -182,7 +182,7 @@ fn finished(
     pair.stored.insert(stage, stored);
     Ok(Finished {
         stage,
-        result_hash: outputs::result_hash(&output.outcome, &named),
+        result_hash: stage_output::result_hash(&output.outcome, &named),
         outcome: output.outcome,
         files: output.files,
         named,

@@ -8,10 +8,10 @@ use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
 use super::RunError;
+use super::compute_thread::Finished;
 use super::events::RunEvent;
-use super::execute::Finished;
 use super::filing::file;
-use super::worker::{PairEnd, PairReport, Shared};
+use super::pair_task::{PairEnd, PairReport, Shared};
 use crate::catalog::{Kept, Lease, StageDone};
 use crate::domain::{PairName, Stage};
 use crate::failpoint::{self, Point};

@@ -7,13 +7,13 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 
 use super::RunError;
+use super::checkpointer::Held;
 use super::clock::Clock;
+use super::compute_thread::{Computed, Computing};
 use super::events::RunEvent;
-use super::execute::{Computed, Computing};
-use super::hand::PairInHand;
-use super::held::Held;
+use super::input_changes;
+use super::pair_context::PairInHand;
 use super::policy::{self, Try};
-use super::refresh;
 use super::steps::Steps;
 use super::stop::{Stop, StopLevel};
 use super::timing::Timing;
@@ -290,8 +290,8 @@ impl Known {
         let seen = self.inputs.clone();
         let paths = [&self.mesh_path, &self.print_path].map(|path| project.input_path(path));
         let look = move || InputsSeen {
-            mesh: seen.mesh.or_else(|| refresh::seen_now(&paths[0])),
-            print: seen.print.or_else(|| refresh::seen_now(&paths[1])),
+            mesh: seen.mesh.or_else(|| input_changes::seen_now(&paths[0])),
+            print: seen.print.or_else(|| input_changes::seen_now(&paths[1])),
         };
         match tokio::task::spawn_blocking(look).await {
             Ok(inputs) => inputs,
