@@ -13,7 +13,7 @@ pub use summary::{CheckSummary, Found, Notes, Repaired, Spare};
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use crate::catalog::{AuditedPair, Catalog, CatalogError, Drift, Trouble};
-use crate::store::{NamedArtifacts, Project, UnnamedKind};
+use crate::store::{Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::Look;
 
 /// Pairs in memory at a time.
@@ -124,7 +124,7 @@ async fn rows_and_files(
         summary.add(Finding::reference(line));
     }
     counters(catalog, options, summary).await?;
-    let mut named = NamedArtifacts::default();
+    let mut named = ReferencedArtifacts::default();
     let mut after = None;
     loop {
         let page = catalog.audit_page(after, PAGE).await?;
@@ -219,7 +219,7 @@ async fn mend_pairs(
 /// Files that no row names; removes those that are ours.
 async fn spare_files(
     project: &Project,
-    mut named: NamedArtifacts,
+    mut named: ReferencedArtifacts,
     remove: bool,
     summary: &mut CheckSummary,
 ) -> Result<(), CheckError> {
@@ -227,7 +227,7 @@ async fn spare_files(
     let walk = move || {
         let mut spare = Spare::default();
         let walked = named.unnamed(&folder, |unnamed| {
-            let ours = unnamed.kind != UnnamedKind::Stranger;
+            let ours = unnamed.kind != UnreferencedKind::UnknownFile;
             // One that cannot be removed is told again by the next check.
             let removed = remove && ours && std::fs::remove_file(&unnamed.path).is_ok();
             spare.count(&unnamed, removed);

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::finding::{Finding, Kind};
 use super::pairs::Look;
-use crate::store::{Unnamed, UnnamedKind};
+use crate::store::{UnreferencedFile, UnreferencedKind};
 
 /// Findings of a kind, and inputs, that are kept by name.
 const NAMED: usize = 20;
@@ -151,10 +151,10 @@ impl Notes {
 }
 
 impl Spare {
-    pub(super) const fn count(&mut self, unnamed: &Unnamed, removed: bool) {
+    pub(super) const fn count(&mut self, unnamed: &UnreferencedFile, removed: bool) {
         match unnamed.kind {
-            UnnamedKind::Stranger => self.strangers += 1,
-            UnnamedKind::Orphan | UnnamedKind::Temporary => {
+            UnreferencedKind::UnknownFile => self.strangers += 1,
+            UnreferencedKind::Orphan | UnreferencedKind::Temporary => {
                 self.files += 1;
                 self.bytes += unnamed.bytes;
                 self.removed += removed as u64;

@@ -12,7 +12,9 @@ use super::output;
 use super::table::count;
 use crate::catalog::{Catalog, VerdictEvent};
 use crate::export::json_lines;
-use crate::store::{CATALOG_FILE, Project, SETTINGS_FILE, finish_whole, partial_of, write_synced};
+use crate::store::{
+    CATALOG_FILE, Project, SETTINGS_FILE, partial_path, rename_into_place, write_synced,
+};
 
 /// Arguments of `backup`.
 #[derive(Debug, Args)]
@@ -76,7 +78,7 @@ struct Partial(PathBuf);
 impl Partial {
     /// Nothing yet, also where a killed process left half a file.
     fn of(file: &Path) -> Self {
-        let partial = Self(partial_of(file));
+        let partial = Self(partial_path(file));
         partial.clear();
         partial
     }
@@ -149,7 +151,7 @@ fn prepare(file: &Path, bytes: &[u8]) -> anyhow::Result<Partial> {
 
 /// Gives a file its name.
 fn place(partial: &Partial, file: &Path) -> anyhow::Result<()> {
-    finish_whole(&partial.0, file).with_context(|| format!("cannot write {}", file.display()))
+    rename_into_place(&partial.0, file).with_context(|| format!("cannot write {}", file.display()))
 }
 
 /// Removes the settings that an earlier backup left, when the project has none any more: without them other results

@@ -14,7 +14,7 @@ use super::table::count;
 use crate::domain::ThresholdMetric;
 use crate::export::{Sheet, SheetOptions, SheetOrder, draw_sheet};
 use crate::raster::png_rgb8;
-use crate::store::write_whole;
+use crate::store::write_atomic;
 
 /// Arguments of `contact-sheet`.
 #[derive(Debug, Args)]
@@ -110,5 +110,5 @@ pub(super) async fn write(
 
 fn save(path: &Path, sheet: &Sheet) -> anyhow::Result<()> {
     let bytes = png_rgb8(&sheet.picture);
-    write_whole(path, &bytes).with_context(|| format!("cannot write {}", path.display()))
+    write_atomic(path, &bytes).with_context(|| format!("cannot write {}", path.display()))
 }

@@ -178,7 +178,7 @@ fn note(event: &RunEvent, palette: Palette) -> Option<String> {
             failure.class,
             span(*wait_ms)
         )),
-        RunEvent::Rescued { pairs } => Some(format!(
+        RunEvent::Recovered { pairs } => Some(format!(
             "{} of a worker that died came back",
             super::table::count(*pairs, "pair")
         )),
@@ -243,7 +243,7 @@ fn as_json(event: &RunEvent) -> Value {
             wait_ms,
         } => json!({"message_type": "pair_backing_off", "pair": pair, "stage": stage,
             "class": failure.class, "message": failure.message, "wait_ms": wait_ms}),
-        RunEvent::Rescued { pairs } => json!({"message_type": "rescued", "pairs": pairs}),
+        RunEvent::Recovered { pairs } => json!({"message_type": "recovered", "pairs": pairs}),
         RunEvent::Stopping { level, reason } => {
             json!({"message_type": "stopping", "now": *level == StopLevel::Now, "reason": reason})
         }

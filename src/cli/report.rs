@@ -14,7 +14,7 @@ use super::time_text::day;
 use crate::catalog::Catalog;
 use crate::export::{Chosen, draw_gallery};
 use crate::report::{Cover, Format, Interval, Report, gate, gather, gather_with, page, render};
-use crate::store::{Project, write_whole};
+use crate::store::{Project, write_atomic};
 
 /// The seed of the pictures that are drawn by lot; the page tells it.
 const LOT_SEED: u64 = 1;
@@ -78,7 +78,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     match &args.output {
         Some(path) => {
             let shown = path.display();
-            write_whole(path, text.as_bytes()).with_context(|| format!("cannot write {shown}"))?;
+            write_atomic(path, text.as_bytes()).with_context(|| format!("cannot write {shown}"))?;
             context.output.say(&format!("report is in {shown}"));
         }
         None => output::print(&text)?,

@@ -45,7 +45,7 @@ impl RunProgress {
             RunEvent::PairFailed { stage, skipped, .. } => self.fail(*stage, *skipped),
             RunEvent::StageStarted { .. }
             | RunEvent::PairBackingOff { .. }
-            | RunEvent::Rescued { .. }
+            | RunEvent::Recovered { .. }
             | RunEvent::Stopping { .. } => {}
         }
     }

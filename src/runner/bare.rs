@@ -5,12 +5,12 @@ use std::time::Duration;
 
 use tokio::task::JoinSet;
 
-use super::compute_thread::{Computed, Computing};
+use super::compute_thread::{ComputeEvent, ComputeThread};
 use super::filing::file;
 use super::options::RunOptions;
-use super::pair_context::PairInHand;
-use super::stage_executor::Pipeline;
-use super::steps::Steps;
+use super::pair_context::PairContext;
+use super::stage_executor::PipelineExecutor;
+use super::steps::StageExecutor;
 use super::stop::Stop;
 use crate::catalog::{PairFacts, PairWork};
 use crate::domain::Stage;
@@ -25,7 +25,7 @@ pub async fn bare(
     options: &RunOptions,
     pairs: Vec<PairFacts>,
 ) -> (usize, Duration) {
-    let steps: Arc<dyn Steps> = Arc::new(Pipeline::new(project, settings, options));
+    let steps: Arc<dyn StageExecutor> = Arc::new(PipelineExecutor::new(project, settings, options));
     let (mut slots, mut endings) = (JoinSet::new(), JoinSet::new());
     for facts in pairs {
         if slots.len() >= options.workers.max(1)
@@ -52,23 +52,23 @@ type Filings = (JoinSet<bool>, Duration);
 
 /// Takes a pair through its stages; `None` where one fails.
 async fn through(
-    steps: Arc<dyn Steps>,
+    steps: Arc<dyn StageExecutor>,
     project: Project,
     limit: Duration,
     facts: PairFacts,
 ) -> Option<Filings> {
     let (stop, name) = (Stop::new(), facts.name.clone());
     let (mut filings, mut at_work) = (JoinSet::new(), Duration::ZERO);
-    let pair = Box::new(PairInHand::new(PairWork {
+    let pair = Box::new(PairContext::new(PairWork {
         facts,
         facts_text: String::new(),
         results: Vec::new(),
     }));
-    let mut computing = Computing::begin(&steps, Stage::Fit, pair, Stage::next).ok()?;
+    let mut computing = ComputeThread::begin(&steps, Stage::Fit, pair, Stage::next).ok()?;
     loop {
         let (finished, next) = match computing.next(limit, &stop).await {
-            Computed::Begun(..) => continue,
-            Computed::Finished(finished, next) => (finished, next),
+            ComputeEvent::Started(..) => continue,
+            ComputeEvent::Finished(finished, next) => (finished, next),
             _ => return None,
         };
         at_work += finished.took;

@@ -8,32 +8,32 @@ use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
 use super::RunError;
-use super::compute_thread::Finished;
+use super::compute_thread::ComputedStage;
 use super::events::RunEvent;
 use super::filing::file;
-use super::pair_task::{PairEnd, PairReport, Shared};
+use super::pair_task::{PairEnd, PairReport, RunContext};
 use crate::catalog::{Kept, Lease, StageDone};
 use crate::domain::{PairName, Stage};
 use crate::failpoint::{self, Point};
 
 /// The right to a pair, and what has been stored under it.
-pub(super) struct Held {
-    shared: Arc<Shared>,
+pub(super) struct Checkpointer {
+    shared: Arc<RunContext>,
     name: PairName,
-    right: Right,
+    right: LeaseState,
     stored: u64,
     /// Whether all that was sent on its way is stored or will be.
     is_whole: bool,
 }
 
 /// Where the lease is.
-enum Right {
+enum LeaseState {
     /// In hand.
     Lease(Lease),
     /// With a task that stores the stages it is sent.
     Storing(
-        mpsc::UnboundedSender<Finished>,
-        JoinHandle<Result<Stored, RunError>>,
+        mpsc::UnboundedSender<ComputedStage>,
+        JoinHandle<Result<StoreOutcome, RunError>>,
     ),
     /// Spent: the pair is done, or the lease was given away.
     Spent,
@@ -42,19 +42,19 @@ enum Right {
 }
 
 /// What became of the lease, and how many stages were stored under it.
-struct Stored {
+struct StoreOutcome {
     kept: Kept,
     stages: u64,
     is_whole: bool,
 }
 
-impl Held {
+impl Checkpointer {
     /// A leased pair of which nothing is on its way.
-    pub(super) const fn new(shared: Arc<Shared>, name: PairName, lease: Lease) -> Self {
+    pub(super) const fn new(shared: Arc<RunContext>, name: PairName, lease: Lease) -> Self {
         Self {
             shared,
             name,
-            right: Right::Lease(lease),
+            right: LeaseState::Lease(lease),
             stored: 0,
             is_whole: true,
         }
@@ -67,8 +67,8 @@ impl Held {
             let _waiting = catalog.waiting().await?;
             self.settle().await?;
         }
-        match std::mem::replace(&mut self.right, Right::Spent) {
-            Right::Lease(lease) => Ok(Some(lease)),
+        match std::mem::replace(&mut self.right, LeaseState::Spent) {
+            LeaseState::Lease(lease) => Ok(Some(lease)),
             right => {
                 self.right = right;
                 Ok(None)
@@ -78,9 +78,9 @@ impl Held {
 
     /// Sends a finished stage on its way, and tells of it when it is stored; `false` when the lease is known to be gone.
     /// Stages are stored in their order.
-    pub(super) async fn store(&mut self, finished: Finished) -> Result<bool, RunError> {
+    pub(super) async fn store(&mut self, finished: ComputedStage) -> Result<bool, RunError> {
         self.begin();
-        if let Right::Storing(sender, _) = &self.right
+        if let LeaseState::Storing(sender, _) = &self.right
             && sender.send(finished).is_ok()
         {
             return Ok(true);
@@ -92,11 +92,11 @@ impl Held {
 
     /// Gives the lease, if it is in hand, to a task that stores.
     fn begin(&mut self) {
-        self.right = match std::mem::replace(&mut self.right, Right::Spent) {
-            Right::Lease(lease) => {
+        self.right = match std::mem::replace(&mut self.right, LeaseState::Spent) {
+            LeaseState::Lease(lease) => {
                 let (sender, stages) = mpsc::unbounded_channel();
                 let task = store(Arc::clone(&self.shared), self.name.clone(), lease, stages);
-                Right::Storing(sender, tokio::spawn(task))
+                LeaseState::Storing(sender, tokio::spawn(task))
             }
             right => right,
         };
@@ -104,7 +104,7 @@ impl Held {
 
     /// Whether a stage may be on its way.
     pub(super) const fn is_storing(&self) -> bool {
-        matches!(self.right, Right::Storing(..))
+        matches!(self.right, LeaseState::Storing(..))
     }
 
     /// How a pair that is done leaves its worker, when all is stored. Nobody waits for it.
@@ -116,7 +116,7 @@ impl Held {
     /// How the pair leaves its worker, when all is stored and a lease that is left has been given back.
     pub(super) async fn report(mut self, end: Result<PairEnd, RunError>) -> PairReport {
         let given_back = self.give_back().await;
-        let lost = matches!(self.right, Right::Lost);
+        let lost = matches!(self.right, LeaseState::Lost);
         let (end, fatal) = match (end, given_back) {
             (Err(error), _) | (Ok(_), Err(error)) => (PairEnd::GivenBack, Some(error)),
             (Ok(_), Ok(())) if lost => (PairEnd::Lost, None),
@@ -139,13 +139,13 @@ impl Held {
 
     /// Waits until the stages that are on their way are stored.
     async fn settle(&mut self) -> Result<(), RunError> {
-        let right = std::mem::replace(&mut self.right, Right::Spent);
-        let Right::Storing(sender, task) = right else {
+        let right = std::mem::replace(&mut self.right, LeaseState::Spent);
+        let LeaseState::Storing(sender, task) = right else {
             self.right = right;
             return Ok(());
         };
         drop(sender);
-        let Stored {
+        let StoreOutcome {
             kept,
             stages,
             is_whole,
@@ -156,9 +156,9 @@ impl Held {
         self.stored += stages;
         self.is_whole &= is_whole;
         self.right = match kept {
-            Kept::Lost => Right::Lost,
-            Kept::Done => Right::Spent,
-            Kept::Lease(lease) => Right::Lease(lease),
+            Kept::Lost => LeaseState::Lost,
+            Kept::Done => LeaseState::Spent,
+            Kept::Lease(lease) => LeaseState::Lease(lease),
         };
         Ok(())
     }
@@ -167,15 +167,15 @@ impl Held {
 /// Stores stages as they come, those together that have come while others were on their way, until no more come or the
 /// lease is gone.
 async fn store(
-    shared: Arc<Shared>,
+    shared: Arc<RunContext>,
     name: PairName,
     mut lease: Lease,
-    mut stages: mpsc::UnboundedReceiver<Finished>,
-) -> Result<Stored, RunError> {
+    mut stages: mpsc::UnboundedReceiver<ComputedStage>,
+) -> Result<StoreOutcome, RunError> {
     let mut stored = 0;
     while let Some(first) = stages.recv().await {
         let Some(first) = filed(&shared, &name, first).await? else {
-            return Ok(Stored {
+            return Ok(StoreOutcome {
                 kept: Kept::Lease(lease),
                 stages: stored,
                 is_whole: false,
@@ -199,7 +199,7 @@ async fn store(
             // What comes after a stage that is not on disk must not be stored without it.
             Kept::Lease(next) if is_whole => lease = next,
             kept => {
-                return Ok(Stored {
+                return Ok(StoreOutcome {
                     kept,
                     stages: stored,
                     is_whole,
@@ -207,7 +207,7 @@ async fn store(
             }
         }
     }
-    Ok(Stored {
+    Ok(StoreOutcome {
         kept: Kept::Lease(lease),
         stages: stored,
         is_whole: true,
@@ -216,9 +216,9 @@ async fn store(
 
 /// Has a stage's files written; then a row may name them. `None` when the run is to stop now.
 async fn filed(
-    shared: &Shared,
+    shared: &RunContext,
     pair: &PairName,
-    stage: Finished,
+    stage: ComputedStage,
 ) -> Result<Option<StageDone>, RunError> {
     let (of, limit) = ((pair, stage.stage), shared.stage_limit);
     if !file(&shared.project, of, stage.files, limit, &shared.stop).await? {
@@ -243,7 +243,7 @@ async fn filed(
     }))
 }
 
-fn finished(shared: &Shared, pair: PairName, stage: Stage, ms: u64) {
+fn finished(shared: &RunContext, pair: PairName, stage: Stage, ms: u64) {
     failpoint::hit(stage, Point::Stored, Some(&pair));
     let last = stage == shared.until.min(Stage::Register);
     shared.tell(RunEvent::StageFinished {

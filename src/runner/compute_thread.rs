@@ -11,9 +11,9 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
 
-use super::pair_context::{PairInHand, Stored};
+use super::pair_context::{PairContext, StoredStage};
 use super::stage_output;
-use super::steps::{Setback, StageOutput, Steps};
+use super::steps::{ExecutionError, StageExecutor, StageOutput};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputsSeen, MetricResult};
 use crate::domain::{ArtifactSet, ContentHash, Failure, FailureClass, Stage, sanitize};
@@ -22,7 +22,7 @@ use crate::store::NewArtifact;
 
 /// A stage that is computed, and the files that must be on disk before a row names them.
 #[derive(Debug)]
-pub(super) struct Finished {
+pub(super) struct ComputedStage {
     pub(super) stage: Stage,
     pub(super) outcome: String,
     pub(super) files: Vec<NewArtifact>,
@@ -40,17 +40,17 @@ pub(super) struct Finished {
 
 /// What happens on a pair's thread.
 #[derive(Debug)]
-pub(super) enum Computed {
+pub(super) enum ComputeEvent {
     /// A stage begins; the input files as read until now.
-    Begun(Stage, InputsSeen),
+    Started(Stage, InputsSeen),
     /// A stage is computed; which one comes next, unless it was the last one.
-    Finished(Box<Finished>, Option<Stage>),
+    Finished(Box<ComputedStage>, Option<Stage>),
     /// A stage failed; the last that comes.
     Failed {
         /// Class and sentence.
         failure: Failure,
         /// Whether another try may go better.
-        may_pass: bool,
+        is_transient: bool,
         /// Input files as read.
         inputs: InputsSeen,
         /// How long it took.
@@ -66,17 +66,17 @@ pub(super) enum Computed {
 
 /// A pair whose stages are computed. When it is dropped, the stage in hand is the last.
 #[derive(Debug)]
-pub(super) struct Computing(mpsc::UnboundedReceiver<Computed>);
+pub(super) struct ComputeThread(mpsc::UnboundedReceiver<ComputeEvent>);
 
-impl Computing {
+impl ComputeThread {
     /// Computes stages of a pair from this one on. What comes after a stage is asked on the pair's thread.
     ///
     /// # Errors
     /// When the system gives no thread; then the pair in hand is lost.
     pub(super) fn begin(
-        steps: &Arc<dyn Steps>,
+        steps: &Arc<dyn StageExecutor>,
         stage: Stage,
-        pair: Box<PairInHand>,
+        pair: Box<PairContext>,
         next: impl Fn(Stage) -> Option<Stage> + Send + 'static,
     ) -> std::io::Result<Self> {
         let (sender, receiver) = mpsc::unbounded_channel();
@@ -87,29 +87,29 @@ impl Computing {
     }
 
     /// What happens next. No stage may take longer than the limit.
-    pub(super) async fn next(&mut self, limit: Duration, stop: &Stop) -> Computed {
+    pub(super) async fn next(&mut self, limit: Duration, stop: &Stop) -> ComputeEvent {
         tokio::select! {
             biased;
             computed = self.0.recv() => computed.unwrap_or_else(|| {
-                Computed::Panicked("the thread of the stages ended without a word".to_owned())
+                ComputeEvent::Panicked("the thread of the stages ended without a word".to_owned())
             }),
-            () = stop.reached(StopLevel::Now) => Computed::Stopped,
-            () = tokio::time::sleep(limit) => Computed::TimedOut,
+            () = stop.reached(StopLevel::Now) => ComputeEvent::Stopped,
+            () = tokio::time::sleep(limit) => ComputeEvent::TimedOut,
         }
     }
 }
 
 /// Takes a pair through its stages, until there is none left or nobody listens any more.
 fn through(
-    steps: &dyn Steps,
+    steps: &dyn StageExecutor,
     mut stage: Stage,
-    mut pair: Box<PairInHand>,
+    mut pair: Box<PairContext>,
     next: impl Fn(Stage) -> Option<Stage>,
-    to: &mpsc::UnboundedSender<Computed>,
+    to: &mpsc::UnboundedSender<ComputeEvent>,
 ) {
     let last = loop {
         if to
-            .send(Computed::Begun(stage, pair.inputs.clone()))
+            .send(ComputeEvent::Started(stage, pair.inputs.clone()))
             .is_err()
         {
             return;
@@ -120,21 +120,24 @@ fn through(
             Ok(Ok(finished)) => match next(stage) {
                 Some(later) => {
                     // Whether somebody listens is seen when the next stage begins.
-                    let _ = to.send(Computed::Finished(Box::new(finished), Some(later)));
+                    let _ = to.send(ComputeEvent::Finished(Box::new(finished), Some(later)));
                     stage = later;
                 }
-                None => break Computed::Finished(Box::new(finished), None),
+                None => break ComputeEvent::Finished(Box::new(finished), None),
             },
-            Ok(Err(Setback::Back(earlier))) => stage = earlier,
-            Ok(Err(Setback::Failed { failure, may_pass })) => {
-                break Computed::Failed {
+            Ok(Err(ExecutionError::RerunFrom(earlier))) => stage = earlier,
+            Ok(Err(ExecutionError::Failed {
+                failure,
+                is_transient,
+            })) => {
+                break ComputeEvent::Failed {
                     failure,
-                    may_pass,
+                    is_transient,
                     inputs: pair.inputs.clone(),
                     took: begun.elapsed(),
                 };
             }
-            Err(payload) => break Computed::Panicked(panic_text(&*payload)),
+            Err(payload) => break ComputeEvent::Panicked(panic_text(&*payload)),
         }
     };
     // Before the word is out that there is memory for another pair.
@@ -143,11 +146,11 @@ fn through(
 }
 
 fn run(
-    steps: &dyn Steps,
+    steps: &dyn StageExecutor,
     stage: Stage,
-    pair: &mut PairInHand,
+    pair: &mut PairContext,
     begun: Instant,
-) -> Result<Finished, Setback> {
+) -> Result<ComputedStage, ExecutionError> {
     let output = steps.run(stage, pair)?;
     let took = begun.elapsed();
     failpoint::hit(stage, Point::Computed, Some(&pair.facts.name));
@@ -157,13 +160,13 @@ fn run(
 /// Names what was given by its hashes, and keeps it in hand as later stages would find it stored.
 fn finished(
     stage: Stage,
-    pair: &mut PairInHand,
+    pair: &mut PairContext,
     output: StageOutput,
     took: Duration,
-) -> Result<Finished, Setback> {
+) -> Result<ComputedStage, ExecutionError> {
     let Some(mesh_hash) = pair.mesh_hash() else {
         let text = "a stage was done before the mesh was read";
-        return Err(Setback::failed(FailureClass::Bug, text));
+        return Err(ExecutionError::failed(FailureClass::Bug, text));
     };
     let print_hash = pair.print_hash();
     let named: ArtifactSet = output
@@ -173,14 +176,14 @@ fn finished(
         .collect();
     let depth = pair.stored.get(&Stage::Depth).map(|stored| &stored.files);
     let metrics = stage_output::metric_results(&output.metrics, &named, depth);
-    let stored = Stored {
+    let stored = StoredStage {
         outcome: serde_json::from_str(&output.outcome).unwrap_or_default(),
         files: named.clone(),
         mesh_hash,
         print_hash,
     };
     pair.stored.insert(stage, stored);
-    Ok(Finished {
+    Ok(ComputedStage {
         stage,
         result_hash: stage_output::result_hash(&output.outcome, &named),
         outcome: output.outcome,

@@ -65,7 +65,7 @@ pub enum RunEvent {
         wait_ms: u64,
     },
     /// Leases of dead workers came back.
-    Rescued {
+    Recovered {
         /// How many pairs.
         pairs: u64,
     },

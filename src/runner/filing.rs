@@ -22,7 +22,7 @@ pub(super) async fn file(
     let (to, name) = (project.clone(), pair.clone());
     let writing = tokio::task::spawn_blocking(move || {
         let written = || failpoint::hit(stage, Point::Written, Some(&name));
-        to.write_artifacts_telling(&files, &written)?;
+        to.write_artifacts_with(&files, &written)?;
         failpoint::hit(stage, Point::Filed, Some(&name));
         Ok(true)
     });

@@ -25,12 +25,12 @@ const SHARE: f64 = 0.8;
 
 /// Memory that is given out to pairs, in bytes by estimate.
 #[derive(Debug)]
-pub(super) struct Budget {
+pub(super) struct MemoryBudget {
     limit: Option<u64>,
     given: u64,
 }
 
-impl Budget {
+impl MemoryBudget {
     /// Nothing given yet; `None` gives to everybody.
     pub(super) const fn new(limit: Option<u64>) -> Self {
         Self { limit, given: 0 }
@@ -148,7 +148,7 @@ fn available(meminfo: &str) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Budget, PAIR_BYTES, PIXEL_BYTES, available, need, print_bytes};
+    use super::{MemoryBudget, PAIR_BYTES, PIXEL_BYTES, available, need, print_bytes};
     use crate::catalog::PairFacts;
     use crate::domain::Stage;
     use crate::raster;
@@ -157,7 +157,7 @@ mod tests {
 
     #[test]
     fn what_is_given_stays_within_the_limit_but_for_one_that_is_too_large() {
-        let mut budget = Budget::new(Some(10));
+        let mut budget = MemoryBudget::new(Some(10));
         assert!(budget.give(4) && budget.give(6));
         assert!(!budget.give(1));
         budget.take_back(4);
@@ -173,7 +173,7 @@ mod tests {
 
     #[test]
     fn without_a_limit_everybody_gets_what_they_need() {
-        let mut budget = Budget::new(None);
+        let mut budget = MemoryBudget::new(None);
         assert!(budget.give(u64::MAX) && budget.give(u64::MAX));
     }
 

@@ -49,10 +49,10 @@ use crate::page_vec;
 use crate::stages::Settings;
 use crate::store::{ArtifactError, LockError, Project, RunLock, StoreError};
 use clock::Clock;
-use pair_task::Shared;
-use scheduler::{Dispatch, Tally};
-use stage_executor::Pipeline;
-use steps::Steps;
+use pair_task::RunContext;
+use scheduler::{RunCounts, Scheduler};
+use stage_executor::PipelineExecutor;
+use steps::StageExecutor;
 use timing::Timing;
 
 /// Why a run could not go on. Pairs that fail are no error: they are in the summary.
@@ -138,7 +138,7 @@ pub async fn run(
     on_event: impl FnMut(RunEvent) + Send,
 ) -> Result<RunSummary, RunError> {
     page_vec::keep_memory(options.memory);
-    let steps = Arc::new(Pipeline::new(project, settings, options));
+    let steps = Arc::new(PipelineExecutor::new(project, settings, options));
     let recipes = recipes(settings);
     run_steps(project, catalog, &recipes, steps, options, stop, on_event).await
 }
@@ -148,7 +148,7 @@ async fn run_steps(
     project: &Project,
     catalog: &Catalog,
     recipes: &Recipes,
-    steps: Arc<dyn Steps>,
+    steps: Arc<dyn StageExecutor>,
     options: &RunOptions,
     stop: &Stop,
     mut on_event: impl FnMut(RunEvent) + Send,
@@ -172,7 +172,7 @@ async fn run_steps(
         return Err(error);
     }
     let (events, mut received) = mpsc::unbounded_channel();
-    let shared = Shared {
+    let shared = RunContext {
         catalog: catalog.clone(),
         project: project.clone(),
         steps,
@@ -187,7 +187,7 @@ async fn run_steps(
         at_work_us: AtomicU64::new(0),
     };
     let shared = Arc::new(shared);
-    let mut dispatch = Dispatch::new(Arc::clone(&shared), worker, among.clone(), options);
+    let mut dispatch = Scheduler::new(Arc::clone(&shared), worker, among.clone(), options);
     let outcome = dispatch.run(&mut received, &mut on_event).await;
     // Said also after an error, so that this worker's end is not taken for a crash.
     let ended = catalog.end_worker(dispatch.worker(), clock.now()).await;
@@ -230,7 +230,7 @@ async fn announce(
         workers: options.workers,
     });
     if rescued > 0 {
-        on_event(RunEvent::Rescued { pairs: rescued });
+        on_event(RunEvent::Recovered { pairs: rescued });
     }
     Ok(())
 }
@@ -281,7 +281,12 @@ async fn selection(
     Ok(Some(catalog.select(names).await?))
 }
 
-fn summary(tally: &Tally, left: WorkLeft, status: StatusCounts, shared: &Shared) -> RunSummary {
+fn summary(
+    tally: &RunCounts,
+    left: WorkLeft,
+    status: StatusCounts,
+    shared: &RunContext,
+) -> RunSummary {
     RunSummary {
         done: tally.done,
         failed: tally.failed,

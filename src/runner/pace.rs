@@ -9,12 +9,12 @@ const MOST: u128 = 16;
 
 /// The time that pairs take in a slot, the last ones above all.
 #[derive(Debug, Default)]
-pub(super) struct Pace {
+pub(super) struct DurationEstimate {
     mean: Option<Duration>,
     is_single: bool,
 }
 
-impl Pace {
+impl DurationEstimate {
     /// Takes in how long a pair was in its slot.
     pub(super) fn took(&mut self, time: Duration) {
         self.mean = Some(self.mean.map_or(time, |mean| (mean * 3 + time) / 4));
@@ -41,11 +41,11 @@ impl Pace {
 mod tests {
     use std::time::Duration;
 
-    use super::{MOST, Pace};
+    use super::{DurationEstimate, MOST};
 
     /// What is taken ahead after pairs of these milliseconds.
     fn ahead(times: &[u64]) -> usize {
-        let mut pace = Pace::default();
+        let mut pace = DurationEstimate::default();
         for ms in times {
             pace.took(Duration::from_millis(*ms));
         }
@@ -63,7 +63,7 @@ mod tests {
 
     #[test]
     fn where_memory_is_short_none_are_taken_ahead() {
-        let mut pace = Pace::default();
+        let mut pace = DurationEstimate::default();
         pace.took(Duration::from_millis(1));
         pace.stay_single();
         assert_eq!(pace.ahead(), 0);

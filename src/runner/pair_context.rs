@@ -13,7 +13,7 @@ use crate::stages::{Print, Scan};
 
 /// What an earlier stage stored.
 #[derive(Debug, Clone)]
-pub(super) struct Stored {
+pub(super) struct StoredStage {
     pub(super) outcome: Value,
     pub(super) files: ArtifactSet,
     pub(super) mesh_hash: ContentHash,
@@ -22,13 +22,13 @@ pub(super) struct Stored {
 
 /// A pair between two stages.
 #[derive(Debug)]
-pub(super) struct PairInHand {
+pub(super) struct PairContext {
     /// As imported.
     pub(super) facts: PairFacts,
     /// What the manifest said that results depend on, as the catalog compares it.
     pub(super) facts_text: String,
     /// What the stages behind it stored.
-    pub(super) stored: BTreeMap<Stage, Stored>,
+    pub(super) stored: BTreeMap<Stage, StoredStage>,
     /// Input files as read by this worker.
     pub(super) inputs: InputsSeen,
     /// What of those was given to the catalog with a stage.
@@ -45,11 +45,11 @@ pub(super) struct PairInHand {
     pub(super) normalized: Option<Normalized>,
 }
 
-impl PairInHand {
+impl PairContext {
     /// A pair as the catalog gives it, nothing in memory yet.
     pub(super) fn new(work: PairWork) -> Self {
         let stored = work.results.into_iter().map(|record| {
-            let stored = Stored {
+            let stored = StoredStage {
                 outcome: record.outcome,
                 files: record.files,
                 mesh_hash: record.mesh_hash,

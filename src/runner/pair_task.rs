@@ -7,14 +7,14 @@ use std::time::Duration;
 use tokio::sync::mpsc;
 
 use super::RunError;
-use super::checkpointer::Held;
+use super::checkpointer::Checkpointer;
 use super::clock::Clock;
-use super::compute_thread::{Computed, Computing};
+use super::compute_thread::{ComputeEvent, ComputeThread};
 use super::events::RunEvent;
 use super::input_changes;
-use super::pair_context::PairInHand;
-use super::policy::{self, Try};
-use super::steps::Steps;
+use super::pair_context::PairContext;
+use super::policy::{self, FailedAttempt};
+use super::steps::StageExecutor;
 use super::stop::{Stop, StopLevel};
 use super::timing::Timing;
 use crate::catalog::{Catalog, InputsSeen, Lease, PairWork, RecipeIds, Sentence, StageFailed};
@@ -23,10 +23,10 @@ use crate::failpoint::{self, Point};
 use crate::store::Project;
 
 /// What the pairs of a run have in common.
-pub(super) struct Shared {
+pub(super) struct RunContext {
     pub(super) catalog: Catalog,
     pub(super) project: Project,
-    pub(super) steps: Arc<dyn Steps>,
+    pub(super) steps: Arc<dyn StageExecutor>,
     pub(super) recipes: RecipeIds,
     pub(super) clock: Clock,
     pub(super) timing: Timing,
@@ -66,7 +66,7 @@ pub(super) struct PairReport {
 }
 
 /// What is stored with a failure even when the pair in hand is gone.
-struct Known {
+struct PairInputs {
     name: PairName,
     facts: String,
     mesh_path: String,
@@ -75,16 +75,16 @@ struct Known {
 }
 
 /// What went wrong.
-struct Blame {
+struct FailedStage {
     failure: Failure,
     /// Whether another try may go better.
-    may_pass: bool,
+    is_transient: bool,
     /// Input files as read, where the pair came back.
     inputs: Option<InputsSeen>,
     ms: Option<u64>,
 }
 
-impl Shared {
+impl RunContext {
     /// Whether nothing new is to be begun.
     pub(super) fn is_draining(&self) -> bool {
         self.stop.level().max(self.drain.level()) >= StopLevel::Drain
@@ -111,52 +111,52 @@ impl Shared {
 }
 
 /// A pair that its thread is done with.
-pub(super) enum Over {
+pub(super) enum PairOutcome {
     /// All is stored.
     Ended(PairReport),
-    /// Its last stages are on their way: what is left is to wait until it is [`Held::done`].
-    Storing(Held),
+    /// Its last stages are on their way: what is left is to wait until it is [`Checkpointer::done`].
+    Storing(Checkpointer),
 }
 
 /// Takes a leased pair through the stages that are left. Each is computed while those before it are on their way to the
 /// disk.
-pub(super) async fn work(shared: Arc<Shared>, lease: Lease, work: PairWork) -> Over {
+pub(super) async fn work(shared: Arc<RunContext>, lease: Lease, work: PairWork) -> PairOutcome {
     let stage = lease.cursor();
-    let pair = Box::new(PairInHand::new(work));
+    let pair = Box::new(PairContext::new(work));
     failpoint::hit(stage, Point::Claimed, Some(&pair.facts.name));
-    let mut held = Held::new(Arc::clone(&shared), pair.facts.name.clone(), lease);
+    let mut held = Checkpointer::new(Arc::clone(&shared), pair.facts.name.clone(), lease);
     match through(&shared, &mut held, stage, pair).await {
-        Ok(PairEnd::Done) if held.is_storing() => Over::Storing(held),
-        end => Over::Ended(held.report(end).await),
+        Ok(PairEnd::Done) if held.is_storing() => PairOutcome::Storing(held),
+        end => PairOutcome::Ended(held.report(end).await),
     }
 }
 
 async fn through(
-    shared: &Arc<Shared>,
-    held: &mut Held,
+    shared: &Arc<RunContext>,
+    held: &mut Checkpointer,
     mut stage: Stage,
-    pair: Box<PairInHand>,
+    pair: Box<PairContext>,
 ) -> Result<PairEnd, RunError> {
-    let mut known = Known::of(&pair);
+    let mut known = PairInputs::of(&pair);
     let (limit, asked) = (shared.stage_limit, Arc::clone(shared));
     let next = move |done| next(&asked, done);
-    let mut computing = match Computing::begin(&shared.steps, stage, pair, next) {
+    let mut computing = match ComputeThread::begin(&shared.steps, stage, pair, next) {
         Ok(computing) => computing,
         Err(error) => {
             let text = format!("the system gave no thread for {stage}: {error}");
-            let blame = Blame::bare(FailureClass::Resource, text);
+            let blame = FailedStage::bare(FailureClass::Resource, text);
             return fail(shared, held, stage, known, blame).await;
         }
     };
     loop {
         let blame = match computing.next(limit, &shared.stop).await {
-            Computed::Begun(begun, inputs) => {
+            ComputeEvent::Started(begun, inputs) => {
                 (stage, known.inputs) = (begun, inputs);
                 let pair = known.name.clone();
                 shared.tell(RunEvent::StageStarted { pair, stage });
                 continue;
             }
-            Computed::Finished(finished, next) => {
+            ComputeEvent::Finished(finished, next) => {
                 shared.note(finished.took);
                 if !held.store(*finished).await? {
                     return Ok(PairEnd::Lost);
@@ -167,44 +167,44 @@ async fn through(
                     None => return Ok(PairEnd::Done),
                 }
             }
-            Computed::Failed {
+            ComputeEvent::Failed {
                 failure,
-                may_pass,
+                is_transient,
                 inputs,
                 took,
             } => {
                 shared.note(took);
-                Blame {
+                FailedStage {
                     failure,
-                    may_pass,
+                    is_transient,
                     inputs: Some(inputs),
                     ms: Some(took.as_millis() as u64),
                 }
             }
-            Computed::Panicked(text) => Blame::bare(FailureClass::Bug, text),
-            Computed::TimedOut => {
+            ComputeEvent::Panicked(text) => FailedStage::bare(FailureClass::Bug, text),
+            ComputeEvent::TimedOut => {
                 let text = format!("{stage} took longer than {} s", limit.as_secs_f64());
-                Blame::bare(FailureClass::Resource, text)
+                FailedStage::bare(FailureClass::Resource, text)
             }
-            Computed::Stopped => return Ok(PairEnd::GivenBack),
+            ComputeEvent::Stopped => return Ok(PairEnd::GivenBack),
         };
         return fail(shared, held, stage, known, blame).await;
     }
 }
 
 /// The stage after this one, if the run goes so far.
-fn next(shared: &Shared, done: Stage) -> Option<Stage> {
+fn next(shared: &RunContext, done: Stage) -> Option<Stage> {
     done.next()
         .filter(|next| *next <= shared.until && !shared.is_draining())
 }
 
 /// Stores a failure and tells of it.
 async fn fail(
-    shared: &Shared,
-    held: &mut Held,
+    shared: &RunContext,
+    held: &mut Checkpointer,
     stage: Stage,
-    known: Known,
-    blame: Blame,
+    known: PairInputs,
+    blame: FailedStage,
 ) -> Result<PairEnd, RunError> {
     let Some(lease) = held.lease().await? else {
         return Ok(PairEnd::Lost);
@@ -214,10 +214,10 @@ async fn fail(
         None => known.inputs(&shared.project).await,
     };
     let now = shared.clock.now();
-    let failed = Try {
+    let failed = FailedAttempt {
         pair: lease.pair(),
         class: blame.failure.class,
-        may_pass: blame.may_pass,
+        is_transient: blame.is_transient,
         attempt: lease.attempt(),
         alone: lease.alone(),
     };
@@ -243,7 +243,7 @@ async fn fail(
 
 /// What is told of a failure, and how the pair leaves its worker.
 fn told(
-    shared: &Shared,
+    shared: &RunContext,
     stage: Stage,
     sentence: Sentence,
     pair: PairName,
@@ -273,8 +273,8 @@ fn told(
     (event, PairEnd::Later)
 }
 
-impl Known {
-    fn of(pair: &PairInHand) -> Self {
+impl PairInputs {
+    fn of(pair: &PairContext) -> Self {
         Self {
             name: pair.facts.name.clone(),
             facts: pair.facts_text.clone(),
@@ -300,12 +300,12 @@ impl Known {
     }
 }
 
-impl Blame {
+impl FailedStage {
     /// A failure after which nothing is left of the pair in hand.
     fn bare(class: FailureClass, text: String) -> Self {
         Self {
             failure: Failure::new(class, text),
-            may_pass: false,
+            is_transient: false,
             inputs: None,
             ms: None,
         }

@@ -15,11 +15,11 @@ pub(super) const BACKOFF_CAP: Duration = Duration::from_mins(1);
 
 /// What is known of a failed try.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Try {
+pub(super) struct FailedAttempt {
     pub(super) pair: PairId,
     pub(super) class: FailureClass,
     /// Whether another try may go better.
-    pub(super) may_pass: bool,
+    pub(super) is_transient: bool,
     /// Which try it was, from 1.
     pub(super) attempt: u32,
     /// Whether it ran with nothing beside it.
@@ -27,11 +27,13 @@ pub(super) struct Try {
 }
 
 /// What a failed try means for the job.
-pub(super) fn sentence(failed: Try, now: UnixMillis) -> Sentence {
+pub(super) fn sentence(failed: FailedAttempt, now: UnixMillis) -> Sentence {
     match failed.class {
-        FailureClass::Io if failed.may_pass && failed.attempt < IO_ATTEMPTS => Sentence::BackOff {
-            run_at: now + backoff_ms(failed.pair, failed.attempt),
-        },
+        FailureClass::Io if failed.is_transient && failed.attempt < IO_ATTEMPTS => {
+            Sentence::BackOff {
+                run_at: now + backoff_ms(failed.pair, failed.attempt),
+            }
+        }
         FailureClass::Resource if !failed.alone => Sentence::Alone,
         FailureClass::Io
         | FailureClass::Resource
@@ -97,15 +99,15 @@ impl Liveness {
 
 #[cfg(test)]
 mod tests {
-    use super::{BACKOFF_CAP, IO_ATTEMPTS, Liveness, Try, backoff_ms, sentence};
+    use super::{BACKOFF_CAP, FailedAttempt, IO_ATTEMPTS, Liveness, backoff_ms, sentence};
     use crate::catalog::{LeaseHolder, Sentence};
     use crate::domain::{FailureClass, PairId, WorkerId};
 
-    fn failed(class: FailureClass, attempt: u32) -> Try {
-        Try {
+    fn failed(class: FailureClass, attempt: u32) -> FailedAttempt {
+        FailedAttempt {
             pair: PairId(7),
             class,
-            may_pass: true,
+            is_transient: true,
             attempt,
             alone: false,
         }
@@ -121,8 +123,8 @@ mod tests {
 
     #[test]
     fn a_missing_file_is_not_waited_for() {
-        let missing = Try {
-            may_pass: false,
+        let missing = FailedAttempt {
+            is_transient: false,
             ..failed(FailureClass::Io, 1)
         };
         assert_eq!(sentence(missing, 0), Sentence::Quarantine);
@@ -132,7 +134,7 @@ mod tests {
     fn too_much_is_tried_alone_once() {
         let first = failed(FailureClass::Resource, 1);
         assert_eq!(sentence(first, 0), Sentence::Alone);
-        let again = Try {
+        let again = FailedAttempt {
             alone: true,
             ..first
         };

@@ -7,15 +7,15 @@ use std::time::Instant;
 use super::RunError;
 use super::events::RunEvent;
 use super::memory_budget;
-use super::pace::Pace;
+use super::pace::DurationEstimate;
 use super::pair_task::work;
-use super::scheduler::Dispatch;
+use super::scheduler::Scheduler;
 use crate::catalog::{ClaimRequest, Lease, PairWork};
 use crate::domain::PairName;
 
 /// A pair that is leased and not begun.
 #[derive(Debug)]
-pub(super) struct Taken {
+pub(super) struct LeasedPair {
     lease: Lease,
     work: PairWork,
     /// Memory it may need.
@@ -24,26 +24,26 @@ pub(super) struct Taken {
 
 /// Pairs that are leased: those begun and those to come.
 #[derive(Debug, Default)]
-pub(super) struct InHand {
+pub(super) struct Prefetch {
     /// Taken ahead.
-    ahead: VecDeque<Taken>,
-    begun: BTreeMap<PairName, Begun>,
-    pace: Pace,
+    ahead: VecDeque<LeasedPair>,
+    begun: BTreeMap<PairName, RunningPair>,
+    pace: DurationEstimate,
 }
 
 /// A pair in a slot.
 #[derive(Debug)]
-struct Begun {
+struct RunningPair {
     at: Instant,
     /// Whether it is at its last stage.
     is_last: bool,
 }
 
-impl InHand {
+impl Prefetch {
     /// Notes that a pair is begun.
     fn begin(&mut self, pair: PairName) {
         let (at, is_last) = (Instant::now(), false);
-        self.begun.insert(pair, Begun { at, is_last });
+        self.begun.insert(pair, RunningPair { at, is_last });
     }
 
     /// Notes that a pair is at its last stage, if it is one of ours.
@@ -72,7 +72,7 @@ impl InHand {
     }
 }
 
-impl Dispatch {
+impl Scheduler {
     /// Takes in what an event says about the slots.
     pub(super) fn observe(&mut self, event: &RunEvent) {
         if let RunEvent::StageStarted { pair, stage } = event
@@ -141,7 +141,7 @@ impl Dispatch {
     }
 
     /// Says so when a pair may need more memory than pairs may take.
-    fn warn(&self, taken: &Taken) {
+    fn warn(&self, taken: &LeasedPair) {
         if let Some(limit) = self.budget.exceeded_by(taken.need) {
             let (need, limit) = (taken.need >> 20, limit >> 20);
             let pair = &taken.work.facts.name;
@@ -151,8 +151,8 @@ impl Dispatch {
         }
     }
 
-    fn spawn(&mut self, taken: Taken) {
-        let Taken { lease, work, need } = taken;
+    fn spawn(&mut self, taken: LeasedPair) {
+        let LeasedPair { lease, work, need } = taken;
         let name = work.facts.name.clone();
         self.in_hand.begin(name.clone());
         let over = self::work(Arc::clone(&self.shared), lease, work);
@@ -171,7 +171,7 @@ impl Dispatch {
     async fn with_needs(
         &self,
         leased: impl Iterator<Item = (Lease, PairWork)> + Send + 'static,
-    ) -> Vec<Taken> {
+    ) -> Vec<LeasedPair> {
         let is_limited = self.budget.is_limited();
         let (project, images) = (self.shared.project.clone(), self.images);
         let look = move |(lease, work): (Lease, PairWork)| {
@@ -180,7 +180,7 @@ impl Dispatch {
             } else {
                 0
             };
-            Taken { lease, work, need }
+            LeasedPair { lease, work, need }
         };
         match tokio::task::spawn_blocking(move || leased.map(look).collect()).await {
             Ok(taken) => taken,
@@ -193,13 +193,13 @@ impl Dispatch {
 mod tests {
     use std::time::Duration;
 
-    use super::InHand;
+    use super::Prefetch;
     use crate::domain::PairName;
 
     #[test]
     fn pairs_are_taken_ahead_when_one_is_nearly_over_and_several_where_they_are_short() {
         let pair = PairName::new("1").expect("a name");
-        let mut in_hand = InHand::default();
+        let mut in_hand = Prefetch::default();
         assert_eq!(in_hand.wanted(2), 2);
         in_hand.begin(pair.clone());
         assert_eq!(in_hand.wanted(0), 0);

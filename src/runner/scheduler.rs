@@ -9,11 +9,11 @@ use tokio::time::{Interval, MissedTickBehavior, interval};
 
 use super::events::RunEvent;
 use super::input_changes;
-use super::memory_budget::Budget;
+use super::memory_budget::MemoryBudget;
 use super::options::RunOptions;
-use super::pair_task::{Over, PairEnd, PairReport, Shared};
+use super::pair_task::{PairEnd, PairOutcome, PairReport, RunContext};
 use super::policy::{self, Liveness};
-use super::prefetch::InHand;
+use super::prefetch::Prefetch;
 use super::stop::StopLevel;
 use super::{RunError, this_process};
 use crate::catalog::{Dead, Outstanding, PairSelection, Waiting};
@@ -28,7 +28,7 @@ const MOST_ENDINGS: usize = 8;
 
 /// What the loop has counted.
 #[derive(Debug, Default)]
-pub(super) struct Tally {
+pub(super) struct RunCounts {
     pub(super) done: u64,
     pub(super) failed: u64,
     pub(super) stages: u64,
@@ -36,21 +36,21 @@ pub(super) struct Tally {
 }
 
 /// The loop's own state.
-pub(super) struct Dispatch {
-    pub(super) shared: Arc<Shared>,
+pub(super) struct Scheduler {
+    pub(super) shared: Arc<RunContext>,
     pub(super) worker: WorkerId,
     pub(super) workers: usize,
     pub(super) among: Option<PairSelection>,
     pub(super) max_failures: Option<u64>,
     pub(super) images: raster::Limits,
     /// Pairs that are computed, each with its name and the memory it was given.
-    pub(super) tasks: JoinSet<(Over, PairName, u64)>,
+    pub(super) tasks: JoinSet<(PairOutcome, PairName, u64)>,
     /// Pairs whose last files and checkpoint are on their way.
     endings: JoinSet<PairReport>,
-    /// Held while pairs are not stored yet and a slot has nothing to do, or they are many.
+    /// Checkpointer while pairs are not stored yet and a slot has nothing to do, or they are many.
     waiting: Option<Waiting>,
-    pub(super) in_hand: InHand,
-    pub(super) budget: Budget,
+    pub(super) in_hand: Prefetch,
+    pub(super) budget: MemoryBudget,
     /// The next pair waits for memory that somebody must give back first.
     pub(super) short: bool,
     /// A pair that nothing may run beside is in hand.
@@ -60,14 +60,14 @@ pub(super) struct Dispatch {
     /// When this worker last showed that it lives, by the run's clock.
     last_beat: UnixMillis,
     liveness: Liveness,
-    tally: Tally,
+    tally: RunCounts,
     fatal: Option<RunError>,
     told: StopLevel,
 }
 
-impl Dispatch {
+impl Scheduler {
     pub(super) fn new(
-        shared: Arc<Shared>,
+        shared: Arc<RunContext>,
         worker: WorkerId,
         among: Option<PairSelection>,
         options: &RunOptions,
@@ -84,12 +84,12 @@ impl Dispatch {
             tasks: JoinSet::new(),
             endings: JoinSet::new(),
             waiting: None,
-            in_hand: InHand::default(),
-            budget: Budget::new(options.memory),
+            in_hand: Prefetch::default(),
+            budget: MemoryBudget::new(options.memory),
             short: false,
             alone: false,
             look: true,
-            tally: Tally::default(),
+            tally: RunCounts::default(),
             fatal: None,
             told: StopLevel::Go,
         }
@@ -105,7 +105,7 @@ impl Dispatch {
         &mut self,
         events: &mut mpsc::UnboundedReceiver<RunEvent>,
         on_event: &mut (impl FnMut(RunEvent) + Send),
-    ) -> Result<Tally, RunError> {
+    ) -> Result<RunCounts, RunError> {
         let timing = self.shared.timing;
         let mut looks = every(LOOK_EVERY);
         let mut rescues = every(timing.rescue_every);
@@ -199,15 +199,15 @@ impl Dispatch {
     }
 
     /// Takes in that a pair's computing is over.
-    fn take(&mut self, (over, name, need): (Over, PairName, u64)) {
+    fn take(&mut self, (over, name, need): (PairOutcome, PairName, u64)) {
         self.alone = false;
         self.short = false;
         self.look = true;
         self.budget.take_back(need);
         self.in_hand.over(&name);
         match over {
-            Over::Ended(report) => self.count(report),
-            Over::Storing(held) => drop(self.endings.spawn(held.done())),
+            PairOutcome::Ended(report) => self.count(report),
+            PairOutcome::Storing(held) => drop(self.endings.spawn(held.done())),
         }
     }
 
@@ -322,7 +322,7 @@ impl Dispatch {
         }
         if rescued > 0 {
             self.look = true;
-            self.shared.tell(RunEvent::Rescued { pairs: rescued });
+            self.shared.tell(RunEvent::Recovered { pairs: rescued });
         }
         Ok(())
     }

@@ -4,28 +4,28 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 use super::options::RunOptions;
-use super::pair_context::PairInHand;
+use super::pair_context::PairContext;
 use super::stage_output;
-use super::steps::{Setback, StageOutput, Steps};
+use super::steps::{ExecutionError, StageExecutor, StageOutput};
 use crate::catalog::InputSeen;
 use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
 use crate::mesh;
 use crate::raster::{self, DepthMap};
 use crate::stages::normalize::Normalized;
 use crate::stages::{Print, Scan, Settings, StageError, depth, fit, normalize, register};
-use crate::store::{ArtifactError, InputError, Project, Seen, open_input, read_input};
+use crate::store::{ArtifactError, InputDigest, InputError, Project, open_input, read_input};
 
 /// The stages of one project with their settings.
 #[derive(Debug)]
-pub(super) struct Pipeline {
+pub(super) struct PipelineExecutor {
     project: Project,
     settings: Settings,
     mesh_limits: mesh::Limits,
     image_limits: raster::Limits,
 }
 
-impl Steps for Pipeline {
-    fn run(&self, stage: Stage, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+impl StageExecutor for PipelineExecutor {
+    fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         match stage {
             Stage::Fit => self.fit(pair),
             Stage::Depth => self.depth(pair),
@@ -35,7 +35,7 @@ impl Steps for Pipeline {
     }
 }
 
-impl Pipeline {
+impl PipelineExecutor {
     /// The stages of a run.
     pub(super) fn new(project: &Project, settings: &Settings, options: &RunOptions) -> Self {
         Self {
@@ -46,7 +46,7 @@ impl Pipeline {
         }
     }
 
-    fn fit(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+    fn fit(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let scan = self.read_scan(pair)?;
         // The paper's fit does not look at the print, so a changed print need not send its results back so far.
         let print = match self.settings.fit.method {
@@ -62,7 +62,7 @@ impl Pipeline {
         Ok(stage_output::numbers(json))
     }
 
-    fn depth(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+    fn depth(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let fit = Self::fitted(pair)?;
         // The scan is not needed after this stage; taken out, its memory is the next pair's.
         let scan = self.scan_of_fit(pair)?;
@@ -77,7 +77,7 @@ impl Pipeline {
         Ok(output)
     }
 
-    fn normalize(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+    fn normalize(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let depth = self.depth_map(pair)?;
         let print = self.print_of_fit(pair)?;
         let normalized =
@@ -99,7 +99,7 @@ impl Pipeline {
         Ok(output)
     }
 
-    fn register(&self, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+    fn register(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let depth = self.depth_map(pair)?;
         let normalized = self.normalized(pair)?;
         let registered = register::register(&depth, &normalized, &self.settings.register)
@@ -109,14 +109,14 @@ impl Pipeline {
     }
 
     /// The fit's outcome, from memory or as stored.
-    fn fitted(pair: &PairInHand) -> Result<FitOutcome, Setback> {
+    fn fitted(pair: &PairContext) -> Result<FitOutcome, ExecutionError> {
         let fit = pair.fit.clone();
         fit.or_else(|| pair.outcome(Stage::Fit))
-            .ok_or(Setback::Back(Stage::Fit))
+            .ok_or(ExecutionError::RerunFrom(Stage::Fit))
     }
 
     /// The scan that was fitted. When the file is another one by now, the fit is no fit of it.
-    fn scan_of_fit(&self, pair: &mut PairInHand) -> Result<Scan, Setback> {
+    fn scan_of_fit(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
         if let Some(scan) = pair.scan.take() {
             return Ok(scan);
         }
@@ -126,11 +126,11 @@ impl Pipeline {
             return Ok(scan);
         }
         pair.scan = Some(scan);
-        Err(Setback::Back(Stage::Fit))
+        Err(ExecutionError::RerunFrom(Stage::Fit))
     }
 
     /// The print. When it is another one by now than the one that the fit looked at, the fit is no fit for it.
-    fn print_of_fit(&self, pair: &mut PairInHand) -> Result<Print, Setback> {
+    fn print_of_fit(&self, pair: &mut PairContext) -> Result<Print, ExecutionError> {
         if let Some(print) = pair.print.take() {
             return Ok(print);
         }
@@ -142,15 +142,15 @@ impl Pipeline {
         if seen.is_none_or(|seen| pair.print_hash() == Some(seen)) {
             return Ok(print);
         }
-        Err(Setback::Back(Stage::Fit))
+        Err(ExecutionError::RerunFrom(Stage::Fit))
     }
 
     /// The depth map, from memory or from its artifact.
-    fn depth_map(&self, pair: &mut PairInHand) -> Result<DepthMap, Setback> {
+    fn depth_map(&self, pair: &mut PairContext) -> Result<DepthMap, ExecutionError> {
         if let Some(map) = pair.depth.take() {
             return Ok(map);
         }
-        let back = || Setback::Back(Stage::Depth);
+        let back = || ExecutionError::RerunFrom(Stage::Depth);
         let outcome: DepthOutcome = pair.outcome(Stage::Depth).ok_or_else(back)?;
         let bytes = self.artifact(pair, Stage::Depth, stage_output::DEPTH)?;
         let levels = raster::decode_grey16(&bytes).ok().ok_or_else(back)?;
@@ -161,11 +161,11 @@ impl Pipeline {
     }
 
     /// The print's masks, from memory or from their artifact.
-    fn normalized(&self, pair: &mut PairInHand) -> Result<Normalized, Setback> {
+    fn normalized(&self, pair: &mut PairContext) -> Result<Normalized, ExecutionError> {
         if let Some(normalized) = pair.normalized.take() {
             return Ok(normalized);
         }
-        let back = || Setback::Back(Stage::Normalize);
+        let back = || ExecutionError::RerunFrom(Stage::Normalize);
         let outcome: NormalizeOutcome = pair.outcome(Stage::Normalize).ok_or_else(back)?;
         let bytes = self.artifact(pair, Stage::Normalize, stage_output::PRINT_MASK)?;
         let grey = raster::decode_grey8(&bytes).ok().ok_or_else(back)?;
@@ -173,27 +173,32 @@ impl Pipeline {
     }
 
     /// An artifact of an earlier stage. When it is gone or changed, that stage runs again.
-    fn artifact(&self, pair: &PairInHand, stage: Stage, role: &str) -> Result<Vec<u8>, Setback> {
+    fn artifact(
+        &self,
+        pair: &PairContext,
+        stage: Stage,
+        role: &str,
+    ) -> Result<Vec<u8>, ExecutionError> {
         let artifact = pair
             .stored
             .get(&stage)
             .and_then(|stored| stored.files.get(role))
-            .ok_or(Setback::Back(stage))?;
+            .ok_or(ExecutionError::RerunFrom(stage))?;
         self.project
             .read_artifact(artifact)
             .map_err(|error| match error {
                 ArtifactError::Missing(_) | ArtifactError::Changed(_) => {
                     tracing::warn!(pair = %pair.facts.name, %stage, "{error}; the stage runs again");
-                    Setback::Back(stage)
+                    ExecutionError::RerunFrom(stage)
                 }
-                ArtifactError::Io { .. } => Setback::Failed {
+                ArtifactError::Io { .. } => ExecutionError::Failed {
                     failure: Failure::new(FailureClass::Io, error.to_string()),
-                    may_pass: true,
+                    is_transient: true,
                 },
             })
     }
 
-    fn read_scan(&self, pair: &mut PairInHand) -> Result<Scan, Setback> {
+    fn read_scan(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
         let stored = &pair.facts.mesh_path;
         let path = self.project.input_path(stored);
         let limit = self.mesh_limits.max_bytes;
@@ -207,12 +212,12 @@ impl Pipeline {
         pair.inputs.mesh = Some(seen(file.finish().map_err(unread)?));
         let mesh = mesh.map_err(|error| {
             let message = format!("{stored}: {error}");
-            Setback::failed(error.class(), message)
+            ExecutionError::failed(error.class(), message)
         })?;
         Ok(mesh.into())
     }
 
-    fn read_print(&self, pair: &mut PairInHand) -> Result<Print, Setback> {
+    fn read_print(&self, pair: &mut PairContext) -> Result<Print, ExecutionError> {
         let stored = &pair.facts.print_path;
         let path = self.project.input_path(stored);
         let limit = self.image_limits.max_bytes;
@@ -220,13 +225,13 @@ impl Pipeline {
         pair.inputs.print = Some(seen(file.seen));
         let picture = raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
             let message = format!("{stored}: {error}");
-            Setback::failed(error.class(), message)
+            ExecutionError::failed(error.class(), message)
         })?;
         Ok(Print::from(picture))
     }
 }
 
-fn seen(Seen { hash, stat }: Seen) -> InputSeen {
+fn seen(InputDigest { hash, stat }: InputDigest) -> InputSeen {
     InputSeen {
         hash,
         stat: stat.as_str().to_owned(),
@@ -234,27 +239,27 @@ fn seen(Seen { hash, stat }: Seen) -> InputSeen {
 }
 
 #[expect(clippy::needless_pass_by_value, reason = "shaped for `map_err`")]
-fn unread(error: InputError) -> Setback {
-    let may_pass = error.may_pass();
-    Setback::Failed {
+fn unread(error: InputError) -> ExecutionError {
+    let is_transient = error.is_transient();
+    ExecutionError::Failed {
         failure: Failure::new(error.class(), error.to_string()),
-        may_pass,
+        is_transient,
     }
 }
 
-fn in_file(path: &str, error: &StageError) -> Setback {
-    Setback::failed(error.class(), format!("{path}: {error}"))
+fn in_file(path: &str, error: &StageError) -> ExecutionError {
+    ExecutionError::failed(error.class(), format!("{path}: {error}"))
 }
 
 /// An outcome as it will be read back, with its JSON. A number that JSON cannot hold is a defect of the stage.
 fn settled<T: Serialize + DeserializeOwned + PartialEq>(
     outcome: &T,
-) -> Result<(T, String), Setback> {
+) -> Result<(T, String), ExecutionError> {
     let json = serde_json::to_value(outcome).map(|value| value.to_string());
     let back = json.and_then(|json| Ok((serde_json::from_str::<T>(&json)?, json)));
     match back {
         Ok((back, json)) if back == *outcome => Ok((back, json)),
-        Ok(_) | Err(_) => Err(Setback::failed(
+        Ok(_) | Err(_) => Err(ExecutionError::failed(
             FailureClass::Bug,
             "the stage gave a number that is not finite",
         )),

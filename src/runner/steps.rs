@@ -1,6 +1,6 @@
 //! What a run does with a pair at each stage, apart from how the work is shared out.
 
-use super::pair_context::PairInHand;
+use super::pair_context::PairContext;
 use crate::domain::{Failure, FailureClass, MetricOutcome, Stage};
 use crate::store::NewArtifact;
 
@@ -17,30 +17,30 @@ pub(super) struct StageOutput {
 
 /// Why a stage gave nothing.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Setback {
+pub(super) enum ExecutionError {
     /// What an earlier stage left is gone or of another input: start again there.
-    Back(Stage),
+    RerunFrom(Stage),
     /// It failed.
     Failed {
         /// Class and sentence.
         failure: Failure,
         /// Whether another try may go better.
-        may_pass: bool,
+        is_transient: bool,
     },
 }
 
-impl Setback {
+impl ExecutionError {
     /// A failure that another try will not mend.
     pub(super) fn failed(class: FailureClass, message: impl Into<String>) -> Self {
         Self::Failed {
             failure: Failure::new(class, message),
-            may_pass: false,
+            is_transient: false,
         }
     }
 }
 
 /// The stages as a run calls them: blocking, on a thread of their own, with the pair between them in memory.
-pub(super) trait Steps: Send + Sync + 'static {
+pub(super) trait StageExecutor: Send + Sync + 'static {
     /// Runs a stage on the pair and leaves in it what later stages need.
-    fn run(&self, stage: Stage, pair: &mut PairInHand) -> Result<StageOutput, Setback>;
+    fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError>;
 }

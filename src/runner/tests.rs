@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use serde_json::{Map, json};
 
-use fake_executor::MadeUp;
+use fake_executor::FakeExecutor;
 
 use super::{Rerun, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel, run_steps};
 use crate::catalog::{Catalog, ClaimRequest, ImportRow, Recipes, WorkerInfo};
@@ -17,10 +17,10 @@ use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 use crate::store::Project;
 
 /// A project with made-up pairs.
-struct World {
+struct RunFixture {
     project: Project,
     catalog: Catalog,
-    steps: Arc<MadeUp>,
+    steps: Arc<FakeExecutor>,
     stop: Stop,
     events: Mutex<Vec<RunEvent>>,
     _dir: tempfile::TempDir,
@@ -41,7 +41,7 @@ fn options(workers: usize) -> RunOptions {
     }
 }
 
-impl World {
+impl RunFixture {
     async fn new(pairs: &[&str]) -> Self {
         Self::with(pairs, async |path| Catalog::create(path).await).await
     }
@@ -108,7 +108,7 @@ impl World {
 
 #[tokio::test]
 async fn every_pair_is_done_and_each_stage_computed_once() {
-    let world = World::new(&["a", "b", "c", "d", "e"]).await;
+    let world = RunFixture::new(&["a", "b", "c", "d", "e"]).await;
     let summary = world.run(&options(2)).await;
     assert_eq!(
         (summary.done, summary.failed, summary.stages, summary.left),
@@ -133,7 +133,7 @@ async fn every_pair_is_done_and_each_stage_computed_once() {
 
 #[tokio::test]
 async fn one_bad_pair_stops_nobody_and_shows() {
-    let world = World::new(&["a", "bad_1", "panics_1", "z"]).await;
+    let world = RunFixture::new(&["a", "bad_1", "panics_1", "z"]).await;
     let summary = world.run(&options(2)).await;
     assert_eq!(
         (summary.done, summary.failed, summary.failed_in_all),
@@ -166,7 +166,7 @@ async fn one_bad_pair_stops_nobody_and_shows() {
 
 #[tokio::test]
 async fn a_pair_that_panicked_is_taken_up_when_its_mesh_is_another() {
-    let world = World::new(&["bursts_1"]).await;
+    let world = RunFixture::new(&["bursts_1"]).await;
     let mesh = world.project.input_path("bursts_1.stl");
     for (content, tries) in [("one", 1), ("one", 1), ("another one", 2)] {
         std::fs::write(&mesh, content).expect("written");
@@ -181,7 +181,7 @@ async fn a_pair_that_panicked_is_taken_up_when_its_mesh_is_another() {
 
 #[tokio::test]
 async fn a_failure_that_may_pass_is_tried_again_in_the_same_run() {
-    let world = World::new(&["flaky_1"]).await;
+    let world = RunFixture::new(&["flaky_1"]).await;
     let summary = world.run(&options(1)).await;
     assert_eq!((summary.done, summary.failed), (1, 0));
     assert_eq!(world.steps.count("flaky_1", Stage::Fit), 2);
@@ -198,7 +198,7 @@ async fn a_failure_that_may_pass_is_tried_again_in_the_same_run() {
 
 #[tokio::test]
 async fn a_stage_that_takes_too_long_is_tried_alone_and_then_quarantined() {
-    let world = World::new(&["a", "hangs_1"]).await;
+    let world = RunFixture::new(&["a", "hangs_1"]).await;
     let limited = RunOptions {
         stage_limit: Duration::from_secs(1),
         ..options(2)
@@ -213,7 +213,7 @@ async fn a_stage_that_takes_too_long_is_tried_alone_and_then_quarantined() {
 
 #[tokio::test]
 async fn what_an_earlier_stage_left_is_made_again_when_it_is_gone() {
-    let world = World::new(&["loses_1"]).await;
+    let world = RunFixture::new(&["loses_1"]).await;
     assert_eq!(world.run(&options(1)).await.done, 1);
     let counts = Stage::ALL.map(|stage| world.steps.count("loses_1", stage));
     assert_eq!(counts, [1, 2, 2, 2]);
@@ -223,7 +223,7 @@ async fn what_an_earlier_stage_left_is_made_again_when_it_is_gone() {
 
 #[tokio::test]
 async fn a_drain_finishes_the_stage_in_hand_and_gives_the_attempt_back() {
-    let world = World::new(&["wait_1", "wait_2"]).await;
+    let world = RunFixture::new(&["wait_1", "wait_2"]).await;
     let options = options(1);
     let drain = async {
         while world.steps.count("wait_1", Stage::Fit) == 0 {
@@ -249,7 +249,7 @@ async fn a_drain_finishes_the_stage_in_hand_and_gives_the_attempt_back() {
 
 #[tokio::test]
 async fn a_second_stop_waits_for_nothing_and_leaves_all_resumable() {
-    let world = World::new(&["wait_1"]).await;
+    let world = RunFixture::new(&["wait_1"]).await;
     let options = options(1);
     let stop = async {
         while world.steps.count("wait_1", Stage::Fit) == 0 {
@@ -271,7 +271,7 @@ async fn a_second_stop_waits_for_nothing_and_leaves_all_resumable() {
 
 #[tokio::test]
 async fn too_many_failures_drain_the_run() {
-    let world = World::new(&["bad_1", "bad_2", "bad_3", "bad_4"]).await;
+    let world = RunFixture::new(&["bad_1", "bad_2", "bad_3", "bad_4"]).await;
     let few = RunOptions {
         max_failures: Some(2),
         ..options(1)
@@ -285,7 +285,7 @@ async fn too_many_failures_drain_the_run() {
 
 #[tokio::test]
 async fn a_selection_runs_alone_and_an_unknown_name_runs_nothing() {
-    let world = World::new(&["a", "b", "c"]).await;
+    let world = RunFixture::new(&["a", "b", "c"]).await;
     let some = |names: &[&str]| RunOptions {
         pairs: Some(names.iter().map(|text| name(text)).collect()),
         ..options(2)
@@ -299,7 +299,7 @@ async fn a_selection_runs_alone_and_an_unknown_name_runs_nothing() {
 
 #[tokio::test]
 async fn a_run_up_to_a_stage_stops_there() {
-    let world = World::new(&["a", "b"]).await;
+    let world = RunFixture::new(&["a", "b"]).await;
     let early = RunOptions {
         until: Stage::Depth,
         ..options(2)
@@ -311,7 +311,7 @@ async fn a_run_up_to_a_stage_stops_there() {
 
 #[tokio::test]
 async fn what_a_dead_process_left_comes_back_at_once() {
-    let world = World::new(&["a", "b"]).await;
+    let world = RunFixture::new(&["a", "b"]).await;
     let info = WorkerInfo {
         host: "here".to_owned(),
         pid: 1,
@@ -331,14 +331,14 @@ async fn what_a_dead_process_left_comes_back_at_once() {
     assert_eq!(world.run(&options(2)).await.done, 2);
     let events = world.events.lock().expect("no panic holds it");
     let first = |like: fn(&RunEvent) -> bool| events.iter().position(like);
-    let rescued = first(|event| matches!(event, RunEvent::Rescued { pairs: 1 }));
+    let rescued = first(|event| matches!(event, RunEvent::Recovered { pairs: 1 }));
     let begun = first(|event| matches!(event, RunEvent::StageStarted { .. }));
     assert!(rescued.is_some() && rescued < begun, "{events:?}");
 }
 
 #[tokio::test]
 async fn a_second_run_is_refused_and_a_joined_one_shares_the_work() {
-    let world = World::new(&["wait_1", "b", "c", "d", "e", "f"]).await;
+    let world = RunFixture::new(&["wait_1", "b", "c", "d", "e", "f"]).await;
     let (one, joined) = (
         options(1),
         RunOptions {
@@ -370,7 +370,7 @@ async fn a_second_run_is_refused_and_a_joined_one_shares_the_work() {
 
 #[tokio::test]
 async fn a_disk_that_refuses_ends_the_run_and_blames_no_pair() {
-    let world = World::new(&["a"]).await;
+    let world = RunFixture::new(&["a"]).await;
     std::fs::write(world.project.artifacts_dir(), b"in the way").expect("a file");
     let outcome = world.try_run(&options(1)).await;
     assert!(matches!(outcome, Err(RunError::Artifact(_))), "{outcome:?}");
@@ -382,7 +382,7 @@ async fn a_disk_that_refuses_ends_the_run_and_blames_no_pair() {
 /// A pair that is past the last stage to run and backs off is nothing to wait for.
 #[tokio::test]
 async fn a_run_up_to_a_stage_does_not_wait_for_a_later_one_to_be_tried_again() {
-    let world = World::new(&["breaks_1", "a"]).await;
+    let world = RunFixture::new(&["breaks_1", "a"]).await;
     let first = RunOptions {
         pairs: Some(vec![name("breaks_1")]),
         ..options(1)
@@ -399,7 +399,7 @@ async fn a_run_up_to_a_stage_does_not_wait_for_a_later_one_to_be_tried_again() {
         until: Stage::Fit,
         ..options(1)
     };
-    let again = World {
+    let again = RunFixture {
         stop: Stop::new(),
         ..world
     };

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Project;
-use super::atomic_write::{folder_of, sync_folder, write_synced};
+use super::atomic_write::{parent_folder, sync_folder, write_synced};
 use crate::domain::{ArtifactRef, ArtifactSet, ContentHash};
 
 /// An artifact that is not on disk yet.
@@ -124,7 +124,7 @@ impl Project {
     /// # Errors
     /// When the disk refuses; what was written stays, and harms nobody.
     pub fn write_artifacts(&self, files: &[NewArtifact]) -> Result<ArtifactSet, ArtifactError> {
-        self.write_artifacts_telling(files, &|| {})
+        self.write_artifacts_with(files, &|| {})
     }
 
     /// [`Project::write_artifacts`] that calls `tell` for each file that is on disk under a temporary name and is
@@ -132,7 +132,7 @@ impl Project {
     ///
     /// # Errors
     /// When the disk refuses; what was written stays, and harms nobody.
-    pub fn write_artifacts_telling(
+    pub fn write_artifacts_with(
         &self,
         files: &[NewArtifact],
         tell: &dyn Fn(),
@@ -141,7 +141,7 @@ impl Project {
         let mut folders = std::collections::BTreeSet::new();
         for file in files {
             let path = self.artifact_path(&file.reference);
-            let folder = folder_of(&path);
+            let folder = parent_folder(&path);
             make_folder(&folder)?;
             if self.read_artifact(&file.reference).is_err() {
                 self.place(&path, &file.bytes, tell)?;

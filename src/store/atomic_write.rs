@@ -9,16 +9,16 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// When it cannot be written; an earlier one is then as it was.
-pub fn write_whole(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A link stays a link: what it leads to is replaced.
     let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if path.exists() && !path.is_file() {
         return std::fs::write(path, bytes);
     }
-    let partial = partial_of(&path);
+    let partial = partial_path(&path);
     let written = File::create(&partial)
         .and_then(|mut file| file.write_all(bytes))
-        .and_then(|()| finish_whole(&partial, &path));
+        .and_then(|()| rename_into_place(&partial, &path));
     if written.is_err() {
         // That it cannot be removed changes nothing.
         let _ = std::fs::remove_file(&partial);
@@ -37,7 +37,7 @@ pub fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 }
 
 /// Where a file is written before it gets its name: beside it, hidden.
-pub fn partial_of(path: &Path) -> PathBuf {
+pub fn partial_path(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!(".{name}.mocban-partial"))
 }
@@ -46,17 +46,17 @@ pub fn partial_of(path: &Path) -> PathBuf {
 ///
 /// # Errors
 /// When the disk refuses.
-pub fn finish_whole(partial: &Path, path: &Path) -> std::io::Result<()> {
+pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     File::open(partial)?.sync_all()?;
     if let Ok(there) = std::fs::metadata(path) {
         std::fs::set_permissions(partial, there.permissions())?;
     }
     std::fs::rename(partial, path)?;
-    sync_folder(&folder_of(path))
+    sync_folder(&parent_folder(path))
 }
 
 /// The folder that holds the name of a file or folder.
-pub(super) fn folder_of(path: &Path) -> PathBuf {
+pub(super) fn parent_folder(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|dir| !dir.as_os_str().is_empty());
     folder.unwrap_or(Path::new(".")).to_owned()
 }
@@ -68,19 +68,19 @@ pub(super) fn sync_folder(folder: &Path) -> std::io::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::{partial_of, write_whole};
+    use super::{partial_path, write_atomic};
 
     #[test]
     fn the_earlier_file_stays_until_the_new_one_is_whole() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("report.txt");
-        write_whole(&path, b"one").expect("written");
+        write_atomic(&path, b"one").expect("written");
         // Nothing can be written where a folder stands in the way.
-        std::fs::create_dir(partial_of(&path)).expect("a folder");
-        assert!(write_whole(&path, b"two").is_err());
+        std::fs::create_dir(partial_path(&path)).expect("a folder");
+        assert!(write_atomic(&path, b"two").is_err());
         assert_eq!(std::fs::read(&path).expect("read"), b"one");
-        std::fs::remove_dir(partial_of(&path)).expect("removed");
-        write_whole(&path, b"two").expect("written");
+        std::fs::remove_dir(partial_path(&path)).expect("removed");
+        write_atomic(&path, b"two").expect("written");
         assert_eq!(std::fs::read(&path).expect("read"), b"two");
         assert_eq!(std::fs::read_dir(dir.path()).expect("listed").count(), 1);
     }
@@ -92,9 +92,9 @@ mod tests {
         let (path, link) = (dir.path().join("a.txt"), dir.path().join("link.txt"));
         std::fs::write(&path, "one").expect("written");
         std::os::unix::fs::symlink(&path, &link).expect("a link");
-        write_whole(&link, b"two").expect("written");
+        write_atomic(&link, b"two").expect("written");
         assert_eq!(std::fs::read(&path).expect("read"), b"two");
         assert!(link.is_symlink());
-        write_whole(std::path::Path::new("/dev/null"), b"x").expect("written");
+        write_atomic(std::path::Path::new("/dev/null"), b"x").expect("written");
     }
 }

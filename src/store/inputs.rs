@@ -43,12 +43,12 @@ pub struct InputFile {
     /// All its bytes.
     pub bytes: PageVec<u8>,
     /// What was seen of it.
-    pub seen: Seen,
+    pub seen: InputDigest,
 }
 
 /// What was seen of an input file that was read to its end.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Seen {
+pub struct InputDigest {
     /// Hash of its bytes.
     pub hash: ContentHash,
     /// What it looked like when it was opened.
@@ -95,7 +95,7 @@ impl InputReader {
     ///
     /// # Errors
     /// When it cannot be read, is larger than the limit by now, or has changed since it was opened.
-    pub fn finish(mut self) -> Result<Seen, InputError> {
+    pub fn finish(mut self) -> Result<InputDigest, InputError> {
         io::copy(&mut self, &mut io::sink()).map_err(|error| self.error(error))?;
         // A file that grows while it is read must not get past the limit either.
         let (limit, setting) = self.limit;
@@ -113,7 +113,7 @@ impl InputReader {
         if now != self.stat {
             return Err(InputError::Changed(self.path));
         }
-        Ok(Seen {
+        Ok(InputDigest {
             hash: ContentHash::from_bytes(*self.hasher.finalize().as_bytes()),
             stat: self.stat,
         })
@@ -192,7 +192,7 @@ impl InputError {
 
     /// Whether trying again by itself may help. A file that is not there is told at once instead: whoever brings
     /// it says `retry`.
-    pub const fn may_pass(&self) -> bool {
+    pub const fn is_transient(&self) -> bool {
         matches!(self, Self::Changed(_) | Self::Io { .. })
     }
 }
@@ -323,7 +323,7 @@ mod tests {
         );
         for error in [missing, directory] {
             assert_eq!(error.class(), FailureClass::Io);
-            assert!(!error.may_pass());
+            assert!(!error.is_transient());
         }
     }
 
@@ -345,7 +345,7 @@ mod tests {
                 .to_string()
                 .ends_with("1.obj changed while it was read")
         );
-        assert!(error.may_pass());
+        assert!(error.is_transient());
         let again = open_input(&path, 100, "x").expect("a file");
         let seen = again.finish().expect("it stays as it is");
         assert_eq!(seen.hash, ContentHash::of(b"v 0 0 0\nv 1 0 0\n"));

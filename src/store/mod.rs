@@ -8,11 +8,11 @@ mod project;
 mod referenced;
 
 pub use artifacts::{ArtifactError, NewArtifact};
-pub use atomic_write::{finish_whole, partial_of, write_synced, write_whole};
+pub use atomic_write::{partial_path, rename_into_place, write_atomic, write_synced};
 pub use inputs::{
-    FileStat, InputError, InputFile, InputReader, Seen, hash_input, open_input, read_input,
+    FileStat, InputDigest, InputError, InputFile, InputReader, hash_input, open_input, read_input,
     stat_input,
 };
 pub use lock::{LockError, RunLock};
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};
-pub use referenced::{NamedArtifacts, Unnamed, UnnamedKind};
+pub use referenced::{ReferencedArtifacts, UnreferencedFile, UnreferencedKind};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::atomic_write::{folder_of, sync_folder};
+use super::atomic_write::{parent_folder, sync_folder};
 
 /// Name of the catalog file in a project.
 pub const CATALOG_FILE: &str = "catalog.sqlite";
@@ -73,7 +73,7 @@ impl Project {
         let missing: Vec<_> = dir.ancestors().take_while(|dir| !dir.exists()).collect();
         std::fs::create_dir_all(dir).map_err(StoreError::io(dir))?;
         for made in missing {
-            let folder = folder_of(made);
+            let folder = parent_folder(made);
             sync_folder(&folder).map_err(StoreError::io(&folder))?;
         }
         Ok(Self {

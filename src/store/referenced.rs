@@ -18,7 +18,7 @@ type Key = [u8; KEPT];
 /// The hashes, in a bucket for each folder of artifacts: a few thousand bytes of memory each, the rest in files
 /// without a name, which are gone when this is dropped or the process dies.
 #[derive(Debug)]
-pub struct NamedArtifacts {
+pub struct ReferencedArtifacts {
     buckets: Vec<Bucket>,
 }
 
@@ -30,27 +30,27 @@ struct Bucket {
 
 /// A file in the folder of artifacts that no row names.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Unnamed {
+pub struct UnreferencedFile {
     /// Where it lies.
     pub path: PathBuf,
     /// Its length.
     pub bytes: u64,
     /// What it is.
-    pub kind: UnnamedKind,
+    pub kind: UnreferencedKind,
 }
 
 /// What a file is that no row names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum UnnamedKind {
+pub enum UnreferencedKind {
     /// A result's file: of a result that was made again since, or of one that was never stored.
     Orphan,
     /// Half-written, left by a process that was killed.
     Temporary,
     /// Not ours: it is left alone.
-    Stranger,
+    UnknownFile,
 }
 
-impl Default for NamedArtifacts {
+impl Default for ReferencedArtifacts {
     fn default() -> Self {
         let buckets = (0..256).map(|_| Bucket::default());
         Self {
@@ -59,7 +59,7 @@ impl Default for NamedArtifacts {
     }
 }
 
-impl NamedArtifacts {
+impl ReferencedArtifacts {
     /// Adds a hash that a row names.
     ///
     /// # Errors
@@ -97,18 +97,18 @@ impl NamedArtifacts {
     pub fn unnamed(
         &mut self,
         project: &Project,
-        mut each: impl FnMut(Unnamed),
+        mut each: impl FnMut(UnreferencedFile),
     ) -> std::io::Result<()> {
         let root = project.artifacts_dir();
         for (path, is_dir, bytes) in entries(&root)? {
             let name = file_name(&path);
             if !is_dir {
-                let kind = UnnamedKind::Stranger;
-                each(Unnamed { path, bytes, kind });
+                let kind = UnreferencedKind::UnknownFile;
+                each(UnreferencedFile { path, bytes, kind });
             } else if path == project.temporary_dir() {
                 for (path, _, bytes) in entries(&path)? {
-                    let kind = UnnamedKind::Temporary;
-                    each(Unnamed { path, bytes, kind });
+                    let kind = UnreferencedKind::Temporary;
+                    each(UnreferencedFile { path, bytes, kind });
                 }
             } else {
                 self.unnamed_in(&path, bucket_of(&name), &mut each)?;
@@ -121,7 +121,7 @@ impl NamedArtifacts {
         &mut self,
         folder: &Path,
         bucket: Option<u8>,
-        each: &mut impl FnMut(Unnamed),
+        each: &mut impl FnMut(UnreferencedFile),
     ) -> std::io::Result<()> {
         let named = match bucket {
             Some(bucket) => self.sorted(bucket)?,
@@ -134,11 +134,11 @@ impl NamedArtifacts {
                     if named.binary_search(&key(&hash)).is_ok() {
                         continue;
                     }
-                    UnnamedKind::Orphan
+                    UnreferencedKind::Orphan
                 }
-                _ => UnnamedKind::Stranger,
+                _ => UnreferencedKind::UnknownFile,
             };
-            each(Unnamed { path, bytes, kind });
+            each(UnreferencedFile { path, bytes, kind });
         }
         Ok(())
     }
@@ -198,7 +198,7 @@ fn entries(folder: &Path) -> std::io::Result<Vec<(PathBuf, bool, u64)>> {
 
 #[cfg(test)]
 mod tests {
-    use super::{NamedArtifacts, RECENT, UnnamedKind};
+    use super::{RECENT, ReferencedArtifacts, UnreferencedKind};
     use crate::domain::ContentHash;
     use crate::store::{NewArtifact, Project};
 
@@ -210,7 +210,7 @@ mod tests {
     fn only_files_that_no_row_names_are_told() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = Project::create(dir.path()).expect("a project");
-        let mut named = NamedArtifacts::default();
+        let mut named = ReferencedArtifacts::default();
         for text in ["kept", "left"] {
             let written = project.write_artifacts(&[file(text.as_bytes())]);
             let artifact = &written.expect("written")["depth.png"];
@@ -230,12 +230,12 @@ mod tests {
             })
             .expect("listed");
         kinds.sort_by_key(|(kind, _)| *kind as u8);
-        let stranger = (UnnamedKind::Stranger, 4);
+        let stranger = (UnreferencedKind::UnknownFile, 4);
         assert_eq!(
             kinds,
             [
-                (UnnamedKind::Orphan, 4),
-                (UnnamedKind::Temporary, 4),
+                (UnreferencedKind::Orphan, 4),
+                (UnreferencedKind::Temporary, 4),
                 stranger,
                 stranger
             ]
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn hashes_beyond_what_memory_keeps_are_found_again() {
-        let mut named = NamedArtifacts::default();
+        let mut named = ReferencedArtifacts::default();
         let mut bytes = [0; 32];
         for number in 0..3 * RECENT + 5 {
             bytes[1..9].copy_from_slice(&(number as u64).wrapping_mul(0x9e37_79b9).to_be_bytes());

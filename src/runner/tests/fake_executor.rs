@@ -9,13 +9,13 @@ use serde_json::json;
 use crate::catalog::InputSeen;
 use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric};
 use crate::report::fixture;
-use crate::runner::pair_context::PairInHand;
-use crate::runner::steps::{Setback, StageOutput, Steps};
+use crate::runner::pair_context::PairContext;
+use crate::runner::steps::{ExecutionError, StageExecutor, StageOutput};
 use crate::store::NewArtifact;
 
 /// What a made-up pair does, told by its name.
 #[derive(Debug, Default)]
-pub(super) struct MadeUp {
+pub(super) struct FakeExecutor {
     /// Times each pair and stage was computed.
     computed: Mutex<BTreeMap<(String, Stage), usize>>,
     running: AtomicUsize,
@@ -25,7 +25,7 @@ pub(super) struct MadeUp {
     gate: (Mutex<bool>, Condvar),
 }
 
-impl MadeUp {
+impl FakeExecutor {
     pub(super) fn count(&self, pair: &str, stage: Stage) -> usize {
         let computed = self.computed.lock().expect("no panic holds it");
         computed
@@ -49,26 +49,28 @@ impl MadeUp {
         );
     }
 
-    fn behave(&self, name: &str, stage: Stage, tries: usize) -> Result<(), Setback> {
+    fn behave(&self, name: &str, stage: Stage, tries: usize) -> Result<(), ExecutionError> {
         match name.split('_').next().unwrap_or_default() {
             "panics" if stage == Stage::Depth => panic!("made up"),
             "bursts" => panic!("made up"),
             "bad" if stage == Stage::Fit => {
-                Err(Setback::failed(FailureClass::BadInput, "no faces"))
+                Err(ExecutionError::failed(FailureClass::BadInput, "no faces"))
             }
-            "flaky" if stage == Stage::Fit && tries == 1 => Err(Setback::Failed {
+            "flaky" if stage == Stage::Fit && tries == 1 => Err(ExecutionError::Failed {
                 failure: Failure::new(FailureClass::Io, "the disk is slow"),
-                may_pass: true,
+                is_transient: true,
             }),
-            "breaks" if stage == Stage::Depth && tries == 1 => Err(Setback::Failed {
+            "breaks" if stage == Stage::Depth && tries == 1 => Err(ExecutionError::Failed {
                 failure: Failure::new(FailureClass::Io, "the disk is slow"),
-                may_pass: true,
+                is_transient: true,
             }),
             "hangs" if stage == Stage::Fit => {
                 self.wait();
                 Ok(())
             }
-            "loses" if stage == Stage::Register && tries == 1 => Err(Setback::Back(Stage::Depth)),
+            "loses" if stage == Stage::Register && tries == 1 => {
+                Err(ExecutionError::RerunFrom(Stage::Depth))
+            }
             "lasts" if stage == Stage::Register => {
                 self.wait();
                 Ok(())
@@ -82,8 +84,8 @@ impl MadeUp {
     }
 }
 
-impl Steps for MadeUp {
-    fn run(&self, stage: Stage, pair: &mut PairInHand) -> Result<StageOutput, Setback> {
+impl StageExecutor for FakeExecutor {
+    fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let name = pair.facts.name.as_str().to_owned();
         let tries = {
             let mut computed = self.computed.lock().expect("no panic holds it");

@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use tokio::time::timeout;
 
-use super::{World, name, options};
+use super::{RunFixture, name, options};
 use crate::catalog::{Catalog, Dead};
 use crate::domain::{JobStatus, PairName, Stage, WorkerId};
 use crate::runner::clock::Clock;
 use crate::runner::{RunEvent, RunOptions, StopLevel};
 
-impl World {
+impl RunFixture {
     /// With a catalog that stores nothing that can wait before it is told to.
     async fn patient(pairs: &[&str]) -> Self {
         Self::with(pairs, async |path| Catalog::create_patient(path).await).await
@@ -41,7 +41,7 @@ fn finished(event: &RunEvent, wanted: Stage) -> bool {
 
 #[tokio::test]
 async fn stages_are_computed_while_those_before_are_stored_and_only_what_is_stored_is_told() {
-    let world = World::new(&["wait_1"]).await;
+    let world = RunFixture::new(&["wait_1"]).await;
     let hold = async {
         world.begun("wait_1", Stage::Fit).await;
         let release = world.catalog.hold().await;
@@ -62,7 +62,7 @@ async fn stages_are_computed_while_those_before_are_stored_and_only_what_is_stor
 
 #[tokio::test]
 async fn what_is_finished_is_stored_while_a_long_stage_is_computed() {
-    let world = World::new(&["lasts_1"]).await;
+    let world = RunFixture::new(&["lasts_1"]).await;
     let look = async {
         world.begun("lasts_1", Stage::Register).await;
         let stored = async {
@@ -89,7 +89,7 @@ const SOON: Duration = Duration::from_secs(8);
 
 #[tokio::test]
 async fn who_needs_the_lease_back_has_what_is_on_its_way_stored_at_once() {
-    let world = World::patient(&["breaks_1"]).await;
+    let world = RunFixture::patient(&["breaks_1"]).await;
     let options = options(1);
     let ended = timeout(SOON, world.run(&options)).await;
     assert_eq!(ended.expect("it does not wait").done, 1);
@@ -98,7 +98,7 @@ async fn who_needs_the_lease_back_has_what_is_on_its_way_stored_at_once() {
 
 #[tokio::test]
 async fn nothing_is_stored_of_a_stage_that_was_computed_while_the_lease_was_lost() {
-    let world = World::new(&["wait_1"]).await;
+    let world = RunFixture::new(&["wait_1"]).await;
     let rob = async {
         world.begun("wait_1", Stage::Fit).await;
         let nobody = Dead::AllBut(WorkerId(99));
@@ -118,7 +118,7 @@ async fn nothing_is_stored_of_a_stage_that_was_computed_while_the_lease_was_lost
 
 #[tokio::test]
 async fn the_next_pair_is_taken_ahead_and_given_back_by_a_drain() {
-    let world = World::new(&["lasts_1", "next", "other"]).await;
+    let world = RunFixture::new(&["lasts_1", "next", "other"]).await;
     let drain = async {
         world.begun("lasts_1", Stage::Register).await;
         while world.status("next").await != JobStatus::Leased {
@@ -149,7 +149,7 @@ async fn the_next_pair_is_taken_ahead_and_given_back_by_a_drain() {
 #[tokio::test]
 async fn no_more_pairs_are_begun_than_the_disk_keeps_up_with() {
     let names: Vec<String> = (0..60).map(|number| format!("pair_{number}")).collect();
-    let world = World::patient(&names.iter().map(String::as_str).collect::<Vec<_>>()).await;
+    let world = RunFixture::patient(&names.iter().map(String::as_str).collect::<Vec<_>>()).await;
     let options = options(1);
     let ended = timeout(SOON, world.run(&options)).await;
     assert_eq!(ended.expect("it does not wait").done, 60);
@@ -166,7 +166,7 @@ async fn no_more_pairs_are_begun_than_the_disk_keeps_up_with() {
 
 #[tokio::test]
 async fn no_more_are_taken_ahead_than_slots_will_be_free() {
-    let world = World::new(&["lasts_1", "lasts_2", "next_1", "next_2", "other"]).await;
+    let world = RunFixture::new(&["lasts_1", "lasts_2", "next_1", "next_2", "other"]).await;
     let look = async {
         while world.status("next_2").await != JobStatus::Leased {
             tokio::task::yield_now().await;
@@ -182,7 +182,7 @@ async fn no_more_are_taken_ahead_than_slots_will_be_free() {
 /// It may have to wait for the one before it for as long as a stage may last, and then has its own time.
 #[tokio::test]
 async fn a_pair_taken_ahead_is_not_overdue_before_it_could_have_begun() {
-    let world = World::new(&["lasts_1", "next"]).await;
+    let world = RunFixture::new(&["lasts_1", "next"]).await;
     let options = options(1);
     let limit = options.stage_limit.as_millis() as i64;
     let clock = Clock::start();
@@ -207,12 +207,12 @@ async fn a_pair_taken_ahead_is_not_overdue_before_it_could_have_begun() {
 /// Both are leased in one claim; the second is given back when it does not fit, before the first can end.
 #[tokio::test]
 async fn pairs_that_do_not_fit_together_run_one_after_the_other() {
-    let world = World::new(&["wait_1", "wait_2", "wait_3"]).await;
+    let world = RunFixture::new(&["wait_1", "wait_2", "wait_3"]).await;
     for (limit, together) in [(None, 3), (Some(80 << 20), 2), (Some(1), 1)] {
         let world = if limit.is_none() {
             &world
         } else {
-            &World::new(&["wait_1", "wait_2", "wait_3"]).await
+            &RunFixture::new(&["wait_1", "wait_2", "wait_3"]).await
         };
         let options = RunOptions {
             memory: limit,
