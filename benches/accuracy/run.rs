@@ -3,7 +3,9 @@
 use mocban::domain::FitOutcome;
 use mocban::mesh;
 use mocban::raster;
-use mocban::stages::{Aligned, Print, Scan, Settings, StageError, depth, fit, normalize, register};
+use mocban::stages::{
+    AlignedPair, Print, Scan, Settings, StageError, depth, fit, normalize, register,
+};
 
 use super::times::{Part, Times};
 
@@ -22,7 +24,7 @@ pub(super) struct Run {
     /// The plane, if it came so far.
     pub(super) fit: Option<FitOutcome>,
     /// The print as read and what the stages found, or why there is nothing.
-    pub(super) result: Result<(Print, Aligned), Failed>,
+    pub(super) result: Result<(Print, AlignedPair), Failed>,
 }
 
 /// Why nothing was found.
@@ -54,7 +56,7 @@ fn align(
     settings: &Settings,
     times: &mut Times,
     fit: &mut Option<FitOutcome>,
-) -> Result<(Print, Aligned), Failed> {
+) -> Result<(Print, AlignedPair), Failed> {
     let scan = times.book(Part::ReadMesh, || {
         mesh::read(&input.mesh, "mesh.stl", &mesh::Limits::SUGGESTED).map(Scan::from)
     })?;
@@ -82,7 +84,7 @@ fn align(
             register::register(&depth, &normalized, &settings.register)
         })
         .map_err(StageError::from)?;
-    let aligned = Aligned {
+    let aligned = AlignedPair {
         fit: plane.clone(),
         depth,
         normalized,

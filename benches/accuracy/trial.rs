@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use mocban::demo::{Pair, Tier};
 use mocban::domain::{MetricOutcome, ThresholdMetric};
 use mocban::report::truth::{TruthErrors, TruthRecord, tops_iou};
-use mocban::stages::Aligned;
+use mocban::stages::AlignedPair;
 
 use super::case::Case;
 use super::method::Method;
@@ -123,7 +123,7 @@ impl Trial {
 }
 
 /// The results of all metrics.
-fn found(pair: &Pair, truth: &TruthRecord, aligned: &Aligned) -> anyhow::Result<Vec<Found>> {
+fn found(pair: &Pair, truth: &TruthRecord, aligned: &AlignedPair) -> anyhow::Result<Vec<Found>> {
     let mut shared = Numbers::default();
     shared.add("fit", &aligned.fit)?;
     shared.add("depth", &aligned.depth.scale)?;

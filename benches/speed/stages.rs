@@ -5,7 +5,7 @@ use mocban::config::{Sources, load};
 use mocban::mesh::{self, Mesh};
 use mocban::raster::{self, Picture};
 use mocban::stages::normalize::Normalized;
-use mocban::stages::{Aligned, Print, Scan, Settings, depth, fit, normalize, register};
+use mocban::stages::{AlignedPair, Print, Scan, Settings, depth, fit, normalize, register};
 
 use super::files::{Files, bytes};
 
@@ -14,7 +14,7 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
     let (stl, png) = (bytes(&files.mesh("stl"))?, bytes(&files.print())?);
     let (mesh, picture) = (read(&stl)?, decode(&png)?);
     let print = Print::from(picture.clone());
-    let aligned = Aligned::new(&mesh.clone().into(), &print, &settings)?;
+    let aligned = AlignedPair::new(&mesh.clone().into(), &print, &settings)?;
     // The ink is read and the surface made ready once for a pair, by fit. Depth alone makes the surface ready too.
     let fresh = |name: &str| match name {
         "fit" => (Scan::from(mesh.clone()), Print::from(picture.clone())),
@@ -38,7 +38,7 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
     bench("depth", &mut |scan, _| {
         drop(depth::depth(scan, &aligned.fit, None, &settings.depth));
     });
-    let large = depth::Params {
+    let large = depth::DepthParams {
         longest_px: 1024,
         ..settings.depth.clone()
     };
@@ -77,12 +77,12 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
 
 /// What register starts from, on a canvas of `side` pixels, for one metric alone.
 fn one_mask(
-    aligned: &Aligned,
+    aligned: &AlignedPair,
     side: u32,
     settings: &Settings,
     print: &Print,
 ) -> anyhow::Result<Normalized> {
-    let canvas = normalize::Params {
+    let canvas = normalize::NormalizeParams {
         canvas_px: side,
         character_px: side * 3 / 4,
         ..settings.normalize.clone()
@@ -93,9 +93,9 @@ fn one_mask(
 }
 
 /// A pair from its files' bytes to its alignment.
-fn pair(stl: &[u8], png: &[u8], settings: &Settings) -> anyhow::Result<Aligned> {
+fn pair(stl: &[u8], png: &[u8], settings: &Settings) -> anyhow::Result<AlignedPair> {
     let print = Print::from(decode(png)?);
-    Ok(Aligned::new(&read(stl)?.into(), &print, settings)?)
+    Ok(AlignedPair::new(&read(stl)?.into(), &print, settings)?)
 }
 
 fn read(stl: &[u8]) -> anyhow::Result<Mesh> {

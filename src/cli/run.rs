@@ -137,7 +137,7 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
             0 => runner::free_memory(),
             mib => Some(mib << 20),
         },
-        stage_limit: Duration::from_secs(config.run.stage_limit_s),
+        stage_limit: Duration::from_secs(config.run.stage_timeout_s),
         mesh_limits: config.limits.mesh,
         image_limits: config.limits.image,
         ..plain

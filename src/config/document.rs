@@ -42,7 +42,7 @@ pub struct RunSettings {
     /// Memory for the pairs worked on at the same time, in MiB; 0 is most of what is free.
     pub memory_mib: u64,
     /// Longest time for one stage of one pair, in seconds.
-    pub stage_limit_s: u64,
+    pub stage_timeout_s: u64,
 }
 
 /// The review page.
@@ -59,10 +59,10 @@ pub struct ReviewSettings {
 struct Document {
     limits: Limits,
     run: RunSettings,
-    fit: fit::Params,
-    depth: depth::Params,
-    normalize: normalize::Params,
-    register: register::Params,
+    fit: fit::FitParams,
+    depth: depth::DepthParams,
+    normalize: normalize::NormalizeParams,
+    register: register::RegisterParams,
     review: ReviewSettings,
 }
 

@@ -83,10 +83,10 @@ mod tests {
         };
         let loaded = load(&sources).expect("valid settings");
         assert_eq!(loaded.config.run.workers, 4);
-        assert_eq!(loaded.config.run.stage_limit_s, 8);
+        assert_eq!(loaded.config.run.stage_timeout_s, 8);
         assert_eq!(loaded.tree.origin("run.workers"), Origin::Flag);
         assert_eq!(
-            loaded.tree.origin("run.stage_limit_s"),
+            loaded.tree.origin("run.stage_timeout_s"),
             Origin::Env("MOCBAN_RUN__STAGE_LIMIT_S".into())
         );
     }

@@ -13,7 +13,7 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("limits.image.max_pixels", 1.0, 1e10),
     ("run.workers", 0.0, 1024.0),
     ("run.memory_mib", 0.0, 1e9),
-    ("run.stage_limit_s", 1.0, 86_400.0),
+    ("run.stage_timeout_s", 1.0, 86_400.0),
     ("fit.spaced_points", 3.0, 100_000.0),
     ("fit.spacing", 1e-6, 1.0),
     ("fit.ransac_draws", 1.0, 100_000.0),
@@ -24,12 +24,12 @@ const RANGES: &[(&str, f64, f64)] = &[
     ("normalize.canvas_px", 64.0, 2048.0),
     ("normalize.character_px", 32.0, 2048.0),
     ("normalize.scale_band", 1.0, 2.0),
-    ("normalize.cut_from", 0.0, 1.0),
-    ("normalize.cut_to", 0.0, 1.0),
+    ("normalize.threshold_min", 0.0, 1.0),
+    ("normalize.threshold_max", 0.0, 1.0),
     ("normalize.ink_spread", 1.0, 3.0),
     ("register.working_px", 32.0, 1024.0),
     ("register.smoothing_px", 0.0, 10.0),
-    ("register.least_confidence", 0.0, 1.0),
+    ("register.min_confidence", 0.0, 1.0),
     ("register.coarse_angles", 4.0, 3600.0),
     ("register.fine_angles", 2.0, 3600.0),
 ];
@@ -37,7 +37,7 @@ const RANGES: &[(&str, f64, f64)] = &[
 /// The first of each two is below the second.
 const RISING: &[(&str, &str)] = &[
     ("normalize.character_px", "normalize.canvas_px"),
-    ("normalize.cut_from", "normalize.cut_to"),
+    ("normalize.threshold_min", "normalize.threshold_max"),
 ];
 
 /// Settings of two numbers of which the first is not above the second.
@@ -65,17 +65,21 @@ pub(super) fn check(tree: &Tree) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// `refine` starts from the pose that `wrap` does not look for: without this every pair would fail.
+/// `refine` starts from the pose that `bounding_box` does not look for: without this every pair would fail.
 fn check_methods(normalize: &Setting, register: &Setting) -> Result<(), ConfigError> {
     let is = |setting: &Setting, name: &str| setting.value.as_str() == Some(name);
-    if !(is(normalize, "wrap") && is(register, "refine")) {
+    if !(is(normalize, "bounding_box") && is(register, "refine")) {
         return Ok(());
     }
     Err(match register.origin {
-        Origin::Default => bad(normalize, "needs register.method = \"turns\"".to_owned()),
-        Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => {
-            bad(register, "needs normalize.method = \"aligned\"".to_owned())
-        }
+        Origin::Default => bad(
+            normalize,
+            "needs register.method = \"exhaustive\"".to_owned(),
+        ),
+        Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => bad(
+            register,
+            "needs normalize.method = \"pose_first\"".to_owned(),
+        ),
     })
 }
 
@@ -168,8 +172,8 @@ mod tests {
             "--set: normalize.canvas_px = 128: must be above normalize.character_px = 192"
         );
         assert_eq!(
-            complaint("normalize.method", "wrap".into()),
-            "--set: normalize.method = \"wrap\": needs register.method = \"turns\""
+            complaint("normalize.method", "bounding_box".into()),
+            "--set: normalize.method = \"bounding_box\": needs register.method = \"exhaustive\""
         );
         let greys = toml::Value::from(vec![9, 5]);
         assert!(complaint("normalize.density_greys", greys).ends_with("above the last"));

@@ -50,8 +50,8 @@ impl PipelineExecutor {
         let scan = self.read_scan(pair)?;
         // The paper's fit does not look at the print, so a changed print need not send its results back so far.
         let print = match self.settings.fit.method {
-            fit::Method::Tops => Some(self.read_print(pair)?),
-            fit::Method::Paper => None,
+            fit::FitMethod::UpperSurface => Some(self.read_print(pair)?),
+            fit::FitMethod::Paper => None,
         };
         let face_down = pair.facts.scanned_face_down;
         let outcome = fit::fit(&scan, print.as_ref(), face_down, &self.settings.fit)
@@ -84,10 +84,10 @@ impl PipelineExecutor {
             normalize::normalize(&depth, &print, &self.settings.normalize).map_err(|error| {
                 // Only a print without ink is the print's fault; all else speaks of the relief.
                 let blamed = match error {
-                    normalize::Error::Print(_) => &pair.facts.print_path,
-                    normalize::Error::NoStrokes
-                    | normalize::Error::Mirrored { .. }
-                    | normalize::Error::NoMatch { .. } => &pair.facts.mesh_path,
+                    normalize::NormalizeError::Print(_) => &pair.facts.print_path,
+                    normalize::NormalizeError::NoStrokes
+                    | normalize::NormalizeError::Mirrored { .. }
+                    | normalize::NormalizeError::NoMatch { .. } => &pair.facts.mesh_path,
                 };
                 in_file(blamed, &error.into())
             })?;

@@ -26,7 +26,7 @@ pub enum ResolutionBy {
 /// Settings of the stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Params {
+pub struct DepthParams {
     /// What fixes the size of a pixel.
     pub resolution_by: ResolutionBy,
     /// Longest side of the map in pixels, 32..=16384.
@@ -37,7 +37,7 @@ pub struct Params {
 
 /// Why the stage found no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Error {
+pub enum DepthError {
     /// Pixels per mm were asked for a mesh of unknown unit.
     #[error(
         "depth.resolution_by is px_per_mm but the unit of the mesh is not known; give it in the manifest"
@@ -56,7 +56,7 @@ pub enum Error {
     NothingSeen,
 }
 
-impl Error {
+impl DepthError {
     /// What the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
@@ -77,12 +77,15 @@ pub fn depth(
     scan: &Scan,
     fit: &FitOutcome,
     unit: Option<LengthUnit>,
-    params: &Params,
-) -> Result<DepthMap, Error> {
+    params: &DepthParams,
+) -> Result<DepthMap, DepthError> {
     let shell = scan.shell();
     let bounds = shell.bounds(&fit.plane_from_mesh);
     let view = View::around(bounds, longest_px(bounds, unit, params)?, true);
-    let plane_from_px = view.px_from_plane.inverse().ok_or(Error::NothingSeen)?;
+    let plane_from_px = view
+        .px_from_plane
+        .inverse()
+        .ok_or(DepthError::NothingSeen)?;
     let mut heights = shell.render(&fit.plane_from_mesh, &view);
     if let Some(bow) = &fit.bow {
         let rows = heights.data_mut().chunks_exact_mut(view.width);
@@ -94,7 +97,8 @@ pub fn depth(
             }
         }
     }
-    let (levels, height_min, height_per_level) = quantise(&heights).ok_or(Error::NothingSeen)?;
+    let (levels, height_min, height_per_level) =
+        quantise(&heights).ok_or(DepthError::NothingSeen)?;
     Ok(DepthMap {
         levels,
         scale: DepthScale {
@@ -112,17 +116,17 @@ pub fn depth(
 fn longest_px(
     [low, high]: [[f64; 2]; 2],
     unit: Option<LengthUnit>,
-    params: &Params,
-) -> Result<usize, Error> {
+    params: &DepthParams,
+) -> Result<usize, DepthError> {
     let longest_px = match params.resolution_by {
         ResolutionBy::LongestSide => f64::from(params.longest_px),
         ResolutionBy::PxPerMm => {
-            let mm = unit.ok_or(Error::UnitUnknown)?.mm();
+            let mm = unit.ok_or(DepthError::UnitUnknown)?.mm();
             (high[0] - low[0]).max(high[1] - low[1]) * mm * params.px_per_mm + 3.0
         }
     };
     if longest_px > LONGEST_PX_LIMIT {
-        return Err(Error::TooLarge { longest_px });
+        return Err(DepthError::TooLarge { longest_px });
     }
     Ok((longest_px.round() as usize).max(8))
 }
@@ -169,14 +173,14 @@ fn range(heights: &[f32]) -> Option<[f32; 2]> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Error, NOTHING, Params, ResolutionBy, depth, quantise};
+    use super::{DepthError, DepthParams, NOTHING, ResolutionBy, depth, quantise};
     use crate::domain::{Bow, FitOutcome, LengthUnit, Rigid3, SideEvidence};
     use crate::mesh::Mesh;
     use crate::raster::Grid;
     use crate::stages::Scan;
 
-    fn params() -> Params {
-        Params {
+    fn params() -> DepthParams {
+        DepthParams {
             resolution_by: ResolutionBy::LongestSide,
             longest_px: 64,
             px_per_mm: 10.0,
@@ -272,12 +276,12 @@ mod tests {
 
     #[test]
     fn pixels_per_mm_need_a_unit() {
-        let per_mm = Params {
+        let per_mm = DepthParams {
             resolution_by: ResolutionBy::PxPerMm,
             ..params()
         };
         let refused = depth(&ramp(), &flat_fit(None), None, &per_mm);
-        assert_eq!(refused, Err(Error::UnitUnknown));
+        assert_eq!(refused, Err(DepthError::UnitUnknown));
         let map = depth(&ramp(), &flat_fit(None), Some(LengthUnit::Cm), &per_mm).expect("a map");
         assert!((map.scale.mesh_unit_per_px - 0.01).abs() < 1e-9);
     }

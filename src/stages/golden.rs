@@ -4,7 +4,7 @@
 
 use std::path::PathBuf;
 
-use super::Aligned;
+use super::AlignedPair;
 use super::testing::{World, print, settings, some_turn};
 use crate::raster::{Grid, decode_grey8, png_grey8};
 
@@ -42,7 +42,7 @@ fn depth_map_and_mask_are_as_they_were() {
         ..World::default()
     };
     let mesh = world.mesh();
-    let aligned = Aligned::new(&mesh.into(), &picture, &settings).expect("an alignment");
+    let aligned = AlignedPair::new(&mesh.into(), &picture, &settings).expect("an alignment");
     let levels = &aligned.depth.levels;
     hold("depth.png", &levels.map(|level| (level >> 8) as u8));
     hold(

@@ -2,29 +2,27 @@
 //!
 //! No files, no SQL, no async, no clock. Each stage has its `Params`, its `Error` and one entry function.
 
-mod aligned;
+mod binarize;
 mod blur;
-mod bulk;
 mod components;
 pub mod depth;
 pub mod fit;
 #[cfg(test)]
 mod golden;
-mod ink;
 pub mod normalize;
-mod otsu;
-mod paper;
-mod polarity;
+mod paper_method;
+mod pipeline;
 mod pose;
 mod print;
 pub mod register;
+mod robust_bounds;
 mod scan;
 pub mod score;
 #[cfg(test)]
 mod testing;
 mod zbuffer;
 
-pub use aligned::Aligned;
+pub use pipeline::AlignedPair;
 pub use print::Print;
 pub use scan::Scan;
 
@@ -37,13 +35,13 @@ use crate::domain::{FailureClass, Stage};
 #[serde(deny_unknown_fields)]
 pub struct Settings {
     /// Mesh to plane.
-    pub fit: fit::Params,
+    pub fit: fit::FitParams,
     /// Mesh and plane to depth map.
-    pub depth: depth::Params,
+    pub depth: depth::DepthParams,
     /// Depth map and print to masks.
-    pub normalize: normalize::Params,
+    pub normalize: normalize::NormalizeParams,
     /// Masks to alignment.
-    pub register: register::Params,
+    pub register: register::RegisterParams,
 }
 
 impl Settings {
@@ -64,16 +62,16 @@ impl Settings {
 pub enum StageError {
     /// From the fit stage.
     #[error(transparent)]
-    Fit(#[from] fit::Error),
+    Fit(#[from] fit::FitError),
     /// From the depth stage.
     #[error(transparent)]
-    Depth(#[from] depth::Error),
+    Depth(#[from] depth::DepthError),
     /// From the normalize stage.
     #[error(transparent)]
-    Normalize(#[from] normalize::Error),
+    Normalize(#[from] normalize::NormalizeError),
     /// From the register stage.
     #[error(transparent)]
-    Register(#[from] register::Error),
+    Register(#[from] register::RegisterError),
 }
 
 impl StageError {

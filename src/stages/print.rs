@@ -2,14 +2,14 @@
 
 use std::sync::OnceLock;
 
-use super::ink::{Error, Ink, readings};
+use super::binarize::{BinarizeError, InkMask, hypotheses};
 use crate::raster::Picture;
 
 /// A print as the stages see it: the whole picture as decoded, and its ink once somebody has asked.
 #[derive(Debug, Clone)]
 pub struct Print {
     picture: Picture,
-    readings: OnceLock<Result<Vec<Ink>, Error>>,
+    hypotheses: OnceLock<Result<Vec<InkMask>, BinarizeError>>,
 }
 
 impl Print {
@@ -19,8 +19,8 @@ impl Print {
     }
 
     /// The ink under every polarity that the picture leaves possible, the likelier first; at least one.
-    pub(super) fn readings(&self) -> Result<&[Ink], Error> {
-        let read = self.readings.get_or_init(|| readings(&self.picture));
+    pub(super) fn hypotheses(&self) -> Result<&[InkMask], BinarizeError> {
+        let read = self.hypotheses.get_or_init(|| hypotheses(&self.picture));
         read.as_deref().map_err(|error| *error)
     }
 }
@@ -29,7 +29,7 @@ impl From<Picture> for Print {
     fn from(picture: Picture) -> Self {
         Self {
             picture,
-            readings: OnceLock::new(),
+            hypotheses: OnceLock::new(),
         }
     }
 }

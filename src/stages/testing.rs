@@ -6,7 +6,7 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{Aligned, Print, Settings, StageError, depth, fit, normalize, register};
+use super::{AlignedPair, Print, Settings, StageError, depth, fit, normalize, register};
 use crate::domain::{Affine2, MetricOutcome, PrintFromMesh};
 use crate::mesh::Mesh;
 use crate::raster::{Grid, Picture};
@@ -167,9 +167,9 @@ pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
 /// The default settings of all stages.
 pub(super) fn settings() -> Settings {
     Settings {
-        fit: fit::Params {
-            method: fit::Method::Tops,
-            bow: true,
+        fit: fit::FitParams {
+            method: fit::FitMethod::UpperSurface,
+            curved_blocks: true,
             seed: 1,
             spaced_points: 1000,
             spacing: 0.02,
@@ -177,17 +177,17 @@ pub(super) fn settings() -> Settings {
             ransac_distance: 0.005,
             min_relief: 0.005,
         },
-        depth: depth::Params {
+        depth: depth::DepthParams {
             resolution_by: depth::ResolutionBy::LongestSide,
             longest_px: 400,
             px_per_mm: 40.0,
         },
         normalize: normalize::tests_support::params(),
-        register: register::Params {
-            method: register::Method::Refine,
+        register: register::RegisterParams {
+            method: register::RegisterMethod::Refine,
             working_px: 192,
-            stretch: false,
-            least_confidence: 0.3,
+            anisotropic_scale: false,
+            min_confidence: 0.3,
             smoothing_px: 1.2,
             coarse_angles: 60,
             fine_angles: 60,
@@ -199,11 +199,11 @@ pub(super) fn settings() -> Settings {
 /// The paper's settings of all stages.
 pub(super) fn paper_settings() -> Settings {
     let mut settings = settings();
-    settings.fit.method = fit::Method::Paper;
-    settings.fit.bow = false;
-    settings.normalize.method = normalize::Method::Wrap;
+    settings.fit.method = fit::FitMethod::Paper;
+    settings.fit.curved_blocks = false;
+    settings.normalize.method = normalize::NormalizeMethod::BoundingBox;
     settings.normalize.print_threshold = normalize::PrintThreshold::Fixed;
-    settings.register.method = register::Method::Turns;
+    settings.register.method = register::RegisterMethod::Exhaustive;
     settings
 }
 
@@ -213,7 +213,7 @@ pub(super) fn run(
     print: &Print,
     settings: &Settings,
 ) -> Result<Vec<(PrintFromMesh, MetricOutcome)>, StageError> {
-    let aligned = Aligned::new(&mesh.clone().into(), print, settings)?;
+    let aligned = AlignedPair::new(&mesh.clone().into(), print, settings)?;
     let of = |metric: &MetricOutcome| (aligned.print_from_mesh(metric), *metric);
     Ok(aligned.metrics().iter().map(of).collect())
 }

@@ -9,7 +9,7 @@ mod triangle;
 mod view;
 mod winding;
 
-use super::bulk::{Bounds, Bulk, room};
+use super::robust_bounds::{Bounds, Bulk, room};
 use crate::domain::Rigid3;
 use crate::mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;

@@ -180,7 +180,7 @@ fn a_crowd_of_hostile_pairs_harms_nobody_and_is_told_pair_by_pair() {
     let begun = Instant::now();
     let (imported, import_kib) = watched(dir.path(), &["import", "data/crowd.csv"]);
     assert_plain(&imported.expect(0));
-    let limit = format!("run.stage_limit_s={STAGE_LIMIT_S}");
+    let limit = format!("run.stage_timeout_s={STAGE_LIMIT_S}");
     let memory = format!("{MEMORY_MIB}M");
     let (ran, run_kib) = watched(dir.path(), &["--set", &limit, "run", "--memory", &memory]);
     assert_plain(&ran.expect(3));

@@ -3,7 +3,7 @@
 
 use mocban::demo::{Decoy, DecoyPair, Pairs, Tier};
 use mocban::raster;
-use mocban::stages::{Aligned, Settings, StageError};
+use mocban::stages::{AlignedPair, Settings, StageError};
 use rayon::prelude::*;
 
 use crate::semi_real::settings;
@@ -13,7 +13,7 @@ const COUNT: u64 = 3;
 
 fn refusal(decoy: &DecoyPair, settings: &Settings) -> Result<(), StageError> {
     let print = raster::decode(&decoy.print, &raster::Limits::SUGGESTED).expect("a picture");
-    Aligned::new(&decoy.mesh.clone().into(), &print.into(), settings)?;
+    AlignedPair::new(&decoy.mesh.clone().into(), &print.into(), settings)?;
     Ok(())
 }
 

@@ -10,7 +10,7 @@ use mocban::demo::{Pairs, Tier};
 use mocban::domain::{Affine2, PrintFromMesh};
 use mocban::mesh::Mesh;
 use mocban::raster::{self, Grid, Picture};
-use mocban::stages::{Aligned, Settings};
+use mocban::stages::{AlignedPair, Settings};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -54,7 +54,7 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
 
 fn align(mesh: &Mesh, print: &Picture) -> PrintFromMesh {
     let print = print.clone().into();
-    let aligned = Aligned::new(&mesh.clone().into(), &print, &SETTINGS).expect("an alignment");
+    let aligned = AlignedPair::new(&mesh.clone().into(), &print, &SETTINGS).expect("an alignment");
     let best = aligned.metrics().first().expect("a metric");
     aligned.print_from_mesh(best)
 }

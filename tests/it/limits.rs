@@ -67,7 +67,7 @@ fn a_stage_past_its_deadline_is_tried_alone_then_quarantined() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "2");
     let file = dir.path().join("held");
-    let mut command = run(&project, &["-j", "2", "--set", "run.stage_limit_s=2"]);
+    let mut command = run(&project, &["-j", "2", "--set", "run.stage_timeout_s=2"]);
     command
         .env("MOCBAN_HOLD_AT", "fit:computed:0@upright-0000")
         .env("MOCBAN_HOLD_FILE", &file);

@@ -170,7 +170,7 @@ pub(crate) fn settings() -> Vec<Named> {
         named("paper.toml", include_str!("../../config/paper.toml")),
         named(
             "preset.toml",
-            "preset = \"paper\"\n[run]\nworkers = 2\nstage_limit_s = 7\n",
+            "preset = \"paper\"\n[run]\nworkers = 2\nstage_timeout_s = 7\n",
         ),
         named(
             "sets.txt",

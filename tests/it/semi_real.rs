@@ -5,7 +5,7 @@ use mocban::demo::{Pair, Pairs, Tier};
 use mocban::domain::MetricOutcome;
 use mocban::raster;
 use mocban::report::truth::{TruthErrors, TruthRecord, tops_iou};
-use mocban::stages::{Aligned, Settings, StageError};
+use mocban::stages::{AlignedPair, Settings, StageError};
 use rayon::prelude::*;
 
 /// Largest landmark error, percent of the character's height: the truth of this tier is good to about a pixel.
@@ -19,7 +19,7 @@ pub(crate) fn settings() -> Settings {
 /// The errors of every metric. Neither unit nor side is told.
 fn aligned(pair: &Pair, settings: &Settings) -> Result<Vec<TruthErrors>, StageError> {
     let print = raster::decode(&pair.print, &raster::Limits::SUGGESTED).expect("a picture");
-    let aligned = Aligned::new(&pair.mesh.clone().into(), &print.into(), settings)?;
+    let aligned = AlignedPair::new(&pair.mesh.clone().into(), &print.into(), settings)?;
     let truth = serde_json::to_value(&pair.truth).expect("a truth is JSON");
     let truth = TruthRecord::read(&truth).expect("the truth is sound");
     let errors = |outcome: &MetricOutcome| {

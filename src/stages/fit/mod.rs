@@ -1,110 +1,26 @@
 //! Mesh to character plane (paper III-A).
 //!
-//! Two methods behind one entry: the paper's ([`Method::Paper`]) and ours ([`Method::Tops`]), which looks at the
+//! Two methods behind one entry: the paper's ([`FitMethod::Paper`]) and ours ([`FitMethod::UpperSurface`]), which looks at the
 //! surface from both sides and fits a one-sided robust surface to what stands out.
 
-mod paper;
+mod carved_side;
+mod least_squares;
+mod params;
 mod pca;
-mod points;
-mod side;
 mod surface;
-mod tops;
+mod upper_surface;
 
-use serde::{Deserialize, Serialize};
+pub use params::{FitError, FitMethod, FitParams};
+pub(super) use pca::{Axes, frame};
+pub(super) use surface::quantile;
 
-use crate::domain::{FailureClass, FitOutcome};
-use crate::stages::{Print, Scan};
+use super::paper_method;
+use super::print::Print;
+use super::scan::Scan;
+use crate::domain::FitOutcome;
 
 /// Raised whenever the same inputs and settings may give another result than before.
 pub const REVISION: u32 = 10;
-
-/// How the plane is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// PCA, sides, upper set, spaced selection, RANSAC + PCA: the paper's.
-    Paper,
-    /// One-sided robust surface over the tops, seen from each side.
-    Tops,
-}
-
-/// Settings of the stage.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Params {
-    /// How the plane is found.
-    pub method: Method,
-    /// Whether `tops` may fit a second-degree surface where the block is bent.
-    pub bow: bool,
-    /// Seed of the random choices of `paper`.
-    pub seed: u64,
-    /// How many points the spaced selection of `paper` takes, 3 or more.
-    pub spaced_points: u32,
-    /// Spacing of that selection as a share of the mesh's extent, above 0.
-    pub spacing: f64,
-    /// RANSAC draws of `paper`, 1 or more.
-    pub ransac_draws: u32,
-    /// Inlier distance of that RANSAC as a share of the mesh's extent, above 0.
-    pub ransac_distance: f64,
-    /// Smallest relief as a share of the mesh's extent; below it there is no carving to align.
-    pub min_relief: f64,
-}
-
-/// Why the stage found no result.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Error {
-    /// Fewer than three points.
-    #[error("mesh has {0} vertices, a plane needs 3")]
-    TooFewPoints(usize),
-    /// Every vertex at one place.
-    #[error("all {0} vertices lie at one point")]
-    OnePoint(usize),
-    /// Every vertex on one line.
-    #[error("all {0} vertices lie on one line")]
-    OneLine(usize),
-    /// Neither faces nor enough points to stand for a surface.
-    #[error("mesh has no faces, and {0} points are too few to show a surface")]
-    NoFaces(usize),
-    /// Hardly a pixel of a rendering is covered, from either side.
-    #[error("mesh of {0} vertices shows no surface from either side")]
-    NoSurface(usize),
-    /// Nothing is carved.
-    #[error(
-        "no carving found: the relief is {relief:.4} of an extent of {extent:.4} (mesh units), below fit.min_relief {min_relief}"
-    )]
-    NoRelief {
-        /// Relief found, mesh units.
-        relief: f64,
-        /// Extent of the mesh, mesh units.
-        extent: f64,
-        /// The setting.
-        min_relief: f64,
-    },
-    /// RANSAC found no plane.
-    #[error("plane fit found {inliers} inliers of {taken} selected points, needs {needs}")]
-    TooFewInliers {
-        /// Points near the best plane.
-        inliers: usize,
-        /// Points that were selected.
-        taken: usize,
-        /// Points needed.
-        needs: usize,
-    },
-}
-
-impl Error {
-    /// What the failure means for the pair.
-    pub const fn class(&self) -> FailureClass {
-        match self {
-            Self::TooFewPoints(_)
-            | Self::OnePoint(_)
-            | Self::OneLine(_)
-            | Self::NoFaces(_)
-            | Self::NoSurface(_) => FailureClass::BadInput,
-            Self::NoRelief { .. } | Self::TooFewInliers { .. } => FailureClass::NoSolution,
-        }
-    }
-}
 
 /// Finds the plane on which the tops of the strokes lie, and the side of it that is carved.
 ///
@@ -119,15 +35,15 @@ pub fn fit(
     scan: &Scan,
     print: Option<&Print>,
     scanned_face_down: Option<bool>,
-    params: &Params,
-) -> Result<FitOutcome, Error> {
+    params: &FitParams,
+) -> Result<FitOutcome, FitError> {
     let count = scan.mesh().vertices.len();
     if count < 3 {
-        return Err(Error::TooFewPoints(count));
+        return Err(FitError::TooFewPoints(count));
     }
     match params.method {
-        Method::Paper => paper::fit(scan.mesh(), params),
-        Method::Tops => tops::fit(scan, print, scanned_face_down, params),
+        FitMethod::Paper => paper_method::fit::fit(scan.mesh(), params),
+        FitMethod::UpperSurface => upper_surface::fit(scan, print, scanned_face_down, params),
     }
 }
 

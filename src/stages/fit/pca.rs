@@ -2,10 +2,10 @@
 
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-use super::Error;
+use super::params::FitError;
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
-use crate::stages::bulk::{Bounds, holds};
+use crate::stages::robust_bounds::{Bounds, holds};
 use crate::stages::zbuffer::{Moments, Shell};
 
 /// A surface given by points alone needs this many: 25 along a side show a stroke or two at best.
@@ -13,15 +13,17 @@ const LEAST_POINTS: usize = 600;
 
 /// Centre and principal axes, longest first, with the variance along each.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Axes {
-    pub(super) centre: Vector3<f64>,
-    pub(super) directions: [Vector3<f64>; 3],
-    pub(super) variances: [f64; 3],
+pub(in crate::stages) struct Axes {
+    pub(in crate::stages) centre: Vector3<f64>,
+    pub(in crate::stages) directions: [Vector3<f64>; 3],
+    pub(in crate::stages) variances: [f64; 3],
 }
 
 impl Axes {
     /// Of points, each with a weight.
-    pub(super) fn of_points(points: impl Iterator<Item = ([f64; 3], f64)> + Clone) -> Self {
+    pub(in crate::stages) fn of_points(
+        points: impl Iterator<Item = ([f64; 3], f64)> + Clone,
+    ) -> Self {
         let mut total = 0.0;
         let mut sum = Vector3::zeros();
         for (p, w) in points.clone() {
@@ -38,7 +40,7 @@ impl Axes {
     }
 
     /// Of a surface; of the vertices where there is no area. Flecks far from the bulk do not count.
-    pub(super) fn of_surface(mesh: &Mesh, shell: &Shell) -> Self {
+    pub(in crate::stages) fn of_surface(mesh: &Mesh, shell: &Shell) -> Self {
         if let Some(moments) = Moments::of(shell) {
             return Self::from_moments(moments.centre, moments.covariance);
         }
@@ -59,31 +61,31 @@ impl Axes {
     }
 
     /// Refuses points that span no surface.
-    pub(super) fn require_surface(&self, mesh: &Mesh) -> Result<(), Error> {
+    pub(in crate::stages) fn require_surface(&self, mesh: &Mesh) -> Result<(), FitError> {
         let count = mesh.vertices.len();
         let scale = self.centre.norm_squared().max(1e-300);
         let [first, second, _] = self.variances;
         if first <= scale * 1e-24 {
-            return Err(Error::OnePoint(count));
+            return Err(FitError::OnePoint(count));
         }
         if second <= first * 1e-10 {
-            return Err(Error::OneLine(count));
+            return Err(FitError::OneLine(count));
         }
         if mesh.triangles.is_empty() && count < LEAST_POINTS {
-            return Err(Error::NoFaces(count));
+            return Err(FitError::NoFaces(count));
         }
         Ok(())
     }
 
     /// Normal of the plane through the centre that leaves the least variance.
-    pub(super) fn normal(&self) -> Vector3<f64> {
+    pub(in crate::stages) fn normal(&self) -> Vector3<f64> {
         self.directions[2]
     }
 }
 
 /// A right-handed plane frame with this normal whose x axis is as close to the mesh's x as it can be, so that an
 /// upright scan stays upright; close to the mesh's y where the normal runs along x.
-pub(super) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
+pub(in crate::stages) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
     let along = if normal.normalize().x.abs() < 0.9 {
         Vector3::x()
     } else {
@@ -93,7 +95,7 @@ pub(super) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
 }
 
 /// A right-handed plane frame with this normal whose x axis is as close to `along` as it can be.
-pub(super) fn frame_along(
+pub(in crate::stages) fn frame_along(
     normal: Vector3<f64>,
     along: Vector3<f64>,
     origin: Vector3<f64>,

@@ -3,7 +3,7 @@
 //! Tops of strokes are the original face of the block: much lies below them, nothing above. So a point above the
 //! surface costs much, one far below it nothing at all.
 
-use super::points::{Belief, Coefficients, OPEN, Points, value};
+use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
 use crate::domain::Rigid3;
 use crate::raster::{Grid, Mask};
 use crate::stages::components::Components;
@@ -158,21 +158,21 @@ impl Samples {
     pub(super) fn fit(&self, allow_bow: bool) -> Surface {
         let ground = self.mean_plane;
         let envelope = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
-        let beliefs = self.beliefs(ground, BOW_SIGMA);
-        let (few, few_beliefs) = self.seen_from_afar(&beliefs);
+        let priors = self.priors(ground, BOW_SIGMA);
+        let (few, few_beliefs) = self.seen_from_afar(&priors);
         let mut start = ground;
         for _ in 0..ENVELOPE_PASSES {
             start = few.solve::<3>(&start, envelope, &few_beliefs);
         }
-        let plane = self.narrow::<3>(start, &beliefs);
+        let plane = self.narrow::<3>(start, &priors);
         if !allow_bow {
             return plane;
         }
-        let free = self.narrow::<6>(start, &beliefs);
+        let free = self.narrow::<6>(start, &priors);
         let sparse = free.support < SPARSE;
         let along = sparse.then(|| self.beliefs_along_ground()).flatten();
         let bent = along
-            .map(|beliefs| self.narrow::<6>(start, &beliefs))
+            .map(|priors| self.narrow::<6>(start, &priors))
             .filter(|along| along.support > free.support)
             .unwrap_or(free);
         if bent.support > plane.support * BOW_GAIN {
@@ -183,8 +183,8 @@ impl Samples {
     }
 
     /// Passes with a shrinking window below the surface.
-    fn narrow<const TERMS: usize>(&self, start: Coefficients, beliefs: &[Belief; 6]) -> Surface {
-        let few = self.seen_from_afar(beliefs);
+    fn narrow<const TERMS: usize>(&self, start: Coefficients, priors: &[Prior; 6]) -> Surface {
+        let few = self.seen_from_afar(priors);
         let mut c = start;
         for (k, window) in WINDOWS.map(|w| w * self.range).into_iter().enumerate() {
             let weight = |r| one_sided_weight(r, window);
@@ -192,21 +192,21 @@ impl Samples {
                 c = if k < AFAR {
                     few.0.solve::<TERMS>(&c, weight, &few.1)
                 } else {
-                    self.points.solve::<TERMS>(&c, weight, beliefs)
+                    self.points.solve::<TERMS>(&c, weight, priors)
                 };
             }
         }
         self.judge(c)
     }
 
-    /// The few points with beliefs that weigh as much beside them as those given do beside all.
-    fn seen_from_afar(&self, beliefs: &[Belief; 6]) -> (&Points, [Belief; 6]) {
+    /// The few points with priors that weigh as much beside them as those given do beside all.
+    fn seen_from_afar(&self, priors: &[Prior; 6]) -> (&Points, [Prior; 6]) {
         let share = self.few.len() as f64 / self.points.len() as f64;
-        let lighter = |belief: Belief| Belief {
-            precision: belief.precision * share,
-            ..belief
+        let lighter = |prior: Prior| Prior {
+            precision: prior.precision * share,
+            ..prior
         };
-        (&self.few, beliefs.map(lighter))
+        (&self.few, priors.map(lighter))
     }
 
     /// How well a surface holds at the narrowest window.
@@ -237,12 +237,12 @@ impl Samples {
 
     /// What the coefficients are taken to be where the tops say little: tilted and bent as `mean` is, the second degree
     /// within `bow_sigma`.
-    fn beliefs(&self, mean: Coefficients, bow_sigma: f64) -> [Belief; 6] {
+    fn priors(&self, mean: Coefficients, bow_sigma: f64) -> [Prior; 6] {
         let noise = CORRELATED_PX * (TOP_SIGMA * self.range).powi(2);
         std::array::from_fn(|k| {
             let sigma = if k < 3 { TILT_SIGMA } else { bow_sigma };
             let precision = if k == 0 { 0.0 } else { noise / (sigma * sigma) };
-            Belief {
+            Prior {
                 mean: mean[k],
                 precision,
             }
@@ -251,21 +251,21 @@ impl Samples {
 
     /// The same where much of the ground is seen: a block bends as a whole, so the tops bend as the ground does. Few
     /// strokes would bend the surface as they like.
-    fn beliefs_along_ground(&self) -> Option<[Belief; 6]> {
+    fn beliefs_along_ground(&self) -> Option<[Prior; 6]> {
         let [a, b, c, ..] = self.mean_plane;
         let [_, _, _, p, q, r] = self.ground()?;
-        Some(self.beliefs([a, b, c, p, q, r], GROUND_BOW_SIGMA))
+        Some(self.priors([a, b, c, p, q, r], GROUND_BOW_SIGMA))
     }
 
     /// The second-degree surface of the carved ground, where enough of it is seen.
     fn ground(&self) -> Option<Coefficients> {
         let mut c = self.mean_plane;
         c[0] += quantile(&mut self.points.residuals(&c), GROUND_START);
-        let beliefs = self.beliefs(self.mean_plane, BOW_SIGMA);
+        let priors = self.priors(self.mean_plane, BOW_SIGMA);
         for window in GROUND_WINDOWS.map(|w| w * self.range) {
             for _ in 0..NARROW_PASSES {
                 let weight = |r| smooth_weight(r, window);
-                c = self.points.solve::<6>(&c, weight, &beliefs);
+                c = self.points.solve::<6>(&c, weight, &priors);
             }
         }
         let window = GROUND_WINDOWS[GROUND_WINDOWS.len() - 1] * self.range;
@@ -338,10 +338,10 @@ impl Samples {
                 tops.push(on_surface);
             }
         }
-        let plane_of = |points: &Points, beliefs| points.solve::<3>(&[0.0; 6], |_| 1.0, beliefs);
+        let plane_of = |points: &Points, priors| points.solve::<3>(&[0.0; 6], |_| 1.0, priors);
         let precision = HARDLY * all.len() as f64;
-        let beliefs = plane_of(&all, &OPEN).map(|mean| Belief { mean, precision });
-        plane_of(&tops, &beliefs)
+        let priors = plane_of(&all, &OPEN).map(|mean| Prior { mean, precision });
+        plane_of(&tops, &priors)
     }
 
     /// Where the tops of the character itself are; all tops where hardly any are left without those at the cut.
@@ -389,7 +389,7 @@ fn height_range(mut residuals: Vec<f64>) -> f64 {
 }
 
 /// The value below which a share of the values lies; reorders them.
-pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
+pub(in crate::stages) fn quantile(values: &mut [f64], share: f64) -> f64 {
     let k = ((values.len() - 1) as f64 * share) as usize;
     *values.select_nth_unstable_by(k, f64::total_cmp).1
 }

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::{Error, Method, fit};
+use super::{FitError, FitMethod, fit};
 use crate::domain::{FailureClass, FitOutcome};
 use crate::mesh::Mesh;
 use crate::stages::testing::{World, print, settings, some_turn};
@@ -70,7 +70,7 @@ fn bow_is_found_only_where_there_is_one() {
 #[test]
 fn the_papers_plane_is_close_on_an_open_mesh() {
     let mut params = settings().fit;
-    params.method = Method::Paper;
+    params.method = FitMethod::Paper;
     for k in 0..4 {
         let world = World {
             turn: some_turn(k),
@@ -95,22 +95,22 @@ fn points_that_span_no_surface_are_refused() {
         triangles: Vec::new().into(),
     };
     let params = settings().fit;
-    for method in [Method::Paper, Method::Tops] {
-        let params = super::Params {
+    for method in [FitMethod::Paper, FitMethod::UpperSurface] {
+        let params = super::FitParams {
             method,
             ..params.clone()
         };
         let fit = |vertices| fit(&mesh(vertices).into(), None, None, &params);
-        assert_eq!(fit(vec![[0.0; 3]; 2]), Err(Error::TooFewPoints(2)));
-        assert_eq!(fit(vec![[1.0, 2.0, 3.0]; 9]), Err(Error::OnePoint(9)));
+        assert_eq!(fit(vec![[0.0; 3]; 2]), Err(FitError::TooFewPoints(2)));
+        assert_eq!(fit(vec![[1.0, 2.0, 3.0]; 9]), Err(FitError::OnePoint(9)));
         let line = (0..50)
             .map(|i| [f64::from(i), f64::from(2 * i), 1.0])
             .collect();
-        assert_eq!(fit(line), Err(Error::OneLine(50)));
+        assert_eq!(fit(line), Err(FitError::OneLine(50)));
         let few = (0..36)
             .map(|i| [f64::from(i % 6), f64::from(i / 6), f64::from(i % 2)])
             .collect();
-        assert_eq!(fit(few), Err(Error::NoFaces(36)));
+        assert_eq!(fit(few), Err(FitError::NoFaces(36)));
         let plate = (0..900)
             .map(|i| [f64::from(i % 30), f64::from(i / 30), 0.0])
             .collect();

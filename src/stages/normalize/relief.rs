@@ -1,9 +1,9 @@
 //! How deep the carving is, and soft tops: relief without a threshold.
 
-use super::heap::Heap;
+use super::height_histogram::HeightHistogram;
 use crate::raster::{DepthMap, PixelBox};
 use crate::simd::dispatch;
-use crate::stages::otsu;
+use crate::stages::binarize;
 use crate::stages::pose::Soft;
 
 /// Every how many pixels the heights are looked at when tops and ground are told apart.
@@ -35,7 +35,7 @@ impl Relief {
     pub fn of(depth: &DepthMap) -> Option<Self> {
         let known = known_box(depth)?;
         let heights = |margin| heights(depth, known, margin);
-        let split = |margin| otsu::split(&mut heights(margin)).filter(|s| s.high > s.low);
+        let split = |margin| binarize::split(&mut heights(margin)).filter(|s| s.high > s.low);
         let split = split(MARGIN).or_else(|| split(0.0))?;
         let classes = Self {
             // Heights are over the fitted surface, which lies on the tops, unless the paper's plane was asked for.
@@ -48,13 +48,13 @@ impl Relief {
             edge: 0.0,
         };
         let heights = heights(0.0);
-        let peak = Heap::of(&heights, &classes).peak();
+        let peak = HeightHistogram::of(&heights, &classes).peak();
         let tops = Self {
             top: classes.top - peak * classes.depth(),
             ..classes
         };
         Some(Self {
-            edge: Heap::of(&heights, &tops).edge(),
+            edge: HeightHistogram::of(&heights, &tops).edge(),
             ..tops
         })
     }

@@ -3,10 +3,11 @@
 //! Every level between two depths under the tops is a candidate; its mask is compared with the print's ink where
 //! both print and depth map hold data.
 
-use super::{Error, Params, Relief};
+use super::params::{NormalizeError, NormalizeParams};
+use super::relief::Relief;
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Grid, Mask, warp_depth, warp_mask};
-use crate::stages::ink::Ink;
+use crate::stages::binarize::InkMask;
 use crate::stages::score::{SsimWindow, WindowMeans};
 
 /// Candidate thresholds between the first and the last cut.
@@ -31,10 +32,10 @@ impl Canvas {
     /// Brings print and depth map to the canvas by a pose; only what both hold is kept.
     pub(super) fn new(
         depth: &DepthMap,
-        print: &Ink,
+        print: &InkMask,
         canvas_from_print: &Affine2,
         print_from_depth: &Affine2,
-        params: &Params,
+        params: &NormalizeParams,
     ) -> Self {
         let side = params.canvas_px as usize / 2;
         let half_from_print = Affine2::scale_shift(0.5, [-0.25, -0.25]).after(canvas_from_print);
@@ -80,12 +81,12 @@ pub(super) fn choose(
     depth: &DepthMap,
     relief: &Relief,
     canvas: &Canvas,
-    params: &Params,
-) -> Result<Vec<ThresholdChoice>, Error> {
+    params: &NormalizeParams,
+) -> Result<Vec<ThresholdChoice>, NormalizeError> {
     let ink = canvas.ink.count() as f64;
     let candidates = candidates(depth, relief, canvas, params);
     if candidates.is_empty() || ink == 0.0 {
-        return Err(Error::NoStrokes);
+        return Err(NormalizeError::NoStrokes);
     }
     let mut structure = Structure::new(canvas, &candidates, params.window);
     let best = structure.best_of_all();
@@ -135,10 +136,10 @@ fn candidates(
     depth: &DepthMap,
     relief: &Relief,
     canvas: &Canvas,
-    params: &Params,
+    params: &NormalizeParams,
 ) -> Vec<Candidate> {
-    let span = params.cut_to - params.cut_from;
-    let share = |k: u32| params.cut_from + span * f64::from(k) / f64::from(CANDIDATES - 1);
+    let span = params.threshold_max - params.threshold_min;
+    let share = |k: u32| params.threshold_min + span * f64::from(k) / f64::from(CANDIDATES - 1);
     let mut levels: Vec<u16> = (0..CANDIDATES)
         .map(|k| relief.level_at(depth, share(k)))
         .collect();

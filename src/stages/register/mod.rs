@@ -1,20 +1,23 @@
 //! Masks to alignment and scores (paper III-D).
 //!
-//! [`Method::Turns`] is the paper's: turns of the wrapped mask, the shift of each by climbing. [`Method::Refine`] is
+//! [`RegisterMethod::Exhaustive`] is the paper's: turns of the wrapped mask, the shift of each by climbing. [`RegisterMethod::Refine`] is
 //! ours: the pose that normalisation found, refined at full size.
 
+mod alignment;
+mod anisotropic_scale;
 mod confidence;
-mod cuts;
-mod refined;
-mod stretch;
-mod turns;
+mod params;
+mod refine;
+mod soft_thresholds;
 
-use serde::{Deserialize, Serialize};
+pub(super) use alignment::{Alignment, chosen};
+pub use params::{RegisterError, RegisterMethod, RegisterParams};
 
 use super::normalize::{Normalized, Relief};
-use super::score::{self, SsimWindow, WindowMeans};
+use super::paper_method::register as exhaustive;
+use super::score::{self, WindowMeans};
 use crate::domain::{
-    Affine2, FailureClass, MetricOutcome, PoseFeatures, RegisterOutcome, Scores, ThresholdMetric,
+    Affine2, MetricOutcome, PoseFeatures, RegisterOutcome, Scores, ThresholdMetric,
 };
 use crate::raster::{DepthMap, Mask, warp_mask};
 
@@ -23,85 +26,6 @@ pub const REVISION: u32 = 10;
 
 /// Mirrored must win by this factor to be named the cause: symmetric characters score alike both ways.
 const MIRROR_WINS: f64 = 1.06;
-
-/// How the alignment is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// Robust sub-pixel refinement of the pose that normalisation found.
-    Refine,
-    /// Turns of the wrapped mask with climbed shifts: the paper's.
-    Turns,
-}
-
-/// Settings of the stage.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Params {
-    /// How the alignment is found.
-    pub method: Method,
-    /// `refine`: working size in pixels along the character, 32..=1024.
-    pub working_px: u32,
-    /// `refine`: smoothing in working pixels, 0..=10.
-    pub smoothing_px: f64,
-    /// `refine`: whether the pose may stretch the relief along one axis, as paper shrinks across its grain.
-    pub stretch: bool,
-    /// `refine`: a pair with less confidence than this is refused, 0..=1.
-    pub least_confidence: f64,
-    /// `turns`: how many angles of a full turn are tried first, 4 or more.
-    pub coarse_angles: u32,
-    /// `turns`: how many angles within three coarse steps each side are tried next, 2 or more.
-    pub fine_angles: u32,
-    /// Window of SSIM in the scores.
-    pub window: SsimWindow,
-}
-
-/// Why the stage found no result.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Error {
-    /// Normalisation left no pose and the method needs one.
-    #[error(
-        "register.method is refine but normalisation found no pose; set normalize.method to aligned"
-    )]
-    NoPose,
-    /// A threshold was not chosen for a metric.
-    #[error("normalisation chose no threshold for {0}")]
-    NoThreshold(ThresholdMetric),
-    /// The mask of a threshold is empty.
-    #[error("the depth map has no strokes at the threshold of {0}")]
-    NoStrokes(ThresholdMetric),
-    /// The relief reads in mirror writing.
-    #[error(
-        "the relief matches the print better in mirror writing ({times:.2} times as well); was the mesh mirrored?"
-    )]
-    Mirrored {
-        /// Score of the mirrored relief over that as read.
-        times: f64,
-    },
-    /// Relief and print do not show the same character, or cannot be told to.
-    #[error(
-        "relief and print do not match: confidence {confidence:.2} is below register.least_confidence {needs}; is it the print of another character?"
-    )]
-    NoMatch {
-        /// Chance that the best pose is right.
-        confidence: f64,
-        /// The setting.
-        needs: f64,
-    },
-}
-
-impl Error {
-    /// What the failure means for the pair.
-    pub const fn class(&self) -> FailureClass {
-        match self {
-            Self::NoPose
-            | Self::NoThreshold(_)
-            | Self::NoStrokes(_)
-            | Self::Mirrored { .. }
-            | Self::NoMatch { .. } => FailureClass::NoSolution,
-        }
-    }
-}
 
 /// The depth mask of one metric on the pair's canvas.
 #[derive(Debug, Clone, PartialEq)]
@@ -123,23 +47,6 @@ pub struct Registered {
     pub canvases: Vec<CanvasMasks>,
 }
 
-/// A pose with what is known of its certainty.
-#[derive(Debug, Clone, Copy)]
-struct Alignment {
-    metric: ThresholdMetric,
-    level: u16,
-    print_from_depth: Affine2,
-    margin: f64,
-    at_bound: bool,
-}
-
-impl Alignment {
-    /// Whether the same strokes are laid on the same place.
-    fn is_as(&self, other: &Self) -> bool {
-        self.level == other.level && self.print_from_depth == other.print_from_depth
-    }
-}
-
 /// Aligns the depth map with the print for each metric's threshold and scores the masks on the canvas.
 ///
 /// The canvas is the print character's: see [`super::normalize`]. Every metric is scored on the same print mask.
@@ -149,20 +56,20 @@ impl Alignment {
 pub fn register(
     depth: &DepthMap,
     normalized: &Normalized,
-    params: &Params,
-) -> Result<Registered, Error> {
+    params: &RegisterParams,
+) -> Result<Registered, RegisterError> {
     let side = normalized.outcome.canvas_px as usize;
     let canvas_from_print = normalized.outcome.canvas_from_print;
     let canvas_print = warp_mask(&normalized.ink, &canvas_from_print, side, side);
     let (alignments, evidence) = match params.method {
-        Method::Refine => {
-            let relief = Relief::of(depth).ok_or(Error::NoPose)?;
-            let (alignments, evidence) = refined::align(depth, &relief, normalized, params)?;
+        RegisterMethod::Refine => {
+            let relief = Relief::of(depth).ok_or(RegisterError::NoPose)?;
+            let (alignments, evidence) = refine::align(depth, &relief, normalized, params)?;
             require_match(&evidence, params)?;
             (alignments, Some((evidence, relief)))
         }
-        Method::Turns => (
-            turns::align(depth, &canvas_print, normalized, params)?,
+        RegisterMethod::Exhaustive => (
+            exhaustive::align(depth, &canvas_print, normalized, params)?,
             None,
         ),
     };
@@ -173,7 +80,7 @@ pub fn register(
     let mut metrics: Vec<MetricOutcome> = Vec::new();
     for (k, (alignment, mask)) in alignments.iter().zip(&masks).enumerate() {
         if mask.count() == 0 {
-            return Err(Error::NoStrokes(alignment.metric));
+            return Err(RegisterError::NoStrokes(alignment.metric));
         }
         // Metrics often choose the same threshold.
         let mut before = alignments[..k].iter();
@@ -239,18 +146,18 @@ fn trust(metrics: &mut [MetricOutcome], evidence: &PoseFeatures, growth: impl Fn
 }
 
 /// Refuses what cannot be told to be the same character.
-fn require_match(evidence: &PoseFeatures, params: &Params) -> Result<(), Error> {
+fn require_match(evidence: &PoseFeatures, params: &RegisterParams) -> Result<(), RegisterError> {
     let confidence = confidence::of_pose(evidence);
-    if evidence.mirrored > MIRROR_WINS && params.least_confidence > 0.0 {
-        Err(Error::Mirrored {
+    if evidence.mirrored > MIRROR_WINS && params.min_confidence > 0.0 {
+        Err(RegisterError::Mirrored {
             times: evidence.mirrored,
         })
-    } else if confidence >= params.least_confidence {
+    } else if confidence >= params.min_confidence {
         Ok(())
     } else {
-        Err(Error::NoMatch {
+        Err(RegisterError::NoMatch {
             confidence,
-            needs: params.least_confidence,
+            needs: params.min_confidence,
         })
     }
 }
@@ -280,15 +187,6 @@ fn outcome(
         confidence: None,
         at_bound: alignment.at_bound,
     }
-}
-
-/// The level that normalisation chose for a metric, and whether it lay at the end of its range.
-fn chosen(normalized: &Normalized, metric: ThresholdMetric) -> Result<(u16, bool), Error> {
-    let mut choices = normalized.outcome.thresholds.iter();
-    choices
-        .find(|choice| choice.metric == metric)
-        .map(|choice| (choice.level, choice.at_bound))
-        .ok_or(Error::NoThreshold(metric))
 }
 
 #[cfg(test)]

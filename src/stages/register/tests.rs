@@ -1,6 +1,6 @@
 //! Known alignments come back through all four stages.
 
-use super::Error;
+use super::RegisterError;
 use crate::domain::{MetricOutcome, PrintFromMesh, ThresholdMetric};
 use crate::mesh::Mesh;
 use crate::stages::StageError;
@@ -55,8 +55,8 @@ fn a_mirrored_mesh_never_passes() {
     assert!(
         matches!(
             error,
-            StageError::Normalize(normalize::Error::Mirrored { .. })
-                | StageError::Register(Error::Mirrored { .. })
+            StageError::Normalize(normalize::NormalizeError::Mirrored { .. })
+                | StageError::Register(RegisterError::Mirrored { .. })
         ),
         "{error}"
     );

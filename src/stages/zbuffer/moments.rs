@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::{Block, LANES, Lanes, Shell};
 use crate::simd::dispatch;
-use crate::stages::bulk::Bounds;
+use crate::stages::robust_bounds::Bounds;
 
 /// Products of two axes, each kept once.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];

@@ -6,7 +6,7 @@ use super::{Shell, View};
 use crate::domain::Rigid3;
 use crate::raster::Grid;
 use crate::simd::{dispatch, higher};
-use crate::stages::bulk::bulk_along;
+use crate::stages::robust_bounds::bulk_along;
 
 /// Height of a pixel that no surface covers.
 pub(in crate::stages) const NOTHING: f32 = f32::NEG_INFINITY;

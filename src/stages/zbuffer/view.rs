@@ -1,7 +1,7 @@
 //! Where the pixels of a rendering lie.
 
 use crate::domain::Affine2;
-use crate::stages::bulk::Bounds;
+use crate::stages::robust_bounds::Bounds;
 
 /// Where the pixels of a rendering lie in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -6,13 +6,11 @@ use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::pca::{Axes, frame};
-use super::surface::quantile;
-use super::{Error, Params};
 use crate::domain::{FitOutcome, SideEvidence};
 use crate::mesh::{Mesh, Vertices};
+use crate::stages::fit::{Axes, FitError, FitParams, frame, quantile};
 
-pub(super) fn fit(mesh: &Mesh, params: &Params) -> Result<FitOutcome, Error> {
+pub(in crate::stages) fn fit(mesh: &Mesh, params: &FitParams) -> Result<FitOutcome, FitError> {
     let points = distinct(&mesh.vertices);
     let all = Axes::of_points(points.iter().map(|p| (*p, 1.0)));
     all.require_surface(mesh)?;
@@ -31,7 +29,7 @@ pub(super) fn fit(mesh: &Mesh, params: &Params) -> Result<FitOutcome, Error> {
     let mut below: Vec<f64> = points.iter().map(|p| -height(p)).collect();
     let relief = quantile(&mut below, 0.75).max(0.0);
     if relief < params.min_relief * extent {
-        return Err(Error::NoRelief {
+        return Err(FitError::NoRelief {
             relief,
             extent,
             min_relief: params.min_relief,
@@ -129,9 +127,13 @@ fn spaced_selection(upper: &[[f64; 3]], all: &Axes, spacing: f64, wanted: u32) -
 }
 
 /// The points near the plane through three of them that has most points near it.
-fn ransac(taken: &[[f64; 3]], distance: f64, params: &Params) -> Result<Vec<[f64; 3]>, Error> {
+fn ransac(
+    taken: &[[f64; 3]],
+    distance: f64,
+    params: &FitParams,
+) -> Result<Vec<[f64; 3]>, FitError> {
     if taken.len() < 3 {
-        return Err(Error::TooFewInliers {
+        return Err(FitError::TooFewInliers {
             inliers: taken.len(),
             taken: taken.len(),
             needs: 3,
@@ -155,7 +157,7 @@ fn ransac(taken: &[[f64; 3]], distance: f64, params: &Params) -> Result<Vec<[f64
     }
     let (count, a, normal) = best;
     if count < 3 {
-        return Err(Error::TooFewInliers {
+        return Err(FitError::TooFewInliers {
             inliers: count,
             taken: taken.len(),
             needs: 3,

@@ -8,7 +8,7 @@ use crate::raster::DepthMap;
 
 /// What the four stages make of a mesh and a print.
 #[derive(Debug, Clone)]
-pub struct Aligned {
+pub struct AlignedPair {
     /// The plane.
     pub fit: FitOutcome,
     /// The depth map, which reads like the print.
@@ -19,7 +19,7 @@ pub struct Aligned {
     pub registered: Registered,
 }
 
-impl Aligned {
+impl AlignedPair {
     /// Runs the four stages, with neither unit nor side told.
     ///
     /// # Errors

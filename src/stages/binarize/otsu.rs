@@ -2,25 +2,25 @@
 
 /// Two classes of values and where they part.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Split {
+pub(in crate::stages) struct Split {
     /// Halfway between the classes' nearest members.
-    pub(super) threshold: f64,
+    pub(in crate::stages) threshold: f64,
     /// Median of the lower class.
-    pub(super) low: f64,
+    pub(in crate::stages) low: f64,
     /// Median of the upper class.
-    pub(super) high: f64,
+    pub(in crate::stages) high: f64,
 }
 
 /// Parts values where the variance between the classes is greatest; `None` for fewer than two values.
 ///
 /// Sorts the values.
-pub(super) fn split(values: &mut [f32]) -> Option<Split> {
+pub(in crate::stages) fn split(values: &mut [f32]) -> Option<Split> {
     sort(values);
     split_sorted(values)
 }
 
 /// The same without the lowest and the highest one in so many of the values.
-pub(super) fn split_inner(values: &mut [f32], one_in: usize) -> Option<Split> {
+pub(in crate::stages) fn split_inner(values: &mut [f32], one_in: usize) -> Option<Split> {
     sort(values);
     let cut = values.len() / one_in;
     split_sorted(&values[cut..values.len() - cut])

@@ -4,11 +4,11 @@
 //! The text judges six sectors at one angle each, which misses by up to half a sector; the program tries 60 angles
 //! and 60 more about the best.
 
-use super::{Alignment, Error, Params, chosen};
 use crate::domain::{Affine2, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::components::without_specks;
 use crate::stages::normalize::Normalized;
+use crate::stages::register::{Alignment, RegisterError, RegisterParams, chosen};
 
 /// The fine pass spans this many coarse steps to each side.
 const FINE_REACH: f64 = 3.0;
@@ -24,12 +24,12 @@ struct Turn {
 }
 
 /// Registers the density and the structure mask; the ensemble is the better of the two by IoU.
-pub(super) fn align(
+pub(in crate::stages) fn align(
     depth: &DepthMap,
     canvas_print: &Mask,
     normalized: &Normalized,
-    params: &Params,
-) -> Result<Vec<Alignment>, Error> {
+    params: &RegisterParams,
+) -> Result<Vec<Alignment>, RegisterError> {
     let one = |metric| align_one(depth, canvas_print, normalized, metric, params);
     let structure = one(ThresholdMetric::NlSsim)?;
     let density = one(ThresholdMetric::Density)?;
@@ -51,14 +51,14 @@ fn align_one(
     canvas_print: &Mask,
     normalized: &Normalized,
     metric: ThresholdMetric,
-    params: &Params,
-) -> Result<(Alignment, f64), Error> {
+    params: &RegisterParams,
+) -> Result<(Alignment, f64), RegisterError> {
     let (level, at_bound) = chosen(normalized, metric)?;
     let raw = depth.strokes(level);
     let mask = without_specks(&raw, raw.data().len());
-    let character_px = longest_side(canvas_print).ok_or(Error::NoStrokes(metric))?;
+    let character_px = longest_side(canvas_print).ok_or(RegisterError::NoStrokes(metric))?;
     let side = canvas_print.width();
-    let turner = Turner::new(&mask, side, character_px).ok_or(Error::NoStrokes(metric))?;
+    let turner = Turner::new(&mask, side, character_px).ok_or(RegisterError::NoStrokes(metric))?;
     let target = Packed::of(canvas_print);
     let attempt =
         |angle_deg: f64| climb(&target, &Packed::of(&turner.turned(angle_deg)), angle_deg);
@@ -66,7 +66,7 @@ fn align_one(
     let first: Vec<Turn> = (0..params.coarse_angles)
         .map(|k| attempt(f64::from(k) * coarse))
         .collect();
-    let best = best_of(&first).ok_or(Error::NoPose)?;
+    let best = best_of(&first).ok_or(RegisterError::NoPose)?;
     let fine = 2.0 * FINE_REACH * coarse / f64::from(params.fine_angles);
     let from = best.angle_deg - FINE_REACH * coarse;
     let second: Vec<Turn> = (0..=params.fine_angles)
@@ -82,7 +82,7 @@ fn align_one(
         .outcome
         .canvas_from_print
         .inverse()
-        .ok_or(Error::NoPose)?;
+        .ok_or(RegisterError::NoPose)?;
     let alignment = Alignment {
         metric,
         level,

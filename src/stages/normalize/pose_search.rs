@@ -1,11 +1,13 @@
 //! Our method: the pose first, from soft relief and soft ink; thresholds afterwards, in the aligned frame.
 
+use super::Search;
+use super::params::{NormalizeError, NormalizeParams};
+use super::relief::Relief;
 use super::relief::soft_stroke;
 use super::threshold::{self, Canvas};
-use super::{Error, Params, Relief, Search};
 use crate::domain::{Affine2, Pose, ThresholdChoice};
 use crate::raster::DepthMap;
-use crate::stages::ink::Ink;
+use crate::stages::binarize::InkMask;
 use crate::stages::pose::{Base, Found, Keep, Limits, Pass, Soft, find};
 
 /// The passes that follow the search.
@@ -46,17 +48,17 @@ const BOUND: f64 = 0.02;
 pub(super) fn search(
     depth: &DepthMap,
     relief: &Relief,
-    readings: Vec<Ink>,
-    params: &Params,
-) -> Result<(Ink, Search), Error> {
+    hypotheses: Vec<InkMask>,
+    params: &NormalizeParams,
+) -> Result<(InkMask, Search), NormalizeError> {
     let depths = relief.depths(depth);
-    let mut best: Option<(Ink, Search)> = None;
+    let mut best: Option<(InkMask, Search)> = None;
     // Which failure is told: that of the likelier reading, which comes first.
     let mut failure = None;
-    for ink in readings {
+    for ink in hypotheses {
         match find_poses(&depths, &ink, params) {
             Ok(search) => {
-                let score = |(_, search): &(Ink, Search)| search.score();
+                let score = |(_, search): &(InkMask, Search)| search.score();
                 if best.as_ref().map(score).is_none_or(|s| search.score() > s) {
                     best = Some((ink, search));
                 }
@@ -66,19 +68,19 @@ pub(super) fn search(
             }
         }
     }
-    best.ok_or(failure.unwrap_or(Error::NoStrokes))
+    best.ok_or(failure.unwrap_or(NormalizeError::NoStrokes))
 }
 
 /// Chooses the thresholds at the best pose.
 pub(super) fn thresholds(
     depth: &DepthMap,
     relief: &Relief,
-    print: &Ink,
+    print: &InkMask,
     canvas_from_print: &Affine2,
     search: &Search,
-    params: &Params,
-) -> Result<Vec<ThresholdChoice>, Error> {
-    let best = search.poses.first().ok_or(Error::NoMatch {
+    params: &NormalizeParams,
+) -> Result<Vec<ThresholdChoice>, NormalizeError> {
+    let best = search.poses.first().ok_or(NormalizeError::NoMatch {
         best: 0.0,
         needs: LEAST_SCORE,
     })?;
@@ -93,10 +95,14 @@ pub(super) fn thresholds(
 }
 
 /// Poses as read, best first, at least one.
-fn find_poses(depths: &Soft, print: &Ink, params: &Params) -> Result<Search, Error> {
+fn find_poses(
+    depths: &Soft,
+    print: &InkMask,
+    params: &NormalizeParams,
+) -> Result<Search, NormalizeError> {
     let (ink, wood) = Base::new(&print.soft, BASE_PX)
         .zip(Base::new(depths, BASE_PX))
-        .ok_or(Error::NoStrokes)?;
+        .ok_or(NormalizeError::NoStrokes)?;
     let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
     let limits = Limits {
         scale: params.scale_band,
@@ -120,17 +126,17 @@ fn longest(soft: &Soft) -> f64 {
 }
 
 /// Refuses mirror writing and relief that matches nothing.
-fn judge(found: &[Found], at_bound: impl Fn(&Found) -> bool) -> Result<Search, Error> {
+fn judge(found: &[Found], at_bound: impl Fn(&Found) -> bool) -> Result<Search, NormalizeError> {
     let best = |mirrored: bool| {
         let of_kind = found.iter().filter(|pose| pose.mirrored == mirrored);
         of_kind.map(|pose| pose.score).fold(0.0, f64::max)
     };
     let (upright, mirrored) = (best(false), best(true));
     if mirrored > upright * MIRROR_WINS && mirrored > LEAST_SCORE {
-        return Err(Error::Mirrored { mirrored, upright });
+        return Err(NormalizeError::Mirrored { mirrored, upright });
     }
     if upright < LEAST_SCORE {
-        return Err(Error::NoMatch {
+        return Err(NormalizeError::NoMatch {
             best: upright,
             needs: LEAST_SCORE,
         });

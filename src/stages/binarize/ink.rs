@@ -1,11 +1,11 @@
 //! The print's ink: where there is paper at all, which side of the grey threshold is ink, how much ink each pixel has.
 
-use super::components::{Components, without_specks};
+use super::background::{self, NARROW, STROKE};
 use super::otsu::{self, Split};
-use super::paper::{self, NARROW, STROKE};
 use super::polarity::polarity;
-use super::pose::Soft;
 use crate::raster::{Grid, Mask, Picture};
+use crate::stages::components::{Components, without_specks};
+use crate::stages::pose::Soft;
 
 /// A pixel is white beyond the cut when its darkest channel is above this share of full white.
 const WHITE: f32 = 0.965;
@@ -32,7 +32,7 @@ const LEAST_PRINT_PX: usize = 16;
 
 /// Why a print shows no ink. None of these can be mended by trying again.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum Error {
+pub enum BinarizeError {
     /// The image has hardly any pixels.
     #[error("print of {width} x {height} px is too small, needs {LEAST_PRINT_PX} px each way")]
     TooSmall {
@@ -67,21 +67,21 @@ pub enum Error {
 
 /// The ink of a print.
 #[derive(Debug, Clone)]
-pub(super) struct Ink {
+pub(in crate::stages) struct InkMask {
     /// Which pixels are ink.
-    pub(super) mask: Mask,
+    pub(in crate::stages) mask: Mask,
     /// How much ink, and where the image is paper or ink at all.
-    pub(super) soft: Soft,
+    pub(in crate::stages) soft: Soft,
     /// Grey between ink and paper, 0..=1.
-    pub(super) threshold: f64,
+    pub(in crate::stages) threshold: f64,
     /// Whether ink is lighter than paper, as in a rubbing.
-    pub(super) light_on_dark: bool,
+    pub(in crate::stages) light_on_dark: bool,
 }
 
-fn grey_of(picture: &Picture) -> Result<Grid<f32>, Error> {
+fn grey_of(picture: &Picture) -> Result<Grid<f32>, BinarizeError> {
     let (width, height) = (picture.rgb.width(), picture.rgb.height());
     if width < LEAST_PRINT_PX || height < LEAST_PRINT_PX {
-        return Err(Error::TooSmall { width, height });
+        return Err(BinarizeError::TooSmall { width, height });
     }
     Ok(picture.rgb.map(|c| luminance(*c)))
 }
@@ -92,13 +92,13 @@ fn luminance(c: [u16; 3]) -> f32 {
 }
 
 /// The paper's mask: darker than a fixed grey is ink, all of the image is known.
-pub(super) fn fixed(picture: &Picture, grey: u8) -> Result<Ink, Error> {
+pub(in crate::stages) fn fixed(picture: &Picture, grey: u8) -> Result<InkMask, BinarizeError> {
     let threshold = f64::from(grey) / 255.0;
     let grey = &grey_of(picture)?;
     let raw = grey.map(|g| f64::from(*g) < threshold);
     let ink = without_specks(&raw, raw.data().len());
     require_ink(&ink, ink.data().len(), grey, threshold)?;
-    Ok(Ink {
+    Ok(InkMask {
         soft: Soft {
             amount: ink.map(|set| f32::from(u8::from(*set))),
             known: Mask::new(ink.width(), ink.height(), true),
@@ -111,13 +111,13 @@ pub(super) fn fixed(picture: &Picture, grey: u8) -> Result<Ink, Error> {
 
 /// Our masks: white beyond the cut left out, paper levelled, threshold found. One for each polarity that the picture
 /// leaves possible, the likelier first, and one that sees past small stains where there may be some.
-pub(super) fn readings(picture: &Picture) -> Result<Vec<Ink>, Error> {
+pub(in crate::stages) fn hypotheses(picture: &Picture) -> Result<Vec<InkMask>, BinarizeError> {
     let grey = &grey_of(picture)?;
     let known = known(picture, grey);
     let mut values = held(grey, &known);
-    let split = otsu::split(&mut values).ok_or(Error::NoContrast { contrast: 0.0 })?;
+    let split = otsu::split(&mut values).ok_or(BinarizeError::NoContrast { contrast: 0.0 })?;
     if split.high - split.low < (LEAST_CONTRAST * split.high).max(NOISE) {
-        return Err(Error::NoContrast {
+        return Err(BinarizeError::NoContrast {
             contrast: split.high - split.low,
         });
     }
@@ -140,7 +140,8 @@ pub(super) fn readings(picture: &Picture) -> Result<Vec<Ink>, Error> {
     } else {
         &[likelier, !likelier]
     };
-    let mut inks: Vec<Result<Ink, Error>> = polarities.iter().map(|light| of(*light)).collect();
+    let mut inks: Vec<Result<InkMask, BinarizeError>> =
+        polarities.iter().map(|light| of(*light)).collect();
     if polarities.contains(&false) && may_be_stained(&values, levelled) {
         inks.push(past_stains(grey, &known));
     }
@@ -163,7 +164,7 @@ fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
 }
 
 /// The ink where what is wider than most strokes is a stain.
-fn past_stains(grey: &Grid<f32>, known: &Mask) -> Result<Ink, Error> {
+fn past_stains(grey: &Grid<f32>, known: &Mask) -> Result<InkMask, BinarizeError> {
     let even = evened(grey, known, STROKE);
     let split = otsu::split(&mut held(&even, known));
     read(grey, &even, split, known, false)
@@ -176,8 +177,8 @@ fn read(
     split: Option<Split>,
     known: &Mask,
     light_on_dark: bool,
-) -> Result<Ink, Error> {
-    let split = split.ok_or(Error::NoContrast { contrast: 0.0 })?;
+) -> Result<InkMask, BinarizeError> {
+    let split = split.ok_or(BinarizeError::NoContrast { contrast: 0.0 })?;
     let raw = Mask::from_fn(grey.width(), grey.height(), |x, y| {
         known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
     });
@@ -187,7 +188,7 @@ fn read(
         ink.at(x, y) && known.at(x, y)
     });
     require_ink(&ink, area, grey, split.threshold)?;
-    Ok(Ink {
+    Ok(InkMask {
         soft: Soft {
             amount: amount(even, &ink, split),
             known: known.clone(),
@@ -234,7 +235,7 @@ fn known(picture: &Picture, grey: &Grid<f32>) -> Mask {
 
 /// Grey over the paper's around it.
 fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
-    let level = paper::level(grey, known, narrow);
+    let level = background::level(grey, known, narrow);
     Grid::from_fn(grey.width(), grey.height(), |x, y| {
         (grey.at(x, y) / level.at(x, y).max(0.01)).min(1.5)
     })
@@ -253,14 +254,19 @@ fn amount(even: &Grid<f32>, ink: &Mask, split: Split) -> Grid<f32> {
     })
 }
 
-fn require_ink(ink: &Mask, area: usize, grey: &Grid<f32>, threshold: f64) -> Result<(), Error> {
+fn require_ink(
+    ink: &Mask,
+    area: usize,
+    grey: &Grid<f32>,
+    threshold: f64,
+) -> Result<(), BinarizeError> {
     let share = ink.count() as f64 / area.max(1) as f64;
     if share < LEAST_INK {
-        return Err(Error::NoInk { share, threshold });
+        return Err(BinarizeError::NoInk { share, threshold });
     }
     let lightest = grey.data().iter().copied().fold(0.0, f32::max);
     if share > 1.0 - LEAST_INK {
-        return Err(Error::AllInk {
+        return Err(BinarizeError::AllInk {
             lightest: f64::from(lightest),
         });
     }
@@ -269,7 +275,7 @@ fn require_ink(ink: &Mask, area: usize, grey: &Grid<f32>, threshold: f64) -> Res
 
 #[cfg(test)]
 mod tests {
-    use super::{Error, Ink, readings};
+    use super::{BinarizeError, InkMask, hypotheses};
     use crate::raster::{Grid, Picture};
 
     fn picture(grey: impl Fn(usize, usize) -> u16) -> Picture {
@@ -278,8 +284,8 @@ mod tests {
         }
     }
 
-    fn read(picture: &Picture) -> Result<Ink, Error> {
-        readings(picture).map(|mut all| all.swap_remove(0))
+    fn read(picture: &Picture) -> Result<InkMask, BinarizeError> {
+        hypotheses(picture).map(|mut all| all.swap_remove(0))
     }
 
     fn cross(x: usize, y: usize) -> bool {
@@ -329,13 +335,13 @@ mod tests {
                 [grey as u16 * 257; 3]
             }),
         };
-        let wrong = |ink: &Ink| {
+        let wrong = |ink: &InkMask| {
             let pixels = ink.mask.data().iter().enumerate();
             pixels
                 .filter(|(i, ink)| **ink != thin(i % 200, i / 200))
                 .count()
         };
-        let found: Vec<usize> = readings(&print(&stain))
+        let found: Vec<usize> = hypotheses(&print(&stain))
             .expect("ink")
             .iter()
             .map(wrong)
@@ -344,7 +350,7 @@ mod tests {
             found.len() == 2 && found[0] > 1000 && found[1] < 150,
             "{found:?}"
         );
-        assert_eq!(readings(&print(&|_, _| false)).expect("ink").len(), 1);
+        assert_eq!(hypotheses(&print(&|_, _| false)).expect("ink").len(), 1);
     }
 
     #[test]
@@ -364,14 +370,17 @@ mod tests {
     fn prints_without_ink_are_refused() {
         for grey in [255, 0, 128] {
             let refused = read(&picture(|_, _| grey));
-            assert!(matches!(refused, Err(Error::NoContrast { .. })), "{grey}");
+            assert!(
+                matches!(refused, Err(BinarizeError::NoContrast { .. })),
+                "{grey}"
+            );
         }
         let one = Picture {
             rgb: Grid::new(1, 1, [0; 3]),
         };
         assert!(matches!(
             read(&one),
-            Err(Error::TooSmall {
+            Err(BinarizeError::TooSmall {
                 width: 1,
                 height: 1
             })

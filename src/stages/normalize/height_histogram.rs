@@ -3,7 +3,7 @@
 //! Walls slope, so each depth holds about as much of them; tops crowd at one depth, worn ones a little below. A cut
 //! loses least of the tops and takes in least of the walls where both are about as frequent.
 
-use super::Relief;
+use super::relief::Relief;
 
 /// Bins a share of the relief, and the depths they cover.
 const BIN: f64 = 0.005;
@@ -27,11 +27,11 @@ const RANGE: [f64; 2] = [0.02, 0.25];
 
 /// How frequent each depth under the tops is.
 #[derive(Debug, Clone)]
-pub(super) struct Heap {
+pub(super) struct HeightHistogram {
     counts: Vec<f64>,
 }
 
-impl Heap {
+impl HeightHistogram {
     /// Counts heights by their depth under the tops.
     pub(super) fn of(heights: &[f32], relief: &Relief) -> Self {
         let mut counts = vec![0.0; ((TO - FROM) / BIN).round() as usize];
@@ -94,7 +94,7 @@ fn smoothed(counts: &[f64], width: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Heap, Relief};
+    use super::{HeightHistogram, Relief};
 
     #[test]
     fn tops_end_where_walls_begin() {
@@ -107,7 +107,7 @@ mod tests {
         let tops = (0..4000).map(|i| -0.04 + 0.08 * (i % 100) as f32 / 100.0);
         let walls = (0..3000).map(|i| -(i as f32) / 3000.0);
         let heights: Vec<f32> = tops.chain(walls).chain([-1.0; 3000]).collect();
-        let heap = Heap::of(&heights, &relief);
+        let heap = HeightHistogram::of(&heights, &relief);
         assert!((0.03..0.06).contains(&heap.edge()), "{}", heap.edge());
         assert!(heap.peak().abs() <= 0.045);
     }

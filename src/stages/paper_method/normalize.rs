@@ -4,11 +4,11 @@
 //! Where the text is silent the authors' own program decides: greys stretched so that the 1st percentile of
 //! nearness is 49 and the 95th 201, dark is near, each threshold tried at four quarter turns.
 
-use super::{Error, Params};
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
+use crate::stages::binarize::InkMask;
 use crate::stages::components::without_specks;
-use crate::stages::ink::Ink;
+use crate::stages::normalize::{NormalizeError, NormalizeParams};
 use crate::stages::score::WindowMeans;
 
 /// Greys of the two percentiles, and the percentiles.
@@ -59,13 +59,13 @@ struct Tried {
 
 /// Chooses the density and the structure threshold on the wrapped pictures. The ensemble keeps the better of the
 /// two once they are registered.
-pub(super) fn choose(
+pub(in crate::stages) fn choose(
     depth: &DepthMap,
-    print: &Ink,
+    print: &InkMask,
     canvas_from_print: &Affine2,
-    params: &Params,
-) -> Result<Vec<ThresholdChoice>, Error> {
-    let greys = Greys::of(depth).ok_or(Error::NoStrokes)?;
+    params: &NormalizeParams,
+) -> Result<Vec<ThresholdChoice>, NormalizeError> {
+    let greys = Greys::of(depth).ok_or(NormalizeError::NoStrokes)?;
     let side = params.canvas_px as usize;
     let canvas = WindowMeans::new(
         &warp_mask(&print.mask, canvas_from_print, side, side),
@@ -79,10 +79,10 @@ pub(super) fn choose(
     let within = |[from, to]: [u8; 2]| tried.iter().filter(move |t| (from..=to).contains(&t.grey));
     let density = within(params.density_greys)
         .min_by(|a, b| a.density_gap.abs().total_cmp(&b.density_gap.abs()))
-        .ok_or(Error::NoStrokes)?;
+        .ok_or(NormalizeError::NoStrokes)?;
     let structure = within(params.structure_greys)
         .max_by(|a, b| a.structure.total_cmp(&b.structure))
-        .ok_or(Error::NoStrokes)?;
+        .ok_or(NormalizeError::NoStrokes)?;
     let choice = |metric, t: &Tried, score, [from, to]: [u8; 2]| ThresholdChoice {
         metric,
         level: t.level,
@@ -111,7 +111,7 @@ fn attempt(
     canvas: &WindowMeans,
     grey: u8,
     level: u16,
-    params: &Params,
+    params: &NormalizeParams,
 ) -> Option<Tried> {
     let side = params.canvas_px as usize;
     let mask = mask_above(depth, level);
@@ -142,7 +142,11 @@ fn mask_above(depth: &DepthMap, level: u16) -> Mask {
 }
 
 /// W(I): the box's longest side to `character_px`, the centroid to the middle of a square canvas.
-pub(super) fn box_wrap(mask: &Mask, canvas_px: usize, character_px: f64) -> Option<Affine2> {
+pub(in crate::stages) fn box_wrap(
+    mask: &Mask,
+    canvas_px: usize,
+    character_px: f64,
+) -> Option<Affine2> {
     let bounds = mask.bounding_box()?;
     let [x, y] = mask.centroid()?;
     let scale = character_px / bounds.width().max(bounds.height()) as f64;

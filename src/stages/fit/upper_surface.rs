@@ -3,14 +3,16 @@
 
 use nalgebra::Vector3;
 
+use super::carved_side::{self, Face, Witness, layer_width};
+use super::params::{FitError, FitParams};
 use super::pca::{Axes, frame, frame_along};
-use super::side::{self, Face, Witness, layer_width};
 use super::surface::{Samples, Surface};
-use super::{Error, Params};
 use crate::domain::{Bow, FitOutcome, Rigid3};
 use crate::raster::Grid;
+use crate::stages::binarize;
+use crate::stages::print::Print;
+use crate::stages::scan::Scan;
 use crate::stages::zbuffer::{Shell, View};
-use crate::stages::{Print, Scan, otsu};
 
 /// Longest side of the rendering that tells the sides apart, and of the one that the surface is fitted to.
 const GLANCE_PX: usize = 96;
@@ -37,22 +39,27 @@ pub(super) fn fit(
     scan: &Scan,
     print: Option<&Print>,
     scanned_face_down: Option<bool>,
-    params: &Params,
-) -> Result<FitOutcome, Error> {
+    params: &FitParams,
+) -> Result<FitOutcome, FitError> {
     let (mesh, shell) = (scan.mesh(), scan.shell());
     let axes = Axes::of_surface(mesh, shell);
     axes.require_surface(mesh)?;
-    let faces = glances(shell, &frame(axes.normal(), axes.centre), params.bow);
+    let faces = glances(
+        shell,
+        &frame(axes.normal(), axes.centre),
+        params.curved_blocks,
+    );
     let witness = Witness {
         shell,
         print,
         scanned_face_down,
     };
-    let no_surface = || Error::NoSurface(mesh.vertices.len());
-    let (face, side) = side::choose(faces, witness).ok_or_else(no_surface)?;
-    let face = look(shell, face.plane_from_mesh, params.bow, LOOK).ok_or_else(no_surface)?;
+    let no_surface = || FitError::NoSurface(mesh.vertices.len());
+    let (face, side) = carved_side::choose(faces, witness).ok_or_else(no_surface)?;
+    let face =
+        look(shell, face.plane_from_mesh, params.curved_blocks, LOOK).ok_or_else(no_surface)?;
     if face.relief < params.min_relief * face.extent {
-        return Err(Error::NoRelief {
+        return Err(FitError::NoRelief {
             relief: face.relief,
             extent: face.extent,
             min_relief: params.min_relief,
@@ -247,5 +254,5 @@ fn bow_height(bow: &Bow, view: &View) -> f64 {
 /// Depth of the carving: between the medians of tops and ground, what lies farthest from the surface left out.
 fn relief(residuals: &[f64]) -> f64 {
     let mut residuals: Vec<f32> = residuals.iter().map(|r| *r as f32).collect();
-    otsu::split_inner(&mut residuals, FARTHEST).map_or(0.0, |split| split.high - split.low)
+    binarize::split_inner(&mut residuals, FARTHEST).map_or(0.0, |split| split.high - split.low)
 }

@@ -1,9 +1,10 @@
 //! Our registration: the poses that normalisation found, refined and compared; the best one, looked at closely, serves
 //! every metric.
 
-use super::cuts::{Cuts, FEW_CUTS, near};
-use super::stretch::stretched;
-use super::{Alignment, Error, Params};
+use super::alignment::Alignment;
+use super::anisotropic_scale::stretched;
+use super::params::{RegisterError, RegisterParams};
+use super::soft_thresholds::{Cuts, FEW_CUTS, near};
 use crate::domain::{Affine2, Pose, PoseFeatures};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{Normalized, Relief, soft_stroke};
@@ -33,17 +34,19 @@ pub(super) fn align(
     depth: &DepthMap,
     relief: &Relief,
     normalized: &Normalized,
-    params: &Params,
-) -> Result<(Vec<Alignment>, PoseFeatures), Error> {
-    let pictures = Pictures::new(depth, relief, normalized, params).ok_or(Error::NoPose)?;
+    params: &RegisterParams,
+) -> Result<(Vec<Alignment>, PoseFeatures), RegisterError> {
+    let pictures = Pictures::new(depth, relief, normalized, params).ok_or(RegisterError::NoPose)?;
     let few = pictures.at(COMPARED);
-    let mut rivals = Rivals::of(&few, normalized).ok_or(Error::NoPose)?;
+    let mut rivals = Rivals::of(&few, normalized).ok_or(RegisterError::NoPose)?;
     let cuts = near(rivals.best.cut);
     let closer = pictures.at(CLOSER);
     let woods = closer.strokes(cuts);
     let cuts = Cuts::new(cuts, &closer.ink, &woods);
-    rivals.look_closer(&cuts).ok_or(Error::NoPose)?;
-    let (print_from_depth, spread) = pictures.look(&few, &rivals.best).ok_or(Error::NoPose)?;
+    rivals.look_closer(&cuts).ok_or(RegisterError::NoPose)?;
+    let (print_from_depth, spread) = pictures
+        .look(&few, &rivals.best)
+        .ok_or(RegisterError::NoPose)?;
     let choices = normalized.outcome.thresholds.iter();
     let alignments = choices.map(|choice| Alignment {
         metric: choice.metric,
@@ -185,7 +188,7 @@ impl Pictures {
         depth: &DepthMap,
         relief: &Relief,
         normalized: &Normalized,
-        params: &Params,
+        params: &RegisterParams,
     ) -> Option<Self> {
         let ink = Soft {
             amount: normalized.ink.map(|set| f32::from(u8::from(*set))),
@@ -197,7 +200,7 @@ impl Pictures {
             depths: Base::new(&relief.depths(depth), px)?,
             px,
             smoothing_px: params.smoothing_px,
-            may_stretch: params.stretch,
+            may_stretch: params.anisotropic_scale,
             middle: [depth.levels.width(), depth.levels.height()].map(|side| side as f64 / 2.0),
         })
     }

@@ -24,9 +24,9 @@ pub(super) struct Points {
 
 /// What a coefficient is taken to be before any point is seen.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Belief {
+pub(super) struct Prior {
     pub(super) mean: f64,
-    /// Weight of the belief.
+    /// Weight of the prior.
     pub(super) precision: f64,
 }
 
@@ -68,7 +68,7 @@ impl Points {
         &self,
         from: &Coefficients,
         weight: impl Fn(f64) -> f64,
-        beliefs: &[Belief; 6],
+        priors: &[Prior; 6],
     ) -> Coefficients {
         let (blocks, whole) = (&self.blocks, self.count / LANES);
         // Sums and points of its own: what may lie in one place is not computed side by side.
@@ -92,12 +92,12 @@ impl Points {
             weights[self.count % LANES..].fill(0.0);
             sums.add::<TERMS>(block, weights);
         }
-        sums.solve(TERMS, beliefs)
+        sums.solve(TERMS, priors)
     }
 }
 
 /// Nothing is known before.
-pub(super) const OPEN: [Belief; 6] = [Belief {
+pub(super) const OPEN: [Prior; 6] = [Prior {
     mean: 0.0,
     precision: 0.0,
 }; 6];
@@ -188,12 +188,12 @@ impl Sums {
     }
 
     /// The normal equations of the first few coefficients, solved; zeros where they say nothing.
-    fn solve(&self, terms: usize, beliefs: &[Belief; 6]) -> Coefficients {
+    fn solve(&self, terms: usize, priors: &[Prior; 6]) -> Coefficients {
         let total = |lanes: &Lanes| lanes.iter().sum::<f64>();
         let mut normal = Matrix6::<f64>::identity();
         let mut side = Vector6::<f64>::zeros();
         for i in 0..terms {
-            let Belief { mean, precision } = beliefs[i];
+            let Prior { mean, precision } = priors[i];
             side[i] = total(&self.heights[i]) + precision * mean;
             for j in 0..terms {
                 normal[(i, j)] = total(&self.powers[product(i, j)]);
@@ -219,7 +219,7 @@ fn product(i: usize, j: usize) -> usize {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Belief, OPEN, Points, value};
+    use super::{OPEN, Points, Prior, value};
 
     fn scattered(count: usize, height: impl Fn([f64; 2]) -> f64) -> Points {
         let mut points = Points::default();
@@ -263,12 +263,12 @@ mod tests {
     fn a_belief_holds_where_points_say_nothing() {
         let mut points = Points::default();
         (0..20).for_each(|k| points.push([f64::from(k) / 20.0, 0.0, 1.0]));
-        let mut beliefs = OPEN;
-        beliefs[2] = Belief {
+        let mut priors = OPEN;
+        priors[2] = Prior {
             mean: 0.7,
             precision: 1.0,
         };
-        let found = points.solve::<3>(&[0.0; 6], |_| 1.0, &beliefs);
+        let found = points.solve::<3>(&[0.0; 6], |_| 1.0, &priors);
         assert!((found[2] - 0.7).abs() < 1e-6, "{found:?}");
         assert!((found[0] - 1.0).abs() < 1e-6, "{found:?}");
     }

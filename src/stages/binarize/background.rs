@@ -1,8 +1,8 @@
 //! The brightness of the paper around each pixel, seen past strokes: what is dark and narrow is ink, what is dark and
 //! wide is a stain.
 
-use super::blur::blur;
 use crate::raster::{Grid, Mask, resample};
+use crate::stages::blur::blur;
 
 /// Paper changes slowly: it is looked at on this many cells along the longest side.
 const CELLS: f64 = 96.0;

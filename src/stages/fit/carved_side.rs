@@ -6,8 +6,8 @@
 
 use super::surface::{Samples, Surface, quantile};
 use crate::domain::{Bow, Rigid3, SideEvidence};
-use crate::stages::Print;
 use crate::stages::pose::{Base, Keep, Limits, Pass, Refiner, Soft, find};
+use crate::stages::print::Print;
 use crate::stages::zbuffer::Shell;
 
 /// A side with less than this share of the other's relief is the back of the block.
@@ -149,10 +149,10 @@ fn log_odds(first: &Face, second: &Face, winding: Option<f64>, witness: Witness<
 /// Log of the ratio between the agreements with the print of the likelier face and of the other, which is asked only
 /// where the likelier one leaves a doubt; 0 when the print shows no ink.
 fn agreement(likelier: &Face, other: &Face, print: &Print) -> f64 {
-    let Ok(readings) = print.readings() else {
+    let Ok(hypotheses) = print.hypotheses() else {
         return 0.0;
     };
-    let inks: Vec<Base> = readings
+    let inks: Vec<Base> = hypotheses
         .iter()
         .filter_map(|ink| Base::new(&ink.soft, BASE_PX))
         .collect();

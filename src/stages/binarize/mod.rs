@@ -1,0 +1,10 @@
+//! Binarization of the print: background, polarity, Otsu threshold, ink mask.
+
+mod background;
+mod ink;
+mod otsu;
+mod polarity;
+
+pub(super) use ink::BinarizeError;
+pub(super) use ink::{InkMask, fixed, hypotheses};
+pub(super) use otsu::{split, split_inner};

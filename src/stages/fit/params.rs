@@ -1,0 +1,93 @@
+//! Settings and errors of the fit stage.
+
+use serde::{Deserialize, Serialize};
+
+use crate::domain::FailureClass;
+
+/// How the plane is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FitMethod {
+    /// PCA, sides, upper set, spaced selection, RANSAC + PCA: the paper's.
+    Paper,
+    /// One-sided robust surface over the tops, seen from each side.
+    UpperSurface,
+}
+
+/// Settings of the stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FitParams {
+    /// How the plane is found.
+    pub method: FitMethod,
+    /// Whether `upper_surface` may fit a second-degree surface where the block is bent.
+    pub curved_blocks: bool,
+    /// Seed of the random choices of `paper`.
+    pub seed: u64,
+    /// How many points the spaced selection of `paper` takes, 3 or more.
+    pub spaced_points: u32,
+    /// Spacing of that selection as a share of the mesh's extent, above 0.
+    pub spacing: f64,
+    /// RANSAC draws of `paper`, 1 or more.
+    pub ransac_draws: u32,
+    /// Inlier distance of that RANSAC as a share of the mesh's extent, above 0.
+    pub ransac_distance: f64,
+    /// Smallest relief as a share of the mesh's extent; below it there is no carving to align.
+    pub min_relief: f64,
+}
+
+/// Why the stage found no result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FitError {
+    /// Fewer than three points.
+    #[error("mesh has {0} vertices, a plane needs 3")]
+    TooFewPoints(usize),
+    /// Every vertex at one place.
+    #[error("all {0} vertices lie at one point")]
+    OnePoint(usize),
+    /// Every vertex on one line.
+    #[error("all {0} vertices lie on one line")]
+    OneLine(usize),
+    /// Neither faces nor enough points to stand for a surface.
+    #[error("mesh has no faces, and {0} points are too few to show a surface")]
+    NoFaces(usize),
+    /// Hardly a pixel of a rendering is covered, from either side.
+    #[error("mesh of {0} vertices shows no surface from either side")]
+    NoSurface(usize),
+    /// Nothing is carved.
+    #[error(
+        "no carving found: the relief is {relief:.4} of an extent of {extent:.4} (mesh units), below fit.min_relief {min_relief}"
+    )]
+    NoRelief {
+        /// Relief found, mesh units.
+        relief: f64,
+        /// Extent of the mesh, mesh units.
+        extent: f64,
+        /// The setting.
+        min_relief: f64,
+    },
+    /// RANSAC found no plane.
+    #[error("plane fit found {inliers} inliers of {taken} selected points, needs {needs}")]
+    TooFewInliers {
+        /// Points near the best plane.
+        inliers: usize,
+        /// Points that were selected.
+        taken: usize,
+        /// Points needed.
+        needs: usize,
+    },
+}
+
+impl FitError {
+    /// What the failure means for the pair.
+    pub const fn class(&self) -> FailureClass {
+        match self {
+            Self::TooFewPoints(_)
+            | Self::OnePoint(_)
+            | Self::OneLine(_)
+            | Self::NoFaces(_)
+            | Self::NoSurface(_) => FailureClass::BadInput,
+            Self::NoRelief { .. } | Self::TooFewInliers { .. } => FailureClass::NoSolution,
+        }
+    }
+}
