@@ -7,7 +7,7 @@ ALTER TABLE verdict ADD COLUMN event TEXT CHECK (event <> '');
 ALTER TABLE verdict ADD COLUMN seen BLOB CHECK (length(seen) = 32);
 ALTER TABLE verdict ADD COLUMN shown_ms INTEGER CHECK (shown_ms >= 0);
 ALTER TABLE verdict ADD COLUMN angle_read_deg REAL CHECK (angle_read_deg BETWEEN -180 AND 180);
-ALTER TABLE verdict ADD COLUMN queue TEXT CHECK (queue IN ('random', 'risk', 'adjudicate'));
+ALTER TABLE verdict ADD COLUMN queue TEXT CHECK (queue IN ('random', 'least_confident', 'adjudicate'));
 CREATE UNIQUE INDEX verdict_event ON verdict (event, metric) WHERE event IS NOT NULL;
 
 -- Answers to planted faults and repeats. They lie apart from verdicts, so that nothing that counts verdicts counts them.
@@ -17,7 +17,7 @@ CREATE TABLE control_answer (
     pair INTEGER NOT NULL REFERENCES pair (id),
     metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble', 'relief')),
     result_hash BLOB NOT NULL CHECK (length(result_hash) = 32),
-    kind TEXT NOT NULL CHECK (kind IN ('turned', 'mirrored', 'cut', 'repeat')),
+    kind TEXT NOT NULL CHECK (kind IN ('turned', 'mirrored', 'threshold', 'duplicate')),
     control TEXT NOT NULL CHECK (json_valid(control)),
     seen BLOB NOT NULL CHECK (length(seen) = 32),
     shown_ms INTEGER CHECK (shown_ms >= 0),

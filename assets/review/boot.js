@@ -17,7 +17,7 @@ export async function renew() {
 
 export const word = () => told.word;
 export const keys = () => told.keys;
-export const queue = told.queue;
+export const queue = told.review_order;
 export const leastViewMs = told.min_view_ms;
 
 /** The words for a key, with what stands in braces filled in. */

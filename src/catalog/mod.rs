@@ -30,9 +30,9 @@ pub use queue::staleness::Again;
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use records::look::Look;
-pub use records::manual_alignments::{HandAlignment, StoredAlignment};
+pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
-    AttemptRecord, FailedPair, MetricRecord, PairDetail, PairFacts, PairResults, ReaderVerdict,
+    AttemptRecord, FailedPair, MetricRecord, PairDetail, PairFacts, PairResults, ReviewerVerdict,
     StageCounts, StageRecord, StatusCounts, StoredFailure,
 };
 pub use records::pages::ResultPages;

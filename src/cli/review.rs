@@ -24,7 +24,7 @@ pub(super) struct ReviewArgs {
     /// Who reads; a label for the verdicts, no login
     #[arg(long, value_name = "NAME", value_parser = reader_name)]
     reader: String,
-    /// What comes first: random stands for all; risk, the most doubtful, finds failures but does not
+    /// What comes first: random estimates the accuracy; least-confident finds failures sooner, but is no sample
     #[arg(long, default_value = "random", value_parser = order)]
     order: ReviewOrder,
     /// Only what two other readers contradict each other on
@@ -64,9 +64,11 @@ pub(super) struct ReviewArgs {
 
 /// An order that can be asked for by name.
 fn order(text: &str) -> Result<ReviewOrder, String> {
-    match text.parse() {
-        Ok(queue @ (ReviewOrder::Random | ReviewOrder::Risk)) => Ok(queue),
-        Ok(ReviewOrder::Adjudicate) | Err(_) => Err("an order is random or risk".to_owned()),
+    match text.replace('-', "_").parse() {
+        Ok(order @ (ReviewOrder::Random | ReviewOrder::LeastConfident)) => Ok(order),
+        Ok(ReviewOrder::Adjudicate) | Err(_) => {
+            Err("an order is random or least-confident".to_owned())
+        }
     }
 }
 
@@ -131,7 +133,7 @@ fn deck(args: &ReviewArgs) -> DeckOptions {
     DeckOptions {
         reader: args.reader.clone(),
         metrics: args.metric.clone(),
-        queue: if args.adjudicate {
+        order: if args.adjudicate {
             ReviewOrder::Adjudicate
         } else {
             args.order
@@ -290,7 +292,7 @@ mod tests {
         assert_eq!(percent("4"), Ok(0.04));
         assert_eq!(percent("12.5%"), Ok(0.125));
         assert!(percent("101").is_err() && percent("-1").is_err() && percent("NaN").is_err());
-        assert_eq!(order("risk"), Ok(ReviewOrder::Risk));
+        assert_eq!(order("least-confident"), Ok(ReviewOrder::LeastConfident));
         assert!(order("adjudicate").is_err());
     }
 }

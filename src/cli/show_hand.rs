@@ -36,7 +36,7 @@ pub(super) async fn of(
     catalog: &Catalog,
     results: &PairResults,
 ) -> Result<Vec<Laid>, CatalogError> {
-    let stored = catalog.hand_alignments().await?.into_iter();
+    let stored = catalog.manual_alignments().await?.into_iter();
     let ours =
         stored.filter(|laid| laid.made.pair == results.facts.name && laid.undone_at.is_none());
     Ok(ours

@@ -23,7 +23,7 @@ struct Line {
     seen: Option<ContentHash>,
     shown_ms: Option<u64>,
     angle_read_deg: Option<f64>,
-    queue: Option<ReviewOrder>,
+    review_order: Option<ReviewOrder>,
     at: Option<UnixMillis>,
     undone_at: Option<UnixMillis>,
 }
@@ -60,7 +60,7 @@ fn row(line: u64, parsed: Line) -> Row {
             seen: parsed.seen,
             shown_ms: parsed.shown_ms,
             angle_read_deg: parsed.angle_read_deg,
-            queue: parsed.queue,
+            review_order: parsed.review_order,
         },
         at: parsed.at,
     };

@@ -14,12 +14,12 @@ pub enum AttentionCheck {
     /// A good result with the relief in mirror writing.
     Mirrored,
     /// A good result cut at another level of the depth map.
-    Cut {
+    Threshold {
         /// Depth-map levels from this one up were shown as stroke.
         level: u16,
     },
     /// A result that the reader had judged before.
-    Repeat,
+    Duplicate,
 }
 
 impl AttentionCheck {
@@ -28,16 +28,16 @@ impl AttentionCheck {
         match self {
             Self::Turned { .. } => "turned",
             Self::Mirrored => "mirrored",
-            Self::Cut { .. } => "cut",
-            Self::Repeat => "repeat",
+            Self::Threshold { .. } => "threshold",
+            Self::Duplicate => "duplicate",
         }
     }
 
     /// Whether it is a fault, so that a reader who fails it has caught it.
     pub const fn is_fault(&self) -> bool {
         match self {
-            Self::Turned { .. } | Self::Mirrored | Self::Cut { .. } => true,
-            Self::Repeat => false,
+            Self::Turned { .. } | Self::Mirrored | Self::Threshold { .. } => true,
+            Self::Duplicate => false,
         }
     }
 }
@@ -52,8 +52,8 @@ mod tests {
         for control in [
             AttentionCheck::Turned { angle_deg: -9.5 },
             AttentionCheck::Mirrored,
-            AttentionCheck::Cut { level: 7 },
-            AttentionCheck::Repeat,
+            AttentionCheck::Threshold { level: 7 },
+            AttentionCheck::Duplicate,
         ] {
             let value = json!(control);
             assert_eq!(value["kind"], control.name());

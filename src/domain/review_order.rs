@@ -9,20 +9,20 @@ pub enum ReviewOrder {
     /// By lot from a seed: what was read so far stands for all.
     Random,
     /// The most doubtful first, to find failures: what was read so far does not stand for all.
-    Risk,
+    LeastConfident,
     /// Only what other readers contradict each other on.
     Adjudicate,
 }
 
 impl ReviewOrder {
     /// Every order.
-    pub const ALL: [Self; 3] = [Self::Random, Self::Risk, Self::Adjudicate];
+    pub const ALL: [Self; 3] = [Self::Random, Self::LeastConfident, Self::Adjudicate];
 
     /// Name in JSON and in the catalog.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
-            Self::Risk => "risk",
+            Self::LeastConfident => "least_confident",
             Self::Adjudicate => "adjudicate",
         }
     }
@@ -40,7 +40,9 @@ impl std::str::FromStr for ReviewOrder {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         Self::ALL
             .into_iter()
-            .find(|queue| queue.name() == text)
-            .ok_or_else(|| format!("{text:?} is not an order (random, risk, adjudicate)"))
+            .find(|order| order.name() == text)
+            .ok_or_else(|| {
+                format!("{text:?} is not an order (random, least_confident, adjudicate)")
+            })
     }
 }

@@ -117,11 +117,11 @@ pub fn json_lines<T: Serialize>(log: &[T]) -> String {
 /// nothing is written where there is nothing.
 async fn write_logs(catalog: &Catalog, root: &Path) -> Result<(), ExportError> {
     write_log(root, VERDICTS, &catalog.verdict_log(None).await?)?;
-    let controls = catalog.control_answers().await?;
-    if !controls.is_empty() {
-        write_log(root, CONTROLS, &controls)?;
+    let checks = catalog.attention_check_answers().await?;
+    if !checks.is_empty() {
+        write_log(root, CONTROLS, &checks)?;
     }
-    let alignments = catalog.hand_alignments().await?;
+    let alignments = catalog.manual_alignments().await?;
     if !alignments.is_empty() {
         write_log(root, ALIGNMENTS, &alignments)?;
     }

@@ -91,7 +91,7 @@ async fn own_verdicts(catalog: &Catalog, reader: &str) -> Result<OwnVerdicts, Ca
     Ok(answers
         .filter_map(|answer| match answer.on {
             AnsweredOn::Result(hash) => Some(((answer.pair, hash), answer.verdict)),
-            AnsweredOn::AttentionCheck(_) => None,
+            AnsweredOn::Check(_) => None,
         })
         .collect())
 }
@@ -127,7 +127,7 @@ impl Counts {
         let answers = controls::newest(answers);
         let repeats = answers
             .iter()
-            .filter(|answer| answer.control == AttentionCheck::Repeat);
+            .filter(|answer| answer.check == AttentionCheck::Duplicate);
         let same = repeats.filter_map(|answer| {
             let first = own.get(&(answer.pair.clone(), answer.result_hash))?;
             Some(*first == answer.verdict)
@@ -197,18 +197,18 @@ impl<'a> Picture<'a> {
 #[cfg(test)]
 mod tests {
     use super::{Counts, OwnVerdicts};
-    use crate::catalog::{AttentionCheckAnswer, Look, MetricRecord, ReaderVerdict};
+    use crate::catalog::{AttentionCheckAnswer, Look, MetricRecord, ReviewerVerdict};
     use crate::domain::{
         AttentionCheck, ContentHash, PairName, ReviewOrder, ThresholdMetric, Verdict,
     };
     use crate::report::fixture;
 
-    fn answer(pair: &str, control: AttentionCheck, verdict: Verdict) -> AttentionCheckAnswer {
+    fn answer(pair: &str, check: AttentionCheck, verdict: Verdict) -> AttentionCheckAnswer {
         AttentionCheckAnswer {
             pair: PairName::new(pair).expect("test names are ids"),
             metric: ThresholdMetric::Density,
             result_hash: ContentHash::of(pair.as_bytes()),
-            control,
+            check,
             verdict,
             reader: "lan".to_owned(),
             reason: None,
@@ -238,11 +238,11 @@ mod tests {
         let mut counts = Counts::default();
         let mut pair = fixture::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]);
         let settle = |record: &mut MetricRecord| {
-            record.verdicts.push(ReaderVerdict {
+            record.verdicts.push(ReviewerVerdict {
                 reader: "third".to_owned(),
                 verdict: Verdict::Fail,
                 reason: None,
-                queue: Some(ReviewOrder::Adjudicate),
+                review_order: Some(ReviewOrder::Adjudicate),
             });
         };
         pair.metrics.iter_mut().for_each(settle);
@@ -286,14 +286,14 @@ mod tests {
     #[test]
     fn a_repeat_is_held_against_the_readers_own_verdict() {
         let own = OwnVerdicts::from(["a", "b"].map(|name| {
-            let first = answer(name, AttentionCheck::Repeat, Verdict::Pass);
+            let first = answer(name, AttentionCheck::Duplicate, Verdict::Pass);
             ((first.pair, first.result_hash), Verdict::Pass)
         }));
         let answers = [
-            answer("a", AttentionCheck::Repeat, Verdict::Pass),
-            answer("b", AttentionCheck::Repeat, Verdict::Fail),
+            answer("a", AttentionCheck::Duplicate, Verdict::Pass),
+            answer("b", AttentionCheck::Duplicate, Verdict::Fail),
             // Its first look was taken back.
-            answer("c", AttentionCheck::Repeat, Verdict::Pass),
+            answer("c", AttentionCheck::Duplicate, Verdict::Pass),
         ];
         let mut counts = Counts::default();
         counts.test("lan", &answers, &own);

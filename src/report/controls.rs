@@ -23,8 +23,8 @@ impl Caught {
     /// Of a reader's answers; those to repeats are left out.
     pub(super) fn of<'a>(answers: impl Iterator<Item = &'a AttentionCheckAnswer>) -> Self {
         let mut told: BTreeMap<_, Vec<bool>> = BTreeMap::new();
-        for answer in answers.filter(|answer| answer.control.is_fault()) {
-            let of_kind = told.entry(answer.control.name()).or_default();
+        for answer in answers.filter(|answer| answer.check.is_fault()) {
+            let of_kind = told.entry(answer.check.name()).or_default();
             of_kind.push(answer.verdict == Verdict::Fail);
         }
         Self {
@@ -84,21 +84,21 @@ pub(super) async fn caught(catalog: &Catalog) -> Result<Caught, CatalogError> {
 pub(super) async fn by_reader(
     catalog: &Catalog,
 ) -> Result<BTreeMap<String, Vec<AttentionCheckAnswer>>, CatalogError> {
-    let mut controls: BTreeMap<String, Vec<AttentionCheckAnswer>> = BTreeMap::new();
-    for answer in catalog.control_answers().await? {
+    let mut checks: BTreeMap<String, Vec<AttentionCheckAnswer>> = BTreeMap::new();
+    for answer in catalog.attention_check_answers().await? {
         if answer.undone_at.is_none() {
-            let of_reader = controls.entry(answer.reader.clone()).or_default();
+            let of_reader = checks.entry(answer.reader.clone()).or_default();
             of_reader.push(answer);
         }
     }
-    Ok(controls)
+    Ok(checks)
 }
 
 /// The newest of a reader's answers to each thing that was shown; they come oldest first.
 pub(super) fn newest(answers: &[AttentionCheckAnswer]) -> Vec<&AttentionCheckAnswer> {
     let shown = |answer: &AttentionCheckAnswer| {
         let hashes = (answer.result_hash, answer.look.seen);
-        (answer.pair.clone(), answer.control.name(), hashes)
+        (answer.pair.clone(), answer.check.name(), hashes)
     };
     let newest: BTreeMap<_, _> = answers
         .iter()

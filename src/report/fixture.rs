@@ -7,7 +7,7 @@ use super::samples::MeanIntervals;
 use super::tally::TruthFinding;
 use super::truth::TruthErrors;
 use crate::catalog::{
-    MetricRecord, PairFacts, PairResults, ReaderVerdict, StageRecord, StoredFailure,
+    MetricRecord, PairFacts, PairResults, ReviewerVerdict, StageRecord, StoredFailure,
 };
 use crate::domain::{
     Affine2, ContentHash, Failure, FailureClass, JobStatus, MetricOutcome, PairName, Scores, Stage,
@@ -42,11 +42,11 @@ pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) ->
         verdicts: verdicts
             .iter()
             .enumerate()
-            .map(|(i, verdict)| ReaderVerdict {
+            .map(|(i, verdict)| ReviewerVerdict {
                 reader: format!("r{i}"),
                 verdict: *verdict,
                 reason: None,
-                queue: None,
+                review_order: None,
             })
             .collect(),
         older_verdicts: 0,

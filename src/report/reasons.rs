@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::standing::{Standing, split};
-use crate::catalog::{MetricRecord, ReaderVerdict};
+use crate::catalog::{MetricRecord, ReviewerVerdict};
 use crate::domain::{Reason, Verdict};
 
 /// Failed results for which a reason was given.
@@ -26,7 +26,7 @@ impl Reasons {
             return;
         }
         let (words, own) = split(record);
-        let failing = |read: &&ReaderVerdict| read.verdict == Verdict::Fail;
+        let failing = |read: &&ReviewerVerdict| read.verdict == Verdict::Fail;
         let given: Vec<Reason> = words
             .into_iter()
             .chain(own)

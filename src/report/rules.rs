@@ -97,7 +97,7 @@ mod tests {
             let verdicts: Vec<Verdict> = own.iter().copied().chain(*word).collect();
             let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &verdicts);
             for settled in &mut record.verdicts[own.len()..] {
-                settled.queue = Some(ReviewOrder::Adjudicate);
+                settled.review_order = Some(ReviewOrder::Adjudicate);
             }
             sums.add(&record);
         }

@@ -1,6 +1,6 @@
 //! What all readers together say of one result.
 
-use crate::catalog::{MetricRecord, ReaderVerdict};
+use crate::catalog::{MetricRecord, ReviewerVerdict};
 use crate::domain::{ReviewOrder, Verdict};
 
 /// Where a result stands with its readers.
@@ -27,7 +27,7 @@ impl Standing {
         let all = || record.verdicts.iter().collect();
         let is_settled =
             contradict(&read) && words.iter().any(|word| word.verdict != Verdict::Unsure);
-        let deciding: Vec<&ReaderVerdict> = if is_settled { words } else { all() };
+        let deciding: Vec<&ReviewerVerdict> = if is_settled { words } else { all() };
         let says = |verdict| deciding.iter().any(|read| read.verdict == verdict);
         match (says(Verdict::Pass), says(Verdict::Fail)) {
             (true, true) => Self::Conflict,
@@ -60,13 +60,13 @@ impl Standing {
 }
 
 /// The words of those who were shown a conflict to settle it, and the verdicts of those who read by themselves.
-pub(crate) fn split(record: &MetricRecord) -> (Vec<&ReaderVerdict>, Vec<&ReaderVerdict>) {
-    let is_word = |read: &&ReaderVerdict| read.queue == Some(ReviewOrder::Adjudicate);
+pub(crate) fn split(record: &MetricRecord) -> (Vec<&ReviewerVerdict>, Vec<&ReviewerVerdict>) {
+    let is_word = |read: &&ReviewerVerdict| read.review_order == Some(ReviewOrder::Adjudicate);
     record.verdicts.iter().partition(is_word)
 }
 
 /// Whether one passes what another fails.
-pub(crate) fn contradict(verdicts: &[&ReaderVerdict]) -> bool {
+pub(crate) fn contradict(verdicts: &[&ReviewerVerdict]) -> bool {
     let says = |verdict| verdicts.iter().any(|read| read.verdict == verdict);
     says(Verdict::Pass) && says(Verdict::Fail)
 }
@@ -109,7 +109,7 @@ mod tests {
             let verdicts = [&[Verdict::Pass, Verdict::Fail], words].concat();
             let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &verdicts);
             for word in &mut record.verdicts[2..] {
-                word.queue = Some(ReviewOrder::Adjudicate);
+                word.review_order = Some(ReviewOrder::Adjudicate);
             }
             Standing::of(&record)
         };

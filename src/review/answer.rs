@@ -87,7 +87,7 @@ impl AnswerBody {
                 seen: Some(card.view.seen()),
                 shown_ms: self.shown_ms,
                 angle_read_deg: self.angle_read_deg,
-                queue: Some(desk.deck_options.queue),
+                review_order: Some(desk.deck_options.order),
             },
             at: None,
         })

@@ -93,8 +93,8 @@ impl Card {
     /// What an answer to it is stored as.
     pub(super) fn shown(&self) -> Shown {
         match (self.control, self.results.first()) {
-            (Some(control), Some((metric, result_hash))) => Shown::AttentionCheck {
-                control,
+            (Some(check), Some((metric, result_hash))) => Shown::Check {
+                check,
                 metric: *metric,
                 result_hash: *result_hash,
             },
@@ -177,7 +177,7 @@ mod tests {
         let key = ContentHash::of(b"key");
         let plain = card(1);
         let mut repeat = plain.clone();
-        repeat.control = Some(AttentionCheck::Repeat);
+        repeat.control = Some(AttentionCheck::Duplicate);
         let names = [
             plain.clone().named(&key, "ana").id,
             plain.clone().named(&key, "bo").id,

@@ -41,7 +41,7 @@ pub(super) fn plant(card: &Card, depth: &DepthMap, lots: &SeededRandom) -> Card 
         ..0.2 if !is_symmetric(&strokes) => (AttentionCheck::Mirrored, card.view.mirrored()),
         0.2..0.5 => match broken_level(depth, card.view.level, draw("cut") < 0.5) {
             Some(level) => (
-                AttentionCheck::Cut { level },
+                AttentionCheck::Threshold { level },
                 View {
                     level,
                     ..card.view.clone()
@@ -115,7 +115,7 @@ pub(super) fn mixed(
             let at = (place as f64 + after).min(count) + 0.25;
             if at - place as f64 > REPEAT_AFTER / 2.0 {
                 let repeat = Card {
-                    control: Some(AttentionCheck::Repeat),
+                    control: Some(AttentionCheck::Duplicate),
                     ..card.clone()
                 };
                 placed.push((at, repeat));
@@ -181,12 +181,12 @@ mod tests {
                 AttentionCheck::Mirrored => {
                     assert!(fault.view.print_from_depth.determinant() < 0.0);
                 }
-                AttentionCheck::Cut { level } => {
+                AttentionCheck::Threshold { level } => {
                     let area = |level| wedge().strokes(level).count() as f64;
                     let share = area(level) / area(good.level);
                     assert!(!(0.7..=1.5).contains(&share), "{share}");
                 }
-                AttentionCheck::Repeat => unreachable!("repeats are not planted here"),
+                AttentionCheck::Duplicate => unreachable!("repeats are not planted here"),
             }
         }
     }
@@ -211,7 +211,7 @@ mod tests {
         assert!((20..70).contains(&planted), "{planted}");
         let deck = mixed(real, faults, &RATES, &lots);
         let repeats: Vec<usize> = (0..deck.len())
-            .filter(|i| deck[*i].control == Some(AttentionCheck::Repeat))
+            .filter(|i| deck[*i].control == Some(AttentionCheck::Duplicate))
             .collect();
         assert!((20..70).contains(&repeats.len()), "{}", repeats.len());
         assert_eq!(deck.len(), 400 + planted + repeats.len());

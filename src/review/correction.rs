@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::answer::{BadAnswer, check_event, note};
 use super::card::{Card, View};
 use super::pictures::{Drawn, SIDE, Subject};
-use crate::catalog::{Catalog, CatalogError, HandAlignment, PairResults};
+use crate::catalog::{Catalog, CatalogError, ManualAlignment, PairResults};
 use crate::domain::{Affine2, ContentHash, Stage};
 use crate::raster::{Overlap, warp_mask};
 use crate::report::HandMove;
@@ -60,7 +60,7 @@ impl From<Overlap> for Agreement {
 }
 
 /// Where the correction of a card begins: at what was shown, or where the reader left it before.
-pub(super) fn start(card: &Card, drawn: &Drawn, before: Option<&HandAlignment>) -> Start {
+pub(super) fn start(card: &Card, drawn: &Drawn, before: Option<&ManualAlignment>) -> Start {
     let view = drawn.subject.view();
     let in_view = |map: &Affine2| view.from_print().after(map);
     let print_from_view = view.from_print().inverse();
@@ -94,7 +94,7 @@ pub(super) struct Corrected {
 
 impl Corrected {
     /// Against what the card shows; `None` where one of the two maps is flat.
-    pub(super) fn of(card: &Card, made: &HandAlignment) -> Option<Self> {
+    pub(super) fn of(card: &Card, made: &ManualAlignment) -> Option<Self> {
         let View {
             print_from_depth,
             depth_px,
@@ -112,7 +112,7 @@ impl Corrected {
 
 /// The newest correction by one reader of each thing seen, of those that hold.
 #[derive(Debug, Default)]
-pub(super) struct Corrections(BTreeMap<ContentHash, HandAlignment>);
+pub(super) struct Corrections(BTreeMap<ContentHash, ManualAlignment>);
 
 impl Corrections {
     /// Reads those that were not taken back.
@@ -120,7 +120,7 @@ impl Corrections {
     /// # Errors
     /// When the catalog refuses.
     pub(super) async fn read(catalog: &Catalog, reader: &str) -> Result<Self, CatalogError> {
-        let stored = catalog.hand_alignments().await?.into_iter();
+        let stored = catalog.manual_alignments().await?.into_iter();
         let ours = stored.filter(|stored| {
             stored.made.reader == reader
                 && stored.holds
@@ -134,7 +134,7 @@ impl Corrections {
     }
 
     /// The correction of what a card shows.
-    pub(super) fn of(&self, card: &Card) -> Option<&HandAlignment> {
+    pub(super) fn of(&self, card: &Card) -> Option<&ManualAlignment> {
         self.0.get(&card.view.seen())
     }
 }
@@ -182,9 +182,9 @@ pub(super) fn made(
     reader: &str,
     print_from_depth: Affine2,
     agreement: &Agreement,
-) -> Result<HandAlignment, AlignedError> {
+) -> Result<ManualAlignment, AlignedError> {
     let aligned = Aligned::new(project, pair);
-    Ok(HandAlignment {
+    Ok(ManualAlignment {
         event: String::new(),
         pair: card.pair.clone(),
         reader: reader.to_owned(),

@@ -26,7 +26,7 @@ pub struct DeckOptions {
     /// where it looks the same: the accuracy of such a choice would stand for nothing.
     pub metrics: Vec<ThresholdMetric>,
     /// What comes first.
-    pub queue: ReviewOrder,
+    pub order: ReviewOrder,
     /// Another seed, another order.
     pub seed: u64,
     /// Only so many results, the same for all readers.
@@ -40,7 +40,7 @@ impl DeckOptions {
     /// twice would give itself away.
     pub(super) fn tests_the_reader(&self) -> bool {
         let Rates { controls, repeats } = self.rates;
-        self.queue != ReviewOrder::Adjudicate && (controls > 0.0 || repeats > 0.0)
+        self.order != ReviewOrder::Adjudicate && (controls > 0.0 || repeats > 0.0)
     }
 }
 
@@ -65,9 +65,9 @@ impl Deck {
         let lots = SeededRandom::new(options.seed, &options.reader);
         let mut cards = all_cards(catalog, options).await?;
         if let Some(most) = options.sample {
-            order::sample(&mut cards, options.queue, options.seed, most);
+            order::sample(&mut cards, options.order, options.seed, most);
         }
-        order::sort(&mut cards, options.queue, &lots);
+        order::sort(&mut cards, options.order, &lots);
         if options.tests_the_reader() {
             let chosen = control::chosen(&cards, &options.rates, &lots);
             let faults = faults(catalog, project, chosen, &lots).await?;
@@ -118,7 +118,7 @@ fn cards_of(pair: &PairResults, options: &DeckOptions) -> Vec<Card> {
         |record: &&MetricRecord| asked.is_empty() || asked.contains(&record.outcome.metric);
     // What looks the same and nobody contradicts another on gets no word: such a choice would stand for nothing either.
     let is_asked = |record: &&MetricRecord| {
-        options.queue != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reader)
+        options.order != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reader)
     };
     let groups = alike(pair.metrics.iter().filter(is_of_metric).filter(is_asked));
     let card = |group: Vec<&MetricRecord>| {
@@ -199,27 +199,27 @@ async fn faults(
 #[cfg(test)]
 mod tests {
     use super::{DeckOptions, Rates, cards_of, is_good, is_open_conflict};
-    use crate::catalog::ReaderVerdict;
+    use crate::catalog::ReviewerVerdict;
     use crate::domain::{ReviewOrder, ThresholdMetric, Verdict};
     use crate::report::fixture;
 
-    fn options(queue: ReviewOrder, controls: f64, repeats: f64) -> DeckOptions {
+    fn options(order: ReviewOrder, controls: f64, repeats: f64) -> DeckOptions {
         DeckOptions {
             reader: "ana".to_owned(),
             metrics: Vec::new(),
-            queue,
+            order,
             seed: 1,
             sample: None,
             rates: Rates { controls, repeats },
         }
     }
 
-    fn read(reader: &str, verdict: Verdict, queue: ReviewOrder) -> ReaderVerdict {
-        ReaderVerdict {
+    fn read(reader: &str, verdict: Verdict, order: ReviewOrder) -> ReviewerVerdict {
+        ReviewerVerdict {
             reader: reader.to_owned(),
             verdict,
             reason: None,
-            queue: Some(queue),
+            review_order: Some(order),
         }
     }
 
@@ -259,8 +259,10 @@ mod tests {
 
     #[test]
     fn a_deck_tests_the_reader_by_faults_or_repeats_but_not_over_conflicts() {
-        let tests = |queue, controls, repeats| options(queue, controls, repeats).tests_the_reader();
-        assert!(tests(ReviewOrder::Random, 0.04, 0.0) && tests(ReviewOrder::Risk, 0.0, 0.05));
+        let tests = |order, controls, repeats| options(order, controls, repeats).tests_the_reader();
+        assert!(
+            tests(ReviewOrder::Random, 0.04, 0.0) && tests(ReviewOrder::LeastConfident, 0.0, 0.05)
+        );
         assert!(!tests(ReviewOrder::Random, 0.0, 0.0));
         assert!(!tests(ReviewOrder::Adjudicate, 0.04, 0.05));
     }

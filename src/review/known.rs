@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::card::Card;
 use super::correction::Corrections;
 use super::deck::DeckOptions;
-use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, HandAlignment};
+use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, ManualAlignment};
 
 /// A reader's newest answers and corrections.
 #[derive(Debug, Default)]
@@ -37,9 +37,7 @@ impl Known {
     /// The answer to a card, if there is one.
     pub(super) fn answer(&self, card: &Card) -> Option<&Answer> {
         if card.control.is_some() {
-            return self
-                .answers
-                .get(&AnsweredOn::AttentionCheck(card.view.seen()));
+            return self.answers.get(&AnsweredOn::Check(card.view.seen()));
         }
         let on_results = card.results.iter();
         on_results
@@ -49,7 +47,7 @@ impl Known {
 
     /// The correction of what a card shows. A repeat shows what was corrected before: it is told of no card that is
     /// not answered, unless nothing comes twice.
-    pub(super) fn correction(&self, card: &Card) -> Option<&HandAlignment> {
+    pub(super) fn correction(&self, card: &Card) -> Option<&ManualAlignment> {
         let found = self.corrections.of(card);
         found.filter(|_| self.is_open || self.answer(card).is_some())
     }

@@ -5,20 +5,20 @@ use crate::domain::{ReviewOrder, SeededRandom};
 use super::card::Card;
 
 /// Sorts cards of results into the order in which they are shown.
-pub(super) fn sort(cards: &mut [Card], queue: ReviewOrder, lots: &SeededRandom) {
+pub(super) fn sort(cards: &mut [Card], order: ReviewOrder, lots: &SeededRandom) {
     let lot = |card: &Card| lots.draw(&card.view.seen(), "order");
     cards.sort_by_cached_key(|card| OrderKey {
-        risk: match queue {
+        risk: match order {
             ReviewOrder::Random | ReviewOrder::Adjudicate => 0.0,
-            ReviewOrder::Risk => -card.risk,
+            ReviewOrder::LeastConfident => -card.risk,
         },
         lot: lot(card),
     });
 }
 
 /// Keeps so many cards, the same whoever reads: what two are given the same number of, both have read.
-pub(super) fn sample(cards: &mut Vec<Card>, queue: ReviewOrder, seed: u64, most: usize) {
-    sort(cards, queue, &SeededRandom::new(seed, "sample"));
+pub(super) fn sample(cards: &mut Vec<Card>, order: ReviewOrder, seed: u64, most: usize) {
+    sort(cards, order, &SeededRandom::new(seed, "sample"));
     cards.truncate(most);
 }
 
@@ -50,12 +50,12 @@ mod tests {
     use crate::domain::{ReviewOrder, SeededRandom};
     use crate::review::card::fixture::card;
 
-    fn order(queue: ReviewOrder, seed: u64, reader: &str) -> Vec<String> {
+    fn order(order: ReviewOrder, seed: u64, reader: &str) -> Vec<String> {
         let mut cards: Vec<_> = (0..50).map(card).collect();
         for (i, card) in cards.iter_mut().enumerate() {
             card.risk = i as f64;
         }
-        sort(&mut cards, queue, &SeededRandom::new(seed, reader));
+        sort(&mut cards, order, &SeededRandom::new(seed, reader));
         cards.iter().map(|card| card.pair.to_string()).collect()
     }
 
@@ -86,7 +86,10 @@ mod tests {
         assert_eq!(first, order(ReviewOrder::Random, 1, "ana"));
         assert_ne!(first, order(ReviewOrder::Random, 2, "ana"));
         assert_ne!(first, order(ReviewOrder::Random, 1, "bo"));
-        assert_eq!(order(ReviewOrder::Risk, 1, "ana")[..2], ["p49", "p48"]);
+        assert_eq!(
+            order(ReviewOrder::LeastConfident, 1, "ana")[..2],
+            ["p49", "p48"]
+        );
     }
 
     #[test]

@@ -94,9 +94,9 @@ pub(super) fn review(desk: &Desk, language: Language) -> Markup {
 
 fn top(desk: &Desk, language: Language) -> Markup {
     let other = language.other();
-    let label = match desk.deck_options.queue {
+    let label = match desk.deck_options.order {
         ReviewOrder::Random => None,
-        ReviewOrder::Risk => Some(language.say("risk_label")),
+        ReviewOrder::LeastConfident => Some(language.say("risk_label")),
         ReviewOrder::Adjudicate => Some(language.say("adjudicate_label")),
     };
     html! {

@@ -134,7 +134,7 @@ async fn boot(State(desk): State<Arc<Desk>>) -> Json<Value> {
     Json(json!({
         "word": desk.session.csrf(),
         "keys": desk.keys,
-        "queue": desk.deck_options.queue,
+        "review_order": desk.deck_options.order,
         "min_view_ms": desk.min_view_ms,
         "words": Language::ALL.map(|language| (language.name(), language.words()))
             .into_iter().collect::<std::collections::BTreeMap<_, _>>(),
@@ -194,10 +194,10 @@ async fn about(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answere
     let drawn = desk.pictures(&card).await?;
     let agreement = correction::agreement(&drawn, &card.view.print_from_depth);
     let metrics = card.results.iter().map(|(metric, _)| metric.title());
-    let others = match desk.deck_options.queue {
+    let others = match desk.deck_options.order {
         ReviewOrder::Adjudicate => others(&desk, &card).await?,
         // What others said of a planted fault does not exist, so it cannot be shown for anything.
-        ReviewOrder::Random | ReviewOrder::Risk => Vec::new(),
+        ReviewOrder::Random | ReviewOrder::LeastConfident => Vec::new(),
     };
     Ok(Json(json!({
         "pair": card.pair, "metrics": metrics.collect::<Vec<_>>(), "iou": agreement.iou, "dice": agreement.dice, "others": others,
@@ -278,7 +278,9 @@ async fn align(
     made.note = body.note()?;
     made.event = body.event;
     let told = json!(Corrected::of(&card, &made));
-    desk.catalog.hand_align(made, (desk.now)()).await?;
+    desk.catalog
+        .store_manual_alignment(made, (desk.now)())
+        .await?;
     Ok(Json(told))
 }
 

@@ -10,7 +10,7 @@ use crate::review_page::ask;
 
 fn alignments(project: &Project) -> Vec<StoredAlignment> {
     ask(project, async |catalog| {
-        catalog.hand_alignments().await.expect("alignments")
+        catalog.manual_alignments().await.expect("alignments")
     })
 }
 

@@ -24,7 +24,7 @@ pub(crate) fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -
 
 fn controls(project: &Project) -> Vec<AttentionCheckAnswer> {
     ask(project, async |catalog| {
-        catalog.control_answers().await.expect("answers")
+        catalog.attention_check_answers().await.expect("answers")
     })
 }
 
@@ -60,7 +60,7 @@ fn page_and_command_line_write_the_same_events() {
         assert_eq!(event["note"], "mờ ở góc");
         assert_eq!(event["angle_read_deg"], -4.5);
         assert_eq!(event["shown_ms"], 1200);
-        assert_eq!(event["queue"], "random");
+        assert_eq!(event["review_order"], "random");
         assert_eq!(event["current"], true);
         assert!(event["seen"].is_string());
     }
@@ -155,7 +155,7 @@ fn planted_faults_are_stored_apart_and_nothing_in_the_page_tells_them() {
     let controls = controls(&project);
     let faults = controls
         .iter()
-        .filter(|answer| answer.control.is_fault())
+        .filter(|answer| answer.check.is_fault())
         .count();
     assert!(
         faults > 5 && controls.len() > faults,
@@ -243,7 +243,7 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
     let word = log.iter().filter(|event| event["reader"] == "hoa");
     assert!(word.clone().count() > 0);
     for event in word {
-        assert_eq!(event["queue"], "adjudicate");
+        assert_eq!(event["review_order"], "adjudicate");
     }
     assert!(
         log.iter()

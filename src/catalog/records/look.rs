@@ -20,13 +20,13 @@ pub struct Look {
     /// How far the reader had to turn the relief until it lay on the print, degrees clockwise.
     pub angle_read_deg: Option<f64>,
     /// The order in which results came.
-    pub queue: Option<ReviewOrder>,
+    pub review_order: Option<ReviewOrder>,
 }
 
 impl Look {
     /// From the columns of its names.
     pub(crate) fn read(row: &SqliteRow) -> Result<Self> {
-        let queue: Option<String> = row.try_get("queue")?;
+        let order: Option<String> = row.try_get("queue")?;
         Ok(Self {
             event: row.try_get("event")?,
             seen: rows::hash_option(row.try_get::<Option<Vec<u8>>, _>("seen")?.as_deref())?,
@@ -34,7 +34,7 @@ impl Look {
                 .try_get::<Option<i64>, _>("shown_ms")?
                 .map(i64::unsigned_abs),
             angle_read_deg: row.try_get("angle_read_deg")?,
-            queue: queue.map(|queue| rows::name(&queue)).transpose()?,
+            review_order: order.map(|order| rows::name(&order)).transpose()?,
         })
     }
 }

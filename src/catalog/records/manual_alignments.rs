@@ -14,7 +14,7 @@ use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
 
 /// An alignment by hand.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct HandAlignment {
+pub struct ManualAlignment {
     /// The client's number of the act: sent twice, it is stored once.
     pub event: String,
     /// The pair.
@@ -46,7 +46,7 @@ pub struct HandAlignment {
 pub struct StoredAlignment {
     /// What was made.
     #[serde(flatten)]
-    pub made: HandAlignment,
+    pub made: ManualAlignment,
     /// When.
     pub at: UnixMillis,
     /// When it was taken back, if it was.
@@ -79,7 +79,11 @@ impl Catalog {
     ///
     /// # Errors
     /// When there is no such pair or the database refuses.
-    pub async fn hand_align(&self, made: HandAlignment, now: UnixMillis) -> Result<bool> {
+    pub async fn store_manual_alignment(
+        &self,
+        made: ManualAlignment,
+        now: UnixMillis,
+    ) -> Result<bool> {
         self.alone(move |conn| {
             Box::pin(async move {
                 let pair = pair_id(conn, &made.pair).await?;
@@ -109,7 +113,7 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn hand_alignments(&self) -> Result<Vec<StoredAlignment>> {
+    pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.reader().await?;
         let found = sqlx::query(LOG).fetch_all(&mut *conn).await?;
         found.iter().map(stored).collect()
@@ -120,7 +124,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn newest_hand_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
-        let stored = self.hand_alignments().await?.into_iter();
+        let stored = self.manual_alignments().await?.into_iter();
         let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());
         // Oldest first, so that the newest stays.
         Ok(valid
@@ -133,7 +137,7 @@ fn stored(row: &SqliteRow) -> Result<StoredAlignment> {
     let hash =
         |column: &str| -> Result<ContentHash> { rows::hash(&row.try_get::<Vec<u8>, _>(column)?) };
     Ok(StoredAlignment {
-        made: HandAlignment {
+        made: ManualAlignment {
             event: row.try_get("event")?,
             pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
             reader: row.try_get("reader")?,

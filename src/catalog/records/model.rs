@@ -103,7 +103,7 @@ impl StageRecord {
 
 /// One reader's newest verdict on a current result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct ReaderVerdict {
+pub struct ReviewerVerdict {
     /// Who read it.
     pub reader: String,
     /// The judgement.
@@ -111,7 +111,7 @@ pub struct ReaderVerdict {
     /// Why, for a fail.
     pub reason: Option<Reason>,
     /// The order in which results came to the reader; [`ReviewOrder::Adjudicate`] marks a word on a conflict.
-    pub queue: Option<ReviewOrder>,
+    pub review_order: Option<ReviewOrder>,
 }
 
 /// One metric's current result of one pair.
@@ -123,7 +123,7 @@ pub struct MetricRecord {
     /// Hash over the numbers and the pictures a reader sees; verdicts are bound to it.
     pub result_hash: ContentHash,
     /// Verdicts on this very result, by reader.
-    pub verdicts: Vec<ReaderVerdict>,
+    pub verdicts: Vec<ReviewerVerdict>,
     /// Verdicts on an older result of this pair and metric, not counted any more.
     pub older_verdicts: u64,
 }

@@ -13,7 +13,7 @@ use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::Counts;
 use crate::catalog::records::import;
 use crate::catalog::records::model::{
-    AttemptRecord, FailedPair, MetricRecord, PairDetail, PairResults, ReaderVerdict, StageRecord,
+    AttemptRecord, FailedPair, MetricRecord, PairDetail, PairResults, ReviewerVerdict, StageRecord,
     StoredFailure,
 };
 use crate::catalog::records::stage_results;
@@ -234,12 +234,12 @@ fn metrics(
     Ok(found)
 }
 
-fn reader_verdict(counted: &verdicts::Counted) -> ReaderVerdict {
-    ReaderVerdict {
+fn reader_verdict(counted: &verdicts::Counted) -> ReviewerVerdict {
+    ReviewerVerdict {
         reader: counted.reader.clone(),
         verdict: counted.verdict,
         reason: counted.reason,
-        queue: counted.queue,
+        review_order: counted.review_order,
     }
 }
 

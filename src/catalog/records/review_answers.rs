@@ -20,9 +20,9 @@ pub enum Shown {
     /// The result of one metric, or of several that came to the same; each with its hash.
     Results(Vec<(ThresholdMetric, ContentHash)>),
     /// Something that tests the reader, made from a metric's result.
-    AttentionCheck {
+    Check {
         /// What it is.
-        control: AttentionCheck,
+        check: AttentionCheck,
         /// The metric it was made from.
         metric: ThresholdMetric,
         /// The result it was made from.
@@ -55,7 +55,7 @@ pub enum AnsweredOn {
     /// A result, by its hash.
     Result(ContentHash),
     /// What tests a reader, by the hash of what was shown.
-    AttentionCheck(ContentHash),
+    Check(ContentHash),
 }
 
 /// An answer to something that tests the reader, taken back or not.
@@ -68,7 +68,7 @@ pub struct AttentionCheckAnswer {
     /// That result.
     pub result_hash: ContentHash,
     /// What was shown.
-    pub control: AttentionCheck,
+    pub check: AttentionCheck,
     /// The judgement.
     pub verdict: Verdict,
     /// Who read it.
@@ -157,13 +157,13 @@ impl Catalog {
                             None => Err(CatalogError::NoResult(given.pair)),
                         }
                     }
-                    Shown::AttentionCheck {
-                        control,
+                    Shown::Check {
+                        check,
                         metric,
                         result_hash,
                     } => {
                         let from = (pair, *metric, *result_hash);
-                        insert_control(conn, &given, from, control, now).await?;
+                        insert_check(conn, &given, from, check, now).await?;
                         Ok(true)
                     }
                 }
@@ -220,10 +220,10 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn control_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
+    pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.reader().await?;
         let found = sqlx::query(CONTROLS).fetch_all(&mut *conn).await?;
-        found.iter().map(control_answer).collect()
+        found.iter().map(check_answer).collect()
     }
 
     /// What the names of pictures are made with: the same at every start.
@@ -253,11 +253,11 @@ pub(crate) async fn pair_id(conn: &mut SqliteConnection, name: &PairName) -> Res
     id.ok_or_else(|| CatalogError::UnknownPair(name.clone()))
 }
 
-async fn insert_control(
+async fn insert_check(
     conn: &mut SqliteConnection,
     given: &NewVerdict,
     (pair, metric, result_hash): (i64, ThresholdMetric, ContentHash),
-    control: &AttentionCheck,
+    check: &AttentionCheck,
     now: UnixMillis,
 ) -> Result<()> {
     let look = &given.look;
@@ -266,8 +266,8 @@ async fn insert_control(
         .bind(pair)
         .bind(metric.name())
         .bind(&result_hash.as_bytes()[..])
-        .bind(control.name())
-        .bind(serde_json::to_string(control)?)
+        .bind(check.name())
+        .bind(serde_json::to_string(check)?)
         .bind(look.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
         .bind(look.shown_ms.map(u64::cast_signed))
         .bind(look.angle_read_deg)
@@ -287,7 +287,7 @@ fn answer(row: &SqliteRow) -> Result<Answer> {
         event: row.try_get("event")?,
         pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
         on: if row.try_get("is_control")? {
-            AnsweredOn::AttentionCheck(hash)
+            AnsweredOn::Check(hash)
         } else {
             AnsweredOn::Result(hash)
         },
@@ -298,12 +298,12 @@ fn answer(row: &SqliteRow) -> Result<Answer> {
     })
 }
 
-fn control_answer(row: &SqliteRow) -> Result<AttentionCheckAnswer> {
+fn check_answer(row: &SqliteRow) -> Result<AttentionCheckAnswer> {
     Ok(AttentionCheckAnswer {
         pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
         metric: rows::name(&row.try_get::<String, _>("metric")?)?,
         result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
-        control: serde_json::from_str(&row.try_get::<String, _>("control")?)?,
+        check: serde_json::from_str(&row.try_get::<String, _>("control")?)?,
         verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
         reader: row.try_get("reader")?,
         reason: reason(row)?,

@@ -76,7 +76,7 @@ pub(crate) struct Counted {
     pub(crate) verdict: Verdict,
     pub(crate) reader: String,
     pub(crate) reason: Option<Reason>,
-    pub(crate) queue: Option<ReviewOrder>,
+    pub(crate) review_order: Option<ReviewOrder>,
 }
 
 /// Results that a verdict on a pair judges: those of a job that is done.
@@ -229,7 +229,7 @@ pub(crate) async fn insert(
         .bind(look.seen.as_ref().map(|hash| &hash.as_bytes()[..]))
         .bind(look.shown_ms.map(u64::cast_signed))
         .bind(look.angle_read_deg)
-        .bind(look.queue.map(ReviewOrder::name))
+        .bind(look.review_order.map(ReviewOrder::name))
         .fetch_optional(conn)
         .await?;
     Ok(act)
@@ -279,13 +279,13 @@ pub(crate) async fn of_pairs(
     for row in &found {
         let metric = rows::name(&row.try_get::<String, _>("metric")?)?;
         let reason: Option<String> = row.try_get("reason")?;
-        let queue: Option<String> = row.try_get("queue")?;
+        let order: Option<String> = row.try_get("queue")?;
         let newest = Counted {
             result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
             verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
             reader: row.try_get("reader")?,
             reason: reason.map(|reason| rows::name(&reason)).transpose()?,
-            queue: queue.map(|queue| rows::name(&queue)).transpose()?,
+            review_order: order.map(|order| rows::name(&order)).transpose()?,
         };
         let of_metric = counted.entry((row.try_get("pair")?, metric)).or_default();
         // Rows come oldest first, so a later one of the same reader on the same result takes its place.

@@ -1,8 +1,8 @@
-//! Answers of the review page: bound to what was shown, stored once, taken back by number, controls apart.
+//! Answers of the review page: bound to what was shown, stored once, taken back by number, checks apart.
 
 use super::{World, name};
 use crate::catalog::db::open;
-use crate::catalog::{AnsweredOn, Catalog, CatalogError, HandAlignment, Look, NewVerdict, Shown};
+use crate::catalog::{AnsweredOn, Catalog, CatalogError, ManualAlignment, Look, NewVerdict, Shown};
 use crate::domain::{
     Affine2, AttentionCheck, ContentHash, PrintFromMesh, Reason, ReviewOrder, ThresholdMetric,
     Verdict,
@@ -21,7 +21,7 @@ fn given(event: &str, verdict: Verdict) -> NewVerdict {
             seen: Some(ContentHash::of(b"seen")),
             shown_ms: Some(1_900),
             angle_read_deg: Some(-4.5),
-            queue: Some(ReviewOrder::Random),
+            review_order: Some(ReviewOrder::Random),
         },
         at: None,
     }
@@ -37,8 +37,8 @@ fn two() -> Shown {
 }
 
 fn turned() -> Shown {
-    Shown::AttentionCheck {
-        control: AttentionCheck::Turned { angle_deg: 9.5 },
+    Shown::Check {
+        check: AttentionCheck::Turned { angle_deg: 9.5 },
         metric: ThresholdMetric::Density,
         result_hash: ContentHash::of(b"density"),
     }
@@ -96,14 +96,15 @@ async fn answers_to_controls_are_no_verdicts() {
             .is_empty()
     );
     assert!(counted(&world.catalog).await.iter().all(Vec::is_empty));
-    let controls = world.catalog.control_answers().await.expect("controls");
-    assert_eq!(controls.len(), 1);
-    assert_eq!(
-        controls[0].control,
-        AttentionCheck::Turned { angle_deg: 9.5 }
-    );
-    assert!(controls[0].control.is_fault());
-    assert_eq!(controls[0].look.shown_ms, Some(1_900));
+    let checks = world
+        .catalog
+        .attention_check_answers()
+        .await
+        .expect("checks");
+    assert_eq!(checks.len(), 1);
+    assert_eq!(checks[0].check, AttentionCheck::Turned { angle_deg: 9.5 });
+    assert!(checks[0].check.is_fault());
+    assert_eq!(checks[0].look.shown_ms, Some(1_900));
 }
 
 #[tokio::test]
@@ -130,8 +131,12 @@ async fn answers_are_taken_back_by_number_and_by_their_reader_only() {
     }
     assert_eq!(left().await, ["e1", "e1"]);
     assert_eq!(counted(&world.catalog).await[1], [Verdict::Pass]);
-    let controls = world.catalog.control_answers().await.expect("controls");
-    assert_eq!(controls[0].undone_at, Some(8));
+    let checks = world
+        .catalog
+        .attention_check_answers()
+        .await
+        .expect("checks");
+    assert_eq!(checks[0].undone_at, Some(8));
     assert!(
         world
             .catalog
@@ -206,8 +211,8 @@ async fn a_verdict_on_what_is_no_current_result_any_more_is_kept_as_stale() {
     assert!(log.len() == 1 && !log[0].current);
 }
 
-fn by_hand(event: &str) -> HandAlignment {
-    HandAlignment {
+fn by_hand(event: &str) -> ManualAlignment {
+    ManualAlignment {
         event: event.to_owned(),
         pair: name("p0"),
         reader: "ana".to_owned(),
@@ -228,19 +233,19 @@ async fn an_alignment_by_hand_is_stored_once_beside_the_result() {
     let world = World::new(1).await;
     world.finish_one().await;
     for is_new in [true, false] {
-        let stored = world.catalog.hand_align(by_hand("a1"), 5).await;
+        let stored = world.catalog.store_manual_alignment(by_hand("a1"), 5).await;
         assert_eq!(stored.expect("stored"), is_new);
     }
-    let another_mesh = HandAlignment {
+    let another_mesh = ManualAlignment {
         mesh_hash: ContentHash::of(b"another"),
         ..by_hand("a2")
     };
     world
         .catalog
-        .hand_align(another_mesh, 6)
+        .store_manual_alignment(another_mesh, 6)
         .await
         .expect("stored");
-    let stored = world.catalog.hand_alignments().await.expect("a read");
+    let stored = world.catalog.manual_alignments().await.expect("a read");
     assert_eq!(stored[0].made, by_hand("a1"));
     assert!(stored[0].holds && stored[0].on_current_depth);
     assert!(!stored[1].holds);
@@ -249,7 +254,7 @@ async fn an_alignment_by_hand_is_stored_once_beside_the_result() {
         .take_back("a1", "ana", 7)
         .await
         .expect("taken back");
-    let stored = world.catalog.hand_alignments().await.expect("a read");
+    let stored = world.catalog.manual_alignments().await.expect("a read");
     assert_eq!((stored.len(), stored[0].undone_at), (2, Some(7)));
 }
 
@@ -257,15 +262,15 @@ async fn an_alignment_by_hand_is_stored_once_beside_the_result() {
 async fn the_database_itself_refuses_to_change_answers_and_alignments() {
     let world = World::new(1).await;
     world.finish_one().await;
-    let control = given("c1", Verdict::Fail);
+    let check = given("c1", Verdict::Fail);
     world
         .catalog
-        .answer(control, turned(), 5)
+        .answer(check, turned(), 5)
         .await
         .expect("stored");
     world
         .catalog
-        .hand_align(by_hand("a1"), 5)
+        .store_manual_alignment(by_hand("a1"), 5)
         .await
         .expect("stored");
     for event in ["c1", "a1"] {
