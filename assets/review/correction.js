@@ -36,7 +36,7 @@ export class Correction {
     this.strokes = bits(own.mask);
     this.ink = bits(own.ink);
     this.lines = edges(this.strokes, own.mask.width, own.mask.height, RELIEF);
-    // Where the reader left it before, if ever.
+    // Where the reviewer left it before, if ever.
     this.map = item.corrected?.map ?? (start.laid ? onCanvas(start.laid) : this.start);
     this.grab();
     this.moved();

@@ -1,4 +1,4 @@
-// The cards in order, the reader's answers to them, and the way back through the answers.
+// The cards in order, the reviewer's answers to them, and the way back through the answers.
 
 import { say } from "./boot.js";
 

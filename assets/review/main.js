@@ -16,8 +16,8 @@ const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scale", "mi
 
 const deck = new Deck();
 const stage = new Stage(document.getElementById("canvas"));
-const reader = document.querySelector("header b").textContent;
-const outbox = new Outbox(reader, saved, refused);
+const reviewer = document.querySelector("header b").textContent;
+const outbox = new Outbox(reviewer, saved, refused);
 const times = [];
 let shownAt = null;
 let note = null;
@@ -167,7 +167,7 @@ async function about(item = deck.current) {
   if (!answer.ok) return screen.tell(say("answer_first"));
   const { pair, metrics, iou, dice, others } = await answer.json();
   const number = (value) => value.toFixed(3);
-  const said = others.map((other) => `${other.reader}: ${screen.words(other)}${other.note ? ` (${other.note})` : ""}`);
+  const said = others.map((other) => `${other.reviewer}: ${screen.words(other)}${other.note ? ` (${other.note})` : ""}`);
   const parts = [
     pair,
     `${say("metrics")} ${metrics.join(", ")}`,

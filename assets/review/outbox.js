@@ -10,8 +10,8 @@ const LONGEST_PAUSE_MS = 4000;
 
 export class Outbox {
   /** `changed(waiting, trouble)` is called when either changes; `refused(letter, why)` when one will never be taken. */
-  constructor(reader, changed, refused) {
-    this.shelf = `${SHELF}:${reader}`;
+  constructor(reviewer, changed, refused) {
+    this.shelf = `${SHELF}:${reviewer}`;
     this.changed = changed;
     this.refused = refused;
     this.letters = this.restore();

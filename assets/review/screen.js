@@ -57,9 +57,9 @@ export function words(answer) {
 export const fixed = (value, digits) => value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1");
 
 /** How a relief was laid by hand, in words. */
-export function laid({ reader, turned_deg: deg, shifted_px: [x, y], scaled, mirrored, iou }) {
+export function laid({ reviewer, turned_deg: deg, shifted_px: [x, y], scaled, mirrored, iou }) {
   return say("corrected_by", {
-    reader, deg: fixed(deg, 1), px: Math.hypot(x, y).toFixed(1), scale: scaled.toFixed(3),
+    reviewer, deg: fixed(deg, 1), px: Math.hypot(x, y).toFixed(1), scale: scaled.toFixed(3),
     mirrored: mirrored ? say("and_mirrored") : "", iou: iou.toFixed(3),
   });
 }

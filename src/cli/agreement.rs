@@ -21,7 +21,7 @@ pub(super) async fn agreement(_: AgreementArgs, context: &Context) -> anyhow::Re
         output::print(&report::agree_text(&found))?;
     }
     if found.conflicts > 0 {
-        let next = "review --adjudicate --reader NAME";
+        let next = "review --adjudicate --reviewer NAME";
         context.output.next(&context.command(next));
     }
     Ok(ExitCode::Done)

@@ -13,7 +13,7 @@ use super::exit::{ExitCode, Refusal};
 use super::output;
 use super::signals;
 use super::table::count;
-use super::verdict::reader_name;
+use super::verdict::reviewer_name;
 use crate::domain::{ReviewOrder, ThresholdMetric};
 use crate::review::{self, Cards, DeckOptions, Language, Rates, Review, ReviewOptions};
 use crate::runner::{Stop, StopLevel};
@@ -22,12 +22,12 @@ use crate::runner::{Stop, StopLevel};
 #[derive(Debug, Args)]
 pub(super) struct ReviewArgs {
     /// Who reads; a label for the verdicts, no login
-    #[arg(long, value_name = "NAME", value_parser = reader_name)]
-    reader: String,
+    #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
+    reviewer: String,
     /// What comes first: random estimates the accuracy; least-confident finds failures sooner, but is no sample
     #[arg(long, default_value = "random", value_parser = order)]
     order: ReviewOrder,
-    /// Only what two other readers contradict each other on
+    /// Only what two other reviewers contradict each other on
     #[arg(long, conflicts_with = "order")]
     adjudicate: bool,
     /// Only results of this metric; may be given many times [default: all]
@@ -42,13 +42,13 @@ pub(super) struct ReviewArgs {
     /// Planted faults for each hundred results, to measure how many are caught
     #[arg(long, value_name = "PERCENT", default_value = "4", value_parser = percent)]
     controls: f64,
-    /// Results of each hundred that are shown twice, to measure how steady the reader is
+    /// Results of each hundred that are shown twice, to measure how steady the reviewer is
     #[arg(long, value_name = "PERCENT", default_value = "5", value_parser = percent)]
     repeats: f64,
     /// Least time a picture is shown before a verdict is taken, milliseconds
     #[arg(long, value_name = "MS", default_value = "250", value_parser = clap::value_parser!(u64).range(0..=60_000))]
     min_view_ms: u64,
-    /// Port on this machine; 0 takes one that is the same for a project and a reader, or any that is free
+    /// Port on this machine; 0 takes one that is the same for a project and a reviewer, or any that is free
     #[arg(long, value_name = "N", default_value = "0")]
     port: u16,
     /// Listen on this address in the place of 127.0.0.1; whoever can reach it sees that there is a page
@@ -131,7 +131,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
 
 fn deck(args: &ReviewArgs) -> DeckOptions {
     DeckOptions {
-        reader: args.reader.clone(),
+        reviewer: args.reviewer.clone(),
         metrics: args.metric.clone(),
         order: if args.adjudicate {
             ReviewOrder::Adjudicate
@@ -152,29 +152,29 @@ fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode>
     if context.global.json {
         output::print(&json!({"schema": 1, "url": null}).to_string())?;
     }
-    let reader = &args.reader;
+    let reviewer = &args.reviewer;
     context.output.say(&format!(
-        "no conflict waits for {reader}: no two others contradict each other on a result that nobody has settled"
+        "no conflict waits for {reviewer}: no two others contradict each other on a result that nobody has settled"
     ));
     context.output.next(&context.command("agreement"));
     Ok(ExitCode::Done)
 }
 
-/// How far a reader is, such as `lan has answered 0 of 54 pictures: 50 results, and 4 to test the reader`.
-fn progress(reader: &str, cards: Cards) -> String {
+/// How far a reviewer is, such as `lan has answered 0 of 54 pictures: 50 results, and 4 to test the reviewer`.
+fn progress(reviewer: &str, cards: Cards) -> String {
     let Cards {
         all,
         results,
         answered,
     } = cards;
     let told = format!(
-        "{reader} has answered {answered} of {}",
+        "{reviewer} has answered {answered} of {}",
         count(all as u64, "picture")
     );
     match all - results {
         0 => told,
         tests => format!(
-            "{told}: {}, and {tests} to test the reader",
+            "{told}: {}, and {tests} to test the reviewer",
             count(results as u64, "result")
         ),
     }
@@ -195,7 +195,7 @@ fn tell(
     }
     context.output.say(&format!(
         "{}; the address opens once, in one browser; Ctrl-C ends",
-        progress(&args.reader, page.cards())
+        progress(&args.reviewer, page.cards())
     ));
     if address.ip().is_loopback() {
         let port = address.port();
@@ -271,7 +271,7 @@ mod tests {
     }
 
     #[test]
-    fn what_tests_the_reader_is_counted_apart() {
+    fn what_tests_the_reviewer_is_counted_apart() {
         let cards = |all, results| Cards {
             all,
             results,
@@ -279,7 +279,7 @@ mod tests {
         };
         assert_eq!(
             progress("lan", cards(54, 50)),
-            "lan has answered 7 of 54 pictures: 50 results, and 4 to test the reader"
+            "lan has answered 7 of 54 pictures: 50 results, and 4 to test the reviewer"
         );
         assert_eq!(
             progress("lan", cards(50, 50)),

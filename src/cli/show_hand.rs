@@ -79,7 +79,7 @@ pub(super) fn text(laid: &[Laid], palette: Palette) -> String {
 /// `  2026-11-22 02:10:00  lan: turned 5.0°, shifted 12.1 px, scaled 1.000 from ensemble; IoU 0.616, before 0.702`
 fn line(laid: &Laid) -> String {
     let made = &laid.stored.made;
-    let mut words = format!("  {}  {}: ", utc(laid.stored.at), made.reader);
+    let mut words = format!("  {}  {}: ", utc(laid.stored.at), made.reviewer);
     words.push_str(&match &laid.moved {
         Some(moved) => deed(moved, made.iou),
         None if laid.stored.holds => "laid on an earlier depth map".to_owned(),

@@ -12,7 +12,7 @@ use super::failures::Failures;
 use super::output::{self, Palette, Tone};
 use super::progress::CLEAR;
 use super::table::{Align, columns, count};
-use super::verdict::reader_name;
+use super::verdict::reviewer_name;
 use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict};
 use crate::runner;
@@ -271,9 +271,9 @@ fn next_steps(view: &View) -> Vec<String> {
 
 /// How to judge what nobody has read, under the name of who asks.
 fn review_step(user: Option<&str>) -> String {
-    let name = user.and_then(|user| reader_name(user).ok());
+    let name = user.and_then(|user| reviewer_name(user).ok());
     let name = name.unwrap_or_else(|| "me".to_owned());
-    format!("review --reader {}", quoted(&name))
+    format!("review --reviewer {}", quoted(&name))
 }
 
 #[cfg(test)]
@@ -345,12 +345,12 @@ mod tests {
         assert_eq!(next_steps(&view(0, 2)), ["run"]);
         let mut done = view(2, 0);
         let steps = next_steps(&done);
-        assert!(steps[0].starts_with("review --reader "), "{steps:?}");
+        assert!(steps[0].starts_with("review --reviewer "), "{steps:?}");
         assert_eq!(steps[1..], ["report"]);
         done.counts.verdicts.insert(Verdict::Pass, 1);
         assert_eq!(next_steps(&done), ["report"]);
-        assert_eq!(review_step(Some("lê văn")), "review --reader 'lê văn'");
-        assert_eq!(review_step(None), "review --reader me");
+        assert_eq!(review_step(Some("lê văn")), "review --reviewer 'lê văn'");
+        assert_eq!(review_step(None), "review --reviewer me");
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::domain::{Reason, ThresholdMetric, Verdict};
 pub(super) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(SetArgs),
-    /// Record the verdicts of a CSV file (pair, verdict, reader, and if wanted metric, reason, note, at), or of the
+    /// Record the verdicts of a CSV file (pair, verdict, reviewer, and if wanted metric, reason, note, at), or of the
     /// verdicts.jsonl of an export or a backup
     Import(ImportArgs),
     /// Print the log, oldest first
@@ -38,8 +38,8 @@ pub(super) struct SetArgs {
     /// pass, fail or unsure
     pub(super) verdict: Verdict,
     /// Who read it
-    #[arg(long, value_name = "NAME", value_parser = reader_name)]
-    pub(super) reader: String,
+    #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
+    pub(super) reviewer: String,
     /// One metric's result: `nl_ssim`, density, ensemble or relief [default: all there are]
     #[arg(long)]
     pub(super) metric: Option<ThresholdMetric>,
@@ -71,16 +71,16 @@ pub(super) struct LogArgs {
 /// Arguments of `verdict undo`.
 #[derive(Debug, Args)]
 pub(super) struct UndoArgs {
-    /// The newest of this reader [default: of anybody]
-    #[arg(long, value_name = "NAME", value_parser = reader_name)]
-    pub(super) reader: Option<String>,
+    /// The newest of this reviewer [default: of anybody]
+    #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
+    pub(super) reviewer: Option<String>,
 }
 
-/// A reader's name: not empty, on one line.
-pub(super) fn reader_name(text: &str) -> Result<String, String> {
+/// A reviewer's name: not empty, on one line.
+pub(super) fn reviewer_name(text: &str) -> Result<String, String> {
     let name = text.trim();
     if name.is_empty() || name.chars().any(char::is_control) {
-        return Err("a reader needs a name on one line".to_owned());
+        return Err("a reviewer needs a name on one line".to_owned());
     }
     Ok(name.to_owned())
 }
@@ -111,7 +111,7 @@ async fn set(args: SetArgs, context: &Context) -> anyhow::Result<ExitCode> {
         pair: select::pair(&catalog, &args.pair).await?,
         metric: args.metric,
         verdict: args.verdict,
-        reader: args.reader,
+        reviewer: args.reviewer,
         reason: args.reason,
         note: args.note,
         look: Look {
@@ -213,7 +213,9 @@ async fn log(args: LogArgs, context: &Context) -> anyhow::Result<ExitCode> {
 
 async fn undo(args: UndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.writer().await?;
-    let undone = catalog.verdict_undo(args.reader.as_deref(), now()).await?;
+    let undone = catalog
+        .verdict_undo(args.reviewer.as_deref(), now())
+        .await?;
     catalog.close().await;
     if context.global.json {
         output::print_json(&json!({"schema": 1, "undone": undone}))?;
@@ -221,7 +223,7 @@ async fn undo(args: UndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
     for event in &undone {
         context.output.say(&format!(
             "taken back: {} of {} {} by {}",
-            event.verdict, event.pair, event.metric, event.reader
+            event.verdict, event.pair, event.metric, event.reviewer
         ));
     }
     Ok(ExitCode::Done)
@@ -249,7 +251,7 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
         event.pair.to_string(),
         event.metric.to_string(),
         palette.paint(tone, event.verdict),
-        event.reader.clone(),
+        event.reviewer.clone(),
         event
             .reason
             .map_or_else(String::new, |reason| reason.to_string()),

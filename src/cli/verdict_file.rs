@@ -12,7 +12,7 @@ use crate::domain::{ContentHash, PairName, UnixMillis, sanitize};
 use crate::manifest::{LineCounter, as_utf8, delimiter};
 
 const COLUMNS: [&str; 7] = [
-    "pair", "verdict", "reader", "metric", "reason", "note", "at",
+    "pair", "verdict", "reviewer", "metric", "reason", "note", "at",
 ];
 const NEEDED: usize = 3;
 
@@ -121,7 +121,7 @@ fn row(
     let verdict = NewVerdict {
         pair: word(needed(0)?, line)?,
         verdict: word(needed(1)?, line)?,
-        reader: needed(2)?.to_owned(),
+        reviewer: needed(2)?.to_owned(),
         metric: cell(3).map(|text| word(text, line)).transpose()?,
         reason: cell(4).map(|text| word(text, line)).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
@@ -174,7 +174,7 @@ mod tests {
 
     #[test]
     fn columns_may_stand_in_any_order_and_be_left_out() {
-        let text = "reader,pair,verdict,metric,reason,note\n\
+        let text = "reviewer,pair,verdict,metric,reason,note\n\
                     lan,0001,pass,,,\n\
                     lan,0002,fail,density,strokes_lost,\"thin, broken\"\n";
         let rows = parse(text.as_bytes()).expect("valid");
@@ -184,16 +184,17 @@ mod tests {
         assert_eq!(rows[1].verdict.metric, Some(ThresholdMetric::Density));
         assert_eq!(rows[1].verdict.reason, Some(Reason::StrokesLost));
         assert_eq!(rows[1].verdict.note.as_deref(), Some("thin, broken"));
-        assert_eq!(parse(b"pair,verdict,reader\n").expect("valid"), []);
+        assert_eq!(parse(b"pair,verdict,reviewer\n").expect("valid"), []);
     }
 
     #[test]
     fn a_time_is_kept_and_what_is_none_is_refused() {
-        let rows = parse(b"pair,verdict,reader,at\n1,pass,lan,2026-11-21 04:10:03\n1,pass,lan,\n");
+        let rows =
+            parse(b"pair,verdict,reviewer,at\n1,pass,lan,2026-11-21 04:10:03\n1,pass,lan,\n");
         let rows = rows.expect("valid");
         assert_eq!(rows[0].verdict.at, Some(1_795_234_203_000));
         assert_eq!(rows[1].verdict.at, None);
-        let refused = error("pair,verdict,reader,at\n1,pass,lan,yesterday\n");
+        let refused = error("pair,verdict,reviewer,at\n1,pass,lan,yesterday\n");
         assert!(
             refused.starts_with("line 2: at is \"yesterday\""),
             "{refused}"
@@ -202,8 +203,8 @@ mod tests {
 
     #[test]
     fn what_spreadsheets_write_is_read() {
-        let plain = parse(b"pair,verdict,reader,note\n1,pass,lan,\"a, b\"\n").expect("valid");
-        let semicolons = "pair;verdict;reader;note\r\n1;pass;lan;a, b\r\n";
+        let plain = parse(b"pair,verdict,reviewer,note\n1,pass,lan,\"a, b\"\n").expect("valid");
+        let semicolons = "pair;verdict;reviewer;note\r\n1;pass;lan;a, b\r\n";
         let tabs = semicolons.replace(';', "\t");
         let utf16: Vec<u8> = "\u{feff}"
             .chars()
@@ -215,28 +216,28 @@ mod tests {
         }
         let cut = parse(&utf16[..utf16.len() - 1]).expect_err("cut short");
         assert!(cut.to_string().contains("UTF-16"), "{cut}");
-        let latin = parse(b"pair;verdict;reader\n1;pass;Nguy\xean\n").expect_err("not UTF-8");
+        let latin = parse(b"pair;verdict;reviewer\n1;pass;Nguy\xean\n").expect_err("not UTF-8");
         assert!(latin.to_string().contains("CSV UTF-8"), "{latin}");
     }
 
     #[test]
     fn wrong_line_is_named_by_its_number() {
         assert_eq!(
-            error("pair,verdict,reader\n1,pass,lan\n2,maybe,lan\n"),
+            error("pair,verdict,reviewer\n1,pass,lan\n2,maybe,lan\n"),
             "line 3: \"maybe\" is not a verdict (pass, fail, unsure); no verdict was recorded"
         );
-        assert!(error("pair,verdict,reader\n1,pass,\n").starts_with("line 2: reader is empty"));
+        assert!(error("pair,verdict,reviewer\n1,pass,\n").starts_with("line 2: reviewer is empty"));
         let rude = error("pair,ver\u{1b}[2J\n");
         assert!(!rude.contains('\u{1b}'), "{rude}");
-        assert!(error("pair,verdict\n").starts_with("line 1: column reader is missing"));
-        assert!(error("pair,verdict,raeder\n").contains("did you mean \"reader\"?"));
-        assert!(error("pair,verdict,reader\n1,pass\n").starts_with("line 2: 2 cells"));
-        assert!(error("pair,verdict,reader\na/b,pass,lan\n").starts_with("line 2: id"));
+        assert!(error("pair,verdict\n").starts_with("line 1: column reviewer is missing"));
+        assert!(error("pair,verdict,reveiwer\n").contains("did you mean \"reviewer\"?"));
+        assert!(error("pair,verdict,reviewer\n1,pass\n").starts_with("line 2: 2 cells"));
+        assert!(error("pair,verdict,reviewer\na/b,pass,lan\n").starts_with("line 2: id"));
     }
 
     #[test]
     fn pair_that_is_not_there_is_named_by_its_line() {
-        let rows = parse(b"pair,verdict,reader\n1,pass,lan\n2,pass,lan\n").expect("valid");
+        let rows = parse(b"pair,verdict,reviewer\n1,pass,lan\n2,pass,lan\n").expect("valid");
         let unknown = ["2".parse().expect("valid id")];
         let error = refuse_unknown(&rows, &unknown).expect_err("refused");
         assert!(

@@ -14,7 +14,7 @@ use crate::manifest::as_utf8;
 struct Line {
     pair: PairName,
     verdict: Verdict,
-    reader: String,
+    reviewer: String,
     metric: Option<ThresholdMetric>,
     result_hash: Option<ContentHash>,
     reason: Option<Reason>,
@@ -39,8 +39,8 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Row>, VerdictFileError> {
     let rows = lines.map(|(line, content)| {
         let parsed: Line = serde_json::from_slice(content)
             .map_err(|error| VerdictFileError::new(line, &words(&error)))?;
-        if parsed.reader.trim().is_empty() {
-            return Err(VerdictFileError::new(line, "reader is empty"));
+        if parsed.reviewer.trim().is_empty() {
+            return Err(VerdictFileError::new(line, "reviewer is empty"));
         }
         Ok(parsed.undone_at.is_none().then(|| row(line, parsed)))
     });
@@ -52,7 +52,7 @@ fn row(line: u64, parsed: Line) -> Row {
         pair: parsed.pair,
         metric: parsed.metric,
         verdict: parsed.verdict,
-        reader: parsed.reader,
+        reviewer: parsed.reviewer,
         reason: parsed.reason,
         note: parsed.note,
         look: Look {
@@ -84,10 +84,10 @@ mod tests {
 
     #[test]
     fn a_line_is_read_back_and_what_was_taken_back_is_left_out() {
-        let text = r#"{"id":1,"act":1,"pair":"0001","metric":"density","verdict":"fail","reader":"lan","reason":"angle","note":"a, b","at":5,"undone_at":null,"current":true}
+        let text = r#"{"id":1,"act":1,"pair":"0001","metric":"density","verdict":"fail","reviewer":"lan","reason":"angle","note":"a, b","at":5,"undone_at":null,"current":true}
 
-{"pair":"0001","verdict":"pass","reader":"lan","undone_at":7}
-{"pair":"0002","verdict":"pass","reader":"lan"}
+{"pair":"0001","verdict":"pass","reviewer":"lan","undone_at":7}
+{"pair":"0002","verdict":"pass","reviewer":"lan"}
 "#;
         let rows = parse(text.as_bytes()).expect("valid");
         assert_eq!(rows.iter().map(|row| row.line).collect::<Vec<_>>(), [1, 4]);
@@ -101,14 +101,17 @@ mod tests {
 
     #[test]
     fn a_wrong_line_is_named_by_its_number() {
-        let good = r#"{"pair":"1","verdict":"pass","reader":"lan"}"#;
+        let good = r#"{"pair":"1","verdict":"pass","reviewer":"lan"}"#;
         for (line, why) in [
-            (r#"{"pair":"1","verdict":"maybe","reader":"lan"}"#, "maybe"),
             (
-                r#"{"pair":"1","verdict":"pass","reader":" "}"#,
-                "reader is empty",
+                r#"{"pair":"1","verdict":"maybe","reviewer":"lan"}"#,
+                "maybe",
             ),
-            (r#"{"pair":"1","verdict":"pass"}"#, "reader"),
+            (
+                r#"{"pair":"1","verdict":"pass","reviewer":" "}"#,
+                "reviewer is empty",
+            ),
+            (r#"{"pair":"1","verdict":"pass"}"#, "reviewer"),
             ("pass", "expected"),
         ] {
             let text = format!("{good}\n{line}\n");

@@ -1,4 +1,4 @@
-//! What is shown to a reader only to test the reader.
+//! What is shown to a reviewer only to test the reviewer.
 
 use serde::{Deserialize, Serialize};
 
@@ -18,7 +18,7 @@ pub enum AttentionCheck {
         /// Depth-map levels from this one up were shown as stroke.
         level: u16,
     },
-    /// A result that the reader had judged before.
+    /// A result that the reviewer had judged before.
     Duplicate,
 }
 
@@ -33,7 +33,7 @@ impl AttentionCheck {
         }
     }
 
-    /// Whether it is a fault, so that a reader who fails it has caught it.
+    /// Whether it is a fault, so that a reviewer who fails it has caught it.
     pub const fn is_fault(&self) -> bool {
         match self {
             Self::Turned { .. } | Self::Mirrored | Self::Threshold { .. } => true,

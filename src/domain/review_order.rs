@@ -1,4 +1,4 @@
-//! In which order results come to a reader.
+//! In which order results come to a reviewer.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,7 +10,7 @@ pub enum ReviewOrder {
     Random,
     /// The most doubtful first, to find failures: what was read so far does not stand for all.
     LeastConfident,
-    /// Only what other readers contradict each other on.
+    /// Only what other reviewers contradict each other on.
     Adjudicate,
 }
 

@@ -10,7 +10,7 @@ pub struct SeededRandom {
 }
 
 impl SeededRandom {
-    /// Random numbers of a seed for a reader, or for whoever draws.
+    /// Random numbers of a seed for a reviewer, or for whoever draws.
     pub fn new(seed: u64, who: &str) -> Self {
         Self {
             seed,

@@ -10,7 +10,7 @@ pub enum Verdict {
     Pass,
     /// The rule does not hold.
     Fail,
-    /// The reader cannot tell; counted apart, never as a pass or a fail.
+    /// The reviewer cannot tell; counted apart, never as a pass or a fail.
     Unsure,
 }
 

@@ -11,7 +11,7 @@ use crate::domain::{Affine2, PairName, PrintFromMesh, UnixMillis};
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ByHand {
     /// Who made it.
-    pub reader: String,
+    pub reviewer: String,
     /// When.
     pub at: UnixMillis,
     /// 3x4: mesh point to print pixel and height.
@@ -22,7 +22,7 @@ pub struct ByHand {
     pub iou: f64,
     /// Dice coefficient of the same.
     pub dice: f64,
-    /// In the reader's words.
+    /// In the reviewer's words.
     pub note: Option<String>,
 }
 
@@ -31,7 +31,7 @@ impl ByHand {
         let made = stored.made;
         let Affine2([first, second]) = made.print_from_depth;
         Self {
-            reader: made.reader,
+            reviewer: made.reviewer,
             at: stored.at,
             print_from_mesh: made.print_from_mesh,
             print_from_depth: stored

@@ -1,4 +1,4 @@
-//! The pictures of a report's page: what readers failed or contradict each other on, what is off the truth, and some
+//! The pictures of a report's page: what reviewers failed or contradict each other on, what is off the truth, and some
 //! by lot.
 
 use rayon::prelude::*;
@@ -34,7 +34,7 @@ struct Subject {
     log: Vec<VerdictEvent>,
 }
 
-/// The results to draw: at most 80 that readers failed, 80 on which they contradict each other, 80 off the truth,
+/// The results to draw: at most 80 that reviewers failed, 80 on which they contradict each other, 80 off the truth,
 /// and 20 by lot.
 #[derive(Debug)]
 pub struct Chosen {
@@ -213,23 +213,23 @@ impl Subject {
         words
     }
 
-    /// The newest word of each reader on this result, by reader.
+    /// The newest word of each reviewer on this result, by reviewer.
     fn said(&self) -> Vec<String> {
         let Some(record) = self.record() else {
             return Vec::new();
         };
-        let counts = |reader: &str| {
+        let counts = |reviewer: &str| {
             let mut log = self.log.iter().rev();
             log.find(|event| {
-                event.reader == reader
+                event.reviewer == reviewer
                     && event.undone_at.is_none()
                     && event.metric == record.outcome.metric
                     && event.result_hash == record.result_hash
             })
         };
-        let readers = record.verdicts.iter();
-        readers
-            .filter_map(|read| counts(&read.reader))
+        let reviewers = record.verdicts.iter();
+        reviewers
+            .filter_map(|read| counts(&read.reviewer))
             .map(said)
             .collect()
     }

@@ -49,7 +49,7 @@ pub struct Line {
     /// What the result was made from.
     #[serde(flatten)]
     pub hashes: Hashes,
-    /// What readers together say of this result.
+    /// What reviewers together say of this result.
     pub verdict: Option<Verdict>,
     /// The newest alignment by hand, where people made one.
     pub by_hand: Option<ByHand>,

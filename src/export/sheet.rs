@@ -212,7 +212,7 @@ fn cell(project: &Project, candidate: &Candidate, options: &SheetOptions) -> She
     }
 }
 
-/// The id, how sure the result is where that is known, and what readers say where anybody has.
+/// The id, how sure the result is where that is known, and what reviewers say where anybody has.
 fn title(pair: &PairResults, metric: ThresholdMetric) -> String {
     let mut title = pair.facts.name.to_string();
     if let Some(record) = pair.metric(metric) {

@@ -1,4 +1,4 @@
-//! How far readers can be trusted: each with the others, with themselves, and on planted faults.
+//! How far reviewers can be trusted: each with the others, with themselves, and on planted faults.
 
 use std::collections::BTreeMap;
 
@@ -18,7 +18,7 @@ use crate::domain::{AttentionCheck, ContentHash, PairName, Verdict};
 /// Version of the JSON form.
 const SCHEMA: u32 = 1;
 
-/// Agreement of all readers of a project.
+/// Agreement of all reviewers of a project.
 ///
 /// Results of one pair that look the same count once. Who settles what others contradict each other on has seen their
 /// verdicts and is not compared with them.
@@ -26,19 +26,19 @@ const SCHEMA: u32 = 1;
 pub struct Agree {
     /// Version of this form.
     pub schema: u32,
-    /// Pictures on which readers contradict each other and nobody has settled it.
+    /// Pictures on which reviewers contradict each other and nobody has settled it.
     pub conflicts: u64,
-    /// Every two readers who have read the same results, by name.
-    pub two_readers: Vec<TwoReaders>,
-    /// Every reader, by name.
-    pub readers: Vec<ReaderRecord>,
-    /// Planted faults that all readers together failed, of those that they answered.
+    /// Every two reviewers who have read the same results, by name.
+    pub reviewer_pairs: Vec<ReviewerPair>,
+    /// Every reviewer, by name.
+    pub reviewers: Vec<ReviewerRecord>,
+    /// Planted faults that all reviewers together failed, of those that they answered.
     pub caught: Rate,
 }
 
-/// Two readers on the same results.
+/// Two reviewers on the same results.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TwoReaders {
+pub struct ReviewerPair {
     /// The first by name.
     pub a: String,
     /// The second.
@@ -48,11 +48,11 @@ pub struct TwoReaders {
     pub agreement: Agreement,
 }
 
-/// What is known of one reader alone.
+/// What is known of one reviewer alone.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct ReaderRecord {
-    /// The reader.
-    pub reader: String,
+pub struct ReviewerRecord {
+    /// The reviewer.
+    pub reviewer: String,
     /// Pictures of current results that they have judged.
     pub read: u64,
     /// Results shown a second time that got the same verdict again.
@@ -75,18 +75,18 @@ pub async fn agree(catalog: &Catalog) -> Result<Agree, CatalogError> {
             counts.add(pair);
         }
     }
-    for (reader, answers) in &controls::by_reader(catalog).await? {
-        let own = own_verdicts(catalog, reader).await?;
-        counts.test(reader, answers, &own);
+    for (reviewer, answers) in &controls::by_reviewer(catalog).await? {
+        let own = own_verdicts(catalog, reviewer).await?;
+        counts.test(reviewer, answers, &own);
     }
     Ok(counts.finish())
 }
 
-/// A reader's newest verdicts on results.
+/// A reviewer's newest verdicts on results.
 type OwnVerdicts = BTreeMap<(PairName, ContentHash), Verdict>;
 
-async fn own_verdicts(catalog: &Catalog, reader: &str) -> Result<OwnVerdicts, CatalogError> {
-    let answers = catalog.answers(reader).await?.into_iter();
+async fn own_verdicts(catalog: &Catalog, reviewer: &str) -> Result<OwnVerdicts, CatalogError> {
+    let answers = catalog.answers(reviewer).await?.into_iter();
     // Oldest first, so that the newest stays.
     Ok(answers
         .filter_map(|answer| match answer.on {
@@ -100,8 +100,8 @@ async fn own_verdicts(catalog: &Catalog, reader: &str) -> Result<OwnVerdicts, Ca
 #[derive(Debug, Default)]
 struct Counts {
     conflicts: u64,
-    two_readers: BTreeMap<(String, String), Crosstab>,
-    readers: BTreeMap<String, ReaderRecord>,
+    reviewer_pairs: BTreeMap<(String, String), Crosstab>,
+    reviewers: BTreeMap<String, ReviewerRecord>,
 }
 
 impl Counts {
@@ -110,10 +110,10 @@ impl Counts {
         for picture in pictures(pair) {
             self.conflicts += u64::from(picture.is_conflict);
             for (i, (a, first)) in picture.read.iter().enumerate() {
-                self.reader(a).read += 1;
+                self.reviewer(a).read += 1;
                 for (b, second) in &picture.read[i + 1..] {
                     let two = ((*a).to_owned(), (*b).to_owned());
-                    self.two_readers
+                    self.reviewer_pairs
                         .entry(two)
                         .or_default()
                         .add(*first, *second);
@@ -122,8 +122,8 @@ impl Counts {
         }
     }
 
-    /// Holds a reader's answers to controls against what they should be.
-    fn test(&mut self, reader: &str, answers: &[AttentionCheckAnswer], own: &OwnVerdicts) {
+    /// Holds a reviewer's answers to controls against what they should be.
+    fn test(&mut self, reviewer: &str, answers: &[AttentionCheckAnswer], own: &OwnVerdicts) {
         let answers = controls::newest(answers);
         let repeats = answers
             .iter()
@@ -132,34 +132,34 @@ impl Counts {
             let first = own.get(&(answer.pair.clone(), answer.result_hash))?;
             Some(*first == answer.verdict)
         });
-        let record = self.reader(reader);
+        let record = self.reviewer(reviewer);
         record.repeats = Rate::of(same);
         let caught = Caught::of(answers.iter().copied());
         (record.caught, record.caught_by_fault) = (caught.all, caught.by_fault);
     }
 
-    fn reader(&mut self, name: &str) -> &mut ReaderRecord {
-        let record = self.readers.entry(name.to_owned());
-        record.or_insert_with(|| ReaderRecord {
-            reader: name.to_owned(),
-            ..ReaderRecord::default()
+    fn reviewer(&mut self, name: &str) -> &mut ReviewerRecord {
+        let record = self.reviewers.entry(name.to_owned());
+        record.or_insert_with(|| ReviewerRecord {
+            reviewer: name.to_owned(),
+            ..ReviewerRecord::default()
         })
     }
 
     fn finish(self) -> Agree {
-        let two_readers = self.two_readers.into_iter();
+        let reviewer_pairs = self.reviewer_pairs.into_iter();
         Agree {
             schema: SCHEMA,
             conflicts: self.conflicts,
-            two_readers: two_readers
-                .map(|((a, b), crosstab)| TwoReaders {
+            reviewer_pairs: reviewer_pairs
+                .map(|((a, b), crosstab)| ReviewerPair {
                     a,
                     b,
                     agreement: crosstab.finish(),
                 })
                 .collect(),
-            caught: Rate::total(self.readers.values().map(|record| record.caught)),
-            readers: self.readers.into_values().collect(),
+            caught: Rate::total(self.reviewers.values().map(|record| record.caught)),
+            reviewers: self.reviewers.into_values().collect(),
         }
     }
 }
@@ -182,7 +182,7 @@ impl<'a> Picture<'a> {
         for record in group {
             for verdict in split(record).1 {
                 // The page gives all of them one verdict; where it was given one by one, the first stands.
-                read.entry(verdict.reader.as_str())
+                read.entry(verdict.reviewer.as_str())
                     .or_insert(verdict.verdict);
             }
         }
@@ -210,7 +210,7 @@ mod tests {
             result_hash: ContentHash::of(pair.as_bytes()),
             check,
             verdict,
-            reader: "lan".to_owned(),
+            reviewer: "lan".to_owned(),
             reason: None,
             note: None,
             look: Look::default(),
@@ -227,8 +227,8 @@ mod tests {
         apart.metrics[0].outcome.threshold_level += 1;
         counts.add(&apart);
         let found = counts.finish();
-        assert_eq!((found.conflicts, found.readers[0].read), (1, 3));
-        let two = &found.two_readers[0];
+        assert_eq!((found.conflicts, found.reviewers[0].read), (1, 3));
+        let two = &found.reviewer_pairs[0];
         assert_eq!((two.a.as_str(), two.b.as_str()), ("r0", "r1"));
         assert_eq!((two.agreement.n, two.agreement.agreed), (3, 2));
     }
@@ -239,7 +239,7 @@ mod tests {
         let mut pair = fixture::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]);
         let settle = |record: &mut MetricRecord| {
             record.verdicts.push(ReviewerVerdict {
-                reader: "third".to_owned(),
+                reviewer: "third".to_owned(),
                 verdict: Verdict::Fail,
                 reason: None,
                 review_order: Some(ReviewOrder::Adjudicate),
@@ -248,15 +248,15 @@ mod tests {
         pair.metrics.iter_mut().for_each(settle);
         counts.add(&pair);
         let found = counts.finish();
-        assert_eq!((found.conflicts, found.two_readers.len()), (0, 1));
-        assert_eq!(found.readers.len(), 2);
+        assert_eq!((found.conflicts, found.reviewer_pairs.len()), (0, 1));
+        assert_eq!(found.reviewers.len(), 2);
     }
 
     #[test]
-    fn every_two_of_three_readers_are_compared() {
+    fn every_two_of_three_reviewers_are_compared() {
         let mut counts = Counts::default();
         counts.add(&fixture::done("a", 0.8, &[Verdict::Pass; 3]));
-        let found = counts.finish().two_readers;
+        let found = counts.finish().reviewer_pairs;
         let names: Vec<_> = found
             .iter()
             .map(|two| (two.a.as_str(), two.b.as_str()))
@@ -276,7 +276,7 @@ mod tests {
         let mut counts = Counts::default();
         counts.test("lan", &answers, &OwnVerdicts::new());
         let found = counts.finish();
-        let lan = &found.readers[0];
+        let lan = &found.reviewers[0];
         assert_eq!((lan.caught.count, lan.caught.n), (2, 3));
         let turned = lan.caught_by_fault["turned"];
         assert_eq!((turned.count, turned.n), (1, 2));
@@ -284,7 +284,7 @@ mod tests {
     }
 
     #[test]
-    fn a_repeat_is_held_against_the_readers_own_verdict() {
+    fn a_repeat_is_held_against_the_reviewers_own_verdict() {
         let own = OwnVerdicts::from(["a", "b"].map(|name| {
             let first = answer(name, AttentionCheck::Duplicate, Verdict::Pass);
             ((first.pair, first.result_hash), Verdict::Pass)
@@ -297,7 +297,7 @@ mod tests {
         ];
         let mut counts = Counts::default();
         counts.test("lan", &answers, &own);
-        let lan = counts.finish().readers.remove(0);
+        let lan = counts.finish().reviewers.remove(0);
         assert_eq!((lan.repeats.count, lan.repeats.n), (1, 2));
         assert_eq!((lan.caught.n, lan.caught.share), (0, None));
     }

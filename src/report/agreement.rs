@@ -1,4 +1,4 @@
-//! How far two readers agree on what both have read.
+//! How far two reviewers agree on what both have read.
 
 use serde::Serialize;
 
@@ -6,12 +6,12 @@ use super::stats::wilson_95;
 use super::tally::share;
 use crate::domain::Verdict::{self, Fail, Pass, Unsure};
 
-/// Results that both readers must have told of before anything is said of their agreement.
+/// Results that both reviewers must have told of before anything is said of their agreement.
 ///
 /// At 30 the 95 % interval of full agreement still goes down to 0.89.
 pub const ENOUGH: u64 = 30;
 
-/// Two readers' verdicts on the same results, counted.
+/// Two reviewers' verdicts on the same results, counted.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Crosstab {
     both_pass: u64,
@@ -21,7 +21,7 @@ pub(super) struct Crosstab {
     unsure: u64,
 }
 
-/// How far two readers agree. Each number is `None` where it does not exist.
+/// How far two reviewers agree. Each number is `None` where it does not exist.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Agreement {
     /// Results on which both told pass or fail; all numbers but `unsure` are of these.
@@ -34,7 +34,7 @@ pub struct Agreement {
     pub agreement: Option<f64>,
     /// Wilson's 95 % interval of `agreement`.
     pub agreement_ci95: Option<[f64; 2]>,
-    /// Cohen's kappa; there is none where chance alone would make them agree always. Near 0 for readers who agree on
+    /// Cohen's kappa; there is none where chance alone would make them agree always. Near 0 for reviewers who agree on
     /// almost all when failures are rare. Source: Cohen 1960, doi:10.1177/001316446002000104.
     pub kappa: Option<f64>,
     /// Gwet's AC1, which rare failures do not pull down. Source: Gwet 2008, doi:10.1348/000711006X126600.

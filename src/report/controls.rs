@@ -1,4 +1,4 @@
-//! Answers to what only tests a reader: planted faults and repeats.
+//! Answers to what only tests a reviewer: planted faults and repeats.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use super::rate::Rate;
 use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
 use crate::domain::Verdict;
 
-/// Planted faults that readers failed, of those that they answered; unsure is not caught.
+/// Planted faults that reviewers failed, of those that they answered; unsure is not caught.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Caught {
     /// Of every kind.
@@ -20,7 +20,7 @@ pub struct Caught {
 }
 
 impl Caught {
-    /// Of a reader's answers; those to repeats are left out.
+    /// Of a reviewer's answers; those to repeats are left out.
     pub(super) fn of<'a>(answers: impl Iterator<Item = &'a AttentionCheckAnswer>) -> Self {
         let mut told: BTreeMap<_, Vec<bool>> = BTreeMap::new();
         for answer in answers.filter(|answer| answer.check.is_fault()) {
@@ -36,14 +36,14 @@ impl Caught {
         }
     }
 
-    /// Of several readers together.
-    pub(super) fn total<'a>(readers: impl Iterator<Item = &'a Self> + Clone) -> Self {
+    /// Of several reviewers together.
+    pub(super) fn total<'a>(reviewers: impl Iterator<Item = &'a Self> + Clone) -> Self {
         let mut by_fault: BTreeMap<_, Vec<Rate>> = BTreeMap::new();
-        for (name, rate) in readers.clone().flat_map(|caught| &caught.by_fault) {
+        for (name, rate) in reviewers.clone().flat_map(|caught| &caught.by_fault) {
             by_fault.entry(*name).or_default().push(*rate);
         }
         Self {
-            all: Rate::total(readers.map(|caught| caught.all)),
+            all: Rate::total(reviewers.map(|caught| caught.all)),
             by_fault: by_fault
                 .into_iter()
                 .map(|(name, rates)| (name, Rate::total(rates.into_iter())))
@@ -64,37 +64,37 @@ impl Caught {
     }
 }
 
-/// Planted faults that all readers of a project caught.
+/// Planted faults that all reviewers of a project caught.
 ///
 /// # Errors
 /// When the catalog cannot be read.
 pub(super) async fn caught(catalog: &Catalog) -> Result<Caught, CatalogError> {
-    let answers = by_reader(catalog).await?;
-    let readers: Vec<Caught> = answers
+    let answers = by_reviewer(catalog).await?;
+    let reviewers: Vec<Caught> = answers
         .values()
         .map(|answers| Caught::of(newest(answers).into_iter()))
         .collect();
-    Ok(Caught::total(readers.iter()))
+    Ok(Caught::total(reviewers.iter()))
 }
 
-/// Answers that were not taken back, by reader, oldest first.
+/// Answers that were not taken back, by reviewer, oldest first.
 ///
 /// # Errors
 /// When the catalog cannot be read.
-pub(super) async fn by_reader(
+pub(super) async fn by_reviewer(
     catalog: &Catalog,
 ) -> Result<BTreeMap<String, Vec<AttentionCheckAnswer>>, CatalogError> {
     let mut checks: BTreeMap<String, Vec<AttentionCheckAnswer>> = BTreeMap::new();
     for answer in catalog.attention_check_answers().await? {
         if answer.undone_at.is_none() {
-            let of_reader = checks.entry(answer.reader.clone()).or_default();
-            of_reader.push(answer);
+            let of_reviewer = checks.entry(answer.reviewer.clone()).or_default();
+            of_reviewer.push(answer);
         }
     }
     Ok(checks)
 }
 
-/// The newest of a reader's answers to each thing that was shown; they come oldest first.
+/// The newest of a reviewer's answers to each thing that was shown; they come oldest first.
 pub(super) fn newest(answers: &[AttentionCheckAnswer]) -> Vec<&AttentionCheckAnswer> {
     let shown = |answer: &AttentionCheckAnswer| {
         let hashes = (answer.result_hash, answer.look.seen);

@@ -14,7 +14,7 @@ use crate::domain::{
     ThresholdMetric, Verdict,
 };
 
-/// A result with an IoU and the Dice that belongs to it; the verdicts are of readers `r0`, `r1`, ...
+/// A result with an IoU and the Dice that belongs to it; the verdicts are of reviewers `r0`, `r1`, ...
 pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) -> MetricRecord {
     MetricRecord {
         outcome: MetricOutcome {
@@ -43,7 +43,7 @@ pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) ->
             .iter()
             .enumerate()
             .map(|(i, verdict)| ReviewerVerdict {
-                reader: format!("r{i}"),
+                reviewer: format!("r{i}"),
                 verdict: *verdict,
                 reason: None,
                 review_order: None,

@@ -26,9 +26,9 @@ pub struct Group {
 /// Why a result is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// Readers failed it.
+    /// Reviewers failed it.
     Failed,
-    /// Readers contradict each other on it.
+    /// Reviewers contradict each other on it.
     Conflict,
     /// It is off the true alignment.
     OffTruth,
@@ -54,7 +54,7 @@ pub struct Shot {
     pub metrics: Vec<ThresholdMetric>,
     /// Its numbers in words.
     pub numbers: String,
-    /// What readers said of it, each with the reason and the note.
+    /// What reviewers said of it, each with the reason and the note.
     pub said: Vec<String>,
     /// Print, relief laid on it, and overlay as JPEG, as far as they could be drawn.
     pub pictures: [Option<Vec<u8>>; 3],
@@ -62,9 +62,9 @@ pub struct Shot {
     pub trouble: Option<String>,
 }
 
-/// What a reader said in one act, such as `lan: fail, angle (“upper half”)`.
+/// What a reviewer said in one act, such as `lan: fail, angle (“upper half”)`.
 pub fn said(event: &VerdictEvent) -> String {
-    let mut words = format!("{}: {}", event.reader, event.verdict);
+    let mut words = format!("{}: {}", event.reviewer, event.verdict);
     let reason = event.reason.filter(|_| event.verdict == Verdict::Fail);
     words.extend(reason.map(|reason| format!(", {}", reason.title())));
     let note = event.note.as_deref().filter(|note| !note.trim().is_empty());

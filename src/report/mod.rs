@@ -1,6 +1,6 @@
 //! From the catalog to a report as plain data, and from there to text, JSON, CSV, Markdown, LaTeX and HTML.
 //!
-//! [`gather()`] streams the pairs through a [`Tally`], [`agree()`] through counts of what readers say; everything else is
+//! [`gather()`] streams the pairs through a [`Tally`], [`agree()`] through counts of what reviewers say; everything else is
 //! pure.
 
 mod agree;
@@ -34,7 +34,7 @@ pub mod truth;
 mod truth_sums;
 mod warnings;
 
-pub use agree::{Agree, ReaderRecord, TwoReaders, agree};
+pub use agree::{Agree, ReviewerPair, ReviewerRecord, agree};
 pub use agreement::{Agreement, ENOUGH};
 pub use by_hand::{ByHand, HandErrors, HandMove};
 pub use controls::Caught;

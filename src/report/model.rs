@@ -36,7 +36,7 @@ pub struct Report {
     /// How the intervals of means and of the score comparisons were drawn; `None` without results, and above 100,000
     /// pairs, where chance hardly moves a mean.
     pub bootstrap: Option<Bootstrap>,
-    /// Accuracy against coverage, by readers and then by truth, for each metric that has confidences.
+    /// Accuracy against coverage, by reviewers and then by truth, for each metric that has confidences.
     pub coverage: Vec<Coverage>,
     /// Pairs without result because they failed, by class.
     pub failures: Vec<FailureGroup>,
@@ -45,7 +45,7 @@ pub struct Report {
     /// How long the stages took. Everything else is the same whenever the same results are told.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub times: Vec<StageTime>,
-    /// Planted faults that readers caught, where any were answered.
+    /// Planted faults that reviewers caught, where any were answered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub caught: Option<Caught>,
     /// What a reader of the table must know, in whole sentences.
@@ -72,13 +72,13 @@ pub struct Row {
     pub n: u64,
     /// Results with a verdict: passed, failed and unsure.
     pub read: u64,
-    /// Passed by every reader who could tell.
+    /// Passed by every reviewer who could tell.
     pub passed: u64,
-    /// Failed by every reader who could tell.
+    /// Failed by every reviewer who could tell.
     pub failed: u64,
-    /// Neither: nobody could tell, or readers contradict each other.
+    /// Neither: nobody could tell, or reviewers contradict each other.
     pub unsure: u64,
-    /// Those of the unsure on which readers contradict each other.
+    /// Those of the unsure on which reviewers contradict each other.
     pub conflicts: u64,
     /// Results without a verdict whose earlier result had one.
     pub stale: u64,
@@ -89,7 +89,7 @@ pub struct Row {
     /// Acc under three rules, where somebody has read.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rules: Option<Rules>,
-    /// Why readers failed the failed ones; a result counts for every reason given.
+    /// Why reviewers failed the failed ones; a result counts for every reason given.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failed_reasons: Vec<ReasonCount>,
     /// Mean structural similarity.
@@ -234,7 +234,7 @@ pub struct FailedPair {
 }
 
 impl Row {
-    /// Failed results for which readers gave a reason, or none.
+    /// Failed results for which reviewers gave a reason, or none.
     pub fn failed_for(&self, reason: Option<Reason>) -> u64 {
         let mut given = self.failed_reasons.iter();
         given

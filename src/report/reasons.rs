@@ -1,4 +1,4 @@
-//! Why readers failed results.
+//! Why reviewers failed results.
 
 use serde::Serialize;
 

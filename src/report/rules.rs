@@ -1,4 +1,4 @@
-//! What becomes of Acc when readers contradict each other: three ways to count, side by side.
+//! What becomes of Acc when reviewers contradict each other: three ways to count, side by side.
 
 use serde::Serialize;
 
@@ -11,14 +11,14 @@ use crate::domain::Verdict;
 /// Passed results under each rule, of those that passed or failed under it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Rules {
-    /// Results that two readers or more have passed or failed by themselves; where there are none, all rules say the
+    /// Results that two reviewers or more have passed or failed by themselves; where there are none, all rules say the
     /// same.
     pub told_twice: u64,
-    /// One reader who fails it is enough.
+    /// One reviewer who fails it is enough.
     pub either_fails: Rate,
-    /// Readers agree, or somebody settled it; a conflict that waits is left out. This is the Acc of the table.
+    /// Reviewers agree, or somebody settled it; a conflict that waits is left out. This is the Acc of the table.
     pub adjudicated: Rate,
-    /// All readers who could tell fail it.
+    /// All reviewers who could tell fail it.
     pub both_fail: Rate,
 }
 

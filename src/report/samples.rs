@@ -121,7 +121,7 @@ impl Default for Samples {
 }
 
 impl Samples {
-    /// Counts one pair in; `told` says whether a metric's result passed, where readers have told.
+    /// Counts one pair in; `told` says whether a metric's result passed, where reviewers have told.
     pub(super) fn add(
         &mut self,
         pair: &PairResults,

@@ -1,20 +1,20 @@
-//! What all readers together say of one result.
+//! What all reviewers together say of one result.
 
 use crate::catalog::{MetricRecord, ReviewerVerdict};
 use crate::domain::{ReviewOrder, Verdict};
 
-/// Where a result stands with its readers.
+/// Where a result stands with its reviewers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
     /// Nobody has read it or an earlier result.
     Unread,
     /// An earlier result was read, this one was not.
     Stale,
-    /// Every reader who could tell passed it, or who settled what they contradict each other on.
+    /// Every reviewer who could tell passed it, or who settled what they contradict each other on.
     Passed,
-    /// Every reader who could tell failed it, or who settled what they contradict each other on.
+    /// Every reviewer who could tell failed it, or who settled what they contradict each other on.
     Failed,
-    /// No reader could tell.
+    /// No reviewer could tell.
     Unsure,
     /// Some passed it and some failed it; it counts as unsure until they agree or somebody has settled it.
     Conflict,
@@ -49,7 +49,7 @@ impl Standing {
         }
     }
 
-    /// Right or wrong, where readers have told.
+    /// Right or wrong, where reviewers have told.
     pub const fn told(self) -> Option<bool> {
         match self {
             Self::Passed => Some(true),
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn readers_who_cannot_tell_leave_the_word_to_those_who_can() {
+    fn reviewers_who_cannot_tell_leave_the_word_to_those_who_can() {
         assert_eq!(
             standing(&[Verdict::Unsure, Verdict::Pass], 0),
             Standing::Passed

@@ -136,7 +136,7 @@ impl Tally {
         }
     }
 
-    /// Takes in the planted faults that readers caught; none where none were answered.
+    /// Takes in the planted faults that reviewers caught; none where none were answered.
     pub fn caught(&mut self, caught: Caught) {
         self.caught = (caught.all.n > 0).then_some(caught);
     }

@@ -81,7 +81,7 @@ fn uncounted_verdicts(row: &Row) -> Option<String> {
         (row.stale, "unread with a verdict for an older result"),
         (
             row.conflicts,
-            "unsure because readers contradict each other",
+            "unsure because reviewers contradict each other",
         ),
     ])?;
     Some(format!(

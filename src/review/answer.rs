@@ -79,7 +79,7 @@ impl AnswerBody {
             pair: card.pair.clone(),
             metric: None,
             verdict: self.verdict,
-            reader: desk.deck_options.reader.clone(),
+            reviewer: desk.deck_options.reviewer.clone(),
             reason: self.reason,
             note: note(self.note.as_deref())?,
             look: Look {

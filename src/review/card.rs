@@ -1,4 +1,4 @@
-//! A card: one picture that a reader judges, and what is known of it on our side only.
+//! A card: one picture that a reviewer judges, and what is known of it on our side only.
 
 use crate::catalog::Shown;
 use crate::domain::{
@@ -79,7 +79,7 @@ pub(super) struct Card {
     pub(super) pair: PairName,
     /// The results that look like this, of one metric or of several.
     pub(super) results: Vec<(ThresholdMetric, ContentHash)>,
-    /// What it is when it only tests the reader.
+    /// What it is when it only tests the reviewer.
     pub(super) control: Option<AttentionCheck>,
     /// What its picture is made from.
     pub(super) view: View,
@@ -103,7 +103,7 @@ impl Card {
     }
 
     /// The name in the page: from a key that is told to nobody.
-    pub(super) fn named(mut self, key: &ContentHash, reader: &str) -> Self {
+    pub(super) fn named(mut self, key: &ContentHash, reviewer: &str) -> Self {
         let kind = self.control.map_or("", |control| control.name());
         let seen = self.view.seen();
         let parts: [&[u8]; 5] = [
@@ -111,7 +111,7 @@ impl Card {
             seen.as_bytes(),
             kind.as_bytes(),
             self.pair.as_str().as_bytes(),
-            reader.as_bytes(),
+            reviewer.as_bytes(),
         ];
         let mut name = ContentHash::of(&parts.join(&0)).to_hex();
         name.truncate(24);
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn names_differ_by_what_is_shown_and_by_reader_and_tell_nothing() {
+    fn names_differ_by_what_is_shown_and_by_reviewer_and_tell_nothing() {
         let key = ContentHash::of(b"key");
         let plain = card(1);
         let mut repeat = plain.clone();

@@ -1,10 +1,10 @@
-//! Planted faults and repeats: how well a reader sees can be told only from what is known beforehand.
+//! Planted faults and repeats: how well a reviewer sees can be told only from what is known beforehand.
 
 use super::card::{Card, View};
 use crate::domain::{AttentionCheck, SeededRandom};
 use crate::raster::{DepthMap, Mask};
 
-/// How often readers are tested.
+/// How often reviewers are tested.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rates {
     /// Planted faults for each result, 0 to 1.
@@ -170,7 +170,7 @@ mod tests {
             });
             of_kind.count()
         };
-        for name in ["turned", "mirrored", "cut"] {
+        for name in ["turned", "mirrored", "threshold"] {
             assert!(count(name) > 20, "{name}: {}", count(name));
         }
         for fault in &faults {

@@ -22,7 +22,7 @@ const SCALES: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 pub(super) struct Start {
     /// Pixels of the depth map to pixels of the pictures, as the card shows it.
     view_from_depth: Affine2,
-    /// The same as the reader laid it before.
+    /// The same as the reviewer laid it before.
     laid: Option<Affine2>,
     /// Pixels of the pictures to the canvas on which the agreement is counted.
     canvas_from_view: Option<Affine2>,
@@ -59,7 +59,7 @@ impl From<Overlap> for Agreement {
     }
 }
 
-/// Where the correction of a card begins: at what was shown, or where the reader left it before.
+/// Where the correction of a card begins: at what was shown, or where the reviewer left it before.
 pub(super) fn start(card: &Card, drawn: &Drawn, before: Option<&ManualAlignment>) -> Start {
     let view = drawn.subject.view();
     let in_view = |map: &Affine2| view.from_print().after(map);
@@ -85,7 +85,7 @@ pub(super) fn agreement(drawn: &Drawn, print_from_depth: &Affine2) -> Agreement 
 /// What is told of a correction.
 #[derive(Debug, Serialize)]
 pub(super) struct Corrected {
-    reader: String,
+    reviewer: String,
     #[serde(flatten)]
     moved: HandMove,
     iou: f64,
@@ -102,7 +102,7 @@ impl Corrected {
         } = &card.view;
         let moved = HandMove::between(print_from_depth, &made.print_from_depth, *depth_px)?;
         Some(Self {
-            reader: made.reader.clone(),
+            reviewer: made.reviewer.clone(),
             moved,
             iou: made.iou,
             dice: made.dice,
@@ -110,7 +110,7 @@ impl Corrected {
     }
 }
 
-/// The newest correction by one reader of each thing seen, of those that hold.
+/// The newest correction by one reviewer of each thing seen, of those that hold.
 #[derive(Debug, Default)]
 pub(super) struct Corrections(BTreeMap<ContentHash, ManualAlignment>);
 
@@ -119,10 +119,10 @@ impl Corrections {
     ///
     /// # Errors
     /// When the catalog refuses.
-    pub(super) async fn read(catalog: &Catalog, reader: &str) -> Result<Self, CatalogError> {
+    pub(super) async fn read(catalog: &Catalog, reviewer: &str) -> Result<Self, CatalogError> {
         let stored = catalog.manual_alignments().await?.into_iter();
         let ours = stored.filter(|stored| {
-            stored.made.reader == reader
+            stored.made.reviewer == reviewer
                 && stored.holds
                 && stored.on_current_depth
                 && stored.undone_at.is_none()
@@ -179,7 +179,7 @@ pub(super) fn made(
     project: &Project,
     pair: &PairResults,
     card: &Card,
-    reader: &str,
+    reviewer: &str,
     print_from_depth: Affine2,
     agreement: &Agreement,
 ) -> Result<ManualAlignment, AlignedError> {
@@ -187,7 +187,7 @@ pub(super) fn made(
     Ok(ManualAlignment {
         event: String::new(),
         pair: card.pair.clone(),
-        reader: reader.to_owned(),
+        reviewer: reviewer.to_owned(),
         print_from_depth,
         print_from_mesh: aligned.print_from_mesh(&print_from_depth)?,
         mesh_hash: aligned.stage(Stage::Fit)?.mesh_hash,

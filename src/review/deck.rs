@@ -1,4 +1,4 @@
-//! The deck: all that a reader is to judge, in order, results that look the same as one card.
+//! The deck: all that a reviewer is to judge, in order, results that look the same as one card.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ const GOOD: f64 = 0.8;
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeckOptions {
     /// Who reads.
-    pub reader: String,
+    pub reviewer: String,
     /// Only results of these metrics; of all where there is none. A metric that is not asked for gets no verdict, also
     /// where it looks the same: the accuracy of such a choice would stand for nothing.
     pub metrics: Vec<ThresholdMetric>,
@@ -29,22 +29,22 @@ pub struct DeckOptions {
     pub order: ReviewOrder,
     /// Another seed, another order.
     pub seed: u64,
-    /// Only so many results, the same for all readers.
+    /// Only so many results, the same for all reviewers.
     pub sample: Option<usize>,
-    /// How often the reader is tested; not when conflicts are settled.
+    /// How often the reviewer is tested; not when conflicts are settled.
     pub rates: Rates,
 }
 
 impl DeckOptions {
-    /// Whether some cards are there to test the reader. Then no card tells its pair before it is answered: a pair met
+    /// Whether some cards are there to test the reviewer. Then no card tells its pair before it is answered: a pair met
     /// twice would give itself away.
-    pub(super) fn tests_the_reader(&self) -> bool {
+    pub(super) fn tests_the_reviewer(&self) -> bool {
         let Rates { controls, repeats } = self.rates;
         self.order != ReviewOrder::Adjudicate && (controls > 0.0 || repeats > 0.0)
     }
 }
 
-/// Cards in order, with what the reader has done.
+/// Cards in order, with what the reviewer has done.
 #[derive(Debug, Default)]
 pub(super) struct Deck {
     pub(super) cards: Vec<Arc<Card>>,
@@ -52,7 +52,7 @@ pub(super) struct Deck {
 }
 
 impl Deck {
-    /// Reads the deck of a reader as the catalog stands.
+    /// Reads the deck of a reviewer as the catalog stands.
     ///
     /// # Errors
     /// When the catalog refuses, or a thread is lost.
@@ -62,19 +62,19 @@ impl Deck {
         options: &DeckOptions,
     ) -> Result<Self, DeckError> {
         let key = catalog.review_key().await?;
-        let lots = SeededRandom::new(options.seed, &options.reader);
+        let lots = SeededRandom::new(options.seed, &options.reviewer);
         let mut cards = all_cards(catalog, options).await?;
         if let Some(most) = options.sample {
             order::sample(&mut cards, options.order, options.seed, most);
         }
         order::sort(&mut cards, options.order, &lots);
-        if options.tests_the_reader() {
+        if options.tests_the_reviewer() {
             let chosen = control::chosen(&cards, &options.rates, &lots);
             let faults = faults(catalog, project, chosen, &lots).await?;
             cards = control::mixed(cards, faults, &options.rates, &lots);
         }
         let cards = cards.into_iter();
-        let cards = cards.map(|card| Arc::new(card.named(&key, &options.reader)));
+        let cards = cards.map(|card| Arc::new(card.named(&key, &options.reviewer)));
         Ok(Self {
             cards: cards.collect(),
             known: Known::read(catalog, options).await?,
@@ -118,7 +118,7 @@ fn cards_of(pair: &PairResults, options: &DeckOptions) -> Vec<Card> {
         |record: &&MetricRecord| asked.is_empty() || asked.contains(&record.outcome.metric);
     // What looks the same and nobody contradicts another on gets no word: such a choice would stand for nothing either.
     let is_asked = |record: &&MetricRecord| {
-        options.order != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reader)
+        options.order != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reviewer)
     };
     let groups = alike(pair.metrics.iter().filter(is_of_metric).filter(is_asked));
     let card = |group: Vec<&MetricRecord>| {
@@ -165,12 +165,12 @@ fn is_good(record: &MetricRecord) -> bool {
 }
 
 /// Whether others contradict each other on it and nobody else has settled it. Who is party to it cannot settle it.
-fn is_open_conflict(record: &MetricRecord, reader: &str) -> bool {
+fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
     let (words, read) = split(record);
-    let is_party = read.iter().any(|read| read.reader == reader);
+    let is_party = read.iter().any(|read| read.reviewer == reviewer);
     let is_settled = words
         .iter()
-        .any(|word| word.reader != reader && word.verdict != Verdict::Unsure);
+        .any(|word| word.reviewer != reviewer && word.verdict != Verdict::Unsure);
     contradict(&read) && !is_party && !is_settled
 }
 
@@ -205,7 +205,7 @@ mod tests {
 
     fn options(order: ReviewOrder, controls: f64, repeats: f64) -> DeckOptions {
         DeckOptions {
-            reader: "ana".to_owned(),
+            reviewer: "ana".to_owned(),
             metrics: Vec::new(),
             order,
             seed: 1,
@@ -214,9 +214,9 @@ mod tests {
         }
     }
 
-    fn read(reader: &str, verdict: Verdict, order: ReviewOrder) -> ReviewerVerdict {
+    fn read(reviewer: &str, verdict: Verdict, order: ReviewOrder) -> ReviewerVerdict {
         ReviewerVerdict {
-            reader: reader.to_owned(),
+            reviewer: reviewer.to_owned(),
             verdict,
             reason: None,
             review_order: Some(order),
@@ -224,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn a_conflict_is_for_a_third_reader_until_one_has_settled_it() {
+    fn a_conflict_is_for_a_third_reviewer_until_one_has_settled_it() {
         let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &[]);
         record.verdicts = vec![read("ana", Verdict::Pass, ReviewOrder::Random)];
         assert!(!is_open_conflict(&record, "chi"));
@@ -258,8 +258,9 @@ mod tests {
     }
 
     #[test]
-    fn a_deck_tests_the_reader_by_faults_or_repeats_but_not_over_conflicts() {
-        let tests = |order, controls, repeats| options(order, controls, repeats).tests_the_reader();
+    fn a_deck_tests_the_reviewer_by_faults_or_repeats_but_not_over_conflicts() {
+        let tests =
+            |order, controls, repeats| options(order, controls, repeats).tests_the_reviewer();
         assert!(
             tests(ReviewOrder::Random, 0.04, 0.0) && tests(ReviewOrder::LeastConfident, 0.0, 0.05)
         );

@@ -1,4 +1,4 @@
-//! What the handlers share: the catalog, the reader, the cards that were dealt.
+//! What the handlers share: the catalog, the reviewer, the cards that were dealt.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -12,7 +12,7 @@ use crate::catalog::Catalog;
 use crate::domain::UnixMillis;
 use crate::store::Project;
 
-/// One reader's desk.
+/// One reviewer's desk.
 #[derive(Debug)]
 pub(super) struct Desk {
     pub(super) catalog: Catalog,

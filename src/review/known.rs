@@ -1,4 +1,4 @@
-//! What a reader has done so far, card by card: answers and corrections by hand.
+//! What a reviewer has done so far, card by card: answers and corrections by hand.
 
 use std::collections::BTreeMap;
 
@@ -7,12 +7,12 @@ use super::correction::Corrections;
 use super::deck::DeckOptions;
 use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, ManualAlignment};
 
-/// A reader's newest answers and corrections.
+/// A reviewer's newest answers and corrections.
 #[derive(Debug, Default)]
 pub(super) struct Known {
     answers: BTreeMap<AnsweredOn, Answer>,
     corrections: Corrections,
-    /// Whether the reader may know a pair again, because no card is there to test the reader.
+    /// Whether the reviewer may know a pair again, because no card is there to test the reviewer.
     is_open: bool,
 }
 
@@ -25,12 +25,12 @@ impl Known {
         catalog: &Catalog,
         options: &DeckOptions,
     ) -> Result<Self, CatalogError> {
-        let answers = catalog.answers(&options.reader).await?.into_iter();
+        let answers = catalog.answers(&options.reviewer).await?.into_iter();
         Ok(Self {
             // Oldest first, so that the newest stays.
             answers: answers.map(|answer| (answer.on, answer)).collect(),
-            corrections: Corrections::read(catalog, &options.reader).await?,
-            is_open: !options.tests_the_reader(),
+            corrections: Corrections::read(catalog, &options.reviewer).await?,
+            is_open: !options.tests_the_reviewer(),
         })
     }
 

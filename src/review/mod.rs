@@ -1,7 +1,7 @@
-//! The review page: a server on this machine where one reader judges results and lays reliefs by hand.
+//! The review page: a server on this machine where one reviewer judges results and lays reliefs by hand.
 //!
 //! [`open`] binds and reads the deck; [`Review::serve`] answers until it is told to stop. Every answer is on the disk
-//! before its sender hears of it. What only tests the reader goes every step of the way as a result does.
+//! before its sender hears of it. What only tests the reviewer goes every step of the way as a result does.
 
 mod answer;
 mod assets;
@@ -53,7 +53,7 @@ pub struct ReviewOptions {
     pub keys: BTreeMap<String, String>,
     /// How long a picture is shown at least before a verdict is taken, milliseconds.
     pub min_view_ms: u64,
-    /// Where to listen; port 0 takes that of the project and the reader, and any where that is taken.
+    /// Where to listen; port 0 takes that of the project and the reviewer, and any where that is taken.
     pub listen: SocketAddr,
     /// Limits on the print images.
     pub limits: raster::Limits,
@@ -100,9 +100,9 @@ pub struct Review {
 pub struct Cards {
     /// Pictures in the deck.
     pub all: usize,
-    /// Of these, those of results; the others test the reader.
+    /// Of these, those of results; the others test the reviewer.
     pub results: usize,
-    /// Those that the reader has answered.
+    /// Those that the reviewer has answered.
     pub answered: usize,
 }
 
@@ -119,7 +119,7 @@ pub async fn open(
         address: options.listen,
         source,
     };
-    let usual = usual_port(&project, &options.deck.reader);
+    let usual = usual_port(&project, &options.deck.reviewer);
     let listener = listen(options.listen, usual).await.map_err(refused)?;
     let address = listener.local_addr().map_err(refused)?;
     let desk = Desk {
@@ -190,11 +190,11 @@ impl Review {
 /// The first of the ports that are nobody's, and how many there are (RFC 6335).
 const FREE_PORTS: [u16; 2] = [49_152, 16_384];
 
-/// The same for a project and a reader every time: what a browser keeps for a page that is gone, it keeps for its port.
-fn usual_port(project: &Project, reader: &str) -> u16 {
+/// The same for a project and a reviewer every time: what a browser keeps for a page that is gone, it keeps for its port.
+fn usual_port(project: &Project, reviewer: &str) -> u16 {
     let dir = project.dir();
     let dir = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());
-    let whose = format!("{}\0{reader}", dir.display());
+    let whose = format!("{}\0{reviewer}", dir.display());
     let [first, second, ..] = *ContentHash::of(whose.as_bytes()).as_bytes();
     FREE_PORTS[0] + u16::from_be_bytes([first, second]) % FREE_PORTS[1]
 }

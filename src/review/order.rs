@@ -1,4 +1,4 @@
-//! In which order cards come: by lot from a seed and the reader's name, or the most doubtful first.
+//! In which order cards come: by lot from a seed and the reviewer's name, or the most doubtful first.
 
 use crate::domain::{ReviewOrder, SeededRandom};
 
@@ -50,24 +50,24 @@ mod tests {
     use crate::domain::{ReviewOrder, SeededRandom};
     use crate::review::card::fixture::card;
 
-    fn order(order: ReviewOrder, seed: u64, reader: &str) -> Vec<String> {
+    fn order(order: ReviewOrder, seed: u64, reviewer: &str) -> Vec<String> {
         let mut cards: Vec<_> = (0..50).map(card).collect();
         for (i, card) in cards.iter_mut().enumerate() {
             card.risk = i as f64;
         }
-        sort(&mut cards, order, &SeededRandom::new(seed, reader));
+        sort(&mut cards, order, &SeededRandom::new(seed, reviewer));
         cards.iter().map(|card| card.pair.to_string()).collect()
     }
 
     #[test]
-    fn two_readers_get_the_same_sample_in_orders_of_their_own() {
-        let read = |reader: &str| {
+    fn two_reviewers_get_the_same_sample_in_orders_of_their_own() {
+        let read = |reviewer: &str| {
             let mut cards: Vec<_> = (0..50).map(card).collect();
             sample(&mut cards, ReviewOrder::Random, 1, 10);
             sort(
                 &mut cards,
                 ReviewOrder::Random,
-                &SeededRandom::new(1, reader),
+                &SeededRandom::new(1, reviewer),
             );
             let names = cards.iter().map(|card| card.pair.to_string());
             names.collect::<Vec<_>>()
@@ -81,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn order_is_by_seed_and_reader() {
+    fn order_is_by_seed_and_reviewer() {
         let first = order(ReviewOrder::Random, 1, "ana");
         assert_eq!(first, order(ReviewOrder::Random, 1, "ana"));
         assert_ne!(first, order(ReviewOrder::Random, 2, "ana"));

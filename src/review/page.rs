@@ -61,7 +61,7 @@ pub(super) fn refused(language: Language) -> Markup {
 
 /// The review page.
 pub(super) fn review(desk: &Desk, language: Language) -> Markup {
-    let title = format!("{} · {}", language.say("title"), desk.deck_options.reader);
+    let title = format!("{} · {}", language.say("title"), desk.deck_options.reviewer);
     let head = html! {
         link rel="stylesheet" href="/assets/review.css";
         link rel="icon" href="/assets/icon.svg";
@@ -85,7 +85,7 @@ pub(super) fn review(desk: &Desk, language: Language) -> Markup {
             }
         }
         (verdict_bar(language))
-        (help(language, desk.deck_options.tests_the_reader()))
+        (help(language, desk.deck_options.tests_the_reviewer()))
         (jump(language))
         p #live .quiet aria-live="polite" {}
     };
@@ -108,7 +108,7 @@ fn top(desk: &Desk, language: Language) -> Markup {
             span.gap {}
             span #pace {}
             span #saved .saved role="status" { (language.say("saved")) }
-            span { (language.say("reader")) ": " b { (desk.deck_options.reader) } }
+            span { (language.say("reviewer")) ": " b { (desk.deck_options.reviewer) } }
             a #language href={ "/?lang=" (other.name()) } hreflang=(other.name()) lang=(other.name()) {
                 (language.say("other_language"))
             }
@@ -199,7 +199,7 @@ fn verdict(action: &'static str, sign: &str, language: Language) -> Markup {
     }
 }
 
-fn help(language: Language, tests_the_reader: bool) -> Markup {
+fn help(language: Language, tests_the_reviewer: bool) -> Markup {
     let list = |actions: &[&'static str]| {
         html! {
             dl {
@@ -227,7 +227,7 @@ fn help(language: Language, tests_the_reader: bool) -> Markup {
                 }
             }
             p { (language.say("by_hand")) ": " (language.say("correct_hint")) }
-            @if tests_the_reader { p { (language.say("tested")) } }
+            @if tests_the_reviewer { p { (language.say("tested")) } }
         }
     }
 }

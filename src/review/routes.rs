@@ -143,7 +143,7 @@ async fn boot(State(desk): State<Arc<Desk>>) -> Json<Value> {
 
 async fn deck(State(desk): State<Arc<Desk>>) -> Answered {
     let deck = desk.deal().await?;
-    let hides_pairs = desk.deck_options.tests_the_reader();
+    let hides_pairs = desk.deck_options.tests_the_reviewer();
     let items = deck.cards.iter().map(|card| {
         let answer = deck.known.answer(card).map(|answer| {
             json!({
@@ -204,15 +204,15 @@ async fn about(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answere
     })))
 }
 
-/// What other readers said of a card's results.
+/// What other reviewers said of a card's results.
 async fn others(desk: &Desk, card: &Card) -> Result<Vec<Value>, CatalogError> {
     let log = desk.catalog.verdict_log(Some(&card.pair)).await?;
     let is_on_card = |hash| card.results.iter().any(|(_, of_card)| *of_card == hash);
     let mut said: Vec<Value> = Vec::new();
     for event in log {
-        let is_other = event.reader != desk.deck_options.reader && event.undone_at.is_none();
+        let is_other = event.reviewer != desk.deck_options.reviewer && event.undone_at.is_none();
         let line = json!({
-            "reader": event.reader, "verdict": event.verdict, "reason": event.reason, "note": event.note,
+            "reviewer": event.reviewer, "verdict": event.verdict, "reason": event.reason, "note": event.note,
         });
         if is_other && is_on_card(event.result_hash) && !said.contains(&line) {
             said.push(line);
@@ -246,8 +246,8 @@ async fn undo(
     body: Result<Json<UndoBody>, JsonRejection>,
 ) -> Answered {
     let Json(body) = body?;
-    let reader = &desk.deck_options.reader;
-    let taken = desk.catalog.take_back(&body.event, reader, (desk.now)());
+    let reviewer = &desk.deck_options.reviewer;
+    let taken = desk.catalog.take_back(&body.event, reviewer, (desk.now)());
     taken.await?;
     Ok(Json(json!({ "undone": body.event })))
 }
@@ -266,12 +266,12 @@ async fn align(
         .pair(&card.pair)
         .await?
         .ok_or(Trouble::NoCard)?;
-    let reader = &desk.deck_options.reader;
+    let reviewer = &desk.deck_options.reviewer;
     let mut made = correction::made(
         &desk.project,
         &found.results,
         &card,
-        reader,
+        reviewer,
         map,
         &agreement,
     )?;

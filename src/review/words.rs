@@ -67,7 +67,7 @@ type Row = (&'static str, &'static str, &'static str);
 
 const WORDS: &[Row] = &[
     ("title", "Review", "Duyệt"),
-    ("reader", "Reader", "Người đọc"),
+    ("reviewer", "Reviewer", "Người đọc"),
     ("skip", "To the stage", "Đến khung chính"),
     (
         "no_script",
@@ -169,14 +169,14 @@ const WORDS: &[Row] = &[
     ),
     (
         "corrected_by",
-        "corrected by hand by {reader}: turned {deg}°, shifted {px} px, scaled {scale}{mirrored}, IoU {iou}",
-        "{reader} đã chỉnh tay: xoay {deg}°, dời {px} px, cỡ {scale}{mirrored}, IoU {iou}",
+        "corrected by hand by {reviewer}: turned {deg}°, shifted {px} px, scaled {scale}{mirrored}, IoU {iou}",
+        "{reviewer} đã chỉnh tay: xoay {deg}°, dời {px} px, cỡ {scale}{mirrored}, IoU {iou}",
     ),
     ("and_mirrored", ", mirrored", ", lật gương"),
     ("iou", "IoU", "IoU"),
     ("dice", "Dice", "Dice"),
     ("metrics", "Threshold by", "Ngưỡng theo"),
-    ("others", "Other readers", "Người đọc khác"),
+    ("others", "Other reviewers", "Người đọc khác"),
     (
         "answer_first",
         "Answer first; then it is told",
@@ -190,7 +190,7 @@ const WORDS: &[Row] = &[
     ("picture_n", "Picture {n}", "Hình {n}"),
     (
         "tested",
-        "Some pictures test the reader: results spoilt on purpose, and some that come a second time. \
+        "Some pictures test the reviewer: results spoilt on purpose, and some that come a second time. \
          So there are more pictures than results, and a picture tells its pair only when it is answered (I).",
         "Một số hình dùng để thử người đọc: kết quả bị làm hỏng có chủ ý, và kết quả xuất hiện lần thứ hai. \
          Vì vậy số hình nhiều hơn số kết quả, và mã của cặp chỉ hiện sau khi trả lời (I).",

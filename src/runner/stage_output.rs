@@ -105,7 +105,7 @@ pub fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
     ContentHash::of(whole.to_string().as_bytes())
 }
 
-/// The metrics with the hashes that verdicts are bound to: over the numbers and the pictures a reader sees.
+/// The metrics with the hashes that verdicts are bound to: over the numbers and the pictures a reviewer sees.
 pub(super) fn metric_results(
     metrics: &[MetricOutcome],
     files: &ArtifactSet,
@@ -137,7 +137,7 @@ pub(super) fn metric_results(
         .collect()
 }
 
-/// The numbers that a reader judges: all but the confidence, which may be calibrated anew under the same alignment.
+/// The numbers that a reviewer judges: all but the confidence, which may be calibrated anew under the same alignment.
 fn judged(outcome: &MetricOutcome) -> Value {
     let mut numbers = json!(outcome);
     if let Value::Object(fields) = &mut numbers {

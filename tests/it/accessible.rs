@@ -77,7 +77,7 @@ fn axe_finds_nothing_serious_in_a_report() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     for (pair, verdict) in [("upright-0001", "fail"), ("upright-0002", "pass")] {
-        let set = ["verdict", "set", pair, verdict, "--reader", "lan"];
+        let set = ["verdict", "set", pair, verdict, "--reviewer", "lan"];
         mocban(project.dir(), &set).expect(0);
     }
     let file = project.dir().join("report.html");

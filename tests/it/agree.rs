@@ -1,4 +1,4 @@
-//! `agree` and what `report` says of readers, on verdicts that came through the page and the command line.
+//! `agree` and what `report` says of reviewers, on verdicts that came through the page and the command line.
 
 use mocban::store::Project;
 use serde_json::{Value, json};
@@ -18,14 +18,14 @@ fn judge_all(page: &Page, deck: &[Value], verdict: &str) {
     }
 }
 
-fn set(project: &Project, pair: &Value, verdict: &str, reader: &str) {
+fn set(project: &Project, pair: &Value, verdict: &str, reviewer: &str) {
     let pair = pair.as_str().expect("a name");
-    let args = ["verdict", "set", pair, verdict, "--reader", reader];
+    let args = ["verdict", "set", pair, verdict, "--reviewer", reviewer];
     mocban(project.dir(), &args).expect(0);
 }
 
 /// `lan` fails all on the page, faults and repeats too; `minh` passes all pairs but the first.
-fn two_readers(project: &Project) -> Vec<Value> {
+fn reviewer_pairs(project: &Project) -> Vec<Value> {
     let page = Page::open(project, "lan", &["--controls", "50", "--repeats", "20"]);
     let deck = page.deck();
     judge_all(&page, &deck, "fail");
@@ -38,11 +38,11 @@ fn two_readers(project: &Project) -> Vec<Value> {
 }
 
 #[test]
-fn two_readers_are_compared_and_tested_and_a_third_settles() {
+fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     assert_eq!(
-        told(&project, &["agreement", "--json"])["readers"],
+        told(&project, &["agreement", "--json"])["reviewers"],
         json!([])
     );
     let pairs = two_readers(&project);
@@ -60,7 +60,7 @@ fn two_readers_are_compared_and_tested_and_a_third_settles() {
     assert!(two["kappa"].as_f64().expect("chance is not sure").abs() < 1e-12);
     assert_eq!(two["enough"], json!(n >= 30));
     assert_eq!(count(&found["conflicts"]), n - agreed);
-    let [lan, minh] = [0, 1].map(|i| &found["readers"][i]);
+    let [lan, minh] = [0, 1].map(|i| &found["reviewers"][i]);
     assert_eq!((count(&lan["read"]), count(&minh["read"])), (n, n));
     let (caught, repeats) = (&lan["caught"], &lan["repeats"]);
     assert!(count(&caught["n"]) > 5 && count(&repeats["n"]) > 0, "{lan}");
@@ -116,8 +116,8 @@ fn report_tells_the_same(project: &Project, caught: &Value) {
         .expect(0)
         .out;
     for part in [
-        "Failed by readers",
-        "Readers contradict each other",
+        "Failed by reviewers",
+        "Reviewers contradict each other",
         "By lot",
         "Planted faults",
     ] {

@@ -98,7 +98,7 @@ fn verdicts_that_an_export_wrote_are_taken_into_another_project() {
         .and_then(|line| serde_json::from_str(line).ok())
         .expect("a line");
     let pair = first["pair"].as_str().expect("a name");
-    let undone = ["verdict", "set", pair, "fail", "--reader", "lan"];
+    let undone = ["verdict", "set", pair, "fail", "--reviewer", "lan"];
     at(&project, &undone).expect(0);
     at(&project, &["verdict", "undo"]).expect(0);
     let out = dir.path().join("out");
@@ -123,7 +123,7 @@ fn verdicts_that_an_export_wrote_are_taken_into_another_project() {
             "metric",
             "result_hash",
             "verdict",
-            "reader",
+            "reviewer",
             "reason",
             "note",
         ];

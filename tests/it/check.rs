@@ -21,7 +21,14 @@ static DONE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     mocban(dir.path(), &[&demo[..], &small].concat()).expect(0);
     let project = Project::open(&dir.path().join("done")).expect("a project");
     at(&project, &["run"]).expect(0);
-    let set = ["verdict", "set", "upright-0000", "pass", "--reader", "lan"];
+    let set = [
+        "verdict",
+        "set",
+        "upright-0000",
+        "pass",
+        "--reviewer",
+        "lan",
+    ];
     at(&project, &set).expect(0);
     dir
 });

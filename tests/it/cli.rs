@@ -81,7 +81,7 @@ fn help_is_data_and_usage_errors_are_not() {
     mocban(dir.path(), &["run", "--jobs", "0"]).expect(2);
     mocban(
         dir.path(),
-        &["verdict", "set", "a", "maybe", "--reader", "lan"],
+        &["verdict", "set", "a", "maybe", "--reviewer", "lan"],
     )
     .expect(2);
 }
@@ -98,7 +98,7 @@ fn directory_without_project_is_code_10_with_a_way_on() {
         &["check", "--repair"],
         &["backup", "b.sqlite"],
         &["verdict", "log"],
-        &["review", "--reader", "lan"],
+        &["review", "--reviewer", "lan"],
         &["agreement"],
         &["report"],
         &["export", "-o", "out"],
@@ -288,7 +288,16 @@ fn unknown_pair_is_code_4_with_the_nearest_ids() {
     let refused = mocban(dir.path(), &["-C", "p", "show", "aa"]).expect(4);
     assert_eq!(refused.err, "error: there is no pair aa; near are a\n");
     mocban(dir.path(), &["-C", "p", "run", "a/b"]).expect(4);
-    let set = ["-C", "p", "verdict", "set", "a", "pass", "--reader", "lan"];
+    let set = [
+        "-C",
+        "p",
+        "verdict",
+        "set",
+        "a",
+        "pass",
+        "--reviewer",
+        "lan",
+    ];
     let refused = mocban(dir.path(), &set).expect(4);
     assert!(refused.err.contains("no result"), "{}", refused.err);
     mocban(dir.path(), &["-C", "p", "verdict", "undo"]).expect(4);
@@ -298,7 +307,7 @@ fn unknown_pair_is_code_4_with_the_nearest_ids() {
 fn refused_verdict_file_records_nothing() {
     let dir = imported();
     let file = dir.path().join("verdicts.csv");
-    std::fs::write(&file, "pair,verdict,reader\na,pass,lan\nz,pass,lan\n").expect("written");
+    std::fs::write(&file, "pair,verdict,reviewer\na,pass,lan\nz,pass,lan\n").expect("written");
     let refused = mocban(
         dir.path(),
         &["-C", "p", "verdict", "import", "verdicts.csv"],

@@ -247,7 +247,7 @@ const BACKUP: Deed = Deed {
         }
         std::fs::write(&settings, "[run]\nworkers = 2\n").expect("written");
         let set = ["-C", "p", "verdict", "set", "upright-0000", "pass"];
-        mocban(root, &[&set[..], &["--reader", "lan"]].concat()).expect(0);
+        mocban(root, &[&set[..], &["--reviewer", "lan"]].concat()).expect(0);
     },
     command: backup,
     after: |_, root, done| {

@@ -248,7 +248,7 @@ fn verdicts_are_read_as_spreadsheets_write_them() {
     let dir = empty();
     let project = done(dir.path());
     let file = project.dir().join("verdicts.csv");
-    let text = "pair;verdict;reader;note\r\nupright-0001;fail;Trần;\"1,5 px; nghiêng\"\r\n";
+    let text = "pair;verdict;reviewer;note\r\nupright-0001;fail;Trần;\"1,5 px; nghiêng\"\r\n";
     let utf16: Vec<u8> = "\u{feff}"
         .encode_utf16()
         .chain(text.encode_utf16())
@@ -264,7 +264,7 @@ fn verdicts_are_read_as_spreadsheets_write_them() {
         let last: serde_json::Value =
             serde_json::from_str(log.lines().last().expect("a line")).expect("JSON");
         assert_eq!(
-            (&last["reader"], &last["note"]),
+            (&last["reviewer"], &last["note"]),
             (&"Trần".into(), &"1,5 px; nghiêng".into())
         );
         at(&project, &["verdict", "undo"]).expect(0);

@@ -72,14 +72,21 @@ fn verdicts_count_until_they_are_taken_back(at: &dyn Fn(&[&str]) -> crate::cli::
     assert_eq!(acc(), Value::Null);
     at(&["report", "--require-complete"]).expect(21);
     at(&[
-        "verdict", "set", id, "fail", "--reader", "lan", "--reason", "angle",
+        "verdict",
+        "set",
+        id,
+        "fail",
+        "--reviewer",
+        "lan",
+        "--reason",
+        "angle",
     ])
     .expect(0);
     assert_eq!(acc(), 0.0);
     at(&["report", "--fail-under", "0.5"]).expect(20);
-    at(&["verdict", "undo", "--reader", "lan"]).expect(0);
+    at(&["verdict", "undo", "--reviewer", "lan"]).expect(0);
     assert_eq!(acc(), Value::Null);
-    at(&["verdict", "set", id, "pass", "--reader", "lan"]).expect(0);
+    at(&["verdict", "set", id, "pass", "--reviewer", "lan"]).expect(0);
     assert_eq!(acc(), 1.0);
     at(&["report", "--require-complete", "--fail-under", "0.98"]).expect(0);
     let log = at(&["verdict", "log", id, "--json"]).expect(0);
@@ -119,7 +126,7 @@ fn the_papers_preset_keeps_to_its_three_metrics() {
     assert_eq!(metrics(&shown["metrics"]), paper);
     assert!(shown["metrics"][0]["confidence"].is_null());
 
-    at(&["verdict", "set", id, "pass", "--reader", "lan"]).expect(0);
+    at(&["verdict", "set", id, "pass", "--reviewer", "lan"]).expect(0);
     let report = at(&["report", "--require-complete", "--json"]).expect(0);
     let report = report.json();
     assert_eq!(metrics(&report["rows"]), paper);

@@ -74,9 +74,9 @@ impl std::ops::Deref for Page {
 }
 
 impl Page {
-    /// Starts the server of a reader, without going in.
-    pub(crate) fn start(project: &Project, reader: &str, args: &[&str]) -> Self {
-        let mut command = review(project, reader);
+    /// Starts the server of a reviewer, without going in.
+    pub(crate) fn start(project: &Project, reviewer: &str, args: &[&str]) -> Self {
+        let mut command = review(project, reviewer);
         let mut child = command
             .args(args)
             .stdout(Stdio::piped())
@@ -99,8 +99,8 @@ impl Page {
     }
 
     /// Starts the server and goes in as a browser does.
-    pub(crate) fn open(project: &Project, reader: &str, args: &[&str]) -> Self {
-        let mut page = Self::start(project, reader, args);
+    pub(crate) fn open(project: &Project, reviewer: &str, args: &[&str]) -> Self {
+        let mut page = Self::start(project, reviewer, args);
         let start = page.url["http://".len() + page.host.len()..].to_owned();
         let reply = page.get(&start);
         let cookie = reply.header("set-cookie").expect("a cookie");
@@ -173,10 +173,10 @@ impl Drop for Page {
     }
 }
 
-fn review(project: &Project, reader: &str) -> Command {
+fn review(project: &Project, reviewer: &str) -> Command {
     let mut command = binary();
     command.arg("-C").arg(project.dir());
-    command.args(["--json", "review", "--no-open", "--reader", reader]);
+    command.args(["--json", "review", "--no-open", "--reviewer", reviewer]);
     command
 }
 

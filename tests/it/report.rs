@@ -340,7 +340,7 @@ async fn verdicts_make_acc(world: &World) {
         pair: pair.clone(),
         metric: None,
         verdict,
-        reader: "lan".to_owned(),
+        reviewer: "lan".to_owned(),
         reason: None,
         note: None,
         look: Look::default(),

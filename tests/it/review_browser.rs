@@ -1,4 +1,4 @@
-//! The review page in a browser: by keys only, over a reload, with two readers, without the server, by hand.
+//! The review page in a browser: by keys only, over a reload, with two reviewers, without the server, by hand.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use crate::page::{Page, read_project};
 /// No planted cards, so that what is pressed is what is logged; no least time, so that the test is not made to wait.
 pub(crate) const PLAIN: [&str; 6] = ["--controls", "0", "--repeats", "0", "--min-view-ms", "0"];
 
-/// Opens a reader's page in a tab and waits for its first card.
+/// Opens a reviewer's page in a tab and waits for its first card.
 pub(crate) fn enter<'a>(browser: &'a Browser, page: &Page, size: [u32; 2]) -> Tab<'a> {
     let tab = browser.tab(size[0], size[1]);
     tab.open(&page.url);
@@ -55,14 +55,15 @@ fn saved(tab: &Tab<'_>) {
     tab.wait("document.getElementById('saved').textContent.includes('✓')");
 }
 
-/// The acts that stand, of a reader: the verdict and the reason by number of the act.
-fn standing(project: &Project, reader: &str) -> BTreeMap<i64, (String, Option<String>)> {
+/// The acts that stand, of a reviewer: the verdict and the reason by number of the act.
+fn standing(project: &Project, reviewer: &str) -> BTreeMap<i64, (String, Option<String>)> {
     let told = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
     let events = told
         .out
         .lines()
         .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
-    let events = events.filter(|event| event["reader"] == reader && event["undone_at"].is_null());
+    let events =
+        events.filter(|event| event["reviewer"] == reviewer && event["undone_at"].is_null());
     let text = |value: &Value| value.as_str().map(str::to_owned);
     events
         .map(|event| {
@@ -193,13 +194,13 @@ fn mode_key(mode: &str) -> &'static str {
 }
 
 #[test]
-fn two_readers_judge_at_once() {
+fn two_reviewers_judge_at_once() {
     let (Some(first), Some(second)) = (Browser::start(), Browser::start()) else {
         return;
     };
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let pages = ["lan", "minh"].map(|reader| Page::start(&project, reader, &PLAIN));
+    let pages = ["lan", "minh"].map(|reviewer| Page::start(&project, reviewer, &PLAIN));
     let tabs = [(&first, &pages[0]), (&second, &pages[1])];
     let tabs = tabs.map(|(browser, page)| enter(browser, page, [1024, 768]));
     for _ in 0..12 {
@@ -207,12 +208,12 @@ fn two_readers_judge_at_once() {
         judge(&tabs[1], "Digit2");
     }
     tabs.iter().for_each(saved);
-    for (reader, verdict) in [("lan", "pass"), ("minh", "fail")] {
-        let acts = standing(&project, reader);
-        assert_eq!(acts.len(), 12, "{reader}");
+    for (reviewer, verdict) in [("lan", "pass"), ("minh", "fail")] {
+        let acts = standing(&project, reviewer);
+        assert_eq!(acts.len(), 12, "{reviewer}");
         assert!(acts.values().all(|(said, _)| said == verdict), "{acts:?}");
     }
-    // The second reader's page says nothing of the first one's answers.
+    // The second reviewer's page says nothing of the first one's answers.
     let history = tabs[1].eval("document.getElementById('history').textContent");
     assert!(!history.to_string().contains('✓'), "{history}");
 }

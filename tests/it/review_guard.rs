@@ -231,7 +231,7 @@ fn other_methods_and_senseless_answers_are_refused() {
         ("event", json!(""), 422),
         ("angle_read_deg", json!(900), 422),
         ("note", json!("x".repeat(2001)), 422),
-        ("reader", json!("somebody else"), 422),
+        ("reviewer", json!("somebody else"), 422),
     ] {
         let mut body = good.clone();
         body[field] = value;
@@ -259,7 +259,7 @@ fn every_answer_carries_the_policy() {
 }
 
 #[test]
-fn a_readers_name_is_text_and_no_markup() {
+fn a_reviewers_name_is_text_and_no_markup() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let name = "<script>alert('lan')</script>&\"";
     let page = Page::open(&read_project(&dir), name, &[]);

@@ -81,7 +81,7 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
             continue;
         }
         let by_hand = &line["by_hand"];
-        assert_eq!(by_hand["reader"], "lan");
+        assert_eq!(by_hand["reviewer"], "lan");
         assert_eq!(by_hand["print_from_mesh"], json!(second.print_from_mesh));
         assert_ne!(by_hand["print_from_mesh"], line["print_from_mesh"]);
     }
@@ -98,7 +98,7 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
     let shown = mocban(project.dir(), &["--json", "show", pair])
         .expect(0)
         .json();
-    assert_eq!(shown["by_hand"][1]["reader"], "lan");
+    assert_eq!(shown["by_hand"][1]["reviewer"], "lan");
     let words = mocban(project.dir(), &["show", pair]).expect(0).out;
     assert!(words.contains("lan: turned 0.0°, shifted"), "{words}");
     let undone = page

@@ -14,7 +14,7 @@ use crate::cli::mocban;
 use crate::page::{Page, Site, answer, read_project};
 use crate::sizes::asked;
 
-/// What a reader did, in order, and how far it got.
+/// What a reviewer did, in order, and how far it got.
 #[derive(Default)]
 struct Diary {
     /// Acts that were acknowledged, by number: the verdict, or `None` where it was taken back.
@@ -107,7 +107,7 @@ fn no_acknowledged_verdict_is_lost_or_doubled() {
             let _ = died.recv_timeout(moment);
             page.kill();
             drop(shot);
-            reading.join().expect("the reader");
+            reading.join().expect("the reviewer");
         });
     }
     // What was under way at the last shot is sent once more.

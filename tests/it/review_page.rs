@@ -66,10 +66,10 @@ fn page_and_command_line_write_the_same_events() {
     }
     let answered = |page: &Page| page.deck()[0]["answer"]["verdict"].clone();
     assert_eq!(answered(&page), "fail");
-    mocban(project.dir(), &["verdict", "undo", "--reader", "lan"]).expect(0);
+    mocban(project.dir(), &["verdict", "undo", "--reviewer", "lan"]).expect(0);
     assert_eq!(answered(&page), Value::Null);
     let pair = item["pair"].as_str().expect("a name");
-    set(&project, &[pair, "pass", "--reader", "lan"]);
+    set(&project, &[pair, "pass", "--reviewer", "lan"]);
     assert_eq!(answered(&page), "pass");
     let event = page.deck()[0]["answer"]["event"].clone();
     let undone = page
@@ -80,7 +80,7 @@ fn page_and_command_line_write_the_same_events() {
 }
 
 #[test]
-fn order_names_and_pictures_are_the_same_after_a_restart_and_others_for_another_reader() {
+fn order_names_and_pictures_are_the_same_after_a_restart_and_others_for_another_reviewer() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let untested = ["--controls", "0", "--repeats", "0"];
@@ -207,12 +207,12 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
     let pair = item["pair"].as_str().expect("a name");
     set(
         &project,
-        &[pair, "fail", "--reader", "minh", "--reason", "angle"],
+        &[pair, "fail", "--reviewer", "minh", "--reason", "angle"],
     );
-    let idle = |reader: &str| {
+    let idle = |reviewer: &str| {
         let told = mocban(
             project.dir(),
-            &["review", "--reader", reader, "--adjudicate"],
+            &["review", "--reviewer", reviewer, "--adjudicate"],
         );
         let told = told.expect(0);
         assert!(told.err.contains("no conflict waits"), "{}", told.err);
@@ -233,21 +233,21 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
         .as_array()
         .expect("others")
         .iter()
-        .map(|other| format!("{} {}", other["reader"], other["verdict"]))
+        .map(|other| format!("{} {}", other["reviewer"], other["verdict"]))
         .collect();
     let wanted = ["\"lan\" \"pass\"", "\"minh\" \"fail\""].map(str::to_owned);
     assert_eq!(said, BTreeSet::from(wanted));
     // It is settled.
     idle("dung");
     let log = log(&project);
-    let word = log.iter().filter(|event| event["reader"] == "hoa");
+    let word = log.iter().filter(|event| event["reviewer"] == "hoa");
     assert!(word.clone().count() > 0);
     for event in word {
         assert_eq!(event["review_order"], "adjudicate");
     }
     assert!(
         log.iter()
-            .any(|event| event["reader"] == "lan" && event["undone_at"] == Value::Null)
+            .any(|event| event["reviewer"] == "lan" && event["undone_at"] == Value::Null)
     );
 }
 

@@ -181,7 +181,7 @@ pub(crate) fn settings() -> Vec<Named> {
 
 /// Files of verdicts and of true alignments.
 pub(crate) fn verdicts() -> Vec<Named> {
-    let plain = "pair,verdict,reader,metric,reason,note\n0001,pass,lan,,,\n\
+    let plain = "pair,verdict,reviewer,metric,reason,note\n0001,pass,lan,,,\n\
         0002,fail,lan,density,strokes_lost,\"thin, broken\"\n0003,unsure,Tr\u{1ea7}n,nl_ssim,angle,\n";
     vec![
         named("comma.csv", plain),

@@ -98,7 +98,7 @@ pub enum CatalogError {
     /// A verdict on a metric that has no result.
     #[error("pair {0} has no result of {1} to judge yet")]
     NoMetricResult(PairName, ThresholdMetric),
-    /// Nothing of this reader is left to take back.
+    /// Nothing of this reviewer is left to take back.
     #[error("there is no verdict of {0} to take back")]
     NothingToUndo(String),
     /// A row that breaks the rules of the schema.

@@ -94,7 +94,7 @@ impl InputsSeen {
 pub struct MetricResult {
     /// The numbers.
     pub outcome: MetricOutcome,
-    /// Hash over the numbers and the pictures a reader sees.
+    /// Hash over the numbers and the pictures a reviewer sees.
     pub result_hash: ContentHash,
 }
 

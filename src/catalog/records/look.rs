@@ -17,7 +17,7 @@ pub struct Look {
     pub seen: Option<ContentHash>,
     /// How long the picture was there, milliseconds.
     pub shown_ms: Option<u64>,
-    /// How far the reader had to turn the relief until it lay on the print, degrees clockwise.
+    /// How far the reviewer had to turn the relief until it lay on the print, degrees clockwise.
     pub angle_read_deg: Option<f64>,
     /// The order in which results came.
     pub review_order: Option<ReviewOrder>,

@@ -20,7 +20,7 @@ pub struct ManualAlignment {
     /// The pair.
     pub pair: PairName,
     /// Who made it.
-    pub reader: String,
+    pub reviewer: String,
     /// Depth-map pixels to print pixels, for the depth map of `depth_hash`.
     pub print_from_depth: Affine2,
     /// Mesh points to print pixels and height: true whatever becomes of the depth map.
@@ -37,7 +37,7 @@ pub struct ManualAlignment {
     pub iou: f64,
     /// Dice coefficient of the same.
     pub dice: f64,
-    /// In the reader's words.
+    /// In the reviewer's words.
     pub note: Option<String>,
 }
 
@@ -98,7 +98,7 @@ impl Catalog {
                     .bind(serde_json::to_string(&made.print_from_mesh)?)
                     .bind(made.iou)
                     .bind(made.dice)
-                    .bind(&made.reader)
+                    .bind(&made.reviewer)
                     .bind(&made.note)
                     .bind(now)
                     .execute(conn)
@@ -140,7 +140,7 @@ fn stored(row: &SqliteRow) -> Result<StoredAlignment> {
         made: ManualAlignment {
             event: row.try_get("event")?,
             pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
-            reader: row.try_get("reader")?,
+            reviewer: row.try_get("reader")?,
             print_from_depth: serde_json::from_str(&row.try_get::<String, _>("print_from_depth")?)?,
             print_from_mesh: serde_json::from_str(&row.try_get::<String, _>("print_from_mesh")?)?,
             mesh_hash: hash("mesh_hash")?,

@@ -27,7 +27,7 @@ pub struct StatusCounts {
     pub stale: u64,
     /// Pairs that are done with a result less confident than [`MetricOutcome::DOUBTFUL`].
     pub doubtful: u64,
-    /// Verdicts on current results, the newest of each reader.
+    /// Verdicts on current results, the newest of each reviewer.
     pub verdicts: BTreeMap<Verdict, u64>,
 }
 
@@ -101,16 +101,16 @@ impl StageRecord {
     }
 }
 
-/// One reader's newest verdict on a current result.
+/// One reviewer's newest verdict on a current result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ReviewerVerdict {
     /// Who read it.
-    pub reader: String,
+    pub reviewer: String,
     /// The judgement.
     pub verdict: Verdict,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// The order in which results came to the reader; [`ReviewOrder::Adjudicate`] marks a word on a conflict.
+    /// The order in which results came to the reviewer; [`ReviewOrder::Adjudicate`] marks a word on a conflict.
     pub review_order: Option<ReviewOrder>,
 }
 
@@ -120,9 +120,9 @@ pub struct MetricRecord {
     /// The numbers.
     #[serde(flatten)]
     pub outcome: MetricOutcome,
-    /// Hash over the numbers and the pictures a reader sees; verdicts are bound to it.
+    /// Hash over the numbers and the pictures a reviewer sees; verdicts are bound to it.
     pub result_hash: ContentHash,
-    /// Verdicts on this very result, by reader.
+    /// Verdicts on this very result, by reviewer.
     pub verdicts: Vec<ReviewerVerdict>,
     /// Verdicts on an older result of this pair and metric, not counted any more.
     pub older_verdicts: u64,

@@ -222,7 +222,7 @@ fn metrics(
         found.push(MetricRecord {
             outcome,
             result_hash,
-            verdicts: current.into_iter().map(reader_verdict).collect(),
+            verdicts: current.into_iter().map(reviewer_verdict).collect(),
             older_verdicts: older.len() as u64,
         });
     }
@@ -234,9 +234,9 @@ fn metrics(
     Ok(found)
 }
 
-fn reader_verdict(counted: &verdicts::Counted) -> ReviewerVerdict {
+fn reviewer_verdict(counted: &verdicts::Counted) -> ReviewerVerdict {
     ReviewerVerdict {
-        reader: counted.reader.clone(),
+        reviewer: counted.reviewer.clone(),
         verdict: counted.verdict,
         reason: counted.reason,
         review_order: counted.review_order,

@@ -1,4 +1,4 @@
-//! What a reader answers on the review page: verdicts on what was shown, and answers to what only tests the reader.
+//! What a reviewer answers on the review page: verdicts on what was shown, and answers to what only tests the reviewer.
 
 use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
@@ -14,12 +14,12 @@ use crate::domain::{
     AttentionCheck, ContentHash, PairName, Reason, ThresholdMetric, UnixMillis, Verdict,
 };
 
-/// What was shown to a reader.
+/// What was shown to a reviewer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shown {
     /// The result of one metric, or of several that came to the same; each with its hash.
     Results(Vec<(ThresholdMetric, ContentHash)>),
-    /// Something that tests the reader, made from a metric's result.
+    /// Something that tests the reviewer, made from a metric's result.
     Check {
         /// What it is.
         check: AttentionCheck,
@@ -43,7 +43,7 @@ pub struct Answer {
     pub verdict: Verdict,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// In the reader's words.
+    /// In the reviewer's words.
     pub note: Option<String>,
     /// When.
     pub at: UnixMillis,
@@ -54,11 +54,11 @@ pub struct Answer {
 pub enum AnsweredOn {
     /// A result, by its hash.
     Result(ContentHash),
-    /// What tests a reader, by the hash of what was shown.
+    /// What tests a reviewer, by the hash of what was shown.
     Check(ContentHash),
 }
 
-/// An answer to something that tests the reader, taken back or not.
+/// An answer to something that tests the reviewer, taken back or not.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AttentionCheckAnswer {
     /// The pair.
@@ -72,10 +72,10 @@ pub struct AttentionCheckAnswer {
     /// The judgement.
     pub verdict: Verdict,
     /// Who read it.
-    pub reader: String,
+    pub reviewer: String,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// In the reader's words.
+    /// In the reviewer's words.
     pub note: Option<String>,
     /// How it came about.
     #[serde(flatten)]
@@ -112,7 +112,7 @@ SELECT c.event, p.name, c.metric, c.result_hash, c.control, c.seen, c.shown_ms, 
 FROM control_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN control_undo AS u ON u.answer = c.id
 ORDER BY c.id";
 
-/// Takes back the answer of a number, by its reader only; once.
+/// Takes back the answer of a number, by its reviewer only; once.
 const UNDO: [&str; 3] = [
     "INSERT INTO verdict_undo (act, at) SELECT DISTINCT act, ?3 FROM verdict
         WHERE coalesce(event, 'act-' || act) = ?1 AND reader = ?2 ON CONFLICT DO NOTHING",
@@ -122,7 +122,7 @@ const UNDO: [&str; 3] = [
         WHERE event = ?1 AND reader = ?2 ON CONFLICT DO NOTHING",
 ];
 
-/// Whether there is something of this number and reader to take back, taken back already or not.
+/// Whether there is something of this number and reviewer to take back, taken back already or not.
 const IS_THERE: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 AND reader = ?2)
     OR EXISTS (SELECT 1 FROM control_answer WHERE event = ?1 AND reader = ?2)
@@ -172,27 +172,27 @@ impl Catalog {
         .await
     }
 
-    /// Takes back what a reader did under this number: an answer or an alignment by hand. A second time changes
+    /// Takes back what a reviewer did under this number: an answer or an alignment by hand. A second time changes
     /// nothing. The log keeps both.
     ///
     /// # Errors
-    /// When the reader did nothing under this number.
-    pub async fn take_back(&self, event: &str, reader: &str, now: UnixMillis) -> Result<()> {
-        let (event, reader) = (event.to_owned(), reader.to_owned());
+    /// When the reviewer did nothing under this number.
+    pub async fn take_back(&self, event: &str, reviewer: &str, now: UnixMillis) -> Result<()> {
+        let (event, reviewer) = (event.to_owned(), reviewer.to_owned());
         self.alone(move |conn| {
             Box::pin(async move {
                 let is_there: bool = sqlx::query_scalar(IS_THERE)
                     .bind(&event)
-                    .bind(&reader)
+                    .bind(&reviewer)
                     .fetch_one(&mut *conn)
                     .await?;
                 if !is_there {
-                    return Err(CatalogError::NothingToUndo(reader));
+                    return Err(CatalogError::NothingToUndo(reviewer));
                 }
                 for undo in UNDO {
                     sqlx::query(undo)
                         .bind(&event)
-                        .bind(&reader)
+                        .bind(&reviewer)
                         .bind(now)
                         .execute(&mut *conn)
                         .await?;
@@ -203,14 +203,14 @@ impl Catalog {
         .await
     }
 
-    /// A reader's answers that were not taken back, oldest first; one on several results is there once a result.
+    /// A reviewer's answers that were not taken back, oldest first; one on several results is there once a result.
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn answers(&self, reader: &str) -> Result<Vec<Answer>> {
+    pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.reader().await?;
         let found = sqlx::query(ANSWERS)
-            .bind(reader)
+            .bind(reviewer)
             .fetch_all(&mut *conn)
             .await?;
         found.iter().map(answer).collect()
@@ -272,7 +272,7 @@ async fn insert_check(
         .bind(look.shown_ms.map(u64::cast_signed))
         .bind(look.angle_read_deg)
         .bind(given.verdict.name())
-        .bind(&given.reader)
+        .bind(&given.reviewer)
         .bind(given.reason.map(Reason::name))
         .bind(&given.note)
         .bind(given.at.unwrap_or(now))
@@ -305,7 +305,7 @@ fn check_answer(row: &SqliteRow) -> Result<AttentionCheckAnswer> {
         result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
         check: serde_json::from_str(&row.try_get::<String, _>("control")?)?,
         verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-        reader: row.try_get("reader")?,
+        reviewer: row.try_get("reader")?,
         reason: reason(row)?,
         note: row.try_get("note")?,
         look: Look::read(row)?,

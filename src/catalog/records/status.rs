@@ -14,7 +14,7 @@ use crate::catalog::records::model::{StageCounts, StatusCounts};
 use crate::catalog::records::pair_results;
 use crate::domain::{JobStatus, Stage, Verdict};
 
-/// Newest verdict of each reader on each current result, by verdict.
+/// Newest verdict of each reviewer on each current result, by verdict.
 const VERDICTS: &str = "
 SELECT v.verdict, count(*) FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash

@@ -1,4 +1,4 @@
-//! Verdicts: an append-only log; the newest of each reader on a result counts.
+//! Verdicts: an append-only log; the newest of each reviewer on a result counts.
 
 use std::collections::BTreeMap;
 
@@ -26,10 +26,10 @@ pub struct NewVerdict {
     /// The judgement.
     pub verdict: Verdict,
     /// Who read it.
-    pub reader: String,
+    pub reviewer: String,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// In the reader's words.
+    /// In the reviewer's words.
     pub note: Option<String>,
     /// How it came about, as far as it is known.
     pub look: Look,
@@ -53,10 +53,10 @@ pub struct VerdictEvent {
     /// The judgement.
     pub verdict: Verdict,
     /// Who read it.
-    pub reader: String,
+    pub reviewer: String,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// In the reader's words.
+    /// In the reviewer's words.
     pub note: Option<String>,
     /// How it came about, as far as it is known.
     #[serde(flatten)]
@@ -69,12 +69,12 @@ pub struct VerdictEvent {
     pub current: bool,
 }
 
-/// A verdict that counts: the newest of its reader on its result, not taken back.
+/// A verdict that counts: the newest of its reviewer on its result, not taken back.
 #[derive(Debug)]
 pub(crate) struct Counted {
     pub(crate) result_hash: ContentHash,
     pub(crate) verdict: Verdict,
-    pub(crate) reader: String,
+    pub(crate) reviewer: String,
     pub(crate) reason: Option<Reason>,
     pub(crate) review_order: Option<ReviewOrder>,
 }
@@ -125,28 +125,28 @@ impl Catalog {
         .await
     }
 
-    /// Takes back the newest act that is not taken back yet, of one reader or of anybody; says which.
+    /// Takes back the newest act that is not taken back yet, of one reviewer or of anybody; says which.
     /// The log keeps both.
     ///
     /// # Errors
     /// When there is none.
     pub async fn verdict_undo(
         &self,
-        reader: Option<&str>,
+        reviewer: Option<&str>,
         now: UnixMillis,
     ) -> Result<Vec<VerdictEvent>> {
-        let reader = reader.map(str::to_owned);
+        let reviewer = reviewer.map(str::to_owned);
         self.alone(move |conn| {
             Box::pin(async move {
                 let act: Option<i64> = sqlx::query_scalar(
                     "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reader = ?1)
                         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)",
                 )
-                .bind(&reader)
+                .bind(&reviewer)
                 .fetch_one(&mut *conn)
                 .await?;
                 let Some(act) = act else {
-                    let who = reader.unwrap_or_else(|| "anybody".to_owned());
+                    let who = reviewer.unwrap_or_else(|| "anybody".to_owned());
                     return Err(CatalogError::NothingToUndo(who));
                 };
                 sqlx::query("INSERT INTO verdict_undo (act, at) VALUES (?1, ?2)")
@@ -221,7 +221,7 @@ pub(crate) async fn insert(
         .bind(metric.name())
         .bind(&result_hash.as_bytes()[..])
         .bind(new.verdict.name())
-        .bind(&new.reader)
+        .bind(&new.reviewer)
         .bind(new.reason.map(Reason::name))
         .bind(&new.note)
         .bind(new.at.unwrap_or(now))
@@ -256,7 +256,7 @@ fn event(row: &SqliteRow) -> Result<VerdictEvent> {
         metric: rows::name(&row.try_get::<String, _>("metric")?)?,
         result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
         verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-        reader: row.try_get("reader")?,
+        reviewer: row.try_get("reader")?,
         reason: reason.map(|reason| rows::name(&reason)).transpose()?,
         note: row.try_get("note")?,
         look: Look::read(row)?,
@@ -266,7 +266,7 @@ fn event(row: &SqliteRow) -> Result<VerdictEvent> {
     })
 }
 
-/// The verdicts that count, of some pairs, in the order of readers.
+/// The verdicts that count, of some pairs, in the order of reviewers.
 pub(crate) async fn of_pairs(
     conn: &mut SqliteConnection,
     pairs: &[i64],
@@ -283,14 +283,15 @@ pub(crate) async fn of_pairs(
         let newest = Counted {
             result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
             verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-            reader: row.try_get("reader")?,
+            reviewer: row.try_get("reader")?,
             reason: reason.map(|reason| rows::name(&reason)).transpose()?,
             review_order: order.map(|order| rows::name(&order)).transpose()?,
         };
         let of_metric = counted.entry((row.try_get("pair")?, metric)).or_default();
-        // Rows come oldest first, so a later one of the same reader on the same result takes its place.
-        of_metric
-            .retain(|old| (&old.reader, old.result_hash) != (&newest.reader, newest.result_hash));
+        // Rows come oldest first, so a later one of the same reviewer on the same result takes its place.
+        of_metric.retain(|old| {
+            (&old.reviewer, old.result_hash) != (&newest.reviewer, newest.result_hash)
+        });
         of_metric.push(newest);
     }
     Ok(counted)

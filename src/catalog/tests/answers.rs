@@ -2,7 +2,7 @@
 
 use super::{World, name};
 use crate::catalog::db::open;
-use crate::catalog::{AnsweredOn, Catalog, CatalogError, ManualAlignment, Look, NewVerdict, Shown};
+use crate::catalog::{AnsweredOn, Catalog, CatalogError, Look, ManualAlignment, NewVerdict, Shown};
 use crate::domain::{
     Affine2, AttentionCheck, ContentHash, PrintFromMesh, Reason, ReviewOrder, ThresholdMetric,
     Verdict,
@@ -13,7 +13,7 @@ fn given(event: &str, verdict: Verdict) -> NewVerdict {
         pair: name("p0"),
         metric: None,
         verdict,
-        reader: "ana".to_owned(),
+        reviewer: "ana".to_owned(),
         reason: (verdict == Verdict::Fail).then_some(Reason::WrongPair),
         note: Some("torn".to_owned()),
         look: Look {
@@ -108,7 +108,7 @@ async fn answers_to_controls_are_no_verdicts() {
 }
 
 #[tokio::test]
-async fn answers_are_taken_back_by_number_and_by_their_reader_only() {
+async fn answers_are_taken_back_by_number_and_by_their_reviewer_only() {
     let world = World::new(1).await;
     world.finish_one().await;
     let answer = async |event: &str, verdict, shown, at| {
@@ -215,7 +215,7 @@ fn by_hand(event: &str) -> ManualAlignment {
     ManualAlignment {
         event: event.to_owned(),
         pair: name("p0"),
-        reader: "ana".to_owned(),
+        reviewer: "ana".to_owned(),
         print_from_depth: Affine2::similarity(0.1 + 0.2, 0.3, [1.0, -2.0]),
         print_from_mesh: PrintFromMesh([[0.1; 4], [0.2; 4], [0.3; 4]]),
         mesh_hash: ContentHash::of(b"mesh"),

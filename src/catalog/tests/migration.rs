@@ -119,7 +119,7 @@ async fn a_migrated_catalog_goes_on_like_a_new_one() {
         pair: name("p0"),
         metric: Some(ThresholdMetric::Ensemble),
         verdict: Verdict::Pass,
-        reader: "ana".to_owned(),
+        reviewer: "ana".to_owned(),
         reason: None,
         note: None,
         look: Look::default(),

@@ -7,12 +7,12 @@ use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 /// Results of a pair that is done.
 const METRICS: usize = ThresholdMetric::ALL.len();
 
-fn verdict(reader: &str, verdict: Verdict) -> NewVerdict {
+fn verdict(reviewer: &str, verdict: Verdict) -> NewVerdict {
     NewVerdict {
         pair: name("p0"),
         metric: None,
         verdict,
-        reader: reader.to_owned(),
+        reviewer: reviewer.to_owned(),
         reason: (verdict == Verdict::Fail).then_some(Reason::Angle),
         note: None,
         look: Look::default(),
@@ -24,11 +24,11 @@ async fn counted(catalog: &Catalog) -> Vec<(String, Verdict)> {
     let detail = catalog.pair(&name("p0")).await.expect("a read");
     let metrics = detail.expect("the pair").results.metrics;
     let of_first = metrics[0].verdicts.iter();
-    of_first.map(|v| (v.reader.clone(), v.verdict)).collect()
+    of_first.map(|v| (v.reviewer.clone(), v.verdict)).collect()
 }
 
 #[tokio::test]
-async fn the_newest_verdict_of_each_reader_counts() {
+async fn the_newest_verdict_of_each_reviewer_counts() {
     let world = World::new(1).await;
     world.finish_one().await;
     for given in [

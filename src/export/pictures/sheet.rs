@@ -30,7 +30,7 @@ pub struct SheetCell {
     pub id: String,
     /// Its numbers, or why it failed, in a few words.
     pub note: String,
-    /// Whether it is known to be wrong: failed, failed by readers, or off the truth.
+    /// Whether it is known to be wrong: failed, failed by reviewers, or off the truth.
     pub wrong: bool,
     /// Print, relief turned onto the print, and overlay, where they exist.
     pub tiles: [Option<Rgb>; TILES],

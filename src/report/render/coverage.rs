@@ -50,7 +50,7 @@ fn by_basis(report: &Report, table: impl Fn(Basis, &[&Coverage]) -> Table) -> Ve
 
 const fn title(basis: Basis) -> &'static str {
     match basis {
-        Basis::Verdicts => "Kept, by readers",
+        Basis::Verdicts => "Kept, by reviewers",
         Basis::Truth => "Kept, by truth",
     }
 }
@@ -58,7 +58,7 @@ const fn title(basis: Basis) -> &'static str {
 /// What the table shows, and how many failures the confidence tells.
 fn caption(basis: Basis, curves: &[&Coverage]) -> String {
     let judge = match basis {
-        Basis::Verdicts => "by readers",
+        Basis::Verdicts => "by reviewers",
         Basis::Truth => "by truth",
     };
     let wrong = curves.iter().filter(|curve| curve.failures > 0);

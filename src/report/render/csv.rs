@@ -5,7 +5,7 @@ use crate::report::coverage::{KEPT_PERCENT, LEAST_PERCENT};
 use crate::report::interval::Interval;
 use crate::report::model::{Basis, Coverage, CoveragePoint, Report, Row, TruthBlock};
 
-/// Names of the columns, in order; those of [`coverage_names`] follow, for readers and then for truth,
+/// Names of the columns, in order; those of [`coverage_names`] follow, for reviewers and then for truth,
 /// and those of [`csv_fields`].
 const COLUMNS: [&str; 27] = [
     "metric",

@@ -1,11 +1,11 @@
-//! What went wrong as tables: why readers failed results, and which planted faults they caught.
+//! What went wrong as tables: why reviewers failed results, and which planted faults they caught.
 
 use super::table::{Table, bounds, count, fixed, interval, number, words};
 use crate::domain::Reason;
 use crate::report::Rate;
 use crate::report::model::Report;
 
-/// Failed results by reason, a column a metric; `None` where readers failed nothing.
+/// Failed results by reason, a column a metric; `None` where reviewers failed nothing.
 pub(super) fn reasons(report: &Report) -> Option<Table> {
     let given = |reason| {
         let counts = report.rows.iter().map(move |row| row.failed_for(reason));
@@ -25,14 +25,14 @@ pub(super) fn reasons(report: &Report) -> Option<Table> {
         .collect();
     let heads = report.rows.iter().map(|row| number(row.metric.title(), 0));
     (!rows.is_empty()).then(|| Table {
-        caption: "Results that readers failed, by the reasons they gave; one may have several."
+        caption: "Results that reviewers failed, by the reasons they gave; one may have several."
             .to_owned(),
         columns: [words("Failed for")].into_iter().chain(heads).collect(),
         rows,
     })
 }
 
-/// Planted faults that readers caught; `None` where none were answered.
+/// Planted faults that reviewers caught; `None` where none were answered.
 pub(super) fn caught(report: &Report) -> Option<Table> {
     let caught = report.caught.as_ref()?;
     let cells = |name: &str, rate: &Rate| {
@@ -48,7 +48,7 @@ pub(super) fn caught(report: &Report) -> Option<Table> {
     let mut rows: Vec<_> = by_fault.map(|(name, rate)| cells(name, rate)).collect();
     rows.push(cells("all", &caught.all));
     Some(Table {
-        caption: "Faults planted in good results that readers failed, of those that they answered: how well they find \
+        caption: "Faults planted in good results that reviewers failed, of those that they answered: how well they find \
                   such faults, and no others."
             .to_owned(),
         columns: vec![

@@ -124,7 +124,7 @@ mod tests {
 
     const GOLDEN: &str = r"\begin{table}
   \centering\small\setlength{\tabcolsep}{3pt}
-  \caption{Acc is the share passed of those passed or failed by readers; SSIM, IoU and Dice are means over the n finished pairs, by pixel; IoU box is of bounding boxes.}
+  \caption{Acc is the share passed of those passed or failed by reviewers; SSIM, IoU and Dice are means over the n finished pairs, by pixel; IoU box is of bounding boxes.}
   \begin{tabular}{l S[table-format=2.0] S[table-format=1.3] l S[table-format=1.3] S[table-format=1.3] S[table-format=1.3] S[table-format=1.3]}
     \toprule
     Method & {n} & {Acc} & 95\% Wilson & {SSIM} & {IoU} & {IoU box} & {Dice} \\

@@ -79,7 +79,7 @@ pub(super) fn tables(report: &Report) -> Vec<Table> {
 pub(super) fn scores(report: &Report) -> Table {
     Table {
         caption: format!(
-            "Acc is the share passed of those passed or failed by readers{}; SSIM, IoU and Dice are means over the \
+            "Acc is the share passed of those passed or failed by reviewers{}; SSIM, IoU and Dice are means over the \
              n finished pairs, by pixel; IoU box is of bounding boxes.",
             passed(report)
         ),
@@ -152,12 +152,12 @@ pub(super) fn verdicts(report: &Report) -> Table {
     }
 }
 
-/// Acc under three rules, where two readers have told of the same result.
+/// Acc under three rules, where two reviewers have told of the same result.
 pub(super) fn rules(report: &Report) -> Option<Table> {
     let told_twice = |row: &Row| row.rules.as_ref().is_some_and(|rules| rules.told_twice > 0);
     report.rows.iter().any(told_twice).then(|| Table {
-        caption: "Acc if one reader who fails it is enough, if a third settles conflicts (the Acc above), and if both \
-                  must fail it; n are the results told of, twice those that two readers told of."
+        caption: "Acc if one reviewer who fails it is enough, if a third settles conflicts (the Acc above), and if both \
+                  must fail it; n are the results told of, twice those that two reviewers told of."
             .to_owned(),
         columns: vec![
             words("Rules"),

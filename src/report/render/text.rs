@@ -145,7 +145,7 @@ Non-luminous SSIM  3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
 Pixel density      3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
 Ensemble           3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
 Relief             3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
-Acc is the share passed of those passed or failed by readers (Non-luminous SSIM
+Acc is the share passed of those passed or failed by reviewers (Non-luminous SSIM
 1 of 2, Pixel density 1 of 2, Ensemble 1 of 2, Relief 1 of 2); SSIM, IoU and
 Dice are means over the n finished pairs, by pixel; IoU box is of bounding
 boxes.
@@ -159,7 +159,7 @@ Verdicts by result; stale ones have a verdict for an older result only.
 
 Failed for       Non-luminous SSIM  Pixel density  Ensemble  Relief
 no reason given                  1              1         1       1
-Results that readers failed, by the reasons they gave; one may have several.
+Results that reviewers failed, by the reasons they gave; one may have several.
 
 Truth              n    Acc  95% Wilson   in 5°  angle °  landm. %  mask IoU
 Non-luminous SSIM  1  1.000  0.207-1.000  1.000     0.50      2.00     0.900

@@ -132,7 +132,7 @@ impl Game {
             pair: name(&format!("p{}", pair - 1)),
             metric: Some(ThresholdMetric::Density),
             verdict: Verdict::Pass,
-            reader: "ana".to_owned(),
+            reviewer: "ana".to_owned(),
             reason: None,
             note: None,
             look: Look::default(),

@@ -90,12 +90,12 @@ const fn words(kind: Kind) -> (&'static str, &'static str, &'static str) {
     match kind {
         Kind::Failed => (
             "failed",
-            "Failed by readers",
-            "Results that readers failed, in the order of names.",
+            "Failed by reviewers",
+            "Results that reviewers failed, in the order of names.",
         ),
         Kind::Conflict => (
             "conflict",
-            "Readers contradict each other",
+            "Reviewers contradict each other",
             "Results that one passed and another failed, and nobody has settled.",
         ),
         Kind::OffTruth => (

@@ -53,7 +53,7 @@ pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
     // The scale begins at a tenth, so that near-perfect rows can still be told apart.
     let from = ((lowest * 10.0).floor() / 10.0).min(0.9);
     let by = match basis {
-        Basis::Verdicts => "by readers",
+        Basis::Verdicts => "by reviewers",
         Basis::Truth => "by truth",
     };
     let what = format!("Acc {by} with its {} interval", report.interval.title());

@@ -32,7 +32,7 @@ pub(super) fn all(report: &Report, album: &Album) -> Vec<Section> {
         (!report.warnings.is_empty()).then(|| section("notes", "To be known", warnings(report))),
         report
             .anybody_read()
-            .then(|| section("readers", "What readers said", readers(report))),
+            .then(|| section("reviewers", "What reviewers said", reviewers(report))),
         is_compared.then(|| section("tests", "Methods compared", tests(report))),
         report
             .has_truth()
@@ -85,7 +85,7 @@ fn warnings(report: &Report) -> Markup {
     html! { ul.notes { @for warning in &report.warnings { li { (warning) } } } }
 }
 
-fn readers(report: &Report) -> Markup {
+fn reviewers(report: &Report) -> Markup {
     let more = [
         tables::rules(report),
         failed::reasons(report),
