@@ -45,9 +45,9 @@ fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
         told(&project, &["agreement", "--json"])["reviewers"],
         json!([])
     );
-    let pairs = two_readers(&project);
+    let pairs = reviewer_pairs(&project);
     let found = told(&project, &["agreement", "--json"]);
-    let two = &found["two_readers"][0];
+    let two = &found["reviewer_pairs"][0];
     assert_eq!((&two["a"], &two["b"]), (&json!("lan"), &json!("minh")));
     let count = |value: &Value| value.as_u64().expect("a count");
     let (n, agreed) = (count(&two["n"]), count(&two["agreed"]));
@@ -78,7 +78,7 @@ fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
     assert_ne!(settled["pair"], pairs[0], "on which they agree");
     let after = told(&project, &["agreement", "--json"]);
     assert_eq!(count(&after["conflicts"]), n - agreed - 1);
-    assert_eq!(after["two_readers"], found["two_readers"]);
+    assert_eq!(after["reviewer_pairs"], found["two_readers"]);
     let text = mocban(project.dir(), &["agreement"]).expect(0).out;
     let waiting = format!("Conflicts waiting: {}\n", n - agreed - 1);
     assert!(

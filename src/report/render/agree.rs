@@ -181,8 +181,8 @@ lan, minh  587      0.995  0.985-0.998  -0.002  0.995
         assert!(text.starts_with(GOLDEN), "{text}");
         for part in [
             "Failures   by anyone  by both  unsure\nlan, minh          3        0       0\n",
-            "lan      587  -        -           19 of 20  0.764-0.991\n",
-            "minh     587  -        -           -         -\n",
+            "lan       587  -        -           19 of 20  0.764-0.991\n",
+            "minh      587  -        -           -         -\n",
             "Conflicts waiting: 3\n",
         ] {
             assert!(text.contains(part), "{part:?} is not in\n{text}");

@@ -145,9 +145,9 @@ Non-luminous SSIM  3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
 Pixel density      3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
 Ensemble           3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
 Relief             3  0.500  0.095-0.905  0.810  0.750    0.900  0.857
-Acc is the share passed of those passed or failed by reviewers (Non-luminous SSIM
-1 of 2, Pixel density 1 of 2, Ensemble 1 of 2, Relief 1 of 2); SSIM, IoU and
-Dice are means over the n finished pairs, by pixel; IoU box is of bounding
+Acc is the share passed of those passed or failed by reviewers (Non-luminous
+SSIM 1 of 2, Pixel density 1 of 2, Ensemble 1 of 2, Relief 1 of 2); SSIM, IoU
+and Dice are means over the n finished pairs, by pixel; IoU box is of bounding
 boxes.
 
 Verdicts           read  unread  passed  failed  unsure  stale
