@@ -1,6 +1,6 @@
 //! Which pair of which data.
 
-use mocban::demo::{Pair, Pairs, Tier};
+use mocban::demo::{DemoPair, PairGenerator, Tier};
 use mocban::mesh::write::MeshFormat;
 
 use super::run::Input;
@@ -30,12 +30,12 @@ impl Case {
     }
 
     /// All pairs of its kind.
-    pub(super) fn pairs(&self) -> Pairs {
-        Pairs::new(self.tier, self.seed).with_vertices(self.vertices)
+    pub(super) fn pairs(&self) -> PairGenerator {
+        PairGenerator::new(self.tier, self.seed).with_vertices(self.vertices)
     }
 
     /// Makes the pair and what the stages are given of it.
-    pub(super) fn make(&self) -> anyhow::Result<(Pair, Input)> {
+    pub(super) fn make(&self) -> anyhow::Result<(DemoPair, Input)> {
         let pair = self.pairs().pair(self.index)?;
         let mesh = MeshFormat::StlBinary.encode(&pair.mesh);
         let print = pair.print.clone();

@@ -1,12 +1,13 @@
 //! Whether pairs without a right answer are told.
 
-use mocban::demo::{Decoy, Tier};
+use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
 use mocban::mesh::write::MeshFormat;
 use mocban::report::stats::quantile;
 
 use super::accuracy::share;
 use super::case::Case;
+use super::decoy::{Decoy, decoy_pair};
 use super::markdown::{Table, number};
 use super::method::Method;
 use super::numbers::Numbers;
@@ -57,7 +58,7 @@ pub(super) fn all(
 }
 
 fn input(case: &Case, kind: Decoy) -> anyhow::Result<Input> {
-    let decoy = case.pairs().decoy(kind, case.index)?;
+    let decoy = decoy_pair(&case.pairs(), kind, case.index)?;
     Ok(Input {
         mesh: MeshFormat::StlBinary.encode(&decoy.mesh),
         print: decoy.print,

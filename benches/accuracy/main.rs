@@ -15,6 +15,8 @@
 mod accuracy;
 mod case;
 mod certainty;
+#[path = "../../tests/support/decoy.rs"]
+mod decoy;
 mod decoys;
 mod lines;
 mod markdown;

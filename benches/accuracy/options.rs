@@ -71,7 +71,7 @@ impl Options {
         let wanted = self.pairs.unwrap_or(if self.bench { PAIRS } else { 1 });
         let mut cases = Vec::new();
         for tier in &self.tiers {
-            let count = wanted.min(tier.most_pairs().unwrap_or(u64::MAX));
+            let count = wanted.min(tier.max_pairs().unwrap_or(u64::MAX));
             for seed in &self.seeds {
                 let case = |index| Case::new(*tier, *seed, index, self.vertices);
                 cases.extend((0..count).map(case));

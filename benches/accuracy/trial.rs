@@ -2,7 +2,7 @@
 
 use std::num::NonZeroUsize;
 
-use mocban::demo::{Pair, Tier};
+use mocban::demo::{DemoPair, Tier};
 use mocban::domain::{MetricOutcome, ThresholdMetric};
 use mocban::report::truth::{TruthErrors, TruthRecord, tops_iou};
 use mocban::stages::AlignedPair;
@@ -83,7 +83,7 @@ pub(super) fn of<'a>(trials: &'a [Trial], tier: Tier, method: &Method) -> Vec<&'
 impl Trial {
     fn new(
         case: Case,
-        pair: &Pair,
+        pair: &DemoPair,
         truth: &TruthRecord,
         method: &Method,
         run: &Run,
@@ -123,7 +123,11 @@ impl Trial {
 }
 
 /// The results of all metrics.
-fn found(pair: &Pair, truth: &TruthRecord, aligned: &AlignedPair) -> anyhow::Result<Vec<Found>> {
+fn found(
+    pair: &DemoPair,
+    truth: &TruthRecord,
+    aligned: &AlignedPair,
+) -> anyhow::Result<Vec<Found>> {
     let mut shared = Numbers::default();
     shared.add("fit", &aligned.fit)?;
     shared.add("depth", &aligned.depth.scale)?;

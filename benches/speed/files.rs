@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use mocban::demo::{Pairs, Tier};
+use mocban::demo::{PairGenerator, Tier};
 use mocban::mesh::write::MeshFormat;
 
 /// Seed of the pair.
@@ -29,7 +29,7 @@ impl Files {
         let root = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
         let dir = root.join(size);
         if !dir.exists() {
-            let pair = Pairs::new(Tier::Pose, SEED)
+            let pair = PairGenerator::new(Tier::Pose, SEED)
                 .with_vertices(Some(vertices))
                 .pair(0)?;
             // Under another name until all of it is there.

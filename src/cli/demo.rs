@@ -15,7 +15,7 @@ use super::report;
 use super::run::{self, drive};
 use super::signals;
 use crate::config::{Origin, Tree};
-use crate::demo::{DatasetFiles, DemoOptions, Error as DatasetError, Tier, write_dataset};
+use crate::demo::{DatasetError, DatasetFiles, DemoOptions, Tier, write_dataset};
 use crate::domain::JobStatus;
 use crate::runner::{Stop, StopLevel};
 use crate::store::{CATALOG_FILE, SETTINGS_FILE};
@@ -121,7 +121,11 @@ async fn make(
     let Some(files) = written(data.clone(), options).await? else {
         return Ok(None);
     };
-    let made = if files.was_there { "found" } else { "made" };
+    let made = if files.already_existed {
+        "found"
+    } else {
+        "made"
+    };
     context.output.say(&format!(
         "{made} {} of tier {}, seed {}, in {}",
         super::table::count(files.pairs, "pair"),

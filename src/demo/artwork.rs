@@ -1,78 +1,82 @@
-//! The carver's drawing: a character's strokes with woodcut character, and what stands around it on the block.
+//! Stroke artwork: the outline of a character as a woodcutter draws it, and its neighbours on the block.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::field::{Field, Frame};
 use super::glyph::Glyphs;
 use super::noise::Noise;
-use super::polygon::BoxMm;
+use super::polygon::BoundsMm;
+use super::scalar_field::{SampleFrame, ScalarField};
 use crate::raster::Grid;
 
-/// How far the frame reaches past the character's ink, mm.
+/// Margin of the sample frame around the character's strokes, mm.
 const MARGIN_MM: f64 = 2.2;
-/// Distance of the frame's samples: finer than the finest scan.
+/// Sample spacing, mm; finer than the densest scan.
 const STEP_MM: f64 = 0.035;
-/// Clear wood the carver leaves between the character and its neighbours, mm.
+/// Minimum gap between the character and its neighbours, mm.
 const CLEARANCE_MM: f64 = 0.35;
 
-/// A character's strokes.
+/// The strokes of one character.
 #[derive(Debug, Clone)]
 pub(super) struct Artwork {
-    /// Signed distance to the strokes' rim in mm, positive in the stroke.
-    pub strokes: Field,
-    /// The box of the strokes.
-    pub ink_box: BoxMm,
-    /// Longest side of the ink box, mm.
+    /// Signed distance to the stroke outline in mm, positive inside a stroke.
+    pub strokes: ScalarField,
+    /// Bounding box of the strokes.
+    pub stroke_bounds: BoundsMm,
+    /// Longest side of the bounding box, mm.
     pub size_mm: f64,
 }
 
 impl Artwork {
-    /// A character of the font, its thin strokes thickened to woodblock weight.
+    /// Draws a character of the font and thickens its strokes to woodblock weight.
     pub(super) fn of_glyph(glyphs: &Glyphs, character: char, rng: &mut ChaCha8Rng) -> Self {
         let size_mm = rng.random_range(8.0..10.2);
-        let weight_mm = weight(size_mm, rng);
-        let frame = Frame::covering(size_mm / 2.0 + MARGIN_MM, STEP_MM);
+        let weight_mm = draw_stroke_weight(size_mm, rng);
+        let frame = SampleFrame::covering(size_mm / 2.0 + MARGIN_MM, STEP_MM);
         let mut coverage = Grid::new(frame.side, frame.side, 0.0);
         let outline_mm = size_mm - 2.0 * weight_mm;
         glyphs.ink(character, frame, [0.0, 0.0], outline_mm, &mut coverage);
-        let mut strokes = carved(&Field::distance_to_rim(frame, &coverage), weight_mm, rng);
-        chip(&mut strokes, rng);
+        let mut strokes = knife_outline(
+            &ScalarField::signed_distance(frame, &coverage),
+            weight_mm,
+            rng,
+        );
+        chip_edges(&mut strokes, rng);
         Self::new(strokes, size_mm)
     }
 
-    /// A character given by its mask: `ink` is the share of ink at a point in mm.
+    /// Builds a character from a mask; `ink` returns the ink coverage, 0..=1, at a point in mm.
     pub(super) fn of_mask(size_mm: f64, ink: impl Fn([f64; 2]) -> f64) -> Self {
-        let frame = Frame::covering(size_mm / 2.0 + MARGIN_MM, STEP_MM);
-        let coverage = Field::from_fn(frame, |point, _, _| ink(point)).values;
-        // A photographed mask has stairs of its own pixels; they are no work of the knife.
-        let strokes = Field::distance_to_rim(frame, &coverage).blurred(0.06);
+        let frame = SampleFrame::covering(size_mm / 2.0 + MARGIN_MM, STEP_MM);
+        let coverage = ScalarField::from_fn(frame, |point, _, _| ink(point)).values;
+        // The blur removes the pixel staircase of a photographed mask.
+        let strokes = ScalarField::signed_distance(frame, &coverage).blurred(0.06);
         Self::new(strokes, size_mm)
     }
 
-    fn new(strokes: Field, size_mm: f64) -> Self {
+    fn new(strokes: ScalarField, size_mm: f64) -> Self {
         let frame = strokes.frame;
         let ink = strokes.values.map(|distance| *distance > 0.0);
         let found = ink.bounding_box().map_or(
-            BoxMm {
+            BoundsMm {
                 min: [-size_mm / 2.0; 2],
                 max: [size_mm / 2.0; 2],
             },
-            |found| BoxMm {
+            |found| BoundsMm {
                 min: frame.position(found.x0, found.y0),
                 max: frame.position(found.x1, found.y1),
             },
         );
         Self {
             strokes,
-            ink_box: found,
+            stroke_bounds: found,
             size_mm,
         }
     }
 
-    /// Strokes of the characters above, below and beside, and column rules, as signed distances. A neighbour or a
-    /// rule may be missing.
-    pub(super) fn surroundings(&self, glyphs: &Glyphs, rng: &mut ChaCha8Rng) -> Field {
+    /// Draws the neighbouring characters and the column rules and returns their signed distance in mm. Each neighbour
+    /// and each rule is present with a fixed probability.
+    pub(super) fn draw_neighbours(&self, glyphs: &Glyphs, rng: &mut ChaCha8Rng) -> ScalarField {
         let frame = self.strokes.frame;
         let mut coverage = Grid::new(frame.side, frame.side, 0.0);
         let pitch = self.size_mm * rng.random_range(1.0..1.08) + 0.2;
@@ -86,56 +90,60 @@ impl Artwork {
                 glyphs.ink(character, frame, centre, size, &mut coverage);
             }
         }
-        let weight_mm = weight(self.size_mm, rng);
-        let mut around = carved(&Field::distance_to_rim(frame, &coverage), weight_mm, rng);
+        let weight_mm = draw_stroke_weight(self.size_mm, rng);
+        let mut neighbours = knife_outline(
+            &ScalarField::signed_distance(frame, &coverage),
+            weight_mm,
+            rng,
+        );
         for u in [-column / 2.0, column / 2.0] {
             if rng.random_bool(0.4) {
-                add_rule(&mut around, u, rng);
+                add_rule(&mut neighbours, u, rng);
             }
         }
-        keep_clear(&mut around, &self.strokes);
-        around
+        clear_around(&mut neighbours, &self.strokes);
+        neighbours
     }
 
-    /// Nothing around the character.
-    pub(super) fn no_surroundings(&self) -> Field {
-        Field::from_fn(self.strokes.frame, |_, _, _| -self.size_mm)
+    /// Returns the signed distance field of an empty surrounding.
+    pub(super) fn empty_neighbours(&self) -> ScalarField {
+        ScalarField::from_fn(self.strokes.frame, |_, _, _| -self.size_mm)
     }
 }
 
-/// By how much the outline moves out to each side: strokes gain twice that, 2.6-4.4 % of the character's size.
-fn weight(size_mm: f64, rng: &mut ChaCha8Rng) -> f64 {
+/// Draws the outward offset of the outline in mm. Strokes widen by twice the offset: 2.6-4.4 % of the character's size.
+fn draw_stroke_weight(size_mm: f64, rng: &mut ChaCha8Rng) -> f64 {
     size_mm * rng.random_range(0.013..0.022)
 }
 
-/// The outline as a knife leaves it: heavier, corners rounded, the line a little unsteady.
-fn carved(distance: &Field, weight_mm: f64, rng: &mut ChaCha8Rng) -> Field {
-    let (slow, quick) = (Noise::draw(rng), Noise::draw(rng));
-    let (sway, nick) = (rng.random_range(0.03..0.07), rng.random_range(0.015..0.035));
+/// Returns the outline as cut with a knife: offset outwards, with rounded corners and a slightly irregular edge.
+fn knife_outline(distance: &ScalarField, weight_mm: f64, rng: &mut ChaCha8Rng) -> ScalarField {
+    let (coarse, fine) = (Noise::draw(rng), Noise::draw(rng));
+    let (coarse_mm, fine_mm) = (rng.random_range(0.03..0.07), rng.random_range(0.015..0.035));
     let round = distance.blurred(rng.random_range(0.05..0.09));
-    Field::from_fn(distance.frame, |[u, v], x, y| {
+    ScalarField::from_fn(distance.frame, |[u, v], x, y| {
         round.at(x, y)
             + weight_mm
-            + sway * slow.at(u / 0.9, v / 0.9)
-            + nick * quick.at(u / 0.22, v / 0.22)
+            + coarse_mm * coarse.at(u / 0.9, v / 0.9)
+            + fine_mm * fine.at(u / 0.22, v / 0.22)
     })
 }
 
-/// Small bites out of the strokes' rims.
-fn chip(strokes: &mut Field, rng: &mut ChaCha8Rng) {
+/// Removes small chips along the stroke outline.
+fn chip_edges(strokes: &mut ScalarField, rng: &mut ChaCha8Rng) {
     for _ in 0..rng.random_range(2..9_u32) {
-        let Some([u, v]) = rim_point(strokes, rng) else {
+        let Some([u, v]) = random_boundary_point(strokes, rng) else {
             return;
         };
-        bite(strokes, [u, v], rng.random_range(0.08..0.24));
+        remove_disc(strokes, [u, v], rng.random_range(0.08..0.24));
     }
 }
 
-/// Takes a disc out of the strokes.
-fn bite(strokes: &mut Field, [u, v]: [f64; 2], radius_mm: f64) {
+/// Removes a disc from the strokes.
+fn remove_disc(strokes: &mut ScalarField, [u, v]: [f64; 2], radius_mm: f64) {
     let frame = strokes.frame;
-    let reach = radius_mm + 0.3;
-    for (x, y) in frame.box_around([u, v], reach) {
+    let extent_mm = radius_mm + 0.3;
+    for (x, y) in frame.box_around([u, v], extent_mm) {
         let [pu, pv] = frame.position(x, y);
         let outside = (pu - u).hypot(pv - v) - radius_mm;
         let value = strokes.at(x, y).min(outside);
@@ -143,8 +151,8 @@ fn bite(strokes: &mut Field, [u, v]: [f64; 2], radius_mm: f64) {
     }
 }
 
-/// A random point next to the rim, if one is found.
-fn rim_point(strokes: &Field, rng: &mut ChaCha8Rng) -> Option<[f64; 2]> {
+/// Returns a random point within 0.05 mm of the outline, or `None` after 4000 draws.
+fn random_boundary_point(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Option<[f64; 2]> {
     let side = strokes.frame.side;
     (0..4000).find_map(|_| {
         let (x, y) = (rng.random_range(0..side), rng.random_range(0..side));
@@ -152,33 +160,33 @@ fn rim_point(strokes: &Field, rng: &mut ChaCha8Rng) -> Option<[f64; 2]> {
     })
 }
 
-/// A vertical rule between two columns.
-fn add_rule(around: &mut Field, at_mm: f64, rng: &mut ChaCha8Rng) {
+/// Adds a vertical rule between two columns.
+fn add_rule(neighbours: &mut ScalarField, at_mm: f64, rng: &mut ChaCha8Rng) {
     let noise = Noise::draw(rng);
     let half_width = rng.random_range(0.10..0.2);
     let lean = rng.random_range(-0.02..0.02);
-    let frame = around.frame;
+    let frame = neighbours.frame;
     for y in 0..frame.side {
         for x in 0..frame.side {
             let [u, v] = frame.position(x, y);
             let middle = at_mm + lean * v + 0.08 * noise.at(v / 1.5, 0.0);
             let inside = half_width + 0.04 * noise.at(v / 0.4, 7.0) - (u - middle).abs();
-            let value = around.at(x, y).max(inside);
-            around.values.set(x, y, value as f32);
+            let value = neighbours.at(x, y).max(inside);
+            neighbours.values.set(x, y, value as f32);
         }
     }
 }
 
-/// Cuts back what would touch the character.
-fn keep_clear(around: &mut Field, strokes: &Field) {
-    let pairs = around.values.data_mut().iter_mut();
+/// Removes neighbours closer than [`CLEARANCE_MM`] to the character.
+fn clear_around(neighbours: &mut ScalarField, strokes: &ScalarField) {
+    let pairs = neighbours.values.data_mut().iter_mut();
     for (value, stroke) in pairs.zip(strokes.values.data()) {
         *value = value.min(-stroke - CLEARANCE_MM as f32);
     }
 }
 
-/// Half the longest side of the strokes' box, mm.
-pub(super) fn reach_mm(strokes: &Field) -> f64 {
+/// Returns half the longest side of the strokes' bounding box, mm.
+pub(super) fn half_extent_mm(strokes: &ScalarField) -> f64 {
     let ink = strokes.values.map(|distance| *distance > 0.0);
     let longest = ink.bounding_box().map_or(strokes.frame.side, |found| {
         found.width().max(found.height())

@@ -1,28 +1,25 @@
-//! The real tier: photographed characters as prints, reliefs carved from their clean masks.
+//! The `real` tier: photographed characters as prints, with reliefs carved from their clean masks.
 //!
-//! The pictures are cells of a figure of the `DiffACR` project (Apache-2.0, the licence lies beside them). A crop
-//! and its clean mask show the same cell, the crop with one row more at the top: over all twenty, the shift at which
-//! both agree best is [0, 1] px, to half a pixel, and the scale 1 to one part in a hundred. So the truth of this tier
-//! is good to about a pixel, that of the others exact.
+//! The images are cells of a figure of the `DiffACR` project (Apache-2.0; see `assets/calligraphy/LICENSE`). A crop
+//! and its clean mask show the same cell; the crop has one extra row at the top. Over all twenty images the best
+//! shift is [0, 1] px within half a pixel and the best scale is 1 within 1 %. The ground truth of this tier is
+//! therefore accurate to about one pixel; the other tiers are exact.
 
 use image::{GrayImage, ImageError};
 use rand::RngExt;
 
 use super::artwork::Artwork;
 use super::damage::Damage;
-use super::pair::{Pair, Printed, Scene, id_of, rng_of};
-use super::print::PrintFrame;
-use super::tier::Tier;
+use super::pair::{DemoPair, Printed, Scene, pair_id, pair_rng};
+use super::rendered_print::PrintFrame;
+use super::tier::{REAL_PAIRS, Tier};
 use crate::domain::Affine2;
 
-/// Where a pixel of the clean mask lies in the crop.
+/// Maps pixels of the clean mask to pixels of the crop.
 const CROP_FROM_CLEAN: Affine2 = Affine2([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);
 
-/// How many there are.
-pub(super) const COUNT: u64 = 20;
-
 /// A photographed character.
-struct Cell {
+struct PhotographedCharacter {
     character: char,
     photograph: &'static [u8],
     clean: &'static [u8],
@@ -30,7 +27,7 @@ struct Cell {
 
 macro_rules! cell {
     ($character:literal, $number:literal) => {
-        Cell {
+        PhotographedCharacter {
             character: $character,
             photograph: include_bytes!(concat!("../../assets/calligraphy/", $number, "_real.png")),
             clean: include_bytes!(concat!("../../assets/calligraphy/", $number, "_clean.png")),
@@ -38,7 +35,7 @@ macro_rules! cell {
     };
 }
 
-static CELLS: [Cell; COUNT as usize] = [
+static CELLS: [PhotographedCharacter; REAL_PAIRS as usize] = [
     cell!('後', "00"),
     cell!('二', "01"),
     cell!('成', "02"),
@@ -61,41 +58,41 @@ static CELLS: [Cell; COUNT as usize] = [
     cell!('同', "19"),
 ];
 
-/// Makes a pair: the photograph as it is, and a relief of its clean mask in any pose.
+/// Makes a pair from the unchanged photograph and a relief of its clean mask in a random pose.
 ///
 /// # Errors
-/// When a picture cannot be read or encoded.
-pub(super) fn pair(seed: u64, index: u64, vertices: Option<u32>) -> Result<Pair, ImageError> {
-    let cell = &CELLS[(index % COUNT) as usize];
-    let mut rng = rng_of(seed, Tier::Real, index);
-    let clean = image::load_from_memory(cell.clean)?.to_luma8();
-    let photograph = image::load_from_memory(cell.photograph)?;
+/// Fails when an embedded image cannot be decoded.
+pub(super) fn pair(seed: u64, index: u64, vertices: Option<u32>) -> Result<DemoPair, ImageError> {
+    let photographed = &CELLS[(index % REAL_PAIRS) as usize];
+    let mut rng = pair_rng(seed, Tier::Real, index);
+    let clean = image::load_from_memory(photographed.clean)?.to_luma8();
+    let photograph = image::load_from_memory(photographed.photograph)?;
     let size_mm = rng.random_range(8.0..10.2);
-    let clean_from_uv = place(&clean, size_mm);
+    let clean_from_uv = clean_from_mm(&clean, size_mm);
     let artwork = Artwork::of_mask(size_mm, |point| {
-        ink_share(&clean, clean_from_uv.apply(point))
+        ink_coverage(&clean, clean_from_uv.apply(point))
     });
     let (width, height) = (photograph.width() as usize, photograph.height() as usize);
     let printed = Printed {
         frame: PrintFrame::new(width, height, CROP_FROM_CLEAN.after(&clean_from_uv)),
-        bytes: cell.photograph.to_vec(),
+        bytes: photographed.photograph.to_vec(),
         extension: "png",
     };
-    let bare = artwork.no_surroundings();
+    let no_neighbours = artwork.empty_neighbours();
     let scene = Scene {
-        id: id_of(Tier::Real, index),
+        id: pair_id(Tier::Real, index),
         tier: Tier::Real,
-        character: cell.character,
+        character: photographed.character,
         artwork,
-        block_around: bare.clone(),
-        print_around: bare,
+        block_neighbours: no_neighbours.clone(),
+        print_neighbours: no_neighbours,
         damage: Damage::default(),
     };
-    Ok(scene.carved(printed, vertices, &mut rng))
+    Ok(scene.into_pair(printed, vertices, &mut rng))
 }
 
-/// Pixels from mm such that the ink box is centred and its longest side is `size_mm`.
-fn place(clean: &GrayImage, size_mm: f64) -> Affine2 {
+/// Returns the map from mm to mask pixels that centres the ink and scales its longest side to `size_mm`.
+fn clean_from_mm(clean: &GrayImage, size_mm: f64) -> Affine2 {
     let ink =
         crate::raster::Mask::from_fn(clean.width() as usize, clean.height() as usize, |x, y| {
             clean.get_pixel(x as u32, y as u32).0[0] < 128
@@ -108,8 +105,8 @@ fn place(clean: &GrayImage, size_mm: f64) -> Affine2 {
     Affine2::scale_shift(scale, centre)
 }
 
-/// Share of ink at a pixel position, bilinear; none outside.
-fn ink_share(clean: &GrayImage, [x, y]: [f64; 2]) -> f64 {
+/// Returns the ink coverage, 0..=1, at a pixel position by bilinear interpolation; 0 outside the image.
+fn ink_coverage(clean: &GrayImage, [x, y]: [f64; 2]) -> f64 {
     let at = |x: f64, y: f64| {
         let (x, y) = (x as i64, y as i64);
         let inside =

@@ -1,58 +1,58 @@
-//! What happened to the block after it was printed: strokes broken off, cracks.
+//! Damage to the block after printing: broken strokes and cracks.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::artwork::Artwork;
-use super::field::Field;
 use super::noise::Noise;
+use super::scalar_field::ScalarField;
 
-/// Least and greatest share of the stroke area that a damaged block has lost.
+/// Minimum and maximum share of the stroke area lost on a damaged block.
 const LOST_SHARE: [f64; 2] = [0.05, 0.20];
 
 /// Damage to one block.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Damage {
-    /// Signed distance in mm to the broken places, positive in them; none when nothing is lost.
-    pub lost: Option<Field>,
+    /// Signed distance in mm to the lost regions, positive inside; `None` when nothing is lost.
+    pub lost: Option<ScalarField>,
     /// Cracks through the wood.
     pub cracks: Vec<Crack>,
 }
 
-/// A crack across the whole square, nearly straight.
+/// A nearly straight crack across the whole sample frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crack {
     normal: [f64; 2],
     offset_mm: f64,
-    wander: Noise,
-    /// Half its width at the top, mm.
+    path_noise: Noise,
+    /// Half the width at the top, mm.
     pub half_width_mm: f64,
-    /// Its depth, mm.
+    /// Depth, mm.
     pub depth_mm: f64,
 }
 
 impl Damage {
-    /// Damage of a block of the hard tier.
+    /// Draws the damage of a block of the `hard` tier.
     pub(super) fn draw(artwork: &Artwork, rng: &mut ChaCha8Rng) -> Self {
-        let lost = Some(broken_places(artwork, rng));
+        let lost = Some(draw_lost_regions(artwork, rng));
         let cracks = (0..rng.random_range(0..3_u32))
             .map(|_| Crack::draw(rng))
             .collect();
         Self { lost, cracks }
     }
 
-    /// The strokes that are left on the block, as signed distance.
-    pub(super) fn remaining(&self, strokes: &Field) -> Field {
-        Field::from_fn(strokes.frame, |_, x, y| {
-            let gone = self
+    /// Returns the signed distance in mm to the strokes left on the block.
+    pub(super) fn remaining(&self, strokes: &ScalarField) -> ScalarField {
+        ScalarField::from_fn(strokes.frame, |_, x, y| {
+            let lost = self
                 .lost
                 .as_ref()
                 .map_or(f64::NEG_INFINITY, |lost| lost.at(x, y));
-            strokes.at(x, y).min(-gone)
+            strokes.at(x, y).min(-lost)
         })
     }
 
-    /// Whether a point lies in a crack or within `margin_mm` of one.
+    /// Returns whether a point lies in a crack or within `margin_mm` of one.
     pub(super) fn is_cracked(&self, point: [f64; 2], margin_mm: f64) -> bool {
         self.cracks
             .iter()
@@ -66,23 +66,23 @@ impl Crack {
         Self {
             normal: [angle.cos(), angle.sin()],
             offset_mm: rng.random_range(-4.0..4.0),
-            wander: Noise::draw(rng),
+            path_noise: Noise::draw(rng),
             half_width_mm: rng.random_range(0.03..0.09),
             depth_mm: rng.random_range(0.3..1.0),
         }
     }
 
-    /// Distance of a point to the crack's middle line, mm.
+    /// Returns the distance of a point to the centre line of the crack, mm.
     pub(super) fn distance_mm(&self, [u, v]: [f64; 2]) -> f64 {
         let [nu, nv] = self.normal;
         let along = u * nv - v * nu;
-        let wander = 0.35 * self.wander.rough(along / 1.7, 0.0);
-        (u * nu + v * nv - self.offset_mm - wander).abs()
+        let offset = 0.35 * self.path_noise.two_octaves(along / 1.7, 0.0);
+        (u * nu + v * nv - self.offset_mm - offset).abs()
     }
 }
 
-/// Blobs with ragged rims, laid on the strokes until enough is lost.
-fn broken_places(artwork: &Artwork, rng: &mut ChaCha8Rng) -> Field {
+/// Draws ragged blobs over the strokes until the target share of the stroke area is lost.
+fn draw_lost_regions(artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
     let strokes = &artwork.strokes;
     let frame = strokes.frame;
     let ink: Vec<(usize, usize)> = (0..frame.side * frame.side)
@@ -90,30 +90,30 @@ fn broken_places(artwork: &Artwork, rng: &mut ChaCha8Rng) -> Field {
         .filter(|(x, y)| strokes.at(*x, *y) > 0.0)
         .collect();
     let target = rng.random_range(LOST_SHARE[0]..LOST_SHARE[1] - 0.04);
-    let rag = Noise::draw(rng);
-    let mut lost = Field::from_fn(frame, |_, _, _| -9.0);
+    let edge_noise = Noise::draw(rng);
+    let mut lost = ScalarField::from_fn(frame, |_, _, _| -9.0);
     for _ in 0..200 {
-        if share_lost(&lost, &ink) >= target || ink.is_empty() {
+        if lost_share(&lost, &ink) >= target || ink.is_empty() {
             break;
         }
         let (x, y) = ink[rng.random_range(0..ink.len())];
         let blob = Blob::draw(frame.position(x, y), rng);
-        let with_blob = Field::from_fn(frame, |point, x, y| {
-            lost.at(x, y).max(blob.inside_mm(point, rag))
+        let with_blob = ScalarField::from_fn(frame, |point, x, y| {
+            lost.at(x, y).max(blob.inside_mm(point, edge_noise))
         });
-        if share_lost(&with_blob, &ink) <= LOST_SHARE[1] {
+        if lost_share(&with_blob, &ink) <= LOST_SHARE[1] {
             lost = with_blob;
         }
     }
     lost
 }
 
-fn share_lost(lost: &Field, ink: &[(usize, usize)]) -> f64 {
-    let gone = ink.iter().filter(|(x, y)| lost.at(*x, *y) > 0.0).count();
-    gone as f64 / ink.len().max(1) as f64
+fn lost_share(lost: &ScalarField, ink: &[(usize, usize)]) -> f64 {
+    let lost_count = ink.iter().filter(|(x, y)| lost.at(*x, *y) > 0.0).count();
+    lost_count as f64 / ink.len().max(1) as f64
 }
 
-/// A broken place: an ellipse.
+/// An elliptical lost region.
 struct Blob {
     centre: [f64; 2],
     axis: [f64; 2],
@@ -133,11 +133,12 @@ impl Blob {
         }
     }
 
-    fn inside_mm(&self, [u, v]: [f64; 2], rag: Noise) -> f64 {
+    fn inside_mm(&self, [u, v]: [f64; 2], edge_noise: Noise) -> f64 {
         let (du, dv) = (u - self.centre[0], v - self.centre[1]);
         let along = (du * self.axis[0] + dv * self.axis[1]) / self.long_mm;
         let across = (dv * self.axis[0] - du * self.axis[1]) / self.short_mm;
-        self.short_mm * (1.0 - along.hypot(across)) + 0.15 * rag.rough(u / 0.5, v / 0.5)
+        self.short_mm * (1.0 - along.hypot(across))
+            + 0.15 * edge_noise.two_octaves(u / 0.5, v / 0.5)
     }
 }
 
@@ -157,7 +158,7 @@ mod tests {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
             let artwork = Artwork::of_glyph(&glyphs, '國', &mut rng);
             let damage = Damage::draw(&artwork, &mut rng);
-            let area = |field: &crate::demo::field::Field| {
+            let area = |field: &crate::demo::scalar_field::ScalarField| {
                 field.values.data().iter().filter(|d| **d > 0.0).count() as f64
             };
             let left = area(&damage.remaining(&artwork.strokes)) / area(&artwork.strokes);

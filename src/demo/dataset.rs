@@ -1,4 +1,4 @@
-//! A dataset on disk: ordinary files that anybody could have made.
+//! The dataset on disk, as ordinary manifest, mesh, image and truth files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,86 +6,86 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::pair::Pair;
-use super::pairs::Pairs;
+use super::generator::PairGenerator;
+use super::pair::DemoPair;
 use super::tier::Tier;
 use crate::raster::png_grey8;
 
-/// Raised whenever the same options give other bytes than before.
+/// Increased whenever the same options produce different bytes.
 const REVISION: u32 = 2;
-/// Pairs that share a block in the manifest.
+/// Number of consecutive pairs with the same block in the manifest.
 const PAIRS_PER_BLOCK: u64 = 12;
-/// Written last: a dataset that has it is whole.
-const SEAL: &str = "dataset.json";
+/// Written last; its presence marks a complete dataset.
+const STAMP_FILE: &str = "dataset.json";
 
-/// What to make.
+/// Size, seed and tier of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DemoOptions {
-    /// How many pairs; the real tier has 20 at most.
+    /// Number of pairs; at most 20 for the `real` tier.
     pub pairs: u64,
-    /// Same seed, same bytes.
+    /// Random seed; the same seed gives the same bytes.
     pub seed: u64,
-    /// How hard.
+    /// Difficulty.
     pub tier: Tier,
 }
 
-/// Where a dataset lies.
+/// Paths of a dataset.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct DatasetFiles {
-    /// `manifest.csv`, to import.
+    /// `manifest.csv`, the input of `mocban import`.
     pub manifest: PathBuf,
     /// `truth.jsonl`.
     pub truth: PathBuf,
-    /// How many pairs it holds.
+    /// Number of pairs.
     pub pairs: u64,
-    /// Whether it was there already and nothing was written.
-    pub was_there: bool,
+    /// Whether a complete dataset with the same options existed, so that nothing was written.
+    pub already_existed: bool,
 }
 
-/// Why a dataset could not be made.
+/// A failure to write the dataset.
 #[derive(Debug, thiserror::Error)]
-pub enum Error {
-    /// A folder or file could not be written.
+pub enum DatasetError {
+    /// A directory or file could not be written.
     #[error("{}: {source}", path.display())]
     Io {
-        /// Which one.
+        /// The path.
         path: PathBuf,
-        /// What the system said.
+        /// The operating system's error.
         source: std::io::Error,
     },
-    /// A picture could not be encoded or, from the program itself, decoded.
-    #[error("picture of pair {id}: {source}")]
-    Picture {
-        /// Which pair.
+    /// An image could not be encoded, or an embedded one not decoded.
+    #[error("image of pair {id}: {source}")]
+    Image {
+        /// The pair.
         id: String,
-        /// What the encoder said.
+        /// The codec's error.
         source: image::ImageError,
     },
-    /// Asked to stop before it was whole.
-    #[error("stopped while the demo's files were made")]
+    /// Stopped before the dataset was complete.
+    #[error("stopped while the demo files were written")]
     Stopped,
-    /// A row could not be put into text.
+    /// A record could not be serialized.
     #[error("{}: {reason}", path.display())]
     Text {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// What the writer said.
+        /// The serializer's message.
         reason: String,
     },
 }
 
-/// What `dataset.json` says.
+/// Content of `dataset.json`.
 #[derive(Debug, PartialEq, Eq, Serialize, Deserialize)]
-struct Seal {
+struct DatasetStamp {
     schema: u32,
     revision: u32,
     #[serde(flatten)]
     options: DemoOptions,
 }
 
-/// One row of the manifest.
+/// One line of `manifest.csv`.
 #[derive(Debug, Clone, Serialize)]
-struct Row {
+struct ManifestLine {
     id: String,
     mesh: String,
     print: String,
@@ -97,91 +97,101 @@ struct Row {
     tier: Tier,
 }
 
-/// Writes the dataset below `dir`, or finds it there whole, made with the same options.
+/// Writes the dataset below `dir`, unless a complete one with the same options is already there.
 ///
-/// `manifest.csv`, `truth.jsonl`, `meshes/`, `prints/` and `tops/` are ordinary files; `dataset.json` is written
-/// last, so what a killed run left behind is made anew. `is_stopped` is asked before each pair.
+/// Writes `manifest.csv`, `truth.jsonl`, `meshes/`, `prints/` and `tops/`. `dataset.json` is written last, so that
+/// the files of a killed run are replaced. Calls `is_stopped` before each pair.
 ///
 /// # Errors
-/// When a file cannot be written, or it was asked to stop.
+/// Fails when a file cannot be written or `is_stopped` returns true.
 pub fn write_dataset(
     dir: &Path,
     options: &DemoOptions,
     is_stopped: &(dyn Fn() -> bool + Sync),
-) -> Result<DatasetFiles, Error> {
+) -> Result<DatasetFiles, DatasetError> {
     let options = DemoOptions {
         pairs: options
             .pairs
-            .min(options.tier.most_pairs().unwrap_or(u64::MAX)),
+            .min(options.tier.max_pairs().unwrap_or(u64::MAX)),
         ..*options
     };
-    let seal = Seal {
+    let stamp = DatasetStamp {
         schema: 1,
         revision: REVISION,
         options,
     };
-    let was_there = is_sealed(dir, &seal);
-    if !was_there {
-        make(dir, &options, is_stopped)?;
-        write(&dir.join(SEAL), &json_line(&dir.join(SEAL), &seal)?)?;
+    let already_existed = is_complete(dir, &stamp);
+    if !already_existed {
+        write_all(dir, &options, is_stopped)?;
+        write(
+            &dir.join(STAMP_FILE),
+            &json_line(&dir.join(STAMP_FILE), &stamp)?,
+        )?;
     }
     Ok(DatasetFiles {
         manifest: dir.join("manifest.csv"),
         truth: dir.join("truth.jsonl"),
         pairs: options.pairs,
-        was_there,
+        already_existed,
     })
 }
 
-fn is_sealed(dir: &Path, seal: &Seal) -> bool {
-    fs::read(dir.join(SEAL))
+fn is_complete(dir: &Path, stamp: &DatasetStamp) -> bool {
+    fs::read(dir.join(STAMP_FILE))
         .ok()
-        .and_then(|bytes| serde_json::from_slice::<Seal>(&bytes).ok())
-        .is_some_and(|found| found == *seal)
+        .and_then(|bytes| serde_json::from_slice::<DatasetStamp>(&bytes).ok())
+        .is_some_and(|found| found == *stamp)
 }
 
-fn make(
+fn write_all(
     dir: &Path,
     options: &DemoOptions,
     is_stopped: &(dyn Fn() -> bool + Sync),
-) -> Result<(), Error> {
+) -> Result<(), DatasetError> {
     for folder in ["meshes", "prints", "tops"] {
-        // What another dataset left here would not be in the new manifest.
+        // Files of an earlier dataset would not be listed in the new manifest.
         remove_folder(&dir.join(folder))?;
         create_folder(&dir.join(folder))?;
     }
-    let pairs = Pairs::new(options.tier, options.seed);
+    let pairs = PairGenerator::new(options.tier, options.seed);
     let lines = (0..options.pairs)
         .into_par_iter()
         .map(|index| {
             if is_stopped() {
-                return Err(Error::Stopped);
+                return Err(DatasetError::Stopped);
             }
-            one(dir, &pairs, index)
+            write_pair(dir, &pairs, index)
         })
-        .collect::<Result<Vec<_>, Error>>()?;
-    let (rows, truths): (Vec<Row>, Vec<Vec<u8>>) = lines.into_iter().unzip();
+        .collect::<Result<Vec<_>, DatasetError>>()?;
+    let (rows, truths): (Vec<ManifestLine>, Vec<Vec<u8>>) = lines.into_iter().unzip();
     write_manifest(&dir.join("manifest.csv"), &rows)?;
     write(&dir.join("truth.jsonl"), &truths.concat())
 }
 
-/// Makes one pair, writes its files, and returns its rows. Nothing else of it stays in memory.
-fn one(dir: &Path, pairs: &Pairs, index: u64) -> Result<(Row, Vec<u8>), Error> {
+/// Makes one pair, writes its files and returns its manifest and truth lines.
+fn write_pair(
+    dir: &Path,
+    pairs: &PairGenerator,
+    index: u64,
+) -> Result<(ManifestLine, Vec<u8>), DatasetError> {
     let tier = pairs.tier();
-    let pair = pairs.pair(index).map_err(|source| Error::Picture {
-        id: super::pair::id_of(tier, index),
+    let pair = pairs.pair(index).map_err(|source| DatasetError::Image {
+        id: super::pair::pair_id(tier, index),
         source,
     })?;
-    let row = row(&pair, tier, index);
-    write(&dir.join(&row.mesh), &pair.mesh_format.encode(&pair.mesh))?;
-    write(&dir.join(&row.print), &pair.print)?;
+    let manifest_line = manifest_line(&pair, tier, index);
+    write(
+        &dir.join(&manifest_line.mesh),
+        &pair.mesh_format.encode(&pair.mesh),
+    )?;
+    write(&dir.join(&manifest_line.print), &pair.print)?;
     write(&dir.join(&pair.truth.tops_mask), &png_grey8(&pair.tops))?;
     let truth = json_line(&dir.join("truth.jsonl"), &pair.truth)?;
-    Ok((row, truth))
+    Ok((manifest_line, truth))
 }
 
-fn row(pair: &Pair, tier: Tier, index: u64) -> Row {
-    Row {
+fn manifest_line(pair: &DemoPair, tier: Tier, index: u64) -> ManifestLine {
+    ManifestLine {
         id: pair.id.clone(),
         mesh: format!("meshes/{}.{}", pair.id, pair.mesh_format.extension()),
         print: format!("prints/{}.{}", pair.id, pair.print_extension),
@@ -194,24 +204,24 @@ fn row(pair: &Pair, tier: Tier, index: u64) -> Row {
     }
 }
 
-fn write_manifest(path: &Path, rows: &[Row]) -> Result<(), Error> {
-    let text_error = |error: csv::Error| Error::Text {
+fn write_manifest(path: &Path, rows: &[ManifestLine]) -> Result<(), DatasetError> {
+    let text_error = |error: csv::Error| DatasetError::Text {
         path: path.to_owned(),
         reason: error.to_string(),
     };
     let mut writer = csv::Writer::from_writer(Vec::new());
-    for row in rows {
-        writer.serialize(row).map_err(text_error)?;
+    for manifest_line in rows {
+        writer.serialize(manifest_line).map_err(text_error)?;
     }
-    let bytes = writer.into_inner().map_err(|error| Error::Text {
+    let bytes = writer.into_inner().map_err(|error| DatasetError::Text {
         path: path.to_owned(),
         reason: error.to_string(),
     })?;
     write(path, &bytes)
 }
 
-fn json_line(path: &Path, value: &impl Serialize) -> Result<Vec<u8>, Error> {
-    let mut line = serde_json::to_vec(value).map_err(|error| Error::Text {
+fn json_line(path: &Path, value: &impl Serialize) -> Result<Vec<u8>, DatasetError> {
+    let mut line = serde_json::to_vec(value).map_err(|error| DatasetError::Text {
         path: path.to_owned(),
         reason: error.to_string(),
     })?;
@@ -219,23 +229,23 @@ fn json_line(path: &Path, value: &impl Serialize) -> Result<Vec<u8>, Error> {
     Ok(line)
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    fs::write(path, bytes).map_err(|source| Error::Io {
+fn write(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
+    fs::write(path, bytes).map_err(|source| DatasetError::Io {
         path: path.to_owned(),
         source,
     })
 }
 
-fn create_folder(path: &Path) -> Result<(), Error> {
-    fs::create_dir_all(path).map_err(|source| Error::Io {
+fn create_folder(path: &Path) -> Result<(), DatasetError> {
+    fs::create_dir_all(path).map_err(|source| DatasetError::Io {
         path: path.to_owned(),
         source,
     })
 }
 
-fn remove_folder(path: &Path) -> Result<(), Error> {
+fn remove_folder(path: &Path) -> Result<(), DatasetError> {
     match fs::remove_dir_all(path) {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(Error::Io {
+        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(DatasetError::Io {
             path: path.to_owned(),
             source,
         }),

@@ -1,15 +1,15 @@
-//! Characters of the embedded font as ink on a frame.
+//! Renders characters of the embedded font onto a sample frame.
 
 use ab_glyph::{Font, FontRef, GlyphId, OutlinedGlyph, PxScale, point};
 
-use super::field::Frame;
+use super::scalar_field::SampleFrame;
 use crate::raster::Grid;
 
-/// A subset of `HanaMin` A and B: 970 characters frequent in Nôm texts. Its licence lies beside it.
+/// A subset of `HanaMin` A and B: 970 characters frequent in Nôm texts. See `assets/LICENSE-mocban-demo-mincho.txt`.
 const FONT: &[u8] = include_bytes!("../../assets/mocban-demo-mincho.ttf");
 
-/// Ink boxes flatter than this are left out: an error told in shares of the character's height means nothing
-/// for a single bar.
+/// Minimum height by width of usable characters. Errors are measured in shares of the character's height, which is
+/// not meaningful for a single horizontal bar.
 const MIN_HEIGHT_BY_WIDTH: f32 = 0.5;
 
 /// The embedded font.
@@ -19,9 +19,9 @@ pub(super) struct Glyphs {
 }
 
 impl Glyphs {
-    /// Reads the font that is part of the program.
+    /// Parses the embedded font.
     pub(super) fn embedded() -> Self {
-        let font = FontRef::try_from_slice(FONT).expect("the font in the program is a font");
+        let font = FontRef::try_from_slice(FONT).expect("the embedded font is valid");
         let mut characters: Vec<char> = font
             .codepoint_ids()
             .filter(|(id, character)| !character.is_ascii() && is_usable(&font, *id))
@@ -31,17 +31,17 @@ impl Glyphs {
         Self { font, characters }
     }
 
-    /// The characters to choose from, by code point.
+    /// Returns the usable characters, sorted by code point.
     pub(super) fn characters(&self) -> &[char] {
         &self.characters
     }
 
-    /// Adds a character's ink to `coverage` (share of each sample's cell, 0..=1): its ink box centred on
-    /// `centre_mm`, the box's longest side `size_mm`.
+    /// Adds a character to `coverage`, the ink coverage of each sample's cell, 0..=1. Its bounding box is centred on
+    /// `centre_mm` and its longest side is `size_mm`.
     pub(super) fn ink(
         &self,
         character: char,
-        frame: Frame,
+        frame: SampleFrame,
         centre_mm: [f64; 2],
         size_mm: f64,
         coverage: &mut Grid<f32>,
@@ -90,11 +90,11 @@ fn draw(outline: &OutlinedGlyph, coverage: &mut Grid<f32>) {
 #[cfg(test)]
 mod tests {
     use super::Glyphs;
-    use crate::demo::field::Frame;
+    use crate::demo::scalar_field::SampleFrame;
     use crate::raster::Grid;
 
     #[test]
-    fn font_holds_nom_characters_beyond_the_basic_plane() {
+    fn font_has_nom_characters_outside_the_basic_multilingual_plane() {
         let glyphs = Glyphs::embedded();
         assert!(glyphs.characters().len() > 900);
         assert!(glyphs.characters().iter().any(|c| *c as u32 > 0xFFFF));
@@ -102,8 +102,8 @@ mod tests {
     }
 
     #[test]
-    fn ink_box_has_the_asked_size_and_centre() {
-        let frame = Frame::covering(6.0, 0.05);
+    fn bounding_box_has_the_requested_size_and_centre() {
+        let frame = SampleFrame::covering(6.0, 0.05);
         let mut coverage = Grid::new(frame.side, frame.side, 0.0);
         Glyphs::embedded().ink('國', frame, [1.0, -0.5], 8.0, &mut coverage);
         let found = coverage.map(|share| *share > 0.5).bounding_box();

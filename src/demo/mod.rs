@@ -1,35 +1,33 @@
 //! The built-in dataset: glyphs carved into meshes and printed, with known truth, from one seed.
 //!
-//! A pair is a pure function of seed, tier and place: `artwork` draws the strokes, `damage` breaks some,
-//! `relief` carves them, `scan` and `pose` make the mesh, `ink`, `paper` and `print` the print,
-//! `truth` writes down the answer, `pairs` makes them in memory, `dataset` puts all of it on disk, `decoy` makes pairs
-//! that have no answer.
+//! A pair is a pure function of seed, tier and index. `artwork` draws the strokes and `damage` removes parts of them.
+//! `carving` computes the carved surface; `scanner` and `scan_pose` turn it into a mesh. `inking`, `print_sheet`,
+//! `rendered_print` and `print_format` make the print. `truth_line` records the true alignment, `generator` makes pairs in
+//! memory and `dataset` writes them to disk.
 
 mod artwork;
 mod calligraphy;
+mod carving;
 mod damage;
 mod dataset;
-mod decoy;
-mod field;
+mod generator;
 mod glyph;
-mod ink;
+mod inking;
 mod noise;
 mod pair;
-mod pairs;
-mod paper;
-mod picture_file;
 mod polygon;
-mod pose;
-mod print;
-mod relief;
-mod scan;
+mod print_format;
+mod print_sheet;
+mod rendered_print;
+mod scalar_field;
+mod scan_pose;
+mod scanner;
 mod tier;
-mod truth;
+mod truth_line;
 
-pub use dataset::{DatasetFiles, DemoOptions, Error, write_dataset};
-pub use decoy::{Decoy, DecoyPair};
-pub use pair::Pair;
-pub use pairs::Pairs;
-pub use pose::TopsPlane;
+pub use dataset::{DatasetError, DatasetFiles, DemoOptions, write_dataset};
+pub use generator::PairGenerator;
+pub use pair::DemoPair;
+pub use scan_pose::TopsPlane;
 pub use tier::Tier;
-pub use truth::TruthLine;
+pub use truth_line::TruthLine;

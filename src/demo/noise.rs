@@ -1,36 +1,47 @@
-//! Smooth random texture: value noise on a lattice.
+//! Value noise and random draws.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// A smooth random function of the plane, with features about one unit across.
+/// A smooth random function of the plane with features of about one unit.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Noise {
     seed: u64,
 }
 
 impl Noise {
-    /// A new function, drawn.
+    /// Draws a new function.
     pub(super) fn draw(rng: &mut ChaCha8Rng) -> Self {
         Self { seed: rng.random() }
     }
 
-    /// Its value at a point, -1..1.
+    /// Returns the value at a point, -1..1.
     pub(super) fn at(self, x: f64, y: f64) -> f64 {
         let (ix, iy) = (floor(x), floor(y));
-        let (fx, fy) = (ease(x - ix as f64), ease(y - iy as f64));
-        let top = mix(self.knot(ix, iy), self.knot(ix + 1, iy), fx);
-        let bottom = mix(self.knot(ix, iy + 1), self.knot(ix + 1, iy + 1), fx);
-        mix(top, bottom, fy)
+        let (fx, fy) = (
+            smoothstep_unit(x - ix as f64),
+            smoothstep_unit(y - iy as f64),
+        );
+        let top = lerp(
+            self.lattice_value(ix, iy),
+            self.lattice_value(ix + 1, iy),
+            fx,
+        );
+        let bottom = lerp(
+            self.lattice_value(ix, iy + 1),
+            self.lattice_value(ix + 1, iy + 1),
+            fx,
+        );
+        lerp(top, bottom, fy)
     }
 
-    /// Two octaves: the function and a finer one at half its strength, -1.5..1.5.
-    pub(super) fn rough(self, x: f64, y: f64) -> f64 {
+    /// Returns the sum of two octaves, the second at half amplitude, -1.5..1.5.
+    pub(super) fn two_octaves(self, x: f64, y: f64) -> f64 {
         self.at(x, y) + 0.5 * self.at(2.17 * x + 31.7, 2.17 * y - 11.3)
     }
 
-    /// The random value of a lattice point, by a mixing hash.
-    fn knot(self, x: i64, y: i64) -> f64 {
+    /// Returns the random value of a lattice point, -1..1, by integer hashing.
+    fn lattice_value(self, x: i64, y: i64) -> f64 {
         let mut bits = self.seed
             ^ (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
             ^ (y as u64).wrapping_mul(0xC2B2_AE3D_27D4_EB4F);
@@ -41,29 +52,30 @@ impl Noise {
     }
 }
 
-/// A draw from the normal distribution (Box and Muller 1958).
+/// Draws from the standard normal distribution (Box and Muller 1958).
 pub(super) fn normal(rng: &mut ChaCha8Rng) -> f64 {
     let radius = (-2.0 * (1.0 - rng.random::<f64>()).ln()).sqrt();
     radius * (std::f64::consts::TAU * rng.random::<f64>()).cos()
 }
 
-/// From `a` to `b` as `t` goes from 0 to 1.
-pub(super) fn mix(a: f64, b: f64, t: f64) -> f64 {
+/// Interpolates linearly from `a` at `t` = 0 to `b` at `t` = 1.
+pub(super) fn lerp(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
-/// 0 below `low`, 1 above `high`, smooth between.
-pub(super) fn ramp(low: f64, high: f64, x: f64) -> f64 {
-    ease(((x - low) / (high - low)).clamp(0.0, 1.0))
+/// Returns 0 below `low`, 1 above `high` and a smooth transition between them.
+pub(super) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
+    smoothstep_unit(((x - low) / (high - low)).clamp(0.0, 1.0))
 }
 
-/// The next whole number down. Without processor flags `f64::floor` is a call, and this runs a million times a pair.
+/// Returns the largest integer not above `x`. On the baseline x86-64 target `f64::floor` is a library call, and this
+/// runs a million times per pair.
 fn floor(x: f64) -> i64 {
     let toward_zero = x as i64;
     toward_zero - i64::from((toward_zero as f64) > x)
 }
 
-fn ease(t: f64) -> f64 {
+fn smoothstep_unit(t: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }
 
@@ -75,7 +87,7 @@ mod tests {
     use super::{Noise, normal};
 
     #[test]
-    fn noise_is_smooth_bounded_and_drawn() {
+    fn noise_is_smooth_bounded_and_random() {
         let mut rng = ChaCha8Rng::seed_from_u64(3);
         let (one, other) = (Noise::draw(&mut rng), Noise::draw(&mut rng));
         let mut differ = 0;

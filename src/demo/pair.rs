@@ -1,107 +1,107 @@
-//! One pair of the dataset, from its seed: carve, scan, print, and the truth about it.
+//! Makes one pair of the dataset: carves, scans and prints a character and records the ground truth.
 
 use image::ImageError;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use super::artwork::Artwork;
+use super::carving::{Carving, carve};
 use super::damage::Damage;
-use super::field::Field;
 use super::glyph::Glyphs;
-use super::ink::Inking;
-use super::picture_file::PictureFormat;
+use super::inking::Inking;
 use super::polygon::Polygon;
-use super::pose::Pose;
-use super::print::{Impression, PrintFrame, print};
-use super::relief::{Carving, relief};
-use super::scan::{ScanStyle, scan};
+use super::print_format::PrintFormat;
+use super::rendered_print::{Impression, PrintFrame, render_print};
+use super::scalar_field::ScalarField;
+use super::scan_pose::ScanPose;
+use super::scanner::{ScanStyle, scan};
 use super::tier::Tier;
-use super::truth::{Known, TruthLine};
+use super::truth_line::{TruthLine, TruthSource};
 use crate::domain::{ContentHash, LengthUnit};
 use crate::mesh::Mesh;
 use crate::mesh::write::MeshFormat;
 use crate::raster::Grid;
 
-/// Everything about a pair in memory.
-pub struct Pair {
-    /// File stem and manifest id.
+/// A pair in memory.
+pub struct DemoPair {
+    /// Manifest id and file stem.
     pub id: String,
     /// The character, as text.
     pub character: String,
-    /// The unit's name, if it is known.
+    /// Name of the length unit, if the manifest gives it.
     pub unit: Option<&'static str>,
-    /// Whether the carved side looks down, where someone wrote it down.
+    /// Whether the carved side faces down, if the manifest says so.
     pub scanned_face_down: Option<bool>,
-    /// Whether the mesh has walls and a foot.
+    /// Whether the mesh has side walls and a base.
     pub is_closed: bool,
     /// The mesh, in mesh coordinates.
     pub mesh: Mesh,
-    /// How the mesh is stored.
+    /// File format of the mesh.
     pub mesh_format: MeshFormat,
-    /// The print's file.
+    /// Encoded print image.
     pub print: Vec<u8>,
-    /// Its file name's ending.
+    /// File name extension of the print.
     pub print_extension: &'static str,
-    /// The tops mask in the print's frame: 255 a stroke top, 0 none, 128 left out of the score.
+    /// Mask of the stroke tops in the print frame: 255 = stroke top, 0 = background, 128 = excluded from the score.
     pub tops: Grid<u8>,
-    /// The truth.
+    /// Ground truth.
     pub truth: TruthLine,
 }
 
-/// The random numbers of one pair: a function of the seed, the tier and the pair's place alone.
-pub(super) fn rng_of(seed: u64, tier: Tier, index: u64) -> ChaCha8Rng {
+/// Creates the random generator of one pair from seed, tier and index.
+pub(super) fn pair_rng(seed: u64, tier: Tier, index: u64) -> ChaCha8Rng {
     let name = format!("mocban demo {tier} {seed} {index}");
     ChaCha8Rng::from_seed(*ContentHash::of(name.as_bytes()).as_bytes())
 }
 
-/// File stem of a pair.
-pub(super) fn id_of(tier: Tier, index: u64) -> String {
+/// Returns the id of a pair, which is also its file stem.
+pub(super) fn pair_id(tier: Tier, index: u64) -> String {
     format!("{tier}-{index:04}")
 }
 
-/// What a pair is made from: a character, what stands around it, what became of the block.
+/// The inputs of a pair: a character, its neighbours and the damage of the block.
 pub(super) struct Scene {
     /// Manifest id and file stem.
     pub id: String,
-    /// How hard.
+    /// Difficulty.
     pub tier: Tier,
     /// The character.
     pub character: char,
-    /// Its strokes.
+    /// Strokes of the character.
     pub artwork: Artwork,
-    /// Neighbours and rules on the block.
-    pub block_around: Field,
-    /// Neighbours and rules on the print.
-    pub print_around: Field,
-    /// Damage to the block since it was printed.
+    /// Neighbours and column rules on the block.
+    pub block_neighbours: ScalarField,
+    /// Neighbours and column rules on the print.
+    pub print_neighbours: ScalarField,
+    /// Damage of the block after printing.
     pub damage: Damage,
 }
 
-/// A print and its frame.
+/// An encoded print and its frame.
 pub(super) struct Printed {
-    /// Size and true map.
+    /// Size and true map of the image.
     pub frame: PrintFrame,
-    /// The file's bytes.
+    /// Encoded image.
     pub bytes: Vec<u8>,
-    /// The file's ending.
+    /// File name extension.
     pub extension: &'static str,
 }
 
-/// Makes a pair of the tiers that are drawn from the font.
+/// Makes a pair of a tier that uses characters of the font.
 ///
 /// # Errors
-/// When a picture cannot be encoded.
+/// Fails when the print cannot be encoded.
 pub(super) fn drawn_pair(
     glyphs: &Glyphs,
     tier: Tier,
     seed: u64,
     index: u64,
     vertices: Option<u32>,
-) -> Result<Pair, ImageError> {
-    let mut rng = rng_of(seed, tier, index);
-    let scene = Scene::draw(glyphs, tier, id_of(tier, index), &mut rng);
+) -> Result<DemoPair, ImageError> {
+    let mut rng = pair_rng(seed, tier, index);
+    let scene = Scene::draw(glyphs, tier, pair_id(tier, index), &mut rng);
     let printed = scene.printed(&mut rng)?;
-    Ok(scene.carved(printed, vertices, &mut rng))
+    Ok(scene.into_pair(printed, vertices, &mut rng))
 }
 
 impl Scene {
@@ -109,37 +109,37 @@ impl Scene {
         let characters = glyphs.characters();
         let character = characters[rng.random_range(0..characters.len())];
         let artwork = Artwork::of_glyph(glyphs, character, rng);
-        let block_around = artwork.surroundings(glyphs, rng);
-        let (print_around, damage) = if tier.is_damaged() {
-            let other = artwork.surroundings(glyphs, rng);
+        let block_neighbours = artwork.draw_neighbours(glyphs, rng);
+        let (print_neighbours, damage) = if tier.is_damaged() {
+            let other = artwork.draw_neighbours(glyphs, rng);
             (other, Damage::draw(&artwork, rng))
         } else {
-            (block_around.clone(), Damage::default())
+            (block_neighbours.clone(), Damage::default())
         };
         Self {
             id,
             tier,
             character,
             artwork,
-            block_around,
-            print_around,
+            block_neighbours,
+            print_neighbours,
             damage,
         }
     }
 
-    /// Prints the whole block on paper and cuts the character out.
+    /// Prints the block and cuts the character out of the print.
     fn printed(&self, rng: &mut ChaCha8Rng) -> Result<Printed, ImageError> {
-        let outline = cut(&self.artwork, rng);
+        let outline = cut_outline(&self.artwork, rng);
         let frame = PrintFrame::draw(&outline, rng);
         let strokes = &self.artwork.strokes;
         let impression = Impression {
-            inking: &Inking::draw(strokes, &self.print_around, self.tier, rng),
+            inking: &Inking::draw(strokes, &self.print_neighbours, self.tier, rng),
             damage: &self.damage,
             outline: &outline,
             tier: self.tier,
         };
-        let picture = print(&impression, &frame, rng);
-        let format = PictureFormat::draw(rng);
+        let picture = render_print(&impression, &frame, rng);
+        let format = PrintFormat::draw(rng);
         Ok(Printed {
             frame,
             bytes: format.encode(&picture)?,
@@ -147,32 +147,32 @@ impl Scene {
         })
     }
 
-    /// Carves and scans the block as it is now, and writes down the truth.
-    pub(super) fn carved(
+    /// Carves and scans the damaged block and records the ground truth.
+    pub(super) fn into_pair(
         self,
         printed: Printed,
         vertices: Option<u32>,
         rng: &mut ChaCha8Rng,
-    ) -> Pair {
+    ) -> DemoPair {
         let remaining = self.damage.remaining(&self.artwork.strokes);
         let surface = self.surface(&remaining, rng);
         let style = ScanStyle::draw(self.tier.is_damaged(), vertices, rng);
-        let mut mesh = scan(&surface, &cut(&self.artwork, rng), &style, rng);
-        let pose = Pose::draw(self.tier, rng);
+        let mut mesh = scan(&surface, &cut_outline(&self.artwork, rng), &style, rng);
+        let pose = ScanPose::draw(self.tier, rng);
         mesh.vertices.change(|vertex| pose.mesh_from_block(vertex));
-        let known = Known {
+        let truth_source = TruthSource {
             strokes: &self.artwork.strokes,
             remaining: &remaining,
-            around: [&self.block_around, &self.print_around],
+            neighbours: [&self.block_neighbours, &self.print_neighbours],
             damage: &self.damage,
             surface: &surface,
         };
         let frame = &printed.frame;
-        Pair {
-            truth: TruthLine::new(&self.id, &known, &pose, frame, rng),
-            tops: known.tops_mask(frame),
+        DemoPair {
+            truth: TruthLine::new(&self.id, &truth_source, &pose, frame, rng),
+            tops: truth_source.tops_mask(frame),
             scanned_face_down: rng.random_bool(0.3).then(|| pose.is_face_down()),
-            mesh_format: draw_format(mesh.vertices.len(), rng),
+            mesh_format: draw_mesh_format(mesh.vertices.len(), rng),
             id: self.id,
             character: self.character.to_string(),
             unit: pose.unit.map(LengthUnit::name),
@@ -183,31 +183,31 @@ impl Scene {
         }
     }
 
-    /// The carved surface with the strokes that are left.
-    fn surface(&self, remaining: &Field, rng: &mut ChaCha8Rng) -> Field {
+    /// Computes the carved surface with the remaining strokes.
+    fn surface(&self, remaining: &ScalarField, rng: &mut ChaCha8Rng) -> ScalarField {
         let carving = Carving {
             strokes: remaining,
-            around: &self.block_around,
+            neighbours: &self.block_neighbours,
             damage: &self.damage,
-            bow_mm: self.tier.bow_mm(),
+            bend_mm: self.tier.bend_mm(),
         };
-        relief(&carving, rng)
+        carve(&carving, rng)
     }
 }
 
-/// The polygon along which a scan or a print is cut out.
-fn cut(artwork: &Artwork, rng: &mut ChaCha8Rng) -> Polygon {
+/// Draws the polygon along which a scan or a print is cut.
+fn cut_outline(artwork: &Artwork, rng: &mut ChaCha8Rng) -> Polygon {
     let margin_mm = rng.random_range(0.3..0.75);
-    Polygon::around(artwork.ink_box, margin_mm, 1.1, rng)
+    Polygon::around(artwork.stroke_bounds, margin_mm, 1.1, rng)
 }
 
-/// Mostly binary STL, as in the field.
-fn draw_format(vertices: usize, rng: &mut ChaCha8Rng) -> MeshFormat {
+/// Draws a mesh format, mostly binary STL as in published data.
+fn draw_mesh_format(vertices: usize, rng: &mut ChaCha8Rng) -> MeshFormat {
     match rng.random_range(0..20_u32) {
         10..=12 => MeshFormat::PlyLittleEndian,
         13..=14 => MeshFormat::PlyBigEndian,
         15..=16 => MeshFormat::PlyAscii,
-        // Text triangle by triangle is six times the size: small scans only.
+        // ASCII STL is six times larger, so it is used for small scans only.
         17 if vertices < 40_000 => MeshFormat::StlAscii,
         18..=19 => MeshFormat::Obj,
         _ => MeshFormat::StlBinary,
@@ -216,18 +216,20 @@ fn draw_format(vertices: usize, rng: &mut ChaCha8Rng) -> MeshFormat {
 
 #[cfg(test)]
 mod tests {
-    use super::Pair;
-    use crate::demo::Pairs;
+    use super::DemoPair;
+    use crate::demo::PairGenerator;
     use crate::demo::tier::Tier;
-    use crate::demo::truth::{LEFT_OUT, TOP};
+    use crate::demo::truth_line::{IGNORED, STROKE_TOP};
     use crate::raster::Grid;
 
-    fn pair(tier: Tier, index: u64) -> Pair {
-        Pairs::new(tier, 11).pair(index).expect("pictures encode")
+    fn pair(tier: Tier, index: u64) -> DemoPair {
+        PairGenerator::new(tier, 11)
+            .pair(index)
+            .expect("images encode")
     }
 
-    /// The mask's value where the true map sends a mesh point, and its height in shares of the character's height.
-    fn seen(pair: &Pair, tops: &Grid<u8>, point: [f64; 3]) -> Option<(u8, f64)> {
+    /// Returns the mask value and the height, in shares of the character's height, of a mesh point under the true map.
+    fn height_at(pair: &DemoPair, tops: &Grid<u8>, point: [f64; 3]) -> Option<(u8, f64)> {
         let map = pair.truth.print_from_mesh;
         let [x, y, height] = map.apply(point);
         let [a, b, c, _] = map.0[0];
@@ -241,65 +243,66 @@ mod tests {
         for tier in Tier::ALL {
             for index in 0..3 {
                 let pair = pair(tier, index);
-                // A bend of 0.8 mm is a tenth of a character of 8 mm.
+                // A bend of 0.8 mm is a tenth of an 8 mm character.
                 let level = if tier == Tier::Hard { 0.12 } else { 0.025 };
                 assert!((12..=40).contains(&pair.truth.landmarks.len()));
                 for landmark in &pair.truth.landmarks {
                     let (value, height) =
-                        seen(&pair, &pair.tops, *landmark).expect("inside the print");
-                    assert_eq!(value, TOP, "{}", pair.id);
+                        height_at(&pair, &pair.tops, *landmark).expect("inside the print");
+                    assert_eq!(value, STROKE_TOP, "{}", pair.id);
                     assert!(height.abs() < level, "{}: {height}", pair.id);
                 }
             }
         }
     }
 
-    /// The mask without its pixels that touch another value: a wall begins at half a pixel from the rim.
-    fn without_rims(tops: &Grid<u8>) -> Grid<u8> {
+    /// Returns the mask without pixels next to another value: a wall starts half a pixel outside the stroke edge.
+    fn without_edges(tops: &Grid<u8>) -> Grid<u8> {
         Grid::from_fn(tops.width(), tops.height(), |x, y| {
             let value = tops.at(x, y);
             let near = |i: i64| tops.get(x as i64 + i % 3 - 1, y as i64 + i / 3 - 1);
             let is_inner = (0..9).all(|i| near(i).is_none_or(|other| other == value));
-            if is_inner { value } else { LEFT_OUT }
+            if is_inner { value } else { IGNORED }
         })
     }
 
     #[test]
-    fn mesh_is_high_where_the_tops_mask_says_so_and_low_elsewhere() {
+    fn mesh_is_high_inside_the_tops_mask_and_low_outside() {
         for tier in [Tier::Upright, Tier::Pose, Tier::Real] {
             let pair = pair(tier, 1);
-            let tops = without_rims(&pair.tops);
-            let (mut tops_high, mut tops_all, mut ground_low, mut ground_all) = (0, 0, 0, 0);
+            let tops = without_edges(&pair.tops);
+            let (mut tops_high, mut tops_all, mut background_low, mut background_all) =
+                (0, 0, 0, 0);
             for vertex in pair.mesh.vertices.iter() {
-                match seen(&pair, &tops, vertex) {
-                    // Below the ground there are only side walls and foot.
+                match height_at(&pair, &tops, vertex) {
+                    // Only side walls and base lie below the carved background.
                     Some((_, height)) if height < -0.175 => {}
-                    Some((TOP, height)) => {
+                    Some((STROKE_TOP, height)) => {
                         tops_all += 1;
                         tops_high += i32::from(height > -0.02);
                     }
                     Some((0, height)) => {
-                        ground_all += 1;
-                        ground_low += i32::from(height < -0.01);
+                        background_all += 1;
+                        background_low += i32::from(height < -0.01);
                     }
                     Some(_) | None => {}
                 }
             }
             let share = |part: i32, all: i32| f64::from(part) / f64::from(all);
-            assert!(tops_all > 500 && ground_all > 5000, "{tier}");
+            assert!(tops_all > 500 && background_all > 5000, "{tier}");
             assert!(
                 share(tops_high, tops_all) > 0.99,
                 "{tier}: {tops_high} of {tops_all}"
             );
             assert!(
-                share(ground_low, ground_all) > 0.99,
-                "{tier}: {ground_low} of {ground_all}"
+                share(background_low, background_all) > 0.99,
+                "{tier}: {background_low} of {background_all}"
             );
         }
     }
 
     #[test]
-    fn scans_hold_twenty_to_a_hundred_and_fifty_thousand_vertices() {
+    fn scans_have_20000_to_150000_vertices() {
         for index in 0..4 {
             let vertices = pair(Tier::Hard, index).mesh.vertices.len();
             assert!((18_000..165_000).contains(&vertices), "{vertices}");

@@ -1,30 +1,31 @@
-//! The irregular outline along which a scan or a print is cut.
+//! Irregular outlines along which scans and prints are cut.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-/// A box in mm as the print reads: least and greatest u and v.
+/// An axis-aligned box in mm, as the print reads.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct BoxMm {
-    /// Least u and v.
+pub(super) struct BoundsMm {
+    /// Minimum u and v.
     pub min: [f64; 2],
-    /// Greatest u and v.
+    /// Maximum u and v.
     pub max: [f64; 2],
 }
 
 /// A closed polygon in mm, as the print reads.
 #[derive(Debug, Clone)]
 pub(super) struct Polygon {
-    /// Corners in order.
+    /// Vertices in order.
     pub corners: Vec<[f64; 2]>,
 }
 
 impl Polygon {
-    /// An irregular polygon that holds the box and `margin_mm` around it, nowhere more than `wander_mm` farther out.
+    /// Draws an irregular polygon that contains the box and a margin of `margin_mm`, and extends at most
+    /// `max_excess_mm` beyond the margin.
     pub(super) fn around(
-        inner: BoxMm,
+        inner: BoundsMm,
         margin_mm: f64,
-        wander_mm: f64,
+        max_excess_mm: f64,
         rng: &mut ChaCha8Rng,
     ) -> Self {
         let [u0, v0] = inner.min.map(|c| c - margin_mm);
@@ -38,22 +39,20 @@ impl Polygon {
         let mut corners = Vec::new();
         for (i, (from, to, out)) in sides.into_iter().enumerate() {
             let before = sides[(i + 3) % 4].2;
-            corners.push(
-                [0, 1].map(|k| {
-                    from[k] + (out[k] + before[k]) * rng.random_range(0.0..0.7 * wander_mm)
-                }),
-            );
+            corners.push([0, 1].map(|k| {
+                from[k] + (out[k] + before[k]) * rng.random_range(0.0..0.7 * max_excess_mm)
+            }));
             for middle in 0..rng.random_range(0..3_u32) {
                 let t = 0.5 * (f64::from(middle) + rng.random_range(0.3..0.7));
-                let push = rng.random_range(0.0..wander_mm);
+                let push = rng.random_range(0.0..max_excess_mm);
                 corners.push([0, 1].map(|k| from[k] + (to[k] - from[k]) * t + out[k] * push));
             }
         }
         Self { corners }
     }
 
-    /// The smallest box that holds it.
-    pub(super) fn bounds(&self) -> BoxMm {
+    /// Returns the bounding box.
+    pub(super) fn bounds(&self) -> BoundsMm {
         let extreme = |start: f64, pick: fn(f64, f64) -> f64| {
             [0, 1].map(|i| {
                 self.corners
@@ -62,13 +61,13 @@ impl Polygon {
                     .fold(start, pick)
             })
         };
-        BoxMm {
+        BoundsMm {
             min: extreme(f64::INFINITY, f64::min),
             max: extreme(f64::NEG_INFINITY, f64::max),
         }
     }
 
-    /// Whether a point lies inside (crossing number).
+    /// Returns whether a point lies inside (crossing-number test).
     pub(super) fn contains(&self, [u, v]: [f64; 2]) -> bool {
         let n = self.corners.len();
         let mut inside = false;
@@ -87,11 +86,11 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::{BoxMm, Polygon};
+    use super::{BoundsMm, Polygon};
 
     #[test]
-    fn polygon_holds_the_box_and_its_margin() {
-        let inner = BoxMm {
+    fn polygon_contains_the_box_and_its_margin() {
+        let inner = BoundsMm {
             min: [-4.0, -5.0],
             max: [4.5, 5.0],
         };

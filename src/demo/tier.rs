@@ -1,30 +1,32 @@
-//! How hard a dataset is, and the ranges that make it so.
+//! Difficulty tiers of the dataset and their parameter ranges.
 
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::calligraphy;
+/// Number of pairs of the `real` tier.
+pub(super) const REAL_PAIRS: u64 = 20;
 
-/// How hard the built-in dataset is.
+/// Difficulty of the built-in dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tier {
-    /// Millimetres, in-plane within 15 degrees of the print, tilt within 10.
+    /// Unit mm, rotation within 15 degrees of the print, tilt within 10 degrees.
     Upright,
-    /// Any orientation, unit and position, slight bow.
+    /// Any orientation, unit and position; slight bend.
     Pose,
-    /// As `Pose`, bowed by 0.2-0.8 mm, strokes lost, cracks, other neighbours on mesh and print, bad ink, stains.
+    /// Like `Pose`, with a bend of 0.2-0.8 mm, lost strokes, cracks, different neighbours on mesh and print, uneven ink and
+    /// stains.
     Hard,
-    /// Twenty photographed characters as prints, reliefs carved from their clean masks, in any pose.
+    /// Twenty photographed characters as prints, with reliefs carved from their clean masks, in any pose.
     Real,
 }
 
 impl Tier {
-    /// Every tier, the easiest first.
+    /// All tiers, easiest first.
     pub const ALL: [Self; 4] = [Self::Upright, Self::Pose, Self::Hard, Self::Real];
 
-    /// Name on the command line and in file names.
+    /// Returns the name used on the command line and in file names.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Upright => "upright",
@@ -34,16 +36,16 @@ impl Tier {
         }
     }
 
-    /// How many pairs there are, where they are not made from a font without end.
-    pub const fn most_pairs(self) -> Option<u64> {
+    /// Returns the number of distinct pairs, or `None` when it is unlimited.
+    pub const fn max_pairs(self) -> Option<u64> {
         match self {
             Self::Upright | Self::Pose | Self::Hard => None,
-            Self::Real => Some(calligraphy::COUNT),
+            Self::Real => Some(REAL_PAIRS),
         }
     }
 
-    /// Largest distance in mm of the bent block from its chord over the character.
-    pub(super) const fn bow_mm(self) -> Range<f64> {
+    /// Returns the range of the bend's sagitta over the character, mm.
+    pub(super) const fn bend_mm(self) -> Range<f64> {
         match self {
             Self::Upright => 0.0..0.03,
             Self::Pose | Self::Real => 0.0..0.06,
@@ -51,7 +53,7 @@ impl Tier {
         }
     }
 
-    /// Whether the block was damaged after the print was made.
+    /// Returns whether the block was damaged after printing.
     pub(super) const fn is_damaged(self) -> bool {
         match self {
             Self::Upright | Self::Pose | Self::Real => false,
@@ -59,7 +61,7 @@ impl Tier {
         }
     }
 
-    /// Whether the scan may lie in any direction and unit.
+    /// Returns whether the scan has an arbitrary orientation and unit.
     pub(super) const fn is_any_pose(self) -> bool {
         match self {
             Self::Upright => false,

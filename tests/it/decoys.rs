@@ -1,18 +1,23 @@
-//! Pairs without a right answer are told, not aligned: another character's print, a mirrored mesh, a plate without
-//! carving.
+//! Pairs without a correct alignment are refused: the print of another character, a mirrored mesh, an uncarved plate.
 
-use mocban::demo::{Decoy, DecoyPair, Pairs, Tier};
+use mocban::demo::{PairGenerator, Tier};
+use mocban::mesh::Mesh;
 use mocban::raster;
 use mocban::stages::{AlignedPair, Settings, StageError};
 use rayon::prelude::*;
 
+use crate::decoy::{Decoy, DecoyPair, decoy_pair};
 use crate::semi_real::settings;
 
-/// Pairs of each kind and tier.
+/// Number of pairs per kind and tier.
 const COUNT: u64 = 3;
 
-fn refusal(decoy: &DecoyPair, settings: &Settings) -> Result<(), StageError> {
-    let print = raster::decode(&decoy.print, &raster::Limits::SUGGESTED).expect("a picture");
+fn made(tier: Tier, seed: u64, kind: Decoy, index: u64) -> DecoyPair {
+    decoy_pair(&PairGenerator::new(tier, seed), kind, index).expect("images encode")
+}
+
+fn align(decoy: &DecoyPair, settings: &Settings) -> Result<(), StageError> {
+    let print = raster::decode(&decoy.print, &raster::Limits::SUGGESTED).expect("a print image");
     AlignedPair::new(&decoy.mesh.clone().into(), &print.into(), settings)?;
     Ok(())
 }
@@ -25,19 +30,76 @@ fn pairs_that_do_not_belong_together_are_refused() {
         .flat_map(|tier| Decoy::ALL.map(|kind| (tier, kind)))
         .flat_map(|(tier, kind)| (0..COUNT).map(move |index| (tier, kind, index)))
         .collect();
-    let taken: Vec<String> = cases
+    let accepted: Vec<String> = cases
         .into_par_iter()
         .filter_map(|(tier, kind, index)| {
-            let decoy = Pairs::new(tier, 77)
-                .decoy(kind, index)
-                .expect("a decoy is made");
-            let name = format!("{tier} {index}: {}", kind.name());
-            refusal(&decoy, &settings).is_ok().then_some(name)
+            let result = align(&made(tier, 77, kind, index), &settings);
+            result
+                .is_ok()
+                .then(|| format!("{tier} {index}: {}", kind.name()))
         })
         .collect();
     assert!(
-        taken.is_empty(),
-        "aligned all the same: {}",
-        taken.join(", ")
+        accepted.is_empty(),
+        "aligned without an error: {}",
+        accepted.join(", ")
     );
+}
+
+/// Returns the normal of a triangle, twice its area in length.
+fn area_vector(mesh: &Mesh, triangle: [u32; 3]) -> [f64; 3] {
+    let [a, b, c] = triangle.map(|corner| mesh.vertices.at(corner as usize));
+    let side = |p: [f64; 3]| [0, 1, 2].map(|i| p[i] - a[i]);
+    let (u, v) = (side(b), side(c));
+    [0, 1, 2].map(|i| u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3])
+}
+
+#[test]
+fn mirrored_decoy_reflects_each_face_and_keeps_it_outward() {
+    let mesh = PairGenerator::new(Tier::Pose, 3)
+        .pair(0)
+        .expect("images encode")
+        .mesh;
+    let reflected = made(Tier::Pose, 3, Decoy::Mirrored, 0).mesh;
+    for (before, after) in mesh.triangles.iter().zip(&reflected.triangles) {
+        let [x, y, z] = area_vector(&mesh, *before);
+        let found = area_vector(&reflected, *after);
+        let size = x.hypot(y).hypot(z);
+        for (value, expected) in found.into_iter().zip([-x, y, z]) {
+            assert!((value - expected).abs() <= 1e-9 * size);
+        }
+    }
+}
+
+#[test]
+fn wrong_print_decoy_has_the_print_of_another_pair() {
+    for tier in [Tier::Upright, Tier::Real] {
+        let own = PairGenerator::new(tier, 3).pair(19).expect("images encode");
+        let decoy = made(tier, 3, Decoy::WrongPrint, 19);
+        assert!(decoy.mesh == own.mesh);
+        assert!(decoy.print != own.print);
+    }
+}
+
+#[test]
+fn uncarved_decoy_is_flat_within_the_noise() {
+    for index in 0..8 {
+        let pairs = PairGenerator::new(Tier::Upright, 3);
+        let pair = pairs.pair(index).expect("images encode");
+        if pair.is_closed {
+            continue;
+        }
+        let plane = pair.truth.plane;
+        let mesh = made(Tier::Upright, 3, Decoy::Uncarved, index).mesh;
+        // Upright meshes are in millimetres.
+        let highest = mesh
+            .vertices
+            .iter()
+            .map(|vertex| {
+                let height = (0..3).map(|i| plane.n[i] * vertex[i]).sum::<f64>() + plane.d;
+                height.abs()
+            })
+            .fold(0.0, f64::max);
+        assert!(highest < 0.02, "{index}: {highest} mm");
+    }
 }

@@ -99,7 +99,7 @@ fn whole_dataset_is_left_alone_and_a_broken_one_made_anew() {
     assert!(
         write_dataset(dir.path(), &options, &|| false)
             .expect("found")
-            .was_there
+            .already_existed
     );
     fs::remove_file(dir.path().join("dataset.json")).expect("the seal is there");
     fs::write(dir.path().join("truth.jsonl"), "half a li").expect("the truth can be spoilt");
@@ -107,7 +107,7 @@ fn whole_dataset_is_left_alone_and_a_broken_one_made_anew() {
     assert!(
         !write_dataset(dir.path(), &options, &|| false)
             .expect("made")
-            .was_there
+            .already_existed
     );
     assert!(files(dir.path()) == found, "the dataset made anew differs");
 }

@@ -6,7 +6,7 @@ use std::f64::consts::PI;
 use std::sync::LazyLock;
 
 use mocban::config::{self, Sources};
-use mocban::demo::{Pairs, Tier};
+use mocban::demo::{PairGenerator, Tier};
 use mocban::domain::{Affine2, PrintFromMesh};
 use mocban::mesh::Mesh;
 use mocban::raster::{self, Grid, Picture};
@@ -37,7 +37,9 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
     let all = [(Tier::Upright, 0), (Tier::Pose, 0), (Tier::Hard, 0)];
     all.into_par_iter()
         .map(|(tier, index)| {
-            let pair = Pairs::new(tier, 57).pair(index).expect("the pair is made");
+            let pair = PairGenerator::new(tier, 57)
+                .pair(index)
+                .expect("the pair is made");
             let print = raster::decode(&pair.print, &raster::Limits::SUGGESTED).expect("a picture");
             let answer = align(&pair.mesh, &print);
             Case {

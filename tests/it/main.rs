@@ -8,6 +8,8 @@ mod check;
 mod cli;
 #[cfg(target_os = "linux")]
 mod crowd;
+#[path = "../support/decoy.rs"]
+mod decoy;
 mod decoys;
 #[cfg(target_os = "linux")]
 mod deed;

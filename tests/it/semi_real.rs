@@ -1,7 +1,7 @@
 //! Real prints: photographed characters over reliefs carved from their own ink, through the four stages.
 
 use mocban::config::{self, Sources};
-use mocban::demo::{Pair, Pairs, Tier};
+use mocban::demo::{DemoPair, PairGenerator, Tier};
 use mocban::domain::MetricOutcome;
 use mocban::raster;
 use mocban::report::truth::{TruthErrors, TruthRecord, tops_iou};
@@ -17,7 +17,7 @@ pub(crate) fn settings() -> Settings {
 }
 
 /// The errors of every metric. Neither unit nor side is told.
-fn aligned(pair: &Pair, settings: &Settings) -> Result<Vec<TruthErrors>, StageError> {
+fn aligned(pair: &DemoPair, settings: &Settings) -> Result<Vec<TruthErrors>, StageError> {
     let print = raster::decode(&pair.print, &raster::Limits::SUGGESTED).expect("a picture");
     let aligned = AlignedPair::new(&pair.mesh.clone().into(), &print.into(), settings)?;
     let truth = serde_json::to_value(&pair.truth).expect("a truth is JSON");
@@ -34,8 +34,8 @@ fn aligned(pair: &Pair, settings: &Settings) -> Result<Vec<TruthErrors>, StageEr
 
 #[test]
 fn every_real_print_is_aligned_with_the_relief_of_its_ink() {
-    let (pairs, settings) = (Pairs::new(Tier::Real, 31), settings());
-    let count = Tier::Real.most_pairs().expect("the real tier ends");
+    let (pairs, settings) = (PairGenerator::new(Tier::Real, 31), settings());
+    let count = Tier::Real.max_pairs().expect("the real tier ends");
     assert_eq!(count, 20);
     let wrong: Vec<String> = (0..count)
         .into_par_iter()
@@ -53,7 +53,7 @@ fn every_real_print_is_aligned_with_the_relief_of_its_ink() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-fn trouble(pair: &Pair, errors: &TruthErrors) -> Option<String> {
+fn trouble(pair: &DemoPair, errors: &TruthErrors) -> Option<String> {
     let is_right = errors.angle_deg <= 5.0 && errors.tre_pct <= MAX_LANDMARKS_PCT;
     (!is_right).then(|| format!("{}: {errors:?}", pair.id))
 }

@@ -1,47 +1,47 @@
-//! The known answer of a pair: one line of `truth.jsonl`, and the mask of true stroke tops.
+//! Ground truth of a pair: one line of `truth.jsonl` and the mask of the stroke tops.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 
 use super::damage::Damage;
-use super::field::Field;
-use super::pose::{Pose, TopsPlane};
-use super::print::PrintFrame;
+use super::rendered_print::PrintFrame;
+use super::scalar_field::ScalarField;
+use super::scan_pose::{ScanPose, TopsPlane};
 use crate::domain::PrintFromMesh;
 use crate::raster::Grid;
 
-/// A true stroke top in the tops mask.
-pub(super) const TOP: u8 = 255;
-/// Left out of the score: neighbours, rules, lost strokes, cracks.
-pub(super) const LEFT_OUT: u8 = 128;
+/// Mask value of a stroke top.
+pub(super) const STROKE_TOP: u8 = 255;
+/// Mask value of pixels excluded from the score: neighbours, rules, lost strokes, cracks.
+pub(super) const IGNORED: u8 = 128;
 
-/// How far around a neighbour the mask is left out, mm: its wall is neither top nor the character's ground.
-const NEIGHBOUR_RIM_MM: f64 = 0.2;
+/// Width of the excluded band around neighbours, mm: their walls are neither stroke top nor background.
+const NEIGHBOUR_MARGIN_MM: f64 = 0.2;
 
 /// One line of `truth.jsonl`.
 #[derive(Debug, Clone, Serialize)]
 pub struct TruthLine {
-    /// The pair.
+    /// Id of the pair.
     pub id: String,
-    /// Print pixels and height from mesh coordinates.
+    /// Maps mesh coordinates to print pixels and height.
     pub print_from_mesh: PrintFromMesh,
-    /// The plane of the tops, mesh coordinates.
+    /// The plane of the stroke tops, in mesh coordinates.
     pub plane: TopsPlane,
-    /// Points on stroke tops, mesh coordinates.
+    /// Points on stroke tops, in mesh coordinates.
     pub landmarks: Vec<[f64; 3]>,
-    /// Height of the character's true ink box, print pixels.
+    /// Height of the true stroke bounding box, in print pixels.
     pub char_height_px: f64,
-    /// The tops mask, relative to `truth.jsonl`.
+    /// Path of the tops mask, relative to `truth.jsonl`.
     pub tops_mask: String,
 }
 
 impl TruthLine {
-    /// The truth of a pair in its pose and print frame.
+    /// Computes the ground truth of a pair from its pose and print frame.
     pub(super) fn new(
         id: &str,
-        known: &Known,
-        pose: &Pose,
+        source: &TruthSource,
+        pose: &ScanPose,
         frame: &PrintFrame,
         rng: &mut ChaCha8Rng,
     ) -> Self {
@@ -49,47 +49,47 @@ impl TruthLine {
             id: id.to_owned(),
             print_from_mesh: pose.print_from_mesh(&frame.print_from_uv),
             plane: pose.tops_plane(),
-            landmarks: known.landmarks(pose, rng),
-            char_height_px: known.height_px(frame),
+            landmarks: source.landmarks(pose, rng),
+            char_height_px: source.character_height_px(frame),
             tops_mask: format!("tops/{id}.png"),
         }
     }
 }
 
-/// What is known of a pair before it is posed and printed.
-pub(super) struct Known<'a> {
-    /// The strokes as carved, signed distance in mm.
-    pub strokes: &'a Field,
-    /// The strokes that are left.
-    pub remaining: &'a Field,
-    /// Neighbours on the block and on the print.
-    pub around: [&'a Field; 2],
-    /// Cracks.
+/// The geometry of a pair before it is posed and printed.
+pub(super) struct TruthSource<'a> {
+    /// Signed distance to the strokes as carved, mm.
+    pub strokes: &'a ScalarField,
+    /// Signed distance to the strokes left on the block, mm.
+    pub remaining: &'a ScalarField,
+    /// Signed distance to the neighbours on the block and on the print, mm.
+    pub neighbours: [&'a ScalarField; 2],
+    /// Damage of the block.
     pub damage: &'a Damage,
     /// Heights of the surface, mm.
-    pub surface: &'a Field,
+    pub surface: &'a ScalarField,
 }
 
-impl Known<'_> {
-    /// The tops mask in the print's frame.
+impl TruthSource<'_> {
+    /// Renders the tops mask in the print frame.
     pub(super) fn tops_mask(&self, frame: &PrintFrame) -> Grid<u8> {
         Grid::from_fn(frame.width, frame.height, |x, y| self.label(frame.uv(x, y)))
     }
 
     fn label(&self, point: [f64; 2]) -> u8 {
         let cracked = self.damage.is_cracked(point, 0.02);
-        let is_near = |field: &&Field| field.value(point) > -NEIGHBOUR_RIM_MM;
+        let is_near = |field: &&ScalarField| field.value(point) > -NEIGHBOUR_MARGIN_MM;
         if self.remaining.value(point) > 0.0 && !cracked {
-            TOP
-        } else if self.strokes.value(point) > 0.0 || self.around.iter().any(is_near) {
-            LEFT_OUT
+            STROKE_TOP
+        } else if self.strokes.value(point) > 0.0 || self.neighbours.iter().any(is_near) {
+            IGNORED
         } else {
             0
         }
     }
 
-    /// Height of the strokes' box in print pixels.
-    pub(super) fn height_px(&self, frame: &PrintFrame) -> f64 {
+    /// Returns the height of the strokes' bounding box in print pixels.
+    pub(super) fn character_height_px(&self, frame: &PrintFrame) -> f64 {
         let ink = Grid::from_fn(frame.width, frame.height, |x, y| {
             self.strokes.value(frame.uv(x, y)) > 0.0
         });
@@ -97,8 +97,8 @@ impl Known<'_> {
             .map_or(0.0, |found| found.height() as f64)
     }
 
-    /// 12 to 40 points on the tops that are left, spread over the character, in mesh coordinates.
-    pub(super) fn landmarks(&self, pose: &Pose, rng: &mut ChaCha8Rng) -> Vec<[f64; 3]> {
+    /// Draws 12 to 40 well-separated points on the remaining stroke tops, in mesh coordinates.
+    pub(super) fn landmarks(&self, pose: &ScanPose, rng: &mut ChaCha8Rng) -> Vec<[f64; 3]> {
         let wanted = rng.random_range(16..=36_usize);
         let mut chosen: Vec<[f64; 2]> = Vec::new();
         for (inside_mm, apart_mm) in [(0.12, 1.0), (0.08, 0.6), (0.04, 0.3), (0.02, 0.1)] {

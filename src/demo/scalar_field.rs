@@ -1,18 +1,18 @@
-//! Values over the character's square, by millimetre: distances to strokes, heights.
+//! Scalar fields over the character's square, in mm: signed distances and heights.
 
 use crate::raster::{Grid, Mask};
 
-/// A square of samples around the character's centre. u runs right and v down **as the print reads**, in mm.
+/// A square grid of samples around the character's centre. u points right and v down **as the print reads**, in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Frame {
-    /// Samples a side.
+pub(super) struct SampleFrame {
+    /// Number of samples per side.
     pub side: usize,
-    /// Distance of two samples, mm.
+    /// Sample spacing, mm.
     pub step_mm: f64,
 }
 
-impl Frame {
-    /// A frame that reaches `half_mm` to each side.
+impl SampleFrame {
+    /// Creates a frame that extends at least `half_mm` from the centre in each direction.
     pub(super) fn covering(half_mm: f64, step_mm: f64) -> Self {
         Self {
             side: 2 * (half_mm / step_mm).ceil() as usize + 1,
@@ -20,12 +20,12 @@ impl Frame {
         }
     }
 
-    /// Half the side, mm.
+    /// Returns half the side length, mm.
     pub(super) fn half_mm(self) -> f64 {
         (self.side - 1) as f64 / 2.0 * self.step_mm
     }
 
-    /// Where a sample lies, mm.
+    /// Returns the position of a sample, mm.
     pub(super) fn position(self, x: usize, y: usize) -> [f64; 2] {
         let half = self.half_mm();
         [
@@ -34,41 +34,41 @@ impl Frame {
         ]
     }
 
-    /// The samples within `reach_mm` of a point in each direction.
+    /// Returns the samples of the square that extends `half_size_mm` from `centre` in each direction.
     pub(super) fn box_around(
         self,
         centre: [f64; 2],
-        reach_mm: f64,
+        half_size_mm: f64,
     ) -> impl Iterator<Item = (usize, usize)> {
         let last = (self.side - 1) as f64;
         let bound = |offset: f64| {
             let point = centre.map(|c| c + offset);
             self.sample(point).map(|c| c.clamp(0.0, last) as usize)
         };
-        let ([x0, y0], [x1, y1]) = (bound(-reach_mm), bound(reach_mm));
+        let ([x0, y0], [x1, y1]) = (bound(-half_size_mm), bound(half_size_mm));
         (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| (x, y)))
     }
 
-    /// Sample coordinates of a point in mm.
+    /// Converts a point in mm to fractional sample coordinates.
     pub(super) fn sample(self, [u, v]: [f64; 2]) -> [f64; 2] {
         let half = self.half_mm();
         [(u + half) / self.step_mm, (v + half) / self.step_mm]
     }
 }
 
-/// One value at each sample of a frame, bilinear between.
+/// One value per sample of a frame, with bilinear interpolation.
 #[derive(Debug, Clone)]
-pub(super) struct Field {
-    /// Where the samples lie.
-    pub frame: Frame,
-    /// The values.
+pub(super) struct ScalarField {
+    /// Positions of the samples.
+    pub frame: SampleFrame,
+    /// The sample values.
     pub values: Grid<f32>,
 }
 
-impl Field {
-    /// A field computed from each sample's place in mm and its column and row.
+impl ScalarField {
+    /// Computes a field from the position in mm, the column and the row of each sample.
     pub(super) fn from_fn(
-        frame: Frame,
+        frame: SampleFrame,
         mut value: impl FnMut([f64; 2], usize, usize) -> f64,
     ) -> Self {
         let values = Grid::from_fn(frame.side, frame.side, |x, y| {
@@ -77,30 +77,30 @@ impl Field {
         Self { frame, values }
     }
 
-    /// Signed distance in mm to the rim of the inked part, positive inside. `coverage` is the share of ink in
-    /// each sample's cell, 0..=1; next to the rim it gives the distance finer than the samples do.
-    pub(super) fn distance_to_rim(frame: Frame, coverage: &Grid<f32>) -> Self {
+    /// Computes the signed distance in mm to the outline of the inked area, positive inside. `coverage` is the ink
+    /// coverage of each sample's cell, 0..=1; next to the outline it gives subpixel precision.
+    pub(super) fn signed_distance(frame: SampleFrame, coverage: &Grid<f32>) -> Self {
         let inside = coverage.map(|share| *share > 0.5);
         let outside = inside.map(|set| !set);
-        let (to_ink, to_ground) = (distance_squared(&inside), distance_squared(&outside));
+        let (to_ink, to_background) = (distance_squared(&inside), distance_squared(&outside));
         let values = Grid::from_fn(frame.side, frame.side, |x, y| {
-            let (ink, ground) = (to_ink.at(x, y).sqrt(), to_ground.at(x, y).sqrt());
-            let pixels = if ink <= 1.0 && ground <= 1.0 {
+            let (ink, background) = (to_ink.at(x, y).sqrt(), to_background.at(x, y).sqrt());
+            let pixels = if ink <= 1.0 && background <= 1.0 {
                 coverage.at(x, y) - 0.5
             } else {
-                ground.max(0.5) - ink.max(0.5)
+                background.max(0.5) - ink.max(0.5)
             };
             pixels * frame.step_mm as f32
         });
         Self { frame, values }
     }
 
-    /// The value at a sample.
+    /// Returns the value at a sample.
     pub(super) fn at(&self, x: usize, y: usize) -> f64 {
         f64::from(self.values.at(x, y))
     }
 
-    /// The value at a point in mm; outside the frame, that of its border.
+    /// Returns the interpolated value at a point in mm; positions outside the frame are clamped to its border.
     pub(super) fn value(&self, point: [f64; 2]) -> f64 {
         let last = (self.frame.side - 1) as f64;
         let [x, y] = self.frame.sample(point).map(|c| c.clamp(0.0, last));
@@ -114,7 +114,7 @@ impl Field {
         top * (1.0 - fy) + bottom * fy
     }
 
-    /// Smoothed by a gaussian of `sigma_mm`.
+    /// Returns the field smoothed by a Gaussian of `sigma_mm`.
     #[must_use]
     pub(super) fn blurred(&self, sigma_mm: f64) -> Self {
         let weights = gaussian(sigma_mm / self.frame.step_mm);
@@ -127,7 +127,7 @@ impl Field {
     }
 }
 
-/// Weights of a gaussian of `sigma` samples, cut at three sigma, their sum one.
+/// Returns the weights of a Gaussian of `sigma` samples, truncated at three sigma and normalized to sum one.
 fn gaussian(sigma: f64) -> Vec<f32> {
     let reach = (3.0 * sigma).ceil().max(1.0) as i32;
     let raw: Vec<f64> = (-reach..=reach)
@@ -160,10 +160,10 @@ fn transpose(grid: &Grid<f32>) -> Grid<f32> {
     Grid::from_fn(grid.height(), grid.width(), |x, y| grid.at(y, x))
 }
 
-/// Squared distance in pixels to the nearest set pixel (Felzenszwalb, Huttenlocher 2012,
+/// Computes the squared distance in pixels to the nearest set pixel (Felzenszwalb and Huttenlocher 2012,
 /// doi:10.4086/toc.2012.v008a019).
 fn distance_squared(mask: &Mask) -> Grid<f32> {
-    // Farther than any distance inside a frame, yet small enough to stay exact in the parabola arithmetic.
+    // Larger than any distance in the frame, yet small enough for exact f32 arithmetic on the parabolas.
     let far = (mask.width() + mask.height()).pow(2) as f32;
     let start = mask.map(|set| if *set { 0.0 } else { far });
     let down = transpose(&lower_envelopes(&transpose(&start)));
@@ -181,7 +181,7 @@ fn lower_envelopes(grid: &Grid<f32>) -> Grid<f32> {
     out
 }
 
-/// `min over q of (x - q)^2 + heights[q]` at each x.
+/// Computes `min over q of (x - q)^2 + heights[q]` for each x.
 fn lower_envelope(heights: &[f32], out: &mut [f32], centres: &mut [usize], ends: &mut [f32]) {
     let meet = |a: usize, b: usize| {
         let (p, q) = (a as f32, b as f32);
@@ -210,11 +210,11 @@ fn lower_envelope(heights: &[f32], out: &mut [f32], centres: &mut [usize], ends:
 
 #[cfg(test)]
 mod tests {
-    use super::{Field, Frame, distance_squared};
+    use super::{SampleFrame, ScalarField, distance_squared};
     use crate::raster::{Grid, Mask};
 
     #[test]
-    fn distances_equal_those_of_a_full_search() {
+    fn distances_equal_a_brute_force_search() {
         let mask = Mask::from_fn(37, 37, |x, y| (x * 7 + y * 13) % 61 == 0);
         let found = distance_squared(&mask);
         for y in 0..37 {
@@ -230,13 +230,13 @@ mod tests {
     }
 
     #[test]
-    fn distance_to_the_rim_of_a_disc_is_its_radius_less_the_distance_to_its_centre() {
-        let frame = Frame::covering(2.0, 0.05);
+    fn signed_distance_of_a_disc_is_its_radius_minus_the_distance_to_its_centre() {
+        let frame = SampleFrame::covering(2.0, 0.05);
         let coverage = Grid::from_fn(frame.side, frame.side, |x, y| {
             let [u, v] = frame.position(x, y);
             ((1.0 - u.hypot(v)) / 0.05 + 0.5).clamp(0.0, 1.0) as f32
         });
-        let field = Field::distance_to_rim(frame, &coverage);
+        let field = ScalarField::signed_distance(frame, &coverage);
         for point in [[0.0, 0.0], [0.5, 0.3], [1.0, 0.0], [-1.3, 0.9]] {
             let truth = 1.0 - f64::hypot(point[0], point[1]);
             assert!((field.value(point) - truth).abs() < 0.03, "{point:?}");
@@ -244,9 +244,9 @@ mod tests {
     }
 
     #[test]
-    fn blur_keeps_a_level_field() {
-        let frame = Frame::covering(1.0, 0.1);
-        let level = Field::from_fn(frame, |_, _, _| 2.5).blurred(0.2);
+    fn blur_keeps_a_constant_field() {
+        let frame = SampleFrame::covering(1.0, 0.1);
+        let level = ScalarField::from_fn(frame, |_, _, _| 2.5).blurred(0.2);
         assert!(level.values.data().iter().all(|v| (v - 2.5).abs() < 1e-5));
     }
 }

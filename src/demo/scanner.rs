@@ -1,47 +1,47 @@
-//! The scanner: a surface as an uneven triangle mesh, cut along a polygon, in the block frame.
+//! Simulated scanner: samples a surface as an irregular triangle mesh in the block frame, cut along a polygon.
 
 use std::collections::{BTreeMap, HashSet};
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::field::Field;
 use super::noise::{Noise, normal};
 use super::polygon::Polygon;
+use super::scalar_field::ScalarField;
 use crate::mesh::Mesh;
 
-/// Height of a scan with walls and foot, mm.
+/// Height of a scan with walls and base, mm.
 const BODY_MM: f64 = 1.9;
-/// Rows of vertices down a side wall.
+/// Rows of vertices on a side wall.
 const WALL_ROWS: u32 = 5;
 
-/// How a scan comes out.
+/// Properties of a simulated scan.
 #[derive(Debug, Clone)]
 pub(super) struct ScanStyle {
-    /// Whether side walls and foot were scanned too.
+    /// Whether the scan includes side walls and base.
     pub is_closed: bool,
-    /// Vertices wanted, about.
+    /// Approximate number of vertices.
     pub vertices: f64,
-    /// Standard deviation of heights, mm.
+    /// Standard deviation of the height noise, mm.
     pub noise_mm: f64,
-    /// Single vertices far off.
+    /// Number of outlier vertices.
     pub spikes: u32,
-    /// Places the scanner did not see.
+    /// Number of holes.
     pub holes: u32,
-    /// Faces wound inward.
+    /// Whether the faces are wound inward.
     pub is_inside_out: bool,
 }
 
 impl ScanStyle {
-    /// A scan of about `wanted` vertices, or else of 20,000 to 150,000, mostly of the smaller ones.
-    pub(super) fn draw(is_rough: bool, wanted: Option<u32>, rng: &mut ChaCha8Rng) -> Self {
+    /// Draws a scan of about `vertices` vertices; `None` draws 20,000 to 150,000, with small scans more likely.
+    pub(super) fn draw(is_damaged_scan: bool, vertices: Option<u32>, rng: &mut ChaCha8Rng) -> Self {
         let is_closed = rng.random_bool(0.125);
         let share: f64 = rng.random_range(0.0..1.0);
         Self {
             is_closed,
-            vertices: wanted.map_or_else(|| 22_000.0 * 6.0_f64.powf(share * share), f64::from),
+            vertices: vertices.map_or_else(|| 22_000.0 * 6.0_f64.powf(share * share), f64::from),
             noise_mm: rng.random_range(0.005..0.010),
-            spikes: if is_rough {
+            spikes: if is_damaged_scan {
                 rng.random_range(0..40)
             } else {
                 rng.random_range(0..6)
@@ -52,19 +52,19 @@ impl ScanStyle {
     }
 }
 
-/// Scans the part of `surface` inside `outline`. Vertices are in the block frame, mm; faces are wound outward
-/// unless the style says otherwise.
+/// Scans the part of `surface` inside `outline`. Returns vertices in the block frame, in mm. Faces are wound outward
+/// unless `style.is_inside_out` is set.
 pub(super) fn scan(
-    surface: &Field,
+    surface: &ScalarField,
     outline: &Polygon,
     style: &ScanStyle,
     rng: &mut ChaCha8Rng,
 ) -> Mesh {
-    let sheet = Sheet::sample(surface, outline, style, rng);
-    let mut mesh = sheet.triangles(outline, &holes(surface, style, rng), rng);
+    let sampled = SampledSurface::sample(surface, outline, style, rng);
+    let mut mesh = sampled.triangles(outline, &holes(surface, style, rng), rng);
     add_spikes(&mut mesh, style.spikes, rng);
     if style.is_closed {
-        close(&mut mesh, style.noise_mm, rng);
+        close_body(&mut mesh, style.noise_mm, rng);
     }
     if style.is_inside_out {
         for [_, b, c] in &mut mesh.triangles {
@@ -74,17 +74,22 @@ pub(super) fn scan(
     mesh
 }
 
-/// A grid of surface points, drawn out of shape so that their density is uneven.
-struct Sheet {
+/// A warped grid of surface points with uneven density.
+struct SampledSurface {
     columns: usize,
     points: Vec<[f64; 3]>,
 }
 
-impl Sheet {
-    fn sample(surface: &Field, outline: &Polygon, style: &ScanStyle, rng: &mut ChaCha8Rng) -> Self {
+impl SampledSurface {
+    fn sample(
+        surface: &ScalarField,
+        outline: &Polygon,
+        style: &ScanStyle,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
         let bounds = outline.bounds();
         let [width, height] = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
-        // The polygon fills about five sixths of its box; the foot of a closed scan repeats the face.
+        // The polygon fills about five sixths of its bounding box; a closed scan repeats the face at its base.
         let wanted = style.vertices * if style.is_closed { 0.5 } else { 1.0 };
         let spacing = (width * height * 0.84 / wanted).sqrt();
         let columns = (width / spacing) as usize + 9;
@@ -106,9 +111,9 @@ impl Sheet {
         Self { columns, points }
     }
 
-    /// The triangles inside the outline and outside the holes, on the vertices they use.
-    fn triangles(&self, outline: &Polygon, holes: &[Hole], rng: &mut ChaCha8Rng) -> Mesh {
-        let is_seen: Vec<bool> = self
+    /// Triangulates the points inside the outline and outside the holes; unused points are dropped.
+    fn triangles(&self, outline: &Polygon, holes: &[ScanHole], rng: &mut ChaCha8Rng) -> Mesh {
+        let is_visible: Vec<bool> = self
             .points
             .iter()
             .map(|[x, y, _]| {
@@ -116,7 +121,7 @@ impl Sheet {
                 outline.contains(point) && !holes.iter().any(|hole| hole.contains(point))
             })
             .collect();
-        let mut builder = Builder::new(&self.points);
+        let mut builder = MeshBuilder::new(&self.points);
         for row in 0..self.points.len() / self.columns - 1 {
             for column in 0..self.columns - 1 {
                 let a = row * self.columns + column;
@@ -127,7 +132,7 @@ impl Sheet {
                     [[a, b, d], [b, c, d]]
                 };
                 for triangle in halves {
-                    if triangle.iter().all(|corner| is_seen[*corner]) {
+                    if triangle.iter().all(|corner| is_visible[*corner]) {
                         builder.add(triangle);
                     }
                 }
@@ -137,14 +142,14 @@ impl Sheet {
     }
 }
 
-/// Collects triangles and the points they use.
-struct Builder<'a> {
+/// Collects triangles and the points that they use.
+struct MeshBuilder<'a> {
     points: &'a [[f64; 3]],
     index: Vec<u32>,
     mesh: Mesh,
 }
 
-impl<'a> Builder<'a> {
+impl<'a> MeshBuilder<'a> {
     fn new(points: &'a [[f64; 3]]) -> Self {
         Self {
             points,
@@ -165,27 +170,27 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// A round place without data.
-struct Hole {
+/// A circular region without data.
+struct ScanHole {
     centre: [f64; 2],
     radius_mm: f64,
 }
 
-impl Hole {
+impl ScanHole {
     fn contains(&self, [u, v]: [f64; 2]) -> bool {
         (u - self.centre[0]).hypot(v - self.centre[1]) < self.radius_mm
     }
 }
 
-/// Holes in deep places, where a scanner sees badly.
-fn holes(surface: &Field, style: &ScanStyle, rng: &mut ChaCha8Rng) -> Vec<Hole> {
+/// Draws holes in deep regions, which scanners see badly.
+fn holes(surface: &ScalarField, style: &ScanStyle, rng: &mut ChaCha8Rng) -> Vec<ScanHole> {
     let half = surface.frame.half_mm();
     (0..style.holes)
         .filter_map(|_| {
             (0..100).find_map(|_| {
                 let centre = [0; 2].map(|_: i32| rng.random_range(-half..half));
                 let radius_mm = rng.random_range(0.05..0.2);
-                (surface.value(centre) < -0.6).then_some(Hole { centre, radius_mm })
+                (surface.value(centre) < -0.6).then_some(ScanHole { centre, radius_mm })
             })
         })
         .collect()
@@ -203,25 +208,25 @@ fn add_spikes(mesh: &mut Mesh, spikes: u32, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Adds side walls and a foot.
-fn close(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
+/// Adds side walls and a base.
+fn close_body(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
     let top = mesh.triangles.clone();
-    let rim = rim_edges(&top);
-    let foot_start = mesh.vertices.len() as u32;
-    let foot: Vec<[f64; 3]> = mesh
+    let boundary = boundary_edges(&top);
+    let base_start = mesh.vertices.len() as u32;
+    let base: Vec<[f64; 3]> = mesh
         .vertices
         .iter()
         .map(|[x, y, _]| [x, y, -BODY_MM + noise_mm * normal(rng)])
         .collect();
-    mesh.vertices.extend(foot);
+    mesh.vertices.extend(base);
     let under = top
         .iter()
-        .map(|[a, b, c]| [a, c, b].map(|corner| corner + foot_start));
+        .map(|[a, b, c]| [a, c, b].map(|corner| corner + base_start));
     mesh.triangles.extend(under);
-    let mut posts = BTreeMap::new();
-    for (a, b) in rim {
-        let from = post(a, foot_start, mesh, &mut posts, noise_mm, rng);
-        let to = post(b, foot_start, mesh, &mut posts, noise_mm, rng);
+    let mut columns = BTreeMap::new();
+    for (a, b) in boundary {
+        let from = wall_column(a, base_start, mesh, &mut columns, noise_mm, rng);
+        let to = wall_column(b, base_start, mesh, &mut columns, noise_mm, rng);
         for row in 0..from.len() - 1 {
             let (p, q, r, s) = (from[row], to[row], to[row + 1], from[row + 1]);
             mesh.triangles.extend([[q, p, s], [q, s, r]]);
@@ -229,33 +234,33 @@ fn close(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Directed edges with a triangle on one side only, in the order of the triangles.
-fn rim_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
+/// Returns the directed edges with one adjacent triangle, in triangle order.
+fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
     let edges = || {
         triangles
             .iter()
             .flat_map(|[a, b, c]| [(*a, *b), (*b, *c), (*c, *a)])
     };
-    let known: HashSet<(u32, u32)> = edges().collect();
+    let directed: HashSet<(u32, u32)> = edges().collect();
     edges()
-        .filter(|(a, b)| !known.contains(&(*b, *a)))
+        .filter(|(a, b)| !directed.contains(&(*b, *a)))
         .collect()
 }
 
-/// The vertices of the wall below a rim vertex, from the face down to the foot.
-fn post(
-    rim: u32,
-    foot_start: u32,
+/// Returns the wall vertices below a boundary vertex, from the face down to the base.
+fn wall_column(
+    boundary: u32,
+    base_start: u32,
     mesh: &mut Mesh,
-    posts: &mut BTreeMap<u32, Vec<u32>>,
+    columns: &mut BTreeMap<u32, Vec<u32>>,
     noise_mm: f64,
     rng: &mut ChaCha8Rng,
 ) -> Vec<u32> {
-    if let Some(known) = posts.get(&rim) {
-        return known.clone();
+    if let Some(existing) = columns.get(&boundary) {
+        return existing.clone();
     }
-    let [x, y, z] = mesh.vertices.at(rim as usize);
-    let mut column = vec![rim];
+    let [x, y, z] = mesh.vertices.at(boundary as usize);
+    let mut column = vec![boundary];
     for row in 1..WALL_ROWS {
         let share = f64::from(row) / f64::from(WALL_ROWS);
         column.push(mesh.vertices.len() as u32);
@@ -265,8 +270,8 @@ fn post(
             z + (-BODY_MM - z) * share,
         ]);
     }
-    column.push(rim + foot_start);
-    posts.insert(rim, column.clone());
+    column.push(boundary + base_start);
+    columns.insert(boundary, column.clone());
     column
 }
 
@@ -275,16 +280,16 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::{ScanStyle, rim_edges, scan};
-    use crate::demo::field::{Field, Frame};
-    use crate::demo::polygon::{BoxMm, Polygon};
+    use super::{ScanStyle, boundary_edges, scan};
+    use crate::demo::polygon::{BoundsMm, Polygon};
+    use crate::demo::scalar_field::{SampleFrame, ScalarField};
     use crate::mesh::Mesh;
 
     fn bump(style: &ScanStyle) -> Mesh {
         let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let frame = Frame::covering(4.0, 0.05);
-        let surface = Field::from_fn(frame, |[u, v], _, _| -0.1 * (u * u + v * v));
-        let inner = BoxMm {
+        let frame = SampleFrame::covering(4.0, 0.05);
+        let surface = ScalarField::from_fn(frame, |[u, v], _, _| -0.1 * (u * u + v * v));
+        let inner = BoundsMm {
             min: [-2.0; 2],
             max: [2.0; 2],
         };
@@ -303,7 +308,7 @@ mod tests {
         }
     }
 
-    /// Six times the signed volume under the faces.
+    /// Returns six times the signed volume of the mesh.
     fn volume(mesh: &Mesh) -> f64 {
         mesh.triangles
             .iter()
@@ -317,14 +322,14 @@ mod tests {
     }
 
     #[test]
-    fn closed_scan_has_no_rim_and_encloses_a_volume() {
+    fn closed_scan_has_no_boundary_and_a_positive_volume() {
         let mesh = bump(&style(true));
-        assert!(rim_edges(&mesh.triangles).is_empty());
+        assert!(boundary_edges(&mesh.triangles).is_empty());
         assert!(volume(&mesh) > 0.0);
     }
 
     #[test]
-    fn open_scan_has_about_the_wanted_vertices_and_looks_out() {
+    fn open_scan_has_about_the_requested_vertices_and_faces_outward() {
         let mesh = bump(&style(false));
         assert!(
             (4000..6000).contains(&mesh.vertices.len()),

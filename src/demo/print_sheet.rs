@@ -1,12 +1,12 @@
-//! The paper: colour, texture, stains.
+//! The sheet that is printed on: colour, texture and stains.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::noise::{Noise, mix, ramp};
+use super::noise::{Noise, lerp, smoothstep};
 
 /// A sheet of old paper.
-pub(super) struct Paper {
+pub(super) struct PrintSheet {
     colour: [f64; 3],
     slope: [f64; 2],
     clouds: Noise,
@@ -15,16 +15,16 @@ pub(super) struct Paper {
     stains: Vec<Stain>,
 }
 
-/// A brown patch with a ragged rim.
+/// A brown stain with a ragged edge.
 struct Stain {
     centre: [f64; 2],
     radius_mm: f64,
-    keep: f64,
-    rag: Noise,
+    min_transmittance: f64,
+    edge_noise: Noise,
 }
 
-impl Paper {
-    /// Yellowish, bluish or greyish paper, with up to `stains` stains.
+impl PrintSheet {
+    /// Draws a yellowish, bluish or greyish sheet with `stains` stains within `half_mm` of the centre.
     pub(super) fn draw(stains: u32, half_mm: f64, rng: &mut ChaCha8Rng) -> Self {
         let base = match rng.random_range(0..10_u32) {
             0..=5 => [228.0, 210.0, 172.0],
@@ -42,21 +42,21 @@ impl Paper {
         }
     }
 
-    /// Colour at a point, 0..=255 a channel.
+    /// Returns the colour at a point, 0..=255 per channel.
     pub(super) fn at(&self, [u, v]: [f64; 2]) -> [f64; 3] {
         let shade = self.slope[0] * u
             + self.slope[1] * v
-            + 5.0 * self.clouds.rough(u / 3.0, v / 3.0)
+            + 5.0 * self.clouds.two_octaves(u / 3.0, v / 3.0)
             + 5.0 * self.fibres.at(u / 0.9, v / 0.09)
             + 4.0 * self.grain.at(u / 0.1, v / 0.1);
         let stained: f64 = self
             .stains
             .iter()
-            .map(|stain| stain.keeps([u, v]))
+            .map(|stain| stain.transmittance([u, v]))
             .product();
-        // Stains take blue first: they are brown.
+        // Stains are brown: they absorb blue most.
         [1.0, 0.94, 0.82]
-            .map(|hue| mix(hue, 1.0, ramp(0.6, 1.0, stained)))
+            .map(|hue| lerp(hue, 1.0, smoothstep(0.6, 1.0, stained)))
             .iter()
             .zip(self.colour)
             .map(|(hue, colour)| (colour + shade) * hue * stained)
@@ -71,15 +71,19 @@ impl Stain {
         Self {
             centre: [0; 2].map(|_: i32| rng.random_range(-half_mm..half_mm)),
             radius_mm: rng.random_range(1.0..3.5),
-            keep: rng.random_range(0.68..0.88),
-            rag: Noise::draw(rng),
+            min_transmittance: rng.random_range(0.68..0.88),
+            edge_noise: Noise::draw(rng),
         }
     }
 
-    /// Share of the light that is left.
-    fn keeps(&self, [u, v]: [f64; 2]) -> f64 {
+    /// Returns the share of reflected light, 0..=1.
+    fn transmittance(&self, [u, v]: [f64; 2]) -> f64 {
         let distance = (u - self.centre[0]).hypot(v - self.centre[1]);
-        let rim = self.radius_mm + 0.6 * self.rag.rough(u / 1.1, v / 1.1);
-        mix(self.keep, 1.0, ramp(rim - 0.5, rim, distance))
+        let rim = self.radius_mm + 0.6 * self.edge_noise.two_octaves(u / 1.1, v / 1.1);
+        lerp(
+            self.min_transmittance,
+            1.0,
+            smoothstep(rim - 0.5, rim, distance),
+        )
     }
 }

@@ -1,4 +1,4 @@
-//! Print images as files: PNG or JPEG, 8 or 16 bits, colour or grey.
+//! Encodes print images as PNG or JPEG, 8 or 16 bits, colour or grey.
 
 use std::io::Cursor;
 
@@ -7,27 +7,27 @@ use image::{DynamicImage, ImageBuffer, ImageError, ImageFormat};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::print::Print;
+use super::rendered_print::RenderedPrint;
 
-/// How a print is stored.
+/// File format of a print.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum PictureFormat {
+pub(super) enum PrintFormat {
     /// 8-bit colour PNG.
     PngRgb8,
     /// 16-bit colour PNG.
     PngRgb16,
-    /// 8-bit colour PNG, transparent outside the cut.
+    /// 8-bit colour PNG, transparent outside the cut outline.
     PngRgba8,
     /// 8-bit grey PNG.
     PngGrey8,
     /// 16-bit grey PNG.
     PngGrey16,
-    /// JPEG of a quality of 1..=100.
+    /// JPEG with a quality of 1..=100.
     Jpeg(u8),
 }
 
-impl PictureFormat {
-    /// Mostly colour PNG and JPEG.
+impl PrintFormat {
+    /// Draws a format, mostly colour PNG or JPEG.
     pub(super) fn draw(rng: &mut ChaCha8Rng) -> Self {
         match rng.random_range(0..20_u32) {
             0..=7 => Self::PngRgb8,
@@ -39,7 +39,7 @@ impl PictureFormat {
         }
     }
 
-    /// Ending of the file's name.
+    /// Returns the file name extension.
     pub(super) const fn extension(self) -> &'static str {
         match self {
             Self::Jpeg(_) => "jpg",
@@ -49,8 +49,11 @@ impl PictureFormat {
         }
     }
 
-    /// The file's bytes.
-    pub(super) fn encode(self, print: &Print) -> Result<Vec<u8>, ImageError> {
+    /// Encodes an image.
+    ///
+    /// # Errors
+    /// Fails when the codec rejects the image.
+    pub(super) fn encode(self, print: &RenderedPrint) -> Result<Vec<u8>, ImageError> {
         let mut bytes = Cursor::new(Vec::new());
         match self {
             Self::Jpeg(quality) => {
@@ -76,7 +79,7 @@ impl PictureFormat {
     }
 }
 
-fn rgb8(print: &Print) -> DynamicImage {
+fn rgb8(print: &RenderedPrint) -> DynamicImage {
     let (width, height) = (print.rgb.width() as u32, print.rgb.height() as u32);
     let picture = ImageBuffer::from_fn(width, height, |x, y| {
         let colour = print.rgb.at(x as usize, y as usize);
@@ -85,15 +88,15 @@ fn rgb8(print: &Print) -> DynamicImage {
     DynamicImage::from(picture)
 }
 
-fn rgba8(print: &Print) -> DynamicImage {
+fn rgba8(print: &RenderedPrint) -> DynamicImage {
     let (width, height) = (print.rgb.width() as u32, print.rgb.height() as u32);
     let picture = ImageBuffer::from_fn(width, height, |x, y| {
         let [r, g, b] = print
             .rgb
             .at(x as usize, y as usize)
             .map(|c| c.round() as u8);
-        let inside = print.is_paper.at(x as usize, y as usize);
-        // What lies under transparency is black in many files, and must not count as ink.
+        let inside = print.inside_cut.at(x as usize, y as usize);
+        // Many tools store black under transparent pixels; it must not count as ink.
         if inside {
             image::Rgba([r, g, b, 255])
         } else {

@@ -1,8 +1,8 @@
-//! Where a scan lies: the block's frame to the mesh's frame, in the mesh's unit.
+//! The pose of a scan: the map from the block frame to the mesh frame, in mesh units.
 //!
-//! Block frame: millimetres, right-handed, z out of the block, origin at the character's centre. The block is
-//! carved in mirror writing, so a point (u, v) of the print lies at x = -u, y = -v: seen from outside with x to the
-//! right and y up, the print's right is on the left.
+//! Block frame: mm, right-handed, z out of the block, origin at the character's centre. The block is carved in
+//! mirror writing, so a point (u, v) of the print lies at x = -u, y = -v: seen from outside with x to the right and
+//! y up, the right side of the print is on the left.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -11,20 +11,20 @@ use super::noise::normal;
 use super::tier::Tier;
 use crate::domain::{Affine2, LengthUnit, PrintFromMesh};
 
-/// A rigid motion and a unit.
+/// A rigid motion and a length unit.
 #[derive(Debug, Clone)]
-pub(super) struct Pose {
-    /// Rows of the rotation mesh from block.
+pub(super) struct ScanPose {
+    /// Rows of the rotation from block to mesh frame.
     rotation: [[f64; 3]; 3],
-    /// Where the block's origin lies, mm.
+    /// Position of the block's origin, mm.
     shift_mm: [f64; 3],
-    /// Mesh units in a millimetre.
+    /// Mesh units per millimetre.
     unit_per_mm: f64,
-    /// The unit as the manifest tells it.
+    /// The unit given in the manifest.
     pub unit: Option<LengthUnit>,
 }
 
-/// The plane of the tops in mesh coordinates: `n . x + d = 0`, n outward.
+/// The plane of the stroke tops in mesh coordinates: `n . x + d = 0`, n outward.
 #[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct TopsPlane {
     /// Unit normal, out of the block.
@@ -33,10 +33,10 @@ pub struct TopsPlane {
     pub d: f64,
 }
 
-impl Pose {
-    /// A pose of a tier.
+impl ScanPose {
+    /// Draws a pose of a tier.
     pub(super) fn draw(tier: Tier, rng: &mut ChaCha8Rng) -> Self {
-        let (rotation, reach) = if tier.is_any_pose() {
+        let (rotation, max_shift_mm) = if tier.is_any_pose() {
             (any_rotation(rng), 150.0)
         } else {
             (upright_rotation(rng), 20.0)
@@ -44,20 +44,20 @@ impl Pose {
         let (unit, unit_per_mm) = draw_unit(tier, rng);
         Self {
             rotation,
-            shift_mm: [0; 3].map(|_: i32| rng.random_range(-reach..reach)),
+            shift_mm: [0; 3].map(|_: i32| rng.random_range(-max_shift_mm..max_shift_mm)),
             unit_per_mm,
             unit,
         }
     }
 
-    /// A block point in mesh coordinates.
+    /// Converts a block point to mesh coordinates.
     pub(super) fn mesh_from_block(&self, point: [f64; 3]) -> [f64; 3] {
         let [x, y, z] = self.rotation.map(|row| dot(row, point));
         let [a, b, c] = self.shift_mm;
         [x + a, y + b, z + c].map(|coordinate| coordinate * self.unit_per_mm)
     }
 
-    /// The plane of the tops.
+    /// Returns the plane of the stroke tops.
     pub(super) fn tops_plane(&self) -> TopsPlane {
         let n = self.block_axis(2);
         TopsPlane {
@@ -66,7 +66,7 @@ impl Pose {
         }
     }
 
-    /// The product of the whole system for this pair, from the true print frame (`print_from_uv`: pixels from mm).
+    /// Returns the true `print_from_mesh` of the pair; `print_from_uv` maps mm to print pixels.
     pub(super) fn print_from_mesh(&self, print_from_uv: &Affine2) -> PrintFromMesh {
         let block_axes = [0, 1, 2].map(|i| self.block_axis(i));
         let row = |weights: [f64; 3], constant: f64| {
@@ -88,12 +88,12 @@ impl Pose {
         ])
     }
 
-    /// Whether the carved side looks down in the mesh's frame.
+    /// Returns whether the carved side faces -z in the mesh frame.
     pub(super) fn is_face_down(&self) -> bool {
         self.block_axis(2)[2] < 0.0
     }
 
-    /// A block axis in the mesh's frame.
+    /// Returns a block axis in the mesh frame.
     fn block_axis(&self, index: usize) -> [f64; 3] {
         self.rotation.map(|row| row[index])
     }
@@ -112,7 +112,7 @@ fn draw_unit(tier: Tier, rng: &mut ChaCha8Rng) -> (Option<LengthUnit>, f64) {
     }
 }
 
-/// A rotation drawn evenly from all (Shoemake 1992: a random unit quaternion).
+/// Draws a uniformly distributed rotation (random unit quaternion, Shoemake 1992).
 fn any_rotation(rng: &mut ChaCha8Rng) -> [[f64; 3]; 3] {
     let raw = [0; 4].map(|_: i32| normal(rng));
     let length = raw.iter().map(|c| c * c).sum::<f64>().sqrt();
@@ -136,19 +136,22 @@ fn any_rotation(rng: &mut ChaCha8Rng) -> [[f64; 3]; 3] {
     ]
 }
 
-/// Turned by up to 11 degrees in the plane (the print adds up to 4), then tilted by up to 10.
+/// Draws a rotation of up to 11 degrees in the plane (the print adds up to 4), then a tilt of up to 10 degrees.
 fn upright_rotation(rng: &mut ChaCha8Rng) -> [[f64; 3]; 3] {
-    let turn = about(
+    let in_plane = rotation_about(
         [0.0, 0.0, 1.0],
         rng.random_range(-11.0..11.0_f64).to_radians(),
     );
     let direction = rng.random_range(0.0..std::f64::consts::TAU);
     let tilt = rng.random_range(0.0..10.0_f64).to_radians();
-    times(about([direction.cos(), direction.sin(), 0.0], tilt), turn)
+    multiply(
+        rotation_about([direction.cos(), direction.sin(), 0.0], tilt),
+        in_plane,
+    )
 }
 
-/// Rotation about a unit axis (Rodrigues).
-fn about([x, y, z]: [f64; 3], angle_rad: f64) -> [[f64; 3]; 3] {
+/// Returns the rotation about a unit axis (Rodrigues' formula).
+fn rotation_about([x, y, z]: [f64; 3], angle_rad: f64) -> [[f64; 3]; 3] {
     let (s, c) = angle_rad.sin_cos();
     let k = 1.0 - c;
     [
@@ -158,7 +161,7 @@ fn about([x, y, z]: [f64; 3], angle_rad: f64) -> [[f64; 3]; 3] {
     ]
 }
 
-fn times(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
+fn multiply(a: [[f64; 3]; 3], b: [[f64; 3]; 3]) -> [[f64; 3]; 3] {
     a.map(|row| [0, 1, 2].map(|j| (0..3).map(|k| row[k] * b[k][j]).sum()))
 }
 
@@ -171,16 +174,16 @@ mod tests {
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
 
-    use super::Pose;
+    use super::ScanPose;
     use crate::demo::tier::Tier;
     use crate::domain::Affine2;
 
     #[test]
-    fn print_from_mesh_undoes_the_pose() {
+    fn print_from_mesh_inverts_the_pose() {
         let print_from_uv = Affine2::similarity(12.0, 0.05, [70.0, 66.0]);
         for seed in 0..20 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let pose = Pose::draw(Tier::Pose, &mut rng);
+            let pose = ScanPose::draw(Tier::Pose, &mut rng);
             let product = pose.print_from_mesh(&print_from_uv);
             let [px, py, height] = product.apply(pose.mesh_from_block([-1.5, -2.5, 0.25]));
             let [ex, ey] = print_from_uv.apply([1.5, 2.5]);
@@ -190,10 +193,10 @@ mod tests {
     }
 
     #[test]
-    fn upright_scans_look_up_and_are_within_their_limits() {
+    fn upright_scans_face_up_within_ten_degrees() {
         for seed in 0..50 {
             let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let pose = Pose::draw(Tier::Upright, &mut rng);
+            let pose = ScanPose::draw(Tier::Upright, &mut rng);
             assert!(pose.block_axis(2)[2] >= 10_f64.to_radians().cos() - 1e-12);
             assert!(!pose.is_face_down());
         }

@@ -1,4 +1,4 @@
-//! The carved surface: heights in mm over the plane of the stroke tops.
+//! The carved surface, as heights in mm above the plane of the stroke tops.
 
 use std::ops::Range;
 
@@ -6,28 +6,28 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::damage::Damage;
-use super::field::{Field, Frame};
-use super::noise::{Noise, ramp};
+use super::noise::{Noise, smoothstep};
+use super::scalar_field::{SampleFrame, ScalarField};
 
-/// What is carved and what remained of it.
+/// Inputs of the carved surface.
 pub(super) struct Carving<'a> {
-    /// Signed distance to the character's strokes that are left, mm.
-    pub strokes: &'a Field,
-    /// Signed distance to neighbours and rules, mm.
-    pub around: &'a Field,
-    /// Cracks to cut.
+    /// Signed distance to the strokes left on the block, mm.
+    pub strokes: &'a ScalarField,
+    /// Signed distance to neighbours and column rules, mm.
+    pub neighbours: &'a ScalarField,
+    /// Damage; only the cracks are used.
     pub damage: &'a Damage,
-    /// Range of the bow, mm.
-    pub bow_mm: Range<f64>,
+    /// Range of the bend, mm.
+    pub bend_mm: Range<f64>,
 }
 
-/// The surface of a carved, worn and bent block. The plane that fits the character's tops best is at height zero.
-pub(super) fn relief(carving: &Carving, rng: &mut ChaCha8Rng) -> Field {
+/// Computes the surface of a carved, worn and bent block. Height zero is the least-squares plane of the stroke tops.
+pub(super) fn carve(carving: &Carving, rng: &mut ChaCha8Rng) -> ScalarField {
     let knife = Knife::draw(carving.strokes.frame, rng);
     let wear = Wear::draw(rng);
     let frame = carving.strokes.frame;
-    let cut = Field::from_fn(frame, |point, x, y| {
-        let inside = carving.strokes.at(x, y).max(carving.around.at(x, y));
+    let cut = ScalarField::from_fn(frame, |point, x, y| {
+        let inside = carving.strokes.at(x, y).max(carving.neighbours.at(x, y));
         if inside > 0.0 {
             -wear.at(point, inside)
         } else {
@@ -35,25 +35,25 @@ pub(super) fn relief(carving: &Carving, rng: &mut ChaCha8Rng) -> Field {
         }
     });
     let rounded = cut.blurred(rng.random_range(0.03..0.05));
-    let bow = Bow::draw(carving, rng);
-    let bent = Field::from_fn(frame, |point, x, y| {
-        rounded.at(x, y) + bow.at(point) - crack_depth(carving.damage, point)
+    let bend = Bend::draw(carving, rng);
+    let bent = ScalarField::from_fn(frame, |point, x, y| {
+        rounded.at(x, y) + bend.at(point) - crack_depth(carving.damage, point)
     });
-    levelled(&bent, carving.strokes)
+    subtract_fitted_plane(&bent, carving.strokes)
 }
 
-/// How the ground was cut away.
+/// Shape of the carved background.
 struct Knife {
     slope: f64,
     lean: Noise,
     depth_mm: f64,
     unevenness: Noise,
     tool_marks: Noise,
-    gouges: Field,
+    gouges: ScalarField,
 }
 
 impl Knife {
-    fn draw(frame: Frame, rng: &mut ChaCha8Rng) -> Self {
+    fn draw(frame: SampleFrame, rng: &mut ChaCha8Rng) -> Self {
         Self {
             slope: rng.random_range(1.3..2.6),
             lean: Noise::draw(rng),
@@ -64,15 +64,15 @@ impl Knife {
         }
     }
 
-    /// Depth below the tops at `outside` mm from the nearest stroke: a sloping wall that runs out into a rough
-    /// floor. Two walls that meet before the floor leave a V.
+    /// Returns the depth in mm below the tops at `outside` mm from the nearest stroke: a sloping wall and a rough
+    /// floor. Two walls that meet above the floor form a V.
     fn depth_mm(&self, [u, v]: [f64; 2], outside: f64, x: usize, y: usize) -> f64 {
         let wall = outside * self.slope * (1.0 + 0.3 * self.lean.at(u / 1.6, v / 1.6));
         let floor = self.depth_mm
             + 0.12 * self.unevenness.at(u / 2.0, v / 2.0)
-            + 0.04 * self.tool_marks.rough(u / 0.3, v / 0.3)
+            + 0.04 * self.tool_marks.two_octaves(u / 0.3, v / 0.3)
             + self.gouges.at(x, y);
-        // The wall runs out smoothly: a soft minimum with a rounding of a fifth of a millimetre.
+        // Smooth minimum of wall and floor with a rounding of 0.2 mm.
         let gap = ((wall - floor) / 0.2).clamp(-1.0, 1.0);
         if wall <= floor {
             wall - 0.05 * (1.0 + gap).powi(2)
@@ -83,9 +83,9 @@ impl Knife {
     }
 }
 
-/// Hollows the gouge left in the floor, mm deep.
-fn gouges(frame: Frame, rng: &mut ChaCha8Rng) -> Field {
-    let mut field = Field::from_fn(frame, |_, _, _| 0.0);
+/// Draws gouge marks in the floor, as depths in mm.
+fn gouges(frame: SampleFrame, rng: &mut ChaCha8Rng) -> ScalarField {
+    let mut field = ScalarField::from_fn(frame, |_, _, _| 0.0);
     let half = frame.half_mm();
     let main = rng.random_range(0.0..std::f64::consts::PI);
     for _ in 0..rng.random_range(60..120_u32) {
@@ -107,7 +107,7 @@ fn gouges(frame: Frame, rng: &mut ChaCha8Rng) -> Field {
     field
 }
 
-/// How the tops were worn by printing and time.
+/// Wear of the stroke tops.
 struct Wear {
     patches: Noise,
     patch_mm: f64,
@@ -130,38 +130,38 @@ impl Wear {
         }
     }
 
-    /// Wood gone from a top at `inside` mm from its rim, mm: patches, the open grain, small pits, rounded rims.
+    /// Returns the height lost in mm at `inside` mm from the stroke edge: patches, open grain, small pits, rounded edges.
     fn at(&self, [u, v]: [f64; 2], inside: f64) -> f64 {
         let along = u * self.grain_axis[0] + v * self.grain_axis[1];
         let across = v * self.grain_axis[0] - u * self.grain_axis[1];
-        let patches = self.patch_mm * (1.0 + self.patches.rough(u / 2.2, v / 2.2));
+        let patches = self.patch_mm * (1.0 + self.patches.two_octaves(u / 2.2, v / 2.2));
         let grain = 0.008 * (1.0 + self.grain.at(along / 2.5, across / 0.12));
-        let pits = 0.06 * ramp(0.72, 0.95, self.pits.at(u / 0.25, v / 0.25));
-        let rim = self.rim_mm * (1.0 - ramp(0.0, 0.18, inside));
+        let pits = 0.06 * smoothstep(0.72, 0.95, self.pits.at(u / 0.25, v / 0.25));
+        let rim = self.rim_mm * (1.0 - smoothstep(0.0, 0.18, inside));
         patches + grain + pits + rim
     }
 }
 
-/// A bend of the second degree.
-struct Bow {
+/// A quadratic bend.
+struct Bend {
     axis: [f64; 2],
     along: f64,
     across: f64,
 }
 
-impl Bow {
-    /// A bend whose distance from its chord over the character is in the wanted range.
+impl Bend {
+    /// Draws a bend whose sagitta over the character lies in `carving.bend_mm`.
     fn draw(carving: &Carving, rng: &mut ChaCha8Rng) -> Self {
-        let range = carving.bow_mm.clone();
-        let sag = if range.is_empty() {
+        let range = carving.bend_mm.clone();
+        let sagitta = if range.is_empty() {
             0.0
         } else {
             rng.random_range(range)
         };
         let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
         let angle = rng.random_range(0.0..std::f64::consts::PI);
-        let reach = super::artwork::reach_mm(carving.strokes);
-        let along = sign * sag / (reach * reach);
+        let half_extent_mm = super::artwork::half_extent_mm(carving.strokes);
+        let along = sign * sagitta / (half_extent_mm * half_extent_mm);
         Self {
             axis: [angle.cos(), angle.sin()],
             along,
@@ -187,8 +187,8 @@ fn crack_depth(damage: &Damage, point: [f64; 2]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The surface less the plane that fits the character's tops best (least squares).
-fn levelled(surface: &Field, strokes: &Field) -> Field {
+/// Subtracts the least-squares plane of the stroke tops.
+fn subtract_fitted_plane(surface: &ScalarField, strokes: &ScalarField) -> ScalarField {
     let mut normal = nalgebra::Matrix3::<f64>::zeros();
     let mut right = nalgebra::Vector3::<f64>::zeros();
     let frame = surface.frame;
@@ -206,7 +206,7 @@ fn levelled(surface: &Field, strokes: &Field) -> Field {
         .cholesky()
         .map(|factor| factor.solve(&right))
         .unwrap_or_default();
-    Field::from_fn(frame, |[u, v], x, y| {
+    ScalarField::from_fn(frame, |[u, v], x, y| {
         surface.at(x, y) - plane[0] - plane[1] * u - plane[2] * v
     })
 }

@@ -1,0 +1,195 @@
+//! Ink on the print: spread, gaps, dry patches and specks.
+
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
+use super::noise::{Noise, lerp, smoothstep};
+use super::scalar_field::ScalarField;
+use super::tier::Tier;
+
+/// Amount of ink on the block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum InkLoad {
+    Normal,
+    Heavy,
+    Faint,
+}
+
+/// One inked impression of a block.
+pub(super) struct Inking {
+    /// Signed distance to the printing area, mm, with corners filled by ink.
+    printed: ScalarField,
+    spread_mm: f64,
+    spread: Noise,
+    rim: Noise,
+    strength: f64,
+    blotches: Noise,
+    dryness: f64,
+    dry_patches: Noise,
+    bristles: Noise,
+    gaps: Vec<InkSpot>,
+    specks: Vec<InkSpot>,
+}
+
+/// A small ellipse with or without ink.
+struct InkSpot {
+    centre: [f64; 2],
+    axis: [f64; 2],
+    long_mm: f64,
+    short_mm: f64,
+}
+
+impl Inking {
+    /// Inks the strokes and their neighbours.
+    pub(super) fn draw(
+        strokes: &ScalarField,
+        neighbours: &ScalarField,
+        tier: Tier,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
+        let load = draw_ink_load(tier, rng);
+        let union = ScalarField::from_fn(strokes.frame, |_, x, y| {
+            strokes.at(x, y).max(neighbours.at(x, y))
+        });
+        let gap_count = rng.random_range(0..if tier.is_damaged() { 9 } else { 5 });
+        let gaps = (0..gap_count)
+            .filter_map(|_| InkSpot::gap(strokes, rng))
+            .collect();
+        let speck_count = rng.random_range(4..if tier.is_damaged() { 45 } else { 22 });
+        let specks = (0..speck_count)
+            .map(|_| InkSpot::speck(strokes, rng))
+            .collect();
+        Self {
+            printed: fill_corners(&union),
+            spread_mm: match load {
+                InkLoad::Normal => rng.random_range(0.0..0.05),
+                InkLoad::Heavy => rng.random_range(0.08..0.16),
+                InkLoad::Faint => rng.random_range(-0.03..0.02),
+            },
+            spread: Noise::draw(rng),
+            rim: Noise::draw(rng),
+            strength: match load {
+                InkLoad::Normal => rng.random_range(0.80..0.97),
+                InkLoad::Heavy => rng.random_range(0.93..0.99),
+                InkLoad::Faint => rng.random_range(0.45..0.68),
+            },
+            blotches: Noise::draw(rng),
+            dryness: match load {
+                InkLoad::Normal => rng.random_range(0.1..0.8),
+                InkLoad::Heavy => 0.0,
+                InkLoad::Faint => rng.random_range(0.6..1.0),
+            },
+            dry_patches: Noise::draw(rng),
+            bristles: Noise::draw(rng),
+            gaps,
+            specks,
+        }
+    }
+
+    /// Returns the ink density at a point, 0..=1, averaged over a pixel of `px_mm`.
+    pub(super) fn at(&self, point: [f64; 2], px_mm: f64) -> f64 {
+        let [u, v] = point;
+        let spread = self.spread_mm
+            + 0.03 * self.spread.at(u / 1.4, v / 1.4)
+            + 0.022 * self.rim.two_octaves(u / 0.16, v / 0.16);
+        let cover = |inside_mm: f64| (0.5 + inside_mm / (1.4 * px_mm)).clamp(0.0, 1.0);
+        let stroke =
+            cover(self.printed.value(point) + spread) * (1.0 - self.missing_share(point, px_mm));
+        let speck = self.specks.iter().map(|spot| cover(spot.inside_mm(point)));
+        let blotch = 1.0 - 0.12 * (1.0 + self.blotches.two_octaves(u / 0.7, v / 0.7)).max(0.0);
+        self.strength * (stroke * blotch.min(1.0)).max(0.8 * speck.fold(0.0, f64::max))
+    }
+
+    /// Returns the share of ink that is missing inside a stroke because of dry patches and gaps.
+    fn missing_share(&self, point: [f64; 2], px_mm: f64) -> f64 {
+        let [u, v] = point;
+        let dry = self.dryness * smoothstep(0.0, 0.8, self.dry_patches.at(u / 2.4, v / 2.4));
+        let bristle = self.bristles.two_octaves(u / 0.2, v / 0.2);
+        let edge = lerp(1.4, 0.15, dry);
+        let patchy = 0.85 * smoothstep(edge, edge + 0.45, bristle);
+        let ragged_mm = 0.05 * bristle;
+        let broken = self.gaps.iter().map(|spot| {
+            (0.5 + (spot.inside_mm(point) + ragged_mm) / (1.4 * px_mm)).clamp(0.0, 0.9)
+        });
+        broken.fold(patchy, f64::max)
+    }
+}
+
+/// Draws the amount of ink; only the `hard` tier has too much or too little.
+fn draw_ink_load(tier: Tier, rng: &mut ChaCha8Rng) -> InkLoad {
+    let share: f64 = rng.random();
+    if !tier.is_damaged() {
+        InkLoad::Normal
+    } else if share < 0.35 {
+        InkLoad::Heavy
+    } else if share < 0.7 {
+        InkLoad::Faint
+    } else {
+        InkLoad::Normal
+    }
+}
+
+/// Averages the signed distance with an estimate from a blurred mask, which fills notches and rounds corners.
+fn fill_corners(printed: &ScalarField) -> ScalarField {
+    const SIGMA_MM: f64 = 0.12;
+    let ink = ScalarField::from_fn(printed.frame, |_, x, y| f64::from(printed.at(x, y) > 0.0));
+    let blurred = ink.blurred(SIGMA_MM);
+    ScalarField::from_fn(printed.frame, |_, x, y| {
+        // A blurred edge has slope 1 / (sigma sqrt(2 pi)); the inverse converts coverage to mm.
+        let blurred_mm = (blurred.at(x, y) - 0.45) * SIGMA_MM * (std::f64::consts::TAU).sqrt();
+        0.5 * printed.at(x, y) + 0.5 * blurred_mm
+    })
+}
+
+impl InkSpot {
+    fn gap(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Option<Self> {
+        let centre = (0..200).find_map(|_| {
+            let point = random_point(strokes, rng);
+            (strokes.value(point) > 0.05).then_some(point)
+        })?;
+        let short_mm = rng.random_range(0.04..0.14);
+        Some(Self::with_random_axis(
+            centre,
+            rng.random_range(0.3..0.8),
+            short_mm,
+            rng,
+        ))
+    }
+
+    fn speck(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Self {
+        let long_mm = 0.02 * 9.0_f64.powf(rng.random());
+        let short_mm = long_mm * rng.random_range(0.5..1.0);
+        Self::with_random_axis(random_point(strokes, rng), long_mm, short_mm, rng)
+    }
+
+    fn with_random_axis(
+        centre: [f64; 2],
+        long_mm: f64,
+        short_mm: f64,
+        rng: &mut ChaCha8Rng,
+    ) -> Self {
+        let angle = rng.random_range(0.0..std::f64::consts::PI);
+        Self {
+            centre,
+            axis: [angle.cos(), angle.sin()],
+            long_mm,
+            short_mm,
+        }
+    }
+
+    /// Returns the approximate signed distance to the edge in mm, positive inside.
+    fn inside_mm(&self, [u, v]: [f64; 2]) -> f64 {
+        let (du, dv) = (u - self.centre[0], v - self.centre[1]);
+        if du * du + dv * dv > (self.long_mm + 1.0).powi(2) {
+            return -1.0;
+        }
+        let along = (du * self.axis[0] + dv * self.axis[1]) / self.long_mm;
+        let across = (dv * self.axis[0] - du * self.axis[1]) / self.short_mm;
+        self.short_mm * (1.0 - along.hypot(across))
+    }
+}
+
+fn random_point(field: &ScalarField, rng: &mut ChaCha8Rng) -> [f64; 2] {
+    let half = field.frame.half_mm();
+    [0; 2].map(|_: i32| rng.random_range(-half..half))
+}

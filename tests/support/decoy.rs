@@ -1,0 +1,116 @@
+//! Pairs without a correct alignment, which the stages must refuse. Used by tests and by the accuracy bench.
+
+use image::ImageError;
+use mocban::demo::{DemoPair, PairGenerator};
+use mocban::mesh::Mesh;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+/// Amplitude of the height noise of an uncarved plate, in shares of the character's height (about 15 µm).
+const PLATE_NOISE: f64 = 0.0016;
+/// Depth below which a vertex belongs to the base or the walls of a closed scan, in shares of the character's height.
+const BASE_DEPTH: f64 = 0.165;
+
+/// A kind of pair without a correct alignment.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Decoy {
+    /// The print of another character.
+    WrongPrint,
+    /// A mesh that is not in mirror writing, with outward faces.
+    Mirrored,
+    /// A flat plate with scanner noise instead of the carved block.
+    Uncarved,
+}
+
+impl Decoy {
+    /// All kinds.
+    pub(crate) const ALL: [Self; 3] = [Self::WrongPrint, Self::Mirrored, Self::Uncarved];
+
+    /// Returns the name used in tables.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::WrongPrint => "wrong print",
+            Self::Mirrored => "mirrored mesh",
+            Self::Uncarved => "uncarved mesh",
+        }
+    }
+}
+
+/// A mesh and a print that do not belong together.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct DecoyPair {
+    /// The mesh, in mesh coordinates.
+    pub(crate) mesh: Mesh,
+    /// The encoded print image.
+    pub(crate) print: Vec<u8>,
+}
+
+/// Makes a decoy from a pair.
+///
+/// # Errors
+/// Fails when an image cannot be encoded or decoded.
+pub(crate) fn decoy_pair(
+    pairs: &PairGenerator,
+    kind: Decoy,
+    index: u64,
+) -> Result<DecoyPair, ImageError> {
+    let pair = pairs.pair(index)?;
+    Ok(match kind {
+        Decoy::WrongPrint => DecoyPair {
+            print: print_of_another_character(pairs, &pair.character, index)?,
+            mesh: pair.mesh,
+        },
+        Decoy::Mirrored => DecoyPair {
+            mesh: mirrored(pair.mesh),
+            print: pair.print,
+        },
+        Decoy::Uncarved => DecoyPair {
+            mesh: flattened(&pair, index),
+            print: pair.print,
+        },
+    })
+}
+
+/// Returns the print of the next pair with another character.
+fn print_of_another_character(
+    pairs: &PairGenerator,
+    character: &str,
+    index: u64,
+) -> Result<Vec<u8>, ImageError> {
+    let mut next = index + 1;
+    loop {
+        let other = pairs.pair(next)?;
+        if other.character != character {
+            return Ok(other.print);
+        }
+        next += 1;
+    }
+}
+
+/// Reflects the mesh in x and reverses its faces, so that they still face outward.
+fn mirrored(mut mesh: Mesh) -> Mesh {
+    mesh.vertices.change(|[x, y, z]| [-x, y, z]);
+    for [_, b, c] in &mut mesh.triangles {
+        std::mem::swap(b, c);
+    }
+    mesh
+}
+
+/// Moves every vertex above the base onto the plane of the stroke tops and adds noise.
+fn flattened(pair: &DemoPair, seed: u64) -> Mesh {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut mesh = pair.mesh.clone();
+    let plane = pair.truth.plane;
+    let [a, b, c, _] = pair.truth.print_from_mesh.0[0];
+    let character = pair.truth.char_height_px / (a * a + b * b + c * c).sqrt();
+    for index in 0..mesh.vertices.len() {
+        let vertex = mesh.vertices.at(index);
+        let height = (0..3).map(|i| plane.n[i] * vertex[i]).sum::<f64>() + plane.d;
+        if height >= -BASE_DEPTH * character {
+            let flat = character * PLATE_NOISE * rng.random_range(-0.5..0.5);
+            let moved = [0, 1, 2].map(|i| vertex[i] + (flat - height) * plane.n[i]);
+            mesh.vertices.set(index, moved);
+        }
+    }
+    mesh
+}
