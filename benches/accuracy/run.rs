@@ -32,7 +32,7 @@ pub(super) struct Run {
 pub(super) enum Failed {
     /// The mesh cannot be read.
     #[error(transparent)]
-    Mesh(#[from] mesh::Error),
+    Mesh(#[from] mesh::MeshError),
     /// The print cannot be read.
     #[error(transparent)]
     Print(#[from] raster::DecodeError),
@@ -58,10 +58,10 @@ fn align(
     fit: &mut Option<FitOutcome>,
 ) -> Result<(Print, AlignedPair), Failed> {
     let scan = times.book(Part::ReadMesh, || {
-        mesh::read(&input.mesh, "mesh.stl", &mesh::Limits::SUGGESTED).map(Scan::from)
+        mesh::read(&input.mesh, "mesh.stl", &mesh::MeshLimits::SUGGESTED).map(Scan::from)
     })?;
     let print = times.book(Part::ReadPrint, || {
-        raster::decode(&input.print, &raster::Limits::SUGGESTED).map(Print::from)
+        raster::decode(&input.print, &raster::ImageLimits::SUGGESTED).map(Print::from)
     })?;
     let plane = times
         .book(Part::Fit, || {

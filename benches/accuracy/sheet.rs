@@ -6,7 +6,7 @@ use anyhow::Context as _;
 use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
 use mocban::export::pictures::{Rgb, SheetCell, View, contact_sheet, tile_side};
-use mocban::raster::{Grid, Picture, png_rgb8};
+use mocban::raster::{Grid, PrintImage, png_rgb8};
 
 use super::method::Method;
 use super::options::Options;
@@ -86,9 +86,10 @@ fn note(trial: &Trial, metric: ThresholdMetric) -> String {
 
 fn tiles(run: &Run, tops: &Grid<u8>, print: &[u8], metric: ThresholdMetric) -> [Option<Rgb>; 3] {
     let side = tile_side(COLUMNS);
-    let decode = |bytes| mocban::raster::decode(bytes, &mocban::raster::Limits::SUGGESTED).ok();
+    let decode =
+        |bytes| mocban::raster::decode(bytes, &mocban::raster::ImageLimits::SUGGESTED).ok();
     let Ok((print, aligned)) = &run.result else {
-        let plain = |print: Picture| View::of_side(&print, side).print(&print);
+        let plain = |print: PrintImage| View::of_side(&print, side).print(&print);
         return [decode(print).map(plain), None, None];
     };
     let view = View::of_side(print.picture(), side);

@@ -16,7 +16,7 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
         let mut group = criterion.benchmark_group(format!("read/{ending}"));
         group.throughput(Throughput::Bytes(held.len() as u64));
         group.bench_function(files.size, |b| {
-            b.iter(|| mesh::read(&held, &name, &mesh::Limits::SUGGESTED));
+            b.iter(|| mesh::read(&held, &name, &mesh::MeshLimits::SUGGESTED));
         });
         group.finish();
         if ending == "obj" {
@@ -43,7 +43,7 @@ fn from_file(path: &Path, name: &str) -> anyhow::Result<Mesh> {
         &mut file,
         about,
         name,
-        &mesh::Limits::SUGGESTED,
+        &mesh::MeshLimits::SUGGESTED,
     )?)
 }
 

@@ -2,7 +2,7 @@
 
 use criterion::{BenchmarkId, Criterion};
 use mocban::raster::{Grid, Mask, png_grey16};
-use mocban::stages::score::{SsimWindow, WindowMeans, measure as score};
+use mocban::stages::score::{SsimReference, SsimWindow, score_masks};
 
 /// Sides of the canvases.
 const SIDES: [usize; 3] = [256, 512, 1024];
@@ -10,10 +10,10 @@ const SIDES: [usize; 3] = [256, 512, 1024];
 pub(super) fn measure(criterion: &mut Criterion) {
     let mut ssim = criterion.benchmark_group("scores");
     for side in SIDES {
-        let print = WindowMeans::new(&rings(side, 0.0), SsimWindow::Gaussian);
+        let print = SsimReference::new(&rings(side, 0.0), SsimWindow::Gaussian);
         let depth = rings(side, 0.4);
         ssim.bench_function(BenchmarkId::from_parameter(side), |b| {
-            b.iter(|| score(&print, &depth));
+            b.iter(|| score_masks(&print, &depth));
         });
     }
     ssim.finish();

@@ -3,7 +3,7 @@
 use criterion::{BatchSize, Criterion};
 use mocban::config::{Sources, load};
 use mocban::mesh::{self, Mesh};
-use mocban::raster::{self, Picture};
+use mocban::raster::{self, PrintImage};
 use mocban::stages::normalize::Normalized;
 use mocban::stages::{AlignedPair, Print, Scan, Settings, depth, fit, normalize, register};
 
@@ -99,9 +99,9 @@ fn pair(stl: &[u8], png: &[u8], settings: &Settings) -> anyhow::Result<AlignedPa
 }
 
 fn read(stl: &[u8]) -> anyhow::Result<Mesh> {
-    Ok(mesh::read(stl, "scan.stl", &mesh::Limits::SUGGESTED)?)
+    Ok(mesh::read(stl, "scan.stl", &mesh::MeshLimits::SUGGESTED)?)
 }
 
-fn decode(png: &[u8]) -> anyhow::Result<Picture> {
-    Ok(raster::decode(png, &raster::Limits::SUGGESTED)?)
+fn decode(png: &[u8]) -> anyhow::Result<PrintImage> {
+    Ok(raster::decode(png, &raster::ImageLimits::SUGGESTED)?)
 }

@@ -28,9 +28,9 @@ pub struct Config {
 #[serde(deny_unknown_fields)]
 pub struct Limits {
     /// Of mesh files.
-    pub mesh: mesh::Limits,
+    pub mesh: mesh::MeshLimits,
     /// Of print images.
-    pub image: raster::Limits,
+    pub image: raster::ImageLimits,
 }
 
 /// How a run uses the machine.

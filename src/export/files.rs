@@ -9,7 +9,7 @@ use crate::catalog::PairResults;
 use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
 use crate::domain::{ContentHash, DepthScale, FileKind, MetricOutcome, Stage, ThresholdMetric};
 use crate::raster::{
-    self, DecodeError, DepthMap, Mask, Picture, png_grey16, png_mask, png_rgb8, warp_depth,
+    self, DecodeError, DepthMap, Mask, PrintImage, png_grey16, png_mask, png_rgb8, warp_depth,
     warp_mask,
 };
 use crate::report::aligned::{Aligned, AlignedError};
@@ -127,7 +127,7 @@ pub(super) struct Drawn {
 pub struct Print {
     bytes: Vec<u8>,
     /// As decoded.
-    pub picture: Picture,
+    pub picture: PrintImage,
 }
 
 impl Print {
@@ -138,7 +138,7 @@ impl Print {
     pub fn read(
         project: &Project,
         pair: &PairResults,
-        limits: &raster::Limits,
+        limits: &raster::ImageLimits,
     ) -> Result<Self, FilesError> {
         let path = project.input_path(&pair.facts.print_path);
         let bytes = match std::fs::read(&path) {
@@ -178,7 +178,7 @@ impl<'a> PairFiles<'a> {
     pub(super) fn read(
         project: &'a Project,
         pair: &'a PairResults,
-        limits: &raster::Limits,
+        limits: &raster::ImageLimits,
     ) -> Result<Self, FilesError> {
         let aligned = Aligned::new(project, pair);
         Ok(Self {
@@ -215,7 +215,7 @@ impl<'a> PairFiles<'a> {
     pub(super) fn draw(&self, outcome: &MetricOutcome) -> Drawn {
         let (width, height) = (self.print_mask.width(), self.print_mask.height());
         let print_from_depth = &outcome.print_from_depth;
-        let strokes = self.depth.strokes(outcome.threshold_level);
+        let strokes = self.depth.stroke_mask(outcome.threshold_level);
         let aligned = warp_mask(&strokes, print_from_depth, width, height);
         let heights = warp_depth(&self.depth, print_from_depth, width, height);
         let view = View::to_judge_by(&self.print.picture);

@@ -56,7 +56,7 @@ pub async fn draw_gallery(
     mut chosen: Chosen,
     catalog: &Catalog,
     project: &Project,
-    limits: raster::Limits,
+    limits: raster::ImageLimits,
 ) -> Result<Gallery, SheetError> {
     chosen.read_log(catalog).await?;
     let project = project.clone();
@@ -121,7 +121,7 @@ impl Chosen {
         Ok(())
     }
 
-    fn draw(self, project: &Project, limits: &raster::Limits) -> Gallery {
+    fn draw(self, project: &Project, limits: &raster::ImageLimits) -> Gallery {
         let mut by_lot: Vec<Subject> = self.by_lot.into_iter().map(|(_, lot)| lot).collect();
         by_lot.sort_by(|a, b| a.pair.facts.name.cmp(&b.pair.facts.name));
         let found = FOUND.into_iter().zip(self.found);
@@ -179,7 +179,7 @@ impl Subject {
             .is_some_and(|record| !record.verdicts.is_empty())
     }
 
-    fn shot(&self, project: &Project, limits: &raster::Limits) -> Shot {
+    fn shot(&self, project: &Project, limits: &raster::ImageLimits) -> Shot {
         let facts = &self.pair.facts;
         let (tiles, trouble) = tiles(project, &self.pair, self.metrics[0], SIDE, limits);
         Shot {

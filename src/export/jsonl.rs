@@ -30,7 +30,7 @@ pub struct JsonlOptions {
     /// Whether to write computing times; the bytes then differ from run to run.
     pub with_times: bool,
     /// Limits on the print images.
-    pub limits: raster::Limits,
+    pub limits: raster::ImageLimits,
 }
 
 /// What was exported.

@@ -84,7 +84,7 @@ pub struct SheetOptions {
     /// Pairs in a row, 1 to 12.
     pub columns: usize,
     /// Limits on the print images.
-    pub limits: raster::Limits,
+    pub limits: raster::ImageLimits,
 }
 
 /// A sheet, and how much of the project is on it.
@@ -267,7 +267,7 @@ mod tests {
             order,
             limit: 50,
             columns: 5,
-            limits: raster::Limits::SUGGESTED,
+            limits: raster::ImageLimits::SUGGESTED,
         }
     }
 

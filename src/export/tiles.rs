@@ -15,7 +15,7 @@ pub(super) fn tiles(
     pair: &PairResults,
     metric: ThresholdMetric,
     side: usize,
-    limits: &raster::Limits,
+    limits: &raster::ImageLimits,
 ) -> ([Option<Rgb>; 3], Option<String>) {
     let Ok(print) = Print::read(project, pair, limits) else {
         return ([None, None, None], None);

@@ -4,18 +4,18 @@ use crate::domain::{FailureClass, FileKind};
 
 /// Why a mesh could not be read from a file.
 #[derive(Debug, thiserror::Error)]
-pub enum ReadError {
+pub enum MeshReadError {
     /// Reading failed half-way.
     #[error(transparent)]
     Io(#[from] std::io::Error),
     /// What was read is no mesh.
     #[error(transparent)]
-    Mesh(#[from] Error),
+    Mesh(#[from] MeshError),
 }
 
 /// Why a mesh could not be read. The messages leave the file's name to the caller.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Error {
+pub enum MeshError {
     /// No bytes at all.
     #[error("the file is empty (0 bytes)")]
     Empty,
@@ -103,7 +103,7 @@ pub enum Error {
     },
 }
 
-impl Error {
+impl MeshError {
     /// Decides retry or quarantine. The file is at fault in every case: one over a limit can only be read by
     /// raising the setting that the message names.
     pub const fn class(&self) -> FailureClass {
@@ -112,9 +112,9 @@ impl Error {
 }
 
 /// Checks that a vertex is finite; `vertex` counts from 1.
-pub(super) fn finite(position: [f64; 3], vertex: u64) -> Result<[f64; 3], Error> {
+pub(super) fn finite(position: [f64; 3], vertex: u64) -> Result<[f64; 3], MeshError> {
     match position.into_iter().find(|value| !value.is_finite()) {
-        Some(value) => Err(Error::NotFinite { vertex, value }),
+        Some(value) => Err(MeshError::NotFinite { vertex, value }),
         None => Ok(position),
     }
 }
@@ -123,7 +123,7 @@ pub(super) fn finite(position: [f64; 3], vertex: u64) -> Result<[f64; 3], Error>
 pub(super) fn all_finite<T: Copy + Into<f64>>(
     positions: &[[T; 3]],
     before: usize,
-) -> Result<(), Error> {
+) -> Result<(), MeshError> {
     let values = positions.as_flattened().iter();
     if values.fold(true, |finite, value| finite & (*value).into().is_finite()) {
         return Ok(());

@@ -1,11 +1,11 @@
 //! Which format some bytes are, by their content.
 
-use super::{Error, stl, text};
+use super::{MeshError, stl, text};
 use crate::domain::FileKind;
 
 /// The formats that are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub enum DetectedFormat {
     /// Wavefront OBJ.
     Obj,
     /// Stanford polygon format, ascii or binary of either byte order.
@@ -21,7 +21,7 @@ pub enum Format {
 /// Lines of a text looked at before it is given up.
 const LINES_TRIED: usize = 1000;
 
-impl Format {
+impl DetectedFormat {
     /// Name in messages.
     pub const fn name(self) -> &'static str {
         match self {
@@ -37,9 +37,9 @@ impl Format {
     ///
     /// # Errors
     /// When the content is of no format that is read.
-    pub fn of(bytes: &[u8], name: &str) -> Result<Self, Error> {
+    pub fn of(bytes: &[u8], name: &str) -> Result<Self, MeshError> {
         if bytes.is_empty() {
-            return Err(Error::Empty);
+            return Err(MeshError::Empty);
         }
         let kind = FileKind::of(bytes);
         match kind {
@@ -47,21 +47,21 @@ impl Format {
             _ if stl::whole_binary_count(bytes, bytes.len() as u64).is_some() => {
                 Ok(Self::StlBinary)
             }
-            FileKind::Text => text_format(bytes, name).ok_or(Error::NotAMesh(kind)),
+            FileKind::Text => text_format(bytes, name).ok_or(MeshError::NotAMesh(kind)),
             FileKind::Binary if has_extension(name, "stl") => Ok(Self::StlBinary),
             // Names in another encoding or a stray control character do not make a text binary.
-            FileKind::Binary => first_words(bytes).ok_or(Error::NotAMesh(kind)),
+            FileKind::Binary => first_words(bytes).ok_or(MeshError::NotAMesh(kind)),
             FileKind::Png
             | FileKind::Jpeg
             | FileKind::Tiff
             | FileKind::OtherImage(_)
             | FileKind::OtherMesh(_)
-            | FileKind::Other(_) => Err(Error::NotAMesh(kind)),
+            | FileKind::Other(_) => Err(MeshError::NotAMesh(kind)),
         }
     }
 }
 
-impl std::fmt::Display for Format {
+impl std::fmt::Display for DetectedFormat {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
     }
@@ -73,26 +73,26 @@ fn has_extension(name: &str, wanted: &str) -> bool {
         .is_some_and(|ext| ext.eq_ignore_ascii_case(wanted))
 }
 
-fn text_format(bytes: &[u8], name: &str) -> Option<Format> {
+fn text_format(bytes: &[u8], name: &str) -> Option<DetectedFormat> {
     if let Some(format) = first_words(bytes) {
         return Some(format);
     }
     // The header of a binary STL may be text all through: count and triangles tell, here cut short.
-    (has_extension(name, "stl") && bytes.contains(&0)).then_some(Format::StlBinary)
+    (has_extension(name, "stl") && bytes.contains(&0)).then_some(DetectedFormat::StlBinary)
 }
 
-fn first_words(bytes: &[u8]) -> Option<Format> {
+fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {
     for (number, line) in text::lines(bytes).take(LINES_TRIED) {
         let mut words = text::words(line);
         let Some(first) = words.next() else { continue };
         match first {
             _ if line.starts_with(b"#") || line.starts_with(b"//") => {}
-            b"ply" if number == 1 => return Some(Format::Ply),
+            b"ply" if number == 1 => return Some(DetectedFormat::Ply),
             _ if first.eq_ignore_ascii_case(b"solid") => return Some(stl_after_solid(bytes)),
             b"v" | b"vn" | b"vt" | b"vp" | b"f" | b"o" | b"g" | b"s" | b"mtllib" | b"usemtl" => {
-                return Some(Format::Obj);
+                return Some(DetectedFormat::Obj);
             }
-            _ if super::points::is_data_or_title(line) => return Some(Format::Xyz),
+            _ if super::xyz::is_data_or_title(line) => return Some(DetectedFormat::Xyz),
             _ => return None,
         }
     }
@@ -100,11 +100,11 @@ fn first_words(bytes: &[u8]) -> Option<Format> {
 }
 
 /// `solid` begins an ascii STL, and the header of some binary ones.
-fn stl_after_solid(bytes: &[u8]) -> Format {
+fn stl_after_solid(bytes: &[u8]) -> DetectedFormat {
     let binary = bytes.iter().take(4096).any(|byte| *byte == 0);
     if binary {
-        Format::StlBinary
+        DetectedFormat::StlBinary
     } else {
-        Format::StlAscii
+        DetectedFormat::StlAscii
     }
 }

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Error;
+use super::MeshError;
 
 /// Limits on meshes, checked before memory is reserved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Limits {
+pub struct MeshLimits {
     /// Largest file in bytes; 2 GiB holds any scan of one character.
     pub max_bytes: u64,
     /// Most vertices; 50 million take 0.6 GB in single precision, 1.2 in double.
@@ -16,7 +16,7 @@ pub struct Limits {
     pub max_triangles: u64,
 }
 
-impl Limits {
+impl MeshLimits {
     /// 2 GiB, 50 million vertices, 100 million triangles.
     pub const SUGGESTED: Self = Self {
         max_bytes: 2 << 30,
@@ -24,17 +24,17 @@ impl Limits {
         max_triangles: 100_000_000,
     };
 
-    pub(super) fn check_bytes(&self, count: u64) -> Result<(), Error> {
+    pub(super) fn check_bytes(&self, count: u64) -> Result<(), MeshError> {
         check("bytes", count, self.max_bytes, "limits.mesh.max_bytes")
     }
 
     /// Never more than a 32-bit index can name, whatever the setting.
-    pub(super) fn check_vertices(&self, count: u64) -> Result<(), Error> {
+    pub(super) fn check_vertices(&self, count: u64) -> Result<(), MeshError> {
         let limit = self.max_vertices.min(u64::from(u32::MAX));
         check("vertices", count, limit, "limits.mesh.max_vertices")
     }
 
-    pub(super) fn check_triangles(&self, count: u64) -> Result<(), Error> {
+    pub(super) fn check_triangles(&self, count: u64) -> Result<(), MeshError> {
         check(
             "triangles",
             count,
@@ -44,11 +44,16 @@ impl Limits {
     }
 }
 
-fn check(what: &'static str, count: u64, limit: u64, setting: &'static str) -> Result<(), Error> {
+fn check(
+    what: &'static str,
+    count: u64,
+    limit: u64,
+    setting: &'static str,
+) -> Result<(), MeshError> {
     if count <= limit {
         return Ok(());
     }
-    Err(Error::TooMany {
+    Err(MeshError::TooMany {
         what,
         count,
         limit,

@@ -5,15 +5,15 @@ mod format;
 mod limits;
 mod obj;
 mod ply;
-mod points;
 mod stl;
 mod text;
 mod vertices;
 pub mod write;
+mod xyz;
 
-pub use error::{Error, ReadError};
-pub use format::Format;
-pub use limits::Limits;
+pub use error::{MeshError, MeshReadError};
+pub use format::DetectedFormat;
+pub use limits::MeshLimits;
 pub use vertices::Vertices;
 
 use std::io::Read;
@@ -39,18 +39,18 @@ pub struct Mesh {
 /// # Errors
 /// When the bytes are no whole mesh of a known format, hold a number that is not finite or an index out of range,
 /// or exceed the limits.
-pub fn read(bytes: &[u8], name: &str, limits: &Limits) -> Result<Mesh, Error> {
+pub fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh, MeshError> {
     limits.check_bytes(bytes.len() as u64)?;
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-    let mesh = match Format::of(bytes, name)? {
-        Format::Obj => obj::read(bytes, limits),
-        Format::Ply => ply::read(bytes, limits),
-        Format::StlBinary => stl::read_binary(bytes, limits),
-        Format::StlAscii => stl::read_ascii(bytes, limits),
-        Format::Xyz => points::read(bytes, limits),
+    let mesh = match DetectedFormat::of(bytes, name)? {
+        DetectedFormat::Obj => obj::read(bytes, limits),
+        DetectedFormat::Ply => ply::read(bytes, limits),
+        DetectedFormat::StlBinary => stl::read_binary(bytes, limits),
+        DetectedFormat::StlAscii => stl::read_ascii(bytes, limits),
+        DetectedFormat::Xyz => xyz::read(bytes, limits),
     }?;
     if mesh.vertices.is_empty() {
-        return Err(Error::NoVertices);
+        return Err(MeshError::NoVertices);
     }
     Ok(mesh)
 }
@@ -66,8 +66,8 @@ pub fn read_from(
     source: &mut impl Read,
     about: u64,
     name: &str,
-    limits: &Limits,
-) -> Result<Mesh, ReadError> {
+    limits: &MeshLimits,
+) -> Result<Mesh, MeshReadError> {
     limits.check_bytes(about)?;
     let mut head = Vec::with_capacity(stl::HEADER);
     source
@@ -86,10 +86,10 @@ pub fn read_from(
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Error, Limits, Mesh, read, read_from};
+    use super::{Mesh, MeshError, MeshLimits, read, read_from};
     use crate::domain::FileKind;
 
-    const LIMITS: Limits = Limits {
+    const LIMITS: MeshLimits = MeshLimits {
         max_bytes: 1 << 20,
         max_vertices: 1000,
         max_triangles: 1000,
@@ -156,12 +156,12 @@ mod tests {
         nan[at_end..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
         for bytes in [long, nan] {
             for len in [bytes.len(), bytes.len() - 7, bytes.len() - 50 * 900 - 3] {
-                let held = read(&bytes[..len], "a.stl", &Limits::SUGGESTED);
+                let held = read(&bytes[..len], "a.stl", &MeshLimits::SUGGESTED);
                 let read = read_from(
                     &mut Slow(&bytes[..len]),
                     bytes.len() as u64,
                     "a.stl",
-                    &Limits::SUGGESTED,
+                    &MeshLimits::SUGGESTED,
                 );
                 let read = read.map_err(|error| error.to_string());
                 assert_eq!(read, held.map_err(|error| error.to_string()), "{len}");
@@ -221,11 +221,11 @@ mod tests {
 
     #[test]
     fn what_is_no_mesh_is_named() {
-        assert_eq!(read(b"", "a.ply", &LIMITS), Err(Error::Empty));
+        assert_eq!(read(b"", "a.ply", &LIMITS), Err(MeshError::Empty));
         let png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
         assert_eq!(
             read(png, "a.stl", &LIMITS),
-            Err(Error::NotAMesh(FileKind::Png))
+            Err(MeshError::NotAMesh(FileKind::Png))
         );
         let error = read(b"Dear reader,\nthis is a letter.\n", "a.obj", &LIMITS).expect_err("text");
         assert_eq!(
@@ -237,14 +237,14 @@ mod tests {
 
     #[test]
     fn limits_name_their_setting() {
-        let tight = Limits {
+        let tight = MeshLimits {
             max_bytes: 10,
             ..LIMITS
         };
         let error = read(&samples()[0].1, "a.obj", &tight).expect_err("over");
         assert!(error.to_string().ends_with("limits.mesh.max_bytes is 10"));
         for (name, bytes) in samples() {
-            let tight = Limits {
+            let tight = MeshLimits {
                 max_vertices: 2,
                 ..LIMITS
             };

@@ -7,7 +7,7 @@ mod quick;
 
 use std::io::{BufRead, Read};
 
-use super::{Error, Limits, Mesh, error, text};
+use super::{Mesh, MeshError, MeshLimits, error, text};
 
 const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
     single_index: false,
@@ -18,11 +18,11 @@ const OPTIONS: tobj::LoadOptions = tobj::LoadOptions {
 
 /// Reads an OBJ. With faces, its vertices are those the faces use, in the order of their first use; without
 /// faces it is a point set.
-pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
+pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     quick::read(bytes, limits).map_or_else(|| read_by_tobj(bytes, limits), Ok)
 }
 
-fn read_by_tobj(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
+fn read_by_tobj(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let joined = join_continued_lines(bytes);
     let bytes = joined.as_deref().unwrap_or(bytes);
     let counts = count(bytes);
@@ -114,12 +114,12 @@ fn join_continued_lines(bytes: &[u8]) -> Option<Vec<u8>> {
     Some(joined)
 }
 
-fn read_points(bytes: &[u8]) -> Result<Mesh, Error> {
+fn read_points(bytes: &[u8]) -> Result<Mesh, MeshError> {
     let mut vertices = Vec::new();
     for (line, record) in records(bytes) {
         if let Record::Vertex(rest) = record {
-            let position =
-                text::position(text::words(rest)).map_err(|reason| Error::Line { line, reason })?;
+            let position = text::position(text::words(rest))
+                .map_err(|reason| MeshError::Line { line, reason })?;
             vertices.push(error::finite(position, vertices.len() as u64 + 1)?);
         }
     }
@@ -186,7 +186,7 @@ impl Read for Filtered<'_> {
 }
 
 /// Finds what `tobj` stumbled over, since it does not tell the place.
-fn find_fault(bytes: &[u8], reason: tobj::LoadError) -> Error {
+fn find_fault(bytes: &[u8], reason: tobj::LoadError) -> MeshError {
     let vertices = count(bytes).vertices;
     let (mut vertex, mut face) = (0, 0);
     for (line, record) in records(bytes) {
@@ -204,33 +204,33 @@ fn find_fault(bytes: &[u8], reason: tobj::LoadError) -> Error {
             return error;
         }
     }
-    Error::Line {
+    MeshError::Line {
         line: 1,
         reason: format!("the OBJ cannot be read: {reason}"),
     }
 }
 
-fn vertex_fault(rest: &[u8], line: u64, vertex: u64) -> Option<Error> {
+fn vertex_fault(rest: &[u8], line: u64, vertex: u64) -> Option<MeshError> {
     match text::position(text::words(rest)) {
-        Err(reason) => Some(Error::Line { line, reason }),
+        Err(reason) => Some(MeshError::Line { line, reason }),
         Ok(position) => error::finite(position, vertex).err(),
     }
 }
 
 /// A corner that is no number, or outside of the file's vertices; a negative one counts back from the last vertex
 /// before the face.
-fn face_fault(rest: &[u8], line: u64, face: u64, (before, all): (u64, u64)) -> Option<Error> {
+fn face_fault(rest: &[u8], line: u64, face: u64, (before, all): (u64, u64)) -> Option<MeshError> {
     for corner in text::words(rest) {
         for part in corner.split(|byte| *byte == b'/').filter(|p| !p.is_empty()) {
             if text::integer(part).is_none() {
                 let reason = text::not_a_number(part);
-                return Some(Error::Line { line, reason });
+                return Some(MeshError::Line { line, reason });
             }
         }
         let position = corner.split(|byte| *byte == b'/').next();
         let Some(index) = position.and_then(text::integer) else {
             let reason = format!("corner {} names no vertex", text::shown(corner));
-            return Some(Error::Line { line, reason });
+            return Some(MeshError::Line { line, reason });
         };
         let from_one = if index < 0 {
             before as i64 + index + 1
@@ -238,7 +238,7 @@ fn face_fault(rest: &[u8], line: u64, face: u64, (before, all): (u64, u64)) -> O
             index
         };
         if from_one < 1 || from_one > all as i64 {
-            return Some(Error::IndexOutOfRange {
+            return Some(MeshError::IndexOutOfRange {
                 face,
                 index,
                 vertices: all,
@@ -250,10 +250,10 @@ fn face_fault(rest: &[u8], line: u64, face: u64, (before, all): (u64, u64)) -> O
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Error, Limits, Mesh};
+    use super::super::{Mesh, MeshError, MeshLimits};
 
-    fn read(text: &str) -> Result<Mesh, Error> {
-        super::read(text.as_bytes(), &Limits::SUGGESTED)
+    fn read(text: &str) -> Result<Mesh, MeshError> {
+        super::read(text.as_bytes(), &MeshLimits::SUGGESTED)
     }
 
     const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
@@ -297,7 +297,7 @@ mod tests {
         let mut bytes = b"o \xc0\xf1\xff\n".to_vec();
         bytes.extend_from_slice(SQUARE.as_bytes());
         bytes.extend_from_slice(b"f 1 2 3\n");
-        assert!(super::read(&bytes, &Limits::SUGGESTED).is_ok());
+        assert!(super::read(&bytes, &MeshLimits::SUGGESTED).is_ok());
     }
 
     #[test]

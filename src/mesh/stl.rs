@@ -2,7 +2,7 @@
 
 use std::io::{self, Read};
 
-use super::{Error, Format, Limits, Mesh, ReadError, Vertices, error, text};
+use super::{DetectedFormat, Mesh, MeshError, MeshLimits, MeshReadError, Vertices, error, text};
 use crate::page_vec::{PageVec, fill};
 
 /// Bytes of the header, the count included.
@@ -31,8 +31,8 @@ pub(super) fn whole_binary_count(bytes: &[u8], len: u64) -> Option<u32> {
 pub(super) fn read_facets(
     source: &mut impl Read,
     count: u32,
-    limits: &Limits,
-) -> Result<Mesh, ReadError> {
+    limits: &MeshLimits,
+) -> Result<Mesh, MeshReadError> {
     let mut facets = Facets::of(count, limits)?;
     let mut bytes = vec![0; FACET * (count as usize).min(MANY)];
     let mut left = count as usize;
@@ -53,9 +53,9 @@ pub(super) fn read_facets(
     Ok(facets.soup()?)
 }
 
-fn truncated(have: u64, count: u32) -> Error {
-    Error::Truncated {
-        format: Format::StlBinary.name(),
+fn truncated(have: u64, count: u32) -> MeshError {
+    MeshError::Truncated {
+        format: DetectedFormat::StlBinary.name(),
         what: "triangles".into(),
         have,
         want: u64::from(count),
@@ -63,9 +63,9 @@ fn truncated(have: u64, count: u32) -> Error {
 }
 
 /// Reads a binary STL; bytes after the last triangle are left out, as are normals and attributes.
-pub(super) fn read_binary(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
-    let count = binary_count(bytes).ok_or_else(|| Error::Truncated {
-        format: Format::StlBinary.name(),
+pub(super) fn read_binary(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
+    let count = binary_count(bytes).ok_or_else(|| MeshError::Truncated {
+        format: DetectedFormat::StlBinary.name(),
         what: "bytes of its header".into(),
         have: bytes.len() as u64,
         want: HEADER as u64,
@@ -88,7 +88,7 @@ struct Facets {
 
 impl Facets {
     /// With room for so many, if that is within the limits.
-    fn of(count: u32, limits: &Limits) -> Result<Self, Error> {
+    fn of(count: u32, limits: &MeshLimits) -> Result<Self, MeshError> {
         limits.check_triangles(u64::from(count))?;
         limits.check_vertices(3 * u64::from(count))?;
         Ok(Self {
@@ -97,7 +97,7 @@ impl Facets {
         })
     }
 
-    fn take(&mut self, facets: &[[u8; FACET]]) -> Result<(), Error> {
+    fn take(&mut self, facets: &[[u8; FACET]]) -> Result<(), MeshError> {
         for facets in facets.chunks(FEW) {
             self.few.clear();
             for facet in facets {
@@ -109,7 +109,7 @@ impl Facets {
         Ok(())
     }
 
-    fn soup(self) -> Result<Mesh, Error> {
+    fn soup(self) -> Result<Mesh, MeshError> {
         soup(Vertices::Single(self.vertices))
     }
 }
@@ -122,9 +122,9 @@ fn corners(facet: &[u8; FACET]) -> [[f32; 3]; 3] {
 }
 
 /// Every three vertices in a row are a triangle.
-fn soup(vertices: Vertices) -> Result<Mesh, Error> {
+fn soup(vertices: Vertices) -> Result<Mesh, MeshError> {
     if vertices.is_empty() {
-        return Err(Error::NoFaces);
+        return Err(MeshError::NoFaces);
     }
     let triangles = (0..vertices.len() as u32)
         .step_by(3)
@@ -137,7 +137,7 @@ fn soup(vertices: Vertices) -> Result<Mesh, Error> {
 }
 
 /// Reads an ascii STL of one or more solids; loops of more than three corners become fans.
-pub(super) fn read_ascii(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
+pub(super) fn read_ascii(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let mut reader = Ascii::default();
     for (line, content) in text::lines(bytes) {
         reader
@@ -145,8 +145,8 @@ pub(super) fn read_ascii(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
             .map_err(|reason| reason.at(line))?;
     }
     if reader.open != Open::Nothing {
-        return Err(Error::EndMissing {
-            format: Format::StlAscii.name(),
+        return Err(MeshError::EndMissing {
+            format: DetectedFormat::StlAscii.name(),
             have: reader.facets,
             missing: reader.open.end(),
         });
@@ -176,13 +176,13 @@ impl Open {
 /// A wrong line, before its number is known; or an error that has a place of its own.
 enum Wrong {
     Line(String),
-    Placed(Error),
+    Placed(MeshError),
 }
 
 impl Wrong {
-    fn at(self, line: u64) -> Error {
+    fn at(self, line: u64) -> MeshError {
         match self {
-            Self::Line(reason) => Error::Line { line, reason },
+            Self::Line(reason) => MeshError::Line { line, reason },
             Self::Placed(error) => error,
         }
     }
@@ -199,7 +199,7 @@ struct Ascii {
 }
 
 impl Ascii {
-    fn line(&mut self, line: &[u8], limits: &Limits) -> Result<(), Wrong> {
+    fn line(&mut self, line: &[u8], limits: &MeshLimits) -> Result<(), Wrong> {
         let mut words = text::words(line);
         let Some(keyword) = words.next() else {
             return Ok(());
@@ -242,7 +242,7 @@ impl Ascii {
         Ok(())
     }
 
-    fn close_facet(&mut self, limits: &Limits) -> Result<(), Error> {
+    fn close_facet(&mut self, limits: &MeshLimits) -> Result<(), MeshError> {
         self.facets += 1;
         if let [first, rest @ ..] = self.loop_corners.as_slice() {
             for pair in rest.windows(2) {
@@ -257,7 +257,7 @@ impl Ascii {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Error, Limits, Mesh, read};
+    use super::super::{Mesh, MeshError, MeshLimits, read};
 
     fn binary(header: &[u8], corners: &[[f32; 3]]) -> Vec<u8> {
         let mut bytes = header.to_vec();
@@ -273,8 +273,8 @@ mod tests {
         bytes
     }
 
-    fn open(bytes: &[u8]) -> Result<Mesh, Error> {
-        read(bytes, "scan.stl", &Limits::SUGGESTED)
+    fn open(bytes: &[u8]) -> Result<Mesh, MeshError> {
+        read(bytes, "scan.stl", &MeshLimits::SUGGESTED)
     }
 
     const CORNERS: [[f32; 3]; 6] = [
@@ -333,8 +333,11 @@ mod tests {
 
     #[test]
     fn no_facets_and_nan_are_refused() {
-        assert_eq!(open(&binary(b"", &[])), Err(Error::NoFaces));
-        assert_eq!(open(b"solid empty\nendsolid empty\n"), Err(Error::NoFaces));
+        assert_eq!(open(&binary(b"", &[])), Err(MeshError::NoFaces));
+        assert_eq!(
+            open(b"solid empty\nendsolid empty\n"),
+            Err(MeshError::NoFaces)
+        );
         let mut corners = CORNERS;
         corners[4][1] = f32::NAN;
         let error = open(&binary(b"", &corners)).expect_err("NaN");

@@ -181,7 +181,7 @@ fn push(out: &mut String, text: std::fmt::Arguments) {
 #[cfg(test)]
 mod tests {
     use super::MeshFormat;
-    use crate::mesh::{Limits, Mesh, read};
+    use crate::mesh::{Mesh, MeshLimits, read};
 
     fn wedge() -> Mesh {
         Mesh {
@@ -206,7 +206,7 @@ mod tests {
     fn every_format_is_read_back_with_its_triangles() {
         for format in MeshFormat::ALL {
             let name = format!("wedge.{}", format.extension());
-            let back = read(&format.encode(&wedge()), &name, &Limits::SUGGESTED);
+            let back = read(&format.encode(&wedge()), &name, &MeshLimits::SUGGESTED);
             let back = back.unwrap_or_else(|error| panic!("{format:?}: {error}"));
             assert_eq!(soup(&back), soup(&wedge()), "{format:?}");
         }

@@ -23,18 +23,18 @@ impl DepthMap {
     }
 
     /// The levels of all pixels that hold data, row by row.
-    pub fn known_levels(&self) -> Vec<u16> {
+    pub fn valid_levels(&self) -> Vec<u16> {
         let levels = self.levels.data().iter().copied();
         levels.filter(|level| *level > 0).collect()
     }
 
     /// The strokes at a threshold: levels from `level` up. No data is no stroke.
-    pub fn strokes(&self, level: u16) -> Mask {
+    pub fn stroke_mask(&self, level: u16) -> Mask {
         self.levels.map(|found| *found >= level.max(1))
     }
 
     /// The strokes at some thresholds in another frame; `to_from` maps depth-map pixels to its pixels.
-    pub fn strokes_in(
+    pub fn warped_stroke_masks(
         &self,
         to_from: &Affine2,
         [width, height]: [usize; 2],

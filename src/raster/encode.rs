@@ -9,7 +9,7 @@ use super::{Grid, Mask};
 
 /// Why an artifact could not be read back.
 #[derive(Debug, thiserror::Error)]
-pub enum ArtifactError {
+pub enum PngError {
     /// Not a whole PNG.
     #[error("the PNG is damaged: {0}")]
     Damaged(#[from] png::DecodingError),
@@ -109,7 +109,7 @@ fn png_of(
 ///
 /// # Errors
 /// When the bytes are damaged or of another kind.
-pub fn decode_grey16(bytes: &[u8]) -> Result<Grid<u16>, ArtifactError> {
+pub fn decode_grey16(bytes: &[u8]) -> Result<Grid<u16>, PngError> {
     let (width, height, samples) = grey_samples(bytes, png::BitDepth::Sixteen, 16)?;
     let (pairs, _) = samples.as_chunks::<2>();
     let levels = pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
@@ -120,7 +120,7 @@ pub fn decode_grey16(bytes: &[u8]) -> Result<Grid<u16>, ArtifactError> {
 ///
 /// # Errors
 /// When the bytes are damaged or of another kind.
-pub fn decode_grey8(bytes: &[u8]) -> Result<Grid<u8>, ArtifactError> {
+pub fn decode_grey8(bytes: &[u8]) -> Result<Grid<u8>, PngError> {
     let (width, height, samples) = grey_samples(bytes, png::BitDepth::Eight, 8)?;
     Ok(Grid::from_vec(width, height, samples).expect("one byte for each pixel"))
 }
@@ -129,10 +129,10 @@ pub fn decode_grey8(bytes: &[u8]) -> Result<Grid<u8>, ArtifactError> {
 ///
 /// # Errors
 /// When the bytes are damaged, of another kind, or hold a value other than 0 and 255.
-pub fn decode_mask(bytes: &[u8]) -> Result<Mask, ArtifactError> {
+pub fn decode_mask(bytes: &[u8]) -> Result<Mask, PngError> {
     let grey = decode_grey8(bytes)?;
     match grey.data().iter().find(|v| !matches!(**v, 0 | 255)) {
-        Some(value) => Err(ArtifactError::NotAMask(*value)),
+        Some(value) => Err(PngError::NotAMask(*value)),
         None => Ok(grey.map(|value| *value == 255)),
     }
 }
@@ -142,12 +142,12 @@ fn grey_samples(
     bytes: &[u8],
     depth: png::BitDepth,
     wanted: u8,
-) -> Result<(usize, usize, Vec<u8>), ArtifactError> {
+) -> Result<(usize, usize, Vec<u8>), PngError> {
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;
     let info = reader.info();
     let (width, height) = (info.width as usize, info.height as usize);
     if info.color_type != png::ColorType::Grayscale || info.bit_depth != depth {
-        return Err(ArtifactError::Kind {
+        return Err(PngError::Kind {
             found: info.color_type,
             bits: info.bit_depth,
             wanted,
@@ -164,10 +164,10 @@ mod tests {
     use proptest::prelude::*;
 
     use super::{
-        ArtifactError, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8, png_grey16,
+        PngError, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8, png_grey16,
         png_mask, png_rgb8,
     };
-    use crate::raster::{Grid, Limits, Mask, decode};
+    use crate::raster::{Grid, ImageLimits, Mask, decode};
 
     #[test]
     fn mask_is_white_where_stroke_is() {
@@ -180,20 +180,14 @@ mod tests {
     #[test]
     fn grey_that_is_no_mask_is_refused() {
         let bytes = png_grey8(&Grid::new(2, 2, 7));
-        assert!(matches!(
-            decode_mask(&bytes),
-            Err(ArtifactError::NotAMask(7))
-        ));
-        assert!(matches!(
-            decode_grey16(&bytes),
-            Err(ArtifactError::Kind { .. })
-        ));
+        assert!(matches!(decode_mask(&bytes), Err(PngError::NotAMask(7))));
+        assert!(matches!(decode_grey16(&bytes), Err(PngError::Kind { .. })));
     }
 
     #[test]
     fn colours_are_read_back_by_the_print_decoder() {
         let grid = Grid::from_fn(4, 4, |x, y| [x as u8 * 60, y as u8 * 60, 9]);
-        let picture = decode(&png_rgb8(&grid), &Limits::SUGGESTED).expect("reads");
+        let picture = decode(&png_rgb8(&grid), &ImageLimits::SUGGESTED).expect("reads");
         assert_eq!(
             picture.rgb,
             grid.map(|c| c.map(|value| u16::from(value) * 257))
@@ -203,7 +197,7 @@ mod tests {
     #[test]
     fn a_jpeg_looks_like_what_it_was_made_from() {
         let grid = Grid::from_fn(40, 24, |x, y| [x as u8 * 5, y as u8 * 9, 90]);
-        let picture = decode(&jpeg_rgb8(&grid, 85), &Limits::SUGGESTED).expect("reads");
+        let picture = decode(&jpeg_rgb8(&grid, 85), &ImageLimits::SUGGESTED).expect("reads");
         assert_eq!((picture.rgb.width(), picture.rgb.height()), (40, 24));
         let far = |(a, b): (&[u16; 3], &[u8; 3])| {
             let apart = a

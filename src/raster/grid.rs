@@ -27,7 +27,7 @@ fn turn_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usi
 
 impl Grid<u16> {
     /// How many values reach a level.
-    pub fn reaching(&self, level: u16) -> usize {
+    pub fn count_at_least(&self, level: u16) -> usize {
         // Few enough for a narrow sum, of which more fit side by side.
         let runs = self.data.chunks(usize::from(u16::MAX));
         let set = |run: &[u16]| run.iter().map(|l| u16::from(*l >= level)).sum::<u16>();
@@ -165,9 +165,9 @@ mod tests {
     #[test]
     fn more_values_than_a_narrow_sum_holds_are_counted() {
         let grid = Grid::from_fn(400, 300, |x, _| x as u16);
-        assert_eq!(grid.reaching(0), 120_000);
-        assert_eq!(grid.reaching(100), 300 * 300);
-        assert_eq!(grid.reaching(400), 0);
+        assert_eq!(grid.count_at_least(0), 120_000);
+        assert_eq!(grid.count_at_least(100), 300 * 300);
+        assert_eq!(grid.count_at_least(400), 0);
     }
 
     #[test]

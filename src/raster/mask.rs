@@ -31,7 +31,7 @@ impl PixelBox {
 
     /// The box around two.
     #[must_use]
-    pub fn around(self, other: Self) -> Self {
+    pub fn union(self, other: Self) -> Self {
         Self {
             x0: self.x0.min(other.x0),
             y0: self.y0.min(other.y0),
@@ -51,7 +51,7 @@ fn set(pixels: impl Iterator<Item = bool>) -> usize {
 
 /// How far two masks of the same size cover each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Overlap {
+pub struct MaskOverlap {
     /// Pixels set in both over pixels set in either, 0..=1; 0 where none is set.
     pub iou: f64,
     /// Twice the pixels set in both over the sum of both counts, 0..=1; 0 where none is set.
@@ -60,13 +60,13 @@ pub struct Overlap {
 
 impl Mask {
     /// How far this mask and another of the same size cover each other.
-    pub fn overlap(&self, other: &Self) -> Overlap {
+    pub fn overlap(&self, other: &Self) -> MaskOverlap {
         let runs = self.data().chunks(RUN).zip(other.data().chunks(RUN));
         let both = runs.map(|(one, other)| set(one.iter().zip(other).map(|(a, b)| *a & *b)));
         let both = both.sum::<usize>() as f64;
         let sum = (self.count() + other.count()) as f64;
         let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
-        Overlap {
+        MaskOverlap {
             iou: share(both, sum - both),
             dice: share(2.0 * both, sum),
         }
@@ -104,14 +104,14 @@ impl Mask {
                 x1: last.unwrap_or(x1.saturating_sub(1)),
                 y1: y,
             };
-            found = Some(found.map_or(row, |so_far| so_far.around(row)));
+            found = Some(found.map_or(row, |so_far| so_far.union(row)));
         }
         found
     }
 
     /// The mask with every pixel that touches it, by a side or a corner.
     #[must_use]
-    pub fn grown(&self) -> Self {
+    pub fn dilate(&self) -> Self {
         let (width, height) = (self.width(), self.height());
         let mut across = self.clone();
         for (y, row) in across.data_mut().chunks_exact_mut(width.max(1)).enumerate() {
@@ -175,7 +175,7 @@ mod tests {
             });
             let set = |x: usize, y: usize| wide.at(x, y).then_some(PixelBox { x0: x, y0: y, x1: x, y1: y });
             let places = (0..wide.height()).flat_map(|y| (0..30).map(move |x| (x, y)));
-            let around = places.filter_map(|(x, y)| set(x, y)).reduce(PixelBox::around);
+            let around = places.filter_map(|(x, y)| set(x, y)).reduce(PixelBox::union);
             prop_assert_eq!(wide.bounding_box(), around);
             prop_assert!((found.dice - 2.0 * share / (1.0 + share)).abs() < 1e-12);
         }
@@ -193,7 +193,7 @@ mod tests {
                 let near = |dx: i64, dy: i64| mask.get(x as i64 + dx, y as i64 + dy) == Some(true);
                 (-1..=1).any(|dy| (-1..=1).any(|dx| near(dx, dy)))
             };
-            prop_assert_eq!(mask.grown(), Mask::from_fn(width, height, touches));
+            prop_assert_eq!(mask.dilate(), Mask::from_fn(width, height, touches));
         }
     }
 

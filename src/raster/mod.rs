@@ -3,24 +3,24 @@
 mod decode;
 mod depth_map;
 pub mod encode;
-mod extremes;
 mod grid;
 mod limits;
-mod looks;
 mod mask;
+mod minmax_pyramid;
 mod picture;
 mod resample;
+mod supersample;
 mod warp;
 
-pub use decode::{DecodeError, decode, pixels_by_header};
+pub use decode::{DecodeError, decode, header_pixel_count};
 pub use depth_map::DepthMap;
 pub use encode::{
-    ArtifactError, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8, png_grey16,
-    png_mask, png_rgb8,
+    PngError, decode_grey8, decode_grey16, decode_mask, jpeg_rgb8, png_grey8, png_grey16, png_mask,
+    png_rgb8,
 };
 pub use grid::Grid;
-pub use limits::Limits;
-pub use mask::{Mask, Overlap, PixelBox};
-pub use picture::Picture;
-pub use resample::{resample, resample_made, resample_turned};
+pub use limits::ImageLimits;
+pub use mask::{Mask, MaskOverlap, PixelBox};
+pub use picture::PrintImage;
+pub use resample::{resample, resample_rows_transposed, resample_transposed};
 pub use warp::{warp_depth, warp_mask};

@@ -9,7 +9,7 @@ use crate::simd::dispatch;
 /// Beyond the source values are zero.
 pub fn resample(values: &Grid<f32>, scale: f64, shift: [f64; 2], to: [usize; 2]) -> Grid<f32> {
     if scale <= 1.0 {
-        return resample_turned(values, scale, shift, to).transposed();
+        return resample_transposed(values, scale, shift, to).transposed();
     }
     // What grows is turned while it is small.
     let from = [values.width(), values.height()];
@@ -18,7 +18,7 @@ pub fn resample(values: &Grid<f32>, scale: f64, shift: [f64; 2], to: [usize; 2])
 }
 
 /// The same with rows and columns changed for each other.
-pub fn resample_turned(
+pub fn resample_transposed(
     values: &Grid<f32>,
     scale: f64,
     shift: [f64; 2],
@@ -31,7 +31,7 @@ pub fn resample_turned(
 }
 
 /// The same of values that `make` writes, row by row as they are asked for; some rows more than once.
-pub fn resample_made(
+pub fn resample_rows_transposed(
     from: [usize; 2],
     make: impl FnMut(usize, &mut [f32]),
     scale: f64,
@@ -148,7 +148,7 @@ fn add<const N: usize>(row: &mut [f32], values: &Grid<f32>, first: usize, weight
 mod tests {
     use proptest::prelude::*;
 
-    use super::{resample, resample_made, resample_turned};
+    use super::{resample, resample_rows_transposed, resample_transposed};
     use crate::raster::Grid;
 
     #[test]
@@ -157,11 +157,11 @@ mod tests {
         let half = resample(&ramp, 0.5, [-0.25, -0.25], [6, 4]);
         assert!((half.at(0, 0) - (0.0 + 1.0 + 10.0 + 11.0) / 4.0).abs() < 1e-5);
         assert!((half.at(5, 3) - (70.0 + 71.0 + 80.0 + 81.0) / 4.0).abs() < 1e-4);
-        let turned = resample_turned(&ramp, 0.5, [-0.25, -0.25], [6, 4]);
+        let turned = resample_transposed(&ramp, 0.5, [-0.25, -0.25], [6, 4]);
         assert_eq!(turned.transposed(), half);
         let row = |y: usize, row: &mut [f32]| row.copy_from_slice(ramp.row(y));
         assert_eq!(
-            resample_made([12, 8], row, 0.5, [-0.25, -0.25], [6, 4]),
+            resample_rows_transposed([12, 8], row, 0.5, [-0.25, -0.25], [6, 4]),
             turned
         );
         let double = resample(&ramp, 2.0, [0.5, 0.5], [24, 16]);

@@ -4,8 +4,8 @@
 
 use std::ops::Range;
 
-use super::extremes::Extremes;
-use super::looks::{Looks, floor, look, look_inside, neighbours};
+use super::minmax_pyramid::Extremes;
+use super::supersample::{Looks, floor, look, look_inside, neighbours};
 use super::{DepthMap, Grid, Mask};
 use crate::domain::Affine2;
 use crate::simd::dispatch;
@@ -236,7 +236,7 @@ fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
 mod tests {
     use super::{HALF, Looks, look, warp_mask, warp_strokes};
     use crate::domain::Affine2;
-    use crate::raster::looks::weights;
+    use crate::raster::supersample::weights;
     use crate::raster::{Grid, Mask};
 
     fn blob() -> Mask {

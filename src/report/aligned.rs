@@ -7,7 +7,7 @@ use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, PRINT_MASK};
 use crate::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, PrintFromMesh, Stage,
 };
-use crate::raster::{ArtifactError, DepthMap, Grid, Mask, decode_grey8, decode_grey16};
+use crate::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
 use crate::store::{self, Project};
 
 /// Ink in a stored print mask; paper is 0 and what is unknown 128.
@@ -44,7 +44,7 @@ pub enum AlignedError {
         /// Which artifact.
         role: &'static str,
         /// Why.
-        source: ArtifactError,
+        source: PngError,
     },
 }
 

@@ -177,7 +177,7 @@ fn read_tops(project: &Project, path: &str) -> Result<Grid<u8>, TruthError> {
     let path = project.input_path(path);
     let refused = |why: String| TruthError::Mask(format!("{}: {why}", path.display()));
     let bytes = std::fs::read(&path).map_err(|error| refused(error.to_string()))?;
-    let picture = raster::decode(&bytes, &raster::Limits::SUGGESTED)
+    let picture = raster::decode(&bytes, &raster::ImageLimits::SUGGESTED)
         .map_err(|error| refused(error.to_string()))?;
     Ok(picture.rgb.map(|colour| (colour[0] / 257) as u8))
 }

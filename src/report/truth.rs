@@ -247,7 +247,7 @@ impl Linear2 {
 
 /// Intersection over union of a metric's depth mask, laid on the print, with the true stroke tops.
 pub fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f64 {
-    let mask = depth.strokes(outcome.threshold_level);
+    let mask = depth.stroke_mask(outcome.threshold_level);
     let (width, height) = (tops.width(), tops.height());
     let aligned = warp_mask(&mask, &outcome.print_from_depth, width, height);
     mask_iou(&aligned, tops).expect("the mask was warped to the size of the tops")

@@ -36,7 +36,7 @@ pub(super) fn chosen<'a>(cards: &'a [Card], rates: &Rates, lots: &SeededRandom) 
 /// A fault made from a good result. What would be no fault, such as a symmetric relief in the mirror, is turned.
 pub(super) fn plant(card: &Card, depth: &DepthMap, lots: &SeededRandom) -> Card {
     let draw = |purpose| lots.draw(&card.view.seen(), purpose);
-    let strokes = depth.strokes(card.view.level);
+    let strokes = depth.stroke_mask(card.view.level);
     let (control, view) = match draw("kind") {
         ..0.2 if !is_symmetric(&strokes) => (AttentionCheck::Mirrored, card.view.mirrored()),
         0.2..0.5 => match broken_level(depth, card.view.level, draw("cut") < 0.5) {
@@ -83,7 +83,7 @@ fn is_symmetric(strokes: &Mask) -> bool {
 
 /// A level at which much of the stroke goes, or much ground comes in; `None` where the relief has no such level.
 fn broken_level(depth: &DepthMap, level: u16, loses: bool) -> Option<u16> {
-    let mut above = depth.known_levels();
+    let mut above = depth.valid_levels();
     above.sort_unstable_by(|a, b| b.cmp(a));
     let area = above.partition_point(|found| *found >= level);
     let share = if loses { LOST } else { FLOODED };
@@ -182,7 +182,7 @@ mod tests {
                     assert!(fault.view.print_from_depth.determinant() < 0.0);
                 }
                 AttentionCheck::Threshold { level } => {
-                    let area = |level| wedge().strokes(level).count() as f64;
+                    let area = |level| wedge().stroke_mask(level).count() as f64;
                     let share = area(level) / area(good.level);
                     assert!(!(0.7..=1.5).contains(&share), "{share}");
                 }

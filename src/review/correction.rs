@@ -9,7 +9,7 @@ use super::card::{Card, View};
 use super::pictures::{Drawn, SIDE, Subject};
 use crate::catalog::{Catalog, CatalogError, ManualAlignment, PairResults};
 use crate::domain::{Affine2, ContentHash, Stage};
-use crate::raster::{Overlap, warp_mask};
+use crate::raster::{MaskOverlap, warp_mask};
 use crate::report::HandMove;
 use crate::report::aligned::{Aligned, AlignedError};
 use crate::store::Project;
@@ -50,8 +50,8 @@ pub(super) struct Agreement {
     pub(super) dice: f64,
 }
 
-impl From<Overlap> for Agreement {
-    fn from(found: Overlap) -> Self {
+impl From<MaskOverlap> for Agreement {
+    fn from(found: MaskOverlap) -> Self {
         Self {
             iou: found.iou,
             dice: found.dice,

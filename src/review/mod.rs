@@ -56,7 +56,7 @@ pub struct ReviewOptions {
     /// Where to listen; port 0 takes that of the project and the reviewer, and any where that is taken.
     pub listen: SocketAddr,
     /// Limits on the print images.
-    pub limits: raster::Limits,
+    pub limits: raster::ImageLimits,
     /// The clock.
     pub now: fn() -> UnixMillis,
 }

@@ -121,7 +121,7 @@ impl Subject {
         project: &Project,
         pair: &PairResults,
         card: &Card,
-        limits: &raster::Limits,
+        limits: &raster::ImageLimits,
     ) -> Result<Self, PictureError> {
         let aligned = Aligned::new(project, pair);
         let hashes = (
@@ -136,7 +136,7 @@ impl Subject {
             print: Print::read(project, pair, limits)?,
             print_mask: aligned.print_mask()?,
             canvas: Canvas::read(&aligned)?,
-            strokes: depth.strokes(card.view.level),
+            strokes: depth.stroke_mask(card.view.level),
             depth,
         })
     }
@@ -192,7 +192,7 @@ impl Drawn {
 pub(super) struct Pictures {
     catalog: Catalog,
     project: Project,
-    limits: raster::Limits,
+    limits: raster::ImageLimits,
     kept: Mutex<Kept>,
 }
 
@@ -219,7 +219,7 @@ impl Kept {
 }
 
 impl Pictures {
-    pub(super) fn new(catalog: Catalog, project: Project, limits: raster::Limits) -> Self {
+    pub(super) fn new(catalog: Catalog, project: Project, limits: raster::ImageLimits) -> Self {
         Self {
             catalog,
             project,

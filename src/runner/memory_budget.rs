@@ -68,7 +68,7 @@ pub(super) fn need(
     project: &Project,
     pair: &PairFacts,
     from: Stage,
-    images: &raster::Limits,
+    images: &raster::ImageLimits,
 ) -> u64 {
     let mesh = match from {
         Stage::Fit | Stage::Depth => mesh_bytes(&project.input_path(&pair.mesh_path)),
@@ -97,12 +97,12 @@ fn mesh_bytes(path: &Path) -> u64 {
 }
 
 /// No more than the largest print that is read. A small file may hold many pixels, so its header is asked first.
-fn print_bytes(path: &Path, images: &raster::Limits) -> u64 {
+fn print_bytes(path: &Path, images: &raster::ImageLimits) -> u64 {
     let size = size(path);
     // What has no size may be a pipe, which would keep us waiting.
     let of_header = (size > 0).then(|| File::open(path).ok()).flatten();
     let pixels = of_header
-        .and_then(|file| raster::pixels_by_header(BufReader::new(file)))
+        .and_then(|file| raster::header_pixel_count(BufReader::new(file)))
         .unwrap_or_else(|| {
             let is_jpeg = has_ending(path, &["jpg", "jpeg"]);
             size.saturating_mul(if is_jpeg {
@@ -185,7 +185,7 @@ mod tests {
         white.save(&path).expect("a file");
         let size = std::fs::metadata(&path).expect("a file").len();
         assert!(size < 100_000);
-        let bytes = print_bytes(&path, &raster::Limits::SUGGESTED);
+        let bytes = print_bytes(&path, &raster::ImageLimits::SUGGESTED);
         assert_eq!(bytes, 6_000_000 * PIXEL_BYTES + size);
     }
 
@@ -203,14 +203,20 @@ mod tests {
             print_path: "1.jpg".to_owned(),
             ..fixture::pending("1").facts
         };
-        let few = raster::Limits {
+        let few = raster::ImageLimits {
             max_pixels: 10,
-            ..raster::Limits::SUGGESTED
+            ..raster::ImageLimits::SUGGESTED
         };
         let from = |stage, limits| need(&project, &facts, stage, limits) - PAIR_BYTES;
         let print = 100 * 8 * 50 + 100;
-        assert_eq!(from(Stage::Fit, &raster::Limits::SUGGESTED), 6000 + print);
-        assert_eq!(from(Stage::Normalize, &raster::Limits::SUGGESTED), print);
+        assert_eq!(
+            from(Stage::Fit, &raster::ImageLimits::SUGGESTED),
+            6000 + print
+        );
+        assert_eq!(
+            from(Stage::Normalize, &raster::ImageLimits::SUGGESTED),
+            print
+        );
         assert_eq!(from(Stage::Normalize, &few), 10 * 50 + 100);
         assert_eq!(from(Stage::Register, &few), 0);
     }

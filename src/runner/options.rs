@@ -39,9 +39,9 @@ pub struct RunOptions {
     /// Longest time for one stage of one pair.
     pub stage_limit: Duration,
     /// Limits on mesh files.
-    pub mesh_limits: mesh::Limits,
+    pub mesh_limits: mesh::MeshLimits,
     /// Limits on print images.
-    pub image_limits: raster::Limits,
+    pub image_limits: raster::ImageLimits,
 }
 
 impl Default for RunOptions {
@@ -56,8 +56,8 @@ impl Default for RunOptions {
             from: Stage::Fit,
             until: Stage::Register,
             stage_limit: Duration::from_mins(10),
-            mesh_limits: mesh::Limits::SUGGESTED,
-            image_limits: raster::Limits::SUGGESTED,
+            mesh_limits: mesh::MeshLimits::SUGGESTED,
+            image_limits: raster::ImageLimits::SUGGESTED,
         }
     }
 }

@@ -42,7 +42,7 @@ pub(super) struct Scheduler {
     pub(super) workers: usize,
     pub(super) among: Option<PairSelection>,
     pub(super) max_failures: Option<u64>,
-    pub(super) images: raster::Limits,
+    pub(super) images: raster::ImageLimits,
     /// Pairs that are computed, each with its name and the memory it was given.
     pub(super) tasks: JoinSet<(PairOutcome, PairName, u64)>,
     /// Pairs whose last files and checkpoint are on their way.

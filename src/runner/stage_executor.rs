@@ -20,8 +20,8 @@ use crate::store::{ArtifactError, InputDigest, InputError, Project, open_input, 
 pub(super) struct PipelineExecutor {
     project: Project,
     settings: Settings,
-    mesh_limits: mesh::Limits,
-    image_limits: raster::Limits,
+    mesh_limits: mesh::MeshLimits,
+    image_limits: raster::ImageLimits,
 }
 
 impl StageExecutor for PipelineExecutor {
@@ -205,8 +205,8 @@ impl PipelineExecutor {
         let mut file = open_input(&path, limit, "limits.mesh.max_bytes").map_err(unread)?;
         let about = file.size();
         let mesh = match mesh::read_from(&mut file, about, stored, &self.mesh_limits) {
-            Err(mesh::ReadError::Io(error)) => return Err(unread(file.error(error))),
-            Err(mesh::ReadError::Mesh(error)) => Err(error),
+            Err(mesh::MeshReadError::Io(error)) => return Err(unread(file.error(error))),
+            Err(mesh::MeshReadError::Mesh(error)) => Err(error),
             Ok(mesh) => Ok(mesh),
         };
         pair.inputs.mesh = Some(seen(file.finish().map_err(unread)?));

@@ -9,15 +9,15 @@ const LEAST_SIGMA: f64 = 0.5;
 /// Values smoothed with a gaussian of `sigma` pixels; unchanged when `sigma` is below half a pixel.
 ///
 /// Beyond the rim values are taken to be zero, so divide by the smoothed weight where that matters.
-pub(super) fn blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
+pub(super) fn gaussian_blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
     if sigma < LEAST_SIGMA {
         return values.clone();
     }
-    blur_turned(values.transposed(), sigma)
+    gaussian_blur_transposed(values.transposed(), sigma)
 }
 
 /// The same of values whose rows and columns were changed for each other, which they are changed back.
-pub(super) fn blur_turned(turned: Grid<f32>, sigma: f64) -> Grid<f32> {
+pub(super) fn gaussian_blur_transposed(turned: Grid<f32>, sigma: f64) -> Grid<f32> {
     if sigma < LEAST_SIGMA {
         return turned.transposed();
     }
@@ -112,7 +112,7 @@ fn columns<const N: usize>(
 mod tests {
     use proptest::prelude::*;
 
-    use super::{blur, down};
+    use super::{down, gaussian_blur};
     use crate::raster::Grid;
 
     proptest! {
@@ -139,7 +139,7 @@ mod tests {
         let mut dot = Grid::new(61, 61, 0.0_f32);
         dot.set(30, 30, 1.0);
         for sigma in [1.0, 2.0, 4.0] {
-            let soft = blur(&dot, sigma);
+            let soft = gaussian_blur(&dot, sigma);
             let (mut sum, mut variance) = (0.0, 0.0);
             for y in 0..61 {
                 for x in 0..61 {

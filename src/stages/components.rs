@@ -7,15 +7,15 @@ const SPECK_SHARE: f64 = 1.0 / 1200.0;
 
 /// Groups of set pixels that touch along an edge, each with its size.
 #[derive(Debug)]
-pub(super) struct Components {
+pub(super) struct ConnectedComponents {
     /// Group of each pixel; `u32::MAX` where the mask is not set.
     labels: Grid<u32>,
     sizes: Vec<usize>,
 }
 
-impl Components {
+impl ConnectedComponents {
     /// Finds the groups of a mask, numbered in the order of their first pixels.
-    pub(super) fn of(mask: &Mask) -> Self {
+    pub(super) fn label(mask: &Mask) -> Self {
         let (width, height) = (mask.width(), mask.height());
         let mut runs = Vec::new();
         // Where the runs of the row above begin and end among all.
@@ -60,13 +60,13 @@ impl Components {
     }
 
     /// The pixels whose group has at least this size.
-    pub(super) fn at_least(&self, size: usize) -> Mask {
+    pub(super) fn with_area_at_least(&self, size: usize) -> Mask {
         self.labels
             .map(|label| *label != u32::MAX && self.sizes[*label as usize] >= size)
     }
 
     /// The pixels whose group comes within `reach` pixels, along either axis, of one of the other mask.
-    pub(super) fn near(&self, other: &Mask, reach: i64) -> Mask {
+    pub(super) fn touching(&self, other: &Mask, reach: i64) -> Mask {
         let mut touches = vec![false; self.sizes.len()];
         for y in 0..self.labels.height() {
             for x in 0..self.labels.width() {
@@ -86,7 +86,7 @@ impl Components {
     }
 
     /// The pixels whose group reaches the border of the grid.
-    pub(super) fn at_border(&self) -> Mask {
+    pub(super) fn touching_border(&self) -> Mask {
         let (width, height) = (self.labels.width(), self.labels.height());
         let mut reaches = vec![false; self.sizes.len()];
         for y in 0..height {
@@ -140,10 +140,10 @@ fn join(runs: &mut [Run], one: usize, other: usize) {
 }
 
 /// The mask without specks for a picture of so many pixels, neither set ones nor holes.
-pub(super) fn without_specks(mask: &Mask, area: usize) -> Mask {
+pub(super) fn remove_specks(mask: &Mask, area: usize) -> Mask {
     let size = (area as f64 * SPECK_SHARE).round() as usize;
-    let kept = Components::of(mask).at_least(size);
-    let holes = Components::of(&kept.map(|set| !set)).at_least(size);
+    let kept = ConnectedComponents::label(mask).with_area_at_least(size);
+    let holes = ConnectedComponents::label(&kept.map(|set| !set)).with_area_at_least(size);
     holes.map(|hole| !hole)
 }
 
@@ -151,7 +151,7 @@ pub(super) fn without_specks(mask: &Mask, area: usize) -> Mask {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{Components, without_specks};
+    use super::{ConnectedComponents, remove_specks};
     use crate::raster::Mask;
 
     /// The slow obvious twin: the least place that each set pixel can be reached from.
@@ -185,7 +185,7 @@ mod tests {
         ) {
             let height = bits.len() / width;
             let mask = Mask::from_fn(width, height, |x, y| bits[y * width + x]);
-            let found = Components::of(&mask);
+            let found = ConnectedComponents::label(&mask);
             let flooded = flooded(&mask);
             let mut firsts: Vec<usize> = flooded.iter().copied().flatten().collect();
             firsts.sort_unstable();
@@ -212,12 +212,15 @@ mod tests {
     fn specks_and_pinholes_go() {
         let mask = drawn(["#.....", ".####.", ".#.##.", ".####.", ".....#"]);
         let clean = drawn(["......", ".####.", ".####.", ".####.", "......"]);
-        assert_eq!(without_specks(&mask, 2400), clean);
+        assert_eq!(remove_specks(&mask, 2400), clean);
     }
 
     #[test]
     fn groups_at_the_border_are_told() {
         let mask = drawn(["##....", "#.....", "..##..", "..##..", "......"]);
-        assert_eq!(Components::of(&mask).at_border().count(), 3);
+        assert_eq!(
+            ConnectedComponents::label(&mask).touching_border().count(),
+            3
+        );
     }
 }

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::Scan;
-use super::zbuffer::{NOTHING, View};
+use super::zbuffer::{NO_HIT, Viewport};
 use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
 use crate::raster::{DepthMap, Grid};
 
@@ -81,7 +81,7 @@ pub fn depth(
 ) -> Result<DepthMap, DepthError> {
     let shell = scan.shell();
     let bounds = shell.bounds(&fit.plane_from_mesh);
-    let view = View::around(bounds, longest_px(bounds, unit, params)?, true);
+    let view = Viewport::around(bounds, longest_px(bounds, unit, params)?, true);
     let plane_from_px = view
         .px_from_plane
         .inverse()
@@ -140,7 +140,7 @@ fn quantise(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
         // Half up: a call of `round` takes longer than all else here.
         let whole = steps as i32;
         let level = 1 + whole + i32::from(steps - f64::from(whole) >= 0.5);
-        if *z == NOTHING { 0 } else { level as u16 }
+        if *z == NO_HIT { 0 } else { level as u16 }
     });
     Some((levels, low, step))
 }
@@ -149,9 +149,9 @@ fn quantise(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
 fn range(heights: &[f32]) -> Option<[f32; 2]> {
     // Side by side, which a minimum over all one after another cannot be.
     const LANES: usize = 16;
-    let (mut lows, mut highs) = ([f32::INFINITY; LANES], [NOTHING; LANES]);
+    let (mut lows, mut highs) = ([f32::INFINITY; LANES], [NO_HIT; LANES]);
     let mut take = |lane: usize, z: f32| {
-        let low = if z == NOTHING { f32::INFINITY } else { z };
+        let low = if z == NO_HIT { f32::INFINITY } else { z };
         lows[lane] = if low < lows[lane] { low } else { lows[lane] };
         highs[lane] = if z > highs[lane] { z } else { highs[lane] };
     };
@@ -165,15 +165,15 @@ fn range(heights: &[f32]) -> Option<[f32; 2]> {
         take(lane, *z);
     }
     let low = lows.into_iter().fold(f32::INFINITY, f32::min);
-    let high = highs.into_iter().fold(NOTHING, f32::max);
-    (high != NOTHING).then_some([low, high])
+    let high = highs.into_iter().fold(NO_HIT, f32::max);
+    (high != NO_HIT).then_some([low, high])
 }
 
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
-    use super::{DepthError, DepthParams, NOTHING, ResolutionBy, depth, quantise};
+    use super::{DepthError, DepthParams, NO_HIT, ResolutionBy, depth, quantise};
     use crate::domain::{Bow, FitOutcome, LengthUnit, Rigid3, SideEvidence};
     use crate::mesh::Mesh;
     use crate::raster::Grid;
@@ -228,9 +228,9 @@ mod tests {
     proptest! {
         #[test]
         fn levels_are_those_of_the_obvious_way(
-            heights in proptest::collection::vec(prop_oneof![4 => -3.0..5.0_f32, 1 => Just(NOTHING)], 1..90),
+            heights in proptest::collection::vec(prop_oneof![4 => -3.0..5.0_f32, 1 => Just(NO_HIT)], 1..90),
         ) {
-            let seen: Vec<f64> = heights.iter().filter(|z| **z != NOTHING).map(|z| f64::from(*z)).collect();
+            let seen: Vec<f64> = heights.iter().filter(|z| **z != NO_HIT).map(|z| f64::from(*z)).collect();
             let grid = Grid::from_vec(heights.len(), 1, heights.clone()).expect("a row");
             let Some((levels, low, step)) = quantise(&grid) else {
                 prop_assert!(seen.is_empty());
@@ -241,7 +241,7 @@ mod tests {
             prop_assert_eq!(step, ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE)));
             for (z, level) in heights.iter().zip(levels.data()) {
                 let rounded = ((f64::from(*z) - low) / step).round().clamp(0.0, 65_534.0) as u16;
-                prop_assert_eq!(*level, if *z == NOTHING { 0 } else { 1 + rounded });
+                prop_assert_eq!(*level, if *z == NO_HIT { 0 } else { 1 + rounded });
             }
         }
     }

@@ -3,18 +3,18 @@
 use std::sync::OnceLock;
 
 use super::binarize::{BinarizeError, InkMask, hypotheses};
-use crate::raster::Picture;
+use crate::raster::PrintImage;
 
 /// A print as the stages see it: the whole picture as decoded, and its ink once somebody has asked.
 #[derive(Debug, Clone)]
 pub struct Print {
-    picture: Picture,
+    picture: PrintImage,
     hypotheses: OnceLock<Result<Vec<InkMask>, BinarizeError>>,
 }
 
 impl Print {
     /// The picture as decoded.
-    pub const fn picture(&self) -> &Picture {
+    pub const fn picture(&self) -> &PrintImage {
         &self.picture
     }
 
@@ -25,8 +25,8 @@ impl Print {
     }
 }
 
-impl From<Picture> for Print {
-    fn from(picture: Picture) -> Self {
+impl From<PrintImage> for Print {
+    fn from(picture: PrintImage) -> Self {
         Self {
             picture,
             hypotheses: OnceLock::new(),

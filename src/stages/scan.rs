@@ -2,14 +2,14 @@
 
 use std::sync::OnceLock;
 
-use super::zbuffer::Shell;
+use super::zbuffer::IndexedSurface;
 use crate::mesh::Mesh;
 
 /// A scan as the stages see it: the mesh as read, and its surface once somebody has looked at it.
 #[derive(Debug)]
 pub struct Scan {
     mesh: Mesh,
-    shell: OnceLock<Shell>,
+    shell: OnceLock<IndexedSurface>,
 }
 
 impl Scan {
@@ -19,8 +19,8 @@ impl Scan {
     }
 
     /// The surface ready to be looked at along any direction.
-    pub(super) fn shell(&self) -> &Shell {
-        self.shell.get_or_init(|| Shell::new(&self.mesh))
+    pub(super) fn shell(&self) -> &IndexedSurface {
+        self.shell.get_or_init(|| IndexedSurface::new(&self.mesh))
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod ssim;
 
-pub use ssim::{SsimWindow, Structure, WindowMeans};
+pub use ssim::{SsimReference, SsimScores, SsimWindow};
 
 use crate::domain::Scores;
 use crate::raster::{Mask, PixelBox};
@@ -10,8 +10,8 @@ use crate::raster::{Mask, PixelBox};
 /// Every score of a depth mask against a print mask of the same size.
 ///
 /// `ssim` and `nl_ssim` use the print's window; masks count as 0 and 1 with data range 1.
-pub fn measure(print: &WindowMeans, depth: &Mask) -> Scores {
-    let structure = print.against(depth);
+pub fn score_masks(print: &SsimReference, depth: &Mask) -> Scores {
+    let structure = print.compare(depth);
     let (print, print_bounds) = (print.mask(), print.bounds);
     let overlap = print.overlap(depth);
     Scores {
@@ -48,7 +48,7 @@ fn box_iou(a: Option<PixelBox>, b: Option<PixelBox>) -> f64 {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{SsimWindow, WindowMeans, box_iou, measure};
+    use super::{SsimReference, SsimWindow, box_iou, score_masks};
     use crate::raster::Mask;
 
     fn masks() -> impl Strategy<Value = (Mask, Mask)> {
@@ -63,8 +63,8 @@ mod tests {
     proptest! {
         #[test]
         fn scores_do_not_care_which_mask_is_first((a, b) in masks()) {
-            let means = |mask| WindowMeans::new(mask, SsimWindow::Gaussian);
-            let (p, q) = (measure(&means(&a), &b), measure(&means(&b), &a));
+            let means = |mask| SsimReference::new(mask, SsimWindow::Gaussian);
+            let (p, q) = (score_masks(&means(&a), &b), score_masks(&means(&b), &a));
             prop_assert!((p.ssim - q.ssim).abs() < 1e-12);
             prop_assert_eq!(p.iou_box, q.iou_box);
         }
@@ -73,7 +73,7 @@ mod tests {
     #[test]
     fn a_mask_agrees_wholly_with_itself() {
         let mask = Mask::from_fn(40, 40, |x, y| (10..30).contains(&x) && (5..20).contains(&y));
-        let scores = measure(&WindowMeans::new(&mask, SsimWindow::Gaussian), &mask);
+        let scores = score_masks(&SsimReference::new(&mask, SsimWindow::Gaussian), &mask);
         for one in [
             scores.ssim,
             scores.nl_ssim,

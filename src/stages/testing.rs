@@ -9,7 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use super::{AlignedPair, Print, Settings, StageError, depth, fit, normalize, register};
 use crate::domain::{Affine2, MetricOutcome, PrintFromMesh};
 use crate::mesh::Mesh;
-use crate::raster::{Grid, Picture};
+use crate::raster::{Grid, PrintImage};
 
 /// Vertices along a side of the carved sheet.
 const SIDE: usize = 110;
@@ -161,7 +161,7 @@ pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
         let paper = 52_000.0 - 40.0 * x as f64;
         [(paper - ink * 42_000.0) as u16; 3]
     });
-    (Picture { rgb }.into(), print_from_sheet)
+    (PrintImage { rgb }.into(), print_from_sheet)
 }
 
 /// The default settings of all stages.

@@ -1,12 +1,12 @@
 //! The highest surface under each pixel, looking straight down on a plane (orthographic z-buffer).
 
-mod block;
-mod boxes;
+mod block_bounds;
 mod moments;
 mod render;
-mod small;
-mod triangle;
-mod view;
+mod small_triangles;
+mod triangle_block;
+mod triangle_fill;
+mod viewport;
 mod winding;
 
 use super::robust_bounds::{Bounds, Bulk, room};
@@ -15,18 +15,18 @@ use crate::mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
 use crate::simd::dispatch;
 
-use block::{Block, Coordinate, LANES, Lanes, Row, block};
-use boxes::Boxes;
+use block_bounds::Boxes;
 pub(super) use moments::Moments;
-pub(super) use render::NOTHING;
-pub(super) use view::View;
+pub(super) use render::NO_HIT;
+use triangle_block::{Block, Coordinate, LANES, Lanes, Row, block};
+pub(super) use viewport::Viewport;
 
 /// A surface ready to be looked at along any direction.
 ///
 /// Corners are kept relative to the middle of the bulk, which single precision resolves to a ten-millionth of its
 /// extent.
 #[derive(Debug)]
-pub(super) struct Shell {
+pub(super) struct IndexedSurface {
     middle: [f64; 3],
     /// Box around the bulk.
     room: Bounds<3>,
@@ -38,7 +38,7 @@ pub(super) struct Shell {
     has_faces: bool,
 }
 
-impl Shell {
+impl IndexedSurface {
     /// Takes the corners of a mesh's triangles, or its points when it has none.
     pub(super) fn new(mesh: &Mesh) -> Self {
         match &mesh.vertices {
@@ -84,7 +84,7 @@ impl Shell {
     }
 
     /// Box around the bulk, in the mesh's frame.
-    pub(super) const fn room(&self) -> Bounds<3> {
+    pub(super) const fn bulk_bounds(&self) -> Bounds<3> {
         self.room
     }
 

@@ -17,7 +17,8 @@ fn made(tier: Tier, seed: u64, kind: Decoy, index: u64) -> DecoyPair {
 }
 
 fn align(decoy: &DecoyPair, settings: &Settings) -> Result<(), StageError> {
-    let print = raster::decode(&decoy.print, &raster::Limits::SUGGESTED).expect("a print image");
+    let print =
+        raster::decode(&decoy.print, &raster::ImageLimits::SUGGESTED).expect("a print image");
     AlignedPair::new(&decoy.mesh.clone().into(), &print.into(), settings)?;
     Ok(())
 }

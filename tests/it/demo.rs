@@ -72,10 +72,10 @@ fn our_own_readers_read_every_file() {
         for row in rows {
             let bytes = fs::read(dir.path().join(&row.mesh)).expect("the mesh is there");
             let name = row.mesh.display().to_string();
-            let scan = mesh::read(&bytes, &name, &mesh::Limits::SUGGESTED).expect("a mesh");
+            let scan = mesh::read(&bytes, &name, &mesh::MeshLimits::SUGGESTED).expect("a mesh");
             assert!(scan.triangles.len() > 30_000, "{name}");
             let bytes = fs::read(dir.path().join(&row.print)).expect("the print is there");
-            let print = raster::decode(&bytes, &raster::Limits::SUGGESTED).expect("a picture");
+            let print = raster::decode(&bytes, &raster::ImageLimits::SUGGESTED).expect("a picture");
             let tops =
                 raster::decode_grey8(&found[&format!("tops/{}.png", row.name)]).expect("a mask");
             let size = [print.rgb.width(), print.rgb.height()];

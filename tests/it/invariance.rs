@@ -9,7 +9,7 @@ use mocban::config::{self, Sources};
 use mocban::demo::{PairGenerator, Tier};
 use mocban::domain::{Affine2, PrintFromMesh};
 use mocban::mesh::Mesh;
-use mocban::raster::{self, Grid, Picture};
+use mocban::raster::{self, Grid, PrintImage};
 use mocban::stages::{AlignedPair, Settings};
 use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::seq::SliceRandom;
@@ -26,7 +26,7 @@ static SETTINGS: LazyLock<Settings> = LazyLock::new(|| {
 struct Case {
     name: String,
     mesh: Mesh,
-    print: Picture,
+    print: PrintImage,
     landmarks: Vec<[f64; 3]>,
     answer: PrintFromMesh,
     /// How much farther a change may move the answer than that of a whole and flat block.
@@ -40,7 +40,8 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
             let pair = PairGenerator::new(tier, 57)
                 .pair(index)
                 .expect("the pair is made");
-            let print = raster::decode(&pair.print, &raster::Limits::SUGGESTED).expect("a picture");
+            let print =
+                raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED).expect("a picture");
             let answer = align(&pair.mesh, &print);
             Case {
                 answer,
@@ -54,7 +55,7 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
         .collect()
 });
 
-fn align(mesh: &Mesh, print: &Picture) -> PrintFromMesh {
+fn align(mesh: &Mesh, print: &PrintImage) -> PrintFromMesh {
     let print = print.clone().into();
     let aligned = AlignedPair::new(&mesh.clone().into(), &print, &SETTINGS).expect("an alignment");
     let best = aligned.metrics().first().expect("a metric");
@@ -92,7 +93,13 @@ impl Motion {
 
 impl Case {
     /// Largest distance at the landmarks between where they should fall and where the changed pair puts them, pixels.
-    fn off_px(&self, mesh: &Mesh, motion: &Motion, print: &Picture, print_motion: &Affine2) -> f64 {
+    fn off_px(
+        &self,
+        mesh: &Mesh,
+        motion: &Motion,
+        print: &PrintImage,
+        print_motion: &Affine2,
+    ) -> f64 {
         let changed = align(mesh, print);
         let distance = |landmark: &[f64; 3]| {
             let [x, y, _] = self.answer.apply(*landmark);
@@ -116,7 +123,7 @@ impl Case {
         self.off_px(mesh, &Motion::NONE, &self.print, &Affine2::IDENTITY)
     }
 
-    fn print_moved(&self, print: &Picture, by: &Affine2) -> f64 {
+    fn print_moved(&self, print: &PrintImage, by: &Affine2) -> f64 {
         self.off_px(&self.mesh, &Motion::NONE, print, by)
     }
 
@@ -173,15 +180,15 @@ fn repeated(mesh: &Mesh) -> Mesh {
 }
 
 /// The print turned by a quarter, clockwise.
-fn turned(print: &Picture) -> (Picture, Affine2) {
+fn turned(print: &PrintImage) -> (PrintImage, Affine2) {
     let (width, height) = (print.rgb.width(), print.rgb.height());
     let rgb = Grid::from_fn(height, width, |x, y| print.rgb.at(y, height - 1 - x));
     let motion = Affine2([[0.0, -1.0, (height - 1) as f64], [1.0, 0.0, 0.0]]);
-    (Picture { rgb }, motion)
+    (PrintImage { rgb }, motion)
 }
 
 /// The print turned by so many quarters.
-fn turned_by(print: &Picture, quarters: usize) -> (Picture, Affine2) {
+fn turned_by(print: &PrintImage, quarters: usize) -> (PrintImage, Affine2) {
     let start = (print.clone(), Affine2::IDENTITY);
     (0..quarters).fold(start, |(print, so_far), _| {
         let (print, motion) = turned(&print);
@@ -190,7 +197,7 @@ fn turned_by(print: &Picture, quarters: usize) -> (Picture, Affine2) {
 }
 
 /// The print with pixels of white added at left, top, right and bottom, or cut off where the number is negative.
-fn framed(print: &Picture, [left, top, right, bottom]: [i64; 4]) -> (Picture, Affine2) {
+fn framed(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintImage, Affine2) {
     let side = |length: usize, added: i64| (length as i64 + added) as usize;
     let width = side(print.rgb.width(), left + right);
     let height = side(print.rgb.height(), top + bottom);
@@ -199,7 +206,7 @@ fn framed(print: &Picture, [left, top, right, bottom]: [i64; 4]) -> (Picture, Af
         from.unwrap_or([u16::MAX; 3])
     });
     let motion = Affine2::scale_shift(1.0, [left as f64, top as f64]);
-    (Picture { rgb }, motion)
+    (PrintImage { rgb }, motion)
 }
 
 /// A change that the stages do not see at all moves no landmark by more than this, pixels.

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use mocban::domain::JobStatus;
-use mocban::raster::{Grid, Limits, decode, jpeg_rgb8};
+use mocban::raster::{Grid, ImageLimits, decode, jpeg_rgb8};
 use mocban::store::Project;
 
 use crate::crowd::watched;
@@ -19,7 +19,9 @@ const MEMORY_MIB: u64 = 400;
 /// Makes a print as many times wider and higher as it may be, with the same picture on it.
 fn enlarge(path: &Path) {
     let bytes = std::fs::read(path).expect("a print");
-    let small = decode(&bytes, &Limits::SUGGESTED).expect("a picture").rgb;
+    let small = decode(&bytes, &ImageLimits::SUGGESTED)
+        .expect("a picture")
+        .rgb;
     let times = (PIXELS / small.data().len()).isqrt();
     let colour = |x: usize, y: usize| {
         let of_16_bits = small.at(x / times, y / times);

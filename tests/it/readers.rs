@@ -10,13 +10,13 @@ use crate::seeds::{self, Named, assert_one_sentence};
 use crate::sizes::asked;
 use crate::spoil::Spoiler;
 
-const MESH: mesh::Limits = mesh::Limits {
+const MESH: mesh::MeshLimits = mesh::MeshLimits {
     max_bytes: 1 << 20,
     max_vertices: 5000,
     max_triangles: 5000,
 };
 
-const IMAGE: raster::Limits = raster::Limits {
+const IMAGE: raster::ImageLimits = raster::ImageLimits {
     max_bytes: 1 << 20,
     max_pixels: 1 << 16,
 };

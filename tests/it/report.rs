@@ -113,7 +113,7 @@ impl World {
         let options = JsonlOptions {
             metrics: &ThresholdMetric::ALL,
             with_times: false,
-            limits: raster::Limits::SUGGESTED,
+            limits: raster::ImageLimits::SUGGESTED,
         };
         let summary = to_jsonl(&self.catalog, &self.project, &target, options)
             .await
@@ -276,7 +276,7 @@ fn aligned_files_are_in_the_prints_frame(export: &Path) {
     for line in lines(export).iter().filter(|line| line["status"] == "done") {
         let size = |grid: &Grid<u8>| [grid.width(), grid.height()];
         let print = std::fs::read(export.join(line["files"]["print"].as_str().expect("a path")));
-        let print = raster::decode(&print.expect("the print"), &raster::Limits::SUGGESTED)
+        let print = raster::decode(&print.expect("the print"), &raster::ImageLimits::SUGGESTED)
             .expect("an image");
         let wanted = [print.rgb.width(), print.rgb.height()];
         assert_eq!(size(&grey8(export, line, "print_mask")), wanted);
@@ -376,7 +376,7 @@ async fn sheet_shows_every_pair(world: &World) {
         order: SheetOrder::Worst,
         limit: 50,
         columns: 5,
-        limits: raster::Limits::SUGGESTED,
+        limits: raster::ImageLimits::SUGGESTED,
     };
     let sheet = draw_sheet(&world.catalog, &world.project, options)
         .await

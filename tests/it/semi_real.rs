@@ -18,7 +18,7 @@ pub(crate) fn settings() -> Settings {
 
 /// The errors of every metric. Neither unit nor side is told.
 fn aligned(pair: &DemoPair, settings: &Settings) -> Result<Vec<TruthErrors>, StageError> {
-    let print = raster::decode(&pair.print, &raster::Limits::SUGGESTED).expect("a picture");
+    let print = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED).expect("a picture");
     let aligned = AlignedPair::new(&pair.mesh.clone().into(), &print.into(), settings)?;
     let truth = serde_json::to_value(&pair.truth).expect("a truth is JSON");
     let truth = TruthRecord::read(&truth).expect("the truth is sound");

@@ -1,11 +1,11 @@
 //! TIFF prints of the rarer kinds: palettes, few bits, transparency, floats.
 
-use mocban::raster::{Grid, Limits, decode};
+use mocban::raster::{Grid, ImageLimits, decode};
 
 use crate::tiff_file::{FLOAT, INT, PALETTE, RGB, TiffFile, WHITE_IS_ZERO};
 
 fn read(file: &TiffFile) -> Result<Grid<[u16; 3]>, String> {
-    let picture = decode(&file.encode(), &Limits::SUGGESTED);
+    let picture = decode(&file.encode(), &ImageLimits::SUGGESTED);
     picture
         .map(|picture| picture.rgb)
         .map_err(|error| error.to_string())

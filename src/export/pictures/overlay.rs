@@ -3,7 +3,7 @@
 use super::paint::{Rgb, eight_bits, resized};
 use super::relief::shaded;
 use crate::domain::{Affine2, MetricOutcome};
-use crate::raster::{DepthMap, Grid, Mask, Picture, warp_depth, warp_mask};
+use crate::raster::{DepthMap, Grid, Mask, PrintImage, warp_depth, warp_mask};
 
 /// Vermillion of Okabe and Ito's palette: told from ink and paper with every kind of colour vision.
 const EDGE: [u8; 3] = [213, 94, 0];
@@ -24,7 +24,7 @@ pub struct View {
 
 impl View {
     /// The print's frame so that its longest side is `side` pixels.
-    pub fn of_side(print: &Picture, side: usize) -> Self {
+    pub fn of_side(print: &PrintImage, side: usize) -> Self {
         let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
         let scale = side as f64 / size[0].max(size[1]) as f64;
         let [width, height] = size.map(|n| ((n as f64 * scale).round() as usize).max(1));
@@ -32,7 +32,7 @@ impl View {
     }
 
     /// The print's frame enlarged by a whole number, so that the longest side is large enough to judge by.
-    pub fn to_judge_by(print: &Picture) -> Self {
+    pub fn to_judge_by(print: &PrintImage) -> Self {
         let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
         let factor = OVERLAY_SIDE.div_ceil(size[0].max(size[1]));
         Self::new(factor as f64, size[0] * factor, size[1] * factor)
@@ -49,7 +49,7 @@ impl View {
     }
 
     /// The print as it is.
-    pub fn print(&self, print: &Picture) -> Rgb {
+    pub fn print(&self, print: &PrintImage) -> Rgb {
         resized(&eight_bits(print), self.width, self.height)
     }
 
@@ -62,7 +62,7 @@ impl View {
     }
 
     /// The print with the edges of the depth mask on it.
-    pub fn overlay(&self, print: &Picture, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
+    pub fn overlay(&self, print: &PrintImage, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
         let mut picture = self.print(print);
         self.draw_edges(&mut picture, &self.laid_on(depth, outcome), EDGE);
         picture
@@ -71,7 +71,7 @@ impl View {
     /// The overlay with the edges of the true stroke tops, a mask in the print's frame, below those of the depth mask.
     pub fn overlay_on_truth(
         &self,
-        print: &Picture,
+        print: &PrintImage,
         tops: &Mask,
         depth: &DepthMap,
         outcome: &MetricOutcome,
@@ -96,7 +96,7 @@ impl View {
 
     /// A metric's depth mask in the view.
     fn laid_on(&self, depth: &DepthMap, outcome: &MetricOutcome) -> Mask {
-        let strokes = depth.strokes(outcome.threshold_level);
+        let strokes = depth.stroke_mask(outcome.threshold_level);
         self.mask(&strokes, &outcome.print_from_depth)
     }
 
@@ -126,7 +126,7 @@ fn edges(mask: &Mask, reach: usize) -> Grid<bool> {
 mod tests {
     use super::{EDGE, TRUE_EDGE, View, edges};
     use crate::domain::{Affine2, ThresholdMetric};
-    use crate::raster::{DepthMap, Grid, Mask, Picture};
+    use crate::raster::{DepthMap, Grid, Mask, PrintImage};
     use crate::report::fixture;
 
     /// A bar of 4 x 20 px at (8, 5) over ground in a map of 30 x 30 px.
@@ -140,8 +140,8 @@ mod tests {
         }))
     }
 
-    fn paper() -> Picture {
-        Picture {
+    fn paper() -> PrintImage {
+        PrintImage {
             rgb: Grid::new(30, 30, [60_000; 3]),
         }
     }

@@ -1,7 +1,7 @@
 //! Painting on colour grids: copying, resizing, writing.
 
 use super::font;
-use crate::raster::{Grid, Picture};
+use crate::raster::{Grid, PrintImage};
 
 /// An 8-bit colour picture.
 pub type Rgb = Grid<[u8; 3]>;
@@ -12,7 +12,7 @@ pub(super) const TEXT: [u8; 3] = [20, 20, 20];
 pub(super) const GROUND: [u8; 3] = [255, 255, 255];
 
 /// A decoded print with 8 bits a channel.
-pub(super) fn eight_bits(print: &Picture) -> Rgb {
+pub(super) fn eight_bits(print: &PrintImage) -> Rgb {
     let narrow = |wide: u16| ((u32::from(wide) + 128) / 257) as u8;
     print.rgb.map(|colour| colour.map(narrow))
 }
@@ -117,7 +117,7 @@ pub(super) fn write(onto: &mut Rgb, text: &str, x: usize, y: usize, dot: usize, 
 #[cfg(test)]
 mod tests {
     use super::{Rgb, copy, cut_to, eight_bits, resized, write};
-    use crate::raster::{Grid, Picture};
+    use crate::raster::{Grid, PrintImage};
 
     #[test]
     fn shrinking_keeps_the_mean_and_growing_keeps_the_pixels() {
@@ -134,7 +134,7 @@ mod tests {
     #[test]
     fn sixteen_bits_narrow_to_the_eight_they_came_from() {
         let rgb = Grid::from_fn(256, 1, |x, _| [x as u16 * 257; 3]);
-        let narrow = eight_bits(&Picture { rgb });
+        let narrow = eight_bits(&PrintImage { rgb });
         assert!((0..256).all(|x| narrow.at(x, 0) == [x as u8; 3]));
     }
 

@@ -3,7 +3,7 @@
 //! Whatever is unusual (continued lines, a word that is no number, an index that names no vertex) is left to `tobj`,
 //! which reads it or stumbles over it. What is read here is read as `tobj` would have.
 
-use super::super::{Limits, Mesh, Vertices, text};
+use super::super::{Mesh, MeshLimits, Vertices, text};
 use crate::page_vec::PageVec;
 
 /// Digits that a 64-bit mantissa surely holds, and the largest one that a float holds exactly.
@@ -20,7 +20,7 @@ const BYTES_PER_VERTEX: usize = 96;
 const BYTES_PER_TRIANGLE: usize = 48;
 
 /// Reads an OBJ; `None` where anything is unusual.
-pub(super) fn read(bytes: &[u8], limits: &Limits) -> Option<Mesh> {
+pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Option<Mesh> {
     // A file of an old Mac has carriage returns only.
     if !bytes.contains(&b'\n') && bytes.contains(&b'\r') {
         return None;
@@ -216,7 +216,7 @@ mod tests {
 
     use super::super::read_by_tobj;
     use super::read;
-    use crate::mesh::{Limits, Mesh};
+    use crate::mesh::{Mesh, MeshLimits};
 
     /// A number as programs write it, and as few do.
     fn number() -> impl Strategy<Value = String> {
@@ -278,8 +278,8 @@ mod tests {
             end in prop::sample::select(vec!["\n", "\r\n", "\r", "\n\n"]),
         ) {
             let text = lines.join(end);
-            if let Some(mesh) = read(text.as_bytes(), &Limits::SUGGESTED) {
-                let twin = read_by_tobj(text.as_bytes(), &Limits::SUGGESTED);
+            if let Some(mesh) = read(text.as_bytes(), &MeshLimits::SUGGESTED) {
+                let twin = read_by_tobj(text.as_bytes(), &MeshLimits::SUGGESTED);
                 prop_assert_eq!(twin, Ok(mesh));
             }
         }
@@ -287,7 +287,7 @@ mod tests {
         #[test]
         fn numbers_are_those_of_the_standard_library(text in number()) {
             let file = format!("v {text} 0 0\n");
-            let mesh = read(file.as_bytes(), &Limits::SUGGESTED);
+            let mesh = read(file.as_bytes(), &MeshLimits::SUGGESTED);
             let value: f64 = text.parse().expect("a number");
             prop_assert_eq!(mesh.map(|m| m.vertices.at(0)[0].to_bits()), value.is_finite().then(|| value.to_bits()));
         }
@@ -305,11 +305,11 @@ mod tests {
                 "",
             ]
             .join(end);
-            let mesh = read(text.as_bytes(), &Limits::SUGGESTED).expect("it is plain");
+            let mesh = read(text.as_bytes(), &MeshLimits::SUGGESTED).expect("it is plain");
             assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
             assert_eq!(mesh.vertices.at(0), [0.0, 1.0, 0.0]);
         }
-        let points = read(b"v 0 0 0\nv 1 0 0", &Limits::SUGGESTED).expect("it is plain");
+        let points = read(b"v 0 0 0\nv 1 0 0", &MeshLimits::SUGGESTED).expect("it is plain");
         assert_eq!(
             points,
             Mesh {

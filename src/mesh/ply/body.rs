@@ -1,6 +1,6 @@
 //! The rows of a PLY body into a mesh.
 
-use super::super::{Error, Limits, Mesh, Vertices, error, text};
+use super::super::{Mesh, MeshError, MeshLimits, Vertices, error, text};
 use super::header::{Element, Header, Scalar, Shape};
 use super::source::{NoNumber, Source};
 use crate::page_vec::PageVec;
@@ -12,7 +12,11 @@ const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 const FEW: usize = 256;
 
 /// Reads all elements in the order of the header.
-pub(super) fn read(header: &Header, source: impl Source, limits: &Limits) -> Result<Mesh, Error> {
+pub(super) fn read(
+    header: &Header,
+    source: impl Source,
+    limits: &MeshLimits,
+) -> Result<Mesh, MeshError> {
     let vertices = header.rows("vertex");
     let mut body = Body {
         header,
@@ -31,7 +35,7 @@ pub(super) fn read(header: &Header, source: impl Source, limits: &Limits) -> Res
 struct Body<'a, S> {
     header: &'a Header,
     source: S,
-    limits: &'a Limits,
+    limits: &'a MeshLimits,
     declared_vertices: u64,
     mesh: Mesh,
     /// The values of the vertex in hand.
@@ -39,7 +43,7 @@ struct Body<'a, S> {
 }
 
 impl<S: Source> Body<'_, S> {
-    fn element(&mut self, element: &Element) -> Result<(), Error> {
+    fn element(&mut self, element: &Element) -> Result<(), MeshError> {
         // Rows without properties have no bytes, however many are declared; a vertex without is an error.
         let is_vertex = element.name == "vertex";
         if element.rows == 0 || (element.properties.is_empty() && !is_vertex) {
@@ -55,7 +59,7 @@ impl<S: Source> Body<'_, S> {
     }
 
     /// Whether the bytes that are left can hold the rows, before memory is reserved for them.
-    fn check_rows(&self, element: &Element) -> Result<(), Error> {
+    fn check_rows(&self, element: &Element) -> Result<(), MeshError> {
         match element.name.as_str() {
             "vertex" => self.limits.check_vertices(self.declared_vertices)?,
             "face" => self.limits.check_triangles(element.rows)?,
@@ -68,8 +72,8 @@ impl<S: Source> Body<'_, S> {
         Ok(())
     }
 
-    fn truncated(&self, element: &Element, have: u64) -> Error {
-        Error::Truncated {
+    fn truncated(&self, element: &Element, have: u64) -> MeshError {
+        MeshError::Truncated {
             format: self.header.encoding.name(),
             what: match element.name.as_str() {
                 "vertex" => "vertices".into(),
@@ -82,18 +86,18 @@ impl<S: Source> Body<'_, S> {
     }
 
     /// The error of a row counted from 0.
-    fn no_number(&self, element: &Element, row: u64, reason: NoNumber) -> Error {
+    fn no_number(&self, element: &Element, row: u64, reason: NoNumber) -> MeshError {
         match reason {
             NoNumber::End => self.truncated(element, row),
             NoNumber::Word(reason) => wrong_row(element, row, reason),
         }
     }
 
-    fn vertices(&mut self, element: &Element) -> Result<(), Error> {
+    fn vertices(&mut self, element: &Element) -> Result<(), MeshError> {
         let mut places = [0; 3];
         for (place, name) in places.iter_mut().zip(["x", "y", "z"]) {
             *place = element.place(&[name]).ok_or_else(|| {
-                Error::Header(format!("element \"vertex\" has no property {name:?}"))
+                MeshError::Header(format!("element \"vertex\" has no property {name:?}"))
             })?;
         }
         let most = self.source.most_rows(element).min(element.rows) as usize;
@@ -123,7 +127,7 @@ impl<S: Source> Body<'_, S> {
     }
 
     /// Reads up to so many positions that are written as most programs do, and says how many.
-    fn plain_vertices(&mut self, rows: u64) -> Result<u64, Error> {
+    fn plain_vertices(&mut self, rows: u64) -> Result<u64, MeshError> {
         let mut few = Vec::with_capacity(FEW);
         let mut row = 0;
         while row < rows {
@@ -171,7 +175,7 @@ impl<S: Source> Body<'_, S> {
         }
     }
 
-    fn skip_rows(&mut self, element: &Element) -> Result<(), Error> {
+    fn skip_rows(&mut self, element: &Element) -> Result<(), MeshError> {
         for row in 0..element.rows {
             for property in &element.properties {
                 self.skip(property.shape)
@@ -181,9 +185,9 @@ impl<S: Source> Body<'_, S> {
         Ok(())
     }
 
-    fn faces(&mut self, element: &Element, joining: Joining) -> Result<(), Error> {
+    fn faces(&mut self, element: &Element, joining: Joining) -> Result<(), MeshError> {
         let corners = element.place(&CORNERS).ok_or_else(|| {
-            Error::Header(format!(
+            MeshError::Header(format!(
                 "element {:?} has no property \"vertex_indices\"",
                 element.name
             ))
@@ -221,7 +225,7 @@ impl<S: Source> Body<'_, S> {
         first_row: u64,
         item: Scalar,
         few: &[[u32; 3]],
-    ) -> Result<(), Error> {
+    ) -> Result<(), MeshError> {
         let declared = self.declared_vertices;
         let corners = few.as_flattened().iter();
         let is_sound = corners.fold(true, |sound, index| sound & (u64::from(*index) < declared));
@@ -244,7 +248,7 @@ impl<S: Source> Body<'_, S> {
         row: u64,
         item: Scalar,
         triangle: [u32; 3],
-    ) -> Result<(), Error> {
+    ) -> Result<(), MeshError> {
         for index in triangle {
             if u64::from(index) >= self.declared_vertices {
                 let negative = f64::from(index.cast_signed());
@@ -259,7 +263,7 @@ impl<S: Source> Body<'_, S> {
         self.push(triangle)
     }
 
-    fn push(&mut self, triangle: [u32; 3]) -> Result<(), Error> {
+    fn push(&mut self, triangle: [u32; 3]) -> Result<(), MeshError> {
         let count = self.mesh.triangles.len() as u64 + 1;
         self.limits.check_triangles(count)?;
         self.mesh.triangles.push(triangle);
@@ -273,7 +277,7 @@ impl<S: Source> Body<'_, S> {
         row: u64,
         corners: usize,
         joining: Joining,
-    ) -> Result<(), Error> {
+    ) -> Result<(), MeshError> {
         for (place, property) in element.properties.iter().enumerate() {
             match property.shape {
                 Shape::List { count, item } if place == corners => {
@@ -294,7 +298,7 @@ impl<S: Source> Body<'_, S> {
         row: u64,
         (count, item): (Scalar, Scalar),
         joining: Joining,
-    ) -> Result<(), Error> {
+    ) -> Result<(), MeshError> {
         let length = self.source.next(count).and_then(length);
         let length = length.map_err(|reason| self.no_number(element, row, reason))?;
         let mut joined = Joined::default();
@@ -313,7 +317,7 @@ impl<S: Source> Body<'_, S> {
         Ok(())
     }
 
-    fn check_index(&self, element: &Element, row: u64, index: f64) -> Result<(), Error> {
+    fn check_index(&self, element: &Element, row: u64, index: f64) -> Result<(), MeshError> {
         if index >= 0.0 && index < self.declared_vertices as f64 && index.fract() == 0.0 {
             return Ok(());
         }
@@ -324,7 +328,7 @@ impl<S: Source> Body<'_, S> {
                 format!("{index} is not a vertex index"),
             ));
         }
-        Err(Error::IndexOutOfRange {
+        Err(MeshError::IndexOutOfRange {
             face: row + 1,
             index: index as i64,
             vertices: self.declared_vertices,
@@ -380,8 +384,8 @@ fn length(count: f64) -> Result<u64, NoNumber> {
     }
 }
 
-fn wrong_row(element: &Element, row: u64, reason: String) -> Error {
-    Error::Row {
+fn wrong_row(element: &Element, row: u64, reason: String) -> MeshError {
+    MeshError::Row {
         element: text::sanitize(&element.name),
         row: row + 1,
         reason,

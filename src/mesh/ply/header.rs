@@ -1,6 +1,6 @@
 //! The PLY header: encoding, elements and their properties.
 
-use super::super::{Error, text};
+use super::super::{MeshError, text};
 
 /// How the body is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -172,7 +172,7 @@ pub(super) struct Header {
 
 impl Header {
     /// The header and the place of the first byte after it.
-    pub(super) fn parse(bytes: &[u8]) -> Result<(Self, usize), Error> {
+    pub(super) fn parse(bytes: &[u8]) -> Result<(Self, usize), MeshError> {
         let mut encoding = None;
         let mut elements = Vec::new();
         let mut at = 0;
@@ -226,7 +226,7 @@ fn line_at(bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
     Some((rest[..len].trim_ascii(), at + len + 1))
 }
 
-fn parse_encoding(name: &[u8]) -> Result<Encoding, Error> {
+fn parse_encoding(name: &[u8]) -> Result<Encoding, MeshError> {
     Encoding::parse(name).ok_or_else(|| {
         wrong(&format!(
             "{} is not a format (ascii, binary_little_endian, binary_big_endian)",
@@ -235,7 +235,7 @@ fn parse_encoding(name: &[u8]) -> Result<Encoding, Error> {
     })
 }
 
-fn parse_element(name: &[u8], rows: &[u8]) -> Result<Element, Error> {
+fn parse_element(name: &[u8], rows: &[u8]) -> Result<Element, MeshError> {
     let count = std::str::from_utf8(rows)
         .ok()
         .and_then(|digits| digits.parse().ok());
@@ -254,7 +254,7 @@ fn parse_element(name: &[u8], rows: &[u8]) -> Result<Element, Error> {
     })
 }
 
-fn parse_property(words: &[&[u8]]) -> Result<Property, Error> {
+fn parse_property(words: &[&[u8]]) -> Result<Property, MeshError> {
     let scalar = |word: &[u8]| {
         Scalar::parse(word).ok_or_else(|| wrong(&format!("{} is not a type", text::shown(word))))
     };
@@ -276,6 +276,6 @@ fn parse_property(words: &[&[u8]]) -> Result<Property, Error> {
     })
 }
 
-fn wrong(reason: &str) -> Error {
-    Error::Header(reason.to_owned())
+fn wrong(reason: &str) -> MeshError {
+    MeshError::Header(reason.to_owned())
 }

@@ -7,10 +7,10 @@ mod source;
 use header::{Encoding, Header};
 use source::{Ascii, Binary};
 
-use super::{Error, Limits, Mesh};
+use super::{Mesh, MeshError, MeshLimits};
 
 /// Reads vertices, faces and triangle strips; other elements and properties are stepped over.
-pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
+pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let (header, start) = Header::parse(bytes)?;
     let rest = &bytes[start..];
     match header.encoding {
@@ -24,10 +24,10 @@ pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::{Error, Limits, Mesh, Vertices};
+    use super::super::{Mesh, MeshError, MeshLimits, Vertices};
 
-    fn read(bytes: &[u8]) -> Result<Mesh, Error> {
-        super::read(bytes, &Limits::SUGGESTED)
+    fn read(bytes: &[u8]) -> Result<Mesh, MeshError> {
+        super::read(bytes, &MeshLimits::SUGGESTED)
     }
 
     fn ascii(elements: &str, body: &str) -> Vec<u8> {
@@ -136,9 +136,9 @@ mod tests {
 
     #[test]
     fn a_long_list_of_corners_meets_the_limit_before_it_is_read() {
-        let limits = Limits {
+        let limits = MeshLimits {
             max_triangles: 10,
-            ..Limits::SUGGESTED
+            ..MeshLimits::SUGGESTED
         };
         for element in ["face", "tristrips"] {
             let elements = format!("element vertex 1\n{XYZ}element {element} 1\n{CORNERS}");
@@ -162,9 +162,9 @@ mod tests {
             read(&bare).expect_err("bare").to_string(),
             "the PLY header is wrong: element \"vertex\" has no property \"x\""
         );
-        let limits = Limits {
+        let limits = MeshLimits {
             max_vertices: 3,
-            ..Limits::SUGGESTED
+            ..MeshLimits::SUGGESTED
         };
         let twice = ascii(
             &format!("element vertex 2\n{XYZ}").repeat(2),

@@ -1,4 +1,4 @@
-//! Print images into [`Picture`]s: PNG, JPEG and TIFF told apart by content, never by name.
+//! Print images into [`PrintImage`]s: PNG, JPEG and TIFF told apart by content, never by name.
 
 mod error;
 mod tiff;
@@ -7,7 +7,7 @@ use std::io::{BufRead, Cursor, Seek};
 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
-use super::{Grid, Limits, Picture};
+use super::{Grid, ImageLimits, PrintImage};
 use crate::domain::{FileKind, sanitize};
 
 pub use error::DecodeError;
@@ -19,18 +19,18 @@ pub use error::DecodeError;
 ///
 /// # Errors
 /// When the bytes are no whole PNG, JPEG or TIFF image, or exceed the limits.
-pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Picture, DecodeError> {
+pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
     let kind = kind_within_limits(bytes, limits)?;
     let format = format_of(kind)?;
     if kind == FileKind::Png {
         check_png_header(bytes, limits)?;
     }
     let rgb = colours(bytes, format, kind, limits)?;
-    Ok(Picture { rgb })
+    Ok(PrintImage { rgb })
 }
 
 /// How many pixels the header of an image promises; `None` where it does not tell.
-pub fn pixels_by_header(file: impl BufRead + Seek) -> Option<u64> {
+pub fn header_pixel_count(file: impl BufRead + Seek) -> Option<u64> {
     let reader = ImageReader::new(file).with_guessed_format().ok()?;
     let (width, height) = reader.into_dimensions().ok()?;
     Some(u64::from(width) * u64::from(height))
@@ -40,7 +40,7 @@ fn colours(
     bytes: &[u8],
     format: ImageFormat,
     kind: FileKind,
-    limits: &Limits,
+    limits: &ImageLimits,
 ) -> Result<Grid<[u16; 3]>, DecodeError> {
     if kind == FileKind::Tiff
         && let Some(colours) = tiff::rare(bytes, limits)?
@@ -51,7 +51,7 @@ fn colours(
     Ok(colours_on_white(&image))
 }
 
-fn kind_within_limits(bytes: &[u8], limits: &Limits) -> Result<FileKind, DecodeError> {
+fn kind_within_limits(bytes: &[u8], limits: &ImageLimits) -> Result<FileKind, DecodeError> {
     let size = bytes.len() as u64;
     if size == 0 {
         return Err(DecodeError::Empty);
@@ -80,7 +80,7 @@ fn format_of(kind: FileKind) -> Result<ImageFormat, DecodeError> {
 }
 
 /// A PNG's size stands at a fixed place, and is checked there: its decoder wants to see pixels first.
-fn check_png_header(bytes: &[u8], limits: &Limits) -> Result<(), DecodeError> {
+fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeError> {
     let side = |at: usize| {
         let field = bytes.get(at..at + 4).and_then(|b| b.try_into().ok());
         field
@@ -90,7 +90,7 @@ fn check_png_header(bytes: &[u8], limits: &Limits) -> Result<(), DecodeError> {
     check_size(side(16)?, side(20)?, limits)
 }
 
-fn check_size(width: u32, height: u32, limits: &Limits) -> Result<(), DecodeError> {
+fn check_size(width: u32, height: u32, limits: &ImageLimits) -> Result<(), DecodeError> {
     if width == 0 || height == 0 {
         return Err(DecodeError::NoPixels { width, height });
     }
@@ -108,7 +108,7 @@ fn decode_pixels(
     bytes: &[u8],
     format: ImageFormat,
     kind: FileKind,
-    limits: &Limits,
+    limits: &ImageLimits,
 ) -> Result<DynamicImage, DecodeError> {
     let whole = kind != FileKind::Jpeg || has_end_marker(bytes);
     let refused = |error: ImageError| {
@@ -230,9 +230,9 @@ mod tests {
     }
 
     use crate::domain::FileKind;
-    use crate::raster::Limits;
+    use crate::raster::ImageLimits;
 
-    const LIMITS: Limits = Limits {
+    const LIMITS: ImageLimits = ImageLimits {
         max_bytes: 1 << 20,
         max_pixels: 10_000,
     };

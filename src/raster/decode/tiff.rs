@@ -7,7 +7,7 @@ use tiff::decoder::{Decoder, DecodingResult, Limits as Memory};
 use tiff::tags::Tag;
 use tiff::{TiffError, TiffResult};
 
-use super::super::{Grid, Limits};
+use super::super::{Grid, ImageLimits};
 use super::{DecodeError, broken, check_size, on_white};
 use crate::domain::FileKind;
 
@@ -129,7 +129,10 @@ impl Layout {
 ///
 /// # Errors
 /// When the image is too large, not whole, or its numbers may mean anything.
-pub(super) fn rare(bytes: &[u8], limits: &Limits) -> Result<Option<Grid<[u16; 3]>>, DecodeError> {
+pub(super) fn rare(
+    bytes: &[u8],
+    limits: &ImageLimits,
+) -> Result<Option<Grid<[u16; 3]>>, DecodeError> {
     // What is wrong with the tags is for the common decoder to tell.
     let layout = Decoder::new(Cursor::new(bytes)).and_then(|mut reader| Layout::read(&mut reader));
     let Ok(Some(layout)) = layout else {
@@ -210,7 +213,7 @@ impl Samples {
     fn read(
         bytes: &[u8],
         layout: &Layout,
-        limits: &Limits,
+        limits: &ImageLimits,
     ) -> TiffResult<Result<Self, DecodeError>> {
         let wanted = limits
             .max_pixels

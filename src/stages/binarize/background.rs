@@ -2,7 +2,7 @@
 //! wide is a stain.
 
 use crate::raster::{Grid, Mask, resample};
-use crate::stages::blur::blur;
+use crate::stages::blur::gaussian_blur;
 
 /// Paper changes slowly: it is looked at on this many cells along the longest side.
 const CELLS: f64 = 96.0;
@@ -55,7 +55,7 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
         .collect();
     let mean = seen.iter().sum::<f32>() / seen.len().max(1) as f32;
     let filled = closed.map(|value| if value.is_nan() { 0.0 } else { value - mean });
-    let smooth = blur(&filled, reach as f64 / 3.0);
+    let smooth = gaussian_blur(&filled, reach as f64 / 3.0);
     let back = shift.map(|shift| -shift / scale);
     resample(&smooth, 1.0 / scale, back, [width, height]).map(|value| value + mean)
 }

@@ -3,9 +3,9 @@
 use super::background::{self, NARROW, STROKE};
 use super::otsu::{self, Split};
 use super::polarity::polarity;
-use crate::raster::{Grid, Mask, Picture};
-use crate::stages::components::{Components, without_specks};
-use crate::stages::pose::Soft;
+use crate::raster::{Grid, Mask, PrintImage};
+use crate::stages::components::{ConnectedComponents, remove_specks};
+use crate::stages::pose::SoftMask;
 
 /// A pixel is white beyond the cut when its darkest channel is above this share of full white.
 const WHITE: f32 = 0.965;
@@ -71,14 +71,14 @@ pub(in crate::stages) struct InkMask {
     /// Which pixels are ink.
     pub(in crate::stages) mask: Mask,
     /// How much ink, and where the image is paper or ink at all.
-    pub(in crate::stages) soft: Soft,
+    pub(in crate::stages) soft: SoftMask,
     /// Grey between ink and paper, 0..=1.
     pub(in crate::stages) threshold: f64,
     /// Whether ink is lighter than paper, as in a rubbing.
     pub(in crate::stages) light_on_dark: bool,
 }
 
-fn grey_of(picture: &Picture) -> Result<Grid<f32>, BinarizeError> {
+fn grey_of(picture: &PrintImage) -> Result<Grid<f32>, BinarizeError> {
     let (width, height) = (picture.rgb.width(), picture.rgb.height());
     if width < LEAST_PRINT_PX || height < LEAST_PRINT_PX {
         return Err(BinarizeError::TooSmall { width, height });
@@ -92,14 +92,14 @@ fn luminance(c: [u16; 3]) -> f32 {
 }
 
 /// The paper's mask: darker than a fixed grey is ink, all of the image is known.
-pub(in crate::stages) fn fixed(picture: &Picture, grey: u8) -> Result<InkMask, BinarizeError> {
+pub(in crate::stages) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeError> {
     let threshold = f64::from(grey) / 255.0;
     let grey = &grey_of(picture)?;
     let raw = grey.map(|g| f64::from(*g) < threshold);
-    let ink = without_specks(&raw, raw.data().len());
+    let ink = remove_specks(&raw, raw.data().len());
     require_ink(&ink, ink.data().len(), grey, threshold)?;
     Ok(InkMask {
-        soft: Soft {
+        soft: SoftMask {
             amount: ink.map(|set| f32::from(u8::from(*set))),
             known: Mask::new(ink.width(), ink.height(), true),
         },
@@ -111,7 +111,7 @@ pub(in crate::stages) fn fixed(picture: &Picture, grey: u8) -> Result<InkMask, B
 
 /// Our masks: white beyond the cut left out, paper levelled, threshold found. One for each polarity that the picture
 /// leaves possible, the likelier first, and one that sees past small stains where there may be some.
-pub(in crate::stages) fn hypotheses(picture: &Picture) -> Result<Vec<InkMask>, BinarizeError> {
+pub(in crate::stages) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeError> {
     let grey = &grey_of(picture)?;
     let known = known(picture, grey);
     let mut values = held(grey, &known);
@@ -183,13 +183,13 @@ fn read(
         known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
     });
     let area = known.count();
-    let ink = without_specks(&raw, area);
+    let ink = remove_specks(&raw, area);
     let ink = Mask::from_fn(ink.width(), ink.height(), |x, y| {
         ink.at(x, y) && known.at(x, y)
     });
     require_ink(&ink, area, grey, split.threshold)?;
     Ok(InkMask {
-        soft: Soft {
+        soft: SoftMask {
             amount: amount(even, &ink, split),
             known: known.clone(),
         },
@@ -205,18 +205,18 @@ fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
 }
 
 /// Where the image is paper or ink: all but the white that reaches the border, if paper is not as white itself.
-fn known(picture: &Picture, grey: &Grid<f32>) -> Mask {
+fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     let white = picture.rgb.map(|c| {
         let darkest = c[0].min(c[1]).min(c[2]);
         f32::from(darkest) / 65_535.0 > WHITE
     });
-    let beyond = Components::of(&white).at_border();
+    let beyond = ConnectedComponents::label(&white).touching_border();
     let all = Mask::new(grey.width(), grey.height(), true);
     if beyond.density() < LEAST_WHITE {
         return all;
     }
     // The cut's edge mixes paper with white.
-    let inside = beyond.grown().map(|b| !b);
+    let inside = beyond.dilate().map(|b| !b);
     let mut values = held(grey, &inside);
     let Some(split) = otsu::split(&mut values) else {
         return all;
@@ -243,7 +243,7 @@ fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
 
 /// 0 at paper, 1 at ink, by the classes' medians; nothing but where the cleaned mask, or its rim, has ink.
 fn amount(even: &Grid<f32>, ink: &Mask, split: Split) -> Grid<f32> {
-    let near = ink.grown();
+    let near = ink.dilate();
     let span = (split.high - split.low).max(1e-6);
     Grid::from_fn(even.width(), even.height(), |x, y| {
         if near.at(x, y) {
@@ -276,15 +276,15 @@ fn require_ink(
 #[cfg(test)]
 mod tests {
     use super::{BinarizeError, InkMask, hypotheses};
-    use crate::raster::{Grid, Picture};
+    use crate::raster::{Grid, PrintImage};
 
-    fn picture(grey: impl Fn(usize, usize) -> u16) -> Picture {
-        Picture {
+    fn picture(grey: impl Fn(usize, usize) -> u16) -> PrintImage {
+        PrintImage {
             rgb: Grid::from_fn(60, 50, |x, y| [grey(x, y) * 257; 3]),
         }
     }
 
-    fn read(picture: &Picture) -> Result<InkMask, BinarizeError> {
+    fn read(picture: &PrintImage) -> Result<InkMask, BinarizeError> {
         hypotheses(picture).map(|mut all| all.swap_remove(0))
     }
 
@@ -328,7 +328,7 @@ mod tests {
         let near = |at: usize, middle: i64| (at as i64 - middle).abs() < 6;
         let thin = |x, y| near(x, 100) || near(y, 90);
         let stain = |x: usize, y: usize| (x as f64 - 130.0).hypot(y as f64 - 120.0) < 22.0;
-        let print = |stain: &dyn Fn(usize, usize) -> bool| Picture {
+        let print = |stain: &dyn Fn(usize, usize) -> bool| PrintImage {
             rgb: Grid::from_fn(200, 200, |x, y| {
                 let plain = if thin(x, y) { 90.0 } else { 215.0 };
                 let grey = plain * if stain(x, y) { 0.7 } else { 1.0 };
@@ -375,7 +375,7 @@ mod tests {
                 "{grey}"
             );
         }
-        let one = Picture {
+        let one = PrintImage {
             rgb: Grid::new(1, 1, [0; 3]),
         };
         assert!(matches!(

@@ -6,9 +6,11 @@
 
 use super::surface::{Samples, Surface, quantile};
 use crate::domain::{Bow, Rigid3, SideEvidence};
-use crate::stages::pose::{Base, Keep, Limits, Pass, Refiner, Soft, find};
+use crate::stages::pose::{
+    BeamWidth, ImagePyramid, RefinementPass, Refiner, SearchRange, SoftMask, search_coarse_to_fine,
+};
 use crate::stages::print::Print;
-use crate::stages::zbuffer::Shell;
+use crate::stages::zbuffer::IndexedSurface;
 
 /// A side with less than this share of the other's relief is the back of the block.
 const BACK: f64 = 0.35;
@@ -26,28 +28,28 @@ const UNASKED: f64 = 0.45;
 /// No face agrees less than this.
 const LEAST_AGREEMENT: f64 = 0.02;
 /// The search against the print: as in normalisation, but not as close.
-const LIMITS: Limits = Limits {
-    scale: 1.6,
-    keep: mirrored(5),
+const LIMITS: SearchRange = SearchRange {
+    max_scale: 1.6,
+    beam_width: mirrored(5),
 };
-const PASSES: [Pass; 2] = [
-    Pass {
-        px: 36,
-        sigma: 0.8,
-        steps: 6,
-        keep: mirrored(2),
+const PASSES: [RefinementPass; 2] = [
+    RefinementPass {
+        size_px: 36,
+        sigma_px: 0.8,
+        max_steps: 6,
+        beam_width: mirrored(2),
     },
-    Pass {
-        px: JUDGED_PX,
-        sigma: 1.0,
-        steps: 5,
-        keep: mirrored(1),
+    RefinementPass {
+        size_px: JUDGED_PX,
+        sigma_px: 1.0,
+        max_steps: 5,
+        beam_width: mirrored(1),
     },
 ];
 
 /// A face is seen from outside, in mirror writing: no other reading counts.
-const fn mirrored(count: usize) -> Keep {
-    Keep {
+const fn mirrored(count: usize) -> BeamWidth {
+    BeamWidth {
         upright: 0,
         mirrored: count,
     }
@@ -73,13 +75,13 @@ pub(super) struct Face {
     /// Width of the heights' crowd at the extreme layer, as a share of the relief.
     pub(super) layer_width: f64,
     /// Nearness to the tops as seen from outside, so in mirror writing.
-    pub(super) tops: Soft,
+    pub(super) tops: SoftMask,
 }
 
 /// What else is known of the side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Witness<'a> {
-    pub(super) shell: &'a Shell,
+    pub(super) shell: &'a IndexedSurface,
     pub(super) print: Option<&'a Print>,
     pub(super) scanned_face_down: Option<bool>,
 }
@@ -92,13 +94,13 @@ pub(super) fn choose(
     let (first, second) = match faces {
         [Some(a), Some(b)] => (a, b),
         [Some(only), None] | [None, Some(only)] => {
-            let winding = witness.shell.outward_share(&only.plane_from_mesh);
+            let winding = witness.shell.upward_facing_share(&only.plane_from_mesh);
             let evidence = evidence(&only, 1.0, winding);
             return Some((only, evidence));
         }
         [None, None] => return None,
     };
-    let winding = witness.shell.outward_share(&first.plane_from_mesh);
+    let winding = witness.shell.upward_facing_share(&first.plane_from_mesh);
     let odds = log_odds(&first, &second, winding, witness);
     let confidence = (odds.abs() / 2.0).tanh();
     // What looks out on one side looks in on the other.
@@ -152,9 +154,9 @@ fn agreement(likelier: &Face, other: &Face, print: &Print) -> f64 {
     let Ok(hypotheses) = print.hypotheses() else {
         return 0.0;
     };
-    let inks: Vec<Base> = hypotheses
+    let inks: Vec<ImagePyramid> = hypotheses
         .iter()
-        .filter_map(|ink| Base::new(&ink.soft, BASE_PX))
+        .filter_map(|ink| ImagePyramid::new(&ink.soft, BASE_PX))
         .collect();
     let score = |face: &Face| {
         let scores = inks.iter().map(|ink| best_score(ink, &face.tops));
@@ -166,11 +168,11 @@ fn agreement(likelier: &Face, other: &Face, print: &Print) -> f64 {
 }
 
 /// How well a face, read in the mirror, agrees with the ink: correlation times the share of the tops that has printed.
-fn best_score(ink: &Base, tops: &Soft) -> f64 {
-    let Some(wood) = Base::new(tops, BASE_PX) else {
+fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
+    let Some(wood) = ImagePyramid::new(tops, BASE_PX) else {
         return 0.0;
     };
-    let found = find(ink, &wood, LIMITS, &PASSES);
+    let found = search_coarse_to_fine(ink, &wood, LIMITS, &PASSES);
     let print = ink.layer(JUDGED_PX, 1.0);
     let tops = wood
         .at(JUDGED_PX, 1.0)
@@ -178,7 +180,7 @@ fn best_score(ink: &Base, tops: &Soft) -> f64 {
     let judge = Refiner::new(&print, &tops);
     let scores = found
         .iter()
-        .map(|pose| judge.judged(pose).score * judge.overlap(pose).moving_met);
+        .map(|pose| judge.evaluate(pose).score * judge.overlap(pose).moving_covered);
     scores.fold(0.0, f64::max)
 }
 

@@ -6,7 +6,7 @@ use super::params::FitError;
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
 use crate::stages::robust_bounds::{Bounds, holds};
-use crate::stages::zbuffer::{Moments, Shell};
+use crate::stages::zbuffer::{IndexedSurface, Moments};
 
 /// A surface given by points alone needs this many: 25 along a side show a stroke or two at best.
 const LEAST_POINTS: usize = 600;
@@ -40,11 +40,11 @@ impl Axes {
     }
 
     /// Of a surface; of the vertices where there is no area. Flecks far from the bulk do not count.
-    pub(in crate::stages) fn of_surface(mesh: &Mesh, shell: &Shell) -> Self {
+    pub(in crate::stages) fn of_surface(mesh: &Mesh, shell: &IndexedSurface) -> Self {
         if let Some(moments) = Moments::of(shell) {
             return Self::from_moments(moments.centre, moments.covariance);
         }
-        let bounds: Bounds<3> = shell.room();
+        let bounds: Bounds<3> = shell.bulk_bounds();
         let kept = mesh.vertices.iter().filter(|v| holds(&bounds, v));
         Self::of_points(kept.map(|v| (v, 1.0)))
     }
@@ -112,7 +112,7 @@ mod tests {
 
     use super::{Axes, frame};
     use crate::mesh::Mesh;
-    use crate::stages::zbuffer::Shell;
+    use crate::stages::zbuffer::IndexedSurface;
 
     #[test]
     fn repeated_vertices_and_split_faces_change_nothing() {
@@ -132,7 +132,7 @@ mod tests {
             vertices: vertices.into(),
             triangles: vec![[0, 1, 2], [3, 4, 5]].into(),
         };
-        let axes = |mesh: &Mesh| Axes::of_surface(mesh, &Shell::new(mesh));
+        let axes = |mesh: &Mesh| Axes::of_surface(mesh, &IndexedSurface::new(mesh));
         let (a, b) = (axes(&shared), axes(&soup));
         assert!((a.centre - b.centre).norm() < 1e-12);
         assert!(a.normal().cross(&b.normal()).norm() < 1e-9);

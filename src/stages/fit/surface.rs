@@ -6,9 +6,9 @@
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
 use crate::domain::Rigid3;
 use crate::raster::{Grid, Mask};
-use crate::stages::components::Components;
-use crate::stages::pose::Soft;
-use crate::stages::zbuffer::{NOTHING, View};
+use crate::stages::components::ConnectedComponents;
+use crate::stages::pose::SoftMask;
+use crate::stages::zbuffer::{NO_HIT, Viewport};
 
 /// Expectile of the first, convex pass: points above weigh this, points below one less it.
 const ENVELOPE: f64 = 0.97;
@@ -81,7 +81,7 @@ pub(super) struct Surface {
 
 impl Samples {
     /// The seen pixels of a rendering; `None` when fewer than 16 are seen.
-    pub(super) fn new(heights: &Grid<f32>, view: &View) -> Option<Self> {
+    pub(super) fn new(heights: &Grid<f32>, view: &Viewport) -> Option<Self> {
         let back = view.px_from_plane.inverse()?;
         let extent = view.unit_per_px * heights.width().max(heights.height()) as f64;
         let centre = back.apply([
@@ -92,7 +92,7 @@ impl Samples {
         let (mut points, mut places) = (Points::default(), Vec::new());
         for y in 0..size[1] {
             for (x, z) in heights.row(y).iter().enumerate() {
-                if *z != NOTHING {
+                if *z != NO_HIT {
                     let [u, v] = back.apply([x as f64, y as f64]);
                     places.push(y * size[0] + x);
                     points.push([
@@ -300,9 +300,9 @@ impl Samples {
     }
 
     /// Nearness to the surface as a picture: 1 on it, 0 from half the relief down.
-    pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> Soft {
+    pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> SoftMask {
         let [width, height] = self.size;
-        let mut soft = Soft {
+        let mut soft = SoftMask {
             amount: Grid::new(width, height, 0.0),
             known: Grid::new(width, height, false),
         };
@@ -356,7 +356,7 @@ impl Samples {
             tops.data_mut()[*place] = r.abs() < window;
             unknown.data_mut()[*place] = false;
         }
-        let cut_off = Components::of(&tops).near(&unknown, CUT_PX);
+        let cut_off = ConnectedComponents::label(&tops).touching(&unknown, CUT_PX);
         let own = Mask::from_fn(width, height, |x, y| tops.at(x, y) && !cut_off.at(x, y));
         if own.count() as f64 >= LEAST_OWN * tops.count() as f64 {
             own

@@ -12,7 +12,7 @@ use crate::raster::Grid;
 use crate::stages::binarize;
 use crate::stages::print::Print;
 use crate::stages::scan::Scan;
-use crate::stages::zbuffer::{Shell, View};
+use crate::stages::zbuffer::{IndexedSurface, Viewport};
 
 /// Longest side of the rendering that tells the sides apart, and of the one that the surface is fitted to.
 const GLANCE_PX: usize = 96;
@@ -101,10 +101,10 @@ const LOOK: Care = Care {
 };
 
 /// Glances at both sides of a frame's plane.
-fn glances(shell: &Shell, front: &Rigid3, bow: bool) -> [Option<Face>; 2] {
-    let view = View::around(shell.bounds(front), GLANCE.px, false);
+fn glances(shell: &IndexedSurface, front: &Rigid3, bow: bool) -> [Option<Face>; 2] {
+    let view = Viewport::around(shell.bounds(front), GLANCE.px, false);
     let frames = [*front, turned_about_x(front)];
-    let [front, back] = shell.render_both(front, &view);
+    let [front, back] = shell.render_both_sides(front, &view);
     let again = Care {
         most: GLANCE.most - 1,
         ..GLANCE
@@ -127,10 +127,10 @@ fn turned_about_x(frame: &Rigid3) -> Rigid3 {
 }
 
 /// Fits the tops as seen along a frame's z, turning the view until it stands square on them.
-fn look(shell: &Shell, start: Rigid3, bow: bool, care: Care) -> Option<Face> {
+fn look(shell: &IndexedSurface, start: Rigid3, bow: bool, care: Care) -> Option<Face> {
     let mut frame = start;
     for round in 1.. {
-        let view = View::around(shell.bounds(&frame), care.px, false);
+        let view = Viewport::around(shell.bounds(&frame), care.px, false);
         let seen = Seen::new(&frame, &shell.render(&frame, &view), view, bow)?;
         let seen = seen.settled(bow, care);
         if seen.slope() < care.slope || round >= care.most {
@@ -144,7 +144,7 @@ fn look(shell: &Shell, start: Rigid3, bow: bool, care: Care) -> Option<Face> {
 /// What a rendering shows.
 struct Seen {
     frame: Rigid3,
-    view: View,
+    view: Viewport,
     samples: Samples,
     surface: Surface,
     /// The tops' plane in the frame, `z = a + b x + c y`.
@@ -152,11 +152,11 @@ struct Seen {
 }
 
 impl Seen {
-    fn new(frame: &Rigid3, heights: &Grid<f32>, view: View, bow: bool) -> Option<Self> {
+    fn new(frame: &Rigid3, heights: &Grid<f32>, view: Viewport, bow: bool) -> Option<Self> {
         Some(Self::of(*frame, Samples::new(heights, &view)?, view, bow))
     }
 
-    fn of(frame: Rigid3, samples: Samples, view: View, bow: bool) -> Self {
+    fn of(frame: Rigid3, samples: Samples, view: Viewport, bow: bool) -> Self {
         let surface = samples.fit(bow);
         Self {
             frame,
@@ -233,7 +233,7 @@ fn lay_on(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
 }
 
 /// Largest less smallest height of the bow over the view.
-fn bow_height(bow: &Bow, view: &View) -> f64 {
+fn bow_height(bow: &Bow, view: &Viewport) -> f64 {
     let Some(back) = view.px_from_plane.inverse() else {
         return 0.0;
     };

@@ -8,26 +8,29 @@ use super::threshold::{self, Canvas};
 use crate::domain::{Affine2, Pose, ThresholdChoice};
 use crate::raster::DepthMap;
 use crate::stages::binarize::InkMask;
-use crate::stages::pose::{Base, Found, Keep, Limits, Pass, Soft, find};
+use crate::stages::pose::{
+    BeamWidth, ImagePyramid, PoseCandidate, RefinementPass, SearchRange, SoftMask,
+    search_coarse_to_fine,
+};
 
 /// The passes that follow the search.
-const PASSES: [Pass; 2] = [
-    Pass {
-        px: 36,
-        sigma: 0.8,
-        steps: 7,
-        keep: keep(4, 2),
+const PASSES: [RefinementPass; 2] = [
+    RefinementPass {
+        size_px: 36,
+        sigma_px: 0.8,
+        max_steps: 7,
+        beam_width: keep(4, 2),
     },
-    Pass {
-        px: 60,
-        sigma: 1.0,
-        steps: 6,
-        keep: keep(3, 1),
+    RefinementPass {
+        size_px: 60,
+        sigma_px: 1.0,
+        max_steps: 6,
+        beam_width: keep(3, 1),
     },
 ];
 
-const fn keep(upright: usize, mirrored: usize) -> Keep {
-    Keep { upright, mirrored }
+const fn keep(upright: usize, mirrored: usize) -> BeamWidth {
+    BeamWidth { upright, mirrored }
 }
 /// Working size of print and relief.
 const BASE_PX: usize = 72;
@@ -36,7 +39,7 @@ const BASE_PX: usize = 72;
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Poses that the search hands on.
-const KEEP: Keep = keep(9, 3);
+const KEEP: BeamWidth = keep(9, 3);
 /// A relief that correlates less than this matches nothing.
 const LEAST_SCORE: f64 = 0.12;
 /// Mirrored must win by this factor before the pair is refused: symmetric characters score alike both ways.
@@ -96,20 +99,20 @@ pub(super) fn thresholds(
 
 /// Poses as read, best first, at least one.
 fn find_poses(
-    depths: &Soft,
+    depths: &SoftMask,
     print: &InkMask,
     params: &NormalizeParams,
 ) -> Result<Search, NormalizeError> {
-    let (ink, wood) = Base::new(&print.soft, BASE_PX)
-        .zip(Base::new(depths, BASE_PX))
+    let (ink, wood) = ImagePyramid::new(&print.soft, BASE_PX)
+        .zip(ImagePyramid::new(depths, BASE_PX))
         .ok_or(NormalizeError::NoStrokes)?;
     let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
-    let limits = Limits {
-        scale: params.scale_band,
-        keep: KEEP,
+    let limits = SearchRange {
+        max_scale: params.scale_band,
+        beam_width: KEEP,
     };
-    let found = find(&ink, &wood, limits, &PASSES);
-    let ratio = |pose: &Found| {
+    let found = search_coarse_to_fine(&ink, &wood, limits, &PASSES);
+    let ratio = |pose: &PoseCandidate| {
         let (ink, wood) = (longest(&print.soft), longest(depths));
         pose.fixed_from_moving.scale() * wood / ink
     };
@@ -120,13 +123,16 @@ fn find_poses(
 }
 
 /// Longest side of what a soft picture knows, pixels.
-fn longest(soft: &Soft) -> f64 {
+fn longest(soft: &SoftMask) -> f64 {
     soft.bounds()
         .map_or(1.0, |b| b.width().max(b.height()) as f64)
 }
 
 /// Refuses mirror writing and relief that matches nothing.
-fn judge(found: &[Found], at_bound: impl Fn(&Found) -> bool) -> Result<Search, NormalizeError> {
+fn judge(
+    found: &[PoseCandidate],
+    at_bound: impl Fn(&PoseCandidate) -> bool,
+) -> Result<Search, NormalizeError> {
     let best = |mirrored: bool| {
         let of_kind = found.iter().filter(|pose| pose.mirrored == mirrored);
         of_kind.map(|pose| pose.score).fold(0.0, f64::max)
@@ -142,7 +148,7 @@ fn judge(found: &[Found], at_bound: impl Fn(&Found) -> bool) -> Result<Search, N
         });
     }
     let upright = || found.iter().filter(|pose| !pose.mirrored);
-    let pose = |found: &Found| Pose {
+    let pose = |found: &PoseCandidate| Pose {
         print_from_depth: found.fixed_from_moving,
         score: found.score,
     };

@@ -4,7 +4,7 @@ use super::height_histogram::HeightHistogram;
 use crate::raster::{DepthMap, PixelBox};
 use crate::simd::dispatch;
 use crate::stages::binarize;
-use crate::stages::pose::Soft;
+use crate::stages::pose::SoftMask;
 
 /// Every how many pixels the heights are looked at when tops and ground are told apart.
 const STRIDE: usize = 3;
@@ -78,19 +78,19 @@ impl Relief {
     pub(in crate::stages) fn growth(&self, depth: &DepthMap, level: u16) -> f64 {
         let bit = A_BIT * self.depth() / depth.scale.height_per_level;
         let lower = (f64::from(level) - bit).clamp(1.0, 65_535.0) as u16;
-        let area = |least: u16| depth.levels.reaching(least);
+        let area = |least: u16| depth.levels.count_at_least(least);
         (area(lower) as f64 / area(level.max(1)).max(1) as f64).ln()
     }
 
     /// Depth of every pixel under the tops, a share of the relief between -1 and 2.
-    pub(in crate::stages) fn depths(&self, depth: &DepthMap) -> Soft {
+    pub(in crate::stages) fn depths(&self, depth: &DepthMap) -> SoftMask {
         let scale = &depth.scale;
         let per_level = (scale.height_per_level / self.depth()) as f32;
         let none = ((self.top - scale.height(1)) / self.depth()) as f32 + per_level;
         let of_level = |level: u16| (none - per_level * f32::from(level)).clamp(-1.0, 2.0);
         dispatch(
             #[inline(always)]
-            || Soft {
+            || SoftMask {
                 amount: depth.levels.map(|level| of_level(*level)),
                 known: depth.levels.map(|level| *level != 0),
             },

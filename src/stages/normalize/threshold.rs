@@ -8,7 +8,7 @@ use super::relief::Relief;
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Grid, Mask, warp_depth, warp_mask};
 use crate::stages::binarize::InkMask;
-use crate::stages::score::{SsimWindow, WindowMeans};
+use crate::stages::score::{SsimReference, SsimWindow};
 
 /// Candidate thresholds between the first and the last cut.
 const CANDIDATES: u32 = 40;
@@ -58,7 +58,7 @@ impl Canvas {
 
     /// Number of pixels of the strokes at a level above 0.
     fn area(&self, level: u16) -> f64 {
-        self.levels.reaching(level) as f64
+        self.levels.count_at_least(level) as f64
     }
 }
 
@@ -156,7 +156,7 @@ fn candidates(
 struct Structure<'a> {
     canvas: &'a Canvas,
     candidates: &'a [Candidate],
-    means: WindowMeans,
+    means: SsimReference,
     known: Vec<Option<f64>>,
 }
 
@@ -165,7 +165,7 @@ impl<'a> Structure<'a> {
         Self {
             canvas,
             candidates,
-            means: WindowMeans::new(&canvas.ink, window),
+            means: SsimReference::new(&canvas.ink, window),
             known: vec![None; candidates.len()],
         }
     }

@@ -7,9 +7,9 @@
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::binarize::InkMask;
-use crate::stages::components::without_specks;
+use crate::stages::components::remove_specks;
 use crate::stages::normalize::{NormalizeError, NormalizeParams};
-use crate::stages::score::WindowMeans;
+use crate::stages::score::SsimReference;
 
 /// Greys of the two percentiles, and the percentiles.
 const STRETCH: [(f64, f64); 2] = [(0.01, 49.0), (0.95, 201.0)];
@@ -22,7 +22,7 @@ struct Greys {
 
 impl Greys {
     fn of(depth: &DepthMap) -> Option<Self> {
-        let mut levels = depth.known_levels();
+        let mut levels = depth.valid_levels();
         if levels.is_empty() {
             return None;
         }
@@ -67,7 +67,7 @@ pub(in crate::stages) fn choose(
 ) -> Result<Vec<ThresholdChoice>, NormalizeError> {
     let greys = Greys::of(depth).ok_or(NormalizeError::NoStrokes)?;
     let side = params.canvas_px as usize;
-    let canvas = WindowMeans::new(
+    let canvas = SsimReference::new(
         &warp_mask(&print.mask, canvas_from_print, side, side),
         params.window,
     );
@@ -108,7 +108,7 @@ pub(in crate::stages) fn choose(
 /// Scores one threshold at four quarter turns; `None` when it leaves no strokes.
 fn attempt(
     depth: &DepthMap,
-    canvas: &WindowMeans,
+    canvas: &SsimReference,
     grey: u8,
     level: u16,
     params: &NormalizeParams,
@@ -130,7 +130,7 @@ fn attempt(
     Some(Tried {
         level,
         grey,
-        structure: canvas.against(&turned).nl_ssim,
+        structure: canvas.compare(&turned).nl_ssim,
         density_gap: wrapped.density() - canvas.mask().density(),
     })
 }
@@ -138,7 +138,7 @@ fn attempt(
 /// Strokes of the depth map at a level, specks removed.
 fn mask_above(depth: &DepthMap, level: u16) -> Mask {
     let raw = depth.levels.map(|l| *l >= level && *l > 0);
-    without_specks(&raw, raw.data().len())
+    remove_specks(&raw, raw.data().len())
 }
 
 /// W(I): the box's longest side to `character_px`, the centroid to the middle of a square canvas.

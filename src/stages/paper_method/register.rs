@@ -6,7 +6,7 @@
 
 use crate::domain::{Affine2, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
-use crate::stages::components::without_specks;
+use crate::stages::components::remove_specks;
 use crate::stages::normalize::Normalized;
 use crate::stages::register::{Alignment, RegisterError, RegisterParams, chosen};
 
@@ -54,8 +54,8 @@ fn align_one(
     params: &RegisterParams,
 ) -> Result<(Alignment, f64), RegisterError> {
     let (level, at_bound) = chosen(normalized, metric)?;
-    let raw = depth.strokes(level);
-    let mask = without_specks(&raw, raw.data().len());
+    let raw = depth.stroke_mask(level);
+    let mask = remove_specks(&raw, raw.data().len());
     let character_px = longest_side(canvas_print).ok_or(RegisterError::NoStrokes(metric))?;
     let side = canvas_print.width();
     let turner = Turner::new(&mask, side, character_px).ok_or(RegisterError::NoStrokes(metric))?;

@@ -1,24 +1,24 @@
 //! How much of each picture the other explains, where both are known.
 
-use super::Layer;
-use super::layer::Between;
+use super::PyramidLevel;
+use super::pyramid::Between;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
 /// Shares of two pictures that lie on each other at a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(in crate::stages) struct Overlap {
+pub(in crate::stages) struct PoseOverlap {
     /// Share of the moving picture's amount that meets the fixed one's: of the tops, what has printed.
-    pub(in crate::stages) moving_met: f64,
+    pub(in crate::stages) moving_covered: f64,
     /// Share of the fixed picture's amount that meets the moving one's: of the ink, what has tops under it.
-    pub(in crate::stages) fixed_met: f64,
+    pub(in crate::stages) fixed_covered: f64,
 }
 
-impl Overlap {
+impl PoseOverlap {
     /// Of the fixed and the moving layer on the grounds on which they can be judged, given where the fixed one's pixels
     /// lie in the moving one; zeros where they do not meet.
     pub(super) fn of(
-        [fixed, moving]: [&Layer; 2],
+        [fixed, moving]: [&PyramidLevel; 2],
         [paper, ground]: [&Grid<f32>; 2],
         moving_from_fixed: &Affine2,
     ) -> Self {
@@ -40,8 +40,8 @@ impl Overlap {
         }
         let share = |part: f64, of: f64| if of > 0.0 { part / of } else { 0.0 };
         Self {
-            moving_met: share(both, wood),
-            fixed_met: share(both, ink),
+            moving_covered: share(both, wood),
+            fixed_covered: share(both, ink),
         }
     }
 }

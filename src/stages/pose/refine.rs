@@ -3,11 +3,11 @@
 use std::cell::OnceCell;
 use std::rc::Rc;
 
-use super::duel::{Side, duel};
-use super::ground::own_ground;
-use super::search::Found;
-use super::step::{Loss, Room, Step};
-use super::{Layer, Overlap};
+use super::border_mask::own_ground;
+use super::gauss_newton::{Loss, Room, Step};
+use super::search::PoseCandidate;
+use super::tiebreak::{Side, duel};
+use super::{PoseOverlap, PyramidLevel};
 use crate::domain::Affine2;
 use crate::raster::Grid;
 use crate::simd::dispatch;
@@ -19,8 +19,8 @@ const RUN: usize = 256;
 
 /// Two layers ready to be laid on each other many times.
 pub(in crate::stages) struct Refiner<'a> {
-    fixed: &'a Layer,
-    moving: &'a Layer,
+    fixed: &'a PyramidLevel,
+    moving: &'a PyramidLevel,
     looked_at: Rc<LookedAt>,
     /// The moving layer's value, slope in x and y, and weight, pixel by pixel.
     cells: Vec<[f32; 4]>,
@@ -34,18 +34,21 @@ pub(in crate::stages) struct Refiner<'a> {
 
 impl<'a> Refiner<'a> {
     /// Prepares the two layers.
-    pub(in crate::stages) fn new(fixed: &'a Layer, moving: &'a Layer) -> Self {
+    pub(in crate::stages) fn new(fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> Self {
         Self::with(Rc::new(LookedAt::of(fixed)), fixed, moving)
     }
 
     /// Prepares several layers to be laid on one.
-    pub(in crate::stages) fn each(fixed: &'a Layer, moving: &'a [Layer]) -> Vec<Self> {
+    pub(in crate::stages) fn for_levels(
+        fixed: &'a PyramidLevel,
+        moving: &'a [PyramidLevel],
+    ) -> Vec<Self> {
         let looked_at = Rc::new(LookedAt::of(fixed));
         let with = |moving| Self::with(Rc::clone(&looked_at), fixed, moving);
         moving.iter().map(with).collect()
     }
 
-    fn with(looked_at: Rc<LookedAt>, fixed: &'a Layer, moving: &'a Layer) -> Self {
+    fn with(looked_at: Rc<LookedAt>, fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> Self {
         let centre = fixed.centre();
         Self {
             cells: cells(moving),
@@ -65,7 +68,12 @@ impl<'a> Refiner<'a> {
     /// The moving values may be scaled and offset freely; residuals are weighed down where only one side has
     /// something. A pose that has not settled after `most_steps` is judged where it is. The score is the correlation
     /// over what both know, over what each holds.
-    pub(in crate::stages) fn refine(&self, start: &Found, most_steps: usize, loss: Loss) -> Found {
+    pub(in crate::stages) fn refine(
+        &self,
+        start: &PoseCandidate,
+        most_steps: usize,
+        loss: Loss,
+    ) -> PoseCandidate {
         let Some(mut from_fixed) = self.moving_from_fixed(&start.fixed_from_moving) else {
             return *start;
         };
@@ -96,7 +104,7 @@ impl<'a> Refiner<'a> {
         };
         let score = self.share(kept.explained, &at);
         match self.to_images(&at) {
-            Some(fixed_from_moving) => Found {
+            Some(fixed_from_moving) => PoseCandidate {
                 fixed_from_moving,
                 score,
                 mirrored: start.mirrored,
@@ -106,18 +114,18 @@ impl<'a> Refiner<'a> {
     }
 
     /// The score of a pose as it is.
-    pub(in crate::stages) fn judged(&self, pose: &Found) -> Found {
+    pub(in crate::stages) fn evaluate(&self, pose: &PoseCandidate) -> PoseCandidate {
         let score = self
             .moving_from_fixed(&pose.fixed_from_moving)
             .map_or(0.0, |at| self.score(&at));
-        Found { score, ..*pose }
+        PoseCandidate { score, ..*pose }
     }
 
     /// How much of each layer the other explains at a pose.
-    pub(in crate::stages) fn overlap(&self, pose: &Found) -> Overlap {
+    pub(in crate::stages) fn overlap(&self, pose: &PoseCandidate) -> PoseOverlap {
         self.moving_from_pixels(pose)
             .map(|into| {
-                Overlap::of(
+                PoseOverlap::of(
                     [self.fixed, self.moving],
                     [self.paper(), self.ground()],
                     &into,
@@ -128,14 +136,19 @@ impl<'a> Refiner<'a> {
 
     /// The scores of a pose and of a rival, which may have other strokes, on the ground they share; zeros where a pose
     /// cannot be turned round.
-    pub(in crate::stages) fn duel(&self, pose: &Found, other: &Self, rival: &Found) -> [f64; 2] {
+    pub(in crate::stages) fn duel(
+        &self,
+        pose: &PoseCandidate,
+        other: &Self,
+        rival: &PoseCandidate,
+    ) -> [f64; 2] {
         match (self.side(pose), other.side(rival)) {
             (Some(one), Some(two)) => duel(self.fixed, self.paper(), &[one, two]),
             _ => [0.0; 2],
         }
     }
 
-    fn side(&self, pose: &Found) -> Option<Side<'_>> {
+    fn side(&self, pose: &PoseCandidate) -> Option<Side<'_>> {
         Some(Side {
             moving: self.moving,
             ground: self.ground(),
@@ -154,7 +167,7 @@ impl<'a> Refiner<'a> {
     }
 
     /// From the fixed layer's pixels into the moving one at a pose.
-    fn moving_from_pixels(&self, pose: &Found) -> Option<Affine2> {
+    fn moving_from_pixels(&self, pose: &PoseCandidate) -> Option<Affine2> {
         let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
         let into = self.moving_from_fixed(&pose.fixed_from_moving)?;
         Some(into.after(&to_middle))
@@ -313,7 +326,7 @@ struct LookedAt {
 }
 
 impl LookedAt {
-    fn of(layer: &Layer) -> Self {
+    fn of(layer: &PyramidLevel) -> Self {
         let centre = layer.centre().map(|c| c as f32);
         let (width, height) = (layer.value.width(), layer.value.height());
         let (mut places, mut values) = (Vec::new(), Vec::new());
@@ -347,7 +360,7 @@ fn moved(map: &Affine2, change: &[f64; 6], mirrored: bool) -> Affine2 {
 }
 
 /// Value, central differences and weight of each pixel of a layer.
-fn cells(layer: &Layer) -> Vec<[f32; 4]> {
+fn cells(layer: &PyramidLevel) -> Vec<[f32; 4]> {
     let (width, height) = (layer.value.width(), layer.value.height());
     let mut cells = Vec::with_capacity(width * height);
     for y in 0..height {

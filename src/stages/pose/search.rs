@@ -6,7 +6,7 @@ use std::sync::Arc;
 use rustfft::num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
-use super::Layer;
+use super::PyramidLevel;
 use crate::domain::Affine2;
 use crate::simd::{dispatch, index, whole_below};
 
@@ -32,14 +32,14 @@ const NEAR_RATIO: f64 = 0.04;
 
 /// How many poses of each reading to keep; a reading of which none is kept is not looked at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::stages) struct Keep {
+pub(in crate::stages) struct BeamWidth {
     /// As the pictures are.
     pub(in crate::stages) upright: usize,
     /// With the moving picture mirrored.
     pub(in crate::stages) mirrored: usize,
 }
 
-impl Keep {
+impl BeamWidth {
     /// How many of one reading.
     pub(super) const fn of(self, mirrored: bool) -> usize {
         if mirrored {
@@ -52,16 +52,16 @@ impl Keep {
 
 /// What the search may try.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stages) struct Limits {
+pub(in crate::stages) struct SearchRange {
     /// Largest ratio, up or down, between the pictures' sizes.
-    pub(in crate::stages) scale: f64,
+    pub(in crate::stages) max_scale: f64,
     /// How many poses to keep.
-    pub(in crate::stages) keep: Keep,
+    pub(in crate::stages) beam_width: BeamWidth,
 }
 
 /// A pose that the search found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stages) struct Found {
+pub(in crate::stages) struct PoseCandidate {
     /// Moving image pixels to fixed image pixels; mirrors when `mirrored`.
     pub(in crate::stages) fixed_from_moving: Affine2,
     /// Correlation of what both know, over what each holds: at most 1.
@@ -70,9 +70,9 @@ pub(in crate::stages) struct Found {
     pub(in crate::stages) mirrored: bool,
 }
 
-impl Found {
+impl PoseCandidate {
     /// By how much two poses are turned from each other, degrees, 0..=180.
-    pub(in crate::stages) fn turn_from(&self, other: &Self) -> f64 {
+    pub(in crate::stages) fn rotation_to(&self, other: &Self) -> f64 {
         let angle = |pose: &Self| pose.fixed_from_moving.angle_deg();
         let turn = (angle(self) - angle(other)).rem_euclid(360.0);
         turn.min(360.0 - turn)
@@ -82,7 +82,7 @@ impl Found {
     pub(super) fn is_near(&self, other: &Self) -> bool {
         let scale = |pose: &Self| pose.fixed_from_moving.scale();
         let ratio = (scale(self) / scale(other)).ln().abs();
-        self.mirrored == other.mirrored && self.turn_from(other) < NEAR_DEG && ratio < NEAR_RATIO
+        self.mirrored == other.mirrored && self.rotation_to(other) < NEAR_DEG && ratio < NEAR_RATIO
     }
 }
 
@@ -97,14 +97,18 @@ struct Peak {
 }
 
 /// The best distinct poses, as read and mirrored, best first.
-pub(super) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -> Vec<Found> {
+pub(super) fn search(
+    fixed: &PyramidLevel,
+    moving: &PyramidLevel,
+    limits: SearchRange,
+) -> Vec<PoseCandidate> {
     let mut transform = Transform::new();
     let target = transform.target(&centred(fixed, None));
     let fixed_norm = fixed.energy().sqrt();
-    let steps = (limits.scale.ln() / SCALE_STEP.ln()).round() as i32;
+    let steps = (limits.max_scale.ln() / SCALE_STEP.ln()).round() as i32;
     let readings: Vec<bool> = [false, true]
         .into_iter()
-        .filter(|mirrored| limits.keep.of(*mirrored) > 0)
+        .filter(|mirrored| limits.beam_width.of(*mirrored) > 0)
         .collect();
     let mut peaks = Vec::new();
     for step in -steps..=steps {
@@ -135,7 +139,7 @@ pub(super) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -> Vec<Found
             }
         }
     }
-    distinct(peaks, limits.keep)
+    distinct(peaks, limits.beam_width)
         .into_iter()
         .map(|peak| peak.found(fixed, moving))
         .collect()
@@ -143,7 +147,7 @@ pub(super) fn search(fixed: &Layer, moving: &Layer, limits: Limits) -> Vec<Found
 
 impl Peak {
     /// In image pixels: image to its layer, about the middle, then to the fixed layer and back to its image.
-    fn found(&self, fixed: &Layer, moving: &Layer) -> Found {
+    fn found(&self, fixed: &PyramidLevel, moving: &PyramidLevel) -> PoseCandidate {
         let [cx, cy] = moving.centre();
         let [fx, fy] = fixed.centre();
         let to_middle = Affine2::scale_shift(1.0, [-cx, -cy]);
@@ -155,7 +159,7 @@ impl Peak {
         let shift = Affine2::scale_shift(1.0, [fx + self.shift[0], fy + self.shift[1]]);
         let layer_from_layer = shift.after(&mirror).after(&turn).after(&to_middle);
         let fixed_image = fixed.work_from_image.inverse().unwrap_or(Affine2::IDENTITY);
-        Found {
+        PoseCandidate {
             fixed_from_moving: fixed_image
                 .after(&layer_from_layer)
                 .after(&moving.work_from_image),
@@ -166,7 +170,7 @@ impl Peak {
 }
 
 /// The best peaks of which no two are the same pose; mirrored ones compete among themselves.
-fn distinct(mut peaks: Vec<Peak>, keep: Keep) -> Vec<Peak> {
+fn distinct(mut peaks: Vec<Peak>, keep: BeamWidth) -> Vec<Peak> {
     peaks.sort_by(|a, b| b.score.total_cmp(&a.score));
     let mut kept: Vec<Peak> = Vec::new();
     for peak in peaks {
@@ -188,7 +192,7 @@ fn distinct(mut peaks: Vec<Peak>, keep: Keep) -> Vec<Peak> {
 }
 
 /// The layer's values in the middle of the square, turned and scaled about its own middle.
-fn centred(layer: &Layer, turn: Option<(f64, f64)>) -> Vec<f32> {
+fn centred(layer: &PyramidLevel, turn: Option<(f64, f64)>) -> Vec<f32> {
     let middle = (SQUARE / 2) as f64;
     let [cx, cy] = layer.centre();
     let (angle, scale) = turn.unwrap_or((0.0, 1.0));

@@ -1,7 +1,7 @@
 //! The last few parts in a thousand: relief stretched along one axis, as paper shrinks across its grain.
 
 use crate::domain::Affine2;
-use crate::stages::pose::{Found, Loss, Refiner};
+use crate::stages::pose::{Loss, PoseCandidate, Refiner};
 
 /// Rounds of stretching and refining; each is a fraction of the last.
 const ROUNDS: usize = 2;
@@ -14,13 +14,17 @@ const MOST: f64 = 0.012;
 /// The pose with the stretch that fits best, in two directions that make any: along an axis, and along a diagonal.
 ///
 /// `middle` is that of the relief, in the moving image's pixels; the pose's score is the refiner's.
-pub(super) fn stretched(refiner: &Refiner, pose: &Found, middle: [f64; 2]) -> Found {
+pub(super) fn stretched(
+    refiner: &Refiner,
+    pose: &PoseCandidate,
+    middle: [f64; 2],
+) -> PoseCandidate {
     let mut best = *pose;
     for _ in 0..ROUNDS {
         let mut is_judged = true;
         for along in [[1.0, 0.0], [0.0, 1.0]] {
             let by = |amount: f64| stretch(&best, middle, along.map(|share| share * amount));
-            let score = |amount: f64| refiner.judged(&by(amount)).score;
+            let score = |amount: f64| refiner.evaluate(&by(amount)).score;
             let at = if is_judged { best.score } else { score(0.0) };
             best = by(summit(score(-TRIED), at, score(TRIED)) * TRIED);
             is_judged = false;
@@ -41,10 +45,10 @@ fn summit(before: f64, at: f64, after: f64) -> f64 {
 
 /// Stretches about the middle by `1 + e` along x and `1 - e` along y, and likewise along the diagonals, so that areas
 /// hardly change.
-fn stretch(pose: &Found, middle: [f64; 2], [e, f]: [f64; 2]) -> Found {
+fn stretch(pose: &PoseCandidate, middle: [f64; 2], [e, f]: [f64; 2]) -> PoseCandidate {
     let [x, y] = pose.fixed_from_moving.apply(middle);
     let about = Affine2([[1.0 + e, f, -e * x - f * y], [f, 1.0 - e, e * y - f * x]]);
-    Found {
+    PoseCandidate {
         fixed_from_moving: about.after(&pose.fixed_from_moving),
         ..*pose
     }

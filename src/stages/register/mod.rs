@@ -15,7 +15,7 @@ pub use params::{RegisterError, RegisterMethod, RegisterParams};
 
 use super::normalize::{Normalized, Relief};
 use super::paper_method::register as exhaustive;
-use super::score::{self, WindowMeans};
+use super::score::{self, SsimReference};
 use crate::domain::{
     Affine2, MetricOutcome, PoseFeatures, RegisterOutcome, Scores, ThresholdMetric,
 };
@@ -73,9 +73,9 @@ pub fn register(
             None,
         ),
     };
-    let print_means = WindowMeans::new(&canvas_print, params.window);
+    let print_means = SsimReference::new(&canvas_print, params.window);
     let masks = masks(&alignments, |pose, levels| {
-        depth.strokes_in(&canvas_from_print.after(pose), [side; 2], levels)
+        depth.warped_stroke_masks(&canvas_from_print.after(pose), [side; 2], levels)
     });
     let mut metrics: Vec<MetricOutcome> = Vec::new();
     for (k, (alignment, mask)) in alignments.iter().zip(&masks).enumerate() {
@@ -86,7 +86,7 @@ pub fn register(
         let mut before = alignments[..k].iter();
         let twin = before.position(|other| other.is_as(alignment));
         let scores = twin.map_or_else(
-            || score::measure(&print_means, mask),
+            || score::score_masks(&print_means, mask),
             |twin| metrics[twin].scores,
         );
         metrics.push(outcome(depth, normalized, alignment, scores));

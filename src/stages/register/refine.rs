@@ -8,7 +8,10 @@ use super::soft_thresholds::{Cuts, FEW_CUTS, near};
 use crate::domain::{Affine2, Pose, PoseFeatures};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{Normalized, Relief, soft_stroke};
-use crate::stages::pose::{Base, Found, Layer, Loss, Overlap, Refiner, Sizer, Soft, Surroundings};
+use crate::stages::pose::{
+    BorderStrokes, ImagePyramid, LevelBuilder, Loss, PoseCandidate, PoseOverlap, PyramidLevel,
+    Refiner, SoftMask,
+};
 
 /// Poses closer in angle than this are one pose when the margin is taken.
 const SAME_POSE_DEG: f64 = 15.0;
@@ -61,8 +64,8 @@ pub(super) fn align(
 /// A pose with the cut that fits the print's strokes there.
 #[derive(Debug, Clone, Copy)]
 struct Settled {
-    found: Found,
-    overlap: Overlap,
+    found: PoseCandidate,
+    overlap: PoseOverlap,
     cut: f64,
     /// Which of the tried cuts came nearest.
     nearest: usize,
@@ -72,7 +75,7 @@ impl Settled {
     /// What ranks poses: correlation, and how much of the tops has printed. Ink without tops is common, for strokes
     /// break off after a print was made; tops without ink are rare.
     fn score(&self) -> f64 {
-        self.found.score * self.overlap.moving_met
+        self.found.score * self.overlap.moving_covered
     }
 }
 
@@ -94,7 +97,7 @@ impl Rivals {
         let tried = settle_all(&Cuts::new(&FEW_CUTS, &pictures.ink, &woods), normalized)?;
         let best = *best_of(&tried, |pose| !pose.found.mirrored)?;
         let elsewhere = |pose: &Settled| {
-            !pose.found.mirrored && pose.found.turn_from(&best.found) > SAME_POSE_DEG
+            !pose.found.mirrored && pose.found.rotation_to(&best.found) > SAME_POSE_DEG
         };
         let other_angle = best_of(&tried, elsewhere).copied();
         let mirrored = best_of(&tried, |pose| pose.found.mirrored).copied();
@@ -146,8 +149,8 @@ impl Rivals {
         let [other_angle, mirrored] = self.shares;
         PoseFeatures {
             correlation: self.best.found.score,
-            tops_met: self.best.overlap.moving_met,
-            ink_met: self.best.overlap.fixed_met,
+            tops_met: self.best.overlap.moving_covered,
+            ink_met: self.best.overlap.fixed_covered,
             other_angle,
             mirrored,
             spread,
@@ -174,8 +177,8 @@ fn best_of(tried: &[Settled], of_kind: impl Fn(&Settled) -> bool) -> Option<&Set
 
 /// Print and relief at working size.
 struct Pictures {
-    ink: Base,
-    depths: Base,
+    ink: ImagePyramid,
+    depths: ImagePyramid,
     px: usize,
     smoothing_px: f64,
     may_stretch: bool,
@@ -190,14 +193,14 @@ impl Pictures {
         normalized: &Normalized,
         params: &RegisterParams,
     ) -> Option<Self> {
-        let ink = Soft {
+        let ink = SoftMask {
             amount: normalized.ink.map(|set| f32::from(u8::from(*set))),
             known: normalized.known.clone(),
         };
         let px = params.working_px as usize;
         Some(Self {
-            ink: Base::new(&ink, px)?,
-            depths: Base::new(&relief.depths(depth), px)?,
+            ink: ImagePyramid::new(&ink, px)?,
+            depths: ImagePyramid::new(&relief.depths(depth), px)?,
             px,
             smoothing_px: params.smoothing_px,
             may_stretch: params.anisotropic_scale,
@@ -221,17 +224,17 @@ impl Pictures {
     fn look(&self, few: &Scaled, best: &Settled) -> Option<(Affine2, f64)> {
         let wood = few.stroke(best.cut);
         let both = [&few.ink, &wood];
-        let around = Surroundings::of(both, &best.found.fixed_from_moving)?;
+        let around = BorderStrokes::of(both, &best.found.fixed_from_moving)?;
         let [ink, wood] = around.without();
         let (closer, spread) = self.steadied(&Refiner::new(&ink, &wood), &best.found);
-        let agree = Surroundings::of(both, &closer.fixed_from_moving)?.agree();
+        let agree = BorderStrokes::of(both, &closer.fixed_from_moving)?.agree();
         let full = self.at(1.0);
         let wood = full.stroke(best.cut);
         let both = [&full.ink, &wood];
         let alone = if agree {
             None
         } else {
-            Some(Surroundings::of(both, &closer.fixed_from_moving)?.without())
+            Some(BorderStrokes::of(both, &closer.fixed_from_moving)?.without())
         };
         let [ink, wood] = alone.as_ref().map_or(both, |[ink, wood]| [ink, wood]);
         let refiner = Refiner::new(ink, wood);
@@ -246,11 +249,11 @@ impl Pictures {
 
     /// The best of the answers from the pose and from a smaller and a larger one, and how far the others lie from it: few
     /// or broken strokes hold a pose where it happens to be.
-    fn steadied(&self, refiner: &Refiner, pose: &Found) -> (Found, f64) {
+    fn steadied(&self, refiner: &Refiner, pose: &PoseCandidate) -> (PoseCandidate, f64) {
         let answer = |k: f64| {
             let [x, y] = pose.fixed_from_moving.apply(self.middle);
             let resize = Affine2::scale_shift(k, [x - k * x, y - k * y]);
-            let start = Found {
+            let start = PoseCandidate {
                 fixed_from_moving: resize.after(&pose.fixed_from_moving),
                 ..*pose
             };
@@ -269,7 +272,7 @@ impl Pictures {
     }
 
     /// How far two poses lay the depth map's corners apart in the mean, a share of its longest side.
-    fn apart(&self, one: &Found, other: &Found) -> f64 {
+    fn apart(&self, one: &PoseCandidate, other: &PoseCandidate) -> f64 {
         let [width, height] = self.middle.map(|middle| 2.0 * middle);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
         let distance = |corner: [f64; 2]| {
@@ -283,24 +286,24 @@ impl Pictures {
 
 /// Print and relief at one size.
 struct Scaled<'a> {
-    ink: Layer,
-    depths: Sizer<'a>,
+    ink: PyramidLevel,
+    depths: LevelBuilder<'a>,
 }
 
 impl Scaled<'_> {
     /// The strokes of a cut under the tops.
-    fn stroke(&self, cut: f64) -> Layer {
+    fn stroke(&self, cut: f64) -> PyramidLevel {
         self.depths.mapped(|d| soft_stroke(d, cut, SOFTNESS))
     }
 
-    fn strokes(&self, cuts: &[f64]) -> Vec<Layer> {
+    fn strokes(&self, cuts: &[f64]) -> Vec<PyramidLevel> {
         cuts.iter().map(|cut| self.stroke(*cut)).collect()
     }
 }
 
 /// The first few poses as read, and the best mirrored one.
 fn settle_all(cuts: &Cuts, normalized: &Normalized) -> Option<Vec<Settled>> {
-    let start = |pose: &Pose, mirrored| Found {
+    let start = |pose: &Pose, mirrored| PoseCandidate {
         fixed_from_moving: pose.print_from_depth,
         score: pose.score,
         mirrored,
@@ -312,7 +315,7 @@ fn settle_all(cuts: &Cuts, normalized: &Normalized) -> Option<Vec<Settled>> {
 }
 
 /// A pose refined with the cut that fits best, first from afar, then closely.
-fn settled(cuts: &Cuts, start: &Found) -> Option<Settled> {
+fn settled(cuts: &Cuts, start: &PoseCandidate) -> Option<Settled> {
     let close = cuts
         .fitting(start)?
         .strokes
@@ -321,7 +324,7 @@ fn settled(cuts: &Cuts, start: &Found) -> Option<Settled> {
 }
 
 /// A pose that is nearly right refined with the cut that fits best.
-fn sharpened(cuts: &Cuts, start: &Found) -> Option<Settled> {
+fn sharpened(cuts: &Cuts, start: &PoseCandidate) -> Option<Settled> {
     let strokes = cuts.fitting(start)?.strokes;
     let pose = strokes.refine(start, FEW_STEPS, Loss::Tukey);
     let fitting = cuts.fitting(&pose)?;

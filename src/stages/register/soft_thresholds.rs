@@ -1,6 +1,6 @@
 //! The relief's strokes at several cuts, and the one between them that fits the print's.
 
-use crate::stages::pose::{Found, Layer, Refiner};
+use crate::stages::pose::{PoseCandidate, PyramidLevel, Refiner};
 
 /// Cuts under the tops, as shares of the relief. The ink of a print spreads; strokes cut too thin or too thick for it
 /// would pull the scale.
@@ -34,7 +34,7 @@ pub(super) struct Fitting<'a, 'b> {
     /// They, ready to be laid on the ink.
     pub(super) strokes: &'b Refiner<'a>,
     /// The pose with its score.
-    pub(super) found: Found,
+    pub(super) found: PoseCandidate,
     /// The cut that fits best, between those that were tried: a choice between cuts that fit alike would make the
     /// answer jump.
     pub(super) cut: f64,
@@ -44,19 +44,19 @@ pub(super) struct Fitting<'a, 'b> {
 
 impl<'a> Cuts<'a> {
     /// Of one layer a cut.
-    pub(super) fn new(cuts: &'a [f64], ink: &'a Layer, woods: &'a [Layer]) -> Self {
+    pub(super) fn new(cuts: &'a [f64], ink: &'a PyramidLevel, woods: &'a [PyramidLevel]) -> Self {
         Self {
             cuts,
-            refiners: Refiner::each(ink, woods),
+            refiners: Refiner::for_levels(ink, woods),
         }
     }
 
     /// What fits best at a pose.
-    pub(super) fn fitting<'b>(&'b self, pose: &Found) -> Option<Fitting<'a, 'b>> {
+    pub(super) fn fitting<'b>(&'b self, pose: &PoseCandidate) -> Option<Fitting<'a, 'b>> {
         let scores: Vec<f64> = self
             .refiners
             .iter()
-            .map(|strokes| strokes.judged(pose).score)
+            .map(|strokes| strokes.evaluate(pose).score)
             .collect();
         let best = highest(&scores);
         let at = summit(&scores);
@@ -64,7 +64,7 @@ impl<'a> Cuts<'a> {
         let first = at as usize;
         Some(Fitting {
             strokes: self.refiners.get(best)?,
-            found: Found {
+            found: PoseCandidate {
                 score: scores[best],
                 ..*pose
             },
@@ -74,7 +74,7 @@ impl<'a> Cuts<'a> {
     }
 
     /// The scores of two poses, each with the strokes of one of the cuts, on the same ground.
-    pub(super) fn duel(&self, [one, two]: [(usize, &Found); 2]) -> [f64; 2] {
+    pub(super) fn duel(&self, [one, two]: [(usize, &PoseCandidate); 2]) -> [f64; 2] {
         self.refiners[one.0].duel(one.1, &self.refiners[two.0], two.1)
     }
 }

@@ -48,7 +48,7 @@ impl SsimWindow {
 
 /// Means over the map, its rim of half a window left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Structure {
+pub struct SsimScores {
     /// Mean structural similarity.
     pub ssim: f64,
     /// Mean of `(2 s_xy + C2) / (s_x^2 + s_y^2 + C2)`: without the luminance factor.
@@ -57,7 +57,7 @@ pub struct Structure {
 
 /// A mask with its windowed means, kept to compare many masks with one.
 #[derive(Debug, Clone)]
-pub struct WindowMeans {
+pub struct SsimReference {
     mask: Mask,
     /// Where the mask is set.
     pub(super) bounds: Option<PixelBox>,
@@ -67,7 +67,7 @@ pub struct WindowMeans {
     covariance_factor: f64,
 }
 
-impl WindowMeans {
+impl SsimReference {
     /// Computes the windowed means of a mask.
     pub fn new(mask: &Mask, window: SsimWindow) -> Self {
         let taps = Taps::new(window.taps());
@@ -85,8 +85,8 @@ impl WindowMeans {
         &self.mask
     }
 
-    /// Structure of this mask against another of the same size.
-    pub fn against(&self, other: &Mask) -> Structure {
+    /// Returns the SSIM scores of this mask against another of the same size.
+    pub fn compare(&self, other: &Mask) -> SsimScores {
         self.compared::<true>(other)
     }
 
@@ -96,7 +96,7 @@ impl WindowMeans {
     }
 
     /// Without `LUMINANCE` the first of the two means is not computed.
-    fn compared<const LUMINANCE: bool>(&self, other: &Mask) -> Structure {
+    fn compared<const LUMINANCE: bool>(&self, other: &Mask) -> SsimScores {
         let count = self.means.data().len();
         let mut both = other.clone();
         let pairs = self.mask.data().iter().zip(other.data());
@@ -121,7 +121,7 @@ impl WindowMeans {
     /// The windows that see something of this mask or of another.
     fn touched(&self, other: &Mask) -> Windows {
         let boxes = [self.bounds, other.bounding_box()];
-        let Some(bounds) = boxes.into_iter().flatten().reduce(PixelBox::around) else {
+        let Some(bounds) = boxes.into_iter().flatten().reduce(PixelBox::union) else {
             return Windows::default();
         };
         let lost = self.taps.lost();
@@ -187,9 +187,9 @@ impl Sums {
     }
 
     /// Means over `count` windows, of which some that were not added agree wholly.
-    fn mean(&self, alike: usize, count: usize) -> Structure {
+    fn mean(&self, alike: usize, count: usize) -> SsimScores {
         let mean = |sums: &[f64]| (sums.iter().sum::<f64>() + alike as f64) / count.max(1) as f64;
-        Structure {
+        SsimScores {
             ssim: mean(&self.ssim),
             nl_ssim: mean(&self.nl_ssim),
         }
@@ -316,7 +316,7 @@ fn mixed<const HALF: usize>(weights: [f64; HALF], across: &[f64], y: usize, mean
 
 #[cfg(test)]
 mod tests {
-    use super::{SsimWindow, WindowMeans};
+    use super::{SsimReference, SsimWindow};
     use crate::raster::Mask;
 
     /// Two masks that any language can rebuild: a disc and a turned, shifted box with holes.
@@ -335,22 +335,26 @@ mod tests {
     #[test]
     fn equals_scikit_image_gaussian() {
         let (a, b) = reference_masks();
-        let got = WindowMeans::new(&a, SsimWindow::Gaussian).against(&b).ssim;
+        let got = SsimReference::new(&a, SsimWindow::Gaussian)
+            .compare(&b)
+            .ssim;
         assert!((got - GAUSSIAN).abs() < 1e-9, "{got}");
     }
 
     #[test]
     fn equals_scikit_image_uniform() {
         let (a, b) = reference_masks();
-        let got = WindowMeans::new(&a, SsimWindow::Uniform7).against(&b).ssim;
+        let got = SsimReference::new(&a, SsimWindow::Uniform7)
+            .compare(&b)
+            .ssim;
         assert!((got - UNIFORM).abs() < 1e-9, "{got}");
     }
 
     #[test]
     fn structure_part_equals_the_formula_in_numpy() {
         let (a, b) = reference_masks();
-        let means = WindowMeans::new(&a, SsimWindow::Gaussian);
-        let got = means.against(&b).nl_ssim;
+        let means = SsimReference::new(&a, SsimWindow::Gaussian);
+        let got = means.compare(&b).nl_ssim;
         assert!((got - STRUCTURE).abs() < 1e-9, "{got}");
         assert_eq!(means.nl_ssim(&b), got);
     }

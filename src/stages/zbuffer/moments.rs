@@ -3,7 +3,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Block, LANES, Lanes, Shell};
+use super::{Block, IndexedSurface, LANES, Lanes};
 use crate::simd::dispatch;
 use crate::stages::robust_bounds::Bounds;
 
@@ -21,7 +21,7 @@ pub(in crate::stages) struct Moments {
 
 impl Moments {
     /// Of the triangles that lie in the bulk; `None` where they have no area.
-    pub(in crate::stages) fn of(shell: &Shell) -> Option<Self> {
+    pub(in crate::stages) fn of(shell: &IndexedSurface) -> Option<Self> {
         if !shell.has_faces {
             return None;
         }
@@ -68,7 +68,7 @@ struct Around {
 }
 
 impl Around {
-    fn of(shell: &Shell) -> Self {
+    fn of(shell: &IndexedSurface) -> Self {
         let [low, high]: Bounds<3> = shell.room;
         let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
         let extent = sides.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b));
@@ -131,7 +131,7 @@ mod tests {
 
     use super::Moments;
     use crate::mesh::Mesh;
-    use crate::stages::zbuffer::Shell;
+    use crate::stages::zbuffer::IndexedSurface;
 
     /// Each triangle is cut into this many rows of small ones.
     const ROWS: usize = 40;
@@ -178,7 +178,7 @@ mod tests {
         ) {
             let triangles = (0..places.len() as u32 - 2).map(|i| [i, i + 1, i + 2]).collect();
             let mesh = Mesh { vertices: places.into(), triangles };
-            let found = Moments::of(&Shell::new(&mesh)).expect("there is area");
+            let found = Moments::of(&IndexedSurface::new(&mesh)).expect("there is area");
             let (centre, covariance) = of_small_triangles(&mesh);
             for i in 0..3 {
                 prop_assert!((found.centre[i] - centre[i]).abs() < 1e-4);
@@ -208,7 +208,7 @@ mod tests {
             vertices: vertices.into(),
             triangles: triangles.into(),
         };
-        let of = |mesh: &Mesh| Moments::of(&Shell::new(mesh)).expect("there is area");
+        let of = |mesh: &Mesh| Moments::of(&IndexedSurface::new(mesh)).expect("there is area");
         let apart = of(&plain).centre - of(&flecked).centre;
         assert!(apart.norm() < 1e-3, "{apart}");
     }

@@ -1,15 +1,15 @@
 //! A shell seen along a direction: what the ray of each pixel meets, the highest first.
 
-use super::block::{Block, LANES, Row, fill_block, holding};
-use super::triangle::pixels;
-use super::{Shell, View};
+use super::triangle_block::{Block, LANES, Row, fill_block, holding};
+use super::triangle_fill::pixels;
+use super::{IndexedSurface, Viewport};
 use crate::domain::Rigid3;
 use crate::raster::Grid;
 use crate::simd::{dispatch, higher};
 use crate::stages::robust_bounds::bulk_along;
 
 /// Height of a pixel that no surface covers.
-pub(in crate::stages) const NOTHING: f32 = f32::NEG_INFINITY;
+pub(in crate::stages) const NO_HIT: f32 = f32::NEG_INFINITY;
 
 /// Where so many triangles come to a pixel, few blocks hold one's centre.
 const MANY_A_PIXEL: usize = 16;
@@ -17,10 +17,10 @@ const MANY_A_PIXEL: usize = 16;
 /// Points of a set without faces are grown to this many times half their mean spacing, so that no holes stay.
 const POINT_GROWTH: f64 = 1.5;
 
-impl Shell {
-    /// The highest z of a frame under each pixel's centre; [`NOTHING`] where the ray meets no surface.
-    pub(in crate::stages) fn render(&self, plane_from_mesh: &Rigid3, view: &View) -> Grid<f32> {
-        let mut heights = Grid::new(view.width, view.height, NOTHING);
+impl IndexedSurface {
+    /// The highest z of a frame under each pixel's centre; [`NO_HIT`] where the ray meets no surface.
+    pub(in crate::stages) fn render(&self, plane_from_mesh: &Rigid3, view: &Viewport) -> Grid<f32> {
+        let mut heights = Grid::new(view.width, view.height, NO_HIT);
         self.raster(plane_from_mesh, view, |place, z| {
             let height = &mut heights.data_mut()[place];
             *height = higher(z, *height);
@@ -29,12 +29,12 @@ impl Shell {
     }
 
     /// The highest z, and seen from the other side the highest of -z: of `plane_from_mesh` turned about its x axis.
-    pub(in crate::stages) fn render_both(
+    pub(in crate::stages) fn render_both_sides(
         &self,
         plane_from_mesh: &Rigid3,
-        view: &View,
+        view: &Viewport,
     ) -> [Grid<f32>; 2] {
-        let mut heights = Grid::new(view.width, view.height, [NOTHING; 2]);
+        let mut heights = Grid::new(view.width, view.height, [NO_HIT; 2]);
         self.raster(plane_from_mesh, view, |place, z| {
             let [front, back] = &mut heights.data_mut()[place];
             *front = higher(z, *front);
@@ -48,7 +48,7 @@ impl Shell {
     }
 
     /// Rows that give a column and a row of a view, and a height.
-    fn view_rows(&self, plane_from_mesh: &Rigid3, view: &View) -> [Row; 3] {
+    fn view_rows(&self, plane_from_mesh: &Rigid3, view: &Viewport) -> [Row; 3] {
         let [x, y, z] = self.rows(plane_from_mesh);
         let [[a, b, c], [d, e, f]] = view.px_from_plane.0;
         let mixed = |p: f64, q: f64, r: f64| {
@@ -59,7 +59,7 @@ impl Shell {
 
     /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet, and with what is no
     /// number.
-    fn raster(&self, plane_from_mesh: &Rigid3, view: &View, meet: impl FnMut(usize, f32)) {
+    fn raster(&self, plane_from_mesh: &Rigid3, view: &Viewport, meet: impl FnMut(usize, f32)) {
         let rows = self.view_rows(plane_from_mesh, view);
         let size = [view.width, view.height];
         if !self.has_faces {
@@ -150,7 +150,7 @@ impl Shell {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{NOTHING, Shell, View};
+    use super::{IndexedSurface, NO_HIT, Viewport};
     use crate::domain::{Affine2, Rigid3};
     use crate::mesh::Mesh;
 
@@ -163,7 +163,7 @@ mod tests {
 
     /// The slow obvious twin: one ray at a time against every triangle. Also says how true single precision can be
     /// there, which is less on slivers, and whether the ray passes too near to an edge to tell.
-    fn cast(mesh: &Mesh, view: &View, x: usize, y: usize) -> (Option<f64>, f64, bool) {
+    fn cast(mesh: &Mesh, view: &Viewport, x: usize, y: usize) -> (Option<f64>, f64, bool) {
         let mut best: Option<f64> = None;
         let (mut tolerance, mut near_edge) = (1e-5_f64, false);
         for t in &mesh.triangles {
@@ -210,8 +210,8 @@ mod tests {
     proptest! {
         #[test]
         fn equals_a_ray_caster(mesh in soup()) {
-            let view = View::around([[0.0, 0.0], [10.0, 10.0]], 24, true);
-            let heights = Shell::new(&mesh).render(&UPRIGHT, &view);
+            let view = Viewport::around([[0.0, 0.0], [10.0, 10.0]], 24, true);
+            let heights = IndexedSurface::new(&mesh).render(&UPRIGHT, &view);
             for y in 0..view.height {
                 for x in 0..view.width {
                     let got = heights.at(x, y);
@@ -220,7 +220,7 @@ mod tests {
                         (Some(z), tolerance, false) => {
                             prop_assert!((f64::from(got) - z).abs() < tolerance);
                         }
-                        (None, _, false) => prop_assert!(got == NOTHING),
+                        (None, _, false) => prop_assert!(got == NO_HIT),
                     }
                 }
             }
@@ -244,8 +244,8 @@ mod tests {
                 [[turn.cos(), turn.sin(), 0.0], [-turn.sin(), turn.cos(), 0.0], [0.0, 0.0, 1.0]],
                 [0.0; 3],
             );
-            let shell = Shell::new(&many);
-            let view = View::around(shell.bounds(&frame), 16, false);
+            let shell = IndexedSurface::new(&many);
+            let view = Viewport::around(shell.bounds(&frame), 16, false);
             let rows = shell.view_rows(&frame, &view);
             let size = [view.width, view.height];
             let mut filled = [Vec::new(), Vec::new()];
@@ -268,13 +268,13 @@ mod tests {
                 .push([angle.cos() * 5.0, angle.sin() * 5.0, 0.0]);
             mesh.triangles.push([0, 1 + k, 1 + (k + 1) % n]);
         }
-        let view = View {
+        let view = Viewport {
             px_from_plane: Affine2::scale_shift(10.0, [60.0, 60.0]),
             width: 121,
             height: 121,
             unit_per_px: 0.1,
         };
-        let heights = Shell::new(&mesh).render(&UPRIGHT, &view);
+        let heights = IndexedSurface::new(&mesh).render(&UPRIGHT, &view);
         for y in 0..121_i64 {
             for x in 0..121_i64 {
                 let inside = (x - 60).pow(2) + (y - 60).pow(2) < 49 * 49;
@@ -285,8 +285,8 @@ mod tests {
 
     #[test]
     fn mirrored_view_reflects_x_only() {
-        let plain = View::around([[0.0, 0.0], [10.0, 6.0]], 64, false);
-        let mirrored = View::around([[0.0, 0.0], [10.0, 6.0]], 64, true);
+        let plain = Viewport::around([[0.0, 0.0], [10.0, 6.0]], 64, false);
+        let mirrored = Viewport::around([[0.0, 0.0], [10.0, 6.0]], 64, true);
         let [x, y] = plain.px_from_plane.apply([2.0, 1.0]);
         let [u, v] = mirrored.px_from_plane.apply([8.0, 1.0]);
         assert!((x - u).abs() < 1e-9 && (y - v).abs() < 1e-9);
@@ -303,8 +303,8 @@ mod tests {
             vertices,
             triangles: Vec::new().into(),
         };
-        let shell = Shell::new(&mesh);
-        let view = View::around(shell.bounds(&UPRIGHT), 128, false);
+        let shell = IndexedSurface::new(&mesh);
+        let view = Viewport::around(shell.bounds(&UPRIGHT), 128, false);
         let heights = shell.render(&UPRIGHT, &view);
         let covered = heights.data().iter().filter(|z| **z == 1.0).count();
         assert!(covered > 120 * 120, "{covered}");

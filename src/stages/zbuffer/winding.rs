@@ -1,14 +1,14 @@
 //! Which way a surface's faces look.
 
-use super::{LANES, Lanes, Shell};
+use super::{IndexedSurface, LANES, Lanes};
 use crate::domain::Rigid3;
 
 /// About so many blocks are looked at: a share is told well enough by tens of thousands of triangles.
 const LOOKED_AT: usize = 8_192;
 
-impl Shell {
+impl IndexedSurface {
     /// Share of the area, as seen along z of a frame, whose winding looks up; `None` without faces.
-    pub(in crate::stages) fn outward_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
+    pub(in crate::stages) fn upward_facing_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
         if !self.has_faces {
             return None;
         }

@@ -3,9 +3,9 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mocban::raster::{Limits, decode};
+use mocban::raster::{ImageLimits, decode};
 
-const LIMITS: Limits = Limits {
+const LIMITS: ImageLimits = ImageLimits {
     max_bytes: 1 << 20,
     max_pixels: 1 << 16,
 };

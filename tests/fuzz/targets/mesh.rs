@@ -3,10 +3,10 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mocban::mesh::{Limits, read};
+use mocban::mesh::{MeshLimits, read};
 
 /// Small enough that every limit is met by small files.
-const LIMITS: Limits = Limits {
+const LIMITS: MeshLimits = MeshLimits {
     max_bytes: 1 << 20,
     max_vertices: 5000,
     max_triangles: 5000,

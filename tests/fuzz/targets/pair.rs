@@ -7,10 +7,10 @@ use std::sync::OnceLock;
 use libfuzzer_sys::fuzz_target;
 use mocban::config::{Config, Sources, load};
 use mocban::mesh;
-use mocban::raster::{Picture, decode};
+use mocban::raster::{PrintImage, decode};
 use mocban::stages::{StageError, depth, fit, normalize, register};
 
-const LIMITS: mesh::Limits = mesh::Limits {
+const LIMITS: mesh::MeshLimits = mesh::MeshLimits {
     max_bytes: 1 << 20,
     max_vertices: 5000,
     max_triangles: 5000,
@@ -21,8 +21,8 @@ fn config() -> &'static Config {
     CONFIG.get_or_init(|| load(&Sources::default()).expect("the defaults").config)
 }
 
-fn prints() -> &'static [Picture] {
-    static PRINTS: OnceLock<Vec<Picture>> = OnceLock::new();
+fn prints() -> &'static [PrintImage] {
+    static PRINTS: OnceLock<Vec<PrintImage>> = OnceLock::new();
     PRINTS.get_or_init(|| {
         let limits = config().limits.image;
         let images = mocban_fuzz::images();
@@ -33,7 +33,7 @@ fn prints() -> &'static [Picture] {
     })
 }
 
-fn align(bytes: &[u8], print: &Picture) -> Result<(), StageError> {
+fn align(bytes: &[u8], print: &PrintImage) -> Result<(), StageError> {
     let settings = &config().stages;
     let Ok(mesh) = mesh::read(bytes, "scan.stl", &LIMITS) else {
         return Ok(());

@@ -1,13 +1,15 @@
 //! A picture brought to working size, its slow variation taken out.
 
 use crate::domain::Affine2;
-use crate::raster::{Grid, Mask, PixelBox, resample, resample_made, resample_turned};
+use crate::raster::{
+    Grid, Mask, PixelBox, resample, resample_rows_transposed, resample_transposed,
+};
 use crate::simd::dispatch;
-use crate::stages::blur::{blur, blur_turned};
+use crate::stages::blur::{gaussian_blur, gaussian_blur_transposed};
 
 /// How much of something each pixel holds, 0..=1, and where that is known.
 #[derive(Debug, Clone)]
-pub(in crate::stages) struct Soft {
+pub(in crate::stages) struct SoftMask {
     /// Ink of a print, or nearness to the tops of a relief.
     pub(in crate::stages) amount: Grid<f32>,
     /// Where the picture holds data.
@@ -16,7 +18,7 @@ pub(in crate::stages) struct Soft {
 
 /// A soft picture at the largest working size, from which its layers are made.
 #[derive(Debug, Clone)]
-pub(in crate::stages) struct Base {
+pub(in crate::stages) struct ImagePyramid {
     /// Amount where it is known, zero elsewhere.
     present: Grid<f32>,
     known: Grid<f32>,
@@ -27,7 +29,7 @@ pub(in crate::stages) struct Base {
 
 /// A soft picture at working size: mean near zero everywhere, zero where nothing is known.
 #[derive(Debug, Clone)]
-pub(in crate::stages) struct Layer {
+pub(in crate::stages) struct PyramidLevel {
     pub(super) value: Grid<f32>,
     /// What `value` was made from: 0..=1, zero where nothing is known.
     pub(super) amount: Grid<f32>,
@@ -43,16 +45,16 @@ const SLOW_PX: usize = 48;
 /// Where less than this share of a working pixel is known, it holds nothing.
 const LEAST_KNOWN: f32 = 0.5;
 
-impl Soft {
+impl SoftMask {
     /// Box around what is known; `None` when nothing is.
     pub(in crate::stages) fn bounds(&self) -> Option<PixelBox> {
         self.known.bounding_box()
     }
 }
 
-impl Base {
+impl ImagePyramid {
     /// Brings a picture to `size` pixels along the longest side of what it knows; `None` when it knows nothing.
-    pub(in crate::stages) fn new(soft: &Soft, size: usize) -> Option<Self> {
+    pub(in crate::stages) fn new(soft: &SoftMask, size: usize) -> Option<Self> {
         let bounds = soft.bounds()?;
         let longest = bounds.width().max(bounds.height()) as f64;
         let scale = size as f64 / longest;
@@ -62,7 +64,7 @@ impl Base {
         ];
         let (sides, shift) = framed([bounds.width(), bounds.height()], middle, scale);
         let from = [soft.known.width(), soft.known.height()];
-        let present = resample_made(
+        let present = resample_rows_transposed(
             from,
             #[inline(always)]
             |y, row| {
@@ -75,7 +77,7 @@ impl Base {
             shift,
             sides,
         );
-        let known = resample_made(
+        let known = resample_rows_transposed(
             from,
             #[inline(always)]
             |y, row| {
@@ -105,19 +107,19 @@ impl Base {
     }
 
     /// The layer of `size` pixels along the longest side of what is known, smoothed by `sigma` pixels.
-    pub(in crate::stages) fn layer(&self, size: usize, sigma: f64) -> Layer {
+    pub(in crate::stages) fn layer(&self, size: usize, sigma: f64) -> PyramidLevel {
         self.at(size, sigma).plain()
     }
 
     /// Ready to make layers of one size and smoothing.
-    pub(in crate::stages) fn at(&self, size: usize, sigma: f64) -> Sizer<'_> {
-        Sizer::new(self, size, sigma)
+    pub(in crate::stages) fn at(&self, size: usize, sigma: f64) -> LevelBuilder<'_> {
+        LevelBuilder::new(self, size, sigma)
     }
 }
 
 /// What all layers of one size and smoothing of a picture share.
-pub(in crate::stages) struct Sizer<'a> {
-    base: &'a Base,
+pub(in crate::stages) struct LevelBuilder<'a> {
+    base: &'a ImagePyramid,
     size: usize,
     sigma: f64,
     scale: f64,
@@ -128,13 +130,14 @@ pub(in crate::stages) struct Sizer<'a> {
     slow_weight: Grid<f32>,
 }
 
-impl<'a> Sizer<'a> {
-    fn new(base: &'a Base, size: usize, sigma: f64) -> Self {
+impl<'a> LevelBuilder<'a> {
+    fn new(base: &'a ImagePyramid, size: usize, sigma: f64) -> Self {
         let scale = size as f64 / base.size;
         let sides = [base.known.width(), base.known.height()];
         let middle = sides.map(|side| (side - 1) as f64 / 2.0);
         let (sides, shift) = framed(sides, middle, scale);
-        let weight = blur_turned(resample_turned(&base.known, scale, shift, sides), sigma);
+        let weight =
+            gaussian_blur_transposed(resample_transposed(&base.known, scale, shift, sides), sigma);
         Self {
             slow_weight: slow(&weight, size),
             base,
@@ -148,9 +151,9 @@ impl<'a> Sizer<'a> {
     }
 
     /// The layer of the picture with each known pixel's amount replaced.
-    pub(in crate::stages) fn mapped(&self, amount: impl Fn(f32) -> f32) -> Layer {
-        let Base { present, known, .. } = self.base;
-        self.layer(resample_made(
+    pub(in crate::stages) fn mapped(&self, amount: impl Fn(f32) -> f32) -> PyramidLevel {
+        let ImagePyramid { present, known, .. } = self.base;
+        self.layer(resample_rows_transposed(
             [present.width(), present.height()],
             #[inline(always)]
             |y, row| {
@@ -165,14 +168,16 @@ impl<'a> Sizer<'a> {
         ))
     }
 
-    fn plain(&self) -> Layer {
+    fn plain(&self) -> PyramidLevel {
         let present = &self.base.present;
-        self.layer(resample_turned(present, self.scale, self.shift, self.sides))
+        self.layer(resample_transposed(
+            present, self.scale, self.shift, self.sides,
+        ))
     }
 
     /// Of amounts at its size, their rows and columns changed for each other.
-    fn layer(&self, turned: Grid<f32>) -> Layer {
-        let mut amount = blur_turned(turned, self.sigma);
+    fn layer(&self, turned: Grid<f32>) -> PyramidLevel {
+        let mut amount = gaussian_blur_transposed(turned, self.sigma);
         // What is slow becomes the value without it.
         let mut value = slow(&amount, self.size);
         let mut held = self.weight.clone();
@@ -194,7 +199,7 @@ impl<'a> Sizer<'a> {
                 }
             },
         );
-        Layer {
+        PyramidLevel {
             value,
             amount,
             weight: held,
@@ -222,14 +227,14 @@ fn least(weight: f32) -> f32 {
 /// The slow variation of a layer of `size` pixels along the longest side of what is known.
 fn slow(values: &Grid<f32>, size: usize) -> Grid<f32> {
     if size <= SLOW_PX {
-        return blur(values, SLOW * size as f64);
+        return gaussian_blur(values, SLOW * size as f64);
     }
     let sides = [values.width(), values.height()];
     let middle = sides.map(|side| (side - 1) as f64 / 2.0);
     let scale = SLOW_PX as f64 / size as f64;
     let (few, shift) = framed(sides, middle, scale);
-    let small = resample_turned(values, scale, shift, few);
-    let small = blur_turned(small, SLOW * SLOW_PX as f64);
+    let small = resample_transposed(values, scale, shift, few);
+    let small = gaussian_blur_transposed(small, SLOW * SLOW_PX as f64);
     resample(&small, 1.0 / scale, shift.map(|s| -s / scale), sides)
 }
 
@@ -240,7 +245,7 @@ fn framed(sides: [usize; 2], middle: [f64; 2], scale: f64) -> ([usize; 2], [f64;
     (half.map(|half| 2 * half as usize + 1), shift)
 }
 
-impl Layer {
+impl PyramidLevel {
     /// The same, known only on some ground: 1 there, 0 elsewhere.
     pub(super) fn known_on(&self, ground: Grid<f32>) -> Self {
         let over = |values: &Grid<f32>| {

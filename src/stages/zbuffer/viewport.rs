@@ -5,7 +5,7 @@ use crate::stages::robust_bounds::Bounds;
 
 /// Where the pixels of a rendering lie in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stages) struct View {
+pub(in crate::stages) struct Viewport {
     /// Plane x, y to pixels.
     pub(in crate::stages) px_from_plane: Affine2,
     /// Columns.
@@ -16,7 +16,7 @@ pub(in crate::stages) struct View {
     pub(in crate::stages) unit_per_px: f64,
 }
 
-impl View {
+impl Viewport {
     /// A view of the bounds whose longest side takes `longest_px` pixels, one of them free on each side.
     ///
     /// The bounds' middle is the view's, so a mesh turned by a right angle is seen by the same rays.

@@ -3,11 +3,11 @@
 //! Walls, frame lines and neighbours do, and go on beyond it. Which of them happens to lie on which tells nothing of the
 //! character, yet would decide where a symmetric one reads as well turned or in the mirror.
 
-use super::Layer;
-use super::layer::{Between, sample};
+use super::PyramidLevel;
+use super::pyramid::{Between, sample};
 use crate::domain::Affine2;
 use crate::raster::{Grid, Mask};
-use crate::stages::components::Components;
+use crate::stages::components::ConnectedComponents;
 
 /// Amounts above this are strokes.
 const STROKE: f32 = 0.3;
@@ -19,29 +19,29 @@ const RIM_PX: usize = 3;
 /// this share of the size along the border is left out instead.
 const MOST_STRAYS: f64 = 0.5;
 const BAND: f64 = 0.1;
-/// Surroundings agree when they meet this many times as much of each other as the character does.
+/// The border strokes agree when they meet this many times as much of each other as the character does.
 const AS_WELL: f64 = 0.75;
 
 /// 1 where a layer is known and free of what runs into its border, 0 elsewhere.
-pub(super) fn own_ground(layer: &Layer) -> Grid<f32> {
+pub(super) fn own_ground(layer: &PyramidLevel) -> Grid<f32> {
     Strokes::of(layer).ground(layer)
 }
 
 /// Two layers at a pose, and what of them runs into the border. What the other layer has strokes for that do not is no
 /// stray: there it is the character that hangs on its surroundings.
-pub(in crate::stages) struct Surroundings<'a> {
-    layers: [&'a Layer; 2],
+pub(in crate::stages) struct BorderStrokes<'a> {
+    layers: [&'a PyramidLevel; 2],
     strokes: [Strokes; 2],
     moving_from_fixed: Affine2,
 }
 
-impl<'a> Surroundings<'a> {
+impl<'a> BorderStrokes<'a> {
     /// Of a fixed and a moving layer; `None` for a map that cannot be turned round.
     pub(in crate::stages) fn of(
-        layers: [&'a Layer; 2],
+        layers: [&'a PyramidLevel; 2],
         fixed_from_moving: &Affine2,
     ) -> Option<Self> {
-        let onto = |a: &Layer, b: &Layer, b_from_a: &Affine2| {
+        let onto = |a: &PyramidLevel, b: &PyramidLevel, b_from_a: &Affine2| {
             let from_work = a.work_from_image.inverse()?;
             Some(b.work_from_image.after(b_from_a).after(&from_work))
         };
@@ -59,7 +59,7 @@ impl<'a> Surroundings<'a> {
     }
 
     /// The layers without them.
-    pub(in crate::stages) fn without(&self) -> [Layer; 2] {
+    pub(in crate::stages) fn without(&self) -> [PyramidLevel; 2] {
         [0, 1].map(|k: usize| self.layers[k].known_on(self.strokes[k].ground(self.layers[k])))
     }
 
@@ -98,10 +98,10 @@ struct Strokes {
 }
 
 impl Strokes {
-    fn of(layer: &Layer) -> Self {
+    fn of(layer: &PyramidLevel) -> Self {
         let all = layer.amount.map(|amount| *amount > STROKE);
         let unknown = layer.weight.map(|weight| *weight == 0.0);
-        let strays = Components::of(&all).near(&unknown, BORDER_PX);
+        let strays = ConnectedComponents::label(&all).touching(&unknown, BORDER_PX);
         Self { all, strays }
     }
 
@@ -124,7 +124,7 @@ impl Strokes {
     }
 
     /// 1 where the layer is known and free of strays, 0 elsewhere.
-    fn ground(&self, layer: &Layer) -> Grid<f32> {
+    fn ground(&self, layer: &PyramidLevel) -> Grid<f32> {
         if self.strays.count() as f64 > MOST_STRAYS * self.all.count() as f64 {
             without_band(&layer.weight)
         } else {
@@ -164,10 +164,10 @@ fn without_band(weight: &Grid<f32>) -> Grid<f32> {
 
 #[cfg(test)]
 pub(super) mod tests {
-    use super::Surroundings;
+    use super::BorderStrokes;
     use crate::domain::Affine2;
     use crate::raster::{Grid, Mask};
-    use crate::stages::pose::{Base, Layer, Soft};
+    use crate::stages::pose::{ImagePyramid, PyramidLevel, SoftMask};
 
     pub(in crate::stages::pose) const SIDE: usize = 64;
     /// A cross in the middle, and bars that run into the left and the right border.
@@ -178,25 +178,25 @@ pub(super) mod tests {
     const BRIDGE: [usize; 4] = [4, 30, 20, 35];
 
     /// Bars as boxes of left, top, right and bottom, right and bottom not in them.
-    pub(in crate::stages::pose) fn layer(bars: &[[usize; 4]]) -> Layer {
+    pub(in crate::stages::pose) fn layer(bars: &[[usize; 4]]) -> PyramidLevel {
         let on = |x, y| {
             let mut bars = bars.iter();
             bars.any(|[l, t, r, b]| (*l..*r).contains(&x) && (*t..*b).contains(&y))
         };
-        let soft = Soft {
+        let soft = SoftMask {
             amount: Grid::from_fn(SIDE, SIDE, |x, y| f32::from(u8::from(on(x, y)))),
             known: Mask::new(SIDE, SIDE, true),
         };
-        let base = Base::new(&soft, SIDE).expect("something is known");
+        let base = ImagePyramid::new(&soft, SIDE).expect("something is known");
         base.layer(SIDE, 0.8)
     }
 
-    fn as_they_lie<'a>(fixed: &'a Layer, moving: &'a Layer) -> Surroundings<'a> {
-        let around = Surroundings::of([fixed, moving], &Affine2::IDENTITY);
+    fn as_they_lie<'a>(fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> BorderStrokes<'a> {
+        let around = BorderStrokes::of([fixed, moving], &Affine2::IDENTITY);
         around.expect("the map can be turned round")
     }
 
-    fn amount(layer: &Layer, x: usize, y: usize) -> f32 {
+    fn amount(layer: &PyramidLevel, x: usize, y: usize) -> f32 {
         let [x, y] = layer.work_from_image.apply([x as f64, y as f64]);
         layer.amount.at(x.round() as usize, y.round() as usize)
     }

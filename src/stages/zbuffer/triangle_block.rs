@@ -1,7 +1,7 @@
 //! A few triangles side by side, and which of them may hold a pixel's centre.
 
-use super::small::Small;
-use super::triangle::fill;
+use super::small_triangles::Small;
+use super::triangle_fill::fill;
 use crate::simd::{higher, lower, whole_below};
 
 /// Triangles that are asked together whether they hold a pixel's centre: most of a scan's are too small.

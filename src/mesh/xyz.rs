@@ -1,20 +1,20 @@
 //! XYZ point sets: lines of numbers, the first three of each a position.
 
-use super::{Error, Limits, Mesh, error, text};
+use super::{Mesh, MeshError, MeshLimits, error, text};
 
 /// Bytes of the shortest line: three digits, two spaces, an end.
 const SHORTEST_LINE: usize = 6;
 
 /// Reads positions; further columns such as normals and colours are left out. Commas and semicolons may stand
 /// between numbers. The first line may be a count or the columns' names.
-pub(super) fn read(bytes: &[u8], limits: &Limits) -> Result<Mesh, Error> {
+pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let mut vertices = Vec::with_capacity((bytes.len() / SHORTEST_LINE).min(1 << 16));
     let mut first = true;
     for (line_number, line) in text::lines(bytes) {
         if is_comment(line) || (std::mem::take(&mut first) && is_title(line)) {
             continue;
         }
-        let position = text::position(cells(line)).map_err(|reason| Error::Line {
+        let position = text::position(cells(line)).map_err(|reason| MeshError::Line {
             line: line_number,
             reason,
         })?;
@@ -59,10 +59,10 @@ fn cells(line: &[u8]) -> impl Iterator<Item = &[u8]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Error, Limits, Mesh, read};
+    use super::super::{Mesh, MeshError, MeshLimits, read};
 
-    fn open(text: &str) -> Result<Mesh, Error> {
-        read(text.as_bytes(), "scan.xyz", &Limits::SUGGESTED)
+    fn open(text: &str) -> Result<Mesh, MeshError> {
+        read(text.as_bytes(), "scan.xyz", &MeshLimits::SUGGESTED)
     }
 
     #[test]
@@ -95,8 +95,8 @@ mod tests {
         );
         assert!(matches!(
             open("1 2 3\n4 inf 6\n"),
-            Err(Error::NotFinite { vertex: 2, .. })
+            Err(MeshError::NotFinite { vertex: 2, .. })
         ));
-        assert_eq!(open("0\n"), Err(Error::NoVertices));
+        assert_eq!(open("0\n"), Err(MeshError::NoVertices));
     }
 }

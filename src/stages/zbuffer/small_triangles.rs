@@ -1,9 +1,9 @@
 //! Small triangles filled side by side: the same pixel, counted from each one's first, is asked of all together.
 //!
-//! Most triangles of a scan hold a pixel or two. Each lane computes what [`fill`](super::triangle::fill) does, to the bit
+//! Most triangles of a scan hold a pixel or two. Each lane computes what [`fill`](super::triangle_fill::fill) does, to the bit
 //! (but for the sign of a zero that two triangles share).
 
-use super::block::{LANES, Lanes};
+use super::triangle_block::{LANES, Lanes};
 use crate::simd::{higher, index, lower, whole_above, whole_below};
 
 /// Triangles that reach over more columns or rows of pixels are filled one by one.
@@ -43,7 +43,7 @@ impl Small {
         self.most == [0; 2]
     }
 
-    /// Hands `meet` places and heights as [`fill`](super::triangle::fill) does.
+    /// Hands `meet` places and heights as [`fill`](super::triangle_fill::fill) does.
     #[inline(always)]
     pub(super) fn fill(
         &self,
@@ -153,8 +153,8 @@ impl Slopes {
 mod tests {
     use proptest::prelude::*;
 
-    use super::super::block::{Block, LANES, Row, fill_block};
-    use super::super::triangle::fill;
+    use super::super::triangle_block::{Block, LANES, Row, fill_block};
+    use super::super::triangle_fill::fill;
     use crate::simd::higher;
 
     const SIZE: [usize; 2] = [9, 7];

@@ -2,21 +2,21 @@
 //!
 //! What only one of them lays on known paper would decide between poses that are else alike, so it does not count.
 
-use super::Layer;
-use super::layer::Between;
+use super::PyramidLevel;
+use super::pyramid::Between;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
 /// A moving picture with where the fixed one's pixels lie in it.
 pub(super) struct Side<'a> {
-    pub(super) moving: &'a Layer,
+    pub(super) moving: &'a PyramidLevel,
     pub(super) ground: &'a Grid<f32>,
     pub(super) moving_from_fixed: Affine2,
 }
 
 /// The scores of two poses over the ground of all pictures: correlation times the share of the moving picture's amount that
 /// meets the fixed one's, 0..=1.
-pub(super) fn duel(fixed: &Layer, paper: &Grid<f32>, sides: &[Side<'_>; 2]) -> [f64; 2] {
+pub(super) fn duel(fixed: &PyramidLevel, paper: &Grid<f32>, sides: &[Side<'_>; 2]) -> [f64; 2] {
     let mut sums = [Sums::default(); 2];
     for y in 0..paper.height() {
         for x in 0..paper.width() {
@@ -35,7 +35,7 @@ pub(super) fn duel(fixed: &Layer, paper: &Grid<f32>, sides: &[Side<'_>; 2]) -> [
             };
             let ink = [fixed.value.at(x, y), fixed.amount.at(x, y)];
             for ((at, side), sums) in [one, two].iter().zip(sides).zip(&mut sums) {
-                let Layer { value, amount, .. } = side.moving;
+                let PyramidLevel { value, amount, .. } = side.moving;
                 sums.add(ink, [value, amount].map(|of| at.value(of)));
             }
         }
@@ -81,13 +81,13 @@ impl Sums {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ground::own_ground;
+    use super::super::border_mask::own_ground;
     use super::{Side, duel};
     use crate::domain::Affine2;
-    use crate::stages::pose::Layer;
-    use crate::stages::pose::ground::tests::{SIDE, layer};
+    use crate::stages::pose::PyramidLevel;
+    use crate::stages::pose::border_mask::tests::{SIDE, layer};
 
-    fn scores(print: &Layer, relief: &Layer) -> [f64; 2] {
+    fn scores(print: &PyramidLevel, relief: &PyramidLevel) -> [f64; 2] {
         let last = (relief.amount.width() - 1) as f64;
         let as_read = Affine2([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         let mirrored = Affine2([[-1.0, 0.0, last], [0.0, 1.0, 0.0]]);
