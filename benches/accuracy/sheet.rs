@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::Context as _;
 use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
-use mocban::export::pictures::{Rgb, SheetCell, View, contact_sheet, tile_side};
+use mocban::export::pictures::{ContactSheetCell, PrintView, Rgb, contact_sheet, tile_side};
 use mocban::raster::{Grid, PrintImage, png_rgb8};
 
 use super::method::Method;
@@ -60,7 +60,7 @@ fn draw(worst: &[&Trial], method: &Method, options: &Options) -> anyhow::Result<
         let trial = worst[index];
         let (pair, input) = trial.case.make()?;
         let run = Run::new(&input, &method.settings);
-        Ok(SheetCell {
+        Ok(ContactSheetCell {
             id: format!("{} seed {}", pair.id, trial.case.seed),
             note: note(trial, options.metric),
             wrong: trial.severity(options.metric) > 1.0,
@@ -89,10 +89,10 @@ fn tiles(run: &Run, tops: &Grid<u8>, print: &[u8], metric: ThresholdMetric) -> [
     let decode =
         |bytes| mocban::raster::decode(bytes, &mocban::raster::ImageLimits::SUGGESTED).ok();
     let Ok((print, aligned)) = &run.result else {
-        let plain = |print: PrintImage| View::of_side(&print, side).print(&print);
+        let plain = |print: PrintImage| PrintView::of_side(&print, side).print(&print);
         return [decode(print).map(plain), None, None];
     };
-    let view = View::of_side(print.picture(), side);
+    let view = PrintView::of_side(print.picture(), side);
     let plain = Some(view.print(print.picture()));
     let Some(found) = aligned.metric(metric) else {
         return [plain, None, None];

@@ -1,7 +1,7 @@
 //! `report --compare`: two projects' tables row by row.
 
 use super::table::{Align, columns};
-use crate::report::{Report, Row};
+use crate::report::{MetricRow, Report};
 
 /// The means of both projects and their differences, a line a metric and number.
 ///
@@ -24,8 +24,8 @@ pub(super) fn side_by_side(here: &Report, there: &Report, names: [&str; 2]) -> S
     columns(&rows, &aligns)
 }
 
-fn lines(here: &Row, there: &Row) -> Vec<Vec<String>> {
-    let truth = |row: &Row, number: fn(&crate::report::TruthBlock) -> Option<f64>| {
+fn lines(here: &MetricRow, there: &MetricRow) -> Vec<Vec<String>> {
+    let truth = |row: &MetricRow, number: fn(&crate::report::TruthSummary) -> Option<f64>| {
         row.truth.as_ref().and_then(number)
     };
     let numbers = [
@@ -66,11 +66,11 @@ fn lines(here: &Row, there: &Row) -> Vec<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::side_by_side;
-    use crate::report::Tally;
+    use crate::report::ReportAccumulator;
 
     #[test]
     fn empty_projects_have_counts_only() {
-        let report = Tally::default().finish();
+        let report = ReportAccumulator::default().finish();
         let text = side_by_side(&report, &report, ["a", "b"]);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines.len(), 1 + report.rows.len());

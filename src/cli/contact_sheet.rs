@@ -12,7 +12,7 @@ use super::output;
 use super::select;
 use super::table::count;
 use crate::domain::ThresholdMetric;
-use crate::export::{Sheet, SheetOptions, SheetOrder, draw_sheet};
+use crate::export::{ContactSheet, ContactSheetOptions, ContactSheetOrder, draw_contact_sheet};
 use crate::raster::png_rgb8;
 use crate::store::write_atomic;
 
@@ -29,7 +29,7 @@ pub(super) struct ContactSheetArgs {
     pub(super) metric: ThresholdMetric,
     /// What comes first: worst, score, margin, confidence (the least confident) or name
     #[arg(long, default_value = "worst")]
-    pub(super) order: SheetOrder,
+    pub(super) order: ContactSheetOrder,
     /// Most pairs on the sheet
     #[arg(long, value_name = "N", default_value = "60", value_parser = clap::value_parser!(u16).range(1..=600))]
     pub(super) limit: u16,
@@ -44,7 +44,7 @@ impl Default for ContactSheetArgs {
             pairs: Vec::new(),
             output: None,
             metric: ThresholdMetric::Ensemble,
-            order: SheetOrder::Worst,
+            order: ContactSheetOrder::Worst,
             limit: 60,
             columns: 5,
         }
@@ -77,13 +77,13 @@ pub(super) async fn contact_sheet(
 pub(super) async fn write(
     args: &ContactSheetArgs,
     context: &Context,
-) -> anyhow::Result<(PathBuf, Sheet)> {
+) -> anyhow::Result<(PathBuf, ContactSheet)> {
     let (project, catalog) = context.reader().await?;
     let pairs = match args.pairs.as_slice() {
         [] => None,
         typed => Some(select::pairs(&catalog, typed).await?),
     };
-    let options = SheetOptions {
+    let options = ContactSheetOptions {
         metric: args.metric,
         pairs,
         order: args.order,
@@ -91,7 +91,7 @@ pub(super) async fn write(
         columns: usize::from(args.columns),
         limits: context.settings()?.config.limits.image,
     };
-    let sheet = draw_sheet(&catalog, &project, options).await?;
+    let sheet = draw_contact_sheet(&catalog, &project, options).await?;
     catalog.close().await;
     if sheet.shown == 0 {
         let text = format!(
@@ -108,7 +108,7 @@ pub(super) async fn write(
     Ok((path, sheet))
 }
 
-fn save(path: &Path, sheet: &Sheet) -> anyhow::Result<()> {
+fn save(path: &Path, sheet: &ContactSheet) -> anyhow::Result<()> {
     let bytes = png_rgb8(&sheet.picture);
     write_atomic(path, &bytes).with_context(|| format!("cannot write {}", path.display()))
 }

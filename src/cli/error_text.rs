@@ -5,8 +5,8 @@ use std::path::Path;
 
 use crate::catalog::{CatalogError, Holder, Trouble, holder};
 use crate::check::CheckError;
-use crate::export::{ExportError, SheetError};
-use crate::report::GatherError;
+use crate::export::{DrawError, ExportError};
+use crate::report::ReportError;
 use crate::runner::RunError;
 use crate::store::CATALOG_FILE;
 
@@ -18,10 +18,10 @@ pub(super) fn of_catalog<'a>(cause: &'a (dyn Error + 'static)) -> Option<&'a Cat
     if let Some(ExportError::Catalog(error)) = cause.downcast_ref() {
         return Some(error);
     }
-    if let Some(SheetError::Catalog(error)) = cause.downcast_ref() {
+    if let Some(DrawError::Catalog(error)) = cause.downcast_ref() {
         return Some(error);
     }
-    if let Some(GatherError::Catalog(error)) = cause.downcast_ref() {
+    if let Some(ReportError::Catalog(error)) = cause.downcast_ref() {
         return Some(error);
     }
     if let Some(CheckError::Catalog(error)) = cause.downcast_ref() {

@@ -12,8 +12,10 @@ use super::exit::{ExitCode, Refusal};
 use super::output;
 use super::time_text::day;
 use crate::catalog::Catalog;
-use crate::export::{Chosen, draw_gallery};
-use crate::report::{Cover, Format, Interval, Report, gate, gather, gather_with, page, render};
+use crate::export::{GallerySelection, draw_gallery};
+use crate::report::{
+    Cover, IntervalMethod, Report, ReportFormat, build, build_with, page, quality_gate, render,
+};
 use crate::store::{Project, write_atomic};
 
 /// The seed of the pictures that are drawn by lot; the page tells it.
@@ -24,13 +26,13 @@ const LOT_SEED: u64 = 1;
 pub(super) struct ReportArgs {
     /// Form of the report: text, json, csv, markdown, latex, or html: one page with pictures of failures
     #[arg(long, short, default_value = "text")]
-    pub(super) format: Format,
+    pub(super) format: ReportFormat,
     /// Write it to this file instead of stdout
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
     /// How the intervals of Acc are computed: wilson, or exact (Clopper and Pearson)
     #[arg(long, value_name = "HOW", default_value = "wilson")]
-    pub(super) ci: Interval,
+    pub(super) ci: IntervalMethod,
     /// Tell computing times by stage too, as html always does; the bytes then differ from run to run
     #[arg(long)]
     pub(super) with_times: bool,
@@ -57,22 +59,29 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     let (project, catalog) = context.reader().await?;
     context.warn_of_stale(&catalog).await?;
     let format = chosen(args.format, context);
-    let mut pictures = Chosen::new(LOT_SEED);
-    let report = if format == Format::Html {
-        gather_with(&catalog, &project, |pair, truth| pictures.add(pair, truth)).await?
+    let mut pictures = GallerySelection::new(LOT_SEED);
+    let report = if format == ReportFormat::Html {
+        build_with(&catalog, &project, |pair, truth| pictures.add(pair, truth)).await?
     } else {
-        gather(&catalog, &project).await?
+        build(&catalog, &project).await?
     };
     let mut report = report.with_interval(args.ci);
-    if !args.with_times && format != Format::Html {
+    if !args.with_times && format != ReportFormat::Html {
         report = report.without_times();
     }
     let text = match (&args.compare, format) {
         (Some(other), _) => compared(&report, other, format, context).await?,
-        (None, Format::Html) => pictured(&report, pictures, (&project, &catalog), context).await?,
-        (None, Format::Text | Format::Json | Format::Csv | Format::Markdown | Format::Latex) => {
-            render(&report, format)
+        (None, ReportFormat::Html) => {
+            pictured(&report, pictures, (&project, &catalog), context).await?
         }
+        (
+            None,
+            ReportFormat::Text
+            | ReportFormat::Json
+            | ReportFormat::Csv
+            | ReportFormat::Markdown
+            | ReportFormat::Latex,
+        ) => render(&report, format),
     };
     catalog.close().await;
     match &args.output {
@@ -89,7 +98,7 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
 /// The report as a page with its pictures.
 async fn pictured(
     report: &Report,
-    pictures: Chosen,
+    pictures: GallerySelection,
     (project, catalog): (&Project, &Catalog),
     context: &Context,
 ) -> anyhow::Result<String> {
@@ -109,23 +118,23 @@ async fn pictured(
 async fn compared(
     here: &Report,
     other: &Path,
-    format: Format,
+    format: ReportFormat,
     context: &Context,
 ) -> anyhow::Result<String> {
     let there = read(&context.at(other)).await?.with_interval(here.interval);
     let names = [context.dir(), other.to_owned()].map(|dir| dir.display().to_string());
     match format {
-        Format::Text => Ok(format!(
+        ReportFormat::Text => Ok(format!(
             "{}\n{}",
             render(here, format),
             side_by_side(here, &there, [&names[0], &names[1]])
         )),
-        Format::Json => {
+        ReportFormat::Json => {
             let mut value = serde_json::to_value(here)?;
             value["compared_with"] = json!({"project": names[1], "report": there});
             Ok(serde_json::to_string_pretty(&value)?)
         }
-        Format::Csv | Format::Markdown | Format::Latex | Format::Html => {
+        ReportFormat::Csv | ReportFormat::Markdown | ReportFormat::Latex | ReportFormat::Html => {
             let text = format!("--compare goes with the forms text and json, not {format}");
             Err(Refusal::Usage(text).into())
         }
@@ -137,15 +146,15 @@ async fn compared(
 /// # Errors
 /// When the catalog cannot be read or stdout is closed.
 pub(super) async fn print(context: &Context) -> anyhow::Result<()> {
-    let format = chosen(Format::Text, context);
+    let format = chosen(ReportFormat::Text, context);
     output::print(&render(&read(context).await?, format))?;
     Ok(())
 }
 
 /// `--json` wins over `--format`.
-const fn chosen(format: Format, context: &Context) -> Format {
+const fn chosen(format: ReportFormat, context: &Context) -> ReportFormat {
     if context.global.json {
-        Format::Json
+        ReportFormat::Json
     } else {
         format
     }
@@ -153,7 +162,7 @@ const fn chosen(format: Format, context: &Context) -> Format {
 
 async fn read(context: &Context) -> anyhow::Result<Report> {
     let (project, catalog) = context.reader().await?;
-    let report = gather(&catalog, &project).await?.without_times();
+    let report = build(&catalog, &project).await?.without_times();
     catalog.close().await;
     Ok(report)
 }
@@ -161,12 +170,12 @@ async fn read(context: &Context) -> anyhow::Result<Report> {
 /// Says what is not met; an incomplete report is told before one that is not good enough.
 fn gates(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
     let missing = if args.require_complete {
-        gate::missing(report)
+        quality_gate::missing(report)
     } else {
         Vec::new()
     };
     let below = match args.fail_under {
-        Some(least) => gate::below(report, least),
+        Some(least) => quality_gate::below(report, least),
         None => Vec::new(),
     };
     let code = match (missing.is_empty(), below.is_empty()) {

@@ -7,7 +7,7 @@ use super::show_text::heading;
 use super::time_text::utc;
 use crate::catalog::{Catalog, CatalogError, PairResults, StoredAlignment};
 use crate::domain::{DepthOutcome, MetricOutcome, Stage, ThresholdMetric};
-use crate::report::HandMove;
+use crate::report::ManualCorrection;
 
 /// An alignment by hand beside the automatic result.
 #[derive(Debug, Serialize)]
@@ -23,7 +23,7 @@ pub(super) struct Laid {
 struct Moved {
     from: ThresholdMetric,
     #[serde(flatten)]
-    by: HandMove,
+    by: ManualCorrection,
     /// The result's own agreement of masks.
     from_iou: f64,
 }
@@ -51,7 +51,7 @@ fn moved(laid: &StoredAlignment, results: &PairResults) -> Option<Moved> {
     let from = automatic(results).filter(|_| laid.on_current_depth)?;
     let depth: DepthOutcome = results.stage(Stage::Depth)?.parse().ok()?;
     let size = [depth.width, depth.height];
-    let by = HandMove::between(&from.print_from_depth, &laid.made.print_from_depth, size)?;
+    let by = ManualCorrection::between(&from.print_from_depth, &laid.made.print_from_depth, size)?;
     Some(Moved {
         from: from.metric,
         by,
@@ -92,7 +92,7 @@ fn line(laid: &Laid) -> String {
 }
 
 fn deed(moved: &Moved, iou: f64) -> String {
-    let HandMove {
+    let ManualCorrection {
         turned_deg,
         shifted_px: [x, y],
         scaled,
@@ -111,14 +111,14 @@ fn deed(moved: &Moved, iou: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{HandMove, Moved, deed};
+    use super::{ManualCorrection, Moved, deed};
     use crate::domain::ThresholdMetric;
 
     #[test]
     fn a_correction_is_one_line() {
         let moved = Moved {
             from: ThresholdMetric::Ensemble,
-            by: HandMove {
+            by: ManualCorrection {
                 turned_deg: -5.04,
                 shifted_px: [3.0, 4.0],
                 scaled: 1.0,

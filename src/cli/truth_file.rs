@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 
 use crate::domain::{PairName, sanitize};
-use crate::report::truth::TruthRecord;
+use crate::report::ground_truth::TruthRecord;
 
 /// One true alignment and the line it stands on.
 #[derive(Debug, Clone, PartialEq)]

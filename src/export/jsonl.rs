@@ -9,14 +9,14 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::by_hand;
-use super::files::{Drawn, FilesError, PAIRS, PairFiles};
-use super::folder::{ALIGNMENTS, CONTROLS, Folder, FolderError, LINES, VERDICTS};
-use super::line::{Line, LineStatus, Outcomes};
+use super::export_folder::{ALIGNMENTS, CONTROLS, Folder, FolderError, LINES, VERDICTS};
+use super::export_line::{ExportLine, LineStatus, Outcomes};
+use super::manual_alignment;
+use super::pair_files::{EncodedAlignment, FilesError, PAIRS, PairFiles};
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Failure, FailureClass, MetricOutcome, PairName, ThresholdMetric};
 use crate::raster;
-use crate::report::aligned::same_alignment;
+use crate::report::pair_artifacts::same_alignment;
 use crate::store::Project;
 
 /// Pairs in memory at a time.
@@ -82,9 +82,9 @@ pub async fn to_jsonl(
     options: JsonlOptions,
 ) -> Result<ExportSummary, ExportError> {
     let folder = Folder::begin(dir)?;
-    let mut lines = Lines::create(folder.path())?;
+    let mut lines = ExportLineWriter::create(folder.path())?;
     let mut summary = ExportSummary::default();
-    let by_hand = by_hand::newest(catalog).await?;
+    let by_hand = manual_alignment::newest(catalog).await?;
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
         for mut pair in write_page(project, folder.path(), page, options).await? {
@@ -136,7 +136,7 @@ fn write_log<T: Serialize>(root: &Path, name: &str, log: &[T]) -> Result<(), Exp
 /// A pair's lines, and why its files are not there although it is done.
 struct PairLines {
     name: PairName,
-    lines: Vec<Line>,
+    lines: Vec<ExportLine>,
     unreadable: Option<String>,
 }
 
@@ -182,7 +182,7 @@ fn pair_lines(
     let name = pair.facts.name.clone();
     if pair.metrics.is_empty() {
         let metrics = options.metrics.iter();
-        let lines = metrics.map(|metric| Line::without_result(pair, *metric));
+        let lines = metrics.map(|metric| ExportLine::without_result(pair, *metric));
         return Ok(PairLines {
             name,
             lines: lines.collect(),
@@ -201,7 +201,7 @@ fn pair_lines(
             let _ = std::fs::remove_dir_all(root.join(PAIRS).join(name.as_str()));
             let failure = Failure::new(FailureClass::Io, error.to_string());
             let metrics = pair.metrics.iter().map(|record| record.outcome.metric);
-            let lines = metrics.map(|metric| Line::unreadable(pair, metric, &failure));
+            let lines = metrics.map(|metric| ExportLine::unreadable(pair, metric, &failure));
             Ok(PairLines {
                 name,
                 lines: lines.collect(),
@@ -216,11 +216,11 @@ fn finished_lines(
     root: &Path,
     pair: &PairResults,
     options: JsonlOptions,
-) -> Result<Vec<Line>, FilesError> {
+) -> Result<Vec<ExportLine>, FilesError> {
     let files = PairFiles::read(project, pair, &options.limits)?;
     let outcomes = Outcomes::read(files.aligned())?;
     files.write_shared(root)?;
-    let mut drawn: Vec<(&MetricOutcome, Drawn)> = Vec::new();
+    let mut drawn: Vec<(&MetricOutcome, EncodedAlignment)> = Vec::new();
     let mut lines = Vec::new();
     for record in &pair.metrics {
         let outcome = &record.outcome;
@@ -233,21 +233,21 @@ fn finished_lines(
             drawn.push((outcome, files.draw(outcome)));
         }
         let written = files.write_metric(root, outcome.metric, &drawn[index].1)?;
-        lines.push(Line {
+        lines.push(ExportLine {
             seconds: options.with_times.then(|| pair.seconds()),
-            ..Line::of(pair, record, &outcomes, written)
+            ..ExportLine::of(pair, record, &outcomes, written)
         });
     }
     Ok(lines)
 }
 
 /// `pairs.jsonl` while it is written.
-struct Lines {
+struct ExportLineWriter {
     path: PathBuf,
     file: BufWriter<File>,
 }
 
-impl Lines {
+impl ExportLineWriter {
     fn create(root: &Path) -> Result<Self, ExportError> {
         let path = root.join(LINES);
         match File::create(&path) {
@@ -259,7 +259,7 @@ impl Lines {
         }
     }
 
-    fn write(&mut self, lines: &[Line]) -> Result<(), ExportError> {
+    fn write(&mut self, lines: &[ExportLine]) -> Result<(), ExportError> {
         for line in lines {
             let text = serde_json::to_string(line)
                 .expect("a line holds only strings, finite numbers, lists and fields");

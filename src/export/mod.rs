@@ -1,19 +1,21 @@
 //! Aligned pairs and pictures for other tools and for people.
 
-mod by_hand;
-mod files;
-mod folder;
-mod gallery;
+mod contact_sheet;
+mod export_folder;
+mod export_line;
+mod gallery_selection;
 mod jsonl;
-mod line;
+mod manual_alignment;
+mod pair_files;
 pub mod pictures;
-mod sheet;
 mod tiles;
 
-pub use by_hand::ByHand;
-pub use files::{Files, FilesError, Print};
-pub use folder::FolderError;
-pub use gallery::{Chosen, draw_gallery};
+pub use contact_sheet::{
+    ContactSheet, ContactSheetOptions, ContactSheetOrder, DrawError, draw_contact_sheet,
+};
+pub use export_folder::FolderError;
+pub use export_line::{ExportLine, Hashes, LineStatus, Maps, Numbers};
+pub use gallery_selection::{GallerySelection, draw_gallery};
 pub use jsonl::{ExportError, ExportSummary, JsonlOptions, json_lines, to_jsonl};
-pub use line::{Hashes, Line, LineStatus, Maps, Numbers};
-pub use sheet::{Sheet, SheetError, SheetOptions, SheetOrder, draw_sheet};
+pub use manual_alignment::LineManualAlignment;
+pub use pair_files::{Files, FilesError, SourcePrint};

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
+use super::accumulate::share;
 use super::stats::wilson_95;
-use super::tally::share;
 use crate::domain::Verdict::{self, Fail, Pass, Unsure};
 
 /// Results that both reviewers must have told of before anything is said of their agreement.

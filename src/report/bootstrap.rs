@@ -21,7 +21,7 @@ const DRAWS: usize = 50_000_000;
 const TOGETHER: usize = 8;
 
 /// What a unit, a pair or a block, adds to each quantity: its sum there, and over how many results.
-pub(super) type Sums = Vec<[f64; 2]>;
+pub(super) type QuantitySums = Vec<[f64; 2]>;
 
 /// How often so many units are drawn anew.
 pub(super) const fn resamples(units: usize) -> usize {
@@ -42,10 +42,10 @@ pub(super) const fn resamples(units: usize) -> usize {
 ///
 /// All quantities are of the same draws, so that differences of them are paired. The order of the units counts, the
 /// number of threads does not.
-pub(super) fn resampled_means(units: &[Sums], width: usize) -> Vec<Vec<f64>> {
+pub(super) fn resampled_means(units: &[QuantitySums], width: usize) -> Vec<Vec<f64>> {
     let flat = units.concat();
     let streams: Vec<u64> = (0..resamples(units.len()) as u64).collect();
-    let drawn: Vec<Sums> = streams
+    let drawn: Vec<QuantitySums> = streams
         .par_chunks(TOGETHER)
         .flat_map_iter(|streams| draw(&flat, width, streams))
         .collect();
@@ -60,7 +60,7 @@ pub(super) fn resampled_means(units: &[Sums], width: usize) -> Vec<Vec<f64>> {
 
 /// For each stream as many units as there are, drawn with replacement and added up. All units lie one after another,
 /// and each is read once for all streams: where there are many, reading them is what takes the time.
-fn draw(units: &[[f64; 2]], width: usize, streams: &[u64]) -> Vec<Sums> {
+fn draw(units: &[[f64; 2]], width: usize, streams: &[u64]) -> Vec<QuantitySums> {
     let count = units.len() / width.max(1);
     let drawn: Vec<Vec<u32>> = streams.iter().map(|stream| times(count, *stream)).collect();
     let mut totals = vec![vec![[0.0; 2]; width]; streams.len()];
@@ -113,8 +113,8 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
 
     use super::{
-        FEWEST_RESAMPLES, RESAMPLES, SEED, Sums, draw, middle_95, resampled_means, resamples,
-        two_sided_p,
+        FEWEST_RESAMPLES, QuantitySums, RESAMPLES, SEED, draw, middle_95, resampled_means,
+        resamples, two_sided_p,
     };
 
     /// Differences of 40 pairs, unevenly spread around 0.01.
@@ -126,7 +126,7 @@ mod tests {
     }
 
     /// Units drawn one after another, as the text books say it.
-    fn slow(units: &[Sums], width: usize, stream: u64) -> Sums {
+    fn slow(units: &[QuantitySums], width: usize, stream: u64) -> QuantitySums {
         let mut rng = ChaCha8Rng::seed_from_u64(SEED);
         rng.set_stream(stream);
         let mut total = vec![[0.0; 2]; width];
@@ -143,7 +143,7 @@ mod tests {
     #[test]
     fn resamples_added_up_together_are_those_drawn_one_by_one() {
         let sums = |i: f64| vec![[i.sin(), 1.0], [i.cos(), 1.0 + (i % 3.0)], [0.0, 0.0]];
-        let units: Vec<Sums> = (0..50).map(|i| sums(f64::from(i))).collect();
+        let units: Vec<QuantitySums> = (0..50).map(|i| sums(f64::from(i))).collect();
         let streams = [4, 0, 7];
         let found = draw(&units.concat(), 3, &streams);
         for (found, stream) in found.iter().zip(streams) {
@@ -166,7 +166,7 @@ mod tests {
 
     #[test]
     fn pairs_drawn_anew_have_the_interval_of_scipy() {
-        let units: Vec<Sums> = differences().into_iter().map(|d| vec![[d, 1.0]]).collect();
+        let units: Vec<QuantitySums> = differences().into_iter().map(|d| vec![[d, 1.0]]).collect();
         let mut means = resampled_means(&units, 1).remove(0);
         assert_eq!(means.len(), RESAMPLES);
         // SciPy 1.17.1 `bootstrap(method="percentile", n_resamples=1_000_000)`.
@@ -179,7 +179,7 @@ mod tests {
 
     #[test]
     fn blocks_drawn_whole_have_the_interval_of_numpy() {
-        let units: Vec<Sums> = differences()
+        let units: Vec<QuantitySums> = differences()
             .chunks(3)
             .map(|block| vec![[block.iter().sum(), block.len() as f64]])
             .collect();
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn quantities_are_of_the_same_draws() {
-        let units: Vec<Sums> = differences()
+        let units: Vec<QuantitySums> = differences()
             .into_iter()
             .map(|d| vec![[d, 1.0], [d + 0.5, 1.0], [0.0, 0.0]])
             .collect();

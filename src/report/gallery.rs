@@ -9,23 +9,23 @@ pub struct Gallery {
     /// The seed of what was drawn by lot.
     pub seed: u64,
     /// In the order in which they are shown.
-    pub groups: Vec<Group>,
+    pub groups: Vec<GalleryGroup>,
 }
 
 /// Results that are shown for the same reason.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Group {
+pub struct GalleryGroup {
     /// Why they are shown.
-    pub kind: Kind,
+    pub kind: GalleryReason,
     /// How many there are in the project.
     pub of: u64,
     /// Those that were drawn.
-    pub shots: Vec<Shot>,
+    pub shots: Vec<GalleryItem>,
 }
 
 /// Why a result is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum GalleryReason {
     /// Reviewers failed it.
     Failed,
     /// Reviewers contradict each other on it.
@@ -36,14 +36,14 @@ pub enum Kind {
     Lot,
 }
 
-impl Kind {
+impl GalleryReason {
     /// Every kind, in the order of the page.
     pub const ALL: [Self; 4] = [Self::Failed, Self::Conflict, Self::OffTruth, Self::Lot];
 }
 
 /// One result with its pictures.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shot {
+pub struct GalleryItem {
     /// The pair.
     pub pair: PairName,
     /// The character, where it is told.

@@ -7,7 +7,7 @@ use super::stats::{binomial_tail, wilson_95};
 /// How an interval of a share is computed; its name is told wherever one is shown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Interval {
+pub enum IntervalMethod {
     /// Wilson's score interval: right on average.
     #[default]
     Wilson,
@@ -15,7 +15,7 @@ pub enum Interval {
     Exact,
 }
 
-impl Interval {
+impl IntervalMethod {
     /// Every one.
     pub const ALL: [Self; 2] = [Self::Wilson, Self::Exact];
 
@@ -64,7 +64,7 @@ fn most(count: u64, n: u64) -> f64 {
     high
 }
 
-impl std::str::FromStr for Interval {
+impl std::str::FromStr for IntervalMethod {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
@@ -77,7 +77,7 @@ impl std::str::FromStr for Interval {
 
 #[cfg(test)]
 mod tests {
-    use super::Interval;
+    use super::IntervalMethod;
     use crate::report::stats::wilson_95;
 
     /// Values of statsmodels 0.15.0 `proportion_confint(method="beta")`.
@@ -99,19 +99,19 @@ mod tests {
     #[test]
     fn exact_equals_statsmodels() {
         for (passed, n, [low, high]) in EXACT {
-            let found = Interval::Exact.of(passed, n).expect("n is not 0");
+            let found = IntervalMethod::Exact.of(passed, n).expect("n is not 0");
             assert!((found[0] - low).abs() < 1e-10, "{passed}/{n}: {found:?}");
             assert!((found[1] - high).abs() < 1e-10, "{passed}/{n}: {found:?}");
         }
-        assert_eq!(Interval::Exact.of(0, 0), None);
-        assert_eq!(Interval::Wilson.of(3, 7), wilson_95(3, 7));
+        assert_eq!(IntervalMethod::Exact.of(0, 0), None);
+        assert_eq!(IntervalMethod::Wilson.of(3, 7), wilson_95(3, 7));
     }
 
     #[test]
     fn every_interval_is_found_by_its_name() {
-        for interval in Interval::ALL {
+        for interval in IntervalMethod::ALL {
             assert_eq!(interval.name().parse(), Ok(interval));
         }
-        assert!("normal".parse::<Interval>().is_err());
+        assert!("normal".parse::<IntervalMethod>().is_err());
     }
 }

@@ -1,57 +1,57 @@
 //! From the catalog to a report as plain data, and from there to text, JSON, CSV, Markdown, LaTeX and HTML.
 //!
-//! [`gather()`] streams the pairs through a [`Tally`], [`agree()`] through counts of what reviewers say; everything else is
+//! [`build()`] streams the pairs through a [`ReportAccumulator`], [`agree()`] through counts of what reviewers say; everything else is
 //! pure.
 
-mod agree;
+mod accumulate;
+mod adjudication;
 mod agreement;
-pub mod aligned;
+mod attention_checks;
 mod bootstrap;
-mod by_hand;
-mod compare;
-mod controls;
-pub mod coverage;
-#[cfg(test)]
-pub(crate) mod fixture;
+mod build;
+mod comparison;
+pub(crate) mod consensus;
+mod fail_reasons;
 pub mod gallery;
-pub mod gate;
-mod gather;
+pub mod ground_truth;
+mod ground_truth_sums;
 mod interval;
+mod manual_alignment;
 mod model;
+pub mod pair_artifacts;
+pub mod quality_gate;
 mod rate;
-mod reasons;
 mod render;
-mod rules;
-mod samples;
+mod reviewer_agreement;
+pub mod risk_coverage;
 mod score;
-mod score_duels;
-pub(crate) mod standing;
+mod score_bootstrap;
+mod score_comparison;
+mod stage_times;
 pub mod stats;
-mod tally;
+#[cfg(test)]
+pub(crate) mod test_fixtures;
 mod thresholds;
-mod times;
-pub mod truth;
-mod truth_sums;
 mod warnings;
 
-pub use agree::{Agree, ReviewerPair, ReviewerRecord, agree};
+pub use accumulate::{ReportAccumulator, TruthEvaluation};
+pub use adjudication::AdjudicationRules;
 pub use agreement::{Agreement, ENOUGH};
-pub use by_hand::{ByHand, HandErrors, HandMove};
-pub use controls::Caught;
-pub use gather::{GatherError, PAGE, finding, gather, gather_with, with_truth};
-pub use interval::Interval;
+pub use attention_checks::AttentionCheckRates;
+pub use build::{PAGE, ReportError, build, build_with, finding, with_truth};
+pub use consensus::Consensus;
+pub use fail_reasons::FailReasonCount;
+pub use interval::IntervalMethod;
+pub use manual_alignment::{ManualAlignmentErrors, ManualCorrection, ManualErrors};
 pub use model::{
-    Basis, Comparison, Coverage, CoveragePoint, FailedPair, FailureGroup, Progress, Report, Row,
-    SCHEMA, TruthBlock,
+    Basis, Comparison, FailureExample, FailureGroup, MetricRow, PairProgress, Report, RiskCoverage,
+    RiskCoveragePoint, SCHEMA, TruthSummary,
 };
 pub use rate::Rate;
-pub use reasons::ReasonCount;
-pub use render::{Cover, Format, MOST_BYTES, agree_text, page, render};
-pub use rules::Rules;
-pub use samples::{Bootstrap, FEWEST_UNITS, MeanIntervals, Unit};
+pub use render::{Cover, MOST_BYTES, ReportFormat, agree_text, page, render};
+pub use reviewer_agreement::{ReviewerAgreement, ReviewerPair, ReviewerRecord, agree};
 pub use score::Score;
-pub use score_duels::ScoreComparison;
-pub use standing::Standing;
-pub use tally::{Tally, TruthFinding};
-pub use thresholds::{BINS, Thresholds};
-pub use times::StageTime;
+pub use score_bootstrap::{BootstrapSettings, FEWEST_UNITS, MeanIntervals, ResamplingUnit};
+pub use score_comparison::ScoreComparison;
+pub use stage_times::StageTimes;
+pub use thresholds::{BINS, ThresholdDistribution};

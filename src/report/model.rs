@@ -2,15 +2,15 @@
 
 use serde::Serialize;
 
-use super::by_hand::ByHand;
-use super::controls::Caught;
-use super::interval::Interval;
-use super::reasons::ReasonCount;
-use super::rules::Rules;
-use super::samples::{Bootstrap, MeanIntervals};
-use super::score_duels::ScoreComparison;
-use super::thresholds::Thresholds;
-use super::times::StageTime;
+use super::adjudication::AdjudicationRules;
+use super::attention_checks::AttentionCheckRates;
+use super::fail_reasons::FailReasonCount;
+use super::interval::IntervalMethod;
+use super::manual_alignment::ManualAlignmentErrors;
+use super::score_bootstrap::{BootstrapSettings, MeanIntervals};
+use super::score_comparison::ScoreComparison;
+use super::stage_times::StageTimes;
+use super::thresholds::ThresholdDistribution;
 use crate::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
 
 /// Version of the JSON form.
@@ -24,37 +24,37 @@ pub struct Report {
     /// Pairs in the project, in whatever state.
     pub pairs: u64,
     /// How the intervals are computed.
-    pub interval: Interval,
+    pub interval: IntervalMethod,
     /// How far they are.
-    pub progress: Progress,
+    pub progress: PairProgress,
     /// One row a metric, in the order of the paper's table; `relief` last and only where there are results of it.
-    pub rows: Vec<Row>,
+    pub rows: Vec<MetricRow>,
     /// Metrics against each other, pair by pair.
     pub comparisons: Vec<Comparison>,
     /// Metrics against each other by their scores, pair by pair.
     pub score_comparisons: Vec<ScoreComparison>,
     /// How the intervals of means and of the score comparisons were drawn; `None` without results, and above 100,000
     /// pairs, where chance hardly moves a mean.
-    pub bootstrap: Option<Bootstrap>,
+    pub bootstrap: Option<BootstrapSettings>,
     /// Accuracy against coverage, by reviewers and then by truth, for each metric that has confidences.
-    pub coverage: Vec<Coverage>,
+    pub coverage: Vec<RiskCoverage>,
     /// Pairs without result because they failed, by class.
     pub failures: Vec<FailureGroup>,
     /// Where the metrics cut the relief.
-    pub thresholds: Vec<Thresholds>,
+    pub thresholds: Vec<ThresholdDistribution>,
     /// How long the stages took. Everything else is the same whenever the same results are told.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub times: Vec<StageTime>,
+    pub times: Vec<StageTimes>,
     /// Planted faults that reviewers caught, where any were answered.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub caught: Option<Caught>,
+    pub caught: Option<AttentionCheckRates>,
     /// What a reader of the table must know, in whole sentences.
     pub warnings: Vec<String>,
 }
 
 /// How far the pairs are.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Progress {
+pub struct PairProgress {
     /// All stages behind them.
     pub done: u64,
     /// Failed for good until somebody retries them.
@@ -65,7 +65,7 @@ pub struct Progress {
 
 /// One metric's row. A mean over no pairs is `None`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Row {
+pub struct MetricRow {
     /// Which metric.
     pub metric: ThresholdMetric,
     /// Pairs that finished with a result of this metric; the means are over these.
@@ -88,10 +88,10 @@ pub struct Row {
     pub acc_ci95: Option<[f64; 2]>,
     /// Acc under three rules, where somebody has read.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub rules: Option<Rules>,
+    pub rules: Option<AdjudicationRules>,
     /// Why reviewers failed the failed ones; a result counts for every reason given.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub failed_reasons: Vec<ReasonCount>,
+    pub failed_reasons: Vec<FailReasonCount>,
     /// Mean structural similarity.
     pub ssim: Option<f64>,
     /// Mean structural similarity without the luminance factor.
@@ -106,15 +106,15 @@ pub struct Row {
     pub means_ci95: MeanIntervals,
     /// Agreement with true alignments, where the project holds them.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub truth: Option<TruthBlock>,
+    pub truth: Option<TruthSummary>,
     /// Distance from alignments by hand, where people made any.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub by_hand: Option<ByHand>,
+    pub by_hand: Option<ManualAlignmentErrors>,
 }
 
 /// A metric's agreement with the true alignments; never mixed with people's verdicts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TruthBlock {
+pub struct TruthSummary {
     /// Results that have a usable truth.
     pub n: u64,
     /// Of these, those with angle, landmarks and mask all right.
@@ -172,7 +172,7 @@ pub struct Comparison {
 
 /// How right one metric's results are when the least confident are left out.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Coverage {
+pub struct RiskCoverage {
     /// What counts as right.
     pub basis: Basis,
     /// Which metric.
@@ -186,12 +186,12 @@ pub struct Coverage {
     /// The wrong ones among these.
     pub failures_in_least: u64,
     /// From everything kept down to half.
-    pub points: Vec<CoveragePoint>,
+    pub points: Vec<RiskCoveragePoint>,
 }
 
 /// The results kept at one coverage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct CoveragePoint {
+pub struct RiskCoveragePoint {
     /// Share of the results that is kept, the most confident ones, 0..=1.
     pub coverage: f64,
     /// How many that are, rounded down.
@@ -214,7 +214,7 @@ pub struct FailureGroup {
     /// How many.
     pub count: u64,
     /// The first of them by name, at most [`FailureGroup::SHOWN`].
-    pub pairs: Vec<FailedPair>,
+    pub pairs: Vec<FailureExample>,
 }
 
 impl FailureGroup {
@@ -224,7 +224,7 @@ impl FailureGroup {
 
 /// A failed pair.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct FailedPair {
+pub struct FailureExample {
     /// The pair.
     pub id: PairName,
     /// Where it failed.
@@ -233,7 +233,7 @@ pub struct FailedPair {
     pub error: String,
 }
 
-impl Row {
+impl MetricRow {
     /// Failed results for which reviewers gave a reason, or none.
     pub fn failed_for(&self, reason: Option<Reason>) -> u64 {
         let mut given = self.failed_reasons.iter();
@@ -246,7 +246,7 @@ impl Row {
 impl Report {
     /// The same with another interval.
     #[must_use]
-    pub fn with_interval(mut self, interval: Interval) -> Self {
+    pub fn with_interval(mut self, interval: IntervalMethod) -> Self {
         self.interval = interval;
         self.caught = self.caught.map(|caught| caught.with_interval(interval));
         for row in &mut self.rows {
@@ -282,13 +282,13 @@ impl Report {
     }
 
     /// The accuracy against coverage of a metric, where it has confidences.
-    pub fn coverage(&self, basis: Basis, metric: ThresholdMetric) -> Option<&Coverage> {
+    pub fn coverage(&self, basis: Basis, metric: ThresholdMetric) -> Option<&RiskCoverage> {
         let mut curves = self.coverage.iter();
         curves.find(|curve| curve.basis == basis && curve.metric == metric)
     }
 
     /// The row of a metric.
-    pub fn row(&self, metric: ThresholdMetric) -> Option<&Row> {
+    pub fn row(&self, metric: ThresholdMetric) -> Option<&MetricRow> {
         self.rows.iter().find(|row| row.metric == metric)
     }
 }

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::interval::Interval;
-use super::tally::share;
+use super::accumulate::share;
+use super::interval::IntervalMethod;
 
 /// So many of so many.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -25,13 +25,13 @@ impl Rate {
             n,
             count,
             share: share(count as f64, n),
-            ci95: Interval::Wilson.of(count, n),
+            ci95: IntervalMethod::Wilson.of(count, n),
         }
     }
 
     /// The same with another interval.
     #[must_use]
-    pub fn with_interval(self, interval: Interval) -> Self {
+    pub fn with_interval(self, interval: IntervalMethod) -> Self {
         Self {
             ci95: interval.of(self.count, self.n),
             ..self

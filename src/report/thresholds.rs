@@ -13,7 +13,7 @@ const LEVELS: f64 = 65_534.0;
 
 /// The cuts of one metric as heights in the depth maps: 0 is the lowest point of a map, 1 the highest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Thresholds {
+pub struct ThresholdDistribution {
     /// Which metric.
     pub metric: ThresholdMetric,
     /// Results.
@@ -30,9 +30,9 @@ pub struct Thresholds {
 
 /// The cuts so far, by metric.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Cuts([Vec<f64>; ThresholdMetric::ALL.len()]);
+pub(super) struct ThresholdSamples([Vec<f64>; ThresholdMetric::ALL.len()]);
 
-impl Cuts {
+impl ThresholdSamples {
     /// Counts the results of one pair in.
     pub(super) fn add(&mut self, pair: &PairResults) {
         for (cuts, metric) in self.0.iter_mut().zip(ThresholdMetric::ALL) {
@@ -42,11 +42,11 @@ impl Cuts {
     }
 
     /// The distribution of every metric that has results.
-    pub(super) fn finish(self) -> Vec<Thresholds> {
+    pub(super) fn finish(self) -> Vec<ThresholdDistribution> {
         let by_metric = ThresholdMetric::ALL.into_iter().zip(self.0);
         by_metric
             .filter_map(|(metric, mut cuts)| {
-                Some(Thresholds {
+                Some(ThresholdDistribution {
                     metric,
                     n: cuts.len() as u64,
                     p5: quantile(&mut cuts, 0.05)?,
@@ -74,9 +74,9 @@ fn bins(cuts: &[f64]) -> Vec<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Cuts, height};
+    use super::{ThresholdSamples, height};
     use crate::domain::ThresholdMetric;
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
     #[test]
     fn levels_span_the_heights_of_a_map() {
@@ -85,9 +85,9 @@ mod tests {
 
     #[test]
     fn every_cut_is_in_one_bin_the_ends_too() {
-        let mut cuts = Cuts::default();
+        let mut cuts = ThresholdSamples::default();
         for (name, level) in [("a", 1), ("b", 32_768), ("c", 65_535)] {
-            let mut pair = fixture::done(name, 0.8, &[]);
+            let mut pair = test_fixtures::done(name, 0.8, &[]);
             pair.metrics.truncate(1);
             pair.metrics[0].outcome.threshold_level = level;
             cuts.add(&pair);

@@ -1,18 +1,18 @@
 //! What a reader of the table must know, in whole sentences.
 
-use super::model::{Progress, Row};
-use super::samples::{FEWEST_UNITS, Lack, MOST_UNITS};
-use super::tally::TruthProblems;
+use super::accumulate::TruthProblems;
+use super::model::{MetricRow, PairProgress};
+use super::score_bootstrap::{BootstrapSkipped, FEWEST_UNITS, MOST_UNITS};
 
 /// Slack for rounding in sums before a mean is called impossible.
 const ROUNDING: f64 = 1e-9;
 
 /// Every warning that the numbers call for.
 pub(super) fn of(
-    progress: Progress,
-    rows: &[Row],
+    progress: PairProgress,
+    rows: &[MetricRow],
     truth: &TruthProblems,
-    lack: Option<Lack>,
+    lack: Option<BootstrapSkipped>,
 ) -> Vec<String> {
     let mut warnings = Vec::new();
     warnings.extend(missing_pairs(progress));
@@ -27,12 +27,12 @@ pub(super) fn of(
 }
 
 /// Why means have no intervals and metrics are not compared by their scores.
-fn nothing_drawn(lack: Lack) -> String {
+fn nothing_drawn(lack: BootstrapSkipped) -> String {
     let why = match lack {
-        Lack::TooMany => format!(
+        BootstrapSkipped::TooMany => format!(
             "there are more than {MOST_UNITS}, and chance hardly moves a mean over so many pairs"
         ),
-        Lack::TooFew { units, by } => {
+        BootstrapSkipped::TooFew { units, by } => {
             let what = by.plural();
             format!("that takes {FEWEST_UNITS} {what} at least; here: {units}")
         }
@@ -41,7 +41,7 @@ fn nothing_drawn(lack: Lack) -> String {
 }
 
 /// Pairs that are in no row.
-fn missing_pairs(progress: Progress) -> Option<String> {
+fn missing_pairs(progress: PairProgress) -> Option<String> {
     let pairs = progress.done + progress.failed + progress.pending;
     let counts = [
         (progress.failed, "failed"),
@@ -63,7 +63,7 @@ fn list<const N: usize>(counts: [(u64, &str); N]) -> Option<String> {
 
 /// Dice is `2 J / (1 + J)` of the IoU `J` for each pair, a concave function: its mean cannot lie above the
 /// function's value at the mean IoU.
-fn impossible_dice(row: &Row) -> Option<String> {
+fn impossible_dice(row: &MetricRow) -> Option<String> {
     let (iou, dice) = (row.iou?, row.dice?);
     let bound = 2.0 * iou / (1.0 + iou);
     (dice > bound + ROUNDING).then(|| {
@@ -76,7 +76,7 @@ fn impossible_dice(row: &Row) -> Option<String> {
 }
 
 /// Verdicts that tell nothing about the current results.
-fn uncounted_verdicts(row: &Row) -> Option<String> {
+fn uncounted_verdicts(row: &MetricRow) -> Option<String> {
     let counts = list([
         (row.stale, "unread with a verdict for an older result"),
         (
@@ -92,7 +92,7 @@ fn uncounted_verdicts(row: &Row) -> Option<String> {
 }
 
 /// Results whose true map says that they read in mirror writing.
-fn mirrored(row: &Row) -> Option<String> {
+fn mirrored(row: &MetricRow) -> Option<String> {
     let counts = list([(
         row.truth.as_ref()?.mirrored,
         "in mirror writing (angle error 180 degrees)",
@@ -118,27 +118,27 @@ fn unusable_truth(truth: &TruthProblems) -> Option<String> {
 mod tests {
     use super::{impossible_dice, missing_pairs, nothing_drawn};
     use crate::domain::ThresholdMetric;
-    use crate::report::fixture;
-    use crate::report::model::Progress;
-    use crate::report::samples::{Lack, Unit};
+    use crate::report::model::PairProgress;
+    use crate::report::score_bootstrap::{BootstrapSkipped, ResamplingUnit};
+    use crate::report::test_fixtures;
 
     #[test]
     fn why_nothing_was_drawn_is_said() {
-        let few = nothing_drawn(Lack::TooFew {
+        let few = nothing_drawn(BootstrapSkipped::TooFew {
             units: 5,
-            by: Unit::Block,
+            by: ResamplingUnit::Block,
         });
         assert!(
             few.ends_with(": that takes 10 blocks at least; here: 5."),
             "{few}"
         );
-        let many = nothing_drawn(Lack::TooMany);
+        let many = nothing_drawn(BootstrapSkipped::TooMany);
         assert!(many.contains("there are more than 100000"), "{many}");
     }
 
     #[test]
     fn the_papers_density_row_is_impossible_and_its_others_are_not() {
-        let row = |iou, dice| fixture::row(ThresholdMetric::Density, iou, dice);
+        let row = |iou, dice| test_fixtures::row(ThresholdMetric::Density, iou, dice);
         let said = impossible_dice(&row(0.708, 0.870)).expect("0.870 is above 0.829");
         assert!(said.contains("0.870 is above 0.829"), "{said}");
         assert_eq!(impossible_dice(&row(0.776, 0.870)), None);
@@ -150,7 +150,7 @@ mod tests {
         let iou = 0.7;
         let dice = 2.0 * iou / (1.0 + iou);
         assert_eq!(
-            impossible_dice(&fixture::row(ThresholdMetric::NlSsim, iou, dice)),
+            impossible_dice(&test_fixtures::row(ThresholdMetric::NlSsim, iou, dice)),
             None
         );
     }
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn failed_and_unfinished_pairs_are_said() {
         let said = |done, failed, pending| {
-            missing_pairs(Progress {
+            missing_pairs(PairProgress {
                 done,
                 failed,
                 pending,

@@ -121,7 +121,7 @@ impl Card {
 }
 
 #[cfg(test)]
-pub(super) mod fixture {
+pub(super) mod test_fixtures {
     use super::{Card, View};
     use crate::domain::{Affine2, ContentHash, PairName, ThresholdMetric};
 
@@ -149,7 +149,7 @@ pub(super) mod fixture {
 
 #[cfg(test)]
 mod tests {
-    use super::fixture::card;
+    use super::test_fixtures::card;
     use crate::domain::{AttentionCheck, ContentHash};
 
     #[test]

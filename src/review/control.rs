@@ -137,7 +137,7 @@ mod tests {
     use crate::domain::{AttentionCheck, SeededRandom};
     use crate::raster::{DepthMap, Grid};
     use crate::review::card::Card;
-    use crate::review::card::fixture::card;
+    use crate::review::card::test_fixtures::card;
 
     const RATES: Rates = Rates {
         controls: 0.1,

@@ -10,8 +10,8 @@ use super::pictures::{Drawn, SIDE, Subject};
 use crate::catalog::{Catalog, CatalogError, ManualAlignment, PairResults};
 use crate::domain::{Affine2, ContentHash, Stage};
 use crate::raster::{MaskOverlap, warp_mask};
-use crate::report::HandMove;
-use crate::report::aligned::{Aligned, AlignedError};
+use crate::report::ManualCorrection;
+use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::Project;
 
 /// How much larger or smaller than the print a relief may be laid.
@@ -87,7 +87,7 @@ pub(super) fn agreement(drawn: &Drawn, print_from_depth: &Affine2) -> Agreement 
 pub(super) struct Corrected {
     reviewer: String,
     #[serde(flatten)]
-    moved: HandMove,
+    moved: ManualCorrection,
     iou: f64,
     dice: f64,
 }
@@ -100,7 +100,7 @@ impl Corrected {
             depth_px,
             ..
         } = &card.view;
-        let moved = HandMove::between(print_from_depth, &made.print_from_depth, *depth_px)?;
+        let moved = ManualCorrection::between(print_from_depth, &made.print_from_depth, *depth_px)?;
         Some(Self {
             reviewer: made.reviewer.clone(),
             moved,
@@ -182,8 +182,8 @@ pub(super) fn made(
     reviewer: &str,
     print_from_depth: Affine2,
     agreement: &Agreement,
-) -> Result<ManualAlignment, AlignedError> {
-    let aligned = Aligned::new(project, pair);
+) -> Result<ManualAlignment, PairArtifactsError> {
+    let aligned = PairArtifacts::new(project, pair);
     Ok(ManualAlignment {
         event: String::new(),
         pair: card.pair.clone(),

@@ -8,8 +8,8 @@ use super::known::Known;
 use super::order;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use crate::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, ThresholdMetric, Verdict};
-use crate::report::aligned::{Aligned, alike};
-use crate::report::standing::{contradict, split};
+use crate::report::consensus::{contradict, split};
+use crate::report::pair_artifacts::{PairArtifacts, alike};
 use crate::store::Project;
 
 /// Pairs in memory at a time.
@@ -188,7 +188,7 @@ async fn faults(
         };
         let (project, card, lots) = (project.clone(), card.clone(), lots.clone());
         let fault = tokio::task::spawn_blocking(move || {
-            let depth = Aligned::new(&project, &detail.results).depth().ok()?;
+            let depth = PairArtifacts::new(&project, &detail.results).depth().ok()?;
             Some(control::plant(&card, &depth, &lots))
         });
         faults.extend(fault.await?);
@@ -201,7 +201,7 @@ mod tests {
     use super::{DeckOptions, Rates, cards_of, is_good, is_open_conflict};
     use crate::catalog::ReviewerVerdict;
     use crate::domain::{ReviewOrder, ThresholdMetric, Verdict};
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
     fn options(order: ReviewOrder, controls: f64, repeats: f64) -> DeckOptions {
         DeckOptions {
@@ -225,7 +225,7 @@ mod tests {
 
     #[test]
     fn a_conflict_is_for_a_third_reviewer_until_one_has_settled_it() {
-        let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &[]);
+        let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]);
         record.verdicts = vec![read("ana", Verdict::Pass, ReviewOrder::Random)];
         assert!(!is_open_conflict(&record, "chi"));
         record
@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn no_fault_is_planted_in_what_somebody_failed() {
         let record =
-            |verdicts: &[Verdict]| fixture::metric(ThresholdMetric::Density, 0.8, verdicts);
+            |verdicts: &[Verdict]| test_fixtures::metric(ThresholdMetric::Density, 0.8, verdicts);
         assert!(is_good(&record(&[])) && is_good(&record(&[Verdict::Pass])));
         assert!(!is_good(&record(&[Verdict::Pass, Verdict::Fail])));
     }
@@ -254,7 +254,7 @@ mod tests {
     #[test]
     fn a_pair_without_results_has_no_card() {
         let options = options(ReviewOrder::Random, 0.0, 0.0);
-        assert_eq!(cards_of(&fixture::pending("a"), &options), []);
+        assert_eq!(cards_of(&test_fixtures::pending("a"), &options), []);
     }
 
     #[test]

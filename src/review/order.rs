@@ -48,7 +48,7 @@ impl Ord for OrderKey {
 mod tests {
     use super::{sample, sort};
     use crate::domain::{ReviewOrder, SeededRandom};
-    use crate::review::card::fixture::card;
+    use crate::review::card::test_fixtures::card;
 
     fn order(order: ReviewOrder, seed: u64, reviewer: &str) -> Vec<String> {
         let mut cards: Vec<_> = (0..50).map(card).collect();

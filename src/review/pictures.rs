@@ -8,10 +8,10 @@ use tokio::sync::{Mutex, OnceCell};
 use super::card::Card;
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Affine2, NormalizeOutcome, Stage};
-use crate::export::pictures::{View, shaded};
-use crate::export::{FilesError, Print};
+use crate::export::pictures::{PrintView, shaded};
+use crate::export::{FilesError, SourcePrint};
 use crate::raster::{self, DepthMap, Mask, png_mask, png_rgb8};
-use crate::report::aligned::{Aligned, AlignedError};
+use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::Project;
 
 /// Longest side of a picture in pixels.
@@ -77,7 +77,7 @@ pub(super) enum PictureError {
     Catalog(#[from] CatalogError),
     /// A result or artifact cannot be read.
     #[error(transparent)]
-    Aligned(#[from] AlignedError),
+    PairArtifacts(#[from] PairArtifactsError),
     /// The print cannot be read.
     #[error(transparent)]
     Print(#[from] FilesError),
@@ -97,7 +97,7 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    fn read(aligned: &Aligned<'_>) -> Result<Self, PictureError> {
+    fn read(aligned: &PairArtifacts<'_>) -> Result<Self, PictureError> {
         let normalized: NormalizeOutcome = aligned.outcome(Stage::Normalize)?;
         Ok(Self {
             ink: aligned.canvas_print_mask()?,
@@ -109,7 +109,7 @@ impl Canvas {
 /// All that a card shows, read from the project.
 #[derive(Debug)]
 pub(super) struct Subject {
-    pub(super) print: Print,
+    pub(super) print: SourcePrint,
     print_mask: Mask,
     pub(super) canvas: Canvas,
     pub(super) depth: DepthMap,
@@ -123,7 +123,7 @@ impl Subject {
         card: &Card,
         limits: &raster::ImageLimits,
     ) -> Result<Self, PictureError> {
-        let aligned = Aligned::new(project, pair);
+        let aligned = PairArtifacts::new(project, pair);
         let hashes = (
             aligned.stage(Stage::Depth)?.result_hash,
             aligned.stage(Stage::Normalize)?.print_hash,
@@ -133,7 +133,7 @@ impl Subject {
         }
         let depth = aligned.depth()?;
         Ok(Self {
-            print: Print::read(project, pair, limits)?,
+            print: SourcePrint::read(project, pair, limits)?,
             print_mask: aligned.print_mask()?,
             canvas: Canvas::read(&aligned)?,
             strokes: depth.stroke_mask(card.view.level),
@@ -142,8 +142,8 @@ impl Subject {
     }
 
     /// The print's frame as it is shown.
-    pub(super) fn view(&self) -> View {
-        View::of_side(&self.print.picture, SIDE)
+    pub(super) fn view(&self) -> PrintView {
+        PrintView::of_side(&self.print.picture, SIDE)
     }
 }
 

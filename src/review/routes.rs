@@ -24,7 +24,7 @@ use super::pictures::{Layer, PictureError};
 use super::words::Language;
 use crate::catalog::CatalogError;
 use crate::domain::{PairName, ReviewOrder};
-use crate::report::aligned::AlignedError;
+use crate::report::pair_artifacts::PairArtifactsError;
 
 /// Everything there is, behind the guard.
 pub(super) fn router(desk: &Arc<Desk>) -> Router {
@@ -64,7 +64,7 @@ enum Trouble {
     #[error(transparent)]
     Picture(#[from] PictureError),
     #[error(transparent)]
-    Aligned(#[from] AlignedError),
+    PairArtifacts(#[from] PairArtifactsError),
 }
 
 impl Trouble {
@@ -76,7 +76,7 @@ impl Trouble {
             Self::Answer(_) => StatusCode::UNPROCESSABLE_ENTITY,
             Self::Picture(PictureError::Gone) => StatusCode::GONE,
             // The page sends again what the server could not store.
-            Self::Catalog(_) | Self::Deck(_) | Self::Picture(_) | Self::Aligned(_) => {
+            Self::Catalog(_) | Self::Deck(_) | Self::Picture(_) | Self::PairArtifacts(_) => {
                 StatusCode::SERVICE_UNAVAILABLE
             }
         }

@@ -152,7 +152,7 @@ mod tests {
     use crate::catalog::PairFacts;
     use crate::domain::Stage;
     use crate::raster;
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
     use crate::store::Project;
 
     #[test]
@@ -201,7 +201,7 @@ mod tests {
         let facts = PairFacts {
             mesh_path: "1.obj".to_owned(),
             print_path: "1.jpg".to_owned(),
-            ..fixture::pending("1").facts
+            ..test_fixtures::pending("1").facts
         };
         let few = raster::ImageLimits {
             max_pixels: 10,

@@ -151,7 +151,7 @@ mod tests {
     use super::{INK, PAPER, UNKNOWN, metric_results, print_mask, result_hash};
     use crate::domain::{ArtifactSet, MetricOutcome, ThresholdMetric};
     use crate::raster::Mask;
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
     #[test]
     fn ink_is_ink_wherever_it_lies() {
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn a_verdict_outlives_another_confidence_but_not_another_alignment() {
         let hash = |change: fn(&mut MetricOutcome)| {
-            let mut outcome = fixture::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+            let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
             change(&mut outcome);
             metric_results(&[outcome], &ArtifactSet::new(), None)[0].result_hash
         };

@@ -8,10 +8,12 @@ use mocban::config::{self, Sources};
 use mocban::demo::{DemoOptions, Tier, write_dataset};
 use mocban::domain::{PairName, ThresholdMetric, Verdict};
 use mocban::export::pictures::SHEET_WIDTH;
-use mocban::export::{JsonlOptions, SheetOptions, SheetOrder, draw_sheet, to_jsonl};
+use mocban::export::{
+    ContactSheetOptions, ContactSheetOrder, JsonlOptions, draw_contact_sheet, to_jsonl,
+};
 use mocban::manifest::parse_csv;
 use mocban::raster::{self, Grid, decode_grey8, decode_grey16};
-use mocban::report::{Report, gather};
+use mocban::report::{Report, build};
 use mocban::runner::{self, RunOptions, Stop};
 use mocban::store::Project;
 use serde_json::Value;
@@ -103,7 +105,7 @@ impl World {
     }
 
     async fn report(&self) -> Report {
-        gather(&self.catalog, &self.project)
+        build(&self.catalog, &self.project)
             .await
             .expect("the catalog is there")
     }
@@ -370,15 +372,15 @@ async fn verdicts_make_acc(world: &World) {
 }
 
 async fn sheet_shows_every_pair(world: &World) {
-    let options = SheetOptions {
+    let options = ContactSheetOptions {
         metric: ThresholdMetric::Ensemble,
         pairs: None,
-        order: SheetOrder::Worst,
+        order: ContactSheetOrder::Worst,
         limit: 50,
         columns: 5,
         limits: raster::ImageLimits::SUGGESTED,
     };
-    let sheet = draw_sheet(&world.catalog, &world.project, options)
+    let sheet = draw_contact_sheet(&world.catalog, &world.project, options)
         .await
         .expect("a sheet");
     assert_eq!((sheet.shown, sheet.of), (3, 3));

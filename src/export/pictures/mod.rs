@@ -4,9 +4,9 @@ mod font;
 mod overlay;
 mod paint;
 mod relief;
-mod sheet;
+mod sheet_layout;
 
-pub use overlay::View;
+pub use overlay::PrintView;
 pub use paint::Rgb;
 pub use relief::shaded;
-pub use sheet::{SHEET_WIDTH, SheetCell, contact_sheet, tile_side};
+pub use sheet_layout::{ContactSheetCell, SHEET_WIDTH, contact_sheet, tile_side};

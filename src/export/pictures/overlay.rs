@@ -16,13 +16,13 @@ const OVERLAY_SIDE: usize = 480;
 
 /// The print image's frame enlarged or shrunk: where pictures for people are drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
+pub struct PrintView {
     width: usize,
     height: usize,
     from_print: Affine2,
 }
 
-impl View {
+impl PrintView {
     /// The print's frame so that its longest side is `side` pixels.
     pub fn of_side(print: &PrintImage, side: usize) -> Self {
         let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
@@ -124,10 +124,10 @@ fn edges(mask: &Mask, reach: usize) -> Grid<bool> {
 
 #[cfg(test)]
 mod tests {
-    use super::{EDGE, TRUE_EDGE, View, edges};
+    use super::{EDGE, PrintView, TRUE_EDGE, edges};
     use crate::domain::{Affine2, ThresholdMetric};
     use crate::raster::{DepthMap, Grid, Mask, PrintImage};
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
     /// A bar of 4 x 20 px at (8, 5) over ground in a map of 30 x 30 px.
     fn depth() -> DepthMap {
@@ -148,9 +148,9 @@ mod tests {
 
     #[test]
     fn overlay_draws_the_bar_where_the_alignment_puts_it() {
-        let mut outcome = fixture::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+        let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
         outcome.print_from_depth = Affine2::scale_shift(1.0, [10.0, 0.0]);
-        let view = View::of_side(&paper(), 30);
+        let view = PrintView::of_side(&paper(), 30);
         let picture = view.overlay(&paper(), &depth(), &outcome);
         let edge: Vec<_> = (0..30).filter(|x| picture.at(*x, 15) == EDGE).collect();
         assert_eq!(edge, [18, 21]);
@@ -158,9 +158,9 @@ mod tests {
 
     #[test]
     fn enlarged_view_keeps_places() {
-        let mut outcome = fixture::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+        let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
         outcome.print_from_depth = Affine2::IDENTITY;
-        let view = View::to_judge_by(&paper());
+        let view = PrintView::to_judge_by(&paper());
         let picture = view.overlay(&paper(), &depth(), &outcome);
         assert_eq!((picture.width(), picture.height()), (480, 480));
         let row: Vec<_> = (0..480).filter(|x| picture.at(*x, 240) == EDGE).collect();
@@ -173,10 +173,10 @@ mod tests {
 
     #[test]
     fn true_edges_are_drawn_below_those_that_were_found() {
-        let mut outcome = fixture::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+        let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
         outcome.print_from_depth = Affine2::scale_shift(1.0, [3.0, 0.0]);
         let tops = Mask::from_fn(30, 30, |x, y| (8..12).contains(&x) && (5..25).contains(&y));
-        let view = View::of_side(&paper(), 30);
+        let view = PrintView::of_side(&paper(), 30);
         let picture = view.overlay_on_truth(&paper(), &tops, &depth(), &outcome);
         let columns =
             |colour| -> Vec<_> { (0..30).filter(|x| picture.at(*x, 15) == colour).collect() };
@@ -193,7 +193,7 @@ mod tests {
 
     #[test]
     fn relief_follows_the_alignment() {
-        let view = View::of_side(&paper(), 30);
+        let view = PrintView::of_side(&paper(), 30);
         let still = view.relief(&depth(), &Affine2::IDENTITY);
         let moved = view.relief(&depth(), &Affine2::scale_shift(1.0, [5.0, 0.0]));
         assert_eq!(still.at(10, 15), moved.at(15, 15));

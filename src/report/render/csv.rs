@@ -1,9 +1,11 @@
 //! The report as CSV (RFC 4180): one line a metric, numbers in full.
 
 use super::csv_fields;
-use crate::report::coverage::{KEPT_PERCENT, LEAST_PERCENT};
-use crate::report::interval::Interval;
-use crate::report::model::{Basis, Coverage, CoveragePoint, Report, Row, TruthBlock};
+use crate::report::interval::IntervalMethod;
+use crate::report::model::{
+    Basis, MetricRow, Report, RiskCoverage, RiskCoveragePoint, TruthSummary,
+};
+use crate::report::risk_coverage::{KEPT_PERCENT, LEAST_PERCENT};
 
 /// Names of the columns, in order; those of [`coverage_names`] follow, for reviewers and then for truth,
 /// and those of [`csv_fields`].
@@ -77,8 +79,8 @@ fn coverage_names(basis: Basis) -> Vec<String> {
     names
 }
 
-fn coverage_fields(curve: Option<&Coverage>) -> Vec<String> {
-    let count = |read: fn(&Coverage) -> u64| {
+fn coverage_fields(curve: Option<&RiskCoverage>) -> Vec<String> {
+    let count = |read: fn(&RiskCoverage) -> u64| {
         curve.map_or_else(String::new, |curve| read(curve).to_string())
     };
     let mut fields = vec![
@@ -92,9 +94,9 @@ fn coverage_fields(curve: Option<&Coverage>) -> Vec<String> {
     fields
 }
 
-fn point_fields(point: Option<&CoveragePoint>) -> [String; 4] {
+fn point_fields(point: Option<&RiskCoveragePoint>) -> [String; 4] {
     let [low, high] = bounds(point.and_then(|point| point.acc_ci95));
-    let value = |read: fn(&CoveragePoint) -> Option<f64>| number(point.and_then(read));
+    let value = |read: fn(&RiskCoveragePoint) -> Option<f64>| number(point.and_then(read));
     [
         value(|point| point.acc),
         low,
@@ -103,7 +105,7 @@ fn point_fields(point: Option<&CoveragePoint>) -> [String; 4] {
     ]
 }
 
-fn fields(row: &Row, interval: Interval) -> Vec<String> {
+fn fields(row: &MetricRow, interval: IntervalMethod) -> Vec<String> {
     let [low, high] = bounds(row.acc_ci95);
     let mut fields = vec![
         field(row.metric.name()),
@@ -129,15 +131,15 @@ fn fields(row: &Row, interval: Interval) -> Vec<String> {
 }
 
 /// What the intervals of the line are; nothing where it has none.
-fn interval_name(row: &Row, interval: Interval) -> String {
+fn interval_name(row: &MetricRow, interval: IntervalMethod) -> String {
     let of_truth = row.truth.as_ref().and_then(|truth| truth.acc_ci95);
     let any = row.acc_ci95.or(of_truth);
     any.map_or_else(String::new, |_| interval.name().to_owned())
 }
 
-fn truth_fields(truth: Option<&TruthBlock>) -> [String; 10] {
-    let value = |read: fn(&TruthBlock) -> Option<f64>| number(truth.and_then(read));
-    let count = |read: fn(&TruthBlock) -> u64| {
+fn truth_fields(truth: Option<&TruthSummary>) -> [String; 10] {
+    let value = |read: fn(&TruthSummary) -> Option<f64>| number(truth.and_then(read));
+    let count = |read: fn(&TruthSummary) -> u64| {
         truth.map_or_else(String::new, |truth| read(truth).to_string())
     };
     let [low, high] = bounds(truth.and_then(|truth| truth.acc_ci95));
@@ -187,18 +189,18 @@ fn line(fields: impl Iterator<Item = String>) -> String {
 mod tests {
     use super::{BASES, COLUMNS, coverage_names, csv_fields, field, render};
     use crate::domain::Verdict;
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
 
     #[test]
     fn every_line_has_every_field_and_ends_with_crlf() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         tally.add(
-            &fixture::done("a", 0.75, &[Verdict::Pass]),
-            &TruthFinding::default(),
+            &test_fixtures::done("a", 0.75, &[Verdict::Pass]),
+            &TruthEvaluation::default(),
         );
         tally.add(
-            &fixture::done("b", 0.75, &[]),
-            &fixture::truth(1.5, 2.0, 0.9),
+            &test_fixtures::done("b", 0.75, &[]),
+            &test_fixtures::truth(1.5, 2.0, 0.9),
         );
         let text = render(&tally.finish());
         let lines: Vec<&str> = text.split("\r\n").collect();
@@ -221,7 +223,7 @@ mod tests {
 
     #[test]
     fn what_is_not_there_is_an_empty_field() {
-        let text = render(&Tally::default().finish());
+        let text = render(&ReportAccumulator::default().finish());
         let line = text.lines().nth(2).expect("density");
         assert!(line.starts_with("density,0,0,0,0,0,0,0,"), "{line}");
         assert!(line.split(',').skip(8).all(str::is_empty), "{line}");
@@ -229,10 +231,10 @@ mod tests {
 
     #[test]
     fn coverage_stands_under_its_names() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for (name, confidence, angle_deg) in [("a", 0.75, 1.0), ("b", 0.25, 90.0)] {
-            let truth = fixture::truth(angle_deg, 1.0, 0.9);
-            tally.add(&fixture::sure(name, confidence), &truth);
+            let truth = test_fixtures::truth(angle_deg, 1.0, 0.9);
+            tally.add(&test_fixtures::sure(name, confidence), &truth);
         }
         let text = render(&tally.finish());
         let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();

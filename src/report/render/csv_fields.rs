@@ -2,12 +2,12 @@
 
 use super::csv::{bounds, number};
 use crate::domain::Reason;
-use crate::report::model::{Report, Row};
-use crate::report::rules::Rules;
-use crate::report::{ByHand, Score};
+use crate::report::adjudication::AdjudicationRules;
+use crate::report::model::{MetricRow, Report};
+use crate::report::{ManualAlignmentErrors, Score};
 
 /// What one column is called and how it is read.
-type Field = (String, String);
+type CsvField = (String, String);
 
 /// Names of the columns.
 pub(super) fn names() -> Vec<String> {
@@ -16,13 +16,13 @@ pub(super) fn names() -> Vec<String> {
 }
 
 /// The fields of a row under [`names`].
-pub(super) fn values(report: &Report, row: &Row) -> Vec<String> {
+pub(super) fn values(report: &Report, row: &MetricRow) -> Vec<String> {
     let fields = fields(Some(report), Some(row));
     fields.into_iter().map(|(_, value)| value).collect()
 }
 
 /// Names and values together, so that neither comes without the other.
-fn fields(report: Option<&Report>, row: Option<&Row>) -> Vec<Field> {
+fn fields(report: Option<&Report>, row: Option<&MetricRow>) -> Vec<CsvField> {
     let mut fields = rules(row.and_then(|row| row.rules.as_ref()));
     fields.extend(reasons(row));
     fields.extend(thresholds(report, row));
@@ -31,11 +31,11 @@ fn fields(report: Option<&Report>, row: Option<&Row>) -> Vec<Field> {
     fields
 }
 
-fn rules(rules: Option<&Rules>) -> Vec<Field> {
+fn rules(rules: Option<&AdjudicationRules>) -> Vec<CsvField> {
     let told_twice = rules.map_or_else(String::new, |rules| rules.told_twice.to_string());
     let mut fields = vec![("rules_told_twice".to_owned(), told_twice)];
-    let rates = rules.map(Rules::rates);
-    for (i, name) in Rules::NAMES.iter().enumerate() {
+    let rates = rules.map(AdjudicationRules::rates);
+    for (i, name) in AdjudicationRules::NAMES.iter().enumerate() {
         let rate = rates.map(|rates| rates[i]);
         let n = rate.map_or_else(String::new, |rate| rate.n.to_string());
         let [low, high] = bounds(rate.and_then(|rate| rate.ci95));
@@ -53,7 +53,7 @@ fn rules(rules: Option<&Rules>) -> Vec<Field> {
 }
 
 /// How often each reason was given; nothing where nobody has read.
-fn reasons(row: Option<&Row>) -> Vec<Field> {
+fn reasons(row: Option<&MetricRow>) -> Vec<CsvField> {
     let told = row.filter(|row| row.read > 0);
     let reasons = Reason::ALL.into_iter().map(Some).chain([None]);
     reasons
@@ -66,7 +66,7 @@ fn reasons(row: Option<&Row>) -> Vec<Field> {
 }
 
 /// The bootstrap intervals of the means; `bootstrap_by` tells what was drawn.
-fn intervals(report: Option<&Report>, row: Option<&Row>) -> Vec<Field> {
+fn intervals(report: Option<&Report>, row: Option<&MetricRow>) -> Vec<CsvField> {
     let means = row.map(|row| row.means_ci95).unwrap_or_default();
     let each = [
         (Score::Ssim.name(), means.ssim),
@@ -87,10 +87,11 @@ fn intervals(report: Option<&Report>, row: Option<&Row>) -> Vec<Field> {
     ends.chain([("bootstrap_by".to_owned(), by)]).collect()
 }
 
-fn by_hand(found: Option<&ByHand>) -> Vec<Field> {
-    let count =
-        |read: fn(&ByHand) -> u64| found.map_or_else(String::new, |found| read(found).to_string());
-    let value = |read: fn(&ByHand) -> Option<f64>| number(found.and_then(read));
+fn by_hand(found: Option<&ManualAlignmentErrors>) -> Vec<CsvField> {
+    let count = |read: fn(&ManualAlignmentErrors) -> u64| {
+        found.map_or_else(String::new, |found| read(found).to_string())
+    };
+    let value = |read: fn(&ManualAlignmentErrors) -> Option<f64>| number(found.and_then(read));
     let fields = [
         ("n", count(|found| found.n)),
         ("angle_le_5deg", value(|found| found.angle_le_5deg)),
@@ -107,7 +108,7 @@ fn by_hand(found: Option<&ByHand>) -> Vec<Field> {
         .to_vec()
 }
 
-fn thresholds(report: Option<&Report>, row: Option<&Row>) -> Vec<Field> {
+fn thresholds(report: Option<&Report>, row: Option<&MetricRow>) -> Vec<CsvField> {
     let found = report.zip(row).and_then(|(report, row)| {
         let mut cuts = report.thresholds.iter();
         cuts.find(|cuts| cuts.metric == row.metric)
@@ -130,11 +131,11 @@ mod tests {
     use super::{names, values};
     use crate::domain::{Reason, Verdict};
     use crate::report::stats::wilson_95;
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
 
     #[test]
     fn rules_reasons_and_thresholds_stand_under_their_names() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for (name, second) in [
             ("a", Verdict::Pass),
             ("b", Verdict::Fail),
@@ -145,11 +146,11 @@ mod tests {
             } else {
                 Verdict::Pass
             };
-            let mut pair = fixture::done(name, 0.8, &[first, second]);
+            let mut pair = test_fixtures::done(name, 0.8, &[first, second]);
             for record in &mut pair.metrics {
                 record.verdicts[1].reason = Some(Reason::Mirrored);
             }
-            tally.add(&pair, &TruthFinding::default());
+            tally.add(&pair, &TruthEvaluation::default());
         }
         let report = tally.finish();
         let (names, values) = (names(), values(&report, &report.rows[0]));
@@ -175,7 +176,7 @@ mod tests {
 
     #[test]
     fn what_nobody_read_has_empty_fields() {
-        let report = Tally::default().finish();
+        let report = ReportAccumulator::default().finish();
         assert!(
             values(&report, &report.rows[0])
                 .iter()

@@ -66,16 +66,18 @@ pub(super) fn caught(report: &Report) -> Option<Table> {
 mod tests {
     use super::{caught, reasons};
     use crate::domain::{Reason, Verdict};
-    use crate::report::{Caught, Rate, Tally, TruthFinding, fixture};
+    use crate::report::{
+        AttentionCheckRates, Rate, ReportAccumulator, TruthEvaluation, test_fixtures,
+    };
 
     #[test]
     fn reasons_that_were_given_have_a_line_and_others_none() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for (name, reason) in [("a", Some(Reason::Angle)), ("b", None)] {
-            let mut pair = fixture::done(name, 0.8, &[Verdict::Fail]);
+            let mut pair = test_fixtures::done(name, 0.8, &[Verdict::Fail]);
             pair.metrics[0].verdicts[0].reason = reason;
             pair.metrics.truncate(1);
-            tally.add(&pair, &TruthFinding::default());
+            tally.add(&pair, &TruthEvaluation::default());
         }
         let table = reasons(&tally.finish()).expect("two failures");
         let rows: Vec<Vec<&str>> = table
@@ -87,14 +89,14 @@ mod tests {
             rows,
             [["angle", "1", "0", "0"], ["no reason given", "1", "0", "0"]]
         );
-        assert_eq!(reasons(&Tally::default().finish()), None);
+        assert_eq!(reasons(&ReportAccumulator::default().finish()), None);
     }
 
     #[test]
     fn caught_faults_have_their_interval_by_kind_and_in_all() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         let turned = Rate::new(19, 20);
-        tally.caught(Caught {
+        tally.caught(AttentionCheckRates {
             all: Rate::new(20, 22),
             by_fault: [("turned", turned), ("cut", Rate::new(1, 2))].into(),
         });
@@ -102,8 +104,8 @@ mod tests {
         let last: Vec<_> = table.rows[1].iter().flatten().collect();
         assert_eq!(last, ["turned", "20", "19", "0.950", "0.764-0.991"]);
         assert_eq!(table.rows[2][1].as_deref(), Some("22"));
-        let mut none = Tally::default();
-        none.caught(Caught::default());
+        let mut none = ReportAccumulator::default();
+        none.caught(AttentionCheckRates::default());
         assert_eq!(caught(&none.finish()), None);
     }
 }

@@ -1,7 +1,7 @@
 //! The report as LaTeX tables with `booktabs` rules and `siunitx` columns.
 
-use super::table::{self, Column, Kind, Table};
-use super::{coverage, scored};
+use super::table::{self, ColumnFormat, Table, TableColumn};
+use super::{coverage_tables, scored};
 use crate::report::model::Report;
 
 /// The report as LaTeX, to be read in by `\input`.
@@ -14,7 +14,7 @@ pub(super) fn render(report: &Report) -> String {
         blocks.push(format!("% Note: {}\n", comment(warning)));
     }
     let mut tables = table::tables(report);
-    tables.extend(coverage::full(report));
+    tables.extend(coverage_tables::full(report));
     blocks.extend(
         tables
             .iter()
@@ -48,8 +48,8 @@ fn float(table: &Table) -> String {
 /// The column type; a number column is as wide as its longest cell.
 fn column(table: &Table, index: usize) -> String {
     match table.columns[index].kind {
-        Kind::Words | Kind::Interval => "l".to_owned(),
-        Kind::Number(decimals) => {
+        ColumnFormat::Words | ColumnFormat::IntervalMethod => "l".to_owned(),
+        ColumnFormat::Number(decimals) => {
             let whole = |cell: Option<&String>| {
                 cell.map_or(1, |text| text.split('.').next().map_or(1, str::len))
             };
@@ -64,25 +64,25 @@ fn column(table: &Table, index: usize) -> String {
 }
 
 /// A head; braces keep `siunitx` from reading it as a number.
-fn head(column: &Column) -> String {
+fn head(column: &TableColumn) -> String {
     match column.kind {
-        Kind::Words | Kind::Interval => escape(column.head),
-        Kind::Number(_) => format!("{{{}}}", escape(column.head)),
+        ColumnFormat::Words | ColumnFormat::IntervalMethod => escape(column.head),
+        ColumnFormat::Number(_) => format!("{{{}}}", escape(column.head)),
     }
 }
 
-fn shown(cell: Option<&str>, column: Column) -> String {
+fn shown(cell: Option<&str>, column: TableColumn) -> String {
     match (cell, column.kind) {
         (None, _) => missing(column).to_owned(),
-        (Some(text), Kind::Interval) => escape(text).replace('-', "--"),
-        (Some(text), Kind::Words | Kind::Number(_)) => escape(text),
+        (Some(text), ColumnFormat::IntervalMethod) => escape(text).replace('-', "--"),
+        (Some(text), ColumnFormat::Words | ColumnFormat::Number(_)) => escape(text),
     }
 }
 
-const fn missing(column: Column) -> &'static str {
+const fn missing(column: TableColumn) -> &'static str {
     match column.kind {
-        Kind::Words | Kind::Interval => "--",
-        Kind::Number(_) => "{--}",
+        ColumnFormat::Words | ColumnFormat::IntervalMethod => "--",
+        ColumnFormat::Number(_) => "{--}",
     }
 }
 
@@ -120,7 +120,7 @@ fn escape(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::{escape, render};
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
 
     const GOLDEN: &str = r"\begin{table}
   \centering\small\setlength{\tabcolsep}{3pt}
@@ -140,11 +140,11 @@ mod tests {
 
     #[test]
     fn table_is_booktabs_with_columns_as_wide_as_their_numbers() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for i in 0..12 {
             tally.add(
-                &fixture::done(&format!("p{i:02}"), 0.75, &[]),
-                &TruthFinding::default(),
+                &test_fixtures::done(&format!("p{i:02}"), 0.75, &[]),
+                &TruthEvaluation::default(),
             );
         }
         let text = render(&tally.finish());

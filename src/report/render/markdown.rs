@@ -1,16 +1,16 @@
 //! The report as Markdown tables.
 
-use super::table::{self, Column, Kind, Table};
-use super::{coverage, scored};
+use super::table::{self, ColumnFormat, Table, TableColumn};
+use super::{coverage_tables, scored};
 use crate::report::model::{FailureGroup, Report};
-use crate::report::score_duels::in_words;
+use crate::report::score_comparison::in_words;
 
 /// The report as Markdown.
 pub(super) fn render(report: &Report) -> String {
     let mut blocks = vec![format!("{}\n", table::headline(report))];
     for found in table::tables(report)
         .into_iter()
-        .chain(coverage::full(report))
+        .chain(coverage_tables::full(report))
         .chain(table::comparisons_in_words(report))
         .chain(scored::comparisons(report))
     {
@@ -45,10 +45,10 @@ fn piped(table: &Table) -> String {
     text
 }
 
-const fn rule(column: &Column) -> &'static str {
+const fn rule(column: &TableColumn) -> &'static str {
     match column.kind {
-        Kind::Words | Kind::Interval => "---",
-        Kind::Number(_) => "---:",
+        ColumnFormat::Words | ColumnFormat::IntervalMethod => "---",
+        ColumnFormat::Number(_) => "---:",
     }
 }
 
@@ -88,15 +88,15 @@ fn escape(text: &str) -> String {
 mod tests {
     use super::{escape, render};
     use crate::domain::{FailureClass, Verdict};
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
 
     #[test]
     fn tables_have_rules_and_escaped_cells() {
-        let mut tally = Tally::default();
-        let none = TruthFinding::default();
-        tally.add(&fixture::done("a", 0.75, &[Verdict::Pass]), &none);
+        let mut tally = ReportAccumulator::default();
+        let none = TruthEvaluation::default();
+        tally.add(&test_fixtures::done("a", 0.75, &[Verdict::Pass]), &none);
         tally.add(
-            &fixture::failed("b_1", FailureClass::BadInput, "x|y <b>.stl"),
+            &test_fixtures::failed("b_1", FailureClass::BadInput, "x|y <b>.stl"),
             &none,
         );
         let text = render(&tally.finish());

@@ -1,7 +1,7 @@
 //! The forms a report can be printed in.
 
-mod agree;
-mod coverage;
+mod agreement_text;
+mod coverage_tables;
 mod csv;
 mod csv_fields;
 mod failed;
@@ -16,12 +16,12 @@ mod work;
 use super::gallery::Gallery;
 use super::model::Report;
 
-pub use agree::agree_text;
+pub use agreement_text::agree_text;
 pub use html::{Cover, MOST_BYTES, page};
 
 /// A form of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
+pub enum ReportFormat {
     /// Aligned tables for a terminal of 80 columns.
     Text,
     /// The report as it is, every number in full.
@@ -36,7 +36,7 @@ pub enum Format {
     Html,
 }
 
-impl Format {
+impl ReportFormat {
     /// Every form.
     pub const ALL: [Self; 6] = [
         Self::Text,
@@ -60,13 +60,13 @@ impl Format {
     }
 }
 
-impl std::fmt::Display for Format {
+impl std::fmt::Display for ReportFormat {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
     }
 }
 
-impl std::str::FromStr for Format {
+impl std::str::FromStr for ReportFormat {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
@@ -80,14 +80,14 @@ impl std::str::FromStr for Format {
 }
 
 /// The report in a form; ends with a line end. [`page`] gives the page with pictures.
-pub fn render(report: &Report, format: Format) -> String {
+pub fn render(report: &Report, format: ReportFormat) -> String {
     match format {
-        Format::Text => text::render(report),
-        Format::Json => json(report),
-        Format::Csv => csv::render(report),
-        Format::Markdown => markdown::render(report),
-        Format::Latex => latex::render(report),
-        Format::Html => page(report, &Gallery::default(), &Cover::default()),
+        ReportFormat::Text => text::render(report),
+        ReportFormat::Json => json(report),
+        ReportFormat::Csv => csv::render(report),
+        ReportFormat::Markdown => markdown::render(report),
+        ReportFormat::Latex => latex::render(report),
+        ReportFormat::Html => page(report, &Gallery::default(), &Cover::default()),
     }
 }
 
@@ -101,24 +101,27 @@ fn json(report: &Report) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Format, render};
+    use super::{ReportFormat, render};
     use crate::domain::Verdict;
-    use crate::report::{Interval, Tally, TruthFinding, fixture};
+    use crate::report::{IntervalMethod, ReportAccumulator, TruthEvaluation, test_fixtures};
     use serde_json::{Value, json};
 
     #[test]
     fn every_format_is_found_by_its_name() {
-        for format in Format::ALL {
+        for format in ReportFormat::ALL {
             assert_eq!(format.name().parse(), Ok(format));
         }
-        assert!("pdf".parse::<Format>().is_err());
+        assert!("pdf".parse::<ReportFormat>().is_err());
     }
 
     #[test]
     fn json_has_the_fixed_names_and_nulls_where_nobody_read() {
-        let mut tally = Tally::default();
-        tally.add(&fixture::done("a", 0.75, &[]), &TruthFinding::default());
-        let text = render(&tally.finish(), Format::Json);
+        let mut tally = ReportAccumulator::default();
+        tally.add(
+            &test_fixtures::done("a", 0.75, &[]),
+            &TruthEvaluation::default(),
+        );
+        let text = render(&tally.finish(), ReportFormat::Json);
         let value: Value = serde_json::from_str(&text).expect("the report is JSON");
         assert_eq!((&value["schema"], &value["pairs"]), (&json!(1), &json!(1)));
         let metrics: Vec<_> = value["rows"].as_array().expect("rows").iter().collect();
@@ -146,19 +149,19 @@ mod tests {
 
     #[test]
     fn every_form_names_the_interval_that_was_asked_for() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for (name, verdict) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
-            let pair = fixture::done(name, 0.75, &[verdict]);
-            tally.add(&pair, &fixture::truth(1.0, 2.0, 0.9));
+            let pair = test_fixtures::done(name, 0.75, &[verdict]);
+            tally.add(&pair, &test_fixtures::truth(1.0, 2.0, 0.9));
         }
-        let report = tally.finish().with_interval(Interval::Exact);
+        let report = tally.finish().with_interval(IntervalMethod::Exact);
         let row = &report.rows[0];
-        assert_eq!(row.acc_ci95, Interval::Exact.of(1, 2));
+        assert_eq!(row.acc_ci95, IntervalMethod::Exact.of(1, 2));
         let truth = row.truth.as_ref().expect("both have truth");
-        assert_eq!(truth.acc_ci95, Interval::Exact.of(2, 2));
+        assert_eq!(truth.acc_ci95, IntervalMethod::Exact.of(2, 2));
         let rules = row.rules.expect("both are read");
-        assert_eq!(rules.adjudicated.ci95, Interval::Exact.of(1, 2));
-        for format in Format::ALL {
+        assert_eq!(rules.adjudicated.ci95, IntervalMethod::Exact.of(1, 2));
+        for format in ReportFormat::ALL {
             let text = render(&report, format);
             let names = [
                 "95% exact",
@@ -173,12 +176,12 @@ mod tests {
 
     #[test]
     fn json_truth_has_the_fixed_names() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         tally.add(
-            &fixture::done("a", 0.75, &[]),
-            &fixture::truth(1.0, 2.0, 0.9),
+            &test_fixtures::done("a", 0.75, &[]),
+            &test_fixtures::truth(1.0, 2.0, 0.9),
         );
-        let text = render(&tally.finish(), Format::Json);
+        let text = render(&tally.finish(), ReportFormat::Json);
         let value: Value = serde_json::from_str(&text).expect("the report is JSON");
         let truth = &value["rows"][2]["truth"];
         let expected = json!({

@@ -1,30 +1,30 @@
 //! Scores drawn anew as tables: intervals of the means, and metrics compared by their scores.
 
 use super::table::{Table, bounds, fixed, interval, number, p_value, words};
-use crate::report::model::{Report, Row};
-use crate::report::samples::{Bootstrap, MeanIntervals};
-use crate::report::score_duels::ScoreComparison;
+use crate::report::model::{MetricRow, Report};
+use crate::report::score_bootstrap::{BootstrapSettings, MeanIntervals};
+use crate::report::score_comparison::ScoreComparison;
 
 /// A column of intervals of means.
-type Interval = fn(&MeanIntervals) -> Option<[f64; 2]>;
+type MeanIntervalField = fn(&MeanIntervals) -> Option<[f64; 2]>;
 
 /// The bootstrap intervals of the means, and of Acc where whole blocks are drawn; `None` where there are none.
 pub(super) fn intervals(report: &Report) -> Option<Table> {
     let how = report.bootstrap.as_ref()?;
-    let mut wanted: Vec<(&'static str, Interval)> = vec![
+    let mut wanted: Vec<(&'static str, MeanIntervalField)> = vec![
         ("SSIM", |means| means.ssim),
         ("IoU", |means| means.iou),
         ("Dice", |means| means.dice),
         ("Acc", |means| means.acc_by_block),
     ];
-    let held = |read: Interval| {
+    let held = |read: MeanIntervalField| {
         report
             .rows
             .iter()
             .any(|row| read(&row.means_ci95).is_some())
     };
     wanted.retain(|(_, read)| held(*read));
-    let cells = |row: &Row| {
+    let cells = |row: &MetricRow| {
         let ends = wanted.iter().map(|(_, read)| bounds(read(&row.means_ci95)));
         [Some(row.metric.title().to_owned())]
             .into_iter()
@@ -43,7 +43,7 @@ pub(super) fn intervals(report: &Report) -> Option<Table> {
 }
 
 /// How the bootstrap was done.
-fn said(how: &Bootstrap) -> String {
+fn said(how: &BootstrapSettings) -> String {
     format!(
         "percentile bootstrap: {} {} drawn anew {} times, seed {}",
         how.units,
@@ -91,18 +91,18 @@ mod tests {
     use super::{comparisons, intervals};
     use crate::domain::ThresholdMetric;
     use crate::report::render::text::aligned;
-    use crate::report::{Report, Tally, TruthFinding, fixture};
+    use crate::report::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
 
     /// Twenty pairs on which this metric has the best IoU.
     fn with_best(best: ThresholdMetric) -> Report {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for i in 0..20 {
-            let mut pair = fixture::done(&format!("p{i:02}"), 0.7, &[]);
+            let mut pair = test_fixtures::done(&format!("p{i:02}"), 0.7, &[]);
             for record in &mut pair.metrics {
                 let is_best = record.outcome.metric == best;
                 record.outcome.scores.iou = if is_best { 0.75 } else { 0.7 };
             }
-            tally.add(&pair, &TruthFinding::default());
+            tally.add(&pair, &TruthEvaluation::default());
         }
         tally.finish()
     }
@@ -152,7 +152,7 @@ mod tests {
 
     #[test]
     fn an_empty_project_has_neither() {
-        let report = Tally::default().finish();
+        let report = ReportAccumulator::default().finish();
         assert_eq!((intervals(&report), comparisons(&report)), (None, None));
     }
 }

@@ -1,9 +1,9 @@
 //! The tables of a report with their cells as text: what text, Markdown and LaTeX have in common.
 
 use super::{failed, scored, work};
-use crate::report::by_hand::ByHand;
-use crate::report::model::{Basis, Comparison, Report, Row, TruthBlock};
-use crate::report::rules::Rules;
+use crate::report::adjudication::AdjudicationRules;
+use crate::report::manual_alignment::ManualAlignmentErrors;
+use crate::report::model::{Basis, Comparison, MetricRow, Report, TruthSummary};
 
 /// A table of text cells.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -11,52 +11,52 @@ pub(super) struct Table {
     /// One sentence on what it shows.
     pub(super) caption: String,
     /// Its columns.
-    pub(super) columns: Vec<Column>,
+    pub(super) columns: Vec<TableColumn>,
     /// Its rows; `None` is a quantity that does not exist.
     pub(super) rows: Vec<Vec<Option<String>>>,
 }
 
 /// A column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Column {
+pub(super) struct TableColumn {
     /// What stands over it.
     pub(super) head: &'static str,
     /// How its cells stand.
-    pub(super) kind: Kind,
+    pub(super) kind: ColumnFormat,
 }
 
 /// How the cells of a column stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum ColumnFormat {
     /// Words, from the left.
     Words,
     /// Two numbers with a hyphen between them, from the left.
-    Interval,
+    IntervalMethod,
     /// Numbers with so many decimals, aligned at the point.
     Number(usize),
 }
 
 /// A column of words.
-pub(super) const fn words(head: &'static str) -> Column {
-    Column {
+pub(super) const fn words(head: &'static str) -> TableColumn {
+    TableColumn {
         head,
-        kind: Kind::Words,
+        kind: ColumnFormat::Words,
     }
 }
 
 /// A column of intervals.
-pub(super) const fn interval(head: &'static str) -> Column {
-    Column {
+pub(super) const fn interval(head: &'static str) -> TableColumn {
+    TableColumn {
         head,
-        kind: Kind::Interval,
+        kind: ColumnFormat::IntervalMethod,
     }
 }
 
 /// A column of numbers with so many decimals.
-pub(super) const fn number(head: &'static str, decimals: usize) -> Column {
-    Column {
+pub(super) const fn number(head: &'static str, decimals: usize) -> TableColumn {
+    TableColumn {
         head,
-        kind: Kind::Number(decimals),
+        kind: ColumnFormat::Number(decimals),
     }
 }
 
@@ -99,7 +99,7 @@ pub(super) fn scores(report: &Report) -> Table {
 
 /// Of how many results Acc is the share, such as ` (Ensemble 586 of 587)`.
 fn passed(report: &Report) -> String {
-    let told = |row: &Row| row.passed + row.failed;
+    let told = |row: &MetricRow| row.passed + row.failed;
     let read = report.rows.iter().filter(|row| told(row) > 0);
     let counts: Vec<String> = read
         .map(|row| format!("{} {} of {}", row.metric.title(), row.passed, told(row)))
@@ -110,7 +110,7 @@ fn passed(report: &Report) -> String {
     format!(" ({})", counts.join(", "))
 }
 
-fn score_cells(row: &Row) -> Vec<Option<String>> {
+fn score_cells(row: &MetricRow) -> Vec<Option<String>> {
     vec![
         Some(row.metric.title().to_owned()),
         Some(count(row.n)),
@@ -125,7 +125,7 @@ fn score_cells(row: &Row) -> Vec<Option<String>> {
 
 /// Who said what.
 pub(super) fn verdicts(report: &Report) -> Table {
-    let cells = |row: &Row| {
+    let cells = |row: &MetricRow| {
         vec![
             Some(row.metric.title().to_owned()),
             Some(count(row.read)),
@@ -154,7 +154,7 @@ pub(super) fn verdicts(report: &Report) -> Table {
 
 /// Acc under three rules, where two reviewers have told of the same result.
 pub(super) fn rules(report: &Report) -> Option<Table> {
-    let told_twice = |row: &Row| row.rules.as_ref().is_some_and(|rules| rules.told_twice > 0);
+    let told_twice = |row: &MetricRow| row.rules.as_ref().is_some_and(|rules| rules.told_twice > 0);
     report.rows.iter().any(told_twice).then(|| Table {
         caption: "Acc if one reviewer who fails it is enough, if a third settles conflicts (the Acc above), and if both \
                   must fail it; n are the results told of, twice those that two reviewers told of."
@@ -173,13 +173,13 @@ pub(super) fn rules(report: &Report) -> Option<Table> {
     })
 }
 
-fn rule_cells(row: &Row) -> Vec<Option<String>> {
+fn rule_cells(row: &MetricRow) -> Vec<Option<String>> {
     let rules = row.rules.as_ref();
     let mut cells = vec![
         Some(row.metric.title().to_owned()),
         rules.map(|rules| count(rules.told_twice)),
     ];
-    for i in 0..Rules::NAMES.len() {
+    for i in 0..AdjudicationRules::NAMES.len() {
         let rate = rules.map(|rules| rules.rates()[i]);
         cells.push(fixed(rate.and_then(|rate| rate.share), 3));
         cells.push(rate.map(|rate| count(rate.n)));
@@ -208,9 +208,9 @@ pub(super) fn truth(report: &Report) -> Table {
     }
 }
 
-fn truth_cells(row: &Row) -> Vec<Option<String>> {
+fn truth_cells(row: &MetricRow) -> Vec<Option<String>> {
     let truth = row.truth.as_ref();
-    let value = |read: fn(&TruthBlock) -> Option<f64>| truth.and_then(read);
+    let value = |read: fn(&TruthSummary) -> Option<f64>| truth.and_then(read);
     vec![
         Some(row.metric.title().to_owned()),
         Some(count(truth.map_or(0, |truth| truth.n))),
@@ -225,12 +225,12 @@ fn truth_cells(row: &Row) -> Vec<Option<String>> {
 
 /// Distance from alignments by hand; `None` where people made none.
 pub(super) fn by_hand(report: &Report) -> Option<Table> {
-    let found: Vec<(&Row, &ByHand)> = report
+    let found: Vec<(&MetricRow, &ManualAlignmentErrors)> = report
         .rows
         .iter()
         .filter_map(|row| Some((row, row.by_hand.as_ref()?)))
         .collect();
-    let cells = |(row, by_hand): &(&Row, &ByHand)| {
+    let cells = |(row, by_hand): &(&MetricRow, &ManualAlignmentErrors)| {
         vec![
             Some(row.metric.title().to_owned()),
             Some(count(by_hand.n)),

@@ -1,9 +1,9 @@
 //! The report for a terminal of 80 columns.
 
-use super::table::{self, Column, Kind, Table};
-use super::{coverage, scored};
+use super::table::{self, ColumnFormat, Table, TableColumn};
+use super::{coverage_tables, scored};
 use crate::report::model::{Comparison, FailureGroup, Report};
-use crate::report::score_duels::in_words;
+use crate::report::score_comparison::in_words;
 
 /// Columns of the terminal.
 const WIDTH: usize = 80;
@@ -15,7 +15,7 @@ pub(super) fn render(report: &Report) -> String {
     let mut blocks = vec![format!("{}\n", table::headline(report))];
     for found in table::tables(report)
         .into_iter()
-        .chain(coverage::short(report))
+        .chain(coverage_tables::short(report))
     {
         blocks.push(aligned(&found) + &wrapped("", &found.caption));
     }
@@ -63,14 +63,14 @@ fn shown(cell: Option<&String>) -> &str {
     cell.map_or("-", String::as_str)
 }
 
-fn line(cells: &[&str], columns: &[Column], widths: &[usize]) -> String {
+fn line(cells: &[&str], columns: &[TableColumn], widths: &[usize]) -> String {
     let padded: Vec<String> = cells
         .iter()
         .zip(columns)
         .zip(widths)
         .map(|((cell, column), width)| match column.kind {
-            Kind::Words | Kind::Interval => format!("{cell:<width$}"),
-            Kind::Number(_) => format!("{cell:>width$}"),
+            ColumnFormat::Words | ColumnFormat::IntervalMethod => format!("{cell:<width$}"),
+            ColumnFormat::Number(_) => format!("{cell:>width$}"),
         })
         .collect();
     format!("{}\n", padded.join("  ").trim_end())
@@ -135,7 +135,7 @@ pub(super) fn wrapped(mark: &str, words: &str) -> String {
 mod tests {
     use super::{render, wrapped};
     use crate::domain::{FailureClass, Verdict};
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
 
     const GOLDEN: &str = "\
 4 pairs: 3 done, 1 failed
@@ -172,16 +172,16 @@ Angle, landmarks and mask IoU are medians.
 ";
 
     fn report() -> crate::report::Report {
-        let mut tally = Tally::default();
-        let none = TruthFinding::default();
-        tally.add(&fixture::done("a", 0.75, &[Verdict::Pass]), &none);
-        tally.add(&fixture::done("b", 0.75, &[Verdict::Fail]), &none);
+        let mut tally = ReportAccumulator::default();
+        let none = TruthEvaluation::default();
+        tally.add(&test_fixtures::done("a", 0.75, &[Verdict::Pass]), &none);
+        tally.add(&test_fixtures::done("b", 0.75, &[Verdict::Fail]), &none);
         tally.add(
-            &fixture::done("c", 0.75, &[]),
-            &fixture::truth(0.5, 2.0, 0.9),
+            &test_fixtures::done("c", 0.75, &[]),
+            &test_fixtures::truth(0.5, 2.0, 0.9),
         );
         tally.add(
-            &fixture::failed("d", FailureClass::BadInput, "d.stl is empty"),
+            &test_fixtures::failed("d", FailureClass::BadInput, "d.stl is empty"),
             &none,
         );
         tally.finish()
@@ -211,10 +211,10 @@ Angle, landmarks and mask IoU are medians.
 
     #[test]
     fn three_rules_stand_side_by_side_where_two_have_read() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for (name, second) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
-            let pair = fixture::done(name, 0.75, &[Verdict::Pass, second]);
-            tally.add(&pair, &TruthFinding::default());
+            let pair = test_fixtures::done(name, 0.75, &[Verdict::Pass, second]);
+            tally.add(&pair, &TruthEvaluation::default());
         }
         let text = render(&tally.finish());
         let wanted = "\
@@ -227,8 +227,11 @@ Non-luminous SSIM      2   0.500  2    1.000  1  1.000  2
 
     #[test]
     fn an_unread_project_says_so() {
-        let mut tally = Tally::default();
-        tally.add(&fixture::done("a", 0.75, &[]), &TruthFinding::default());
+        let mut tally = ReportAccumulator::default();
+        tally.add(
+            &test_fixtures::done("a", 0.75, &[]),
+            &TruthEvaluation::default(),
+        );
         let text = render(&tally.finish());
         assert!(text.contains("Nobody has read these results yet"), "{text}");
         assert!(

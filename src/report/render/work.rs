@@ -22,7 +22,7 @@ pub(super) fn thresholds(report: &Report) -> Option<Table> {
                   median, and the percentiles between which nine in ten lie."
             .to_owned(),
         columns: vec![
-            words("Thresholds"),
+            words("ThresholdDistribution"),
             number("n", 0),
             number("5 %", 3),
             number("median", 3),
@@ -51,7 +51,7 @@ pub(super) fn times(report: &Report) -> Option<Table> {
                   milliseconds, sum in seconds."
             .to_owned(),
         columns: vec![
-            words("Times"),
+            words("StageTimeSamples"),
             number("n", 0),
             number("median ms", 0),
             number("95 % ms", 0),
@@ -65,14 +65,14 @@ pub(super) fn times(report: &Report) -> Option<Table> {
 mod tests {
     use super::{thresholds, times};
     use crate::domain::Stage;
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
 
     #[test]
     fn times_are_told_until_they_are_left_out_and_thresholds_always() {
-        let mut tally = Tally::default();
-        let mut pair = fixture::done("a", 0.8, &[]);
-        pair.stages = vec![fixture::stage(Stage::Fit, 12)];
-        tally.add(&pair, &TruthFinding::default());
+        let mut tally = ReportAccumulator::default();
+        let mut pair = test_fixtures::done("a", 0.8, &[]);
+        pair.stages = vec![test_fixtures::stage(Stage::Fit, 12)];
+        tally.add(&pair, &TruthEvaluation::default());
         let report = tally.finish();
         let table = times(&report).expect("one stage");
         let row: Vec<_> = table.rows[0].iter().flatten().collect();

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use crate::catalog::InputSeen;
 use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric};
-use crate::report::fixture;
+use crate::report::test_fixtures;
 use crate::runner::pair_context::PairContext;
 use crate::runner::steps::{ExecutionError, StageExecutor, StageOutput};
 use crate::store::NewArtifact;
@@ -106,7 +106,7 @@ impl StageExecutor for FakeExecutor {
         pair.inputs.print = (stage >= Stage::Normalize).then(|| seen("print"));
         let register = RegisterOutcome {
             metrics: ThresholdMetric::ALL
-                .map(|metric| fixture::metric(metric, 0.5, &[]).outcome)
+                .map(|metric| test_fixtures::metric(metric, 0.5, &[]).outcome)
                 .to_vec(),
             evidence: None,
         };

@@ -3,7 +3,7 @@
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use maud::{Markup, PreEscaped, html};
 
-use crate::report::gallery::{Gallery, Kind, Shot};
+use crate::report::gallery::{Gallery, GalleryItem, GalleryReason};
 
 /// What the three pictures of a shot are, for who cannot see them.
 const LAYERS: [&str; 3] = [
@@ -15,11 +15,11 @@ const LAYERS: [&str; 3] = [
 /// The groups that have something to show.
 pub(super) struct Album {
     seed: u64,
-    groups: Vec<Page>,
+    groups: Vec<AlbumGroup>,
 }
 
-struct Page {
-    kind: Kind,
+struct AlbumGroup {
+    kind: GalleryReason,
     of: u64,
     shots: Vec<String>,
 }
@@ -27,12 +27,12 @@ struct Page {
 impl Album {
     /// As many pictures as take at most `room` bytes, a kind having no more than the others while they all have some.
     pub(super) fn new(gallery: &Gallery, room: usize) -> Self {
-        let page = |kind, of| Page {
+        let page = |kind, of| AlbumGroup {
             kind,
             of,
             shots: Vec::new(),
         };
-        let mut groups: Vec<Page> = gallery
+        let mut groups: Vec<AlbumGroup> = gallery
             .groups
             .iter()
             .map(|group| page(group.kind, group.of))
@@ -71,13 +71,13 @@ impl Album {
         }
     }
 
-    fn group(&self, page: &Page) -> Markup {
+    fn group(&self, page: &AlbumGroup) -> Markup {
         let (id, title, what) = words(page.kind);
         html! {
             h3 id={ "pictures-" (id) } { (title) }
             p {
                 (what) " " (page.shots.len()) " of " (page.of) " are shown"
-                @if page.kind == Kind::Lot { ", drawn by lot with the seed " (self.seed) }
+                @if page.kind == GalleryReason::Lot { ", drawn by lot with the seed " (self.seed) }
                 "."
             }
             ul.shots { @for shot in &page.shots { li { (PreEscaped(shot)) } } }
@@ -86,24 +86,24 @@ impl Album {
 }
 
 /// Name in addresses, title and sentence of a kind.
-const fn words(kind: Kind) -> (&'static str, &'static str, &'static str) {
+const fn words(kind: GalleryReason) -> (&'static str, &'static str, &'static str) {
     match kind {
-        Kind::Failed => (
+        GalleryReason::Failed => (
             "failed",
             "Failed by reviewers",
             "Results that reviewers failed, in the order of names.",
         ),
-        Kind::Conflict => (
+        GalleryReason::Conflict => (
             "conflict",
             "Reviewers contradict each other",
             "Results that one passed and another failed, and nobody has settled.",
         ),
-        Kind::OffTruth => (
+        GalleryReason::OffTruth => (
             "off-truth",
             "Off the truth",
             "Results that miss the true alignment or the true stroke tops.",
         ),
-        Kind::Lot => (
+        GalleryReason::Lot => (
             "lot",
             "By lot",
             "Results of the ensemble, whatever was said of them.",
@@ -112,12 +112,12 @@ const fn words(kind: Kind) -> (&'static str, &'static str, &'static str) {
 }
 
 /// Bytes that the pictures of a shot take at least.
-fn size(shot: &Shot) -> usize {
+fn size(shot: &GalleryItem) -> usize {
     let pictures = shot.pictures.iter().flatten();
     pictures.map(|picture| picture.len().div_ceil(3) * 4).sum()
 }
 
-fn figure(shot: &Shot) -> Markup {
+fn figure(shot: &GalleryItem) -> Markup {
     let methods: Vec<&str> = shot.metrics.iter().map(|metric| metric.title()).collect();
     let [mesh, print] = &shot.files;
     html! {
@@ -143,7 +143,7 @@ fn code_points(character: &str) -> String {
     points.collect::<Vec<_>>().join(" ")
 }
 
-fn image(shot: &Shot, picture: Option<&[u8]>, layer: &str) -> Markup {
+fn image(shot: &GalleryItem, picture: Option<&[u8]>, layer: &str) -> Markup {
     let alt = format!("{}: {layer}", shot.pair);
     let Some(bytes) = picture else {
         return html! { span.missing { "no picture" } };

@@ -2,7 +2,7 @@
 
 use maud::{Markup, html};
 
-use crate::report::render::table::{Column, Kind, Table};
+use crate::report::render::table::{ColumnFormat, Table, TableColumn};
 
 /// A table in a frame that scrolls sideways where it is too wide.
 pub(super) fn table(table: &Table) -> Markup {
@@ -37,19 +37,19 @@ fn line(table: &Table, row: &[Option<String>]) -> Markup {
 }
 
 /// A cell with the dash or the minus that its hyphen stands for.
-fn shown(cell: Option<&str>, kind: Kind) -> Markup {
+fn shown(cell: Option<&str>, kind: ColumnFormat) -> Markup {
     match (cell, kind) {
-        (Some(text), Kind::Interval) => html! { (text.replace('-', "\u{2013}")) },
-        (Some(text), Kind::Number(_)) => html! { (text.replace('-', "\u{2212}")) },
-        (Some(text), Kind::Words) => html! { (text) },
+        (Some(text), ColumnFormat::IntervalMethod) => html! { (text.replace('-', "\u{2013}")) },
+        (Some(text), ColumnFormat::Number(_)) => html! { (text.replace('-', "\u{2212}")) },
+        (Some(text), ColumnFormat::Words) => html! { (text) },
         (None, _) => html! { span.none title="does not exist" { "\u{2013}" } },
     }
 }
 
-const fn class(column: &Column) -> &'static str {
+const fn class(column: &TableColumn) -> &'static str {
     match column.kind {
-        Kind::Words => "words",
-        Kind::Interval => "interval",
-        Kind::Number(_) => "number",
+        ColumnFormat::Words => "words",
+        ColumnFormat::IntervalMethod => "interval",
+        ColumnFormat::Number(_) => "number",
     }
 }

@@ -83,23 +83,23 @@ fn document(report: &Report, album: &Album, cover: &Cover) -> Markup {
 mod tests {
     use super::{Cover, MOST_BYTES, page};
     use crate::domain::{PairName, ThresholdMetric, Verdict};
-    use crate::report::gallery::{Gallery, Group, Kind, Shot};
-    use crate::report::{Report, Tally, TruthFinding, fixture};
+    use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason};
+    use crate::report::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
 
     fn report() -> Report {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for (name, second) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
-            let pair = fixture::done(name, 0.75, &[Verdict::Pass, second]);
-            tally.add(&pair, &fixture::truth(1.0, 2.0, 0.9));
+            let pair = test_fixtures::done(name, 0.75, &[Verdict::Pass, second]);
+            tally.add(&pair, &test_fixtures::truth(1.0, 2.0, 0.9));
         }
         let class = crate::domain::FailureClass::BadInput;
-        let failed = fixture::failed("c", class, "<script>alert(1)</script>.stl is empty");
-        tally.add(&failed, &TruthFinding::default());
+        let failed = test_fixtures::failed("c", class, "<script>alert(1)</script>.stl is empty");
+        tally.add(&failed, &TruthEvaluation::default());
         tally.finish()
     }
 
-    fn shot(name: &str, bytes: usize) -> Shot {
-        Shot {
+    fn shot(name: &str, bytes: usize) -> GalleryItem {
+        GalleryItem {
             pair: PairName::new(name).expect("test names are ids"),
             character: Some("<b>".to_owned()),
             files: ["a\"><img src=x>.stl".to_owned(), "a&b.png".to_owned()],
@@ -112,14 +112,14 @@ mod tests {
     }
 
     fn gallery(shots: usize, bytes: usize) -> Gallery {
-        let group = |kind| Group {
+        let group = |kind| GalleryGroup {
             kind,
             of: 400,
             shots: (0..shots).map(|i| shot(&format!("p{i}"), bytes)).collect(),
         };
         Gallery {
             seed: 11,
-            groups: Kind::ALL.map(group).to_vec(),
+            groups: GalleryReason::ALL.map(group).to_vec(),
         }
     }
 

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::report::model::{Basis, Report};
 use crate::report::render::table::fixed;
-use crate::report::thresholds::Thresholds;
+use crate::report::thresholds::ThresholdDistribution;
 
 /// Width of a drawing in its own units.
 const WIDTH: f64 = 460.0;
@@ -22,7 +22,7 @@ const BARS: f64 = 54.0;
 const MARKS: usize = 5;
 
 /// One row: a name, a value, and the ends of the line through it.
-struct Row {
+struct PlotRow {
     name: &'static str,
     value: f64,
     ends: [f64; 2],
@@ -41,14 +41,14 @@ pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
             ),
         };
         let value = acc?;
-        Some(Row {
+        Some(PlotRow {
             name: row.metric.title(),
             value,
             ends: ends?,
             told: format!("{value:.3}"),
         })
     });
-    let rows: Vec<Row> = found.collect();
+    let rows: Vec<PlotRow> = found.collect();
     let lowest = rows.iter().map(|row| row.ends[0]).fold(1.0, f64::min);
     // The scale begins at a tenth, so that near-perfect rows can still be told apart.
     let from = ((lowest * 10.0).floor() / 10.0).min(0.9);
@@ -62,13 +62,13 @@ pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
 
 /// The median time of every stage with its 95th percentile, in milliseconds.
 pub(super) fn times(report: &Report) -> Markup {
-    let found = report.times.iter().map(|time| Row {
+    let found = report.times.iter().map(|time| PlotRow {
         name: time.stage.name(),
         value: time.median_ms,
         ends: [time.median_ms, time.p95_ms],
         told: format!("{:.0}", time.median_ms),
     });
-    let rows: Vec<Row> = found.collect();
+    let rows: Vec<PlotRow> = found.collect();
     let longest = rows.iter().map(|row| row.ends[1]).fold(1.0, f64::max);
     let what = "Milliseconds a pair by stage: the median, with a line to the 95th percentile";
     lines(&rows, [0.0, round_up(longest)], 0, what)
@@ -81,7 +81,7 @@ fn round_up(number: f64) -> f64 {
 }
 
 /// Rows of points on lines over a scale; nothing without rows.
-fn lines(rows: &[Row], [from, to]: [f64; 2], decimals: usize, what: &str) -> Markup {
+fn lines(rows: &[PlotRow], [from, to]: [f64; 2], decimals: usize, what: &str) -> Markup {
     let place = |value: f64| LEFT + (RIGHT - LEFT) * (value - from) / (to - from);
     let below = ROW * rows.len() as f64;
     let told: Vec<String> = rows
@@ -127,7 +127,7 @@ pub(super) fn thresholds(report: &Report) -> Markup {
     figure(below + SCALE, &alt, what, &drawing)
 }
 
-fn bars(cuts: &Thresholds, top: f64) -> Markup {
+fn bars(cuts: &ThresholdDistribution, top: f64) -> Markup {
     let most = cuts.bins.iter().copied().max().unwrap_or(0).max(1) as f64;
     let wide = (RIGHT - LEFT) / cuts.bins.len() as f64;
     let base = top + BARS;
@@ -165,14 +165,14 @@ mod tests {
     use super::{accuracy, round_up, thresholds, times};
     use crate::domain::{Stage, Verdict};
     use crate::report::model::Basis;
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
 
     #[test]
     fn points_stand_where_their_numbers_are_on_the_scale() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for (name, verdict) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
-            let pair = fixture::done(name, 0.8, &[verdict]);
-            tally.add(&pair, &TruthFinding::default());
+            let pair = test_fixtures::done(name, 0.8, &[verdict]);
+            tally.add(&pair, &TruthEvaluation::default());
         }
         let report = tally.finish();
         // 1 of 2 has the interval 0.095 to 0.905, so that the scale goes from 0 to 1, and the half lies in its middle.
@@ -184,12 +184,12 @@ mod tests {
 
     #[test]
     fn times_and_thresholds_are_drawn_once_a_row() {
-        let mut tally = Tally::default();
-        let mut pair = fixture::done("a", 0.8, &[]);
+        let mut tally = ReportAccumulator::default();
+        let mut pair = test_fixtures::done("a", 0.8, &[]);
         pair.stages = [(Stage::Fit, 40), (Stage::Depth, 80)]
-            .map(|(stage, ms)| fixture::stage(stage, ms))
+            .map(|(stage, ms)| test_fixtures::stage(stage, ms))
             .to_vec();
-        tally.add(&pair, &TruthFinding::default());
+        tally.add(&pair, &TruthEvaluation::default());
         let report = tally.finish();
         let drawn = times(&report).into_string();
         assert!(

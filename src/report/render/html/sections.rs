@@ -7,8 +7,8 @@ use super::markup::table;
 use super::plots;
 use crate::report::model::{Basis, Comparison, FailureGroup, Report};
 use crate::report::render::table::{self as tables, basis, comparisons, p_value, title};
-use crate::report::render::{coverage, failed, scored, work};
-use crate::report::score_duels::in_words;
+use crate::report::render::{coverage_tables, failed, scored, work};
+use crate::report::score_comparison::in_words;
 
 /// Longest error that is told in full, letters.
 const LONGEST_ERROR: usize = 600;
@@ -61,7 +61,10 @@ const fn section(id: &'static str, title: &'static str, body: Markup) -> Section
 
 /// Accuracy against coverage, a line a method, with every number behind a fold; none without confidences.
 fn confidence(report: &Report) -> Option<Section> {
-    let (short, full) = (coverage::short(report), coverage::full(report));
+    let (short, full) = (
+        coverage_tables::short(report),
+        coverage_tables::full(report),
+    );
     let body = html! {
         @for found in &short { (table(found)) }
         details { summary { "With intervals" } @for found in &full { (table(found)) } }

@@ -8,7 +8,7 @@ use crate::domain::Stage;
 
 /// Computing times of one stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct StageTime {
+pub struct StageTimes {
     /// Which stage.
     pub stage: Stage,
     /// Pairs that have a result of it.
@@ -23,9 +23,9 @@ pub struct StageTime {
 
 /// The times so far by stage, milliseconds.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Times([Vec<f64>; Stage::ALL.len()]);
+pub(super) struct StageTimeSamples([Vec<f64>; Stage::ALL.len()]);
 
-impl Times {
+impl StageTimeSamples {
     /// Counts the stages of one pair in.
     pub(super) fn add(&mut self, stages: &[StageRecord]) {
         for record in stages {
@@ -34,11 +34,11 @@ impl Times {
     }
 
     /// The times of every stage that has any, in order.
-    pub(super) fn finish(self) -> Vec<StageTime> {
+    pub(super) fn finish(self) -> Vec<StageTimes> {
         let by_stage = Stage::ALL.into_iter().zip(self.0);
         by_stage
             .filter_map(|(stage, mut ms)| {
-                Some(StageTime {
+                Some(StageTimes {
                     stage,
                     n: ms.len() as u64,
                     median_ms: median(&mut ms)?,
@@ -52,15 +52,15 @@ impl Times {
 
 #[cfg(test)]
 mod tests {
-    use super::Times;
+    use super::StageTimeSamples;
     use crate::domain::Stage;
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
     #[test]
     fn a_stage_has_its_median_its_tail_and_its_sum() {
-        let mut times = Times::default();
+        let mut times = StageTimeSamples::default();
         for ms in [10, 20, 30, 40, 100] {
-            times.add(&[fixture::stage(Stage::Depth, ms)]);
+            times.add(&[test_fixtures::stage(Stage::Depth, ms)]);
         }
         times.add(&[]);
         let found = times.finish();

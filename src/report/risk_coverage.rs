@@ -1,6 +1,6 @@
 //! Accuracy against coverage: how right those results are that stay when the least confident are left out.
 
-use super::model::{Basis, Coverage, CoveragePoint};
+use super::model::{Basis, RiskCoverage, RiskCoveragePoint};
 use super::stats::wilson_95;
 use crate::domain::ThresholdMetric;
 
@@ -11,13 +11,13 @@ pub const LEAST_PERCENT: u64 = 3;
 
 /// Confidences of all metrics with what became of them.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Confidences([Judged; ThresholdMetric::ALL.len()]);
+pub(super) struct ConfidenceSamples([ConfidenceOutcomes; ThresholdMetric::ALL.len()]);
 
 /// Confidence and outcome of one metric's results.
 #[derive(Debug, Clone, Default)]
-struct Judged(Vec<(f64, bool)>);
+struct ConfidenceOutcomes(Vec<(f64, bool)>);
 
-impl Confidences {
+impl ConfidenceSamples {
     /// Counts one pair in; `judged` tells a metric's confidence and whether its result is right, where both are known.
     pub(super) fn add(&mut self, judged: impl Fn(ThresholdMetric) -> Option<(f64, bool)>) {
         for (column, metric) in self.0.iter_mut().zip(ThresholdMetric::ALL) {
@@ -26,7 +26,7 @@ impl Confidences {
     }
 
     /// The curves of all metrics that have any.
-    pub(super) fn finish(self, basis: Basis) -> Vec<Coverage> {
+    pub(super) fn finish(self, basis: Basis) -> Vec<RiskCoverage> {
         let columns = self.0.into_iter().zip(ThresholdMetric::ALL);
         columns
             .filter(|(judged, _)| !judged.0.is_empty())
@@ -35,14 +35,14 @@ impl Confidences {
     }
 }
 
-impl Judged {
-    fn finish(mut self, basis: Basis, metric: ThresholdMetric) -> Coverage {
+impl ConfidenceOutcomes {
+    fn finish(mut self, basis: Basis, metric: ThresholdMetric) -> RiskCoverage {
         // The sort is stable: of equally confident results the first by name stays the longest.
         self.0.sort_by(|a, b| b.0.total_cmp(&a.0));
         let kept = |percent| self.0.len() * percent as usize / 100;
         let failures = |judged: &[(f64, bool)]| judged.iter().filter(|(_, right)| !right).count();
         let least = &self.0[kept(100 - LEAST_PERCENT)..];
-        Coverage {
+        RiskCoverage {
             basis,
             metric,
             n: self.0.len() as u64,
@@ -58,10 +58,10 @@ impl Judged {
 }
 
 /// One point of a curve from the results that are kept, the most confident first.
-fn point(percent: u64, kept: &[(f64, bool)]) -> CoveragePoint {
+fn point(percent: u64, kept: &[(f64, bool)]) -> RiskCoveragePoint {
     let n = kept.len() as u64;
     let passed = kept.iter().filter(|(_, right)| *right).count() as u64;
-    CoveragePoint {
+    RiskCoveragePoint {
         coverage: percent as f64 / 100.0,
         n,
         passed,
@@ -73,14 +73,14 @@ fn point(percent: u64, kept: &[(f64, bool)]) -> CoveragePoint {
 
 #[cfg(test)]
 mod tests {
-    use super::{Confidences, KEPT_PERCENT};
+    use super::{ConfidenceSamples, KEPT_PERCENT};
     use crate::domain::ThresholdMetric;
-    use crate::report::model::{Basis, Coverage};
+    use crate::report::model::{Basis, RiskCoverage};
     use crate::report::stats::wilson_95;
 
     /// The curve of density over results in the order given.
-    fn curve(judged: &[(f64, bool)]) -> Coverage {
-        let mut confidences = Confidences::default();
+    fn curve(judged: &[(f64, bool)]) -> RiskCoverage {
+        let mut confidences = ConfidenceSamples::default();
         for one in judged {
             confidences.add(|metric| (metric == ThresholdMetric::Density).then_some(*one));
         }

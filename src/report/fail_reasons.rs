@@ -2,13 +2,13 @@
 
 use serde::Serialize;
 
-use super::standing::{Standing, split};
+use super::consensus::{Consensus, split};
 use crate::catalog::{MetricRecord, ReviewerVerdict};
 use crate::domain::{Reason, Verdict};
 
 /// Failed results for which a reason was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct ReasonCount {
+pub struct FailReasonCount {
     /// The reason; `None` where nobody gave one.
     pub reason: Option<Reason>,
     /// How many.
@@ -17,12 +17,12 @@ pub struct ReasonCount {
 
 /// The counts so far: the reasons in their order, then those without.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Reasons([u64; Reason::ALL.len() + 1]);
+pub(super) struct FailReasonSums([u64; Reason::ALL.len() + 1]);
 
-impl Reasons {
+impl FailReasonSums {
     /// Counts one result in, if it failed: once for each reason that was given.
     pub(super) fn add(&mut self, record: &MetricRecord) {
-        if Standing::of(record) != Standing::Failed {
+        if Consensus::of(record) != Consensus::Failed {
             return;
         }
         let (words, own) = split(record);
@@ -40,29 +40,29 @@ impl Reasons {
     }
 
     /// The reasons that were given, in their order; those without last.
-    pub(super) fn finish(self) -> Vec<ReasonCount> {
+    pub(super) fn finish(self) -> Vec<FailReasonCount> {
         let reasons = Reason::ALL.into_iter().map(Some).chain([None]);
         reasons
             .zip(self.0)
             .filter(|(_, count)| *count > 0)
-            .map(|(reason, count)| ReasonCount { reason, count })
+            .map(|(reason, count)| FailReasonCount { reason, count })
             .collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ReasonCount, Reasons};
+    use super::{FailReasonCount, FailReasonSums};
     use crate::domain::Reason::{Angle, Mirrored};
     use crate::domain::Verdict::{Fail, Pass};
     use crate::domain::{Reason, ThresholdMetric};
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
     #[test]
     fn a_failed_result_counts_once_for_each_reason_and_a_passed_one_not_at_all() {
-        let mut reasons = Reasons::default();
+        let mut reasons = FailReasonSums::default();
         let mut add = |verdicts: &[_], given: &[Option<Reason>]| {
-            let mut record = fixture::metric(ThresholdMetric::Density, 0.8, verdicts);
+            let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, verdicts);
             for (read, reason) in record.verdicts.iter_mut().zip(given) {
                 read.reason = *reason;
             }
@@ -72,7 +72,7 @@ mod tests {
         add(&[Fail, Fail], &[Some(Angle), Some(Mirrored)]);
         add(&[Fail], &[None]);
         add(&[Pass, Fail], &[None, Some(Mirrored)]);
-        let count = |reason, count| ReasonCount { reason, count };
+        let count = |reason, count| FailReasonCount { reason, count };
         let wanted = [
             count(Some(Angle), 2),
             count(Some(Mirrored), 1),

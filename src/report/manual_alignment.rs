@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::aligned::{Aligned, AlignedError};
+use super::accumulate::share;
+use super::ground_truth::MAX_ANGLE_DEG;
+use super::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use super::stats::{median, quantile};
-use super::tally::share;
-use super::truth::MAX_ANGLE_DEG;
 use crate::catalog::{PairResults, StoredAlignment};
 use crate::domain::{Affine2, DepthOutcome, Stage, ThresholdMetric};
 use crate::store::Project;
 
 /// How far one metric's results lie from the alignments by hand.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ByHand {
+pub struct ManualAlignmentErrors {
     /// Results that have an alignment by hand.
     pub n: u64,
     /// Share turned by at most 5 degrees against it.
@@ -37,7 +37,7 @@ pub struct ByHand {
 
 /// What somebody did who laid a relief anew.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct HandMove {
+pub struct ManualCorrection {
     /// By how much it was turned, degrees in (-180, 180], clockwise on the screen.
     pub turned_deg: f64,
     /// By how much its centre was shifted, print pixels, x right and y down.
@@ -48,7 +48,7 @@ pub struct HandMove {
     pub mirrored: bool,
 }
 
-impl HandMove {
+impl ManualCorrection {
     /// From one way of laying a relief of so many pixels on its print to another; `None` when one flattens it.
     pub fn between(found: &Affine2, by_hand: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
         let back = found.inverse()?;
@@ -73,7 +73,7 @@ impl HandMove {
 
 /// One result's distance from the alignment by hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct HandErrors {
+pub struct ManualErrors {
     /// Turn, degrees in 0..=180; 180 when mirrored.
     angle_deg: f64,
     /// Shift of the relief's centre, percent of its longer side.
@@ -84,10 +84,10 @@ pub struct HandErrors {
     mirrored: bool,
 }
 
-impl HandErrors {
+impl ManualErrors {
     /// Between two ways of laying a relief of so many pixels on its print; `None` when one flattens it.
     fn between(found: &Affine2, by_hand: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
-        let moved = HandMove::between(found, by_hand, depth_px)?;
+        let moved = ManualCorrection::between(found, by_hand, depth_px)?;
         let [x, y] = moved.shifted_px;
         let longer = f64::from(depth_px[0].max(depth_px[1]));
         Some(Self {
@@ -111,11 +111,11 @@ pub(super) fn errors(
     project: &Project,
     pair: &PairResults,
     by_hand: &StoredAlignment,
-) -> Result<BTreeMap<ThresholdMetric, HandErrors>, AlignedError> {
+) -> Result<BTreeMap<ThresholdMetric, ManualErrors>, PairArtifactsError> {
     if pair.metrics.is_empty() {
         return Ok(BTreeMap::new());
     }
-    let aligned = Aligned::new(project, pair);
+    let aligned = PairArtifacts::new(project, pair);
     let depth: DepthOutcome = aligned.outcome(Stage::Depth)?;
     let Some(laid) = aligned.print_from_depth(&by_hand.made.print_from_mesh)? else {
         return Ok(BTreeMap::new());
@@ -124,7 +124,7 @@ pub(super) fn errors(
     let size = [depth.width, depth.height];
     Ok(outcomes
         .filter_map(|outcome| {
-            let errors = HandErrors::between(&outcome.print_from_depth, &laid, size)?;
+            let errors = ManualErrors::between(&outcome.print_from_depth, &laid, size)?;
             Some((outcome.metric, errors))
         })
         .collect())
@@ -132,27 +132,27 @@ pub(super) fn errors(
 
 /// The distances so far of one metric.
 #[derive(Debug, Clone, Default)]
-pub(super) struct HandSums(Vec<HandErrors>);
+pub(super) struct ManualErrorSums(Vec<ManualErrors>);
 
-impl HandSums {
+impl ManualErrorSums {
     /// Counts one result in.
-    pub(super) fn add(&mut self, errors: HandErrors) {
+    pub(super) fn add(&mut self, errors: ManualErrors) {
         self.0.push(errors);
     }
 
     /// What follows; `None` without any alignment by hand.
-    pub(super) fn finish(self) -> Option<ByHand> {
+    pub(super) fn finish(self) -> Option<ManualAlignmentErrors> {
         let n = self.0.len() as u64;
-        let of = |read: fn(&HandErrors) -> f64| -> [Option<f64>; 2] {
+        let of = |read: fn(&ManualErrors) -> f64| -> [Option<f64>; 2] {
             let mut values: Vec<f64> = self.0.iter().map(read).collect();
             [median(&mut values), quantile(&mut values, 0.95)]
         };
-        let count = |is: fn(&HandErrors) -> bool| self.0.iter().filter(|one| is(one)).count();
+        let count = |is: fn(&ManualErrors) -> bool| self.0.iter().filter(|one| is(one)).count();
         let right = count(|errors| errors.angle_deg <= MAX_ANGLE_DEG);
         let [angle_median_deg, angle_p95_deg] = of(|errors| errors.angle_deg);
         let [shift_median_pct, shift_p95_pct] = of(|errors| errors.shift_pct);
         let [scale_median_pct, scale_p95_pct] = of(|errors| errors.scale_pct);
-        (n > 0).then(|| ByHand {
+        (n > 0).then(|| ManualAlignmentErrors {
             n,
             angle_le_5deg: share(right as f64, n),
             angle_median_deg,
@@ -168,7 +168,7 @@ impl HandSums {
 
 #[cfg(test)]
 mod tests {
-    use super::{HandErrors, HandMove, HandSums};
+    use super::{ManualCorrection, ManualErrorSums, ManualErrors};
     use crate::domain::Affine2;
 
     /// A relief of 101 x 51 px laid with its centre at (200, 100).
@@ -178,14 +178,14 @@ mod tests {
         Affine2::similarity(scale, angle_deg.to_radians(), centre).after(&back)
     }
 
-    fn errors(found: &Affine2) -> HandErrors {
+    fn errors(found: &Affine2) -> ManualErrors {
         let by_hand = laid(2.0, 30.0, [0.0, 0.0]);
-        HandErrors::between(found, &by_hand, [101, 51]).expect("neither is flat")
+        ManualErrors::between(found, &by_hand, [101, 51]).expect("neither is flat")
     }
 
     #[test]
     fn turn_shift_and_scale_are_told_apart() {
-        let near = |found: HandErrors, wanted: [f64; 3]| {
+        let near = |found: ManualErrors, wanted: [f64; 3]| {
             let told = [found.angle_deg, found.shift_pct, found.scale_pct];
             for (told, wanted) in told.into_iter().zip(wanted) {
                 assert!((told - wanted).abs() < 1e-9, "{found:?}");
@@ -196,7 +196,8 @@ mod tests {
         // 202 px is the relief's longer side on the print.
         near(errors(&laid(2.0, 30.0, [6.06, 8.08])), [0.0, 5.0, 0.0]);
         near(errors(&laid(1.6, 30.0, [0.0, 0.0])), [0.0, 0.0, 25.0]);
-        let flat = HandErrors::between(&Affine2([[0.0; 3]; 2]), &laid(1.0, 0.0, [0.0; 2]), [9, 9]);
+        let flat =
+            ManualErrors::between(&Affine2([[0.0; 3]; 2]), &laid(1.0, 0.0, [0.0; 2]), [9, 9]);
         assert_eq!(flat, None);
     }
 
@@ -205,7 +206,7 @@ mod tests {
         let found = laid(2.0, 30.0, [0.0, 0.0]);
         let turned = laid(2.0, 42.5, [3.0, -4.0]);
         let moved = |by_hand: &Affine2| {
-            HandMove::between(&found, by_hand, [101, 51]).expect("neither is flat")
+            ManualCorrection::between(&found, by_hand, [101, 51]).expect("neither is flat")
         };
         for (by_hand, mirrored) in [(turned, false), (turned.after(&Affine2::mirror(101)), true)] {
             let told = moved(&by_hand);
@@ -228,7 +229,7 @@ mod tests {
 
     #[test]
     fn the_share_within_five_degrees_is_of_those_corrected() {
-        let mut sums = HandSums::default();
+        let mut sums = ManualErrorSums::default();
         for angle_deg in [30.0, 31.0, 34.0, 40.0, 10.0] {
             sums.add(errors(&laid(2.0, angle_deg, [0.0, 0.0])));
         }
@@ -243,6 +244,6 @@ mod tests {
         near(found.angle_median_deg, 4.0);
         // NumPy 2 `quantile([0, 1, 4, 10, 20], 0.95)`.
         near(found.angle_p95_deg, 18.0);
-        assert_eq!(HandSums::default().finish(), None);
+        assert_eq!(ManualErrorSums::default().finish(), None);
     }
 }

@@ -6,10 +6,10 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::bootstrap::{self, Sums, middle_95, resampled_means, resamples, two_sided_p};
-use super::compare::PAIRS;
+use super::bootstrap::{self, QuantitySums, middle_95, resampled_means, resamples, two_sided_p};
+use super::comparison::PAIRS;
 use super::score::Score;
-use super::score_duels::{Difference, ScoreComparison, compared};
+use super::score_comparison::{Difference, ScoreComparison, compared};
 use crate::catalog::PairResults;
 use crate::domain::ThresholdMetric;
 
@@ -26,14 +26,14 @@ const WIDTH: usize = METRICS * SCORES + METRICS + PAIRS.len() * SCORES;
 /// What is drawn anew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Unit {
+pub enum ResamplingUnit {
     /// Pairs, each by itself.
     Pair,
     /// Woodblocks with all their pairs; a pair without one counts as its own.
     Block,
 }
 
-impl Unit {
+impl ResamplingUnit {
     /// What several are called.
     pub const fn plural(self) -> &'static str {
         match self {
@@ -45,11 +45,11 @@ impl Unit {
 
 /// How the bootstrap was done.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Bootstrap {
+pub struct BootstrapSettings {
     /// Its kind of interval.
     pub method: &'static str,
     /// What was drawn.
-    pub by: Unit,
+    pub by: ResamplingUnit,
     /// How many of them there are.
     pub units: u64,
     /// How often they were drawn anew.
@@ -77,18 +77,18 @@ pub struct MeanIntervals {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Drawn {
     /// How; `None` where nothing was drawn.
-    pub(super) bootstrap: Option<Bootstrap>,
+    pub(super) bootstrap: Option<BootstrapSettings>,
     /// Intervals of the means, in the order of [`ThresholdMetric::ALL`].
     pub(super) means: [MeanIntervals; METRICS],
     /// Metrics compared by their scores.
     pub(super) comparisons: Vec<ScoreComparison>,
     /// Why means have no intervals and metrics are not compared by their scores.
-    pub(super) lack: Option<Lack>,
+    pub(super) lack: Option<BootstrapSkipped>,
 }
 
 /// Why nothing follows from drawing anew.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Lack {
+pub(super) enum BootstrapSkipped {
     /// More units than are kept.
     TooMany,
     /// Fewer units than an interval takes.
@@ -96,14 +96,14 @@ pub(super) enum Lack {
         /// How many there are.
         units: usize,
         /// Of what.
-        by: Unit,
+        by: ResamplingUnit,
     },
 }
 
 /// The sums so far, by unit.
 #[derive(Debug, Clone)]
 pub(super) struct Samples {
-    units: Vec<Sums>,
+    units: Vec<QuantitySums>,
     blocks: BTreeMap<String, usize>,
     most: usize,
     is_over: bool,
@@ -182,18 +182,18 @@ impl Samples {
                 bootstrap: None,
                 means: Default::default(),
                 comparisons: Vec::new(),
-                lack: self.is_over.then_some(Lack::TooMany),
+                lack: self.is_over.then_some(BootstrapSkipped::TooMany),
             };
         }
         let units = self.units.len();
         let by = if self.blocks.is_empty() {
-            Unit::Pair
+            ResamplingUnit::Pair
         } else {
-            Unit::Block
+            ResamplingUnit::Block
         };
         let mut quantities = Quantities::draw(&self.units);
         Drawn {
-            bootstrap: Some(Bootstrap {
+            bootstrap: Some(BootstrapSettings {
                 method: "percentile",
                 by,
                 units: self.units.len() as u64,
@@ -202,7 +202,7 @@ impl Samples {
             }),
             means: std::array::from_fn(|metric| quantities.intervals(metric, by)),
             comparisons: compared(&quantities.differences(), by),
-            lack: (units < FEWEST_UNITS).then_some(Lack::TooFew { units, by }),
+            lack: (units < FEWEST_UNITS).then_some(BootstrapSkipped::TooFew { units, by }),
         }
     }
 }
@@ -224,14 +224,14 @@ const fn difference_of(pair: usize, score: usize) -> usize {
 
 /// Every quantity as it is and as it is drawn anew.
 struct Quantities {
-    total: Sums,
+    total: QuantitySums,
     /// Units that have any of it.
     held_by: Vec<usize>,
     drawn: Vec<Vec<f64>>,
 }
 
 impl Quantities {
-    fn draw(units: &[Sums]) -> Self {
+    fn draw(units: &[QuantitySums]) -> Self {
         let mut total = vec![[0.0; 2]; WIDTH];
         let mut held_by = vec![0; WIDTH];
         for unit in units {
@@ -254,7 +254,7 @@ impl Quantities {
         middle_95(&mut self.drawn[quantity]).filter(|_| is_enough)
     }
 
-    fn intervals(&mut self, metric: usize, by: Unit) -> MeanIntervals {
+    fn intervals(&mut self, metric: usize, by: ResamplingUnit) -> MeanIntervals {
         let [ssim, iou, iou_box, dice] =
             std::array::from_fn(|score| self.interval(mean_of(metric, score)));
         let [passed, told] = self.total[acc_of(metric)];
@@ -265,7 +265,7 @@ impl Quantities {
             iou,
             iou_box,
             dice,
-            acc_by_block: acc.filter(|_| varies && by == Unit::Block),
+            acc_by_block: acc.filter(|_| varies && by == ResamplingUnit::Block),
         }
     }
 
@@ -295,16 +295,16 @@ impl Quantities {
 
 #[cfg(test)]
 mod tests {
-    use super::{Drawn, FEWEST_UNITS, Samples, Unit};
+    use super::{Drawn, FEWEST_UNITS, ResamplingUnit, Samples};
     use crate::catalog::PairResults;
     use crate::domain::ThresholdMetric;
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
     /// Pairs in blocks of three whose ensemble has a higher IoU than all others; every seventh fails.
     fn drawn(pairs: u32, has_blocks: bool) -> Drawn {
         let mut samples = Samples::default();
         for i in 0..pairs {
-            let mut pair: PairResults = fixture::done(&format!("p{i:02}"), 0.8, &[]);
+            let mut pair: PairResults = test_fixtures::done(&format!("p{i:02}"), 0.8, &[]);
             pair.facts.block = has_blocks.then(|| format!("b{}", i / 3));
             let wave = f64::from(i).sin();
             for record in &mut pair.metrics {
@@ -321,8 +321,8 @@ mod tests {
         let by_pair = drawn(40, false);
         let by_block = drawn(40, true);
         let how = |drawn: &Drawn| drawn.bootstrap.map(|how| (how.by, how.units));
-        assert_eq!(how(&by_pair), Some((Unit::Pair, 40)));
-        assert_eq!(how(&by_block), Some((Unit::Block, 14)));
+        assert_eq!(how(&by_pair), Some((ResamplingUnit::Pair, 40)));
+        assert_eq!(how(&by_block), Some((ResamplingUnit::Block, 14)));
         assert_eq!(by_pair.means[0].acc_by_block, None);
         let [low, high] = by_block.means[0].acc_by_block.expect("14 blocks");
         // NumPy 2.4.6 with a million resamples: 0.762 and 0.929; deviation 0.045.
@@ -353,7 +353,7 @@ mod tests {
     fn acc_that_never_fails_has_no_interval_by_block() {
         let mut samples = Samples::default();
         for i in 0..20 {
-            let mut pair = fixture::done(&format!("p{i:02}"), 0.8, &[]);
+            let mut pair = test_fixtures::done(&format!("p{i:02}"), 0.8, &[]);
             pair.facts.block = Some(format!("b{i}"));
             samples.add(&pair, |_| Some(true));
         }
@@ -365,7 +365,7 @@ mod tests {
     #[test]
     fn a_project_without_results_draws_nothing() {
         let mut samples = Samples::default();
-        samples.add(&fixture::pending("a"), |_| None);
+        samples.add(&test_fixtures::pending("a"), |_| None);
         let found = samples.finish();
         assert_eq!((found.bootstrap, found.comparisons), (None, Vec::new()));
     }

@@ -9,7 +9,7 @@ use crate::domain::{Affine2, PairName, PrintFromMesh, UnixMillis};
 
 /// An alignment by hand that holds for the mesh and print there are.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ByHand {
+pub struct LineManualAlignment {
     /// Who made it.
     pub reviewer: String,
     /// When.
@@ -26,7 +26,7 @@ pub struct ByHand {
     pub note: Option<String>,
 }
 
-impl ByHand {
+impl LineManualAlignment {
     fn of(stored: StoredAlignment) -> Self {
         let made = stored.made;
         let Affine2([first, second]) = made.print_from_depth;
@@ -48,9 +48,11 @@ impl ByHand {
 ///
 /// # Errors
 /// When the catalog refuses.
-pub(super) async fn newest(catalog: &Catalog) -> Result<BTreeMap<PairName, ByHand>, CatalogError> {
+pub(super) async fn newest(
+    catalog: &Catalog,
+) -> Result<BTreeMap<PairName, LineManualAlignment>, CatalogError> {
     let newest = catalog.newest_hand_alignments().await?.into_iter();
     Ok(newest
-        .map(|(pair, stored)| (pair, ByHand::of(stored)))
+        .map(|(pair, stored)| (pair, LineManualAlignment::of(stored)))
         .collect())
 }

@@ -2,9 +2,9 @@
 
 use serde::Serialize;
 
-use super::compare::{LEVEL, after_holm};
-use super::samples::Unit;
+use super::comparison::{LEVEL, after_holm};
 use super::score::Score;
+use super::score_bootstrap::ResamplingUnit;
 use crate::domain::ThresholdMetric;
 
 /// A score's mean difference between two metrics, and what drawing anew says of it.
@@ -48,7 +48,7 @@ pub struct ScoreComparison {
 const TEST: &str = "paired bootstrap, percentile, two-sided";
 
 /// The comparisons that follow, Holm's correction done for each score by itself.
-pub(super) fn compared(found: &[Difference], by: Unit) -> Vec<ScoreComparison> {
+pub(super) fn compared(found: &[Difference], by: ResamplingUnit) -> Vec<ScoreComparison> {
     let of_one_score = found.chunk_by(|a, b| a.score == b.score);
     of_one_score
         .flat_map(|family| {
@@ -62,7 +62,7 @@ pub(super) fn compared(found: &[Difference], by: Unit) -> Vec<ScoreComparison> {
 }
 
 impl Difference {
-    fn finish(&self, p_holm: Option<f64>, by: Unit) -> ScoreComparison {
+    fn finish(&self, p_holm: Option<f64>, by: ResamplingUnit) -> ScoreComparison {
         ScoreComparison {
             score: self.score,
             a: self.a,
@@ -77,7 +77,7 @@ impl Difference {
         }
     }
 
-    fn words(&self, p: Option<(f64, f64)>, by: Unit) -> String {
+    fn words(&self, p: Option<(f64, f64)>, by: ResamplingUnit) -> String {
         let higher = if self.mean > 0.0 { self.a } else { self.b }.title();
         match p {
             None => format!("too few {} to tell", by.plural()),
@@ -123,8 +123,8 @@ pub(super) fn in_words(found: &[ScoreComparison]) -> Vec<String> {
 mod tests {
     use super::{Difference, compared, in_words};
     use crate::domain::ThresholdMetric::{Density, Ensemble, NlSsim, Relief};
-    use crate::report::samples::Unit;
     use crate::report::score::Score;
+    use crate::report::score_bootstrap::ResamplingUnit;
 
     fn difference(score: Score, difference: f64, p: Option<f64>) -> Difference {
         Difference {
@@ -147,7 +147,7 @@ mod tests {
             difference(Score::Iou, -0.1, Some(0.04)),
         ];
         (found[1].b, found[2].a) = (NlSsim, Relief);
-        let found = compared(&found, Unit::Pair);
+        let found = compared(&found, ResamplingUnit::Pair);
         // statsmodels 0.15.0 `multipletests([0.01, 0.03, 0.5], method="holm")`.
         let wanted = [0.03, 0.06, 0.5, 0.04];
         for (one, wanted) in found.iter().zip(wanted) {
@@ -170,12 +170,12 @@ mod tests {
             difference(Score::Dice, 0.1, Some(0.001)),
         ];
         assert_eq!(
-            in_words(&compared(&found, Unit::Pair)),
+            in_words(&compared(&found, ResamplingUnit::Pair)),
             [
                 "Ensemble v. Pixel density: Ensemble is higher (SSIM, Dice); cannot tell them apart (IoU)"
             ]
         );
-        let few = compared(&[difference(Score::Iou, 0.1, None)], Unit::Block);
+        let few = compared(&[difference(Score::Iou, 0.1, None)], ResamplingUnit::Block);
         assert_eq!(
             (few[0].p_holm, few[0].words.as_str()),
             (None, "too few blocks to tell")
@@ -187,7 +187,7 @@ mod tests {
         let mut same = difference(Score::Dice, 0.0, Some(1.0));
         same.ci95 = Some([0.0; 2]);
         assert_eq!(
-            compared(&[same], Unit::Pair)[0].words,
+            compared(&[same], ResamplingUnit::Pair)[0].words,
             "the same on all pairs"
         );
     }

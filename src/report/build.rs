@@ -2,12 +2,12 @@
 
 use rayon::prelude::*;
 
-use super::aligned::{Aligned, AlignedError, same_alignment};
-use super::by_hand;
-use super::controls;
+use super::accumulate::{ReportAccumulator, TruthEvaluation};
+use super::attention_checks;
+use super::ground_truth::{TruthError, TruthErrors, TruthRecord, tops_iou};
+use super::manual_alignment;
 use super::model::Report;
-use super::tally::{Tally, TruthFinding};
-use super::truth::{TruthError, TruthErrors, TruthRecord, tops_iou};
+use super::pair_artifacts::{PairArtifacts, PairArtifactsError, same_alignment};
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use crate::domain::MetricOutcome;
 use crate::raster::{self, DepthMap, Grid};
@@ -18,13 +18,13 @@ pub const PAGE: usize = 256;
 
 /// Why no report can be made.
 #[derive(Debug, thiserror::Error)]
-pub enum GatherError {
+pub enum ReportError {
     /// The catalog refused.
     #[error(transparent)]
     Catalog(#[from] CatalogError),
     /// A result that has an alignment by hand cannot be read.
     #[error(transparent)]
-    Aligned(#[from] AlignedError),
+    PairArtifacts(#[from] PairArtifactsError),
     /// A thread of the comparison with truth was lost.
     #[error("comparing with the truth stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
@@ -36,7 +36,7 @@ enum Unusable {
     #[error(transparent)]
     Truth(#[from] TruthError),
     #[error(transparent)]
-    Aligned(#[from] AlignedError),
+    PairArtifacts(#[from] PairArtifactsError),
 }
 
 /// The report of a project as its catalog stands.
@@ -45,21 +45,21 @@ enum Unusable {
 ///
 /// # Errors
 /// When the catalog cannot be read.
-pub async fn gather(catalog: &Catalog, project: &Project) -> Result<Report, GatherError> {
-    gather_with(catalog, project, |_, _| {}).await
+pub async fn build(catalog: &Catalog, project: &Project) -> Result<Report, ReportError> {
+    build_with(catalog, project, |_, _| {}).await
 }
 
 /// The same; every pair is shown to `see` on the way, with what its truth says.
 ///
 /// # Errors
 /// When the catalog cannot be read.
-pub async fn gather_with(
+pub async fn build_with(
     catalog: &Catalog,
     project: &Project,
-    mut see: impl FnMut(&PairResults, &TruthFinding),
-) -> Result<Report, GatherError> {
-    let mut tally = Tally::default();
-    tally.caught(controls::caught(catalog).await?);
+    mut see: impl FnMut(&PairResults, &TruthEvaluation),
+) -> Result<Report, ReportError> {
+    let mut tally = ReportAccumulator::default();
+    tally.caught(attention_checks::caught(catalog).await?);
     let laid = catalog.newest_hand_alignments().await?;
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
@@ -67,7 +67,7 @@ pub async fn gather_with(
             tally.add(&pair, &truth);
             see(&pair, &truth);
             if let Some(laid) = laid.get(&pair.facts.name) {
-                tally.add_by_hand(&by_hand::errors(project, &pair, laid)?);
+                tally.add_by_hand(&manual_alignment::errors(project, &pair, laid)?);
             }
         }
     }
@@ -81,14 +81,14 @@ pub async fn gather_with(
 pub async fn with_truth(
     project: &Project,
     pairs: Vec<PairResults>,
-) -> Result<Vec<(PairResults, TruthFinding)>, tokio::task::JoinError> {
+) -> Result<Vec<(PairResults, TruthEvaluation)>, tokio::task::JoinError> {
     if pairs.iter().all(|pair| pair.truth.is_none()) {
-        let none = |pair| (pair, TruthFinding::default());
+        let none = |pair| (pair, TruthEvaluation::default());
         return Ok(pairs.into_iter().map(none).collect());
     }
     let project = project.clone();
     tokio::task::spawn_blocking(move || {
-        let found: Vec<TruthFinding> = pairs
+        let found: Vec<TruthEvaluation> = pairs
             .par_iter()
             .map(|pair| finding(&project, pair))
             .collect();
@@ -98,15 +98,15 @@ pub async fn with_truth(
 }
 
 /// What the truth says of a pair; nothing where there is no truth or no result.
-pub fn finding(project: &Project, pair: &PairResults) -> TruthFinding {
+pub fn finding(project: &Project, pair: &PairResults) -> TruthEvaluation {
     let Some(truth) = pair.truth.as_ref().filter(|_| !pair.metrics.is_empty()) else {
-        return TruthFinding::default();
+        return TruthEvaluation::default();
     };
     match measure(project, pair, truth) {
         Ok(finding) => finding,
-        Err(unusable) => TruthFinding {
+        Err(unusable) => TruthEvaluation {
             problem: Some(unusable.to_string()),
-            ..TruthFinding::default()
+            ..TruthEvaluation::default()
         },
     }
 }
@@ -115,13 +115,13 @@ fn measure(
     project: &Project,
     pair: &PairResults,
     truth: &serde_json::Value,
-) -> Result<TruthFinding, Unusable> {
-    let (record, aligned) = (TruthRecord::read(truth)?, Aligned::new(project, pair));
+) -> Result<TruthEvaluation, Unusable> {
+    let (record, aligned) = (TruthRecord::read(truth)?, PairArtifacts::new(project, pair));
     let tops = match &record.tops_mask {
         Some(path) => Some(Tops::read(project, path, &aligned)?),
         None => None,
     };
-    let mut finding = TruthFinding::default();
+    let mut finding = TruthEvaluation::default();
     let mut done: Vec<&MetricRecord> = Vec::new();
     for found in &pair.metrics {
         let outcome = &found.outcome;
@@ -141,7 +141,7 @@ fn measure(
 
 fn errors(
     record: &TruthRecord,
-    aligned: &Aligned<'_>,
+    aligned: &PairArtifacts<'_>,
     tops: Option<&Tops>,
     outcome: &MetricOutcome,
 ) -> Result<TruthErrors, Unusable> {
@@ -157,7 +157,7 @@ struct Tops {
 }
 
 impl Tops {
-    fn read(project: &Project, path: &str, aligned: &Aligned<'_>) -> Result<Self, Unusable> {
+    fn read(project: &Project, path: &str, aligned: &PairArtifacts<'_>) -> Result<Self, Unusable> {
         let print = aligned.print_mask()?;
         let tops = read_tops(project, path)?;
         let (found, wanted) = (

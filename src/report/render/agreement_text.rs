@@ -2,12 +2,12 @@
 
 use super::table::{Table, bounds, count, fixed, interval, number, words};
 use super::text::{aligned, wrapped};
-use crate::report::agree::{Agree, ReviewerPair, ReviewerRecord};
 use crate::report::agreement::ENOUGH;
 use crate::report::rate::Rate;
+use crate::report::reviewer_agreement::{ReviewerAgreement, ReviewerPair, ReviewerRecord};
 
 /// The agreement as aligned tables; ends with a line end.
-pub fn agree_text(found: &Agree) -> String {
+pub fn agree_text(found: &ReviewerAgreement) -> String {
     if found.reviewers.is_empty() {
         return "Nobody has read a result yet.\n".to_owned();
     }
@@ -33,7 +33,7 @@ fn names(two: &ReviewerPair) -> String {
     format!("{}, {}", two.a, two.b)
 }
 
-fn agreement(found: &Agree) -> Table {
+fn agreement(found: &ReviewerAgreement) -> Table {
     let cells = |two: &ReviewerPair| {
         let agreement = &two.agreement;
         let is_enough = |value: Option<String>| value.filter(|_| agreement.enough);
@@ -66,7 +66,7 @@ fn agreement(found: &Agree) -> Table {
     }
 }
 
-fn failures(found: &Agree) -> Table {
+fn failures(found: &ReviewerAgreement) -> Table {
     let cells = |two: &ReviewerPair| {
         vec![
             Some(names(two)),
@@ -89,7 +89,7 @@ fn failures(found: &Agree) -> Table {
     }
 }
 
-fn reviewers(found: &Agree) -> Table {
+fn reviewers(found: &ReviewerAgreement) -> Table {
     let cells = |reviewer: &ReviewerRecord| {
         vec![
             Some(reviewer.reviewer.clone()),
@@ -139,9 +139,9 @@ mod tests {
     use super::agree_text;
     use crate::domain::Verdict;
     use crate::report::agreement::Crosstab;
-    use crate::report::{Agree, Rate, ReviewerPair, ReviewerRecord};
+    use crate::report::{Rate, ReviewerAgreement, ReviewerPair, ReviewerRecord};
 
-    fn reviewer_pairs(pass: u64, contradicting: u64) -> Agree {
+    fn reviewer_pairs(pass: u64, contradicting: u64) -> ReviewerAgreement {
         let mut crosstab = Crosstab::default();
         (0..pass).for_each(|_| crosstab.add(Verdict::Pass, Verdict::Pass));
         for i in 0..contradicting {
@@ -154,7 +154,7 @@ mod tests {
             caught,
             ..ReviewerRecord::default()
         };
-        Agree {
+        ReviewerAgreement {
             schema: 1,
             conflicts: contradicting,
             reviewer_pairs: vec![ReviewerPair {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use super::pictures::View;
+use super::pictures::PrintView;
 use crate::catalog::PairResults;
 use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
 use crate::domain::{ContentHash, DepthScale, FileKind, MetricOutcome, Stage, ThresholdMetric};
@@ -12,7 +12,7 @@ use crate::raster::{
     self, DecodeError, DepthMap, Mask, PrintImage, png_grey16, png_mask, png_rgb8, warp_depth,
     warp_mask,
 };
-use crate::report::aligned::{Aligned, AlignedError};
+use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::Project;
 
 /// Folder of the pairs below the export folder.
@@ -64,10 +64,10 @@ impl Files {
 pub enum FilesError {
     /// A result or artifact cannot be read; the pair is told and the others go on.
     #[error(transparent)]
-    Aligned(#[from] AlignedError),
+    PairArtifacts(#[from] PairArtifactsError),
     /// The print cannot be read any more.
     #[error("{path}: {source}")]
-    Print {
+    SourcePrint {
         /// The print.
         path: PathBuf,
         /// Why.
@@ -107,15 +107,15 @@ struct Sidecar<'a> {
 
 /// Everything of a pair that is drawn or copied, in memory.
 pub(super) struct PairFiles<'a> {
-    aligned: Aligned<'a>,
+    aligned: PairArtifacts<'a>,
     name: &'a str,
-    print: Print,
+    print: SourcePrint,
     print_mask: Mask,
     depth: DepthMap,
 }
 
 /// The files of one alignment, encoded.
-pub(super) struct Drawn {
+pub(super) struct EncodedAlignment {
     depth_mask: Vec<u8>,
     aligned_depth: Vec<u8>,
     aligned_mask: Vec<u8>,
@@ -124,13 +124,13 @@ pub(super) struct Drawn {
 
 /// A print as given and as decoded.
 #[derive(Debug)]
-pub struct Print {
+pub struct SourcePrint {
     bytes: Vec<u8>,
     /// As decoded.
     pub picture: PrintImage,
 }
 
-impl Print {
+impl SourcePrint {
     /// Reads a pair's print and makes sure it is the one that was aligned.
     ///
     /// # Errors
@@ -143,7 +143,7 @@ impl Print {
         let path = project.input_path(&pair.facts.print_path);
         let bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
-            Err(source) => return Err(FilesError::Print { path, source }),
+            Err(source) => return Err(FilesError::SourcePrint { path, source }),
         };
         let aligned = pair
             .stage(Stage::Normalize)
@@ -180,18 +180,18 @@ impl<'a> PairFiles<'a> {
         pair: &'a PairResults,
         limits: &raster::ImageLimits,
     ) -> Result<Self, FilesError> {
-        let aligned = Aligned::new(project, pair);
+        let aligned = PairArtifacts::new(project, pair);
         Ok(Self {
             aligned,
             name: pair.facts.name.as_str(),
-            print: Print::read(project, pair, limits)?,
+            print: SourcePrint::read(project, pair, limits)?,
             print_mask: aligned.print_mask()?,
             depth: aligned.depth()?,
         })
     }
 
     /// The results this was read for.
-    pub(super) const fn aligned(&self) -> &Aligned<'a> {
+    pub(super) const fn aligned(&self) -> &PairArtifacts<'a> {
         &self.aligned
     }
 
@@ -212,14 +212,14 @@ impl<'a> PairFiles<'a> {
     }
 
     /// Draws what depends on the alignment alone.
-    pub(super) fn draw(&self, outcome: &MetricOutcome) -> Drawn {
+    pub(super) fn draw(&self, outcome: &MetricOutcome) -> EncodedAlignment {
         let (width, height) = (self.print_mask.width(), self.print_mask.height());
         let print_from_depth = &outcome.print_from_depth;
         let strokes = self.depth.stroke_mask(outcome.threshold_level);
         let aligned = warp_mask(&strokes, print_from_depth, width, height);
         let heights = warp_depth(&self.depth, print_from_depth, width, height);
-        let view = View::to_judge_by(&self.print.picture);
-        Drawn {
+        let view = PrintView::to_judge_by(&self.print.picture);
+        EncodedAlignment {
             depth_mask: png_mask(&strokes),
             aligned_depth: png_grey16(&heights),
             aligned_mask: png_mask(&aligned),
@@ -232,7 +232,7 @@ impl<'a> PairFiles<'a> {
         &self,
         root: &Path,
         metric: ThresholdMetric,
-        drawn: &Drawn,
+        drawn: &EncodedAlignment,
     ) -> Result<Files, FilesError> {
         let files = self.files(metric);
         let role = canvas_depth_mask(metric);

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::interval::Interval;
+use super::interval::IntervalMethod;
 use super::rate::Rate;
 use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
 use crate::domain::Verdict;
 
 /// Planted faults that reviewers failed, of those that they answered; unsure is not caught.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Caught {
+pub struct AttentionCheckRates {
     /// Of every kind.
     #[serde(flatten)]
     pub all: Rate,
@@ -19,7 +19,7 @@ pub struct Caught {
     pub by_fault: BTreeMap<&'static str, Rate>,
 }
 
-impl Caught {
+impl AttentionCheckRates {
     /// Of a reviewer's answers; those to repeats are left out.
     pub(super) fn of<'a>(answers: impl Iterator<Item = &'a AttentionCheckAnswer>) -> Self {
         let mut told: BTreeMap<_, Vec<bool>> = BTreeMap::new();
@@ -53,7 +53,7 @@ impl Caught {
 
     /// The same with another interval.
     #[must_use]
-    pub fn with_interval(self, interval: Interval) -> Self {
+    pub fn with_interval(self, interval: IntervalMethod) -> Self {
         let by_fault = self.by_fault.into_iter();
         Self {
             all: self.all.with_interval(interval),
@@ -68,13 +68,13 @@ impl Caught {
 ///
 /// # Errors
 /// When the catalog cannot be read.
-pub(super) async fn caught(catalog: &Catalog) -> Result<Caught, CatalogError> {
+pub(super) async fn caught(catalog: &Catalog) -> Result<AttentionCheckRates, CatalogError> {
     let answers = by_reviewer(catalog).await?;
-    let reviewers: Vec<Caught> = answers
+    let reviewers: Vec<AttentionCheckRates> = answers
         .values()
-        .map(|answers| Caught::of(newest(answers).into_iter()))
+        .map(|answers| AttentionCheckRates::of(newest(answers).into_iter()))
         .collect();
-    Ok(Caught::total(reviewers.iter()))
+    Ok(AttentionCheckRates::total(reviewers.iter()))
 }
 
 /// Answers that were not taken back, by reviewer, oldest first.

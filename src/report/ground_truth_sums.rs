@@ -1,9 +1,9 @@
 //! One metric's results against the truth, added up.
 
-use super::model::TruthBlock;
+use super::accumulate::share;
+use super::ground_truth::{MAX_ANGLE_DEG, TruthErrors};
+use super::model::TruthSummary;
 use super::stats::{median, wilson_95};
-use super::tally::share;
-use super::truth::{MAX_ANGLE_DEG, TruthErrors};
 
 /// The sums so far.
 #[derive(Debug, Clone, Default)]
@@ -28,9 +28,9 @@ impl TruthSums {
     }
 
     /// The block that follows; `None` without any truth.
-    pub(super) fn finish(mut self) -> Option<TruthBlock> {
+    pub(super) fn finish(mut self) -> Option<TruthSummary> {
         let n = self.angles_deg.len() as u64;
-        (n > 0).then(|| TruthBlock {
+        (n > 0).then(|| TruthSummary {
             n,
             passed: self.passed,
             acc: share(self.passed as f64, n),
@@ -47,22 +47,22 @@ impl TruthSums {
 #[cfg(test)]
 mod tests {
     use crate::domain::ThresholdMetric;
-    use crate::report::{Tally, fixture};
+    use crate::report::{ReportAccumulator, test_fixtures};
 
     #[test]
     fn truth_is_counted_apart_from_verdicts() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         tally.add(
-            &fixture::done("a", 0.8, &[]),
-            &fixture::truth(1.0, 2.0, 0.9),
+            &test_fixtures::done("a", 0.8, &[]),
+            &test_fixtures::truth(1.0, 2.0, 0.9),
         );
         tally.add(
-            &fixture::done("b", 0.8, &[]),
-            &fixture::truth(9.0, 2.0, 0.9),
+            &test_fixtures::done("b", 0.8, &[]),
+            &test_fixtures::truth(9.0, 2.0, 0.9),
         );
         tally.add(
-            &fixture::done("c", 0.8, &[]),
-            &fixture::truth(3.0, 4.0, 0.6),
+            &test_fixtures::done("c", 0.8, &[]),
+            &test_fixtures::truth(3.0, 4.0, 0.6),
         );
         let report = tally.finish();
         let row = report

@@ -25,7 +25,7 @@ const MISSING: [u8; 3] = [240, 240, 240];
 
 /// One pair on the sheet.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SheetCell {
+pub struct ContactSheetCell {
     /// The pair's id.
     pub id: String,
     /// Its numbers, or why it failed, in a few words.
@@ -38,14 +38,14 @@ pub struct SheetCell {
 
 /// Sizes of a sheet's parts in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Layout {
+struct SheetLayout {
     columns: usize,
     cell: [usize; 2],
     tile: usize,
     dot: usize,
 }
 
-impl Layout {
+impl SheetLayout {
     fn new(columns: usize) -> Self {
         let columns = columns.clamp(1, MAX_COLUMNS);
         let width = SHEET_WIDTH / columns;
@@ -63,12 +63,12 @@ impl Layout {
 
 /// Longest side of the pictures in the cells of a sheet with so many columns, pixels.
 pub fn tile_side(columns: usize) -> usize {
-    Layout::new(columns).tile
+    SheetLayout::new(columns).tile
 }
 
 /// Cells in rows of 1 to 12 columns, [`SHEET_WIDTH`] pixels wide; larger pictures are shrunk.
-pub fn contact_sheet(cells: &[SheetCell], columns: usize) -> Rgb {
-    let layout = Layout::new(columns);
+pub fn contact_sheet(cells: &[ContactSheetCell], columns: usize) -> Rgb {
+    let layout = SheetLayout::new(columns);
     let height = cells.len().div_ceil(layout.columns).max(1) * layout.cell[1];
     let mut sheet = Rgb::new(SHEET_WIDTH, height, GROUND);
     for (i, cell) in cells.iter().enumerate() {
@@ -81,7 +81,7 @@ pub fn contact_sheet(cells: &[SheetCell], columns: usize) -> Rgb {
     sheet
 }
 
-fn paint(sheet: &mut Rgb, [x, y]: [usize; 2], cell: &SheetCell, layout: &Layout) {
+fn paint(sheet: &mut Rgb, [x, y]: [usize; 2], cell: &ContactSheetCell, layout: &SheetLayout) {
     let colour = if cell.wrong { WRONG } else { FRAME };
     frame(
         sheet,
@@ -113,7 +113,7 @@ fn paint(sheet: &mut Rgb, [x, y]: [usize; 2], cell: &SheetCell, layout: &Layout)
 }
 
 /// The whole note, over the places of the relief and the overlay that are not there.
-fn paint_story(sheet: &mut Rgb, [x, y]: [usize; 2], note: &str, layout: &Layout) {
+fn paint_story(sheet: &mut Rgb, [x, y]: [usize; 2], note: &str, layout: &SheetLayout) {
     let letters = (2 * layout.tile - 2 * GAP) / text_width(1, SMALL);
     let lines = (layout.tile - GAP) / text_height(SMALL);
     let note: Vec<char> = note.chars().collect();
@@ -160,11 +160,11 @@ fn frame(sheet: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8; 3]) {
 
 #[cfg(test)]
 mod tests {
-    use super::{MISSING, Rgb, SHEET_WIDTH, SheetCell, WRONG, contact_sheet, tile_side};
+    use super::{ContactSheetCell, MISSING, Rgb, SHEET_WIDTH, WRONG, contact_sheet, tile_side};
 
-    fn cell(id: &str, wrong: bool) -> SheetCell {
+    fn cell(id: &str, wrong: bool) -> ContactSheetCell {
         let side = tile_side(5);
-        SheetCell {
+        ContactSheetCell {
             id: id.to_owned(),
             note: "IoU 0.812  margin 0.31".to_owned(),
             wrong,
@@ -194,7 +194,7 @@ mod tests {
         let mut failed = cell("a", true);
         failed.note = "bad_input: ".to_owned() + &"x".repeat(300);
         let (short, long) = (cell("a", true), failed);
-        let ink = |cell: &SheetCell| {
+        let ink = |cell: &ContactSheetCell| {
             let sheet = contact_sheet(std::slice::from_ref(cell), 5);
             let below = (70..sheet.height()).flat_map(|y| sheet.row(y)[150..390].to_vec());
             below.filter(|colour| *colour == super::TEXT).count()

@@ -5,11 +5,11 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::agreement::{Agreement, Crosstab};
-use super::aligned::alike;
-use super::controls::{self, Caught};
-use super::gather::PAGE;
+use super::attention_checks::{self, AttentionCheckRates};
+use super::build::PAGE;
+use super::consensus::{Consensus, split};
+use super::pair_artifacts::alike;
 use super::rate::Rate;
-use super::standing::{Standing, split};
 use crate::catalog::{
     AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults,
 };
@@ -23,7 +23,7 @@ const SCHEMA: u32 = 1;
 /// Results of one pair that look the same count once. Who settles what others contradict each other on has seen their
 /// verdicts and is not compared with them.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Agree {
+pub struct ReviewerAgreement {
     /// Version of this form.
     pub schema: u32,
     /// Pictures on which reviewers contradict each other and nobody has settled it.
@@ -67,15 +67,15 @@ pub struct ReviewerRecord {
 ///
 /// # Errors
 /// When the catalog cannot be read.
-pub async fn agree(catalog: &Catalog) -> Result<Agree, CatalogError> {
-    let mut counts = Counts::default();
+pub async fn agree(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogError> {
+    let mut counts = AgreementCounts::default();
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
         for pair in &page {
             counts.add(pair);
         }
     }
-    for (reviewer, answers) in &controls::by_reviewer(catalog).await? {
+    for (reviewer, answers) in &attention_checks::by_reviewer(catalog).await? {
         let own = own_verdicts(catalog, reviewer).await?;
         counts.test(reviewer, answers, &own);
     }
@@ -98,13 +98,13 @@ async fn own_verdicts(catalog: &Catalog, reviewer: &str) -> Result<OwnVerdicts, 
 
 /// The sums so far.
 #[derive(Debug, Default)]
-struct Counts {
+struct AgreementCounts {
     conflicts: u64,
     reviewer_pairs: BTreeMap<(String, String), Crosstab>,
     reviewers: BTreeMap<String, ReviewerRecord>,
 }
 
-impl Counts {
+impl AgreementCounts {
     /// Counts the pictures of one pair in.
     fn add(&mut self, pair: &PairResults) {
         for picture in pictures(pair) {
@@ -124,7 +124,7 @@ impl Counts {
 
     /// Holds a reviewer's answers to controls against what they should be.
     fn test(&mut self, reviewer: &str, answers: &[AttentionCheckAnswer], own: &OwnVerdicts) {
-        let answers = controls::newest(answers);
+        let answers = attention_checks::newest(answers);
         let repeats = answers
             .iter()
             .filter(|answer| answer.check == AttentionCheck::Duplicate);
@@ -134,7 +134,7 @@ impl Counts {
         });
         let record = self.reviewer(reviewer);
         record.repeats = Rate::of(same);
-        let caught = Caught::of(answers.iter().copied());
+        let caught = AttentionCheckRates::of(answers.iter().copied());
         (record.caught, record.caught_by_fault) = (caught.all, caught.by_fault);
     }
 
@@ -146,9 +146,9 @@ impl Counts {
         })
     }
 
-    fn finish(self) -> Agree {
+    fn finish(self) -> ReviewerAgreement {
         let reviewer_pairs = self.reviewer_pairs.into_iter();
-        Agree {
+        ReviewerAgreement {
             schema: SCHEMA,
             conflicts: self.conflicts,
             reviewer_pairs: reviewer_pairs
@@ -165,18 +165,21 @@ impl Counts {
 }
 
 /// A picture with the verdicts of those who judged it by themselves, in the order of their names.
-struct Picture<'a> {
+struct DistinctResult<'a> {
     read: Vec<(&'a str, Verdict)>,
     is_conflict: bool,
 }
 
 /// The pictures of a pair: results that look the same are one.
-fn pictures(pair: &PairResults) -> Vec<Picture<'_>> {
+fn pictures(pair: &PairResults) -> Vec<DistinctResult<'_>> {
     let groups = alike(&pair.metrics);
-    groups.iter().map(|group| Picture::of(group)).collect()
+    groups
+        .iter()
+        .map(|group| DistinctResult::of(group))
+        .collect()
 }
 
-impl<'a> Picture<'a> {
+impl<'a> DistinctResult<'a> {
     fn of(group: &[&'a MetricRecord]) -> Self {
         let mut read = BTreeMap::new();
         for record in group {
@@ -186,7 +189,7 @@ impl<'a> Picture<'a> {
                     .or_insert(verdict.verdict);
             }
         }
-        let is_conflict = |record: &&MetricRecord| Standing::of(record) == Standing::Conflict;
+        let is_conflict = |record: &&MetricRecord| Consensus::of(record) == Consensus::Conflict;
         Self {
             read: read.into_iter().collect(),
             is_conflict: group.iter().any(is_conflict),
@@ -196,12 +199,12 @@ impl<'a> Picture<'a> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Counts, OwnVerdicts};
+    use super::{AgreementCounts, OwnVerdicts};
     use crate::catalog::{AttentionCheckAnswer, Look, MetricRecord, ReviewerVerdict};
     use crate::domain::{
         AttentionCheck, ContentHash, PairName, ReviewOrder, ThresholdMetric, Verdict,
     };
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
     fn answer(pair: &str, check: AttentionCheck, verdict: Verdict) -> AttentionCheckAnswer {
         AttentionCheckAnswer {
@@ -221,9 +224,13 @@ mod tests {
 
     #[test]
     fn results_that_look_the_same_count_once() {
-        let mut counts = Counts::default();
-        counts.add(&fixture::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]));
-        let mut apart = fixture::done("b", 0.8, &[Verdict::Pass, Verdict::Pass]);
+        let mut counts = AgreementCounts::default();
+        counts.add(&test_fixtures::done(
+            "a",
+            0.8,
+            &[Verdict::Pass, Verdict::Fail],
+        ));
+        let mut apart = test_fixtures::done("b", 0.8, &[Verdict::Pass, Verdict::Pass]);
         apart.metrics[0].outcome.threshold_level += 1;
         counts.add(&apart);
         let found = counts.finish();
@@ -235,8 +242,8 @@ mod tests {
 
     #[test]
     fn who_settles_a_conflict_is_compared_with_nobody() {
-        let mut counts = Counts::default();
-        let mut pair = fixture::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]);
+        let mut counts = AgreementCounts::default();
+        let mut pair = test_fixtures::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]);
         let settle = |record: &mut MetricRecord| {
             record.verdicts.push(ReviewerVerdict {
                 reviewer: "third".to_owned(),
@@ -254,8 +261,8 @@ mod tests {
 
     #[test]
     fn every_two_of_three_reviewers_are_compared() {
-        let mut counts = Counts::default();
-        counts.add(&fixture::done("a", 0.8, &[Verdict::Pass; 3]));
+        let mut counts = AgreementCounts::default();
+        counts.add(&test_fixtures::done("a", 0.8, &[Verdict::Pass; 3]));
         let found = counts.finish().reviewer_pairs;
         let names: Vec<_> = found
             .iter()
@@ -273,7 +280,7 @@ mod tests {
             answer("b", turned, Verdict::Unsure),
             answer("b", AttentionCheck::Mirrored, Verdict::Fail),
         ];
-        let mut counts = Counts::default();
+        let mut counts = AgreementCounts::default();
         counts.test("lan", &answers, &OwnVerdicts::new());
         let found = counts.finish();
         let lan = &found.reviewers[0];
@@ -295,7 +302,7 @@ mod tests {
             // Its first look was taken back.
             answer("c", AttentionCheck::Duplicate, Verdict::Pass),
         ];
-        let mut counts = Counts::default();
+        let mut counts = AgreementCounts::default();
         counts.test("lan", &answers, &own);
         let lan = counts.finish().reviewers.remove(0);
         assert_eq!((lan.repeats.count, lan.repeats.n), (1, 2));

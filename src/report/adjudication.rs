@@ -2,15 +2,15 @@
 
 use serde::Serialize;
 
-use super::interval::Interval;
+use super::consensus::{Consensus, split};
+use super::interval::IntervalMethod;
 use super::rate::Rate;
-use super::standing::{Standing, split};
 use crate::catalog::MetricRecord;
 use crate::domain::Verdict;
 
 /// Passed results under each rule, of those that passed or failed under it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Rules {
+pub struct AdjudicationRules {
     /// Results that two reviewers or more have passed or failed by themselves; where there are none, all rules say the
     /// same.
     pub told_twice: u64,
@@ -22,7 +22,7 @@ pub struct Rules {
     pub both_fail: Rate,
 }
 
-impl Rules {
+impl AdjudicationRules {
     /// Names of the rules, in their order.
     pub const NAMES: [&str; 3] = ["either_fails", "adjudicated", "both_fail"];
 
@@ -32,7 +32,7 @@ impl Rules {
     }
 
     /// The same with another interval.
-    pub(super) fn with_interval(self, interval: Interval) -> Self {
+    pub(super) fn with_interval(self, interval: IntervalMethod) -> Self {
         Self {
             told_twice: self.told_twice,
             either_fails: self.either_fails.with_interval(interval),
@@ -44,14 +44,14 @@ impl Rules {
 
 /// The sums so far: passed and told under each rule.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct RuleSums {
+pub(super) struct AdjudicationSums {
     told_twice: u64,
     either_fails: [u64; 2],
     adjudicated: [u64; 2],
     both_fail: [u64; 2],
 }
 
-impl RuleSums {
+impl AdjudicationSums {
     /// Counts one result in.
     pub(super) fn add(&mut self, record: &MetricRecord) {
         let own = split(record).1;
@@ -62,15 +62,15 @@ impl RuleSums {
             count(&mut self.either_fails, fails == 0);
             count(&mut self.both_fail, passes > 0);
         }
-        if let Some(passed) = Standing::of(record).told() {
+        if let Some(passed) = Consensus::of(record).told() {
             count(&mut self.adjudicated, passed);
         }
     }
 
     /// The shares that follow.
-    pub(super) fn finish(self) -> Rules {
+    pub(super) fn finish(self) -> AdjudicationRules {
         let rate = |[passed, told]: [u64; 2]| Rate::new(passed, told);
-        Rules {
+        AdjudicationRules {
             told_twice: self.told_twice,
             either_fails: rate(self.either_fails),
             adjudicated: rate(self.adjudicated),
@@ -86,16 +86,16 @@ fn count([passed, told]: &mut [u64; 2], is_passed: bool) {
 
 #[cfg(test)]
 mod tests {
-    use super::{RuleSums, Rules};
+    use super::{AdjudicationRules, AdjudicationSums};
     use crate::domain::Verdict::{self, Fail, Pass, Unsure};
     use crate::domain::{ReviewOrder, ThresholdMetric};
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
-    fn of(results: &[(&[Verdict], Option<Verdict>)]) -> Rules {
-        let mut sums = RuleSums::default();
+    fn of(results: &[(&[Verdict], Option<Verdict>)]) -> AdjudicationRules {
+        let mut sums = AdjudicationSums::default();
         for (own, word) in results {
             let verdicts: Vec<Verdict> = own.iter().copied().chain(*word).collect();
-            let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &verdicts);
+            let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, &verdicts);
             for settled in &mut record.verdicts[own.len()..] {
                 settled.review_order = Some(ReviewOrder::Adjudicate);
             }

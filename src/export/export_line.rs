@@ -2,16 +2,16 @@
 
 use serde::Serialize;
 
-use super::by_hand::ByHand;
-use super::files::Files;
+use super::manual_alignment::LineManualAlignment;
+use super::pair_files::Files;
 use crate::catalog::{MetricRecord, PairResults};
 use crate::domain::{
     Affine2, ContentHash, DepthOutcome, Failure, FailureClass, FitOutcome, JobStatus,
     MetricOutcome, NormalizeOutcome, PairName, PrintFromMesh, Rigid3, Stage, ThresholdMetric,
     Verdict,
 };
-use crate::report::Standing;
-use crate::report::aligned::{Aligned, AlignedError};
+use crate::report::Consensus;
+use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 
 /// How far a pair is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -27,7 +27,7 @@ pub enum LineStatus {
 
 /// A line. What does not exist is null; field names are fixed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Line {
+pub struct ExportLine {
     /// The pair's id.
     pub id: PairName,
     /// How the depth threshold was chosen.
@@ -52,7 +52,7 @@ pub struct Line {
     /// What reviewers together say of this result.
     pub verdict: Option<Verdict>,
     /// The newest alignment by hand, where people made one.
-    pub by_hand: Option<ByHand>,
+    pub by_hand: Option<LineManualAlignment>,
     /// Computing time of the pair's stages, where times were asked for.
     pub seconds: Option<f64>,
 }
@@ -124,7 +124,7 @@ pub(super) struct Outcomes {
 
 impl Outcomes {
     /// Reads them from the stored results.
-    pub(super) fn read(aligned: &Aligned<'_>) -> Result<Self, AlignedError> {
+    pub(super) fn read(aligned: &PairArtifacts<'_>) -> Result<Self, PairArtifactsError> {
         Ok(Self {
             fit: aligned.outcome(Stage::Fit)?,
             depth: aligned.outcome(Stage::Depth)?,
@@ -133,7 +133,7 @@ impl Outcomes {
     }
 }
 
-impl Line {
+impl ExportLine {
     /// The line of a pair without result.
     pub(super) fn without_result(pair: &PairResults, metric: ThresholdMetric) -> Self {
         let failure = pair.failure.as_ref().map(|stored| &stored.failure);
@@ -181,7 +181,7 @@ impl Line {
                 result_hash: Some(record.result_hash),
                 ..hashes(pair)
             },
-            verdict: Standing::of(record).verdict(),
+            verdict: Consensus::of(record).verdict(),
             ..Self::without_result(pair, record.outcome.metric)
         }
     }
@@ -252,9 +252,9 @@ const fn status(status: JobStatus) -> LineStatus {
 
 #[cfg(test)]
 mod tests {
-    use super::Line;
+    use super::ExportLine;
     use crate::domain::{Failure, FailureClass, ThresholdMetric};
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
     use serde_json::{Value, json};
 
     /// The fields in the order the interface gives them.
@@ -293,8 +293,8 @@ mod tests {
 
     #[test]
     fn failed_pair_has_every_field_and_nulls() {
-        let pair = fixture::failed("a", FailureClass::BadInput, "a.stl is empty");
-        let line = Line::without_result(&pair, ThresholdMetric::Density);
+        let pair = test_fixtures::failed("a", FailureClass::BadInput, "a.stl is empty");
+        let line = ExportLine::without_result(&pair, ThresholdMetric::Density);
         let text = serde_json::to_string(&line).expect("a line is JSON");
         let value: Value = serde_json::from_str(&text).expect("a line is JSON");
         let mut place = 0;
@@ -313,10 +313,10 @@ mod tests {
     #[test]
     fn unfinished_pair_is_pending_and_damaged_one_failed() {
         let metric = ThresholdMetric::Density;
-        let pending = Line::without_result(&fixture::pending("a"), metric);
+        let pending = ExportLine::without_result(&test_fixtures::pending("a"), metric);
         assert_eq!(json!(pending.status), "pending");
         let gone = Failure::new(FailureClass::Io, "depth.png is gone");
-        let damaged = Line::unreadable(&fixture::done("a", 0.8, &[]), metric, &gone);
+        let damaged = ExportLine::unreadable(&test_fixtures::done("a", 0.8, &[]), metric, &gone);
         assert_eq!(
             (json!(damaged.status), damaged.error.as_deref()),
             (json!("failed"), Some("depth.png is gone"))

@@ -5,7 +5,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::files::PAIRS;
+use super::pair_files::PAIRS;
 
 /// The list of lines; a folder with it is an export.
 pub(super) const LINES: &str = "pairs.jsonl";

@@ -52,15 +52,15 @@ pub fn missing(report: &Report) -> Vec<String> {
 mod tests {
     use super::{below, missing};
     use crate::domain::{FailureClass, Verdict};
-    use crate::report::fixture;
-    use crate::report::{Report, Tally, TruthFinding};
+    use crate::report::test_fixtures;
+    use crate::report::{Report, ReportAccumulator, TruthEvaluation};
 
     fn report(verdicts: &[Option<Verdict>]) -> Report {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for (i, verdict) in verdicts.iter().enumerate() {
             let read: Vec<Verdict> = verdict.iter().copied().collect();
-            let pair = fixture::done(&format!("p{i}"), 0.8, &read);
-            tally.add(&pair, &TruthFinding::default());
+            let pair = test_fixtures::done(&format!("p{i}"), 0.8, &read);
+            tally.add(&pair, &TruthEvaluation::default());
         }
         tally.finish()
     }
@@ -87,19 +87,19 @@ mod tests {
 
     #[test]
     fn a_metric_that_the_method_does_not_give_is_not_missing() {
-        let mut tally = Tally::default();
-        let pair = fixture::done_by_paper("a", 0.8, &[Verdict::Pass]);
-        tally.add(&pair, &TruthFinding::default());
+        let mut tally = ReportAccumulator::default();
+        let pair = test_fixtures::done_by_paper("a", 0.8, &[Verdict::Pass]);
+        tally.add(&pair, &TruthEvaluation::default());
         let report = tally.finish();
         assert!(missing(&report).is_empty() && below(&report, 1.0).is_empty());
     }
 
     #[test]
     fn failed_pair_makes_it_incomplete() {
-        let mut tally = Tally::default();
-        let none = TruthFinding::default();
-        tally.add(&fixture::done("a", 0.8, &[Verdict::Pass]), &none);
-        tally.add(&fixture::failed("b", FailureClass::Io, "gone"), &none);
+        let mut tally = ReportAccumulator::default();
+        let none = TruthEvaluation::default();
+        tally.add(&test_fixtures::done("a", 0.8, &[Verdict::Pass]), &none);
+        tally.add(&test_fixtures::failed("b", FailureClass::Io, "gone"), &none);
         assert_eq!(missing(&tally.finish()), ["failed pairs: 1"]);
     }
 }

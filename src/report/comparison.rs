@@ -19,11 +19,11 @@ pub(super) const PAIRS: [(ThresholdMetric, ThresholdMetric); 4] = [
 
 /// Counts of the metrics of [`PAIRS`].
 #[derive(Debug, Clone)]
-pub(super) struct Duels([Duel; PAIRS.len()]);
+pub(super) struct McNemarTests([McNemarTest; PAIRS.len()]);
 
 /// Counts of two metrics.
 #[derive(Debug, Clone, Copy)]
-struct Duel {
+struct McNemarTest {
     a: ThresholdMetric,
     b: ThresholdMetric,
     n: u64,
@@ -31,9 +31,9 @@ struct Duel {
     b_only: u64,
 }
 
-impl Default for Duels {
+impl Default for McNemarTests {
     fn default() -> Self {
-        Self(PAIRS.map(|(a, b)| Duel {
+        Self(PAIRS.map(|(a, b)| McNemarTest {
             a,
             b,
             n: 0,
@@ -43,7 +43,7 @@ impl Default for Duels {
     }
 }
 
-impl Duels {
+impl McNemarTests {
     /// Counts one pair in; `right` tells whether a metric's result is right, where that is known.
     pub(super) fn add(&mut self, right: impl Fn(ThresholdMetric) -> Option<bool>) {
         for duel in &mut self.0 {
@@ -57,7 +57,7 @@ impl Duels {
 
     /// The comparisons of all metrics that were judged on the same pairs.
     pub(super) fn finish(self, basis: Basis) -> Vec<Comparison> {
-        let duels: Vec<Duel> = self.0.into_iter().filter(|duel| duel.n > 0).collect();
+        let duels: Vec<McNemarTest> = self.0.into_iter().filter(|duel| duel.n > 0).collect();
         let ps: Vec<Option<f64>> = duels
             .iter()
             .map(|duel| mcnemar_exact(duel.a_only, duel.b_only))
@@ -80,7 +80,7 @@ pub(super) fn after_holm(ps: &[Option<f64>]) -> Vec<Option<f64>> {
     corrected.map(|(p, p_holm)| p.map(|_| p_holm)).collect()
 }
 
-impl Duel {
+impl McNemarTest {
     fn finish(self, basis: Basis, p: Option<(f64, f64)>) -> Comparison {
         Comparison {
             basis,
@@ -147,13 +147,13 @@ fn grouped(number: u64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Duels, grouped, rounded};
+    use super::{McNemarTests, grouped, rounded};
     use crate::domain::ThresholdMetric;
     use crate::report::model::Basis;
 
     /// `(times, [nl_ssim, density, ensemble])`
     fn finish(worlds: &[(usize, [Option<bool>; 3])]) -> Vec<crate::report::Comparison> {
-        let mut duels = Duels::default();
+        let mut duels = McNemarTests::default();
         for (times, right) in worlds {
             for _ in 0..*times {
                 duels.add(|metric| right.get(metric as usize).copied().flatten());

@@ -15,7 +15,7 @@ const INK: u8 = 255;
 
 /// Why a stored result cannot be used.
 #[derive(Debug, thiserror::Error)]
-pub enum AlignedError {
+pub enum PairArtifactsError {
     /// The catalog says the stage is done but holds no result.
     #[error("there is no result of {0}")]
     NoResult(Stage),
@@ -40,7 +40,7 @@ pub enum AlignedError {
     Store(#[from] store::ArtifactError),
     /// The artifact is not the picture it should be.
     #[error("{role}: {source}")]
-    Picture {
+    DistinctResult {
         /// Which artifact.
         role: &'static str,
         /// Why.
@@ -50,12 +50,12 @@ pub enum AlignedError {
 
 /// A finished pair together with its project's files.
 #[derive(Debug, Clone, Copy)]
-pub struct Aligned<'a> {
+pub struct PairArtifacts<'a> {
     project: &'a Project,
     pair: &'a PairResults,
 }
 
-impl<'a> Aligned<'a> {
+impl<'a> PairArtifacts<'a> {
     /// A pair of a project.
     pub const fn new(project: &'a Project, pair: &'a PairResults) -> Self {
         Self { project, pair }
@@ -65,26 +65,32 @@ impl<'a> Aligned<'a> {
     ///
     /// # Errors
     /// When there is none.
-    pub fn stage(&self, stage: Stage) -> Result<&'a StageRecord, AlignedError> {
-        self.pair.stage(stage).ok_or(AlignedError::NoResult(stage))
+    pub fn stage(&self, stage: Stage) -> Result<&'a StageRecord, PairArtifactsError> {
+        self.pair
+            .stage(stage)
+            .ok_or(PairArtifactsError::NoResult(stage))
     }
 
     /// The numbers of a stage, such as [`FitOutcome`].
     ///
     /// # Errors
     /// When there are none or they are of another form.
-    pub fn outcome<T: DeserializeOwned>(&self, stage: Stage) -> Result<T, AlignedError> {
+    pub fn outcome<T: DeserializeOwned>(&self, stage: Stage) -> Result<T, PairArtifactsError> {
         self.stage(stage)?
             .parse()
-            .map_err(|source| AlignedError::Outcome { stage, source })
+            .map_err(|source| PairArtifactsError::Outcome { stage, source })
     }
 
     /// An artifact of a stage by its role.
     ///
     /// # Errors
     /// When the result has none of that role.
-    pub fn artifact(&self, stage: Stage, role: &str) -> Result<&'a ArtifactRef, AlignedError> {
-        let missing = || AlignedError::NoArtifact {
+    pub fn artifact(
+        &self,
+        stage: Stage,
+        role: &str,
+    ) -> Result<&'a ArtifactRef, PairArtifactsError> {
+        let missing = || PairArtifactsError::NoArtifact {
             stage,
             role: role.to_owned(),
         };
@@ -95,7 +101,7 @@ impl<'a> Aligned<'a> {
     ///
     /// # Errors
     /// When there is none, or the file is missing or changed.
-    pub fn bytes(&self, stage: Stage, role: &str) -> Result<Vec<u8>, AlignedError> {
+    pub fn bytes(&self, stage: Stage, role: &str) -> Result<Vec<u8>, PairArtifactsError> {
         Ok(self.project.read_artifact(self.artifact(stage, role)?)?)
     }
 
@@ -103,11 +109,11 @@ impl<'a> Aligned<'a> {
     ///
     /// # Errors
     /// When the result or its picture cannot be read.
-    pub fn depth(&self) -> Result<DepthMap, AlignedError> {
+    pub fn depth(&self) -> Result<DepthMap, PairArtifactsError> {
         let outcome: DepthOutcome = self.outcome(Stage::Depth)?;
         let levels = decode_grey16(&self.bytes(Stage::Depth, DEPTH)?);
         Ok(DepthMap {
-            levels: levels.map_err(|source| AlignedError::Picture {
+            levels: levels.map_err(|source| PairArtifactsError::DistinctResult {
                 role: DEPTH,
                 source,
             })?,
@@ -119,7 +125,7 @@ impl<'a> Aligned<'a> {
     ///
     /// # Errors
     /// When the result or its picture cannot be read.
-    pub fn print_mask(&self) -> Result<Mask, AlignedError> {
+    pub fn print_mask(&self) -> Result<Mask, PairArtifactsError> {
         let grey = self.grey(Stage::Normalize, PRINT_MASK)?;
         Ok(grey.map(|value| *value == INK))
     }
@@ -128,14 +134,14 @@ impl<'a> Aligned<'a> {
     ///
     /// # Errors
     /// When the result or its picture cannot be read.
-    pub fn canvas_print_mask(&self) -> Result<Mask, AlignedError> {
+    pub fn canvas_print_mask(&self) -> Result<Mask, PairArtifactsError> {
         let grey = self.grey(Stage::Register, CANVAS_PRINT_MASK)?;
         Ok(grey.map(|value| *value == INK))
     }
 
-    fn grey(&self, stage: Stage, role: &'static str) -> Result<Grid<u8>, AlignedError> {
+    fn grey(&self, stage: Stage, role: &'static str) -> Result<Grid<u8>, PairArtifactsError> {
         decode_grey8(&self.bytes(stage, role)?)
-            .map_err(|source| AlignedError::Picture { role, source })
+            .map_err(|source| PairArtifactsError::DistinctResult { role, source })
     }
 
     /// Depth-map pixels to print pixels under a map from the mesh, on the fitted plane; `None` where the depth map
@@ -146,7 +152,7 @@ impl<'a> Aligned<'a> {
     pub fn print_from_depth(
         &self,
         print_from_mesh: &PrintFromMesh,
-    ) -> Result<Option<Affine2>, AlignedError> {
+    ) -> Result<Option<Affine2>, PairArtifactsError> {
         let fit: FitOutcome = self.outcome(Stage::Fit)?;
         let depth: DepthOutcome = self.outcome(Stage::Depth)?;
         let mesh_from_plane = fit.plane_from_mesh.inverse();
@@ -170,7 +176,7 @@ impl<'a> Aligned<'a> {
     pub fn print_from_mesh(
         &self,
         print_from_depth: &Affine2,
-    ) -> Result<PrintFromMesh, AlignedError> {
+    ) -> Result<PrintFromMesh, PairArtifactsError> {
         let fit: FitOutcome = self.outcome(Stage::Fit)?;
         let depth: DepthOutcome = self.outcome(Stage::Depth)?;
         Ok(PrintFromMesh::new(

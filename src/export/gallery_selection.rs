@@ -3,15 +3,15 @@
 
 use rayon::prelude::*;
 
-use super::sheet::SheetError;
+use super::contact_sheet::DrawError;
 use super::tiles::tiles;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults, VerdictEvent};
 use crate::domain::{ContentHash, SeededRandom, ThresholdMetric};
 use crate::raster::{self, jpeg_rgb8};
-use crate::report::aligned::alike;
-use crate::report::gallery::{Gallery, Group, Kind, Shot, said};
-use crate::report::truth::TruthErrors;
-use crate::report::{Standing, TruthFinding};
+use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, said};
+use crate::report::ground_truth::TruthErrors;
+use crate::report::pair_artifacts::alike;
+use crate::report::{Consensus, TruthEvaluation};
 use crate::store::Project;
 
 /// Longest side of a picture in pixels.
@@ -27,7 +27,7 @@ const LOT_METRIC: ThresholdMetric = ThresholdMetric::Ensemble;
 
 /// A result to be drawn: of one metric, or of several that came to the same.
 #[derive(Debug)]
-struct Subject {
+struct GallerySubject {
     pair: PairResults,
     metrics: Vec<ThresholdMetric>,
     truth: Option<TruthErrors>,
@@ -37,34 +37,38 @@ struct Subject {
 /// The results to draw: at most 80 that reviewers failed, 80 on which they contradict each other, 80 off the truth,
 /// and 20 by lot.
 #[derive(Debug)]
-pub struct Chosen {
+pub struct GallerySelection {
     seed: u64,
     lots: SeededRandom,
-    found: [(u64, Vec<Subject>); 3],
-    by_lot: Vec<(f64, Subject)>,
+    found: [(u64, Vec<GallerySubject>); 3],
+    by_lot: Vec<(f64, GallerySubject)>,
     pairs: u64,
 }
 
-/// Kinds that are chosen for what was found, in the order of [`Chosen::found`].
-const FOUND: [Kind; 3] = [Kind::Failed, Kind::Conflict, Kind::OffTruth];
+/// Kinds that are chosen for what was found, in the order of [`GallerySelection::found`].
+const FOUND: [GalleryReason; 3] = [
+    GalleryReason::Failed,
+    GalleryReason::Conflict,
+    GalleryReason::OffTruth,
+];
 
 /// Draws the pictures of a project's report. One that cannot be made is left out, with the reason.
 ///
 /// # Errors
 /// When the catalog cannot be read.
 pub async fn draw_gallery(
-    mut chosen: Chosen,
+    mut chosen: GallerySelection,
     catalog: &Catalog,
     project: &Project,
     limits: raster::ImageLimits,
-) -> Result<Gallery, SheetError> {
+) -> Result<Gallery, DrawError> {
     chosen.read_log(catalog).await?;
     let project = project.clone();
     let draw = move || chosen.draw(&project, &limits);
     Ok(tokio::task::spawn_blocking(draw).await?)
 }
 
-impl Chosen {
+impl GallerySelection {
     /// Nothing yet; the seed is that of the lot.
     pub fn new(seed: u64) -> Self {
         Self {
@@ -77,14 +81,14 @@ impl Chosen {
     }
 
     /// Takes a pair's results in, where they are to be drawn. Pairs come in the order of their names.
-    pub fn add(&mut self, pair: &PairResults, truth: &TruthFinding) {
+    pub fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
         for records in alike(&pair.metrics) {
             for ((of, subjects), kind) in self.found.iter_mut().zip(FOUND) {
                 let is_of_kind = |record: &&MetricRecord| is_of(kind, record, truth);
                 let metrics: Vec<_> = records.iter().copied().filter(is_of_kind).collect();
                 *of += u64::from(!metrics.is_empty());
                 if !metrics.is_empty() && subjects.len() < MOST {
-                    subjects.push(Subject::new(pair, &metrics, truth));
+                    subjects.push(GallerySubject::new(pair, &metrics, truth));
                 }
             }
             if records
@@ -97,13 +101,13 @@ impl Chosen {
     }
 
     /// Takes a pair in by lot; who drew the highest goes.
-    fn cast(&mut self, pair: &PairResults, records: &[&MetricRecord], truth: &TruthFinding) {
+    fn cast(&mut self, pair: &PairResults, records: &[&MetricRecord], truth: &TruthEvaluation) {
         self.pairs += 1;
         let name = ContentHash::of(pair.facts.name.as_str().as_bytes());
         let lot = self.lots.draw(&name, "picture");
         let place = self.by_lot.partition_point(|(other, _)| *other <= lot);
         if place < BY_LOT {
-            let subject = Subject::new(pair, records, truth);
+            let subject = GallerySubject::new(pair, records, truth);
             self.by_lot.insert(place, (lot, subject));
             self.by_lot.truncate(BY_LOT);
         }
@@ -122,17 +126,17 @@ impl Chosen {
     }
 
     fn draw(self, project: &Project, limits: &raster::ImageLimits) -> Gallery {
-        let mut by_lot: Vec<Subject> = self.by_lot.into_iter().map(|(_, lot)| lot).collect();
+        let mut by_lot: Vec<GallerySubject> = self.by_lot.into_iter().map(|(_, lot)| lot).collect();
         by_lot.sort_by(|a, b| a.pair.facts.name.cmp(&b.pair.facts.name));
         let found = FOUND.into_iter().zip(self.found);
         let all = found
             .map(|(kind, (of, subjects))| (kind, of, subjects))
-            .chain([(Kind::Lot, self.pairs, by_lot)]);
+            .chain([(GalleryReason::Lot, self.pairs, by_lot)]);
         let groups = all.filter(|(_, of, _)| *of > 0);
         Gallery {
             seed: self.seed,
             groups: groups
-                .map(|(kind, of, subjects)| Group {
+                .map(|(kind, of, subjects)| GalleryGroup {
                     kind,
                     of,
                     shots: subjects
@@ -146,20 +150,20 @@ impl Chosen {
 }
 
 /// Whether a result is shown for this.
-fn is_of(kind: Kind, record: &MetricRecord, truth: &TruthFinding) -> bool {
+fn is_of(kind: GalleryReason, record: &MetricRecord, truth: &TruthEvaluation) -> bool {
     match kind {
-        Kind::Failed => Standing::of(record) == Standing::Failed,
-        Kind::Conflict => Standing::of(record) == Standing::Conflict,
-        Kind::OffTruth => truth
+        GalleryReason::Failed => Consensus::of(record) == Consensus::Failed,
+        GalleryReason::Conflict => Consensus::of(record) == Consensus::Conflict,
+        GalleryReason::OffTruth => truth
             .errors
             .get(&record.outcome.metric)
             .is_some_and(|errors| !errors.pass()),
-        Kind::Lot => false,
+        GalleryReason::Lot => false,
     }
 }
 
-impl Subject {
-    fn new(pair: &PairResults, records: &[&MetricRecord], truth: &TruthFinding) -> Self {
+impl GallerySubject {
+    fn new(pair: &PairResults, records: &[&MetricRecord], truth: &TruthEvaluation) -> Self {
         let metrics: Vec<_> = records.iter().map(|record| record.outcome.metric).collect();
         Self {
             pair: pair.clone(),
@@ -179,10 +183,10 @@ impl Subject {
             .is_some_and(|record| !record.verdicts.is_empty())
     }
 
-    fn shot(&self, project: &Project, limits: &raster::ImageLimits) -> Shot {
+    fn shot(&self, project: &Project, limits: &raster::ImageLimits) -> GalleryItem {
         let facts = &self.pair.facts;
         let (tiles, trouble) = tiles(project, &self.pair, self.metrics[0], SIDE, limits);
-        Shot {
+        GalleryItem {
             pair: facts.name.clone(),
             character: facts.character.clone(),
             files: [facts.mesh_path.clone(), facts.print_path.clone()],
@@ -237,23 +241,23 @@ impl Subject {
 
 #[cfg(test)]
 mod tests {
-    use super::{BY_LOT, Chosen, MOST};
+    use super::{BY_LOT, GallerySelection, MOST};
     use crate::domain::Verdict::{Fail, Pass};
-    use crate::report::{TruthFinding, fixture};
+    use crate::report::{TruthEvaluation, test_fixtures};
 
-    fn chosen(seed: u64, pairs: usize) -> Chosen {
-        let mut chosen = Chosen::new(seed);
+    fn chosen(seed: u64, pairs: usize) -> GallerySelection {
+        let mut chosen = GallerySelection::new(seed);
         for i in 0..pairs {
             let verdicts: &[_] = match i % 3 {
                 0 => &[Fail],
                 1 => &[Fail, Pass],
                 _ => &[Pass],
             };
-            let pair = fixture::done(&format!("p{i:03}"), 0.8, verdicts);
+            let pair = test_fixtures::done(&format!("p{i:03}"), 0.8, verdicts);
             let truth = if i == 2 {
-                fixture::truth(90.0, 1.0, 0.9)
+                test_fixtures::truth(90.0, 1.0, 0.9)
             } else {
-                TruthFinding::default()
+                TruthEvaluation::default()
             };
             chosen.add(&pair, &truth);
         }

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use super::model::Row;
-use super::samples::MeanIntervals;
-use super::tally::TruthFinding;
-use super::truth::TruthErrors;
+use super::accumulate::TruthEvaluation;
+use super::ground_truth::TruthErrors;
+use super::model::MetricRow;
+use super::score_bootstrap::MeanIntervals;
 use crate::catalog::{
     MetricRecord, PairFacts, PairResults, ReviewerVerdict, StageRecord, StoredFailure,
 };
@@ -136,22 +136,22 @@ pub(crate) fn pending(name: &str) -> PairResults {
 }
 
 /// The same errors for all metrics.
-pub(crate) fn truth(angle_deg: f64, tre_pct: f64, mask_iou: f64) -> TruthFinding {
+pub(crate) fn truth(angle_deg: f64, tre_pct: f64, mask_iou: f64) -> TruthEvaluation {
     let errors = TruthErrors {
         angle_deg,
         mirrored: false,
         tre_pct,
         mask_iou: Some(mask_iou),
     };
-    TruthFinding {
+    TruthEvaluation {
         errors: BTreeMap::from(ThresholdMetric::ALL.map(|metric| (metric, errors))),
         problem: None,
     }
 }
 
 /// A row of 587 pairs nobody has read.
-pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> Row {
-    Row {
+pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> MetricRow {
+    MetricRow {
         metric,
         n: 587,
         read: 0,

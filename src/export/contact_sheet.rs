@@ -2,13 +2,13 @@
 
 use rayon::prelude::*;
 
-use super::pictures::{Rgb, SheetCell, contact_sheet, tile_side};
+use super::pictures::{ContactSheetCell, Rgb, contact_sheet, tile_side};
 use super::tiles::tiles;
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{JobStatus, PairName, ThresholdMetric};
 use crate::raster;
-use crate::report::truth::TruthErrors;
-use crate::report::{Standing, TruthFinding, with_truth};
+use crate::report::ground_truth::TruthErrors;
+use crate::report::{Consensus, TruthEvaluation, with_truth};
 use crate::store::Project;
 
 /// Pairs in memory at a time while the worst are looked for.
@@ -16,7 +16,7 @@ const PAGE: usize = 256;
 
 /// What comes first on a sheet. Failed pairs come before all others but in the order of names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SheetOrder {
+pub enum ContactSheetOrder {
     /// The farthest from the truth; without truth, the lowest `IoU`.
     Worst,
     /// The lowest `IoU` on the canvas.
@@ -29,7 +29,7 @@ pub enum SheetOrder {
     Name,
 }
 
-impl SheetOrder {
+impl ContactSheetOrder {
     /// Every order.
     pub const ALL: [Self; 5] = [
         Self::Worst,
@@ -51,13 +51,13 @@ impl SheetOrder {
     }
 }
 
-impl std::fmt::Display for SheetOrder {
+impl std::fmt::Display for ContactSheetOrder {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.pad(self.name())
     }
 }
 
-impl std::str::FromStr for SheetOrder {
+impl std::str::FromStr for ContactSheetOrder {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
@@ -72,13 +72,13 @@ impl std::str::FromStr for SheetOrder {
 
 /// What to draw.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SheetOptions {
+pub struct ContactSheetOptions {
     /// Whose results.
     pub metric: ThresholdMetric,
     /// Only these pairs; all when `None`.
     pub pairs: Option<Vec<PairName>>,
     /// What comes first.
-    pub order: SheetOrder,
+    pub order: ContactSheetOrder,
     /// Most pairs on the sheet.
     pub limit: usize,
     /// Pairs in a row, 1 to 12.
@@ -89,7 +89,7 @@ pub struct SheetOptions {
 
 /// A sheet, and how much of the project is on it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sheet {
+pub struct ContactSheet {
     /// The picture.
     pub picture: Rgb,
     /// Pairs on it.
@@ -100,7 +100,7 @@ pub struct Sheet {
 
 /// Why there is no sheet.
 #[derive(Debug, thiserror::Error)]
-pub enum SheetError {
+pub enum DrawError {
     /// The catalog refused.
     #[error(transparent)]
     Catalog(#[from] CatalogError),
@@ -110,7 +110,7 @@ pub enum SheetError {
 }
 
 /// A pair that may get on the sheet.
-struct Candidate {
+struct SheetCandidate {
     /// Lowest first.
     rank: f64,
     pair: PairResults,
@@ -123,17 +123,17 @@ struct Candidate {
 ///
 /// # Errors
 /// When the catalog cannot be read.
-pub async fn draw_sheet(
+pub async fn draw_contact_sheet(
     catalog: &Catalog,
     project: &Project,
-    options: SheetOptions,
-) -> Result<Sheet, SheetError> {
+    options: ContactSheetOptions,
+) -> Result<ContactSheet, DrawError> {
     let (chosen, of) = choose(catalog, project, &options).await?;
     let project = project.clone();
     let picture = move || {
         let draw = |candidate| cell(&project, candidate, &options);
-        let cells: Vec<SheetCell> = chosen.par_iter().map(draw).collect();
-        Sheet {
+        let cells: Vec<ContactSheetCell> = chosen.par_iter().map(draw).collect();
+        ContactSheet {
             picture: contact_sheet(&cells, options.columns),
             shown: cells.len(),
             of,
@@ -146,15 +146,15 @@ pub async fn draw_sheet(
 async fn choose(
     catalog: &Catalog,
     project: &Project,
-    options: &SheetOptions,
-) -> Result<(Vec<Candidate>, usize), SheetError> {
+    options: &ContactSheetOptions,
+) -> Result<(Vec<SheetCandidate>, usize), DrawError> {
     let (mut chosen, mut of) = (Vec::new(), 0);
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
         let wanted = page.into_iter().filter(|pair| wants(options, pair));
         for (pair, truth) in with_truth(project, wanted.collect()).await? {
             of += 1;
-            chosen.push(Candidate::new(pair, &truth, options));
+            chosen.push(SheetCandidate::new(pair, &truth, options));
         }
         // The sort is stable and pairs come by name, so that equal ranks stay in the order of names.
         chosen.sort_by(|a, b| a.rank.total_cmp(&b.rank));
@@ -164,14 +164,14 @@ async fn choose(
 }
 
 /// Whether a pair was asked for and has something to show.
-fn wants(options: &SheetOptions, pair: &PairResults) -> bool {
+fn wants(options: &ContactSheetOptions, pair: &PairResults) -> bool {
     let asked = |names: &Vec<PairName>| names.contains(&pair.facts.name);
     options.pairs.as_ref().is_none_or(asked)
         && (pair.status == JobStatus::Quarantined || pair.metric(options.metric).is_some())
 }
 
-impl Candidate {
-    fn new(pair: PairResults, truth: &TruthFinding, options: &SheetOptions) -> Self {
+impl SheetCandidate {
+    fn new(pair: PairResults, truth: &TruthEvaluation, options: &ContactSheetOptions) -> Self {
         let truth = truth.errors.get(&options.metric).copied();
         let rank = rank(&pair, truth.as_ref(), options);
         Self { rank, pair, truth }
@@ -179,8 +179,8 @@ impl Candidate {
 }
 
 /// Place of a pair on the sheet, lowest first.
-fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &SheetOptions) -> f64 {
-    if options.order == SheetOrder::Name {
+fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &ContactSheetOptions) -> f64 {
+    if options.order == ContactSheetOrder::Name {
         return 0.0;
     }
     let Some(record) = pair.metric(options.metric) else {
@@ -188,26 +188,30 @@ fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &SheetOptions)
     };
     let score = record.outcome.scores.iou;
     match options.order {
-        SheetOrder::Worst => truth.map_or(score, |errors| -errors.severity()),
-        SheetOrder::Score => score,
-        SheetOrder::Margin => record.outcome.margin,
-        SheetOrder::Confidence => record.outcome.confidence.unwrap_or(f64::INFINITY),
-        SheetOrder::Name => 0.0,
+        ContactSheetOrder::Worst => truth.map_or(score, |errors| -errors.severity()),
+        ContactSheetOrder::Score => score,
+        ContactSheetOrder::Margin => record.outcome.margin,
+        ContactSheetOrder::Confidence => record.outcome.confidence.unwrap_or(f64::INFINITY),
+        ContactSheetOrder::Name => 0.0,
     }
 }
 
-fn cell(project: &Project, candidate: &Candidate, options: &SheetOptions) -> SheetCell {
+fn cell(
+    project: &Project,
+    candidate: &SheetCandidate,
+    options: &ContactSheetOptions,
+) -> ContactSheetCell {
     let pair = &candidate.pair;
-    let standing = pair.metric(options.metric).map(Standing::of);
+    let standing = pair.metric(options.metric).map(Consensus::of);
     let off_truth = candidate.truth.is_some_and(|errors| !errors.pass());
     let side = tile_side(options.columns);
     let (tiles, trouble) = tiles(project, pair, options.metric, side, &options.limits);
-    SheetCell {
+    ContactSheetCell {
         id: title(pair, options.metric),
         note: trouble.unwrap_or_else(|| note(candidate, options.metric)),
         wrong: pair.metric(options.metric).is_none()
             || off_truth
-            || standing == Some(Standing::Failed),
+            || standing == Some(Consensus::Failed),
         tiles,
     }
 }
@@ -218,14 +222,14 @@ fn title(pair: &PairResults, metric: ThresholdMetric) -> String {
     if let Some(record) = pair.metric(metric) {
         let sure = record.outcome.confidence;
         title.extend(sure.map(|sure| format!("  sure {sure:.2}")));
-        let verdict = Standing::of(record).verdict();
+        let verdict = Consensus::of(record).verdict();
         title.extend(verdict.map(|verdict| format!("  {verdict}")));
     }
     title
 }
 
 /// The numbers of a pair, or why it failed.
-fn note(candidate: &Candidate, metric: ThresholdMetric) -> String {
+fn note(candidate: &SheetCandidate, metric: ThresholdMetric) -> String {
     let pair = &candidate.pair;
     match (pair.metric(metric), &candidate.truth, &pair.failure) {
         (Some(record), Some(errors), _) => {
@@ -255,13 +259,13 @@ fn short(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{SheetOptions, SheetOrder, rank, title, wants};
+    use super::{ContactSheetOptions, ContactSheetOrder, rank, title, wants};
     use crate::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
     use crate::raster;
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
-    fn options(order: SheetOrder) -> SheetOptions {
-        SheetOptions {
+    fn options(order: ContactSheetOrder) -> ContactSheetOptions {
+        ContactSheetOptions {
             metric: ThresholdMetric::Ensemble,
             pairs: None,
             order,
@@ -273,55 +277,61 @@ mod tests {
 
     #[test]
     fn failed_pairs_come_first_and_the_better_score_last() {
-        let (good, poor) = (fixture::done("a", 0.9, &[]), fixture::done("b", 0.4, &[]));
-        let failed = fixture::failed("c", FailureClass::BadInput, "c.stl is empty");
-        for order in [SheetOrder::Worst, SheetOrder::Score] {
+        let (good, poor) = (
+            test_fixtures::done("a", 0.9, &[]),
+            test_fixtures::done("b", 0.4, &[]),
+        );
+        let failed = test_fixtures::failed("c", FailureClass::BadInput, "c.stl is empty");
+        for order in [ContactSheetOrder::Worst, ContactSheetOrder::Score] {
             let rank = |pair| rank(pair, None, &options(order));
             assert!(
                 rank(&failed) < rank(&poor) && rank(&poor) < rank(&good),
                 "{order}"
             );
         }
-        assert_eq!(rank(&failed, None, &options(SheetOrder::Name)), 0.0);
+        assert_eq!(rank(&failed, None, &options(ContactSheetOrder::Name)), 0.0);
     }
 
     #[test]
     fn the_least_confident_come_first_and_the_unknown_last() {
-        let order = options(SheetOrder::Confidence);
-        let (doubtful, sure) = (fixture::sure("b", 0.2), fixture::sure("a", 0.9));
+        let order = options(ContactSheetOrder::Confidence);
+        let (doubtful, sure) = (test_fixtures::sure("b", 0.2), test_fixtures::sure("a", 0.9));
         let rank = |pair| rank(pair, None, &order);
         assert!(rank(&doubtful) < rank(&sure));
-        assert!(rank(&sure) < rank(&fixture::done("c", 0.1, &[])));
+        assert!(rank(&sure) < rank(&test_fixtures::done("c", 0.1, &[])));
         assert_eq!(title(&doubtful, order.metric), "b  sure 0.20");
-        let read = fixture::done("c", 0.1, &[Verdict::Fail]);
+        let read = test_fixtures::done("c", 0.1, &[Verdict::Fail]);
         assert_eq!(title(&read, order.metric), "c  fail");
     }
 
     #[test]
     fn truth_outweighs_the_score_in_worst() {
         let (near, far) = (
-            fixture::truth(1.0, 1.0, 0.9),
-            fixture::truth(90.0, 30.0, 0.1),
+            test_fixtures::truth(1.0, 1.0, 0.9),
+            test_fixtures::truth(90.0, 30.0, 0.1),
         );
         let metric = ThresholdMetric::Ensemble;
-        let worst = options(SheetOrder::Worst);
-        let (good, poor) = (fixture::done("a", 0.9, &[]), fixture::done("b", 0.4, &[]));
+        let worst = options(ContactSheetOrder::Worst);
+        let (good, poor) = (
+            test_fixtures::done("a", 0.9, &[]),
+            test_fixtures::done("b", 0.4, &[]),
+        );
         let wrong = rank(&good, far.errors.get(&metric), &worst);
         assert!(wrong < rank(&poor, near.errors.get(&metric), &worst));
     }
 
     #[test]
     fn unfinished_and_unasked_pairs_are_not_shown() {
-        let mut asked = options(SheetOrder::Name);
-        assert!(!wants(&asked, &fixture::pending("a")));
-        assert!(wants(&asked, &fixture::done("a", 0.9, &[])));
+        let mut asked = options(ContactSheetOrder::Name);
+        assert!(!wants(&asked, &test_fixtures::pending("a")));
+        assert!(wants(&asked, &test_fixtures::done("a", 0.9, &[])));
         asked.pairs = Some(vec![PairName::new("b").expect("an id")]);
-        assert!(!wants(&asked, &fixture::done("a", 0.9, &[])));
+        assert!(!wants(&asked, &test_fixtures::done("a", 0.9, &[])));
     }
 
     #[test]
     fn every_order_is_found_by_its_name() {
-        for order in SheetOrder::ALL {
+        for order in ContactSheetOrder::ALL {
             assert_eq!(order.name().parse(), Ok(order));
         }
     }

@@ -6,28 +6,28 @@
 
 use std::collections::BTreeMap;
 
-use super::by_hand::{HandErrors, HandSums};
-use super::compare::Duels;
-use super::controls::Caught;
-use super::coverage::Confidences;
-use super::interval::Interval;
-use super::model::{Basis, FailedPair, FailureGroup, Progress, Report, Row, SCHEMA};
-use super::reasons::Reasons;
-use super::rules::RuleSums;
-use super::samples::{Drawn, Samples};
-use super::standing::Standing;
+use super::adjudication::AdjudicationSums;
+use super::attention_checks::AttentionCheckRates;
+use super::comparison::McNemarTests;
+use super::consensus::Consensus;
+use super::fail_reasons::FailReasonSums;
+use super::ground_truth::TruthErrors;
+use super::ground_truth_sums::TruthSums;
+use super::interval::IntervalMethod;
+use super::manual_alignment::{ManualErrorSums, ManualErrors};
+use super::model::{Basis, FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
+use super::risk_coverage::ConfidenceSamples;
+use super::score_bootstrap::{Drawn, Samples};
+use super::stage_times::StageTimeSamples;
 use super::stats::wilson_95;
-use super::thresholds::Cuts;
-use super::times::Times;
-use super::truth::TruthErrors;
-use super::truth_sums::TruthSums;
+use super::thresholds::ThresholdSamples;
 use super::warnings;
 use crate::catalog::{MetricRecord, PairResults};
 use crate::domain::{FailureClass, JobStatus, ThresholdMetric};
 
 /// What the truth says of one pair.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct TruthFinding {
+pub struct TruthEvaluation {
     /// Errors by metric; empty where there is no truth or it cannot be used.
     pub errors: BTreeMap<ThresholdMetric, TruthErrors>,
     /// Why a truth that is there cannot be used.
@@ -36,19 +36,19 @@ pub struct TruthFinding {
 
 /// The sums so far.
 #[derive(Debug, Clone)]
-pub struct Tally {
+pub struct ReportAccumulator {
     pairs: u64,
-    progress: Progress,
-    columns: [Column; ThresholdMetric::ALL.len()],
+    progress: PairProgress,
+    columns: [MetricSums; ThresholdMetric::ALL.len()],
     samples: Samples,
-    by_verdicts: Duels,
-    by_truth: Duels,
-    sure_by_verdicts: Confidences,
-    sure_by_truth: Confidences,
+    by_verdicts: McNemarTests,
+    by_truth: McNemarTests,
+    sure_by_verdicts: ConfidenceSamples,
+    sure_by_truth: ConfidenceSamples,
     failures: BTreeMap<FailureClass, FailureGroup>,
-    cuts: Cuts,
-    times: Times,
-    caught: Option<Caught>,
+    cuts: ThresholdSamples,
+    times: StageTimeSamples,
+    caught: Option<AttentionCheckRates>,
     truth_problems: TruthProblems,
 }
 
@@ -63,7 +63,7 @@ pub(super) struct TruthProblems {
 
 /// The sums of one metric.
 #[derive(Debug, Clone)]
-struct Column {
+struct MetricSums {
     metric: ThresholdMetric,
     n: u64,
     passed: u64,
@@ -71,40 +71,40 @@ struct Column {
     unsure: u64,
     conflicts: u64,
     stale: u64,
-    rules: RuleSums,
-    reasons: Reasons,
+    rules: AdjudicationSums,
+    reasons: FailReasonSums,
     ssim: f64,
     nl_ssim: f64,
     iou: f64,
     iou_box: f64,
     dice: f64,
     truth: TruthSums,
-    by_hand: HandSums,
+    by_hand: ManualErrorSums,
 }
 
-impl Default for Tally {
+impl Default for ReportAccumulator {
     fn default() -> Self {
         Self {
             pairs: 0,
-            progress: Progress::default(),
-            columns: ThresholdMetric::ALL.map(Column::new),
+            progress: PairProgress::default(),
+            columns: ThresholdMetric::ALL.map(MetricSums::new),
             samples: Samples::default(),
-            by_verdicts: Duels::default(),
-            by_truth: Duels::default(),
-            sure_by_verdicts: Confidences::default(),
-            sure_by_truth: Confidences::default(),
+            by_verdicts: McNemarTests::default(),
+            by_truth: McNemarTests::default(),
+            sure_by_verdicts: ConfidenceSamples::default(),
+            sure_by_truth: ConfidenceSamples::default(),
             failures: BTreeMap::new(),
-            cuts: Cuts::default(),
-            times: Times::default(),
+            cuts: ThresholdSamples::default(),
+            times: StageTimeSamples::default(),
             caught: None,
             truth_problems: TruthProblems::default(),
         }
     }
 }
 
-impl Tally {
+impl ReportAccumulator {
     /// Counts one pair in. Pairs come in the order of their names, so that sums are the same every time.
-    pub fn add(&mut self, pair: &PairResults, truth: &TruthFinding) {
+    pub fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
         self.pairs += 1;
         self.count_status(pair);
         self.count_truth_problem(pair, truth);
@@ -115,7 +115,7 @@ impl Tally {
                 column.add(record, truth.errors.get(&column.metric));
             }
         }
-        let told = |metric| Standing::of(pair.metric(metric)?).told();
+        let told = |metric| Consensus::of(pair.metric(metric)?).told();
         let right = |metric| truth.errors.get(&metric).map(TruthErrors::pass);
         let sure = |metric| pair.metric(metric)?.outcome.confidence;
         self.samples.add(pair, told);
@@ -128,7 +128,7 @@ impl Tally {
     }
 
     /// Counts in how far a pair's results are from its alignment by hand.
-    pub fn add_by_hand(&mut self, errors: &BTreeMap<ThresholdMetric, HandErrors>) {
+    pub fn add_by_hand(&mut self, errors: &BTreeMap<ThresholdMetric, ManualErrors>) {
         for column in &mut self.columns {
             if let Some(errors) = errors.get(&column.metric) {
                 column.by_hand.add(*errors);
@@ -137,7 +137,7 @@ impl Tally {
     }
 
     /// Takes in the planted faults that reviewers caught; none where none were answered.
-    pub fn caught(&mut self, caught: Caught) {
+    pub fn caught(&mut self, caught: AttentionCheckRates) {
         self.caught = (caught.all.n > 0).then_some(caught);
     }
 
@@ -166,7 +166,7 @@ impl Tally {
         });
         group.count += 1;
         if group.pairs.len() < FailureGroup::SHOWN {
-            group.pairs.push(FailedPair {
+            group.pairs.push(FailureExample {
                 id: pair.facts.name.clone(),
                 stage: stored.stage,
                 error: stored.failure.message.clone(),
@@ -174,7 +174,7 @@ impl Tally {
         }
     }
 
-    fn count_truth_problem(&mut self, pair: &PairResults, truth: &TruthFinding) {
+    fn count_truth_problem(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
         if let Some(problem) = &truth.problem {
             self.truth_problems.count += 1;
             let first = || format!("{}: {problem}", pair.facts.name);
@@ -184,9 +184,9 @@ impl Tally {
 
     /// The report over all pairs counted.
     pub fn finish(self) -> Report {
-        let told = self.columns.into_iter().filter(Column::is_told);
+        let told = self.columns.into_iter().filter(MetricSums::is_told);
         let drawn = self.samples.finish();
-        let rows: Vec<Row> = told.map(|column| column.finish(&drawn)).collect();
+        let rows: Vec<MetricRow> = told.map(|column| column.finish(&drawn)).collect();
         let mut comparisons = self.by_verdicts.finish(Basis::Verdicts);
         comparisons.extend(self.by_truth.finish(Basis::Truth));
         let mut coverage = self.sure_by_verdicts.finish(Basis::Verdicts);
@@ -194,7 +194,7 @@ impl Tally {
         Report {
             schema: SCHEMA,
             pairs: self.pairs,
-            interval: Interval::default(),
+            interval: IntervalMethod::default(),
             progress: self.progress,
             warnings: warnings::of(self.progress, &rows, &self.truth_problems, drawn.lack),
             rows,
@@ -210,7 +210,7 @@ impl Tally {
     }
 }
 
-impl Column {
+impl MetricSums {
     fn new(metric: ThresholdMetric) -> Self {
         Self {
             metric,
@@ -220,15 +220,15 @@ impl Column {
             unsure: 0,
             conflicts: 0,
             stale: 0,
-            rules: RuleSums::default(),
-            reasons: Reasons::default(),
+            rules: AdjudicationSums::default(),
+            reasons: FailReasonSums::default(),
             ssim: 0.0,
             nl_ssim: 0.0,
             iou: 0.0,
             iou_box: 0.0,
             dice: 0.0,
             truth: TruthSums::default(),
-            by_hand: HandSums::default(),
+            by_hand: ManualErrorSums::default(),
         }
     }
 
@@ -247,30 +247,30 @@ impl Column {
         self.dice += scores.dice;
         self.rules.add(record);
         self.reasons.add(record);
-        self.count_standing(Standing::of(record));
+        self.count_standing(Consensus::of(record));
         if let Some(errors) = truth {
             self.truth.add(errors);
         }
     }
 
-    fn count_standing(&mut self, standing: Standing) {
+    fn count_standing(&mut self, standing: Consensus) {
         match standing {
-            Standing::Unread => {}
-            Standing::Stale => self.stale += 1,
-            Standing::Passed => self.passed += 1,
-            Standing::Failed => self.failed += 1,
-            Standing::Unsure => self.unsure += 1,
-            Standing::Conflict => {
+            Consensus::Unread => {}
+            Consensus::Stale => self.stale += 1,
+            Consensus::Passed => self.passed += 1,
+            Consensus::Failed => self.failed += 1,
+            Consensus::Unsure => self.unsure += 1,
+            Consensus::Conflict => {
                 self.unsure += 1;
                 self.conflicts += 1;
             }
         }
     }
 
-    fn finish(self, drawn: &Drawn) -> Row {
+    fn finish(self, drawn: &Drawn) -> MetricRow {
         let mean = |sum: f64| share(sum, self.n);
         let told = self.passed + self.failed;
-        Row {
+        MetricRow {
             metric: self.metric,
             n: self.n,
             read: told + self.unsure,
@@ -302,21 +302,21 @@ pub(super) fn share(sum: f64, n: u64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Tally, TruthFinding};
+    use super::{ReportAccumulator, TruthEvaluation};
     use crate::domain::{FailureClass, ThresholdMetric, Verdict};
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
     #[test]
     fn means_are_over_finished_pairs_only() {
-        let mut tally = Tally::default();
-        let none = TruthFinding::default();
-        tally.add(&fixture::done("a", 0.8, &[]), &none);
+        let mut tally = ReportAccumulator::default();
+        let none = TruthEvaluation::default();
+        tally.add(&test_fixtures::done("a", 0.8, &[]), &none);
         tally.add(
-            &fixture::failed("b", FailureClass::BadInput, "b.stl is empty"),
+            &test_fixtures::failed("b", FailureClass::BadInput, "b.stl is empty"),
             &none,
         );
-        tally.add(&fixture::done("c", 0.6, &[]), &none);
-        tally.add(&fixture::pending("d"), &none);
+        tally.add(&test_fixtures::done("c", 0.6, &[]), &none);
+        tally.add(&test_fixtures::pending("d"), &none);
         let report = tally.finish();
         assert_eq!((report.pairs, report.progress.pending), (4, 1));
         for row in &report.rows {
@@ -331,12 +331,12 @@ mod tests {
 
     #[test]
     fn unsure_is_read_but_neither_passed_nor_failed() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         let all = [Verdict::Pass, Verdict::Pass, Verdict::Fail, Verdict::Unsure];
         for (name, verdict) in ["a", "b", "c", "d"].into_iter().zip(all) {
             tally.add(
-                &fixture::done(name, 0.8, &[verdict]),
-                &TruthFinding::default(),
+                &test_fixtures::done(name, 0.8, &[verdict]),
+                &TruthEvaluation::default(),
             );
         }
         let report = tally.finish();
@@ -349,7 +349,7 @@ mod tests {
 
     #[test]
     fn empty_project_has_three_empty_rows() {
-        let report = Tally::default().finish();
+        let report = ReportAccumulator::default().finish();
         assert_eq!(report.rows.len(), 3);
         assert!(
             report
@@ -362,9 +362,9 @@ mod tests {
 
     #[test]
     fn the_papers_method_has_the_papers_rows_and_no_complaint() {
-        let mut tally = Tally::default();
-        let pair = fixture::done_by_paper("a", 0.8, &[Verdict::Pass]);
-        tally.add(&pair, &TruthFinding::default());
+        let mut tally = ReportAccumulator::default();
+        let pair = test_fixtures::done_by_paper("a", 0.8, &[Verdict::Pass]);
+        tally.add(&pair, &TruthEvaluation::default());
         let report = tally.finish();
         let metrics: Vec<_> = report.rows.iter().map(|row| row.metric).collect();
         assert_eq!(metrics, ThresholdMetric::PAPER);
@@ -376,10 +376,10 @@ mod tests {
 
     #[test]
     fn failures_beyond_the_shown_are_still_counted() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for i in 0..130 {
-            let pair = fixture::failed(&format!("p{i:03}"), FailureClass::Io, "gone");
-            tally.add(&pair, &TruthFinding::default());
+            let pair = test_fixtures::failed(&format!("p{i:03}"), FailureClass::Io, "gone");
+            tally.add(&pair, &TruthEvaluation::default());
         }
         let report = tally.finish();
         assert_eq!(report.failures[0].count, 130);

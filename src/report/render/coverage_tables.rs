@@ -1,8 +1,8 @@
 //! Accuracy against coverage as tables: a line a metric for a terminal, every number for a document.
 
 use super::table::{Table, bounds, count, fixed, interval, number, words};
-use crate::report::coverage::{KEPT_PERCENT, LEAST_PERCENT};
-use crate::report::model::{Basis, Coverage, CoveragePoint, Report};
+use crate::report::model::{Basis, Report, RiskCoverage, RiskCoveragePoint};
+use crate::report::risk_coverage::{KEPT_PERCENT, LEAST_PERCENT};
 
 /// Heads of the columns of [`short`], one for each of [`KEPT_PERCENT`].
 const HEADS: [&str; KEPT_PERCENT.len()] = ["100 %", "99 %", "97 %", "95 %", "90 %", "80 %", "50 %"];
@@ -36,7 +36,7 @@ pub(super) fn full(report: &Report) -> Vec<Table> {
     })
 }
 
-fn by_basis(report: &Report, table: impl Fn(Basis, &[&Coverage]) -> Table) -> Vec<Table> {
+fn by_basis(report: &Report, table: impl Fn(Basis, &[&RiskCoverage]) -> Table) -> Vec<Table> {
     [Basis::Verdicts, Basis::Truth]
         .into_iter()
         .map(|basis| {
@@ -56,7 +56,7 @@ const fn title(basis: Basis) -> &'static str {
 }
 
 /// What the table shows, and how many failures the confidence tells.
-fn caption(basis: Basis, curves: &[&Coverage]) -> String {
+fn caption(basis: Basis, curves: &[&RiskCoverage]) -> String {
     let judge = match basis {
         Basis::Verdicts => "by reviewers",
         Basis::Truth => "by truth",
@@ -70,7 +70,7 @@ fn caption(basis: Basis, curves: &[&Coverage]) -> String {
 }
 
 /// How many failures of a metric its confidence tells.
-fn told(curve: &Coverage) -> String {
+fn told(curve: &RiskCoverage) -> String {
     format!(
         "{}: of the {}, {} among the {LEAST_PERCENT} % least confident ({} of {}).",
         curve.metric.title(),
@@ -91,17 +91,17 @@ fn verb(n: u64) -> String {
     format!("{n} {}", if n == 1 { "is" } else { "are" })
 }
 
-fn short_row(curve: &Coverage) -> Vec<Option<String>> {
+fn short_row(curve: &RiskCoverage) -> Vec<Option<String>> {
     let mut cells = vec![Some(curve.metric.title().to_owned()), Some(count(curve.n))];
     cells.extend(curve.points.iter().map(|point| fixed(point.acc, 3)));
     cells
 }
 
-fn full_rows(curve: &Coverage) -> impl Iterator<Item = Vec<Option<String>>> {
+fn full_rows(curve: &RiskCoverage) -> impl Iterator<Item = Vec<Option<String>>> {
     curve.points.iter().map(|point| full_row(curve, point))
 }
 
-fn full_row(curve: &Coverage, point: &CoveragePoint) -> Vec<Option<String>> {
+fn full_row(curve: &RiskCoverage, point: &RiskCoveragePoint) -> Vec<Option<String>> {
     vec![
         Some(curve.metric.title().to_owned()),
         fixed(Some(100.0 * point.coverage), 0),
@@ -115,8 +115,8 @@ fn full_row(curve: &Coverage, point: &CoveragePoint) -> Vec<Option<String>> {
 #[cfg(test)]
 mod tests {
     use super::{HEADS, full, short};
-    use crate::report::coverage::KEPT_PERCENT;
-    use crate::report::{Tally, TruthFinding, fixture};
+    use crate::report::risk_coverage::KEPT_PERCENT;
+    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
 
     #[test]
     fn heads_name_the_coverages() {
@@ -128,13 +128,13 @@ mod tests {
 
     #[test]
     fn failures_that_confidence_tells_are_counted_in_the_caption() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         for (i, (confidence, angle_deg)) in [(0.9, 1.0), (0.2, 170.0), (0.8, 1.0)]
             .into_iter()
             .enumerate()
         {
-            let pair = fixture::sure(&format!("p{i}"), confidence);
-            tally.add(&pair, &fixture::truth(angle_deg, 1.0, 0.9));
+            let pair = test_fixtures::sure(&format!("p{i}"), confidence);
+            tally.add(&pair, &test_fixtures::truth(angle_deg, 1.0, 0.9));
         }
         let report = tally.finish();
         let [table] = &short(&report)[..] else {
@@ -162,12 +162,12 @@ mod tests {
 
     #[test]
     fn without_confidence_there_is_no_table() {
-        let mut tally = Tally::default();
+        let mut tally = ReportAccumulator::default();
         tally.add(
-            &fixture::done("a", 0.8, &[]),
-            &fixture::truth(1.0, 1.0, 0.9),
+            &test_fixtures::done("a", 0.8, &[]),
+            &test_fixtures::truth(1.0, 1.0, 0.9),
         );
-        tally.add(&fixture::sure("b", 0.8), &TruthFinding::default());
+        tally.add(&test_fixtures::sure("b", 0.8), &TruthEvaluation::default());
         let report = tally.finish();
         assert!(short(&report).is_empty() && full(&report).is_empty());
     }

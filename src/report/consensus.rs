@@ -5,7 +5,7 @@ use crate::domain::{ReviewOrder, Verdict};
 
 /// Where a result stands with its reviewers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
+pub enum Consensus {
     /// Nobody has read it or an earlier result.
     Unread,
     /// An earlier result was read, this one was not.
@@ -20,7 +20,7 @@ pub enum Standing {
     Conflict,
 }
 
-impl Standing {
+impl Consensus {
     /// The standing of a current result.
     pub fn of(record: &MetricRecord) -> Self {
         let (words, read) = split(record);
@@ -73,33 +73,33 @@ pub(crate) fn contradict(verdicts: &[&ReviewerVerdict]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::Standing;
+    use super::Consensus;
     use crate::domain::{ReviewOrder, ThresholdMetric, Verdict};
-    use crate::report::fixture;
+    use crate::report::test_fixtures;
 
-    fn standing(verdicts: &[Verdict], older: u64) -> Standing {
-        let mut record = fixture::metric(ThresholdMetric::Density, 0.8, verdicts);
+    fn standing(verdicts: &[Verdict], older: u64) -> Consensus {
+        let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, verdicts);
         record.older_verdicts = older;
-        Standing::of(&record)
+        Consensus::of(&record)
     }
 
     #[test]
     fn reviewers_who_cannot_tell_leave_the_word_to_those_who_can() {
         assert_eq!(
             standing(&[Verdict::Unsure, Verdict::Pass], 0),
-            Standing::Passed
+            Consensus::Passed
         );
         assert_eq!(
             standing(&[Verdict::Fail, Verdict::Unsure], 0),
-            Standing::Failed
+            Consensus::Failed
         );
-        assert_eq!(standing(&[Verdict::Unsure], 0), Standing::Unsure);
+        assert_eq!(standing(&[Verdict::Unsure], 0), Consensus::Unsure);
     }
 
     #[test]
     fn contradiction_counts_as_unsure() {
         let both = standing(&[Verdict::Fail, Verdict::Pass], 0);
-        assert_eq!(both, Standing::Conflict);
+        assert_eq!(both, Consensus::Conflict);
         assert_eq!(both.verdict(), Some(Verdict::Unsure));
     }
 
@@ -107,23 +107,29 @@ mod tests {
     fn the_word_on_a_conflict_settles_it_unless_it_is_unsure_or_contradicted() {
         let settled = |words: &[Verdict]| {
             let verdicts = [&[Verdict::Pass, Verdict::Fail], words].concat();
-            let mut record = fixture::metric(ThresholdMetric::Density, 0.8, &verdicts);
+            let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, &verdicts);
             for word in &mut record.verdicts[2..] {
                 word.review_order = Some(ReviewOrder::Adjudicate);
             }
-            Standing::of(&record)
+            Consensus::of(&record)
         };
-        assert_eq!(settled(&[Verdict::Fail]), Standing::Failed);
-        assert_eq!(settled(&[Verdict::Pass, Verdict::Unsure]), Standing::Passed);
-        assert_eq!(settled(&[Verdict::Unsure]), Standing::Conflict);
-        assert_eq!(settled(&[Verdict::Pass, Verdict::Fail]), Standing::Conflict);
+        assert_eq!(settled(&[Verdict::Fail]), Consensus::Failed);
+        assert_eq!(
+            settled(&[Verdict::Pass, Verdict::Unsure]),
+            Consensus::Passed
+        );
+        assert_eq!(settled(&[Verdict::Unsure]), Consensus::Conflict);
+        assert_eq!(
+            settled(&[Verdict::Pass, Verdict::Fail]),
+            Consensus::Conflict
+        );
     }
 
     #[test]
     fn verdict_on_an_older_result_is_no_verdict() {
-        assert_eq!(standing(&[], 2), Standing::Stale);
-        assert_eq!(standing(&[], 0), Standing::Unread);
-        assert_eq!(standing(&[Verdict::Pass], 2), Standing::Passed);
-        assert_eq!(Standing::Stale.verdict(), None);
+        assert_eq!(standing(&[], 2), Consensus::Stale);
+        assert_eq!(standing(&[], 0), Consensus::Unread);
+        assert_eq!(standing(&[Verdict::Pass], 2), Consensus::Passed);
+        assert_eq!(Consensus::Stale.verdict(), None);
     }
 }
