@@ -1,7 +1,8 @@
-//! Who imports whom: the source is held to the table in `src/lib.rs`.
+//! Imports between the rooms of the crate, checked against the table in `src/lib.rs`, and import cycles among files.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+
+use crate::source_text::{SourceFile, identifier, package_dir, paths_after, source_files};
 
 /// Crates that only these rooms may name.
 const ONLY_IN: &[(&str, &[&str])] = &[
@@ -16,7 +17,7 @@ const ONLY_IN: &[(&str, &[&str])] = &[
     ("nalgebra", &["stages", "demo", "mesh", "raster", "report"]),
 ];
 
-/// What the pure rooms may not touch: files, processes, clocks, async.
+/// Rooms without files, processes, clocks and async code.
 const PURE_ROOMS: &[&str] = &["domain", "raster", "mesh", "stages"];
 const IMPURE: &[&str] = &[
     "tokio::",
@@ -27,119 +28,24 @@ const IMPURE: &[&str] = &[
     "Instant::now",
 ];
 
-fn src() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
-}
+/// Imports that only the unit tests of a room may use, beyond the table.
+const TEST_IMPORTS: &[(&str, &[&str])] = &[("runner", &["report"])];
 
-fn rust_files(dir: &Path, into: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(dir).expect("a readable directory") {
-        let path = entry.expect("a readable entry").path();
-        if path.is_dir() {
-            rust_files(&path, into);
-        } else if path.extension().is_some_and(|ending| ending == "rs") {
-            into.push(path);
-        }
-    }
-}
+/// Files that may take part in import cycles. Remove entries when a cycle is broken; add none.
+const CYCLIC_FILES: &[&str] = &[
+    "catalog/", "cli/", "mesh/", "raster/", "report/", "review/", "runner/", "stages/",
+];
 
-/// Names of test modules that have files of their own: `#[cfg(test)] mod NAME;`.
-fn test_modules(files: &[PathBuf]) -> BTreeSet<String> {
-    let declared = |path: &PathBuf| {
-        let text = std::fs::read_to_string(path).expect("readable source");
-        let mut names = Vec::new();
-        for after in text.split("#[cfg(test)]\n").skip(1) {
-            let line = after.lines().next().unwrap_or_default();
-            let name = line
-                .rsplit(' ')
-                .next()
-                .and_then(|name| name.strip_suffix(';'));
-            names.extend(name.map(str::to_owned));
-        }
-        names
-    };
-    files.iter().flat_map(declared).collect()
-}
-
-/// Every source file of a room that ships, with the room's name. `main.rs` and `lib.rs` are no rooms.
-fn sources() -> Vec<(String, PathBuf, String)> {
-    let mut files = Vec::new();
-    rust_files(&src(), &mut files);
-    files.sort();
-    let tests = test_modules(&files);
-    files.retain(|path| {
-        let inside = path
-            .strip_prefix(src())
-            .expect("below src")
-            .with_extension("");
-        !inside
-            .iter()
-            .any(|part| tests.contains(&*part.to_string_lossy()))
-    });
+/// Returns the files that belong to rooms.
+fn room_files() -> Vec<SourceFile> {
+    let mut files = source_files();
+    files.retain(|file| file.room != "main" && file.room != "lib");
     files
-        .into_iter()
-        .filter_map(|path| {
-            let inside = path.strip_prefix(src()).expect("below src");
-            let first = inside.components().next().expect("a name");
-            let room = first.as_os_str().to_string_lossy();
-            let room = room.trim_end_matches(".rs").to_owned();
-            let text = std::fs::read_to_string(&path).expect("readable source");
-            (room != "main" && room != "lib").then_some((room, path, text))
-        })
-        .collect()
 }
 
-/// The code of a file: no comments, no unit tests. A test module in a file of its own is but a line here, and what
-/// follows it still counts.
-fn code(text: &str) -> String {
-    let inline = text.match_indices("#[cfg(test)]\n").find(|(at, mark)| {
-        let rest = &text[at + mark.len()..];
-        let line = rest.lines().next().unwrap_or_default();
-        line.contains("mod ") && line.ends_with('{')
-    });
-    let shipped = inline.map_or(text, |(at, _)| &text[..at]);
-    shipped
-        .lines()
-        .filter(|line| !line.trim_start().starts_with("//"))
-        .collect::<Vec<_>>()
-        .join("\n")
-}
-
-/// Names right after `prefix`, also those in braces: `crate::{a::B, c}` gives `a` and `c`.
-fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
-    code.match_indices(prefix)
-        .filter(|(at, _)| !code[..*at].ends_with(|c: char| c.is_alphanumeric() || c == '_'))
-        .flat_map(|(at, _)| first_names(&code[at + prefix.len()..]))
-        .collect()
-}
-
-fn first_names(rest: &str) -> Vec<String> {
-    let Some(list) = rest.strip_prefix('{') else {
-        return vec![identifier(rest)];
-    };
-    let mut depth = 0;
-    let mut names = vec![String::new()];
-    for c in list.chars() {
-        match c {
-            '{' => depth += 1,
-            '}' if depth == 0 => break,
-            '}' => depth -= 1,
-            ',' if depth == 0 => names.push(String::new()),
-            _ if depth == 0 => names.last_mut().expect("never empty").push(c),
-            _ => {}
-        }
-    }
-    names.iter().map(|name| identifier(name.trim())).collect()
-}
-
-fn identifier(text: &str) -> String {
-    text.chars()
-        .take_while(|c| c.is_alphanumeric() || *c == '_')
-        .collect()
-}
-
-/// The table in the code map: room to what it may import.
+/// Returns the table of the code map: each room and the rooms that it may import.
 fn table() -> BTreeMap<String, BTreeSet<String>> {
-    let lib = std::fs::read_to_string(src().join("lib.rs")).expect("readable source");
+    let lib = std::fs::read_to_string(package_dir().join("src/lib.rs")).expect("readable source");
     let rooms: Vec<(String, String)> = lib
         .lines()
         .filter_map(|line| line.strip_prefix("//! | `"))
@@ -162,9 +68,24 @@ fn table() -> BTreeMap<String, BTreeSet<String>> {
         .collect()
 }
 
+/// Returns the first names of the paths after a prefix.
+fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
+    let paths = paths_after(code, prefix).into_iter();
+    paths.filter_map(|path| path.into_iter().next()).collect()
+}
+
+/// Returns the rooms that a piece of code of this file names.
+fn imported_rooms(file: &SourceFile, code: &str) -> BTreeSet<String> {
+    let mut used = names_after(code, "crate::");
+    if file.module().len() == 1 {
+        used.extend(names_after(code, "super::"));
+    }
+    used
+}
+
 #[test]
 fn every_room_is_in_the_code_map() {
-    let rooms: BTreeSet<String> = sources().into_iter().map(|(room, ..)| room).collect();
+    let rooms: BTreeSet<String> = room_files().into_iter().map(|file| file.room).collect();
     let mapped: BTreeSet<String> = table().into_keys().collect();
     assert_eq!(rooms, mapped);
 }
@@ -173,38 +94,70 @@ fn every_room_is_in_the_code_map() {
 fn rooms_import_only_what_the_table_allows() {
     let table = table();
     let mut wrong = Vec::new();
-    for (room, path, text) in sources() {
-        let code = code(&text);
-        let mut used = names_after(&code, "crate::");
-        let is_room_root =
-            path.parent() == Some(&src()) || path.ends_with(format!("{room}/mod.rs"));
-        if is_room_root {
-            used.extend(names_after(&code, "super::"));
-        }
-        for name in used {
-            let foreign = table.contains_key(&name) && name != room;
-            if foreign && !table[&room].contains(&name) {
-                wrong.push(format!("{}: {room} may not import {name}", path.display()));
+    for file in room_files() {
+        for name in imported_rooms(&file, &file.production_code()) {
+            let is_foreign = table.contains_key(&name) && name != file.room;
+            if is_foreign && !table[&file.room].contains(&name) {
+                wrong.push(format!(
+                    "{}: {} may not import {name}",
+                    file.name, file.room
+                ));
             }
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn unit_tests_import_only_what_the_table_and_its_exceptions_allow() {
+    let table = table();
+    let exceptions: BTreeMap<&str, &[&str]> = TEST_IMPORTS.iter().copied().collect();
+    let mut wrong = BTreeSet::new();
+    let mut unused: BTreeSet<(String, String)> = TEST_IMPORTS
+        .iter()
+        .flat_map(|(room, names)| {
+            names
+                .iter()
+                .map(|name| ((*room).to_owned(), (*name).to_owned()))
+        })
+        .collect();
+    for file in room_files() {
+        let extra = exceptions
+            .get(file.room.as_str())
+            .copied()
+            .unwrap_or_default();
+        for name in imported_rooms(&file, &file.test_code()) {
+            let is_foreign = table.contains_key(&name) && name != file.room;
+            if !is_foreign || table[&file.room].contains(&name) {
+                continue;
+            }
+            unused.remove(&(file.room.clone(), name.clone()));
+            if !extra.contains(&name.as_str()) {
+                wrong.insert(format!(
+                    "{}: tests of {} may not import {name}",
+                    file.name, file.room
+                ));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!(unused.is_empty(), "no longer needed: {unused:?}");
 }
 
 #[test]
 fn crates_stay_in_their_rooms() {
     let mut wrong = Vec::new();
-    for (room, path, text) in sources() {
-        let code = code(&text);
+    for file in room_files() {
+        let code = file.production_code();
         for (name, rooms) in ONLY_IN {
-            let named = !names_after(&code, &format!("{name}::")).is_empty();
-            if named && !rooms.contains(&room.as_str()) {
-                wrong.push(format!("{}: {name} is not for {room}", path.display()));
+            let is_named = !names_after(&code, &format!("{name}::")).is_empty();
+            if is_named && !rooms.contains(&file.room.as_str()) {
+                wrong.push(format!("{}: {} may not use {name}", file.name, file.room));
             }
         }
-        for thing in IMPURE {
-            if PURE_ROOMS.contains(&room.as_str()) && code.contains(thing) {
-                wrong.push(format!("{}: {thing} is not for {room}", path.display()));
+        for name in IMPURE {
+            if PURE_ROOMS.contains(&file.room.as_str()) && code.contains(name) {
+                wrong.push(format!("{}: {} may not use {name}", file.name, file.room));
             }
         }
     }
@@ -212,33 +165,182 @@ fn crates_stay_in_their_rooms() {
 }
 
 #[test]
-fn only_progress_draws() {
-    for (_, path, text) in sources() {
-        let draws = !names_after(&code(&text), "indicatif::").is_empty();
-        assert!(
-            !draws || path.ends_with("cli/progress.rs"),
-            "{}",
-            path.display()
-        );
+fn only_the_progress_file_draws() {
+    for file in room_files() {
+        let draws = !names_after(&file.production_code(), "indicatif::").is_empty();
+        assert!(!draws || file.name == "cli/progress.rs", "{}", file.name);
     }
 }
 
-#[test]
-fn every_file_says_its_job_first() {
-    let mut files = Vec::new();
-    rust_files(&src(), &mut files);
-    for room in ["tests", "benches"] {
-        rust_files(&src().with_file_name(room), &mut files);
+/// The import graph of the crate's files.
+struct ImportGraph {
+    files: Vec<SourceFile>,
+    by_module: BTreeMap<Vec<String>, usize>,
+    /// Names that a module re-exports, with the paths that they stand for.
+    re_exports: BTreeMap<(Vec<String>, String), Vec<String>>,
+}
+
+impl ImportGraph {
+    fn new() -> Self {
+        let mut files = source_files();
+        files.retain(|file| !file.is_test && file.name != "main.rs");
+        let by_module = files
+            .iter()
+            .enumerate()
+            .map(|(index, file)| (file.module(), index))
+            .collect();
+        let mut graph = Self {
+            files,
+            by_module,
+            re_exports: BTreeMap::new(),
+        };
+        for index in 0..graph.files.len() {
+            let module = graph.files[index].module();
+            for path in graph.re_exported_paths(index) {
+                if let Some(name) = path.last() {
+                    graph
+                        .re_exports
+                        .insert((module.clone(), name.clone()), path);
+                }
+            }
+        }
+        graph
     }
-    for path in files {
-        let text = std::fs::read_to_string(&path).expect("readable source");
-        assert!(text.starts_with("//! "), "{}", path.display());
+
+    /// Returns the modules that a file declares.
+    fn children(&self, index: usize) -> Vec<String> {
+        let module = self.files[index].module();
+        let is_child =
+            |other: &&Vec<String>| other.len() == module.len() + 1 && other.starts_with(&module);
+        self.by_module
+            .keys()
+            .filter(is_child)
+            .filter_map(|child| child.last().cloned())
+            .collect()
+    }
+
+    /// Returns the absolute paths in `pub use` declarations.
+    fn re_exported_paths(&self, index: usize) -> Vec<Vec<String>> {
+        let code = self.files[index].production_code();
+        let declarations = code.split("\npub").skip(1).filter_map(|text| {
+            let text = text
+                .strip_prefix("(crate)")
+                .or_else(|| text.strip_prefix("(super)"))
+                .unwrap_or(text);
+            let declaration = text.strip_prefix(" use ")?;
+            Some(format!("use {};", declaration.split(';').next()?))
+        });
+        declarations
+            .flat_map(|declaration| self.absolute_paths(index, &declaration))
+            .collect()
+    }
+
+    /// Returns the paths that a piece of code of a file names, from the crate root.
+    fn absolute_paths(&self, index: usize, code: &str) -> Vec<Vec<String>> {
+        let module = self.files[index].module();
+        let below = |base: &[String], paths: Vec<Vec<String>>| {
+            let join = |path| [base.to_vec(), path].concat();
+            paths.into_iter().map(join).collect::<Vec<_>>()
+        };
+        let mut found = below(&[], paths_after(code, "crate::"));
+        let mut prefix = String::from("super::");
+        for depth in (0..module.len()).rev() {
+            let paths = paths_after(code, &prefix);
+            found.extend(
+                below(&module[..depth], paths)
+                    .into_iter()
+                    .filter(|path| path.last().is_none_or(|name| name != "super")),
+            );
+            prefix.push_str("super::");
+        }
+        for child in self.children(index) {
+            let base = [module.clone(), vec![child.clone()]].concat();
+            found.extend(below(&base, paths_after(code, &format!("{child}::"))));
+        }
+        found
+    }
+
+    /// Returns the file that defines what a path names.
+    fn file_of(&self, path: &[String]) -> Option<usize> {
+        for length in (1..=path.len()).rev() {
+            let (module, rest) = path.split_at(length);
+            let Some(index) = self.by_module.get(module) else {
+                continue;
+            };
+            let target = rest
+                .first()
+                .and_then(|name| self.re_exports.get(&(module.to_vec(), name.clone())));
+            return match target {
+                Some(target) if target != path => self.file_of(target).or(Some(*index)),
+                Some(_) | None => Some(*index),
+            };
+        }
+        None
+    }
+
+    /// Returns the imports of a file. Re-exports are not imports: they name a thing without using it.
+    fn imports(&self, index: usize) -> BTreeSet<usize> {
+        let code = self.files[index].production_code();
+        let mut used = String::new();
+        for (at, text) in code.split("\npub").enumerate() {
+            let visible = text
+                .strip_prefix("(crate)")
+                .or_else(|| text.strip_prefix("(super)"))
+                .unwrap_or(text);
+            let body = if at > 0 && visible.starts_with(" use ") {
+                visible.split_once(';').map_or("", |(_, rest)| rest)
+            } else {
+                text
+            };
+            used.push_str(body);
+            used.push('\n');
+        }
+        let paths = self.absolute_paths(index, &used);
+        let files = paths.iter().filter_map(|path| self.file_of(path));
+        files.filter(|file| *file != index).collect()
+    }
+
+    /// Returns the groups of files that import each other.
+    fn cycles(&self) -> Vec<BTreeSet<String>> {
+        let imports: Vec<BTreeSet<usize>> = (0..self.files.len())
+            .map(|index| self.imports(index))
+            .collect();
+        let reached: Vec<BTreeSet<usize>> = (0..imports.len())
+            .map(|start| reachable(&imports, start))
+            .collect();
+        let mut groups = BTreeSet::new();
+        for (index, from_here) in reached.iter().enumerate() {
+            if from_here.contains(&index) {
+                let group = from_here
+                    .iter()
+                    .filter(|other| reached[**other].contains(&index));
+                groups.insert(
+                    group
+                        .map(|other| self.files[*other].name.clone())
+                        .collect::<BTreeSet<_>>(),
+                );
+            }
+        }
+        groups.into_iter().collect()
     }
 }
 
+/// Returns the nodes reachable from a node over at least one edge.
+fn reachable(edges: &[BTreeSet<usize>], start: usize) -> BTreeSet<usize> {
+    let mut found = BTreeSet::new();
+    let mut open: Vec<usize> = edges[start].iter().copied().collect();
+    while let Some(node) = open.pop() {
+        if found.insert(node) {
+            open.extend(&edges[node]);
+        }
+    }
+    found
+}
+
 #[test]
-fn names_are_found_in_paths_and_braces() {
-    let code = "use crate::{domain::{Stage, PairName}, mesh};\nlet x = crate::raster::Grid; mycrate::no();";
-    let found: Vec<String> = names_after(code, "crate::").into_iter().collect();
-    assert_eq!(found, ["domain", "mesh", "raster"]);
+fn files_do_not_import_each_other_in_cycles() {
+    let is_known = |name: &String| CYCLIC_FILES.iter().any(|known| name.starts_with(known));
+    let mut cycles = ImportGraph::new().cycles();
+    cycles.retain(|cycle| !cycle.iter().all(is_known));
+    assert!(cycles.is_empty(), "import cycles: {cycles:#?}");
 }

@@ -49,7 +49,9 @@ mod semi_real;
 #[cfg(target_os = "linux")]
 mod shim;
 mod sizes;
+mod source_text;
 mod spoil;
+mod style;
 mod tiff_file;
 mod tiffs;
 mod unbroken;

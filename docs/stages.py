@@ -1,0 +1,68 @@
+"""Draws docs/stages.png, the stages of one demo pair with a label under each panel.
+
+    mocban demo demo --tier pose --pairs 4 --seed 1
+    mocban -C demo export -o demo-export
+    pip install pillow numpy
+    python docs/stages.py demo-export pose-0003 docs/stages.png
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+
+PANEL_PX = 260
+GAP_PX = 16
+LABEL_PX = 52
+FONT = ImageFont.load_default(17)
+METRIC = "ensemble"
+
+
+def shaded_relief(pair: Path) -> Image.Image:
+    """Returns the depth map lit from the top left; pixels without data are white."""
+    levels = np.asarray(Image.open(pair / "depth.png")).astype(float)
+    scale = json.loads((pair / "depth.json").read_text())
+    height_px = levels * scale["height_per_level"] / scale["mesh_unit_per_px"]
+    dy, dx = np.gradient(height_px)
+    normal = np.stack([-dx, -dy, np.ones_like(dx)]) / np.sqrt(dx**2 + dy**2 + 1)
+    light = np.array([-0.5, -0.6, 0.62])
+    shade = np.clip(np.tensordot(light, normal, 1), 0, 1) ** 0.8
+    rgb = 40 + shade[..., None] * np.array([206, 190, 160])
+    rgb[levels == 0] = 255
+    return Image.fromarray(rgb.astype(np.uint8))
+
+
+def panels(pair: Path) -> list[tuple[Image.Image, str, str]]:
+    """Returns the panels, each with its title and a second line."""
+    metric = pair / METRIC
+    return [
+        (Image.open(pair / "print.png"), "1  Print", "as scanned"),
+        (shaded_relief(pair), "2  Depth map", "on the fitted plane, mirrored"),
+        (Image.open(metric / "depth_mask.png"), "3  Relief mask", "at the selected threshold"),
+        (Image.open(metric / "aligned_mask.png"), "4  Aligned mask", "in the print's frame"),
+        (Image.open(metric / "overlay.png"), "5  Overlay", "relief outline on the print"),
+    ]
+
+
+def main(export: str, pair: str, output: str) -> None:
+    """Writes the picture of a pair of an export."""
+    drawn = panels(Path(export) / "pairs" / pair)
+    width = len(drawn) * (PANEL_PX + GAP_PX) + GAP_PX
+    sheet = Image.new("RGB", (width, PANEL_PX + LABEL_PX + 2 * GAP_PX), "white")
+    draw = ImageDraw.Draw(sheet)
+    for index, (panel, title, text) in enumerate(drawn):
+        panel = panel.convert("RGB")
+        factor = PANEL_PX / max(panel.size)
+        panel = panel.resize([round(side * factor) for side in panel.size], Image.Resampling.LANCZOS)
+        left = GAP_PX + index * (PANEL_PX + GAP_PX)
+        sheet.paste(panel, (left + (PANEL_PX - panel.width) // 2, GAP_PX + (PANEL_PX - panel.height) // 2))
+        middle = left + PANEL_PX // 2
+        draw.text((middle, GAP_PX + PANEL_PX + 8), title, "black", FONT, anchor="mt")
+        draw.text((middle, GAP_PX + PANEL_PX + 32), text, "#555555", ImageFont.load_default(14), anchor="mt")
+    sheet.convert("P", palette=Image.Palette.ADAPTIVE, colors=128).save(output, optimize=True)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

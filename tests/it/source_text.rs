@@ -1,0 +1,220 @@
+//! Reads the source files of the crate for the tests that check its structure.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// A source file below `src`.
+pub(crate) struct SourceFile {
+    /// Path relative to `src`, with forward slashes.
+    pub(crate) name: String,
+    /// The top-level module.
+    pub(crate) room: String,
+    /// The whole text.
+    pub(crate) text: String,
+    /// Whether the file is compiled for tests only.
+    pub(crate) is_test: bool,
+}
+
+impl SourceFile {
+    /// Returns the code without comments and without unit tests; nothing for a test file.
+    pub(crate) fn production_code(&self) -> String {
+        if self.is_test {
+            return String::new();
+        }
+        without_comments(&self.text[..test_module_start(&self.text)])
+    }
+
+    /// Returns the code of the unit tests without comments.
+    pub(crate) fn test_code(&self) -> String {
+        if self.is_test {
+            return without_comments(&self.text);
+        }
+        without_comments(&self.text[test_module_start(&self.text)..])
+    }
+
+    /// Returns the module path from the crate root; empty for `lib.rs` and `main.rs`.
+    pub(crate) fn module(&self) -> Vec<String> {
+        let name = self.name.trim_end_matches(".rs");
+        let mut parts: Vec<String> = name.split('/').map(str::to_owned).collect();
+        if matches!(
+            parts.last().map(String::as_str),
+            Some("mod" | "lib" | "main")
+        ) {
+            parts.pop();
+        }
+        parts
+    }
+}
+
+/// Returns the directory of the package.
+pub(crate) fn package_dir() -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Lists all Rust files below a directory.
+pub(crate) fn rust_files(dir: &Path) -> Vec<PathBuf> {
+    let mut files = Vec::new();
+    let mut dirs = vec![dir.to_owned()];
+    while let Some(dir) = dirs.pop() {
+        for entry in std::fs::read_dir(dir).expect("a readable directory") {
+            let path = entry.expect("a readable entry").path();
+            if path.is_dir() {
+                dirs.push(path);
+            } else if path.extension().is_some_and(|extension| extension == "rs") {
+                files.push(path);
+            }
+        }
+    }
+    files.sort();
+    files
+}
+
+/// Reads all files below `src`.
+pub(crate) fn source_files() -> Vec<SourceFile> {
+    let src = package_dir().join("src");
+    let texts: Vec<(String, String)> = rust_files(&src)
+        .into_iter()
+        .map(|path| {
+            let name = path.strip_prefix(&src).expect("a path below src");
+            let name = name.to_string_lossy().replace('\\', "/");
+            let text = std::fs::read_to_string(&path).expect("readable source");
+            (name, text)
+        })
+        .collect();
+    let test_modules: BTreeSet<String> = texts
+        .iter()
+        .flat_map(|(name, text)| test_modules(name, text))
+        .collect();
+    texts
+        .into_iter()
+        .map(|(name, text)| {
+            let stem = name.trim_end_matches(".rs").to_owned();
+            let is_test = test_modules.iter().any(|module| {
+                stem == *module
+                    || stem
+                        .strip_prefix(module.as_str())
+                        .is_some_and(|rest| rest.starts_with('/'))
+            });
+            let room = stem.split('/').next().unwrap_or_default().to_owned();
+            SourceFile {
+                name,
+                room,
+                text,
+                is_test,
+            }
+        })
+        .collect()
+}
+
+/// Returns the modules declared as `#[cfg(test)] mod NAME;`, as paths below `src` without an extension.
+fn test_modules(name: &str, text: &str) -> Vec<String> {
+    let stem = name.trim_end_matches(".rs");
+    let dir = ["/mod", "lib", "main"]
+        .iter()
+        .find_map(|suffix| stem.strip_suffix(suffix))
+        .unwrap_or(stem);
+    text.split("#[cfg(test)]\n")
+        .skip(1)
+        .filter_map(|after| {
+            let module = after
+                .lines()
+                .next()?
+                .strip_suffix(';')?
+                .rsplit(' ')
+                .next()?;
+            Some(format!("{dir}/{module}").trim_start_matches('/').to_owned())
+        })
+        .collect()
+}
+
+/// Returns the offset of the inline test module, or the length of the text.
+fn test_module_start(text: &str) -> usize {
+    let found = text
+        .match_indices("#[cfg(test)]\n")
+        .find(|(at, attribute)| {
+            let line = text[at + attribute.len()..]
+                .lines()
+                .next()
+                .unwrap_or_default();
+            line.contains("mod ") && line.ends_with('{')
+        });
+    found.map_or(text.len(), |(at, _)| at)
+}
+
+fn without_comments(text: &str) -> String {
+    let is_code = |line: &&str| !line.trim_start().starts_with("//");
+    text.lines().filter(is_code).collect::<Vec<_>>().join("\n")
+}
+
+/// Returns the leading identifier of a text.
+pub(crate) fn identifier(text: &str) -> String {
+    let is_part = |c: &char| c.is_alphanumeric() || *c == '_';
+    text.chars().take_while(is_part).collect()
+}
+
+/// Returns every path that follows `prefix`, with groups in braces expanded: `crate::{a::B, c}` gives `a::B` and `c`.
+pub(crate) fn paths_after(code: &str, prefix: &str) -> Vec<Vec<String>> {
+    code.match_indices(prefix)
+        .filter(|(at, _)| {
+            let before = code[..*at].chars().next_back();
+            !before.is_some_and(|c| c.is_alphanumeric() || c == '_' || c == ':')
+        })
+        .flat_map(|(at, _)| expand_paths(&code[at + prefix.len()..]))
+        .collect()
+}
+
+/// Expands the path or the group of paths at the start of a text.
+fn expand_paths(text: &str) -> Vec<Vec<String>> {
+    let text = text.trim_start();
+    if let Some(group) = text.strip_prefix('{') {
+        return group_members(group)
+            .iter()
+            .flat_map(|member| expand_paths(member))
+            .collect();
+    }
+    let name = identifier(text);
+    if name.is_empty() {
+        return vec![Vec::new()];
+    }
+    let Some(rest) = text[name.len()..].strip_prefix("::") else {
+        return vec![vec![name]];
+    };
+    expand_paths(rest)
+        .into_iter()
+        .map(|tail| [vec![name.clone()], tail].concat())
+        .collect()
+}
+
+/// Splits the inside of a group at its top-level commas, up to the closing brace.
+fn group_members(text: &str) -> Vec<String> {
+    let mut depth = 0;
+    let mut members = vec![String::new()];
+    for c in text.chars() {
+        match c {
+            '}' if depth == 0 => break,
+            ',' if depth == 0 => {
+                members.push(String::new());
+                continue;
+            }
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            _ => {}
+        }
+        members.last_mut().expect("at least one member").push(c);
+    }
+    members.retain(|member| !member.trim().is_empty());
+    members
+}
+
+#[test]
+fn paths_are_found_after_a_prefix_and_in_groups() {
+    let code = "use crate::{domain::{Stage, PairName}, mesh};\nlet x = crate::raster::Grid; mycrate::no();";
+    let found: Vec<String> = paths_after(code, "crate::")
+        .iter()
+        .map(|path| path.join("::"))
+        .collect();
+    assert_eq!(
+        found,
+        ["domain::Stage", "domain::PairName", "mesh", "raster::Grid"]
+    );
+}
