@@ -1,6 +1,6 @@
 //! A preset with the settings laid over it.
 
-use mocban::config::{self, Preset, Sources, Start};
+use mocban::config::{self, BaseLayer, Preset, Sources};
 use mocban::stages::Settings;
 
 /// How pairs are aligned.
@@ -16,7 +16,7 @@ impl Method {
     /// A preset under values as `--set` takes them. The environment has no say.
     pub(super) fn load(preset: Preset, sets: &[String]) -> anyhow::Result<Self> {
         let loaded = config::load(&Sources {
-            start: Start::Preset(preset),
+            base: BaseLayer::Preset(preset),
             env: Vec::new(),
             sets: sets.to_vec(),
         })?;

@@ -1,4 +1,4 @@
-//! `agreement`: how far reviewers can be trusted.
+//! `agreement`: how reliable the reviewers are.
 
 use clap::Args;
 
@@ -7,12 +7,12 @@ use super::exit::ExitCode;
 use super::output;
 use crate::report;
 
-/// Arguments of `agreement`: none but those of every command.
+/// Arguments of `agreement`: only the global ones.
 #[derive(Debug, Args)]
 pub(super) struct AgreementArgs {}
 
 pub(super) async fn agreement(_: AgreementArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.reader().await?;
+    let (_project, catalog) = context.open_read_only().await?;
     let found = report::agree(&catalog).await?;
     catalog.close().await;
     if context.global.json {

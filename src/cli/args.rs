@@ -1,11 +1,12 @@
-//! The command line as clap reads it: global flags and the list of commands.
+//! The command line as clap parses it: global flags and the list of commands.
 
-use std::path::PathBuf;
+use std::ffi::OsString;
 
 use clap::builder::{Resettable, StyledStr};
-use clap::{ArgAction, Args, CommandFactory as _, Parser, Subcommand, ValueEnum};
+use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 
 use super::exit::ExitCode;
+use super::global::Global;
 use super::{
     agreement, backup, check, completions, config, contact_sheet, demo, export, import, man,
     report, retry, review, run, show, status, verdict,
@@ -13,155 +14,43 @@ use super::{
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
 ///
-/// A project is a directory with a catalog and artifacts. `import` makes one from your files, `run` aligns what
-/// is left to align, `report` prints the table. A run that was stopped goes on where it was.
+/// A project is a directory with a catalog and artifacts. `import` creates one from your files, `run` aligns the
+/// pairs that are not aligned yet, and `report` prints the table of results. A run that was interrupted continues
+/// where it stopped.
 #[derive(Debug, Parser)]
 #[command(name = "mocban", version, after_help = ExitCode::table(), subcommand_required = true, arg_required_else_help = true)]
 pub(super) struct Cli {
     /// Flags of every command.
     #[command(flatten)]
     pub(super) global: Global,
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub(super) command: Command,
 }
 
-/// The command line with its help as a terminal shows it: without the marks of code in its texts.
-pub(super) fn command() -> clap::Command {
-    unmarked(Cli::command())
-}
-
-fn unmarked(command: clap::Command) -> clap::Command {
-    let about = plain(command.get_about());
-    let long_about = plain(command.get_long_about());
-    command
-        .mut_args(|arg| {
-            let (help, long_help) = (plain(arg.get_help()), plain(arg.get_long_help()));
-            arg.help(help).long_help(long_help)
-        })
-        .mut_subcommands(unmarked)
-        .about(about)
-        .long_about(long_about)
-}
-
-fn plain(text: Option<&StyledStr>) -> Resettable<StyledStr> {
-    text.map_or(Resettable::Reset, |text| {
-        Resettable::Value(text.to_string().replace('`', "").into())
-    })
-}
-
-/// Flags of every command.
-#[derive(Debug, Clone, Args)]
-#[command(next_help_heading = "Global options")]
-pub(super) struct Global {
-    /// The project's directory [default: the current one]
-    #[arg(short = 'C', value_name = "DIR", global = true)]
-    pub(super) directory: Option<PathBuf>,
-    /// Settings from this file in the place of the project's mocban.toml; "default" and "paper" are built in
-    #[arg(long, value_name = "FILE", global = true)]
-    pub(super) config: Option<String>,
-    /// One setting, stronger than any file, such as run.workers=2; may be given many times
-    #[arg(long, value_name = "SECTION.KEY=VALUE", global = true, action = ArgAction::Append)]
-    pub(super) set: Vec<String>,
-    /// Say nothing but warnings and errors
-    #[arg(short, long, global = true)]
-    pub(super) quiet: bool,
-    /// Log more; -vv logs all
-    #[arg(short, long, global = true, action = ArgAction::Count)]
-    pub(super) verbose: u8,
-    /// Answer in JSON on stdout
-    #[arg(long, global = true)]
-    pub(super) json: bool,
-    /// When to colour: auto, always or never
-    #[arg(
-        long,
-        hide_possible_values = true,
-        value_name = "WHEN",
-        global = true,
-        default_value = "auto"
-    )]
-    pub(super) color: ColorWhen,
-    /// Form of the log: text or json
-    #[arg(
-        long,
-        hide_possible_values = true,
-        value_name = "FORM",
-        global = true,
-        default_value = "text"
-    )]
-    pub(super) log_format: LogFormat,
-    /// Log to this file instead of stderr; it is appended to
-    #[arg(long, value_name = "FILE", global = true)]
-    pub(super) log_file: Option<PathBuf>,
-    /// How a run shows its progress on stderr: auto, bar, plain, json or none
-    #[arg(
-        long,
-        hide_possible_values = true,
-        value_name = "HOW",
-        global = true,
-        default_value = "auto"
-    )]
-    pub(super) progress: ProgressMode,
-}
-
-/// When to colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum ColorWhen {
-    /// On a terminal, unless `NO_COLOR` is set.
-    Auto,
-    /// Always.
-    Always,
-    /// Never.
-    Never,
-}
-
-/// Form of the log.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum LogFormat {
-    /// Lines for people.
-    Text,
-    /// One JSON object a line.
-    Json,
-}
-
-/// How a run shows its progress.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum ProgressMode {
-    /// A bar on a terminal, plain lines elsewhere.
-    Auto,
-    /// A bar.
-    Bar,
-    /// A line every ten seconds or five per cent.
-    Plain,
-    /// One JSON object an event.
-    Json,
-    /// Nothing.
-    None,
-}
-
-/// What to do.
+/// The commands.
 #[derive(Debug, Subcommand)]
 pub(super) enum Command {
-    /// Make the built-in dataset, run it and print the report
+    /// Create the built-in dataset, run it and print the report
     Demo(demo::DemoArgs),
-    /// Take pairs of meshes and prints into the project
+    /// Add pairs of meshes and prints to the project
     Import(import::ImportArgs),
-    /// Align the pairs that are left to align
+    /// Align the pairs that are not aligned yet
     Run(run::RunArgs),
-    /// Show on one screen where the project stands
+    /// Show the state of the project on one screen
     Status(status::StatusArgs),
-    /// Show one pair: numbers, files, history, and why it runs again
+    /// Show one pair: numbers, files, history, and why it will run again
     Show(show::ShowArgs),
-    /// Take failed pairs up again at the next run
+    /// Let failed pairs run again
     Retry(retry::RetryArgs),
-    /// Hold files, rows and counters against each other
+    /// Check files, rows and counters against each other
     Check(check::CheckArgs),
-    /// Copy the catalog and the verdicts to a file, also while a run goes on
+    /// Copy the catalog and the verdicts to a file, also during a run
     Backup(backup::BackupArgs),
-    /// Record what people say of the results
+    /// Record and list people's verdicts on the results
     #[command(subcommand)]
     Verdict(verdict::VerdictCommand),
-    /// Judge results in the browser, by keys, and lay reliefs by hand
+    /// Judge results in the browser with the keyboard, and align pairs manually
     Review(review::ReviewArgs),
     /// Measure how far reviewers agree with each other and with themselves, and which planted errors they catch
     Agreement(agreement::AgreementArgs),
@@ -172,7 +61,7 @@ pub(super) enum Command {
     /// Draw many overlays on one PNG, worst first
     #[command(visible_alias = "sheet")]
     ContactSheet(contact_sheet::ContactSheetArgs),
-    /// Show the settings in force
+    /// Show the settings in effect
     #[command(subcommand)]
     Config(config::ConfigCommand),
     /// Print a completion script for a shell
@@ -181,27 +70,167 @@ pub(super) enum Command {
     Man(man::ManArgs),
 }
 
+/// Returns the command line with help texts as a terminal shows them: without backticks.
+pub(super) fn command() -> clap::Command {
+    without_backticks(Cli::command())
+}
+
+fn without_backticks(command: clap::Command) -> clap::Command {
+    let about = plain(command.get_about());
+    let long_about = plain(command.get_long_about());
+    command
+        .mut_args(|arg| {
+            let (help, long_help) = (plain(arg.get_help()), plain(arg.get_long_help()));
+            arg.help(help).long_help(long_help)
+        })
+        .mut_subcommands(without_backticks)
+        .about(about)
+        .long_about(long_about)
+}
+
+fn plain(text: Option<&StyledStr>) -> Resettable<StyledStr> {
+    text.map_or(Resettable::Reset, |text| {
+        Resettable::Value(text.to_string().replace('`', "").into())
+    })
+}
+
+/// Letters of flags without a value, which may be followed by other letters in the same word.
+const FLAGS: [char; 6] = ['h', 'n', 'q', 'v', 'V', 'w'];
+
+/// Parses a command line.
+///
+/// # Errors
+/// For a wrong command line, and for `--help` and `--version`.
+pub(super) fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
+    let command = command().color(help_color(args));
+    let mut cli = Cli::from_arg_matches(&command.try_get_matches_from(args)?)?;
+    // clap drops values before the command's name when there are others after it.
+    cli.global.set = values_of("--set", args);
+    cli.global.verbose = count_verbose(args);
+    Ok(cli)
+}
+
+/// Counts `-v` on a command line that clap has accepted, where a word that starts with a dash is never a value.
+fn count_verbose(args: &[OsString]) -> u8 {
+    let words = args.iter().skip(1).filter_map(|arg| arg.to_str());
+    let words = words.take_while(|word| *word != "--");
+    let counts = words.map(|word| match word.strip_prefix('-') {
+        Some("-verbose") => 1,
+        // The rest of the word after a letter that takes a value is that value.
+        Some(letters) => {
+            let flags = letters.chars().take_while(|c| FLAGS.contains(c));
+            flags.filter(|c| *c == 'v').count()
+        }
+        None => 0,
+    });
+    u8::try_from(counts.sum::<usize>()).unwrap_or(u8::MAX)
+}
+
+/// Finds `--color` before clap parses: help and usage errors are printed before the flags are known.
+fn help_color(args: &[OsString]) -> ColorChoice {
+    let values = values_of("--color", args);
+    let choice = values.iter().find_map(|value| match value.as_str() {
+        "never" => Some(ColorChoice::Never),
+        "always" => Some(ColorChoice::Always),
+        _ => None,
+    });
+    choice.unwrap_or(ColorChoice::Auto)
+}
+
+/// Returns every value of a flag, wherever it stands on the command line.
+fn values_of(flag: &str, args: &[OsString]) -> Vec<String> {
+    let words = args.iter().skip(1).filter_map(|arg| arg.to_str());
+    let mut words = words.take_while(|word| *word != "--");
+    let mut values = Vec::new();
+    while let Some(word) = words.next() {
+        let value = match word.strip_prefix(flag) {
+            Some("") => words.next(),
+            Some(rest) => rest.strip_prefix('='),
+            None => None,
+        };
+        values.extend(value.map(str::to_owned));
+    }
+    values
+}
+
 #[cfg(test)]
 mod tests {
-    use super::command;
+    use super::{ColorChoice, FLAGS, command, help_color, parse};
+
+    fn args(text: &str) -> Vec<std::ffi::OsString> {
+        text.split(' ').map(Into::into).collect()
+    }
 
     #[test]
-    fn command_line_is_sound() {
+    fn command_line_is_consistent() {
         command().debug_assert();
     }
 
     #[test]
-    fn help_is_without_the_marks_of_code() {
+    fn help_has_no_backticks() {
         fn check(mut command: clap::Command) {
             let help = command.render_long_help().to_string();
             assert!(!help.contains('`'), "{help}");
             command.get_subcommands().cloned().for_each(check);
         }
-        let shown = command().render_long_help().to_string();
-        assert!(
-            shown.contains("import makes one from your files"),
-            "{shown}"
-        );
         check(command());
+    }
+
+    #[test]
+    fn color_is_found_before_the_command_line_is_parsed() {
+        assert_eq!(
+            help_color(&args("mocban --color never run")),
+            ColorChoice::Never
+        );
+        assert_eq!(
+            help_color(&args("mocban run --color=always")),
+            ColorChoice::Always
+        );
+        assert_eq!(
+            help_color(&args("mocban -- --color never")),
+            ColorChoice::Auto
+        );
+    }
+
+    #[test]
+    fn settings_before_and_after_the_command_add_up() {
+        let cli = parse(&args(
+            "mocban --set run.workers=1 run --set=fit.seed=2 --set run.workers=3",
+        ));
+        let expected = ["run.workers=1", "fit.seed=2", "run.workers=3"];
+        assert_eq!(cli.expect("valid").global.set, expected);
+    }
+
+    #[test]
+    fn verbose_before_and_after_the_command_adds_up() {
+        for (text, times) in [
+            ("mocban run", 0),
+            ("mocban -v run", 1),
+            ("mocban run -v", 1),
+            ("mocban -v run -v", 2),
+            ("mocban --verbose status -wv", 2),
+            ("mocban -vv run -j2 -Cv", 2),
+            ("mocban run -nvv -- -v", 2),
+        ] {
+            let cli = parse(&args(text)).expect(text);
+            assert_eq!(cli.global.verbose, times, "{text}");
+        }
+    }
+
+    #[test]
+    fn letters_of_flags_without_a_value_are_complete() {
+        fn check(command: &clap::Command) {
+            for arg in command.get_arguments() {
+                let Some(letter) = arg.get_short() else {
+                    continue;
+                };
+                let takes_value = arg.get_action().takes_values();
+                assert_eq!(FLAGS.contains(&letter), !takes_value, "-{letter}");
+            }
+            command.get_subcommands().for_each(check);
+        }
+        let mut command = command();
+        command.build();
+        check(&command);
     }
 }

@@ -1,4 +1,4 @@
-//! `backup`: the catalog, the verdicts and the settings, copied whole while a run may be writing.
+//! `backup`: copies catalog, verdicts and settings consistently, also during a run.
 
 use std::path::{Path, PathBuf};
 
@@ -19,23 +19,23 @@ use crate::store::{
 /// Arguments of `backup`.
 #[derive(Debug, Args)]
 pub(super) struct BackupArgs {
-    /// The file to write, such as blocks.sqlite; an earlier backup there stays until the new one is whole. The
-    /// verdicts go beside it as blocks.verdicts.jsonl, the project's settings as blocks.mocban.toml
+    /// The file to write, such as blocks.sqlite; an existing backup is replaced only when the new one is complete. The
+    /// verdicts are written to blocks.verdicts.jsonl, the project's settings to blocks.mocban.toml
     pub(super) file: PathBuf,
 }
 
 pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.reader().await?;
+    let (project, catalog) = context.open_read_only().await?;
     let file = &args.file;
     let shown = file.display();
-    refuse_place(file, &project)?;
-    let partial = Partial::of(file);
+    check_target(file, &project)?;
+    let partial = PartialFile::of(file);
     catalog
         .copy_to(&partial.0)
         .await
         .with_context(|| format!("cannot write the backup {shown}"))?;
     catalog.close().await;
-    let (log, pairs) = held_by(&partial).await?;
+    let (log, pairs) = read_copy(&partial).await?;
     let verdicts = log.len() as u64;
     let log = prepare(&verdicts_file(file), json_lines(&log).as_bytes())?;
     let settings_file = file.with_extension("mocban.toml");
@@ -43,19 +43,20 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
         Ok(bytes) => Some(prepare(&settings_file, &bytes)?),
         Err(_) => None,
     };
-    // All of it is written before the first takes its name, and the catalog takes its name last. When one is refused
-    // its name, those beside the catalog go back to what they were.
-    let earlier = [verdicts_file(file), settings_file.clone()].map(|file| Earlier::keep(&file));
-    let placed = place(&log, &verdicts_file(file))
+    // All files are written before the first is renamed, and the catalog is renamed last. If renaming fails, the files
+    // beside the catalog are restored.
+    let previous =
+        [verdicts_file(file), settings_file.clone()].map(|file| PreviousFile::save(&file));
+    let renamed = rename(&log, &verdicts_file(file))
         .and_then(|()| match &settings {
-            Some(partial) => place(partial, &settings_file),
+            Some(partial) => rename(partial, &settings_file),
             None => remove(&settings_file),
         })
-        .and_then(|()| place(&partial, file));
-    if placed.is_err() {
-        earlier.iter().flatten().for_each(Earlier::put_back);
+        .and_then(|()| rename(&partial, file));
+    if renamed.is_err() {
+        previous.iter().flatten().for_each(PreviousFile::restore);
     }
-    placed?;
+    renamed?;
     let bytes = std::fs::metadata(file)?.len();
     if context.global.json {
         output::print_json(&json!({
@@ -63,8 +64,8 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
             "verdicts_file": verdicts_file(file),
         }))?;
     }
-    context.output.say(&format!(
-        "{} and {} are in {shown}, {:.1} MB; pictures are not in it, `run` makes them again",
+    context.output.info(&format!(
+        "{} and {} saved to {shown}, {:.1} MB; images are not included, `run` computes them again",
         count(pairs, "pair"),
         count(verdicts, "verdict"),
         bytes as f64 / 1e6
@@ -72,11 +73,11 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
     Ok(ExitCode::Done)
 }
 
-/// A file under way; what is left of it goes when it is dropped.
-struct Partial(PathBuf);
+/// A file that is being written under a temporary name; removed when dropped.
+struct PartialFile(PathBuf);
 
-impl Partial {
-    /// Nothing yet, also where a killed process left half a file.
+impl PartialFile {
+    /// Starts without a file; removes what a killed process left.
     fn of(file: &Path) -> Self {
         let partial = Self(partial_path(file));
         partial.clear();
@@ -87,54 +88,54 @@ impl Partial {
         for ending in ["", "-wal", "-shm", "-journal"] {
             let mut name = self.0.as_os_str().to_owned();
             name.push(ending);
-            // Mostly there is nothing; and what cannot be removed shows when the copy is written.
+            // Usually there is no such file; one that cannot be removed makes writing the copy fail.
             let _ = std::fs::remove_file(PathBuf::from(name));
         }
     }
 }
 
-impl Drop for Partial {
+impl Drop for PartialFile {
     fn drop(&mut self) {
         self.clear();
     }
 }
 
-/// A file of an earlier backup, which has a second name until the new backup is whole.
-struct Earlier {
+/// A file of the previous backup, saved under a second name until the new backup is complete.
+struct PreviousFile {
     file: PathBuf,
-    kept: Partial,
-    was_there: bool,
+    saved: PartialFile,
+    existed: bool,
 }
 
-impl Earlier {
-    /// `None` where the file cannot be kept; then a refused name leaves the new one there.
-    fn keep(file: &Path) -> Option<Self> {
+impl PreviousFile {
+    /// Returns `None` if the file cannot be saved; then a failed renaming leaves the new file in its place.
+    fn save(file: &Path) -> Option<Self> {
         let mut name = file.as_os_str().to_owned();
         name.push(".earlier");
-        let kept = Partial::of(Path::new(&name));
-        let was_there = file.exists();
-        let is_kept = !was_there
-            || std::fs::hard_link(file, &kept.0).is_ok()
-            || std::fs::copy(file, &kept.0).is_ok();
-        is_kept.then(|| Self {
+        let saved = PartialFile::of(Path::new(&name));
+        let existed = file.exists();
+        let is_saved = !existed
+            || std::fs::hard_link(file, &saved.0).is_ok()
+            || std::fs::copy(file, &saved.0).is_ok();
+        is_saved.then(|| Self {
             file: file.to_owned(),
-            kept,
-            was_there,
+            saved,
+            existed,
         })
     }
 
-    fn put_back(&self) {
-        // What was refused is told already; more than trying cannot be done about this.
-        let _ = if self.was_there {
-            std::fs::rename(&self.kept.0, &self.file)
+    fn restore(&self) {
+        // The first error is reported already; nothing more can be done about this one.
+        let _ = if self.existed {
+            std::fs::rename(&self.saved.0, &self.file)
         } else {
             std::fs::remove_file(&self.file)
         };
     }
 }
 
-/// The verdicts and the number of pairs in a copy.
-async fn held_by(partial: &Partial) -> anyhow::Result<(Vec<VerdictEvent>, u64)> {
+/// Returns the verdicts and the number of pairs in a copy of the catalog.
+async fn read_copy(partial: &PartialFile) -> anyhow::Result<(Vec<VerdictEvent>, u64)> {
     let copy = Catalog::open_read_only(&partial.0).await?;
     let log = copy.verdict_log(None).await?;
     let pairs = copy.counters().await?.values().sum();
@@ -142,20 +143,19 @@ async fn held_by(partial: &Partial) -> anyhow::Result<(Vec<VerdictEvent>, u64)> 
     Ok((log, pairs))
 }
 
-/// Writes what goes beside the backup, under another name.
-fn prepare(file: &Path, bytes: &[u8]) -> anyhow::Result<Partial> {
-    let partial = Partial::of(file);
+/// Writes a file under a temporary name.
+fn prepare(file: &Path, bytes: &[u8]) -> anyhow::Result<PartialFile> {
+    let partial = PartialFile::of(file);
     write_synced(&partial.0, bytes).with_context(|| format!("cannot write {}", file.display()))?;
     Ok(partial)
 }
 
-/// Gives a file its name.
-fn place(partial: &Partial, file: &Path) -> anyhow::Result<()> {
+/// Gives a file its final name.
+fn rename(partial: &PartialFile, file: &Path) -> anyhow::Result<()> {
     rename_into_place(&partial.0, file).with_context(|| format!("cannot write {}", file.display()))
 }
 
-/// Removes the settings that an earlier backup left, when the project has none any more: without them other results
-/// would come of it.
+/// Removes the settings of the previous backup if the project has none any more: they would change the results.
 fn remove(file: &Path) -> anyhow::Result<()> {
     match std::fs::remove_file(file) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
@@ -169,29 +169,29 @@ fn verdicts_file(file: &Path) -> PathBuf {
     file.with_extension("verdicts.jsonl")
 }
 
-/// Refuses a place where something lies that is not an earlier backup.
-fn refuse_place(file: &Path, project: &Project) -> Result<(), Refusal> {
+/// Refuses a target that exists and is not a backup.
+fn check_target(file: &Path, project: &Project) -> Result<(), Refusal> {
     let shown = file.display();
-    let refuse = |what: &str| Err(Refusal::Usage(format!("{shown} {what}")));
+    let refuse = |reason: &str| Err(Refusal::Usage(format!("{shown} {reason}")));
     if file.file_name().is_none() || file.is_dir() {
         return refuse("is a directory; name a file for the backup");
     }
-    let called = |known: &str| file.file_name().is_some_and(|name| name == known);
+    let is_named = |known: &str| file.file_name().is_some_and(|name| name == known);
     let here = is_same(file.parent(), project.dir());
-    if called(CATALOG_FILE) && (here || file.exists())
-        || called(SETTINGS_FILE) && here
+    if is_named(CATALOG_FILE) && (here || file.exists())
+        || is_named(SETTINGS_FILE) && here
         || is_same(Some(file), &project.catalog_path())
     {
-        return refuse("is a file of a project itself; name another file for the backup");
+        return refuse("is a file of a project; name another file for the backup");
     }
     match std::fs::metadata(file) {
         Err(_) => Ok(()),
         Ok(meta) if meta.len() == 0 || is_backup(file) => Ok(()),
-        Ok(_) => refuse("is there already and no backup; name another file"),
+        Ok(_) => refuse("exists and is not a backup; name another file"),
     }
 }
 
-/// Whether two paths lead to the same file.
+/// Returns whether two paths name the same file.
 fn is_same(one: Option<&Path>, other: &Path) -> bool {
     let one = one.map(|path| {
         if path == Path::new("") {
@@ -200,11 +200,11 @@ fn is_same(one: Option<&Path>, other: &Path) -> bool {
             path
         }
     });
-    let whole = one.and_then(|path| path.canonicalize().ok());
-    whole.is_some() && whole == other.canonicalize().ok()
+    let canonical = one.and_then(|path| path.canonicalize().ok());
+    canonical.is_some() && canonical == other.canonicalize().ok()
 }
 
-/// Whether a file is a database with the catalog's mark: bytes 68 to 71 of an SQLite file.
+/// Returns whether a file is an SQLite database with the catalog's application id (bytes 68 to 71).
 fn is_backup(file: &Path) -> bool {
     use std::io::Read as _;
     let mut head = [0; 72];

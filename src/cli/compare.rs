@@ -1,11 +1,11 @@
-//! `report --compare`: two projects' tables row by row.
+//! `report --compare`: the tables of two projects side by side.
 
 use super::table::{Align, columns};
 use crate::report::{MetricRow, Report};
 
-/// The means of both projects and their differences, a line a metric and number.
+/// Formats the means of both projects and their differences, one line per metric and number.
 ///
-/// The two may hold other pairs; what is compared are the tables, not pairs one by one.
+/// The projects may hold different pairs: tables are compared, not pairs.
 pub(super) fn side_by_side(here: &Report, there: &Report, names: [&str; 2]) -> String {
     let head = ["", "", names[0], names[1], "difference"];
     let mut rows = vec![head.map(ToOwned::to_owned).to_vec()];
@@ -46,7 +46,7 @@ fn lines(here: &MetricRow, there: &MetricRow) -> Vec<Vec<String>> {
         ),
     ];
     let counts = vec!["n".to_owned(), here.n.to_string(), there.n.to_string()];
-    let told = numbers
+    let lines = numbers
         .iter()
         .filter(|(_, a, b)| a.is_some() || b.is_some())
         .map(|(name, a, b)| {
@@ -58,7 +58,7 @@ fn lines(here: &MetricRow, there: &MetricRow) -> Vec<Vec<String>> {
         });
     let mut title = here.metric.title().to_owned();
     std::iter::once(counts)
-        .chain(told)
+        .chain(lines)
         .map(|line| [vec![std::mem::take(&mut title)], line].concat())
         .collect()
 }
@@ -69,7 +69,7 @@ mod tests {
     use crate::report::ReportAccumulator;
 
     #[test]
-    fn empty_projects_have_counts_only() {
+    fn empty_projects_have_only_counts() {
         let report = ReportAccumulator::default().finish();
         let text = side_by_side(&report, &report, ["a", "b"]);
         let lines: Vec<&str> = text.lines().collect();

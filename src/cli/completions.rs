@@ -1,9 +1,8 @@
-//! `completions SHELL`: a completion script on stdout.
+//! `completions SHELL`: prints a completion script.
 
-use clap::Args;
+use clap::{Args, Command};
 use clap_complete::Shell;
 
-use super::args;
 use super::exit::ExitCode;
 use super::output;
 
@@ -14,9 +13,12 @@ pub(super) struct CompletionsArgs {
     pub(super) shell: Shell,
 }
 
-pub(super) fn completions(args: &CompletionsArgs) -> anyhow::Result<ExitCode> {
+pub(super) fn completions(
+    args: &CompletionsArgs,
+    mut command: Command,
+) -> anyhow::Result<ExitCode> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut args::command(), "mocban", &mut script);
+    clap_complete::generate(args.shell, &mut command, "mocban", &mut script);
     output::print(&String::from_utf8(script)?)?;
     Ok(ExitCode::Done)
 }

@@ -1,26 +1,30 @@
-//! `config show`: the settings in force, as a file that could be read again.
+//! `config show`: prints the settings in effect as a settings file.
 
 use clap::{Args, Subcommand};
 use serde_json::{Map, json};
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::output::{self, Palette, Tone};
-use crate::config::{Origin, Setting};
+use super::output;
+use super::screen::{Palette, Tone};
+use crate::config::{Origin, Setting, explanation};
 
-/// What to do with settings.
+/// Commands on settings.
 #[derive(Debug, Subcommand)]
 pub(super) enum ConfigCommand {
     /// Print every setting
-    Show(ShowArgs),
+    Show(ConfigShowArgs),
 }
 
 /// Arguments of `config show`.
-#[derive(Debug, Args)]
-pub(super) struct ShowArgs {
-    /// Say beside each value where it came from
+#[derive(Debug, Default, Args)]
+pub(super) struct ConfigShowArgs {
+    /// Print where each value came from
     #[arg(long)]
     pub(super) origin: bool,
+    /// Print what each setting means, its range and the reason for its default
+    #[arg(long)]
+    pub(super) explain: bool,
 }
 
 pub(super) fn config(command: &ConfigCommand, context: &Context) -> anyhow::Result<ExitCode> {
@@ -29,7 +33,7 @@ pub(super) fn config(command: &ConfigCommand, context: &Context) -> anyhow::Resu
     if context.global.json {
         output::print_json(&as_json(&settings))?;
     } else {
-        output::print(&as_toml(&settings, args.origin, context.output.out))?;
+        output::print(&as_toml(&settings, args, context.output.stdout))?;
     }
     Ok(ExitCode::Done)
 }
@@ -45,23 +49,32 @@ fn as_json(settings: &[Setting]) -> serde_json::Value {
     json!({"schema": 1, "settings": values})
 }
 
-/// Settings as a file that reads back the same, with the origins in comments where they are wanted.
-pub(super) fn as_toml(settings: &[Setting], origins: bool, palette: Palette) -> String {
+/// Formats settings as a file that parses to the same values, optionally with origins and explanations in comments.
+pub(super) fn as_toml(settings: &[Setting], args: &ConfigShowArgs, palette: Palette) -> String {
     let longest = settings.iter().map(|setting| line(setting).len()).max();
     let mut lines = Vec::new();
-    let mut section = "";
+    let (mut section, mut comment) = ("", Vec::new());
     for setting in settings {
-        let (own, _) = setting.key.rsplit_once('.').unwrap_or(("", &setting.key));
-        if own != section {
+        let (current, _) = setting.key.rsplit_once('.').unwrap_or(("", &setting.key));
+        if current != section {
             if !lines.is_empty() {
                 lines.push(String::new());
             }
-            lines.push(palette.paint(Tone::Strong, format!("[{own}]")));
-            section = own;
+            lines.push(palette.paint(Tone::Strong, format!("[{current}]")));
+            section = current;
+        }
+        let explained = explanation(&setting.key);
+        if args.explain && explained != comment {
+            lines.extend(
+                explained
+                    .iter()
+                    .map(|text| palette.paint(Tone::Faint, format!("# {text}"))),
+            );
+            comment = explained;
         }
         let line = line(setting);
         let blanks = " ".repeat(longest.unwrap_or(0) - line.len());
-        lines.push(if origins {
+        lines.push(if args.origin {
             format!("{line}{blanks}  {}", origin(setting, palette))
         } else {
             line
@@ -85,11 +98,11 @@ fn line(setting: &Setting) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Palette, as_toml};
+    use super::{ConfigShowArgs, Palette, as_toml};
     use crate::config::{Origin, Setting};
 
     #[test]
-    fn output_is_a_settings_file_again() {
+    fn output_is_a_settings_file() {
         let setting = |key: &str, value: toml::Value, origin| Setting {
             key: key.to_owned(),
             value,
@@ -100,7 +113,11 @@ mod tests {
             setting("limits.mesh.max_bytes", 7.into(), Origin::Default),
             setting("fit.side", "auto".into(), Origin::Preset("paper")),
         ];
-        let text = as_toml(&settings, true, Palette::PLAIN);
+        let args = ConfigShowArgs {
+            origin: true,
+            explain: true,
+        };
+        let text = as_toml(&settings, &args, Palette::PLAIN);
         let table: toml::Table = text.parse().expect("valid TOML");
         assert_eq!(table["limits"]["mesh"]["max_bytes"].as_integer(), Some(7));
         assert_eq!(

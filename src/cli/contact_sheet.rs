@@ -1,4 +1,4 @@
-//! `contact-sheet`: many pairs on one PNG, worst first.
+//! `contact-sheet`: draws many pairs on one PNG, worst first.
 
 use std::path::{Path, PathBuf};
 
@@ -19,21 +19,21 @@ use crate::store::write_atomic;
 /// Arguments of `contact-sheet`.
 #[derive(Debug, Args)]
 pub(super) struct ContactSheetArgs {
-    /// Only these pairs
+    /// Only these pairs [default: all]
     pub(super) pairs: Vec<String>,
     /// The PNG to write [default: sheet.png in the project]
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
-    /// Whose results: `nl_ssim`, density, ensemble or relief
+    /// Metric whose results are drawn: `nl_ssim`, density, ensemble or relief
     #[arg(long, default_value = "ensemble")]
     pub(super) metric: ThresholdMetric,
-    /// What comes first: worst, score, margin, confidence (the least confident) or name
+    /// Order of the pairs: worst, score, margin, confidence (least confident first) or name
     #[arg(long, default_value = "worst")]
     pub(super) order: ContactSheetOrder,
-    /// Most pairs on the sheet
+    /// Maximum number of pairs
     #[arg(long, value_name = "N", default_value = "60", value_parser = clap::value_parser!(u16).range(1..=600))]
     pub(super) limit: u16,
-    /// Pairs in a row
+    /// Pairs per row
     #[arg(long, value_name = "N", default_value = "5", value_parser = clap::value_parser!(u16).range(1..=12))]
     pub(super) columns: u16,
 }
@@ -61,7 +61,7 @@ pub(super) async fn contact_sheet(
             &json!({"schema": 1, "file": path, "shown": sheet.shown, "of": sheet.of}),
         )?;
     }
-    context.output.say(&format!(
+    context.output.info(&format!(
         "{} of {} on {}",
         count(sheet.shown as u64, "pair"),
         sheet.of,
@@ -70,15 +70,15 @@ pub(super) async fn contact_sheet(
     Ok(ExitCode::Done)
 }
 
-/// Draws the sheet and writes it; says where.
+/// Draws the sheet, writes it and returns its path.
 ///
 /// # Errors
-/// When no pair is finished, or catalog or disk refuse.
+/// When no pair is finished, or the catalog or the disk fails.
 pub(super) async fn write(
     args: &ContactSheetArgs,
     context: &Context,
 ) -> anyhow::Result<(PathBuf, ContactSheet)> {
-    let (project, catalog) = context.reader().await?;
+    let (project, catalog) = context.open_read_only().await?;
     let pairs = match args.pairs.as_slice() {
         [] => None,
         typed => Some(select::pairs(&catalog, typed).await?),
@@ -95,7 +95,7 @@ pub(super) async fn write(
     catalog.close().await;
     if sheet.shown == 0 {
         let text = format!(
-            "no pair has a result of {} yet, so there is nothing to show",
+            "no pair has a result of {} yet, so there is nothing to draw",
             args.metric
         );
         return Err(Refusal::NothingSelected(text).into());

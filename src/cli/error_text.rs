@@ -1,17 +1,91 @@
-//! What to say of an error of the catalog in place of the database's own words.
+//! What an error means to the user: its exit code and its sentence.
 
 use std::error::Error;
 use std::path::Path;
 
+use super::exit::{ExitCode, Refusal};
+use super::manifest_file::RefusedManifest;
+use super::truth_file::TruthFileError;
+use super::verdict_file::VerdictFileError;
 use crate::catalog::{CatalogError, Holder, Trouble, holder};
 use crate::check::CheckError;
+use crate::config::ConfigError;
 use crate::export::{DrawError, ExportError};
 use crate::report::ReportError;
 use crate::runner::RunError;
-use crate::store::CATALOG_FILE;
+use crate::store::{CATALOG_FILE, StoreError};
 
-/// The catalog's error at the root of a cause, however it is wrapped.
-pub(super) fn of_catalog<'a>(cause: &'a (dyn Error + 'static)) -> Option<&'a CatalogError> {
+/// Returns the exit code of an error.
+pub(super) fn exit_code(error: &anyhow::Error) -> ExitCode {
+    let code = error.chain().find_map(code_of_cause);
+    code.unwrap_or(ExitCode::Error)
+}
+
+fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
+    if let Some(refusal) = cause.downcast_ref::<Refusal>() {
+        return Some(refusal.code());
+    }
+    let is_refused_text = cause.is::<ConfigError>()
+        || cause.is::<RefusedManifest>()
+        || cause.is::<TruthFileError>()
+        || cause.is::<VerdictFileError>();
+    if is_refused_text {
+        return Some(ExitCode::Usage);
+    }
+    match cause.downcast_ref() {
+        Some(RunError::InUse(_)) => return Some(ExitCode::InUse),
+        Some(RunError::OtherSettings(_)) => return Some(ExitCode::Usage),
+        Some(RunError::NoSuchPair(_)) => return Some(ExitCode::NothingSelected),
+        Some(_) | None => {}
+    }
+    match cause.downcast_ref() {
+        Some(StoreError::NoProject(_)) => return Some(ExitCode::NoProject),
+        Some(StoreError::NotUtf8(_)) => return Some(ExitCode::Usage),
+        Some(_) | None => {}
+    }
+    match catalog_error(cause)? {
+        CatalogError::Missing(_) => Some(ExitCode::NoProject),
+        CatalogError::NetworkFileSystem { .. } => Some(ExitCode::Usage),
+        CatalogError::UnknownPair(_)
+        | CatalogError::NoResult(_)
+        | CatalogError::NoMetricResult(..)
+        | CatalogError::NothingToUndo(_) => Some(ExitCode::NothingSelected),
+        _ => None,
+    }
+}
+
+/// Returns the sentence for an error: an explanation where the catalog is to blame, otherwise the chain of causes.
+pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
+    let found = error.chain().find_map(catalog_error);
+    let explained = found.and_then(|found| explain_catalog(found, project));
+    explained.unwrap_or_else(|| join_causes(error))
+}
+
+/// Joins the chain of causes; a cause that its parent already quotes is left out.
+fn join_causes(error: &anyhow::Error) -> String {
+    let mut text = String::new();
+    for cause in error.chain() {
+        let part = cause.to_string();
+        if text.is_empty() {
+            text = part;
+        } else if !text.contains(&part) {
+            text = format!("{text}: {part}");
+        }
+    }
+    text
+}
+
+/// Returns whether stdout was closed, as by `mocban report | head`; this is not an error.
+pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
+    error.chain().any(|cause| {
+        cause
+            .downcast_ref::<std::io::Error>()
+            .is_some_and(|error| error.kind() == std::io::ErrorKind::BrokenPipe)
+    })
+}
+
+/// Returns the catalog's error at the root of a cause, whatever it is wrapped in.
+pub(super) fn catalog_error<'a>(cause: &'a (dyn Error + 'static)) -> Option<&'a CatalogError> {
     if let Some(RunError::Catalog(error)) = cause.downcast_ref() {
         return Some(error);
     }
@@ -30,19 +104,19 @@ pub(super) fn of_catalog<'a>(cause: &'a (dyn Error + 'static)) -> Option<&'a Cat
     cause.downcast_ref()
 }
 
-/// Whether the error says that the catalog's file is not what it was.
+/// Returns whether the catalog's content is damaged, empty or not a catalog.
 pub(super) fn is_damage(error: &CatalogError) -> bool {
-    let told = matches!(
+    let is_wrong_content = matches!(
         error,
         CatalogError::Empty(_)
             | CatalogError::Foreign { .. }
             | CatalogError::Corrupt(_)
             | CatalogError::Json(_)
     );
-    told || is_damaged_file(error)
+    is_wrong_content || is_damaged_file(error)
 }
 
-/// Whether the pages of the catalog's file contradict each other.
+/// Returns whether the pages of the catalog's file are inconsistent.
 pub(super) fn is_damaged_file(error: &CatalogError) -> bool {
     matches!(error, CatalogError::Damaged(_))
         || matches!(
@@ -51,55 +125,52 @@ pub(super) fn is_damaged_file(error: &CatalogError) -> bool {
         )
 }
 
-/// The catalog's file as it is shown.
-pub(super) fn file(dir: &Path) -> String {
-    dir.join(CATALOG_FILE).display().to_string()
+/// Returns the path of the catalog's file as messages show it.
+pub(super) fn catalog_path(project: &Path) -> String {
+    project.join(CATALOG_FILE).display().to_string()
 }
 
-/// A sentence with the file and what to do; `None` where the error says so itself.
-pub(super) fn sentence(error: &CatalogError, dir: &Path) -> Option<String> {
-    let shown = file(dir);
+/// Returns a sentence with the file and the way out, in place of the database's own message; `None` where the error
+/// has such a sentence already.
+pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<String> {
+    let path = catalog_path(project);
     Some(match error.trouble() {
         Some(Trouble::Damaged | Trouble::NotADatabase) => {
-            CatalogError::Damaged(shown.into()).to_string()
+            CatalogError::Damaged(path.into()).to_string()
         }
         Some(Trouble::ReadOnly | Trouble::CannotOpen) => {
-            CatalogError::NotWritable(shown.into()).to_string()
+            CatalogError::NotWritable(path.into()).to_string()
         }
         Some(Trouble::Full) => format!(
-            "{shown} cannot grow: the disk is full; make room and call again, what was stored is safe"
+            "{path} cannot grow because the disk is full; free some space and try again, everything stored so far is safe"
         ),
-        Some(Trouble::Busy) => locked(&shown, holder(Path::new(&shown))),
+        Some(Trouble::Busy) => locked(&path, holder(Path::new(&path))),
         Some(Trouble::Disk) => format!(
-            "{shown}: the disk refused ({}); look after the disk and call again, what was stored is safe",
-            root(error)
+            "{path}: the disk reported an error ({}); check the disk and try again, everything stored so far is safe",
+            root_cause(error)
         ),
         Some(Trouble::Contradiction) => format!(
-            "{shown} holds rows or counters that contradict each other; `check` tells which, `check --repair` mends them"
+            "{path} holds rows or counters that contradict each other; `check` lists them, `check --repair` repairs them"
         ),
         None => match error {
             CatalogError::Corrupt(_) | CatalogError::Json(_) => {
-                format!("{shown} holds what it must not: {error}; `check` tells more")
+                format!("{path} holds an invalid value: {error}; `check` gives details")
             }
             _ => return None,
         },
     })
 }
 
-/// That somebody else kept the catalog locked.
-fn locked(shown: &str, by: Option<Holder>) -> String {
-    match by {
-        Some(holder) => {
-            format!(
-                "{shown} was kept locked by {holder} for too long; call again when it is done or has ended"
-            )
-        }
-        None => format!("{shown} was kept locked by another process for too long; call again"),
+fn locked(path: &str, owner: Option<Holder>) -> String {
+    match owner {
+        Some(owner) => format!(
+            "{path} was locked by {owner} for too long; try again when that process has finished"
+        ),
+        None => format!("{path} was locked by another process for too long; try again"),
     }
 }
 
-/// The last cause, in its own words.
-fn root(error: &CatalogError) -> String {
+fn root_cause(error: &CatalogError) -> String {
     let mut last: &dyn Error = error;
     while let Some(next) = last.source() {
         last = next;
@@ -111,38 +182,54 @@ fn root(error: &CatalogError) -> String {
 mod tests {
     use std::path::Path;
 
-    use super::{is_damage, locked, of_catalog, sentence};
+    use super::{ExitCode, Refusal};
+    use super::{catalog_error, exit_code, explain_catalog, is_damage, join_causes, locked};
     use crate::catalog::{CatalogError, Holder};
     use crate::export::ExportError;
 
     #[test]
-    fn a_wrapped_error_is_found_and_explained() {
+    fn refusal_keeps_its_code_under_context() {
+        let error =
+            anyhow::Error::new(Refusal::NothingSelected("no pair".to_owned())).context("run");
+        assert_eq!(exit_code(&error), ExitCode::NothingSelected);
+        assert_eq!(join_causes(&error), "run: no pair");
+    }
+
+    #[test]
+    fn quoted_cause_is_not_repeated() {
+        let io = std::io::Error::other("disk on fire");
+        let error = anyhow::Error::new(io).context("a.png: disk on fire");
+        assert_eq!(join_causes(&error), "a.png: disk on fire");
+    }
+
+    #[test]
+    fn wrapped_catalog_error_is_found_and_explained() {
         let error = ExportError::Catalog(CatalogError::Corrupt("stage 9 is unknown".into()));
-        let found = of_catalog(&error).expect("the catalog's error");
+        let found = catalog_error(&error).expect("the catalog's error");
         assert!(is_damage(found));
-        let said = sentence(found, Path::new("nowhere")).expect("a sentence");
+        let text = explain_catalog(found, Path::new("nowhere")).expect("a sentence");
         assert!(
-            said.contains("nowhere/catalog.sqlite") && said.contains("`check`"),
-            "{said}"
+            text.contains("nowhere/catalog.sqlite") && text.contains("`check`"),
+            "{text}"
         );
         let plain = CatalogError::Missing("p/catalog.sqlite".into());
-        assert_eq!(sentence(&plain, Path::new("p")), None);
+        assert_eq!(explain_catalog(&plain, Path::new("p")), None);
         assert!(!is_damage(&plain));
     }
 
     #[test]
-    fn who_keeps_the_catalog_locked_is_named_with_what_frees_it() {
+    fn owner_of_the_lock_is_named_with_the_command_that_resumes_it() {
         let (pid, is_stopped) = (12, true);
-        let said = locked("p/catalog.sqlite", Some(Holder { pid, is_stopped }));
+        let text = locked("p/catalog.sqlite", Some(Holder { pid, is_stopped }));
         assert!(
-            said.contains("pid 12, which is stopped") && said.contains("kill -CONT 12"),
-            "{said}"
+            text.contains("pid 12, which is stopped") && text.contains("kill -CONT 12"),
+            "{text}"
         );
         let is_stopped = false;
-        let said = locked("p/catalog.sqlite", Some(Holder { pid, is_stopped }));
+        let text = locked("p/catalog.sqlite", Some(Holder { pid, is_stopped }));
         assert!(
-            said.contains("by pid 12 for too long") && !said.contains("CONT"),
-            "{said}"
+            text.contains("by pid 12 for too long") && !text.contains("CONT"),
+            "{text}"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! `export`: the aligned pairs for other tools.
+//! `export`: writes the aligned pairs for other tools.
 
 use std::path::PathBuf;
 
@@ -14,38 +14,38 @@ use crate::export::{ExportSummary, JsonlOptions, to_jsonl};
 /// Arguments of `export`.
 #[derive(Debug, Args)]
 pub(super) struct ExportArgs {
-    /// Form of the export
-    #[arg(long, value_name = "FORM", default_value = "jsonl")]
-    pub(super) to: Form,
-    /// The folder to write; an earlier export there is replaced
+    /// Format of the export
+    #[arg(long, value_name = "FORMAT", default_value = "jsonl")]
+    pub(super) to: ExportFormat,
+    /// The directory to write; an earlier export there is replaced
     #[arg(short, long, value_name = "DIR")]
     pub(super) output: PathBuf,
-    /// Write computing times too; the bytes then differ from run to run
+    /// Include computing times; the output then differs from run to run
     #[arg(long)]
     pub(super) with_times: bool,
 }
 
-/// Form of an export.
+/// Format of an export.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Form {
-    /// One line a pair and metric, with masks and pictures beside it.
+pub(super) enum ExportFormat {
+    /// One line per pair and metric, with masks and images in files.
     Jsonl,
 }
 
 pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.reader().await?;
+    let (project, catalog) = context.open_read_only().await?;
     let config = context.settings()?.config;
-    context.warn_of_stale(&catalog).await?;
+    context.warn_about_stale(&catalog).await?;
     let options = JsonlOptions {
         metrics: config.stages.normalize.method.metrics(),
         with_times: args.with_times,
         limits: config.limits.image,
     };
     let summary = match args.to {
-        Form::Jsonl => to_jsonl(&catalog, &project, &args.output, options).await?,
+        ExportFormat::Jsonl => to_jsonl(&catalog, &project, &args.output, options).await?,
     };
     catalog.close().await;
-    tell(&summary, &args, context)?;
+    print_summary(&summary, &args, context)?;
     Ok(if summary.unreadable.is_empty() {
         ExitCode::Done
     } else {
@@ -53,7 +53,11 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
     })
 }
 
-fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow::Result<()> {
+fn print_summary(
+    summary: &ExportSummary,
+    args: &ExportArgs,
+    context: &Context,
+) -> anyhow::Result<()> {
     if context.global.json {
         let unreadable: Vec<_> = summary
             .unreadable
@@ -71,32 +75,32 @@ fn tell(summary: &ExportSummary, args: &ExportArgs, context: &Context) -> anyhow
     for (pair, why) in &summary.unreadable {
         context
             .output
-            .warn(&format!("{pair} has no files in the export: {why}"));
+            .warn(&format!("the export has no files of {pair}: {why}"));
     }
     let shown = args.output.display();
     if summary.kept_earlier {
         let lost = count(summary.unreadable.len() as u64, "pair");
-        context.output.say(&format!(
-            "the earlier export in {shown} stays: the new one would lack the files of {lost}; mend them, or export to a new folder"
+        context.output.info(&format!(
+            "the earlier export in {shown} was kept, because the new one would lack the files of {lost}; repair them, or export to a new directory"
         ));
     } else {
-        tell_done(summary, args, context);
+        print_done(summary, args, context);
     }
     if !summary.unreadable.is_empty() {
-        // A run trusts what the catalog says is done; a check does not.
+        // A run trusts the catalog, so the check must come first.
         context.output.next(&context.command("check --repair"));
         context.output.next(&context.command("run"));
     }
     Ok(())
 }
 
-fn tell_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
+fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
     let unreadable = match summary.unreadable.len() {
         0 => String::new(),
-        lost => format!(", {lost} whose files are gone or changed"),
+        lost => format!(", {lost} with missing or changed files"),
     };
-    context.output.say(&format!(
-        "{} exported to {}, {} without result{unreadable}",
+    context.output.info(&format!(
+        "{} exported to {}, {} without a result{unreadable}",
         count(summary.done, "pair"),
         args.output.display(),
         summary.without_result

@@ -6,66 +6,69 @@ use super::table::{Align, columns};
 use crate::catalog::{Catalog, FailedPair, StoredFailure};
 use crate::domain::FailureClass;
 
-/// How many failed pairs are read, and how many of a class are named, unless all are asked for.
-const READ: usize = 200;
-const NAMED: usize = 3;
-const ALL: usize = i64::MAX as usize;
+/// Failed pairs that are read, and failed pairs per class that are named, unless all are asked for.
+const READ_LIMIT: usize = 200;
+const NAME_LIMIT: usize = 3;
+const NO_LIMIT: usize = i64::MAX as usize;
 
 /// The failed pairs of a project.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Failures {
     counts: Vec<(FailureClass, u64)>,
-    named: Vec<FailedPair>,
-    /// Most that are named of a class.
-    most: usize,
+    pairs: Vec<FailedPair>,
+    names_per_class: usize,
 }
 
 impl Failures {
-    /// Reads them, to name a few of each class.
+    /// Reads the failures, to name a few of each class.
     ///
     /// # Errors
-    /// When the catalog refuses.
+    /// When the catalog cannot be read.
     pub(super) async fn read(catalog: &Catalog) -> anyhow::Result<Self> {
-        Self::up_to(catalog, READ, NAMED).await
+        Self::read_some(catalog, READ_LIMIT, NAME_LIMIT).await
     }
 
-    /// Reads all of them, to name each.
+    /// Reads the failures, to name all of them.
     ///
     /// # Errors
-    /// When the catalog refuses.
+    /// When the catalog cannot be read.
     pub(super) async fn read_all(catalog: &Catalog) -> anyhow::Result<Self> {
-        Self::up_to(catalog, ALL, ALL).await
+        Self::read_some(catalog, NO_LIMIT, NO_LIMIT).await
     }
 
-    async fn up_to(catalog: &Catalog, read: usize, most: usize) -> anyhow::Result<Self> {
+    async fn read_some(
+        catalog: &Catalog,
+        limit: usize,
+        names_per_class: usize,
+    ) -> anyhow::Result<Self> {
         let mut counts = catalog.failure_counts().await?;
         counts.sort_by_key(|(class, number)| (std::cmp::Reverse(*number), *class));
-        let named = match counts.as_slice() {
+        let pairs = match counts.as_slice() {
             [] => Vec::new(),
-            _ => catalog.failures(read).await?,
+            _ => catalog.failures(limit).await?,
         };
         Ok(Self {
             counts,
-            named,
-            most,
+            pairs,
+            names_per_class,
         })
     }
 
-    /// The first by name.
+    /// Returns the first failed pair.
     pub(super) fn first(&self) -> Option<&FailedPair> {
-        self.named.first()
+        self.pairs.first()
     }
 
-    /// Those that are named, each with stage, class and reason.
+    /// Returns the failed pairs with stage, class and message.
     pub(super) fn json(&self) -> Value {
-        let named = self.named.iter().map(|pair| {
+        let pairs = self.pairs.iter().map(|pair| {
             let StoredFailure { stage, failure, .. } = &pair.failure;
             json!({"id": pair.name, "stage": stage, "class": failure.class, "error": failure.message})
         });
-        named.collect()
+        pairs.collect()
     }
 
-    /// One line a named pair, the most frequent class first.
+    /// Formats one line per named pair, the most frequent class first.
     pub(super) fn text(&self) -> String {
         let rows: Vec<Vec<String>> = self
             .counts
@@ -79,7 +82,12 @@ impl Failures {
         let mut head = format!("  {class} {number}");
         let mut rows = Vec::new();
         let of_class = |pair: &&FailedPair| pair.failure.failure.class == class;
-        for pair in self.named.iter().filter(of_class).take(self.most) {
+        for pair in self
+            .pairs
+            .iter()
+            .filter(of_class)
+            .take(self.names_per_class)
+        {
             rows.push(vec![
                 std::mem::take(&mut head),
                 pair.name.to_string(),
@@ -89,8 +97,8 @@ impl Failures {
         }
         let more = number.saturating_sub(rows.len() as u64);
         if more > 0 {
-            let all = "`status --failed` names all".to_owned();
-            rows.push(vec![head, format!("and {more} more"), String::new(), all]);
+            let hint = "`status --failed` lists all".to_owned();
+            rows.push(vec![head, format!("and {more} more"), String::new(), hint]);
         }
         rows
     }
@@ -115,11 +123,11 @@ mod tests {
     }
 
     #[test]
-    fn most_frequent_class_comes_first_and_the_rest_is_counted() {
+    fn most_frequent_class_comes_first_and_unnamed_pairs_are_counted() {
         let failures = Failures {
-            most: super::NAMED,
+            names_per_class: super::NAME_LIMIT,
             counts: vec![(FailureClass::Io, 9), (FailureClass::BadInput, 1)],
-            named: vec![
+            pairs: vec![
                 failed("a", FailureClass::BadInput),
                 failed("b", FailureClass::Io),
                 failed("c", FailureClass::Io),
@@ -128,7 +136,7 @@ mod tests {
         let text = failures.text();
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[0], "  io 9         b           at fit  b.stl: reason");
-        let more = "               and 7 more          `status --failed` names all";
+        let more = "               and 7 more          `status --failed` lists all";
         assert_eq!(lines[2], more);
         assert_eq!(lines[3], "  bad_input 1  a           at fit  a.stl: reason");
     }

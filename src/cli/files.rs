@@ -1,29 +1,57 @@
-//! Files and folders that the command line names.
+//! Files and directories named on the command line.
 
 use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
 
-/// Reads a file that was named.
+/// Reads a file.
 ///
 /// # Errors
 /// When it cannot be read: the command line is wrong then.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
-    std::fs::read(path).map_err(|error| refused("read", path, &error))
+    std::fs::read(path).map_err(|error| refusal("read", path, &error))
 }
 
-/// Lists a folder that was named.
+/// Lists a directory.
 ///
 /// # Errors
 /// When it cannot be listed.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
-    let refuse = |error: std::io::Error| refused("list", dir, &error);
+    let refuse = |error: std::io::Error| refusal("list", dir, &error);
     let entries = std::fs::read_dir(dir).map_err(refuse)?;
     entries
         .map(|entry| Ok(entry.map_err(refuse)?.path()))
         .collect()
 }
 
-fn refused(deed: &str, path: &Path, error: &std::io::Error) -> Refusal {
-    Refusal::Usage(format!("cannot {deed} {}: {error}", path.display()))
+/// Returns whether a file holds JSON Lines: by its extension, or by its first character if the extension is not known.
+pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
+    let extension = file.extension().and_then(|extension| extension.to_str());
+    match extension.map(str::to_ascii_lowercase).as_deref() {
+        Some("jsonl" | "ndjson" | "json") => true,
+        Some("csv" | "tsv") => false,
+        Some(_) | None => {
+            let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+            text.trim_ascii_start().starts_with(b"{")
+        }
+    }
+}
+
+fn refusal(action: &str, path: &Path, error: &std::io::Error) -> Refusal {
+    Refusal::Usage(format!("cannot {action} {}: {error}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::is_jsonl;
+
+    #[test]
+    fn format_follows_from_the_extension_then_from_the_content() {
+        assert!(is_jsonl(Path::new("a.jsonl"), b""));
+        assert!(!is_jsonl(Path::new("a.csv"), b"{"));
+        assert!(is_jsonl(Path::new("a"), b"\xef\xbb\xbf {\"id\":1}"));
+        assert!(!is_jsonl(Path::new("a.txt"), b"id,mesh,print"));
+    }
 }

@@ -1,4 +1,4 @@
-//! `import`: takes pairs of meshes and prints into the project, and makes it where there is none.
+//! `import`: adds pairs of meshes and prints to the project, and creates the project if there is none.
 
 use std::path::{Path, PathBuf};
 
@@ -13,61 +13,64 @@ use super::files;
 use super::manifest_file::Listing;
 use super::output;
 use super::table::count;
-use super::truth_file::{self, refusal};
+use super::truth_file::{self, TruthRow, refusal};
 use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
 use crate::domain::{LengthUnit, PairName};
-use crate::manifest::{Ids, ManifestRow};
+use crate::manifest::{ManifestRow, RowIds};
 use crate::store::Project;
 
-/// Rows handed to the catalog at a time, and how many times it may be behind.
+/// Rows per chunk sent to the catalog, and chunks that may wait there.
 const CHUNK: usize = 2_000;
-const CHUNKS_AHEAD: usize = 2;
+const WAITING_CHUNKS: usize = 2;
 
 /// Arguments of `import`.
 #[derive(Debug, Default, Args)]
 pub(super) struct ImportArgs {
-    /// A CSV or JSON Lines file with the columns id, mesh, print and if wanted character, block, unit,
+    /// A CSV or JSON Lines file with the columns id, mesh, print and optionally character, block, unit,
     /// `scanned_face_down`; paths are relative to the file
     #[arg(required_unless_present = "meshes", conflicts_with = "meshes")]
     pub(super) file: Option<PathBuf>,
-    /// A folder of meshes, paired with --prints by file stem
+    /// A directory of meshes, paired with --prints by file stem
     #[arg(long, value_name = "DIR", requires = "prints")]
     pub(super) meshes: Option<PathBuf>,
-    /// A folder of prints
+    /// A directory of prints
     #[arg(long, value_name = "DIR", requires = "meshes")]
     pub(super) prints: Option<PathBuf>,
-    /// Unit of the meshes of a folder: mm, cm, m or in
+    /// Unit of the meshes in --meshes: mm, cm, m or in
     #[arg(long, requires = "meshes")]
     pub(super) unit: Option<LengthUnit>,
-    /// True alignments, one JSON object a line; the report then tells how far results are from them
+    /// True alignments, one JSON object per line; the report then gives the errors against them
     #[arg(long, value_name = "FILE")]
     pub(super) truth: Option<PathBuf>,
 }
 
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let taken = take(&args, context).await?;
+    let outcome = import_pairs(&args, context).await?;
     if context.global.json {
-        output::print_json(&as_json(&taken))?;
+        output::print_json(&as_json(&outcome))?;
     }
-    tell(&taken, context);
+    print_outcome(&outcome, context);
     context.output.next(&context.command("run"));
     Ok(ExitCode::Done)
 }
 
-/// What an import did.
+/// What an import changed.
 #[derive(Debug)]
-pub(super) struct Taken {
+pub(super) struct ImportOutcome {
     pub(super) summary: ImportSummary,
     pub(super) truths: u64,
     missing: Vec<String>,
     remarks: Vec<String>,
 }
 
-/// Imports: everything is read and checked before anything is written.
+/// Imports pairs; everything is read and checked before anything is written.
 ///
 /// # Errors
-/// When a list is refused, or catalog or disk refuse.
-pub(super) async fn take(args: &ImportArgs, context: &Context) -> anyhow::Result<Taken> {
+/// When a list is refused, or the catalog or the disk fails.
+pub(super) async fn import_pairs(
+    args: &ImportArgs,
+    context: &Context,
+) -> anyhow::Result<ImportOutcome> {
     let mut listing = listing(args)?;
     let remarks = std::mem::take(&mut listing.remarks);
     let dir = context.dir();
@@ -77,13 +80,13 @@ pub(super) async fn take(args: &ImportArgs, context: &Context) -> anyhow::Result
     };
     let project = Project::at(&dir);
     let truths = stored_truths(truths, &project)?;
-    let before = Before::of(&project);
+    let before = StateBefore::of(&project);
     let stored = store(&project, listing, truths).await;
     if stored.is_err() {
         before.restore(&project);
     }
     let (summary, truths, missing) = stored?;
-    Ok(Taken {
+    Ok(ImportOutcome {
         summary,
         truths,
         missing,
@@ -91,8 +94,7 @@ pub(super) async fn take(args: &ImportArgs, context: &Context) -> anyhow::Result
     })
 }
 
-/// Stores the list; gives what changed, how many true alignments were stored, and a line for each file that is not
-/// there.
+/// Stores the list. Returns what changed, the number of true alignments stored, and a line per missing file.
 async fn store(
     project: &Project,
     listing: Listing,
@@ -100,19 +102,21 @@ async fn store(
 ) -> anyhow::Result<(ImportSummary, u64, Vec<String>)> {
     Project::create(project.dir())?;
     let catalog = Catalog::create(&project.catalog_path()).await?;
-    let (sender, rows) = mpsc::channel(CHUNKS_AHEAD);
-    let of = project.clone();
-    let fed = tokio::task::spawn_blocking(move || feed(listing, &of, &sender));
+    let (sender, rows) = mpsc::channel(WAITING_CHUNKS);
+    let owned = project.clone();
+    let sent = tokio::task::spawn_blocking(move || send_rows(listing, &owned, &sender));
     let stored = catalog.import_all(rows, truths, now()).await;
     catalog.close().await;
-    // Where a row cannot be made, that says more than that the import was cut short.
-    let missing = fed.await.context("the list's reader stopped")??;
+    // The error of a row explains more than the catalog's error that the list ended early.
+    let missing = sent
+        .await
+        .context("the task that reads the list stopped")??;
     let (summary, truths) = stored?;
     Ok((summary, truths, missing))
 }
 
-/// Makes the rows and hands them on, some at a time; gives a line for each file that is not there.
-fn feed(
+/// Sends the rows to the catalog in chunks. Returns a line per missing file.
+fn send_rows(
     listing: Listing,
     project: &Project,
     sender: &mpsc::Sender<ImportChunk>,
@@ -127,7 +131,7 @@ fn feed(
             Err(_) => {}
         }
         if chunk.len() == CHUNK {
-            // The catalog hears no more after an error of its own, which is told there.
+            // The catalog stops receiving after an error, which it reports itself.
             let _ = sender.blocking_send(ImportChunk::Rows(std::mem::take(&mut chunk)));
         }
     });
@@ -138,13 +142,13 @@ fn feed(
     Ok(missing)
 }
 
-/// What was there before an import, so that one that fails leaves no half-made project.
-struct Before {
+/// What existed before an import, so that a failed one leaves no incomplete project.
+struct StateBefore {
     dir: bool,
     catalog: bool,
 }
 
-impl Before {
+impl StateBefore {
     fn of(project: &Project) -> Self {
         Self {
             dir: project.dir().exists(),
@@ -152,7 +156,7 @@ impl Before {
         }
     }
 
-    /// Takes away what was not there. What cannot be removed is an empty project, which harms nobody.
+    /// Removes what did not exist before. What cannot be removed is a harmless empty project.
     fn restore(&self, project: &Project) {
         if !self.catalog {
             for ending in ["", "-wal", "-shm", "-journal"] {
@@ -162,7 +166,7 @@ impl Before {
             }
         }
         if !self.dir {
-            // Only where it is empty.
+            // Fails unless the directory is empty.
             let _ = std::fs::remove_dir(project.dir());
         }
     }
@@ -176,12 +180,8 @@ fn listing(args: &ImportArgs) -> anyhow::Result<Listing> {
     }
 }
 
-/// Reads true alignments and refuses those of pairs that are neither in the list nor in the project.
-async fn read_truths(
-    file: &Path,
-    listed: &Ids,
-    dir: &Path,
-) -> anyhow::Result<Vec<truth_file::Row>> {
+/// Reads true alignments. Refuses those of pairs that are neither in the list nor in the project.
+async fn read_truths(file: &Path, listed: &RowIds, dir: &Path) -> anyhow::Result<Vec<TruthRow>> {
     let text = String::from_utf8(files::read(file)?)
         .map_err(|error| Refusal::Usage(format!("{}: {error}", file.display())))?;
     let truths = truth_file::parse(file, &text)?;
@@ -211,9 +211,10 @@ async fn read_truths(
     }
 }
 
-/// `tops_mask` is kept as inputs are: relative to the project when it lies below it.
+/// Converts true alignments to their stored form; like inputs, `tops_mask` is stored relative to the project if it lies
+/// below it.
 fn stored_truths(
-    truths: Vec<truth_file::Row>,
+    truths: Vec<TruthRow>,
     project: &Project,
 ) -> anyhow::Result<Vec<(PairName, Value)>> {
     truths
@@ -240,45 +241,45 @@ fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow>
     })
 }
 
-/// Says what an import did; warnings first.
-pub(super) fn tell(taken: &Taken, context: &Context) {
-    const WARNED: usize = 20;
-    const NAMED: usize = 10;
+/// Prints what an import changed, after its warnings.
+pub(super) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
+    const MAX_WARNINGS: usize = 20;
+    const MAX_CHANGES: usize = 10;
     let output = &context.output;
-    for line in taken.missing.iter().take(WARNED) {
+    for line in outcome.missing.iter().take(MAX_WARNINGS) {
         output.warn(line);
     }
-    if let Some(more) = taken.missing.len().checked_sub(WARNED + 1) {
-        output.warn(&format!("{} more files are not there", more + 1));
+    if let Some(more) = outcome.missing.len().checked_sub(MAX_WARNINGS + 1) {
+        output.warn(&format!("{} more files do not exist", more + 1));
     }
-    for line in &taken.remarks {
+    for line in &outcome.remarks {
         output.warn(line);
     }
-    let summary = &taken.summary;
-    output.say(&format!(
+    let summary = &outcome.summary;
+    output.info(&format!(
         "{} added, {} changed, {} unchanged{}",
         count(summary.added, "pair"),
         summary.changed.len(),
         summary.unchanged,
-        match taken.truths {
+        match outcome.truths {
             0 => String::new(),
             truths => format!("; {} stored", count(truths, "true alignment")),
         }
     ));
-    for change in summary.changed.iter().take(NAMED) {
-        output.say(&format!(
+    for change in summary.changed.iter().take(MAX_CHANGES) {
+        output.info(&format!(
             "  {}: {} changed",
             change.name,
             change.fields.join(", ")
         ));
     }
-    if let Some(more) = summary.changed.len().checked_sub(NAMED + 1) {
-        output.say(&format!("  and {} more", more + 1));
+    if let Some(more) = summary.changed.len().checked_sub(MAX_CHANGES + 1) {
+        output.info(&format!("  and {} more", more + 1));
     }
 }
 
-fn as_json(taken: &Taken) -> Value {
-    let changed: Vec<Value> = taken
+fn as_json(outcome: &ImportOutcome) -> Value {
+    let changed: Vec<Value> = outcome
         .summary
         .changed
         .iter()
@@ -286,11 +287,11 @@ fn as_json(taken: &Taken) -> Value {
         .collect();
     json!({
         "schema": 1,
-        "added": taken.summary.added,
+        "added": outcome.summary.added,
         "changed": changed,
-        "unchanged": taken.summary.unchanged,
-        "truths": taken.truths,
-        "missing_files": taken.missing,
-        "left_out": taken.remarks,
+        "unchanged": outcome.summary.unchanged,
+        "truths": outcome.truths,
+        "missing_files": outcome.missing,
+        "left_out": outcome.remarks,
     })
 }

@@ -1,16 +1,17 @@
-//! `tracing` to stderr or a file, as text or JSON.
+//! The log: `tracing` events on stderr or in a file, as text or JSON.
 
 use std::fs::OpenOptions;
+use std::io::IsTerminal as _;
 use std::sync::Mutex;
 
 use anyhow::Context as _;
 use tracing_subscriber::EnvFilter;
 use tracing_subscriber::fmt::writer::BoxMakeWriter;
 
-use super::args::{Global, LogFormat};
-use super::progress::Screen;
+use super::global::{Global, LogFormat};
+use super::screen::{Palette, Screen};
 
-/// Starts the log. `RUST_LOG`, where it is set, wins over `-v` and `-q`.
+/// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
 ///
 /// # Errors
 /// When the log file cannot be opened.
@@ -18,16 +19,12 @@ pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
     let (writer, to_file) = writer(global, screen)?;
     let level = level(global.verbose, global.quiet, to_file);
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(level));
+    let colours = Palette::choose(global.color, std::io::stderr().is_terminal());
     let builder = tracing_subscriber::fmt()
         .with_env_filter(filter)
-        .with_ansi(
-            !to_file
-                && super::output::Output::new(global, screen.clone())
-                    .err
-                    .is_on(),
-        )
+        .with_ansi(!to_file && colours.is_on())
         .with_writer(writer);
-    // A second start in one process can only be a test's; the first log stays.
+    // Only a test starts a second log in one process; the first one stays.
     let _ = match global.log_format {
         LogFormat::Text => builder.with_target(false).try_init(),
         LogFormat::Json => builder.json().flatten_event(true).try_init(),
@@ -48,7 +45,7 @@ fn writer(global: &Global, screen: &Screen) -> anyhow::Result<(BoxMakeWriter, bo
     Ok((BoxMakeWriter::new(Mutex::new(file)), true))
 }
 
-/// A log file is there to be read later, so it holds more than the screen.
+/// Returns the filter. A log file is read later, so it gets more than the terminal.
 const fn level(verbose: u8, quiet: bool, to_file: bool) -> &'static str {
     match (verbose, to_file, quiet) {
         (0, false, true) => "mocban=error",
@@ -63,7 +60,7 @@ mod tests {
     use super::level;
 
     #[test]
-    fn each_v_logs_more_and_a_file_more_than_the_screen() {
+    fn each_v_logs_more_and_a_file_more_than_the_terminal() {
         assert_eq!(level(0, true, false), "mocban=error");
         assert_eq!(level(0, false, false), "mocban=warn");
         for quiet in [false, true] {

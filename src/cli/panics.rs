@@ -1,45 +1,46 @@
-//! Panics are defects of ours: logged for us, told to the user in a sentence.
+//! Panics are defects of this program: details go to the log, a sentence to the user.
 
 use std::backtrace::Backtrace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use super::exit::ExitCode;
 
-/// Lets a panic's own words and the way to it go to the log (`-v`, `--log-file`) instead of the screen; who catches it
-/// says the rest.
+/// Sends the message and backtrace of a panic to the log (`-v`, `--log-file`) instead of the terminal.
 pub(super) fn log_only() {
     std::panic::set_hook(Box::new(|panic| {
         if tracing::enabled!(tracing::Level::INFO) {
-            let way = Backtrace::force_capture();
-            tracing::info!("{panic}\n{way}");
+            let backtrace = Backtrace::force_capture();
+            tracing::info!("{panic}\n{backtrace}");
         }
     }));
 }
 
-/// Does some work; a panic in it becomes `told` and an exit code.
-pub(super) fn caught(work: impl FnOnce() -> ExitCode, told: impl FnOnce(&str)) -> ExitCode {
+/// Does some work; turns a panic into a sentence for `show_error` and an exit code.
+pub(super) fn catch(work: impl FnOnce() -> ExitCode, show_error: impl FnOnce(&str)) -> ExitCode {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
-        told("a defect of this program stopped it; the same with -v tells where");
+        show_error(
+            "a defect of this program stopped it; run the same command with -v to see where",
+        );
         ExitCode::Error
     })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ExitCode, caught};
+    use super::{ExitCode, catch};
 
     #[test]
-    fn a_panic_becomes_a_sentence_and_code_1() {
-        let mut said = String::new();
-        let code = caught(
+    fn panic_becomes_a_sentence_and_code_1() {
+        let mut message = String::new();
+        let code = catch(
             || unreachable!("made up"),
-            |text| text.clone_into(&mut said),
+            |text| text.clone_into(&mut message),
         );
         assert_eq!(code, ExitCode::Error);
         assert!(
-            said.contains("a defect") && !said.contains("made up"),
-            "{said}"
+            message.contains("a defect") && !message.contains("made up"),
+            "{message}"
         );
-        assert_eq!(caught(|| ExitCode::Done, |_| {}), ExitCode::Done);
+        assert_eq!(catch(|| ExitCode::Done, |_| {}), ExitCode::Done);
     }
 }

@@ -1,137 +1,104 @@
-//! The only file that draws: the bar of a run, or what stands in for it off a terminal.
+//! Shows a run's progress on stderr: a bar, or plain lines, or JSON.
 
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif::{ProgressBar, ProgressState, ProgressStyle};
 use serde_json::{Value, json};
 
-use super::args::ProgressMode;
-use super::output::{Palette, Tone, dumb_terminal};
+use super::global::ProgressMode;
 use super::run_progress::RunProgress;
-use super::time_text::span;
+use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
+use super::time_text::duration;
 use crate::domain::{Failure, PairName, Stage};
 use crate::runner::{RunEvent, StopLevel};
 
-/// stderr, shared by talk, log and bar so that no line tears the bar.
-#[derive(Debug, Clone)]
-pub(super) struct Screen(MultiProgress);
-
-impl Screen {
-    /// The screen without a bar yet.
-    pub(super) fn new() -> Self {
-        Self(MultiProgress::new())
-    }
-
-    /// A line above the bar, or just a line.
-    pub(super) fn line(&self, text: &str) {
-        // When stderr is closed nobody is there to be told so.
-        let _ = self.clone().write_all(format!("{text}\n").as_bytes());
-    }
-}
-
-impl Write for Screen {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        self.0
-            .suspend(|| std::io::stderr().lock().write_all(bytes))?;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        std::io::stderr().flush()
-    }
-}
-
-/// Puts the cursor to the top of a terminal and clears it, for `status --watch`.
-pub(super) const CLEAR: &str = "\u{1b}[H\u{1b}[2J";
-
 /// Shows one run.
 #[derive(Debug)]
-pub(super) struct Progress {
+pub(super) struct ProgressReporter {
     screen: Screen,
     palette: Palette,
-    counts: RunProgress,
+    progress: RunProgress,
     started: Instant,
-    form: Form,
+    display: Display,
 }
 
 #[derive(Debug)]
-enum Form {
+enum Display {
     Bar(ProgressBar),
-    Plain { at: Instant, percent: u64 },
+    Plain { last: Instant, percent: u64 },
     Json,
     None,
 }
 
-/// A plain line comes after this time or this share of the work, whichever is first.
-const PLAIN_EVERY: Duration = Duration::from_secs(10);
+/// A plain line is written after this time or this share of the stages, whichever comes first.
+const PLAIN_INTERVAL: Duration = Duration::from_secs(10);
 const PLAIN_PERCENT: u64 = 5;
-/// However fast the work goes, plain lines are at least this far apart.
-const PLAIN_LEAST: Duration = Duration::from_secs(1);
+/// Shortest time between two plain lines.
+const PLAIN_MIN_INTERVAL: Duration = Duration::from_secs(1);
 
-impl Progress {
-    /// Progress in the form asked for; `-q` takes the automatic one away.
+impl ProgressReporter {
+    /// Starts the display that was asked for; `-q` turns the automatic one off.
     pub(super) fn new(mode: ProgressMode, quiet: bool, screen: &Screen, palette: Palette) -> Self {
         let now = Instant::now();
         Self {
             screen: screen.clone(),
             palette,
-            counts: RunProgress::default(),
+            progress: RunProgress::default(),
             started: now,
-            form: form(mode, quiet, screen, now),
+            display: display(mode, quiet, screen, now),
         }
     }
 
-    /// Shows what has happened.
+    /// Shows an event.
     pub(super) fn event(&mut self, event: &RunEvent) {
-        self.counts.observe(event);
-        match &mut self.form {
-            Form::None => return,
-            Form::Json => {
+        self.progress.observe(event);
+        match &mut self.display {
+            Display::None => return,
+            Display::Json => {
                 self.screen.line(&as_json(event).to_string());
                 return;
             }
-            Form::Bar(bar) => draw(bar, &self.counts),
-            Form::Plain { at, percent } => {
-                let enough = self.counts.percent() >= *percent + PLAIN_PERCENT;
-                let due = at.elapsed() >= PLAIN_EVERY || enough && at.elapsed() >= PLAIN_LEAST;
-                if due {
-                    (*at, *percent) = (Instant::now(), self.counts.percent());
+            Display::Bar(bar) => update_bar(bar, &self.progress),
+            Display::Plain { last, percent } => {
+                let is_enough = self.progress.percent() >= *percent + PLAIN_PERCENT;
+                let since = last.elapsed();
+                if since >= PLAIN_INTERVAL || is_enough && since >= PLAIN_MIN_INTERVAL {
+                    (*last, *percent) = (Instant::now(), self.progress.percent());
                     let elapsed = self.started.elapsed().as_millis() as u64;
-                    self.screen.line(&self.counts.line(elapsed));
+                    self.screen.line(&self.progress.line(elapsed));
                 }
             }
         }
-        if let Some(line) = note(event, self.palette) {
+        if let Some(line) = event_line(event, self.palette) {
             self.screen.line(&line);
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub(super) fn end(self) {
-        if let Form::Bar(bar) = self.form {
+        if let Display::Bar(bar) = self.display {
             bar.finish_and_clear();
         }
     }
 }
 
-fn form(mode: ProgressMode, quiet: bool, screen: &Screen, now: Instant) -> Form {
-    let plain = Form::Plain {
-        at: now,
-        percent: 0,
-    };
+fn display(mode: ProgressMode, quiet: bool, screen: &Screen, now: Instant) -> Display {
     match mode {
-        ProgressMode::Auto if quiet => Form::None,
-        ProgressMode::Auto if std::io::stderr().is_terminal() && !dumb_terminal() => bar(screen),
-        ProgressMode::Auto | ProgressMode::Plain => plain,
+        ProgressMode::Auto if quiet => Display::None,
+        ProgressMode::Auto if std::io::stderr().is_terminal() && !is_dumb_terminal() => bar(screen),
+        ProgressMode::Auto | ProgressMode::Plain => Display::Plain {
+            last: now,
+            percent: 0,
+        },
         ProgressMode::Bar => bar(screen),
-        ProgressMode::Json => Form::Json,
-        ProgressMode::None => Form::None,
+        ProgressMode::Json => Display::Json,
+        ProgressMode::None => Display::None,
     }
 }
 
-fn bar(screen: &Screen) -> Form {
-    // Not the whole width: the terminal writes "^C" at the end of the line, and must not wrap.
+fn bar(screen: &Screen) -> Display {
+    // Narrower than the terminal, which writes "^C" at the end of the line and must not wrap there.
     let style = ProgressStyle::with_template(
         "{msg}\n{bar:40} {percent:>3} %  {pos}/{len} stages  {per_sec}  {eta} left",
     )
@@ -139,26 +106,26 @@ fn bar(screen: &Screen) -> Form {
     .progress_chars("━╸─")
     .with_key(
         "per_sec",
-        |state: &indicatif::ProgressState, to: &mut dyn std::fmt::Write| {
-            // A formatter into memory does not fail.
+        |state: &ProgressState, to: &mut dyn std::fmt::Write| {
+            // Formatting into memory does not fail.
             let _ = write!(to, "{:.1}/s", state.per_sec());
         },
     );
-    let bar = screen.0.add(ProgressBar::new(0).with_style(style));
+    let bar = screen.add_bar(ProgressBar::new(0).with_style(style));
     bar.enable_steady_tick(Duration::from_millis(250));
-    Form::Bar(bar)
+    Display::Bar(bar)
 }
 
-fn draw(bar: &ProgressBar, counts: &RunProgress) {
-    if bar.length() != Some(counts.stages) {
-        bar.set_length(counts.stages);
+fn update_bar(bar: &ProgressBar, progress: &RunProgress) {
+    if bar.length() != Some(progress.stages) {
+        bar.set_length(progress.stages);
     }
-    bar.set_position(counts.passed);
-    bar.set_message(counts.by_stage_line());
+    bar.set_position(progress.finished);
+    bar.set_message(progress.by_stage_line());
 }
 
-/// What deserves a line of its own.
-fn note(event: &RunEvent, palette: Palette) -> Option<String> {
+/// Returns the line of an event that deserves one.
+fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
     match event {
         RunEvent::PairFailed {
             pair,
@@ -172,18 +139,18 @@ fn note(event: &RunEvent, palette: Palette) -> Option<String> {
             failure,
             wait_ms,
         } => Some(format!(
-            "{} {pair} at {stage}: {} ({}), again in {}",
-            palette.paint(Tone::Warn, "waits"),
+            "{} {pair} at {stage}: {} ({}), retrying in {}",
+            palette.paint(Tone::Warn, "waiting"),
             failure.message,
             failure.class,
-            span(*wait_ms)
+            duration(*wait_ms)
         )),
         RunEvent::Recovered { pairs } => Some(format!(
-            "{} of a worker that died came back",
+            "{} recovered from a worker that died",
             super::table::count(*pairs, "pair")
         )),
         RunEvent::Stopping { level, reason } => {
-            Some(palette.paint(Tone::Warn, stopping(*level, reason)))
+            Some(palette.paint(Tone::Warn, stopping_line(*level, reason)))
         }
         RunEvent::Started { .. }
         | RunEvent::StageStarted { .. }
@@ -192,7 +159,7 @@ fn note(event: &RunEvent, palette: Palette) -> Option<String> {
     }
 }
 
-/// `failed 0003 at fit: mesh has no faces (bad_input)`
+/// Returns `failed 0003 at fit: mesh has no faces (bad_input)`.
 fn failed_line(pair: &PairName, stage: Stage, failure: &Failure, palette: Palette) -> String {
     format!(
         "{} {} at {stage}: {} ({})",
@@ -203,13 +170,13 @@ fn failed_line(pair: &PairName, stage: Stage, failure: &Failure, palette: Palett
     )
 }
 
-fn stopping(level: StopLevel, reason: &str) -> String {
+fn stopping_line(level: StopLevel, reason: &str) -> String {
     match level {
         StopLevel::Go => reason.to_owned(),
         StopLevel::Drain => {
-            format!("{reason}: finishing the stages in hand; Ctrl-C once more stops now")
+            format!("{reason}: finishing the current stages; press Ctrl-C again to stop now")
         }
-        StopLevel::Now => format!("{reason}: stopping now; what is stored stays"),
+        StopLevel::Now => format!("{reason}: stopping now; stored results are kept"),
     }
 }
 
@@ -252,11 +219,11 @@ fn as_json(event: &RunEvent) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use super::{Palette, RunEvent, StopLevel, note};
+    use super::{Palette, RunEvent, StopLevel, event_line};
     use crate::domain::{Failure, FailureClass, Stage};
 
     #[test]
-    fn failure_is_named_in_one_line() {
+    fn failure_is_one_line() {
         let event = RunEvent::PairFailed {
             pair: "0003".parse().expect("valid id"),
             stage: Stage::Fit,
@@ -264,18 +231,18 @@ mod tests {
             skipped: 4,
         };
         assert_eq!(
-            note(&event, Palette::PLAIN).as_deref(),
+            event_line(&event, Palette::PLAIN).as_deref(),
             Some("failed 0003 at fit: a.stl: no faces (bad_input)")
         );
     }
 
     #[test]
-    fn drain_tells_how_to_stop_now() {
+    fn drain_explains_how_to_stop_now() {
         let event = RunEvent::Stopping {
             level: StopLevel::Drain,
             reason: "interrupted".into(),
         };
-        let line = note(&event, Palette::PLAIN).expect("a line");
-        assert!(line.contains("Ctrl-C once more"), "{line}");
+        let line = event_line(&event, Palette::PLAIN).expect("a line");
+        assert!(line.contains("Ctrl-C again"), "{line}");
     }
 }

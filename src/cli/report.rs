@@ -1,4 +1,4 @@
-//! `report`: the table of all results.
+//! `report`: prints the table of all results.
 
 use std::path::{Path, PathBuf};
 
@@ -18,36 +18,36 @@ use crate::report::{
 };
 use crate::store::{Project, write_atomic};
 
-/// The seed of the pictures that are drawn by lot; the page tells it.
-const LOT_SEED: u64 = 1;
+/// Seed of the random choice of images; the HTML page states it.
+const IMAGE_SEED: u64 = 1;
 
 /// Arguments of `report`.
 #[derive(Debug, Args)]
 pub(super) struct ReportArgs {
-    /// Form of the report: text, json, csv, markdown, latex, or html: one page with pictures of failures
+    /// Format of the report: text, json, csv, markdown, latex, or html (one page with images of failures)
     #[arg(long, short, default_value = "text")]
     pub(super) format: ReportFormat,
-    /// Write it to this file instead of stdout
+    /// Write the report to this file instead of stdout
     #[arg(short, long, value_name = "FILE")]
     pub(super) output: Option<PathBuf>,
-    /// How the intervals of Acc are computed: wilson, or exact (Clopper and Pearson)
-    #[arg(long, value_name = "HOW", default_value = "wilson")]
+    /// Confidence intervals of Acc: wilson, or exact (Clopper-Pearson)
+    #[arg(long, value_name = "METHOD", default_value = "wilson")]
     pub(super) ci: IntervalMethod,
-    /// Tell computing times by stage too, as html always does; the bytes then differ from run to run
+    /// Include computing times by stage, as html always does; the output then differs from run to run
     #[arg(long)]
     pub(super) with_times: bool,
-    /// Set another project's table beside this one; with the forms text and json
+    /// Also print the table of another project; only with the formats text and json
     #[arg(long, value_name = "DIR")]
     pub(super) compare: Option<PathBuf>,
-    /// End with code 20 unless every row somebody has read has at least this Acc, such as 0.98
+    /// Exit with code 20 unless every judged row has at least this Acc, such as 0.98
     #[arg(long, value_name = "ACC", value_parser = share)]
     pub(super) fail_under: Option<f64>,
-    /// End with code 21 unless every pair is done and every result passed or failed
+    /// Exit with code 21 unless every pair is done and every result is judged pass or fail
     #[arg(long)]
     pub(super) require_complete: bool,
 }
 
-/// A number in 0..=1.
+/// Parses a number from 0 to 1.
 fn share(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if (0.0..=1.0).contains(&value) => Ok(value),
@@ -56,10 +56,10 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.reader().await?;
-    context.warn_of_stale(&catalog).await?;
-    let format = chosen(args.format, context);
-    let mut pictures = GallerySelection::new(LOT_SEED);
+    let (project, catalog) = context.open_read_only().await?;
+    context.warn_about_stale(&catalog).await?;
+    let format = chosen_format(args.format, context);
+    let mut pictures = GallerySelection::new(IMAGE_SEED);
     let report = if format == ReportFormat::Html {
         build_with(&catalog, &project, |pair, truth| pictures.add(pair, truth)).await?
     } else {
@@ -88,14 +88,14 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
         Some(path) => {
             let shown = path.display();
             write_atomic(path, text.as_bytes()).with_context(|| format!("cannot write {shown}"))?;
-            context.output.say(&format!("report is in {shown}"));
+            context.output.info(&format!("the report is in {shown}"));
         }
         None => output::print(&text)?,
     }
-    Ok(gates(&report, &args, context))
+    Ok(check_requirements(&report, &args, context))
 }
 
-/// The report as a page with its pictures.
+/// Renders the report as a page with images.
 async fn pictured(
     report: &Report,
     pictures: GallerySelection,
@@ -114,7 +114,7 @@ async fn pictured(
     Ok(page(report, &gallery, &cover))
 }
 
-/// This project's report with another's beside it.
+/// Renders this project's report with another one.
 async fn compared(
     here: &Report,
     other: &Path,
@@ -135,24 +135,24 @@ async fn compared(
             Ok(serde_json::to_string_pretty(&value)?)
         }
         ReportFormat::Csv | ReportFormat::Markdown | ReportFormat::Latex | ReportFormat::Html => {
-            let text = format!("--compare goes with the forms text and json, not {format}");
+            let text = format!("--compare needs the format text or json, not {format}");
             Err(Refusal::Usage(text).into())
         }
     }
 }
 
-/// Prints the report to stdout, as text or as `--json` asks.
+/// Prints the report to stdout, as text or JSON.
 ///
 /// # Errors
 /// When the catalog cannot be read or stdout is closed.
 pub(super) async fn print(context: &Context) -> anyhow::Result<()> {
-    let format = chosen(ReportFormat::Text, context);
+    let format = chosen_format(ReportFormat::Text, context);
     output::print(&render(&read(context).await?, format))?;
     Ok(())
 }
 
-/// `--json` wins over `--format`.
-const fn chosen(format: ReportFormat, context: &Context) -> ReportFormat {
+/// Returns the format; `--json` overrides `--format`.
+const fn chosen_format(format: ReportFormat, context: &Context) -> ReportFormat {
     if context.global.json {
         ReportFormat::Json
     } else {
@@ -161,14 +161,14 @@ const fn chosen(format: ReportFormat, context: &Context) -> ReportFormat {
 }
 
 async fn read(context: &Context) -> anyhow::Result<Report> {
-    let (project, catalog) = context.reader().await?;
+    let (project, catalog) = context.open_read_only().await?;
     let report = build(&catalog, &project).await?.without_times();
     catalog.close().await;
     Ok(report)
 }
 
-/// Says what is not met; an incomplete report is told before one that is not good enough.
-fn gates(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
+/// Warns about unmet requirements and returns the exit code; an incomplete report comes before a low Acc.
+fn check_requirements(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
     let missing = if args.require_complete {
         quality_gate::missing(report)
     } else {

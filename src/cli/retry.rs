@@ -1,4 +1,4 @@
-//! `retry`: failed pairs are taken up again at the next run.
+//! `retry`: lets failed pairs run again.
 
 use clap::Args;
 use serde_json::json;
@@ -14,28 +14,28 @@ use crate::domain::FailureClass;
 /// Arguments of `retry`.
 #[derive(Debug, Args)]
 pub(super) struct RetryArgs {
-    /// These pairs [default: all that failed]
+    /// The pairs to retry [default: all failed pairs]
     #[arg(conflicts_with = "class")]
     pub(super) pairs: Vec<String>,
-    /// All that failed with this class: `bad_input`, `no_solution`, io, resource or bug
+    /// Retry the pairs that failed with this class: `bad_input`, `no_solution`, io, resource or bug
     #[arg(long)]
     pub(super) class: Option<FailureClass>,
 }
 
 pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.writer().await?;
+    let (_project, catalog) = context.open().await?;
     let selection = selection(&args, &catalog).await?;
     let retried = catalog.retry(&selection).await?;
     catalog.close().await;
     if retried == 0 {
-        return Err(Refusal::NothingSelected(nothing(&selection)).into());
+        return Err(Refusal::NothingSelected(no_match(&selection)).into());
     }
     if context.global.json {
         output::print_json(&json!({"schema": 1, "retried": retried}))?;
     }
     context
         .output
-        .say(&format!("{} will run again", count(retried, "pair")));
+        .info(&format!("{} will run again", count(retried, "pair")));
     context.output.next(&context.command("run"));
     Ok(ExitCode::Done)
 }
@@ -48,7 +48,7 @@ async fn selection(args: &RetryArgs, catalog: &Catalog) -> anyhow::Result<RetryS
     })
 }
 
-fn nothing(selection: &RetrySelection) -> String {
+fn no_match(selection: &RetrySelection) -> String {
     match selection {
         RetrySelection::All => "no pair has failed".to_owned(),
         RetrySelection::Class(class) => format!("no pair has failed with class {class}"),

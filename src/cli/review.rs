@@ -90,7 +90,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
             "--listen needs the one address of this machine under which the page is to be reached";
         return Err(Refusal::Usage(text.to_owned()).into());
     }
-    let (project, catalog) = context.writer().await?;
+    let (project, catalog) = context.open().await?;
     let language = args.lang.unwrap_or_else(language_of_system);
     let options = ReviewOptions {
         listen: SocketAddr::new(
@@ -124,7 +124,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     catalog.close().await;
     context
         .output
-        .say("the page is closed; every answer is stored");
+        .info("the page is closed; every answer is stored");
     context.output.next(&context.command("report"));
     Ok(ExitCode::Done)
 }
@@ -153,7 +153,7 @@ fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode>
         output::print(&json!({"schema": 1, "url": null}).to_string())?;
     }
     let reviewer = &args.reviewer;
-    context.output.say(&format!(
+    context.output.info(&format!(
         "no conflict waits for {reviewer}: no two others contradict each other on a result that nobody has settled"
     ));
     context.output.next(&context.command("agreement"));
@@ -193,13 +193,13 @@ fn tell(
     } else {
         output::print(&url)?;
     }
-    context.output.say(&format!(
+    context.output.info(&format!(
         "{}; the address opens once, in one browser; Ctrl-C ends",
         progress(&args.reviewer, page.cards())
     ));
     if address.ip().is_loopback() {
         let port = address.port();
-        context.output.say(&format!(
+        context.output.info(&format!(
             "on a far machine, first: ssh -L {port}:127.0.0.1:{port} THAT-MACHINE"
         ));
     } else {

@@ -1,4 +1,4 @@
-//! `run`: aligns what is left, shows how it goes, and says how it ended.
+//! `run`: aligns the pairs that are not aligned yet and reports the outcome.
 
 use std::time::Duration;
 
@@ -9,9 +9,9 @@ use super::context::Context;
 use super::exit::ExitCode;
 use super::failures::Failures;
 use super::output;
-use super::progress::Progress;
+use super::progress::ProgressReporter;
 use super::table::{Align, columns, count};
-use super::time_text::span;
+use super::time_text::duration;
 use super::{select, signals};
 use crate::catalog::{Catalog, Plan};
 use crate::config::Config;
@@ -22,74 +22,74 @@ use crate::store::{Project, RunLock};
 /// Arguments of `run`.
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
-    /// Only these pairs
+    /// Only these pairs [default: all]
     pub(super) pairs: Vec<String>,
-    /// Pairs worked on at the same time [default: one a core]
+    /// Number of pairs to process at the same time [default: one per core]
     #[arg(short = 'j', long = "jobs", value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub(super) jobs: Option<u16>,
-    /// Memory for the pairs worked on at the same time, such as 4G or 512M, by the sizes of their files; a larger pair
-    /// runs alone [default: most of what is free]
+    /// Memory for the pairs processed at the same time, such as 4G or 512M, estimated from file sizes; a pair that
+    /// needs more runs alone [default: most of the free memory]
     #[arg(long, value_name = "SIZE", value_parser = bytes)]
     pub(super) memory: Option<u64>,
-    /// Say what would run and why, and run nothing
+    /// Print what would run and why, without running it
     #[arg(short = 'n', long)]
     pub(super) dry_run: bool,
-    /// Join a run that goes on in another process, as more workers
+    /// Join a run in another process as additional workers
     #[arg(long)]
     pub(super) join: bool,
-    /// Stop after this many pairs failed
+    /// Stop after this many pairs have failed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) max_failures: Option<u64>,
-    /// Run these again too; what changed is always run again
+    /// Also run these pairs again; pairs whose settings or files changed always run again
     #[arg(long, value_name = "WHICH")]
-    pub(super) rerun: Option<Rerun>,
-    /// This stage only: what it needs is run where it is missing, what follows waits for a later run
+    pub(super) rerun: Option<RerunArg>,
+    /// Run only this stage, and earlier stages where their results are missing; later stages wait for another run
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
 }
 
-/// What to run again.
+/// Pairs to run again.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum Rerun {
+pub(super) enum RerunArg {
     /// Pairs that failed.
     Failed,
-    /// Pairs whose settings or files changed: what a run does anyway.
+    /// Pairs whose settings or files changed, which every run includes.
     Stale,
     /// Every pair.
     All,
 }
 
-impl From<Rerun> for runner::Rerun {
-    fn from(rerun: Rerun) -> Self {
+impl From<RerunArg> for runner::Rerun {
+    fn from(rerun: RerunArg) -> Self {
         match rerun {
-            Rerun::Failed => Self::Failed,
-            Rerun::Stale => Self::Stale,
-            Rerun::All => Self::All,
+            RerunArg::Failed => Self::Failed,
+            RerunArg::Stale => Self::Stale,
+            RerunArg::All => Self::All,
         }
     }
 }
 
 pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let config = context.settings()?.config;
-    let (project, catalog) = context.writer().await?;
+    let (project, catalog) = context.open().await?;
     let options = options(&args, &config, &catalog).await?;
     if args.dry_run {
         let plan = runner::plan(&project, &catalog, &config.stages, &options).await?;
         catalog.close().await;
-        return tell_plan(&plan, RunLock::is_held(&project), context);
+        return print_plan(&plan, RunLock::is_held(&project), context);
     }
     let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
     if context.global.json {
         output::print_json(&as_json(&summary))?;
     }
-    tell_end(&summary, &failures, context);
+    print_outcome(&summary, &failures, context);
     for command in next_steps(&summary, &failures) {
         context.output.next(&context.command(&command));
     }
     Ok(code(&summary))
 }
 
-/// A number of bytes with an ending for its unit: 4G, 512M, 900K.
+/// Parses a number of bytes with an optional unit: 4G, 512M, 900K.
 fn bytes(text: &str) -> Result<u64, String> {
     let text = text.trim();
     let (number, shift) = match text.chars().last().map(|c| c.to_ascii_uppercase()) {
@@ -125,7 +125,7 @@ async fn options(args: &RunArgs, config: &Config, catalog: &Catalog) -> anyhow::
     })
 }
 
-/// Options of a run of all pairs, from the settings alone.
+/// Returns the options of a run of all pairs, from the settings alone.
 pub(super) fn from_config(config: &Config) -> RunOptions {
     let plain = RunOptions::default();
     RunOptions {
@@ -144,7 +144,7 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
     }
 }
 
-/// Runs with progress on the screen and signals watched, and closes the catalog.
+/// Runs with progress on stderr and signal handling, then closes the catalog.
 ///
 /// # Errors
 /// As [`runner::run`].
@@ -158,11 +158,11 @@ pub(super) async fn drive(
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;
     let global = &context.global;
-    let mut progress = Progress::new(
+    let mut progress = ProgressReporter::new(
         global.progress,
         global.quiet,
         &context.screen,
-        context.output.err,
+        context.output.stderr,
     );
     let ended = runner::run(project, &catalog, &config.stages, options, &stop, |event| {
         progress.event(&event);
@@ -175,7 +175,7 @@ pub(super) async fn drive(
     Ok((ended?, failures?))
 }
 
-/// The exit code of a run.
+/// Returns the exit code of a run.
 pub(super) const fn code(summary: &RunSummary) -> ExitCode {
     if summary.stopped {
         ExitCode::Stopped
@@ -186,18 +186,18 @@ pub(super) const fn code(summary: &RunSummary) -> ExitCode {
     }
 }
 
-/// Says how a run ended and which pairs failed.
-pub(super) fn tell_end(summary: &RunSummary, failures: &Failures, context: &Context) {
+/// Prints how a run ended and which pairs failed.
+pub(super) fn print_outcome(summary: &RunSummary, failures: &Failures, context: &Context) {
     let output = &context.output;
-    output.say(&headline(summary));
+    output.info(&headline(summary));
     if summary.failed_in_all > 0 {
         let number = count(summary.failed_in_all, "pair");
-        output.say(&format!("{number} failed:\n{}", failures.text().trim_end()));
+        output.info(&format!("{number} failed:\n{}", failures.text().trim_end()));
     }
 }
 
 fn headline(summary: &RunSummary) -> String {
-    let took = span(summary.elapsed_ms);
+    let took = duration(summary.elapsed_ms);
     if summary.stopped {
         return format!(
             "stopped after {took}: {} done, {} left; the state is safe",
@@ -207,8 +207,8 @@ fn headline(summary: &RunSummary) -> String {
     }
     if summary.too_many_failures {
         return format!(
-            "stopped after {took} at {} failed in this run: {} done, {} left",
-            summary.failed,
+            "stopped after {took} because {} failed in this run: {} done, {} left",
+            count(summary.failed, "pair"),
             count(summary.done, "pair"),
             summary.left
         );
@@ -230,7 +230,7 @@ fn headline(summary: &RunSummary) -> String {
     )
 }
 
-/// What a person may want to do after a run.
+/// Returns the commands that make sense after a run.
 pub(super) fn next_steps(summary: &RunSummary, failures: &Failures) -> Vec<String> {
     let mut steps = Vec::new();
     if summary.status.pairs == 0 {
@@ -265,7 +265,7 @@ fn as_json(summary: &RunSummary) -> Value {
     })
 }
 
-fn tell_plan(plan: &Plan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
+fn print_plan(plan: &Plan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
     if context.global.json {
         output::print_json(&json!({"schema": 1, "pairs": plan.pairs(), "plan": plan}))?;
         return Ok(ExitCode::Done);
@@ -279,14 +279,14 @@ fn tell_plan(plan: &Plan, running: bool, context: &Context) -> anyhow::Result<Ex
 
 fn plan_text(plan: &Plan, running: bool) -> String {
     let leased = if running {
-        "in the hands of another run"
+        "running in another process"
     } else {
-        "cut off by the end of their process would run on"
+        "interrupted (they would continue)"
     };
     let mut parts = vec![format!("{} would run", count(plan.pairs(), "pair"))];
     for (number, what) in [
         (plan.done, "done"),
-        (plan.quarantined, "failed and kept back"),
+        (plan.quarantined, "failed"),
         (plan.held, "set aside"),
         (plan.leased, leased),
     ] {
@@ -319,7 +319,7 @@ mod tests {
     use crate::domain::Stage;
 
     #[test]
-    fn sizes_have_a_unit() {
+    fn sizes_may_have_a_unit() {
         assert_eq!(bytes("4G"), Ok(4 << 30));
         assert_eq!(bytes("512m"), Ok(512 << 20));
         assert_eq!(bytes("1000"), Ok(1000));

@@ -1,4 +1,4 @@
-//! How far a run has come, told from its events.
+//! Counts a run's progress from its events.
 
 use crate::domain::Stage;
 use crate::runner::RunEvent;
@@ -6,24 +6,24 @@ use crate::runner::RunEvent;
 /// Counts of a run so far.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub(super) struct RunProgress {
-    /// Stages to do in all.
+    /// All stages to compute.
     pub(super) stages: u64,
-    /// Stages done, or that will not run because their pair failed.
-    pub(super) passed: u64,
+    /// Stages done, and stages that will not run because their pair failed.
+    pub(super) finished: u64,
     /// Stages computed.
     pub(super) computed: u64,
-    /// Pairs to do.
+    /// All pairs to align.
     pub(super) pairs: u64,
     /// Pairs done.
     pub(super) done: u64,
     /// Pairs failed.
     pub(super) failed: u64,
-    /// Done and to do by stage.
+    /// Done and total per stage.
     pub(super) by_stage: [(u64, u64); 4],
 }
 
 impl RunProgress {
-    /// Takes in one event.
+    /// Counts one event.
     pub(super) fn observe(&mut self, event: &RunEvent) {
         match event {
             RunEvent::Started {
@@ -34,10 +34,10 @@ impl RunProgress {
             } => {
                 self.pairs = *pairs;
                 self.stages = *stages;
-                self.by_stage = by_stage.map(|todo| (0, todo));
+                self.by_stage = by_stage.map(|total| (0, total));
             }
             RunEvent::StageFinished { stage, .. } => {
-                self.passed += 1;
+                self.finished += 1;
                 self.computed += 1;
                 self.by_stage[stage.index()].0 += 1;
             }
@@ -52,18 +52,19 @@ impl RunProgress {
 
     fn fail(&mut self, stage: Stage, skipped: u64) {
         self.failed += 1;
-        self.passed += skipped;
-        for (_, todo) in self.by_stage.iter_mut().skip(stage.index()) {
-            *todo = todo.saturating_sub(1);
+        self.finished += skipped;
+        for (_, total) in self.by_stage.iter_mut().skip(stage.index()) {
+            *total = total.saturating_sub(1);
         }
     }
 
-    /// `fit 24/24  depth 20/24  normalize 12/24  register 10/24`, with the failed pairs where there are some.
+    /// Returns `fit 24/24  depth 20/24  normalize 12/24  register 10/24`, followed by the number of failed pairs if
+    /// there are any.
     pub(super) fn by_stage_line(&self) -> String {
         let mut parts: Vec<String> = Stage::ALL
             .iter()
             .zip(self.by_stage)
-            .map(|(stage, (done, todo))| format!("{stage} {done}/{todo}"))
+            .map(|(stage, (done, total))| format!("{stage} {done}/{total}"))
             .collect();
         if self.failed > 0 {
             parts.push(format!("{} failed", self.failed));
@@ -71,7 +72,7 @@ impl RunProgress {
         parts.join("  ")
     }
 
-    /// One line for a log: `42 % · 10 of 24 pairs done, 1 failed · 3.1 stages/s · about 17 s left`.
+    /// Returns one line for a log: `42 % · 10 of 24 pairs done, 1 failed · 3.1 stages/s · about 17 s left`.
     pub(super) fn line(&self, elapsed_ms: u64) -> String {
         let counts = format!(
             "{} % · {} of {} pairs done, {} failed",
@@ -82,23 +83,23 @@ impl RunProgress {
         );
         match self.rate(elapsed_ms) {
             Some(rate) => {
-                let left_ms = self.stages.saturating_sub(self.passed) as f64 / rate * 1000.0;
-                let left = super::time_text::rough(left_ms as u64);
+                let left_ms = self.stages.saturating_sub(self.finished) as f64 / rate * 1000.0;
+                let left = super::time_text::rough_duration(left_ms as u64);
                 format!("{counts} · {rate:.1} stages/s · about {left} left")
             }
             None => counts,
         }
     }
 
-    /// Whole per cent of the stages, rounded down, so that 100 is the end.
+    /// Returns the finished stages in per cent, rounded down so that only the end is 100.
     pub(super) const fn percent(&self) -> u64 {
-        match (self.passed * 100).checked_div(self.stages) {
+        match (self.finished * 100).checked_div(self.stages) {
             Some(percent) => percent,
             None => 100,
         }
     }
 
-    /// Stages a second; `None` before there is one.
+    /// Returns stages per second; `None` before the first stage.
     fn rate(&self, elapsed_ms: u64) -> Option<f64> {
         (self.computed > 0 && elapsed_ms > 0)
             .then(|| self.computed as f64 * 1000.0 / elapsed_ms as f64)
@@ -116,47 +117,47 @@ mod tests {
     }
 
     #[test]
-    fn failed_pair_takes_its_stages_off_the_list() {
-        let mut counts = RunProgress::default();
-        counts.observe(&RunEvent::Started {
+    fn stages_of_a_failed_pair_count_as_finished() {
+        let mut progress = RunProgress::default();
+        progress.observe(&RunEvent::Started {
             pairs: 2,
             stages: 8,
             by_stage: [2; 4],
             workers: 1,
         });
         for stage in Stage::ALL {
-            counts.observe(&RunEvent::StageFinished {
+            progress.observe(&RunEvent::StageFinished {
                 pair: pair(),
                 stage,
                 ms: 5,
             });
         }
-        counts.observe(&RunEvent::PairDone { pair: pair() });
-        assert_eq!(counts.percent(), 50);
-        counts.observe(&RunEvent::StageFinished {
+        progress.observe(&RunEvent::PairDone { pair: pair() });
+        assert_eq!(progress.percent(), 50);
+        progress.observe(&RunEvent::StageFinished {
             pair: pair(),
             stage: Stage::Fit,
             ms: 5,
         });
-        counts.observe(&RunEvent::PairFailed {
+        progress.observe(&RunEvent::PairFailed {
             pair: pair(),
             stage: Stage::Depth,
             failure: Failure::new(FailureClass::NoSolution, "flat"),
             skipped: 3,
         });
-        assert_eq!(counts.percent(), 100);
+        assert_eq!(progress.percent(), 100);
         assert_eq!(
-            counts.by_stage_line(),
+            progress.by_stage_line(),
             "fit 2/2  depth 1/1  normalize 1/1  register 1/1  1 failed"
         );
         assert_eq!(
-            counts.line(1000),
+            progress.line(1000),
             "100 % · 1 of 2 pairs done, 1 failed · 5.0 stages/s · about 0 s left"
         );
     }
 
     #[test]
-    fn nothing_to_do_is_all_done() {
+    fn run_without_stages_is_at_100_per_cent() {
         assert_eq!(RunProgress::default().percent(), 100);
     }
 }

@@ -1,15 +1,14 @@
 //! Pairs named on the command line.
 
+use super::exit::Refusal;
 use crate::catalog::Catalog;
 use crate::config::nearest;
 use crate::domain::PairName;
 
-use super::exit::Refusal;
-
-/// The names as ids of pairs that are there.
+/// Looks up pairs by their ids.
 ///
 /// # Errors
-/// When one of them is no pair; the nearest ids are told.
+/// When one of them does not exist; the message suggests similar ids.
 pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result<Vec<PairName>> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;
@@ -26,7 +25,7 @@ pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result
     }
 }
 
-/// One pair.
+/// Looks up one pair.
 ///
 /// # Errors
 /// As [`pairs`].
@@ -39,11 +38,14 @@ pub(super) async fn pair(catalog: &Catalog, typed: &str) -> anyhow::Result<PairN
 }
 
 fn no_such_pair(typed: &str, all: &[PairName]) -> String {
-    let near = nearest(typed, all.iter().map(PairName::as_str), 3);
-    if near.is_empty() {
+    let similar = nearest(typed, all.iter().map(PairName::as_str), 3);
+    if similar.is_empty() {
         format!("there is no pair {typed}")
     } else {
-        format!("there is no pair {typed}; near are {}", near.join(", "))
+        format!(
+            "there is no pair {typed}; similar ids: {}",
+            similar.join(", ")
+        )
     }
 }
 
@@ -52,11 +54,11 @@ mod tests {
     use super::no_such_pair;
 
     #[test]
-    fn near_ids_are_told() {
+    fn similar_ids_are_suggested() {
         let all = ["0001", "0002", "b04-0117"].map(|id| id.parse().expect("valid id"));
         assert_eq!(
             no_such_pair("b4-0117", &all),
-            "there is no pair b4-0117; near are b04-0117"
+            "there is no pair b4-0117; similar ids: b04-0117"
         );
         assert_eq!(no_such_pair("zzz", &all), "there is no pair zzz");
     }

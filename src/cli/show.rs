@@ -1,17 +1,19 @@
-//! `show PAIR`: numbers, files, history, and why it runs again.
+//! `show PAIR`: prints numbers, files, history, and why the pair will run again.
 
 use clap::Args;
 use serde_json::{Value, json};
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::output::{self, Palette, Tone};
-use super::show_hand::Laid;
-use super::show_text::Page;
+use super::output;
+use super::screen::{Palette, Tone};
+use super::select;
+use super::show_text::{Adjustment, ManualResult, PairPage, manual_text};
 use super::time_text::utc;
-use super::{select, show_hand, verdict};
-use crate::catalog::{PairDetail, PlanEntry};
-use crate::domain::JobStatus;
+use super::verdict;
+use crate::catalog::{Catalog, CatalogError, PairDetail, PairResults, PlanEntry, StoredAlignment};
+use crate::domain::{DepthOutcome, JobStatus, MetricOutcome, Stage, ThresholdMetric};
+use crate::report::ManualCorrection;
 use crate::runner;
 use crate::store::Project;
 
@@ -23,29 +25,29 @@ pub(super) struct ShowArgs {
 }
 
 pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.reader().await?;
+    let (project, catalog) = context.open_read_only().await?;
     let name = select::pair(&catalog, &args.pair).await?;
     let recipes = runner::recipes(&context.settings()?.config.stages);
     let why = catalog.why(&name, &recipes).await?;
     let Some(detail) = catalog.pair(&name).await? else {
-        anyhow::bail!("pair {name} went away while it was looked up");
+        anyhow::bail!("pair {name} was removed while it was read");
     };
-    let laid = show_hand::of(&catalog, &detail.results).await?;
+    let manual = manual_results(&catalog, &detail.results).await?;
     catalog.close().await;
     if context.global.json {
-        output::print_json(&as_json(&detail, &laid, why.as_ref(), &project)?)?;
+        output::print_json(&as_json(&detail, &manual, why.as_ref(), &project)?)?;
         return Ok(ExitCode::Done);
     }
-    let page = Page {
+    let page = PairPage {
         detail: &detail,
         project: &project,
-        palette: context.output.out,
+        palette: context.output.stdout,
     };
     output::print(&format!(
         "{}{}{}",
         page.text(),
-        show_hand::text(&laid, context.output.out),
-        tail(&detail, why.as_ref(), context.output.out)
+        manual_text(&manual, context.output.stdout),
+        tail(&detail, why.as_ref(), context.output.stdout)
     ))?;
     for command in next_steps(&detail, why.is_some()) {
         context.output.next(&context.command(&command));
@@ -53,7 +55,7 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-/// Verdicts and what comes next.
+/// Formats the verdicts and what the next run would do.
 fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> String {
     let mut lines = Vec::new();
     if !detail.verdict_log.is_empty() {
@@ -64,9 +66,9 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
     lines.push(palette.paint(Tone::Strong, "next run"));
     lines.push(match (why, detail.results.status) {
         (Some(entry), _) => format!("  from {}: {}", entry.from, entry.why),
-        (None, JobStatus::Quarantined) => "  stays failed until it is retried".to_owned(),
-        (None, JobStatus::Held) => "  set aside until it is retried".to_owned(),
-        (None, JobStatus::Leased) => "  in the hands of a run".to_owned(),
+        (None, JobStatus::Quarantined) => "  nothing until `retry`".to_owned(),
+        (None, JobStatus::Held) => "  set aside until `retry`".to_owned(),
+        (None, JobStatus::Leased) => "  running now".to_owned(),
         (None, JobStatus::Done | JobStatus::Ready | JobStatus::Backoff) => {
             "  nothing left to do".to_owned()
         }
@@ -86,10 +88,10 @@ fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
     }
 }
 
-/// The catalog's record with the paths of its files and what a run would do.
+/// Returns the catalog's record with the paths of its files and what the next run would do.
 fn as_json(
     detail: &PairDetail,
-    laid: &[Laid],
+    manual: &[ManualResult],
     why: Option<&PlanEntry>,
     project: &Project,
 ) -> anyhow::Result<Value> {
@@ -103,9 +105,55 @@ fn as_json(
             }
         }
         fields.insert("files".to_owned(), Value::Object(paths));
-        fields.insert("by_hand".to_owned(), serde_json::to_value(laid)?);
+        fields.insert(
+            "manual_alignments".to_owned(),
+            serde_json::to_value(manual)?,
+        );
         fields.insert("next_run".to_owned(), serde_json::to_value(why)?);
         fields.insert("schema".to_owned(), json!(1));
     }
     Ok(value)
+}
+
+/// Reads the manual alignments of a pair that were not undone, oldest first.
+///
+/// # Errors
+/// When the catalog cannot be read.
+async fn manual_results(
+    catalog: &Catalog,
+    results: &PairResults,
+) -> Result<Vec<ManualResult>, CatalogError> {
+    let all = catalog.manual_alignments().await?.into_iter();
+    let of_pair =
+        all.filter(|stored| stored.made.pair == results.facts.name && stored.undone_at.is_none());
+    Ok(of_pair
+        .map(|stored| ManualResult {
+            adjustment: adjustment(&stored, results),
+            stored,
+        })
+        .collect())
+}
+
+fn adjustment(manual: &StoredAlignment, results: &PairResults) -> Option<Adjustment> {
+    let automatic = automatic_result(results).filter(|_| manual.on_current_depth)?;
+    let depth: DepthOutcome = results.stage(Stage::Depth)?.parse().ok()?;
+    let size = [depth.width, depth.height];
+    let by = ManualCorrection::between(
+        &automatic.print_from_depth,
+        &manual.made.print_from_depth,
+        size,
+    )?;
+    Some(Adjustment {
+        from: automatic.metric,
+        by,
+        from_iou: automatic.scores.iou,
+    })
+}
+
+/// Returns the result that manual alignments are compared with: that of the ensemble, otherwise the first.
+fn automatic_result(results: &PairResults) -> Option<&MetricOutcome> {
+    let ensemble = results.metric(ThresholdMetric::Ensemble);
+    ensemble
+        .or(results.metrics.first())
+        .map(|record| &record.outcome)
 }

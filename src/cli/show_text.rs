@@ -1,29 +1,38 @@
-//! The page that `show` prints of one pair.
+//! The text that `show` prints about one pair.
 
-use super::output::{Palette, Tone};
+use serde::Serialize;
+
+use super::screen::{Palette, Tone};
 use super::table::{Align, columns};
-use super::time_text::{span, utc};
-use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord};
-use crate::domain::{DepthOutcome, FitOutcome, JobStatus, NormalizeOutcome, Stage, Verdict};
+use super::time_text::{duration, utc};
+use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
+use crate::domain::{
+    DepthOutcome, FitOutcome, JobStatus, NormalizeOutcome, Stage, ThresholdMetric, Verdict,
+};
+use crate::report::ManualCorrection;
 use crate::store::Project;
 
 /// One pair, its project and the colours.
-pub(super) struct Page<'a> {
+pub(super) struct PairPage<'a> {
     pub(super) detail: &'a PairDetail,
     pub(super) project: &'a Project,
     pub(super) palette: Palette,
 }
 
-/// A heading on a line of its own.
-pub(super) fn heading(word: &str, palette: Palette) -> String {
-    format!("{}\n", palette.paint(Tone::Strong, word))
+/// Formats a heading and the rows below it; returns nothing if there are no rows.
+fn section(name: &str, rows: &[Vec<String>], aligns: &[Align], palette: Palette) -> String {
+    if rows.is_empty() {
+        return String::new();
+    }
+    let heading = palette.paint(Tone::Strong, name);
+    format!("{heading}\n{}", columns(rows, aligns))
 }
 
-impl Page<'_> {
-    /// Everything but verdicts and next steps.
+impl PairPage<'_> {
+    /// Formats everything except manual alignments, verdicts and the next run.
     pub(super) fn text(&self) -> String {
         [
-            self.facts(),
+            self.attributes(),
             self.failure(),
             self.stages(),
             self.metrics(),
@@ -33,7 +42,7 @@ impl Page<'_> {
         .concat()
     }
 
-    fn facts(&self) -> String {
+    fn attributes(&self) -> String {
         let facts = &self.detail.results.facts;
         let mut names = vec![self.palette.paint(Tone::Strong, &facts.name)];
         names.extend(
@@ -72,7 +81,7 @@ impl Page<'_> {
         let missing = if path.exists() {
             String::new()
         } else {
-            self.palette.paint(Tone::Bad, "  not there")
+            self.palette.paint(Tone::Bad, "  (missing)")
         };
         format!("{}{missing}", path.display())
     }
@@ -90,7 +99,7 @@ impl Page<'_> {
         let stage = results.next_stage.map(|stage| format!(" before {stage}"));
         let crashes = match self.detail.crashes {
             0 => String::new(),
-            crashes => format!(", {crashes} workers died over it"),
+            crashes => format!(", {crashes} workers died on it"),
         };
         format!("{status}{}{crashes}", stage.unwrap_or_default())
     }
@@ -111,26 +120,19 @@ impl Page<'_> {
 
     fn stages(&self) -> String {
         let records = &self.detail.results.stages;
-        if records.is_empty() {
-            return String::new();
-        }
         let rows: Vec<Vec<String>> = records
             .iter()
             .map(|record| {
                 vec![
                     format!("  {}", record.stage),
-                    span(record.ms),
+                    duration(record.ms),
                     record.result_hash.short(),
                     numbers(record),
                 ]
             })
             .collect();
         let aligns = [Align::Left, Align::Right, Align::Left, Align::Left];
-        format!(
-            "{}{}",
-            heading("stages", self.palette),
-            columns(&rows, &aligns)
-        )
+        section("stages", &rows, &aligns, self.palette)
     }
 
     fn metrics(&self) -> String {
@@ -144,11 +146,7 @@ impl Page<'_> {
         let mut aligns = [Align::Right; 12];
         aligns[0] = Align::Left;
         aligns[11] = Align::Left;
-        format!(
-            "{}{}",
-            heading("result", self.palette),
-            columns(&rows, &aligns)
-        )
+        section("result", &rows, &aligns, self.palette)
     }
 
     fn files(&self) -> String {
@@ -163,31 +161,14 @@ impl Page<'_> {
                 vec![format!("  {role}"), path.display().to_string()]
             })
             .collect();
-        if rows.is_empty() {
-            return String::new();
-        }
-        format!(
-            "{}{}",
-            heading("files", self.palette),
-            columns(&rows, &[Align::Left; 2])
-        )
+        section("files", &rows, &[Align::Left; 2], self.palette)
     }
 
     fn history(&self) -> String {
-        let attempts = &self.detail.attempts;
-        if attempts.is_empty() {
-            return String::new();
-        }
-        let rows: Vec<Vec<String>> = attempts
-            .iter()
-            .map(|attempt| self.attempt_row(attempt))
-            .collect();
+        let attempts = self.detail.attempts.iter();
+        let rows: Vec<Vec<String>> = attempts.map(|attempt| self.attempt_row(attempt)).collect();
         let aligns = [Align::Left, Align::Left, Align::Right, Align::Left];
-        format!(
-            "{}{}",
-            heading("history", self.palette),
-            columns(&rows, &aligns)
-        )
+        section("history", &rows, &aligns, self.palette)
     }
 
     fn attempt_row(&self, attempt: &AttemptRecord) -> Vec<String> {
@@ -201,13 +182,13 @@ impl Page<'_> {
         vec![
             format!("  {}", utc(attempt.at)),
             attempt.stage.to_string(),
-            attempt.ms.map_or_else(String::new, span),
+            attempt.ms.map_or_else(String::new, duration),
             outcome,
         ]
     }
 }
 
-/// The few numbers of a stage that tell whether it went well.
+/// Returns the few numbers of a stage that show whether it succeeded.
 fn numbers(record: &StageRecord) -> String {
     let text = match record.stage {
         Stage::Fit => record.parse::<FitOutcome>().map(|fit| fit_numbers(&fit)),
@@ -227,16 +208,16 @@ fn numbers(record: &StageRecord) -> String {
         }),
         Stage::Register => Ok(String::new()),
     };
-    text.unwrap_or_else(|_| "written by another version of the program".to_owned())
+    text.unwrap_or_else(|_| "written by another version of this program".to_owned())
 }
 
 fn fit_numbers(fit: &FitOutcome) -> String {
     let bow = match fit.bow {
-        Some(_) => format!(", bow {:.3}", fit.bow_height),
+        Some(_) => format!(", curvature {:.3}", fit.bow_height),
         None => String::new(),
     };
     format!(
-        "relief {:.3}, rms {:.4}, inliers {:.2}, side sure {:.2}{bow}; {} vertices, {} triangles",
+        "relief {:.3}, rms {:.4}, inliers {:.2}, side confidence {:.2}{bow}; {} vertices, {} triangles",
         fit.relief, fit.rms, fit.inlier_ratio, fit.side.confidence, fit.vertices, fit.triangles
     )
 }
@@ -253,7 +234,7 @@ fn depth_numbers(depth: &DepthOutcome) -> String {
 
 fn metric_row(record: &MetricRecord) -> Vec<String> {
     let result = &record.outcome;
-    let bound = if result.at_bound { " at a bound" } else { "" };
+    let bound = if result.at_bound { " at a limit" } else { "" };
     vec![
         format!("  {}", result.metric),
         format!("{:.2}", result.angle_deg),
@@ -267,7 +248,7 @@ fn metric_row(record: &MetricRecord) -> Vec<String> {
         format!("{:.3}", result.margin),
         result
             .confidence
-            .map_or_else(|| "-".to_owned(), |sure| format!("{sure:.3}")),
+            .map_or_else(|| "-".to_owned(), |confidence| format!("{confidence:.3}")),
         format!("{}{bound}", verdicts(record)),
     ]
 }
@@ -288,4 +269,89 @@ fn verdicts(record: &MetricRecord) -> String {
         parts.push(format!("{} for an older result", record.older_verdicts));
     }
     parts.join(", ")
+}
+
+/// A manual alignment beside the automatic result.
+#[derive(Debug, Serialize)]
+pub(super) struct ManualResult {
+    #[serde(flatten)]
+    pub(super) stored: StoredAlignment,
+    /// The difference to the automatic result; `None` if that belongs to another depth map.
+    pub(super) adjustment: Option<Adjustment>,
+}
+
+/// How a manual alignment differs from the result of a metric.
+#[derive(Debug, Serialize)]
+pub(super) struct Adjustment {
+    pub(super) from: ThresholdMetric,
+    #[serde(flatten)]
+    pub(super) by: ManualCorrection,
+    /// Intersection over union of the automatic result.
+    pub(super) from_iou: f64,
+}
+
+/// Formats manual alignments, one line each; returns nothing if there are none.
+pub(super) fn manual_text(manual: &[ManualResult], palette: Palette) -> String {
+    let rows: Vec<Vec<String>> = manual.iter().map(|one| vec![manual_line(one)]).collect();
+    section("manual alignments", &rows, &[Align::Left], palette)
+}
+
+/// Returns `  2026-11-22 02:10:00  lan: rotated 5.0°, shifted 12.1 px, scaled 1.000 from ensemble; IoU 0.616, before
+/// 0.702`.
+fn manual_line(manual: &ManualResult) -> String {
+    let made = &manual.stored.made;
+    let change = match &manual.adjustment {
+        Some(adjustment) => adjustment_text(adjustment, made.iou),
+        None if manual.stored.holds => "on an earlier depth map".to_owned(),
+        None => "for another mesh or print".to_owned(),
+    };
+    let note = made.note.as_deref().map(|note| format!(" ({note})"));
+    format!(
+        "  {}  {}: {change}{}",
+        utc(manual.stored.at),
+        made.reviewer,
+        note.unwrap_or_default()
+    )
+}
+
+fn adjustment_text(adjustment: &Adjustment, iou: f64) -> String {
+    let ManualCorrection {
+        turned_deg,
+        shifted_px: [x, y],
+        scaled,
+        mirrored,
+    } = adjustment.by;
+    // Adding zero turns -0.0 into 0.0.
+    let turned_deg = (turned_deg * 10.0).round() / 10.0 + 0.0;
+    let mirrored = if mirrored { ", mirrored" } else { "" };
+    format!(
+        "rotated {turned_deg:.1}\u{b0}, shifted {:.1} px, scaled {scaled:.3}{mirrored} from {}; IoU {iou:.3}, before {:.3}",
+        x.hypot(y),
+        adjustment.from,
+        adjustment.from_iou
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Adjustment, ManualCorrection, adjustment_text};
+    use crate::domain::ThresholdMetric;
+
+    #[test]
+    fn adjustment_is_one_line() {
+        let adjustment = Adjustment {
+            from: ThresholdMetric::Ensemble,
+            by: ManualCorrection {
+                turned_deg: -5.04,
+                shifted_px: [3.0, 4.0],
+                scaled: 1.0,
+                mirrored: true,
+            },
+            from_iou: 0.7021,
+        };
+        assert_eq!(
+            adjustment_text(&adjustment, 0.616),
+            "rotated -5.0\u{b0}, shifted 5.0 px, scaled 1.000, mirrored from ensemble; IoU 0.616, before 0.702"
+        );
+    }
 }

@@ -1,15 +1,16 @@
-//! Ctrl-C, SIGTERM and a closed terminal: the first drains the run, the second stops it now.
+//! Signals: the first one lets a run finish its current stages, the second stops it at once.
 
-use tokio::signal::unix::{SignalKind, signal};
 use tokio::task::JoinHandle;
 
 use crate::runner::Stop;
 
-/// Watches for signals until the handle is aborted.
+/// Watches Ctrl-C, SIGTERM and a closed terminal until the handle is aborted.
 ///
 /// # Errors
-/// When the system refuses a handler.
+/// When the system does not install a handler.
+#[cfg(unix)]
 pub(super) fn watch(stop: &Stop) -> std::io::Result<JoinHandle<()>> {
+    use tokio::signal::unix::{SignalKind, signal};
     let mut interrupt = signal(SignalKind::interrupt())?;
     let mut terminate = signal(SignalKind::terminate())?;
     let mut hang_up = signal(SignalKind::hangup())?;
@@ -22,6 +23,20 @@ pub(super) fn watch(stop: &Stop) -> std::io::Result<JoinHandle<()>> {
                 Some(()) = hang_up.recv() => stop.escalate(),
                 else => return,
             };
+        }
+    }))
+}
+
+/// Watches Ctrl-C until the handle is aborted.
+///
+/// # Errors
+/// Never.
+#[cfg(not(unix))]
+pub(super) fn watch(stop: &Stop) -> std::io::Result<JoinHandle<()>> {
+    let stop = stop.clone();
+    Ok(tokio::spawn(async move {
+        while tokio::signal::ctrl_c().await.is_ok() {
+            stop.escalate();
         }
     }))
 }

@@ -1,4 +1,4 @@
-//! `status`: where the project stands, on one screen.
+//! `status`: shows the state of the project on one screen.
 
 use std::io::IsTerminal;
 use std::time::Duration;
@@ -6,11 +6,11 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use super::context::{Context, quoted};
+use super::context::{Context, shell_quoted};
 use super::exit::ExitCode;
 use super::failures::Failures;
-use super::output::{self, Palette, Tone};
-use super::progress::CLEAR;
+use super::output;
+use super::screen::{CLEAR, Palette, Tone};
 use super::table::{Align, columns, count};
 use super::verdict::reviewer_name;
 use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
@@ -21,18 +21,18 @@ use crate::store::{Project, RunLock};
 /// Arguments of `status`.
 #[derive(Debug, Args)]
 pub(super) struct StatusArgs {
-    /// Look again every two seconds until Ctrl-C
+    /// Refresh every two seconds until Ctrl-C
     #[arg(short, long)]
     pub(super) watch: bool,
-    /// Name every failed pair with its reason, not only the first of each class
+    /// List every failed pair with its error, not only the first ones of each class
     #[arg(long)]
     pub(super) failed: bool,
 }
 
-const EVERY: Duration = Duration::from_secs(2);
+const WATCH_INTERVAL: Duration = Duration::from_secs(2);
 
 pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (project, catalog) = context.reader().await?;
+    let (project, catalog) = context.open_read_only().await?;
     loop {
         let recipes = runner::recipes(&context.settings()?.config.stages);
         let failures = if args.failed {
@@ -40,13 +40,13 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
         } else {
             Failures::read(&catalog).await?
         };
-        let view = View::read(&project, &catalog, &recipes, failures).await?;
-        show(&view, &args, context)?;
+        let status = ProjectStatus::read(&project, &catalog, &recipes, failures).await?;
+        print_status(&status, &args, context)?;
         if !args.watch {
             break;
         }
         tokio::select! {
-            () = tokio::time::sleep(EVERY) => {}
+            () = tokio::time::sleep(WATCH_INTERVAL) => {}
             _ = tokio::signal::ctrl_c() => break,
         }
     }
@@ -54,22 +54,22 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
     Ok(ExitCode::Done)
 }
 
-/// What the screen shows.
-struct View {
+/// The state that the screen shows.
+struct ProjectStatus {
     counts: StatusCounts,
-    /// Whether a process works on the project: without one nothing runs, whatever the leases say.
+    /// Whether a process works on the project; otherwise leased pairs are not running but interrupted.
     running: bool,
     failures: Failures,
 }
 
-impl View {
+impl ProjectStatus {
     async fn read(
         project: &Project,
         catalog: &Catalog,
         recipes: &Recipes,
         failures: Failures,
     ) -> anyhow::Result<Self> {
-        // Before the counts: a run that ends in between leaves no leases.
+        // Read before the counts: a run that ends in between leaves no leases.
         let running = RunLock::is_held(project);
         let counts = catalog.status(recipes).await?;
         Ok(Self {
@@ -87,7 +87,7 @@ impl View {
         self.jobs(JobStatus::Ready) + self.jobs(JobStatus::Backoff)
     }
 
-    /// Pairs that a process had in hand when it died; the next run takes them up.
+    /// Returns the number of pairs whose process died; the next run continues them.
     fn interrupted(&self) -> u64 {
         if self.running {
             0
@@ -96,10 +96,10 @@ impl View {
         }
     }
 
-    fn json(&self, names_failed: bool) -> anyhow::Result<Value> {
+    fn json(&self, with_failures: bool) -> anyhow::Result<Value> {
         let mut json = serde_json::to_value(&self.counts)?;
         json["running"] = Value::from(self.running);
-        if names_failed {
+        if with_failures {
             json["failures"] = self.failures.json();
         }
         Ok(json)
@@ -110,10 +110,13 @@ impl View {
     }
 }
 
-fn show(view: &View, args: &StatusArgs, context: &Context) -> anyhow::Result<()> {
-    let output = &context.output;
+fn print_status(
+    status: &ProjectStatus,
+    args: &StatusArgs,
+    context: &Context,
+) -> anyhow::Result<()> {
     if context.global.json {
-        let json = view.json(args.failed)?;
+        let json = status.json(args.failed)?;
         if args.watch {
             output::print(&json.to_string())?;
         } else {
@@ -126,61 +129,62 @@ fn show(view: &View, args: &StatusArgs, context: &Context) -> anyhow::Result<()>
             ""
         };
         let dir = context.dir().display().to_string();
-        output::print(&format!("{clear}{}", screen(view, &dir, output.out)))?;
-        for command in next_steps(view) {
-            output.next(&context.command(&command));
+        let text = screen(status, &dir, context.output.stdout);
+        output::print(&format!("{clear}{text}"))?;
+        for command in next_steps(status) {
+            context.output.next(&context.command(&command));
         }
     }
     Ok(())
 }
 
-fn screen(view: &View, dir: &str, palette: Palette) -> String {
+fn screen(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
     let line = |word: &str, text: &str| format!("{}  {text}\n", label(word, palette));
     let mut parts = vec![
-        line("project", &headline(view, dir, palette)),
-        stage_table(&view.counts, palette),
+        line("project", &headline(status, dir, palette)),
+        stage_table(&status.counts, palette),
     ];
-    if view.failed() > 0 {
+    if status.failed() > 0 {
         parts.push(format!("{}\n", label("failed", palette)));
-        parts.push(view.failures.text());
+        parts.push(status.failures.text());
     }
-    if view.interrupted() > 0 {
-        let text = "the process that had them died; the next run takes them up";
-        parts.push(line("cut off", text));
+    if status.interrupted() > 0 {
+        let text = "their process died; the next run continues them";
+        parts.push(line("interrupted", text));
     }
-    if view.counts.stale > 0 {
-        let pairs = count(view.counts.stale, "pair");
-        let text = format!("{pairs} ran with other settings or files than those of now");
+    if status.counts.stale > 0 {
+        let pairs = count(status.counts.stale, "pair");
+        let text = format!("{pairs} computed with other settings or files than the current ones");
         parts.push(line("stale", &text));
     }
-    parts.extend(doubtful_line(&view.counts).map(|text| line("doubtful", &text)));
-    parts.extend(verdict_line(&view.counts).map(|text| line("verdicts", &text)));
+    parts.extend(low_confidence_line(&status.counts).map(|text| line("confidence", &text)));
+    parts.extend(verdict_line(&status.counts).map(|text| line("verdicts", &text)));
     parts.concat()
 }
 
 fn label(word: &str, palette: Palette) -> String {
-    palette.paint(Tone::Strong, format!("{word:<9}"))
+    palette.paint(Tone::Strong, format!("{word:<11}"))
 }
 
-/// `demo · 24 pairs · 22 done · 1 failed · 1 waiting · 91.7 %`
-fn headline(view: &View, dir: &str, palette: Palette) -> String {
-    let done = view.jobs(JobStatus::Done);
-    let pairs = view.counts.pairs;
+/// Returns `demo · 24 pairs · 22 done · 1 failed · 1 waiting · 91.7 %`
+fn headline(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
+    let done = status.jobs(JobStatus::Done);
+    let pairs = status.counts.pairs;
     let mut parts = vec![
         dir.to_owned(),
         count(pairs, "pair"),
         palette.paint(Tone::Good, format!("{done} done")),
     ];
     for (number, word, tone) in [
-        (view.failed(), "failed", Tone::Bad),
+        (status.failed(), "failed", Tone::Bad),
         (
-            view.jobs(JobStatus::Leased) - view.interrupted(),
+            status.jobs(JobStatus::Leased) - status.interrupted(),
             "running",
             Tone::Strong,
         ),
-        (view.interrupted(), "cut off", Tone::Warn),
-        (view.waiting(), "waiting", Tone::Warn),
-        (view.jobs(JobStatus::Held), "set aside", Tone::Warn),
+        (status.interrupted(), "interrupted", Tone::Warn),
+        (status.waiting(), "waiting", Tone::Warn),
+        (status.jobs(JobStatus::Held), "set aside", Tone::Warn),
     ] {
         if number > 0 {
             parts.push(palette.paint(tone, format!("{number} {word}")));
@@ -224,13 +228,10 @@ fn stage_table(counts: &StatusCounts, palette: Palette) -> String {
     )
 }
 
-fn doubtful_line(counts: &StatusCounts) -> Option<String> {
+fn low_confidence_line(counts: &StatusCounts) -> Option<String> {
     (counts.doubtful > 0).then(|| {
         let pairs = count(counts.doubtful, "done pair");
-        format!(
-            "{pairs} with a confidence below {}",
-            MetricOutcome::DOUBTFUL
-        )
+        format!("{pairs} below {}", MetricOutcome::DOUBTFUL)
     })
 }
 
@@ -244,23 +245,23 @@ fn verdict_line(counts: &StatusCounts) -> Option<String> {
     })
 }
 
-fn next_steps(view: &View) -> Vec<String> {
+fn next_steps(status: &ProjectStatus) -> Vec<String> {
     let mut steps = Vec::new();
-    if view.counts.pairs == 0 {
+    if status.counts.pairs == 0 {
         steps.push("import pairs.csv".to_owned());
     }
-    let running = view.jobs(JobStatus::Leased) > view.interrupted();
-    if !running && view.waiting() + view.interrupted() + view.counts.stale > 0 {
+    let running = status.jobs(JobStatus::Leased) > status.interrupted();
+    if !running && status.waiting() + status.interrupted() + status.counts.stale > 0 {
         steps.push("run".to_owned());
     }
-    if let Some(first) = view.failures.first() {
+    if let Some(first) = status.failures.first() {
         steps.push(format!("show {}", first.name));
     }
-    if view.counts.doubtful > 0 {
+    if status.counts.doubtful > 0 {
         steps.push("contact-sheet --order confidence".to_owned());
     }
-    if view.jobs(JobStatus::Done) > 0 && !running {
-        if view.counts.verdicts.values().sum::<u64>() == 0 {
+    if status.jobs(JobStatus::Done) > 0 && !running {
+        if status.counts.verdicts.values().sum::<u64>() == 0 {
             let user = std::env::var("USER").ok();
             steps.push(review_step(user.as_deref()));
         }
@@ -269,27 +270,27 @@ fn next_steps(view: &View) -> Vec<String> {
     steps
 }
 
-/// How to judge what nobody has read, under the name of who asks.
+/// Returns the command that judges the results, with the name of the user.
 fn review_step(user: Option<&str>) -> String {
     let name = user.and_then(|user| reviewer_name(user).ok());
     let name = name.unwrap_or_else(|| "me".to_owned());
-    format!("review --reviewer {}", quoted(&name))
+    format!("review --reviewer {}", shell_quoted(&name))
 }
 
 #[cfg(test)]
 mod tests {
     use super::{
-        JobStatus, Palette, Stage, StageCounts, StatusCounts, Verdict, View, next_steps,
+        JobStatus, Palette, ProjectStatus, Stage, StageCounts, StatusCounts, Verdict, next_steps,
         review_step, screen,
     };
 
-    fn view(done: u64, ready: u64) -> View {
+    fn status(done: u64, ready: u64) -> ProjectStatus {
         let stage = StageCounts {
             done,
             pending: ready,
             failed: 0,
         };
-        View {
+        ProjectStatus {
             counts: StatusCounts {
                 schema: 1,
                 pairs: done + ready,
@@ -305,45 +306,45 @@ mod tests {
     }
 
     #[test]
-    fn what_a_dead_process_had_in_hand_is_not_running() {
-        let mut view = view(3, 0);
-        view.counts.jobs.insert(JobStatus::Leased, 2);
-        let headline = |view: &View| {
-            let text = screen(view, "demo", Palette::PLAIN);
+    fn pairs_of_a_dead_process_are_interrupted() {
+        let mut status = status(3, 0);
+        status.counts.jobs.insert(JobStatus::Leased, 2);
+        let headline = |status: &ProjectStatus| {
+            let text = screen(status, "demo", Palette::PLAIN);
             text.lines().next().map(str::to_owned)
         };
-        let told = |word: &str| {
+        let expected = |word: &str| {
             Some(format!(
-                "project    demo · 3 pairs · 3 done · 2 {word} · 100.0 %"
+                "project      demo · 3 pairs · 3 done · 2 {word} · 100.0 %"
             ))
         };
-        assert_eq!(headline(&view), told("running"));
-        assert!(next_steps(&view).is_empty());
-        view.running = false;
-        assert_eq!(headline(&view), told("cut off"));
-        let steps = next_steps(&view);
+        assert_eq!(headline(&status), expected("running"));
+        assert!(next_steps(&status).is_empty());
+        status.running = false;
+        assert_eq!(headline(&status), expected("interrupted"));
+        let steps = next_steps(&status);
         assert_eq!([&steps[0], &steps[steps.len() - 1]], ["run", "report"]);
-        assert_eq!(view.json(false).expect("JSON")["running"], false);
+        assert_eq!(status.json(false).expect("JSON")["running"], false);
     }
 
     #[test]
     fn screen_has_a_headline_and_a_row_for_each_count() {
-        let text = screen(&view(3, 1), "demo", Palette::PLAIN);
+        let text = screen(&status(3, 1), "demo", Palette::PLAIN);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(
             lines[0],
-            "project    demo · 4 pairs · 3 done · 1 waiting · 75.0 %"
+            "project      demo · 4 pairs · 3 done · 1 waiting · 75.0 %"
         );
-        assert_eq!(lines[1], "stages     fit  depth  normalize  register");
-        assert_eq!(lines[2], "  done       3      3          3         3");
+        assert_eq!(lines[1], "stages       fit  depth  normalize  register");
+        assert_eq!(lines[2], "  done         3      3          3         3");
         assert_eq!(lines.len(), 5);
     }
 
     #[test]
     fn next_step_follows_from_the_counts() {
-        assert_eq!(next_steps(&view(0, 0)), ["import pairs.csv"]);
-        assert_eq!(next_steps(&view(0, 2)), ["run"]);
-        let mut done = view(2, 0);
+        assert_eq!(next_steps(&status(0, 0)), ["import pairs.csv"]);
+        assert_eq!(next_steps(&status(0, 2)), ["run"]);
+        let mut done = status(2, 0);
         let steps = next_steps(&done);
         assert!(steps[0].starts_with("review --reviewer "), "{steps:?}");
         assert_eq!(steps[1..], ["report"]);
@@ -354,13 +355,13 @@ mod tests {
     }
 
     #[test]
-    fn doubtful_pairs_are_said_with_how_to_look_at_them() {
-        let mut doubtful = view(3, 0);
-        assert!(!screen(&doubtful, "demo", Palette::PLAIN).contains("doubtful"));
-        doubtful.counts.doubtful = 1;
-        let text = screen(&doubtful, "demo", Palette::PLAIN);
-        let line = "doubtful   1 done pair with a confidence below 0.5\n";
+    fn pairs_of_low_confidence_are_counted_with_the_command_that_draws_them() {
+        let mut status = status(3, 0);
+        assert!(!screen(&status, "demo", Palette::PLAIN).contains("confidence"));
+        status.counts.doubtful = 1;
+        let text = screen(&status, "demo", Palette::PLAIN);
+        let line = "confidence   1 done pair below 0.5\n";
         assert!(text.ends_with(line), "{text}");
-        assert_eq!(next_steps(&doubtful)[0], "contact-sheet --order confidence");
+        assert_eq!(next_steps(&status)[0], "contact-sheet --order confidence");
     }
 }

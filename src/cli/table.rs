@@ -1,25 +1,23 @@
 //! Columns of plain text.
 
-/// How a column stands.
+use unicode_width::UnicodeWidthStr;
+
+/// Alignment of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Align {
-    /// Words.
+    /// For words.
     Left,
-    /// Numbers.
+    /// For numbers.
     Right,
 }
 
-/// Lays rows out in columns two spaces apart; lines end without blanks.
+/// Formats rows as columns two spaces apart, without trailing blanks.
 pub(super) fn columns(rows: &[Vec<String>], aligns: &[Align]) -> String {
-    let widths: Vec<usize> = (0..aligns.len())
-        .map(|column| {
-            rows.iter()
-                .filter_map(|row| row.get(column))
-                .map(|cell| width(cell))
-                .max()
-                .unwrap_or(0)
-        })
-        .collect();
+    let width_of_column = |column: usize| {
+        let cells = rows.iter().filter_map(|row| row.get(column));
+        cells.map(|cell| width(cell)).max().unwrap_or(0)
+    };
+    let widths: Vec<usize> = (0..aligns.len()).map(width_of_column).collect();
     rows.iter()
         .flat_map(|row| [line(row, aligns, &widths), "\n".to_owned()])
         .collect()
@@ -34,33 +32,23 @@ fn line(row: &[String], aligns: &[Align], widths: &[usize]) -> String {
     cells.join("  ").trim_end().to_owned()
 }
 
-fn pad(cell: &str, align: Align, wanted: usize) -> String {
-    let blanks = " ".repeat(wanted.saturating_sub(width(cell)));
+fn pad(cell: &str, align: Align, to_width: usize) -> String {
+    let blanks = " ".repeat(to_width.saturating_sub(width(cell)));
     match align {
         Align::Left => format!("{cell}{blanks}"),
         Align::Right => format!("{blanks}{cell}"),
     }
 }
 
-/// Columns a text takes on a terminal: colour codes take none, East Asian wide characters two.
-pub(super) fn width(text: &str) -> usize {
-    let mut columns = 0;
-    let mut chars = text.chars();
-    while let Some(c) = chars.next() {
-        if c == '\u{1b}' {
-            chars.by_ref().find(|c| *c == 'm');
-        } else {
-            columns += if is_wide(c) { 2 } else { 1 };
-        }
-    }
-    columns
+/// Returns the number of terminal columns of a text; colour codes take none, East Asian wide characters two.
+fn width(text: &str) -> usize {
+    let mut parts = text.split("\u{1b}[");
+    let first = parts.next().map_or(0, UnicodeWidthStr::width);
+    let after_codes = parts.map(|part| part.split_once('m').map_or(0, |(_, rest)| rest.width()));
+    first + after_codes.sum::<usize>()
 }
 
-const fn is_wide(c: char) -> bool {
-    matches!(c as u32, 0x1100..=0x115f | 0x2e80..=0xa4cf | 0xac00..=0xd7a3 | 0xf900..=0xfaff | 0xff00..=0xff60 | 0x2_0000..=0x3_fffd)
-}
-
-/// `1 pair`, `2 pairs`.
+/// Formats a number with its noun: `1 pair`, `2 pairs`.
 pub(super) fn count(number: u64, noun: &str) -> String {
     let ending = if number == 1 { "" } else { "s" };
     format!("{number} {noun}{ending}")
@@ -79,10 +67,16 @@ mod tests {
                 "\u{1b}[31mx\u{1b}[0m".to_owned(),
                 "10".to_owned(),
             ],
+            // Vietnamese letters of one character and of a letter with two combining marks.
+            vec![
+                "Tr\u{1ea7}n".to_owned(),
+                "a\u{302}\u{300}".to_owned(),
+                "5".to_owned(),
+            ],
         ];
         let text = columns(&rows, &[Align::Left, Align::Left, Align::Right]);
         let ends: Vec<usize> = text.lines().map(width).collect();
-        assert_eq!(ends, [10, 10]);
+        assert_eq!(ends, [12, 12, 12]);
     }
 
     #[test]

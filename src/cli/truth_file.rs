@@ -1,4 +1,4 @@
-//! A `truth.jsonl` file: read whole or refused by line number.
+//! A `truth.jsonl` file: accepted as a whole, or refused by line number.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -8,14 +8,14 @@ use serde_json::Value;
 use crate::domain::{PairName, sanitize};
 use crate::report::ground_truth::TruthRecord;
 
-/// One true alignment and the line it stands on.
+/// One true alignment and its line number.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Row {
+pub(super) struct TruthRow {
     pub(super) line: usize,
     pub(super) name: PairName,
     /// The object as given.
     pub(super) value: Value,
-    /// Its tops mask, as it is reached from the working directory.
+    /// Its mask of stroke tops, relative to the working directory.
     pub(super) tops_mask: Option<PathBuf>,
 }
 
@@ -28,11 +28,11 @@ pub(super) struct TruthFileError {
     reason: String,
 }
 
-/// Reads all lines; `tops_mask` is relative to the file.
+/// Parses all lines; `tops_mask` is relative to the file.
 ///
 /// # Errors
-/// At the first line that is no true alignment, or of a pair that was there before.
-pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<Row>, TruthFileError> {
+/// At the first line that is not a true alignment, or repeats a pair.
+pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, TruthFileError> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut lines: BTreeMap<PairName, usize> = BTreeMap::new();
     let mut rows = Vec::new();
@@ -46,11 +46,11 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<Row>, TruthFileError>
         let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
         if let Some(first) = lines.insert(record.id.clone(), line) {
             return Err(refuse(format!(
-                "pair {} is on line {first} already",
+                "pair {} is already on line {first}",
                 record.id
             )));
         }
-        rows.push(Row {
+        rows.push(TruthRow {
             line,
             tops_mask: record.tops_mask.map(|mask| folder.join(mask)),
             name: record.id,
@@ -60,7 +60,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<Row>, TruthFileError>
     Ok(rows)
 }
 
-/// A refusal of one line.
+/// Refuses a line.
 pub(super) fn refusal(file: &Path, line: usize, reason: &str) -> TruthFileError {
     TruthFileError {
         file: file.to_owned(),
@@ -73,16 +73,16 @@ pub(super) fn refusal(file: &Path, line: usize, reason: &str) -> TruthFileError 
 mod tests {
     use std::path::Path;
 
-    use super::{Row, parse, refusal};
+    use super::{TruthRow, parse, refusal};
 
     const LINE: &str = r#"{"id":"a","print_from_mesh":[[1,0,0,0],[0,-1,0,0],[0,0,1,0]],"plane":{"n":[0,0,1],"d":0},"landmarks":[[0,0,0]],"char_height_px":10,"tops_mask":"tops/a.png"}"#;
 
-    fn read(text: &str) -> Result<Vec<Row>, String> {
+    fn read(text: &str) -> Result<Vec<TruthRow>, String> {
         parse(Path::new("data/truth.jsonl"), text).map_err(|error| error.to_string())
     }
 
     #[test]
-    fn words_of_a_line_come_plain_and_short() {
+    fn quoted_text_is_sanitized_and_short() {
         for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(301)] {
             let said = refusal(Path::new("truth.jsonl"), 1, &rude).to_string();
             assert!(!said.contains(&rude), "{said:?}");
@@ -104,7 +104,7 @@ mod tests {
         let twice = read(&format!("{LINE}\n{LINE}\n")).expect_err("twice");
         assert_eq!(
             twice,
-            "data/truth.jsonl: line 2: pair a is on line 1 already; nothing was imported"
+            "data/truth.jsonl: line 2: pair a is already on line 1; nothing was imported"
         );
         let broken = read("{\"id\":\n").expect_err("cut off");
         assert!(

@@ -7,11 +7,11 @@ use serde_json::json;
 
 use super::context::{Context, now};
 use super::exit::ExitCode;
-use super::manifest_file::is_jsonl;
-use super::output::{self, Palette, Tone};
+use super::output;
+use super::screen::{Palette, Tone};
 use super::table::{Align, columns, count};
-use super::time_text::{span, utc};
-use super::verdict_file::Row;
+use super::time_text::{duration, utc};
+use super::verdict_file::VerdictRow;
 use super::{files, select, verdict_file, verdict_lines};
 use crate::catalog::{Catalog, Look, NewVerdict, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
@@ -20,19 +20,19 @@ use crate::domain::{Reason, ThresholdMetric, Verdict};
 #[derive(Debug, Subcommand)]
 pub(super) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
-    Set(SetArgs),
+    Set(VerdictSetArgs),
     /// Record the verdicts of a CSV file (pair, verdict, reviewer, and if wanted metric, reason, note, at), or of the
     /// verdicts.jsonl of an export or a backup
-    Import(ImportArgs),
+    Import(VerdictImportArgs),
     /// Print the log, oldest first
-    Log(LogArgs),
+    Log(VerdictLogArgs),
     /// Take back the newest verdict; the log keeps both
-    Undo(UndoArgs),
+    Undo(VerdictUndoArgs),
 }
 
 /// Arguments of `verdict set`.
 #[derive(Debug, Args)]
-pub(super) struct SetArgs {
+pub(super) struct VerdictSetArgs {
     /// The pair
     pub(super) pair: String,
     /// pass, fail or unsure
@@ -56,21 +56,21 @@ pub(super) struct SetArgs {
 
 /// Arguments of `verdict import`.
 #[derive(Debug, Args)]
-pub(super) struct ImportArgs {
+pub(super) struct VerdictImportArgs {
     /// The file
     pub(super) file: PathBuf,
 }
 
 /// Arguments of `verdict log`.
 #[derive(Debug, Args)]
-pub(super) struct LogArgs {
+pub(super) struct VerdictLogArgs {
     /// Only this pair
     pub(super) pair: Option<String>,
 }
 
 /// Arguments of `verdict undo`.
 #[derive(Debug, Args)]
-pub(super) struct UndoArgs {
+pub(super) struct VerdictUndoArgs {
     /// The newest of this reviewer [default: of anybody]
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     pub(super) reviewer: Option<String>,
@@ -105,8 +105,8 @@ pub(super) async fn verdict(
     }
 }
 
-async fn set(args: SetArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.writer().await?;
+async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.open().await?;
     let new = NewVerdict {
         pair: select::pair(&catalog, &args.pair).await?,
         metric: args.metric,
@@ -123,7 +123,7 @@ async fn set(args: SetArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let said = format!("{} of {}: {}", new.pair, on(new.metric), new.verdict);
     catalog.verdict_set(vec![new], now()).await?;
     catalog.close().await;
-    context.output.say(&said);
+    context.output.info(&said);
     Ok(ExitCode::Done)
 }
 
@@ -131,10 +131,10 @@ fn on(metric: Option<ThresholdMetric>) -> &'static str {
     metric.map_or("all metrics", ThresholdMetric::name)
 }
 
-async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
+async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let bytes = files::read(&args.file)?;
-    let (_project, catalog) = context.writer().await?;
-    let parse = if is_jsonl(&args.file, &bytes) {
+    let (_project, catalog) = context.open().await?;
+    let parse = if files::is_jsonl(&args.file, &bytes) {
         verdict_lines::parse
     } else {
         verdict_file::parse
@@ -161,17 +161,20 @@ async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode>
     }
     if kept > number {
         let known = count(kept - number, "verdict");
-        context.output.say(&format!("{known} there already"));
+        context.output.info(&format!("{known} there already"));
     }
     context
         .output
-        .say(&format!("{} recorded", count(number, "verdict")));
+        .info(&format!("{} recorded", count(number, "verdict")));
     context.output.next(&context.command("report"));
     Ok(ExitCode::Done)
 }
 
 /// Those of the rows that name no result, or one that is current here.
-async fn on_current_results(catalog: &Catalog, rows: Vec<Row>) -> anyhow::Result<Vec<Row>> {
+async fn on_current_results(
+    catalog: &Catalog,
+    rows: Vec<VerdictRow>,
+) -> anyhow::Result<Vec<VerdictRow>> {
     let mut kept = Vec::with_capacity(rows.len());
     for row in rows {
         let Some(judged) = row.judged else {
@@ -191,8 +194,8 @@ async fn on_current_results(catalog: &Catalog, rows: Vec<Row>) -> anyhow::Result
     Ok(kept)
 }
 
-async fn log(args: LogArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.reader().await?;
+async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.open_read_only().await?;
     let pair = match &args.pair {
         Some(typed) => Some(select::pair(&catalog, typed).await?),
         None => None,
@@ -204,15 +207,15 @@ async fn log(args: LogArgs, context: &Context) -> anyhow::Result<ExitCode> {
             output::print(&serde_json::to_string(event)?)?;
         }
     } else if events.is_empty() {
-        context.output.say("no verdicts yet");
+        context.output.info("no verdicts yet");
     } else {
-        output::print(&log_text(&events, context.output.out))?;
+        output::print(&log_text(&events, context.output.stdout))?;
     }
     Ok(ExitCode::Done)
 }
 
-async fn undo(args: UndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
-    let (_project, catalog) = context.writer().await?;
+async fn undo(args: VerdictUndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
+    let (_project, catalog) = context.open().await?;
     let undone = catalog
         .verdict_undo(args.reviewer.as_deref(), now())
         .await?;
@@ -221,7 +224,7 @@ async fn undo(args: UndoArgs, context: &Context) -> anyhow::Result<ExitCode> {
         output::print_json(&json!({"schema": 1, "undone": undone}))?;
     }
     for event in &undone {
-        context.output.say(&format!(
+        context.output.info(&format!(
             "taken back: {} of {} {} by {}",
             event.verdict, event.pair, event.metric, event.reviewer
         ));
@@ -263,7 +266,7 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
 
 /// How long it was looked at, and by how much it was found turned.
 fn looked(look: &Look) -> String {
-    let shown = look.shown_ms.map(span);
+    let shown = look.shown_ms.map(duration);
     let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
     let parts: Vec<String> = shown.into_iter().chain(angle).collect();
     parts.join(" ")

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use csv::StringRecord;
 
-use super::time_text::from_utc;
+use super::time_text::parse_utc;
 use crate::catalog::{Look, NewVerdict};
 use crate::config::hint;
 use crate::domain::{ContentHash, PairName, UnixMillis, sanitize};
@@ -18,7 +18,7 @@ const NEEDED: usize = 3;
 
 /// One verdict and the line it stands on.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Row {
+pub(super) struct VerdictRow {
     pub(super) line: u64,
     pub(super) verdict: NewVerdict,
     /// The result that it judged, where the file says so.
@@ -54,7 +54,7 @@ impl VerdictFileError {
 ///
 /// # Errors
 /// At the first line that is wrong.
-pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Row>, VerdictFileError> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Vec<VerdictRow>, VerdictFileError> {
     let text = as_utf8(bytes).map_err(|error| VerdictFileError::new(1, &error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter(&text))
@@ -76,7 +76,10 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Row>, VerdictFileError> {
 ///
 /// # Errors
 /// At the first such row.
-pub(super) fn refuse_unknown(rows: &[Row], unknown: &[PairName]) -> Result<(), VerdictFileError> {
+pub(super) fn refuse_unknown(
+    rows: &[VerdictRow],
+    unknown: &[PairName],
+) -> Result<(), VerdictFileError> {
     match rows.iter().find(|row| unknown.contains(&row.verdict.pair)) {
         Some(row) => {
             let reason = format!("there is no pair {}", row.verdict.pair);
@@ -108,7 +111,7 @@ fn row(
     record: &StringRecord,
     line: u64,
     places: &[Option<usize>; 7],
-) -> Result<Row, VerdictFileError> {
+) -> Result<VerdictRow, VerdictFileError> {
     let cell = |column: usize| {
         places[column]
             .and_then(|place| record.get(place))
@@ -128,7 +131,7 @@ fn row(
         look: Look::default(),
         at: cell(6).map(|text| moment(text, line)).transpose()?,
     };
-    Ok(Row {
+    Ok(VerdictRow {
         line,
         verdict,
         judged: None,
@@ -136,7 +139,7 @@ fn row(
 }
 
 fn moment(text: &str, line: u64) -> Result<UnixMillis, VerdictFileError> {
-    from_utc(text).ok_or_else(|| {
+    parse_utc(text).ok_or_else(|| {
         let reason =
             format!("at is {text:?}, not a time such as 2026-11-21 or 2026-11-21 04:10:03");
         VerdictFileError::new(line, &reason)

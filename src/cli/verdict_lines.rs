@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::verdict_file::{Row, VerdictFileError};
+use super::verdict_file::{VerdictFileError, VerdictRow};
 use crate::catalog::{Look, NewVerdict};
 use crate::domain::{
     ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
@@ -11,7 +11,7 @@ use crate::manifest::as_utf8;
 
 /// A line; what else it has, such as numbers of the other log, means nothing here.
 #[derive(Debug, Deserialize)]
-struct Line {
+struct VerdictLine {
     pair: PairName,
     verdict: Verdict,
     reviewer: String,
@@ -32,12 +32,12 @@ struct Line {
 ///
 /// # Errors
 /// At the first line that is wrong.
-pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Row>, VerdictFileError> {
+pub(super) fn parse(bytes: &[u8]) -> Result<Vec<VerdictRow>, VerdictFileError> {
     let text = as_utf8(bytes).map_err(|error| VerdictFileError::new(1, &error.to_string()))?;
     let lines = (1..).zip(text.split(|byte| *byte == b'\n'));
     let lines = lines.filter(|(_, content)| !content.trim_ascii().is_empty());
     let rows = lines.map(|(line, content)| {
-        let parsed: Line = serde_json::from_slice(content)
+        let parsed: VerdictLine = serde_json::from_slice(content)
             .map_err(|error| VerdictFileError::new(line, &words(&error)))?;
         if parsed.reviewer.trim().is_empty() {
             return Err(VerdictFileError::new(line, "reviewer is empty"));
@@ -47,7 +47,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Vec<Row>, VerdictFileError> {
     rows.filter_map(Result::transpose).collect()
 }
 
-fn row(line: u64, parsed: Line) -> Row {
+fn row(line: u64, parsed: VerdictLine) -> VerdictRow {
     let verdict = NewVerdict {
         pair: parsed.pair,
         metric: parsed.metric,
@@ -64,7 +64,7 @@ fn row(line: u64, parsed: Line) -> Row {
         },
         at: parsed.at,
     };
-    Row {
+    VerdictRow {
         line,
         verdict,
         judged: parsed.result_hash,

@@ -1,11 +1,13 @@
-//! The settings as plain values for the rooms that use them, and the sections they are written in.
+//! The settings as typed values, and the sections of a settings file.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use toml::Value;
 
-use super::{Change, ConfigError, Origin, Tree};
+use super::error::{ConfigError, Origin};
+use super::sources::Preset;
+use super::tree::{Change, Tree};
 use crate::mesh;
 use crate::raster;
 use crate::stages::{Settings, depth, fit, normalize, register};
@@ -13,35 +15,35 @@ use crate::stages::{Settings, depth, fit, normalize, register};
 /// Every setting, checked.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Config {
-    /// What an input file may ask of the machine.
-    pub limits: Limits,
-    /// How a run uses the machine; changes no result.
+    /// Size limits of input files.
+    pub limits: InputLimits,
+    /// Resources of a run; they change no result.
     pub run: RunSettings,
-    /// The method.
+    /// The stages.
     pub stages: Settings,
     /// The review page.
     pub review: ReviewSettings,
 }
 
-/// What an input file may ask of the machine before it is refused.
+/// Size limits above which an input file is refused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Limits {
-    /// Of mesh files.
+pub struct InputLimits {
+    /// Limits of mesh files.
     pub mesh: mesh::MeshLimits,
-    /// Of print images.
+    /// Limits of print images.
     pub image: raster::ImageLimits,
 }
 
-/// How a run uses the machine.
+/// Resources of a run.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunSettings {
-    /// Pairs worked on at the same time; 0 is one a core.
+    /// Pairs processed at the same time; 0 means one per core.
     pub workers: usize,
-    /// Memory for the pairs worked on at the same time, in MiB; 0 is most of what is free.
+    /// Memory for the pairs processed at the same time, in MiB; 0 means most of the free memory.
     pub memory_mib: u64,
-    /// Longest time for one stage of one pair, in seconds.
+    /// Time limit for one stage of one pair, in seconds.
     pub stage_timeout_s: u64,
 }
 
@@ -49,7 +51,7 @@ pub struct RunSettings {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ReviewSettings {
-    /// Keys by what they do, each named by its place on the keyboard.
+    /// Keys by action, each named by its position on the keyboard (`KeyboardEvent.code`).
     pub keys: BTreeMap<String, String>,
 }
 
@@ -57,7 +59,7 @@ pub struct ReviewSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Document {
-    limits: Limits,
+    limits: InputLimits,
     run: RunSettings,
     fit: fit::FitParams,
     depth: depth::DepthParams,
@@ -82,10 +84,10 @@ impl From<Document> for Config {
     }
 }
 
-/// The merged tree as typed settings.
+/// Converts the merged tree to typed settings.
 ///
 /// # Errors
-/// When a value is of the wrong type or is not known; the first change that brought it in is named.
+/// When a value has the wrong type or is unknown; the message names the first change to blame.
 pub(super) fn typed(tree: &Tree, changes: &[Change]) -> Result<Config, ConfigError> {
     match read(tree) {
         Ok(document) => Ok(document.into()),
@@ -97,9 +99,9 @@ fn read(tree: &Tree) -> Result<Document, toml::de::Error> {
     Value::Table(tree.table().clone()).try_into()
 }
 
-/// Lays the changes over the defaults one by one until the settings can no longer be read.
+/// Applies the changes to the defaults one by one and blames the first after which the settings are invalid.
 fn blame(changes: &[Change], error: &toml::de::Error) -> ConfigError {
-    let Ok(defaults) = super::Preset::Default.table() else {
+    let Ok(defaults) = Preset::Default.table() else {
         return ConfigError::BuiltIn(error.message().to_owned());
     };
     let mut tree = Tree::new(defaults);
@@ -128,8 +130,7 @@ fn bad_value(change: &Change, error: &toml::de::Error) -> ConfigError {
 mod tests {
     use toml::{Table, Value};
 
-    use super::super::{Preset, Tree};
-    use super::{Document, read};
+    use super::{Document, Preset, Tree, read};
 
     fn keys(table: &Table, prefix: &str, into: &mut Vec<String>) {
         for (key, value) in table {
@@ -142,16 +143,16 @@ mod tests {
     }
 
     #[test]
-    fn default_file_holds_exactly_the_settings_there_are() {
+    fn default_file_holds_exactly_the_existing_settings() {
         let file = Preset::Default.table().expect("valid TOML");
         let document: Document = read(&Tree::new(file.clone())).expect("every key and no other");
-        let again = Table::try_from(&document).expect("plain values");
-        let (mut written, mut wanted) = (Vec::new(), Vec::new());
+        let typed = Table::try_from(&document).expect("plain values");
+        let (mut written, mut expected) = (Vec::new(), Vec::new());
         keys(&file, "", &mut written);
-        keys(&again, "", &mut wanted);
+        keys(&typed, "", &mut expected);
         written.sort();
-        wanted.sort();
-        assert_eq!(written, wanted);
+        expected.sort();
+        assert_eq!(written, expected);
     }
 
     #[test]

@@ -1,37 +1,33 @@
-//! Settings: read, merge, validate; unknown keys are errors; each value knows where it came from.
+//! Settings: reads, merges and validates them; unknown keys are errors; each value has an origin.
 //!
-//! Flags win over the environment, that over the project's file, that over the preset it names, and that over
-//! the embedded `config/default.toml`, which holds every setting there is.
+//! Flags override environment variables, which override the project's file, which overrides the preset that it names,
+//! which overrides the embedded `config/default.toml` with every setting.
 
 mod document;
 mod error;
-mod nearest;
-mod origin;
 mod ranges;
 mod sources;
 mod tree;
 
-pub use document::{Config, Limits, ReviewSettings, RunSettings};
-pub use error::ConfigError;
-pub use nearest::{hint, nearest};
-pub use origin::Origin;
-pub use sources::{Preset, Sources, Start};
+pub use document::{Config, InputLimits, ReviewSettings, RunSettings};
+pub use error::{ConfigError, Origin, hint, nearest};
+pub use sources::{BaseLayer, Preset, Sources, explanation};
 pub use tree::{Change, Setting, Tree};
 
 /// Settings ready for use, with the values they were made from.
 #[derive(Debug, Clone)]
 pub struct Loaded {
-    /// Typed and checked.
+    /// The typed and checked settings.
     pub config: Config,
     /// Every value with its origin.
     pub tree: Tree,
 }
 
-/// Reads every layer, lays them over each other and checks the result.
+/// Reads every layer, merges them and checks the result.
 ///
 /// # Errors
-/// When a layer cannot be read, names a setting that does not exist, or gives one a value it cannot have; the
-/// message names layer and key.
+/// When a layer cannot be read, names a setting that does not exist, or gives a setting an invalid value; the message
+/// names layer and key.
 pub fn load(sources: &Sources) -> Result<Loaded, ConfigError> {
     let defaults = Preset::Default.table()?;
     let mut tree = Tree::new(defaults);
@@ -54,7 +50,7 @@ pub fn load(sources: &Sources) -> Result<Loaded, ConfigError> {
 mod tests {
     use std::path::PathBuf;
 
-    use super::{ConfigError, Loaded, Origin, Preset, Sources, Start, load};
+    use super::{BaseLayer, ConfigError, Loaded, Origin, Preset, Sources, load};
 
     fn with(sets: &[&str]) -> Result<Loaded, ConfigError> {
         load(&Sources {
@@ -71,13 +67,13 @@ mod tests {
     }
 
     #[test]
-    fn flag_wins_over_environment_and_that_over_the_file() {
-        let (_dir, file) = project("[run]\nworkers = 2\nstage_limit_s = 7");
+    fn flag_overrides_environment_which_overrides_the_file() {
+        let (_dir, file) = project("[run]\nworkers = 2\nstage_timeout_s = 7");
         let sources = Sources {
-            start: Start::Project(file.clone()),
+            base: BaseLayer::Project(file.clone()),
             env: vec![
                 ("MOCBAN_RUN__WORKERS".into(), "3".into()),
-                ("MOCBAN_RUN__STAGE_LIMIT_S".into(), "8".into()),
+                ("MOCBAN_RUN__STAGE_TIMEOUT_S".into(), "8".into()),
             ],
             sets: vec!["run.workers=4".into()],
         };
@@ -87,7 +83,7 @@ mod tests {
         assert_eq!(loaded.tree.origin("run.workers"), Origin::Flag);
         assert_eq!(
             loaded.tree.origin("run.stage_timeout_s"),
-            Origin::Env("MOCBAN_RUN__STAGE_LIMIT_S".into())
+            Origin::Env("MOCBAN_RUN__STAGE_TIMEOUT_S".into())
         );
     }
 
@@ -95,12 +91,12 @@ mod tests {
     fn project_file_may_start_from_a_preset() {
         let (_dir, file) = project("preset = \"paper\"\n[run]\nworkers = 2");
         let loaded = load(&Sources {
-            start: Start::Project(file.clone()),
+            base: BaseLayer::Project(file.clone()),
             ..Sources::default()
         })
         .expect("valid settings");
         let paper = load(&Sources {
-            start: Start::Preset(Preset::Paper),
+            base: BaseLayer::Preset(Preset::Paper),
             ..Sources::default()
         })
         .expect("valid preset");
@@ -110,9 +106,9 @@ mod tests {
 
     #[test]
     fn project_without_a_file_has_the_defaults() {
-        let missing = Start::Project(PathBuf::from("/nonexistent/mocban.toml"));
+        let missing = BaseLayer::Project(PathBuf::from("/nonexistent/mocban.toml"));
         let loaded = load(&Sources {
-            start: missing,
+            base: missing,
             ..Sources::default()
         })
         .expect("no file is no error");
@@ -120,9 +116,9 @@ mod tests {
     }
 
     #[test]
-    fn file_that_was_asked_for_must_be_there() {
+    fn file_named_by_config_must_exist() {
         let error = load(&Sources {
-            start: Start::File("/nonexistent/x.toml".into()),
+            base: BaseLayer::File("/nonexistent/x.toml".into()),
             ..Sources::default()
         })
         .expect_err("not there");
@@ -139,7 +135,7 @@ mod tests {
         );
         let (_dir, file) = project("[run]\nworkers = -1");
         let error = load(&Sources {
-            start: Start::Project(file.clone()),
+            base: BaseLayer::Project(file.clone()),
             ..Sources::default()
         })
         .expect_err("negative");
@@ -152,7 +148,7 @@ mod tests {
         let error = with(&["run.workers=100000"]).expect_err("too many");
         assert_eq!(
             error.to_string(),
-            "--set: run.workers = 100000 is outside 0 to 1024"
+            "--set: run.workers = 100000 is outside the range 0 to 1024"
         );
     }
 
@@ -160,7 +156,7 @@ mod tests {
     fn bad_toml_names_file_and_line() {
         let (_dir, file) = project("[run]\nworkers 2\n");
         let error = load(&Sources {
-            start: Start::Project(file.clone()),
+            base: BaseLayer::Project(file.clone()),
             ..Sources::default()
         })
         .expect_err("no equals sign");
@@ -172,7 +168,7 @@ mod tests {
     fn unknown_preset_environment_and_flag_are_refused() {
         let (_dir, file) = project("preset = \"papr\"");
         let error = load(&Sources {
-            start: Start::Project(file),
+            base: BaseLayer::Project(file),
             ..Sources::default()
         })
         .expect_err("no such preset");
@@ -194,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn variables_with_one_underscore_count_and_mistyped_ones_are_refused() {
+    fn variables_with_one_underscore_are_read_and_mistyped_ones_refused() {
         let env = |name: &str, value: &str| {
             load(&Sources {
                 env: vec![
@@ -222,8 +218,8 @@ mod tests {
     }
 
     #[test]
-    fn a_value_is_one_value_whatever_lines_it_holds() {
-        let error = with(&["run.workers=2\nstage_limit_s = 3"]).expect_err("two lines");
+    fn value_of_two_lines_is_one_value() {
+        let error = with(&["run.workers=2\nstage_timeout_s = 3"]).expect_err("two lines");
         assert_eq!(error.to_string().lines().count(), 1, "{error}");
     }
 

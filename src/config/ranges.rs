@@ -1,118 +1,150 @@
-//! Ranges of the settings that are numbers, and settings that must fit together.
+//! The ranges of numeric settings, and settings that depend on each other.
+
+use std::fmt;
 
 use toml::Value;
 
-use super::{ConfigError, Origin, Setting, Tree};
+use super::error::{ConfigError, Origin};
+use super::tree::{Setting, Tree};
 
-/// Key, smallest and largest value. The reasons stand beside the settings in `config/default.toml`.
-const RANGES: &[(&str, f64, f64)] = &[
-    ("limits.mesh.max_bytes", 1.0, 1e15),
-    ("limits.mesh.max_vertices", 3.0, 4_294_967_295.0),
-    ("limits.mesh.max_triangles", 1.0, 4_294_967_295.0),
-    ("limits.image.max_bytes", 1.0, 1e15),
-    ("limits.image.max_pixels", 1.0, 1e10),
-    ("run.workers", 0.0, 1024.0),
-    ("run.memory_mib", 0.0, 1e9),
-    ("run.stage_timeout_s", 1.0, 86_400.0),
-    ("fit.spaced_points", 3.0, 100_000.0),
-    ("fit.spacing", 1e-6, 1.0),
-    ("fit.ransac_draws", 1.0, 100_000.0),
-    ("fit.ransac_distance", 1e-6, 1.0),
-    ("fit.min_relief", 0.0, 1.0),
-    ("depth.longest_px", 32.0, 16_384.0),
-    ("depth.px_per_mm", 1e-3, 1e4),
-    ("normalize.canvas_px", 64.0, 2048.0),
-    ("normalize.character_px", 32.0, 2048.0),
-    ("normalize.scale_band", 1.0, 2.0),
-    ("normalize.threshold_min", 0.0, 1.0),
-    ("normalize.threshold_max", 0.0, 1.0),
-    ("normalize.ink_spread", 1.0, 3.0),
-    ("register.working_px", 32.0, 1024.0),
-    ("register.smoothing_px", 0.0, 10.0),
-    ("register.min_confidence", 0.0, 1.0),
-    ("register.coarse_angles", 4.0, 3600.0),
-    ("register.fine_angles", 2.0, 3600.0),
+/// The values that a numeric setting, or each number of a list, may have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Range {
+    min: f64,
+    max: f64,
+}
+
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.max.is_infinite() {
+            write!(f, "{} or more", self.min)
+        } else {
+            write!(f, "{} to {}", self.min, self.max)
+        }
+    }
+}
+
+const fn range(min: f64, max: f64) -> Range {
+    Range { min, max }
+}
+
+/// The range of every numeric setting. The comments in `config/default.toml` repeat them, which a test checks.
+const RANGES: &[(&str, Range)] = &[
+    ("limits.mesh.max_bytes", range(1.0, 1e15)),
+    ("limits.mesh.max_vertices", range(3.0, 4_294_967_295.0)),
+    ("limits.mesh.max_triangles", range(1.0, 4_294_967_295.0)),
+    ("limits.image.max_bytes", range(1.0, 1e15)),
+    ("limits.image.max_pixels", range(1.0, 1e10)),
+    ("run.workers", range(0.0, 1024.0)),
+    ("run.memory_mib", range(0.0, 1e9)),
+    ("run.stage_timeout_s", range(1.0, 86_400.0)),
+    ("fit.seed", range(0.0, f64::INFINITY)),
+    ("fit.spaced_points", range(3.0, 100_000.0)),
+    ("fit.spacing", range(1e-6, 1.0)),
+    ("fit.ransac_draws", range(1.0, 100_000.0)),
+    ("fit.ransac_distance", range(1e-6, 1.0)),
+    ("fit.min_relief", range(0.0, 1.0)),
+    ("depth.longest_px", range(32.0, 16_384.0)),
+    ("depth.px_per_mm", range(1e-3, 1e4)),
+    ("normalize.print_grey", range(0.0, 255.0)),
+    ("normalize.canvas_px", range(64.0, 2048.0)),
+    ("normalize.character_px", range(32.0, 2048.0)),
+    ("normalize.scale_band", range(1.0, 2.0)),
+    ("normalize.threshold_min", range(0.0, 1.0)),
+    ("normalize.threshold_max", range(0.0, 1.0)),
+    ("normalize.ink_spread", range(1.0, 3.0)),
+    ("normalize.density_greys", range(0.0, 255.0)),
+    ("normalize.structure_greys", range(0.0, 255.0)),
+    ("register.working_px", range(32.0, 1024.0)),
+    ("register.smoothing_px", range(0.0, 10.0)),
+    ("register.min_confidence", range(0.0, 1.0)),
+    ("register.coarse_angles", range(4.0, 3600.0)),
+    ("register.fine_angles", range(2.0, 3600.0)),
 ];
 
-/// The first of each two is below the second.
-const RISING: &[(&str, &str)] = &[
+/// Pairs of settings of which the first must be below the second.
+const ASCENDING: &[(&str, &str)] = &[
     ("normalize.character_px", "normalize.canvas_px"),
     ("normalize.threshold_min", "normalize.threshold_max"),
 ];
 
-/// Settings of two numbers of which the first is not above the second.
-const SPANS: &[&str] = &["normalize.density_greys", "normalize.structure_greys"];
-
-/// Holds every number to its range and to its neighbour.
+/// Checks every number against its range, and settings against each other.
 ///
 /// # Errors
-/// For the first number that is out of place.
+/// For the first invalid value.
 pub(super) fn check(tree: &Tree) -> Result<(), ConfigError> {
     let settings = tree.settings();
-    check_ranges(&settings)?;
+    settings.iter().try_for_each(check_range)?;
     let find = |key: &str| settings.iter().find(|setting| setting.key == key);
-    for (low, high) in RISING {
+    for (low, high) in ASCENDING {
         if let (Some(low), Some(high)) = (find(low), find(high)) {
-            check_rising(low, high)?;
+            check_ascending(low, high)?;
         }
     }
     if let (Some(normalize), Some(register)) = (find("normalize.method"), find("register.method")) {
         check_methods(normalize, register)?;
     }
-    for span in SPANS.iter().filter_map(|key| find(key)) {
-        check_span(span)?;
-    }
     Ok(())
 }
 
-/// `refine` starts from the pose that `bounding_box` does not look for: without this every pair would fail.
-fn check_methods(normalize: &Setting, register: &Setting) -> Result<(), ConfigError> {
-    let is = |setting: &Setting, name: &str| setting.value.as_str() == Some(name);
-    if !(is(normalize, "bounding_box") && is(register, "refine")) {
+/// Checks the numbers of a setting against its range; a list of two must not descend.
+fn check_range(setting: &Setting) -> Result<(), ConfigError> {
+    let Some((_, range)) = RANGES.iter().find(|(key, _)| *key == setting.key) else {
         return Ok(());
+    };
+    let numbers = numbers(&setting.value);
+    let is_inside = |number: &f64| (range.min..=range.max).contains(number);
+    if !numbers.iter().all(is_inside) {
+        return Err(ConfigError::Range {
+            origin: setting.origin.clone(),
+            key: setting.key.clone(),
+            value: setting.value.to_string(),
+            range: range.to_string(),
+        });
     }
-    Err(match register.origin {
-        Origin::Default => bad(
-            normalize,
-            "needs register.method = \"exhaustive\"".to_owned(),
-        ),
-        Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => bad(
-            register,
-            "needs normalize.method = \"pose_first\"".to_owned(),
-        ),
-    })
+    match numbers[..] {
+        [first, last] if first > last => {
+            Err(invalid(setting, "the first is above the last".to_owned()))
+        }
+        _ => Ok(()),
+    }
 }
 
-/// The one of the two that somebody set is to blame, the lower one where both or neither are.
-fn check_rising(low: &Setting, high: &Setting) -> Result<(), ConfigError> {
-    match (number(&low.value), number(&high.value)) {
-        (Some(a), Some(b)) if a >= b => {
+/// Blames the value that was set; if both or neither were, the lower one.
+fn check_ascending(low: &Setting, high: &Setting) -> Result<(), ConfigError> {
+    match (&numbers(&low.value)[..], &numbers(&high.value)[..]) {
+        ([a], [b]) if a >= b => {
             let (blamed, reason) = match low.origin {
                 Origin::Default => (high, format!("must be above {} = {}", low.key, low.value)),
                 Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => {
                     (low, format!("must be below {} = {}", high.key, high.value))
                 }
             };
-            Err(bad(blamed, reason))
+            Err(invalid(blamed, reason))
         }
         _ => Ok(()),
     }
 }
 
-fn check_span(setting: &Setting) -> Result<(), ConfigError> {
-    let ends: Option<Vec<f64>> = setting
-        .value
-        .as_array()
-        .and_then(|values| values.iter().map(number).collect());
-    match ends.as_deref() {
-        Some([first, last]) if first > last => {
-            Err(bad(setting, "the first is above the last".to_owned()))
-        }
-        _ => Ok(()),
+/// Refuses `bounding_box` with `refine`: refinement starts from a pose that `bounding_box` does not search, so every pair would fail.
+fn check_methods(normalize: &Setting, register: &Setting) -> Result<(), ConfigError> {
+    let is = |setting: &Setting, name: &str| setting.value.as_str() == Some(name);
+    if !(is(normalize, "bounding_box") && is(register, "refine")) {
+        return Ok(());
     }
+    Err(match register.origin {
+        Origin::Default => invalid(
+            normalize,
+            "needs register.method = \"exhaustive\"".to_owned(),
+        ),
+        Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => invalid(
+            register,
+            "needs normalize.method = \"pose_first\"".to_owned(),
+        ),
+    })
 }
 
-fn bad(setting: &Setting, reason: String) -> ConfigError {
+fn invalid(setting: &Setting, reason: String) -> ConfigError {
     ConfigError::Value {
         origin: setting.origin.clone(),
         key: setting.key.clone(),
@@ -121,52 +153,35 @@ fn bad(setting: &Setting, reason: String) -> ConfigError {
     }
 }
 
-fn check_ranges(settings: &[Setting]) -> Result<(), ConfigError> {
-    for setting in settings {
-        let Some((_, min, max)) = RANGES.iter().find(|(key, ..)| *key == setting.key) else {
-            continue;
-        };
-        let inside = number(&setting.value).is_none_or(|value| (*min..=*max).contains(&value));
-        if !inside {
-            return Err(ConfigError::Range {
-                origin: setting.origin.clone(),
-                key: setting.key.clone(),
-                value: setting.value.to_string(),
-                min: *min,
-                max: *max,
-            });
-        }
-    }
-    Ok(())
-}
-
-fn number(value: &Value) -> Option<f64> {
+/// Returns the number of a setting, the numbers of a list, or nothing for other values.
+fn numbers(value: &Value) -> Vec<f64> {
     match value {
-        Value::Integer(integer) => Some(*integer as f64),
-        Value::Float(float) => Some(*float),
-        Value::String(_)
-        | Value::Boolean(_)
-        | Value::Datetime(_)
-        | Value::Array(_)
-        | Value::Table(_) => None,
+        Value::Integer(integer) => vec![*integer as f64],
+        Value::Float(float) => vec![*float],
+        Value::Array(values) => values.iter().flat_map(numbers).collect(),
+        Value::String(_) | Value::Boolean(_) | Value::Datetime(_) | Value::Table(_) => Vec::new(),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{RANGES, RISING, SPANS, Tree, check};
-    use crate::config::{Origin, Preset};
+    use super::{ASCENDING, Origin, RANGES, Range, Tree, check, numbers, range};
+    use crate::config::{Preset, explanation};
+
+    fn tree() -> Tree {
+        Tree::new(Preset::Default.table().expect("valid TOML"))
+    }
 
     fn complaint(key: &str, value: toml::Value) -> String {
-        let mut tree = Tree::new(Preset::Default.table().expect("valid TOML"));
+        let mut tree = tree();
         for change in tree.change(key, value, &Origin::Flag).expect("a known key") {
             tree.apply(&change);
         }
-        check(&tree).expect_err("out of place").to_string()
+        check(&tree).expect_err("refused").to_string()
     }
 
     #[test]
-    fn neighbours_out_of_order_are_refused() {
+    fn values_that_contradict_each_other_are_refused() {
         assert_eq!(
             complaint("normalize.canvas_px", 128.into()),
             "--set: normalize.canvas_px = 128: must be above normalize.character_px = 192"
@@ -178,21 +193,49 @@ mod tests {
         let greys = toml::Value::from(vec![9, 5]);
         assert!(complaint("normalize.density_greys", greys).ends_with("above the last"));
         assert!(complaint("fit.spacing", f64::NAN.into()).contains("outside"));
+        assert!(complaint("fit.seed", (-1).into()).ends_with("outside the range 0 or more"));
     }
 
     #[test]
-    fn every_range_is_of_a_setting_that_exists() {
-        let tree = Tree::new(Preset::Default.table().expect("valid TOML"));
-        let settings = tree.settings();
-        let rising = RISING.iter().flat_map(|(low, high)| [low, high]);
-        for key in RANGES
+    fn every_number_has_a_range_and_every_range_a_number() {
+        let settings = tree().settings();
+        let numeric = settings
             .iter()
-            .map(|(key, ..)| key)
-            .chain(rising)
-            .chain(SPANS)
-        {
-            assert!(settings.iter().any(|setting| setting.key == *key), "{key}");
+            .filter(|setting| !numbers(&setting.value).is_empty());
+        let mut expected: Vec<&str> = numeric.map(|setting| setting.key.as_str()).collect();
+        let mut keys: Vec<&str> = RANGES.iter().map(|(key, _)| *key).collect();
+        expected.sort_unstable();
+        keys.sort_unstable();
+        assert_eq!(keys, expected);
+        let ascending = ASCENDING.iter().flat_map(|(low, high)| [low, high]);
+        for key in ascending {
+            assert!(keys.contains(key), "{key}");
         }
-        assert!(RANGES.iter().all(|(_, min, max)| min < max));
+        assert!(RANGES.iter().all(|(_, range)| range.min < range.max));
+    }
+
+    /// Finds `A to B` or `A or more` at the end of a clause.
+    fn stated_ranges(comment: &str) -> Vec<Range> {
+        let clauses = comment.split([' ', '\n']).collect::<Vec<_>>();
+        let number = |text: &str| text.trim_end_matches(['.', ';', ',']).parse::<f64>().ok();
+        let stated = clauses.windows(3).filter_map(|words| match words {
+            [min, "to", max] => Some(range(number(min)?, number(max)?)),
+            [min, "or", more] if more.starts_with("more") => {
+                Some(range(number(min)?, f64::INFINITY))
+            }
+            _ => None,
+        });
+        stated.collect()
+    }
+
+    #[test]
+    fn comments_in_the_default_file_state_the_ranges() {
+        for (key, range) in RANGES {
+            let comment = explanation(key).join(" ");
+            assert!(
+                stated_ranges(&comment).contains(range),
+                "{key}: the comment must state \"{range}\": {comment}"
+            );
+        }
     }
 }

@@ -1,19 +1,19 @@
-//! The layers above the defaults: preset, file, environment, flags.
+//! The layers above the defaults: preset, file, environment variables, flags.
 
 use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::nearest::hint;
-use super::{ConfigError, Origin, Tree};
+use super::error::{ConfigError, Origin, hint};
+use super::tree::Tree;
 
 /// Settings that come with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
-    /// The best that is known; holds every setting.
+    /// The best known method; holds every setting.
     #[default]
     Default,
-    /// The paper's method to the letter; holds what differs from the default.
+    /// The paper's method; holds only what differs from the default.
     Paper,
 }
 
@@ -21,7 +21,7 @@ impl Preset {
     /// Every preset.
     pub const ALL: [Self; 2] = [Self::Default, Self::Paper];
 
-    /// Name in files and on the command line.
+    /// Returns the name in files and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Default => "default",
@@ -29,12 +29,12 @@ impl Preset {
         }
     }
 
-    /// The preset of a name.
+    /// Returns the preset of a name.
     pub fn named(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|preset| preset.name() == name)
     }
 
-    /// Its text, with a comment for each setting.
+    /// Returns the TOML text, with a comment for each setting.
     pub const fn text(self) -> &'static str {
         match self {
             Self::Default => include_str!("../../config/default.toml"),
@@ -54,28 +54,56 @@ impl Preset {
     }
 }
 
-/// Where the layers between the defaults and the environment come from.
+/// Returns the comment of a setting in `config/default.toml`, line by line without the comment signs. A comment applies
+/// to all settings below it, up to the next comment; above a section's header it describes the section.
+pub fn explanation(key: &str) -> Vec<&'static str> {
+    let Some((section, name)) = key.rsplit_once('.') else {
+        return Vec::new();
+    };
+    let (mut current, mut comment, mut is_complete) = ("", Vec::new(), true);
+    for line in Preset::Default.text().lines() {
+        if let Some(text) = line.strip_prefix("# ") {
+            if is_complete {
+                comment.clear();
+            }
+            comment.push(text);
+            is_complete = false;
+        } else if let Some(header) = line.strip_prefix('[') {
+            current = header.trim_end_matches(']');
+            comment.clear();
+        } else {
+            let is_key = line.split_once(" = ").is_some_and(|(key, _)| key == name);
+            if is_key && current == section {
+                return comment;
+            }
+            is_complete = true;
+        }
+    }
+    Vec::new()
+}
+
+/// The layers between the defaults and the environment.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Start {
+pub enum BaseLayer {
     /// A preset alone (`--config paper`).
     Preset(Preset),
-    /// A file that must be there (`--config FILE`), in the place of the project's own.
+    /// A file that must exist (`--config FILE`), instead of the project's.
     File(PathBuf),
-    /// The project's own file, which need not be there.
+    /// The project's file, which need not exist.
     Project(PathBuf),
 }
 
-impl Default for Start {
+impl Default for BaseLayer {
     fn default() -> Self {
         Self::Preset(Preset::Default)
     }
 }
 
-/// Everything that settings are read from besides the embedded defaults.
+/// Everything that settings are read from, except the embedded defaults.
 #[derive(Debug, Clone, Default)]
 pub struct Sources {
     /// Preset or file.
-    pub start: Start,
+    pub base: BaseLayer,
     /// Environment variables; those named `MOCBAN_SECTION__KEY` or `MOCBAN_SECTION_KEY` are settings.
     pub env: Vec<(String, String)>,
     /// `section.key=value`, as given to `--set`.
@@ -83,17 +111,17 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// Layers that are whole tables, lowest first.
+    /// Returns the layers that are tables, lowest first.
     pub(super) fn tables(&self) -> Result<Vec<(Table, Origin)>, ConfigError> {
-        match &self.start {
-            Start::Preset(preset) => Ok(preset_layer(*preset)?.into_iter().collect()),
-            Start::File(path) => file_layers(path),
-            Start::Project(path) if path.exists() => file_layers(path),
-            Start::Project(_) => Ok(Vec::new()),
+        match &self.base {
+            BaseLayer::Preset(preset) => Ok(preset_layer(*preset)?.into_iter().collect()),
+            BaseLayer::File(path) => file_layers(path),
+            BaseLayer::Project(path) if path.exists() => file_layers(path),
+            BaseLayer::Project(_) => Ok(Vec::new()),
         }
     }
 
-    /// Layers of one value each: environment, then flags.
+    /// Returns the layers of one value each: environment variables, then flags.
     pub(super) fn single_values(
         &self,
         defaults: &Tree,
@@ -103,7 +131,7 @@ impl Sources {
             .iter()
             .filter_map(|(name, text)| Some((env_key(name, defaults)?, name, text)))
             .collect();
-        // Of two ways to write one name, that with two underscores wins.
+        // Of two spellings of one name, the one with two underscores wins.
         named.sort();
         let mut values: Vec<_> = named
             .into_iter()
@@ -117,8 +145,9 @@ impl Sources {
     }
 }
 
-/// `MOCBAN_LIMITS__MESH__MAX_BYTES` is `limits.mesh.max_bytes`, and so is `MOCBAN_LIMITS_MESH_MAX_BYTES`. A name that
-/// begins with no section is no setting; one that does and is none is passed on, to be refused by its name.
+/// Returns the setting of an environment variable: both `MOCBAN_LIMITS__MESH__MAX_BYTES` and
+/// `MOCBAN_LIMITS_MESH_MAX_BYTES` are `limits.mesh.max_bytes`. Returns `None` for a name that starts with no section;
+/// an unknown key of a section is returned, to be refused later.
 fn env_key(name: &str, defaults: &Tree) -> Option<String> {
     let rest = name.strip_prefix("MOCBAN_")?.to_ascii_lowercase();
     if rest.contains("__") {
@@ -149,7 +178,7 @@ fn split_set(text: &str) -> Result<(String, Value), ConfigError> {
     }
 }
 
-/// A value as TOML writes it, or else the text itself, so that words need no quotes.
+/// Parses a TOML value; other text becomes a string, so that words need no quotes.
 fn value(text: &str) -> Value {
     format!("value = {text}")
         .parse::<Table>()

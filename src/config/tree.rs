@@ -1,13 +1,12 @@
-//! Layers of settings laid over each other as TOML tables, each value with its origin.
+//! Layers of settings merged as TOML tables, each value with its origin.
 
 use std::collections::BTreeMap;
 
 use toml::{Table, Value};
 
-use super::nearest::hint;
-use super::{ConfigError, Origin};
+use super::error::{ConfigError, Origin, hint};
 
-/// The merged settings and, for each dotted key that a layer changed, the layer.
+/// The merged settings and, for each changed dotted key, the layer that changed it.
 #[derive(Debug, Clone)]
 pub struct Tree {
     root: Table,
@@ -21,7 +20,7 @@ pub struct Change {
     pub key: String,
     /// The new value.
     pub value: Value,
-    /// The layer it belongs to.
+    /// The layer.
     pub origin: Origin,
 }
 
@@ -30,14 +29,14 @@ pub struct Change {
 pub struct Setting {
     /// Dotted key.
     pub key: String,
-    /// Its value now.
+    /// The current value.
     pub value: Value,
     /// Where the value came from.
     pub origin: Origin,
 }
 
 impl Tree {
-    /// The lowest layer: it alone says which sections and keys exist.
+    /// Starts with the lowest layer, which defines the sections and keys.
     pub const fn new(defaults: Table) -> Self {
         Self {
             root: defaults,
@@ -45,15 +44,15 @@ impl Tree {
         }
     }
 
-    /// The merged table.
+    /// Returns the merged table.
     pub const fn table(&self) -> &Table {
         &self.root
     }
 
-    /// What a layer's table changes here, key by key.
+    /// Returns the changes that a layer's table makes, one per key.
     ///
-    /// A table is walked into where the defaults have a section that holds all of its keys; elsewhere it is one
-    /// value, as a choice with data is (`{ fixed = 127 }`).
+    /// A table is a section if the defaults have a section with all of its keys; otherwise it is one value, such as an
+    /// enum variant with data (`{ fixed = 127 }`).
     ///
     /// # Errors
     /// When the layer names a section or key that does not exist.
@@ -63,7 +62,7 @@ impl Tree {
         Ok(changes)
     }
 
-    /// The change of one dotted key.
+    /// Returns the change of one dotted key.
     ///
     /// # Errors
     /// When there is no such key.
@@ -83,7 +82,7 @@ impl Tree {
         }
     }
 
-    /// Lays one change over the rest.
+    /// Applies one change.
     pub fn apply(&mut self, change: &Change) {
         let mut parts: Vec<&str> = change.key.split('.').collect();
         let Some(last) = parts.pop() else { return };
@@ -101,7 +100,7 @@ impl Tree {
             .insert(change.key.clone(), change.origin.clone());
     }
 
-    /// Every value with its origin, in the order of the defaults.
+    /// Returns every value with its origin, in the order of the defaults.
     pub fn settings(&self) -> Vec<Setting> {
         let mut settings = Vec::new();
         flatten(&self.root, "", &mut |key, value| {
@@ -114,7 +113,7 @@ impl Tree {
         settings
     }
 
-    /// The layer that set a key, or the choice that it is a part of.
+    /// Returns the layer that set a key, or set the table that contains it.
     pub fn origin(&self, key: &str) -> Origin {
         let mut key = key;
         loop {
@@ -182,8 +181,8 @@ fn collect(
     Ok(())
 }
 
-/// Top-level tables are sections whatever they hold, so that a mistyped key is told by its name; deeper ones only
-/// when they know every key.
+/// Returns whether a table is a section: top-level tables always are, so that a mistyped key is reported by name; others
+/// only if every key is known.
 fn is_section(prefix: &str, section: &Table, layer: &Table) -> bool {
     prefix.is_empty() || layer.keys().all(|key| section.contains_key(key))
 }
@@ -208,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn later_layer_wins_and_its_origin_is_kept() {
+    fn later_layer_wins_and_its_origin_is_recorded() {
         let mut tree = tree();
         apply(&mut tree, "run.workers = 2", &Origin::Preset("paper"));
         apply(&mut tree, "run.workers = 3", &Origin::Flag);
@@ -218,7 +217,7 @@ mod tests {
     }
 
     #[test]
-    fn choice_with_data_is_replaced_as_a_whole() {
+    fn enum_variant_with_data_is_replaced_as_one_value() {
         let mut tree = tree();
         apply(&mut tree, "fit.ink = { otsu = {} }", &Origin::Flag);
         assert!(tree.table()["fit"]["ink"].get("fixed").is_none());
@@ -227,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_key_names_layer_key_and_the_likely_meaning() {
+    fn unknown_key_is_reported_with_layer_and_suggestion() {
         let layer = "[run]\nwrokers = 1".parse().expect("valid");
         let error = tree()
             .changes(&layer, &Origin::File("p/mocban.toml".into()))
@@ -239,12 +238,12 @@ mod tests {
     }
 
     #[test]
-    fn value_in_the_place_of_a_section_is_refused() {
+    fn value_in_place_of_a_section_is_refused() {
         let layer = "run = 1".parse().expect("valid");
         let error = tree().changes(&layer, &Origin::Flag).expect_err("refused");
         assert_eq!(
             error.to_string(),
-            "--set: run is a section; give its keys one by one"
+            "--set: run is a section; set its keys one by one"
         );
     }
 }

@@ -1,29 +1,27 @@
-//! CSV lists: comma, semicolon or tab, as the header line has it.
+//! CSV lists, separated by commas, semicolons or tabs.
 
 use std::collections::BTreeMap;
 
-use super::draft::{Draft, Rows};
-use super::{
-    COLUMNS, Ids, LineCounter, ManifestError, ManifestRow, Problem, REQUIRED, as_utf8, delimiter,
-};
+use super::draft::{DraftRow, RowCollector};
+use super::error::{ManifestError, Problem};
+use super::row::{COLUMNS, ManifestRow, REQUIRED, RowIds};
+use super::text::{LineCounter, as_utf8, delimiter};
 
-/// Parses a CSV list with a header line. Column names may stand in any order and in capitals; blank lines are
-/// left out.
+/// Parses a CSV list with a header line. Columns may be in any order, their names in any case; blank lines are ignored.
 ///
 /// # Errors
-/// All that is wrong, by the line each row begins at.
+/// All problems, by the line where each row starts.
 pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     let mut rows = Vec::new();
     read_csv(bytes, &mut |row| rows.push(row))?;
     Ok(rows)
 }
 
-/// The same for lists that are too long to be held: each row goes to `each` as it is read, also where a later one is
-/// refused.
+/// Like [`parse_csv`], for lists too long for memory: passes each row to `each`, even if a later row is refused.
 ///
 /// # Errors
-/// All that is wrong, by the line each row begins at.
-pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<Ids, ManifestError> {
+/// All problems, by the line where each row starts.
+pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError> {
     let text = as_utf8(bytes).map_err(|error| Problem::whole(error.to_string()))?;
     let bytes = &*text;
     let mut reader = ::csv::ReaderBuilder::new()
@@ -39,10 +37,10 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<Ids, 
         Ok::<_, Problem>((line, record))
     });
     let header = match records.next() {
-        Some(header) => Header::parse(&header?)?,
+        Some(header) => CsvHeader::parse(&header?)?,
         None => return Err(Problem::whole("the list is empty").into()),
     };
-    let mut rows = Rows::new(each);
+    let mut rows = RowCollector::new(each);
     for record in records {
         let (line, record) = record?;
         match header.draft(line, &record) {
@@ -51,22 +49,22 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<Ids, 
             Err(problem) => rows.problems.push(problem),
         }
     }
-    rows.end()
+    rows.finish()
 }
 
-/// What a column holds.
+/// The meaning of a column.
 #[derive(Debug, Clone)]
-enum Column {
+enum CsvColumn {
     Known(&'static str),
     Meta(String),
 }
 
 #[derive(Debug)]
-struct Header {
-    columns: Vec<Column>,
+struct CsvHeader {
+    columns: Vec<CsvColumn>,
 }
 
-impl Header {
+impl CsvHeader {
     fn parse((line, record): &(usize, ::csv::ByteRecord)) -> Result<Self, ManifestError> {
         let mut problems = Vec::new();
         let mut seen = BTreeMap::new();
@@ -97,8 +95,8 @@ impl Header {
         }
     }
 
-    /// A row's cells; `None` for a row of empty cells, as spreadsheets leave them at the end.
-    fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<Draft>, Problem> {
+    /// Returns a row's cells; `None` for a row of empty cells, as spreadsheets write them at the end.
+    fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<DraftRow>, Problem> {
         if record.iter().all(<[u8]>::is_empty) {
             return Ok(None);
         }
@@ -106,15 +104,15 @@ impl Header {
             return Err(Problem::line(
                 line,
                 format!(
-                    "the row has {} cells, the header {}",
+                    "the row has {} cells, the header has {}",
                     record.len(),
                     self.columns.len()
                 ),
             ));
         }
-        let mut draft = Draft {
+        let mut draft = DraftRow {
             line,
-            ..Draft::default()
+            ..DraftRow::default()
         };
         for (column, cell) in self.columns.iter().zip(record) {
             let Ok(cell) = std::str::from_utf8(cell) else {
@@ -130,31 +128,31 @@ impl Header {
     }
 }
 
-impl Draft {
-    fn put(&mut self, column: &Column, cell: &str) {
+impl DraftRow {
+    fn put(&mut self, column: &CsvColumn, cell: &str) {
         match column {
-            Column::Known(name) => {
+            CsvColumn::Known(name) => {
                 self.cells.insert(name, cell.to_owned());
             }
-            Column::Meta(name) if !cell.is_empty() && !name.is_empty() => {
+            CsvColumn::Meta(name) if !cell.is_empty() && !name.is_empty() => {
                 self.meta.insert(name.clone(), cell.into());
             }
-            Column::Meta(_) => {}
+            CsvColumn::Meta(_) => {}
         }
     }
 }
 
-fn column(name: &str) -> Column {
+fn column(name: &str) -> CsvColumn {
     COLUMNS
         .into_iter()
         .find(|known| known.eq_ignore_ascii_case(name))
-        .map_or_else(|| Column::Meta(name.to_owned()), Column::Known)
+        .map_or_else(|| CsvColumn::Meta(name.to_owned()), CsvColumn::Known)
 }
 
-fn column_name(column: &Column) -> &str {
+fn column_name(column: &CsvColumn) -> &str {
     match column {
-        Column::Known(name) => name,
-        Column::Meta(name) => name,
+        CsvColumn::Known(name) => name,
+        CsvColumn::Meta(name) => name,
     }
 }
 
@@ -172,7 +170,7 @@ fn missing_column(name: &str, record: &::csv::ByteRecord) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ManifestError, ManifestRow};
+    use super::{ManifestError, ManifestRow};
     use crate::domain::LengthUnit;
 
     fn parse(text: &str) -> Result<Vec<ManifestRow>, ManifestError> {
@@ -184,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn all_columns_are_read_and_others_kept() {
+    fn known_columns_are_parsed_and_others_stored() {
         let rows = parse(
             "id,mesh,print,character,block,unit,scanned_face_down,folio\n\
              b1_0001,m/1.stl,p/1.png,天,b1,mm,yes,12r\nb1_0002,m/2.stl,p/2.png,,,,,\n",
@@ -204,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn order_capitals_spaces_bom_and_separators_do_not_matter() {
+    fn order_case_spaces_bom_and_separators_do_not_matter() {
         let plain = parse("id,mesh,print\na,b,c\n").expect("parses");
         for text in [
             "\u{feff}id,mesh,print\r\na,b,c\r\n",
@@ -226,7 +224,7 @@ mod tests {
     }
 
     #[test]
-    fn every_problem_is_named_by_its_line() {
+    fn every_problem_is_reported_with_its_line() {
         let text = "id,mesh,print,unit,scanned_face_down\n\
             a,m,p,,\n\
             a/b,m,p,,\n\
@@ -239,18 +237,18 @@ mod tests {
             [
                 "line 3: id \"a/b\" holds '/'; an id is made of letters A-Z, digits, _ and -",
                 "line 4: the id is empty",
-                "line 5: id \"a\" was given in line 2 already",
-                "line 6: no mesh is given",
-                "line 6: no print is given",
+                "line 5: id \"a\" is already on line 2",
+                "line 6: mesh is empty",
+                "line 6: print is empty",
                 "line 6: \"furlong\" is not a unit (mm, cm, m, in)",
                 "line 6: scanned_face_down is \"maybe\", not true, false, yes, no, 1 or 0",
-                "line 7: the row has 2 cells, the header 5",
+                "line 7: the row has 2 cells, the header has 5",
             ]
         );
     }
 
     #[test]
-    fn missing_and_doubled_columns_are_named() {
+    fn missing_and_repeated_columns_are_reported() {
         assert_eq!(
             refusal("id,model,print\na,b,c\n"),
             "line 1: column \"mesh\" is missing; the header has: id, model, print"
@@ -260,11 +258,11 @@ mod tests {
             "line 1: columns 2 and 4 are both named \"Mesh\""
         );
         assert_eq!(refusal(""), "the list is empty");
-        assert_eq!(refusal("id,mesh,print\n"), "the list holds no pairs");
+        assert_eq!(refusal("id,mesh,print\n"), "the list contains no pairs");
     }
 
     #[test]
-    fn bytes_that_are_not_utf8_are_named_by_line_and_column() {
+    fn bytes_that_are_not_utf8_are_reported_with_line_and_column() {
         let error = super::parse_csv(b"id,mesh,print\na,b,c\nd,\xff\xfe,f\n").expect_err("bytes");
         assert_eq!(
             error.to_string(),

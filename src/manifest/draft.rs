@@ -1,44 +1,45 @@
-//! A row whose cells are not yet checked, and the check that all lists share.
+//! Rows whose cells are not yet checked, and the checks that all formats share.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::{Ids, ManifestError, ManifestRow, Problem, REQUIRED};
+use super::error::{ManifestError, Problem};
+use super::row::{ManifestRow, REQUIRED, RowIds};
 use crate::domain::{LengthUnit, PairName};
 
-/// Cells of one row by lower-case column name, and the columns of no meaning to us.
+/// The cells of one row by lower-case column name, and its other columns.
 #[derive(Debug, Default)]
-pub(super) struct Draft {
+pub(super) struct DraftRow {
     pub(super) line: usize,
     pub(super) cells: BTreeMap<&'static str, String>,
     pub(super) meta: BTreeMap<String, serde_json::Value>,
 }
 
-/// Passes rows on; collects problems, and the line of each id.
-pub(super) struct Rows<'e> {
+/// Passes valid rows on; collects problems and ids.
+pub(super) struct RowCollector<'e> {
     pub(super) problems: Vec<Problem>,
-    ids: Ids,
+    ids: RowIds,
     each: &'e mut dyn FnMut(ManifestRow),
 }
 
-impl<'e> Rows<'e> {
-    /// For a list whose sound rows are to go to `each`.
+impl<'e> RowCollector<'e> {
+    /// Passes valid rows to `each`.
     pub(super) fn new(each: &'e mut dyn FnMut(ManifestRow)) -> Self {
         Self {
             problems: Vec::new(),
-            ids: Ids::default(),
+            ids: RowIds::default(),
             each,
         }
     }
 
-    /// The ids of the list, or all that is wrong with it.
-    pub(super) fn end(self) -> Result<Ids, ManifestError> {
-        ManifestError::unless_none(self.ids.is_empty(), self.problems)?;
+    /// Returns the ids of the list, or all its problems.
+    pub(super) fn finish(self) -> Result<RowIds, ManifestError> {
+        ManifestError::check(self.ids.is_empty(), self.problems)?;
         Ok(self.ids)
     }
 
-    /// Checks a row; what is wrong with it is noted.
-    pub(super) fn push(&mut self, draft: Draft) {
+    /// Checks a row and records its problems.
+    pub(super) fn push(&mut self, draft: DraftRow) {
         let line = draft.line;
         let mut reasons = Vec::new();
         let name = self.name(&draft, &mut reasons);
@@ -51,8 +52,8 @@ impl<'e> Rows<'e> {
         }
     }
 
-    /// The row's id, when it is well formed and new.
-    fn name(&mut self, draft: &Draft, reasons: &mut Vec<String>) -> Option<PairName> {
+    /// Returns the row's id if it is valid and new.
+    fn name(&mut self, draft: &DraftRow, reasons: &mut Vec<String>) -> Option<PairName> {
         let text = draft.cells.get("id").map_or("", String::as_str);
         let name = match PairName::new(text) {
             Ok(name) => name,
@@ -62,7 +63,7 @@ impl<'e> Rows<'e> {
             }
         };
         if let Some(first) = self.ids.insert(&name, draft.line) {
-            reasons.push(format!("id {text:?} was given in line {first} already"));
+            reasons.push(format!("id {text:?} is already on line {first}"));
             return None;
         }
         Some(name)
@@ -70,14 +71,14 @@ impl<'e> Rows<'e> {
 }
 
 fn complete(
-    mut draft: Draft,
+    mut draft: DraftRow,
     name: Option<PairName>,
     reasons: &mut Vec<String>,
 ) -> Option<ManifestRow> {
     draft.cells.retain(|_, cell| !cell.is_empty());
     for column in REQUIRED.into_iter().filter(|column| *column != "id") {
         if !draft.cells.contains_key(column) {
-            reasons.push(format!("no {column} is given"));
+            reasons.push(format!("{column} is empty"));
         }
     }
     let unit = checked(draft.cells.remove("unit"), parse_unit, reasons);
@@ -95,7 +96,7 @@ fn complete(
     })
 }
 
-/// An optional cell's value; a wrong one is noted.
+/// Parses an optional cell; records an invalid value.
 fn checked<T>(
     cell: Option<String>,
     parse: impl Fn(&str) -> Result<T, String>,

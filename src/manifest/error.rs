@@ -1,28 +1,28 @@
-//! What is wrong with a list of pairs, by line.
+//! Problems of a list of pairs, by line.
 
 use std::fmt;
 use std::path::PathBuf;
 
 use crate::domain::sanitize;
 
-/// Characters of a problem that are shown.
-const LONGEST: usize = 300;
+/// Longest text of a problem, in characters.
+const MAX_CHARS: usize = 300;
 
-/// Problems shown at most; the rest are counted.
-const SHOWN: usize = 20;
+/// Maximum number of problems shown; the others are counted.
+const MAX_SHOWN: usize = 20;
 
-/// Where in a list a problem is.
+/// Where a problem is in a list.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Place {
+pub enum ProblemLocation {
     /// A line, counted from 1.
     Line(usize),
-    /// A file of a folder.
+    /// A file of a directory.
     File(PathBuf),
-    /// The list as a whole.
+    /// The whole list.
     Whole,
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for ProblemLocation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Line(line) => write!(f, "line {line}: "),
@@ -32,40 +32,40 @@ impl fmt::Display for Place {
     }
 }
 
-/// One thing that is wrong.
+/// One problem of a list.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Problem {
-    /// Where.
-    pub place: Place,
+    /// Where it is.
+    pub location: ProblemLocation,
     /// A lower-case fragment with the values in it.
     pub reason: String,
 }
 
 impl Problem {
-    /// A problem of a line.
+    /// Creates a problem of a line.
     pub(super) fn line(line: usize, reason: impl Into<String>) -> Self {
         Self {
-            place: Place::Line(line),
-            reason: sanitize(&reason.into(), LONGEST),
+            location: ProblemLocation::Line(line),
+            reason: sanitize(&reason.into(), MAX_CHARS),
         }
     }
 
-    /// A problem of the whole list.
+    /// Creates a problem of the whole list.
     pub(super) fn whole(reason: impl Into<String>) -> Self {
         Self {
-            place: Place::Whole,
-            reason: sanitize(&reason.into(), LONGEST),
+            location: ProblemLocation::Whole,
+            reason: sanitize(&reason.into(), MAX_CHARS),
         }
     }
 }
 
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}{}", self.place, self.reason)
+        write!(f, "{}{}", self.location, self.reason)
     }
 }
 
-/// A list that is refused as a whole, and all that is wrong with it; shown a problem a line.
+/// A list that is refused as a whole, with all its problems; displayed as one problem per line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub struct ManifestError {
     /// In the order of the list; never empty.
@@ -73,13 +73,13 @@ pub struct ManifestError {
 }
 
 impl ManifestError {
-    /// Refuses a list with anything wrong in it, or without pairs.
-    pub(super) fn unless_none(is_empty: bool, problems: Vec<Problem>) -> Result<(), Self> {
+    /// Refuses a list that has problems, or no pairs.
+    pub(super) fn check(is_empty: bool, problems: Vec<Problem>) -> Result<(), Self> {
         if !problems.is_empty() {
             return Err(Self { problems });
         }
         if is_empty {
-            return Err(Problem::whole("the list holds no pairs").into());
+            return Err(Problem::whole("the list contains no pairs").into());
         }
         Ok(())
     }
@@ -95,11 +95,11 @@ impl From<Problem> for ManifestError {
 
 impl fmt::Display for ManifestError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (number, problem) in self.problems.iter().take(SHOWN).enumerate() {
+        for (number, problem) in self.problems.iter().take(MAX_SHOWN).enumerate() {
             let separator = if number == 0 { "" } else { "\n" };
             write!(f, "{separator}{problem}")?;
         }
-        match self.problems.len().saturating_sub(SHOWN) {
+        match self.problems.len().saturating_sub(MAX_SHOWN) {
             0 => Ok(()),
             more => write!(f, "\nand {more} more"),
         }
@@ -108,18 +108,18 @@ impl fmt::Display for ManifestError {
 
 #[cfg(test)]
 mod tests {
-    use super::{ManifestError, Place, Problem};
+    use super::{ManifestError, Problem, ProblemLocation};
 
     #[test]
-    fn words_of_a_list_come_plain_and_short() {
+    fn quoted_text_is_sanitized_and_short() {
         for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(5000)] {
-            let place = Place::File(rude.as_str().into());
-            for said in [
+            let location = ProblemLocation::File(rude.as_str().into());
+            for text in [
                 Problem::line(1, rude.as_str()).to_string(),
                 Problem::whole(rude.as_str()).to_string(),
-                place.to_string(),
+                location.to_string(),
             ] {
-                assert!(!said.contains(&rude), "{said:?}");
+                assert!(!text.contains(&rude), "{text:?}");
             }
         }
     }

@@ -1,38 +1,39 @@
-//! Pairs from two folders: files of the same stem belong together, as in `stl/12.stl` and `print/12.png`.
+//! Pairs from two directories: files with the same stem form a pair, such as `stl/12.stl` and `print/12.png`.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::{ManifestError, ManifestRow, Place, Problem};
+use super::error::{ManifestError, Problem, ProblemLocation};
+use super::row::ManifestRow;
 use crate::domain::PairName;
 
-const MESH_ENDINGS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
-const PRINT_ENDINGS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
+const MESH_EXTENSIONS: [&str; 5] = ["obj", "ply", "stl", "xyz", "pts"];
+const PRINT_EXTENSIONS: [&str; 5] = ["png", "jpg", "jpeg", "tif", "tiff"];
 
-/// What two folders hold.
+/// The content of two directories.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FolderPairs {
-    /// Pairs in the order of their stems, numbers by value.
+    /// Pairs in the order of their stems; numbers are ordered by value.
     pub rows: Vec<ManifestRow>,
     /// Meshes without a print.
     pub meshes_alone: Vec<PathBuf>,
     /// Prints without a mesh.
     pub prints_alone: Vec<PathBuf>,
-    /// Files whose ending is neither a mesh's nor a print's.
+    /// Files with other extensions.
     pub ignored: Vec<PathBuf>,
 }
 
-/// Pairs the files of a listing of meshes with those of a listing of prints by stem.
+/// Pairs the files of two listings by stem.
 ///
-/// Only files with a known ending count, hidden ones never; what is in them is told by content later. The result
-/// does not depend on the order of the listings.
+/// Uses only files with a known extension that are not hidden; their format is detected later, from their content. The
+/// result does not depend on the order of the listings.
 ///
 /// # Errors
-/// When two meshes or two prints have the same stem, a stem of a pair is no id, or there is no pair at all.
+/// When two meshes or two prints have the same stem, a stem is not a valid id, or there is no pair.
 pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPairs, ManifestError> {
     let mut problems = Vec::new();
-    let (meshes, mut ignored) = by_stem(meshes, &MESH_ENDINGS, "meshes", &mut problems);
-    let (mut prints, more) = by_stem(prints, &PRINT_ENDINGS, "prints", &mut problems);
+    let (meshes, mut ignored) = by_stem(meshes, &MESH_EXTENSIONS, "meshes", &mut problems);
+    let (mut prints, more) = by_stem(prints, &PRINT_EXTENSIONS, "prints", &mut problems);
     ignored.extend(more);
     let mut rows = Vec::new();
     let mut meshes_alone = Vec::new();
@@ -46,7 +47,7 @@ pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPair
             Err(error) => problems.push(at_file(&mesh, error.to_string())),
         }
     }
-    ManifestError::unless_none(rows.is_empty(), problems)?;
+    ManifestError::check(rows.is_empty(), problems)?;
     Ok(FolderPairs {
         rows,
         meshes_alone,
@@ -69,7 +70,7 @@ fn row(line: usize, name: PairName, mesh: PathBuf, print: PathBuf) -> ManifestRo
     }
 }
 
-/// A stem that sorts by value when it is a number, before all others.
+/// A file stem; numbers are ordered by value, before all other stems.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct Stem {
     rank: (bool, u64),
@@ -87,11 +88,11 @@ impl Stem {
     }
 }
 
-/// Files of these endings by stem, and the others.
+/// Splits a listing into files with these extensions, by stem, and others.
 fn by_stem(
     listing: &[PathBuf],
-    endings: &[&str],
-    what: &str,
+    extensions: &[&str],
+    kind: &str,
     problems: &mut Vec<Problem>,
 ) -> (BTreeMap<Stem, PathBuf>, Vec<PathBuf>) {
     let mut sorted = listing.to_vec();
@@ -99,11 +100,11 @@ fn by_stem(
     let mut found: BTreeMap<Stem, PathBuf> = BTreeMap::new();
     let mut ignored = Vec::new();
     for path in sorted.into_iter().filter(|path| !is_hidden(path)) {
-        match Stem::of(&path).filter(|_| has_ending(&path, endings)) {
+        match Stem::of(&path).filter(|_| has_extension(&path, extensions)) {
             None => ignored.push(path),
             Some(stem) => {
                 if let Some(first) = found.get(&stem) {
-                    problems.push(same_stem(first, &path, what));
+                    problems.push(same_stem(first, &path, kind));
                 } else {
                     found.insert(stem, path);
                 }
@@ -118,20 +119,23 @@ fn is_hidden(path: &Path) -> bool {
         .is_some_and(|name| name.as_encoded_bytes().starts_with(b"."))
 }
 
-fn has_ending(path: &Path, endings: &[&str]) -> bool {
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     path.extension()
-        .and_then(|ending| ending.to_str())
-        .is_some_and(|ending| endings.iter().any(|e| e.eq_ignore_ascii_case(ending)))
+        .and_then(|extension| extension.to_str())
+        .is_some_and(|extension| extensions.iter().any(|e| e.eq_ignore_ascii_case(extension)))
 }
 
-fn same_stem(first: &Path, second: &Path, what: &str) -> Problem {
-    let reason = format!("{} has the same stem; {what} pair by stem", first.display());
+fn same_stem(first: &Path, second: &Path, kind: &str) -> Problem {
+    let reason = format!(
+        "{} has the same stem; {kind} are paired by stem",
+        first.display()
+    );
     at_file(second, reason)
 }
 
 fn at_file(path: &Path, reason: String) -> Problem {
     Problem {
-        place: Place::File(path.to_owned()),
+        location: ProblemLocation::File(path.to_owned()),
         reason,
     }
 }
@@ -164,8 +168,8 @@ mod tests {
         assert_eq!(found.meshes_alone, files(&["m/9.stl"]));
         assert_eq!(found.prints_alone, files(&["p/77.png"]));
         assert_eq!(found.ignored, files(&["m/a.mtl"]));
-        let turned: Vec<_> = meshes.into_iter().rev().collect();
-        assert_eq!(pair_folders(&turned, &prints).expect("pairs"), found);
+        let reversed: Vec<_> = meshes.into_iter().rev().collect();
+        assert_eq!(pair_folders(&reversed, &prints).expect("pairs"), found);
     }
 
     #[test]
@@ -173,12 +177,12 @@ mod tests {
         let error = pair_folders(&files(&["a.stl", "a.ply"]), &files(&["a.png"]));
         assert_eq!(
             error.expect_err("twice").to_string(),
-            "a.stl: a.ply has the same stem; meshes pair by stem"
+            "a.stl: a.ply has the same stem; meshes are paired by stem"
         );
     }
 
     #[test]
-    fn stems_that_are_no_ids_are_named_by_file() {
+    fn stems_that_are_not_valid_ids_are_reported_by_file() {
         let error = pair_folders(&files(&["x y.stl", "b.stl"]), &files(&["x y.png", "b.png"]));
         assert_eq!(
             error.expect_err("space").to_string(),
@@ -187,7 +191,7 @@ mod tests {
         let none = pair_folders(&files(&["a.stl"]), &files(&["b.png"]));
         assert_eq!(
             none.expect_err("no pair").to_string(),
-            "the list holds no pairs"
+            "the list contains no pairs"
         );
     }
 }

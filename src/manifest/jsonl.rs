@@ -1,30 +1,33 @@
-//! JSON Lines lists: an object a line.
+//! JSON Lines lists: one object per line.
 
 use serde_json::{Map, Value};
 
-use super::draft::{Draft, Rows};
-use super::{COLUMNS, Ids, ManifestError, ManifestRow, Problem, as_utf8};
+use super::draft::{DraftRow, RowCollector};
+use super::error::{ManifestError, Problem};
+use super::row::{COLUMNS, ManifestRow, RowIds};
+use super::text::as_utf8;
 
-/// Parses a JSON Lines list. Keys have the names of the CSV columns; `null` is the same as no key; blank lines are
-/// left out.
+/// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` means no value; blank lines are ignored.
 ///
 /// # Errors
-/// All that is wrong, by line.
+/// All problems, by line.
 pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     let mut rows = Vec::new();
     read_jsonl(bytes, &mut |row| rows.push(row))?;
     Ok(rows)
 }
 
-/// The same for lists that are too long to be held: each row goes to `each` as it is read, also where a later one is
-/// refused.
+/// Like [`parse_jsonl`], for lists too long for memory: passes each row to `each`, even if a later row is refused.
 ///
 /// # Errors
-/// All that is wrong, by line.
-pub fn read_jsonl(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<Ids, ManifestError> {
+/// All problems, by line.
+pub fn read_jsonl(
+    bytes: &[u8],
+    each: &mut dyn FnMut(ManifestRow),
+) -> Result<RowIds, ManifestError> {
     let text = as_utf8(bytes).map_err(|error| Problem::whole(error.to_string()))?;
     let bytes = &*text;
-    let mut rows = Rows::new(each);
+    let mut rows = RowCollector::new(each);
     for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
         let content = content.trim_ascii();
         if content.is_empty() {
@@ -35,17 +38,17 @@ pub fn read_jsonl(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<Ids
             Err(reason) => rows.problems.push(Problem::line(line, reason)),
         }
     }
-    rows.end()
+    rows.finish()
 }
 
-fn draft(line: usize, content: &[u8]) -> Result<Draft, String> {
+fn draft(line: usize, content: &[u8]) -> Result<DraftRow, String> {
     let text = std::str::from_utf8(content)
         .map_err(|error| format!("byte {} is not UTF-8", error.valid_up_to() + 1))?;
     let object: Map<String, Value> =
         serde_json::from_str(text).map_err(|error| not_an_object(&error))?;
-    let mut draft = Draft {
+    let mut draft = DraftRow {
         line,
-        ..Draft::default()
+        ..DraftRow::default()
     };
     for (key, value) in object {
         let known = COLUMNS
@@ -64,7 +67,7 @@ fn draft(line: usize, content: &[u8]) -> Result<Draft, String> {
     Ok(draft)
 }
 
-/// A known key's value as text. A number is taken by its digits, as ids are often numbers.
+/// Returns the value of a known key as text. Numbers are accepted, because ids often are numbers.
 fn cell(name: &str, value: Value) -> Result<String, String> {
     match value {
         Value::String(text) => Ok(text.trim().to_owned()),
@@ -76,16 +79,16 @@ fn cell(name: &str, value: Value) -> Result<String, String> {
     }
 }
 
-/// The parser's words, its own line number left out since each line is parsed alone.
+/// Returns the parser's message without its line number, because each line is parsed separately.
 fn not_an_object(error: &serde_json::Error) -> String {
-    let words = error.to_string();
-    let reason = words.split(" at line ").next().unwrap_or(&words);
+    let message = error.to_string();
+    let reason = message.split(" at line ").next().unwrap_or(&message);
     format!("not a JSON object, column {}: {reason}", error.column())
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{ManifestError, ManifestRow};
+    use super::{ManifestError, ManifestRow};
 
     fn parse(text: &str) -> Result<Vec<ManifestRow>, ManifestError> {
         super::parse_jsonl(text.as_bytes())
@@ -119,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn every_problem_is_named_by_its_line() {
+    fn every_problem_is_reported_with_its_line() {
         let text = "{\"id\":\"a\",\"mesh\":\"m\",\"print\":\"p\"}\n\
             {\"id\":\"a\",\"mesh\":\"m\",\"print\":\"p\"}\n\
             {\"id\":\"b\",\"mesh\":\"m\"}\n\
@@ -129,8 +132,8 @@ mod tests {
             {\"mesh\":\"m\",\"print\":\"p\"}\n";
         let refusal = parse(text).expect_err("refused").to_string();
         let lines: Vec<_> = refusal.lines().collect();
-        assert_eq!(lines[0], "line 2: id \"a\" was given in line 1 already");
-        assert_eq!(lines[1], "line 3: no print is given");
+        assert_eq!(lines[0], "line 2: id \"a\" is already on line 1");
+        assert_eq!(lines[1], "line 3: print is empty");
         assert!(
             lines[2].starts_with("line 4: not a JSON object, column "),
             "{}",

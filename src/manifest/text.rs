@@ -1,24 +1,24 @@
-//! The bytes of a list as UTF-8 text: spreadsheets also write UTF-16, and marks at the start.
+//! The text of a list: spreadsheets also write UTF-16 and byte-order marks.
 
 use std::borrow::Cow;
 
 const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// UTF-16 text that cannot be read.
+/// Invalid UTF-16 text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-#[error("the text is UTF-16 and cut short or damaged; save it as UTF-8")]
+#[error("the text is UTF-16 and truncated or damaged; save it as UTF-8")]
 pub struct NotText;
 
-/// The bytes without a byte-order mark, and in UTF-8 where they are UTF-16. What is not UTF-8 otherwise is passed on,
-/// to be refused by its line.
+/// Returns the bytes without a byte-order mark, and UTF-16 converted to UTF-8. Other bytes that are not UTF-8 are
+/// returned unchanged, to be refused by line.
 ///
 /// # Errors
-/// When UTF-16 is cut short or damaged.
+/// When UTF-16 is truncated or damaged.
 pub fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, NotText> {
     match *bytes {
         [0xff, 0xfe, ref rest @ ..] => from_utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, ref rest @ ..] => from_utf16(rest, u16::from_be_bytes),
-        // Without a mark: a list begins with a letter, a quote or a brace, which leave one byte of two empty.
+        // Without a mark: a list starts with an ASCII character, of which UTF-16 leaves one byte zero.
         [first, 0, ..] if first != 0 => from_utf16(bytes, u16::from_le_bytes),
         [0, second, ..] if second != 0 => from_utf16(bytes, u16::from_be_bytes),
         _ => Ok(bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes).into()),
@@ -36,7 +36,7 @@ fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, N
         .ok_or(NotText)
 }
 
-/// The separator that the first line holds most of: tab, semicolon or comma; a comma when in doubt.
+/// Returns the most frequent separator of the first line: tab, semicolon or comma; a comma if there is none.
 pub fn delimiter(bytes: &[u8]) -> u8 {
     let start = bytes.trim_ascii_start();
     let header = start.split(|byte| *byte == b'\n').next().unwrap_or(start);
@@ -47,8 +47,8 @@ pub fn delimiter(bytes: &[u8]) -> u8 {
         .unwrap_or(b',')
 }
 
-/// Tells the line a record of a CSV list begins at. The reader's own count stops at the end of the record before, and
-/// half a line end or blank lines may follow there.
+/// Counts the line where a record of a CSV list starts. The parser's own count stops at the end of the previous record,
+/// after which half a line end or blank lines may follow.
 #[derive(Debug)]
 pub struct LineCounter<'a> {
     bytes: &'a [u8],
@@ -57,7 +57,7 @@ pub struct LineCounter<'a> {
 }
 
 impl<'a> LineCounter<'a> {
-    /// At the start of a list.
+    /// Starts at the beginning of a list.
     pub const fn new(bytes: &'a [u8]) -> Self {
         Self {
             bytes,
@@ -66,7 +66,7 @@ impl<'a> LineCounter<'a> {
         }
     }
 
-    /// The line of a record, counted from 1. Records come in their order.
+    /// Returns the line of a record, counted from 1. Records must come in order.
     pub fn at(&mut self, position: Option<&::csv::Position>) -> usize {
         let from = position.map_or(0, ::csv::Position::byte) as usize;
         let blank = self.bytes[from..]
@@ -85,7 +85,7 @@ mod tests {
     use super::{NotText, as_utf8, delimiter};
 
     #[test]
-    fn utf16_and_marks_come_out_as_plain_utf8() {
+    fn utf16_and_marks_become_plain_utf8() {
         let text = "id;mesh\n明;b\n";
         let units: Vec<u16> = text.encode_utf16().collect();
         let little: Vec<u8> = units.iter().flat_map(|unit| unit.to_le_bytes()).collect();
@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn the_header_tells_the_separator() {
+    fn header_determines_the_separator() {
         assert_eq!(delimiter(b"a;b;c\n1,5;2;3\n"), b';');
         assert_eq!(delimiter(b"a\tb\n"), b'\t');
         assert_eq!(delimiter(b"a\n"), b',');

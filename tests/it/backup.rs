@@ -183,9 +183,9 @@ fn a_backup_overwrites_nothing_but_a_backup() {
     let thesis = dir.path().join("thesis.docx");
     std::fs::write(&thesis, "ten years").expect("written");
     for (place, says) in [
-        ("../thesis.docx", "no backup"),
-        ("catalog.sqlite", "of a project itself"),
-        ("mocban.toml", "of a project itself"),
+        ("../thesis.docx", "not a backup"),
+        ("catalog.sqlite", "is a file of a project"),
+        ("mocban.toml", "is a file of a project"),
         ("artifacts", "is a directory"),
     ] {
         let refused = mocban(project.dir(), &["backup", place]).expect(2);

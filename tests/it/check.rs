@@ -123,11 +123,7 @@ fn missing_and_changed_files_are_found_and_their_stages_run_again() {
     let project = done(dir.path());
     let (before, said) = (exported(&project, "before"), verdicts(&project));
     let sound = at(&project, &["check"]).expect(0);
-    assert!(
-        sound.out.contains("all is as it should be"),
-        "{}",
-        sound.out
-    );
+    assert!(sound.out.contains("no problems found"), "{}", sound.out);
 
     let missing = artifact(&project, 0, Stage::Depth, "depth.png");
     let changed = artifact(&project, 1, Stage::Register, "canvas_print_mask.png");
@@ -349,7 +345,7 @@ fn inputs_that_are_gone_or_changed_are_notes_and_no_damage() {
     std::fs::remove_file(&mesh).expect("removed");
     std::fs::write(&print, "another").expect("written");
     let told = at(&project, &["check"]).expect(0);
-    for (path, what) in [(&mesh, "not there"), (&print, "not what was read")] {
+    for (path, what) in [(&mesh, "is missing"), (&print, "changed since")] {
         let line = told.out.lines().find(|line| line.contains(what));
         let line = line.unwrap_or_else(|| panic!("{what}: {}", told.out));
         assert!(line.contains(path.to_str().expect("UTF-8")), "{line}");

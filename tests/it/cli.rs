@@ -248,7 +248,7 @@ fn missing_files_are_warned_of_by_line_and_fail_their_pairs_alone() {
     assert!(
         first
             .err
-            .contains("pairs.csv: line 3: mesh b.stl of b is not there"),
+            .contains("pairs.csv: line 3: mesh b.stl of b does not exist"),
         "{}",
         first.err
     );
@@ -286,7 +286,7 @@ fn missing_files_are_warned_of_by_line_and_fail_their_pairs_alone() {
 fn unknown_pair_is_code_4_with_the_nearest_ids() {
     let dir = imported();
     let refused = mocban(dir.path(), &["-C", "p", "show", "aa"]).expect(4);
-    assert_eq!(refused.err, "error: there is no pair aa; near are a\n");
+    assert_eq!(refused.err, "error: there is no pair aa; similar ids: a\n");
     mocban(dir.path(), &["-C", "p", "run", "a/b"]).expect(4);
     let set = [
         "-C",
@@ -359,7 +359,7 @@ fn project_that_was_moved_finds_its_files() {
     std::fs::rename(dir.path().join("p"), dir.path().join("q")).expect("moved");
     let shown = mocban(dir.path(), &["-C", "q", "show", "a"]).expect(0);
     assert!(shown.out.contains("q/scans/a.stl"), "{}", shown.out);
-    assert!(!shown.out.contains("not there"), "{}", shown.out);
+    assert!(!shown.out.contains("missing"), "{}", shown.out);
 }
 
 #[test]

@@ -95,6 +95,7 @@ fn is_said(told: &Call, end: End, root: &Path, at: &str) {
     let reasons = [
         "disk is full",
         "disk refused",
+        "disk reported an error",
         "disk refuses",
         "disk cannot read",
         "cannot be written to",

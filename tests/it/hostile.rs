@@ -299,7 +299,7 @@ fn wrong_lists_are_refused_by_line_and_leave_nothing_behind() {
         (
             "id,mesh,print",
             format!("{good}b,b.stl,b.png\n{good}"),
-            "line 4: id \"a\" was given in line 2",
+            "line 4: id \"a\" is already on line 2",
         ),
         (
             "id,mesh,print",

@@ -37,7 +37,7 @@ fn status_names_every_failed_pair_where_all_are_asked_for() {
     mocban(dir.path(), &["run"]).expect(3);
     let short = mocban(dir.path(), &["status"]).expect(0).out;
     assert!(
-        short.contains("and 2 more") && short.contains("`status --failed` names all"),
+        short.contains("and 2 more") && short.contains("`status --failed` lists all"),
         "{short}"
     );
     assert!(!short.contains("p4"), "{short}");
@@ -68,7 +68,7 @@ fn a_demo_in_the_place_of_another_says_how_that_goes_on() {
     demo("upright").expect(0);
     let refused = demo("pose").expect(2);
     assert!(
-        refused.err.contains("`mocban -C d run` goes on with it"),
+        refused.err.contains("`mocban -C d run` continues it"),
         "{}",
         refused.err
     );
@@ -96,6 +96,9 @@ fn a_demo_that_is_stopped_while_its_files_are_made_says_so() {
     let output = child.wait_with_output().expect("it ends");
     let err = String::from_utf8(output.stderr).expect("UTF-8");
     assert_eq!(output.status.code(), Some(130), "{err}");
-    assert!(err.contains("stopped while the files were made"), "{err}");
+    assert!(
+        err.contains("stopped while the files were being written"),
+        "{err}"
+    );
     assert!(!dir.path().join("d/catalog.sqlite").exists());
 }

@@ -107,7 +107,7 @@ fn a_catalog_with_garbage_in_its_middle_is_told_and_no_repair_writes_to_it() {
     for command in [&["check"][..], &["check", "--repair"]] {
         let found = at(&project, command).expect(12).out;
         assert!(found.contains("faults of the database"), "{found}");
-        assert!(found.contains("put a backup in its place"), "{found}");
+        assert!(found.contains("replace it with a backup"), "{found}");
     }
     let after = std::fs::read(project.catalog_path()).expect("read");
     assert!(after == before, "the repair wrote to a damaged catalog");
@@ -117,7 +117,7 @@ fn a_catalog_with_garbage_in_its_middle_is_told_and_no_repair_writes_to_it() {
     spoil(&project, 1, 7);
     for command in [&["check"][..], &["check", "--repair"]] {
         let refused = at(&project, command).expect(12);
-        plain(&refused.err, "damaged so far that it cannot be read");
+        plain(&refused.err, "too damaged to be read");
     }
 }
 
@@ -128,7 +128,7 @@ fn counters_that_are_off_end_a_run_in_a_sentence_that_leads_to_their_mending() {
     sql(&project, "UPDATE counter SET n = 0");
     let again = ["run", "--rerun", "all", "--stage", "register"];
     let refused = at(&project, &again).expect(1);
-    plain(&refused.err, "`check --repair` mends them");
+    plain(&refused.err, "`check --repair` repairs them");
     at(&project, &["check", "--repair"]).expect(0);
     at(&project, &again).expect(0);
     at(&project, &["check"]).expect(0);
@@ -208,7 +208,7 @@ fn an_export_that_would_lack_files_leaves_the_earlier_one() {
     }
     let again = at(&project, &["export", "-o", "../out"]).expect(3);
     assert!(
-        again.err.contains("the earlier export in ../out stays"),
+        again.err.contains("the earlier export in ../out was kept"),
         "{}",
         again.err
     );

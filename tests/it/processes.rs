@@ -295,7 +295,7 @@ fn pairs_of_a_dead_process_come_back_at_once_to_one_that_is_alone() {
         (&false.into(), &1.into())
     );
     let shown = mocban(dir, &["status"]).expect(0);
-    assert!(shown.out.contains("1 cut off"), "{}", shown.out);
+    assert!(shown.out.contains("1 interrupted"), "{}", shown.out);
     assert!(!shown.out.contains("running"), "{}", shown.out);
     let begun = Instant::now();
     call(&mut run(&world.project, &[])).expect(0);

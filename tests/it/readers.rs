@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use mocban::config::{Sources, Start, load};
+use mocban::config::{BaseLayer, Sources, load};
 use mocban::manifest::{parse_csv, parse_jsonl};
 use mocban::{mesh, raster};
 
@@ -65,7 +65,7 @@ fn read_settings(name: &str, bytes: &[u8]) -> Result<(), String> {
     let sets = String::from_utf8_lossy(bytes);
     let sources = if Path::new(name).extension().is_some_and(|end| end == "toml") {
         Sources {
-            start: Start::File(file),
+            base: BaseLayer::File(file),
             ..Sources::default()
         }
     } else {

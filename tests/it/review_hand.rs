@@ -98,9 +98,9 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
     let shown = mocban(project.dir(), &["--json", "show", pair])
         .expect(0)
         .json();
-    assert_eq!(shown["by_hand"][1]["reviewer"], "lan");
+    assert_eq!(shown["manual_alignments"][1]["reviewer"], "lan");
     let words = mocban(project.dir(), &["show", pair]).expect(0).out;
-    assert!(words.contains("lan: turned 0.0°, shifted"), "{words}");
+    assert!(words.contains("lan: rotated 0.0°, shifted"), "{words}");
     let undone = page
         .post("/api/undo", &json!({ "event": "a1" }))
         .expect("a reply");

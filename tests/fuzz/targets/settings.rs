@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 use libfuzzer_sys::fuzz_target;
-use mocban::config::{Sources, Start, load};
+use mocban::config::{BaseLayer, Sources, load};
 
 fn file() -> &'static PathBuf {
     static FILE: OnceLock<PathBuf> = OnceLock::new();
@@ -38,7 +38,7 @@ fn check(sources: &Sources) {
 fuzz_target!(|text: &str| {
     std::fs::write(file(), text).expect("written");
     check(&Sources {
-        start: Start::File(file().clone()),
+        base: BaseLayer::File(file().clone()),
         ..Sources::default()
     });
     let lines = || text.lines().take(20);

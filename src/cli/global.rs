@@ -1,0 +1,94 @@
+//! Flags that every command takes.
+
+use std::path::PathBuf;
+
+use clap::{ArgAction, Args, ValueEnum};
+
+/// Flags of every command.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Global options")]
+pub(super) struct Global {
+    /// The project's directory [default: the current one]
+    #[arg(short = 'C', value_name = "DIR", global = true)]
+    pub(super) directory: Option<PathBuf>,
+    /// Read settings from this file instead of the project's mocban.toml; "default" and "paper" are built in
+    #[arg(long, value_name = "FILE", global = true)]
+    pub(super) config: Option<String>,
+    /// Override one setting, such as run.workers=2; may be repeated
+    #[arg(long, value_name = "SECTION.KEY=VALUE", global = true, action = ArgAction::Append)]
+    pub(super) set: Vec<String>,
+    /// Print only warnings and errors
+    #[arg(short, long, global = true)]
+    pub(super) quiet: bool,
+    /// Log more; -vv logs everything
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    pub(super) verbose: u8,
+    /// Print the result as JSON on stdout
+    #[arg(long, global = true)]
+    pub(super) json: bool,
+    /// When to use colour: auto, always or never
+    #[arg(
+        long,
+        hide_possible_values = true,
+        value_name = "WHEN",
+        global = true,
+        default_value = "auto"
+    )]
+    pub(super) color: ColorWhen,
+    /// Format of the log: text or json
+    #[arg(
+        long,
+        hide_possible_values = true,
+        value_name = "FORMAT",
+        global = true,
+        default_value = "text"
+    )]
+    pub(super) log_format: LogFormat,
+    /// Append the log to this file instead of printing it on stderr
+    #[arg(long, value_name = "FILE", global = true)]
+    pub(super) log_file: Option<PathBuf>,
+    /// How a run shows its progress on stderr: auto, bar, plain, json or none
+    #[arg(
+        long,
+        hide_possible_values = true,
+        value_name = "MODE",
+        global = true,
+        default_value = "auto"
+    )]
+    pub(super) progress: ProgressMode,
+}
+
+/// When to use colour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ColorWhen {
+    /// On a terminal, unless `NO_COLOR` is set.
+    Auto,
+    /// Always.
+    Always,
+    /// Never.
+    Never,
+}
+
+/// Format of the log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum LogFormat {
+    /// Lines for people.
+    Text,
+    /// One JSON object per line.
+    Json,
+}
+
+/// How a run shows its progress.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ProgressMode {
+    /// A bar on a terminal, plain lines elsewhere.
+    Auto,
+    /// A bar.
+    Bar,
+    /// One line every ten seconds or five per cent.
+    Plain,
+    /// One JSON object per event.
+    Json,
+    /// Nothing.
+    None,
+}

@@ -1,0 +1,89 @@
+//! The rows of a list of pairs, their columns, and the set of their ids.
+
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+use std::path::PathBuf;
+
+use crate::domain::{ContentHash, LengthUnit, PairName};
+
+/// One pair as a list names it. Paths are as written: relative ones are relative to the list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ManifestRow {
+    /// The line where the row starts, counted from 1; for pairs of two directories the row's number.
+    pub line: usize,
+    /// The pair's id.
+    pub name: PairName,
+    /// Path of the mesh.
+    pub mesh: PathBuf,
+    /// Path of the print image.
+    pub print: PathBuf,
+    /// The character, as text.
+    pub character: Option<String>,
+    /// The block on which it is carved.
+    pub block: Option<String>,
+    /// Unit of the mesh's coordinates; `None` if unknown.
+    pub unit: Option<LengthUnit>,
+    /// Whether the block lay face down in the scanner; `None` if unknown.
+    pub scanned_face_down: Option<bool>,
+    /// All other columns, without empty cells.
+    pub meta: BTreeMap<String, serde_json::Value>,
+}
+
+/// Names of the columns with a meaning.
+pub const COLUMNS: [&str; 7] = [
+    "id",
+    "mesh",
+    "print",
+    "character",
+    "block",
+    "unit",
+    "scanned_face_down",
+];
+
+/// Columns that every list needs.
+pub const REQUIRED: [&str; 3] = ["id", "mesh", "print"];
+
+/// Hash bytes stored per id: two ids of a list collide once in 10^24 lists of ten million rows.
+const HASH_BYTES: usize = 16;
+
+/// The ids of a list and the line of each, as hashes, because a list may have millions of rows.
+#[derive(Debug, Default)]
+pub struct RowIds(BTreeMap<[u8; HASH_BYTES], u32>);
+
+impl RowIds {
+    /// Adds an id; returns its first line if it was added before.
+    pub(super) fn insert(&mut self, name: &PairName, line: usize) -> Option<u32> {
+        match self.0.entry(key(name)) {
+            Entry::Occupied(first) => Some(*first.get()),
+            Entry::Vacant(free) => {
+                free.insert(u32::try_from(line).unwrap_or(u32::MAX));
+                None
+            }
+        }
+    }
+
+    /// Returns whether the list contains the id.
+    pub fn contains(&self, name: &PairName) -> bool {
+        self.0.contains_key(&key(name))
+    }
+
+    /// Returns whether the list has no rows.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl<'n> FromIterator<&'n PairName> for RowIds {
+    fn from_iter<T: IntoIterator<Item = &'n PairName>>(names: T) -> Self {
+        let mut ids = Self::default();
+        for (line, name) in (1..).zip(names) {
+            ids.insert(name, line);
+        }
+        ids
+    }
+}
+
+fn key(name: &PairName) -> [u8; HASH_BYTES] {
+    let hash = ContentHash::of(name.as_str().as_bytes());
+    std::array::from_fn(|at| hash.as_bytes()[at])
+}
