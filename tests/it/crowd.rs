@@ -15,8 +15,8 @@ use serde_json::Value;
 use crate::check::below;
 use crate::cli::{Call, binary, empty, mocban};
 use crate::hostile_pairs::{HostilePair, HostilePairs};
-use crate::seeds::assert_one_sentence;
-use crate::sizes::asked;
+use crate::sample_files::assert_one_sentence;
+use crate::test_size::size_from_env;
 
 /// Good pairs in the crowd.
 const GOOD: u64 = 2;
@@ -169,7 +169,7 @@ fn alone(dir: &Path) -> PathBuf {
 
 #[test]
 fn a_crowd_of_hostile_pairs_harms_nobody_and_is_told_pair_by_pair() {
-    let count = asked("MOCBAN_HOSTILE", 240);
+    let count = size_from_env("MOCBAN_HOSTILE", 240);
     let dir = empty();
     let data = dir.path().join("data");
     fs::create_dir(&data).expect("a folder");

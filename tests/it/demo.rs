@@ -1,4 +1,4 @@
-//! The built-in dataset: same seed same bytes, truth true.
+//! The built-in dataset: the same seed gives the same bytes, and all files can be read.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,7 +8,7 @@ use mocban::demo::{DemoOptions, Tier, write_dataset};
 use mocban::manifest::parse_csv;
 use mocban::{mesh, raster};
 
-/// Every file below a folder by its path, and what it holds.
+/// Returns all files below a directory with their content.
 fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![dir.to_owned()];
@@ -31,7 +31,7 @@ fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
 }
 
 fn made(tier: Tier, pairs: u64, seed: u64) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
-    let dir = tempfile::tempdir().expect("a folder for the test");
+    let dir = tempfile::tempdir().expect("a temporary directory");
     write_dataset(dir.path(), &DemoOptions { pairs, seed, tier }, &|| false)
         .expect("the dataset is written");
     let found = files(dir.path());
@@ -39,7 +39,7 @@ fn made(tier: Tier, pairs: u64, seed: u64) -> (tempfile::TempDir, BTreeMap<Strin
 }
 
 #[test]
-fn same_seed_gives_the_same_bytes_and_another_seed_others() {
+fn same_seed_gives_the_same_bytes_and_another_seed_different_ones() {
     let (_one, first) = made(Tier::Hard, 2, 5);
     let (_two, second) = made(Tier::Hard, 2, 5);
     let (_three, other) = made(Tier::Hard, 2, 6);
@@ -48,7 +48,7 @@ fn same_seed_gives_the_same_bytes_and_another_seed_others() {
 }
 
 #[test]
-fn a_pair_does_not_depend_on_how_many_there_are() {
+fn a_pair_does_not_depend_on_the_number_of_pairs() {
     let (_one, few) = made(Tier::Pose, 1, 9);
     let (_two, more) = made(Tier::Pose, 2, 9);
     let id = "tops/pose-0000.png";
@@ -63,7 +63,7 @@ fn a_pair_does_not_depend_on_how_many_there_are() {
 }
 
 #[test]
-fn our_own_readers_read_every_file() {
+fn every_file_of_the_dataset_can_be_read() {
     for tier in Tier::ALL {
         let (dir, found) = made(tier, 2, 2);
         let rows = parse_csv(&found["manifest.csv"]).expect("the manifest is sound");
@@ -89,7 +89,7 @@ fn our_own_readers_read_every_file() {
 }
 
 #[test]
-fn whole_dataset_is_left_alone_and_a_broken_one_made_anew() {
+fn complete_dataset_is_kept_and_a_damaged_one_is_rewritten() {
     let options = DemoOptions {
         pairs: 1,
         seed: 3,
@@ -101,20 +101,20 @@ fn whole_dataset_is_left_alone_and_a_broken_one_made_anew() {
             .expect("found")
             .already_existed
     );
-    fs::remove_file(dir.path().join("dataset.json")).expect("the seal is there");
-    fs::write(dir.path().join("truth.jsonl"), "half a li").expect("the truth can be spoilt");
+    fs::remove_file(dir.path().join("dataset.json")).expect("dataset.json exists");
+    fs::write(dir.path().join("truth.jsonl"), "half a li").expect("the truth file is writable");
     fs::write(dir.path().join("meshes/stray.stl"), "of a killed run").expect("a stray file");
     assert!(
         !write_dataset(dir.path(), &options, &|| false)
             .expect("made")
             .already_existed
     );
-    assert!(files(dir.path()) == found, "the dataset made anew differs");
+    assert!(files(dir.path()) == found, "the rewritten dataset differs");
 }
 
 #[test]
-fn real_tier_has_twenty_pairs_at_most_and_its_prints_are_the_photographs() {
-    let dir = tempfile::tempdir().expect("a folder for the test");
+fn real_tier_has_twenty_pairs_with_unchanged_photographs() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
     let options = DemoOptions {
         pairs: 99,
         seed: 1,

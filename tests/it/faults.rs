@@ -7,8 +7,8 @@ use std::process::Command;
 use mocban::store::Project;
 
 use crate::cli::{binary, call, mocban};
-use crate::deed::{Deed, End, moments};
 use crate::fault::{EAGAIN, EIO, ENOSPC, Fault};
+use crate::fault_scenario::{End, FaultScenario, fault_points};
 use crate::resume::{copy, copy_folder, run};
 use crate::unbroken::{World, files};
 
@@ -20,49 +20,49 @@ const PLACED: &str = "p/artifacts/??/*";
 
 /// The catalog's faults in a run.
 const OF_THE_CATALOG: &[(Fault, End)] = &[
-    (Fault::once("write", WAL, ENOSPC), End::Refused),
-    (Fault::once("write", WAL, EIO).on(), End::Refused),
-    (Fault::half(WAL), End::Unmoved),
+    (Fault::once("write", WAL, ENOSPC), End::Fails),
+    (Fault::once("write", WAL, EIO).on(), End::Fails),
+    (Fault::half(WAL), End::Succeeds),
     (
         Fault::once("write", WAL, ENOSPC).on().half_first(),
-        End::Refused,
+        End::Fails,
     ),
     (Fault::once("sync", WAL, EIO), End::Either),
     (Fault::once("sync", WAL, EIO).on(), End::Either),
     (Fault::once("open", WAL, EIO), End::Either),
-    (Fault::once("unlink", WAL, EIO), End::Unmoved),
-    (Fault::once("truncate", WAL, EIO), End::Unmoved),
-    (Fault::once("write", CATALOG, EIO), End::Unmoved),
-    (Fault::once("write", CATALOG, ENOSPC).on(), End::Unmoved),
-    (Fault::once("sync", CATALOG, EIO), End::Unmoved),
-    (Fault::once("read", CATALOG, EIO), End::Refused),
+    (Fault::once("unlink", WAL, EIO), End::Succeeds),
+    (Fault::once("truncate", WAL, EIO), End::Succeeds),
+    (Fault::once("write", CATALOG, EIO), End::Succeeds),
+    (Fault::once("write", CATALOG, ENOSPC).on(), End::Succeeds),
+    (Fault::once("sync", CATALOG, EIO), End::Succeeds),
+    (Fault::once("read", CATALOG, EIO), End::Fails),
     (Fault::once("open", CATALOG, EIO), End::Either),
-    (Fault::once("open", INDEX, EIO), End::Refused),
-    (Fault::once("write", INDEX, ENOSPC), End::Refused),
+    (Fault::once("open", INDEX, EIO), End::Fails),
+    (Fault::once("write", INDEX, ENOSPC), End::Fails),
 ];
 
 /// The faults of everything else that a run writes.
 const OF_THE_FILES: &[(Fault, End)] = &[
-    (Fault::once("open", TEMPORARY, ENOSPC), End::Refused),
-    (Fault::once("write", TEMPORARY, ENOSPC), End::Refused),
-    (Fault::half(TEMPORARY), End::Unmoved),
+    (Fault::once("open", TEMPORARY, ENOSPC), End::Fails),
+    (Fault::once("write", TEMPORARY, ENOSPC), End::Fails),
+    (Fault::half(TEMPORARY), End::Succeeds),
     (
         Fault::once("write", TEMPORARY, ENOSPC).on().half_first(),
-        End::Refused,
+        End::Fails,
     ),
-    (Fault::once("sync", TEMPORARY, EIO), End::Refused),
-    (Fault::once("rename", PLACED, EIO), End::Refused),
-    (Fault::once("rename", PLACED, ENOSPC).on(), End::Refused),
-    (Fault::once("sync", "p/artifacts/??", EIO), End::Refused),
-    (Fault::once("sync", "p/artifacts", EIO), End::Refused),
-    (Fault::once("mkdir", "p/artifacts*", ENOSPC), End::Refused),
-    (Fault::once("truncate", "p/run.*", EIO), End::Refused),
-    (Fault::once("write", "p/run.*", ENOSPC), End::Refused),
-    (Fault::once("open", "p/run.*", EIO), End::Refused),
+    (Fault::once("sync", TEMPORARY, EIO), End::Fails),
+    (Fault::once("rename", PLACED, EIO), End::Fails),
+    (Fault::once("rename", PLACED, ENOSPC).on(), End::Fails),
+    (Fault::once("sync", "p/artifacts/??", EIO), End::Fails),
+    (Fault::once("sync", "p/artifacts", EIO), End::Fails),
+    (Fault::once("mkdir", "p/artifacts*", ENOSPC), End::Fails),
+    (Fault::once("truncate", "p/run.*", EIO), End::Fails),
+    (Fault::once("write", "p/run.*", ENOSPC), End::Fails),
+    (Fault::once("open", "p/run.*", EIO), End::Fails),
     (Fault::once("open", "p/data/*", EIO), End::Either),
     (Fault::once("write", "*", ENOSPC).on(), End::Either),
     (Fault::once("sync", "*", EIO).on(), End::Either),
-    (Fault::slow("sync", "*", 5), End::Unmoved),
+    (Fault::slow("sync", "*", 5), End::Succeeds),
 ];
 
 /// Faults of an import into a new project.
@@ -73,68 +73,68 @@ const OF_AN_IMPORT: &[(Fault, End)] = &[
         End::Either,
     ),
     (Fault::once("write", "*", ENOSPC).on(), End::Either),
-    (Fault::half("p/catalog.sqlite*"), End::Unmoved),
+    (Fault::half("p/catalog.sqlite*"), End::Succeeds),
     (Fault::once("sync", "*", EIO), End::Either),
     (Fault::once("sync", "*", EIO).on(), End::Either),
 ];
 
 /// Faults of an export.
 const OF_AN_EXPORT: &[(Fault, End)] = &[
-    (Fault::once("open", ".out*", ENOSPC), End::Refused),
-    (Fault::once("write", ".out*", ENOSPC), End::Refused),
-    (Fault::once("write", "*", EIO).on(), End::Refused),
-    (Fault::half(".out*"), End::Unmoved),
-    (Fault::once("mkdir", ".out*", ENOSPC), End::Refused),
-    (Fault::once("rename", "out", EIO), End::Refused),
+    (Fault::once("open", ".out*", ENOSPC), End::Fails),
+    (Fault::once("write", ".out*", ENOSPC), End::Fails),
+    (Fault::once("write", "*", EIO).on(), End::Fails),
+    (Fault::half(".out*"), End::Succeeds),
+    (Fault::once("mkdir", ".out*", ENOSPC), End::Fails),
+    (Fault::once("rename", "out", EIO), End::Fails),
 ];
 
 /// Faults of a backup.
 const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("open", ".b.*", ENOSPC), End::Either),
-    (Fault::once("write", ".b.*", ENOSPC), End::Refused),
-    (Fault::once("write", ".b.v*", ENOSPC), End::Refused),
-    (Fault::once("write", "*", EIO).on(), End::Refused),
-    (Fault::half(".b.v*"), End::Unmoved),
-    (Fault::once("sync", ".b.*", EIO), End::Refused),
-    (Fault::once("sync", "*", EIO).on(), End::Refused),
-    (Fault::once("rename", "b.sqlite", EIO), End::Refused),
-    (Fault::once("rename", "b.v*", EIO), End::Refused),
-    (Fault::once("rename", "b.m*", EIO), End::Refused),
-    (Fault::once("write", ".b.m*", ENOSPC), End::Refused),
-    (Fault::once("unlink", ".b.*", EIO), End::Unmoved),
-    (Fault::once("read", CATALOG, EIO), End::Refused),
+    (Fault::once("write", ".b.*", ENOSPC), End::Fails),
+    (Fault::once("write", ".b.v*", ENOSPC), End::Fails),
+    (Fault::once("write", "*", EIO).on(), End::Fails),
+    (Fault::half(".b.v*"), End::Succeeds),
+    (Fault::once("sync", ".b.*", EIO), End::Fails),
+    (Fault::once("sync", "*", EIO).on(), End::Fails),
+    (Fault::once("rename", "b.sqlite", EIO), End::Fails),
+    (Fault::once("rename", "b.v*", EIO), End::Fails),
+    (Fault::once("rename", "b.m*", EIO), End::Fails),
+    (Fault::once("write", ".b.m*", ENOSPC), End::Fails),
+    (Fault::once("unlink", ".b.*", EIO), End::Succeeds),
+    (Fault::once("read", CATALOG, EIO), End::Fails),
 ];
 
 /// Faults of a check: what cannot be read is not said to be damaged.
 const OF_A_CHECK: &[(Fault, End)] = &[
     (Fault::once("read", CATALOG, EIO), End::Either),
-    (Fault::once("read", CATALOG, EIO).on(), End::Refused),
+    (Fault::once("read", CATALOG, EIO).on(), End::Fails),
 ];
 
 /// Faults of a repair.
 const OF_A_REPAIR: &[(Fault, End)] = &[
-    (Fault::once("write", WAL, ENOSPC), End::Refused),
-    (Fault::once("write", WAL, EIO).on(), End::Refused),
-    (Fault::half(WAL), End::Unmoved),
+    (Fault::once("write", WAL, ENOSPC), End::Fails),
+    (Fault::once("write", WAL, EIO).on(), End::Fails),
+    (Fault::half(WAL), End::Succeeds),
     (Fault::once("sync", WAL, EIO), End::Either),
     (Fault::once("open", CATALOG, EIO), End::Either),
-    (Fault::once("read", PLACED, EIO), End::Unmoved),
-    (Fault::once("open", PLACED, EIO), End::Unmoved),
-    (Fault::once("unlink", PLACED, EIO), End::Unmoved),
-    (Fault::once("open", "p/run.*", EIO), End::Refused),
-    (Fault::once("write", "*", ENOSPC).on(), End::Refused),
+    (Fault::once("read", PLACED, EIO), End::Succeeds),
+    (Fault::once("open", PLACED, EIO), End::Succeeds),
+    (Fault::once("unlink", PLACED, EIO), End::Succeeds),
+    (Fault::once("open", "p/run.*", EIO), End::Fails),
+    (Fault::once("write", "*", ENOSPC).on(), End::Fails),
 ];
 
 /// Locks that are not to be had for so many tries: SQLite gives up after about a hundred.
 const LOCKED: &[(Fault, End)] = &[
-    (Fault::once("lock", INDEX, EAGAIN).times(300), End::Unmoved),
+    (Fault::once("lock", INDEX, EAGAIN).times(300), End::Succeeds),
     (
         Fault::once("lock", CATALOG, EAGAIN).times(300),
-        End::Unmoved,
+        End::Succeeds,
     ),
 ];
 
-const RUN: Deed = Deed {
+const RUN: FaultScenario = FaultScenario {
     before: |world, root| {
         copy(&world.fresh, &root.join("p"));
     },
@@ -160,7 +160,7 @@ fn import(root: &Path) -> Command {
     command
 }
 
-const IMPORT: Deed = Deed {
+const IMPORT: FaultScenario = FaultScenario {
     before: |world, root| {
         copy_folder(&world.fresh.dir().join("data"), &root.join("p/data"));
     },
@@ -189,7 +189,7 @@ fn export(root: &Path) -> Command {
     command
 }
 
-const EXPORT: Deed = Deed {
+const EXPORT: FaultScenario = FaultScenario {
     before: put_done,
     command: export,
     after: |world, root, done| {
@@ -235,7 +235,7 @@ fn names(root: &Path) -> Vec<String> {
 /// What a backup is.
 const BACKED_UP: [&str; 3] = ["b.mocban.toml", "b.sqlite", "b.verdicts.jsonl"];
 
-const BACKUP: Deed = Deed {
+const BACKUP: FaultScenario = FaultScenario {
     before: |world, root| {
         put_done(world, root);
         let settings = Project::at(&root.join("p")).settings_path();
@@ -291,7 +291,7 @@ fn check(root: &Path) -> Command {
     command
 }
 
-const CHECK: Deed = Deed {
+const CHECK: FaultScenario = FaultScenario {
     before: put_done,
     command: check,
     after: |_, root, _| {
@@ -299,7 +299,7 @@ const CHECK: Deed = Deed {
     },
 };
 
-const REPAIR: Deed = Deed {
+const REPAIR: FaultScenario = FaultScenario {
     before: |world, root| {
         put_done(world, root);
         let folder = root.join("p/artifacts");
@@ -328,37 +328,37 @@ const REPAIR: Deed = Deed {
 
 #[test]
 fn a_refusing_disk_under_the_catalog_is_told_of_and_costs_nothing() {
-    RUN.survives_all(OF_THE_CATALOG, moments());
+    RUN.check_all(OF_THE_CATALOG, fault_points());
 }
 
 #[test]
 fn a_refusing_disk_under_the_files_is_told_of_and_costs_nothing() {
-    RUN.survives_all(OF_THE_FILES, moments());
+    RUN.check_all(OF_THE_FILES, fault_points());
 }
 
 #[test]
 fn an_import_or_export_that_the_disk_refuses_leaves_nothing_half_made() {
-    IMPORT.survives_all(OF_AN_IMPORT, moments());
-    EXPORT.survives_all(OF_AN_EXPORT, moments());
+    IMPORT.check_all(OF_AN_IMPORT, fault_points());
+    EXPORT.check_all(OF_AN_EXPORT, fault_points());
 }
 
 #[test]
 fn a_backup_that_the_disk_refuses_leaves_the_earlier_one_in_place() {
-    BACKUP.survives_all(OF_A_BACKUP, moments());
+    BACKUP.check_all(OF_A_BACKUP, fault_points());
 }
 
 #[test]
 fn a_check_that_the_disk_refuses_finds_no_damage() {
-    CHECK.survives_all(OF_A_CHECK, 4 * moments());
+    CHECK.check_all(OF_A_CHECK, 4 * fault_points());
 }
 
 #[test]
 fn a_repair_that_the_disk_refuses_is_told_of_and_done_by_the_next() {
-    REPAIR.survives_all(OF_A_REPAIR, moments());
+    REPAIR.check_all(OF_A_REPAIR, fault_points());
 }
 
 /// Another process holds each lock of the database for longer than SQLite itself waits.
 #[test]
 fn a_locked_catalog_is_waited_for() {
-    RUN.survives_all(LOCKED, 4 * moments());
+    RUN.check_all(LOCKED, 4 * fault_points());
 }

@@ -1,4 +1,5 @@
-//! Bad inputs: each gives one clear line and the right class, and harms nobody else; bad lists leave nothing behind.
+//! Bad inputs: each pair fails with one clear line and the right class without affecting others; bad manifests leave
+//! no files.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -11,34 +12,34 @@ use serde_json::Value;
 
 use crate::cli::mocban;
 
-/// A file that is put in the place of the good mesh or the good print.
-enum Bad {
+/// A replacement of the good mesh or the good print; `None` removes the file.
+enum BadInput {
     Mesh(Option<Vec<u8>>),
     Print(Option<Vec<u8>>),
-    MeshFolder,
-    PrintFolder,
+    MeshDirectory,
+    PrintDirectory,
 }
 
-/// One bad pair and what is to be said of it.
+/// A bad pair with its expected error.
 struct Case {
     id: &'static str,
-    bad: Bad,
+    bad: BadInput,
     class: &'static str,
-    says: &'static str,
+    message: &'static str,
 }
 
-fn case(id: &'static str, bad: Bad, class: &'static str, says: &'static str) -> Case {
+fn case(id: &'static str, bad: BadInput, class: &'static str, message: &'static str) -> Case {
     Case {
         id,
         bad,
         class,
-        says,
+        message,
     }
 }
 
 fn cases() -> Vec<Case> {
-    let mesh = |bytes: Vec<u8>| Bad::Mesh(Some(bytes));
-    let print = |bytes: Vec<u8>| Bad::Print(Some(bytes));
+    let mesh = |bytes: Vec<u8>| BadInput::Mesh(Some(bytes));
+    let print = |bytes: Vec<u8>| BadInput::Print(Some(bytes));
     let plain = |level| png_grey8(&Grid::new(120, 120, level));
     vec![
         case(
@@ -113,17 +114,17 @@ fn cases() -> Vec<Case> {
             "bad_input",
             "the file is text",
         ),
-        case("missing_mesh", Bad::Mesh(None), "io", "is not there"),
-        case("missing_print", Bad::Print(None), "io", "is not there"),
+        case("missing_mesh", BadInput::Mesh(None), "io", "is not there"),
+        case("missing_print", BadInput::Print(None), "io", "is not there"),
         case(
             "mesh_folder",
-            Bad::MeshFolder,
+            BadInput::MeshDirectory,
             "io",
             "is a directory, not a file",
         ),
         case(
             "print_folder",
-            Bad::PrintFolder,
+            BadInput::PrintDirectory,
             "io",
             "is a directory, not a file",
         ),
@@ -132,7 +133,7 @@ fn cases() -> Vec<Case> {
 
 type Facet = [[f32; 3]; 3];
 
-/// A binary STL.
+/// Encodes a binary STL.
 fn stl(facets: &[Facet]) -> Vec<u8> {
     let mut bytes = vec![0; 80];
     bytes.extend((facets.len() as u32).to_le_bytes());
@@ -171,7 +172,7 @@ fn points_on_a_line() -> Vec<u8> {
     (0..5000).map(line).collect::<String>().into_bytes()
 }
 
-/// The header of a PNG of 60,000 by 60,000 pixels, and nothing after it.
+/// Returns the header of a PNG of 60,000 by 60,000 pixels without data.
 fn huge_header() -> Vec<u8> {
     let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
     bytes.extend(60_000_u32.to_be_bytes());
@@ -180,7 +181,7 @@ fn huge_header() -> Vec<u8> {
     bytes
 }
 
-/// One good pair of the demo.
+/// Returns a valid pair of the demo.
 fn good_pair(dir: &Path) -> ManifestRow {
     let options = DemoOptions {
         pairs: 1,
@@ -192,8 +193,8 @@ fn good_pair(dir: &Path) -> ManifestRow {
     parse_csv(&manifest).expect("rows").remove(0)
 }
 
-/// Writes what a case needs and gives the paths of its mesh and its print.
-fn lay_out(dir: &Path, case: &Case, good: &ManifestRow) -> (PathBuf, PathBuf) {
+/// Writes the files of a case and returns the paths of mesh and print.
+fn write_case(dir: &Path, case: &Case, good: &ManifestRow) -> (PathBuf, PathBuf) {
     let put = |ending: &str, bytes: Option<&Vec<u8>>| {
         let name = format!("{}.{ending}", case.id);
         if let Some(bytes) = bytes {
@@ -202,10 +203,10 @@ fn lay_out(dir: &Path, case: &Case, good: &ManifestRow) -> (PathBuf, PathBuf) {
         PathBuf::from(name)
     };
     match &case.bad {
-        Bad::Mesh(bytes) => (put("stl", bytes.as_ref()), good.print.clone()),
-        Bad::Print(bytes) => (good.mesh.clone(), put("png", bytes.as_ref())),
-        Bad::MeshFolder => (PathBuf::from("meshes"), good.print.clone()),
-        Bad::PrintFolder => (good.mesh.clone(), PathBuf::from("prints")),
+        BadInput::Mesh(bytes) => (put("stl", bytes.as_ref()), good.print.clone()),
+        BadInput::Print(bytes) => (good.mesh.clone(), put("png", bytes.as_ref())),
+        BadInput::MeshDirectory => (PathBuf::from("meshes"), good.print.clone()),
+        BadInput::PrintDirectory => (good.mesh.clone(), PathBuf::from("prints")),
     }
 }
 
@@ -217,13 +218,13 @@ fn write_manifest(dir: &Path, good: &ManifestRow) {
     row("good", &good.mesh, &good.print);
     row("jpeg_named_png", &good.mesh, Path::new("jpeg.png"));
     for case in cases() {
-        let (mesh, print) = lay_out(dir, &case, good);
+        let (mesh, print) = write_case(dir, &case, good);
         row(case.id, &mesh, &print);
     }
     fs::write(dir.join("bad.csv"), text).expect("writes");
 }
 
-/// The good print again as a JPEG with a PNG's name.
+/// Writes the good print as a JPEG with the extension of a PNG.
 fn write_misnamed_jpeg(dir: &Path, good: &ManifestRow) {
     let print = image::ImageReader::open(dir.join(&good.print))
         .and_then(image::ImageReader::with_guessed_format)
@@ -241,7 +242,7 @@ fn show(project: &Path, id: &str) -> Value {
 }
 
 #[test]
-fn every_bad_input_gives_one_line_and_harms_nobody_else() {
+fn every_bad_input_gives_one_line_and_does_not_affect_others() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let data = dir.path().join("data");
     let good = good_pair(&data);
@@ -270,14 +271,14 @@ fn check(project: &Path, case: &Case, run: &str) {
     let failure = &shown["failure"];
     let message = failure["message"].as_str().unwrap_or_default();
     assert_eq!(failure["class"], case.class, "{}: {message}", case.id);
-    assert!(message.contains(case.says), "{}: {message}", case.id);
+    assert!(message.contains(case.message), "{}: {message}", case.id);
     assert_eq!(message.lines().count(), 1, "{message}");
     assert_eq!(shown["status"], "quarantined", "{}", case.id);
     assert!(run.contains(message), "{}: {message}\n{run}", case.id);
 }
 
 #[test]
-fn a_pair_whose_file_has_come_is_taken_up_by_retry() {
+fn retry_runs_a_pair_whose_missing_file_was_added() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let print = png_rgb8(&Grid::new(64, 64, [200; 3]));
     fs::write(dir.path().join("a.png"), print).expect("writes");
@@ -293,7 +294,7 @@ fn a_pair_whose_file_has_come_is_taken_up_by_retry() {
 }
 
 #[test]
-fn wrong_lists_are_refused_by_line_and_leave_nothing_behind() {
+fn invalid_manifests_are_rejected_by_line_and_leave_no_files() {
     let good = "a,a.stl,a.png\n";
     for (header, rows, says) in [
         (
@@ -333,7 +334,7 @@ fn wrong_lists_are_refused_by_line_and_leave_nothing_behind() {
 }
 
 #[test]
-fn a_refused_list_changes_nothing_in_a_project_that_is_there() {
+fn a_rejected_manifest_does_not_change_an_existing_project() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     fs::write(dir.path().join("one.csv"), "id,mesh,print\na,a.stl,a.png\n").expect("writes");
     mocban(dir.path(), &["import", "one.csv"]).expect(0);

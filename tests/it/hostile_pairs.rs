@@ -1,4 +1,4 @@
-//! Makes hostile pairs: files that are empty, cut, spoilt, of another kind, of absurd shape, or no files at all.
+//! Generates hostile pairs: empty, truncated, corrupted, mistyped and degenerate files, and paths that are not files.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -7,60 +7,60 @@ use mocban::mesh::Mesh;
 use mocban::mesh::write::MeshFormat;
 use mocban::raster::{Grid, png_grey8, png_rgb8};
 
-use crate::seeds::{self, Named};
-use crate::spoil::Spoiler;
+use crate::corruption::Corruptor;
+use crate::sample_files::{self, NamedFile};
 
-/// What stands in a pair's list in the place of a good file.
-enum Bad {
-    /// A file with this ending.
+/// A replacement of a valid file.
+enum BadFile {
+    /// A file with this extension and content.
     File(String, Vec<u8>),
-    /// No file of ours.
+    /// A path that is not a regular file.
     At(PathBuf),
 }
 
-impl Bad {
+impl BadFile {
     fn file(ending: &str, bytes: impl Into<Vec<u8>>) -> Self {
         Self::File(ending.to_owned(), bytes.into())
     }
 }
 
-/// One pair as its list has it.
+/// A row of the manifest.
 pub(crate) struct HostilePair {
     pub(crate) id: String,
     pub(crate) mesh: PathBuf,
     pub(crate) print: PathBuf,
 }
 
-/// Makes one pair after the other in a folder; the same ones for the same seed.
+/// Generates pairs in a directory, deterministically from a seed.
 pub(crate) struct HostilePairs {
     dir: PathBuf,
-    spoiler: Spoiler,
-    meshes: Vec<Named>,
-    images: Vec<Named>,
+    corruptor: Corruptor,
+    meshes: Vec<NamedFile>,
+    images: Vec<NamedFile>,
     made: usize,
 }
 
 impl HostilePairs {
     pub(crate) fn new(dir: &Path, seed: u64) -> Self {
         odd_places(dir);
-        let whole = seeds::relief(40);
+        let whole = sample_files::relief(40);
         fs::write(
             dir.join("whole.ply"),
             MeshFormat::PlyLittleEndian.encode(&whole),
         )
         .expect("written");
-        let (_, print) = seeds::images().swap_remove(2);
+        let (_, print) = sample_files::images().swap_remove(2);
         fs::write(dir.join("whole.png"), print).expect("written");
         Self {
             dir: dir.to_owned(),
-            spoiler: Spoiler::new(seed),
-            meshes: seeds::meshes(),
-            images: seeds::images(),
+            corruptor: Corruptor::new(seed),
+            meshes: sample_files::meshes(),
+            images: sample_files::images(),
             made: 0,
         }
     }
 
-    /// The next pair: its mesh or its print is bad, or both.
+    /// Makes the next pair, with a bad mesh, a bad print or both.
     pub(crate) fn make(&mut self) -> HostilePair {
         let number = self.made;
         self.made += 1;
@@ -75,11 +75,11 @@ impl HostilePairs {
         }
     }
 
-    fn put(&self, id: &str, bad: Option<Bad>, whole: &str) -> PathBuf {
+    fn put(&self, id: &str, bad: Option<BadFile>, whole: &str) -> PathBuf {
         match bad {
             None => whole.into(),
-            Some(Bad::At(path)) => path,
-            Some(Bad::File(ending, bytes)) => {
+            Some(BadFile::At(path)) => path,
+            Some(BadFile::File(ending, bytes)) => {
                 let name = format!("{id}.{ending}");
                 fs::write(self.dir.join(&name), bytes).expect("written");
                 name.into()
@@ -87,29 +87,29 @@ impl HostilePairs {
         }
     }
 
-    fn spoilt(&mut self, files: fn(&Self) -> &[Named]) -> Bad {
-        let at = self.spoiler.below(files(self).len());
+    fn corrupted_sample(&mut self, files: fn(&Self) -> &[NamedFile]) -> BadFile {
+        let at = self.corruptor.below(files(self).len());
         let (name, whole) = files(self)[at].clone();
         let ending = name.rsplit('.').next().unwrap_or_default();
-        Bad::file(ending, self.spoiler.spoilt(&whole))
+        BadFile::file(ending, self.corruptor.corrupt(&whole))
     }
 
-    fn mesh(&mut self, number: usize) -> Bad {
+    fn mesh(&mut self, number: usize) -> BadFile {
         let cases = 40;
-        let stl = |mesh: Mesh| Bad::file("stl", MeshFormat::StlBinary.encode(&mesh));
+        let stl = |mesh: Mesh| BadFile::file("stl", MeshFormat::StlBinary.encode(&mesh));
         let relief = |change: fn([f64; 3]) -> [f64; 3]| {
-            let mut mesh = seeds::relief(20);
+            let mut mesh = sample_files::relief(20);
             mesh.vertices.change(change);
             mesh
         };
         match number % cases {
-            0 => Bad::file("stl", []),
-            1 => Bad::file(
+            0 => BadFile::file("stl", []),
+            1 => BadFile::file(
                 "ply",
                 "ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n\
                 property float x\nproperty float y\nproperty float z\nend_header\n",
             ),
-            2 => Bad::file(
+            2 => BadFile::file(
                 "stl",
                 [&[0; 80][..], &u32::MAX.to_le_bytes(), &[0; 50]].concat(),
             ),
@@ -119,7 +119,7 @@ impl HostilePairs {
             4 => stl(relief(|[x, y, _]| [x, y, f64::INFINITY])),
             5 => stl(Mesh::default()),
             6 => stl(relief(|[x, y, _]| [x, y, 0.0])),
-            7 => Bad::file("obj", self.images[3].1.clone()),
+            7 => BadFile::file("obj", self.images[3].1.clone()),
             8 => stl(Mesh {
                 vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]].into(),
                 triangles: vec![[0, 1, 2]].into(),
@@ -135,31 +135,31 @@ impl HostilePairs {
                 [x, y, (x * 12.9898 + y * 78.233).sin() * 43758.5453 % 9.0]
             })),
             17 => stl(degenerate(2000)),
-            18 => Bad::file("obj", "v 0 0 0\n".repeat(3000) + "f 1 2 3\n"),
-            19 => Bad::file("xyz", "0 0 0\n1 1 1\n".repeat(100)),
-            20 => Bad::file("ply", [b"ply\n".to_vec(), vec![b'a'; 5000]].concat()),
+            18 => BadFile::file("obj", "v 0 0 0\n".repeat(3000) + "f 1 2 3\n"),
+            19 => BadFile::file("xyz", "0 0 0\n1 1 1\n".repeat(100)),
+            20 => BadFile::file("ply", [b"ply\n".to_vec(), vec![b'a'; 5000]].concat()),
             21 => stl(relief(|[x, y, z]| [x * 1e150, y, z * 1e-150])),
-            22 => Bad::file(
+            22 => BadFile::file(
                 "stl",
                 "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n",
             ),
-            23 => Bad::At(odd_place(number / cases)),
-            _ => self.spoilt(|pairs| &pairs.meshes),
+            23 => BadFile::At(odd_place(number / cases)),
+            _ => self.corrupted_sample(|pairs| &pairs.meshes),
         }
     }
 
-    fn print(&mut self, number: usize) -> Bad {
+    fn print(&mut self, number: usize) -> BadFile {
         let cases = 32;
-        let png = |grid: Grid<u8>| Bad::file("png", png_grey8(&grid));
+        let png = |grid: Grid<u8>| BadFile::file("png", png_grey8(&grid));
         let bars = |width, height| {
             Grid::from_fn(width, height, |x, y| {
                 if (x / 4 + y / 4) % 3 == 0 { 0 } else { 255 }
             })
         };
         match number % cases {
-            0 => Bad::file("png", []),
-            1 => Bad::file("png", header(b"IHDR", u32::MAX)),
-            2 => Bad::file("png", header(b"IHDR", 60_000)),
+            0 => BadFile::file("png", []),
+            1 => BadFile::file("png", header(b"IHDR", u32::MAX)),
+            2 => BadFile::file("png", header(b"IHDR", 60_000)),
             3 => png(Grid::new(120, 120, 255)),
             4 => png(Grid::new(120, 120, 0)),
             5 => png(Grid::new(1, 1, 9)),
@@ -170,23 +170,23 @@ impl HostilePairs {
             10 => png(Grid::from_fn(90, 90, |x, y| {
                 (x * 31 + y * 17 + x * y * 7) as u8
             })),
-            11 => Bad::file("tif", self.meshes[0].1.clone()),
-            12 => Bad::file("jpg", "Dear reader,\n"),
-            13 => Bad::file(
+            11 => BadFile::file("tif", self.meshes[0].1.clone()),
+            12 => BadFile::file("jpg", "Dear reader,\n"),
+            13 => BadFile::file(
                 "png",
                 png_rgb8(&Grid::from_fn(64, 64, |x, _| [x as u8 * 4; 3])),
             ),
-            14 => Bad::file("gif", "GIF89a\x01\0\x01\0\0\0\0;"),
+            14 => BadFile::file("gif", "GIF89a\x01\0\x01\0\0\0\0;"),
             15 => png(Grid::from_fn(64, 64, |x, y| {
                 u8::from(x != 31 || y != 31) * 255
             })),
-            16 => Bad::At(odd_place(number / cases)),
-            _ => self.spoilt(|pairs| &pairs.images),
+            16 => BadFile::At(odd_place(number / cases)),
+            _ => self.corrupted_sample(|pairs| &pairs.images),
         }
     }
 }
 
-/// The first chunk of a PNG that tells of as many columns as rows, and nothing after it.
+/// Returns the header of a square PNG without data.
 fn header(kind: &[u8], side: u32) -> Vec<u8> {
     let mut bytes = b"\x89PNG\r\n\x1a\n\0\0\0\x0d".to_vec();
     bytes.extend(kind);
@@ -195,7 +195,7 @@ fn header(kind: &[u8], side: u32) -> Vec<u8> {
     bytes
 }
 
-/// Triangles without area, some in one point.
+/// Returns triangles without area, some of them single points.
 pub(crate) fn degenerate(count: u32) -> Mesh {
     let vertices = (0..count + 2)
         .map(|at| [f64::from(at % 100), f64::from(at / 100), 0.0])
@@ -215,7 +215,7 @@ pub(crate) fn degenerate(count: u32) -> Mesh {
     }
 }
 
-/// Paths that lead to no file.
+/// Paths that are not regular files.
 const PLACES: [&str; 8] = [
     "nowhere.stl",
     "folder",

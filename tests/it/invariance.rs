@@ -1,6 +1,6 @@
-//! What must not matter: unit, pose, order and repetition of vertices, place and turn of the print.
+//! Invariance of the alignment under changes of unit, pose, vertex order, and position and rotation of the print.
 //!
-//! Each test aligns pairs twice, as they are and changed, and compares where the landmarks fall in print pixels.
+//! Each test aligns original and changed pairs and compares the landmarks in print pixels.
 
 use std::f64::consts::PI;
 use std::sync::LazyLock;
@@ -22,15 +22,15 @@ static SETTINGS: LazyLock<Settings> = LazyLock::new(|| {
     loaded.config.stages
 });
 
-/// A pair with its answer.
+/// A pair with its alignment.
 struct Case {
     name: String,
     mesh: Mesh,
     print: PrintImage,
     landmarks: Vec<[f64; 3]>,
-    answer: PrintFromMesh,
-    /// How much farther a change may move the answer than that of a whole and flat block.
-    looseness: f64,
+    alignment: PrintFromMesh,
+    /// Factor on the tolerance, relative to an undamaged and flat block.
+    tolerance_factor: f64,
 }
 
 static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
@@ -42,10 +42,10 @@ static CASES: LazyLock<Vec<Case>> = LazyLock::new(|| {
                 .expect("the pair is made");
             let print =
                 raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED).expect("a picture");
-            let answer = align(&pair.mesh, &print);
+            let alignment = align(&pair.mesh, &print);
             Case {
-                answer,
-                looseness: if tier == Tier::Hard { HARD } else { 1.0 },
+                alignment,
+                tolerance_factor: if tier == Tier::Hard { HARD_FACTOR } else { 1.0 },
                 name: pair.id,
                 landmarks: pair.truth.landmarks,
                 mesh: pair.mesh,
@@ -62,7 +62,7 @@ fn align(mesh: &Mesh, print: &PrintImage) -> PrintFromMesh {
     aligned.print_from_mesh(best)
 }
 
-/// A motion and scaling of the mesh.
+/// A rigid motion and scaling of the mesh.
 #[derive(Debug, Clone, Copy)]
 struct Motion {
     rotation: Rotation3<f64>,
@@ -92,8 +92,8 @@ impl Motion {
 }
 
 impl Case {
-    /// Largest distance at the landmarks between where they should fall and where the changed pair puts them, pixels.
-    fn off_px(
+    /// Returns the largest distance in pixels between the expected and the found landmarks of the changed pair.
+    fn max_error_px(
         &self,
         mesh: &Mesh,
         motion: &Motion,
@@ -102,7 +102,7 @@ impl Case {
     ) -> f64 {
         let changed = align(mesh, print);
         let distance = |landmark: &[f64; 3]| {
-            let [x, y, _] = self.answer.apply(*landmark);
+            let [x, y, _] = self.alignment.apply(*landmark);
             let [u, v] = print_motion.apply([x, y]);
             let [p, q, _] = changed.apply(motion.point(*landmark));
             (p - u).hypot(q - v)
@@ -110,8 +110,8 @@ impl Case {
         self.landmarks.iter().map(distance).fold(0.0, f64::max)
     }
 
-    fn mesh_moved(&self, motion: &Motion) -> f64 {
-        self.off_px(
+    fn error_of_moved_mesh(&self, motion: &Motion) -> f64 {
+        self.max_error_px(
             &motion.mesh(&self.mesh),
             motion,
             &self.print,
@@ -119,12 +119,12 @@ impl Case {
         )
     }
 
-    fn mesh_changed(&self, mesh: &Mesh) -> f64 {
-        self.off_px(mesh, &Motion::NONE, &self.print, &Affine2::IDENTITY)
+    fn error_of_changed_mesh(&self, mesh: &Mesh) -> f64 {
+        self.max_error_px(mesh, &Motion::NONE, &self.print, &Affine2::IDENTITY)
     }
 
-    fn print_moved(&self, print: &PrintImage, by: &Affine2) -> f64 {
-        self.off_px(&self.mesh, &Motion::NONE, print, by)
+    fn error_of_changed_print(&self, print: &PrintImage, by: &Affine2) -> f64 {
+        self.max_error_px(&self.mesh, &Motion::NONE, print, by)
     }
 
     fn extent(&self) -> f64 {
@@ -158,7 +158,7 @@ fn shuffled(mesh: &Mesh) -> Mesh {
     }
 }
 
-fn soup(mesh: &Mesh) -> Mesh {
+fn unshared_vertices(mesh: &Mesh) -> Mesh {
     let corners = mesh.triangles.iter().flatten();
     Mesh {
         vertices: corners.map(|i| mesh.vertices.at(*i as usize)).collect(),
@@ -179,25 +179,25 @@ fn repeated(mesh: &Mesh) -> Mesh {
     }
 }
 
-/// The print turned by a quarter, clockwise.
-fn turned(print: &PrintImage) -> (PrintImage, Affine2) {
+/// Rotates the print by 90 degrees clockwise.
+fn rotated_90(print: &PrintImage) -> (PrintImage, Affine2) {
     let (width, height) = (print.rgb.width(), print.rgb.height());
     let rgb = Grid::from_fn(height, width, |x, y| print.rgb.at(y, height - 1 - x));
     let motion = Affine2([[0.0, -1.0, (height - 1) as f64], [1.0, 0.0, 0.0]]);
     (PrintImage { rgb }, motion)
 }
 
-/// The print turned by so many quarters.
-fn turned_by(print: &PrintImage, quarters: usize) -> (PrintImage, Affine2) {
+/// Rotates the print by a multiple of 90 degrees.
+fn rotated_by_quarters(print: &PrintImage, quarters: usize) -> (PrintImage, Affine2) {
     let start = (print.clone(), Affine2::IDENTITY);
     (0..quarters).fold(start, |(print, so_far), _| {
-        let (print, motion) = turned(&print);
+        let (print, motion) = rotated_90(&print);
         (print, motion.after(&so_far))
     })
 }
 
-/// The print with pixels of white added at left, top, right and bottom, or cut off where the number is negative.
-fn framed(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintImage, Affine2) {
+/// Adds white pixels at left, top, right and bottom; negative numbers crop.
+fn padded(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintImage, Affine2) {
     let side = |length: usize, added: i64| (length as i64 + added) as usize;
     let width = side(print.rgb.width(), left + right);
     let height = side(print.rgb.height(), top + bottom);
@@ -209,35 +209,34 @@ fn framed(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintIma
     (PrintImage { rgb }, motion)
 }
 
-/// A change that the stages do not see at all moves no landmark by more than this, pixels.
+/// Tolerance of changes that leave the data of the stages equal, pixels.
 const EXACT_PX: f64 = 0.02;
-/// The same for a turn of the mesh that is not by a right angle in the plane: the depth map stays upright, so its
-/// pixels see other places.
-const TURNED_PX: f64 = 0.15;
-/// The same where less of the print is known.
+/// Tolerance of other rotations of the mesh, pixels: the depth map samples different points.
+const ROTATED_PX: f64 = 0.15;
+/// Tolerance of cropped prints, pixels.
 const CROPPED_PX: f64 = 0.1;
-/// A bent and broken block holds its answer this much less tightly.
-const HARD: f64 = 5.0;
+/// Tolerance factor of bent and damaged blocks.
+const HARD_FACTOR: f64 = 5.0;
 
-/// Holds every pair under a change to the limit.
-fn hold(what: &str, limit_px: f64, off_px: impl Fn(&Case) -> f64 + Sync) {
+/// Asserts that the error of every pair stays within the limit.
+fn assert_within(what: &str, limit_px: f64, error_px: impl Fn(&Case) -> f64 + Sync) {
     let far = |case: &Case| {
-        let off = off_px(case);
-        (off > limit_px).then(|| format!("{}: {off:.4} px", case.name))
+        let error = error_px(case);
+        (error > limit_px).then(|| format!("{}: {error:.4} px", case.name))
     };
     let wrong: Vec<String> = CASES.par_iter().filter_map(far).collect();
     assert!(wrong.is_empty(), "{what}: {}", wrong.join(", "));
 }
 
 #[test]
-fn unit_and_place_change_nothing() {
+fn unit_and_position_change_nothing() {
     for (scale, extents) in [(0.001, 1.0), (25.4, 1e3), (1.0, 1e3)] {
-        hold(
+        assert_within(
             &format!("scaled by {scale}, {extents} extents away"),
             EXACT_PX,
             |case| {
                 let shift = Vector3::new(0.6, -0.7, 0.4) * scale * extents * case.extent();
-                case.mesh_moved(&Motion {
+                case.error_of_moved_mesh(&Motion {
                     scale,
                     shift,
                     ..Motion::NONE
@@ -252,22 +251,22 @@ fn order_and_repetition_of_vertices_change_nothing() {
     type Change = fn(&Mesh) -> Mesh;
     let changes: [(&str, Change); 3] = [
         ("shuffled", shuffled),
-        ("soup", soup),
+        ("unshared vertices", unshared_vertices),
         ("repeated", repeated),
     ];
     for (what, change) in changes {
-        hold(what, EXACT_PX, |case| {
-            case.mesh_changed(&change(&case.mesh))
+        assert_within(what, EXACT_PX, |case| {
+            case.error_of_changed_mesh(&change(&case.mesh))
         });
     }
 }
 
 #[test]
-fn scan_upside_down_changes_nothing() {
+fn scan_rotated_by_half_a_turn_changes_nothing() {
     for axis in [Vector3::x(), Vector3::y(), Vector3::z()] {
         let rotation = Rotation3::new(axis * PI);
-        hold(&format!("turned about {axis:?}"), EXACT_PX, |case| {
-            case.mesh_moved(&Motion {
+        assert_within(&format!("rotated about {axis:?}"), EXACT_PX, |case| {
+            case.error_of_moved_mesh(&Motion {
                 rotation,
                 ..Motion::NONE
             })
@@ -276,7 +275,7 @@ fn scan_upside_down_changes_nothing() {
 }
 
 #[test]
-fn any_pose_of_the_scan_changes_hardly_anything() {
+fn any_pose_of_the_scan_gives_the_same_alignment() {
     for axis in [
         [0.087, 0.02, 0.0],
         [0.0, 0.0, 0.52],
@@ -284,45 +283,45 @@ fn any_pose_of_the_scan_changes_hardly_anything() {
         [-0.3, 2.1, -1.8],
     ] {
         let rotation = Rotation3::new(Vector3::from(axis));
-        hold(&format!("turned by {axis:?}"), TURNED_PX, |case| {
-            case.mesh_moved(&Motion {
+        assert_within(&format!("rotated by {axis:?}"), ROTATED_PX, |case| {
+            case.error_of_moved_mesh(&Motion {
                 rotation,
                 ..Motion::NONE
-            }) / case.looseness
+            }) / case.tolerance_factor
         });
     }
 }
 
 #[test]
-fn turned_print_turns_the_answer() {
+fn rotated_print_rotates_the_alignment() {
     for quarters in 1..4 {
-        hold(
-            &format!("print turned by {quarters} quarters"),
+        assert_within(
+            &format!("print rotated by {quarters} quarters"),
             EXACT_PX,
             |case| {
-                let (print, motion) = turned_by(&case.print, quarters);
-                case.print_moved(&print, &motion)
+                let (print, motion) = rotated_by_quarters(&case.print, quarters);
+                case.error_of_changed_print(&print, &motion)
             },
         );
     }
 }
 
 #[test]
-fn white_around_the_print_moves_the_answer() {
+fn white_border_shifts_the_alignment() {
     for by in [[7, 0, 0, 0], [13, 9, 5, 21]] {
-        hold(&format!("white added {by:?}"), EXACT_PX, |case| {
-            let (print, motion) = framed(&case.print, by);
-            case.print_moved(&print, &motion)
+        assert_within(&format!("white added {by:?}"), EXACT_PX, |case| {
+            let (print, motion) = padded(&case.print, by);
+            case.error_of_changed_print(&print, &motion)
         });
     }
 }
 
 #[test]
-fn cropped_print_moves_the_answer() {
+fn cropped_print_shifts_the_alignment() {
     for by in [[-3, 0, 0, 0], [-1, -2, -3, -4]] {
-        hold(&format!("cropped {by:?}"), CROPPED_PX, |case| {
-            let (print, motion) = framed(&case.print, by);
-            case.print_moved(&print, &motion) / case.looseness
+        assert_within(&format!("cropped {by:?}"), CROPPED_PX, |case| {
+            let (print, motion) = padded(&case.print, by);
+            case.error_of_changed_print(&print, &motion) / case.tolerance_factor
         });
     }
 }

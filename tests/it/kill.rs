@@ -9,7 +9,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use crate::resume::{copy, project, run};
-use crate::sizes::asked;
+use crate::test_size::size_from_env;
 use crate::unbroken::{Wanted, files};
 
 /// Deaths with no pair in hand that come before the shots.
@@ -86,8 +86,8 @@ fn run_under_fire(project: &Project, dice: &mut ChaCha8Rng) -> usize {
 /// Kills runs of copies of a project until there were enough kills.
 #[test]
 fn twenty_kills_lose_nothing_and_double_nothing() {
-    let count = asked("MOCBAN_KILLED_PAIRS", 8);
-    let kills = asked("MOCBAN_KILLS", 20);
+    let count = size_from_env("MOCBAN_KILLED_PAIRS", 8);
+    let kills = size_from_env("MOCBAN_KILLS", 20);
     let dir = tempfile::tempdir().expect("a temporary directory");
     let fresh = project(dir.path(), "fresh", &count.to_string());
     let wanted = Wanted::of(&fresh, &dir.path().join("unbroken"));

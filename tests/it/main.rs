@@ -6,16 +6,17 @@ mod backup;
 mod browser;
 mod check;
 mod cli;
+mod corruption;
 #[cfg(target_os = "linux")]
 mod crowd;
 #[path = "../support/decoy.rs"]
 mod decoy;
 mod decoys;
-#[cfg(target_os = "linux")]
-mod deed;
 mod demo;
 #[cfg(target_os = "linux")]
 mod fault;
+#[cfg(target_os = "linux")]
+mod fault_scenario;
 #[cfg(target_os = "linux")]
 mod faults;
 mod hostile;
@@ -44,14 +45,13 @@ mod review_guard;
 mod review_hand;
 mod review_kill;
 mod review_page;
-mod seeds;
+mod sample_files;
 mod semi_real;
 #[cfg(target_os = "linux")]
 mod shim;
-mod sizes;
 mod source_text;
-mod spoil;
 mod style;
+mod test_size;
 mod tiff_file;
-mod tiffs;
+mod tiff_kinds;
 mod unbroken;

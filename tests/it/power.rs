@@ -16,7 +16,7 @@ use mocban::store::Project;
 use crate::cli::{binary, call, mocban};
 use crate::resume::{copy, copy_folder, finished, run, stages_done};
 use crate::shim::SHADOW;
-use crate::sizes::asked;
+use crate::test_size::size_from_env;
 use crate::unbroken::World;
 
 type Inode = u64;
@@ -251,7 +251,7 @@ fn some(disks: Vec<(String, Disk)>, wanted: usize) -> Vec<(String, Disk)> {
 /// Cuts the power during a run at some moments.
 #[test]
 fn a_power_cut_at_some_syncs_loses_nothing_that_was_stored() {
-    let moments = asked("MOCBAN_POWER_CUTS", 36);
+    let moments = size_from_env("MOCBAN_POWER_CUTS", 36);
     let world = World::new("2");
     let recorded = world.recorded(&["-j", "2"]);
     let disks = all(&recorded);

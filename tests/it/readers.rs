@@ -6,9 +6,9 @@ use mocban::config::{BaseLayer, Sources, load};
 use mocban::manifest::{parse_csv, parse_jsonl};
 use mocban::{mesh, raster};
 
-use crate::seeds::{self, Named, assert_one_sentence};
-use crate::sizes::asked;
-use crate::spoil::Spoiler;
+use crate::corruption::Corruptor;
+use crate::sample_files::{self, NamedFile, assert_one_sentence};
+use crate::test_size::size_from_env;
 
 const MESH: mesh::MeshLimits = mesh::MeshLimits {
     max_bytes: 1 << 20,
@@ -79,12 +79,12 @@ fn read_settings(name: &str, bytes: &[u8]) -> Result<(), String> {
 
 type Reader = fn(&str, &[u8]) -> Result<(), String>;
 
-fn readers() -> [(&'static str, Vec<Named>, Reader); 4] {
+fn readers() -> [(&'static str, Vec<NamedFile>, Reader); 4] {
     [
-        ("mesh", seeds::meshes(), read_mesh),
-        ("image", seeds::images(), read_image),
-        ("list", seeds::lists(), read_list),
-        ("settings", seeds::settings(), read_settings),
+        ("mesh", sample_files::meshes(), read_mesh),
+        ("image", sample_files::images(), read_image),
+        ("list", sample_files::lists(), read_list),
+        ("settings", sample_files::settings(), read_settings),
     ]
 }
 
@@ -107,13 +107,13 @@ fn every_whole_file_is_read() {
 
 #[test]
 fn spoilt_files_of_every_kind_are_read_or_told_in_a_sentence() {
-    let each = asked("MOCBAN_SPOILT", 120);
+    let each = size_from_env("MOCBAN_SPOILT", 120);
     for (kind, files, read) in readers() {
-        let mut spoiler = Spoiler::new(2026);
+        let mut corruptor = Corruptor::new(2026);
         let mut refused = 0;
         for (name, whole) in &files {
             for _ in 0..each {
-                if let Err(sentence) = read(name, &spoiler.spoilt(whole)) {
+                if let Err(sentence) = read(name, &corruptor.corrupt(whole)) {
                     assert_one_sentence(&sentence);
                     refused += 1;
                 }
@@ -131,10 +131,13 @@ fn spoilt_files_of_every_kind_are_read_or_told_in_a_sentence() {
 #[test]
 fn the_fuzzer_starts_from_whole_files() {
     let dir = std::env::var_os("MOCBAN_CORPUS").map(std::path::PathBuf::from);
-    let meshes = seeds::meshes()
+    let meshes = sample_files::meshes()
         .into_iter()
         .map(|(name, bytes)| (name, [b"\0", &bytes[..]].concat()));
-    let mut all = vec![("pair", meshes.collect()), ("verdicts", seeds::verdicts())];
+    let mut all = vec![
+        ("pair", meshes.collect()),
+        ("verdicts", sample_files::verdicts()),
+    ];
     all.extend(readers().map(|(kind, files, _)| (kind, files)));
     for (kind, files) in all {
         assert!(!files.is_empty(), "{kind}");

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use crate::cli::mocban;
 use crate::page::{Page, Site, answer, read_project};
-use crate::sizes::asked;
+use crate::test_size::size_from_env;
 
 /// What a reviewer did, in order, and how far it got.
 #[derive(Default)]
@@ -87,7 +87,7 @@ fn stored(project: &Project) -> BTreeMap<String, Option<String>> {
 
 #[test]
 fn no_acknowledged_verdict_is_lost_or_doubled() {
-    let kills = asked("MOCBAN_REVIEW_KILLS", 15);
+    let kills = size_from_env("MOCBAN_REVIEW_KILLS", 15);
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let mut dice = ChaCha8Rng::seed_from_u64(7);

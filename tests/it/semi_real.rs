@@ -1,4 +1,4 @@
-//! Real prints: photographed characters over reliefs carved from their own ink, through the four stages.
+//! Photographed prints with reliefs carved from their own ink, through all four stages.
 
 use mocban::config::{self, Sources};
 use mocban::demo::{DemoPair, PairGenerator, Tier};
@@ -8,7 +8,7 @@ use mocban::report::ground_truth::{TruthErrors, TruthRecord, tops_iou};
 use mocban::stages::{AlignedPair, Settings, StageError};
 use rayon::prelude::*;
 
-/// Largest landmark error, percent of the character's height: the truth of this tier is good to about a pixel.
+/// Largest landmark error in percent of the character height; the ground truth is accurate to about a pixel.
 const MAX_LANDMARKS_PCT: f64 = 3.0;
 
 pub(crate) fn settings() -> Settings {
@@ -16,7 +16,7 @@ pub(crate) fn settings() -> Settings {
     loaded.config.stages
 }
 
-/// The errors of every metric. Neither unit nor side is told.
+/// Returns the errors of all metrics. Neither unit nor carved side is given.
 fn aligned(pair: &DemoPair, settings: &Settings) -> Result<Vec<TruthErrors>, StageError> {
     let print = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED).expect("a picture");
     let aligned = AlignedPair::new(&pair.mesh.clone().into(), &print.into(), settings)?;
@@ -33,9 +33,9 @@ fn aligned(pair: &DemoPair, settings: &Settings) -> Result<Vec<TruthErrors>, Sta
 }
 
 #[test]
-fn every_real_print_is_aligned_with_the_relief_of_its_ink() {
+fn every_photographed_print_is_aligned_with_its_relief() {
     let (pairs, settings) = (PairGenerator::new(Tier::Real, 31), settings());
-    let count = Tier::Real.max_pairs().expect("the real tier ends");
+    let count = Tier::Real.max_pairs().expect("the real tier is finite");
     assert_eq!(count, 20);
     let wrong: Vec<String> = (0..count)
         .into_par_iter()
@@ -44,7 +44,7 @@ fn every_real_print_is_aligned_with_the_relief_of_its_ink() {
             match aligned(&pair, &settings) {
                 Ok(found) => found
                     .iter()
-                    .filter_map(|errors| trouble(&pair, errors))
+                    .filter_map(|errors| error_message(&pair, errors))
                     .collect(),
                 Err(error) => vec![format!("{}: {error}", pair.id)],
             }
@@ -53,7 +53,7 @@ fn every_real_print_is_aligned_with_the_relief_of_its_ink() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
-fn trouble(pair: &DemoPair, errors: &TruthErrors) -> Option<String> {
+fn error_message(pair: &DemoPair, errors: &TruthErrors) -> Option<String> {
     let is_right = errors.angle_deg <= 5.0 && errors.tre_pct <= MAX_LANDMARKS_PCT;
     (!is_right).then(|| format!("{}: {errors:?}", pair.id))
 }

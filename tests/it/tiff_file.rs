@@ -1,44 +1,44 @@
-//! Uncompressed TIFF files of kinds that no encoder at hand writes.
+//! Writes uncompressed TIFF files of kinds that the `image` crate cannot encode.
 
-/// Bilevel and grey of which 0 is white.
+/// Photometric interpretation: 0 is white.
 pub(crate) const WHITE_IS_ZERO: u16 = 0;
-/// Grey of which 0 is black.
+/// Photometric interpretation: 0 is black.
 pub(crate) const BLACK_IS_ZERO: u16 = 1;
-/// Red, green, blue.
+/// Photometric interpretation: red, green, blue.
 pub(crate) const RGB: u16 = 2;
-/// Colours by number.
+/// Photometric interpretation: palette indices.
 pub(crate) const PALETTE: u16 = 3;
 
-/// Unsigned whole numbers.
+/// Sample format: unsigned integers.
 pub(crate) const UINT: u16 = 1;
-/// Signed whole numbers.
+/// Sample format: signed integers.
 pub(crate) const INT: u16 = 2;
-/// IEEE floats.
+/// Sample format: IEEE floats.
 pub(crate) const FLOAT: u16 = 3;
 
-/// One strip of pixels and the tags that say what they mean; little end first.
+/// A little-endian TIFF with one strip of pixels.
 #[derive(Debug, Clone)]
 pub(crate) struct TiffFile {
-    /// Columns.
+    /// Width in pixels.
     pub(crate) width: u32,
-    /// Rows.
+    /// Height in pixels.
     pub(crate) height: u32,
-    /// Bits of each sample of a pixel.
+    /// Bits per sample.
     pub(crate) bits: Vec<u16>,
     /// Photometric interpretation.
     pub(crate) photometric: u16,
-    /// Sample format of every sample.
+    /// Sample format of all samples.
     pub(crate) format: u16,
-    /// What the samples beyond the colours are: 1 premultiplied, 2 plain transparency.
+    /// Kind of the extra sample: 1 premultiplied alpha, 2 unassociated alpha.
     pub(crate) extra: Option<u16>,
-    /// Red, green and blue of each number, 16 bits; all reds first.
+    /// 16-bit palette: all reds, then all greens, then all blues.
     pub(crate) colours: Vec<u16>,
-    /// Rows, each from a whole byte.
+    /// Pixel data; each row starts at a byte boundary.
     pub(crate) data: Vec<u8>,
 }
 
 impl TiffFile {
-    /// Grey of whole numbers.
+    /// Returns a grey image of unsigned integers.
     pub(crate) fn grey(width: u32, height: u32, bits: u16, data: Vec<u8>) -> Self {
         Self {
             width,
@@ -52,7 +52,7 @@ impl TiffFile {
         }
     }
 
-    /// One of each kind, 16 by 16 pixels.
+    /// Returns one file of each kind, 16 by 16 pixels.
     pub(crate) fn samples() -> Vec<(&'static str, Self)> {
         let grey = |bits: u16| {
             let bytes = 16 * 16 * usize::from(bits) / 8;
@@ -120,35 +120,35 @@ impl TiffFile {
         ]
     }
 
-    /// The file's bytes.
+    /// Encodes the file.
     pub(crate) fn encode(&self) -> Vec<u8> {
         let mut tags = vec![
-            (256, Field::Long(self.width)),
-            (257, Field::Long(self.height)),
-            (258, Field::Shorts(self.bits.clone())),
-            (259, Field::Shorts(vec![1])),
-            (262, Field::Shorts(vec![self.photometric])),
-            (273, Field::Long(8)),
-            (277, Field::Shorts(vec![self.bits.len() as u16])),
-            (278, Field::Long(self.height)),
-            (279, Field::Long(self.data.len() as u32)),
+            (256, TagValue::Long(self.width)),
+            (257, TagValue::Long(self.height)),
+            (258, TagValue::Shorts(self.bits.clone())),
+            (259, TagValue::Shorts(vec![1])),
+            (262, TagValue::Shorts(vec![self.photometric])),
+            (273, TagValue::Long(8)),
+            (277, TagValue::Shorts(vec![self.bits.len() as u16])),
+            (278, TagValue::Long(self.height)),
+            (279, TagValue::Long(self.data.len() as u32)),
         ];
         if !self.colours.is_empty() {
-            tags.push((320, Field::Shorts(self.colours.clone())));
+            tags.push((320, TagValue::Shorts(self.colours.clone())));
         }
-        tags.extend(self.extra.map(|kind| (338, Field::Shorts(vec![kind]))));
-        tags.push((339, Field::Shorts(vec![self.format; self.bits.len()])));
+        tags.extend(self.extra.map(|kind| (338, TagValue::Shorts(vec![kind]))));
+        tags.push((339, TagValue::Shorts(vec![self.format; self.bits.len()])));
         self.with_tags(&tags)
     }
 
-    /// Header, pixels, what does not fit into a tag, tags.
-    fn with_tags(&self, tags: &[(u16, Field)]) -> Vec<u8> {
+    /// Writes the header, the pixels, values that do not fit into a tag, and the tags.
+    fn with_tags(&self, tags: &[(u16, TagValue)]) -> Vec<u8> {
         let mut bytes = b"II*\0\0\0\0\0".to_vec();
         bytes.extend(&self.data);
         bytes.resize(bytes.len().next_multiple_of(2), 0);
         let mut directory = (tags.len() as u16).to_le_bytes().to_vec();
-        for (tag, field) in tags {
-            let (kind, count, value) = field.parts();
+        for (tag, value) in tags {
+            let (kind, count, value) = value.parts();
             directory.extend(tag.to_le_bytes());
             directory.extend([kind, 0]);
             directory.extend((count as u32).to_le_bytes());
@@ -168,13 +168,13 @@ impl TiffFile {
     }
 }
 
-enum Field {
+enum TagValue {
     Long(u32),
     Shorts(Vec<u16>),
 }
 
-impl Field {
-    /// Type, count and bytes.
+impl TagValue {
+    /// Returns type, count and bytes.
     fn parts(&self) -> (u8, usize, Vec<u8>) {
         match self {
             Self::Long(value) => (4, 1, value.to_le_bytes().to_vec()),

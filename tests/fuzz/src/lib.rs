@@ -1,19 +1,19 @@
-//! What the targets share with the tests of the package.
-#![allow(dead_code, reason = "the tests use the rest")]
+//! Helpers of the fuzz targets, shared with the integration tests.
+#![allow(dead_code, reason = "the integration tests use the other functions")]
 
-#[path = "../../it/seeds.rs"]
-mod seeds;
+#[path = "../../it/sample_files.rs"]
+mod sample_files;
 #[path = "../../it/tiff_file.rs"]
 mod tiff_file;
 
-/// Fails unless a message is one a user may see.
+/// Asserts that a message is one readable line.
 pub fn one_sentence(message: &str) {
-    seeds::assert_one_sentence(message);
+    sample_files::assert_one_sentence(message);
 }
 
-/// Whole images of every kind.
+/// Returns valid images of every kind.
 pub fn images() -> Vec<Vec<u8>> {
-    seeds::images()
+    sample_files::images()
         .into_iter()
         .map(|(_, bytes)| bytes)
         .collect()

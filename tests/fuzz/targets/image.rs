@@ -1,4 +1,4 @@
-//! Any bytes as a print image: an error of one line, or a picture within the limits.
+//! Arbitrary bytes as a print image: an error of one line, or an image within the limits.
 
 #![no_main]
 

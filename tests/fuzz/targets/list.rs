@@ -1,4 +1,4 @@
-//! Any bytes as a list of pairs, CSV and JSON Lines: rows that may be imported, or problems of one line each.
+//! Arbitrary bytes as a manifest in CSV and JSON Lines: valid rows, or problems of one line each.
 
 #![no_main]
 

@@ -1,11 +1,11 @@
-//! Any bytes as a mesh file: an error of one line, or a mesh that keeps the reader's promises.
+//! Arbitrary bytes as a mesh file: an error of one line, or a mesh with the documented properties.
 
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
 use mocban::mesh::{MeshLimits, read};
 
-/// Small enough that every limit is met by small files.
+/// Limits that small files can exceed.
 const LIMITS: MeshLimits = MeshLimits {
     max_bytes: 1 << 20,
     max_vertices: 5000,

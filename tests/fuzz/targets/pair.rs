@@ -1,4 +1,4 @@
-//! Any bytes as a mesh, with a print chosen by the first of them, through all four stages.
+//! Arbitrary bytes as a mesh, with a print selected by the first byte, through all four stages.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Any text as a settings file, as `--set` and as variables: settings in their ranges, or an error that names the place.
+//! Arbitrary text as a settings file, as `--set` and as environment variables: valid settings, or an error with the position.
 
 #![no_main]
 
@@ -18,7 +18,7 @@ fn file() -> &'static PathBuf {
 
 fn check(sources: &Sources) {
     match load(sources) {
-        // What is shown can be given again.
+        // Printed settings can be parsed again.
         Ok(loaded) => {
             let sets = loaded.tree.settings();
             let again = Sources {

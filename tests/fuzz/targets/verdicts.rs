@@ -1,9 +1,9 @@
-//! Any bytes as a file of verdicts or of true alignments: rows, or an error that names the line.
+//! Arbitrary bytes as a verdict file or a ground-truth file: rows, or an error with the line.
 
 #![no_main]
 #![allow(
     dead_code,
-    reason = "the readers are taken from the command line, where all of them is used"
+    reason = "the parsers are compiled from the command line's files, which use everything"
 )]
 
 use std::path::Path;

@@ -1,4 +1,4 @@
-//! TIFF prints of the rarer kinds: palettes, few bits, transparency, floats.
+//! Less common TIFF prints: palettes, few bits per sample, alpha, floats.
 
 use mocban::raster::{Grid, ImageLimits, decode};
 
@@ -24,7 +24,7 @@ fn floats(values: &[f32]) -> TiffFile {
 
 #[test]
 fn a_palette_gives_its_colours_at_every_depth() {
-    // Three columns, so that rows of few bits end within a byte.
+    // With three columns, rows of few bits end within a byte.
     for (bits, data) in [
         (1, vec![0b0100_0000, 0b1010_0000]),
         (2, vec![0b0001_0000, 0b0100_0100]),
@@ -49,7 +49,7 @@ fn a_palette_gives_its_colours_at_every_depth() {
 }
 
 #[test]
-fn a_number_beyond_the_palette_is_told() {
+fn a_pixel_outside_the_palette_is_an_error() {
     let file = TiffFile {
         photometric: PALETTE,
         colours: vec![0; 12],
@@ -62,14 +62,14 @@ fn a_number_beyond_the_palette_is_told() {
 }
 
 #[test]
-fn grey_with_transparency_lies_on_white() {
+fn grey_with_alpha_is_composited_on_white() {
     let data = vec![0, 255, 0, 0, 100, 255, 0, 51];
     let plain = TiffFile {
         bits: vec![8, 8],
         extra: Some(2),
         ..TiffFile::grey(4, 1, 8, data.clone())
     };
-    // Plain, premultiplied, and something unknown that is left out of account.
+    // Unassociated alpha, premultiplied alpha, and an unknown extra sample, which is ignored.
     for (extra, levels) in [
         (2, [0, 65535, 25700, 52428]),
         (1, [0, 65535, 25700, 52428]),
@@ -123,7 +123,7 @@ fn grey_of_any_depth_spans_black_to_white() {
 }
 
 #[test]
-fn floats_are_read_where_their_range_tells_what_they_mean() {
+fn floats_are_read_when_their_range_is_unambiguous() {
     let levels = |file: &TiffFile| {
         read(file).map(|grid| grid.data().iter().map(|c| c[0]).collect::<Vec<_>>())
     };
@@ -155,7 +155,7 @@ fn floats_are_read_where_their_range_tells_what_they_mean() {
 }
 
 #[test]
-fn signed_samples_and_huge_headers_are_refused_in_a_sentence() {
+fn signed_samples_and_huge_headers_are_rejected() {
     let signed = TiffFile {
         format: INT,
         ..TiffFile::grey(1, 1, 16, vec![0, 0])
@@ -183,13 +183,13 @@ fn signed_samples_and_huge_headers_are_refused_in_a_sentence() {
 }
 
 #[test]
-fn a_decoder_that_lists_thousands_of_samples_is_cut_short() {
+fn a_message_with_thousands_of_samples_is_truncated() {
     let file = TiffFile {
         photometric: RGB,
         bits: vec![8; 5000],
         ..TiffFile::grey(2, 2, 8, vec![0; 4])
     };
     let error = read(&file).expect_err("5000 samples a pixel");
-    crate::seeds::assert_one_sentence(&error);
+    crate::sample_files::assert_one_sentence(&error);
     assert!(error.ends_with("..."), "{error}");
 }

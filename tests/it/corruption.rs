@@ -1,9 +1,9 @@
-//! Spoils whole files as disks, programs and people do: the same ways for the same seed.
+//! Corrupts valid files the way disks, programs and people do, deterministically from a seed.
 
 use rand::{Rng as _, RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-/// Numbers that counts, sizes and indices are replaced by.
+/// Replacement values of counts, sizes and indices.
 const NUMBERS: [u64; 10] = [
     0,
     1,
@@ -17,7 +17,7 @@ const NUMBERS: [u64; 10] = [
     u64::MAX,
 ];
 
-/// Words that words of a text are replaced by.
+/// Replacement words of text files.
 const WORDS: [&str; 22] = [
     "0",
     "-1",
@@ -43,28 +43,28 @@ const WORDS: [&str; 22] = [
     "9999999999999999999999",
 ];
 
-/// Spoils one file after the other.
-pub(crate) struct Spoiler {
+/// A random generator of corruptions.
+pub(crate) struct Corruptor {
     rng: ChaCha8Rng,
 }
 
-impl Spoiler {
+impl Corruptor {
     pub(crate) fn new(seed: u64) -> Self {
         Self {
             rng: ChaCha8Rng::seed_from_u64(seed),
         }
     }
 
-    /// A file with one to four faults.
-    pub(crate) fn spoilt(&mut self, whole: &[u8]) -> Vec<u8> {
-        let mut bytes = whole.to_vec();
+    /// Returns a copy with one to four corruptions.
+    pub(crate) fn corrupt(&mut self, valid: &[u8]) -> Vec<u8> {
+        let mut bytes = valid.to_vec();
         for _ in 0..self.rng.random_range(1..5) {
             self.fault(&mut bytes);
         }
         bytes
     }
 
-    /// One fault.
+    /// Applies one corruption.
     fn fault(&mut self, bytes: &mut Vec<u8>) {
         match self.rng.random_range(0..10) {
             0 => bytes.truncate(self.below(bytes.len() + 1)),
@@ -88,8 +88,8 @@ impl Spoiler {
 
     fn range(&mut self, len: usize) -> (usize, usize) {
         let from = self.below(len + 1);
-        let most = if self.rng.random() { 16 } else { len };
-        (from, (from + self.below(most + 1)).min(len))
+        let max = if self.rng.random() { 16 } else { len };
+        (from, (from + self.below(max + 1)).min(len))
     }
 
     fn flip(&mut self, bytes: &mut [u8]) {
@@ -101,7 +101,7 @@ impl Spoiler {
         }
     }
 
-    /// A count, size or index that lies; headers are hit as often as all the rest.
+    /// Overwrites a number; half of the time within the first 200 bytes, where headers are.
     fn number(&mut self, bytes: &mut [u8]) {
         let value = NUMBERS[self.below(NUMBERS.len())];
         let width = [1, 2, 4, 8][self.below(4)];
@@ -129,26 +129,26 @@ impl Spoiler {
     }
 
     fn write(&mut self, bytes: &mut [u8], field: &[u8]) {
-        let reach = if self.rng.random() {
+        let limit = if self.rng.random() {
             bytes.len().min(200)
         } else {
             bytes.len()
         };
-        let at = self.below(reach);
+        let at = self.below(limit);
         for (byte, new) in bytes.iter_mut().skip(at).zip(field) {
             *byte = *new;
         }
     }
 
-    /// One word of a text for another.
+    /// Replaces a word.
     fn word(&mut self, bytes: &mut Vec<u8>) {
         let is_word = |byte: &u8| byte.is_ascii_alphanumeric() || b".-+_".contains(byte);
-        let reach = if self.rng.random() {
+        let limit = if self.rng.random() {
             bytes.len().min(400)
         } else {
             bytes.len()
         };
-        let at = self.below(reach);
+        let at = self.below(limit);
         let from = bytes[..at]
             .iter()
             .rposition(|byte| !is_word(byte))
@@ -161,7 +161,7 @@ impl Spoiler {
         bytes.splice(from..to.max(from), word.bytes());
     }
 
-    /// A piece twice, or very often.
+    /// Repeats a piece once or 64 times.
     fn repeat(&mut self, bytes: &mut Vec<u8>) {
         let (from, to) = self.range(bytes.len());
         let often = if self.rng.random() { 1 } else { 64 };
@@ -169,7 +169,7 @@ impl Spoiler {
         bytes.splice(to..to, piece.into_iter().take(1 << 16));
     }
 
-    /// One line away, twice, or at another place.
+    /// Removes, duplicates or swaps lines.
     fn line(&mut self, bytes: &mut Vec<u8>) {
         let mut lines: Vec<&[u8]> = bytes.split_inclusive(|byte| *byte == b'\n').collect();
         let (from, to) = (self.below(lines.len()), self.below(lines.len()));

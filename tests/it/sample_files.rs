@@ -1,4 +1,4 @@
-//! Whole small files of every kind that is read, for tests that spoil them.
+//! Small valid files of every input format, for tests that corrupt them.
 
 use std::io::Cursor;
 
@@ -8,21 +8,21 @@ use mocban::mesh::write::MeshFormat;
 
 use super::tiff_file::TiffFile;
 
-/// A file by a name that says what it is.
-pub(crate) type Named = (String, Vec<u8>);
+/// A file name with extension, and the content.
+pub(crate) type NamedFile = (String, Vec<u8>);
 
-fn named(name: &str, bytes: impl Into<Vec<u8>>) -> Named {
+fn named(name: &str, bytes: impl Into<Vec<u8>>) -> NamedFile {
     (name.to_owned(), bytes.into())
 }
 
-/// Fails unless a message is one a user may see: a line that can be read.
+/// Asserts that a message is one readable line.
 pub(crate) fn assert_one_sentence(message: &str) {
     assert!(!message.trim().is_empty(), "an empty message");
     assert!(message.len() < 1000, "{} bytes: {message}", message.len());
     assert!(!message.contains(char::is_control), "{message:?}");
 }
 
-/// A plate of `side` by `side` vertices with two strokes on it.
+/// Returns a plate of `side` by `side` vertices with two strokes.
 pub(crate) fn relief(side: u32) -> Mesh {
     let stroke = |at: u32, across: u32| at.abs_diff(across) <= side / 12;
     let height = |x: u32, y: u32| {
@@ -46,8 +46,8 @@ pub(crate) fn relief(side: u32) -> Mesh {
     }
 }
 
-/// Meshes and points in every format and encoding.
-pub(crate) fn meshes() -> Vec<Named> {
+/// Returns meshes and point sets in every format and encoding.
+pub(crate) fn meshes() -> Vec<NamedFile> {
     let mesh = relief(12);
     let mut files: Vec<_> = MeshFormat::ALL
         .iter()
@@ -69,13 +69,13 @@ pub(crate) fn meshes() -> Vec<Named> {
 const RICH_OBJ: &str = "# a scan\nmtllib a.mtl\no plate\nv 0 0 0 1 0 0\nv 1 0 0\nv 1 1 .5 1\nv 0 1 -2e-1\nvt 0 0\n\
     vn 0 0 1\ng one\nusemtl red\ns 1\nf 1/1/1 2/1/1 3/1/1 4/1/1\nf -4//-1 \\\n -3//1 -2//1\nl 1 2\n";
 
-const RICH_PLY: &str = "ply\nformat ascii 1.0\ncomment by hand\nelement camera 1\nproperty list uchar float k\n\
+const RICH_PLY: &str = "ply\nformat ascii 1.0\ncomment sample\nelement camera 1\nproperty list uchar float k\n\
     element vertex 4\nproperty uchar red\nproperty double x\nproperty float y\nproperty float z\n\
     element face 2\nproperty uchar flags\nproperty list uchar int vertex_index\nelement tristrips 1\n\
     property list int int vertex_indices\nend_header\n2 1 .5\n9 0 0 0\n9 1 0 0\n9 1 1 0\n9 0 1 1\n\
     0 4 0 1 2 3\n0 3 0 1 2\n5 0 1 2 -1 3\n";
 
-/// A print of two strokes.
+/// Returns a print with two strokes.
 fn print(side: u32) -> image::RgbImage {
     let ink = |at: u32| at.abs_diff(side / 2) <= side / 10;
     image::RgbImage::from_fn(side, side, |x, y| {
@@ -90,8 +90,8 @@ fn encoded(image: &DynamicImage, format: ImageFormat) -> Vec<u8> {
     out.into_inner()
 }
 
-/// Images in every format and of every kind of pixel.
-pub(crate) fn images() -> Vec<Named> {
+/// Returns images in every format and pixel type.
+pub(crate) fn images() -> Vec<NamedFile> {
     let rgb = DynamicImage::ImageRgb8(print(64));
     let mut files = vec![
         named("rgb8.jpeg", encoded(&rgb, ImageFormat::Jpeg)),
@@ -142,8 +142,8 @@ fn utf16(text: &str, unit: fn(u16) -> [u8; 2]) -> Vec<u8> {
         .collect()
 }
 
-/// Lists of pairs in every dialect.
-pub(crate) fn lists() -> Vec<Named> {
+/// Returns manifests in every dialect.
+pub(crate) fn lists() -> Vec<NamedFile> {
     let plain = "id,mesh,print,character,block,unit,scanned_face_down,folio\n\
         b1_0001,m/1.stl,p/1.png,\u{660e},b1,mm,yes,12r\n\nb1_0002,m/2.stl,\"p/2 \"\"b\"\".png\",,,IN,0,\"two\nlines\"\n";
     let tabs = plain.replace(',', "\t");
@@ -163,8 +163,8 @@ pub(crate) fn lists() -> Vec<Named> {
     ]
 }
 
-/// Settings files; each line does for `--set` as well.
-pub(crate) fn settings() -> Vec<Named> {
+/// Returns settings files; each line is also valid for `--set`.
+pub(crate) fn settings() -> Vec<NamedFile> {
     vec![
         named("default.toml", include_str!("../../config/default.toml")),
         named("paper.toml", include_str!("../../config/paper.toml")),
@@ -179,8 +179,8 @@ pub(crate) fn settings() -> Vec<Named> {
     ]
 }
 
-/// Files of verdicts and of true alignments.
-pub(crate) fn verdicts() -> Vec<Named> {
+/// Returns verdict files and a ground-truth file.
+pub(crate) fn verdicts() -> Vec<NamedFile> {
     let plain = "pair,verdict,reviewer,metric,reason,note\n0001,pass,lan,,,\n\
         0002,fail,lan,density,strokes_lost,\"thin, broken\"\n0003,unsure,Tr\u{1ea7}n,nl_ssim,angle,\n";
     vec![

@@ -1,0 +1,111 @@
+//! A command that runs while system calls on the disk fail, and the expected outcome.
+
+use std::path::Path;
+use std::process::Command;
+
+use crate::cli::{Call, call};
+use crate::fault::{Fault, spread};
+use crate::test_size::size_from_env;
+use crate::unbroken::World;
+
+/// The expected outcome of a command under a fault.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum End {
+    /// The command fails.
+    Fails,
+    /// The command succeeds.
+    Succeeds,
+    /// Either, depending on the failing call.
+    Either,
+}
+
+/// A command that runs while the disk fails.
+pub(crate) struct FaultScenario {
+    /// Prepares a directory for the command.
+    pub(crate) before: fn(&World, &Path),
+    /// Returns the command for that directory.
+    pub(crate) command: fn(&Path) -> Command,
+    /// Checks the state after the command, given whether it succeeded, and completes the work.
+    pub(crate) after: fn(&World, &Path, bool),
+}
+
+impl FaultScenario {
+    /// Counts the calls of the fault's kind in a run without faults.
+    fn calls(&self, world: &World, fault: &Fault) -> usize {
+        let (root, notes) = (world.folder("counted"), world.folder("notes"));
+        (self.before)(world, &root);
+        call(fault.strike(0, &root, &notes, &mut (self.command)(&root))).expect(0);
+        let calls = Fault::calls(&notes);
+        assert!(calls > 0, "{fault}: the command makes no such call");
+        calls
+    }
+
+    /// Runs the command with a fault at the n-th call, then checks and completes it without faults. Returns the exit
+    /// code, or `None` when the command made fewer calls.
+    fn check(&self, world: &World, fault: &Fault, nth: usize, end: End) -> Option<i32> {
+        let (root, notes) = (world.folder("struck"), world.folder("notes"));
+        (self.before)(world, &root);
+        let result = call(fault.strike(nth, &root, &notes, &mut (self.command)(&root)));
+        if Fault::struck(&notes) == 0 {
+            return None;
+        }
+        let at = format!("{fault}, call {nth}: code {}, {}", result.code, result.err);
+        assert_outcome(&result, end, &root, &at);
+        (self.after)(world, &root, result.code == 0);
+        Some(result.code)
+    }
+
+    /// Injects each fault at `points` calls, spread evenly over all calls it applies to.
+    #[expect(clippy::print_stderr, reason = "figures of the long test")]
+    pub(crate) fn check_all(&self, faults: &[(Fault, End)], points: usize) {
+        let world = World::new("1");
+        for (fault, end) in faults {
+            let calls = self.calls(&world, fault);
+            let chosen = spread(calls, points);
+            let codes: Vec<_> = (chosen.iter())
+                .map(|nth| self.check(&world, fault, *nth, *end))
+                .collect();
+            let injected = codes.iter().flatten().count();
+            assert!(injected > 0, "{fault}: no fault was injected");
+            let refused = codes.iter().flatten().filter(|code| **code != 0).count();
+            eprintln!("{fault}: {injected} of {calls} calls failed, {refused} commands failed");
+        }
+    }
+}
+
+/// Asserts the outcome, and that an error is one line with the file and the reason.
+fn assert_outcome(result: &Call, end: End, root: &Path, at: &str) {
+    match end {
+        End::Fails => assert_ne!(result.code, 0, "{at}"),
+        End::Succeeds => assert_eq!(result.code, 0, "{at}"),
+        End::Either => {}
+    }
+    assert!(!result.err.contains("panicked"), "{at}");
+    if result.code == 0 {
+        return;
+    }
+    assert_eq!(result.code, 1, "{at}");
+    // Warnings and log lines are not errors.
+    let lines = result.err.lines();
+    let mut lines = lines.filter(|line| !line.starts_with("warning: ") && !line.contains(" WARN "));
+    let error = lines.next().unwrap_or_default();
+    assert_eq!(lines.next(), None, "{at}");
+    assert!(error.starts_with("error: "), "{at}");
+    assert!(error.contains(&format!("{}/", root.display())), "{at}");
+    let reasons = [
+        "disk is full",
+        "disk refused",
+        "disk reported an error",
+        "disk refuses",
+        "disk cannot read",
+        "cannot be written to",
+        "No space left",
+        "Input/output error",
+    ];
+    assert!(reasons.iter().any(|reason| error.contains(reason)), "{at}");
+}
+
+/// Returns the number of calls at which each fault is injected.
+pub(crate) fn fault_points() -> usize {
+    size_from_env("MOCBAN_FAULT_MOMENTS", 1)
+}
