@@ -1,27 +1,33 @@
--- The only schema. Times are milliseconds since the Unix epoch, hashes 32 bytes, states the codes of `domain::job`.
+-- The whole schema. Times are milliseconds since the Unix epoch, hashes are 32 bytes, states are the codes of
+-- `domain::job`.
 PRAGMA application_id = 1836016482; -- "mocb"
-PRAGMA user_version = 1;
+PRAGMA user_version = 6;
 
--- One start of a process that works; ids are never used again.
+-- One row per start of a worker process; ids are never reused. `fingerprints` are the settings it computes with, as a
+-- JSON array by stage; `died` is set when others found it dead.
 CREATE TABLE worker (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     host TEXT NOT NULL,
     pid INTEGER NOT NULL,
     boot_id TEXT,
     started INTEGER NOT NULL,
-    beat INTEGER NOT NULL,
-    ended INTEGER
+    heartbeat INTEGER NOT NULL,
+    ended INTEGER,
+    fingerprints TEXT CHECK (json_valid(fingerprints)),
+    died INTEGER NOT NULL DEFAULT 0 CHECK (died IN (0, 1))
 ) STRICT;
 
--- What a stage's result depends on besides the inputs.
-CREATE TABLE recipe (
+-- What a stage's result depends on besides the inputs: its settings and revision, and the fingerprint of the stage
+-- before it.
+CREATE TABLE fingerprint (
     id INTEGER PRIMARY KEY,
     stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 3),
     hash BLOB NOT NULL UNIQUE CHECK (length(hash) = 32),
-    fields TEXT NOT NULL CHECK (json_valid(fields))
+    fields TEXT NOT NULL CHECK (json_valid(fields)),
+    upstream INTEGER REFERENCES fingerprint (id)
 ) STRICT;
 
--- A pair as imported, and its input files as last read. `facts` is what the manifest says that results depend on.
+-- A pair as imported, and its input files as last read. `attributes` are the manifest columns that results depend on.
 CREATE TABLE pair (
     id INTEGER PRIMARY KEY,
     name TEXT NOT NULL UNIQUE,
@@ -32,7 +38,7 @@ CREATE TABLE pair (
     character TEXT,
     block TEXT,
     meta TEXT NOT NULL CHECK (json_valid(meta)),
-    facts TEXT NOT NULL CHECK (json_valid(facts)),
+    attributes TEXT NOT NULL CHECK (json_valid(attributes)),
     mesh_hash BLOB CHECK (length(mesh_hash) = 32),
     mesh_stat TEXT,
     print_hash BLOB CHECK (length(print_hash) = 32),
@@ -40,19 +46,22 @@ CREATE TABLE pair (
     imported INTEGER NOT NULL
 ) STRICT;
 
--- One hot row a pair: a cursor over the four stages.
+-- One hot row per pair: a cursor over the four stages. `made` is the fingerprint of the result before the cursor,
+-- unless earlier results were computed with other settings since.
 CREATE TABLE job (
     pair INTEGER PRIMARY KEY REFERENCES pair (id),
     stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 4),
-    status INTEGER NOT NULL CHECK (status BETWEEN 0 AND 5),
+    status INTEGER NOT NULL CHECK (status BETWEEN 0 AND 4),
     prio INTEGER NOT NULL DEFAULT 0,
     run_at INTEGER,
     attempt INTEGER NOT NULL DEFAULT 0 CHECK (attempt >= 0),
     crashes INTEGER NOT NULL DEFAULT 0 CHECK (crashes >= 0),
-    epoch INTEGER NOT NULL DEFAULT 0 CHECK (epoch >= 0),
+    token INTEGER NOT NULL DEFAULT 0 CHECK (token >= 0),
     worker INTEGER REFERENCES worker (id),
     deadline INTEGER,
-    mem_class INTEGER NOT NULL DEFAULT 0 CHECK (mem_class IN (0, 1)),
+    exclusive INTEGER NOT NULL DEFAULT 0 CHECK (exclusive IN (0, 1)),
+    made INTEGER REFERENCES fingerprint (id),
+    low_confidence INTEGER NOT NULL DEFAULT 0 CHECK (low_confidence IN (0, 1)),
     CHECK ((status = 3) = (stage = 4)),
     CHECK ((status = 1) = (worker IS NOT NULL)),
     CHECK ((status = 1) = (deadline IS NOT NULL)),
@@ -61,22 +70,24 @@ CREATE TABLE job (
 CREATE INDEX job_ready ON job (prio, stage DESC, pair) WHERE status = 0;
 CREATE INDEX job_leased ON job (worker) WHERE status = 1;
 CREATE INDEX job_backoff ON job (run_at) WHERE status = 2;
-CREATE INDEX job_bad ON job (stage, pair) WHERE status IN (4, 5);
+CREATE INDEX job_quarantined ON job (pair) WHERE status = 4;
+CREATE INDEX job_mixed ON job (pair) WHERE made IS NULL AND stage > 0;
+CREATE INDEX job_low_confidence ON job (pair) WHERE low_confidence = 1 AND status = 3;
 
--- Why a job backs off or is quarantined, and what it was run on.
+-- Why a job backs off or is quarantined, with the settings and inputs of the failed attempt.
 CREATE TABLE failure (
     pair INTEGER PRIMARY KEY REFERENCES pair (id),
     stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 3),
     class TEXT NOT NULL CHECK (class IN ('bad_input', 'no_solution', 'io', 'resource', 'bug')),
     message TEXT NOT NULL,
-    recipe INTEGER REFERENCES recipe (id),
+    fingerprint INTEGER REFERENCES fingerprint (id),
     mesh_hash BLOB CHECK (length(mesh_hash) = 32),
     print_hash BLOB CHECK (length(print_hash) = 32),
-    facts TEXT,
+    attributes TEXT,
     at INTEGER NOT NULL
 ) STRICT;
 
--- Every try of every stage; old ones are pruned when a pair fails often.
+-- Every attempt of every stage; old ones are pruned when a pair fails often.
 CREATE TABLE attempt (
     id INTEGER PRIMARY KEY,
     pair INTEGER NOT NULL REFERENCES pair (id),
@@ -90,14 +101,14 @@ CREATE TABLE attempt (
 ) STRICT;
 CREATE INDEX attempt_pair ON attempt (pair, id);
 
--- The current result of each stage, with the recipe and inputs it was computed from.
+-- The current result of each stage, with the settings and inputs it was computed from.
 CREATE TABLE stage_result (
     pair INTEGER NOT NULL REFERENCES pair (id),
     stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 3),
-    recipe INTEGER NOT NULL REFERENCES recipe (id),
+    fingerprint INTEGER NOT NULL REFERENCES fingerprint (id),
     mesh_hash BLOB NOT NULL CHECK (length(mesh_hash) = 32),
     print_hash BLOB CHECK (length(print_hash) = 32),
-    facts TEXT NOT NULL,
+    attributes TEXT NOT NULL,
     outcome TEXT NOT NULL CHECK (json_valid(outcome)),
     files TEXT NOT NULL CHECK (json_valid(files)),
     result_hash BLOB NOT NULL CHECK (length(result_hash) = 32),
@@ -108,10 +119,10 @@ CREATE TABLE stage_result (
     CHECK (stage < 2 OR print_hash IS NOT NULL)
 ) STRICT;
 
--- The numbers of each threshold metric; verdicts are bound to its result_hash.
+-- The scores of each threshold metric; verdicts are bound to its result_hash.
 CREATE TABLE metric_result (
     pair INTEGER NOT NULL REFERENCES pair (id),
-    metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble')),
+    metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble', 'relief')),
     threshold_level INTEGER NOT NULL,
     threshold_depth REAL NOT NULL,
     print_from_depth TEXT NOT NULL CHECK (json_valid(print_from_depth)),
@@ -127,26 +138,35 @@ CREATE TABLE metric_result (
     density_print REAL NOT NULL,
     density_depth REAL NOT NULL,
     margin REAL NOT NULL,
+    confidence REAL CHECK (confidence BETWEEN 0 AND 1),
     at_bound INTEGER NOT NULL CHECK (at_bound IN (0, 1)),
     result_hash BLOB NOT NULL CHECK (length(result_hash) = 32),
     PRIMARY KEY (pair, metric)
 ) STRICT;
 
--- What people judged. Nothing is ever changed or removed; an act is taken back by a row in verdict_undo.
+-- Verdicts of people. Append-only; one is undone by a row in verdict_undo. `event` is the client's id of the action, so
+-- that a request sent twice is stored once; `seen` is the hash of what was on the screen, `shown_ms` how long it was
+-- there, `angle_read_deg` the rotation that the reviewer found missing, `review_order` the order in which results came.
 CREATE TABLE verdict (
     id INTEGER PRIMARY KEY AUTOINCREMENT,
     act INTEGER NOT NULL,
     pair INTEGER NOT NULL REFERENCES pair (id),
-    metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble')),
+    metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble', 'relief')),
     result_hash BLOB NOT NULL CHECK (length(result_hash) = 32),
     verdict TEXT NOT NULL CHECK (verdict IN ('pass', 'fail', 'unsure')),
-    reader TEXT NOT NULL CHECK (reader <> ''),
+    reviewer TEXT NOT NULL CHECK (reviewer <> ''),
     reason TEXT CHECK (reason IN ('angle', 'strokes_lost', 'background_in', 'shift_or_scale', 'mirrored', 'wrong_pair')),
     note TEXT,
-    at INTEGER NOT NULL
+    at INTEGER NOT NULL,
+    event TEXT CHECK (event <> ''),
+    seen BLOB CHECK (length(seen) = 32),
+    shown_ms INTEGER CHECK (shown_ms >= 0),
+    angle_read_deg REAL CHECK (angle_read_deg BETWEEN -180 AND 180),
+    review_order TEXT CHECK (review_order IN ('random', 'least_confident', 'adjudicate'))
 ) STRICT;
-CREATE INDEX verdict_pair ON verdict (pair, metric, reader, id);
+CREATE INDEX verdict_pair ON verdict (pair, metric, reviewer, id);
 CREATE INDEX verdict_act ON verdict (act);
+CREATE UNIQUE INDEX verdict_event ON verdict (event, metric) WHERE event IS NOT NULL;
 CREATE TABLE verdict_undo (
     act INTEGER PRIMARY KEY,
     at INTEGER NOT NULL
@@ -156,18 +176,95 @@ CREATE TRIGGER verdict_no_delete BEFORE DELETE ON verdict BEGIN SELECT RAISE (AB
 CREATE TRIGGER verdict_undo_no_update BEFORE UPDATE ON verdict_undo BEGIN SELECT RAISE (ABORT, 'verdicts are append-only'); END;
 CREATE TRIGGER verdict_undo_no_delete BEFORE DELETE ON verdict_undo BEGIN SELECT RAISE (ABORT, 'verdicts are append-only'); END;
 
--- True alignments, where a dataset has them.
+-- Ground-truth alignments, where a dataset has them.
 CREATE TABLE truth (
     pair INTEGER PRIMARY KEY REFERENCES pair (id),
     body TEXT NOT NULL CHECK (json_valid(body))
 ) STRICT;
 
--- Jobs by cursor and status, moved in the same transaction as the jobs.
+-- Numbers of jobs by cursor and status, changed in the same transaction as the jobs.
 CREATE TABLE counter (
     stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 4),
-    status INTEGER NOT NULL CHECK (status BETWEEN 0 AND 5),
+    status INTEGER NOT NULL CHECK (status BETWEEN 0 AND 4),
     n INTEGER NOT NULL CHECK (n >= 0),
     PRIMARY KEY (stage, status)
 ) STRICT, WITHOUT ROWID;
 INSERT INTO counter (stage, status, n)
-SELECT stage.value, status.value, 0 FROM json_each('[0,1,2,3,4]') AS stage, json_each('[0,1,2,3,4,5]') AS status;
+SELECT stage.value, status.value, 0 FROM json_each('[0,1,2,3,4]') AS stage, json_each('[0,1,2,3,4]') AS status;
+
+-- Numbers of jobs by `made`.
+CREATE TABLE made (
+    fingerprint INTEGER PRIMARY KEY REFERENCES fingerprint (id),
+    n INTEGER NOT NULL CHECK (n >= 0)
+) STRICT;
+CREATE TRIGGER job_made AFTER UPDATE OF made ON job WHEN OLD.made IS NOT NEW.made BEGIN
+    UPDATE made SET n = n - 1 WHERE fingerprint = OLD.made;
+    INSERT INTO made SELECT NEW.made, 1 WHERE NEW.made IS NOT NULL ON CONFLICT (fingerprint) DO UPDATE SET n = n + 1;
+END;
+
+-- Pairs whose files or attributes changed since they may have been computed; a run removes those it has handled.
+CREATE TABLE moved (pair INTEGER PRIMARY KEY REFERENCES pair (id)) STRICT;
+CREATE TRIGGER pair_moved AFTER UPDATE OF mesh_hash, print_hash, attributes ON pair
+WHEN OLD.mesh_hash <> NEW.mesh_hash OR OLD.print_hash <> NEW.print_hash OR OLD.attributes <> NEW.attributes BEGIN
+    INSERT INTO moved VALUES (NEW.id) ON CONFLICT (pair) DO NOTHING;
+END;
+
+-- Answers to attention checks, kept apart from verdicts so that no count of verdicts includes them.
+CREATE TABLE attention_check_answer (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    event TEXT NOT NULL UNIQUE CHECK (event <> ''),
+    pair INTEGER NOT NULL REFERENCES pair (id),
+    metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble', 'relief')),
+    result_hash BLOB NOT NULL CHECK (length(result_hash) = 32),
+    kind TEXT NOT NULL CHECK (kind IN ('turned', 'mirrored', 'threshold', 'duplicate')),
+    attention_check TEXT NOT NULL CHECK (json_valid(control)),
+    seen BLOB NOT NULL CHECK (length(seen) = 32),
+    shown_ms INTEGER CHECK (shown_ms >= 0),
+    angle_read_deg REAL CHECK (angle_read_deg BETWEEN -180 AND 180),
+    verdict TEXT NOT NULL CHECK (verdict IN ('pass', 'fail', 'unsure')),
+    reviewer TEXT NOT NULL CHECK (reviewer <> ''),
+    reason TEXT CHECK (reason IN ('angle', 'strokes_lost', 'background_in', 'shift_or_scale', 'mirrored', 'wrong_pair')),
+    note TEXT,
+    at INTEGER NOT NULL
+) STRICT;
+CREATE INDEX attention_check_answer_reviewer ON attention_check_answer (reviewer, id);
+CREATE TABLE attention_check_undo (
+    answer INTEGER PRIMARY KEY REFERENCES attention_check_answer (id),
+    at INTEGER NOT NULL
+) STRICT;
+
+-- Manual alignments of these contents of mesh and print, made on this result of the depth stage.
+CREATE TABLE manual_alignment (
+    id INTEGER PRIMARY KEY AUTOINCREMENT,
+    event TEXT NOT NULL UNIQUE CHECK (event <> ''),
+    pair INTEGER NOT NULL REFERENCES pair (id),
+    mesh_hash BLOB NOT NULL CHECK (length(mesh_hash) = 32),
+    print_hash BLOB NOT NULL CHECK (length(print_hash) = 32),
+    depth_hash BLOB NOT NULL CHECK (length(depth_hash) = 32),
+    seen BLOB NOT NULL CHECK (length(seen) = 32),
+    print_from_depth TEXT NOT NULL CHECK (json_valid(print_from_depth)),
+    print_from_mesh TEXT NOT NULL CHECK (json_valid(print_from_mesh)),
+    iou REAL NOT NULL CHECK (iou BETWEEN 0 AND 1),
+    dice REAL NOT NULL CHECK (dice BETWEEN 0 AND 1),
+    reviewer TEXT NOT NULL CHECK (reviewer <> ''),
+    note TEXT,
+    at INTEGER NOT NULL
+) STRICT;
+CREATE INDEX manual_alignment_pair ON manual_alignment (pair, id);
+CREATE TABLE manual_alignment_undo (
+    alignment INTEGER PRIMARY KEY REFERENCES manual_alignment (id),
+    at INTEGER NOT NULL
+) STRICT;
+
+CREATE TRIGGER attention_check_answer_no_update BEFORE UPDATE ON attention_check_answer BEGIN SELECT RAISE (ABORT, 'answers are append-only'); END;
+CREATE TRIGGER attention_check_answer_no_delete BEFORE DELETE ON attention_check_answer BEGIN SELECT RAISE (ABORT, 'answers are append-only'); END;
+CREATE TRIGGER attention_check_undo_no_update BEFORE UPDATE ON attention_check_undo BEGIN SELECT RAISE (ABORT, 'answers are append-only'); END;
+CREATE TRIGGER attention_check_undo_no_delete BEFORE DELETE ON attention_check_undo BEGIN SELECT RAISE (ABORT, 'answers are append-only'); END;
+CREATE TRIGGER manual_alignment_no_update BEFORE UPDATE ON manual_alignment BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
+CREATE TRIGGER manual_alignment_no_delete BEFORE DELETE ON manual_alignment BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
+CREATE TRIGGER manual_alignment_undo_no_update BEFORE UPDATE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
+CREATE TRIGGER manual_alignment_undo_no_delete BEFORE DELETE ON manual_alignment_undo BEGIN SELECT RAISE (ABORT, 'manual alignments are append-only'); END;
+
+-- Key for the names of pictures on the review page: they reveal nothing and stay the same after a restart.
+CREATE TABLE review_key (id INTEGER PRIMARY KEY CHECK (id = 1), key BLOB NOT NULL CHECK (length(key) = 32)) STRICT;
+INSERT INTO review_key (id, key) VALUES (1, randomblob(32));

@@ -6,7 +6,7 @@ use mocban::catalog::Catalog;
 
 use super::fake::Fake;
 use super::spread::Spread;
-use super::world::{World, recipes};
+use super::world::{World, fingerprints};
 
 /// Pairs in a large claim.
 pub(super) const MANY: usize = 64;
@@ -15,7 +15,7 @@ const TIMES: usize = 200;
 
 /// Times of claims of one pair and of many, each stored before it is answered. All are given back.
 pub(super) async fn times(world: &World, catalog: &Catalog) -> anyhow::Result<[String; 2]> {
-    let fake = Fake::enter(&world.project, catalog, &recipes(None)?).await?;
+    let fake = Fake::enter(&world.project, catalog, &fingerprints(None)?).await?;
     let mut cells = [String::new(), String::new()];
     for (cell, slots) in cells.iter_mut().zip([1, MANY]) {
         let mut spread = Spread::default();

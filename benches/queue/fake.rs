@@ -2,7 +2,8 @@
 
 use mocban::catalog::{Catalog, ClaimRequest, WorkerInfo};
 use mocban::catalog::{
-    InputSeen, InputsSeen, Kept, Lease, MetricResult, RecipeIds, Recipes, StageDone,
+    CheckpointOutcome, FingerprintIds, Fingerprints, InputVersion, InputVersions, Lease,
+    MetricResult, StageCheckpoint,
 };
 use mocban::domain::{
     Affine2, ArtifactSet, ContentHash, MetricOutcome, RegisterOutcome, Scores, Stage,
@@ -15,13 +16,13 @@ use serde_json::json;
 /// What the manifest of the bench says that results depend on, as the catalog writes it.
 pub(super) const FACTS: &str = r#"{"scanned_face_down":null,"unit":null}"#;
 
-/// Faked stages with the recipes and inputs of a project.
+/// Faked stages with the fingerprints and inputs of a project.
 #[derive(Debug, Clone)]
 pub(super) struct Fake {
     pub(super) worker: WorkerId,
-    recipes: RecipeIds,
-    mesh: InputSeen,
-    print: InputSeen,
+    fingerprints: FingerprintIds,
+    mesh: InputVersion,
+    print: InputVersion,
 }
 
 impl Fake {
@@ -29,17 +30,17 @@ impl Fake {
     pub(super) async fn enter(
         project: &Project,
         catalog: &Catalog,
-        recipes: &Recipes,
+        fingerprints: &Fingerprints,
     ) -> anyhow::Result<Self> {
-        let recipes = catalog.register_recipes(recipes).await?;
+        let fingerprints = catalog.register_fingerprints(fingerprints).await?;
         let info = WorkerInfo {
             host: "bench".to_owned(),
             pid: std::process::id(),
             boot_id: None,
         };
         Ok(Self {
-            worker: catalog.register_worker(info, recipes, 1).await?,
-            recipes,
+            worker: catalog.register_worker(info, fingerprints, 1).await?,
+            fingerprints,
             mesh: seen(project, "mesh.stl")?,
             print: seen(project, "print.png")?,
         })
@@ -56,15 +57,15 @@ impl Fake {
         loop {
             let done = self.done(lease.cursor());
             lease = match catalog.checkpoint(lease, done).await? {
-                Kept::Lease(next) => next,
-                Kept::Done => return Ok(()),
-                Kept::Lost => anyhow::bail!("a lease was lost"),
+                CheckpointOutcome::Lease(next) => next,
+                CheckpointOutcome::Done => return Ok(()),
+                CheckpointOutcome::LeaseLost => anyhow::bail!("a lease was lost"),
             };
         }
     }
 
     /// A stage's checkpoint.
-    pub(super) fn done(&self, stage: Stage) -> StageDone {
+    pub(super) fn done(&self, stage: Stage) -> StageCheckpoint {
         let files = ArtifactSet::new();
         let last = stage == Stage::Register;
         let metrics = if last { metrics() } else { Vec::new() };
@@ -78,12 +79,12 @@ impl Fake {
         };
         let outcome = outcome.to_string();
         let sees_print = stage >= Stage::Normalize;
-        StageDone {
+        StageCheckpoint {
             stage,
-            recipe: self.recipes.of(stage),
+            fingerprint: self.fingerprints.of(stage),
             mesh_hash: self.mesh.hash,
             print_hash: sees_print.then_some(self.print.hash),
-            facts: FACTS.to_owned(),
+            attributes: FACTS.to_owned(),
             result_hash: result_hash(&outcome, &files),
             outcome,
             files,
@@ -97,21 +98,21 @@ impl Fake {
     }
 
     /// Input files as a run tells of them: with the stage that reads them first.
-    fn seen(&self, stage: Stage) -> InputsSeen {
+    fn seen(&self, stage: Stage) -> InputVersions {
         if stage > Stage::Fit {
-            return InputsSeen::default();
+            return InputVersions::default();
         }
-        InputsSeen {
+        InputVersions {
             mesh: Some(self.mesh.clone()),
             print: Some(self.print.clone()),
         }
     }
 }
 
-fn seen(project: &Project, name: &str) -> anyhow::Result<InputSeen> {
+fn seen(project: &Project, name: &str) -> anyhow::Result<InputVersion> {
     let (hash, stat) = hash_input(&project.dir().join(name))?;
     let stat = stat.as_str().to_owned();
-    Ok(InputSeen { hash, stat })
+    Ok(InputVersion { hash, stat })
 }
 
 /// A row for each metric, all sure of themselves.

@@ -6,9 +6,9 @@ use sqlx::sqlite::{SqliteConnectOptions, SqliteSynchronous};
 use sqlx::{ConnectOptions as _, Connection as _};
 
 const COPIES: [&str; 5] = [
-    "INSERT INTO stage_result (pair, stage, recipe, mesh_hash, print_hash, facts, outcome, files, result_hash, ms,
+    "INSERT INTO stage_result (pair, stage, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms,
         worker, at)
-    SELECT j.pair, r.stage, r.recipe, r.mesh_hash, r.print_hash, r.facts, r.outcome, r.files, r.result_hash, r.ms,
+    SELECT j.pair, r.stage, r.fingerprint, r.mesh_hash, r.print_hash, r.attributes, r.outcome, r.files, r.result_hash, r.ms,
         r.worker, r.at
     FROM job AS j CROSS JOIN stage_result AS r ON r.pair = 1 WHERE j.pair > ?1 AND j.pair <= ?2",
     "INSERT INTO metric_result (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale,
@@ -24,7 +24,7 @@ const COPIES: [&str; 5] = [
     "UPDATE pair SET mesh_hash = one.mesh_hash, mesh_stat = one.mesh_stat, print_hash = one.print_hash,
         print_stat = one.print_stat
     FROM (SELECT * FROM pair WHERE id = 1) AS one WHERE pair.id > ?1 AND pair.id <= ?2",
-    "UPDATE job SET stage = 4, status = 3, attempt = 1, epoch = 1, made = (SELECT made FROM job WHERE pair = 1)
+    "UPDATE job SET stage = 4, status = 3, attempt = 1, token = 1, made = (SELECT made FROM job WHERE pair = 1)
     WHERE pair > ?1 AND pair <= ?2",
 ];
 

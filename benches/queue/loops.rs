@@ -15,17 +15,17 @@ use sqlx::{Row as _, SqliteConnection};
 use super::fake::Fake;
 
 const CLAIM: &str = "
-UPDATE job SET status = 1, worker = ?1, deadline = 1000, epoch = epoch + 1, attempt = attempt + 1
+UPDATE job SET status = 1, worker = ?1, deadline = 1000, token = token + 1, attempt = attempt + 1
 WHERE pair = (SELECT pair FROM job WHERE status = 0 ORDER BY prio, stage DESC, pair LIMIT 1)
-RETURNING pair, epoch";
+RETURNING pair, token";
 const STEP: &str = "
 UPDATE job SET stage = ?2, status = iif(?2 = 4, 3, 1), worker = iif(?2 = 4, NULL, worker),
     deadline = iif(?2 = 4, NULL, 2000), attempt = 1, crashes = 0
-WHERE pair = ?1 AND epoch = ?3 AND status = 1";
+WHERE pair = ?1 AND token = ?3 AND status = 1";
 const RESULT: &str = "
 INSERT INTO stage_result
-    (pair, stage, recipe, mesh_hash, print_hash, facts, outcome, files, result_hash, ms, worker, at)
-VALUES (?1, ?2, (SELECT id FROM recipe WHERE stage = ?2), ?3, ?4, ?5, ?6, '{}', ?7, 1, ?8, 1)";
+    (pair, stage, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, worker, at)
+VALUES (?1, ?2, (SELECT id FROM fingerprint WHERE stage = ?2), ?3, ?4, ?5, ?6, '{}', ?7, 1, ?8, 1)";
 const ATTEMPT: &str = "INSERT INTO attempt (pair, stage, worker, ms, at) VALUES (?1, ?2, ?3, 1, 1)";
 const SEEN: &str = "UPDATE pair SET mesh_hash = ?2, print_hash = ?3 WHERE id = ?1";
 const COUNTER: &str = "UPDATE counter SET n = n + ?3 WHERE stage = ?1 AND status = ?2";
@@ -70,9 +70,9 @@ async fn through(pool: SqlitePool, fake: Fake, left: Arc<AtomicUsize>) -> anyhow
         .fetch_update(Ordering::SeqCst, Ordering::SeqCst, one_less)
         .is_ok()
     {
-        let (pair, epoch) = claim(&mut conn, &fake).await?;
+        let (pair, token) = claim(&mut conn, &fake).await?;
         for stage in Stage::ALL {
-            checkpoint(&mut conn, &fake, stage, pair, epoch).await?;
+            checkpoint(&mut conn, &fake, stage, pair, token).await?;
         }
     }
     Ok(())
@@ -92,16 +92,16 @@ async fn checkpoint(
     fake: &Fake,
     stage: Stage,
     pair: i64,
-    epoch: i64,
+    token: i64,
 ) -> anyhow::Result<()> {
     let (done, at) = (fake.done(stage), stage.index() as i64);
     let mesh = done.mesh_hash.as_bytes().to_vec();
     let print = done.print_hash.map(|hash| hash.as_bytes().to_vec());
     sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await?;
-    let step = sqlx::query(STEP).bind(pair).bind(at + 1).bind(epoch);
+    let step = sqlx::query(STEP).bind(pair).bind(at + 1).bind(token);
     anyhow::ensure!(step.execute(&mut *conn).await?.rows_affected() == 1);
     let result = sqlx::query(RESULT).bind(pair).bind(at).bind(&mesh);
-    let result = result.bind(&print).bind(done.facts).bind(done.outcome);
+    let result = result.bind(&print).bind(done.attributes).bind(done.outcome);
     let result = result.bind(done.result_hash.as_bytes().to_vec());
     result.bind(fake.worker.0).execute(&mut *conn).await?;
     let attempt = sqlx::query(ATTEMPT).bind(pair).bind(at);

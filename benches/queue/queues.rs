@@ -12,7 +12,7 @@ use super::markdown::{Table, number};
 use super::options::Options;
 use super::process;
 use super::spread::Spread;
-use super::world::{World, recipes, work};
+use super::world::{World, fingerprints, work};
 
 const NOTE: &str = "\
 Medians. A pair: one claim and four checkpoints, each durable before the next; all with a write-ahead log and \
@@ -109,7 +109,7 @@ async fn time(options: &Options, queue: ReviewOrder, workers: usize) -> anyhow::
             let (world, _) = World::import(pairs)?;
             let path = world.project.catalog_path();
             let catalog = Catalog::open(&path).await?;
-            let fake = Fake::enter(&world.project, &catalog, &recipes(None)?).await?;
+            let fake = Fake::enter(&world.project, &catalog, &fingerprints(None)?).await?;
             catalog.close().await;
             loops::work(&path, &fake, pairs, workers).await
         }

@@ -2,7 +2,7 @@
 
 use std::io::Write as _;
 
-use mocban::catalog::{Again, Catalog, Recipes};
+use mocban::catalog::{Catalog, Fingerprints, RerunPolicy};
 
 use super::claims::{self, MANY};
 use super::fill;
@@ -10,7 +10,7 @@ use super::markdown::{Table, number};
 use super::options::Options;
 use super::process::{self, Needed};
 use super::spread::Spread;
-use super::world::{World, recipes, work};
+use super::world::{World, fingerprints, work};
 
 /// Pairs that are left to do where most are done.
 const LEFT: usize = 1_000;
@@ -125,7 +125,7 @@ async fn at(
         let cells = vec![pairs.to_string(), state.to_owned(), one, many];
         push(&mut tables.claims, cells);
     }
-    let now = recipes(None)?;
+    let now = fingerprints(None)?;
     let mut asked = |what: &str, (library, process): (Spread, (Spread, f64))| {
         let cells = line(pairs, state, what, library, process);
         push(&mut tables.asked, cells);
@@ -147,7 +147,7 @@ async fn changed(
     pairs: usize,
     tables: &mut Tables,
 ) -> anyhow::Result<()> {
-    let now = recipes(Some(OTHER))?;
+    let now = fingerprints(Some(OTHER))?;
     let (library, process) = status(world, catalog, &now, &["--set", OTHER, "status"]).await?;
     let asked = line(pairs, "changed", "status", library, process);
     push(&mut tables.asked, asked);
@@ -173,7 +173,7 @@ fn line(
 async fn status(
     world: &World,
     catalog: &Catalog,
-    now: &Recipes,
+    now: &Fingerprints,
     args: &[&str],
 ) -> anyhow::Result<(Spread, (Spread, f64))> {
     let library = Spread::of(20, async || catalog.status(now).await).await?;
@@ -183,10 +183,10 @@ async fn status(
 async fn plan(
     world: &World,
     catalog: &Catalog,
-    now: &Recipes,
+    now: &Fingerprints,
     args: &[&str],
 ) -> anyhow::Result<(Spread, (Spread, f64))> {
-    let plan = async || catalog.plan(now, None, Again::Changed).await;
+    let plan = async || catalog.plan(now, None, RerunPolicy::Changed).await;
     Ok((Spread::of(3, plan).await?, ask(world, args, 1)?))
 }
 

@@ -154,7 +154,7 @@ async fn without(project: &Project, workers: usize) -> anyhow::Result<Took> {
     let mut pages = catalog.result_pages(1000);
     let mut pairs = Vec::new();
     while let Some(page) = pages.next().await? {
-        pairs.extend(page.into_iter().map(|pair| pair.facts));
+        pairs.extend(page.into_iter().map(|pair| pair.attributes));
     }
     catalog.close().await;
     let wanted = pairs.len();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::Context as _;
-use mocban::catalog::{Catalog, Recipes};
+use mocban::catalog::{Catalog, Fingerprints};
 use mocban::config::{Sources, load};
 use mocban::runner;
 use mocban::store::Project;
@@ -66,13 +66,13 @@ fn write_list(path: &Path, pairs: usize) -> anyhow::Result<()> {
     Ok(file.flush()?)
 }
 
-/// The recipes of the settings that the program runs with, and one other setting of the last stage where asked for.
-pub(super) fn recipes(set: Option<&str>) -> anyhow::Result<Recipes> {
+/// The fingerprints of the settings that the program runs with, and one other setting of the last stage where asked for.
+pub(super) fn fingerprints(set: Option<&str>) -> anyhow::Result<Fingerprints> {
     let loaded = load(&Sources {
         sets: set.into_iter().map(str::to_owned).collect(),
         ..Sources::default()
     })?;
-    Ok(runner::recipes(&loaded.config.stages))
+    Ok(runner::fingerprints(&loaded.config.stages))
 }
 
 /// Takes so many pairs through all stages, with so many in hand at a time; asks as a run does, for all free slots.
@@ -82,7 +82,7 @@ pub(super) async fn work(
     pairs: usize,
     in_hand: usize,
 ) -> anyhow::Result<Duration> {
-    let fake = Arc::new(Fake::enter(&world.project, catalog, &recipes(None)?).await?);
+    let fake = Arc::new(Fake::enter(&world.project, catalog, &fingerprints(None)?).await?);
     let start = Instant::now();
     let mut left = pairs;
     let mut tasks = tokio::task::JoinSet::new();

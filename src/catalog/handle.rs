@@ -18,7 +18,7 @@ const INBOX: usize = 1024;
 /// A catalog, open. Clones share the connections.
 #[derive(Debug, Clone)]
 pub struct Catalog {
-    readers: SqlitePool,
+    reader_pool: SqlitePool,
     /// `None` when opened to read only.
     inbox: Option<mpsc::Sender<Message>>,
     pub(crate) company: Arc<Company>,
@@ -48,7 +48,7 @@ impl Catalog {
     /// When there is none or it is no catalog.
     pub async fn open_read_only(path: &Path) -> Result<Self> {
         Ok(Self {
-            readers: open::readers(path).await?,
+            reader_pool: open::reader_pool(path).await?,
             inbox: None,
             company: Company::new(),
             path: path.into(),
@@ -60,14 +60,14 @@ impl Catalog {
         create: bool,
         company: Arc<Company>,
     ) -> Result<Self> {
-        let conn = open::writer(path, create).await?;
-        let readers = open::readers(path).await?;
+        let conn = open::write_conn(path, create).await?;
+        let reader_pool = open::reader_pool(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();
         let commits_with = Arc::clone(&company);
         tokio::spawn(writer::run(conn, Arc::clone(&path), inbox, commits_with));
         Ok(Self {
-            readers,
+            reader_pool,
             inbox: Some(sender),
             company,
             path,
@@ -77,7 +77,7 @@ impl Catalog {
     /// Waits until everything sent is stored, folds the log back and closes the connections.
     pub async fn close(self) {
         // Readers first: an open reader keeps the log from being folded back whole.
-        self.readers.close().await;
+        self.reader_pool.close().await;
         if let Some(inbox) = self.inbox {
             let (sender, receiver) = oneshot::channel();
             if inbox.send(Message::Close(sender)).await.is_ok() {
@@ -91,20 +91,20 @@ impl Catalog {
         self.inbox.as_ref().ok_or(CatalogError::ReadOnly)
     }
 
-    pub(crate) async fn reader(&self) -> Result<PoolConnection<Sqlite>> {
-        Ok(self.readers.acquire().await?)
+    pub(crate) async fn read_conn(&self) -> Result<PoolConnection<Sqlite>> {
+        Ok(self.reader_pool.acquire().await?)
     }
 
     /// A read transaction: everything read in it is of one moment.
     pub(crate) async fn snapshot(&self) -> Result<Transaction<'static, Sqlite>> {
-        Ok(self.readers.begin().await?)
+        Ok(self.reader_pool.begin().await?)
     }
 
     /// Runs `work` in its own write transaction.
-    pub(crate) async fn alone<T: Send + 'static>(
+    pub(crate) async fn in_transaction<T: Send + 'static>(
         &self,
         work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
     ) -> Result<T> {
-        writer::alone(self.writer()?, &self.path, work).await
+        writer::in_transaction(self.writer()?, &self.path, work).await
     }
 }

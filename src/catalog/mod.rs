@@ -14,26 +14,27 @@ mod tests;
 pub use audit::integrity::{AuditedPair, AuditedResult, CounterDrift, Drift};
 pub use db::commit_delay::Waiting;
 pub use db::error::{CatalogError, Result};
-pub use db::error_kind::Trouble;
-pub use db::lock_owner::{Holder, holder};
+pub use db::error_kind::CatalogErrorKind;
+pub use db::lock_owner::{LockOwner, lock_owner};
 pub use handle::Catalog;
 pub use queue::claim::{ClaimRequest, PairSelection};
-pub use queue::counters::Counts;
-pub use queue::fingerprint::{Recipe, RecipeIds, Recipes};
+pub use queue::counters::JobCounts;
+pub use queue::fingerprint::{Fingerprint, FingerprintIds, Fingerprints};
 pub use queue::lease::{
-    InputSeen, InputsSeen, Kept, Lease, MetricResult, RecipeId, Sentence, StageDone, StageFailed,
+    CheckpointOutcome, FailureAction, FingerprintId, InputVersion, InputVersions, Lease,
+    MetricResult, StageCheckpoint, StageFailure,
 };
-pub use queue::plan::{FieldChange, Plan, PlanEntry, WorkReason};
-pub use queue::recovery::{Dead, LeaseHolder, Rescued};
+pub use queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
+pub use queue::recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use queue::requeue::RetrySelection;
-pub use queue::staleness::Again;
+pub use queue::staleness::RerunPolicy;
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use records::look::Look;
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
-    AttemptRecord, FailedPair, MetricRecord, PairDetail, PairFacts, PairResults, ReviewerVerdict,
-    StageCounts, StageRecord, StatusCounts, StoredFailure,
+    AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults,
+    ReviewerVerdict, StageCounts, StageRecord, StatusCounts, StoredFailure,
 };
 pub use records::pages::ResultPages;
 pub use records::pair_work::{KnownInputs, PairWork};

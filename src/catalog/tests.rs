@@ -4,12 +4,12 @@ mod answers;
 mod guards;
 mod histories;
 mod import;
-mod migration;
 mod model;
 mod plans;
 mod protocol;
 mod schema;
 mod staleness;
+mod state_machine;
 mod together;
 mod verdicts;
 
@@ -21,8 +21,8 @@ use tokio::sync::oneshot;
 
 use super::db::commit_delay::Company;
 use super::{
-    Again, Catalog, ClaimRequest, Dead, ImportRow, InputSeen, InputsSeen, Kept, Lease,
-    MetricResult, RecipeIds, Recipes, StageDone, WorkerInfo,
+    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
+    InputVersion, InputVersions, Lease, MetricResult, RerunPolicy, StageCheckpoint, WorkerInfo,
 };
 use crate::domain::{
     Affine2, ArtifactSet, ContentHash, MetricOutcome, PairName, RegisterOutcome, Scores, Stage,
@@ -41,7 +41,7 @@ impl Catalog {
         let (release, released) = oneshot::channel();
         let catalog = self.clone();
         tokio::spawn(async move {
-            let wait = catalog.alone(move |_| {
+            let wait = catalog.in_transaction(move |_| {
                 Box::pin(async move {
                     held.send(()).expect("somebody waits");
                     // Dropped or used: both let go.
@@ -59,7 +59,7 @@ impl Catalog {
 /// A catalog in a directory of its own.
 struct World {
     catalog: Catalog,
-    recipes: RecipeIds,
+    fingerprints: FingerprintIds,
     worker: WorkerId,
     dir: tempfile::TempDir,
 }
@@ -81,8 +81,10 @@ fn row(text: &str) -> ImportRow {
     }
 }
 
-fn recipes(revision: [u32; 4]) -> Recipes {
-    Recipes::new(|stage| json!({ "revision": revision[stage.index()], "settings": { "seed": 0 } }))
+fn fingerprints(revision: [u32; 4]) -> Fingerprints {
+    Fingerprints::new(
+        |stage| json!({ "revision": revision[stage.index()], "settings": { "seed": 0 } }),
+    )
 }
 
 impl World {
@@ -93,14 +95,14 @@ impl World {
             .expect("a catalog");
         let rows = (0..pairs).map(|n| row(&format!("p{n}"))).collect();
         catalog.import(rows, 1).await.expect("imported");
-        let recipes = catalog
-            .register_recipes(&recipes([1; 4]))
+        let fingerprints = catalog
+            .register_fingerprints(&fingerprints([1; 4]))
             .await
-            .expect("recipes");
+            .expect("fingerprints");
         let worker = register(&catalog).await;
         Self {
             catalog,
-            recipes,
+            fingerprints,
             worker,
             dir,
         }
@@ -118,22 +120,22 @@ impl World {
     /// One pair that must run by itself.
     async fn claim_alone(&self, worker: WorkerId) -> Vec<Lease> {
         let request = ClaimRequest {
-            alone: true,
+            exclusive: true,
             ..ClaimRequest::new(worker, 1, 1_000)
         };
         self.catalog.claim(request).await.expect("a claim")
     }
 
     /// Enters another worker that takes all others for dead, and so many pairs come back from them.
-    async fn rescued_by_another(&self, pairs: u64) -> WorkerId {
+    async fn recovered_by_another(&self, pairs: u64) -> WorkerId {
         let other = register(&self.catalog).await;
-        let rescued = self.catalog.rescue(Dead::AllBut(other), 60).await;
-        assert_eq!(rescued.expect("a rescue").ready, pairs);
+        let recovered = self.catalog.recover(DeadWorker::AllExcept(other), 60).await;
+        assert_eq!(recovered.expect("a recovery").ready, pairs);
         other
     }
 
-    fn done(&self, stage: Stage) -> StageDone {
-        done(self.recipes, stage)
+    fn done(&self, stage: Stage) -> StageCheckpoint {
+        done(self.fingerprints, stage)
     }
 
     /// Takes the next pair through all stages.
@@ -142,8 +144,8 @@ impl World {
         loop {
             let stage = lease.cursor();
             match self.catalog.checkpoint(lease, self.done(stage)).await {
-                Ok(Kept::Lease(next)) => lease = next,
-                Ok(Kept::Done) => return,
+                Ok(CheckpointOutcome::Lease(next)) => lease = next,
+                Ok(CheckpointOutcome::Done) => return,
                 other => panic!("the checkpoint was not kept: {other:?}"),
             }
         }
@@ -161,28 +163,31 @@ impl World {
     async fn shortcuts_hold(&self) {
         let names = self.catalog.pair_names().await.expect("names");
         for revision in [[1; 4], [1, 1, 2, 1]] {
-            let recipes = recipes(revision);
-            let plan = |names| self.catalog.plan(&recipes, names, Again::Changed);
+            let fingerprints = fingerprints(revision);
+            let plan = |names| {
+                self.catalog
+                    .plan(&fingerprints, names, RerunPolicy::Changed)
+            };
             let all = plan(None).await.expect("a plan");
             let each = plan(Some(names.as_slice())).await.expect("a plan");
             assert_eq!(all, each, "{revision:?}");
-            let stale = self.catalog.stale(&recipes).await.expect("a read");
-            let counted = self.count_stale(&recipes).await;
+            let stale = self.catalog.stale(&fingerprints).await.expect("a read");
+            let counted = self.count_stale(&fingerprints).await;
             assert_eq!(stale, counted, "{revision:?}");
         }
     }
 
     /// Looks at every result of every pair.
-    async fn count_stale(&self, recipes: &Recipes) -> u64 {
-        let mut conn = self.catalog.reader().await.expect("a reader");
-        let current = super::queue::fingerprint::current_json(&mut conn, recipes).await;
+    async fn count_stale(&self, fingerprints: &Fingerprints) -> u64 {
+        let mut conn = self.catalog.read_conn().await.expect("a reader");
+        let current = super::queue::fingerprint::current_json(&mut conn, fingerprints).await;
         let n: i64 = sqlx::query_scalar(
             "SELECT count(*) FROM job AS j JOIN pair AS p ON p.id = j.pair WHERE EXISTS (
                 SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-                    r.recipe <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash
-                    OR r.print_hash <> p.print_hash OR r.facts <> p.facts))",
+                    r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash
+                    OR r.print_hash <> p.print_hash OR r.attributes <> p.attributes))",
         )
-        .bind(current.expect("recipes"))
+        .bind(current.expect("fingerprints"))
         .fetch_one(&mut *conn)
         .await
         .expect("a count");
@@ -191,22 +196,22 @@ impl World {
 }
 
 async fn register(catalog: &Catalog) -> WorkerId {
-    let recipes = catalog.register_recipes(&recipes([1; 4])).await;
-    enter(catalog, recipes.expect("recipes"), 1).await
+    let fingerprints = catalog.register_fingerprints(&fingerprints([1; 4])).await;
+    enter(catalog, fingerprints.expect("fingerprints"), 1).await
 }
 
 /// Enters a worker whose clock shows this.
-async fn enter(catalog: &Catalog, recipes: RecipeIds, clock: UnixMillis) -> WorkerId {
+async fn enter(catalog: &Catalog, fingerprints: FingerprintIds, clock: UnixMillis) -> WorkerId {
     let info = WorkerInfo {
         host: "here".to_owned(),
         pid: 1,
         boot_id: None,
     };
-    let entered = catalog.register_worker(info, recipes, clock);
+    let entered = catalog.register_worker(info, fingerprints, clock);
     entered.await.expect("a worker")
 }
 
-fn done(recipes: RecipeIds, stage: Stage) -> StageDone {
+fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
     let register = RegisterOutcome {
         metrics: ThresholdMetric::ALL.map(metric).to_vec(),
         evidence: None,
@@ -216,12 +221,12 @@ fn done(recipes: RecipeIds, stage: Stage) -> StageDone {
         outcome: *outcome,
         result_hash: ContentHash::of(outcome.metric.name().as_bytes()),
     });
-    StageDone {
+    StageCheckpoint {
         stage,
-        recipe: recipes.of(stage),
+        fingerprint: fingerprints.of(stage),
         mesh_hash: ContentHash::of(b"mesh"),
         print_hash: (stage >= Stage::Normalize).then(|| ContentHash::of(b"print")),
-        facts: json!({ "scanned_face_down": null, "unit": null }).to_string(),
+        attributes: json!({ "scanned_face_down": null, "unit": null }).to_string(),
         outcome: if last {
             json!(register).to_string()
         } else {
@@ -238,12 +243,12 @@ fn done(recipes: RecipeIds, stage: Stage) -> StageDone {
     }
 }
 
-fn inputs(stage: Stage) -> InputsSeen {
-    let seen = |text: &str| InputSeen {
+fn inputs(stage: Stage) -> InputVersions {
+    let seen = |text: &str| InputVersion {
         hash: ContentHash::of(text.as_bytes()),
         stat: format!("{text} as it was"),
     };
-    InputsSeen {
+    InputVersions {
         mesh: Some(seen("mesh")),
         print: (stage >= Stage::Normalize).then(|| seen("print")),
     }

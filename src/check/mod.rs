@@ -12,7 +12,7 @@ pub use summary::{CheckSummary, Found, Notes, Repaired, Spare};
 
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
-use crate::catalog::{AuditedPair, Catalog, CatalogError, Drift, Trouble};
+use crate::catalog::{AuditedPair, Catalog, CatalogError, CatalogErrorKind, Drift};
 use crate::store::{Project, ReferencedArtifacts, UnreferencedKind};
 use pairs::Look;
 
@@ -81,8 +81,8 @@ pub async fn check(
 fn is_damage(error: &CatalogError) -> bool {
     let told = matches!(error, CatalogError::Corrupt(_) | CatalogError::Json(_));
     told || matches!(
-        error.trouble(),
-        Some(Trouble::Damaged | Trouble::NotADatabase)
+        error.kind(),
+        Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase)
     )
 }
 
@@ -100,7 +100,7 @@ async fn database(
     if faults.is_empty() {
         return Ok(true);
     }
-    if !(options.repair && indexes_alone && catalog.mend_indexes().await?.is_empty()) {
+    if !(options.repair && indexes_alone && catalog.rebuild_indexes().await?.is_empty()) {
         return Ok(false);
     }
     summary.mended(Kind::Database);
@@ -155,7 +155,7 @@ async fn schema(
         summary.add(Finding::schema(line.clone()));
     }
     if options.repair && !found.is_empty() {
-        catalog.mend_schema().await?;
+        catalog.restore_schema().await?;
         let left = catalog.schema_differences().await?;
         summary.mended_but(Kind::Schema, left.len() as u64);
         summary.repaired.schema = left.len() < found.len();
@@ -177,7 +177,7 @@ async fn counters(
         summary.add(Finding::shortcut(line));
     }
     if options.repair && is_off {
-        catalog.mend_counters().await?;
+        catalog.rebuild_counters().await?;
         summary.mended(Kind::Counter);
         summary.repaired.counters = true;
     }
@@ -211,7 +211,7 @@ async fn mend_pairs(
     let back: Vec<_> = back.collect();
     if options.repair && !back.is_empty() {
         summary.repaired.put_back += back.len() as u64;
-        catalog.put_back(back).await?;
+        catalog.restore(back).await?;
     }
     Ok(())
 }

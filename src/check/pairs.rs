@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::finding::{Finding, Kind};
-use crate::catalog::{AuditedPair, AuditedResult, InputSeen};
+use crate::catalog::{AuditedPair, AuditedResult, InputVersion};
 use crate::domain::{
     ArtifactSet, ContentHash, JobStatus, PairId, RegisterOutcome, Stage, ThresholdMetric,
 };
@@ -163,7 +163,7 @@ fn inputs(project: &Project, pair: &AuditedPair, look: &mut Look) {
             Err(InputError::NotThere(_)) => look.inputs_missing.push(said()),
             Err(_) => look.inputs_changed.push(said()),
             Ok(stat) => {
-                let moved = |seen: &&InputSeen| seen.stat != stat.as_str();
+                let moved = |seen: &&InputVersion| seen.stat != stat.as_str();
                 let changed = seen.filter(moved).is_some_and(|seen| {
                     hash_input(&path).map_or(true, |(hash, _)| hash != seen.hash)
                 });

@@ -108,8 +108,8 @@ impl Context {
         let Ok(settings) = self.settings() else {
             return Ok(());
         };
-        let recipes = runner::recipes(&settings.config.stages);
-        let stale = catalog.stale(&recipes).await?;
+        let fingerprints = runner::fingerprints(&settings.config.stages);
+        let stale = catalog.stale(&fingerprints).await?;
         if stale > 0 {
             let pairs = count(stale, "pair");
             let verb = if stale == 1 { "is" } else { "are" };

@@ -7,7 +7,7 @@ use super::exit::{ExitCode, Refusal};
 use super::manifest_file::RefusedManifest;
 use super::truth_file::TruthFileError;
 use super::verdict_file::VerdictFileError;
-use crate::catalog::{CatalogError, Holder, Trouble, holder};
+use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, lock_owner};
 use crate::check::CheckError;
 use crate::config::ConfigError;
 use crate::export::{DrawError, ExportError};
@@ -120,8 +120,8 @@ pub(super) fn is_damage(error: &CatalogError) -> bool {
 pub(super) fn is_damaged_file(error: &CatalogError) -> bool {
     matches!(error, CatalogError::Damaged(_))
         || matches!(
-            error.trouble(),
-            Some(Trouble::Damaged | Trouble::NotADatabase)
+            error.kind(),
+            Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase)
         )
 }
 
@@ -134,22 +134,22 @@ pub(super) fn catalog_path(project: &Path) -> String {
 /// has such a sentence already.
 pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<String> {
     let path = catalog_path(project);
-    Some(match error.trouble() {
-        Some(Trouble::Damaged | Trouble::NotADatabase) => {
+    Some(match error.kind() {
+        Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase) => {
             CatalogError::Damaged(path.into()).to_string()
         }
-        Some(Trouble::ReadOnly | Trouble::CannotOpen) => {
+        Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen) => {
             CatalogError::NotWritable(path.into()).to_string()
         }
-        Some(Trouble::Full) => format!(
+        Some(CatalogErrorKind::Full) => format!(
             "{path} cannot grow because the disk is full; free some space and try again, everything stored so far is safe"
         ),
-        Some(Trouble::Busy) => locked(&path, holder(Path::new(&path))),
-        Some(Trouble::Disk) => format!(
+        Some(CatalogErrorKind::Busy) => locked(&path, lock_owner(Path::new(&path))),
+        Some(CatalogErrorKind::Disk) => format!(
             "{path}: the disk reported an error ({}); check the disk and try again, everything stored so far is safe",
             root_cause(error)
         ),
-        Some(Trouble::Contradiction) => format!(
+        Some(CatalogErrorKind::Contradiction) => format!(
             "{path} holds rows or counters that contradict each other; `check` lists them, `check --repair` repairs them"
         ),
         None => match error {
@@ -161,7 +161,7 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
     })
 }
 
-fn locked(path: &str, owner: Option<Holder>) -> String {
+fn locked(path: &str, owner: Option<LockOwner>) -> String {
     match owner {
         Some(owner) => format!(
             "{path} was locked by {owner} for too long; try again when that process has finished"
@@ -184,7 +184,7 @@ mod tests {
 
     use super::{ExitCode, Refusal};
     use super::{catalog_error, exit_code, explain_catalog, is_damage, join_causes, locked};
-    use crate::catalog::{CatalogError, Holder};
+    use crate::catalog::{CatalogError, LockOwner};
     use crate::export::ExportError;
 
     #[test]
@@ -220,13 +220,13 @@ mod tests {
     #[test]
     fn owner_of_the_lock_is_named_with_the_command_that_resumes_it() {
         let (pid, is_stopped) = (12, true);
-        let text = locked("p/catalog.sqlite", Some(Holder { pid, is_stopped }));
+        let text = locked("p/catalog.sqlite", Some(LockOwner { pid, is_stopped }));
         assert!(
             text.contains("pid 12, which is stopped") && text.contains("kill -CONT 12"),
             "{text}"
         );
         let is_stopped = false;
-        let text = locked("p/catalog.sqlite", Some(Holder { pid, is_stopped }));
+        let text = locked("p/catalog.sqlite", Some(LockOwner { pid, is_stopped }));
         assert!(
             text.contains("by pid 12 for too long") && !text.contains("CONT"),
             "{text}"

@@ -287,7 +287,6 @@ fn plan_text(plan: &Plan, running: bool) -> String {
     for (number, what) in [
         (plan.done, "done"),
         (plan.quarantined, "failed"),
-        (plan.held, "set aside"),
         (plan.leased, leased),
     ] {
         if number > 0 {
@@ -315,7 +314,7 @@ fn plan_text(plan: &Plan, running: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Plan, bytes, plan_text};
-    use crate::catalog::{FieldChange, PlanEntry, WorkReason};
+    use crate::catalog::{FieldChange, PlanEntry, StaleReason};
     use crate::domain::Stage;
 
     #[test]
@@ -333,7 +332,7 @@ mod tests {
         let plan = Plan {
             entries: vec![PlanEntry {
                 from: Stage::Register,
-                why: WorkReason::Settings {
+                why: StaleReason::Settings {
                     stage: Stage::Register,
                     changes: vec![FieldChange {
                         field: "register.max_scale".into(),

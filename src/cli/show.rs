@@ -27,8 +27,8 @@ pub(super) struct ShowArgs {
 pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
     let name = select::pair(&catalog, &args.pair).await?;
-    let recipes = runner::recipes(&context.settings()?.config.stages);
-    let why = catalog.why(&name, &recipes).await?;
+    let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
+    let why = catalog.why(&name, &fingerprints).await?;
     let Some(detail) = catalog.pair(&name).await? else {
         anyhow::bail!("pair {name} was removed while it was read");
     };
@@ -67,7 +67,6 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
     lines.push(match (why, detail.results.status) {
         (Some(entry), _) => format!("  from {}: {}", entry.from, entry.why),
         (None, JobStatus::Quarantined) => "  nothing until `retry`".to_owned(),
-        (None, JobStatus::Held) => "  set aside until `retry`".to_owned(),
         (None, JobStatus::Leased) => "  running now".to_owned(),
         (None, JobStatus::Done | JobStatus::Ready | JobStatus::Backoff) => {
             "  nothing left to do".to_owned()
@@ -78,9 +77,9 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
 }
 
 fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
-    let name = &detail.results.facts.name;
+    let name = &detail.results.attributes.name;
     match detail.results.status {
-        JobStatus::Quarantined | JobStatus::Held => vec![format!("retry {name}")],
+        JobStatus::Quarantined => vec![format!("retry {name}")],
         JobStatus::Leased => vec!["status --watch".to_owned()],
         JobStatus::Ready | JobStatus::Backoff => vec![format!("run {name}")],
         JobStatus::Done if has_work => vec![format!("run {name}")],
@@ -124,8 +123,8 @@ async fn manual_results(
     results: &PairResults,
 ) -> Result<Vec<ManualResult>, CatalogError> {
     let all = catalog.manual_alignments().await?.into_iter();
-    let of_pair =
-        all.filter(|stored| stored.made.pair == results.facts.name && stored.undone_at.is_none());
+    let of_pair = all
+        .filter(|stored| stored.made.pair == results.attributes.name && stored.undone_at.is_none());
     Ok(of_pair
         .map(|stored| ManualResult {
             adjustment: adjustment(&stored, results),

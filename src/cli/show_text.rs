@@ -43,16 +43,16 @@ impl PairPage<'_> {
     }
 
     fn attributes(&self) -> String {
-        let facts = &self.detail.results.facts;
-        let mut names = vec![self.palette.paint(Tone::Strong, &facts.name)];
+        let attributes = &self.detail.results.attributes;
+        let mut names = vec![self.palette.paint(Tone::Strong, &attributes.name)];
         names.extend(
-            [&facts.character, &facts.block]
+            [&attributes.character, &attributes.block]
                 .into_iter()
                 .flatten()
                 .cloned(),
         );
-        let unit = facts.unit.map_or("unit unknown", |unit| unit.name());
-        let side = match facts.scanned_face_down {
+        let unit = attributes.unit.map_or("unit unknown", |unit| unit.name());
+        let side = match attributes.scanned_face_down {
             Some(true) => ", scanned face down",
             Some(false) => ", scanned face up",
             None => "",
@@ -62,11 +62,11 @@ impl PairPage<'_> {
             ["state".to_owned(), self.state()],
             [
                 "mesh".to_owned(),
-                format!("{} ({unit}{side})", self.input(&facts.mesh_path)),
+                format!("{} ({unit}{side})", self.input(&attributes.mesh_path)),
             ],
-            ["print".to_owned(), self.input(&facts.print_path)],
+            ["print".to_owned(), self.input(&attributes.print_path)],
         ];
-        for (key, value) in &facts.meta {
+        for (key, value) in &attributes.meta {
             let text = value
                 .as_str()
                 .map_or_else(|| value.to_string(), ToOwned::to_owned);
@@ -91,9 +91,7 @@ impl PairPage<'_> {
         let tone = match results.status {
             JobStatus::Done => Tone::Good,
             JobStatus::Quarantined => Tone::Bad,
-            JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff | JobStatus::Held => {
-                Tone::Warn
-            }
+            JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => Tone::Warn,
         };
         let status = self.palette.paint(tone, results.status);
         let stage = results.next_stage.map(|stage| format!(" before {stage}"));

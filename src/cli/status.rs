@@ -13,7 +13,7 @@ use super::output;
 use super::screen::{CLEAR, Palette, Tone};
 use super::table::{Align, columns, count};
 use super::verdict::reviewer_name;
-use crate::catalog::{Catalog, Recipes, StageCounts, StatusCounts};
+use crate::catalog::{Catalog, Fingerprints, StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict};
 use crate::runner;
 use crate::store::{Project, RunLock};
@@ -34,13 +34,13 @@ const WATCH_INTERVAL: Duration = Duration::from_secs(2);
 pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (project, catalog) = context.open_read_only().await?;
     loop {
-        let recipes = runner::recipes(&context.settings()?.config.stages);
+        let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
         let failures = if args.failed {
             Failures::read_all(&catalog).await?
         } else {
             Failures::read(&catalog).await?
         };
-        let status = ProjectStatus::read(&project, &catalog, &recipes, failures).await?;
+        let status = ProjectStatus::read(&project, &catalog, &fingerprints, failures).await?;
         print_status(&status, &args, context)?;
         if !args.watch {
             break;
@@ -66,12 +66,12 @@ impl ProjectStatus {
     async fn read(
         project: &Project,
         catalog: &Catalog,
-        recipes: &Recipes,
+        fingerprints: &Fingerprints,
         failures: Failures,
     ) -> anyhow::Result<Self> {
         // Read before the counts: a run that ends in between leaves no leases.
         let running = RunLock::is_held(project);
-        let counts = catalog.status(recipes).await?;
+        let counts = catalog.status(fingerprints).await?;
         Ok(Self {
             counts,
             running,
@@ -184,7 +184,6 @@ fn headline(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
         ),
         (status.interrupted(), "interrupted", Tone::Warn),
         (status.waiting(), "waiting", Tone::Warn),
-        (status.jobs(JobStatus::Held), "set aside", Tone::Warn),
     ] {
         if number > 0 {
             parts.push(palette.paint(tone, format!("{number} {word}")));
@@ -229,9 +228,9 @@ fn stage_table(counts: &StatusCounts, palette: Palette) -> String {
 }
 
 fn low_confidence_line(counts: &StatusCounts) -> Option<String> {
-    (counts.doubtful > 0).then(|| {
-        let pairs = count(counts.doubtful, "done pair");
-        format!("{pairs} below {}", MetricOutcome::DOUBTFUL)
+    (counts.low_confidence > 0).then(|| {
+        let pairs = count(counts.low_confidence, "done pair");
+        format!("{pairs} below {}", MetricOutcome::LOW_CONFIDENCE)
     })
 }
 
@@ -257,7 +256,7 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     if let Some(first) = status.failures.first() {
         steps.push(format!("show {}", first.name));
     }
-    if status.counts.doubtful > 0 {
+    if status.counts.low_confidence > 0 {
         steps.push("contact-sheet --order confidence".to_owned());
     }
     if status.jobs(JobStatus::Done) > 0 && !running {
@@ -297,7 +296,7 @@ mod tests {
                 jobs: [(JobStatus::Done, done), (JobStatus::Ready, ready)].into(),
                 stages: Stage::ALL.map(|name| (name, stage)).into(),
                 stale: 0,
-                doubtful: 0,
+                low_confidence: 0,
                 verdicts: std::collections::BTreeMap::new(),
             },
             running: true,
@@ -358,7 +357,7 @@ mod tests {
     fn pairs_of_low_confidence_are_counted_with_the_command_that_draws_them() {
         let mut status = status(3, 0);
         assert!(!screen(&status, "demo", Palette::PLAIN).contains("confidence"));
-        status.counts.doubtful = 1;
+        status.counts.low_confidence = 1;
         let text = screen(&status, "demo", Palette::PLAIN);
         let line = "confidence   1 done pair below 0.5\n";
         assert!(text.ends_with(line), "{text}");

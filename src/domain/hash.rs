@@ -1,4 +1,4 @@
-//! BLAKE3 hashes that name contents: input files, artifacts, recipes, results.
+//! BLAKE3 hashes that name contents: input files, artifacts, fingerprints, results.
 
 use serde::{Deserialize, Serialize};
 

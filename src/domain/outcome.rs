@@ -205,12 +205,12 @@ pub struct MetricOutcome {
 
 impl MetricOutcome {
     /// Results with less confidence than this are worth a look before they are used.
-    pub const DOUBTFUL: f64 = 0.5;
+    pub const LOW_CONFIDENCE: f64 = 0.5;
 
-    /// Whether it is known to be less confident than [`Self::DOUBTFUL`].
-    pub fn is_doubtful(&self) -> bool {
+    /// Whether it is known to be less confident than [`Self::LOW_CONFIDENCE`].
+    pub fn is_low_confidence(&self) -> bool {
         self.confidence
-            .is_some_and(|confidence| confidence < Self::DOUBTFUL)
+            .is_some_and(|confidence| confidence < Self::LOW_CONFIDENCE)
     }
 }
 

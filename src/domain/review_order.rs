@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub enum ReviewOrder {
     /// By lot from a seed: what was read so far stands for all.
     Random,
-    /// The most doubtful first, to find failures: what was read so far does not stand for all.
+    /// the least confident first, to find failures: what was read so far does not stand for all.
     LeastConfident,
     /// Only what other reviewers contradict each other on.
     Adjudicate,

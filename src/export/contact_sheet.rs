@@ -165,7 +165,7 @@ async fn choose(
 
 /// Whether a pair was asked for and has something to show.
 fn wants(options: &ContactSheetOptions, pair: &PairResults) -> bool {
-    let asked = |names: &Vec<PairName>| names.contains(&pair.facts.name);
+    let asked = |names: &Vec<PairName>| names.contains(&pair.attributes.name);
     options.pairs.as_ref().is_none_or(asked)
         && (pair.status == JobStatus::Quarantined || pair.metric(options.metric).is_some())
 }
@@ -218,7 +218,7 @@ fn cell(
 
 /// The id, how sure the result is where that is known, and what reviewers say where anybody has.
 fn title(pair: &PairResults, metric: ThresholdMetric) -> String {
-    let mut title = pair.facts.name.to_string();
+    let mut title = pair.attributes.name.to_string();
     if let Some(record) = pair.metric(metric) {
         let sure = record.outcome.confidence;
         title.extend(sure.map(|sure| format!("  sure {sure:.2}")));
@@ -295,11 +295,11 @@ mod tests {
     #[test]
     fn the_least_confident_come_first_and_the_unknown_last() {
         let order = options(ContactSheetOrder::Confidence);
-        let (doubtful, sure) = (test_fixtures::sure("b", 0.2), test_fixtures::sure("a", 0.9));
+        let (low_confidence, sure) = (test_fixtures::sure("b", 0.2), test_fixtures::sure("a", 0.9));
         let rank = |pair| rank(pair, None, &order);
-        assert!(rank(&doubtful) < rank(&sure));
+        assert!(rank(&low_confidence) < rank(&sure));
         assert!(rank(&sure) < rank(&test_fixtures::done("c", 0.1, &[])));
-        assert_eq!(title(&doubtful, order.metric), "b  sure 0.20");
+        assert_eq!(title(&low_confidence, order.metric), "b  sure 0.20");
         let read = test_fixtures::done("c", 0.1, &[Verdict::Fail]);
         assert_eq!(title(&read, order.metric), "c  fail");
     }

@@ -138,7 +138,7 @@ impl ExportLine {
     pub(super) fn without_result(pair: &PairResults, metric: ThresholdMetric) -> Self {
         let failure = pair.failure.as_ref().map(|stored| &stored.failure);
         Self {
-            id: pair.facts.name.clone(),
+            id: pair.attributes.name.clone(),
             metric,
             status: status(pair.status),
             error_class: failure.map(|failure| failure.class),
@@ -236,7 +236,9 @@ fn hashes(pair: &PairResults) -> Hashes {
             .stage(Stage::Normalize)
             .and_then(|record| record.print_hash),
         result_hash: None,
-        config_hash: pair.stage(Stage::Register).map(|record| record.recipe_hash),
+        config_hash: pair
+            .stage(Stage::Register)
+            .map(|record| record.fingerprint_hash),
     }
 }
 
@@ -244,9 +246,7 @@ const fn status(status: JobStatus) -> LineStatus {
     match status {
         JobStatus::Done => LineStatus::Done,
         JobStatus::Quarantined => LineStatus::Failed,
-        JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff | JobStatus::Held => {
-            LineStatus::Pending
-        }
+        JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => LineStatus::Pending,
     }
 }
 

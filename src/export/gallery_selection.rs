@@ -103,7 +103,7 @@ impl GallerySelection {
     /// Takes a pair in by lot; who drew the highest goes.
     fn cast(&mut self, pair: &PairResults, records: &[&MetricRecord], truth: &TruthEvaluation) {
         self.pairs += 1;
-        let name = ContentHash::of(pair.facts.name.as_str().as_bytes());
+        let name = ContentHash::of(pair.attributes.name.as_str().as_bytes());
         let lot = self.lots.draw(&name, "picture");
         let place = self.by_lot.partition_point(|(other, _)| *other <= lot);
         if place < BY_LOT {
@@ -119,7 +119,9 @@ impl GallerySelection {
         let by_lot = self.by_lot.iter_mut().map(|(_, subject)| subject);
         for subject in found.chain(by_lot) {
             if subject.is_read() {
-                subject.log = catalog.verdict_log(Some(&subject.pair.facts.name)).await?;
+                subject.log = catalog
+                    .verdict_log(Some(&subject.pair.attributes.name))
+                    .await?;
             }
         }
         Ok(())
@@ -127,7 +129,7 @@ impl GallerySelection {
 
     fn draw(self, project: &Project, limits: &raster::ImageLimits) -> Gallery {
         let mut by_lot: Vec<GallerySubject> = self.by_lot.into_iter().map(|(_, lot)| lot).collect();
-        by_lot.sort_by(|a, b| a.pair.facts.name.cmp(&b.pair.facts.name));
+        by_lot.sort_by(|a, b| a.pair.attributes.name.cmp(&b.pair.attributes.name));
         let found = FOUND.into_iter().zip(self.found);
         let all = found
             .map(|(kind, (of, subjects))| (kind, of, subjects))
@@ -184,12 +186,12 @@ impl GallerySubject {
     }
 
     fn shot(&self, project: &Project, limits: &raster::ImageLimits) -> GalleryItem {
-        let facts = &self.pair.facts;
+        let attributes = &self.pair.attributes;
         let (tiles, trouble) = tiles(project, &self.pair, self.metrics[0], SIDE, limits);
         GalleryItem {
-            pair: facts.name.clone(),
-            character: facts.character.clone(),
-            files: [facts.mesh_path.clone(), facts.print_path.clone()],
+            pair: attributes.name.clone(),
+            character: attributes.character.clone(),
+            files: [attributes.mesh_path.clone(), attributes.print_path.clone()],
             metrics: self.metrics.clone(),
             numbers: self.numbers(),
             said: self.said(),
@@ -288,7 +290,7 @@ mod tests {
             let by_lot = chosen(seed, pairs).by_lot;
             let names = by_lot
                 .iter()
-                .map(|(_, lot)| lot.pair.facts.name.to_string());
+                .map(|(_, lot)| lot.pair.attributes.name.to_string());
             names.collect()
         };
         assert_eq!(names(1, 90), names(1, 90));

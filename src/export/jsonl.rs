@@ -179,7 +179,7 @@ fn pair_lines(
     pair: &PairResults,
     options: JsonlOptions,
 ) -> Result<PairLines, ExportError> {
-    let name = pair.facts.name.clone();
+    let name = pair.attributes.name.clone();
     if pair.metrics.is_empty() {
         let metrics = options.metrics.iter();
         let lines = metrics.map(|metric| ExportLine::without_result(pair, *metric));

@@ -140,7 +140,7 @@ impl SourcePrint {
         pair: &PairResults,
         limits: &raster::ImageLimits,
     ) -> Result<Self, FilesError> {
-        let path = project.input_path(&pair.facts.print_path);
+        let path = project.input_path(&pair.attributes.print_path);
         let bytes = match std::fs::read(&path) {
             Ok(bytes) => bytes,
             Err(source) => return Err(FilesError::SourcePrint { path, source }),
@@ -183,7 +183,7 @@ impl<'a> PairFiles<'a> {
         let aligned = PairArtifacts::new(project, pair);
         Ok(Self {
             aligned,
-            name: pair.facts.name.as_str(),
+            name: pair.attributes.name.as_str(),
             print: SourcePrint::read(project, pair, limits)?,
             print_mask: aligned.print_mask()?,
             depth: aligned.depth()?,

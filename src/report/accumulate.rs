@@ -148,7 +148,7 @@ impl ReportAccumulator {
                 self.progress.failed += 1;
                 self.count_failure(pair);
             }
-            JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff | JobStatus::Held => {
+            JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff => {
                 self.progress.pending += 1;
             }
         }
@@ -167,7 +167,7 @@ impl ReportAccumulator {
         group.count += 1;
         if group.pairs.len() < FailureGroup::SHOWN {
             group.pairs.push(FailureExample {
-                id: pair.facts.name.clone(),
+                id: pair.attributes.name.clone(),
                 stage: stored.stage,
                 error: stored.failure.message.clone(),
             });
@@ -177,7 +177,7 @@ impl ReportAccumulator {
     fn count_truth_problem(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
         if let Some(problem) = &truth.problem {
             self.truth_problems.count += 1;
-            let first = || format!("{}: {problem}", pair.facts.name);
+            let first = || format!("{}: {problem}", pair.attributes.name);
             self.truth_problems.first.get_or_insert_with(first);
         }
     }

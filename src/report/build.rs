@@ -66,7 +66,7 @@ pub async fn build_with(
         for (pair, truth) in with_truth(project, page).await? {
             tally.add(&pair, &truth);
             see(&pair, &truth);
-            if let Some(laid) = laid.get(&pair.facts.name) {
+            if let Some(laid) = laid.get(&pair.attributes.name) {
                 tally.add_by_hand(&manual_alignment::errors(project, &pair, laid)?);
             }
         }

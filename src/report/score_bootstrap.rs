@@ -130,7 +130,7 @@ impl Samples {
         if pair.metrics.is_empty() {
             return;
         }
-        let Some(place) = self.place(pair.facts.block.as_deref()) else {
+        let Some(place) = self.place(pair.attributes.block.as_deref()) else {
             return;
         };
         let unit = &mut self.units[place];
@@ -305,7 +305,7 @@ mod tests {
         let mut samples = Samples::default();
         for i in 0..pairs {
             let mut pair: PairResults = test_fixtures::done(&format!("p{i:02}"), 0.8, &[]);
-            pair.facts.block = has_blocks.then(|| format!("b{}", i / 3));
+            pair.attributes.block = has_blocks.then(|| format!("b{}", i / 3));
             let wave = f64::from(i).sin();
             for record in &mut pair.metrics {
                 let is_best = record.outcome.metric == ThresholdMetric::Ensemble;
@@ -354,7 +354,7 @@ mod tests {
         let mut samples = Samples::default();
         for i in 0..20 {
             let mut pair = test_fixtures::done(&format!("p{i:02}"), 0.8, &[]);
-            pair.facts.block = Some(format!("b{i}"));
+            pair.attributes.block = Some(format!("b{i}"));
             samples.add(&pair, |_| Some(true));
         }
         let means = samples.finish().means[0];

@@ -7,7 +7,7 @@ use super::ground_truth::TruthErrors;
 use super::model::MetricRow;
 use super::score_bootstrap::MeanIntervals;
 use crate::catalog::{
-    MetricRecord, PairFacts, PairResults, ReviewerVerdict, StageRecord, StoredFailure,
+    MetricRecord, PairAttributes, PairResults, ReviewerVerdict, StageRecord, StoredFailure,
 };
 use crate::domain::{
     Affine2, ContentHash, Failure, FailureClass, JobStatus, MetricOutcome, PairName, Scores, Stage,
@@ -104,8 +104,8 @@ pub(crate) fn stage(stage: Stage, ms: u64) -> StageRecord {
         outcome: serde_json::Value::Null,
         files: BTreeMap::new(),
         result_hash: hash,
-        recipe_hash: hash,
-        recipe_fields: serde_json::Value::Null,
+        fingerprint_hash: hash,
+        fingerprint_fields: serde_json::Value::Null,
         mesh_hash: hash,
         print_hash: Some(hash),
         ms,
@@ -116,7 +116,7 @@ pub(crate) fn stage(stage: Stage, ms: u64) -> StageRecord {
 /// A pair nothing was done with.
 pub(crate) fn pending(name: &str) -> PairResults {
     PairResults {
-        facts: PairFacts {
+        attributes: PairAttributes {
             name: PairName::new(name).expect("test names are ids"),
             mesh_path: format!("{name}.stl"),
             print_path: format!("{name}.png"),

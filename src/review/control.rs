@@ -230,11 +230,11 @@ mod tests {
     }
 
     #[test]
-    fn doubtful_results_are_no_ground_for_faults() {
-        let mut doubtful: Vec<Card> = (0..400).map(card).collect();
-        for card in &mut doubtful {
+    fn results_of_low_confidence_are_no_ground_for_faults() {
+        let mut low_confidence: Vec<Card> = (0..400).map(card).collect();
+        for card in &mut low_confidence {
             card.is_good = false;
         }
-        assert!(chosen(&doubtful, &RATES, &SeededRandom::new(5, "ana")).is_empty());
+        assert!(chosen(&low_confidence, &RATES, &SeededRandom::new(5, "ana")).is_empty());
     }
 }

@@ -125,7 +125,7 @@ fn cards_of(pair: &PairResults, options: &DeckOptions) -> Vec<Card> {
         let outcome_of_metric = group[0].outcome;
         Card {
             id: String::new(),
-            pair: pair.facts.name.clone(),
+            pair: pair.attributes.name.clone(),
             results: group
                 .iter()
                 .map(|record| (record.outcome.metric, record.result_hash))

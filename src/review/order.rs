@@ -1,4 +1,4 @@
-//! In which order cards come: by lot from a seed and the reviewer's name, or the most doubtful first.
+//! In which order cards come: by lot from a seed and the reviewer's name, or the least confident first.
 
 use crate::domain::{ReviewOrder, SeededRandom};
 

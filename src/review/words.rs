@@ -246,7 +246,7 @@ const WORDS: &[Row] = &[
     ),
     (
         "risk_label",
-        "Most doubtful first: a hunt for failures, not an estimate",
+        "Least confident first: a hunt for failures, not an estimate",
         "Nghi ngờ nhất trước: để tìm lỗi, không phải để ước lượng",
     ),
     (

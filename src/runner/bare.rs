@@ -12,7 +12,7 @@ use super::pair_context::PairContext;
 use super::stage_executor::PipelineExecutor;
 use super::steps::StageExecutor;
 use super::stop::Stop;
-use crate::catalog::{PairFacts, PairWork};
+use crate::catalog::{PairAttributes, PairWork};
 use crate::domain::Stage;
 use crate::stages::Settings;
 use crate::store::Project;
@@ -23,18 +23,18 @@ pub async fn bare(
     project: &Project,
     settings: &Settings,
     options: &RunOptions,
-    pairs: Vec<PairFacts>,
+    pairs: Vec<PairAttributes>,
 ) -> (usize, Duration) {
     let steps: Arc<dyn StageExecutor> = Arc::new(PipelineExecutor::new(project, settings, options));
     let (mut slots, mut endings) = (JoinSet::new(), JoinSet::new());
-    for facts in pairs {
+    for attributes in pairs {
         if slots.len() >= options.workers.max(1)
             && let Some(Ok(filings)) = slots.join_next().await
         {
             endings.spawn(all_filed(filings));
         }
         let (steps, project) = (Arc::clone(&steps), project.clone());
-        slots.spawn(through(steps, project, options.stage_limit, facts));
+        slots.spawn(through(steps, project, options.stage_limit, attributes));
     }
     for filings in slots.join_all().await {
         endings.spawn(all_filed(filings));
@@ -55,13 +55,13 @@ async fn through(
     steps: Arc<dyn StageExecutor>,
     project: Project,
     limit: Duration,
-    facts: PairFacts,
+    attributes: PairAttributes,
 ) -> Option<Filings> {
-    let (stop, name) = (Stop::new(), facts.name.clone());
+    let (stop, name) = (Stop::new(), attributes.name.clone());
     let (mut filings, mut at_work) = (JoinSet::new(), Duration::ZERO);
     let pair = Box::new(PairContext::new(PairWork {
-        facts,
-        facts_text: String::new(),
+        attributes,
+        attributes_json: String::new(),
         results: Vec::new(),
     }));
     let mut computing = ComputeThread::begin(&steps, Stage::Fit, pair, Stage::next).ok()?;

@@ -12,7 +12,7 @@ use super::compute_thread::ComputedStage;
 use super::events::RunEvent;
 use super::filing::file;
 use super::pair_task::{PairEnd, PairReport, RunContext};
-use crate::catalog::{Kept, Lease, StageDone};
+use crate::catalog::{CheckpointOutcome, Lease, StageCheckpoint};
 use crate::domain::{PairName, Stage};
 use crate::failpoint::{self, Point};
 
@@ -43,7 +43,7 @@ enum LeaseState {
 
 /// What became of the lease, and how many stages were stored under it.
 struct StoreOutcome {
-    kept: Kept,
+    kept: CheckpointOutcome,
     stages: u64,
     is_whole: bool,
 }
@@ -156,9 +156,9 @@ impl Checkpointer {
         self.stored += stages;
         self.is_whole &= is_whole;
         self.right = match kept {
-            Kept::Lost => LeaseState::Lost,
-            Kept::Done => LeaseState::Spent,
-            Kept::Lease(lease) => LeaseState::Lease(lease),
+            CheckpointOutcome::LeaseLost => LeaseState::Lost,
+            CheckpointOutcome::Done => LeaseState::Spent,
+            CheckpointOutcome::Lease(lease) => LeaseState::Lease(lease),
         };
         Ok(())
     }
@@ -176,7 +176,7 @@ async fn store(
     while let Some(first) = stages.recv().await {
         let Some(first) = filed(&shared, &name, first).await? else {
             return Ok(StoreOutcome {
-                kept: Kept::Lease(lease),
+                kept: CheckpointOutcome::Lease(lease),
                 stages: stored,
                 is_whole: false,
             });
@@ -189,7 +189,7 @@ async fn store(
         }
         let told: Vec<_> = done.iter().map(|done| (done.stage, done.ms)).collect();
         let kept = shared.catalog.checkpoint_in_time(lease, done).await?;
-        if !matches!(kept, Kept::Lost) {
+        if !matches!(kept, CheckpointOutcome::LeaseLost) {
             stored += told.len() as u64;
             for (stage, ms) in told {
                 finished(&shared, name.clone(), stage, ms);
@@ -197,7 +197,7 @@ async fn store(
         }
         match kept {
             // What comes after a stage that is not on disk must not be stored without it.
-            Kept::Lease(next) if is_whole => lease = next,
+            CheckpointOutcome::Lease(next) if is_whole => lease = next,
             kept => {
                 return Ok(StoreOutcome {
                     kept,
@@ -208,7 +208,7 @@ async fn store(
         }
     }
     Ok(StoreOutcome {
-        kept: Kept::Lease(lease),
+        kept: CheckpointOutcome::Lease(lease),
         stages: stored,
         is_whole: true,
     })
@@ -219,18 +219,18 @@ async fn filed(
     shared: &RunContext,
     pair: &PairName,
     stage: ComputedStage,
-) -> Result<Option<StageDone>, RunError> {
+) -> Result<Option<StageCheckpoint>, RunError> {
     let (of, limit) = ((pair, stage.stage), shared.stage_limit);
     if !file(&shared.project, of, stage.files, limit, &shared.stop).await? {
         return Ok(None);
     }
     // The disk may have taken long: whether the lease still stands is asked as of now.
-    Ok(Some(StageDone {
+    Ok(Some(StageCheckpoint {
         stage: stage.stage,
-        recipe: shared.recipes.of(stage.stage),
+        fingerprint: shared.fingerprints.of(stage.stage),
         mesh_hash: stage.mesh_hash,
         print_hash: stage.print_hash,
-        facts: stage.facts,
+        attributes: stage.attributes,
         outcome: stage.outcome,
         files: stage.named,
         result_hash: stage.result_hash,

@@ -15,7 +15,7 @@ use super::pair_context::{PairContext, StoredStage};
 use super::stage_output;
 use super::steps::{ExecutionError, StageExecutor, StageOutput};
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{InputsSeen, MetricResult};
+use crate::catalog::{InputVersions, MetricResult};
 use crate::domain::{ArtifactSet, ContentHash, Failure, FailureClass, Stage, sanitize};
 use crate::failpoint::{self, Point};
 use crate::store::NewArtifact;
@@ -32,9 +32,9 @@ pub(super) struct ComputedStage {
     pub(super) metrics: Vec<MetricResult>,
     pub(super) mesh_hash: ContentHash,
     pub(super) print_hash: Option<ContentHash>,
-    pub(super) facts: String,
+    pub(super) attributes: String,
     /// Input files as read, if no stage before told them.
-    pub(super) inputs: InputsSeen,
+    pub(super) inputs: InputVersions,
     pub(super) took: Duration,
 }
 
@@ -42,17 +42,17 @@ pub(super) struct ComputedStage {
 #[derive(Debug)]
 pub(super) enum ComputeEvent {
     /// A stage begins; the input files as read until now.
-    Started(Stage, InputsSeen),
+    Started(Stage, InputVersions),
     /// A stage is computed; which one comes next, unless it was the last one.
     Finished(Box<ComputedStage>, Option<Stage>),
     /// A stage failed; the last that comes.
     Failed {
-        /// Class and sentence.
+        /// Class and message.
         failure: Failure,
         /// Whether another try may go better.
         is_transient: bool,
         /// Input files as read.
-        inputs: InputsSeen,
+        inputs: InputVersions,
         /// How long it took.
         took: Duration,
     },
@@ -81,7 +81,7 @@ impl ComputeThread {
     ) -> std::io::Result<Self> {
         let (sender, receiver) = mpsc::unbounded_channel();
         let steps = Arc::clone(steps);
-        let thread = std::thread::Builder::new().name(pair.facts.name.to_string());
+        let thread = std::thread::Builder::new().name(pair.attributes.name.to_string());
         thread.spawn(move || through(&*steps, stage, pair, next, &sender))?;
         Ok(Self(receiver))
     }
@@ -153,7 +153,7 @@ fn run(
 ) -> Result<ComputedStage, ExecutionError> {
     let output = steps.run(stage, pair)?;
     let took = begun.elapsed();
-    failpoint::hit(stage, Point::Computed, Some(&pair.facts.name));
+    failpoint::hit(stage, Point::Computed, Some(&pair.attributes.name));
     finished(stage, pair, output, took)
 }
 
@@ -192,7 +192,7 @@ fn finished(
         metrics,
         mesh_hash,
         print_hash,
-        facts: pair.facts_text.clone(),
+        attributes: pair.attributes_json.clone(),
         inputs: pair.news(),
         took,
     })

@@ -48,7 +48,7 @@ pub enum RunEvent {
         pair: PairName,
         /// The stage.
         stage: Stage,
-        /// Class and sentence.
+        /// Class and message.
         failure: Failure,
         /// Stages of the pair that will not run now, this one included: the bar grows by them.
         skipped: u64,
@@ -59,7 +59,7 @@ pub enum RunEvent {
         pair: PairName,
         /// The stage.
         stage: Stage,
-        /// Class and sentence.
+        /// Class and message.
         failure: Failure,
         /// Wait in milliseconds.
         wait_ms: u64,

@@ -5,7 +5,7 @@ use std::path::Path;
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use super::RunError;
-use crate::catalog::{Catalog, InputSeen, InputsSeen, KnownInputs, PairSelection};
+use crate::catalog::{Catalog, InputVersion, InputVersions, KnownInputs, PairSelection};
 use crate::domain::{ContentHash, PairId};
 use crate::store::{InputError, Project, hash_input, stat_input};
 
@@ -42,7 +42,7 @@ pub(super) async fn inputs(
 }
 
 /// Notes what the files of pairs are that killed their workers before any stage could tell.
-pub(super) async fn condemned(
+pub(super) async fn poisoned(
     project: &Project,
     catalog: &Catalog,
     pairs: &[PairId],
@@ -63,24 +63,24 @@ pub(super) async fn condemned(
         Ok(seen) => seen,
         Err(panic) => std::panic::resume_unwind(panic.into_panic()),
     };
-    Ok(catalog.note_fatal_inputs(seen).await?)
+    Ok(catalog.record_poisoned_inputs(seen).await?)
 }
 
 /// What the files are that no stage has told of.
-fn unread(project: &Project, known: &KnownInputs) -> InputsSeen {
-    let look = |known: Option<&InputSeen>, stored: &str| match known {
+fn unread(project: &Project, known: &KnownInputs) -> InputVersions {
+    let look = |known: Option<&InputVersion>, stored: &str| match known {
         Some(_) => None,
         None => seen_now(&project.input_path(stored)),
     };
-    InputsSeen {
+    InputVersions {
         mesh: look(known.mesh.as_ref(), &known.mesh_path),
         print: look(known.print.as_ref(), &known.print_path),
     }
 }
 
 /// What changed of a pair's files; `None` when nothing did.
-fn changed(project: &Project, known: &KnownInputs) -> Option<(PairId, InputsSeen)> {
-    let seen = InputsSeen {
+fn changed(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersions)> {
+    let seen = InputVersions {
         mesh: moved(project, &known.mesh_path, known.mesh.as_ref()),
         print: moved(project, &known.print_path, known.print.as_ref()),
     };
@@ -89,13 +89,13 @@ fn changed(project: &Project, known: &KnownInputs) -> Option<(PairId, InputsSeen
 
 /// What a file is now, when it is not what it was. A file that has gone is left alone: results made from it stand.
 /// But where the manifest names another path than before, a file that is not there is no longer the old content.
-fn moved(project: &Project, stored: &str, known: Option<&InputSeen>) -> Option<InputSeen> {
+fn moved(project: &Project, stored: &str, known: Option<&InputVersion>) -> Option<InputVersion> {
     let known = known?;
     let path = project.input_path(stored);
     match stat_input(&path) {
         Ok(stat) if stat.as_str() == known.stat => None,
         Ok(_) => seen_now(&path),
-        Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputSeen {
+        Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputVersion {
             hash: ContentHash::of(b""),
             stat: "gone".to_owned(),
         }),
@@ -104,8 +104,8 @@ fn moved(project: &Project, stored: &str, known: Option<&InputSeen>) -> Option<I
 }
 
 /// What a file is now; `None` when it cannot be read.
-pub(super) fn seen_now(path: &Path) -> Option<InputSeen> {
+pub(super) fn seen_now(path: &Path) -> Option<InputVersion> {
     let (hash, stat) = hash_input(path).ok()?;
     let stat = stat.as_str().to_owned();
-    Some(InputSeen { hash, stat })
+    Some(InputVersion { hash, stat })
 }

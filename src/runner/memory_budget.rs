@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
-use crate::catalog::PairFacts;
+use crate::catalog::PairAttributes;
 use crate::domain::Stage;
 use crate::raster;
 use crate::store::Project;
@@ -66,7 +66,7 @@ impl MemoryBudget {
 /// What a pair may need at once from a stage on, in bytes. A file that is not there takes nothing: its pair fails soon.
 pub(super) fn need(
     project: &Project,
-    pair: &PairFacts,
+    pair: &PairAttributes,
     from: Stage,
     images: &raster::ImageLimits,
 ) -> u64 {
@@ -149,7 +149,7 @@ fn available(meminfo: &str) -> Option<u64> {
 #[cfg(test)]
 mod tests {
     use super::{MemoryBudget, PAIR_BYTES, PIXEL_BYTES, available, need, print_bytes};
-    use crate::catalog::PairFacts;
+    use crate::catalog::PairAttributes;
     use crate::domain::Stage;
     use crate::raster;
     use crate::report::test_fixtures;
@@ -198,16 +198,16 @@ mod tests {
         };
         write("1.obj", 1000);
         write("1.jpg", 100);
-        let facts = PairFacts {
+        let attributes = PairAttributes {
             mesh_path: "1.obj".to_owned(),
             print_path: "1.jpg".to_owned(),
-            ..test_fixtures::pending("1").facts
+            ..test_fixtures::pending("1").attributes
         };
         let few = raster::ImageLimits {
             max_pixels: 10,
             ..raster::ImageLimits::SUGGESTED
         };
-        let from = |stage, limits| need(&project, &facts, stage, limits) - PAIR_BYTES;
+        let from = |stage, limits| need(&project, &attributes, stage, limits) - PAIR_BYTES;
         let print = 100 * 8 * 50 + 100;
         assert_eq!(
             from(Stage::Fit, &raster::ImageLimits::SUGGESTED),

@@ -41,8 +41,8 @@ pub use stage_output::result_hash;
 pub use stop::{Stop, StopLevel};
 
 use crate::catalog::{
-    Again, Catalog, CatalogError, Dead, FieldChange, PairSelection, Plan, Recipes, StatusCounts,
-    WorkLeft, WorkerInfo,
+    Catalog, CatalogError, DeadWorker, FieldChange, Fingerprints, PairSelection, Plan, RerunPolicy,
+    StatusCounts, WorkLeft, WorkerInfo,
 };
 use crate::domain::{PairName, WorkerId};
 use crate::page_vec;
@@ -102,9 +102,9 @@ impl From<LockError> for RunError {
     }
 }
 
-/// The recipes of these settings.
-pub fn recipes(settings: &Settings) -> Recipes {
-    Recipes::new(|stage| settings.recipe_fields(stage))
+/// The fingerprints of these settings.
+pub fn fingerprints(settings: &Settings) -> Fingerprints {
+    Fingerprints::new(|stage| settings.fingerprint_fields(stage))
 }
 
 /// What [`run`] would do, for `--dry-run`. Looks at the input files first, and notes what they are now.
@@ -121,7 +121,7 @@ pub async fn plan(
     input_changes::inputs(project, catalog, among.as_ref()).await?;
     let names = options.pairs.as_deref();
     Ok(catalog
-        .plan(&recipes(settings), names, options.again())
+        .plan(&fingerprints(settings), names, options.again())
         .await?)
 }
 
@@ -139,15 +139,24 @@ pub async fn run(
 ) -> Result<RunSummary, RunError> {
     page_vec::keep_memory(options.memory);
     let steps = Arc::new(PipelineExecutor::new(project, settings, options));
-    let recipes = recipes(settings);
-    run_steps(project, catalog, &recipes, steps, options, stop, on_event).await
+    let fingerprints = fingerprints(settings);
+    run_steps(
+        project,
+        catalog,
+        &fingerprints,
+        steps,
+        options,
+        stop,
+        on_event,
+    )
+    .await
 }
 
 /// [`run`] with any steps.
 async fn run_steps(
     project: &Project,
     catalog: &Catalog,
-    recipes: &Recipes,
+    fingerprints: &Fingerprints,
     steps: Arc<dyn StageExecutor>,
     options: &RunOptions,
     stop: &Stop,
@@ -155,16 +164,24 @@ async fn run_steps(
 ) -> Result<RunSummary, RunError> {
     let clock = Clock::start();
     let among = selection(catalog, options).await?;
-    let recipe_ids = catalog.register_recipes(recipes).await?;
+    let fingerprint_ids = catalog.register_fingerprints(fingerprints).await?;
     let mut lock = RunLock::acquire(project, options.join)?;
-    agree(catalog, &mut lock, recipes).await?;
+    agree(catalog, &mut lock, fingerprints).await?;
     let worker = catalog
-        .register_worker(this_process(), recipe_ids, clock.now())
+        .register_worker(this_process(), fingerprint_ids, clock.now())
         .await?;
     let prepared = async {
-        let rescued = take_over(project, catalog, &mut lock, worker, clock).await?;
-        find_work(project, catalog, recipes, options, among.as_ref(), clock).await?;
-        announce(catalog, options, among.as_ref(), rescued, &mut on_event).await
+        let recovered = take_over(project, catalog, &mut lock, worker, clock).await?;
+        find_work(
+            project,
+            catalog,
+            fingerprints,
+            options,
+            among.as_ref(),
+            clock,
+        )
+        .await?;
+        announce(catalog, options, among.as_ref(), recovered, &mut on_event).await
     };
     if let Err(error) = prepared.await {
         // What went wrong says more than that the end could not be noted either.
@@ -176,7 +193,7 @@ async fn run_steps(
         catalog: catalog.clone(),
         project: project.clone(),
         steps,
-        recipes: recipe_ids,
+        fingerprints: fingerprint_ids,
         clock,
         timing: Timing::of_this_build(),
         stop: stop.clone(),
@@ -193,7 +210,7 @@ async fn run_steps(
     let ended = catalog.end_worker(dispatch.worker(), clock.now()).await;
     let tally = outcome?;
     ended?;
-    let status = catalog.status(recipes).await?;
+    let status = catalog.status(fingerprints).await?;
     let left = catalog.work_left(options.until, among.as_ref()).await?;
     Ok(summary(&tally, left, status, &shared))
 }
@@ -202,15 +219,17 @@ async fn run_steps(
 async fn find_work(
     project: &Project,
     catalog: &Catalog,
-    recipes: &Recipes,
+    fingerprints: &Fingerprints,
     options: &RunOptions,
     among: Option<&PairSelection>,
     clock: Clock,
 ) -> Result<(), RunError> {
     input_changes::inputs(project, catalog, among).await?;
-    catalog.send_back(recipes, among, options.again()).await?;
+    catalog
+        .requeue_stale(fingerprints, among, options.again())
+        .await?;
     let longest = policy::longest_backoff_ms();
-    catalog.stage_due(clock.now(), longest).await?;
+    catalog.release_due_backoffs(clock.now(), longest).await?;
     Ok(())
 }
 
@@ -219,7 +238,7 @@ async fn announce(
     catalog: &Catalog,
     options: &RunOptions,
     among: Option<&PairSelection>,
-    rescued: u64,
+    recovered: u64,
     on_event: &mut (impl FnMut(RunEvent) + Send),
 ) -> Result<(), RunError> {
     let left = catalog.work_left(options.until, among).await?;
@@ -229,23 +248,27 @@ async fn announce(
         by_stage: left.by_stage,
         workers: options.workers,
     });
-    if rescued > 0 {
-        on_event(RunEvent::Recovered { pairs: rescued });
+    if recovered > 0 {
+        on_event(RunEvent::Recovered { pairs: recovered });
     }
     Ok(())
 }
 
 /// Holds this process to the settings of those that work already; the first one's settings are the run's.
-async fn agree(catalog: &Catalog, lock: &mut RunLock, recipes: &Recipes) -> Result<(), RunError> {
+async fn agree(
+    catalog: &Catalog,
+    lock: &mut RunLock,
+    fingerprints: &Fingerprints,
+) -> Result<(), RunError> {
     if lock.is_alone() {
-        lock.set_terms(&recipes.terms())?;
+        lock.set_terms(&fingerprints.terms())?;
         return Ok(());
     }
     let terms = lock.terms()?;
-    if terms == recipes.terms() {
+    if terms == fingerprints.terms() {
         return Ok(());
     }
-    let changes = catalog.changes_from(&terms, recipes).await?;
+    let changes = catalog.changes_from(&terms, fingerprints).await?;
     Err(RunError::OtherSettings(changes))
 }
 
@@ -260,11 +283,13 @@ async fn take_over(
     if !lock.is_alone() {
         return Ok(0);
     }
-    let rescued = catalog.rescue(Dead::AllBut(me), clock.now()).await?;
-    input_changes::condemned(project, catalog, &rescued.condemned).await?;
+    let recovered = catalog
+        .recover(DeadWorker::AllExcept(me), clock.now())
+        .await?;
+    input_changes::poisoned(project, catalog, &recovered.poisoned).await?;
     project.clear_temporary()?;
     lock.admit()?;
-    Ok(rescued.ready)
+    Ok(recovered.ready)
 }
 
 async fn selection(
@@ -316,11 +341,11 @@ fn this_process() -> WorkerInfo {
 
 impl RunOptions {
     /// What to take up besides what changed.
-    fn again(&self) -> Again {
+    fn again(&self) -> RerunPolicy {
         match self.rerun {
-            None | Some(Rerun::Stale) => Again::Changed,
-            Some(Rerun::Failed) => Again::Failed,
-            Some(Rerun::All) => Again::All(self.from),
+            None | Some(Rerun::Stale) => RerunPolicy::Changed,
+            Some(Rerun::Failed) => RerunPolicy::Failed,
+            Some(Rerun::All) => RerunPolicy::All(self.from),
         }
     }
 }

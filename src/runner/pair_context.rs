@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::catalog::{InputsSeen, PairFacts, PairWork};
+use crate::catalog::{InputVersions, PairAttributes, PairWork};
 use crate::domain::{ArtifactSet, ContentHash, FitOutcome, Stage};
 use crate::raster::DepthMap;
 use crate::stages::normalize::Normalized;
@@ -24,15 +24,15 @@ pub(super) struct StoredStage {
 #[derive(Debug)]
 pub(super) struct PairContext {
     /// As imported.
-    pub(super) facts: PairFacts,
+    pub(super) attributes: PairAttributes,
     /// What the manifest said that results depend on, as the catalog compares it.
-    pub(super) facts_text: String,
+    pub(super) attributes_json: String,
     /// What the stages behind it stored.
     pub(super) stored: BTreeMap<Stage, StoredStage>,
     /// Input files as read by this worker.
-    pub(super) inputs: InputsSeen,
+    pub(super) inputs: InputVersions,
     /// What of those was given to the catalog with a stage.
-    pub(super) told: InputsSeen,
+    pub(super) told: InputVersions,
     /// The scan, from fit to depth.
     pub(super) scan: Option<Scan>,
     /// The print, from the first stage that reads it to normalize.
@@ -58,11 +58,11 @@ impl PairContext {
             (record.stage, stored)
         });
         Self {
-            facts: work.facts,
-            facts_text: work.facts_text,
+            attributes: work.attributes,
+            attributes_json: work.attributes_json,
             stored: stored.collect(),
-            inputs: InputsSeen::default(),
-            told: InputsSeen::default(),
+            inputs: InputVersions::default(),
+            told: InputVersions::default(),
             scan: None,
             print: None,
             fit: None,
@@ -72,9 +72,9 @@ impl PairContext {
     }
 
     /// Input files as read, if the catalog was not given them with an earlier stage.
-    pub(super) fn news(&mut self) -> InputsSeen {
+    pub(super) fn news(&mut self) -> InputVersions {
         if self.told == self.inputs {
-            return InputsSeen::default();
+            return InputVersions::default();
         }
         self.told = self.inputs.clone();
         self.told.clone()

@@ -17,7 +17,9 @@ use super::policy::{self, FailedAttempt};
 use super::steps::StageExecutor;
 use super::stop::{Stop, StopLevel};
 use super::timing::Timing;
-use crate::catalog::{Catalog, InputsSeen, Lease, PairWork, RecipeIds, Sentence, StageFailed};
+use crate::catalog::{
+    Catalog, FailureAction, FingerprintIds, InputVersions, Lease, PairWork, StageFailure,
+};
 use crate::domain::{Failure, FailureClass, PairName, Stage, UnixMillis};
 use crate::failpoint::{self, Point};
 use crate::store::Project;
@@ -27,7 +29,7 @@ pub(super) struct RunContext {
     pub(super) catalog: Catalog,
     pub(super) project: Project,
     pub(super) steps: Arc<dyn StageExecutor>,
-    pub(super) recipes: RecipeIds,
+    pub(super) fingerprints: FingerprintIds,
     pub(super) clock: Clock,
     pub(super) timing: Timing,
     pub(super) stop: Stop,
@@ -68,10 +70,10 @@ pub(super) struct PairReport {
 /// What is stored with a failure even when the pair in hand is gone.
 struct PairInputs {
     name: PairName,
-    facts: String,
+    attributes: String,
     mesh_path: String,
     print_path: String,
-    inputs: InputsSeen,
+    inputs: InputVersions,
 }
 
 /// What went wrong.
@@ -80,7 +82,7 @@ struct FailedStage {
     /// Whether another try may go better.
     is_transient: bool,
     /// Input files as read, where the pair came back.
-    inputs: Option<InputsSeen>,
+    inputs: Option<InputVersions>,
     ms: Option<u64>,
 }
 
@@ -123,8 +125,8 @@ pub(super) enum PairOutcome {
 pub(super) async fn work(shared: Arc<RunContext>, lease: Lease, work: PairWork) -> PairOutcome {
     let stage = lease.cursor();
     let pair = Box::new(PairContext::new(work));
-    failpoint::hit(stage, Point::Claimed, Some(&pair.facts.name));
-    let mut held = Checkpointer::new(Arc::clone(&shared), pair.facts.name.clone(), lease);
+    failpoint::hit(stage, Point::Claimed, Some(&pair.attributes.name));
+    let mut held = Checkpointer::new(Arc::clone(&shared), pair.attributes.name.clone(), lease);
     match through(&shared, &mut held, stage, pair).await {
         Ok(PairEnd::Done) if held.is_storing() => PairOutcome::Storing(held),
         end => PairOutcome::Ended(held.report(end).await),
@@ -219,15 +221,15 @@ async fn fail(
         class: blame.failure.class,
         is_transient: blame.is_transient,
         attempt: lease.attempt(),
-        alone: lease.alone(),
+        exclusive: lease.exclusive(),
     };
-    let sentence = policy::sentence(failed, now);
-    let failed = StageFailed {
+    let action = policy::action(failed, now);
+    let failed = StageFailure {
         stage,
         failure: blame.failure.clone(),
-        sentence,
-        recipe: shared.recipes.of(stage),
-        facts: known.facts,
+        action,
+        fingerprint: shared.fingerprints.of(stage),
+        attributes: known.attributes,
         inputs,
         ms: blame.ms,
         at: now,
@@ -236,7 +238,7 @@ async fn fail(
     if !shared.catalog.fail(lease, failed).await? {
         return Ok(PairEnd::Lost);
     }
-    let (event, end) = told(shared, stage, sentence, known.name, blame.failure, now);
+    let (event, end) = told(shared, stage, action, known.name, blame.failure, now);
     shared.tell(event);
     Ok(end)
 }
@@ -245,15 +247,15 @@ async fn fail(
 fn told(
     shared: &RunContext,
     stage: Stage,
-    sentence: Sentence,
+    action: FailureAction,
     pair: PairName,
     failure: Failure,
     now: UnixMillis,
 ) -> (RunEvent, PairEnd) {
-    let wait_ms = match sentence {
-        Sentence::BackOff { run_at } => (run_at - now).unsigned_abs(),
-        Sentence::Alone => 0,
-        Sentence::Quarantine => {
+    let wait_ms = match action {
+        FailureAction::BackOff { run_at } => (run_at - now).unsigned_abs(),
+        FailureAction::RetryExclusive => 0,
+        FailureAction::Quarantine => {
             let skipped = (shared.until.index() + 1).saturating_sub(stage.index()) as u64;
             let event = RunEvent::PairFailed {
                 pair,
@@ -276,20 +278,20 @@ fn told(
 impl PairInputs {
     fn of(pair: &PairContext) -> Self {
         Self {
-            name: pair.facts.name.clone(),
-            facts: pair.facts_text.clone(),
-            mesh_path: pair.facts.mesh_path.clone(),
-            print_path: pair.facts.print_path.clone(),
+            name: pair.attributes.name.clone(),
+            attributes: pair.attributes_json.clone(),
+            mesh_path: pair.attributes.mesh_path.clone(),
+            print_path: pair.attributes.print_path.clone(),
             inputs: pair.inputs.clone(),
         }
     }
 
     /// The input files as they were read, or as they are now where the reader was lost: a file that is mended later
     /// must be told from the one that failed.
-    async fn inputs(&self, project: &Project) -> InputsSeen {
+    async fn inputs(&self, project: &Project) -> InputVersions {
         let seen = self.inputs.clone();
         let paths = [&self.mesh_path, &self.print_path].map(|path| project.input_path(path));
-        let look = move || InputsSeen {
+        let look = move || InputVersions {
             mesh: seen.mesh.or_else(|| input_changes::seen_now(&paths[0])),
             print: seen.print.or_else(|| input_changes::seen_now(&paths[1])),
         };

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-use crate::catalog::{LeaseHolder, Sentence};
+use crate::catalog::{FailureAction, LeaseHolder};
 use crate::domain::{FailureClass, PairId, UnixMillis, WorkerId};
 
 /// Tries of a stage that reading or writing failed in.
@@ -23,23 +23,23 @@ pub(super) struct FailedAttempt {
     /// Which try it was, from 1.
     pub(super) attempt: u32,
     /// Whether it ran with nothing beside it.
-    pub(super) alone: bool,
+    pub(super) exclusive: bool,
 }
 
 /// What a failed try means for the job.
-pub(super) fn sentence(failed: FailedAttempt, now: UnixMillis) -> Sentence {
+pub(super) fn action(failed: FailedAttempt, now: UnixMillis) -> FailureAction {
     match failed.class {
         FailureClass::Io if failed.is_transient && failed.attempt < IO_ATTEMPTS => {
-            Sentence::BackOff {
+            FailureAction::BackOff {
                 run_at: now + backoff_ms(failed.pair, failed.attempt),
             }
         }
-        FailureClass::Resource if !failed.alone => Sentence::Alone,
+        FailureClass::Resource if !failed.exclusive => FailureAction::RetryExclusive,
         FailureClass::Io
         | FailureClass::Resource
         | FailureClass::BadInput
         | FailureClass::NoSolution
-        | FailureClass::Bug => Sentence::Quarantine,
+        | FailureClass::Bug => FailureAction::Quarantine,
     }
 }
 
@@ -58,7 +58,7 @@ pub(super) fn longest_backoff_ms() -> i64 {
     BACKOFF_CAP.as_millis() as i64 * 3 / 2
 }
 
-/// Tells dead workers by their beats: the same beat for as long as a lease, by our own clock. Two machines' clocks
+/// Tells dead workers by their heartbeats: the same heartbeat for as long as a lease, by our own clock. Two machines' clocks
 /// are never compared.
 #[derive(Debug)]
 pub(super) struct Liveness {
@@ -75,7 +75,7 @@ impl Liveness {
         }
     }
 
-    /// Takes in what the lease holders' beats are now; gives those that are dead.
+    /// Takes in what the lease holders' heartbeats are now; gives those that are dead.
     pub(super) fn observe(
         &mut self,
         holders: &[LeaseHolder],
@@ -86,9 +86,12 @@ impl Liveness {
             .retain(|worker, _| holders.iter().any(|holder| holder.worker == *worker));
         let mut dead = Vec::new();
         for holder in holders.iter().filter(|holder| holder.worker != me) {
-            let (beat, since) = self.seen.entry(holder.worker).or_insert((holder.beat, now));
-            if *beat != holder.beat {
-                (*beat, *since) = (holder.beat, now);
+            let (heartbeat, since) = self
+                .seen
+                .entry(holder.worker)
+                .or_insert((holder.heartbeat, now));
+            if *heartbeat != holder.heartbeat {
+                (*heartbeat, *since) = (holder.heartbeat, now);
             } else if now - *since >= self.lease_ms {
                 dead.push(holder.worker);
             }
@@ -99,8 +102,8 @@ impl Liveness {
 
 #[cfg(test)]
 mod tests {
-    use super::{BACKOFF_CAP, FailedAttempt, IO_ATTEMPTS, Liveness, backoff_ms, sentence};
-    use crate::catalog::{LeaseHolder, Sentence};
+    use super::{BACKOFF_CAP, FailedAttempt, IO_ATTEMPTS, Liveness, action, backoff_ms};
+    use crate::catalog::{FailureAction, LeaseHolder};
     use crate::domain::{FailureClass, PairId, WorkerId};
 
     fn failed(class: FailureClass, attempt: u32) -> FailedAttempt {
@@ -109,16 +112,18 @@ mod tests {
             class,
             is_transient: true,
             attempt,
-            alone: false,
+            exclusive: false,
         }
     }
 
     #[test]
     fn reading_is_tried_again_but_not_for_ever() {
-        let first = sentence(failed(FailureClass::Io, 1), 1000);
-        assert!(matches!(first, Sentence::BackOff { run_at } if (1500..=2500).contains(&run_at)));
-        let last = sentence(failed(FailureClass::Io, IO_ATTEMPTS), 1000);
-        assert_eq!(last, Sentence::Quarantine);
+        let first = action(failed(FailureClass::Io, 1), 1000);
+        assert!(
+            matches!(first, FailureAction::BackOff { run_at } if (1500..=2500).contains(&run_at))
+        );
+        let last = action(failed(FailureClass::Io, IO_ATTEMPTS), 1000);
+        assert_eq!(last, FailureAction::Quarantine);
     }
 
     #[test]
@@ -127,18 +132,18 @@ mod tests {
             is_transient: false,
             ..failed(FailureClass::Io, 1)
         };
-        assert_eq!(sentence(missing, 0), Sentence::Quarantine);
+        assert_eq!(action(missing, 0), FailureAction::Quarantine);
     }
 
     #[test]
     fn too_much_is_tried_alone_once() {
         let first = failed(FailureClass::Resource, 1);
-        assert_eq!(sentence(first, 0), Sentence::Alone);
+        assert_eq!(action(first, 0), FailureAction::RetryExclusive);
         let again = FailedAttempt {
-            alone: true,
+            exclusive: true,
             ..first
         };
-        assert_eq!(sentence(again, 0), Sentence::Quarantine);
+        assert_eq!(action(again, 0), FailureAction::Quarantine);
     }
 
     #[test]
@@ -148,7 +153,7 @@ mod tests {
             FailureClass::NoSolution,
             FailureClass::Bug,
         ] {
-            assert_eq!(sentence(failed(class, 1), 0), Sentence::Quarantine);
+            assert_eq!(action(failed(class, 1), 0), FailureAction::Quarantine);
         }
     }
 
@@ -164,10 +169,10 @@ mod tests {
     #[test]
     fn a_silent_worker_is_dead_after_a_lease_and_a_beating_one_never() {
         let (me, other) = (WorkerId(1), WorkerId(2));
-        let holders = |beat| {
+        let holders = |heartbeat| {
             [me, other].map(|worker| LeaseHolder {
                 worker,
-                beat: if worker == me { 0 } else { beat },
+                heartbeat: if worker == me { 0 } else { heartbeat },
             })
         };
         let mut liveness = Liveness::new(60_000);

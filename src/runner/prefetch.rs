@@ -77,7 +77,7 @@ impl Scheduler {
     pub(super) fn observe(&mut self, event: &RunEvent) {
         if let RunEvent::StageStarted { pair, stage } = event
             && *stage == self.shared.until
-            && !self.alone
+            && !self.exclusive
         {
             self.in_hand.nearly_over(pair);
             self.look = true;
@@ -91,7 +91,7 @@ impl Scheduler {
     }
 
     /// Takes so many pairs and begins as many as there are free slots.
-    pub(super) async fn claim(&mut self, slots: usize, alone: bool) -> Result<(), RunError> {
+    pub(super) async fn claim(&mut self, slots: usize, exclusive: bool) -> Result<(), RunError> {
         let shared = &self.shared;
         // One that is taken ahead may wait for a slot for as long as a stage may last.
         let is_ahead = slots + self.tasks.len() > self.workers;
@@ -106,13 +106,13 @@ impl Scheduler {
                 worker: self.worker,
                 slots,
                 until: shared.until,
-                alone,
+                exclusive,
                 among: self.among.clone(),
                 deadline: shared.deadline() + wait,
                 alive_since: shared.alive_since(),
             })
             .await?;
-        self.alone = alone && !leases.is_empty();
+        self.exclusive = exclusive && !leases.is_empty();
         if !leases.is_empty() {
             let works = self.shared.catalog.work(&leases).await?;
             let taken = leases.into_iter().zip(works);
@@ -144,7 +144,7 @@ impl Scheduler {
     fn warn(&self, taken: &LeasedPair) {
         if let Some(limit) = self.budget.exceeded_by(taken.need) {
             let (need, limit) = (taken.need >> 20, limit >> 20);
-            let pair = &taken.work.facts.name;
+            let pair = &taken.work.attributes.name;
             tracing::warn!(
                 "{pair} may need {need} MiB, more than the {limit} MiB of --memory: it runs with nothing beside it"
             );
@@ -153,7 +153,7 @@ impl Scheduler {
 
     fn spawn(&mut self, taken: LeasedPair) {
         let LeasedPair { lease, work, need } = taken;
-        let name = work.facts.name.clone();
+        let name = work.attributes.name.clone();
         self.in_hand.begin(name.clone());
         let over = self::work(Arc::clone(&self.shared), lease, work);
         self.tasks.spawn(async move { (over.await, name, need) });
@@ -176,7 +176,7 @@ impl Scheduler {
         let (project, images) = (self.shared.project.clone(), self.images);
         let look = move |(lease, work): (Lease, PairWork)| {
             let need = if is_limited {
-                memory_budget::need(&project, &work.facts, lease.cursor(), &images)
+                memory_budget::need(&project, &work.attributes, lease.cursor(), &images)
             } else {
                 0
             };

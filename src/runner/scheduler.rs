@@ -16,7 +16,7 @@ use super::policy::{self, Liveness};
 use super::prefetch::Prefetch;
 use super::stop::StopLevel;
 use super::{RunError, this_process};
-use crate::catalog::{Dead, Outstanding, PairSelection, Waiting};
+use crate::catalog::{DeadWorker, Outstanding, PairSelection, Waiting};
 use crate::domain::{PairName, UnixMillis, WorkerId};
 use crate::raster;
 
@@ -54,7 +54,7 @@ pub(super) struct Scheduler {
     /// The next pair waits for memory that somebody must give back first.
     pub(super) short: bool,
     /// A pair that nothing may run beside is in hand.
-    pub(super) alone: bool,
+    pub(super) exclusive: bool,
     /// Whether a claim may find something that the last one did not.
     pub(super) look: bool,
     /// When this worker last showed that it lives, by the run's clock.
@@ -87,7 +87,7 @@ impl Scheduler {
             in_hand: Prefetch::default(),
             budget: MemoryBudget::new(options.memory),
             short: false,
-            alone: false,
+            exclusive: false,
             look: true,
             tally: RunCounts::default(),
             fatal: None,
@@ -108,22 +108,22 @@ impl Scheduler {
     ) -> Result<RunCounts, RunError> {
         let timing = self.shared.timing;
         let mut looks = every(LOOK_EVERY);
-        let mut rescues = every(timing.rescue_every);
-        let mut beats = every(timing.beat_every);
+        let mut recoveries = every(timing.rescue_every);
+        let mut heartbeats = every(timing.beat_every);
         while !self.is_over().await? {
             self.wait().await?;
             let shared = Arc::clone(&self.shared);
             tokio::select! {
                 biased;
                 () = shared.stop.reached(next_level(self.told)), if self.told < StopLevel::Now => self.tell_stop(),
-                _ = beats.tick() => self.beat().await?,
+                _ = heartbeats.tick() => self.heartbeat().await?,
                 Some(event) = events.recv() => {
                     self.observe(&event);
                     on_event(event);
                 }
                 Some(over) = self.tasks.join_next() => self.take(unwound(over)),
                 Some(report) = self.endings.join_next() => self.count(unwound(report)),
-                _ = rescues.tick() => self.rescue().await?,
+                _ = recoveries.tick() => self.recover().await?,
                 _ = looks.tick(), if self.tasks.len() < self.workers => self.look_again().await?,
             }
         }
@@ -142,7 +142,7 @@ impl Scheduler {
             self.give_back().await?;
             return Ok(self.is_idle());
         }
-        if self.alone || self.short {
+        if self.exclusive || self.short {
             return Ok(false);
         }
         self.begin().await?;
@@ -200,7 +200,7 @@ impl Scheduler {
 
     /// Takes in that a pair's computing is over.
     fn take(&mut self, (over, name, need): (PairOutcome, PairName, u64)) {
-        self.alone = false;
+        self.exclusive = false;
         self.short = false;
         self.look = true;
         self.budget.take_back(need);
@@ -261,7 +261,10 @@ impl Scheduler {
         let left = self.outstanding().await?;
         if left.next_due.is_some_and(|due| due <= now) {
             let longest = policy::longest_backoff_ms();
-            self.shared.catalog.stage_due(now, longest).await?;
+            self.shared
+                .catalog
+                .release_due_backoffs(now, longest)
+                .await?;
         }
         self.look = true;
         Ok(())
@@ -269,11 +272,11 @@ impl Scheduler {
 
     /// A sign of life. When none can be stored for as long as a lease lasts, the run is over; when one comes too late,
     /// because the process was held up, it goes on as another worker.
-    async fn beat(&mut self) -> Result<(), RunError> {
+    async fn heartbeat(&mut self) -> Result<(), RunError> {
         let now = self.shared.clock.now();
         let alive_since = self.shared.alive_since();
         let catalog = &self.shared.catalog;
-        match catalog.beat(self.worker, now, alive_since).await {
+        match catalog.heartbeat(self.worker, now, alive_since).await {
             Ok(true) => self.last_beat = now,
             Ok(false) => self.enter_anew(now).await?,
             Err(error) => {
@@ -295,34 +298,34 @@ impl Scheduler {
         let old = self.worker;
         catalog.end_worker(old, now).await?;
         self.worker = catalog
-            .register_worker(this_process(), self.shared.recipes, now)
+            .register_worker(this_process(), self.shared.fingerprints, now)
             .await?;
         self.last_beat = now;
-        catalog.rescue(Dead::Workers(vec![old]), now).await?;
+        catalog.recover(DeadWorker::Workers(vec![old]), now).await?;
         self.look = true;
         Ok(())
     }
 
     /// Takes back the leases of dead workers in other processes.
-    async fn rescue(&mut self) -> Result<(), RunError> {
+    async fn recover(&mut self) -> Result<(), RunError> {
         let catalog = &self.shared.catalog;
         let now = self.shared.clock.now();
         let holders = catalog.lease_holders().await?;
         let dead = self.liveness.observe(&holders, self.worker, now);
-        let mut rescued = 0;
+        let mut recovered = 0;
         if !dead.is_empty() {
-            let found = catalog.rescue(Dead::Workers(dead), now).await?;
-            input_changes::condemned(&self.shared.project, catalog, &found.condemned).await?;
-            rescued += found.ready;
+            let found = catalog.recover(DeadWorker::Workers(dead), now).await?;
+            input_changes::poisoned(&self.shared.project, catalog, &found.poisoned).await?;
+            recovered += found.ready;
         }
         if holders.iter().any(|holder| holder.worker != self.worker) {
             let margin = self.shared.timing.deadline_margin.as_millis() as i64;
-            let overdue = catalog.rescue_overdue(self.worker, margin, now).await?;
-            rescued += overdue.ready;
+            let overdue = catalog.recover_overdue(self.worker, margin, now).await?;
+            recovered += overdue.ready;
         }
-        if rescued > 0 {
+        if recovered > 0 {
             self.look = true;
-            self.shared.tell(RunEvent::Recovered { pairs: rescued });
+            self.shared.tell(RunEvent::Recovered { pairs: recovered });
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_output;
 use super::steps::{ExecutionError, StageExecutor, StageOutput};
-use crate::catalog::InputSeen;
+use crate::catalog::InputVersion;
 use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
 use crate::mesh;
 use crate::raster::{self, DepthMap};
@@ -53,9 +53,9 @@ impl PipelineExecutor {
             fit::FitMethod::UpperSurface => Some(self.read_print(pair)?),
             fit::FitMethod::Paper => None,
         };
-        let face_down = pair.facts.scanned_face_down;
+        let face_down = pair.attributes.scanned_face_down;
         let outcome = fit::fit(&scan, print.as_ref(), face_down, &self.settings.fit)
-            .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;
+            .map_err(|error| in_file(&pair.attributes.mesh_path, &error.into()))?;
         let (outcome, json) = settled(&outcome)?;
         (pair.scan, pair.print) = (Some(scan), print);
         pair.fit = Some(outcome);
@@ -66,8 +66,8 @@ impl PipelineExecutor {
         let fit = Self::fitted(pair)?;
         // The scan is not needed after this stage; taken out, its memory is the next pair's.
         let scan = self.scan_of_fit(pair)?;
-        let map = depth::depth(&scan, &fit, pair.facts.unit, &self.settings.depth)
-            .map_err(|error| in_file(&pair.facts.mesh_path, &error.into()))?;
+        let map = depth::depth(&scan, &fit, pair.attributes.unit, &self.settings.depth)
+            .map_err(|error| in_file(&pair.attributes.mesh_path, &error.into()))?;
         let (outcome, json) = settled(&stage_output::depth_outcome(&map))?;
         let output = stage_output::depth(json, &map);
         pair.depth = Some(DepthMap {
@@ -84,10 +84,10 @@ impl PipelineExecutor {
             normalize::normalize(&depth, &print, &self.settings.normalize).map_err(|error| {
                 // Only a print without ink is the print's fault; all else speaks of the relief.
                 let blamed = match error {
-                    normalize::NormalizeError::Print(_) => &pair.facts.print_path,
+                    normalize::NormalizeError::Print(_) => &pair.attributes.print_path,
                     normalize::NormalizeError::NoStrokes
                     | normalize::NormalizeError::Mirrored { .. }
-                    | normalize::NormalizeError::NoMatch { .. } => &pair.facts.mesh_path,
+                    | normalize::NormalizeError::NoMatch { .. } => &pair.attributes.mesh_path,
                 };
                 in_file(blamed, &error.into())
             })?;
@@ -103,7 +103,7 @@ impl PipelineExecutor {
         let depth = self.depth_map(pair)?;
         let normalized = self.normalized(pair)?;
         let registered = register::register(&depth, &normalized, &self.settings.register)
-            .map_err(|error| in_file(&pair.facts.print_path, &error.into()))?;
+            .map_err(|error| in_file(&pair.attributes.print_path, &error.into()))?;
         let (outcome, json) = settled(&registered.outcome)?;
         Ok(stage_output::registered(json, outcome, &registered))
     }
@@ -188,7 +188,7 @@ impl PipelineExecutor {
             .read_artifact(artifact)
             .map_err(|error| match error {
                 ArtifactError::Missing(_) | ArtifactError::Changed(_) => {
-                    tracing::warn!(pair = %pair.facts.name, %stage, "{error}; the stage runs again");
+                    tracing::warn!(pair = %pair.attributes.name, %stage, "{error}; the stage runs again");
                     ExecutionError::RerunFrom(stage)
                 }
                 ArtifactError::Io { .. } => ExecutionError::Failed {
@@ -199,7 +199,7 @@ impl PipelineExecutor {
     }
 
     fn read_scan(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
-        let stored = &pair.facts.mesh_path;
+        let stored = &pair.attributes.mesh_path;
         let path = self.project.input_path(stored);
         let limit = self.mesh_limits.max_bytes;
         let mut file = open_input(&path, limit, "limits.mesh.max_bytes").map_err(unread)?;
@@ -218,7 +218,7 @@ impl PipelineExecutor {
     }
 
     fn read_print(&self, pair: &mut PairContext) -> Result<Print, ExecutionError> {
-        let stored = &pair.facts.print_path;
+        let stored = &pair.attributes.print_path;
         let path = self.project.input_path(stored);
         let limit = self.image_limits.max_bytes;
         let file = read_input(&path, limit, "limits.image.max_bytes").map_err(unread)?;
@@ -231,8 +231,8 @@ impl PipelineExecutor {
     }
 }
 
-fn seen(InputDigest { hash, stat }: InputDigest) -> InputSeen {
-    InputSeen {
+fn seen(InputDigest { hash, stat }: InputDigest) -> InputVersion {
+    InputVersion {
         hash,
         stat: stat.as_str().to_owned(),
     }

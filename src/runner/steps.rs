@@ -22,7 +22,7 @@ pub(super) enum ExecutionError {
     RerunFrom(Stage),
     /// It failed.
     Failed {
-        /// Class and sentence.
+        /// Class and message.
         failure: Failure,
         /// Whether another try may go better.
         is_transient: bool,

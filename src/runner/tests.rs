@@ -12,7 +12,7 @@ use serde_json::{Map, json};
 use fake_executor::FakeExecutor;
 
 use super::{Rerun, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel, run_steps};
-use crate::catalog::{Catalog, ClaimRequest, ImportRow, Recipes, WorkerInfo};
+use crate::catalog::{Catalog, ClaimRequest, Fingerprints, ImportRow, WorkerInfo};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 use crate::store::Project;
 
@@ -30,8 +30,8 @@ fn name(text: &str) -> PairName {
     PairName::new(text).expect("a pair's name")
 }
 
-fn recipes() -> Recipes {
-    Recipes::new(|_| json!({ "revision": 1 }))
+fn fingerprints() -> Fingerprints {
+    Fingerprints::new(|_| json!({ "revision": 1 }))
 }
 
 fn options(workers: usize) -> RunOptions {
@@ -82,7 +82,7 @@ impl RunFixture {
         let summary = run_steps(
             project,
             catalog,
-            &recipes(),
+            &fingerprints(),
             steps,
             options,
             &self.stop,
@@ -317,10 +317,10 @@ async fn what_a_dead_process_left_comes_back_at_once() {
         pid: 1,
         boot_id: None,
     };
-    let ids = world.catalog.register_recipes(&recipes()).await;
+    let ids = world.catalog.register_fingerprints(&fingerprints()).await;
     let dead = world
         .catalog
-        .register_worker(info, ids.expect("recipes"), 1)
+        .register_worker(info, ids.expect("fingerprints"), 1)
         .await
         .expect("a worker");
     let request = ClaimRequest::new(dead, 1, 1);
@@ -331,9 +331,9 @@ async fn what_a_dead_process_left_comes_back_at_once() {
     assert_eq!(world.run(&options(2)).await.done, 2);
     let events = world.events.lock().expect("no panic holds it");
     let first = |like: fn(&RunEvent) -> bool| events.iter().position(like);
-    let rescued = first(|event| matches!(event, RunEvent::Recovered { pairs: 1 }));
+    let recovered = first(|event| matches!(event, RunEvent::Recovered { pairs: 1 }));
     let begun = first(|event| matches!(event, RunEvent::StageStarted { .. }));
-    assert!(rescued.is_some() && rescued < begun, "{events:?}");
+    assert!(recovered.is_some() && recovered < begun, "{events:?}");
 }
 
 #[tokio::test]

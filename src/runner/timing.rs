@@ -63,7 +63,7 @@ mod tests {
             rescue_every,
             ..
         } = Timing::REAL;
-        // The beat is first seen at a look, and the end of the lease noticed at another.
+        // The heartbeat is first seen at a look, and the end of the lease noticed at another.
         assert!(lease + rescue_every * 2 <= Duration::from_mins(1));
         assert!(lease >= beat_every * 4);
     }

@@ -46,7 +46,7 @@ pub struct Settings {
 
 impl Settings {
     /// What a stage's result depends on besides its inputs: the stage's revision and its own settings.
-    pub fn recipe_fields(&self, stage: Stage) -> serde_json::Value {
+    pub fn fingerprint_fields(&self, stage: Stage) -> serde_json::Value {
         let (revision, params) = match stage {
             Stage::Fit => (fit::REVISION, serde_json::to_value(&self.fit)),
             Stage::Depth => (depth::REVISION, serde_json::to_value(&self.depth)),

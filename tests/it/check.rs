@@ -172,12 +172,12 @@ fn rows_and_counters_that_disagree_are_found_and_mended() {
             "UPDATE counter SET n = n + 1 WHERE stage = 0 AND status = 0",
         ),
         ("counter", "DELETE FROM counter WHERE n = 0"),
-        // What tells stale pairs without a look at each: counts by recipe, recipes of jobs, notes of other files.
+        // What tells stale pairs without a look at each: counts by fingerprint, fingerprints of jobs, notes of other files.
         ("counter", "UPDATE made SET n = n + 1"),
         ("counter", "DELETE FROM made"),
         (
             "counter",
-            "UPDATE job SET made = (SELECT min(id) FROM recipe) WHERE pair = 1",
+            "UPDATE job SET made = (SELECT min(id) FROM fingerprint) WHERE pair = 1",
         ),
         (
             "counter",
@@ -205,7 +205,7 @@ fn rows_and_counters_that_disagree_are_found_and_mended() {
         ),
         (
             "reason_missing",
-            "UPDATE job SET stage = 3, status = 4, made = (SELECT recipe FROM stage_result WHERE pair = 2 AND stage = 2)
+            "UPDATE job SET stage = 3, status = 4, made = (SELECT fingerprint FROM stage_result WHERE pair = 2 AND stage = 2)
             WHERE pair = 2;
             UPDATE counter SET n = 1 WHERE (stage, status) IN ((4, 3), (3, 4))",
         ),
@@ -340,8 +340,8 @@ fn inputs_that_are_gone_or_changed_are_notes_and_no_damage() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let found = pairs(&project);
-    let mesh = project.input_path(&found[0].results.facts.mesh_path);
-    let print = project.input_path(&found[1].results.facts.print_path);
+    let mesh = project.input_path(&found[0].results.attributes.mesh_path);
+    let print = project.input_path(&found[1].results.attributes.print_path);
     std::fs::remove_file(&mesh).expect("removed");
     std::fs::write(&print, "another").expect("written");
     let told = at(&project, &["check"]).expect(0);

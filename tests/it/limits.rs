@@ -53,7 +53,7 @@ fn a_pair_that_kills_its_process_is_quarantined_after_three_and_stops_nobody() {
 
         // It stays so, until somebody asks or its mesh is another.
         call(&mut run(&project, &[])).expect(3);
-        let mesh = project.input_path(&all[1].results.facts.mesh_path);
+        let mesh = project.input_path(&all[1].results.attributes.mesh_path);
         let mut bytes = std::fs::read(&mesh).expect("a mesh");
         bytes.push(b'\n');
         std::fs::write(&mesh, bytes).expect("written");
@@ -89,7 +89,7 @@ fn too_many_failures_stop_the_claiming_and_show_in_the_exit_code() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "4");
     for pair in &pairs(&project)[..3] {
-        let print = project.input_path(&pair.results.facts.print_path);
+        let print = project.input_path(&pair.results.attributes.print_path);
         std::fs::write(print, b"no picture").expect("written");
     }
     let args = ["-j", "1", "--json", "--max-failures", "2"];
@@ -142,7 +142,7 @@ fn pairs_larger_than_the_memory_run_one_by_one_to_the_same_end() {
     let project = project(dir.path(), "p", "2");
     let small = call(&mut run(&project, &["-j", "2", "--memory", "1M"])).expect(0);
     for pair in &pairs(&project) {
-        let needs = format!("{} may need ", pair.results.facts.name);
+        let needs = format!("{} may need ", pair.results.attributes.name);
         let told = small.err.split_once(&needs).map(|(_, rest)| rest);
         let (mib, rest) = told
             .and_then(|rest| rest.split_once(" MiB, "))

@@ -48,7 +48,7 @@ fn large_prints_stay_within_the_memory_together() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let bounded = project(dir.path(), "bounded", &PAIRS.to_string());
     for pair in pairs(&bounded) {
-        enlarge(&bounded.input_path(&pair.results.facts.print_path));
+        enlarge(&bounded.input_path(&pair.results.attributes.print_path));
     }
     let free = copy(&bounded, &dir.path().join("free"));
     let within = peak_mib(&bounded, &format!("{MEMORY_MIB}M"));

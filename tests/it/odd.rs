@@ -74,14 +74,14 @@ fn a_catalog_that_is_none_is_told_in_a_sentence() {
 }
 
 #[test]
-fn a_newer_or_foreign_database_is_refused_and_left_alone() {
+fn a_database_of_another_version_or_program_is_refused_and_left_alone() {
     let dir = empty();
     let project = done(dir.path());
     sql(&project, "PRAGMA user_version = 9000");
     let before = std::fs::read(project.catalog_path()).expect("read");
     for command in ["status", "run", "check"] {
         let refused = at(&project, &[command]).expect(1);
-        plain(&refused.err, "newer version of this program");
+        plain(&refused.err, "another version of this program");
     }
     assert!(std::fs::read(project.catalog_path()).expect("read") == before);
     sql(

@@ -22,11 +22,11 @@ fn finished(project: &Project) -> Vec<[usize; 4]> {
 }
 
 fn mesh(project: &Project, index: usize) -> PathBuf {
-    project.input_path(&pairs(project)[index].results.facts.mesh_path)
+    project.input_path(&pairs(project)[index].results.attributes.mesh_path)
 }
 
 fn print(project: &Project, index: usize) -> PathBuf {
-    project.input_path(&pairs(project)[index].results.facts.print_path)
+    project.input_path(&pairs(project)[index].results.attributes.print_path)
 }
 
 /// The same picture or mesh in other bytes: every reader of ours leaves what comes after the end alone.

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use mocban::catalog::{Catalog, PairDetail, Recipes};
+use mocban::catalog::{Catalog, Fingerprints, PairDetail};
 use mocban::domain::{JobStatus, Stage};
 use mocban::store::Project;
 
@@ -112,11 +112,14 @@ pub(crate) fn results(project: &Project) -> Vec<String> {
             let files = &stage.files;
             lines.push(format!(
                 "{} {} {hash:?} {outcome} {files:?}",
-                results.facts.name, stage.stage
+                results.attributes.name, stage.stage
             ));
         }
         for metric in &results.metrics {
-            lines.push(format!("{} {:?}", results.facts.name, metric.result_hash));
+            lines.push(format!(
+                "{} {:?}",
+                results.attributes.name, metric.result_hash
+            ));
         }
     }
     lines
@@ -147,8 +150,8 @@ pub(crate) fn stages_done(project: &Project) -> u64 {
     runtime.block_on(async {
         let path = project.catalog_path();
         let catalog = Catalog::open_read_only(&path).await.expect("a catalog");
-        let recipes = Recipes::new(|_| serde_json::Value::Null);
-        let status = catalog.status(&recipes).await.expect("a status");
+        let fingerprints = Fingerprints::new(|_| serde_json::Value::Null);
+        let status = catalog.status(&fingerprints).await.expect("a status");
         status.stages.values().map(|stage| stage.done).sum()
     })
 }

@@ -8,13 +8,13 @@ use sqlx::{ConnectOptions as _, Row as _, SqliteConnection};
 
 use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::error_kind::Trouble;
+use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::alike::{misremembered, unnoted};
 use crate::catalog::queue::counters::standings;
-use crate::catalog::queue::job_counts::{self, Census, by_recipe, by_status, census};
+use crate::catalog::queue::job_counts::{self, Census, by_fingerprint, by_status, census};
 use crate::catalog::records::pair_work::{self, KnownInputs};
 use crate::catalog::records::stage_results;
 use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
@@ -82,7 +82,7 @@ WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name <> '_sqlx_migrations'
 
 const COUNTERS: &str = "SELECT stage, status, n FROM counter";
 
-const MADE: &str = "SELECT recipe, n FROM made";
+const MADE: &str = "SELECT fingerprint, n FROM made";
 
 const KEPT_DRIFT: &str = concat!("SELECT count(*) FROM job WHERE ", misremembered!());
 
@@ -105,13 +105,15 @@ impl Catalog {
     /// # Errors
     /// When the check cannot be made.
     pub async fn integrity(&self, quick: bool) -> Result<Vec<String>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         match integrity(&mut conn, quick).await {
             Ok(lines) if lines.iter().any(|line| is_unread(line)) => {
                 Err(CatalogError::Unread(self.path.to_path_buf()))
             }
-            Err(error) => match error.trouble() {
-                Some(Trouble::Damaged | Trouble::NotADatabase) => Ok(vec![error.to_string()]),
+            Err(error) => match error.kind() {
+                Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase) => {
+                    Ok(vec![error.to_string()])
+                }
                 _ => Err(error),
             },
             lines => lines,
@@ -123,7 +125,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn broken_references(&self) -> Result<Vec<String>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let lines = sqlx::query_scalar(REFERENCES).bind(LINES as i64);
         Ok(lines.fetch_all(&mut *conn).await?)
     }
@@ -133,7 +135,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn schema_differences(&self) -> Result<Vec<String>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let found = objects(&mut conn).await?;
         let wanted = wanted_objects().await?;
         let gone = wanted.keys().filter(|name| !found.contains_key(*name));
@@ -161,11 +163,11 @@ impl Catalog {
         let looks = [
             (
                 KEPT_DRIFT,
-                "keep another recipe than that of their last result",
+                "keep another fingerprint than that of their last result",
             ),
             (
                 MOVED_DRIFT,
-                "are not noted, though their files or facts changed since",
+                "are not noted, though their files or attributes changed since",
             ),
         ];
         for (sql, what) in looks.into_iter().filter(|_| !quick) {
@@ -229,17 +231,19 @@ async fn counter_drift(conn: &mut SqliteConnection, counted: &Census) -> Result<
     Ok(drift.collect())
 }
 
-/// Counters of recipes that are off, a line each.
+/// Counters of fingerprints that are off, a line each.
 async fn made_drift(conn: &mut SqliteConnection, counted: &Census) -> Result<Vec<String>> {
     let kept: Vec<(i64, i64)> = sqlx::query_as(MADE).fetch_all(conn).await?;
     let kept: BTreeMap<i64, i64> = kept.into_iter().collect();
-    let counted = by_recipe(counted);
-    let recipes: BTreeSet<_> = kept.keys().chain(counted.keys()).collect();
-    let lines = recipes.into_iter().filter_map(|recipe| {
-        let kept = kept.get(recipe).copied().unwrap_or(0);
-        let counted = counted.get(recipe).copied().unwrap_or(0);
+    let counted = by_fingerprint(counted);
+    let fingerprints: BTreeSet<_> = kept.keys().chain(counted.keys()).collect();
+    let lines = fingerprints.into_iter().filter_map(|fingerprint| {
+        let kept = kept.get(fingerprint).copied().unwrap_or(0);
+        let counted = counted.get(fingerprint).copied().unwrap_or(0);
         let is_off = u64::try_from(kept) != Ok(counted);
-        is_off.then(|| format!("the counter of recipe {recipe} says {kept}, there are {counted}"))
+        is_off.then(|| {
+            format!("the counter of fingerprint {fingerprint} says {kept}, there are {counted}")
+        })
     });
     Ok(lines.collect())
 }
@@ -260,7 +264,7 @@ pub(crate) async fn integrity(conn: &mut SqliteConnection, quick: bool) -> Resul
 fn is_unread(line: &str) -> bool {
     let code = line.rsplit_once("error code=").map(|(_, code)| code.trim());
     let code: Option<i64> = code.and_then(|code| code.parse().ok());
-    code.and_then(Trouble::of_code) == Some(Trouble::Disk)
+    code.and_then(CatalogErrorKind::of_code) == Some(CatalogErrorKind::Disk)
 }
 
 /// Tables, indexes and triggers by kind and name, with the statement that makes each.

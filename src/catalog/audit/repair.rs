@@ -11,7 +11,7 @@ use crate::catalog::db::script::Script;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::alike::{made, misremembered, unnoted};
 use crate::catalog::queue::counters::{Deltas, cursor, standings};
-use crate::catalog::queue::job_counts::{self, by_recipe, by_status, census};
+use crate::catalog::queue::job_counts::{self, by_fingerprint, by_status, census};
 use crate::domain::{JobStatus, PairId, Stage};
 
 const STANDING: &str = "
@@ -22,12 +22,12 @@ const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
 SELECT value ->> 0, 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = value ->> 0)";
 
-/// Back to a stage and never forward. A lease is no hindrance: no process lives that could hold it, and the new epoch
-/// shuts out one that does. What somebody set aside stays set aside.
-pub(crate) const PUT_BACK: &str = concat!(
+/// Back to a stage and never forward. A lease is no hindrance: no process lives that could hold it, and the new token
+/// shuts out one that does.
+pub(crate) const RESTORE: &str = concat!(
     "
-UPDATE job SET stage = min(stage, item.value ->> 1), status = iif(status = 5, 5, 0), run_at = NULL, prio = 0,
-    attempt = 0, crashes = 0, mem_class = 0, worker = NULL, deadline = NULL, epoch = epoch + 1,
+UPDATE job SET stage = min(stage, item.value ->> 1), status = 0, run_at = NULL, prio = 0,
+    attempt = 0, crashes = 0, exclusive = 0, worker = NULL, deadline = NULL, token = token + 1,
     made = ",
     made!("min(job.stage, item.value ->> 1)"),
     "
@@ -58,12 +58,12 @@ const NOTE_MOVED: &str = concat!("INSERT INTO moved ", unnoted!());
 
 impl Catalog {
     /// Puts pairs back to be done, each from a stage on; a pair without a job gets one. The counters must be right
-    /// already: see [`Catalog::mend_counters`].
+    /// already: see [`Catalog::rebuild_counters`].
     ///
     /// # Errors
     /// When the database refuses; then nothing is changed.
-    pub async fn put_back(&self, pairs: Vec<(PairId, Stage)>) -> Result<()> {
-        self.alone(move |conn| Box::pin(async move { put_back(conn, &pairs).await }))
+    pub async fn restore(&self, pairs: Vec<(PairId, Stage)>) -> Result<()> {
+        self.in_transaction(move |conn| Box::pin(async move { restore(conn, &pairs).await }))
             .await
     }
 
@@ -71,8 +71,8 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn mend_counters(&self) -> Result<()> {
-        self.alone(|conn| {
+    pub async fn rebuild_counters(&self) -> Result<()> {
+        self.in_transaction(|conn| {
             Box::pin(async move {
                 sqlx::query(REMAKE).execute(&mut *conn).await?;
                 let counted = census(conn, job_counts::ALL).await?;
@@ -81,8 +81,8 @@ impl Catalog {
                     let jobs = by_status.get(&(cursor, status)).copied().unwrap_or(0);
                     json!([cursor, status.code(), jobs])
                 });
-                let made = by_recipe(&counted).into_iter();
-                let made = made.map(|(recipe, jobs)| json!([recipe, jobs]));
+                let made = by_fingerprint(&counted).into_iter();
+                let made = made.map(|(fingerprint, jobs)| json!([fingerprint, jobs]));
                 let mut script = Script::default();
                 script.add(&[RECOUNT]).bind(array(counters).to_string())?;
                 script.add(&RECOUNT_MADE).bind(array(made).to_string())?;
@@ -98,8 +98,8 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn mend_indexes(&self) -> Result<Vec<String>> {
-        self.alone(|conn| {
+    pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
+        self.in_transaction(|conn| {
             Box::pin(async move {
                 sqlx::query("REINDEX").execute(&mut *conn).await?;
                 integrity(conn, false).await
@@ -112,9 +112,9 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn mend_schema(&self) -> Result<()> {
+    pub async fn restore_schema(&self) -> Result<()> {
         let wanted = wanted_objects().await?;
-        self.alone(move |conn| {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let found = objects(conn).await?;
                 for (name, sql) in wanted {
@@ -130,14 +130,14 @@ impl Catalog {
     }
 }
 
-async fn put_back(conn: &mut SqliteConnection, pairs: &[(PairId, Stage)]) -> Result<()> {
+async fn restore(conn: &mut SqliteConnection, pairs: &[(PairId, Stage)]) -> Result<()> {
     let items = pairs.iter();
     let items = array(items.map(|(pair, stage)| json!([pair.0, stage.index()]))).to_string();
     let standing = sqlx::query(STANDING)
         .bind(&items)
         .fetch_all(&mut *conn)
         .await?;
-    for sql in [NEW_JOBS, PUT_BACK, FORGET] {
+    for sql in [NEW_JOBS, RESTORE, FORGET] {
         sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
     }
     let mut deltas = Deltas::default();
@@ -145,9 +145,6 @@ async fn put_back(conn: &mut SqliteConnection, pairs: &[(PairId, Stage)]) -> Res
         let (to, at): (i64, Option<i64>) = (row.try_get("to_stage")?, row.try_get("stage")?);
         let status: Option<i64> = row.try_get("status")?;
         match (at, status.map(rows::status).transpose()?) {
-            (Some(at), Some(JobStatus::Held)) => {
-                deltas.moved((at, JobStatus::Held), (at.min(to), JobStatus::Held));
-            }
             (Some(at), Some(status)) => {
                 deltas.moved((at, status), (at.min(to), JobStatus::Ready));
             }

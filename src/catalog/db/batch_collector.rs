@@ -28,7 +28,7 @@ impl Gathering {
                 self.until = None;
             }
             Message::Hurry => self.until = None,
-            other @ (Message::Alone(_) | Message::Close(_)) => self.other = Some(other),
+            other @ (Message::Transaction(_) | Message::Close(_)) => self.other = Some(other),
         }
     }
 
@@ -83,17 +83,17 @@ mod tests {
     use super::{BATCH, gather};
     use crate::catalog::Catalog;
     use crate::catalog::db::commit_delay::Company;
-    use crate::catalog::db::group_commit::{Beat, Request};
+    use crate::catalog::db::group_commit::{Heartbeat, Request};
     use crate::catalog::db::writer::Message;
     use crate::domain::WorkerId;
 
     fn request() -> Request {
-        let beat = Beat {
+        let heartbeat = Heartbeat {
             worker: WorkerId(1),
             now: 1,
             alive_since: 1,
         };
-        Request::Beat(beat, oneshot::channel().0)
+        Request::Heartbeat(heartbeat, oneshot::channel().0)
     }
 
     /// Requests in the batch that begins with the first of these, where nothing else ever comes.

@@ -6,24 +6,24 @@ use std::time::Duration;
 use tokio::time::{Instant, Sleep, sleep};
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::error_kind::Trouble;
-use crate::catalog::db::lock_owner::holder;
+use crate::catalog::db::error_kind::CatalogErrorKind;
+use crate::catalog::db::lock_owner::lock_owner;
 
 /// How long in all.
-const PATIENCE: Duration = Duration::from_mins(1);
+const LONGEST_WAIT: Duration = Duration::from_mins(1);
 /// After so long it is said who is waited for.
-const SILENCE: Duration = Duration::from_secs(5);
+const QUIET_WAIT: Duration = Duration::from_secs(5);
 /// Between two tries: some locks are refused at once.
-const BETWEEN: Duration = Duration::from_millis(5);
+const RETRY_EVERY: Duration = Duration::from_millis(5);
 
 /// Tries again for as long as others have the catalog locked, so that "busy" reaches no caller before its time.
-pub(crate) struct Patience<'p> {
+pub(crate) struct BusyRetry<'p> {
     catalog: &'p Path,
     begun: Instant,
     is_told: bool,
 }
 
-impl<'p> Patience<'p> {
+impl<'p> BusyRetry<'p> {
     /// From now on, with this catalog.
     pub(crate) fn begin(catalog: &'p Path) -> Self {
         Self {
@@ -37,20 +37,20 @@ impl<'p> Patience<'p> {
     pub(crate) fn wait<T>(&mut self, outcome: &Result<T>) -> Option<Sleep> {
         let error = outcome.as_ref().err()?;
         let waited = self.begun.elapsed();
-        if error.trouble() != Some(Trouble::Busy) || waited >= PATIENCE {
+        if error.kind() != Some(CatalogErrorKind::Busy) || waited >= LONGEST_WAIT {
             return None;
         }
         tracing::debug!(%error, "the catalog is busy, waiting");
-        if waited >= SILENCE && !self.is_told {
+        if waited >= QUIET_WAIT && !self.is_told {
             self.is_told = true;
             self.tell();
         }
-        Some(sleep(BETWEEN))
+        Some(sleep(RETRY_EVERY))
     }
 
     fn tell(&self) {
         let catalog = self.catalog.display();
-        let by = holder(self.catalog)
+        let by = lock_owner(self.catalog)
             .map_or_else(|| "another process".to_owned(), |holder| holder.to_string());
         tracing::warn!("{catalog} is kept locked by {by}; waiting");
     }
@@ -68,7 +68,7 @@ mod tests {
     use tracing::span::{Attributes, Id, Record};
     use tracing::{Event, Level, Metadata, Subscriber, subscriber};
 
-    use super::{PATIENCE, Patience, SILENCE};
+    use super::{BusyRetry, LONGEST_WAIT, QUIET_WAIT};
     use crate::catalog::{CatalogError, Result};
 
     async fn connect(path: &Path) -> SqliteConnection {
@@ -90,10 +90,10 @@ mod tests {
     }
 
     /// One that has waited for so long.
-    fn after(waited: Duration) -> Patience<'static> {
-        let mut patience = Patience::begin(Path::new("catalog.sqlite"));
-        patience.begun -= waited;
-        patience
+    fn after(waited: Duration) -> BusyRetry<'static> {
+        let mut retry = BusyRetry::begin(Path::new("catalog.sqlite"));
+        retry.begun -= waited;
+        retry
     }
 
     /// A log that counts its warnings.
@@ -130,12 +130,12 @@ mod tests {
         let _log = subscriber::set_default(warnings);
         assert!(after(Duration::ZERO).wait(&busy).is_some());
         assert_eq!(told.load(Ordering::SeqCst), 0);
-        let mut patience = after(SILENCE);
+        let mut retry = after(QUIET_WAIT);
         for _ in 0..3 {
-            assert!(patience.wait(&busy).is_some());
+            assert!(retry.wait(&busy).is_some());
             assert_eq!(told.load(Ordering::SeqCst), 1);
         }
-        assert!(after(PATIENCE).wait(&busy).is_none());
+        assert!(after(LONGEST_WAIT).wait(&busy).is_none());
     }
 
     #[tokio::test]

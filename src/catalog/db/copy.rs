@@ -8,7 +8,7 @@ use sqlx::{ConnectOptions as _, Connection as _};
 use crate::catalog::audit::integrity;
 use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::error_kind::Trouble;
+use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::{Identity, identity};
 use crate::catalog::handle::Catalog;
 
@@ -23,7 +23,7 @@ impl Catalog {
             return Err(CatalogError::NotUtf8(file.to_owned()));
         };
         // A connection that may only query may not copy either, so one is taken out of the pool.
-        let mut conn = self.reader().await?.detach();
+        let mut conn = self.read_conn().await?.detach();
         sqlx::query("PRAGMA query_only = 0")
             .execute(&mut conn)
             .await?;
@@ -51,11 +51,16 @@ impl Catalog {
 
 /// Blames the copy for what the disk refused: the catalog itself is only read.
 fn not_copied(file: &Path, error: sqlx::Error) -> CatalogError {
-    let reason = match Trouble::of(&error) {
-        Some(Trouble::Full) => "the disk is full",
-        Some(Trouble::ReadOnly | Trouble::CannotOpen) => "it cannot be written",
-        Some(Trouble::Disk) => "the disk refused",
-        Some(Trouble::Damaged | Trouble::NotADatabase | Trouble::Busy | Trouble::Contradiction)
+    let reason = match CatalogErrorKind::of(&error) {
+        Some(CatalogErrorKind::Full) => "the disk is full",
+        Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen) => "it cannot be written",
+        Some(CatalogErrorKind::Disk) => "the disk refused",
+        Some(
+            CatalogErrorKind::Damaged
+            | CatalogErrorKind::NotADatabase
+            | CatalogErrorKind::Busy
+            | CatalogErrorKind::Contradiction,
+        )
         | None => {
             return error.into();
         }

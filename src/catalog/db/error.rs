@@ -28,11 +28,11 @@ pub enum CatalogError {
         /// What it is instead.
         reason: String,
     },
-    /// The file is of a later version of the program.
+    /// The file was written by another version of the program.
     #[error(
-        "{path} was written by a newer version of this program (schema {found}, this one knows {known}); open it with that version"
+        "{path} was written by another version of this program (schema {found}, this one reads only {known}); open it with that version"
     )]
-    Newer {
+    OtherVersion {
         /// The file.
         path: PathBuf,
         /// Version of its schema.

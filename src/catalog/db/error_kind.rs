@@ -4,7 +4,7 @@ use crate::catalog::db::error::CatalogError;
 
 /// What is wrong with the catalog's file, in place of the database's own words.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Trouble {
+pub enum CatalogErrorKind {
     /// Its pages contradict each other.
     Damaged,
     /// It is no database at all.
@@ -23,7 +23,7 @@ pub enum Trouble {
     Contradiction,
 }
 
-impl Trouble {
+impl CatalogErrorKind {
     /// By SQLite's result code, extended ones included.
     pub(crate) const fn of_code(code: i64) -> Option<Self> {
         match code & 0xff {
@@ -48,12 +48,12 @@ impl Trouble {
 
 impl CatalogError {
     /// What it means for the file; `None` when the file is not to blame or the error says so itself.
-    pub fn trouble(&self) -> Option<Trouble> {
+    pub fn kind(&self) -> Option<CatalogErrorKind> {
         match self {
             Self::Database(error) | Self::Migrate(sqlx::migrate::MigrateError::Execute(error)) => {
-                Trouble::of(error)
+                CatalogErrorKind::of(error)
             }
-            Self::Shared(error) => error.trouble(),
+            Self::Shared(error) => error.kind(),
             _ => None,
         }
     }
@@ -61,14 +61,23 @@ impl CatalogError {
 
 #[cfg(test)]
 mod tests {
-    use super::Trouble;
+    use super::CatalogErrorKind;
 
     #[test]
     fn extended_codes_mean_what_their_base_means() {
         // SQLITE_CORRUPT_INDEX, SQLITE_READONLY_DIRECTORY, SQLITE_IOERR_FSYNC.
-        assert_eq!(Trouble::of_code(779), Some(Trouble::Damaged));
-        assert_eq!(Trouble::of_code(1544), Some(Trouble::ReadOnly));
-        assert_eq!(Trouble::of_code(1034), Some(Trouble::Disk));
-        assert_eq!(Trouble::of_code(1), None);
+        assert_eq!(
+            CatalogErrorKind::of_code(779),
+            Some(CatalogErrorKind::Damaged)
+        );
+        assert_eq!(
+            CatalogErrorKind::of_code(1544),
+            Some(CatalogErrorKind::ReadOnly)
+        );
+        assert_eq!(
+            CatalogErrorKind::of_code(1034),
+            Some(CatalogErrorKind::Disk)
+        );
+        assert_eq!(CatalogErrorKind::of_code(1), None);
     }
 }

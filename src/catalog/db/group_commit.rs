@@ -15,7 +15,7 @@ use crate::catalog::queue::checkpoint::Steps;
 use crate::catalog::queue::claim::{self, ClaimRequest};
 use crate::catalog::queue::counters::Deltas;
 use crate::catalog::queue::fail;
-use crate::catalog::queue::lease::{Lease, StageDone, StageFailed};
+use crate::catalog::queue::lease::{Lease, StageCheckpoint, StageFailure};
 use crate::domain::{UnixMillis, WorkerId};
 
 /// Where an answer goes.
@@ -23,7 +23,7 @@ pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;
 
 /// A sign of life.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Beat {
+pub(crate) struct Heartbeat {
     pub(crate) worker: WorkerId,
     pub(crate) now: UnixMillis,
     pub(crate) alive_since: UnixMillis,
@@ -31,9 +31,9 @@ pub(crate) struct Beat {
 
 /// A request that may share a commit. The lease travels with it and comes back only if it still holds.
 pub(crate) enum Request {
-    Beat(Beat, Reply<bool>),
+    Heartbeat(Heartbeat, Reply<bool>),
     Checkpoint(Box<Steps>, Reply<bool>),
-    Fail(Box<(Lease, StageFailed)>, Reply<bool>),
+    Fail(Box<(Lease, StageFailure)>, Reply<bool>),
     Release(Lease, Reply<bool>),
     Claim(ClaimRequest, Reply<Vec<Lease>>),
 }
@@ -44,16 +44,16 @@ type Under<T> = (Box<(Lease, T)>, Reply<bool>);
 /// Requests of one commit by kind.
 #[derive(Default)]
 pub(crate) struct Batch {
-    beats: Vec<(Beat, Reply<bool>)>,
-    checkpoints: Vec<Under<Vec<StageDone>>>,
-    failures: Vec<Under<StageFailed>>,
+    heartbeats: Vec<(Heartbeat, Reply<bool>)>,
+    checkpoints: Vec<Under<Vec<StageCheckpoint>>>,
+    failures: Vec<Under<StageFailure>>,
     releases: Vec<(Lease, Reply<bool>)>,
     claims: Vec<(ClaimRequest, Reply<Vec<Lease>>)>,
 }
 
 /// Answers to the requests of a batch, in their order.
 pub(crate) struct Answers {
-    beats: Vec<bool>,
+    heartbeats: Vec<bool>,
     checkpoints: Vec<bool>,
     failures: Vec<bool>,
     releases: Vec<bool>,
@@ -63,9 +63,9 @@ pub(crate) struct Answers {
 /// What the changed rows of workers and jobs tell.
 #[derive(Default)]
 struct Told {
-    /// Workers whose beat came in time.
+    /// Workers whose heartbeat came in time.
     alive: BTreeSet<i64>,
-    /// Leases that held, by pair and epoch.
+    /// Leases that held, by pair and token.
     held: BTreeSet<(i64, i64)>,
     /// Jobs of the first claim.
     taken: Vec<SqliteRow>,
@@ -86,7 +86,7 @@ impl Told {
     }
 
     fn holds(&self, lease: &Lease) -> bool {
-        self.held.contains(&(lease.pair.0, lease.epoch))
+        self.held.contains(&(lease.pair.0, lease.token))
     }
 
     fn each<'l>(&self, leases: impl Iterator<Item = &'l Lease>) -> Vec<bool> {
@@ -103,7 +103,7 @@ impl Told {
 impl Batch {
     pub(crate) fn push(&mut self, request: Request) {
         match request {
-            Request::Beat(beat, reply) => self.beats.push((beat, reply)),
+            Request::Heartbeat(heartbeat, reply) => self.heartbeats.push((heartbeat, reply)),
             Request::Checkpoint(done, reply) => self.checkpoints.push((done, reply)),
             Request::Fail(failed, reply) => self.failures.push((failed, reply)),
             Request::Release(lease, reply) => self.releases.push((lease, reply)),
@@ -112,14 +112,14 @@ impl Batch {
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.beats.len()
+        self.heartbeats.len()
             + self.checkpoints.len()
             + self.failures.len()
             + self.releases.len()
             + self.claims.len()
     }
 
-    /// Runs the requests in a transaction of their own: beats, checkpoints, failures, releases, claims. After an error
+    /// Runs the requests in a transaction of their own: heartbeats, checkpoints, failures, releases, claims. After an error
     /// that transaction may still be open.
     pub(crate) async fn apply(&self, conn: &mut SqliteConnection) -> Result<Answers> {
         let mut deltas = Deltas::default();
@@ -134,10 +134,10 @@ impl Batch {
         deltas.write(&mut script)?;
         script.add(&["COMMIT"]);
         script.run(conn).await?;
-        let beats = self.beats.iter();
+        let heartbeats = self.heartbeats.iter();
         Ok(Answers {
-            beats: beats
-                .map(|(beat, _)| told.alive.contains(&beat.worker.0))
+            heartbeats: heartbeats
+                .map(|(heartbeat, _)| told.alive.contains(&heartbeat.worker.0))
                 .collect(),
             checkpoints: told.each(self.checkpoints.iter().map(|(item, _)| &item.0)),
             failures: told.each(self.failures.iter().map(|(item, _)| &item.0)),
@@ -154,8 +154,8 @@ impl Batch {
     ) -> Result<(Told, Vec<Vec<Lease>>)> {
         let mut script = Script::default();
         script.add(&["BEGIN IMMEDIATE"]);
-        for (beat, _) in &self.beats {
-            claim::beat(&mut script, *beat)?;
+        for (heartbeat, _) in &self.heartbeats {
+            claim::heartbeat(&mut script, *heartbeat)?;
         }
         checkpoint::step(
             &mut script,
@@ -184,7 +184,7 @@ impl Batch {
 
     /// Tells everybody what became of the request. Whoever does not wait any more gets no answer.
     pub(crate) fn answer(self, answers: Answers) {
-        for ((_, reply), alive) in self.beats.into_iter().zip(answers.beats) {
+        for ((_, reply), alive) in self.heartbeats.into_iter().zip(answers.heartbeats) {
             let _ = reply.send(Ok(alive));
         }
         for ((_, reply), kept) in self.checkpoints.into_iter().zip(answers.checkpoints) {
@@ -204,7 +204,7 @@ impl Batch {
     /// Tells everybody that nothing was stored.
     pub(crate) fn refuse(self, error: &Arc<CatalogError>) {
         let shared = || CatalogError::Shared(Arc::clone(error));
-        let replies = self.beats.into_iter().map(|(_, reply)| reply);
+        let replies = self.heartbeats.into_iter().map(|(_, reply)| reply);
         let replies = replies.chain(self.checkpoints.into_iter().map(|(_, reply)| reply));
         let replies = replies.chain(self.failures.into_iter().map(|(_, reply)| reply));
         for reply in replies.chain(self.releases.into_iter().map(|(_, reply)| reply)) {
@@ -217,7 +217,10 @@ impl Batch {
 
     /// The same requests, each in a batch of its own, in the order they would have run.
     pub(crate) fn split(self) -> Vec<Self> {
-        let beats = self.beats.into_iter().map(|(a, b)| Request::Beat(a, b));
+        let heartbeats = self
+            .heartbeats
+            .into_iter()
+            .map(|(a, b)| Request::Heartbeat(a, b));
         let checkpoints = self.checkpoints.into_iter();
         let checkpoints = checkpoints.map(|(a, b)| Request::Checkpoint(a, b));
         let failures = self.failures.into_iter();
@@ -225,7 +228,7 @@ impl Batch {
         let releases = self.releases.into_iter();
         let releases = releases.map(|(a, b)| Request::Release(a, b));
         let claims = self.claims.into_iter().map(|(a, b)| Request::Claim(a, b));
-        let all = beats.chain(checkpoints).chain(failures);
+        let all = heartbeats.chain(checkpoints).chain(failures);
         all.chain(releases)
             .chain(claims)
             .map(|request| {

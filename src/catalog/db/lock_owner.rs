@@ -11,14 +11,14 @@ const WRITE_LOCK: &str = "120";
 
 /// A process that writes to the catalog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Holder {
+pub struct LockOwner {
     /// Its number.
     pub pid: u32,
     /// Whether a signal has stopped it, so that it keeps what it has for as long as nobody lets it go on.
     pub is_stopped: bool,
 }
 
-impl fmt::Display for Holder {
+impl fmt::Display for LockOwner {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { pid, is_stopped } = self;
         write!(f, "pid {pid}")?;
@@ -31,7 +31,7 @@ impl fmt::Display for Holder {
 
 /// The process that has the catalog locked for writing; `None` where there is none, or the system does not tell. No
 /// file of the catalog is opened: closing it again would drop the locks of this process's own connections.
-pub fn holder(catalog: &Path) -> Option<Holder> {
+pub fn lock_owner(catalog: &Path) -> Option<LockOwner> {
     let index = std::fs::metadata(beside(catalog, "-shm")).ok()?;
     let device = index.dev();
     let (major, minor) = (rustix::fs::major(device), rustix::fs::minor(device));
@@ -39,7 +39,7 @@ pub fn holder(catalog: &Path) -> Option<Holder> {
     let locks = std::fs::read_to_string("/proc/locks").ok()?;
     let pid = locks.lines().find_map(|line| writer(line, &file))?;
     let state = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-    Some(Holder {
+    Some(LockOwner {
         pid,
         is_stopped: is_stopped(&state),
     })

@@ -9,10 +9,10 @@ use sqlx::sqlite::{
 };
 use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
 
-use crate::catalog::db::busy_retry::Patience;
+use crate::catalog::db::busy_retry::BusyRetry;
 use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::error_kind::Trouble;
+use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::network_fs;
 use crate::domain::FileKind;
 
@@ -20,8 +20,8 @@ use crate::domain::FileKind;
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
 /// Marks a database as a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
-/// Version of the schema, raised by each migration.
-const SCHEMA_VERSION: i64 = 5;
+/// Version of the schema. Versions 1 to 5 were never released.
+const SCHEMA_VERSION: i64 = 6;
 /// Read connections of a process.
 const READERS: u32 = 4;
 
@@ -39,14 +39,14 @@ fn options(path: &Path) -> SqliteConnectOptions {
 }
 
 /// The write connection, with the schema brought up to date. Makes the file when `create` is set.
-pub(crate) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection> {
+pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnection> {
     network_fs::refuse(path)?;
     look(path, create)?;
     let is_new = create && !path.exists();
     let mut conn = connect(path, create)
         .await
-        .map_err(|error| match error.trouble() {
-            Some(Trouble::CannotOpen) if is_new => CatalogError::NotMade(path.to_owned()),
+        .map_err(|error| match error.kind() {
+            Some(CatalogErrorKind::CannotOpen) if is_new => CatalogError::NotMade(path.to_owned()),
             _ => not_writable(path, error),
         })?;
     for (name, sql, wanted) in [
@@ -77,10 +77,10 @@ pub(crate) async fn writer(path: &Path, create: bool) -> Result<SqliteConnection
 }
 
 async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
-    let mut patience = Patience::begin(path);
+    let mut retry = BusyRetry::begin(path);
     loop {
         let outcome = try_connect(path, create).await;
-        match patience.wait(&outcome) {
+        match retry.wait(&outcome) {
             Some(moment) => moment.await,
             None => return outcome,
         }
@@ -96,14 +96,13 @@ async fn try_connect(path: &Path, create: bool) -> Result<SqliteConnection> {
         .pragma("journal_size_limit", "67108864")
         .connect()
         .await?;
-    migrate(&mut conn, path).await?;
+    create_schema(&mut conn, path).await?;
     Ok(conn)
 }
 
-/// Connections that only read. They never wait for the writer, nor the writer for them. The catalog of an older
-/// version of the program is brought up to date first. Where nothing can be written, not even the files that readers
-/// share, the catalog is read as it lies.
-pub(crate) async fn readers(path: &Path) -> Result<SqlitePool> {
+/// Opens read connections. In WAL mode they never wait for the writer, nor the writer for them. Where nothing can be
+/// written, not even the shared-memory file, the catalog is opened as an immutable file.
+pub(crate) async fn reader_pool(path: &Path) -> Result<SqlitePool> {
     look(path, false)?;
     let (pool, found) = match shared(path).await {
         Err(error) if is_kept_out(&error) => frozen(path, error).await?,
@@ -111,9 +110,9 @@ pub(crate) async fn readers(path: &Path) -> Result<SqlitePool> {
     };
     match found {
         Identity::Current => Ok(pool),
-        Identity::Older => {
+        Identity::Uninitialized => {
             pool.close().await;
-            writer(path, false).await?.close().await?;
+            write_conn(path, false).await?.close().await?;
             Ok(shared(path).await?.0)
         }
         Identity::Other(number) => Err(wrong_identity(path, number)),
@@ -122,10 +121,10 @@ pub(crate) async fn readers(path: &Path) -> Result<SqlitePool> {
 
 /// Readers beside writers.
 async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
-    let mut patience = Patience::begin(path);
+    let mut retry = BusyRetry::begin(path);
     loop {
         let outcome = pool(options(path).pragma("query_only", "1")).await;
-        match patience.wait(&outcome) {
+        match retry.wait(&outcome) {
             Some(moment) => moment.await,
             None => return outcome,
         }
@@ -174,33 +173,33 @@ fn look(path: &Path, create: bool) -> Result<()> {
     }
 }
 
-/// Brings the schema up to date.
-async fn migrate(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
+/// Creates the schema in a new database.
+async fn create_schema(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
     match identity(conn).await? {
         Identity::Current => return Ok(()),
-        Identity::Older => {}
+        Identity::Uninitialized => {}
         Identity::Other(number) => return Err(wrong_identity(path, number)),
     }
     let outcome = MIGRATOR.run(&mut *conn).await;
-    // Another process may have made the schema at the same time; then ours failed and all is well.
+    // Another process may have created the schema at the same time; then ours failed, and the database is ready.
     if identity(conn).await? == Identity::Current {
         return Ok(());
     }
     Ok(outcome?)
 }
 
-/// Whose database it is.
+/// What kind of database a file holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Identity {
-    /// A catalog as this program writes it.
+    /// A catalog with the schema of this program.
     Current,
-    /// A catalog of an earlier version, or one whose making was cut short.
-    Older,
-    /// Something else, by application id and version.
+    /// A database without tables: new, or its creation was interrupted.
+    Uninitialized,
+    /// Anything else, by application id and version.
     Other((i64, i64)),
 }
 
-/// Reads whose database it is.
+/// Reads application id and version.
 pub(crate) async fn identity(conn: &mut SqliteConnection) -> Result<Identity> {
     let id = sqlx::query_scalar("PRAGMA application_id")
         .fetch_one(&mut *conn)
@@ -210,8 +209,7 @@ pub(crate) async fn identity(conn: &mut SqliteConnection) -> Result<Identity> {
         .await?;
     Ok(match (id, version) {
         (APPLICATION_ID, SCHEMA_VERSION) => Identity::Current,
-        (APPLICATION_ID, version) if version < SCHEMA_VERSION => Identity::Older,
-        (0, 0) if is_empty(conn).await? => Identity::Older,
+        (0, 0) if is_empty(conn).await? => Identity::Uninitialized,
         number => Identity::Other(number),
     })
 }
@@ -227,7 +225,7 @@ async fn is_empty(conn: &mut SqliteConnection) -> Result<bool> {
 fn wrong_identity(path: &Path, (id, version): (i64, i64)) -> CatalogError {
     let path = path.to_owned();
     if id == APPLICATION_ID {
-        return CatalogError::Newer {
+        return CatalogError::OtherVersion {
             path,
             found: version,
             known: SCHEMA_VERSION,
@@ -242,8 +240,8 @@ fn wrong_identity(path: &Path, (id, version): (i64, i64)) -> CatalogError {
 /// Whether the file or its directory cannot be written to, as readers beside writers need it.
 fn is_kept_out(error: &CatalogError) -> bool {
     matches!(
-        error.trouble(),
-        Some(Trouble::ReadOnly | Trouble::CannotOpen)
+        error.kind(),
+        Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen)
     )
 }
 
@@ -257,13 +255,13 @@ fn not_writable(path: &Path, error: CatalogError) -> CatalogError {
 
 /// Says plainly when the file is no database, or no longer a whole one.
 fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
-    match error.trouble() {
+    match error.kind() {
         // No connection can be open on a file that is no database, so it may be looked into.
-        Some(Trouble::NotADatabase) => CatalogError::Foreign {
+        Some(CatalogErrorKind::NotADatabase) => CatalogError::Foreign {
             path: path.to_owned(),
             reason: kind(path).to_owned(),
         },
-        Some(Trouble::Damaged) => CatalogError::Damaged(path.to_owned()),
+        Some(CatalogErrorKind::Damaged) => CatalogError::Damaged(path.to_owned()),
         _ => error,
     }
 }
@@ -298,7 +296,7 @@ async fn assert_pragma(
 
 #[cfg(test)]
 mod tests {
-    use super::{readers, writer};
+    use super::{reader_pool, write_conn};
     use crate::catalog::CatalogError;
 
     #[tokio::test]
@@ -306,7 +304,7 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("catalog.sqlite");
         std::fs::write(&path, "id,mesh,print\n".repeat(100)).expect("a file");
-        let outcome = writer(&path, true).await;
+        let outcome = write_conn(&path, true).await;
         assert!(
             matches!(outcome, Err(CatalogError::Foreign { .. })),
             "{outcome:?}"
@@ -329,11 +327,11 @@ mod tests {
             .await
             .expect("a table");
         assert!(matches!(
-            writer(&path, true).await,
+            write_conn(&path, true).await,
             Err(CatalogError::Foreign { .. })
         ));
         assert!(matches!(
-            readers(&path).await,
+            reader_pool(&path).await,
             Err(CatalogError::Foreign { .. })
         ));
     }

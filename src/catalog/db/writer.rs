@@ -9,11 +9,11 @@ use sqlx::{Connection as _, SqliteConnection};
 use tokio::sync::{mpsc, oneshot};
 
 use crate::catalog::db::batch_collector::gather;
-use crate::catalog::db::busy_retry::Patience;
+use crate::catalog::db::busy_retry::BusyRetry;
 use crate::catalog::db::commit_delay::Company;
 use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::error_kind::Trouble;
+use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::group_commit::{Answers, Batch, Request};
 
 /// Commits after which the write-ahead log is folded back even while there is work; about 4 MiB of log.
@@ -24,7 +24,8 @@ const IDLE: Duration = Duration::from_millis(250);
 /// A future that borrows the write connection.
 pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
 /// A transaction of its own; it sends its own answer.
-pub(crate) type Alone = Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, ()> + Send>;
+pub(crate) type TransactionTask =
+    Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, ()> + Send>;
 
 /// What the writer is told.
 pub(crate) enum Message {
@@ -35,7 +36,7 @@ pub(crate) enum Message {
     /// Somebody waits: the next commit is to wait no longer.
     Hurry,
     /// Runs in its own transaction.
-    Alone(Alone),
+    Transaction(TransactionTask),
     /// Ends the writer when all before it is done.
     Close(oneshot::Sender<()>),
 }
@@ -53,7 +54,7 @@ pub(crate) async fn run(
             inbox.recv().await
         } else {
             let Ok(message) = tokio::time::timeout(IDLE, inbox.recv()).await else {
-                fold_log(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
+                wal_checkpoint(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
                 commits = 0;
                 continue;
             };
@@ -62,7 +63,7 @@ pub(crate) async fn run(
         match message {
             None => break None,
             Some(Message::Close(done)) => break Some(done),
-            Some(Message::Alone(work)) => work(&mut conn).await,
+            Some(Message::Transaction(work)) => work(&mut conn).await,
             // What it was sent for is stored already.
             Some(Message::Hurry) => continue,
             Some(first @ (Message::Grouped(_) | Message::InTime(_))) => {
@@ -70,18 +71,18 @@ pub(crate) async fn run(
                 commit(&mut conn, &path, batch).await;
                 match after {
                     Some(Message::Close(done)) => break Some(done),
-                    Some(Message::Alone(work)) => work(&mut conn).await,
+                    Some(Message::Transaction(work)) => work(&mut conn).await,
                     Some(Message::Grouped(_) | Message::InTime(_) | Message::Hurry) | None => {}
                 }
             }
         }
         commits += 1;
         if commits >= COMMITS_PER_CHECKPOINT {
-            fold_log(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
+            wal_checkpoint(&mut conn, "PRAGMA wal_checkpoint(PASSIVE)").await;
             commits = 0;
         }
     };
-    fold_log(&mut conn, "PRAGMA wal_checkpoint(TRUNCATE)").await;
+    wal_checkpoint(&mut conn, "PRAGMA wal_checkpoint(TRUNCATE)").await;
     if let Err(error) = conn.close().await {
         tracing::warn!(%error, "the catalog did not close cleanly");
     }
@@ -112,18 +113,18 @@ async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
 
 /// Whether the file is in trouble, whatever is written to it.
 fn is_of_the_file(error: &CatalogError) -> bool {
-    let trouble = error.trouble();
-    trouble.is_some_and(|trouble| trouble != Trouble::Contradiction)
+    let trouble = error.kind();
+    trouble.is_some_and(|trouble| trouble != CatalogErrorKind::Contradiction)
 }
 
 async fn attempt(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Result<Answers> {
-    let mut patience = Patience::begin(path);
+    let mut retry = BusyRetry::begin(path);
     loop {
         let outcome = batch.apply(conn).await;
         if outcome.is_err() {
-            take_back(conn).await;
+            rollback(conn).await;
         }
-        match patience.wait(&outcome) {
+        match retry.wait(&outcome) {
             Some(moment) => moment.await,
             None => return outcome,
         }
@@ -132,11 +133,11 @@ async fn attempt(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Res
 
 /// Begins a write transaction, when no other process has one.
 async fn begin(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
-    let mut patience = Patience::begin(path);
+    let mut retry = BusyRetry::begin(path);
     loop {
         let begun = sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await;
         let outcome = begun.map(|_| ()).map_err(CatalogError::from);
-        match patience.wait(&outcome) {
+        match retry.wait(&outcome) {
             Some(moment) => moment.await,
             None => return outcome,
         }
@@ -152,19 +153,19 @@ async fn end<T>(conn: &mut SqliteConnection, outcome: Result<T>) -> Result<T> {
         },
         failed => failed,
     };
-    take_back(conn).await;
+    rollback(conn).await;
     outcome
 }
 
 /// Takes back what a transaction did that went wrong.
-async fn take_back(conn: &mut SqliteConnection) {
+async fn rollback(conn: &mut SqliteConnection) {
     // Some errors, such as a full disk, have rolled back already; then there is nothing to take back.
     if let Err(error) = sqlx::query("ROLLBACK").execute(conn).await {
         tracing::debug!(%error, "nothing to roll back");
     }
 }
 
-async fn fold_log(conn: &mut SqliteConnection, pragma: &'static str) {
+async fn wal_checkpoint(conn: &mut SqliteConnection, pragma: &'static str) {
     // Readers may hold it back; then the next one does it.
     if let Err(error) = sqlx::query(pragma).execute(conn).await {
         tracing::debug!(%error, "the write-ahead log was not folded back");
@@ -172,25 +173,25 @@ async fn fold_log(conn: &mut SqliteConnection, pragma: &'static str) {
 }
 
 /// Runs `work` in its own transaction through the writer.
-pub(crate) async fn alone<T: Send + 'static>(
+pub(crate) async fn in_transaction<T: Send + 'static>(
     inbox: &mpsc::Sender<Message>,
     path: &Arc<Path>,
     work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
 ) -> Result<T> {
     let (sender, receiver) = oneshot::channel();
     let path = Arc::clone(path);
-    let task: Alone = Box::new(move |conn| {
+    let task: TransactionTask = Box::new(move |conn| {
         Box::pin(async move {
-            let _ = sender.send(in_transaction(conn, &path, work).await);
+            let _ = sender.send(run_transaction(conn, &path, work).await);
         })
     });
-    if inbox.send(Message::Alone(task)).await.is_err() {
+    if inbox.send(Message::Transaction(task)).await.is_err() {
         return Err(CatalogError::Closed);
     }
     receiver.await.unwrap_or(Err(CatalogError::Closed))
 }
 
-async fn in_transaction<T>(
+async fn run_transaction<T>(
     conn: &mut SqliteConnection,
     path: &Path,
     work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>>,

@@ -1,8 +1,8 @@
 //! Pairs that are alike are looked at once for all of them: the plan and the number of stale pairs without a look at
 //! every pair.
 //!
-//! A job keeps the recipe of the result right behind its cursor. Jobs with the same cursor, status and recipe fare
-//! alike, except for pairs that failed, whose files or facts moved, or whose settings changed half-way: those are looked at one by one.
+//! A job keeps the fingerprint of the result right behind its cursor. Jobs with the same cursor, status and fingerprint fare
+//! alike, except for pairs that failed, whose files or attributes moved, or whose settings changed half-way: those are looked at one by one.
 
 use std::collections::BTreeMap;
 
@@ -11,41 +11,41 @@ use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::Result;
 use crate::catalog::queue::claim::PairSelection;
-use crate::catalog::queue::fingerprint::{Recipes, current_json};
+use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
 use crate::catalog::queue::job_counts::{census, counted};
 use crate::catalog::queue::staleness::{PAGE, Seen, look};
 
-/// The recipe that a job keeps when its cursor goes back to a stage: that of the result before it, where that took in
+/// The fingerprint that a job keeps when its cursor goes back to a stage: that of the result before it, where that took in
 /// those of all results before it.
 macro_rules! made {
     ($to:literal) => {
         concat!(
-            "(SELECT r.recipe FROM stage_result AS r WHERE r.pair = job.pair AND r.stage = ",
+            "(SELECT r.fingerprint FROM stage_result AS r WHERE r.pair = job.pair AND r.stage = ",
             $to,
             " - 1 AND NOT EXISTS (
-        SELECT 1 FROM stage_result AS own JOIN recipe ON recipe.id = own.recipe
-        WHERE own.pair = r.pair AND own.stage BETWEEN 1 AND r.stage AND recipe.upstream IS NOT (
-            SELECT recipe FROM stage_result AS b WHERE b.pair = r.pair AND b.stage = own.stage - 1)))"
+        SELECT 1 FROM stage_result AS own JOIN fingerprint ON fingerprint.id = own.fingerprint
+        WHERE own.pair = r.pair AND own.stage BETWEEN 1 AND r.stage AND fingerprint.upstream IS NOT (
+            SELECT fingerprint FROM stage_result AS b WHERE b.pair = r.pair AND b.stage = own.stage - 1)))"
         )
     };
 }
 pub(crate) use made;
 
-/// Whether a job keeps another recipe than that of the result right behind its cursor.
+/// Whether a job keeps another fingerprint than that of the result right behind its cursor.
 macro_rules! misremembered {
     () => {
         "EXISTS (SELECT 1 FROM stage_result AS r
-    WHERE r.pair = job.pair AND r.stage = job.stage - 1 AND r.recipe <> job.made)"
+    WHERE r.pair = job.pair AND r.stage = job.stage - 1 AND r.fingerprint <> job.made)"
     };
 }
 pub(crate) use misremembered;
 
-/// Pairs that are not noted as moved, with a result whose files or facts are not what they are now.
+/// Pairs that are not noted as moved, with a result whose files or attributes are not what they are now.
 macro_rules! unnoted {
     () => {
         "SELECT p.id FROM pair AS p WHERE NOT EXISTS (SELECT 1 FROM moved WHERE moved.pair = p.id) AND EXISTS (
     SELECT 1 FROM job AS j JOIN stage_result AS r ON r.pair = j.pair AND r.stage < j.stage
-    WHERE j.pair = p.id AND (r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.facts <> p.facts))"
+    WHERE j.pair = p.id AND (r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.attributes <> p.attributes))"
     };
 }
 pub(crate) use unnoted;
@@ -73,15 +73,15 @@ pub(crate) const APART: &str = "
 SELECT pair FROM moved WHERE pair > ?1 UNION SELECT pair FROM failure WHERE pair > ?1
 UNION SELECT pair FROM job WHERE pair > ?1 AND made IS NULL AND stage > 0 ORDER BY 1 LIMIT ?2";
 
-/// Pairs with a result that would be made otherwise now: by settings from the counts, by files and facts among those
+/// Pairs with a result that would be made otherwise now: by settings from the counts, by files and attributes among those
 /// that moved.
 pub(crate) const STALE: &str = "
-SELECT (SELECT coalesce(sum(n), 0) FROM made WHERE recipe NOT IN (SELECT value FROM json_each(?1))) + (
+SELECT (SELECT coalesce(sum(n), 0) FROM made WHERE fingerprint NOT IN (SELECT value FROM json_each(?1))) + (
     SELECT count(*) FROM (SELECT pair FROM moved UNION SELECT pair FROM job WHERE made IS NULL AND stage > 0) AS m
         CROSS JOIN job AS j ON j.pair = m.pair CROSS JOIN pair AS p ON p.id = m.pair
     WHERE (j.made IS NULL OR j.made IN (SELECT value FROM json_each(?1))) AND EXISTS (
         SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-            r.recipe <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.facts <> p.facts)))";
+            r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.attributes <> p.attributes)))";
 
 /// Takes out pairs in a range of numbers that have been looked after. Leased ones stay: their results are yet to come.
 pub(crate) const SETTLE: &str = "
@@ -89,11 +89,11 @@ DELETE FROM moved WHERE pair > ?1 AND pair <= ?2 AND EXISTS (
     SELECT 1 FROM job AS j JOIN pair AS p ON p.id = j.pair
     WHERE j.pair = moved.pair AND j.status <> 1 AND NOT EXISTS (
         SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-            r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.facts <> p.facts)))";
+            r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash OR r.attributes <> p.attributes)))";
 
 /// How many pairs have a result that would be made otherwise now.
-pub(crate) async fn stale(conn: &mut SqliteConnection, recipes: &Recipes) -> Result<u64> {
-    let current = current_json(conn, recipes).await?;
+pub(crate) async fn stale(conn: &mut SqliteConnection, fingerprints: &Fingerprints) -> Result<u64> {
+    let current = current_json(conn, fingerprints).await?;
     let n: i64 = sqlx::query_scalar(STALE)
         .bind(current)
         .fetch_one(conn)
@@ -182,7 +182,7 @@ pub(crate) async fn look_apart(
     Ok(Some((seen, last)))
 }
 
-/// Notes which pairs in a range of numbers no longer differ from their files and facts.
+/// Notes which pairs in a range of numbers no longer differ from their files and attributes.
 pub(crate) async fn settle(conn: &mut SqliteConnection, after: i64, last: i64) -> Result<()> {
     let query = sqlx::query(SETTLE).bind(after).bind(last);
     query.execute(conn).await?;

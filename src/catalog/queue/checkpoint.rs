@@ -9,36 +9,38 @@ use crate::catalog::db::script::Script;
 use crate::catalog::db::writer::Message;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{Cursor, DONE, Deltas, cursor};
-use crate::catalog::queue::lease::{InputsSeen, Kept, Lease, RecipeId, StageDone};
+use crate::catalog::queue::lease::{
+    CheckpointOutcome, FingerprintId, InputVersions, Lease, StageCheckpoint,
+};
 use crate::domain::{ContentHash, JobStatus, MetricOutcome, PairId, Stage, UnixMillis};
 use crate::failpoint::{self, Point};
 
 /// A lease and the stages to be stored under it, in the order they were computed.
-pub(crate) type Steps = (Lease, Vec<StageDone>);
+pub(crate) type Steps = (Lease, Vec<StageCheckpoint>);
 
 /// The job's step; only where the lease still holds and its worker has given a sign of life lately. Progress clears the pair of suspicion.
 pub(crate) const STEP: &str = "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
-    attempt = 1, crashes = 0, mem_class = 0, doubtful = item.value ->> 'doubtful',
+    attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.value ->> 'low_confidence',
     made = iif((item.value ->> 'first') IS NULL
-        OR made = (SELECT upstream FROM recipe WHERE id = item.value ->> 'first'), item.value ->> 'made', NULL)
+        OR made = (SELECT upstream FROM fingerprint WHERE id = item.value ->> 'first'), item.value ->> 'made', NULL)
 FROM jsonb_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
-    AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
+    AND job.token = item.value ->> 'token' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
-        WHERE w.id = job.worker AND w.ended IS NULL AND w.beat >= item.value ->> 'alive_since')
-RETURNING pair, epoch";
+        WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.value ->> 'alive_since')
+RETURNING pair, token";
 
 const RESULT: &str = "
 INSERT INTO stage_result
-    (pair, stage, recipe, mesh_hash, print_hash, facts, outcome, files, result_hash, ms, worker, at)
-SELECT value ->> 'pair', value ->> 'stage', value ->> 'recipe', unhex(value ->> 'mesh_hash'),
-    unhex(value ->> 'print_hash'), value ->> 'facts', value ->> 'outcome', value ->> 'files',
+    (pair, stage, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, worker, at)
+SELECT value ->> 'pair', value ->> 'stage', value ->> 'fingerprint', unhex(value ->> 'mesh_hash'),
+    unhex(value ->> 'print_hash'), value ->> 'attributes', value ->> 'outcome', value ->> 'files',
     unhex(value ->> 'result_hash'), value ->> 'ms', value ->> 'worker', value ->> 'at'
 FROM jsonb_each(?1) WHERE true
-ON CONFLICT (pair, stage) DO UPDATE SET recipe = excluded.recipe, mesh_hash = excluded.mesh_hash,
-    print_hash = excluded.print_hash, facts = excluded.facts, outcome = excluded.outcome, files = excluded.files,
+ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
+    print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
     result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
 
 /// A method may give fewer metrics than the one before; what it does not give is no result any more.
@@ -110,7 +112,7 @@ pub(crate) fn store(script: &mut Script, made: &[&Steps], deltas: &mut Deltas) -
 }
 
 /// Each stage with its lease.
-fn each((lease, done): &Steps) -> impl Iterator<Item = (&Lease, &StageDone)> {
+fn each((lease, done): &Steps) -> impl Iterator<Item = (&Lease, &StageCheckpoint)> {
     done.iter().map(move |one| (lease, one))
 }
 
@@ -127,14 +129,14 @@ fn after(stage: Stage) -> (Cursor, JobStatus) {
 struct Job {
     pair: i64,
     worker: i64,
-    epoch: i64,
+    token: i64,
     next: Cursor,
     status: i64,
-    /// The recipe whose upstream must be that of the result before; none where there is none before.
+    /// The fingerprint whose upstream must be that of the result before; none where there is none before.
     first: Option<i64>,
-    /// The recipe of the last result; none where the results do not follow on each other.
+    /// The fingerprint of the last result; none where the results do not follow on each other.
     made: Option<i64>,
-    doubtful: i64,
+    low_confidence: i64,
     deadline: Option<UnixMillis>,
     alive_since: UnixMillis,
 }
@@ -148,27 +150,30 @@ fn job((lease, done): &Steps) -> Option<Job> {
     Some(Job {
         pair: lease.pair.0,
         worker: lease.worker.0,
-        epoch: lease.epoch,
+        token: lease.token,
         next,
         status: status.code(),
-        first: first.map(|recipe| recipe.0),
-        made: made.map(|recipe| recipe.0),
-        doubtful: i64::from(metrics.any(|metric| metric.outcome.is_doubtful())),
+        first: first.map(|fingerprint| fingerprint.0),
+        made: made.map(|fingerprint| fingerprint.0),
+        low_confidence: i64::from(metrics.any(|metric| metric.outcome.is_low_confidence())),
         deadline: (status == JobStatus::Leased).then_some(last.next_deadline),
         alive_since: last.alive_since,
     })
 }
 
-/// The recipes of the first and the last of the results that follow on each other up to the last; no first where that
+/// The fingerprints of the first and the last of the results that follow on each other up to the last; no first where that
 /// is the first stage of all. No last where some do not.
-fn chain(done: &[StageDone]) -> (Option<RecipeId>, Option<RecipeId>) {
+fn chain(done: &[StageCheckpoint]) -> (Option<FingerprintId>, Option<FingerprintId>) {
     let fresh = done.iter().rposition(|one| one.stage == Stage::Fit);
     let chain = &done[fresh.unwrap_or(0)..];
-    let follows = |two: &[StageDone]| two[0].stage.next() == Some(two[1].stage);
+    let follows = |two: &[StageCheckpoint]| two[0].stage.next() == Some(two[1].stage);
     let whole = chain.windows(2).all(follows);
     let first = fresh.is_none().then(|| chain.first()).flatten();
     let last = chain.last().filter(|_| whole);
-    (first.map(|one| one.recipe), last.map(|one| one.recipe))
+    (
+        first.map(|one| one.fingerprint),
+        last.map(|one| one.fingerprint),
+    )
 }
 
 /// One item of [`RESULT`].
@@ -176,10 +181,10 @@ fn chain(done: &[StageDone]) -> (Option<RecipeId>, Option<RecipeId>) {
 struct ResultRow<'d> {
     pair: i64,
     stage: usize,
-    recipe: i64,
+    fingerprint: i64,
     mesh_hash: ContentHash,
     print_hash: Option<ContentHash>,
-    facts: &'d str,
+    attributes: &'d str,
     outcome: &'d str,
     files: String,
     result_hash: ContentHash,
@@ -188,14 +193,14 @@ struct ResultRow<'d> {
     at: UnixMillis,
 }
 
-fn result<'d>((lease, done): (&Lease, &'d StageDone)) -> ResultRow<'d> {
+fn result<'d>((lease, done): (&Lease, &'d StageCheckpoint)) -> ResultRow<'d> {
     ResultRow {
         pair: lease.pair.0,
         stage: done.stage.index(),
-        recipe: done.recipe.0,
+        fingerprint: done.fingerprint.0,
         mesh_hash: done.mesh_hash,
         print_hash: done.print_hash,
-        facts: &done.facts,
+        attributes: &done.attributes,
         outcome: &done.outcome,
         files: json!(done.files).to_string(),
         result_hash: done.result_hash,
@@ -208,7 +213,7 @@ fn result<'d>((lease, done): (&Lease, &'d StageDone)) -> ResultRow<'d> {
 /// One item of [`ATTEMPT`]: pair, stage, worker, milliseconds, time.
 type Attempt = (i64, usize, i64, u64, UnixMillis);
 
-const fn attempt((lease, done): (&Lease, &StageDone)) -> Attempt {
+const fn attempt((lease, done): (&Lease, &StageCheckpoint)) -> Attempt {
     let stage = done.stage.index();
     (lease.pair.0, stage, lease.worker.0, done.ms, done.at)
 }
@@ -221,7 +226,9 @@ struct MetricRow<'d> {
     result_hash: ContentHash,
 }
 
-fn metrics<'d>((lease, done): (&'d Lease, &'d StageDone)) -> impl Iterator<Item = MetricRow<'d>> {
+fn metrics<'d>(
+    (lease, done): (&'d Lease, &'d StageCheckpoint),
+) -> impl Iterator<Item = MetricRow<'d>> {
     done.metrics.iter().map(|metric| MetricRow {
         pair: lease.pair.0,
         row: &metric.outcome,
@@ -232,7 +239,7 @@ fn metrics<'d>((lease, done): (&'d Lease, &'d StageDone)) -> impl Iterator<Item 
 /// Adds what is known of the input files of leased pairs.
 pub(crate) fn store_seen<'a>(
     script: &mut Script,
-    seen: impl Iterator<Item = (&'a Lease, &'a InputsSeen)>,
+    seen: impl Iterator<Item = (&'a Lease, &'a InputVersions)>,
 ) -> Result<()> {
     let items = seen.filter(|(_, seen)| seen.is_told());
     let items = items.map(|(lease, seen)| seen_row(lease.pair.0, seen));
@@ -249,7 +256,7 @@ pub(crate) struct SeenRow<'s> {
     print_stat: Option<&'s str>,
 }
 
-pub(crate) fn seen_row(pair: i64, seen: &InputsSeen) -> SeenRow<'_> {
+pub(crate) fn seen_row(pair: i64, seen: &InputVersions) -> SeenRow<'_> {
     let (mesh, print) = (seen.mesh.as_ref(), seen.print.as_ref());
     SeenRow {
         pair,
@@ -261,7 +268,7 @@ pub(crate) fn seen_row(pair: i64, seen: &InputsSeen) -> SeenRow<'_> {
 }
 
 /// Adds what is known of input files.
-pub(crate) fn store_inputs(script: &mut Script, seen: &[(PairId, InputsSeen)]) -> Result<()> {
+pub(crate) fn store_inputs(script: &mut Script, seen: &[(PairId, InputVersions)]) -> Result<()> {
     let items = seen.iter().map(|(pair, seen)| seen_row(pair.0, seen));
     over(script, &[SEEN], items)
 }
@@ -288,8 +295,12 @@ impl Catalog {
     /// Stores a finished stage in one transaction and moves the job on. The artifacts must be on disk already.
     ///
     /// # Errors
-    /// When the database refuses; then nothing is stored and the lease stands until it is rescued.
-    pub async fn checkpoint(&self, lease: Lease, done: StageDone) -> Result<Kept> {
+    /// When the database refuses; then nothing is stored and the lease stands until it is recovered.
+    pub async fn checkpoint(
+        &self,
+        lease: Lease,
+        done: StageCheckpoint,
+    ) -> Result<CheckpointOutcome> {
         self.store(lease, vec![done], Message::Grouped).await
     }
 
@@ -298,18 +309,22 @@ impl Catalog {
     ///
     /// # Errors
     /// As there.
-    pub async fn checkpoint_in_time(&self, lease: Lease, done: Vec<StageDone>) -> Result<Kept> {
+    pub async fn checkpoint_in_time(
+        &self,
+        lease: Lease,
+        done: Vec<StageCheckpoint>,
+    ) -> Result<CheckpointOutcome> {
         self.store(lease, done, Message::InTime).await
     }
 
     async fn store(
         &self,
         lease: Lease,
-        done: Vec<StageDone>,
+        done: Vec<StageCheckpoint>,
         message: fn(Request) -> Message,
-    ) -> Result<Kept> {
+    ) -> Result<CheckpointOutcome> {
         let Some(last) = done.last() else {
-            return Ok(Kept::Lease(lease));
+            return Ok(CheckpointOutcome::Lease(lease));
         };
         let next = last.stage.next();
         let moved = next.map(|cursor| Lease {
@@ -323,9 +338,9 @@ impl Catalog {
             .answered(|reply| message(Request::Checkpoint(Box::new((lease, done)), reply)))
             .await?;
         Ok(match (kept, moved) {
-            (false, _) => Kept::Lost,
-            (true, Some(lease)) => Kept::Lease(lease),
-            (true, None) => Kept::Done,
+            (false, _) => CheckpointOutcome::LeaseLost,
+            (true, Some(lease)) => CheckpointOutcome::Lease(lease),
+            (true, None) => CheckpointOutcome::Done,
         })
     }
 }

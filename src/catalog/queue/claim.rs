@@ -7,7 +7,7 @@ use tokio::sync::oneshot;
 
 use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::group_commit::{Beat, Reply, Request};
+use crate::catalog::db::group_commit::{Heartbeat, Reply, Request};
 use crate::catalog::db::rows;
 use crate::catalog::db::script::Script;
 use crate::catalog::db::writer::Message;
@@ -28,7 +28,7 @@ pub struct ClaimRequest {
     /// Only pairs whose next stage is this one or an earlier one.
     pub until: Stage,
     /// Pairs that must run with nothing beside them, or the others.
-    pub alone: bool,
+    pub exclusive: bool,
     /// Only these; `None` for all.
     pub among: Option<PairSelection>,
     /// When the first stage should be over.
@@ -44,7 +44,7 @@ impl ClaimRequest {
             worker,
             slots,
             until: Stage::Register,
-            alone: false,
+            exclusive: false,
             among: None,
             deadline,
             alive_since: UnixMillis::MIN,
@@ -84,39 +84,38 @@ impl PairSelection {
 /// Takes the first ready jobs in the order of the index `job_ready`. A bare `?5` as the limit would have the statement
 /// prepared anew each time, because the planner looks at its value.
 pub(crate) const CLAIM: &str = "
-UPDATE job SET status = 1, worker = ?1, deadline = ?2, epoch = epoch + 1, attempt = attempt + 1
+UPDATE job SET status = 1, worker = ?1, deadline = ?2, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
-    SELECT pair FROM job WHERE status = 0 AND stage <= ?3 AND mem_class = ?4
+    SELECT pair FROM job WHERE status = 0 AND stage <= ?3 AND exclusive = ?4
     ORDER BY prio, stage DESC, pair LIMIT +?5)
-    AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND beat >= ?6)
-RETURNING pair, stage, attempt, epoch, crashes, mem_class";
+    AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND heartbeat >= ?6)
+RETURNING pair, stage, attempt, token, crashes, exclusive";
 
 /// The same among some pairs only.
 pub(crate) const CLAIM_AMONG: &str = "
-UPDATE job SET status = 1, worker = ?1, deadline = ?2, epoch = epoch + 1, attempt = attempt + 1
+UPDATE job SET status = 1, worker = ?1, deadline = ?2, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
     SELECT j.pair FROM json_each(?7) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
-    WHERE j.status = 0 AND j.stage <= ?3 AND j.mem_class = ?4
+    WHERE j.status = 0 AND j.stage <= ?3 AND j.exclusive = ?4
     ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?5)
-    AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND beat >= ?6)
-RETURNING pair, stage, attempt, epoch, crashes, mem_class";
+    AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND heartbeat >= ?6)
+RETURNING pair, stage, attempt, token, crashes, exclusive";
 
 /// Gives leases back as if they had never been taken.
 pub(crate) const RELEASE: &str = "
 UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = max(attempt - 1, 0)
 FROM jsonb_each(?1) AS item
-WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.epoch = item.value ->> 2
+WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.token = item.value ->> 2
     AND job.status = 1
-RETURNING pair, epoch";
+RETURNING pair, token";
 
 /// A sign of life. A worker that has ended, or whose last one is too long ago, gives none: others may have taken it for
 /// dead.
-pub(crate) const BEAT: &str =
-    "UPDATE worker SET beat = ?2 WHERE id = ?1 AND ended IS NULL AND beat >= ?3 RETURNING id";
+pub(crate) const HEARTBEAT: &str = "UPDATE worker SET heartbeat = ?2 WHERE id = ?1 AND ended IS NULL AND heartbeat >= ?3 RETURNING id";
 
-pub(crate) fn beat(script: &mut Script, beat: Beat) -> Result<()> {
-    let script = script.add(&[BEAT]).bind(beat.worker.0)?;
-    script.bind(beat.now)?.bind(beat.alive_since)?;
+pub(crate) fn heartbeat(script: &mut Script, heartbeat: Heartbeat) -> Result<()> {
+    let script = script.add(&[HEARTBEAT]).bind(heartbeat.worker.0)?;
+    script.bind(heartbeat.now)?.bind(heartbeat.alive_since)?;
     Ok(())
 }
 
@@ -131,7 +130,7 @@ pub(crate) fn take(script: &mut Script, request: &ClaimRequest) -> Result<()> {
     let script = script
         .bind(request.deadline)?
         .bind(cursor(request.until))?
-        .bind(i64::from(request.alone))?
+        .bind(i64::from(request.exclusive))?
         .bind(request.slots as i64)?
         .bind(request.alive_since)?;
     if let Some(among) = &request.among {
@@ -164,11 +163,11 @@ fn lease(row: &SqliteRow, worker: WorkerId) -> Result<Lease> {
     Ok(Lease {
         pair: PairId(row.try_get("pair")?),
         worker,
-        epoch: row.try_get("epoch")?,
+        token: row.try_get("token")?,
         cursor: rows::stage(row.try_get("stage")?)?,
         attempt: row.try_get("attempt")?,
         crashes: row.try_get("crashes")?,
-        alone: row.try_get::<i64, _>("mem_class")? == 1,
+        exclusive: row.try_get::<i64, _>("exclusive")? == 1,
         cleared: false,
     })
 }
@@ -189,9 +188,9 @@ pub(crate) fn given_back<'l>(leases: impl Iterator<Item = &'l Lease>, deltas: &m
     }
 }
 
-/// What a write under a lease must match: pair, worker, epoch.
+/// What a write under a lease must match: pair, worker, token.
 fn fence(lease: &Lease) -> Value {
-    json!([lease.pair.0, lease.worker.0, lease.epoch])
+    json!([lease.pair.0, lease.worker.0, lease.token])
 }
 
 impl Catalog {
@@ -216,18 +215,19 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn beat(
+    pub async fn heartbeat(
         &self,
         worker: WorkerId,
         now: UnixMillis,
         alive_since: UnixMillis,
     ) -> Result<bool> {
-        let beat = Beat {
+        let heartbeat = Heartbeat {
             worker,
             now,
             alive_since,
         };
-        self.grouped(|reply| Request::Beat(beat, reply)).await
+        self.grouped(|reply| Request::Heartbeat(heartbeat, reply))
+            .await
     }
 
     /// Sends a request into the next group commit and waits for the answer.

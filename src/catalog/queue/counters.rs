@@ -77,15 +77,15 @@ pub(crate) fn standings() -> impl Iterator<Item = (Cursor, JobStatus)> {
 }
 
 /// Jobs by cursor and status; only what is not 0.
-pub type Counts = BTreeMap<(i64, JobStatus), u64>;
+pub type JobCounts = BTreeMap<(i64, JobStatus), u64>;
 
 impl Catalog {
     /// The counts as kept.
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn counters(&self) -> Result<Counts> {
-        let mut conn = self.reader().await?;
+    pub async fn counters(&self) -> Result<JobCounts> {
+        let mut conn = self.read_conn().await?;
         counts(&mut conn, KEPT).await
     }
 
@@ -93,14 +93,14 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn recount(&self) -> Result<Counts> {
+    pub async fn recount(&self) -> Result<JobCounts> {
         let mut conn = self.snapshot().await?;
         by_status(&census(&mut conn, job_counts::ALL).await?)
     }
 }
 
 /// Counts from a query of cursor, status and number.
-pub(crate) async fn counts(conn: &mut SqliteConnection, sql: &'static str) -> Result<Counts> {
+pub(crate) async fn counts(conn: &mut SqliteConnection, sql: &'static str) -> Result<JobCounts> {
     let rows = sqlx::query(sql).fetch_all(conn).await?;
     rows.iter()
         .map(|row| {

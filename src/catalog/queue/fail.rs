@@ -10,7 +10,7 @@ use crate::catalog::handle::Catalog;
 use crate::catalog::queue::alike::made;
 use crate::catalog::queue::checkpoint::{over, store_seen};
 use crate::catalog::queue::counters::{Deltas, cursor};
-use crate::catalog::queue::lease::{Lease, Sentence, StageFailed};
+use crate::catalog::queue::lease::{FailureAction, Lease, StageFailure};
 use crate::domain::JobStatus;
 
 /// Attempts that are kept of a pair that fails again and again.
@@ -20,26 +20,26 @@ const ATTEMPTS_KEPT: i64 = 64;
 pub(crate) const FAIL: &str = concat!(
     "
 UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.value ->> 'status',
-    run_at = item.value ->> 'run_at', mem_class = max(mem_class, item.value ->> 'mem_class'),
+    run_at = item.value ->> 'run_at', exclusive = max(exclusive, item.value ->> 'exclusive'),
     worker = NULL, deadline = NULL, made = ",
     made!("min(job.stage, item.value ->> 'stage')"),
     "
 FROM jsonb_each(?1) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
-    AND job.epoch = item.value ->> 'epoch' AND job.status = 1 AND EXISTS (
+    AND job.token = item.value ->> 'token' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
-        WHERE w.id = job.worker AND w.ended IS NULL AND w.beat >= item.value ->> 'alive_since')
-RETURNING pair, epoch"
+        WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.value ->> 'alive_since')
+RETURNING pair, token"
 );
 
 const FAILURE: &str = "
-INSERT INTO failure (pair, stage, class, message, recipe, mesh_hash, print_hash, facts, at)
-SELECT value ->> 'pair', value ->> 'stage', value ->> 'class', value ->> 'message', value ->> 'recipe',
-    unhex(value ->> 'mesh_hash'), unhex(value ->> 'print_hash'), value ->> 'facts', value ->> 'at'
+INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
+SELECT value ->> 'pair', value ->> 'stage', value ->> 'class', value ->> 'message', value ->> 'fingerprint',
+    unhex(value ->> 'mesh_hash'), unhex(value ->> 'print_hash'), value ->> 'attributes', value ->> 'at'
 FROM jsonb_each(?1) WHERE value ->> 'status' <> 0
 ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
-    recipe = excluded.recipe, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
-    facts = excluded.facts, at = excluded.at";
+    fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
+    attributes = excluded.attributes, at = excluded.at";
 
 const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, class, message, ms, at)
@@ -55,7 +55,7 @@ DELETE FROM attempt WHERE id IN (
 /// Adds the new states of jobs that failed; those whose leases no longer hold stay as they are.
 pub(crate) fn step<'i>(
     script: &mut Script,
-    failed: impl Iterator<Item = &'i (Lease, StageFailed)>,
+    failed: impl Iterator<Item = &'i (Lease, StageFailure)>,
 ) -> Result<()> {
     over(script, &[FAIL], failed.map(json_of))
 }
@@ -63,7 +63,7 @@ pub(crate) fn step<'i>(
 /// Adds what is stored beside failures that counted.
 pub(crate) fn store(
     script: &mut Script,
-    failed: &[&(Lease, StageFailed)],
+    failed: &[&(Lease, StageFailure)],
     deltas: &mut Deltas,
 ) -> Result<()> {
     if failed.is_empty() {
@@ -79,32 +79,32 @@ pub(crate) fn store(
     for (lease, failed) in failed.iter().map(|item| &**item) {
         let to = cursor(lease.cursor.min(failed.stage));
         let from = (cursor(lease.cursor), JobStatus::Leased);
-        deltas.moved(from, (to, status(failed.sentence)));
+        deltas.moved(from, (to, status(failed.action)));
     }
     Ok(())
 }
 
-const fn status(sentence: Sentence) -> JobStatus {
-    match sentence {
-        Sentence::BackOff { .. } => JobStatus::Backoff,
-        Sentence::Alone => JobStatus::Ready,
-        Sentence::Quarantine => JobStatus::Quarantined,
+const fn status(action: FailureAction) -> JobStatus {
+    match action {
+        FailureAction::BackOff { .. } => JobStatus::Backoff,
+        FailureAction::RetryExclusive => JobStatus::Ready,
+        FailureAction::Quarantine => JobStatus::Quarantined,
     }
 }
 
-fn json_of((lease, failed): &(Lease, StageFailed)) -> Value {
-    let run_at = match failed.sentence {
-        Sentence::BackOff { run_at } => Some(run_at),
-        Sentence::Alone | Sentence::Quarantine => None,
+fn json_of((lease, failed): &(Lease, StageFailure)) -> Value {
+    let run_at = match failed.action {
+        FailureAction::BackOff { run_at } => Some(run_at),
+        FailureAction::RetryExclusive | FailureAction::Quarantine => None,
     };
     json!({
-        "pair": lease.pair.0, "worker": lease.worker.0, "epoch": lease.epoch, "stage": failed.stage.index(),
-        "status": status(failed.sentence).code(), "run_at": run_at,
-        "mem_class": i64::from(failed.sentence == Sentence::Alone),
-        "class": failed.failure.class, "message": failed.failure.message, "recipe": failed.recipe.0,
+        "pair": lease.pair.0, "worker": lease.worker.0, "token": lease.token, "stage": failed.stage.index(),
+        "status": status(failed.action).code(), "run_at": run_at,
+        "exclusive": i64::from(failed.action == FailureAction::RetryExclusive),
+        "class": failed.failure.class, "message": failed.failure.message, "fingerprint": failed.fingerprint.0,
         "mesh_hash": failed.inputs.mesh.as_ref().map(|seen| seen.hash),
         "print_hash": failed.inputs.print.as_ref().map(|seen| seen.hash),
-        "facts": failed.facts, "ms": failed.ms, "at": failed.at, "alive_since": failed.alive_since,
+        "attributes": failed.attributes, "ms": failed.ms, "at": failed.at, "alive_since": failed.alive_since,
     })
 }
 
@@ -113,7 +113,7 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn fail(&self, lease: Lease, failed: StageFailed) -> Result<bool> {
+    pub async fn fail(&self, lease: Lease, failed: StageFailure) -> Result<bool> {
         self.grouped(|reply| Request::Fail(Box::new((lease, failed)), reply))
             .await
     }

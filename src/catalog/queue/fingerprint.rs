@@ -1,4 +1,4 @@
-//! Recipes: what the result of a stage depends on besides the inputs.
+//! Fingerprints: what the result of a stage depends on besides the inputs.
 
 use serde_json::{Value, json};
 use sqlx::SqliteConnection;
@@ -7,27 +7,27 @@ use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::lease::RecipeId;
+use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
 use crate::catalog::queue::staleness::differences;
 use crate::domain::{ContentHash, Stage};
 
-/// One stage's recipe.
+/// One stage's fingerprint.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recipe {
-    /// Hash over the stage, its fields and the recipe before it.
+pub struct Fingerprint {
+    /// Hash over the stage, its fields and the fingerprint before it.
     pub hash: ContentHash,
     /// Revision and settings of the stage.
     pub fields: Value,
 }
 
-/// The current recipes of the four stages.
+/// The current fingerprints of the four stages.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Recipes([Recipe; 4]);
+pub struct Fingerprints([Fingerprint; 4]);
 
-impl Recipes {
-    /// Recipes from each stage's fields. A stage's hash takes in the one before it, so that a changed setting
-    /// changes the recipes of its stage and of all later ones.
+impl Fingerprints {
+    /// Fingerprints from each stage's fields. A stage's hash takes in the one before it, so that a changed setting
+    /// changes the fingerprints of its stage and of all later ones.
     pub fn new(fields: impl Fn(Stage) -> Value) -> Self {
         let mut upstream: Option<ContentHash> = None;
         Self(Stage::ALL.map(|stage| {
@@ -35,72 +35,75 @@ impl Recipes {
             let whole = json!({ "stage": stage, "fields": fields, "upstream": upstream });
             let hash = ContentHash::of(whole.to_string().as_bytes());
             upstream = Some(hash);
-            Recipe { hash, fields }
+            Fingerprint { hash, fields }
         }))
     }
 
-    /// The recipe of a stage.
-    pub fn of(&self, stage: Stage) -> &Recipe {
+    /// The fingerprint of a stage.
+    pub fn of(&self, stage: Stage) -> &Fingerprint {
         &self.0[stage.index()]
     }
 
-    /// The recipes in a line, for processes to compare; [`Catalog::changes_from`] reads it.
+    /// The fingerprints in a line, for processes to compare; [`Catalog::changes_from`] reads it.
     pub fn terms(&self) -> String {
         self.0
             .each_ref()
-            .map(|recipe| recipe.hash.to_hex())
+            .map(|fingerprint| fingerprint.hash.to_hex())
             .join(" ")
     }
 }
 
-/// Numbers of the current recipes in the catalog.
+/// Numbers of the current fingerprints in the catalog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RecipeIds([RecipeId; 4]);
+pub struct FingerprintIds([FingerprintId; 4]);
 
-impl RecipeIds {
-    /// The recipe of a stage.
-    pub const fn of(&self, stage: Stage) -> RecipeId {
+impl FingerprintIds {
+    /// The fingerprint of a stage.
+    pub const fn of(&self, stage: Stage) -> FingerprintId {
         self.0[stage.index()]
     }
 
     /// The numbers as a JSON array by stage.
     pub(crate) fn json(self) -> String {
-        rows::array(self.0.map(|RecipeId(id)| id)).to_string()
+        rows::array(self.0.map(|FingerprintId(id)| id)).to_string()
     }
 }
 
 const ENTER: &str = "
-INSERT INTO recipe (stage, hash, fields, upstream) VALUES (?1, ?2, ?3, ?4)
+INSERT INTO fingerprint (stage, hash, fields, upstream) VALUES (?1, ?2, ?3, ?4)
 ON CONFLICT (hash) DO UPDATE SET upstream = excluded.upstream RETURNING id";
 
 impl Catalog {
-    /// Enters the current recipes where they are new; gives their numbers.
+    /// Enters the current fingerprints where they are new; gives their numbers.
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn register_recipes(&self, recipes: &Recipes) -> Result<RecipeIds> {
-        let recipes = recipes.clone();
-        self.alone(move |conn| {
+    pub async fn register_fingerprints(
+        &self,
+        fingerprints: &Fingerprints,
+    ) -> Result<FingerprintIds> {
+        let fingerprints = fingerprints.clone();
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut upstream: Option<i64> = None;
                 for stage in Stage::ALL {
-                    let recipe = recipes.of(stage);
+                    let fingerprint = fingerprints.of(stage);
                     let id = sqlx::query_scalar(ENTER)
                         .bind(stage.index() as i64)
-                        .bind(&recipe.hash.as_bytes()[..])
-                        .bind(recipe.fields.to_string())
+                        .bind(&fingerprint.hash.as_bytes()[..])
+                        .bind(fingerprint.fields.to_string())
                         .bind(upstream)
                         .fetch_one(&mut *conn)
                         .await?;
                     upstream = Some(id);
                 }
-                let mut ids = [RecipeId(0); 4];
-                for (id, found) in ids.iter_mut().zip(known(conn, &recipes).await?) {
+                let mut ids = [FingerprintId(0); 4];
+                for (id, found) in ids.iter_mut().zip(known(conn, &fingerprints).await?) {
                     *id = found.ok_or_else(|| {
-                        CatalogError::Corrupt("a recipe just written is not there".to_owned())
+                        CatalogError::Corrupt("a fingerprint just written is not there".to_owned())
                     })?;
                 }
-                Ok(RecipeIds(ids))
+                Ok(FingerprintIds(ids))
             })
         })
         .await
@@ -108,49 +111,56 @@ impl Catalog {
 }
 
 impl Catalog {
-    /// What differs between recipes as [`Recipes::terms`] told them and these; what the catalog does not know of is
+    /// What differs between fingerprints as [`Fingerprints::terms`] told them and these; what the catalog does not know of is
     /// left out.
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn changes_from(&self, terms: &str, recipes: &Recipes) -> Result<Vec<FieldChange>> {
-        let mut conn = self.reader().await?;
+    pub async fn changes_from(
+        &self,
+        terms: &str,
+        fingerprints: &Fingerprints,
+    ) -> Result<Vec<FieldChange>> {
+        let mut conn = self.read_conn().await?;
         let mut changes = Vec::new();
         for (stage, hash) in Stage::ALL.into_iter().zip(terms.split_whitespace()) {
             let fields: Option<String> =
-                sqlx::query_scalar("SELECT fields FROM recipe WHERE hash = unhex(?1)")
+                sqlx::query_scalar("SELECT fields FROM fingerprint WHERE hash = unhex(?1)")
                     .bind(hash)
                     .fetch_optional(&mut *conn)
                     .await?;
             if let Some(fields) = fields {
                 let old = serde_json::from_str(&fields)?;
-                changes.extend(differences(stage, &old, &recipes.of(stage).fields));
+                changes.extend(differences(stage, &old, &fingerprints.of(stage).fields));
             }
         }
         Ok(changes)
     }
 }
 
-/// Numbers of the recipes that the catalog knows.
+/// Numbers of the fingerprints that the catalog knows.
 pub(crate) async fn known(
     conn: &mut SqliteConnection,
-    recipes: &Recipes,
-) -> Result<[Option<RecipeId>; 4]> {
+    fingerprints: &Fingerprints,
+) -> Result<[Option<FingerprintId>; 4]> {
     let mut ids = [None; 4];
     for (id, stage) in ids.iter_mut().zip(Stage::ALL) {
-        *id = sqlx::query_scalar("SELECT id FROM recipe WHERE hash = ?1")
-            .bind(&recipes.of(stage).hash.as_bytes()[..])
+        *id = sqlx::query_scalar("SELECT id FROM fingerprint WHERE hash = ?1")
+            .bind(&fingerprints.of(stage).hash.as_bytes()[..])
             .fetch_optional(&mut *conn)
             .await?
-            .map(RecipeId);
+            .map(FingerprintId);
     }
     Ok(ids)
 }
 
-/// The recipes as a JSON array of stage and number for `json_each`; a number no result has where it is unknown.
-pub(crate) async fn current_json(conn: &mut SqliteConnection, recipes: &Recipes) -> Result<String> {
-    let ids = known(conn, recipes).await?;
-    let ids = ids.iter().map(|id| id.map_or(-1, |RecipeId(id)| id));
+/// The fingerprints as a JSON array of stage and number for `json_each`; a number no result has where it is unknown.
+pub(crate) async fn current_json(
+    conn: &mut SqliteConnection,
+    fingerprints: &Fingerprints,
+) -> Result<String> {
+    let ids = known(conn, fingerprints).await?;
+    let ids = ids.iter().map(|id| id.map_or(-1, |FingerprintId(id)| id));
     Ok(rows::array(ids).to_string())
 }
 
@@ -158,13 +168,13 @@ pub(crate) async fn current_json(conn: &mut SqliteConnection, recipes: &Recipes)
 mod tests {
     use serde_json::json;
 
-    use super::Recipes;
+    use super::Fingerprints;
     use crate::domain::Stage;
 
     #[test]
     fn a_changed_setting_changes_its_stage_and_those_after_it() {
-        let old = Recipes::new(|_| json!({ "revision": 1 }));
-        let new = Recipes::new(|stage| match stage {
+        let old = Fingerprints::new(|_| json!({ "revision": 1 }));
+        let new = Fingerprints::new(|stage| match stage {
             Stage::Normalize => json!({ "revision": 2 }),
             Stage::Fit | Stage::Depth | Stage::Register => json!({ "revision": 1 }),
         });

@@ -7,7 +7,7 @@ use sqlx::{Row as _, SqliteConnection};
 
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
-use crate::catalog::queue::counters::{Counts, Cursor};
+use crate::catalog::queue::counters::{Cursor, JobCounts};
 
 /// Numbers of pairs that are counted in one statement.
 const RANGE: i64 = 100_000;
@@ -36,7 +36,7 @@ pub(crate) struct Standing {
     pub(crate) cursor: Cursor,
     /// As it is stored: a check counts what no program would write, too.
     pub(crate) status: i64,
-    /// Recipe of the result right behind the cursor.
+    /// Fingerprint of the result right behind the cursor.
     pub(crate) made: Option<i64>,
 }
 
@@ -81,8 +81,8 @@ async fn in_ranges(conn: &mut SqliteConnection, sql: &'static str, range: i64) -
 }
 
 /// Every job by cursor and status.
-pub(crate) fn by_status(census: &Census) -> Result<Counts> {
-    let mut counts = Counts::new();
+pub(crate) fn by_status(census: &Census) -> Result<JobCounts> {
+    let mut counts = JobCounts::new();
     for (standing, alike) in census {
         let status = rows::status(standing.status)?;
         *counts.entry((standing.cursor, status)).or_default() += alike.jobs;
@@ -90,8 +90,8 @@ pub(crate) fn by_status(census: &Census) -> Result<Counts> {
     Ok(counts)
 }
 
-/// Every job that keeps a recipe, by recipe.
-pub(crate) fn by_recipe(census: &Census) -> BTreeMap<i64, u64> {
+/// Every job that keeps a fingerprint, by fingerprint.
+pub(crate) fn by_fingerprint(census: &Census) -> BTreeMap<i64, u64> {
     let mut counts = BTreeMap::new();
     for (standing, alike) in census {
         if let Some(made) = standing.made {
@@ -109,7 +109,7 @@ mod tests {
 
     use super::{ALL, RANGE, in_ranges};
 
-    /// Stage, status, recipe, how many, first number.
+    /// Stage, status, fingerprint, how many, first number.
     type Row = (i64, i64, Option<i64>, i64, i64);
 
     async fn at_once_and_by_ranges(jobs: &[(i64, i64)], range: i64) -> (Vec<Row>, Vec<Row>) {

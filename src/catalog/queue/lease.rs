@@ -6,17 +6,17 @@ use crate::domain::{
 
 /// The right to work on one pair. Only a claim makes one, and only its holder can store anything for the pair.
 ///
-/// `epoch` fences it: each claim and each rescue raises the job's epoch, so that a lease that was taken away
+/// `token` fences it: each claim and each recovery raises the job's token, so that a lease that was taken away
 /// changes nothing any more.
 #[derive(Debug)]
 pub struct Lease {
     pub(crate) pair: PairId,
     pub(crate) worker: WorkerId,
-    pub(crate) epoch: i64,
+    pub(crate) token: i64,
     pub(crate) cursor: Stage,
     pub(crate) attempt: u32,
     pub(crate) crashes: u32,
-    pub(crate) alone: bool,
+    pub(crate) exclusive: bool,
     /// Whether a stage was stored under it, so that no failure is known of the pair any more.
     pub(crate) cleared: bool,
 }
@@ -43,30 +43,30 @@ impl Lease {
     }
 
     /// Whether nothing else may run beside it, because it needed too much or a worker died over it.
-    pub const fn alone(&self) -> bool {
-        self.alone
+    pub const fn exclusive(&self) -> bool {
+        self.exclusive
     }
 
-    /// The fence: of two leases on a pair the one with the higher epoch is the later.
-    pub const fn epoch(&self) -> i64 {
-        self.epoch
+    /// The fence: of two leases on a pair the one with the higher token is the later.
+    pub const fn token(&self) -> i64 {
+        self.token
     }
 }
 
 /// What became of a lease when something was stored under it.
 #[derive(Debug)]
-pub enum Kept {
+pub enum CheckpointOutcome {
     /// Stored; the lease goes on with the next stage.
     Lease(Lease),
     /// Stored; the pair is done.
     Done,
     /// The lease is lost: nothing was stored, the work is dropped.
-    Lost,
+    LeaseLost,
 }
 
 /// An input file as a stage read it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct InputSeen {
+pub struct InputVersion {
     /// Hash of its bytes.
     pub hash: ContentHash,
     /// Size, time and number of the file at that moment, as the store writes them.
@@ -75,14 +75,14 @@ pub struct InputSeen {
 
 /// The input files of a pair as its worker read them; `None` for one that was not read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct InputsSeen {
+pub struct InputVersions {
     /// The mesh.
-    pub mesh: Option<InputSeen>,
+    pub mesh: Option<InputVersion>,
     /// The print.
-    pub print: Option<InputSeen>,
+    pub print: Option<InputVersion>,
 }
 
-impl InputsSeen {
+impl InputVersions {
     /// Whether anything is told of either.
     pub(crate) const fn is_told(&self) -> bool {
         self.mesh.is_some() || self.print.is_some()
@@ -100,17 +100,17 @@ pub struct MetricResult {
 
 /// A stage that is done: everything its checkpoint stores.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StageDone {
+pub struct StageCheckpoint {
     /// Which stage.
     pub stage: Stage,
-    /// Number of the recipe it was computed with.
-    pub recipe: RecipeId,
+    /// Number of the fingerprint it was computed with.
+    pub fingerprint: FingerprintId,
     /// Content of the mesh it was computed from.
     pub mesh_hash: ContentHash,
     /// Content of the print, for stages that see it.
     pub print_hash: Option<ContentHash>,
     /// What the manifest said that it depends on.
-    pub facts: String,
+    pub attributes: String,
     /// The numbers as JSON.
     pub outcome: String,
     /// The artifacts by role.
@@ -120,7 +120,7 @@ pub struct StageDone {
     /// The metrics' results, for the last stage.
     pub metrics: Vec<MetricResult>,
     /// Input files as read for this pair.
-    pub inputs: InputsSeen,
+    pub inputs: InputVersions,
     /// Computing time in milliseconds.
     pub ms: u64,
     /// When it was done.
@@ -133,33 +133,33 @@ pub struct StageDone {
 
 /// What a failure means for the job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sentence {
+pub enum FailureAction {
     /// Again at this time.
     BackOff {
         /// When.
         run_at: UnixMillis,
     },
     /// Again at once, with nothing beside it.
-    Alone,
+    RetryExclusive,
     /// Not again until somebody asks.
     Quarantine,
 }
 
 /// A stage that failed.
 #[derive(Debug, Clone, PartialEq)]
-pub struct StageFailed {
+pub struct StageFailure {
     /// Which stage.
     pub stage: Stage,
-    /// Class and sentence.
+    /// Class and message.
     pub failure: Failure,
     /// What it means for the job.
-    pub sentence: Sentence,
-    /// Number of the recipe it was run with.
-    pub recipe: RecipeId,
+    pub action: FailureAction,
+    /// Number of the fingerprint it was run with.
+    pub fingerprint: FingerprintId,
     /// What the manifest said.
-    pub facts: String,
+    pub attributes: String,
     /// Input files as read for this pair.
-    pub inputs: InputsSeen,
+    pub inputs: InputVersions,
     /// Computing time in milliseconds, where something was computed.
     pub ms: Option<u64>,
     /// When it failed.
@@ -168,6 +168,6 @@ pub struct StageFailed {
     pub alive_since: UnixMillis,
 }
 
-/// A recipe's number in the catalog.
+/// A fingerprint's number in the catalog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct RecipeId(pub(crate) i64);
+pub struct FingerprintId(pub(crate) i64);

@@ -8,7 +8,7 @@ use crate::domain::{JobStatus, Stage};
 /// Why a pair has work before it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "reason")]
-pub enum WorkReason {
+pub enum StaleReason {
     /// It has never run.
     New,
     /// An earlier run ended before it was done, or it was taken up again by `retry`.
@@ -52,7 +52,7 @@ pub struct PlanEntry {
     pub from: Stage,
     /// Why.
     #[serde(flatten)]
-    pub why: WorkReason,
+    pub why: StaleReason,
     /// How many pairs.
     pub pairs: u64,
 }
@@ -66,8 +66,6 @@ pub struct Plan {
     pub done: u64,
     /// Pairs that failed for good and stay so.
     pub quarantined: u64,
-    /// Pairs set aside.
-    pub held: u64,
     /// Pairs that a run in another process has in hand.
     pub leased: u64,
 }
@@ -83,7 +81,6 @@ impl Plan {
         match status {
             JobStatus::Done => self.done += pairs,
             JobStatus::Quarantined => self.quarantined += pairs,
-            JobStatus::Held => self.held += pairs,
             JobStatus::Leased => self.leased += pairs,
             // These always have work before them.
             JobStatus::Ready | JobStatus::Backoff => {}
@@ -108,7 +105,7 @@ impl std::fmt::Display for FieldChange {
     }
 }
 
-impl std::fmt::Display for WorkReason {
+impl std::fmt::Display for StaleReason {
     /// A fragment that says why, such as `the print changed`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let text = match self {

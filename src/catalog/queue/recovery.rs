@@ -11,7 +11,7 @@ use crate::catalog::db::script::Script;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::checkpoint::{SEEN, over, seen_row};
 use crate::catalog::queue::counters::Deltas;
-use crate::catalog::queue::lease::InputsSeen;
+use crate::catalog::queue::lease::InputVersions;
 use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
 /// A worker that holds leases, and when it last gave a sign of life by its own clock.
@@ -19,30 +19,30 @@ use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, Wo
 pub struct LeaseHolder {
     /// Which worker.
     pub worker: WorkerId,
-    /// Its last beat. Compare it with an earlier look, never with this machine's clock.
-    pub beat: UnixMillis,
+    /// Its last heartbeat. Compare it with an earlier look, never with this machine's clock.
+    pub heartbeat: UnixMillis,
 }
 
-/// What a rescue brought back.
+/// What a recovery brought back.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct Rescued {
+pub struct Recovered {
     /// How many pairs are ready again.
     pub ready: u64,
     /// Pairs that killed too many workers: quarantined.
-    pub condemned: Vec<PairId>,
+    pub poisoned: Vec<PairId>,
 }
 
 /// Which leases to take back: those of some workers, or all but one's.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Dead {
+pub enum DeadWorker {
     /// These.
     Workers(Vec<WorkerId>),
     /// Everybody else, because the lock proves that no other process lives.
-    AllBut(WorkerId),
+    AllExcept(WorkerId),
 }
 
 pub(crate) const HOLDERS: &str = "
-SELECT w.id, w.beat FROM worker AS w
+SELECT w.id, w.heartbeat FROM worker AS w
 WHERE w.id IN (SELECT worker FROM job WHERE status = 1)
 ORDER BY w.id";
 
@@ -54,13 +54,13 @@ WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.
 
 /// Takes leases back: worker, whether it died, whether its pair is to blame. A crash counts as a crash and not as a
 /// try, so that a failure that may pass later keeps all its tries. Pairs of a worker that died are suspect:
-/// they run after the others, each by itself. The condition is `domain::is_condemned`.
-pub(crate) const RESCUE: &str = "
+/// they run after the others, each by itself. The condition is `domain::is_poisoned`.
+pub(crate) const RECOVER: &str = "
 UPDATE job SET
     status = iif((item.value ->> 2)
         AND crashes + 1 >= ?2 + max(0, ?3 - crashes - 2), 4, 0),
-    worker = NULL, deadline = NULL, epoch = epoch + 1, crashes = crashes + (item.value ->> 2),
-    attempt = max(attempt - 1, 0), mem_class = max(mem_class, item.value ->> 1)
+    worker = NULL, deadline = NULL, token = token + 1, crashes = crashes + (item.value ->> 2),
+    attempt = max(attempt - 1, 0), exclusive = max(exclusive, item.value ->> 1)
 FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = item.value ->> 0
 RETURNING pair, stage, status, crashes";
 
@@ -76,29 +76,29 @@ const DEATHS: &str = "
 SELECT count(*) FROM (SELECT died, ended FROM worker ORDER BY id DESC LIMIT 32) WHERE died AND ended IS NULL";
 
 /// Whose leases are taken back.
-pub(crate) const VICTIMS: &str = "
+pub(crate) const AFFECTED_PAIRS: &str = "
 SELECT pair, worker FROM job WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))";
 
-/// Takes back leases of other workers that still give signs of life long after the lease's deadline. Beat and deadline
+/// Takes back leases of other workers that still give signs of life long after the lease's deadline. Heartbeat and deadline
 /// are both by the worker's own clock: two clocks are never compared.
 pub(crate) const OVERDUE: &str = "
 UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = NULL,
-    epoch = epoch + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), mem_class = 1
+    token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), exclusive = 1
 WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))
-    AND deadline + ?3 < (SELECT w.beat FROM worker AS w WHERE w.id = job.worker)
+    AND deadline + ?3 < (SELECT w.heartbeat FROM worker AS w WHERE w.id = job.worker)
 RETURNING pair, stage, status, crashes";
 
 /// With the settings of the worker that died and the inputs as last seen.
 const CRASHED: &str = "
-INSERT INTO failure (pair, stage, class, message, recipe, mesh_hash, print_hash, facts, at)
+INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
 SELECT p.id, item.value ->> 'stage', item.value ->> 'class', item.value ->> 'message',
-    w.recipes ->> (item.value ->> 'stage'), p.mesh_hash, p.print_hash, p.facts, item.value ->> 'at'
+    w.fingerprints ->> (item.value ->> 'stage'), p.mesh_hash, p.print_hash, p.attributes, item.value ->> 'at'
 FROM json_each(?1) AS item CROSS JOIN pair AS p ON p.id = item.value ->> 'pair'
     LEFT JOIN worker AS w ON w.id = item.value ->> 'worker'
 WHERE true
 ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
-    recipe = excluded.recipe, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
-    facts = excluded.facts, at = excluded.at";
+    fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
+    attributes = excluded.attributes, at = excluded.at";
 
 const CRASH_ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, class, message, at)
@@ -115,14 +115,14 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let found = sqlx::query(HOLDERS).fetch_all(&mut *conn).await?;
         found
             .iter()
             .map(|row| {
                 Ok(LeaseHolder {
                     worker: WorkerId(row.try_get(0)?),
-                    beat: row.try_get(1)?,
+                    heartbeat: row.try_get(1)?,
                 })
             })
             .collect()
@@ -130,26 +130,26 @@ impl Catalog {
 
     /// Takes back the leases of dead workers: ready again, or quarantined when too many died over the pair.
     ///
-    /// A pair is blamed for a death only when its worker held no other, and condemned only as `is_condemned` says.
+    /// A pair is blamed for a death only when its worker held no other, and poisoned only as `is_poisoned` says.
     /// So a process that is killed from outside, however often, hardly ever brings its pairs into quarantine: only one
     /// that was alone in hand at nearly every death there was, which is what a pair that kills looks like.
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn rescue(&self, dead: Dead, now: UnixMillis) -> Result<Rescued> {
-        self.alone(move |conn| {
+    pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
-                let workers = bury(conn, &dead).await?;
-                let victims = victims(conn, &workers).await?;
+                let workers = mark_dead(conn, &dead).await?;
+                let affected = affected_pairs(conn, &workers).await?;
                 let items = left_by(conn, &workers).await?;
                 let deaths: i64 = sqlx::query_scalar(DEATHS).fetch_one(&mut *conn).await?;
-                let found = sqlx::query(RESCUE)
+                let found = sqlx::query(RECOVER)
                     .bind(items)
                     .bind(CRASH_LIMIT)
                     .bind(deaths)
                     .fetch_all(&mut *conn)
                     .await?;
-                brought_back(conn, &found, &victims, now).await
+                brought_back(conn, &found, &affected, now).await
             })
         })
         .await
@@ -160,8 +160,8 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn note_fatal_inputs(&self, seen: Vec<(PairId, InputsSeen)>) -> Result<()> {
-        self.alone(move |conn| {
+    pub async fn record_poisoned_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut script = Script::default();
                 let items = seen.iter().map(|(pair, seen)| seen_row(pair.0, seen));
@@ -178,13 +178,13 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn rescue_overdue(
+    pub async fn recover_overdue(
         &self,
         me: WorkerId,
         margin_ms: i64,
         now: UnixMillis,
-    ) -> Result<Rescued> {
-        self.alone(move |conn| Box::pin(overdue(conn, me, margin_ms, now)))
+    ) -> Result<Recovered> {
+        self.in_transaction(move |conn| Box::pin(overdue(conn, me, margin_ms, now)))
             .await
     }
 }
@@ -194,19 +194,19 @@ async fn overdue(
     me: WorkerId,
     margin_ms: i64,
     now: UnixMillis,
-) -> Result<Rescued> {
+) -> Result<Recovered> {
     let others = holders_but(conn, me).await?;
-    let victims = victims(conn, &others).await?;
+    let affected = affected_pairs(conn, &others).await?;
     let found = sqlx::query(OVERDUE)
         .bind(others)
         .bind(CRASH_LIMIT)
         .bind(margin_ms)
         .fetch_all(&mut *conn)
         .await?;
-    brought_back(conn, &found, &victims, now).await
+    brought_back(conn, &found, &affected, now).await
 }
 
-/// Items of [`RESCUE`] for some workers.
+/// Items of [`RECOVER`] for some workers.
 async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
     let found = sqlx::query(LEFT_BY).bind(workers).fetch_all(conn).await?;
     let mut items = Vec::with_capacity(found.len());
@@ -220,14 +220,14 @@ async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
 }
 
 /// Notes who died; gives those that may hold leases, as a JSON array.
-async fn bury(conn: &mut SqliteConnection, dead: &Dead) -> Result<String> {
+async fn mark_dead(conn: &mut SqliteConnection, dead: &DeadWorker) -> Result<String> {
     match dead {
-        Dead::Workers(workers) => {
+        DeadWorker::Workers(workers) => {
             let workers = rows::array(workers.iter().map(|worker| worker.0)).to_string();
             sqlx::query(DIED).bind(&workers).execute(conn).await?;
             Ok(workers)
         }
-        Dead::AllBut(me) => {
+        DeadWorker::AllExcept(me) => {
             sqlx::query(ALL_DIED).bind(me.0).execute(&mut *conn).await?;
             holders_but(conn, *me).await
         }
@@ -242,8 +242,8 @@ async fn holders_but(conn: &mut SqliteConnection, me: WorkerId) -> Result<String
 }
 
 /// The pairs of some workers, each with its worker.
-async fn victims(conn: &mut SqliteConnection, workers: &str) -> Result<BTreeMap<i64, i64>> {
-    let found: Vec<(i64, i64)> = sqlx::query_as(VICTIMS)
+async fn affected_pairs(conn: &mut SqliteConnection, workers: &str) -> Result<BTreeMap<i64, i64>> {
+    let found: Vec<(i64, i64)> = sqlx::query_as(AFFECTED_PAIRS)
         .bind(workers)
         .fetch_all(conn)
         .await?;
@@ -254,10 +254,10 @@ async fn victims(conn: &mut SqliteConnection, workers: &str) -> Result<BTreeMap<
 async fn brought_back(
     conn: &mut SqliteConnection,
     found: &[sqlx::sqlite::SqliteRow],
-    victims: &BTreeMap<i64, i64>,
+    affected: &BTreeMap<i64, i64>,
     now: UnixMillis,
-) -> Result<Rescued> {
-    let mut rescued = Rescued::default();
+) -> Result<Recovered> {
+    let mut recovered = Recovered::default();
     let mut deltas = Deltas::default();
     let mut crashed = Vec::new();
     for row in found {
@@ -265,13 +265,13 @@ async fn brought_back(
         let (status, crashes): (_, i64) = (rows::status(row.try_get(2)?)?, row.try_get(3)?);
         deltas.moved((stage, JobStatus::Leased), (stage, status));
         if status == JobStatus::Quarantined {
-            rescued.condemned.push(PairId(pair));
+            recovered.poisoned.push(PairId(pair));
             crashed.push(json!({
-                "pair": pair, "worker": victims.get(&pair), "stage": stage, "class": FailureClass::Resource, "at": now,
+                "pair": pair, "worker": affected.get(&pair), "stage": stage, "class": FailureClass::Resource, "at": now,
                 "message": format!("{crashes} workers died or hung over it at {}", rows::stage(stage)?),
             }));
         } else {
-            rescued.ready += 1;
+            recovered.ready += 1;
         }
     }
     if !crashed.is_empty() {
@@ -281,5 +281,5 @@ async fn brought_back(
         }
     }
     deltas.apply(conn).await?;
-    Ok(rescued)
+    Ok(recovered)
 }

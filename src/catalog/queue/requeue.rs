@@ -13,15 +13,15 @@ use crate::catalog::queue::alike;
 use crate::catalog::queue::alike::made;
 use crate::catalog::queue::claim::PairSelection;
 use crate::catalog::queue::counters::{Deltas, cursor};
-use crate::catalog::queue::fingerprint::{Recipes, current_json};
-use crate::catalog::queue::staleness::{Again, Cause, Seen, decide, look};
+use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
+use crate::catalog::queue::staleness::{Cause, RerunPolicy, Seen, decide, look};
 use crate::catalog::records::import;
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 
 /// Which failed pairs to take up again.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RetrySelection {
-    /// These pairs, whatever keeps them: failed, backing off or held.
+    /// These pairs, whatever keeps them: failed or backing off.
     Names(Vec<PairName>),
     /// All that failed or back off with this class.
     Class(FailureClass),
@@ -30,10 +30,10 @@ pub enum RetrySelection {
 }
 
 /// Back to a stage, as if newly imported; never a job that somebody works on.
-pub(crate) const SEND_BACK: &str = concat!(
+pub(crate) const REQUEUE: &str = concat!(
     "
 UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
-    mem_class = 0, made = ",
+    exclusive = 0, made = ",
     made!("(item.value ->> 1)"),
     "
 FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1"
@@ -47,7 +47,7 @@ WHERE j.status IN (2, 4) AND (?1 IS NULL OR f.class = ?1)";
 
 const KEPT_BACK_AMONG: &str = "
 SELECT j.pair, j.stage, j.status FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
-WHERE j.status IN (2, 4, 5)";
+WHERE j.status IN (2, 4)";
 
 /// A job that goes back.
 struct Moved {
@@ -61,22 +61,22 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn send_back(
+    pub async fn requeue_stale(
         &self,
-        recipes: &Recipes,
+        fingerprints: &Fingerprints,
         among: Option<&PairSelection>,
-        again: Again,
+        again: RerunPolicy,
     ) -> Result<u64> {
         let Some(among) = among else {
-            return self.send_all_back(recipes, again).await;
+            return self.send_all_back(fingerprints, again).await;
         };
         let mut sent = 0;
         let mut after = Some(0);
         while let Some(from) = after {
-            let (recipes, among) = (recipes.clone(), among.clone());
+            let (fingerprints, among) = (fingerprints.clone(), among.clone());
             let (moved, next) = self
-                .alone(move |conn| {
-                    Box::pin(async move { page(conn, &recipes, &among, again, from).await })
+                .in_transaction(move |conn| {
+                    Box::pin(async move { page(conn, &fingerprints, &among, again, from).await })
                 })
                 .await?;
             sent += moved;
@@ -87,10 +87,10 @@ impl Catalog {
 
     /// Pairs that are alike go back together; only those that are not are looked at one by one. Each page is a
     /// transaction of its own, so that others' writes are not kept waiting.
-    async fn send_all_back(&self, recipes: &Recipes, again: Again) -> Result<u64> {
+    async fn send_all_back(&self, fingerprints: &Fingerprints, again: RerunPolicy) -> Result<u64> {
         let (current, groups) = {
             let mut conn = self.snapshot().await?;
-            let current = current_json(&mut conn, recipes).await?;
+            let current = current_json(&mut conn, fingerprints).await?;
             let groups = alike::groups(&mut conn, &current).await?;
             (current, groups)
         };
@@ -101,7 +101,7 @@ impl Catalog {
             while let (Some(from), Some(to)) = (after, goes_back(&group.seen, again)) {
                 let group = Arc::clone(&group);
                 let (moved, next) = self
-                    .alone(move |conn| Box::pin(group_page(conn, group, to, from)))
+                    .in_transaction(move |conn| Box::pin(group_page(conn, group, to, from)))
                     .await?;
                 sent += moved;
                 after = next;
@@ -111,7 +111,7 @@ impl Catalog {
         while let Some(from) = after {
             let current = current.clone();
             let (moved, next) = self
-                .alone(move |conn| Box::pin(apart_page(conn, current, again, from)))
+                .in_transaction(move |conn| Box::pin(apart_page(conn, current, again, from)))
                 .await?;
             sent += moved;
             after = next;
@@ -125,7 +125,7 @@ impl Catalog {
     /// When a named pair is not there; then nothing changes.
     pub async fn retry(&self, selection: &RetrySelection) -> Result<u64> {
         let selection = selection.clone();
-        self.alone(move |conn| {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let found = kept_back(conn, &selection).await?;
                 apply(conn, &found).await
@@ -136,13 +136,13 @@ impl Catalog {
 }
 
 /// Where a job goes back to; `None` when it stays or waits to be run anyhow.
-fn goes_back(seen: &Seen, again: Again) -> Option<Stage> {
+fn goes_back(seen: &Seen, again: RerunPolicy) -> Option<Stage> {
     let (to, cause) = decide(seen, again)?;
     let waits = matches!(cause, Cause::New | Cause::Unfinished | Cause::BackingOff);
     (!waits).then_some(to)
 }
 
-fn moved(seen: &[Seen], again: Again) -> Vec<Moved> {
+fn moved(seen: &[Seen], again: RerunPolicy) -> Vec<Moved> {
     let moved = |seen: &Seen| {
         Some(Moved {
             pair: seen.pair,
@@ -156,12 +156,12 @@ fn moved(seen: &[Seen], again: Again) -> Vec<Moved> {
 /// One page of some pairs: how many moved, and where the next page begins.
 async fn page(
     conn: &mut SqliteConnection,
-    recipes: &Recipes,
+    fingerprints: &Fingerprints,
     among: &PairSelection,
-    again: Again,
+    again: RerunPolicy,
     after: i64,
 ) -> Result<(u64, Option<i64>)> {
-    let current = current_json(conn, recipes).await?;
+    let current = current_json(conn, fingerprints).await?;
     let found = look(conn, &current, after, among).await?;
     let sent = apply(conn, &moved(&found, again)).await?;
     Ok((sent, found.last().map(|seen| seen.pair)))
@@ -189,7 +189,7 @@ async fn group_page(
 async fn apart_page(
     conn: &mut SqliteConnection,
     current: String,
-    again: Again,
+    again: RerunPolicy,
     after: i64,
 ) -> Result<(u64, Option<i64>)> {
     let Some((found, last)) = alike::look_apart(conn, &current, after).await? else {
@@ -251,7 +251,7 @@ async fn apply(conn: &mut SqliteConnection, moved: &[Moved]) -> Result<u64> {
         .iter()
         .map(|moved| json!([moved.pair, moved.to.index()]));
     let items = rows::array(items).to_string();
-    for sql in [SEND_BACK, FORGET] {
+    for sql in [REQUEUE, FORGET] {
         sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
     }
     let mut deltas = Deltas::default();

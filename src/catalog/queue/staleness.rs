@@ -12,8 +12,8 @@ use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::alike;
 use crate::catalog::queue::claim::PairSelection;
-use crate::catalog::queue::fingerprint::{Recipes, current_json};
-use crate::catalog::queue::plan::{FieldChange, Plan, PlanEntry, WorkReason};
+use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
+use crate::catalog::queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
 use crate::catalog::records::import;
 use crate::domain::{JobStatus, PairName, Stage};
 
@@ -22,7 +22,7 @@ pub(crate) const PAGE: usize = 10_000;
 
 /// What to run again besides what changed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Again {
+pub enum RerunPolicy {
     /// Nothing.
     Changed,
     /// Pairs that failed.
@@ -34,17 +34,17 @@ pub enum Again {
 /// Each job with its first result that was made otherwise than it would be now.
 pub(crate) const LOOK: &str = "
 WITH seen AS (
-    SELECT j.pair, j.stage, j.status, p.mesh_hash, p.print_hash, p.facts, (
+    SELECT j.pair, j.stage, j.status, p.mesh_hash, p.print_hash, p.attributes, (
         SELECT min(r.stage) FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
-            r.recipe <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
-            OR r.facts <> p.facts)) AS first
+            r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
+            OR r.attributes <> p.attributes)) AS first
     FROM (SELECT value FROM json_each(?4)) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
         JOIN pair AS p ON p.id = j.pair WHERE j.pair > ?2 ORDER BY j.pair LIMIT ?3)
-SELECT seen.pair, seen.stage, seen.status, seen.first, r.recipe,
+SELECT seen.pair, seen.stage, seen.status, seen.first, r.fingerprint,
     coalesce(r.mesh_hash <> seen.mesh_hash, 0) AS mesh, coalesce(r.print_hash <> seen.print_hash, 0) AS print,
-    coalesce(r.facts <> seen.facts, 0) AS facts,
-    coalesce(f.recipe <> (?1 ->> f.stage), 0) OR coalesce(f.mesh_hash <> seen.mesh_hash, 0)
-        OR coalesce(f.print_hash <> seen.print_hash, 0) OR coalesce(f.facts <> seen.facts, 0) AS otherwise
+    coalesce(r.attributes <> seen.attributes, 0) AS attributes,
+    coalesce(f.fingerprint <> (?1 ->> f.stage), 0) OR coalesce(f.mesh_hash <> seen.mesh_hash, 0)
+        OR coalesce(f.print_hash <> seen.print_hash, 0) OR coalesce(f.attributes <> seen.attributes, 0) AS otherwise
 FROM seen LEFT JOIN stage_result AS r ON r.pair = seen.pair AND r.stage = seen.first
     LEFT JOIN failure AS f ON f.pair = seen.pair ORDER BY seen.pair";
 
@@ -75,17 +75,19 @@ pub(crate) enum Cause {
 }
 
 /// Where a job would start and why; `None` when it stays as it is.
-pub(crate) fn decide(seen: &Seen, again: Again) -> Option<(Stage, Cause)> {
+pub(crate) fn decide(seen: &Seen, again: RerunPolicy) -> Option<(Stage, Cause)> {
     let next = usize::try_from(seen.cursor)
         .ok()
         .and_then(Stage::from_index);
-    if matches!(seen.status, JobStatus::Leased | JobStatus::Held) {
+    if seen.status == JobStatus::Leased {
         return None;
     }
     let asked = match again {
-        Again::All(from) => Some((next.map_or(from, |next| next.min(from)), Cause::Asked)),
-        Again::Failed if seen.status == JobStatus::Quarantined => next.map(|at| (at, Cause::Asked)),
-        Again::Failed | Again::Changed => None,
+        RerunPolicy::All(from) => Some((next.map_or(from, |next| next.min(from)), Cause::Asked)),
+        RerunPolicy::Failed if seen.status == JobStatus::Quarantined => {
+            next.map(|at| (at, Cause::Asked))
+        }
+        RerunPolicy::Failed | RerunPolicy::Changed => None,
     };
     // The earlier start wins; between equals the change says more than the asking.
     match (seen.change, asked) {
@@ -99,9 +101,7 @@ pub(crate) fn decide(seen: &Seen, again: Again) -> Option<(Stage, Cause)> {
         JobStatus::Ready => Cause::Unfinished,
         JobStatus::Backoff => Cause::BackingOff,
         JobStatus::Quarantined if seen.otherwise => Cause::FailedBefore,
-        JobStatus::Quarantined | JobStatus::Done | JobStatus::Leased | JobStatus::Held => {
-            return None;
-        }
+        JobStatus::Quarantined | JobStatus::Done | JobStatus::Leased => return None,
     };
     next.map(|at| (at, cause))
 }
@@ -139,10 +139,10 @@ fn changed(row: &SqliteRow, stage: Stage) -> Result<Cause> {
         Cause::Mesh
     } else if row.try_get("print")? {
         Cause::Print
-    } else if row.try_get("facts")? {
+    } else if row.try_get("attributes")? {
         Cause::Manifest
     } else {
-        Cause::Settings(stage, row.try_get("recipe")?)
+        Cause::Settings(stage, row.try_get("fingerprint")?)
     })
 }
 
@@ -153,49 +153,53 @@ impl Catalog {
     /// When the database refuses.
     pub async fn plan(
         &self,
-        recipes: &Recipes,
+        fingerprints: &Fingerprints,
         names: Option<&[PairName]>,
-        again: Again,
+        again: RerunPolicy,
     ) -> Result<Plan> {
         let mut conn = self.snapshot().await?;
         let among = match names {
             Some(names) => Some(import::select(&mut conn, names).await?),
             None => None,
         };
-        plan(&mut conn, recipes, among.as_ref(), again).await
+        plan(&mut conn, fingerprints, among.as_ref(), again).await
     }
 
     /// Pairs with results that were made with other settings or inputs than those of now.
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn stale(&self, recipes: &Recipes) -> Result<u64> {
-        let mut conn = self.reader().await?;
-        alike::stale(&mut conn, recipes).await
+    pub async fn stale(&self, fingerprints: &Fingerprints) -> Result<u64> {
+        let mut conn = self.read_conn().await?;
+        alike::stale(&mut conn, fingerprints).await
     }
 
     /// Why a pair would run, and from which stage; `None` when nothing is left to do.
     ///
     /// # Errors
     /// When there is no such pair.
-    pub async fn why(&self, pair: &PairName, recipes: &Recipes) -> Result<Option<PlanEntry>> {
+    pub async fn why(
+        &self,
+        pair: &PairName,
+        fingerprints: &Fingerprints,
+    ) -> Result<Option<PlanEntry>> {
         let mut conn = self.snapshot().await?;
         let among = import::select(&mut conn, std::slice::from_ref(pair)).await?;
         if among.is_empty() {
             return Err(CatalogError::UnknownPair(pair.clone()));
         }
-        let plan = plan(&mut conn, recipes, Some(&among), Again::Changed).await?;
+        let plan = plan(&mut conn, fingerprints, Some(&among), RerunPolicy::Changed).await?;
         Ok(plan.entries.into_iter().next())
     }
 }
 
 async fn plan(
     conn: &mut SqliteConnection,
-    recipes: &Recipes,
+    fingerprints: &Fingerprints,
     among: Option<&PairSelection>,
-    again: Again,
+    again: RerunPolicy,
 ) -> Result<Plan> {
-    let current = current_json(conn, recipes).await?;
+    let current = current_json(conn, fingerprints).await?;
     let mut plan = Plan::default();
     let mut entries: BTreeMap<(Stage, Cause), u64> = BTreeMap::new();
     let mut take = |seen: &Seen, pairs: u64| match decide(seen, again) {
@@ -207,7 +211,7 @@ async fn plan(
         None => alike::look_at_all(conn, &current, &mut take).await?,
     }
     for ((from, cause), pairs) in entries {
-        let why = reason(conn, recipes, cause).await?;
+        let why = reason(conn, fingerprints, cause).await?;
         plan.entries.push(PlanEntry { from, why, pairs });
     }
     Ok(plan)
@@ -235,31 +239,31 @@ async fn look_at(
 
 async fn reason(
     conn: &mut SqliteConnection,
-    recipes: &Recipes,
+    fingerprints: &Fingerprints,
     cause: Cause,
-) -> Result<WorkReason> {
+) -> Result<StaleReason> {
     Ok(match cause {
-        Cause::New => WorkReason::New,
-        Cause::Unfinished => WorkReason::Unfinished,
-        Cause::BackingOff => WorkReason::BackingOff,
-        Cause::FailedBefore => WorkReason::FailedBefore,
-        Cause::Mesh => WorkReason::Mesh,
-        Cause::Print => WorkReason::Print,
-        Cause::Manifest => WorkReason::Manifest,
-        Cause::Asked => WorkReason::Asked,
-        Cause::Settings(stage, recipe) => {
-            let fields: String = sqlx::query_scalar("SELECT fields FROM recipe WHERE id = ?1")
-                .bind(recipe)
+        Cause::New => StaleReason::New,
+        Cause::Unfinished => StaleReason::Unfinished,
+        Cause::BackingOff => StaleReason::BackingOff,
+        Cause::FailedBefore => StaleReason::FailedBefore,
+        Cause::Mesh => StaleReason::Mesh,
+        Cause::Print => StaleReason::Print,
+        Cause::Manifest => StaleReason::Manifest,
+        Cause::Asked => StaleReason::Asked,
+        Cause::Settings(stage, fingerprint) => {
+            let fields: String = sqlx::query_scalar("SELECT fields FROM fingerprint WHERE id = ?1")
+                .bind(fingerprint)
                 .fetch_one(conn)
                 .await?;
             let old: Value = serde_json::from_str(&fields)?;
-            let changes = differences(stage, &old, &recipes.of(stage).fields);
-            WorkReason::Settings { stage, changes }
+            let changes = differences(stage, &old, &fingerprints.of(stage).fields);
+            StaleReason::Settings { stage, changes }
         }
     })
 }
 
-/// Leaves that differ between two recipes' fields, by name: `register.max_scale`.
+/// Leaves that differ between two fingerprints' fields, by name: `register.max_scale`.
 pub(crate) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
     let (old, new) = (leaves(stage, old), leaves(stage, new));
     let names = old.keys().chain(new.keys());
@@ -307,7 +311,7 @@ fn leaves(stage: Stage, fields: &Value) -> Map<String, Value> {
 mod tests {
     use serde_json::json;
 
-    use super::{Again, Cause, Seen, decide, differences};
+    use super::{Cause, RerunPolicy, Seen, decide, differences};
     use crate::domain::{JobStatus, Stage};
 
     fn seen(cursor: i64, status: JobStatus) -> Seen {
@@ -332,9 +336,9 @@ mod tests {
     #[test]
     fn a_pair_that_is_done_and_unchanged_stays() {
         let done = seen(4, JobStatus::Done);
-        assert_eq!(decide(&done, Again::Changed), None);
-        assert_eq!(decide(&done, Again::Failed), None);
-        let all = decide(&done, Again::All(Stage::Depth));
+        assert_eq!(decide(&done, RerunPolicy::Changed), None);
+        assert_eq!(decide(&done, RerunPolicy::Failed), None);
+        let all = decide(&done, RerunPolicy::All(Stage::Depth));
         assert_eq!(all, Some((Stage::Depth, Cause::Asked)));
     }
 
@@ -342,16 +346,16 @@ mod tests {
     fn the_first_changed_stage_is_where_it_starts() {
         let mut print_changed = seen(4, JobStatus::Done);
         print_changed.change = Some((Stage::Normalize, Cause::Print));
-        let found = decide(&print_changed, Again::All(Stage::Register));
+        let found = decide(&print_changed, RerunPolicy::All(Stage::Register));
         assert_eq!(found, Some((Stage::Normalize, Cause::Print)));
     }
 
     #[test]
     fn a_failure_of_other_settings_is_no_failure_of_these() {
         let mut failed = seen(1, JobStatus::Quarantined);
-        assert_eq!(decide(&failed, Again::Changed), None);
+        assert_eq!(decide(&failed, RerunPolicy::Changed), None);
         failed.otherwise = true;
-        let found = decide(&failed, Again::Changed);
+        let found = decide(&failed, RerunPolicy::Changed);
         assert_eq!(found, Some((Stage::Depth, Cause::FailedBefore)));
     }
 }

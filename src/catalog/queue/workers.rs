@@ -7,7 +7,7 @@ use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::claim::PairSelection;
 use crate::catalog::queue::counters::{Deltas, KEPT, cursor};
-use crate::catalog::queue::fingerprint::RecipeIds;
+use crate::catalog::queue::fingerprint::FingerprintIds;
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 
 /// The process a worker runs in.
@@ -67,17 +67,17 @@ SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job A
 GROUP BY j.stage, j.status";
 
 impl Catalog {
-    /// Enters a process that will work with these recipes; its number is never used again.
+    /// Enters a process that will work with these fingerprints; its number is never used again.
     ///
     /// # Errors
     /// When the database refuses.
     pub async fn register_worker(
         &self,
         info: WorkerInfo,
-        recipes: RecipeIds,
+        fingerprints: FingerprintIds,
         now: UnixMillis,
     ) -> Result<WorkerId> {
-        self.alone(move |conn| Box::pin(enter(conn, info, recipes, now)))
+        self.in_transaction(move |conn| Box::pin(insert_worker(conn, info, fingerprints, now)))
             .await
     }
 
@@ -86,7 +86,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn end_worker(&self, worker: WorkerId, now: UnixMillis) -> Result<()> {
-        self.alone(move |conn| {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 sqlx::query("UPDATE worker SET ended = ?2 WHERE id = ?1")
                     .bind(worker.0)
@@ -104,8 +104,8 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn stage_due(&self, now: UnixMillis, longest: i64) -> Result<u64> {
-        self.alone(move |conn| {
+    pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let stages: Vec<i64> = sqlx::query_scalar(DUE)
                     .bind(now)
@@ -132,7 +132,7 @@ impl Catalog {
         until: Stage,
         among: Option<&PairSelection>,
     ) -> Result<Outstanding> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let query = match among {
             None => sqlx::query(LEFT_ALL).bind(cursor(until)),
             Some(among) => sqlx::query(LEFT_AMONG)
@@ -150,21 +150,21 @@ impl Catalog {
     }
 }
 
-async fn enter(
+async fn insert_worker(
     conn: &mut SqliteConnection,
     info: WorkerInfo,
-    recipes: RecipeIds,
+    fingerprints: FingerprintIds,
     now: UnixMillis,
 ) -> Result<WorkerId> {
     let id: i64 = sqlx::query_scalar(
-        "INSERT INTO worker (host, pid, boot_id, started, beat, recipes)
+        "INSERT INTO worker (host, pid, boot_id, started, heartbeat, fingerprints)
         VALUES (?1, ?2, ?3, ?4, ?4, ?5) RETURNING id",
     )
     .bind(info.host)
     .bind(info.pid)
     .bind(info.boot_id)
     .bind(now)
-    .bind(recipes.json())
+    .bind(fingerprints.json())
     .fetch_one(conn)
     .await?;
     Ok(WorkerId(id))
@@ -176,7 +176,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let query = match among {
             None => sqlx::query(KEPT),
             Some(among) => sqlx::query(COUNT_AMONG).bind(&among.json),
@@ -197,11 +197,7 @@ impl Catalog {
                         }
                     }
                 }
-                JobStatus::Ready
-                | JobStatus::Leased
-                | JobStatus::Backoff
-                | JobStatus::Done
-                | JobStatus::Held => {}
+                JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff | JobStatus::Done => {}
             }
         }
         Ok(left)

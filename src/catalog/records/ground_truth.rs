@@ -26,7 +26,7 @@ impl Catalog {
     /// # Errors
     /// When a pair is not there; then nothing is stored.
     pub async fn set_truth(&self, truths: Vec<(PairName, Value)>) -> Result<u64> {
-        self.alone(move |conn| Box::pin(async move { set(conn, &truths).await }))
+        self.in_transaction(move |conn| Box::pin(async move { set(conn, &truths).await }))
             .await
     }
 
@@ -35,7 +35,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn has_truth(&self) -> Result<bool> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         Ok(sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM truth)")
             .fetch_one(&mut *conn)
             .await?)

@@ -14,11 +14,11 @@ use crate::catalog::handle::Catalog;
 use crate::catalog::queue::claim::PairSelection;
 use crate::catalog::queue::counters::{Deltas, cursor};
 use crate::catalog::records::ground_truth;
-use crate::catalog::records::model::PairFacts;
+use crate::catalog::records::model::PairAttributes;
 use crate::domain::{JobStatus, PairName, Stage, UnixMillis};
 
 /// A row to import.
-pub type ImportRow = PairFacts;
+pub type ImportRow = PairAttributes;
 
 /// Rows in one statement.
 const CHUNK: usize = 2_000;
@@ -52,22 +52,22 @@ pub struct PairChange {
     pub fields: Vec<&'static str>,
 }
 
-/// Columns of a pair's facts, in the order of [`facts`].
+/// Columns of a pair's attributes, in the order of [`attributes`].
 const SELECT: &str = "
 SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta
 FROM pair WHERE name IN (SELECT value FROM json_each(?1))";
 
 /// A path that changed forgets what the file looked like, so that the next run reads it.
 const UPSERT: &str = "
-INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, facts, imported)
+INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, attributes, imported)
 SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', value ->> 'face_down',
-    value ->> 'character', value ->> 'block', value ->> 'meta', value ->> 'facts', ?2
+    value ->> 'character', value ->> 'block', value ->> 'meta', value ->> 'attributes', ?2
 FROM json_each(?1) WHERE true
 ON CONFLICT (name) DO UPDATE SET
     mesh_stat = iif(mesh_path = excluded.mesh_path, mesh_stat, ''), mesh_path = excluded.mesh_path,
     print_stat = iif(print_path = excluded.print_path, print_stat, ''), print_path = excluded.print_path,
     unit = excluded.unit, scanned_face_down = excluded.scanned_face_down, character = excluded.character,
-    block = excluded.block, meta = excluded.meta, facts = excluded.facts";
+    block = excluded.block, meta = excluded.meta, attributes = excluded.attributes";
 
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
@@ -101,7 +101,7 @@ impl Catalog {
         truths: Vec<(PairName, Value)>,
         now: UnixMillis,
     ) -> Result<(ImportSummary, u64)> {
-        self.alone(move |conn| {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut summary = ImportSummary::default();
                 loop {
@@ -132,7 +132,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let names: Vec<String> = sqlx::query_scalar("SELECT name FROM pair ORDER BY name")
             .fetch_all(&mut *conn)
             .await?;
@@ -144,7 +144,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let found: Vec<String> = sqlx::query_scalar(
             "SELECT name FROM pair WHERE name IN (SELECT value FROM json_each(?1))",
         )
@@ -161,7 +161,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         select(&mut conn, names).await
     }
 }
@@ -195,7 +195,7 @@ async fn import_chunk(
         .await?;
     let mut known = known
         .iter()
-        .map(|row| facts(row).map(|facts| (facts.name.clone(), facts)))
+        .map(|row| attributes(row).map(|attributes| (attributes.name.clone(), attributes)))
         .collect::<Result<BTreeMap<_, _>>>()?;
     for row in chunk {
         match known.insert(row.name.clone(), row.clone()) {
@@ -221,12 +221,12 @@ fn item(row: &ImportRow) -> Value {
     json!({
         "name": row.name, "mesh": row.mesh_path, "print": row.print_path, "unit": row.unit,
         "face_down": row.scanned_face_down.map(i64::from), "character": row.character, "block": row.block,
-        "meta": json!(row.meta).to_string(), "facts": result_facts(row),
+        "meta": json!(row.meta).to_string(), "attributes": result_attributes(row),
     })
 }
 
 /// What the manifest says that results depend on, as the catalog compares it.
-fn result_facts(row: &ImportRow) -> String {
+fn result_attributes(row: &ImportRow) -> String {
     json!({ "scanned_face_down": row.scanned_face_down, "unit": row.unit }).to_string()
 }
 
@@ -248,11 +248,11 @@ fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
     .collect()
 }
 
-/// A pair's facts from a row that has the columns of [`SELECT`] by name.
-pub(crate) fn facts(row: &SqliteRow) -> Result<PairFacts> {
+/// A pair's attributes from a row that has the columns of [`SELECT`] by name.
+pub(crate) fn attributes(row: &SqliteRow) -> Result<PairAttributes> {
     let unit: Option<String> = row.try_get("unit")?;
     let meta: String = row.try_get("meta")?;
-    Ok(PairFacts {
+    Ok(PairAttributes {
         name: rows::pair_name(&row.try_get::<String, _>("name")?)?,
         mesh_path: row.try_get("mesh_path")?,
         print_path: row.try_get("print_path")?,

@@ -26,7 +26,7 @@ pub struct Look {
 impl Look {
     /// From the columns of its names.
     pub(crate) fn read(row: &SqliteRow) -> Result<Self> {
-        let order: Option<String> = row.try_get("queue")?;
+        let order: Option<String> = row.try_get("review_order")?;
         Ok(Self {
             event: row.try_get("event")?,
             seen: rows::hash_option(row.try_get::<Option<Vec<u8>>, _>("seen")?.as_deref())?,

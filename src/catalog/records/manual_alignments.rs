@@ -59,11 +59,11 @@ pub struct StoredAlignment {
 
 const INSERT: &str = "
 INSERT INTO manual_alignment (event, pair, mesh_hash, print_hash, depth_hash, seen, print_from_depth, print_from_mesh,
-    iou, dice, reader, note, at)
+    iou, dice, reviewer, note, at)
 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) ON CONFLICT (event) DO NOTHING";
 
 const LOG: &str = "
-SELECT a.event, p.name, a.reader, a.print_from_depth, a.print_from_mesh, a.mesh_hash, a.print_hash, a.depth_hash, a.seen,
+SELECT a.event, p.name, a.reviewer, a.print_from_depth, a.print_from_mesh, a.mesh_hash, a.print_hash, a.depth_hash, a.seen,
     a.iou, a.dice, a.note, a.at, u.at AS undone_at,
     coalesce(d.mesh_hash = a.mesh_hash AND n.print_hash = a.print_hash, 0) AS holds,
     coalesce(d.result_hash = a.depth_hash, 0) AS on_current_depth
@@ -84,7 +84,7 @@ impl Catalog {
         made: ManualAlignment,
         now: UnixMillis,
     ) -> Result<bool> {
-        self.alone(move |conn| {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let pair = pair_id(conn, &made.pair).await?;
                 let stored = sqlx::query(INSERT)
@@ -114,7 +114,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let found = sqlx::query(LOG).fetch_all(&mut *conn).await?;
         found.iter().map(stored).collect()
     }
@@ -140,7 +140,7 @@ fn stored(row: &SqliteRow) -> Result<StoredAlignment> {
         made: ManualAlignment {
             event: row.try_get("event")?,
             pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
-            reviewer: row.try_get("reader")?,
+            reviewer: row.try_get("reviewer")?,
             print_from_depth: serde_json::from_str(&row.try_get::<String, _>("print_from_depth")?)?,
             print_from_mesh: serde_json::from_str(&row.try_get::<String, _>("print_from_mesh")?)?,
             mesh_hash: hash("mesh_hash")?,

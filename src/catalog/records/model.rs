@@ -25,8 +25,8 @@ pub struct StatusCounts {
     pub stages: BTreeMap<Stage, StageCounts>,
     /// Pairs whose results were made with other settings or inputs than the current ones.
     pub stale: u64,
-    /// Pairs that are done with a result less confident than [`MetricOutcome::DOUBTFUL`].
-    pub doubtful: u64,
+    /// Pairs that are done with a result less confident than [`MetricOutcome::LOW_CONFIDENCE`].
+    pub low_confidence: u64,
     /// Verdicts on current results, the newest of each reviewer.
     pub verdicts: BTreeMap<Verdict, u64>,
 }
@@ -38,7 +38,7 @@ pub struct StageCounts {
     pub done: u64,
     /// Have it before them.
     pub pending: u64,
-    /// Failed at it or are held before it.
+    /// Failed at it.
     pub failed: u64,
 }
 
@@ -47,7 +47,7 @@ pub struct StageCounts {
 pub struct StoredFailure {
     /// Where it failed.
     pub stage: Stage,
-    /// Class and sentence.
+    /// Class and message.
     #[serde(flatten)]
     pub failure: Failure,
     /// When.
@@ -78,9 +78,9 @@ pub struct StageRecord {
     /// Hash over outcome and files; the same bytes give the same hash.
     pub result_hash: ContentHash,
     /// Hash of the settings it was computed with, earlier stages' included.
-    pub recipe_hash: ContentHash,
+    pub fingerprint_hash: ContentHash,
     /// Those settings: revision and settings of this stage.
-    pub recipe_fields: Value,
+    pub fingerprint_fields: Value,
     /// Content of the mesh it was computed from.
     pub mesh_hash: ContentHash,
     /// Content of the print it was computed from; `None` for stages that do not see the print.
@@ -130,7 +130,7 @@ pub struct MetricRecord {
 
 /// What was said of a pair when it was imported.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct PairFacts {
+pub struct PairAttributes {
     /// The user's id.
     pub name: PairName,
     /// Path of the mesh as stored: relative to the project, or absolute.
@@ -154,7 +154,7 @@ pub struct PairFacts {
 pub struct PairResults {
     /// What was said of it at import.
     #[serde(flatten)]
-    pub facts: PairFacts,
+    pub attributes: PairAttributes,
     /// Where its job stands.
     pub status: JobStatus,
     /// Next stage; `None` when done.

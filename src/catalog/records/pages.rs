@@ -35,7 +35,7 @@ impl ResultPages<'_> {
         let Some(last) = page.last() else {
             return Ok(None);
         };
-        self.after = Some(last.facts.name.clone());
+        self.after = Some(last.attributes.name.clone());
         Ok(Some(page))
     }
 }

@@ -10,7 +10,7 @@ use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::counters::Counts;
+use crate::catalog::queue::counters::JobCounts;
 use crate::catalog::records::import;
 use crate::catalog::records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairDetail, PairResults, ReviewerVerdict, StageRecord,
@@ -43,11 +43,11 @@ WHERE p.name = ?1";
 pub(crate) const FAILED: &str = "
 SELECT p.name, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at
 FROM job AS j JOIN pair AS p ON p.id = j.pair JOIN failure AS f ON f.pair = j.pair
-WHERE j.status IN (4, 5) AND j.status = 4 ORDER BY p.name LIMIT ?1";
+WHERE j.status = 4 ORDER BY p.name LIMIT ?1";
 
 pub(crate) const FAILED_BY_CLASS: &str = "
 SELECT f.class, count(*) FROM job AS j JOIN failure AS f ON f.pair = j.pair
-WHERE j.status IN (4, 5) AND j.status = 4 GROUP BY f.class";
+WHERE j.status = 4 GROUP BY f.class";
 
 impl Catalog {
     /// The next pairs after a name, in the order of names, at most `limit`; empty at the end.
@@ -104,7 +104,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let found = sqlx::query(FAILED)
             .bind(limit as i64)
             .fetch_all(&mut *conn)
@@ -128,7 +128,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let found = sqlx::query(FAILED_BY_CLASS).fetch_all(&mut *conn).await?;
         let mut counts = found
             .iter()
@@ -172,7 +172,7 @@ fn pair_results(
 ) -> Result<PairResults> {
     let truth: Option<String> = row.try_get("truth")?;
     Ok(PairResults {
-        facts: import::facts(row)?,
+        attributes: import::attributes(row)?,
         status: rows::status(row.try_get("status")?)?,
         next_stage: rows::next_stage(cursor)?,
         failure: stored_failure(row)?,
@@ -272,7 +272,7 @@ async fn attempts(conn: &mut SqliteConnection, pair: i64) -> Result<Vec<AttemptR
 }
 
 /// Jobs by status from the counters.
-pub(crate) fn by_status(counts: &Counts) -> BTreeMap<JobStatus, u64> {
+pub(crate) fn by_status(counts: &JobCounts) -> BTreeMap<JobStatus, u64> {
     let mut jobs: BTreeMap<_, _> = JobStatus::ALL
         .into_iter()
         .map(|status| (status, 0))

@@ -12,9 +12,9 @@ use crate::catalog::db::script::Script;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::checkpoint;
 use crate::catalog::queue::claim::PairSelection;
-use crate::catalog::queue::lease::{InputSeen, InputsSeen, Lease};
+use crate::catalog::queue::lease::{InputVersion, InputVersions, Lease};
 use crate::catalog::records::import;
-use crate::catalog::records::model::{PairFacts, StageRecord};
+use crate::catalog::records::model::{PairAttributes, StageRecord};
 use crate::catalog::records::stage_results;
 use crate::domain::{ContentHash, PairId, Stage};
 
@@ -22,9 +22,9 @@ use crate::domain::{ContentHash, PairId, Stage};
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairWork {
     /// As imported.
-    pub facts: PairFacts,
+    pub attributes: PairAttributes,
     /// What the manifest says that results depend on; stored with each result.
-    pub facts_text: String,
+    pub attributes_json: String,
     /// Results of the stages behind it, in order; none missing.
     pub results: Vec<StageRecord>,
 }
@@ -37,15 +37,15 @@ pub struct KnownInputs {
     /// Path of the mesh as stored.
     pub mesh_path: String,
     /// The mesh as last read.
-    pub mesh: Option<InputSeen>,
+    pub mesh: Option<InputVersion>,
     /// Path of the print as stored.
     pub print_path: String,
     /// The print as last read.
-    pub print: Option<InputSeen>,
+    pub print: Option<InputVersion>,
 }
 
 pub(crate) const LEASED: &str = "
-SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.facts
+SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.attributes
 FROM json_each(?1) AS wanted CROSS JOIN pair AS p ON p.id = wanted.value";
 
 /// Pairs of which at least one file has been read, in pages by number.
@@ -63,7 +63,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses or holds what it must not.
     pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let wanted = rows::array(leases.iter().map(|lease| lease.pair.0));
         let leased = sqlx::query(LEASED).bind(wanted.to_string());
         let leased = leased.fetch_all(&mut *conn).await?;
@@ -98,7 +98,7 @@ impl Catalog {
         limit: usize,
         among: Option<&PairSelection>,
     ) -> Result<Vec<KnownInputs>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let after = after.map_or(0, |pair| pair.0);
         let query = match among {
             None => sqlx::query(INPUTS).bind(after).bind(limit as i64),
@@ -115,8 +115,8 @@ impl Catalog {
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn store_inputs(&self, seen: Vec<(PairId, InputsSeen)>) -> Result<()> {
-        self.alone(move |conn| {
+    pub async fn store_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut script = Script::default();
                 checkpoint::store_inputs(&mut script, &seen)?;
@@ -134,18 +134,20 @@ fn gone(pair: PairId) -> CatalogError {
 
 fn work_of(row: &SqliteRow, results: Vec<StageRecord>) -> Result<PairWork> {
     Ok(PairWork {
-        facts: import::facts(row)?,
-        facts_text: row.try_get("facts")?,
+        attributes: import::attributes(row)?,
+        attributes_json: row.try_get("attributes")?,
         results,
     })
 }
 
 pub(crate) fn known_inputs(row: &SqliteRow) -> Result<KnownInputs> {
-    let seen = |hash: &str, stat: &str| -> Result<Option<InputSeen>> {
+    let seen = |hash: &str, stat: &str| -> Result<Option<InputVersion>> {
         let hash: Option<Vec<u8>> = row.try_get(hash)?;
         let hash: Option<ContentHash> = rows::hash_option(hash.as_deref())?;
         let stat: Option<String> = row.try_get(stat)?;
-        Ok(hash.zip(stat).map(|(hash, stat)| InputSeen { hash, stat }))
+        Ok(hash
+            .zip(stat)
+            .map(|(hash, stat)| InputVersion { hash, stat }))
     };
     Ok(KnownInputs {
         pair: PairId(row.try_get("id")?),

@@ -87,46 +87,46 @@ pub struct AttentionCheckAnswer {
 }
 
 const INSERT_CONTROL: &str = "
-INSERT INTO control_answer (event, pair, metric, result_hash, kind, control, seen, shown_ms, angle_read_deg,
-    verdict, reader, reason, note, at)
+INSERT INTO attention_check_answer (event, pair, metric, result_hash, kind, attention_check, seen, shown_ms, angle_read_deg,
+    verdict, reviewer, reason, note, at)
 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14)";
 
 /// Whether this number of the client is taken.
 const KNOWN: &str = "
-SELECT EXISTS (SELECT 1 FROM verdict WHERE event = ?1) OR EXISTS (SELECT 1 FROM control_answer WHERE event = ?1)";
+SELECT EXISTS (SELECT 1 FROM verdict WHERE event = ?1) OR EXISTS (SELECT 1 FROM attention_check_answer WHERE event = ?1)";
 
 const ANSWERS: &str = "
-SELECT coalesce(v.event, 'act-' || v.act) AS event, p.name, v.result_hash AS hash, 0 AS is_control,
+SELECT coalesce(v.event, 'act-' || v.act) AS event, p.name, v.result_hash AS hash, 0 AS is_check,
     v.verdict, v.reason, v.note, v.at, v.id
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair
-WHERE v.reader = ?1 AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
+WHERE v.reviewer = ?1 AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 UNION ALL
 SELECT c.event, p.name, c.seen, 1, c.verdict, c.reason, c.note, c.at, c.id
-FROM control_answer AS c JOIN pair AS p ON p.id = c.pair
-WHERE c.reader = ?1 AND NOT EXISTS (SELECT 1 FROM control_undo AS u WHERE u.answer = c.id)
-ORDER BY v.at, is_control, v.id";
+FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair
+WHERE c.reviewer = ?1 AND NOT EXISTS (SELECT 1 FROM attention_check_undo AS u WHERE u.answer = c.id)
+ORDER BY v.at, is_check, v.id";
 
 const CONTROLS: &str = "
-SELECT c.event, p.name, c.metric, c.result_hash, c.control, c.seen, c.shown_ms, c.angle_read_deg, NULL AS queue,
-    c.verdict, c.reader, c.reason, c.note, c.at, u.at AS undone_at
-FROM control_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN control_undo AS u ON u.answer = c.id
+SELECT c.event, p.name, c.metric, c.result_hash, c.attention_check, c.seen, c.shown_ms, c.angle_read_deg, NULL AS review_order,
+    c.verdict, c.reviewer, c.reason, c.note, c.at, u.at AS undone_at
+FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN attention_check_undo AS u ON u.answer = c.id
 ORDER BY c.id";
 
 /// Takes back the answer of a number, by its reviewer only; once.
 const UNDO: [&str; 3] = [
     "INSERT INTO verdict_undo (act, at) SELECT DISTINCT act, ?3 FROM verdict
-        WHERE coalesce(event, 'act-' || act) = ?1 AND reader = ?2 ON CONFLICT DO NOTHING",
-    "INSERT INTO control_undo (answer, at) SELECT id, ?3 FROM control_answer
-        WHERE event = ?1 AND reader = ?2 ON CONFLICT DO NOTHING",
+        WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
+    "INSERT INTO attention_check_undo (answer, at) SELECT id, ?3 FROM attention_check_answer
+        WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
     "INSERT INTO manual_alignment_undo (alignment, at) SELECT id, ?3 FROM manual_alignment
-        WHERE event = ?1 AND reader = ?2 ON CONFLICT DO NOTHING",
+        WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
 ];
 
 /// Whether there is something of this number and reviewer to take back, taken back already or not.
 const IS_THERE: &str = "
-SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 AND reader = ?2)
-    OR EXISTS (SELECT 1 FROM control_answer WHERE event = ?1 AND reader = ?2)
-    OR EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1 AND reader = ?2)";
+SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2)
+    OR EXISTS (SELECT 1 FROM attention_check_answer WHERE event = ?1 AND reviewer = ?2)
+    OR EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1 AND reviewer = ?2)";
 
 impl Catalog {
     /// Appends an answer to what was shown, which may be no current result any more. It is on the disk when this
@@ -136,7 +136,7 @@ impl Catalog {
     /// # Errors
     /// When there is no such pair, nothing was shown, or the database refuses.
     pub async fn answer(&self, given: NewVerdict, shown: Shown, now: UnixMillis) -> Result<bool> {
-        self.alone(move |conn| {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let event = given.look.event.as_deref();
                 if is_known(conn, event).await? {
@@ -179,7 +179,7 @@ impl Catalog {
     /// When the reviewer did nothing under this number.
     pub async fn take_back(&self, event: &str, reviewer: &str, now: UnixMillis) -> Result<()> {
         let (event, reviewer) = (event.to_owned(), reviewer.to_owned());
-        self.alone(move |conn| {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let is_there: bool = sqlx::query_scalar(IS_THERE)
                     .bind(&event)
@@ -208,7 +208,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let found = sqlx::query(ANSWERS)
             .bind(reviewer)
             .fetch_all(&mut *conn)
@@ -221,7 +221,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let found = sqlx::query(CONTROLS).fetch_all(&mut *conn).await?;
         found.iter().map(check_answer).collect()
     }
@@ -231,7 +231,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn review_key(&self) -> Result<ContentHash> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         let key: Vec<u8> = sqlx::query_scalar("SELECT key FROM review_key")
             .fetch_one(&mut *conn)
             .await?;
@@ -286,7 +286,7 @@ fn answer(row: &SqliteRow) -> Result<Answer> {
     Ok(Answer {
         event: row.try_get("event")?,
         pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
-        on: if row.try_get("is_control")? {
+        on: if row.try_get("is_check")? {
             AnsweredOn::Check(hash)
         } else {
             AnsweredOn::Result(hash)
@@ -303,9 +303,9 @@ fn check_answer(row: &SqliteRow) -> Result<AttentionCheckAnswer> {
         pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
         metric: rows::name(&row.try_get::<String, _>("metric")?)?,
         result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
-        check: serde_json::from_str(&row.try_get::<String, _>("control")?)?,
+        check: serde_json::from_str(&row.try_get::<String, _>("attention_check")?)?,
         verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-        reviewer: row.try_get("reader")?,
+        reviewer: row.try_get("reviewer")?,
         reason: reason(row)?,
         note: row.try_get("note")?,
         look: Look::read(row)?,

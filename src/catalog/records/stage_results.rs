@@ -12,9 +12,9 @@ use crate::domain::{ContentHash, ThresholdMetric};
 
 pub(crate) const STAGE_RESULTS: &str = "
 SELECT r.pair, r.stage, r.mesh_hash, r.print_hash, r.outcome, r.files, r.result_hash, r.ms, r.at,
-    recipe.hash AS recipe_hash, recipe.fields AS recipe_fields
+    fingerprint.hash AS fingerprint_hash, fingerprint.fields AS fingerprint_fields
 FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value
-    CROSS JOIN recipe ON recipe.id = r.recipe
+    CROSS JOIN fingerprint ON fingerprint.id = r.fingerprint
 ORDER BY r.pair, r.stage";
 
 pub(crate) const METRIC_HASHES: &str = "
@@ -47,8 +47,8 @@ fn record(row: &sqlx::sqlite::SqliteRow) -> Result<StageRecord> {
         outcome: serde_json::from_str(&row.try_get::<String, _>("outcome")?)?,
         files: serde_json::from_str(&row.try_get::<String, _>("files")?)?,
         result_hash: hash("result_hash")?,
-        recipe_hash: hash("recipe_hash")?,
-        recipe_fields: serde_json::from_str(&row.try_get::<String, _>("recipe_fields")?)?,
+        fingerprint_hash: hash("fingerprint_hash")?,
+        fingerprint_fields: serde_json::from_str(&row.try_get::<String, _>("fingerprint_fields")?)?,
         mesh_hash: hash("mesh_hash")?,
         print_hash: rows::hash_option(print.as_deref())?,
         ms: row.try_get::<i64, _>("ms")?.unsigned_abs(),

@@ -8,8 +8,8 @@ use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::alike;
-use crate::catalog::queue::counters::{Counts, KEPT, counts};
-use crate::catalog::queue::fingerprint::Recipes;
+use crate::catalog::queue::counters::{JobCounts, KEPT, counts};
+use crate::catalog::queue::fingerprint::Fingerprints;
 use crate::catalog::records::model::{StageCounts, StatusCounts};
 use crate::catalog::records::pair_results;
 use crate::domain::{JobStatus, Stage, Verdict};
@@ -20,19 +20,20 @@ SELECT v.verdict, count(*) FROM verdict AS v
     JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric AND m.result_hash = v.result_hash
 WHERE v.id = (
     SELECT max(n.id) FROM verdict AS n
-    WHERE n.pair = v.pair AND n.metric = v.metric AND n.reader = v.reader AND n.result_hash = v.result_hash
+    WHERE n.pair = v.pair AND n.metric = v.metric AND n.reviewer = v.reviewer AND n.result_hash = v.result_hash
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act))
 GROUP BY v.verdict";
 
 /// Finished pairs with a metric that is unsure of itself.
-pub(crate) const DOUBTFUL: &str = "SELECT count(*) FROM job WHERE doubtful = 1 AND status = 3";
+pub(crate) const LOW_CONFIDENCE: &str =
+    "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
 
 impl Catalog {
-    /// Counts for `status`; `recipes` are the current ones, to tell what is stale.
+    /// Counts for `status`; `fingerprints` are the current ones, to tell what is stale.
     ///
     /// # Errors
     /// When the database refuses.
-    pub async fn status(&self, recipes: &Recipes) -> Result<StatusCounts> {
+    pub async fn status(&self, fingerprints: &Fingerprints) -> Result<StatusCounts> {
         let mut conn = self.snapshot().await?;
         let counted = counts(&mut conn, KEPT).await?;
         Ok(StatusCounts {
@@ -40,8 +41,8 @@ impl Catalog {
             pairs: counted.values().sum(),
             jobs: pair_results::by_status(&counted),
             stages: by_stage(&counted),
-            stale: alike::stale(&mut conn, recipes).await?,
-            doubtful: sqlx::query_scalar::<_, i64>(DOUBTFUL)
+            stale: alike::stale(&mut conn, fingerprints).await?,
+            low_confidence: sqlx::query_scalar::<_, i64>(LOW_CONFIDENCE)
                 .fetch_one(&mut *conn)
                 .await?
                 .unsigned_abs(),
@@ -51,7 +52,7 @@ impl Catalog {
 }
 
 /// Pairs by stage from the counters. A pair that failed at a stage is still pending at the later ones.
-fn by_stage(counted: &Counts) -> BTreeMap<Stage, StageCounts> {
+fn by_stage(counted: &JobCounts) -> BTreeMap<Stage, StageCounts> {
     let mut stages: BTreeMap<_, _> = Stage::ALL
         .into_iter()
         .map(|stage| (stage, StageCounts::default()))
@@ -61,13 +62,12 @@ fn by_stage(counted: &Counts) -> BTreeMap<Stage, StageCounts> {
             let index = stage.index() as i64;
             match status {
                 _ if *cursor > index => count.done += n,
-                JobStatus::Quarantined | JobStatus::Held if *cursor == index => count.failed += n,
+                JobStatus::Quarantined if *cursor == index => count.failed += n,
                 JobStatus::Ready
                 | JobStatus::Leased
                 | JobStatus::Backoff
                 | JobStatus::Done
-                | JobStatus::Quarantined
-                | JobStatus::Held => count.pending += n,
+                | JobStatus::Quarantined => count.pending += n,
             }
         }
     }

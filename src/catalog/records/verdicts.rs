@@ -86,25 +86,25 @@ SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
 WHERE p.name = ?1 ORDER BY m.metric";
 
 const INSERT: &str = "
-INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, reason, note, at,
-    event, seen, shown_ms, angle_read_deg, queue)
+INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, reason, note, at,
+    event, seen, shown_ms, angle_read_deg, review_order)
 SELECT coalesce(?1, (SELECT coalesce(max(id), 0) + 1 FROM verdict)), ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14
 WHERE ?10 IS NULL OR NOT EXISTS (SELECT 1 FROM verdict WHERE event = ?10 AND metric = ?3)
 RETURNING act";
 
 /// Lines of the log of one act, or of one pair, or all.
 const LOG: &str = "
-SELECT v.id, v.act, p.name, v.metric, v.result_hash, v.verdict, v.reader, v.reason, v.note, v.at,
-    v.event, v.seen, v.shown_ms, v.angle_read_deg, v.queue, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, 0) AS current
+SELECT v.id, v.act, p.name, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
+    v.event, v.seen, v.shown_ms, v.angle_read_deg, v.review_order, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, 0) AS current
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act
     LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
 WHERE (?1 IS NULL OR v.act = ?1) AND (?2 IS NULL OR p.name = ?2) ORDER BY v.id";
 
 pub(crate) const COUNTED: &str = "
-SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reader, v.reason, v.queue
+SELECT v.pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.review_order
 FROM json_each(?1) AS wanted CROSS JOIN verdict AS v ON v.pair = wanted.value
 WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
-ORDER BY v.pair, v.metric, v.reader, v.id";
+ORDER BY v.pair, v.metric, v.reviewer, v.id";
 
 impl Catalog {
     /// Appends verdicts on the current results, all or none. Those that are there already by the client's number are
@@ -113,7 +113,7 @@ impl Catalog {
     /// # Errors
     /// When a pair is not there or has no result; then nothing is stored.
     pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
-        self.alone(move |conn| {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut stored = 0;
                 for verdict in &verdicts {
@@ -136,10 +136,10 @@ impl Catalog {
         now: UnixMillis,
     ) -> Result<Vec<VerdictEvent>> {
         let reviewer = reviewer.map(str::to_owned);
-        self.alone(move |conn| {
+        self.in_transaction(move |conn| {
             Box::pin(async move {
                 let act: Option<i64> = sqlx::query_scalar(
-                    "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reader = ?1)
+                    "SELECT max(v.act) FROM verdict AS v WHERE (?1 IS NULL OR v.reviewer = ?1)
                         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)",
                 )
                 .bind(&reviewer)
@@ -170,7 +170,7 @@ impl Catalog {
     /// # Errors
     /// When the database refuses.
     pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
-        let mut conn = self.reader().await?;
+        let mut conn = self.read_conn().await?;
         log(&mut conn, pair).await
     }
 }
@@ -256,7 +256,7 @@ fn event(row: &SqliteRow) -> Result<VerdictEvent> {
         metric: rows::name(&row.try_get::<String, _>("metric")?)?,
         result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
         verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-        reviewer: row.try_get("reader")?,
+        reviewer: row.try_get("reviewer")?,
         reason: reason.map(|reason| rows::name(&reason)).transpose()?,
         note: row.try_get("note")?,
         look: Look::read(row)?,
@@ -279,11 +279,11 @@ pub(crate) async fn of_pairs(
     for row in &found {
         let metric = rows::name(&row.try_get::<String, _>("metric")?)?;
         let reason: Option<String> = row.try_get("reason")?;
-        let order: Option<String> = row.try_get("queue")?;
+        let order: Option<String> = row.try_get("review_order")?;
         let newest = Counted {
             result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
             verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-            reviewer: row.try_get("reader")?,
+            reviewer: row.try_get("reviewer")?,
             reason: reason.map(|reason| rows::name(&reason)).transpose()?,
             review_order: order.map(|order| rows::name(&order)).transpose()?,
         };

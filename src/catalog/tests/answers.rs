@@ -281,12 +281,12 @@ async fn the_database_itself_refuses_to_change_answers_and_alignments() {
             .expect("taken back");
     }
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = open::writer(&path, false).await.expect("a connection");
+    let mut conn = open::write_conn(&path, false).await.expect("a connection");
     for sql in [
-        "UPDATE control_answer SET reader = 'bo'",
-        "DELETE FROM control_answer",
-        "UPDATE control_undo SET at = 9",
-        "DELETE FROM control_undo",
+        "UPDATE attention_check_answer SET reader = 'bo'",
+        "DELETE FROM attention_check_answer",
+        "UPDATE attention_check_undo SET at = 9",
+        "DELETE FROM attention_check_undo",
         "UPDATE manual_alignment SET iou = 1",
         "DELETE FROM manual_alignment",
         "UPDATE manual_alignment_undo SET at = 9",

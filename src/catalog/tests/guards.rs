@@ -1,9 +1,10 @@
 //! What breaks other queues, each by name: late workers, worn-out identities, busy databases, jumping clocks.
 
-use super::{World, done, enter, inputs, name, recipes, register, row};
+use super::{World, done, enter, fingerprints, inputs, name, register, row};
 use crate::catalog::db::open;
 use crate::catalog::{
-    Again, Catalog, ClaimRequest, Dead, Kept, Lease, RecipeIds, Sentence, StageFailed,
+    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction, FingerprintIds, Lease,
+    RerunPolicy, StageFailure,
 };
 use crate::domain::{CRASH_LIMIT, Failure, FailureClass, JobStatus, PairId, Stage, WorkerId};
 
@@ -12,13 +13,13 @@ async fn status(world: &World) -> JobStatus {
     detail.expect("the pair").results.status
 }
 
-fn failed(recipes: RecipeIds, sentence: Sentence) -> StageFailed {
-    StageFailed {
+fn failed(fingerprints: FingerprintIds, action: FailureAction) -> StageFailure {
+    StageFailure {
         stage: Stage::Fit,
         failure: Failure::new(FailureClass::Io, "the disk is slow"),
-        sentence,
-        recipe: recipes.of(Stage::Fit),
-        facts: done(recipes, Stage::Fit).facts,
+        action,
+        fingerprint: fingerprints.of(Stage::Fit),
+        attributes: done(fingerprints, Stage::Fit).attributes,
         inputs: inputs(Stage::Fit),
         ms: None,
         at: 50,
@@ -33,10 +34,10 @@ async fn a_reused_worker_identity_cannot_complete() {
     let first = register(&world.catalog).await;
     let lease = world.claim_as(first, 1).await.remove(0);
     let me = world.worker;
-    let rescued = world.catalog.rescue(Dead::AllBut(me), 60).await;
-    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let recovered = world.catalog.recover(DeadWorker::AllExcept(me), 60).await;
+    assert_eq!(recovered.expect("a recovery").ready, 1);
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = open::writer(&path, false).await.expect("a connection");
+    let mut conn = open::write_conn(&path, false).await.expect("a connection");
     let removed = sqlx::query("DELETE FROM worker WHERE id = ?1").bind(first.0);
     removed.execute(&mut conn).await.expect("removed");
 
@@ -44,23 +45,23 @@ async fn a_reused_worker_identity_cannot_complete() {
     assert!(second > first, "{second:?} again");
     assert_eq!(world.claim_alone(second).await.len(), 1);
     let late = world.catalog.checkpoint(lease, world.done(Stage::Fit));
-    assert!(matches!(late.await, Ok(Kept::Lost)));
+    assert!(matches!(late.await, Ok(CheckpointOutcome::LeaseLost)));
     assert_eq!(status(&world).await, JobStatus::Leased);
 }
 
 /// The older and the newer lease of a pair that hung under a worker, was taken back by others, and came to the same
-/// worker again, which lives: pair, worker, status and sign of life are what they were, and only the epoch tells.
+/// worker again, which lives: pair, worker, status and sign of life are what they were, and only the token tells.
 async fn taken_twice(world: &World) -> [Lease; 2] {
     let late = world.claim(1).await.remove(0);
-    let beat = world.catalog.beat(world.worker, 5_000, 0).await;
-    assert!(beat.expect("an answer"));
+    let heartbeat = world.catalog.heartbeat(world.worker, 5_000, 0).await;
+    assert!(heartbeat.expect("an answer"));
     let other = register(&world.catalog).await;
-    let overdue = world.catalog.rescue_overdue(other, 60, 70).await;
-    assert_eq!(overdue.expect("a rescue").ready, 1);
+    let overdue = world.catalog.recover_overdue(other, 60, 70).await;
+    assert_eq!(overdue.expect("a recovery").ready, 1);
     let again = world.claim_alone(world.worker).await.remove(0);
     assert_eq!(
-        (again.pair(), again.cursor(), again.epoch()),
-        (late.pair(), late.cursor(), late.epoch() + 2)
+        (again.pair(), again.cursor(), again.token()),
+        (late.pair(), late.cursor(), late.token() + 2)
     );
     [late, again]
 }
@@ -70,14 +71,14 @@ async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothi
     let world = World::new(1).await;
     let [late, again] = taken_twice(&world).await;
     let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
-    assert!(matches!(kept, Ok(Kept::Lost)));
+    assert!(matches!(kept, Ok(CheckpointOutcome::LeaseLost)));
     // Nor has it moved the job on.
     world.counters_hold().await;
     let kept = world
         .catalog
         .checkpoint(again, world.done(Stage::Fit))
         .await;
-    assert!(matches!(kept, Ok(Kept::Lease(_))));
+    assert!(matches!(kept, Ok(CheckpointOutcome::Lease(_))));
     world.counters_hold().await;
 }
 
@@ -87,7 +88,7 @@ async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothi
 async fn a_late_completion_beside_the_right_one_changes_nothing() {
     let world = World::new(2).await;
     let late = world.claim(1).await.remove(0);
-    let other = world.rescued_by_another(1).await;
+    let other = world.recovered_by_another(1).await;
     assert_eq!(world.claim_as(other, 1).await.len(), 1);
     let lease = world.claim_alone(other).await.remove(0);
     let mut lost = world.done(Stage::Fit);
@@ -97,8 +98,8 @@ async fn a_late_completion_beside_the_right_one_changes_nothing() {
         world.catalog.checkpoint(late, lost),
         world.catalog.checkpoint(lease, world.done(Stage::Fit)),
     );
-    assert!(matches!(lost, Ok(Kept::Lost)), "{lost:?}");
-    assert!(matches!(kept, Ok(Kept::Lease(_))), "{kept:?}");
+    assert!(matches!(lost, Ok(CheckpointOutcome::LeaseLost)), "{lost:?}");
+    assert!(matches!(kept, Ok(CheckpointOutcome::Lease(_))), "{kept:?}");
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     let stages = detail.expect("the pair").results.stages;
     assert_eq!(stages[0].outcome, serde_json::json!({}));
@@ -109,7 +110,7 @@ async fn a_late_completion_beside_the_right_one_changes_nothing() {
 async fn a_late_failure_under_an_older_lease_of_the_same_worker_changes_nothing() {
     let world = World::new(1).await;
     let [late, again] = taken_twice(&world).await;
-    let quarantine = || failed(world.recipes, Sentence::Quarantine);
+    let quarantine = || failed(world.fingerprints, FailureAction::Quarantine);
     assert!(
         !world
             .catalog
@@ -145,10 +146,10 @@ async fn a_worker_that_ended_completes_and_claims_nothing() {
     let ended = world.catalog.end_worker(world.worker, 50).await;
     ended.expect("ended");
     let late = world.catalog.checkpoint(lease, world.done(Stage::Fit));
-    assert!(matches!(late.await, Ok(Kept::Lost)));
+    assert!(matches!(late.await, Ok(CheckpointOutcome::LeaseLost)));
     assert!(world.claim(1).await.is_empty());
-    let beat = world.catalog.beat(world.worker, 51, 0).await;
-    assert!(!beat.expect("an answer"));
+    let heartbeat = world.catalog.heartbeat(world.worker, 51, 0).await;
+    assert!(!heartbeat.expect("an answer"));
 }
 
 /// The worker's last sign of life was at 1; nobody has taken its leases back yet.
@@ -160,14 +161,14 @@ async fn a_beat_or_completion_after_the_lease_is_over_is_refused() {
     let mut late = world.done(Stage::Fit);
     late.alive_since = 2;
     let kept = world.catalog.checkpoint(first, late).await;
-    assert!(matches!(kept, Ok(Kept::Lost)));
-    let late = StageFailed {
+    assert!(matches!(kept, Ok(CheckpointOutcome::LeaseLost)));
+    let late = StageFailure {
         alive_since: 2,
-        ..failed(world.recipes, Sentence::Quarantine)
+        ..failed(world.fingerprints, FailureAction::Quarantine)
     };
     assert!(!world.catalog.fail(second, late).await.expect("an answer"));
-    let beat = world.catalog.beat(world.worker, 90, 2).await;
-    assert!(!beat.expect("an answer"));
+    let heartbeat = world.catalog.heartbeat(world.worker, 90, 2).await;
+    assert!(!heartbeat.expect("an answer"));
     let request = ClaimRequest {
         alive_since: 2,
         ..ClaimRequest::new(world.worker, 1, 1_000)
@@ -182,8 +183,8 @@ async fn a_beat_or_completion_after_the_lease_is_over_is_refused() {
     );
     assert_eq!(status(&world).await, JobStatus::Leased);
     // In time, all of it is taken.
-    let beat = world.catalog.beat(world.worker, 90, 1).await;
-    assert!(beat.expect("an answer"));
+    let heartbeat = world.catalog.heartbeat(world.worker, 90, 1).await;
+    assert!(heartbeat.expect("an answer"));
     assert_eq!(world.claim(1).await.len(), 1);
     world.counters_hold().await;
 }
@@ -193,7 +194,7 @@ async fn a_beat_or_completion_after_the_lease_is_over_is_refused() {
 async fn busy_reaches_no_caller() {
     let world = World::new(80).await;
     let path = world.dir.path().join("catalog.sqlite");
-    let recipes = world.recipes;
+    let fingerprints = world.fingerprints;
     let worker = |catalog: Catalog| async move {
         let worker = register(&catalog).await;
         let mut done = 0;
@@ -203,11 +204,13 @@ async fn busy_reaches_no_caller() {
                 return done;
             };
             let stage = lease.cursor();
-            let kept = catalog.checkpoint(lease, super::done(recipes, stage)).await;
-            let Kept::Lease(lease) = kept.expect("stored") else {
+            let kept = catalog
+                .checkpoint(lease, super::done(fingerprints, stage))
+                .await;
+            let CheckpointOutcome::Lease(lease) = kept.expect("stored") else {
                 panic!("the first of four stages")
             };
-            let fail = failed(recipes, Sentence::Quarantine);
+            let fail = failed(fingerprints, FailureAction::Quarantine);
             assert!(catalog.fail(lease, fail).await.expect("stored"));
             done += 1;
         }
@@ -244,21 +247,21 @@ async fn a_failure_that_may_pass_is_not_stranded_by_a_death() {
         let worker = register(&world.catalog).await;
         let lease = world.claim_as(worker, 1).await.remove(0);
         assert_eq!(lease.attempt(), attempt);
-        let back_off = failed(world.recipes, Sentence::BackOff { run_at: 2_000 });
+        let back_off = failed(world.fingerprints, FailureAction::BackOff { run_at: 2_000 });
         assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
         let next = register(&world.catalog).await;
-        let rescued = world.catalog.rescue(Dead::AllBut(next), 60).await;
-        assert_eq!(rescued.expect("a rescue").ready, 0);
+        let recovered = world.catalog.recover(DeadWorker::AllExcept(next), 60).await;
+        assert_eq!(recovered.expect("a recovery").ready, 0);
         assert_eq!(status(&world).await, JobStatus::Backoff);
-        let due = world.catalog.stage_due(2_000, 60_000).await;
+        let due = world.catalog.release_due_backoffs(2_000, 60_000).await;
         assert_eq!(due.expect("stored"), 1);
     }
     // A crash is no try: the failure keeps all it may have.
     let worker = register(&world.catalog).await;
     assert_eq!(world.claim_as(worker, 1).await[0].attempt(), 3);
     let next = register(&world.catalog).await;
-    let rescued = world.catalog.rescue(Dead::AllBut(next), 60).await;
-    assert_eq!(rescued.expect("a rescue").ready, 1);
+    let recovered = world.catalog.recover(DeadWorker::AllExcept(next), 60).await;
+    assert_eq!(recovered.expect("a recovery").ready, 1);
     let again = world.claim_alone(next).await;
     assert_eq!((again[0].attempt(), again[0].crashes()), (3, 1));
 }
@@ -268,8 +271,8 @@ async fn a_failure_that_may_pass_is_not_stranded_by_a_death() {
 async fn a_clock_that_jumps_strands_nothing_and_robs_nobody() {
     const YEARS: i64 = 100_000_000_000;
     let world = World::new(3).await;
-    let past = enter(&world.catalog, world.recipes, 5).await;
-    let future = enter(&world.catalog, world.recipes, YEARS).await;
+    let past = enter(&world.catalog, world.fingerprints, 5).await;
+    let future = enter(&world.catalog, world.fingerprints, YEARS).await;
     let mut leases = Vec::new();
     for (worker, clock) in [(past, 5), (future, YEARS)] {
         let request = ClaimRequest {
@@ -277,31 +280,34 @@ async fn a_clock_that_jumps_strands_nothing_and_robs_nobody() {
             ..ClaimRequest::new(worker, 1, clock + 10)
         };
         leases.extend(world.catalog.claim(request).await.expect("a claim"));
-        let beat = world.catalog.beat(worker, clock + 20, clock - 30).await;
-        assert!(beat.expect("an answer"));
+        let heartbeat = world
+            .catalog
+            .heartbeat(worker, clock + 20, clock - 30)
+            .await;
+        assert!(heartbeat.expect("an answer"));
     }
     for (me, now) in [(past, 25), (future, YEARS + 20)] {
-        let overdue = world.catalog.rescue_overdue(me, 60, now).await;
-        assert_eq!(overdue.expect("a rescue").ready, 0);
+        let overdue = world.catalog.recover_overdue(me, 60, now).await;
+        assert_eq!(overdue.expect("a recovery").ready, 0);
     }
     for (lease, clock) in leases.into_iter().zip([5, YEARS]) {
         let mut done = world.done(Stage::Fit);
         (done.at, done.alive_since) = (clock + 20, clock - 30);
         let kept = world.catalog.checkpoint(lease, done).await;
-        assert!(matches!(kept, Ok(Kept::Lease(_))));
+        assert!(matches!(kept, Ok(CheckpointOutcome::Lease(_))));
     }
     // What the future put off is tried by the past.
     let lease = world.claim_as(future, 1).await.remove(0);
     let run_at = YEARS + 1_000;
-    let back_off = failed(world.recipes, Sentence::BackOff { run_at });
+    let back_off = failed(world.fingerprints, FailureAction::BackOff { run_at });
     assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
-    let due = world.catalog.stage_due(25, 90_000).await;
+    let due = world.catalog.release_due_backoffs(25, 90_000).await;
     assert_eq!(due.expect("stored"), 1);
     world.counters_hold().await;
 }
 
 /// A pair that killed its workers, and the worker that is there now.
-async fn condemned() -> (World, WorkerId) {
+async fn poisoned() -> (World, WorkerId) {
     let world = World::new(1).await;
     let mut me = world.worker;
     for crash in 0..CRASH_LIMIT {
@@ -312,22 +318,22 @@ async fn condemned() -> (World, WorkerId) {
         };
         assert_eq!(taken.len(), 1);
         me = register(&world.catalog).await;
-        let rescued = world.catalog.rescue(Dead::AllBut(me), 60).await;
-        let condemned = rescued.expect("a rescue").condemned;
+        let recovered = world.catalog.recover(DeadWorker::AllExcept(me), 60).await;
+        let poisoned = recovered.expect("a recovery").poisoned;
         let expected = (crash + 1 == CRASH_LIMIT).then_some(PairId(1));
-        assert_eq!(condemned, Vec::from_iter(expected));
+        assert_eq!(poisoned, Vec::from_iter(expected));
     }
     (world, me)
 }
 
 #[tokio::test]
 async fn a_pair_that_killed_its_workers_is_tried_again_with_other_settings() {
-    let (world, _) = condemned().await;
+    let (world, _) = poisoned().await;
     for (revision, sent) in [([1; 4], 0), ([1, 2, 1, 1], 0), ([2, 1, 1, 1], 1)] {
-        let recipes = recipes(revision);
+        let fingerprints = fingerprints(revision);
         let back = world
             .catalog
-            .send_back(&recipes, None, Again::Changed)
+            .requeue_stale(&fingerprints, None, RerunPolicy::Changed)
             .await;
         assert_eq!(back.expect("sent back"), sent);
     }
@@ -336,25 +342,25 @@ async fn a_pair_that_killed_its_workers_is_tried_again_with_other_settings() {
 
 #[tokio::test]
 async fn a_pair_that_killed_its_workers_is_tried_again_with_another_mesh() {
-    let (world, _) = condemned().await;
+    let (world, _) = poisoned().await;
     let seen = |text: &str| {
         let mut seen = inputs(Stage::Fit);
         let mesh = seen.mesh.as_mut().expect("a mesh");
         mesh.hash = crate::domain::ContentHash::of(text.as_bytes());
         vec![(PairId(1), seen)]
     };
-    let noted = world.catalog.note_fatal_inputs(seen("fatal")).await;
+    let noted = world.catalog.record_poisoned_inputs(seen("fatal")).await;
     noted.expect("stored");
-    let send_back = async || {
-        let recipes = recipes([1; 4]);
+    let requeue_stale = async || {
+        let fingerprints = fingerprints([1; 4]);
         let back = world
             .catalog
-            .send_back(&recipes, None, Again::Changed)
+            .requeue_stale(&fingerprints, None, RerunPolicy::Changed)
             .await;
         back.expect("sent back")
     };
-    assert_eq!(send_back().await, 0);
+    assert_eq!(requeue_stale().await, 0);
     let mended = world.catalog.store_inputs(seen("mended")).await;
     mended.expect("stored");
-    assert_eq!(send_back().await, 1);
+    assert_eq!(requeue_stale().await, 1);
 }

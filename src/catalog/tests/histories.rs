@@ -8,9 +8,12 @@ use rand_chacha::ChaCha8Rng;
 use sqlx::SqliteConnection;
 
 use super::model::{LEASE, Process, Queue};
-use super::{World, done, enter, inputs, recipes};
+use super::{World, done, enter, fingerprints, inputs};
 use crate::catalog::db::open;
-use crate::catalog::{ClaimRequest, Kept, Lease, RecipeIds, Recipes, Sentence, StageFailed};
+use crate::catalog::{
+    CheckpointOutcome, ClaimRequest, FailureAction, FingerprintIds, Fingerprints, Lease,
+    StageFailure,
+};
 use crate::domain::{Failure, FailureClass, Stage};
 
 /// Pairs at first, and at most.
@@ -27,9 +30,9 @@ struct Game {
     leases: Vec<Lease>,
     /// The wall clock that the next process and the back-offs look at; it jumps.
     wall: i64,
-    settings: (Recipes, RecipeIds),
+    settings: (Fingerprints, FingerprintIds),
     verdicts: Vec<i64>,
-    epochs: Vec<i64>,
+    tokens: Vec<i64>,
     seen: Seen,
 }
 
@@ -40,7 +43,7 @@ struct Seen {
     fenced: u32,
     /// Writes under a lease that is over, though nobody has taken it back.
     late: u32,
-    condemned: u32,
+    poisoned: u32,
     overdue: u64,
 }
 
@@ -48,9 +51,9 @@ impl Game {
     async fn new(seed: u64) -> Self {
         let world = World::new(PAIRS).await;
         let path = world.dir.path().join("catalog.sqlite");
-        let conn = open::writer(&path, false).await.expect("a connection");
+        let conn = open::write_conn(&path, false).await.expect("a connection");
         let mut game = Self {
-            settings: (recipes([1; 4]), world.recipes),
+            settings: (fingerprints([1; 4]), world.fingerprints),
             conn,
             world,
             dice: ChaCha8Rng::seed_from_u64(seed),
@@ -58,7 +61,7 @@ impl Game {
             leases: Vec::new(),
             wall: 10_000,
             verdicts: Vec::new(),
-            epochs: vec![0; MOST_PAIRS + 1],
+            tokens: vec![0; MOST_PAIRS + 1],
             seen: Seen::default(),
         };
         // The world's own worker takes no part.
@@ -78,15 +81,15 @@ impl Game {
             9..20 => self.checkpoint().await,
             20..23 => self.fail().await,
             23 => self.release().await,
-            24..27 => self.beat().await,
+            24..27 => self.heartbeat().await,
             27..30 => self.time_passes(),
             30 => self.join().await,
             31 => self.end().await,
             32 => self.crash(),
-            33 => self.rescue().await,
+            33 => self.recover().await,
             34 => self.take_over().await,
             35 => self.due().await,
-            36 => self.send_back().await,
+            36 => self.requeue_stale().await,
             37 => self.retry().await,
             38 => self.import().await,
             39 => self.poison().await,
@@ -120,15 +123,15 @@ impl Game {
 
     async fn join(&mut self) {
         self.wall += self.dice.random_range(-5_000..5_000);
-        let (recipes, clock) = (self.settings.1, self.wall);
+        let (fingerprints, clock) = (self.settings.1, self.wall);
         self.model.processes.push(Process {
-            worker: enter(&self.world.catalog, recipes, clock).await,
+            worker: enter(&self.world.catalog, fingerprints, clock).await,
             clock,
-            beat: clock,
+            heartbeat: clock,
             ended: false,
             died: false,
             running: true,
-            recipes,
+            fingerprints,
         });
     }
 
@@ -140,7 +143,7 @@ impl Game {
         }
     }
 
-    async fn beat(&mut self) {
+    async fn heartbeat(&mut self) {
         if let Some(index) = self.somebody() {
             self.beat_of(index).await;
         }
@@ -149,33 +152,37 @@ impl Game {
     async fn beat_of(&mut self, index: usize) {
         let process = &mut self.model.processes[index];
         let (now, since) = (process.clock, process.alive_since());
-        let beat = self.world.catalog.beat(process.worker, now, since).await;
-        assert_eq!(beat.expect("an answer"), process.is_alive());
+        let heartbeat = self
+            .world
+            .catalog
+            .heartbeat(process.worker, now, since)
+            .await;
+        assert_eq!(heartbeat.expect("an answer"), process.is_alive());
         if process.is_alive() {
-            process.beat = now;
+            process.heartbeat = now;
         }
     }
 
     async fn claim(&mut self) {
-        let (slots, alone) = (self.dice.random_range(1..3), self.is_likely(0.4));
+        let (slots, exclusive) = (self.dice.random_range(1..3), self.is_likely(0.4));
         if let Some(index) = self.somebody() {
-            self.claim_by(index, slots, alone).await;
+            self.claim_by(index, slots, exclusive).await;
         }
     }
 
-    async fn claim_by(&mut self, index: usize, slots: usize, alone: bool) {
+    async fn claim_by(&mut self, index: usize, slots: usize, exclusive: bool) {
         let process = self.model.processes[index];
         let deadline = process.clock + self.dice.random_range(0..LEASE / 2);
         let request = ClaimRequest {
-            alone,
+            exclusive,
             alive_since: process.alive_since(),
             ..ClaimRequest::new(process.worker, slots, deadline)
         };
         let taken = self.world.catalog.claim(request).await.expect("a claim");
-        let expected = self.model.claim(&process, slots, alone, deadline);
+        let expected = self.model.claim(&process, slots, exclusive, deadline);
         let found: Vec<_> = taken
             .iter()
-            .map(|lease| (lease.pair().0, lease.epoch()))
+            .map(|lease| (lease.pair().0, lease.token()))
             .collect();
         assert_eq!(found, expected);
         self.leases.extend(taken);
@@ -202,7 +209,7 @@ impl Game {
         } else {
             lease.cursor()
         };
-        let mut done = done(process.recipes, stage);
+        let mut done = done(process.fingerprints, stage);
         done.alive_since = process.alive_since();
         done.next_deadline = process.clock + self.dice.random_range(0..LEASE / 2);
         let before = self.dump(stands).await;
@@ -215,8 +222,8 @@ impl Game {
             .checkpoint(lease, done)
             .await
             .expect("an answer");
-        assert_eq!(stands, !matches!(kept, Kept::Lost));
-        if let Kept::Lease(lease) = kept {
+        assert_eq!(stands, !matches!(kept, CheckpointOutcome::LeaseLost));
+        if let CheckpointOutcome::Lease(lease) = kept {
             self.leases.push(lease);
         }
         assert_eq!(before, self.dump(stands).await);
@@ -229,17 +236,17 @@ impl Game {
         let (stands, process) = (self.stands(&lease), *self.process(&lease));
         let stage = lease.cursor();
         let run_at = self.wall + self.dice.random_range(0..LONGEST);
-        let sentence = match self.dice.random_range(0..3) {
-            0 => Sentence::BackOff { run_at },
-            1 => Sentence::Alone,
-            _ => Sentence::Quarantine,
+        let action = match self.dice.random_range(0..3) {
+            0 => FailureAction::BackOff { run_at },
+            1 => FailureAction::RetryExclusive,
+            _ => FailureAction::Quarantine,
         };
-        let failed = StageFailed {
+        let failed = StageFailure {
             stage,
             failure: Failure::new(FailureClass::Bug, "made up"),
-            sentence,
-            recipe: process.recipes.of(stage),
-            facts: done(process.recipes, stage).facts,
+            action,
+            fingerprint: process.fingerprints.of(stage),
+            attributes: done(process.fingerprints, stage).attributes,
             inputs: inputs(stage),
             ms: None,
             at: process.clock,
@@ -247,9 +254,9 @@ impl Game {
         };
         let before = self.dump(stands).await;
         if stands {
-            let back_off = (sentence == Sentence::BackOff { run_at }).then_some(run_at);
+            let back_off = (action == FailureAction::BackOff { run_at }).then_some(run_at);
             self.model
-                .fail(&lease, back_off, sentence == Sentence::Alone);
+                .fail(&lease, back_off, action == FailureAction::RetryExclusive);
         }
         let kept = self
             .world
@@ -289,9 +296,9 @@ async fn random_histories_leave_the_catalog_as_the_model_says() {
         }
         all.fenced += game.seen.fenced;
         all.late += game.seen.late;
-        all.condemned += game.seen.condemned;
+        all.poisoned += game.seen.poisoned;
         all.overdue += game.seen.overdue;
     }
     assert!(all.fenced > 50 && all.late > 10, "{all:?}");
-    assert!(all.condemned > 0 && all.overdue > 0, "{all:?}");
+    assert!(all.poisoned > 0 && all.overdue > 0, "{all:?}");
 }

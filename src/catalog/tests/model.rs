@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::catalog::{Again, Lease, RecipeIds};
-use crate::domain::{
-    Event, JobState, JobStatus, Stage, UnixMillis, WorkerId, is_condemned, transition,
-};
+use super::state_machine::{Event, JobState, transition};
+use crate::catalog::{FingerprintIds, Lease, RerunPolicy};
+use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId, is_poisoned};
 
 /// How long a worker lives without a sign of life.
 pub(super) const LEASE: i64 = 100;
@@ -16,14 +15,14 @@ const LOOKED_AT: usize = 32;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Job {
     pub(super) state: JobState,
-    pub(super) epoch: i64,
+    pub(super) token: i64,
     pub(super) attempt: u32,
     pub(super) crashes: u32,
-    pub(super) alone: bool,
+    pub(super) exclusive: bool,
     /// What each stage's result was computed with.
-    results: [Option<RecipeIds>; 4],
+    results: [Option<FingerprintIds>; 4],
     /// Where it failed, and with what.
-    pub(super) failure: Option<(Stage, RecipeIds)>,
+    pub(super) failure: Option<(Stage, FingerprintIds)>,
 }
 
 /// A worker's process.
@@ -32,18 +31,18 @@ pub(super) struct Process {
     pub(super) worker: WorkerId,
     /// Its own clock, which tells nobody else's time.
     pub(super) clock: UnixMillis,
-    pub(super) beat: UnixMillis,
+    pub(super) heartbeat: UnixMillis,
     pub(super) ended: bool,
     pub(super) died: bool,
     /// Whether it can still do anything. One that was taken for dead may.
     pub(super) running: bool,
-    pub(super) recipes: RecipeIds,
+    pub(super) fingerprints: FingerprintIds,
 }
 
 impl Process {
     /// Whether its leases stand, by its own clock.
     pub(super) const fn is_alive(&self) -> bool {
-        !self.ended && self.beat >= self.alive_since()
+        !self.ended && self.heartbeat >= self.alive_since()
     }
 
     pub(super) const fn alive_since(&self) -> UnixMillis {
@@ -62,10 +61,10 @@ impl Job {
     const fn fresh() -> Self {
         Self {
             state: JobState::Ready { stage: Stage::Fit },
-            epoch: 0,
+            token: 0,
             attempt: 0,
             crashes: 0,
-            alone: false,
+            exclusive: false,
             results: [None; 4],
             failure: None,
         }
@@ -76,7 +75,7 @@ impl Job {
     }
 
     /// First stage that would be computed otherwise now.
-    fn changed(&self, current: RecipeIds) -> Option<Stage> {
+    fn changed(&self, current: FingerprintIds) -> Option<Stage> {
         let behind = |stage: &Stage| self.state.stage().is_none_or(|next| *stage < next);
         Stage::ALL.into_iter().filter(behind).find(|stage| {
             self.results[stage.index()].is_some_and(|then| then.of(*stage) != current.of(*stage))
@@ -84,8 +83,8 @@ impl Job {
     }
 
     fn start_over(&mut self, stage: Stage) {
-        self.happens(Event::SendBack { stage });
-        (self.attempt, self.crashes, self.alone) = (0, 0, false);
+        self.happens(Event::Requeue { stage });
+        (self.attempt, self.crashes, self.exclusive) = (0, 0, false);
         self.failure = None;
     }
 }
@@ -110,7 +109,7 @@ impl Queue {
     pub(super) fn holds(&self, lease: &Lease) -> bool {
         let job = &self.jobs[&lease.pair().0];
         let held = |worker| matches!(job.state, JobState::Leased { worker: holder, .. } if holder == worker);
-        held(lease.worker) && job.epoch == lease.epoch()
+        held(lease.worker) && job.token == lease.token()
     }
 
     /// Whether something may be stored under a lease.
@@ -118,19 +117,19 @@ impl Queue {
         self.holds(lease) && self.of_worker(lease.worker).is_alive()
     }
 
-    /// Takes jobs; gives the pairs with their epochs, in order.
+    /// Takes jobs; gives the pairs with their tokens, in order.
     pub(super) fn claim(
         &mut self,
         process: &Process,
         slots: usize,
-        alone: bool,
+        exclusive: bool,
         deadline: UnixMillis,
     ) -> Vec<(i64, i64)> {
         if !process.is_alive() {
             return Vec::new();
         }
         let ready = self.jobs.iter().filter_map(|(pair, job)| match job.state {
-            JobState::Ready { stage } if job.alone == alone => {
+            JobState::Ready { stage } if job.exclusive == exclusive => {
                 Some((std::cmp::Reverse(stage), *pair))
             }
             _ => None,
@@ -142,40 +141,40 @@ impl Queue {
         let take = |(_, pair)| {
             let job = self.job(pair);
             job.happens(Event::Claim { worker, deadline });
-            job.epoch += 1;
+            job.token += 1;
             job.attempt += 1;
-            (pair, job.epoch)
+            (pair, job.token)
         };
         ready.into_iter().map(take).collect()
     }
 
     pub(super) fn checkpoint(&mut self, lease: &Lease, stage: Stage, deadline: UnixMillis) {
-        let (worker, recipes) = (lease.worker, self.of_worker(lease.worker).recipes);
+        let (worker, fingerprints) = (lease.worker, self.of_worker(lease.worker).fingerprints);
         let job = self.job(lease.pair().0);
         job.happens(Event::Checkpoint {
             worker,
             stage,
             deadline,
         });
-        (job.attempt, job.crashes, job.alone) = (1, 0, false);
-        job.results[stage.index()] = Some(recipes);
+        (job.attempt, job.crashes, job.exclusive) = (1, 0, false);
+        job.results[stage.index()] = Some(fingerprints);
         job.failure = None;
     }
 
-    /// `back_off` is the time to try again; `alone` sends it to run by itself; neither quarantines.
-    pub(super) fn fail(&mut self, lease: &Lease, back_off: Option<UnixMillis>, alone: bool) {
-        let (worker, recipes) = (lease.worker, self.of_worker(lease.worker).recipes);
+    /// `back_off` is the time to try again; `exclusive` sends it to run by itself; neither quarantines.
+    pub(super) fn fail(&mut self, lease: &Lease, back_off: Option<UnixMillis>, exclusive: bool) {
+        let (worker, fingerprints) = (lease.worker, self.of_worker(lease.worker).fingerprints);
         let job = self.job(lease.pair().0);
-        if alone {
+        if exclusive {
             job.happens(Event::Release { worker });
-            job.alone = true;
+            job.exclusive = true;
             return;
         }
         job.happens(match back_off {
             Some(run_at) => Event::BackOff { worker, run_at },
             None => Event::Quarantine { worker },
         });
-        job.failure = Some((lease.cursor(), recipes));
+        job.failure = Some((lease.cursor(), fingerprints));
     }
 
     pub(super) fn release(&mut self, lease: &Lease) {
@@ -186,7 +185,7 @@ impl Queue {
     }
 
     /// Takes back the leases of workers that are taken for dead; how many pairs are ready again.
-    pub(super) fn rescue(&mut self, dead: &[WorkerId]) -> u64 {
+    pub(super) fn recover(&mut self, dead: &[WorkerId]) -> u64 {
         for process in &mut self.processes {
             process.died |= dead.contains(&process.worker) && !process.ended;
         }
@@ -195,19 +194,19 @@ impl Queue {
         let deaths = deaths.count() as u32;
         let mut ready = 0;
         for worker in dead {
-            let (died, recipes) = (
+            let (died, fingerprints) = (
                 !self.of_worker(*worker).ended,
-                self.of_worker(*worker).recipes,
+                self.of_worker(*worker).fingerprints,
             );
             let left: Vec<_> = self.leased_by(*worker);
             let blamed = died && left.len() == 1;
             for pair in left {
                 let job = self.job(pair);
                 job.crashes += u32::from(blamed);
-                job.alone |= died;
-                let condemned = blamed && is_condemned(job.crashes, deaths);
-                ready += u64::from(!condemned);
-                job.taken_back(condemned, recipes);
+                job.exclusive |= died;
+                let poisoned = blamed && is_poisoned(job.crashes, deaths);
+                ready += u64::from(!poisoned);
+                job.taken_back(poisoned, fingerprints);
             }
         }
         ready
@@ -221,18 +220,18 @@ impl Queue {
     }
 
     /// Takes back what others hold although their own clock is past the deadline by more than a margin.
-    pub(super) fn rescue_overdue(&mut self, me: WorkerId, margin: i64) -> u64 {
+    pub(super) fn recover_overdue(&mut self, me: WorkerId, margin: i64) -> u64 {
         let mut ready = 0;
         for process in self.processes.clone() {
             for pair in self.leased_by(process.worker) {
                 let job = self.job(pair);
-                let late = matches!(job.state, JobState::Leased { deadline, .. } if deadline + margin < process.beat);
+                let late = matches!(job.state, JobState::Leased { deadline, .. } if deadline + margin < process.heartbeat);
                 if late && process.worker != me {
                     job.crashes += 1;
-                    job.alone = true;
-                    let condemned = is_condemned(job.crashes, job.crashes);
-                    ready += u64::from(!condemned);
-                    job.taken_back(condemned, process.recipes);
+                    job.exclusive = true;
+                    let poisoned = is_poisoned(job.crashes, job.crashes);
+                    ready += u64::from(!poisoned);
+                    job.taken_back(poisoned, process.fingerprints);
                 }
             }
         }
@@ -254,7 +253,7 @@ impl Queue {
     }
 
     /// What other settings, or somebody who asks for all, send back; how many.
-    pub(super) fn send_back(&mut self, current: RecipeIds, again: Again) -> u64 {
+    pub(super) fn requeue_stale(&mut self, current: FingerprintIds, again: RerunPolicy) -> u64 {
         let mut sent = 0;
         for job in self.jobs.values_mut() {
             if job.state.status() == JobStatus::Leased {
@@ -262,8 +261,8 @@ impl Queue {
             }
             let at = job.state.stage();
             let asked = match again {
-                Again::All(from) => Some(at.map_or(from, |at| at.min(from))),
-                Again::Changed | Again::Failed => None,
+                RerunPolicy::All(from) => Some(at.map_or(from, |at| at.min(from))),
+                RerunPolicy::Changed | RerunPolicy::Failed => None,
             };
             let failed_otherwise = job.state.status() == JobStatus::Quarantined
                 && job
@@ -294,13 +293,13 @@ impl Queue {
 }
 
 impl Job {
-    fn taken_back(&mut self, condemned: bool, recipes: RecipeIds) {
+    fn taken_back(&mut self, poisoned: bool, fingerprints: FingerprintIds) {
         let stage = self.state.stage().expect("it is leased");
-        self.epoch += 1;
+        self.token += 1;
         self.attempt = self.attempt.saturating_sub(1);
-        self.happens(Event::Rescue { condemned });
-        if condemned {
-            self.failure = Some((stage, recipes));
+        self.happens(Event::Recover { poisoned });
+        if poisoned {
+            self.failure = Some((stage, fingerprints));
         }
     }
 }

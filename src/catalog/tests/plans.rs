@@ -25,7 +25,7 @@ use crate::catalog::records::verdicts;
 async fn plan(sql: &str) -> Vec<String> {
     let world = World::new(0).await;
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = open::writer(&path, false).await.expect("a connection");
+    let mut conn = open::write_conn(&path, false).await.expect("a connection");
     let rows = sqlx::query(AssertSqlSafe(format!("EXPLAIN QUERY PLAN {sql}")))
         .fetch_all(&mut conn)
         .await
@@ -61,8 +61,8 @@ async fn fenced_writes_find_their_jobs_by_key() {
         checkpoint::STEP,
         fail::FAIL,
         claim::RELEASE,
-        requeue::SEND_BACK,
-        repair::PUT_BACK,
+        requeue::REQUEUE,
+        repair::RESTORE,
     ] {
         let plan = plan(sql).await;
         assert!(
@@ -77,11 +77,11 @@ async fn fenced_writes_find_their_jobs_by_key() {
 #[tokio::test]
 async fn rescue_and_holders_use_the_index_of_leases() {
     for sql in [
-        recovery::RESCUE,
+        recovery::RECOVER,
         recovery::LEFT_BY,
         recovery::OVERDUE,
         recovery::HOLDERS,
-        recovery::VICTIMS,
+        recovery::AFFECTED_PAIRS,
     ] {
         let plan = plan(sql).await;
         assert!(
@@ -104,10 +104,10 @@ async fn due_pairs_come_from_the_index_of_back_offs() {
 }
 
 #[tokio::test]
-async fn doubtful_pairs_come_from_their_index() {
-    let plan = plan(status::DOUBTFUL).await;
-    assert_only(&plan, &["job USING COVERING INDEX job_doubtful"]);
-    assert!(plan[0].contains("INDEX job_doubtful"), "{plan:?}");
+async fn pairs_of_low_confidence_come_from_their_index() {
+    let plan = plan(status::LOW_CONFIDENCE).await;
+    assert_only(&plan, &["job USING COVERING INDEX job_low_confidence"]);
+    assert!(plan[0].contains("INDEX job_low_confidence"), "{plan:?}");
 }
 
 #[tokio::test]
@@ -163,10 +163,13 @@ async fn what_a_run_asks_of_inputs_and_counts_is_paged_or_small() {
         &plan(workers::LEFT_ALL).await,
         &["INDEX job_", "CONSTANT ROW", "SCAN (subquery"],
     );
-    assert_only(&plan(pair_results::FAILED).await, &["INDEX job_bad"]);
+    assert_only(
+        &plan(pair_results::FAILED).await,
+        &["INDEX job_quarantined"],
+    );
     assert_only(
         &plan(pair_results::FAILED_BY_CLASS).await,
-        &["INDEX job_bad"],
+        &["INDEX job_quarantined"],
     );
 }
 

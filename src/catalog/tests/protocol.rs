@@ -1,21 +1,22 @@
-//! Leases, checkpoints, failures, rescue and counters.
+//! Leases, checkpoints, failures, recovery and counters.
 
 use super::{World, done, name, register, row};
 use crate::catalog::{
-    Catalog, CatalogError, ClaimRequest, Dead, Kept, RetrySelection, Sentence, StageFailed,
+    Catalog, CatalogError, CheckpointOutcome, ClaimRequest, DeadWorker, FailureAction,
+    RetrySelection, StageFailure,
 };
 use crate::domain::{
     CRASH_LIMIT, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome, Stage,
     ThresholdMetric,
 };
 
-fn failed(world: &World, stage: Stage, sentence: Sentence) -> StageFailed {
-    StageFailed {
+fn failed(world: &World, stage: Stage, action: FailureAction) -> StageFailure {
+    StageFailure {
         stage,
         failure: Failure::new(FailureClass::Io, "the disk is slow"),
-        sentence,
-        recipe: world.recipes.of(stage),
-        facts: super::done(world.recipes, stage).facts,
+        action,
+        fingerprint: world.fingerprints.of(stage),
+        attributes: super::done(world.fingerprints, stage).attributes,
         inputs: super::inputs(stage),
         ms: Some(3),
         at: 50,
@@ -44,8 +45,8 @@ async fn a_pair_goes_through_four_checkpoints_and_is_read_back_whole() {
 }
 
 #[tokio::test]
-async fn pairs_below_the_limit_of_confidence_are_counted_as_doubtful() {
-    let limit = MetricOutcome::DOUBTFUL;
+async fn pairs_below_the_limit_of_confidence_are_counted() {
+    let limit = MetricOutcome::LOW_CONFIDENCE;
     let world = World::new(4).await;
     for confidence in [Some(limit - 1e-9), Some(limit), Some(1.0), None] {
         let mut lease = world.claim(1).await.remove(0);
@@ -55,14 +56,14 @@ async fn pairs_below_the_limit_of_confidence_are_counted_as_doubtful() {
                 metric.outcome.confidence = confidence;
             }
             match world.catalog.checkpoint(lease, done).await {
-                Ok(Kept::Lease(next)) => lease = next,
-                Ok(Kept::Done) => break,
+                Ok(CheckpointOutcome::Lease(next)) => lease = next,
+                Ok(CheckpointOutcome::Done) => break,
                 other => panic!("the checkpoint was not kept: {other:?}"),
             }
         }
     }
-    let status = world.catalog.status(&super::recipes([1; 4])).await;
-    assert_eq!(status.expect("counts").doubtful, 1);
+    let status = world.catalog.status(&super::fingerprints([1; 4])).await;
+    assert_eq!(status.expect("counts").low_confidence, 1);
 }
 
 #[tokio::test]
@@ -70,7 +71,7 @@ async fn a_claim_takes_the_pair_that_is_furthest() {
     let world = World::new(3).await;
     let lease = world.claim(1).await.remove(0);
     let pair = lease.pair();
-    let Ok(Kept::Lease(lease)) = world
+    let Ok(CheckpointOutcome::Lease(lease)) = world
         .catalog
         .checkpoint(lease, world.done(Stage::Fit))
         .await
@@ -99,10 +100,10 @@ async fn two_claims_never_get_the_same_pair() {
 async fn a_late_completion_of_a_rescued_job_changes_nothing() {
     let world = World::new(1).await;
     let late = world.claim(1).await.remove(0);
-    let other = world.rescued_by_another(1).await;
-    let epoch = late.epoch();
+    let other = world.recovered_by_another(1).await;
+    let token = late.token();
     let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
-    assert!(matches!(kept, Ok(Kept::Lost)));
+    assert!(matches!(kept, Ok(CheckpointOutcome::LeaseLost)));
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     let detail = detail.expect("the pair");
     assert!(detail.results.stages.is_empty() && detail.attempts.is_empty());
@@ -111,7 +112,7 @@ async fn a_late_completion_of_a_rescued_job_changes_nothing() {
         (JobStatus::Ready, 1)
     );
     let again = world.claim_alone(other).await.remove(0);
-    assert!(again.alone() && again.epoch() > epoch);
+    assert!(again.exclusive() && again.token() > token);
     world.counters_hold().await;
 }
 
@@ -119,9 +120,9 @@ async fn a_late_completion_of_a_rescued_job_changes_nothing() {
 async fn a_late_failure_and_a_late_release_change_nothing() {
     let world = World::new(2).await;
     let mut leases = world.claim(2).await;
-    world.rescued_by_another(2).await;
+    world.recovered_by_another(2).await;
     let (first, second) = (leases.remove(0), leases.remove(0));
-    let kept = failed(&world, Stage::Fit, Sentence::Quarantine);
+    let kept = failed(&world, Stage::Fit, FailureAction::Quarantine);
     assert!(!world.catalog.fail(first, kept).await.expect("an answer"));
     assert!(!world.catalog.release(second).await.expect("an answer"));
     assert_eq!(status(&world, "p0").await, JobStatus::Ready);
@@ -134,15 +135,15 @@ async fn the_third_crash_is_quarantined_and_says_so() {
     for crash in 1..=CRASH_LIMIT {
         let worker = register(&world.catalog).await;
         let request = ClaimRequest {
-            alone: crash > 1,
+            exclusive: crash > 1,
             ..ClaimRequest::new(worker, 1, 1_000)
         };
         assert_eq!(
             world.catalog.claim(request).await.expect("a claim").len(),
             1
         );
-        let rescue = world.catalog.rescue(Dead::Workers(vec![worker]), 60);
-        rescue.await.expect("a rescue");
+        let recover = world.catalog.recover(DeadWorker::Workers(vec![worker]), 60);
+        recover.await.expect("a recovery");
         world.counters_hold().await;
     }
     let failures = world.catalog.failures(10).await.expect("a read");
@@ -159,14 +160,14 @@ async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
         register(&world.catalog).await;
         let worker = register(&world.catalog).await;
         let request = ClaimRequest {
-            alone: round > 0,
+            exclusive: round > 0,
             ..ClaimRequest::new(worker, 1, 1_000)
         };
         assert_eq!(
             world.catalog.claim(request).await.expect("a claim").len(),
             1
         );
-        world.rescued_by_another(1).await;
+        world.recovered_by_another(1).await;
     }
     world.counters_hold().await;
 }
@@ -175,7 +176,7 @@ async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
 async fn pairs_that_died_together_are_suspect_but_not_blamed() {
     let world = World::new(2).await;
     assert_eq!(world.claim(2).await.len(), 2);
-    let other = world.rescued_by_another(2).await;
+    let other = world.recovered_by_another(2).await;
     let detail = world.catalog.pair(&name("p1")).await.expect("a read");
     assert_eq!(detail.expect("the pair").crashes, 0);
     assert!(world.claim_as(other, 2).await.is_empty());
@@ -187,7 +188,7 @@ async fn leases_of_a_worker_that_ended_in_order_are_no_crash() {
     drop(world.claim(1).await);
     let ended = world.catalog.end_worker(world.worker, 50).await;
     ended.expect("ended");
-    world.rescued_by_another(1).await;
+    world.recovered_by_another(1).await;
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     assert_eq!(detail.expect("the pair").crashes, 0);
 }
@@ -196,14 +197,14 @@ async fn leases_of_a_worker_that_ended_in_order_are_no_crash() {
 async fn progress_forgives_crashes() {
     let world = World::new(1).await;
     drop(world.claim(1).await);
-    let other = world.rescued_by_another(1).await;
+    let other = world.recovered_by_another(1).await;
     let lease = world.claim_alone(other).await.remove(0);
     assert_eq!(lease.crashes(), 1);
     let kept = world
         .catalog
         .checkpoint(lease, world.done(Stage::Fit))
         .await;
-    let Ok(Kept::Lease(lease)) = kept else {
+    let Ok(CheckpointOutcome::Lease(lease)) = kept else {
         panic!("the checkpoint was not kept")
     };
     assert_eq!(lease.crashes(), 0);
@@ -216,19 +217,19 @@ async fn a_lease_long_past_its_deadline_under_a_living_worker_comes_back_to_othe
     let world = World::new(1).await;
     drop(world.claim(1).await);
     let other = register(&world.catalog).await;
-    // Its deadline is 1000, and it still beats; what time others have is nothing to it.
-    for (beat, rescued) in [(1_060, 0), (1_061, 1)] {
+    // Its deadline is 1000, and it still heartbeats; what time others have is nothing to it.
+    for (heartbeat, recovered) in [(1_060, 0), (1_061, 1)] {
         assert!(
             world
                 .catalog
-                .beat(world.worker, beat, 0)
+                .heartbeat(world.worker, heartbeat, 0)
                 .await
                 .expect("stored")
         );
-        let own = world.catalog.rescue_overdue(world.worker, 60, 9_000_000);
-        assert_eq!(own.await.expect("a rescue").ready, 0);
-        let by_others = world.catalog.rescue_overdue(other, 60, 9_000_000);
-        assert_eq!(by_others.await.expect("a rescue").ready, rescued);
+        let own = world.catalog.recover_overdue(world.worker, 60, 9_000_000);
+        assert_eq!(own.await.expect("a recovery").ready, 0);
+        let by_others = world.catalog.recover_overdue(other, 60, 9_000_000);
+        assert_eq!(by_others.await.expect("a recovery").ready, recovered);
     }
     world.counters_hold().await;
 }
@@ -237,16 +238,16 @@ async fn a_lease_long_past_its_deadline_under_a_living_worker_comes_back_to_othe
 async fn backing_off_ends_when_due_and_after_a_clock_jump_too() {
     let world = World::new(2).await;
     for (lease, run_at) in world.claim(2).await.into_iter().zip([2_000, 9_000_000]) {
-        let back_off = failed(&world, Stage::Fit, Sentence::BackOff { run_at });
+        let back_off = failed(&world, Stage::Fit, FailureAction::BackOff { run_at });
         assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
     }
     assert!(world.claim(2).await.is_empty());
     let left = world.catalog.outstanding(Stage::Register, None).await;
     let left = left.expect("a read");
     assert_eq!((left.backoff, left.next_due), (2, Some(2_000)));
-    let due = world.catalog.stage_due(1_999, 90_000_000).await;
+    let due = world.catalog.release_due_backoffs(1_999, 90_000_000).await;
     assert_eq!(due.expect("stored"), 0);
-    let due = world.catalog.stage_due(2_000, 60_000).await;
+    let due = world.catalog.release_due_backoffs(2_000, 60_000).await;
     assert_eq!(due.expect("stored"), 2);
     let again = world.claim(2).await;
     assert!(again.len() == 2 && again.iter().all(|lease| lease.attempt() == 2));
@@ -257,7 +258,7 @@ async fn backing_off_ends_when_due_and_after_a_clock_jump_too() {
 async fn a_failure_names_class_and_sentence_and_retry_takes_it_up() {
     let world = World::new(3).await;
     for lease in world.claim(2).await {
-        let quarantine = failed(&world, Stage::Fit, Sentence::Quarantine);
+        let quarantine = failed(&world, Stage::Fit, FailureAction::Quarantine);
         assert!(world.catalog.fail(lease, quarantine).await.expect("stored"));
     }
     assert_eq!(world.claim(5).await.len(), 1);
@@ -282,7 +283,7 @@ async fn a_failure_names_class_and_sentence_and_retry_takes_it_up() {
 async fn too_much_for_the_others_is_claimed_alone_only() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);
-    let alone = failed(&world, Stage::Fit, Sentence::Alone);
+    let alone = failed(&world, Stage::Fit, FailureAction::RetryExclusive);
     assert!(world.catalog.fail(lease, alone).await.expect("stored"));
     assert!(world.claim(1).await.is_empty());
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
@@ -329,12 +330,12 @@ async fn importing_again_adds_what_is_new_and_tells_what_changed() {
 async fn pages_come_in_the_order_of_names_and_end() {
     let world = World::new(12).await;
     let first = world.catalog.results_page(None, 5).await.expect("a page");
-    let after = &first[4].facts.name;
+    let after = &first[4].attributes.name;
     let second = world.catalog.results_page(Some(after), 50).await;
     let names: Vec<_> = first
         .iter()
         .chain(&second.expect("a page"))
-        .map(|pair| pair.facts.name.clone())
+        .map(|pair| pair.attributes.name.clone())
         .collect();
     assert_eq!(names.len(), 12);
     assert!(names.is_sorted());
@@ -348,7 +349,7 @@ async fn a_reader_works_beside_the_writer_and_cannot_write() {
     let path = world.dir.path().join("catalog.sqlite");
     let reader = Catalog::open_read_only(&path).await.expect("a reader");
     world.finish_one().await;
-    let status = reader.status(&super::recipes([1; 4])).await;
+    let status = reader.status(&super::fingerprints([1; 4])).await;
     assert_eq!(status.expect("a read").jobs[&JobStatus::Done], 1);
     let refused = reader.import(vec![row("p9")], 1).await;
     assert!(matches!(refused, Err(CatalogError::ReadOnly)));
@@ -377,7 +378,7 @@ async fn one_bad_request_does_not_take_its_batch_with_it() {
         world.catalog.checkpoint(good, world.done(Stage::Fit)),
         world.catalog.checkpoint(bad, broken),
     );
-    assert!(matches!(good, Ok(Kept::Lease(_))));
+    assert!(matches!(good, Ok(CheckpointOutcome::Lease(_))));
     assert!(matches!(bad, Err(CatalogError::Shared(_))));
     world.counters_hold().await;
 }
@@ -390,10 +391,10 @@ async fn everything_sent_is_stored_when_the_catalog_is_closed() {
     let (kept, ()) = tokio::join!(
         world
             .catalog
-            .checkpoint(lease, done(world.recipes, Stage::Fit)),
+            .checkpoint(lease, done(world.fingerprints, Stage::Fit)),
         world.catalog.clone().close(),
     );
-    assert!(matches!(kept, Ok(Kept::Lease(_))));
+    assert!(matches!(kept, Ok(CheckpointOutcome::Lease(_))));
     assert!(!path.with_extension("sqlite-wal").exists());
     let again = Catalog::open(&path).await.expect("a catalog");
     let detail = again.pair(&name("p0")).await.expect("a read");

@@ -12,7 +12,7 @@ use crate::domain::{
 async fn checks_of_the_schema_and_our_enums_agree() {
     let world = World::new(1).await;
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::db::open::writer(&path, false)
+    let mut conn = crate::catalog::db::open::write_conn(&path, false)
         .await
         .expect("a connection");
     let mut accepts = async |sql: &'static str, value: &str| {
@@ -23,13 +23,15 @@ async fn checks_of_the_schema_and_our_enums_agree() {
             .await;
         outcome.is_ok()
     };
-    let verdict = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, at)
+    let verdict = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at)
         VALUES (1, 1, 'density', zeroblob(32), ?1, 'me', 1)";
-    let reason = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, reason, at)
+    let reason =
+        "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, reason, at)
         VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', ?1, 1)";
-    let metric = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, at)
+    let metric = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at)
         VALUES (1, 1, ?1, zeroblob(32), 'fail', 'me', 1)";
-    let queue = "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reader, at, queue)
+    let queue =
+        "INSERT INTO verdict (act, pair, metric, result_hash, verdict, reviewer, at, review_order)
         VALUES (1, 1, 'density', zeroblob(32), 'fail', 'me', 1, ?1)";
     let class = "INSERT INTO failure (pair, stage, class, message, at) VALUES (1, 0, ?1, '', 1)";
     let unit = "UPDATE pair SET unit = ?1";
@@ -56,10 +58,10 @@ async fn checks_of_the_schema_and_our_enums_agree() {
 async fn a_job_row_that_is_no_state_is_refused() {
     let world = World::new(1).await;
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::db::open::writer(&path, false)
+    let mut conn = crate::catalog::db::open::write_conn(&path, false)
         .await
         .expect("a connection");
-    for status in 0..=6 {
+    for status in 0..=5 {
         for bits in 0..16 {
             let stage = if bits & 1 == 0 { 2 } else { 4 };
             let [worker, deadline, run_at] = [2, 4, 8].map(|bit| (bits & bit != 0).then_some(1));

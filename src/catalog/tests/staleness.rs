@@ -1,8 +1,9 @@
 //! Changed settings and inputs send a pair back to the first stage they touch, and no further.
 
-use super::{World, name, recipes, row};
+use super::{World, fingerprints, name, row};
 use crate::catalog::{
-    Again, InputSeen, InputsSeen, Plan, Recipes, Sentence, StageFailed, WorkReason,
+    FailureAction, Fingerprints, InputVersion, InputVersions, Plan, RerunPolicy, StageFailure,
+    StaleReason,
 };
 use crate::domain::{ContentHash, Failure, FailureClass, JobStatus, LengthUnit, Stage};
 
@@ -11,8 +12,10 @@ async fn cursor(world: &World, pair: &str) -> Option<Stage> {
     detail.expect("the pair").results.next_stage
 }
 
-async fn send_back(world: &World, recipes: &Recipes) -> u64 {
-    let sent = world.catalog.send_back(recipes, None, Again::Changed);
+async fn requeue_stale(world: &World, fingerprints: &Fingerprints) -> u64 {
+    let sent = world
+        .catalog
+        .requeue_stale(fingerprints, None, RerunPolicy::Changed);
     sent.await.expect("sent back")
 }
 
@@ -20,18 +23,18 @@ async fn send_back(world: &World, recipes: &Recipes) -> u64 {
 async fn a_changed_register_setting_re_runs_register_only() {
     let world = World::new(2).await;
     world.finish_one().await;
-    let changed = recipes([1, 1, 1, 2]);
+    let changed = fingerprints([1, 1, 1, 2]);
     let why = world.catalog.why(&name("p0"), &changed).await;
     let why = why.expect("a read").expect("a reason");
     assert_eq!(why.from, Stage::Register);
     assert_eq!(why.why.to_string(), "register.revision: 1 -> 2");
     let status = world.catalog.status(&changed).await.expect("a read");
     assert_eq!(status.stale, 1);
-    assert_eq!(send_back(&world, &changed).await, 1);
+    assert_eq!(requeue_stale(&world, &changed).await, 1);
     assert_eq!(cursor(&world, "p0").await, Some(Stage::Register));
     let page = world.catalog.results_page(None, 1).await.expect("a page");
     assert_eq!(page[0].stages.len(), 3);
-    assert_eq!(send_back(&world, &changed).await, 0);
+    assert_eq!(requeue_stale(&world, &changed).await, 0);
     world.counters_hold().await;
 }
 
@@ -39,25 +42,27 @@ async fn a_changed_register_setting_re_runs_register_only() {
 async fn unchanged_settings_send_nothing_back() {
     let world = World::new(1).await;
     world.finish_one().await;
-    assert_eq!(send_back(&world, &recipes([1; 4])).await, 0);
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
     let plan = plan(&world).await;
     assert_eq!((plan.pairs(), plan.done), (0, 1));
 }
 
 async fn plan(world: &World) -> Plan {
-    let recipes = recipes([1; 4]);
-    let plan = world.catalog.plan(&recipes, None, Again::Changed);
+    let fingerprints = fingerprints([1; 4]);
+    let plan = world
+        .catalog
+        .plan(&fingerprints, None, RerunPolicy::Changed);
     plan.await.expect("a plan")
 }
 
 async fn see(world: &World, mesh: &str, print: &str) {
     let page = world.catalog.known_inputs(None, 10, None).await;
     let pair = page.expect("a page")[0].pair;
-    let seen = |text: &str| InputSeen {
+    let seen = |text: &str| InputVersion {
         hash: ContentHash::of(text.as_bytes()),
         stat: format!("{text} touched"),
     };
-    let inputs = InputsSeen {
+    let inputs = InputVersions {
         mesh: Some(seen(mesh)),
         print: Some(seen(print)),
     };
@@ -70,7 +75,7 @@ async fn a_touched_file_re_runs_nothing() {
     let world = World::new(1).await;
     world.finish_one().await;
     see(&world, "mesh", "print").await;
-    assert_eq!(send_back(&world, &recipes([1; 4])).await, 0);
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
 }
 
 #[tokio::test]
@@ -81,8 +86,8 @@ async fn a_changed_print_sends_its_pair_back_to_normalize() {
     see(&world, "mesh", "another print").await;
     let plan = plan(&world).await;
     assert_eq!(plan.entries.len(), 1);
-    assert_eq!(plan.entries[0].why, WorkReason::Print);
-    assert_eq!(send_back(&world, &recipes([1; 4])).await, 1);
+    assert_eq!(plan.entries[0].why, StaleReason::Print);
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 1);
     assert_eq!(cursor(&world, "p0").await, Some(Stage::Normalize));
     assert_eq!(cursor(&world, "p1").await, None);
 }
@@ -92,7 +97,7 @@ async fn a_changed_mesh_sends_its_pair_back_to_fit() {
     let world = World::new(1).await;
     world.finish_one().await;
     see(&world, "another mesh", "print").await;
-    assert_eq!(send_back(&world, &recipes([1; 4])).await, 1);
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 1);
     assert_eq!(cursor(&world, "p0").await, Some(Stage::Fit));
 }
 
@@ -107,9 +112,9 @@ async fn another_unit_in_the_manifest_is_a_reason_to_run() {
         .import(vec![changed], 9)
         .await
         .expect("imported");
-    let why = world.catalog.why(&name("p0"), &recipes([1; 4])).await;
+    let why = world.catalog.why(&name("p0"), &fingerprints([1; 4])).await;
     let why = why.expect("a read").expect("a reason");
-    assert_eq!((why.from, why.why), (Stage::Fit, WorkReason::Manifest));
+    assert_eq!((why.from, why.why), (Stage::Fit, StaleReason::Manifest));
 }
 
 #[tokio::test]
@@ -127,28 +132,28 @@ async fn another_path_is_read_again_and_metadata_is_no_reason_to_run() {
     let known = world.catalog.known_inputs(None, 10, None).await;
     let mesh = known.expect("a page")[0].mesh.clone().expect("a mesh");
     assert_eq!(mesh.stat, "");
-    assert_eq!(send_back(&world, &recipes([1; 4])).await, 0);
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
 }
 
 #[tokio::test]
 async fn a_failure_is_taken_up_when_its_settings_change() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);
-    let failed = StageFailed {
+    let failed = StageFailure {
         stage: Stage::Fit,
         failure: Failure::new(FailureClass::NoSolution, "no relief"),
-        sentence: Sentence::Quarantine,
-        recipe: world.recipes.of(Stage::Fit),
-        facts: super::done(world.recipes, Stage::Fit).facts,
+        action: FailureAction::Quarantine,
+        fingerprint: world.fingerprints.of(Stage::Fit),
+        attributes: super::done(world.fingerprints, Stage::Fit).attributes,
         inputs: super::inputs(Stage::Fit),
         ms: None,
         at: 5,
         alive_since: 0,
     };
     assert!(world.catalog.fail(lease, failed).await.expect("stored"));
-    assert_eq!(send_back(&world, &recipes([1; 4])).await, 0);
-    assert_eq!(send_back(&world, &recipes([1, 2, 1, 1])).await, 0);
-    assert_eq!(send_back(&world, &recipes([2, 1, 1, 1])).await, 1);
+    assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
+    assert_eq!(requeue_stale(&world, &fingerprints([1, 2, 1, 1])).await, 0);
+    assert_eq!(requeue_stale(&world, &fingerprints([2, 1, 1, 1])).await, 1);
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     let results = detail.expect("the pair").results;
     assert_eq!((results.status, results.failure), (JobStatus::Ready, None));
@@ -159,9 +164,9 @@ async fn a_failure_is_taken_up_when_its_settings_change() {
 async fn a_leased_pair_is_never_sent_back() {
     let world = World::new(1).await;
     let _lease = world.claim(1).await;
-    let recipes = recipes([2; 4]);
-    let again = Again::All(Stage::Fit);
-    let sent = world.catalog.send_back(&recipes, None, again);
+    let fingerprints = fingerprints([2; 4]);
+    let again = RerunPolicy::All(Stage::Fit);
+    let sent = world.catalog.requeue_stale(&fingerprints, None, again);
     assert_eq!(sent.await.expect("sent back"), 0);
     world.counters_hold().await;
 }

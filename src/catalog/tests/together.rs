@@ -1,11 +1,11 @@
 //! Stages of a pair that are stored in one commit.
 
 use super::{World, name};
-use crate::catalog::{Kept, Lease, PairDetail};
+use crate::catalog::{CheckpointOutcome, Lease, PairDetail};
 use crate::domain::Stage;
 
 /// Stores stages under a lease in one commit.
-async fn store(world: &World, lease: Lease, stages: &[Stage]) -> Kept {
+async fn store(world: &World, lease: Lease, stages: &[Stage]) -> CheckpointOutcome {
     let done = stages.iter().map(|stage| world.done(*stage)).collect();
     let kept = world.catalog.checkpoint_in_time(lease, done).await;
     kept.expect("stored")
@@ -16,9 +16,9 @@ async fn detail(world: &World, pair: &str) -> PairDetail {
     detail.expect("the pair")
 }
 
-/// The recipe that the job's results were made with, where they follow on each other.
+/// The fingerprint that the job's results were made with, where they follow on each other.
 async fn made(world: &World, pair: i64) -> Option<i64> {
-    let mut conn = world.catalog.reader().await.expect("a reader");
+    let mut conn = world.catalog.read_conn().await.expect("a reader");
     let made = sqlx::query_scalar("SELECT made FROM job WHERE pair = ?1").bind(pair);
     made.fetch_one(&mut *conn).await.expect("the job")
 }
@@ -30,17 +30,17 @@ async fn stages_stored_together_leave_what_they_leave_one_by_one() {
     let lease = world.claim(1).await.remove(0);
     assert!(matches!(
         store(&world, lease, &Stage::ALL).await,
-        Kept::Done
+        CheckpointOutcome::Done
     ));
     let lease = world.claim(1).await.remove(0);
-    let Kept::Lease(lease) = store(&world, lease, &Stage::ALL[..2]).await else {
+    let CheckpointOutcome::Lease(lease) = store(&world, lease, &Stage::ALL[..2]).await else {
         panic!("two stages are left");
     };
     assert_eq!(lease.cursor(), Stage::Normalize);
     world.counters_hold().await;
     assert!(matches!(
         store(&world, lease, &Stage::ALL[2..]).await,
-        Kept::Done
+        CheckpointOutcome::Done
     ));
     let one_by_one = detail(&world, "p0").await;
     for (pair, number) in [("p1", 2), ("p2", 3)] {
@@ -61,7 +61,7 @@ async fn results_that_do_not_follow_on_each_other_are_not_taken_for_one_chain() 
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);
     let way = [Stage::Fit, Stage::Depth, Stage::Normalize, Stage::Depth];
-    let Kept::Lease(lease) = store(&world, lease, &way).await else {
+    let CheckpointOutcome::Lease(lease) = store(&world, lease, &way).await else {
         panic!("stages are left");
     };
     assert_eq!(lease.cursor(), Stage::Normalize);

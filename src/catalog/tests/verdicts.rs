@@ -1,7 +1,7 @@
 //! Verdicts: bound to results, appended, taken back.
 
 use super::{World, name};
-use crate::catalog::{Catalog, CatalogError, Kept, Look, NewVerdict};
+use crate::catalog::{Catalog, CatalogError, CheckpointOutcome, Look, NewVerdict};
 use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 
 /// Results of a pair that is done.
@@ -47,7 +47,7 @@ async fn the_newest_verdict_of_each_reviewer_counts() {
         ("bo".to_owned(), Verdict::Unsure),
     ];
     assert_eq!(counted(&world.catalog).await, expected);
-    let status = world.catalog.status(&super::recipes([1; 4])).await;
+    let status = world.catalog.status(&super::fingerprints([1; 4])).await;
     let status = status.expect("a read");
     assert_eq!(status.verdicts[&Verdict::Fail], METRICS as u64);
     assert_eq!(status.verdicts[&Verdict::Pass], 0);
@@ -121,11 +121,11 @@ async fn a_new_result_does_not_inherit_a_verdict_and_the_same_result_keeps_it() 
     world.finish_one().await;
     let given = vec![verdict("ana", Verdict::Pass)];
     world.catalog.verdict_set(given, 5).await.expect("stored");
-    let again = crate::catalog::Again::All(Stage::Register);
+    let again = crate::catalog::RerunPolicy::All(Stage::Register);
     for changed in [false, true] {
         let sent = world
             .catalog
-            .send_back(&super::recipes([1; 4]), None, again)
+            .requeue_stale(&super::fingerprints([1; 4]), None, again)
             .await;
         assert_eq!(sent.expect("sent back"), 1);
         let lease = world.claim(1).await.remove(0);
@@ -134,7 +134,7 @@ async fn a_new_result_does_not_inherit_a_verdict_and_the_same_result_keeps_it() 
             done.metrics[0].result_hash = ContentHash::of(b"another");
         }
         let kept = world.catalog.checkpoint(lease, done).await;
-        assert!(matches!(kept, Ok(Kept::Done)));
+        assert!(matches!(kept, Ok(CheckpointOutcome::Done)));
         assert_eq!(counted(&world.catalog).await.is_empty(), changed);
     }
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
@@ -147,10 +147,10 @@ async fn a_new_result_does_not_inherit_a_verdict_and_the_same_result_keeps_it() 
 async fn a_metric_that_the_new_method_does_not_give_cannot_be_judged_any_more() {
     let world = World::new(1).await;
     world.finish_one().await;
-    let again = crate::catalog::Again::All(Stage::Register);
+    let again = crate::catalog::RerunPolicy::All(Stage::Register);
     let sent = world
         .catalog
-        .send_back(&super::recipes([1; 4]), None, again)
+        .requeue_stale(&super::fingerprints([1; 4]), None, again)
         .await;
     assert_eq!(sent.expect("sent back"), 1);
     let lease = world.claim(1).await.remove(0);
@@ -159,7 +159,7 @@ async fn a_metric_that_the_new_method_does_not_give_cannot_be_judged_any_more() 
     let left: Vec<_> = done.metrics.iter().map(|m| m.outcome).collect();
     done.outcome = serde_json::json!({ "metrics": left }).to_string();
     let kept = world.catalog.checkpoint(lease, done).await;
-    assert!(matches!(kept, Ok(Kept::Done)));
+    assert!(matches!(kept, Ok(CheckpointOutcome::Done)));
     let all = verdict("ana", Verdict::Pass);
     let one = NewVerdict {
         metric: Some(gone),
@@ -179,7 +179,7 @@ async fn the_database_itself_refuses_to_change_a_verdict() {
     let given = vec![verdict("ana", Verdict::Pass)];
     world.catalog.verdict_set(given, 5).await.expect("stored");
     let path = world.dir.path().join("catalog.sqlite");
-    let mut conn = crate::catalog::db::open::writer(&path, false)
+    let mut conn = crate::catalog::db::open::write_conn(&path, false)
         .await
         .expect("a connection");
     for sql in ["UPDATE verdict SET reader = 'bo'", "DELETE FROM verdict"] {

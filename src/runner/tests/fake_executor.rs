@@ -6,7 +6,7 @@ use std::sync::{Condvar, Mutex};
 
 use serde_json::json;
 
-use crate::catalog::InputSeen;
+use crate::catalog::InputVersion;
 use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric};
 use crate::report::test_fixtures;
 use crate::runner::pair_context::PairContext;
@@ -86,7 +86,7 @@ impl FakeExecutor {
 
 impl StageExecutor for FakeExecutor {
     fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
-        let name = pair.facts.name.as_str().to_owned();
+        let name = pair.attributes.name.as_str().to_owned();
         let tries = {
             let mut computed = self.computed.lock().expect("no panic holds it");
             let count = computed.entry((name.clone(), stage)).or_default();
@@ -98,7 +98,7 @@ impl StageExecutor for FakeExecutor {
         let outcome = self.behave(&name, stage, tries);
         self.running.fetch_sub(1, Ordering::SeqCst);
         outcome?;
-        let seen = |text: &str| InputSeen {
+        let seen = |text: &str| InputVersion {
             hash: ContentHash::of(text.as_bytes()),
             stat: "as it was".to_owned(),
         };

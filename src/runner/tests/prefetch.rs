@@ -6,7 +6,7 @@ use std::time::Duration;
 use tokio::time::timeout;
 
 use super::{RunFixture, name, options};
-use crate::catalog::{Catalog, Dead};
+use crate::catalog::{Catalog, DeadWorker};
 use crate::domain::{JobStatus, PairName, Stage, WorkerId};
 use crate::runner::clock::Clock;
 use crate::runner::{RunEvent, RunOptions, StopLevel};
@@ -101,9 +101,9 @@ async fn nothing_is_stored_of_a_stage_that_was_computed_while_the_lease_was_lost
     let world = RunFixture::new(&["wait_1"]).await;
     let rob = async {
         world.begun("wait_1", Stage::Fit).await;
-        let nobody = Dead::AllBut(WorkerId(99));
-        let rescued = world.catalog.rescue(nobody, 1).await.expect("a rescue");
-        assert_eq!(rescued.ready, 1);
+        let nobody = DeadWorker::AllExcept(WorkerId(99));
+        let recovered = world.catalog.recover(nobody, 1).await.expect("a recovery");
+        assert_eq!(recovered.ready, 1);
         world.steps.open();
     };
     let options = options(1);
@@ -193,10 +193,13 @@ async fn a_pair_taken_ahead_is_not_overdue_before_it_could_have_begun() {
         }
         // As if its worker had gone on for one and a half times that long.
         let (me, other) = (WorkerId(1), WorkerId(99));
-        let beat = world.catalog.beat(me, clock.now() + limit * 3 / 2, 0).await;
-        assert!(beat.expect("stored"));
-        let overdue = world.catalog.rescue_overdue(other, 0, 0).await;
-        assert_eq!(overdue.expect("a rescue").ready, 1);
+        let heartbeat = world
+            .catalog
+            .heartbeat(me, clock.now() + limit * 3 / 2, 0)
+            .await;
+        assert!(heartbeat.expect("stored"));
+        let overdue = world.catalog.recover_overdue(other, 0, 0).await;
+        assert_eq!(overdue.expect("a recovery").ready, 1);
         assert_eq!(world.status("next").await, JobStatus::Leased);
         world.steps.open();
     };

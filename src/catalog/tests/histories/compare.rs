@@ -2,8 +2,8 @@
 
 use sqlx::{AssertSqlSafe, Row as _};
 
+use super::super::state_machine::JobState;
 use super::Game;
-use crate::domain::JobState;
 
 /// Tables that no refused write may touch.
 const TABLES: [&str; 8] = [
@@ -37,10 +37,10 @@ impl Game {
         lines
     }
 
-    /// Every row is what the model says, no epoch falls, the counters are right, no verdict is lost.
+    /// Every row is what the model says, no token falls, the counters are right, no verdict is lost.
     pub(super) async fn agrees(&mut self) {
         let rows = sqlx::query(
-            "SELECT j.*, f.stage AS failed_at, f.recipe AS failed_with FROM job AS j
+            "SELECT j.*, f.stage AS failed_at, f.fingerprint AS failed_with FROM job AS j
                 LEFT JOIN failure AS f ON f.pair = j.pair ORDER BY j.pair",
         );
         let rows = rows.fetch_all(&mut self.conn).await.expect("a read");
@@ -54,10 +54,7 @@ impl Game {
                     (holder, when) = (Some(worker.0), Some(deadline));
                 }
                 JobState::Backoff { run_at: at, .. } => run_at = Some(at),
-                JobState::Ready { .. }
-                | JobState::Done
-                | JobState::Quarantined { .. }
-                | JobState::Held { .. } => {}
+                JobState::Ready { .. } | JobState::Done | JobState::Quarantined { .. } => {}
             }
             let number = |column: &str| row.get::<i64, _>(column);
             let stage = job.state.stage().map_or(4, |stage| stage.index() as i64);
@@ -67,16 +64,16 @@ impl Game {
             );
             assert_eq!(
                 (
-                    number("epoch"),
+                    number("token"),
                     number("attempt"),
                     number("crashes"),
-                    number("mem_class")
+                    number("exclusive")
                 ),
                 (
-                    job.epoch,
+                    job.token,
                     i64::from(job.attempt),
                     i64::from(job.crashes),
-                    i64::from(job.alone)
+                    i64::from(job.exclusive)
                 ),
                 "pair {pair}"
             );
@@ -90,12 +87,12 @@ impl Game {
                 (row.get("failed_at"), row.get("failed_with")),
                 (
                     failed.map(|(stage, _)| stage.index() as i64),
-                    failed.map(|(_, recipe)| recipe.0)
+                    failed.map(|(_, fingerprint)| fingerprint.0)
                 ),
                 "pair {pair}"
             );
-            assert!(job.epoch >= self.epochs[*pair as usize]);
-            self.epochs[*pair as usize] = job.epoch;
+            assert!(job.token >= self.tokens[*pair as usize]);
+            self.tokens[*pair as usize] = job.token;
         }
         self.world.counters_hold().await;
         let log = self.world.catalog.verdict_log(None).await.expect("a log");

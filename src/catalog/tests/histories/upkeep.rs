@@ -1,12 +1,13 @@
-//! Moves that no worker makes for itself: deaths, rescues, jumping clocks, and what people ask for.
+//! Moves that no worker makes for itself: deaths, recoveries, jumping clocks, and what people ask for.
 
 use rand::RngExt as _;
 
 use super::super::model::LEASE;
-use super::super::{name, recipes, row};
+use super::super::state_machine::JobState;
+use super::super::{fingerprints, name, row};
 use super::{Game, LONGEST, MOST_PAIRS};
-use crate::catalog::{Again, Dead, Look, NewVerdict, RetrySelection};
-use crate::domain::{JobState, JobStatus, Stage, ThresholdMetric, Verdict};
+use crate::catalog::{DeadWorker, Look, NewVerdict, RerunPolicy, RetrySelection};
+use crate::domain::{JobStatus, Stage, ThresholdMetric, Verdict};
 
 impl Game {
     pub(super) async fn end(&mut self) {
@@ -25,29 +26,32 @@ impl Game {
     }
 
     /// Somebody takes another for dead, rightly or not, or finds its deadlines long past.
-    pub(super) async fn rescue(&mut self) {
+    pub(super) async fn recover(&mut self) {
         let (Some(me), now) = (self.somebody(), self.wall) else {
             return;
         };
         let me = self.model.processes[me].worker;
         let other = self.dice.random_range(0..self.model.processes.len());
         let other = self.model.processes[other].worker;
-        let rescued = if self.is_likely(0.5) && other != me {
-            let rescue = self.world.catalog.rescue(Dead::Workers(vec![other]), now);
-            (rescue.await, self.model.rescue(&[other]))
+        let recovered = if self.is_likely(0.5) && other != me {
+            let recover = self
+                .world
+                .catalog
+                .recover(DeadWorker::Workers(vec![other]), now);
+            (recover.await, self.model.recover(&[other]))
         } else {
             if let Some(index) = self.somebody() {
                 self.model.processes[index].clock += LEASE / 2;
                 self.beat_of(index).await;
             }
-            let overdue = self.world.catalog.rescue_overdue(me, 10, now);
-            let expected = self.model.rescue_overdue(me, 10);
+            let overdue = self.world.catalog.recover_overdue(me, 10, now);
+            let expected = self.model.recover_overdue(me, 10);
             self.seen.overdue += expected;
             (overdue.await, expected)
         };
-        let found = rescued.0.expect("a rescue");
-        assert_eq!(found.ready, rescued.1);
-        self.seen.condemned += found.condemned.len() as u32;
+        let found = recovered.0.expect("a recovery");
+        assert_eq!(found.ready, recovered.1);
+        self.seen.poisoned += found.poisoned.len() as u32;
     }
 
     /// All processes die; a new one opens the catalog alone.
@@ -59,10 +63,13 @@ impl Game {
         let (me, others) = self.model.processes.split_last().expect("it joined");
         let (me, others) = (me.worker, others.iter().map(|other| other.worker));
         let others: Vec<_> = others.collect();
-        let rescue = self.world.catalog.rescue(Dead::AllBut(me), self.wall);
-        let rescued = rescue.await.expect("a rescue");
-        assert_eq!(rescued.ready, self.model.rescue(&others));
-        self.seen.condemned += rescued.condemned.len() as u32;
+        let recover = self
+            .world
+            .catalog
+            .recover(DeadWorker::AllExcept(me), self.wall);
+        let recovered = recover.await.expect("a recovery");
+        assert_eq!(recovered.ready, self.model.recover(&others));
+        self.seen.poisoned += recovered.poisoned.len() as u32;
         assert!(
             self.model
                 .jobs
@@ -73,12 +80,12 @@ impl Game {
 
     /// A pair kills one process after the other.
     pub(super) async fn poison(&mut self) {
-        let before = self.seen.condemned;
+        let before = self.seen.poisoned;
         for round in 0..8 {
             self.take_over().await;
             let me = self.model.processes.len() - 1;
             self.claim_by(me, 1, round > 0).await;
-            if self.seen.condemned > before {
+            if self.seen.poisoned > before {
                 return;
             }
         }
@@ -87,23 +94,34 @@ impl Game {
     /// The wall clock jumps, forward or back.
     pub(super) async fn due(&mut self) {
         self.wall += self.dice.random_range(-300..300);
-        let due = self.world.catalog.stage_due(self.wall, LONGEST).await;
+        let due = self
+            .world
+            .catalog
+            .release_due_backoffs(self.wall, LONGEST)
+            .await;
         assert_eq!(due.expect("stored"), self.model.due(self.wall, LONGEST));
     }
 
-    pub(super) async fn send_back(&mut self) {
-        let mut again = Again::Changed;
+    pub(super) async fn requeue_stale(&mut self) {
+        let mut again = RerunPolicy::Changed;
         if self.is_likely(0.7) {
             let revisions = [1; 4].map(|one: u32| one + self.dice.random_range(0..2));
-            let new = recipes(revisions);
-            let ids = self.world.catalog.register_recipes(&new).await;
-            self.settings = (new, ids.expect("recipes"));
+            let new = fingerprints(revisions);
+            let ids = self.world.catalog.register_fingerprints(&new).await;
+            self.settings = (new, ids.expect("fingerprints"));
         } else {
-            again = Again::All(Stage::ALL[self.dice.random_range(0..4)]);
+            again = RerunPolicy::All(Stage::ALL[self.dice.random_range(0..4)]);
         }
-        let (recipes, ids) = &self.settings;
-        let sent = self.world.catalog.send_back(recipes, None, again).await;
-        assert_eq!(sent.expect("sent back"), self.model.send_back(*ids, again));
+        let (fingerprints, ids) = &self.settings;
+        let sent = self
+            .world
+            .catalog
+            .requeue_stale(fingerprints, None, again)
+            .await;
+        assert_eq!(
+            sent.expect("sent back"),
+            self.model.requeue_stale(*ids, again)
+        );
     }
 
     pub(super) async fn retry(&mut self) {
