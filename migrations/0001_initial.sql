@@ -217,7 +217,7 @@ CREATE TABLE attention_check_answer (
     metric TEXT NOT NULL CHECK (metric IN ('nl_ssim', 'density', 'ensemble', 'relief')),
     result_hash BLOB NOT NULL CHECK (length(result_hash) = 32),
     kind TEXT NOT NULL CHECK (kind IN ('turned', 'mirrored', 'threshold', 'duplicate')),
-    attention_check TEXT NOT NULL CHECK (json_valid(control)),
+    attention_check TEXT NOT NULL CHECK (json_valid(attention_check)),
     seen BLOB NOT NULL CHECK (length(seen) = 32),
     shown_ms INTEGER CHECK (shown_ms >= 0),
     angle_read_deg REAL CHECK (angle_read_deg BETWEEN -180 AND 180),

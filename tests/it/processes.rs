@@ -6,7 +6,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
-use mocban::catalog::holder;
+use mocban::catalog::lock_owner;
 use mocban::domain::{JobStatus, Stage};
 use mocban::store::Project;
 use rustix::process::{Pid, Signal, kill_process};
@@ -66,7 +66,7 @@ impl World {
         loop {
             let world = Self::new(count);
             let stopped = world.stopped_at("fit:filed", &[TIME_SCALE]);
-            if holder(&world.project.catalog_path()).is_none() {
+            if lock_owner(&world.project.catalog_path()).is_none() {
                 return (world, stopped);
             }
         }
@@ -233,7 +233,7 @@ fn who_is_stopped_inside_a_commit_is_named_to_those_who_wait() {
     let world = World::new("2");
     let mut stopped = world.stopped_at("fit:claiming", &[]);
     let pid = stopped.pid();
-    let found = holder(&world.project.catalog_path()).expect("a holder");
+    let found = lock_owner(&world.project.catalog_path()).expect("a holder");
     assert_eq!((found.pid, found.is_stopped), (pid, true));
     let mut command = joined(&world.project);
     command.stderr(File::create(world.said()).expect("a file"));

@@ -283,7 +283,7 @@ async fn the_database_itself_refuses_to_change_answers_and_alignments() {
     let path = world.dir.path().join("catalog.sqlite");
     let mut conn = open::write_conn(&path, false).await.expect("a connection");
     for sql in [
-        "UPDATE attention_check_answer SET reader = 'bo'",
+        "UPDATE attention_check_answer SET reviewer = 'bo'",
         "DELETE FROM attention_check_answer",
         "UPDATE attention_check_undo SET at = 9",
         "DELETE FROM attention_check_undo",

@@ -239,13 +239,11 @@ impl Queue {
     }
 
     /// Back-offs that are over, or further ahead than any can be.
-    pub(super) fn due(&mut self, now: UnixMillis, longest: i64) -> u64 {
+    pub(super) fn due(&mut self, now: UnixMillis, longest_ms: i64) -> u64 {
         let mut due = 0;
         for job in self.jobs.values_mut() {
-            if let JobState::Backoff { stage, run_at } = job.state
-                && (run_at <= now || run_at > now + longest)
-            {
-                job.state = JobState::Ready { stage };
+            if let Ok(state) = transition(job.state, Event::Due { now, longest_ms }) {
+                job.state = state;
                 due += 1;
             }
         }

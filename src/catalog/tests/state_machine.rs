@@ -100,10 +100,12 @@ pub(super) enum Event {
         /// Whether too many workers died over it: see [`is_poisoned`].
         poisoned: bool,
     },
-    /// The back-off time may be over.
+    /// The back-off time may be over, or too far ahead because the clock jumped.
     Due {
         /// The time now.
         now: UnixMillis,
+        /// No back-off is longer.
+        longest_ms: i64,
     },
     /// Somebody asks for it again, or its settings or inputs changed: back to `stage`, never forward.
     Requeue {
@@ -134,7 +136,9 @@ pub(super) fn transition(state: JobState, event: Event) -> Result<JobState, Refu
             deadline,
         }),
         (JobState::Leased { stage, worker, .. }, event) => leased(stage, worker, event),
-        (JobState::Backoff { stage, run_at }, Event::Due { now }) if run_at <= now => {
+        (JobState::Backoff { stage, run_at }, Event::Due { now, longest_ms })
+            if run_at <= now || run_at > now + longest_ms =>
+        {
             Some(JobState::Ready { stage })
         }
         (state, Event::Requeue { stage }) => Some(JobState::Ready {

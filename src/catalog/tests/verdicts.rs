@@ -182,7 +182,7 @@ async fn the_database_itself_refuses_to_change_a_verdict() {
     let mut conn = crate::catalog::db::open::write_conn(&path, false)
         .await
         .expect("a connection");
-    for sql in ["UPDATE verdict SET reader = 'bo'", "DELETE FROM verdict"] {
+    for sql in ["UPDATE verdict SET reviewer = 'bo'", "DELETE FROM verdict"] {
         assert!(sqlx::query(sql).execute(&mut conn).await.is_err());
     }
 }
