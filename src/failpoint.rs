@@ -1,107 +1,117 @@
-//! Named points at which a test build dies as a killed process does, is stopped, or is held up.
+//! Named points at which a test can make the process die, stop, wait or panic.
 //!
-//! `MOCBAN_BREAK_AT=STAGE:POINT[:N][@PAIR]`, for example `depth:filed:2` or `fit:claimed@0003`, ends the process the
-//! N-th time (1 when left out, 0 for each time) that a pair, or that pair, reaches the point at that stage.
-//! `MOCBAN_STOP_AT` stops the process there instead, until it is sent SIGCONT. `MOCBAN_HOLD_AT` holds the thread up:
-//! it makes the file that `MOCBAN_HOLD_FILE` names and goes on when somebody has removed it; such a point must be one
-//! that a thread of its own reaches: `computed`, `written` or `filed`. At `MOCBAN_PANIC_AT`, of the same kind, that
-//! thread panics. Only builds with debug assertions look.
+//! Each variable names a point as `STAGE:POINT[:N][@PAIR]`, for example `depth:synced:2` or `fit:claimed@0003`. It takes
+//! effect the N-th time (by default the first time, with 0 each time) that a pair, or the named pair, reaches the point.
+//!
+//! - `MOCBAN_BREAK_AT` ends the process as a kill does.
+//! - `MOCBAN_STOP_AT` stops the process until it receives SIGCONT.
+//! - `MOCBAN_HOLD_AT` creates the file that `MOCBAN_HOLD_FILE` names and blocks the thread until the file is removed. It
+//!   must name a point on a thread for blocking code: `computed`, `written` or `synced`.
+//! - `MOCBAN_PANIC_AT` panics, at the same points as `MOCBAN_HOLD_AT`.
+//!
+//! Only builds with debug assertions read these variables.
 
 use crate::domain::{PairName, Stage};
 
-/// Where a process may be made to die, in the order in which a pair comes by at each stage.
+/// A failpoint, in the order in which a pair passes them at each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Point {
-    /// The claim's row is written, not committed. Pairs have no names here.
+    /// The claim is written and not committed. Pairs have no names here.
     Claiming,
     /// The pair is leased, nothing is computed.
     Claimed,
-    /// The stage is computed, nothing is on disk.
+    /// The stage is computed, nothing is on the disk.
     Computed,
-    /// A file of it is written under a temporary name, and has not got its own.
+    /// One of the stage's files is written under its temporary name.
     Written,
-    /// Its files are on disk, no row names them.
-    Filed,
-    /// Its job's step is written, not committed. Pairs have no names here.
-    Rowed,
-    /// Its rows are committed.
-    Stored,
+    /// The stage's files are on the disk, no row names them.
+    Synced,
+    /// The stage's rows are written and not committed. Pairs have no names here.
+    Recorded,
+    /// The stage's rows are committed.
+    Committed,
 }
 
-/// Dies, stops or waits here if a test asks for it.
+/// Dies, stops, waits or panics here if a test asks for it.
 #[cfg(debug_assertions)]
 pub(crate) fn hit(stage: Stage, point: Point, pair: Option<&PairName>) {
-    use test_build::{Wanted, asked};
-
-    if asked(&test_build::BREAK_AT, "MOCBAN_BREAK_AT").is_some_and(|at| at.is(stage, point, pair)) {
+    let is_at = |failpoint: &Option<test_build::Failpoint>| {
+        failpoint
+            .as_ref()
+            .is_some_and(|failpoint| failpoint.fires(stage, point, pair))
+    };
+    if is_at(&test_build::BREAK_AT) {
         std::process::abort();
     }
-    let stop: Option<&Wanted> = asked(&test_build::STOP_AT, "MOCBAN_STOP_AT");
-    if stop.is_some_and(|at| at.is(stage, point, pair)) {
-        let me = rustix::process::getpid();
-        // A signal that cannot be sent leaves the process running, and the test that waits for it fails.
-        let _ = rustix::process::kill_process(me, rustix::process::Signal::STOP);
+    if is_at(&test_build::STOP_AT) {
+        test_build::stop();
     }
-    let hold = asked(&test_build::HOLD_AT, "MOCBAN_HOLD_AT");
-    if hold.is_some_and(|at| at.is(stage, point, pair)) {
+    if is_at(&test_build::HOLD_AT) {
         test_build::hold();
     }
-    let panic = asked(&test_build::PANIC_AT, "MOCBAN_PANIC_AT");
-    let panics = panic.is_some_and(|at| at.is(stage, point, pair));
+    let panics = is_at(&test_build::PANIC_AT);
     assert!(!panics, "asked for by a test");
 }
 
-/// Nothing to reach in a release build.
+/// Does nothing in a release build.
 #[cfg(not(debug_assertions))]
 pub(crate) const fn hit(_stage: Stage, _point: Point, _pair: Option<&PairName>) {}
 
-/// What only a build with debug assertions looks at.
+/// The failpoints that the environment configures.
 #[cfg(debug_assertions)]
 mod test_build {
-    use std::sync::OnceLock;
+    use std::sync::LazyLock;
     use std::sync::atomic::{AtomicU64, Ordering};
 
     use super::Point;
     use crate::domain::{PairName, Stage};
 
-    pub(super) static BREAK_AT: OnceLock<Option<Wanted>> = OnceLock::new();
-    pub(super) static STOP_AT: OnceLock<Option<Wanted>> = OnceLock::new();
-    pub(super) static HOLD_AT: OnceLock<Option<Wanted>> = OnceLock::new();
-    pub(super) static PANIC_AT: OnceLock<Option<Wanted>> = OnceLock::new();
+    pub(super) static BREAK_AT: LazyLock<Option<Failpoint>> =
+        LazyLock::new(|| Failpoint::from_variable("MOCBAN_BREAK_AT"));
+    pub(super) static STOP_AT: LazyLock<Option<Failpoint>> =
+        LazyLock::new(|| Failpoint::from_variable("MOCBAN_STOP_AT"));
+    pub(super) static HOLD_AT: LazyLock<Option<Failpoint>> =
+        LazyLock::new(|| Failpoint::from_variable("MOCBAN_HOLD_AT"));
+    pub(super) static PANIC_AT: LazyLock<Option<Failpoint>> =
+        LazyLock::new(|| Failpoint::from_variable("MOCBAN_PANIC_AT"));
 
-    /// A place that a test names.
+    /// A failpoint from the environment.
     #[derive(Debug)]
-    pub(super) struct Wanted {
+    pub(super) struct Failpoint {
         place: String,
         pair: Option<String>,
         nth: u64,
-        reached: AtomicU64,
+        hits: AtomicU64,
     }
 
-    pub(super) fn asked(
-        place: &'static OnceLock<Option<Wanted>>,
-        variable: &str,
-    ) -> Option<&'static Wanted> {
-        let wanted = place.get_or_init(|| Wanted::parse(&std::env::var(variable).ok()?));
-        wanted.as_ref()
+    /// Stops the process until it receives SIGCONT.
+    #[cfg(unix)]
+    pub(super) fn stop() {
+        use rustix::process::{Signal, getpid, kill_process};
+        // A signal that cannot be sent leaves the process running, and the test that waits for it fails.
+        let _ = kill_process(getpid(), Signal::STOP);
     }
 
-    /// Waits until the file that tells of it is gone.
+    #[cfg(not(unix))]
+    pub(super) const fn stop() {}
+
+    /// Creates the hold file and waits until it is removed.
     pub(super) fn hold() {
         let Some(file) = std::env::var_os("MOCBAN_HOLD_FILE") else {
             return;
         };
-        let made = std::fs::write(&file, b"");
-        while made.is_ok() && std::path::Path::new(&file).exists() {
+        let created = std::fs::write(&file, b"");
+        while created.is_ok() && std::path::Path::new(&file).exists() {
             std::thread::sleep(std::time::Duration::from_millis(2));
         }
     }
 
-    impl Wanted {
-        fn parse(text: &str) -> Option<Self> {
+    impl Failpoint {
+        fn from_variable(name: &str) -> Option<Self> {
+            let text = std::env::var(name).ok()?;
             let (place, pair) = match text.split_once('@') {
                 Some((place, pair)) => (place, Some(pair.to_owned())),
-                None => (text, None),
+                None => (text.as_str(), None),
             };
             let mut parts = place.splitn(3, ':');
             let (stage, point) = (parts.next()?, parts.next()?);
@@ -109,16 +119,16 @@ mod test_build {
                 place: format!("{stage}:{point}"),
                 pair,
                 nth: parts.next().map_or(Some(1), |nth| nth.parse().ok())?,
-                reached: AtomicU64::new(0),
+                hits: AtomicU64::new(0),
             })
         }
 
-        /// Whether this is the place, for the N-th time.
-        pub(super) fn is(&self, stage: Stage, point: Point, pair: Option<&PairName>) -> bool {
-            let pair_is = |wanted: &String| pair.is_some_and(|pair| pair.as_str() == wanted);
+        /// Counts a hit; returns whether it is the one to act on.
+        pub(super) fn fires(&self, stage: Stage, point: Point, pair: Option<&PairName>) -> bool {
+            let is_pair = |wanted: &String| pair.is_some_and(|pair| pair.as_str() == wanted);
             self.place == format!("{stage}:{}", name(point))
-                && self.pair.as_ref().is_none_or(pair_is)
-                && (self.reached.fetch_add(1, Ordering::SeqCst) + 1 == self.nth || self.nth == 0)
+                && self.pair.as_ref().is_none_or(is_pair)
+                && (self.hits.fetch_add(1, Ordering::SeqCst) + 1 == self.nth || self.nth == 0)
         }
     }
 
@@ -128,9 +138,9 @@ mod test_build {
             Point::Claimed => "claimed",
             Point::Computed => "computed",
             Point::Written => "written",
-            Point::Filed => "filed",
-            Point::Rowed => "rowed",
-            Point::Stored => "stored",
+            Point::Synced => "synced",
+            Point::Recorded => "recorded",
+            Point::Committed => "committed",
         }
     }
 }

@@ -110,9 +110,7 @@ impl Fake {
 }
 
 fn seen(project: &Project, name: &str) -> anyhow::Result<InputVersion> {
-    let (hash, stat) = hash_input(&project.dir().join(name))?;
-    let stat = stat.as_str().to_owned();
-    Ok(InputVersion { hash, stat })
+    Ok(hash_input(&project.dir().join(name))?.into())
 }
 
 /// A row for each metric, all sure of themselves.

@@ -128,7 +128,7 @@ fn asked(workers: usize) -> anyhow::Result<(Settings, RunOptions)> {
     let loaded = load(&Sources::default())?;
     let options = RunOptions {
         workers,
-        memory: runner::free_memory(),
+        memory: runner::default_memory_limit(),
         ..RunOptions::default()
     };
     Ok((loaded.config.stages, options))
@@ -141,7 +141,7 @@ async fn with_catalog(project: &Project, workers: usize) -> anyhow::Result<Took>
     let watch = Watch::start()?;
     let stop = Stop::new();
     let summary = runner::run(project, &catalog, &settings, &options, &stop, |_| {}).await?;
-    let took = watch.stop(summary.at_work / workers as u32)?;
+    let took = watch.stop(summary.compute_time / workers as u32)?;
     catalog.close().await;
     anyhow::ensure!(summary.left == 0, "{} pairs left", summary.left);
     Ok(took)
@@ -214,7 +214,7 @@ fn artifacts_part(project: &Project) -> anyhow::Result<Duration> {
         let bytes = std::fs::read(&path)?;
         let file = NewArtifact::new("file", "bin", bytes);
         let start = Instant::now();
-        other.write_artifacts(&[file])?;
+        other.write_artifacts(&[file], &|| {})?;
         time += start.elapsed();
     }
     Ok(time)

@@ -134,7 +134,7 @@ async fn rows_and_files(
         mend_pairs(catalog, options, &looks, summary).await?;
         for look in looks {
             for hash in &look.named {
-                named.add(hash).map_err(spill)?;
+                named.add(hash);
             }
             summary.count(look, options.repair);
         }
@@ -219,14 +219,14 @@ async fn mend_pairs(
 /// Files that no row names; removes those that are ours.
 async fn spare_files(
     project: &Project,
-    mut named: ReferencedArtifacts,
+    named: ReferencedArtifacts,
     remove: bool,
     summary: &mut CheckSummary,
 ) -> Result<(), CheckError> {
     let folder = project.clone();
     let walk = move || {
         let mut spare = Spare::default();
-        let walked = named.unnamed(&folder, |unnamed| {
+        let walked = named.for_each_unreferenced(&folder, |unnamed| {
             let ours = unnamed.kind != UnreferencedKind::UnknownFile;
             // One that cannot be removed is told again by the next check.
             let removed = remove && ours && std::fs::remove_file(&unnamed.path).is_ok();
@@ -243,13 +243,6 @@ async fn spare_files(
             path: project.artifacts_dir(),
             source,
         }),
-    }
-}
-
-fn spill(source: std::io::Error) -> CheckError {
-    CheckError::Artifacts {
-        path: std::env::temp_dir(),
-        source,
     }
 }
 

@@ -165,7 +165,7 @@ fn inputs(project: &Project, pair: &AuditedPair, look: &mut Look) {
             Ok(stat) => {
                 let moved = |seen: &&InputVersion| seen.stat != stat.as_str();
                 let changed = seen.filter(moved).is_some_and(|seen| {
-                    hash_input(&path).map_or(true, |(hash, _)| hash != seen.hash)
+                    hash_input(&path).map_or(true, |found| found.hash != seen.hash)
                 });
                 if changed {
                     look.inputs_changed.push(said());

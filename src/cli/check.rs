@@ -118,7 +118,7 @@ async fn repair(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSumm
 /// Takes the run's lock if no other process works on the project.
 fn exclusive_lock(project: &Project) -> Result<RunLock, RunError> {
     let lock = RunLock::acquire(project, false)?;
-    if lock.is_alone() {
+    if lock.is_exclusive() {
         Ok(lock)
     } else {
         Err(LockError::InUse { pid: None }.into())

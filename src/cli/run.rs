@@ -134,10 +134,10 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
             workers => workers,
         },
         memory: match config.run.memory_mib {
-            0 => runner::free_memory(),
+            0 => runner::default_memory_limit(),
             mib => Some(mib << 20),
         },
-        stage_limit: Duration::from_secs(config.run.stage_timeout_s),
+        stage_timeout: Duration::from_secs(config.run.stage_timeout_s),
         mesh_limits: config.limits.mesh,
         image_limits: config.limits.image,
         ..plain

@@ -5,12 +5,11 @@ use std::time::Duration;
 
 use tokio::task::JoinSet;
 
+use super::checkpointer::write_files;
 use super::compute_thread::{ComputeEvent, ComputeThread};
-use super::filing::file;
 use super::options::RunOptions;
 use super::pair_context::PairContext;
-use super::stage_executor::PipelineExecutor;
-use super::steps::StageExecutor;
+use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::Stop;
 use crate::catalog::{PairAttributes, PairWork};
 use crate::domain::Stage;
@@ -34,7 +33,7 @@ pub async fn bare(
             endings.spawn(all_filed(filings));
         }
         let (steps, project) = (Arc::clone(&steps), project.clone());
-        slots.spawn(through(steps, project, options.stage_limit, attributes));
+        slots.spawn(through(steps, project, options.stage_timeout, attributes));
     }
     for filings in slots.join_all().await {
         endings.spawn(all_filed(filings));
@@ -64,18 +63,18 @@ async fn through(
         attributes_json: String::new(),
         results: Vec::new(),
     }));
-    let mut computing = ComputeThread::begin(&steps, Stage::Fit, pair, Stage::next).ok()?;
+    let mut computing = ComputeThread::start(&steps, Stage::Fit, pair, Stage::next).ok()?;
     loop {
-        let (finished, next) = match computing.next(limit, &stop).await {
+        let (finished, next) = match computing.next_event(limit, &stop).await {
             ComputeEvent::Started(..) => continue,
             ComputeEvent::Finished(finished, next) => (finished, next),
             _ => return None,
         };
-        at_work += finished.took;
+        at_work += finished.elapsed;
         let (project, name, stop) = (project.clone(), name.clone(), stop.clone());
         filings.spawn(async move {
             let of = (&name, finished.stage);
-            let filed = file(&project, of, finished.files, limit, &stop).await;
+            let filed = write_files(&project, of, finished.files, limit, &stop).await;
             matches!(filed, Ok(true))
         });
         if next.is_none() {

@@ -1,257 +1,257 @@
-//! A pair's lease in a worker's hand. The thread that computes does not wait for the disk: files are written and stages
-//! stored while those after them are computed, several at once where they are short, and the lease comes back when all
-//! are.
+//! Stores the stages of one pair under its lease, in a task of its own, so that the thread that computes does not wait
+//! for the disk. A stage's files are on the disk before a row names them; stages are stored in their order, and those
+//! that are computed while others are stored share a transaction. The lease comes back when all are stored.
 
+use std::io;
 use std::sync::Arc;
+use std::time::Duration;
 
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
-use super::RunError;
-use super::compute_thread::ComputedStage;
+use super::compute_thread::{ComputedStage, run_blocking, task_result};
+use super::error::RunError;
 use super::events::RunEvent;
-use super::filing::file;
-use super::pair_task::{PairEnd, PairReport, RunContext};
+use super::run_context::{PairEnd, PairReport, RunContext};
+use super::stop::{Stop, StopLevel};
 use crate::catalog::{CheckpointOutcome, Lease, StageCheckpoint};
 use crate::domain::{PairName, Stage};
 use crate::failpoint::{self, Point};
+use crate::store::{ArtifactError, NewArtifact, Project};
 
-/// The right to a pair, and what has been stored under it.
+/// The task that holds a pair's lease and stores its stages.
 pub(super) struct Checkpointer {
-    shared: Arc<RunContext>,
-    name: PairName,
-    right: LeaseState,
-    stored: u64,
-    /// Whether all that was sent on its way is stored or will be.
-    is_whole: bool,
+    context: Arc<RunContext>,
+    stages: mpsc::UnboundedSender<ComputedStage>,
+    task: JoinHandle<Result<Settled, RunError>>,
 }
 
-/// Where the lease is.
-enum LeaseState {
-    /// In hand.
-    Lease(Lease),
-    /// With a task that stores the stages it is sent.
-    Storing(
-        mpsc::UnboundedSender<ComputedStage>,
-        JoinHandle<Result<StoreOutcome, RunError>>,
-    ),
-    /// Spent: the pair is done, or the lease was given away.
-    Spent,
-    /// Lost to somebody else.
-    Lost,
+/// What a checkpointer leaves behind.
+pub(super) struct Settled {
+    lease: CheckpointOutcome,
+    /// Number of stages stored.
+    pub(super) stages: u64,
+    /// Whether every stage was stored that was sent; `false` when the run was told to stop at once.
+    is_complete: bool,
 }
 
-/// What became of the lease, and how many stages were stored under it.
-struct StoreOutcome {
-    kept: CheckpointOutcome,
-    stages: u64,
-    is_whole: bool,
+impl Settled {
+    /// Returns the lease, if it is still held and every stage that was sent is stored.
+    ///
+    /// # Errors
+    /// Returns itself otherwise.
+    pub(super) fn into_lease(self) -> Result<Lease, Self> {
+        match self.lease {
+            CheckpointOutcome::Lease(lease) if self.is_complete => Ok(lease),
+            lease => Err(Self { lease, ..self }),
+        }
+    }
+
+    /// Releases a lease that is left, and returns how the pair ended: as given, unless the lease was lost or not every
+    /// stage was stored.
+    pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
+        let stages = self.stages;
+        let end = match &self.lease {
+            CheckpointOutcome::LeaseLost => PairEnd::LeaseLost,
+            CheckpointOutcome::Done | CheckpointOutcome::Lease(_) if !self.is_complete => {
+                PairEnd::Released
+            }
+            CheckpointOutcome::Done | CheckpointOutcome::Lease(_) => end,
+        };
+        if let CheckpointOutcome::Lease(lease) = self.lease
+            && let Err(error) = context.catalog.release(lease).await
+        {
+            return PairReport {
+                stages,
+                ..PairReport::fatal(error.into())
+            };
+        }
+        PairReport {
+            end,
+            stages,
+            fatal: None,
+        }
+    }
 }
 
 impl Checkpointer {
-    /// A leased pair of which nothing is on its way.
-    pub(super) const fn new(shared: Arc<RunContext>, name: PairName, lease: Lease) -> Self {
+    /// Starts the task for a leased pair.
+    pub(super) fn start(context: Arc<RunContext>, pair: PairName, lease: Lease) -> Self {
+        let (sender, stages) = mpsc::unbounded_channel();
+        let task = tokio::spawn(store_stages(Arc::clone(&context), pair, lease, stages));
         Self {
-            shared,
-            name,
-            right: LeaseState::Lease(lease),
-            stored: 0,
-            is_whole: true,
+            context,
+            stages: sender,
+            task,
         }
     }
 
-    /// Has what is on its way stored at once and takes out the lease; `None` when it is lost or spent.
-    pub(super) async fn lease(&mut self) -> Result<Option<Lease>, RunError> {
-        if self.is_storing() {
-            let catalog = self.shared.catalog.clone();
-            let _waiting = catalog.waiting().await?;
-            self.settle().await?;
-        }
-        match std::mem::replace(&mut self.right, LeaseState::Spent) {
-            LeaseState::Lease(lease) => Ok(Some(lease)),
-            right => {
-                self.right = right;
-                Ok(None)
-            }
-        }
+    /// Sends a computed stage to be stored. Returns `false` when no more stages can be stored: the lease is lost, the
+    /// disk or the catalog returned an error, or the run was told to stop at once.
+    pub(super) fn store(&self, stage: ComputedStage) -> bool {
+        self.stages.send(stage).is_ok()
     }
 
-    /// Sends a finished stage on its way, and tells of it when it is stored; `false` when the lease is known to be gone.
-    /// Stages are stored in their order.
-    pub(super) async fn store(&mut self, finished: ComputedStage) -> Result<bool, RunError> {
-        self.begin();
-        if let LeaseState::Storing(sender, _) = &self.right
-            && sender.send(finished).is_ok()
-        {
-            return Ok(true);
-        }
-        // It takes no more where the lease was lost, or the disk or the catalog refused.
-        self.settle().await?;
-        Ok(false)
+    /// Waits until the stages that were sent are stored, without delay for a larger commit, because the caller waits.
+    pub(super) async fn settle(self) -> Result<Settled, RunError> {
+        let _flush = self.context.catalog.waiting().await?;
+        drop(self.stages);
+        task_result(self.task.await)
     }
 
-    /// Gives the lease, if it is in hand, to a task that stores.
-    fn begin(&mut self) {
-        self.right = match std::mem::replace(&mut self.right, LeaseState::Spent) {
-            LeaseState::Lease(lease) => {
-                let (sender, stages) = mpsc::unbounded_channel();
-                let task = store(Arc::clone(&self.shared), self.name.clone(), lease, stages);
-                LeaseState::Storing(sender, tokio::spawn(task))
-            }
-            right => right,
+    /// Waits until the stages that were sent are stored, releases a lease that is left, and returns how the pair ended.
+    pub(super) async fn finish(self, end: PairEnd) -> PairReport {
+        let context = Arc::clone(&self.context);
+        let settled = if end == PairEnd::Done {
+            // Nobody waits for it, so the last stages may share a commit with those of other pairs.
+            drop(self.stages);
+            task_result(self.task.await)
+        } else {
+            self.settle().await
         };
-    }
-
-    /// Whether a stage may be on its way.
-    pub(super) const fn is_storing(&self) -> bool {
-        matches!(self.right, LeaseState::Storing(..))
-    }
-
-    /// How a pair that is done leaves its worker, when all is stored. Nobody waits for it.
-    pub(super) async fn done(mut self) -> PairReport {
-        let settled = self.settle().await;
-        self.report(settled.map(|()| PairEnd::Done)).await
-    }
-
-    /// How the pair leaves its worker, when all is stored and a lease that is left has been given back.
-    pub(super) async fn report(mut self, end: Result<PairEnd, RunError>) -> PairReport {
-        let given_back = self.give_back().await;
-        let lost = matches!(self.right, LeaseState::Lost);
-        let (end, fatal) = match (end, given_back) {
-            (Err(error), _) | (Ok(_), Err(error)) => (PairEnd::GivenBack, Some(error)),
-            (Ok(_), Ok(())) if lost => (PairEnd::Lost, None),
-            (Ok(_), Ok(())) if !self.is_whole => (PairEnd::GivenBack, None),
-            (Ok(end), Ok(())) => (end, None),
-        };
-        PairReport {
-            end,
-            stages: self.stored,
-            fatal,
+        match settled {
+            Ok(settled) => settled.finish(&context, end).await,
+            Err(error) => PairReport::fatal(error),
         }
-    }
-
-    async fn give_back(&mut self) -> Result<(), RunError> {
-        if let Some(lease) = self.lease().await? {
-            self.shared.catalog.release(lease).await?;
-        }
-        Ok(())
-    }
-
-    /// Waits until the stages that are on their way are stored.
-    async fn settle(&mut self) -> Result<(), RunError> {
-        let right = std::mem::replace(&mut self.right, LeaseState::Spent);
-        let LeaseState::Storing(sender, task) = right else {
-            self.right = right;
-            return Ok(());
-        };
-        drop(sender);
-        let StoreOutcome {
-            kept,
-            stages,
-            is_whole,
-        } = match task.await {
-            Ok(stored) => stored?,
-            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
-        };
-        self.stored += stages;
-        self.is_whole &= is_whole;
-        self.right = match kept {
-            CheckpointOutcome::LeaseLost => LeaseState::Lost,
-            CheckpointOutcome::Done => LeaseState::Spent,
-            CheckpointOutcome::Lease(lease) => LeaseState::Lease(lease),
-        };
-        Ok(())
     }
 }
 
-/// Stores stages as they come, those together that have come while others were on their way, until no more come or the
-/// lease is gone.
-async fn store(
-    shared: Arc<RunContext>,
-    name: PairName,
+/// Stores stages as they arrive, until no more come or the lease is gone.
+async fn store_stages(
+    context: Arc<RunContext>,
+    pair: PairName,
     mut lease: Lease,
     mut stages: mpsc::UnboundedReceiver<ComputedStage>,
-) -> Result<StoreOutcome, RunError> {
+) -> Result<Settled, RunError> {
     let mut stored = 0;
     while let Some(first) = stages.recv().await {
-        let Some(first) = filed(&shared, &name, first).await? else {
-            return Ok(StoreOutcome {
-                kept: CheckpointOutcome::Lease(lease),
-                stages: stored,
-                is_whole: false,
+        let (batch, is_complete) = write_batch(&context, &pair, first, &mut stages).await?;
+        if batch.is_empty() {
+            let (lease, stages) = (CheckpointOutcome::Lease(lease), stored);
+            return Ok(Settled {
+                lease,
+                stages,
+                is_complete,
             });
-        };
-        let (mut done, mut is_whole) = (vec![first], true);
-        while is_whole && let Ok(next) = stages.try_recv() {
-            let next = filed(&shared, &name, next).await?;
-            is_whole = next.is_some();
-            done.extend(next);
         }
-        let told: Vec<_> = done.iter().map(|done| (done.stage, done.ms)).collect();
-        let kept = shared.catalog.checkpoint_in_time(lease, done).await?;
-        if !matches!(kept, CheckpointOutcome::LeaseLost) {
-            stored += told.len() as u64;
-            for (stage, ms) in told {
-                finished(&shared, name.clone(), stage, ms);
+        let times: Vec<_> = batch.iter().map(|done| (done.stage, done.ms)).collect();
+        let outcome = context.catalog.checkpoint_in_time(lease, batch).await?;
+        if !matches!(outcome, CheckpointOutcome::LeaseLost) {
+            stored += times.len() as u64;
+            for (stage, ms) in times {
+                report_stored(&context, pair.clone(), stage, ms);
             }
         }
-        match kept {
-            // What comes after a stage that is not on disk must not be stored without it.
-            CheckpointOutcome::Lease(next) if is_whole => lease = next,
-            kept => {
-                return Ok(StoreOutcome {
-                    kept,
-                    stages: stored,
-                    is_whole,
+        match outcome {
+            // A stage that comes after one that was not stored must not be stored either.
+            CheckpointOutcome::Lease(next) if is_complete => lease = next,
+            lease => {
+                let stages = stored;
+                return Ok(Settled {
+                    lease,
+                    stages,
+                    is_complete,
                 });
             }
         }
     }
-    Ok(StoreOutcome {
-        kept: CheckpointOutcome::Lease(lease),
-        stages: stored,
-        is_whole: true,
+    let (lease, stages) = (CheckpointOutcome::Lease(lease), stored);
+    Ok(Settled {
+        lease,
+        stages,
+        is_complete: true,
     })
 }
 
-/// Has a stage's files written; then a row may name them. `None` when the run is to stop now.
-async fn filed(
-    shared: &RunContext,
+/// Writes the files of a stage and of those that have arrived meanwhile. The second value is `false` when the run was
+/// told to stop before all were written.
+async fn write_batch(
+    context: &RunContext,
+    pair: &PairName,
+    first: ComputedStage,
+    stages: &mut mpsc::UnboundedReceiver<ComputedStage>,
+) -> Result<(Vec<StageCheckpoint>, bool), RunError> {
+    let (mut batch, mut next) = (Vec::new(), Some(first));
+    while let Some(stage) = next {
+        match write_stage(context, pair, stage).await? {
+            Some(done) => batch.push(done),
+            None => return Ok((batch, false)),
+        }
+        next = stages.try_recv().ok();
+    }
+    Ok((batch, true))
+}
+
+/// Writes a stage's files; returns the row that may name them then, `None` when the run is to stop at once.
+async fn write_stage(
+    context: &RunContext,
     pair: &PairName,
     stage: ComputedStage,
 ) -> Result<Option<StageCheckpoint>, RunError> {
-    let (of, limit) = ((pair, stage.stage), shared.stage_limit);
-    if !file(&shared.project, of, stage.files, limit, &shared.stop).await? {
+    let (id, timeout) = ((pair, stage.stage), context.stage_timeout);
+    if !write_files(&context.project, id, stage.files, timeout, &context.stop).await? {
         return Ok(None);
     }
-    // The disk may have taken long: whether the lease still stands is asked as of now.
+    // The disk may have taken long, so the lease must be valid now, not when the stage was computed.
     Ok(Some(StageCheckpoint {
         stage: stage.stage,
-        fingerprint: shared.fingerprints.of(stage.stage),
+        fingerprint: context.fingerprints.of(stage.stage),
         mesh_hash: stage.mesh_hash,
         print_hash: stage.print_hash,
         attributes: stage.attributes,
         outcome: stage.outcome,
-        files: stage.named,
+        files: stage.artifacts,
         result_hash: stage.result_hash,
         metrics: stage.metrics,
         inputs: stage.inputs,
-        ms: stage.took.as_millis() as u64,
-        at: shared.clock.now(),
-        next_deadline: shared.deadline(),
-        alive_since: shared.alive_since(),
+        ms: stage.elapsed.as_millis() as u64,
+        at: context.clock.now(),
+        next_deadline: context.deadline(),
+        alive_since: context.alive_since(),
     }))
 }
 
-fn finished(shared: &RunContext, pair: PairName, stage: Stage, ms: u64) {
-    failpoint::hit(stage, Point::Stored, Some(&pair));
-    let last = stage == shared.until.min(Stage::Register);
-    shared.tell(RunEvent::StageFinished {
+/// Writes a stage's files durably, on a thread for blocking calls. Returns `false` when the run is to stop at once: it
+/// waits for no disk.
+///
+/// # Errors
+/// When the disk returns an error, or has not finished within the time limit.
+pub(super) async fn write_files(
+    project: &Project,
+    (pair, stage): (&PairName, Stage),
+    files: Vec<NewArtifact>,
+    timeout: Duration,
+    stop: &Stop,
+) -> Result<bool, ArtifactError> {
+    let (to, name) = (project.clone(), pair.clone());
+    let writing = run_blocking(move || {
+        let on_written = || failpoint::hit(stage, Point::Written, Some(&name));
+        to.write_artifacts(&files, &on_written)?;
+        failpoint::hit(stage, Point::Synced, Some(&name));
+        Ok(true)
+    });
+    tokio::select! {
+        biased;
+        written = writing => written,
+        () = stop.reached(StopLevel::Now) => Ok(false),
+        () = tokio::time::sleep(timeout) => {
+            let text = format!("the disk took longer than {} s", timeout.as_secs_f64());
+            Err(ArtifactError::Io {
+                path: project.artifacts_dir(),
+                source: io::Error::new(io::ErrorKind::TimedOut, text),
+            })
+        }
+    }
+}
+
+fn report_stored(context: &RunContext, pair: PairName, stage: Stage, ms: u64) {
+    failpoint::hit(stage, Point::Committed, Some(&pair));
+    context.emit(RunEvent::StageFinished {
         pair: pair.clone(),
         stage,
         ms,
     });
-    if last {
-        shared.tell(RunEvent::PairDone { pair });
+    if stage == context.until {
+        context.emit(RunEvent::PairDone { pair });
     }
 }

@@ -1,8 +1,8 @@
-//! The one bridge from tokio to computing: the stages of a pair run one after another on a thread of their own.
+//! The bridge from async code to blocking code: the stages of a pair run one after another on a thread of their own.
 //!
-//! A thread a pair, rather than a pool, so that one that hangs past its deadline can be left behind without taking a
-//! place from the others. And not a thread a stage: a core that waits for a thread to be handed its work is idle for
-//! as long as the system takes to see it, often until its next tick some milliseconds later.
+//! Each pair has its own thread instead of one from a pool, so that a stage that hangs past its deadline can be
+//! abandoned without taking a place from other pairs. The thread keeps the pair from stage to stage, because handing
+//! each stage to another thread leaves a core idle until the scheduler wakes that thread, often some milliseconds.
 
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -10,120 +10,119 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use tokio::sync::mpsc;
+use tokio::task::JoinError;
 
 use super::pair_context::{PairContext, StoredStage};
-use super::stage_output;
-use super::steps::{ExecutionError, StageExecutor, StageOutput};
+use super::stage_executor::StageExecutor;
+use super::stage_output::{self, ExecutionError, StageOutput};
 use super::stop::{Stop, StopLevel};
 use crate::catalog::{InputVersions, MetricResult};
 use crate::domain::{ArtifactSet, ContentHash, Failure, FailureClass, Stage, sanitize};
 use crate::failpoint::{self, Point};
 use crate::store::NewArtifact;
 
-/// A stage that is computed, and the files that must be on disk before a row names them.
+/// A computed stage: what its row will hold, and the files that must be on the disk before.
 #[derive(Debug)]
 pub(super) struct ComputedStage {
     pub(super) stage: Stage,
+    /// The outcome as JSON.
     pub(super) outcome: String,
     pub(super) files: Vec<NewArtifact>,
-    /// How the files will be named.
-    pub(super) named: ArtifactSet,
+    /// The names that the files will have.
+    pub(super) artifacts: ArtifactSet,
     pub(super) result_hash: ContentHash,
     pub(super) metrics: Vec<MetricResult>,
     pub(super) mesh_hash: ContentHash,
     pub(super) print_hash: Option<ContentHash>,
     pub(super) attributes: String,
-    /// Input files as read, if no stage before told them.
+    /// The input files as read, unless an earlier stage reported them.
     pub(super) inputs: InputVersions,
-    pub(super) took: Duration,
+    pub(super) elapsed: Duration,
 }
 
 /// What happens on a pair's thread.
 #[derive(Debug)]
 pub(super) enum ComputeEvent {
-    /// A stage begins; the input files as read until now.
+    /// A stage starts. The input files as read so far.
     Started(Stage, InputVersions),
-    /// A stage is computed; which one comes next, unless it was the last one.
+    /// A stage is computed. The stage that follows, if any.
     Finished(Box<ComputedStage>, Option<Stage>),
-    /// A stage failed; the last that comes.
+    /// A stage failed; this is the last event.
     Failed {
-        /// Class and message.
         failure: Failure,
-        /// Whether another try may go better.
+        /// Whether the failure may pass by itself.
         is_transient: bool,
-        /// Input files as read.
+        /// The input files as read.
         inputs: InputVersions,
-        /// How long it took.
-        took: Duration,
+        elapsed: Duration,
     },
-    /// A stage panicked; the pair in hand is lost with it.
+    /// A stage panicked; the pair's data is lost.
     Panicked(String),
-    /// It took too long; its thread is left behind.
+    /// A stage took too long; its thread is abandoned.
     TimedOut,
-    /// The run is to stop now; the thread is left behind.
+    /// The run is to stop at once; the thread is abandoned.
     Stopped,
 }
 
-/// A pair whose stages are computed. When it is dropped, the stage in hand is the last.
+/// The thread that computes a pair's stages. When this is dropped, the stage in progress is the last one.
 #[derive(Debug)]
 pub(super) struct ComputeThread(mpsc::UnboundedReceiver<ComputeEvent>);
 
 impl ComputeThread {
-    /// Computes stages of a pair from this one on. What comes after a stage is asked on the pair's thread.
+    /// Starts a thread that computes a pair's stages from `first` on. `next_stage` is called on the thread after each
+    /// stage.
     ///
     /// # Errors
-    /// When the system gives no thread; then the pair in hand is lost.
-    pub(super) fn begin(
-        steps: &Arc<dyn StageExecutor>,
-        stage: Stage,
+    /// When the system cannot start a thread; the pair's data is lost then.
+    pub(super) fn start(
+        executor: &Arc<dyn StageExecutor>,
+        first: Stage,
         pair: Box<PairContext>,
-        next: impl Fn(Stage) -> Option<Stage> + Send + 'static,
+        next_stage: impl Fn(Stage) -> Option<Stage> + Send + 'static,
     ) -> std::io::Result<Self> {
-        let (sender, receiver) = mpsc::unbounded_channel();
-        let steps = Arc::clone(steps);
+        let (events, receiver) = mpsc::unbounded_channel();
+        let executor = Arc::clone(executor);
         let thread = std::thread::Builder::new().name(pair.attributes.name.to_string());
-        thread.spawn(move || through(&*steps, stage, pair, next, &sender))?;
+        thread.spawn(move || run_stages(&*executor, first, pair, next_stage, &events))?;
         Ok(Self(receiver))
     }
 
-    /// What happens next. No stage may take longer than the limit.
-    pub(super) async fn next(&mut self, limit: Duration, stop: &Stop) -> ComputeEvent {
+    /// Waits for the next event, for at most as long as one stage may take.
+    pub(super) async fn next_event(&mut self, timeout: Duration, stop: &Stop) -> ComputeEvent {
         tokio::select! {
             biased;
-            computed = self.0.recv() => computed.unwrap_or_else(|| {
-                ComputeEvent::Panicked("the thread of the stages ended without a word".to_owned())
+            event = self.0.recv() => event.unwrap_or_else(|| {
+                ComputeEvent::Panicked("the pair's thread ended without an event".to_owned())
             }),
             () = stop.reached(StopLevel::Now) => ComputeEvent::Stopped,
-            () = tokio::time::sleep(limit) => ComputeEvent::TimedOut,
+            () = tokio::time::sleep(timeout) => ComputeEvent::TimedOut,
         }
     }
 }
 
-/// Takes a pair through its stages, until there is none left or nobody listens any more.
-fn through(
-    steps: &dyn StageExecutor,
+/// Computes stages until there is no next one, one fails, or nobody receives the events any more.
+fn run_stages(
+    executor: &dyn StageExecutor,
     mut stage: Stage,
     mut pair: Box<PairContext>,
-    next: impl Fn(Stage) -> Option<Stage>,
-    to: &mpsc::UnboundedSender<ComputeEvent>,
+    next_stage: impl Fn(Stage) -> Option<Stage>,
+    events: &mpsc::UnboundedSender<ComputeEvent>,
 ) {
     let last = loop {
-        if to
-            .send(ComputeEvent::Started(stage, pair.inputs.clone()))
-            .is_err()
-        {
+        let started = ComputeEvent::Started(stage, pair.inputs.clone());
+        if events.send(started).is_err() {
             return;
         }
         let begun = Instant::now();
-        let work = AssertUnwindSafe(|| run(steps, stage, &mut pair, begun));
+        let work = AssertUnwindSafe(|| run_stage(executor, stage, &mut pair, begun));
         match catch_unwind(work) {
-            Ok(Ok(finished)) => match next(stage) {
-                Some(later) => {
-                    // Whether somebody listens is seen when the next stage begins.
-                    let _ = to.send(ComputeEvent::Finished(Box::new(finished), Some(later)));
-                    stage = later;
+            Ok(Ok(computed)) => match next_stage(stage) {
+                Some(next) => {
+                    // A closed channel is noticed when the next stage starts.
+                    let _ = events.send(ComputeEvent::Finished(Box::new(computed), Some(next)));
+                    stage = next;
                 }
-                None => break ComputeEvent::Finished(Box::new(finished), None),
+                None => break ComputeEvent::Finished(Box::new(computed), None),
             },
             Ok(Err(ExecutionError::RerunFrom(earlier))) => stage = earlier,
             Ok(Err(ExecutionError::Failed {
@@ -134,96 +133,106 @@ fn through(
                     failure,
                     is_transient,
                     inputs: pair.inputs.clone(),
-                    took: begun.elapsed(),
+                    elapsed: begun.elapsed(),
                 };
             }
             Err(payload) => break ComputeEvent::Panicked(panic_text(&*payload)),
         }
     };
-    // Before the word is out that there is memory for another pair.
+    // Free the pair's memory before the scheduler gives it to another pair.
     drop(pair);
-    let _ = to.send(last);
+    let _ = events.send(last);
 }
 
-fn run(
-    steps: &dyn StageExecutor,
+/// Runs one stage, and keeps its outcome in the pair for later stages.
+fn run_stage(
+    executor: &dyn StageExecutor,
     stage: Stage,
     pair: &mut PairContext,
     begun: Instant,
 ) -> Result<ComputedStage, ExecutionError> {
-    let output = steps.run(stage, pair)?;
-    let took = begun.elapsed();
+    let StageOutput {
+        outcome,
+        files,
+        metrics,
+    } = executor.run(stage, pair)?;
+    let elapsed = begun.elapsed();
     failpoint::hit(stage, Point::Computed, Some(&pair.attributes.name));
-    finished(stage, pair, output, took)
-}
-
-/// Names what was given by its hashes, and keeps it in hand as later stages would find it stored.
-fn finished(
-    stage: Stage,
-    pair: &mut PairContext,
-    output: StageOutput,
-    took: Duration,
-) -> Result<ComputedStage, ExecutionError> {
     let Some(mesh_hash) = pair.mesh_hash() else {
-        let text = "a stage was done before the mesh was read";
+        let text = "a stage finished before the mesh was read";
         return Err(ExecutionError::failed(FailureClass::Bug, text));
     };
     let print_hash = pair.print_hash();
-    let named: ArtifactSet = output
-        .files
+    let artifacts: ArtifactSet = files
         .iter()
         .map(|file| (file.role().to_owned(), file.reference().clone()))
         .collect();
     let depth = pair.stored.get(&Stage::Depth).map(|stored| &stored.files);
-    let metrics = stage_output::metric_results(&output.metrics, &named, depth);
+    let metrics = stage_output::metric_results(&metrics, &artifacts, depth);
+    let json = outcome.to_string();
     let stored = StoredStage {
-        outcome: serde_json::from_str(&output.outcome).unwrap_or_default(),
-        files: named.clone(),
+        outcome,
+        files: artifacts.clone(),
         mesh_hash,
         print_hash,
     };
     pair.stored.insert(stage, stored);
     Ok(ComputedStage {
         stage,
-        result_hash: stage_output::result_hash(&output.outcome, &named),
-        outcome: output.outcome,
-        files: output.files,
-        named,
+        result_hash: stage_output::result_hash(&json, &artifacts),
+        outcome: json,
+        files,
+        artifacts,
         metrics,
         mesh_hash,
         print_hash,
         attributes: pair.attributes_json.clone(),
-        inputs: pair.news(),
-        took,
+        inputs: pair.unreported_inputs(),
+        elapsed,
     })
 }
 
-/// Most characters of a panic's own words.
-const LONGEST: usize = 160;
+/// Longest excerpt of a panic's message, in characters.
+const MAX_PANIC_CHARS: usize = 160;
 
-/// What a panic said, and what to do.
+/// Describes a panic and what to do about it.
 fn panic_text(payload: &(dyn Any + Send)) -> String {
-    let said = payload
+    let message = payload
         .downcast_ref::<&str>()
-        .map(|text| (*text).to_owned())
-        .or_else(|| payload.downcast_ref::<String>().cloned());
-    let said = said.map_or_else(String::new, |text| {
-        format!(" ({})", sanitize(&text, LONGEST))
+        .copied()
+        .or_else(|| payload.downcast_ref::<String>().map(String::as_str));
+    let message = message.map_or_else(String::new, |text| {
+        format!(" ({})", sanitize(text, MAX_PANIC_CHARS))
     });
     format!(
-        "the stage panicked{said}: a defect of this program, please report it with what `run --rerun failed -v` tells"
+        "the stage panicked{message}: this is a bug, please report it with the output of `run --rerun failed -v`"
     )
+}
+
+/// Runs a blocking call on a thread for such calls; resumes its panic.
+pub(super) async fn run_blocking<T: Send + 'static>(
+    call: impl FnOnce() -> T + Send + 'static,
+) -> T {
+    task_result(tokio::task::spawn_blocking(call).await)
+}
+
+/// Returns what a task returned; resumes its panic.
+pub(super) fn task_result<T>(ended: Result<T, JoinError>) -> T {
+    match ended {
+        Ok(result) => result,
+        Err(error) => std::panic::resume_unwind(error.into_panic()),
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{LONGEST, panic_text};
+    use super::{MAX_PANIC_CHARS, panic_text};
 
     #[test]
-    fn words_of_a_panic_come_plain_and_short() {
-        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(LONGEST + 1)] {
-            let said = panic_text(&rude);
-            assert!(!said.contains(&rude), "{said:?}");
+    fn the_message_of_a_panic_is_sanitized_and_shortened() {
+        for message in ["a\u{1b}[2J".to_owned(), "a".repeat(MAX_PANIC_CHARS + 1)] {
+            let text = panic_text(&message);
+            assert!(!text.contains(&message), "{text:?}");
         }
     }
 }

@@ -1,34 +1,33 @@
-//! What a run tells while it goes on, and at its end.
+//! What a run reports while it is in progress, and at its end.
 
 use std::time::Duration;
 
+use super::stop::StopLevel;
 use crate::catalog::StatusCounts;
 use crate::domain::{Failure, PairName, Stage};
-
-use super::StopLevel;
 
 /// Something that happened in a run.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RunEvent {
-    /// The run begins.
+    /// The run starts.
     Started {
-        /// Pairs with work before them.
+        /// Pairs with stages to run.
         pairs: u64,
-        /// Stages before them, all pairs together: the length of the overall bar.
+        /// Stages to run, all pairs together: the length of the overall progress bar.
         stages: u64,
-        /// Stages before them by stage.
+        /// Pairs that each stage has to run for.
         by_stage: [u64; 4],
-        /// Pairs worked on at the same time.
+        /// Pairs computed at the same time.
         workers: usize,
     },
-    /// A stage begins.
+    /// A stage starts.
     StageStarted {
         /// The pair.
         pair: PairName,
         /// The stage.
         stage: Stage,
     },
-    /// A stage is done and stored.
+    /// A stage is computed and stored.
     StageFinished {
         /// The pair.
         pair: PairName,
@@ -37,12 +36,12 @@ pub enum RunEvent {
         /// Computing time in milliseconds.
         ms: u64,
     },
-    /// All stages of a pair are done.
+    /// All stages of a pair are stored.
     PairDone {
         /// The pair.
         pair: PairName,
     },
-    /// A pair failed for good.
+    /// A pair was quarantined.
     PairFailed {
         /// The pair.
         pair: PairName,
@@ -50,10 +49,10 @@ pub enum RunEvent {
         stage: Stage,
         /// Class and message.
         failure: Failure,
-        /// Stages of the pair that will not run now, this one included: the bar grows by them.
+        /// Stages of the pair that will not run, this one included: the progress bar advances by them.
         skipped: u64,
     },
-    /// A stage failed in a way that may pass; it is tried again later.
+    /// A stage failed in a way that may pass; it is retried later.
     PairBackingOff {
         /// The pair.
         pair: PairName,
@@ -61,19 +60,19 @@ pub enum RunEvent {
         stage: Stage,
         /// Class and message.
         failure: Failure,
-        /// Wait in milliseconds.
+        /// Wait before the retry in milliseconds.
         wait_ms: u64,
     },
-    /// Leases of dead workers came back.
+    /// Pairs of dead workers are ready again.
     Recovered {
-        /// How many pairs.
+        /// Number of pairs.
         pairs: u64,
     },
-    /// The run was asked to stop.
+    /// The run is stopping.
     Stopping {
-        /// How.
+        /// How soon.
         level: StopLevel,
-        /// Why, in a few words: a signal, or too many failures.
+        /// Why, in a few words: asked to stop, or too many failures.
         reason: String,
     },
 }
@@ -81,24 +80,24 @@ pub enum RunEvent {
 /// How a run ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
-    /// Pairs that were finished by this run.
+    /// Pairs that this run finished.
     pub done: u64,
-    /// Pairs that failed for good in this run.
+    /// Pairs that were quarantined in this run.
     pub failed: u64,
-    /// Stages computed by this run.
+    /// Stages computed and stored by this run.
     pub stages: u64,
-    /// Pairs still to do, among those selected.
+    /// Selected pairs with stages left to run.
     pub left: u64,
-    /// Pairs among those selected that stand failed now, from this run or an earlier one: not 0 means exit code 3.
+    /// Selected pairs that are quarantined now, by this run or an earlier one: exit code 3 if there are any.
     pub failed_in_all: u64,
-    /// Set when it was stopped before all was done, by a signal.
+    /// Whether a signal stopped the run before everything was done.
     pub stopped: bool,
-    /// Set when it drained because of `max_failures`.
+    /// Whether the run ended early because of [`RunOptions::max_failures`](super::RunOptions::max_failures).
     pub too_many_failures: bool,
-    /// Time that threads were computing stages, all together.
-    pub at_work: Duration,
-    /// Wall time in milliseconds.
+    /// Time that stages were computed, all threads together.
+    pub compute_time: Duration,
+    /// Wall-clock time in milliseconds.
     pub elapsed_ms: u64,
-    /// Counts of the project at the end.
+    /// The project's counts at the end.
     pub status: StatusCounts,
 }

@@ -1,19 +1,21 @@
-//! Before a run: which input files are not what they were. Size, time and number first; only what moved is hashed.
+//! Which input files have changed since they were read. Size, modification time and inode are compared first; only
+//! files that differ in them are hashed.
 
 use std::path::Path;
 
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
-use super::RunError;
+use super::compute_thread::{run_blocking, task_result};
+use super::error::RunError;
 use crate::catalog::{Catalog, InputVersion, InputVersions, KnownInputs, PairSelection};
 use crate::domain::{ContentHash, PairId};
-use crate::store::{InputError, Project, hash_input, stat_input};
+use crate::store::{InputDigest, InputError, Project, hash_input, stat_input};
 
-/// Pairs looked at in one go.
+/// Pairs compared in one page.
 const PAGE: usize = 1_000;
 
-/// Brings the catalog's knowledge of input files up to date. Files that no stage has read yet are left to it.
-pub(super) async fn inputs(
+/// Stores in the catalog which input files have changed. Files that no stage has read yet are left out.
+pub(super) async fn store_changes(
     project: &Project,
     catalog: &Catalog,
     among: Option<&PairSelection>,
@@ -22,27 +24,25 @@ pub(super) async fn inputs(
     while let Some(last) = page.last() {
         let after = Some(last.pair);
         let project = project.clone();
-        let look = move || -> Vec<_> {
+        let compare = move || -> Vec<_> {
             page.into_par_iter()
-                .filter_map(|known| changed(&project, &known))
+                .filter_map(|known| changes(&project, &known))
                 .collect()
         };
-        // The next ones are read while the files of these are looked at.
-        let looking = tokio::task::spawn_blocking(look);
+        // Read the next page from the catalog while the files of this one are compared.
+        let comparing = tokio::task::spawn_blocking(compare);
         page = catalog.known_inputs(after, PAGE, among).await?;
-        let moved = match looking.await {
-            Ok(moved) => moved,
-            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
-        };
-        if !moved.is_empty() {
-            catalog.store_inputs(moved).await?;
+        let changed = task_result(comparing.await);
+        if !changed.is_empty() {
+            catalog.store_inputs(changed).await?;
         }
     }
     Ok(())
 }
 
-/// Notes what the files of pairs are that killed their workers before any stage could tell.
-pub(super) async fn poisoned(
+/// Stores the current input files of pairs that were quarantined because their workers died before a stage could
+/// report what it had read: a later run sees then whether a file was replaced.
+pub(super) async fn store_of_poisoned(
     project: &Project,
     catalog: &Catalog,
     pairs: &[PairId],
@@ -55,46 +55,44 @@ pub(super) async fn poisoned(
         .known_inputs(None, pairs.len(), Some(&among))
         .await?;
     let project = project.clone();
-    let look = move || -> Vec<_> {
-        let look = |known: KnownInputs| (known.pair, unread(&project, &known));
-        known.into_par_iter().map(look).collect()
-    };
-    let seen = match tokio::task::spawn_blocking(look).await {
-        Ok(seen) => seen,
-        Err(panic) => std::panic::resume_unwind(panic.into_panic()),
-    };
-    Ok(catalog.record_poisoned_inputs(seen).await?)
+    let inputs = run_blocking(move || -> Vec<_> {
+        let known = known.into_par_iter();
+        known
+            .map(|known| (known.pair, unread_inputs(&project, &known)))
+            .collect()
+    });
+    Ok(catalog.record_poisoned_inputs(inputs.await).await?)
 }
 
-/// What the files are that no stage has told of.
-fn unread(project: &Project, known: &KnownInputs) -> InputVersions {
-    let look = |known: Option<&InputVersion>, stored: &str| match known {
+/// Returns the current state of the input files that no stage has reported.
+fn unread_inputs(project: &Project, known: &KnownInputs) -> InputVersions {
+    let current = |known: Option<&InputVersion>, stored: &str| match known {
         Some(_) => None,
-        None => seen_now(&project.input_path(stored)),
+        None => current(&project.input_path(stored)),
     };
     InputVersions {
-        mesh: look(known.mesh.as_ref(), &known.mesh_path),
-        print: look(known.print.as_ref(), &known.print_path),
+        mesh: current(known.mesh.as_ref(), &known.mesh_path),
+        print: current(known.print.as_ref(), &known.print_path),
     }
 }
 
-/// What changed of a pair's files; `None` when nothing did.
-fn changed(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersions)> {
-    let seen = InputVersions {
-        mesh: moved(project, &known.mesh_path, known.mesh.as_ref()),
-        print: moved(project, &known.print_path, known.print.as_ref()),
+/// Returns which input files of a pair have changed; `None` when none has.
+fn changes(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersions)> {
+    let changed = InputVersions {
+        mesh: change(project, &known.mesh_path, known.mesh.as_ref()),
+        print: change(project, &known.print_path, known.print.as_ref()),
     };
-    (seen.mesh.is_some() || seen.print.is_some()).then_some((known.pair, seen))
+    (changed.mesh.is_some() || changed.print.is_some()).then_some((known.pair, changed))
 }
 
-/// What a file is now, when it is not what it was. A file that has gone is left alone: results made from it stand.
-/// But where the manifest names another path than before, a file that is not there is no longer the old content.
-fn moved(project: &Project, stored: &str, known: Option<&InputVersion>) -> Option<InputVersion> {
+/// Returns the current state of a file that differs from the known one. A missing file does not count, because results
+/// made from it stay valid, except where the manifest names another path than before.
+fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Option<InputVersion> {
     let known = known?;
     let path = project.input_path(stored);
     match stat_input(&path) {
         Ok(stat) if stat.as_str() == known.stat => None,
-        Ok(_) => seen_now(&path),
+        Ok(_) => current(&path),
         Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputVersion {
             hash: ContentHash::of(b""),
             stat: "gone".to_owned(),
@@ -103,9 +101,16 @@ fn moved(project: &Project, stored: &str, known: Option<&InputVersion>) -> Optio
     }
 }
 
-/// What a file is now; `None` when it cannot be read.
-pub(super) fn seen_now(path: &Path) -> Option<InputVersion> {
-    let (hash, stat) = hash_input(path).ok()?;
-    let stat = stat.as_str().to_owned();
-    Some(InputVersion { hash, stat })
+/// Returns the current state of a file; `None` when it cannot be read.
+pub(super) fn current(path: &Path) -> Option<InputVersion> {
+    hash_input(path).ok().map(Into::into)
+}
+
+impl From<InputDigest> for InputVersion {
+    fn from(read: InputDigest) -> Self {
+        Self {
+            hash: read.hash,
+            stat: read.stat.as_str().to_owned(),
+        }
+    }
 }

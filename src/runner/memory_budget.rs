@@ -1,4 +1,4 @@
-//! Memory: what a pair may need at once, told by the sizes of its files, and how much of it is given out.
+//! The memory that running pairs may take together, and an estimate of what each needs, from the sizes of its files.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -9,62 +9,61 @@ use crate::domain::Stage;
 use crate::raster;
 use crate::store::Project;
 
-/// What any pair takes besides its files: the maps and canvases of the stages.
+/// Bytes that any pair needs besides its files, for the maps and masks of the stages.
 const PAIR_BYTES: u64 = 32 << 20;
-/// Bytes at work for each byte of a mesh file, the file itself included. Measured with one to two million vertices:
-/// binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, points 2.5, OBJ 1.8, and 5.7 where it is not plain.
+/// Bytes needed for each byte of a mesh file, the file itself included. Measured with one to two million vertices:
+/// binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, points 2.5, OBJ 1.8, and 5.7 for an OBJ with normals or
+/// texture coordinates.
 const MESH_FACTOR: f64 = 3.5;
 const OBJ_FACTOR: f64 = 6.0;
-/// Bytes at work for each pixel of a print. Measured with 10 and 28 million pixels in grey and in colour: 32 to 39.
+/// Bytes needed for each pixel of a print. Measured with 10 and 28 million pixels, grey and colour: 32 to 39.
 const PIXEL_BYTES: u64 = 50;
-/// Most pixels that a byte of a print's file is expected to hold, where its header does not tell.
+/// Most pixels expected for each byte of an image file whose header cannot be read.
 const PIXELS_PER_BYTE: u64 = 1;
 const JPEG_PIXELS_PER_BYTE: u64 = 8;
-/// Share of the memory that is free at the start.
-const SHARE: f64 = 0.8;
 
-/// Memory that is given out to pairs, in bytes by estimate.
+/// Memory that is reserved for running pairs, in estimated bytes.
 #[derive(Debug)]
 pub(super) struct MemoryBudget {
     limit: Option<u64>,
-    given: u64,
+    reserved: u64,
 }
 
 impl MemoryBudget {
-    /// Nothing given yet; `None` gives to everybody.
+    /// Nothing is reserved yet. With `None` there is no limit.
     pub(super) const fn new(limit: Option<u64>) -> Self {
-        Self { limit, given: 0 }
+        Self { limit, reserved: 0 }
     }
 
-    /// Whether anything is held to it.
+    /// Returns whether there is a limit.
     pub(super) const fn is_limited(&self) -> bool {
         self.limit.is_some()
     }
 
-    /// Gives a pair what it needs, if there is so much. One that needs more than all there is gets it when nobody else
-    /// has any, and is alone until it gives it back.
-    pub(super) fn give(&mut self, need: u64) -> bool {
-        let given = self.given.saturating_add(need);
-        let fits = self.given == 0 || self.limit.is_none_or(|limit| given <= limit);
+    /// Reserves bytes for a pair; returns `false` where the limit does not allow it. A pair that needs more than the limit
+    /// is allowed when nothing else is reserved, and then runs with no other pair beside it.
+    pub(super) fn reserve(&mut self, bytes: u64) -> bool {
+        let reserved = self.reserved.saturating_add(bytes);
+        let fits = self.reserved == 0 || self.limit.is_none_or(|limit| reserved <= limit);
         if fits {
-            self.given = given;
+            self.reserved = reserved;
         }
         fits
     }
 
-    /// The limit, where a pair needs more than all there is.
-    pub(super) fn exceeded_by(&self, need: u64) -> Option<u64> {
-        self.limit.filter(|limit| need > *limit)
+    /// Returns the limit, if a pair needs more than it allows in total.
+    pub(super) fn exceeded_by(&self, bytes: u64) -> Option<u64> {
+        self.limit.filter(|limit| bytes > *limit)
     }
 
-    /// Takes back what a pair was given.
-    pub(super) const fn take_back(&mut self, need: u64) {
-        self.given = self.given.saturating_sub(need);
+    /// Ends a reservation.
+    pub(super) const fn release(&mut self, bytes: u64) {
+        self.reserved = self.reserved.saturating_sub(bytes);
     }
 }
 
-/// What a pair may need at once from a stage on, in bytes. A file that is not there takes nothing: its pair fails soon.
-pub(super) fn need(
+/// Estimates the bytes that a pair needs at most from a stage on. A missing file counts as empty: its pair fails soon.
+pub(super) fn estimated_bytes(
     project: &Project,
     pair: &PairAttributes,
     from: Stage,
@@ -88,7 +87,7 @@ fn size(path: &Path) -> u64 {
 }
 
 fn mesh_bytes(path: &Path) -> u64 {
-    let factor = if has_ending(path, &["obj"]) {
+    let factor = if has_extension(path, &["obj"]) {
         OBJ_FACTOR
     } else {
         MESH_FACTOR
@@ -96,15 +95,16 @@ fn mesh_bytes(path: &Path) -> u64 {
     (size(path) as f64 * factor) as u64
 }
 
-/// No more than the largest print that is read. A small file may hold many pixels, so its header is asked first.
+/// Estimates the bytes for a print, up to the largest one that is read. A small file may hold many pixels, so the number
+/// of pixels is read from its header where possible.
 fn print_bytes(path: &Path, images: &raster::ImageLimits) -> u64 {
     let size = size(path);
-    // What has no size may be a pipe, which would keep us waiting.
+    // A file without a size may be a pipe; reading it would block.
     let of_header = (size > 0).then(|| File::open(path).ok()).flatten();
     let pixels = of_header
         .and_then(|file| raster::header_pixel_count(BufReader::new(file)))
         .unwrap_or_else(|| {
-            let is_jpeg = has_ending(path, &["jpg", "jpeg"]);
+            let is_jpeg = has_extension(path, &["jpg", "jpeg"]);
             size.saturating_mul(if is_jpeg {
                 JPEG_PIXELS_PER_BYTE
             } else {
@@ -115,40 +115,18 @@ fn print_bytes(path: &Path, images: &raster::ImageLimits) -> u64 {
     pixels.saturating_mul(PIXEL_BYTES).saturating_add(size)
 }
 
-fn has_ending(path: &Path, endings: &[&str]) -> bool {
-    let ending = path.extension().and_then(std::ffi::OsStr::to_str);
-    ending.is_some_and(|ending| {
-        endings
+fn has_extension(path: &Path, extensions: &[&str]) -> bool {
+    let extension = path.extension().and_then(std::ffi::OsStr::to_str);
+    extension.is_some_and(|extension| {
+        extensions
             .iter()
-            .any(|wanted| ending.eq_ignore_ascii_case(wanted))
+            .any(|wanted| extension.eq_ignore_ascii_case(wanted))
     })
-}
-
-/// What a run takes of the machine where nothing else is said: a share of the memory that is free now, or of what the
-/// process's group may have. `None` where neither can be told.
-pub fn free_memory() -> Option<u64> {
-    let meminfo = std::fs::read_to_string("/proc/meminfo").ok();
-    let group = std::fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
-    let free = [
-        meminfo.as_deref().and_then(available),
-        group.and_then(|text| text.trim().parse().ok()),
-    ];
-    let least = free.into_iter().flatten().min()?;
-    Some((least as f64 * SHARE) as u64)
-}
-
-/// `MemAvailable` of `/proc/meminfo`, in bytes (`proc_meminfo(5)`).
-fn available(meminfo: &str) -> Option<u64> {
-    let line = meminfo
-        .lines()
-        .find_map(|line| line.strip_prefix("MemAvailable:"))?;
-    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    kib.checked_mul(1024)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{MemoryBudget, PAIR_BYTES, PIXEL_BYTES, available, need, print_bytes};
+    use super::{MemoryBudget, PAIR_BYTES, PIXEL_BYTES, estimated_bytes, print_bytes};
     use crate::catalog::PairAttributes;
     use crate::domain::Stage;
     use crate::raster;
@@ -156,29 +134,29 @@ mod tests {
     use crate::store::Project;
 
     #[test]
-    fn what_is_given_stays_within_the_limit_but_for_one_that_is_too_large() {
+    fn reservations_stay_within_the_limit_except_for_one_pair_that_exceeds_it() {
         let mut budget = MemoryBudget::new(Some(10));
-        assert!(budget.give(4) && budget.give(6));
-        assert!(!budget.give(1));
-        budget.take_back(4);
-        assert!(!budget.give(11), "others still have some");
-        budget.take_back(6);
-        assert!(budget.give(11));
-        assert!(!budget.give(1), "it is alone");
-        budget.take_back(11);
-        assert!(budget.give(1));
+        assert!(budget.reserve(4) && budget.reserve(6));
+        assert!(!budget.reserve(1));
+        budget.release(4);
+        assert!(!budget.reserve(11), "others still hold some");
+        budget.release(6);
+        assert!(budget.reserve(11));
+        assert!(!budget.reserve(1), "the large pair runs with no other");
+        budget.release(11);
+        assert!(budget.reserve(1));
         assert_eq!(budget.exceeded_by(11), Some(10));
         assert_eq!(budget.exceeded_by(10), None);
     }
 
     #[test]
-    fn without_a_limit_everybody_gets_what_they_need() {
+    fn without_a_limit_every_reservation_is_granted() {
         let mut budget = MemoryBudget::new(None);
-        assert!(budget.give(u64::MAX) && budget.give(u64::MAX));
+        assert!(budget.reserve(u64::MAX) && budget.reserve(u64::MAX));
     }
 
     #[test]
-    fn a_small_file_of_many_pixels_is_told_by_its_header() {
+    fn the_pixels_of_a_small_file_are_read_from_its_header() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("white.png");
         let white = image::GrayImage::from_pixel(3000, 2000, image::Luma([255]));
@@ -190,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn need_follows_the_files_that_the_stages_left_will_read() {
+    fn the_estimate_follows_the_files_that_the_remaining_stages_read() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = Project::create(dir.path()).expect("a project");
         let write = |name: &str, bytes: usize| {
@@ -207,7 +185,8 @@ mod tests {
             max_pixels: 10,
             ..raster::ImageLimits::SUGGESTED
         };
-        let from = |stage, limits| need(&project, &attributes, stage, limits) - PAIR_BYTES;
+        let from =
+            |stage, limits| estimated_bytes(&project, &attributes, stage, limits) - PAIR_BYTES;
         let print = 100 * 8 * 50 + 100;
         assert_eq!(
             from(Stage::Fit, &raster::ImageLimits::SUGGESTED),
@@ -219,12 +198,5 @@ mod tests {
         );
         assert_eq!(from(Stage::Normalize, &few), 10 * 50 + 100);
         assert_eq!(from(Stage::Register, &few), 0);
-    }
-
-    #[test]
-    fn free_memory_is_read_from_its_line() {
-        let text = "MemTotal:       24000 kB\nMemAvailable:   12 kB\n";
-        assert_eq!(available(text), Some(12 * 1024));
-        assert_eq!(available("MemTotal: 1 kB\n"), None);
     }
 }

@@ -5,39 +5,39 @@ use std::time::Duration;
 use crate::domain::{PairName, Stage};
 use crate::{mesh, raster};
 
-/// What to run again besides what is left. Changed settings and inputs are always taken up.
+/// What to run again besides stages without a current result. Results of changed settings or inputs are never current.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rerun {
-    /// Pairs that failed.
+    /// Failed pairs.
     Failed,
-    /// Nothing more than what changed: the default, by name.
+    /// Nothing more: the default.
     Stale,
-    /// Every pair, from `RunOptions::from` on.
+    /// Every pair, from the stage [`RunOptions::from`] on.
     All,
 }
 
 /// Options of a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunOptions {
-    /// Pairs worked on at the same time; each has one thread.
+    /// Pairs computed at the same time, each on one thread.
     pub workers: usize,
-    /// Memory that the pairs worked on at the same time may need together, in bytes by the sizes of their files; one
-    /// that needs more runs with nothing beside it. `None` for no limit.
+    /// Memory in bytes that pairs computed at the same time may need together, estimated from the sizes of their files. A
+    /// pair that needs more runs with no other beside it. `None` for no limit.
     pub memory: Option<u64>,
-    /// Join a run that goes on in another process.
+    /// Join a run in progress in another process.
     pub join: bool,
-    /// Drain after this many failed pairs.
+    /// Start no more pairs after this many have failed.
     pub max_failures: Option<u64>,
-    /// Only these pairs; all when `None`.
+    /// Only these pairs; `None` for all.
     pub pairs: Option<Vec<PairName>>,
     /// What to run again.
     pub rerun: Option<Rerun>,
-    /// First stage of a `Rerun::All`.
+    /// First stage that [`Rerun::All`] runs again.
     pub from: Stage,
     /// Last stage to run.
     pub until: Stage,
     /// Longest time for one stage of one pair.
-    pub stage_limit: Duration,
+    pub stage_timeout: Duration,
     /// Limits on mesh files.
     pub mesh_limits: mesh::MeshLimits,
     /// Limits on print images.
@@ -55,7 +55,7 @@ impl Default for RunOptions {
             rerun: None,
             from: Stage::Fit,
             until: Stage::Register,
-            stage_limit: Duration::from_mins(10),
+            stage_timeout: Duration::from_mins(10),
             mesh_limits: mesh::MeshLimits::SUGGESTED,
             image_limits: raster::ImageLimits::SUGGESTED,
         }

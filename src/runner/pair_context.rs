@@ -1,4 +1,4 @@
-//! A pair in a worker's hand: what is known of it, and what the stages have left in memory.
+//! A pair between two stages: what is known of it, and what the stages have left in memory.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::raster::DepthMap;
 use crate::stages::normalize::Normalized;
 use crate::stages::{Print, Scan};
 
-/// What an earlier stage stored.
+/// The stored result of an earlier stage.
 #[derive(Debug, Clone)]
 pub(super) struct StoredStage {
     pub(super) outcome: Value,
@@ -20,33 +20,28 @@ pub(super) struct StoredStage {
     pub(super) print_hash: Option<ContentHash>,
 }
 
-/// A pair between two stages.
+/// What a pair's stages share. Each value in memory is there from the stage that made it to the last one that needs it.
 #[derive(Debug)]
 pub(super) struct PairContext {
-    /// As imported.
+    /// The pair as imported.
     pub(super) attributes: PairAttributes,
-    /// What the manifest said that results depend on, as the catalog compares it.
+    /// The manifest attributes that results depend on, in the form that the catalog compares.
     pub(super) attributes_json: String,
-    /// What the stages behind it stored.
+    /// Results of earlier stages.
     pub(super) stored: BTreeMap<Stage, StoredStage>,
-    /// Input files as read by this worker.
+    /// Input files as read by this thread.
     pub(super) inputs: InputVersions,
-    /// What of those was given to the catalog with a stage.
-    pub(super) told: InputVersions,
-    /// The scan, from fit to depth.
+    /// The part of `inputs` that an earlier stage has reported to the catalog.
+    reported: InputVersions,
     pub(super) scan: Option<Scan>,
-    /// The print, from the first stage that reads it to normalize.
     pub(super) print: Option<Print>,
-    /// From fit on.
     pub(super) fit: Option<FitOutcome>,
-    /// From depth on.
     pub(super) depth: Option<DepthMap>,
-    /// From normalize on.
     pub(super) normalized: Option<Normalized>,
 }
 
 impl PairContext {
-    /// A pair as the catalog gives it, nothing in memory yet.
+    /// A pair as the catalog returns it, with nothing in memory yet.
     pub(super) fn new(work: PairWork) -> Self {
         let stored = work.results.into_iter().map(|record| {
             let stored = StoredStage {
@@ -62,7 +57,7 @@ impl PairContext {
             attributes_json: work.attributes_json,
             stored: stored.collect(),
             inputs: InputVersions::default(),
-            told: InputVersions::default(),
+            reported: InputVersions::default(),
             scan: None,
             print: None,
             fit: None,
@@ -71,31 +66,31 @@ impl PairContext {
         }
     }
 
-    /// Input files as read, if the catalog was not given them with an earlier stage.
-    pub(super) fn news(&mut self) -> InputVersions {
-        if self.told == self.inputs {
+    /// Returns the input files as read, unless an earlier stage has reported the same.
+    pub(super) fn unreported_inputs(&mut self) -> InputVersions {
+        if self.reported == self.inputs {
             return InputVersions::default();
         }
-        self.told = self.inputs.clone();
-        self.told.clone()
+        self.reported = self.inputs.clone();
+        self.inputs.clone()
     }
 
-    /// The stored outcome of a stage; `None` when it is not there or not of this type any more.
+    /// Returns the stored outcome of a stage; `None` when there is none, or none of this type any more.
     pub(super) fn outcome<T: DeserializeOwned>(&self, stage: Stage) -> Option<T> {
         let stored = self.stored.get(&stage)?;
         T::deserialize(&stored.outcome).ok()
     }
 
-    /// Content of the mesh that the results are of: as read now, or as read for the fit.
+    /// Returns the hash of the mesh that the results belong to: as this thread read it, or as it was read for the fit.
     pub(super) fn mesh_hash(&self) -> Option<ContentHash> {
-        let read = self.inputs.mesh.as_ref().map(|seen| seen.hash);
+        let read = self.inputs.mesh.as_ref().map(|input| input.hash);
         read.or_else(|| Some(self.stored.get(&Stage::Fit)?.mesh_hash))
     }
 
-    /// Content of the print that the results are of: as read now, or as an earlier stage read it; `None` while none
-    /// has.
+    /// Returns the hash of the print that the results belong to: as this thread read it, or as the latest stage that
+    /// read it did; `None` before that.
     pub(super) fn print_hash(&self) -> Option<ContentHash> {
-        let read = self.inputs.print.as_ref().map(|seen| seen.hash);
+        let read = self.inputs.print.as_ref().map(|input| input.hash);
         let mut stored = self.stored.values().rev();
         read.or_else(|| stored.find_map(|stored| stored.print_hash))
     }

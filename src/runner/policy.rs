@@ -1,33 +1,32 @@
-//! The run's decisions as pure functions: what a failure means, who is dead, how long to wait.
+//! The run's decisions without side effects: what a failure leads to, and the times by which workers know each other.
 
-use std::collections::BTreeMap;
-use std::time::Duration;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-use crate::catalog::{FailureAction, LeaseHolder};
-use crate::domain::{FailureClass, PairId, UnixMillis, WorkerId};
+use crate::catalog::FailureAction;
+use crate::domain::{FailureClass, PairId, UnixMillis};
 
-/// Tries of a stage that reading or writing failed in.
-pub(super) const IO_ATTEMPTS: u32 = 3;
-/// First wait after such a failure.
-pub(super) const BACKOFF_BASE: Duration = Duration::from_secs(1);
-/// Longest wait.
-pub(super) const BACKOFF_CAP: Duration = Duration::from_mins(1);
+/// Attempts of a stage that fails to read or write.
+const IO_ATTEMPTS: u32 = 3;
+/// Wait after the first such failure.
+const BACKOFF_BASE: Duration = Duration::from_secs(1);
+/// Longest wait, before jitter.
+const BACKOFF_CAP: Duration = Duration::from_mins(1);
 
-/// What is known of a failed try.
+/// A failed attempt of a stage.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FailedAttempt {
     pub(super) pair: PairId,
     pub(super) class: FailureClass,
-    /// Whether another try may go better.
+    /// Whether the failure may pass by itself.
     pub(super) is_transient: bool,
-    /// Which try it was, from 1.
+    /// Number of the attempt, from 1.
     pub(super) attempt: u32,
-    /// Whether it ran with nothing beside it.
+    /// Whether the pair ran with no other beside it.
     pub(super) exclusive: bool,
 }
 
-/// What a failed try means for the job.
-pub(super) fn action(failed: FailedAttempt, now: UnixMillis) -> FailureAction {
+/// Decides what a failed attempt leads to: a retry after a wait, a retry with no other pair beside it, or quarantine.
+pub(super) fn failure_action(failed: FailedAttempt, now: UnixMillis) -> FailureAction {
     match failed.class {
         FailureClass::Io if failed.is_transient && failed.attempt < IO_ATTEMPTS => {
             FailureAction::BackOff {
@@ -43,7 +42,8 @@ pub(super) fn action(failed: FailedAttempt, now: UnixMillis) -> FailureAction {
     }
 }
 
-/// `min(cap, base * 2^(attempt - 1))` times 0.5 to 1.5, told by pair and try so that it can be told again.
+/// Returns `min(cap, base * 2^(attempt - 1))` times 0.5 to 1.5 in milliseconds. The factor is a hash of pair and
+/// attempt, so that pairs which failed together are not retried together, and a run can be reproduced.
 fn backoff_ms(pair: PairId, attempt: u32) -> i64 {
     let doubled = BACKOFF_BASE.saturating_mul(1 << attempt.saturating_sub(1).min(16));
     let wait = doubled.min(BACKOFF_CAP).as_millis() as i64;
@@ -53,58 +53,97 @@ fn backoff_ms(pair: PairId, attempt: u32) -> i64 {
     wait / 2 + wait * (mixed % 1000) as i64 / 1000
 }
 
-/// Longest wait that a back-off can ask for.
-pub(super) fn longest_backoff_ms() -> i64 {
+/// Returns the longest wait that a failure can lead to, in milliseconds.
+pub(super) const fn longest_backoff_ms() -> i64 {
     BACKOFF_CAP.as_millis() as i64 * 3 / 2
 }
 
-/// Tells dead workers by their heartbeats: the same heartbeat for as long as a lease, by our own clock. Two machines' clocks
-/// are never compared.
-#[derive(Debug)]
-pub(super) struct Liveness {
-    lease_ms: i64,
-    seen: BTreeMap<WorkerId, (UnixMillis, UnixMillis)>,
+/// Intervals by which workers know that the others live. A lease lasts as long for its holder as for those who watch
+/// it, each by its own clock: whoever is taken for dead knows it too. The pairs of a dead worker are ready again within
+/// a minute: one lease and two recovery intervals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Timing {
+    /// Interval between heartbeats.
+    pub(super) heartbeat_every: Duration,
+    /// A worker without a heartbeat for this long is dead.
+    pub(super) lease: Duration,
+    /// Interval between searches for dead workers.
+    pub(super) recover_every: Duration,
+    /// How long after its deadline a lease is taken from a worker that is still alive.
+    pub(super) deadline_margin: Duration,
 }
 
-impl Liveness {
-    /// With leases of this length.
-    pub(super) const fn new(lease_ms: i64) -> Self {
+impl Timing {
+    const DEFAULT: Self = Self {
+        heartbeat_every: Duration::from_secs(10),
+        lease: Duration::from_secs(50),
+        recover_every: Duration::from_secs(5),
+        deadline_margin: Duration::from_mins(1),
+    };
+
+    /// Returns the intervals of this build. With debug assertions, `MOCBAN_TIME_SCALE=N` divides them by N, for tests.
+    pub(super) fn of_this_build() -> Self {
+        let scale = cfg!(debug_assertions)
+            .then(|| std::env::var("MOCBAN_TIME_SCALE").ok()?.parse().ok())
+            .flatten();
+        Self::DEFAULT.divided_by(scale.unwrap_or(1))
+    }
+
+    fn divided_by(self, scale: u32) -> Self {
+        let scale = scale.max(1);
         Self {
-            lease_ms,
-            seen: BTreeMap::new(),
+            heartbeat_every: self.heartbeat_every / scale,
+            lease: self.lease / scale,
+            recover_every: self.recover_every / scale,
+            deadline_margin: self.deadline_margin / scale,
         }
     }
 
-    /// Takes in what the lease holders' heartbeats are now; gives those that are dead.
-    pub(super) fn observe(
-        &mut self,
-        holders: &[LeaseHolder],
-        me: WorkerId,
-        now: UnixMillis,
-    ) -> Vec<WorkerId> {
-        self.seen
-            .retain(|worker, _| holders.iter().any(|holder| holder.worker == *worker));
-        let mut dead = Vec::new();
-        for holder in holders.iter().filter(|holder| holder.worker != me) {
-            let (heartbeat, since) = self
-                .seen
-                .entry(holder.worker)
-                .or_insert((holder.heartbeat, now));
-            if *heartbeat != holder.heartbeat {
-                (*heartbeat, *since) = (holder.heartbeat, now);
-            } else if now - *since >= self.lease_ms {
-                dead.push(holder.worker);
-            }
+    /// Returns the length of a lease in milliseconds.
+    pub(super) const fn lease_ms(&self) -> i64 {
+        self.lease.as_millis() as i64
+    }
+}
+
+/// Wall-clock time that is read once, at the start, and then only advances: a jump of the system's clock during a run
+/// does not move it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Clock {
+    start: UnixMillis,
+    since: Instant,
+}
+
+impl Clock {
+    /// Starts at the system's time.
+    pub(super) fn start() -> Self {
+        let start = SystemTime::now()
+            .duration_since(UNIX_EPOCH)
+            .map_or(0, |since| since.as_millis() as UnixMillis);
+        Self {
+            start,
+            since: Instant::now(),
         }
-        dead
+    }
+
+    /// Returns the current time.
+    pub(super) fn now(&self) -> UnixMillis {
+        self.start + self.since.elapsed().as_millis() as UnixMillis
+    }
+
+    /// Returns the milliseconds since the start.
+    pub(super) fn elapsed_ms(&self) -> u64 {
+        self.since.elapsed().as_millis() as u64
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BACKOFF_CAP, FailedAttempt, IO_ATTEMPTS, Liveness, action, backoff_ms};
-    use crate::catalog::{FailureAction, LeaseHolder};
-    use crate::domain::{FailureClass, PairId, WorkerId};
+    use std::collections::BTreeSet;
+    use std::time::Duration;
+
+    use super::{BACKOFF_CAP, FailedAttempt, IO_ATTEMPTS, Timing, backoff_ms, failure_action};
+    use crate::catalog::FailureAction;
+    use crate::domain::{FailureClass, PairId};
 
     fn failed(class: FailureClass, attempt: u32) -> FailedAttempt {
         FailedAttempt {
@@ -117,68 +156,67 @@ mod tests {
     }
 
     #[test]
-    fn reading_is_tried_again_but_not_for_ever() {
-        let first = action(failed(FailureClass::Io, 1), 1000);
+    fn a_transient_io_failure_is_retried_a_few_times() {
+        let first = failure_action(failed(FailureClass::Io, 1), 1000);
         assert!(
             matches!(first, FailureAction::BackOff { run_at } if (1500..=2500).contains(&run_at))
         );
-        let last = action(failed(FailureClass::Io, IO_ATTEMPTS), 1000);
+        let last = failure_action(failed(FailureClass::Io, IO_ATTEMPTS), 1000);
         assert_eq!(last, FailureAction::Quarantine);
     }
 
     #[test]
-    fn a_missing_file_is_not_waited_for() {
+    fn a_missing_file_is_not_retried() {
         let missing = FailedAttempt {
             is_transient: false,
             ..failed(FailureClass::Io, 1)
         };
-        assert_eq!(action(missing, 0), FailureAction::Quarantine);
+        assert_eq!(failure_action(missing, 0), FailureAction::Quarantine);
     }
 
     #[test]
-    fn too_much_is_tried_alone_once() {
+    fn a_pair_that_exceeded_a_limit_is_retried_once_with_no_other_beside_it() {
         let first = failed(FailureClass::Resource, 1);
-        assert_eq!(action(first, 0), FailureAction::RetryExclusive);
-        let again = FailedAttempt {
+        assert_eq!(failure_action(first, 0), FailureAction::RetryExclusive);
+        let second = FailedAttempt {
             exclusive: true,
             ..first
         };
-        assert_eq!(action(again, 0), FailureAction::Quarantine);
+        assert_eq!(failure_action(second, 0), FailureAction::Quarantine);
     }
 
     #[test]
-    fn what_cannot_change_is_quarantined_at_once() {
+    fn a_permanent_failure_is_quarantined_at_once() {
         for class in [
             FailureClass::BadInput,
             FailureClass::NoSolution,
             FailureClass::Bug,
         ] {
-            assert_eq!(action(failed(class, 1), 0), FailureAction::Quarantine);
+            assert_eq!(
+                failure_action(failed(class, 1), 0),
+                FailureAction::Quarantine
+            );
         }
     }
 
     #[test]
     fn waits_double_up_to_the_cap_and_differ_between_pairs() {
-        let waits: std::collections::BTreeSet<_> =
-            (0..50).map(|pair| backoff_ms(PairId(pair), 1)).collect();
+        let waits: BTreeSet<_> = (0..50).map(|pair| backoff_ms(PairId(pair), 1)).collect();
         assert!(waits.len() > 10 && waits.iter().all(|wait| (500..=1500).contains(wait)));
         let cap = BACKOFF_CAP.as_millis() as i64;
         assert!((cap / 2..=cap * 3 / 2).contains(&backoff_ms(PairId(1), 30)));
     }
 
     #[test]
-    fn a_silent_worker_is_dead_after_a_lease_and_a_beating_one_never() {
-        let (me, other) = (WorkerId(1), WorkerId(2));
-        let holders = |heartbeat| {
-            [me, other].map(|worker| LeaseHolder {
-                worker,
-                heartbeat: if worker == me { 0 } else { heartbeat },
-            })
-        };
-        let mut liveness = Liveness::new(60_000);
-        assert!(liveness.observe(&holders(5), me, 0).is_empty());
-        assert!(liveness.observe(&holders(6), me, 59_999).is_empty());
-        assert!(liveness.observe(&holders(6), me, 119_998).is_empty());
-        assert_eq!(liveness.observe(&holders(6), me, 119_999), [other]);
+    fn dead_workers_are_found_within_a_minute_and_slow_ones_are_not_taken_for_dead() {
+        let Timing {
+            heartbeat_every,
+            lease,
+            recover_every,
+            ..
+        } = Timing::DEFAULT;
+        // One search sees the last heartbeat for the first time, a later one sees the end of the lease.
+        assert!(lease + recover_every * 2 <= Duration::from_mins(1));
+        assert!(lease >= heartbeat_every * 4);
     }
 }

@@ -1,190 +1,296 @@
-//! Taking pairs: for slots that are free, and ahead for those that soon will be, so that no core waits for a claim.
+//! The pairs that this process has leased: those in a slot, and a queue of those that will soon be, so that no core
+//! waits for a claim.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use super::RunError;
+use super::compute_thread::run_blocking;
+use super::error::RunError;
 use super::events::RunEvent;
-use super::memory_budget;
-use super::pace::DurationEstimate;
-use super::pair_task::work;
-use super::scheduler::Scheduler;
-use crate::catalog::{ClaimRequest, Lease, PairWork};
-use crate::domain::PairName;
+use super::memory_budget::{MemoryBudget, estimated_bytes};
+use super::options::RunOptions;
+use super::run_context::RunContext;
+use crate::catalog::{ClaimRequest, Lease, PairSelection, PairWork};
+use crate::domain::{PairName, WorkerId};
+use crate::raster;
 
-/// A pair that is leased and not begun.
+/// Pairs are claimed ahead for about this long, so that one claim serves all of them.
+const CLAIM_AHEAD: Duration = Duration::from_millis(250);
+/// Most pairs claimed ahead for one slot, however short they are.
+const MAX_AHEAD_PER_SLOT: u128 = 16;
+
+/// A pair that is leased and has not started.
 #[derive(Debug)]
 pub(super) struct LeasedPair {
-    lease: Lease,
-    work: PairWork,
-    /// Memory it may need.
-    need: u64,
+    pub(super) lease: Lease,
+    pub(super) work: PairWork,
+    /// Estimate of the memory it needs.
+    bytes: u64,
 }
 
-/// Pairs that are leased: those begun and those to come.
-#[derive(Debug, Default)]
+/// The leased pairs, and the memory they may take.
 pub(super) struct Prefetch {
-    /// Taken ahead.
-    ahead: VecDeque<LeasedPair>,
-    begun: BTreeMap<PairName, RunningPair>,
-    pace: DurationEstimate,
+    context: Arc<RunContext>,
+    selection: Option<PairSelection>,
+    image_limits: raster::ImageLimits,
+    /// Pairs that are computed at the same time at most.
+    slots: usize,
+    /// Leased pairs that have not started, in the order of their claim.
+    queue: VecDeque<LeasedPair>,
+    running: BTreeMap<PairName, RunningPair>,
+    durations: DurationEstimate,
+    memory: MemoryBudget,
+    /// The next pair needs memory that a running pair has to return first.
+    waits_for_memory: bool,
+    /// A pair is running that no other may run beside.
+    is_exclusive: bool,
+    /// A claim may find pairs that the last one did not find.
+    may_find_more: bool,
 }
 
 /// A pair in a slot.
 #[derive(Debug)]
 struct RunningPair {
-    at: Instant,
-    /// Whether it is at its last stage.
-    is_last: bool,
+    since: Instant,
+    bytes: u64,
+    is_at_last_stage: bool,
 }
 
 impl Prefetch {
-    /// Notes that a pair is begun.
-    fn begin(&mut self, pair: PairName) {
-        let (at, is_last) = (Instant::now(), false);
-        self.begun.insert(pair, RunningPair { at, is_last });
-    }
-
-    /// Notes that a pair is at its last stage, if it is one of ours.
-    pub(super) fn nearly_over(&mut self, pair: &PairName) {
-        if let Some(begun) = self.begun.get_mut(pair) {
-            begun.is_last = true;
+    /// Nothing is leased yet.
+    pub(super) fn new(
+        context: Arc<RunContext>,
+        selection: Option<PairSelection>,
+        options: &RunOptions,
+    ) -> Self {
+        Self {
+            context,
+            selection,
+            image_limits: options.image_limits,
+            slots: options.workers.max(1),
+            queue: VecDeque::new(),
+            running: BTreeMap::new(),
+            durations: DurationEstimate::default(),
+            memory: MemoryBudget::new(options.memory),
+            waits_for_memory: false,
+            is_exclusive: false,
+            may_find_more: true,
         }
     }
 
-    /// Notes that a pair's computing is over.
-    pub(super) fn over(&mut self, pair: &PairName) {
-        if let Some(begun) = self.begun.remove(pair) {
-            self.pace.took(begun.at.elapsed());
+    /// Returns the number of slots without a pair.
+    pub(super) fn free_slots(&self) -> usize {
+        self.slots.saturating_sub(self.running.len())
+    }
+
+    /// Notes that pairs may have become ready since the last claim.
+    pub(super) const fn expect_more(&mut self) {
+        self.may_find_more = true;
+    }
+
+    /// Takes in an event of a running pair: its slot is about to become free when its last stage starts.
+    pub(super) fn observe(&mut self, event: &RunEvent) {
+        if let RunEvent::StageStarted { pair, stage } = event
+            && *stage == self.context.until
+            && !self.is_exclusive
+        {
+            if let Some(running) = self.running.get_mut(pair) {
+                running.is_at_last_stage = true;
+            }
+            self.may_find_more = true;
         }
     }
 
-    /// Pairs to take when so many slots are free. None while there are enough; then at once as many as will be begun
-    /// soon.
-    fn wanted(&self, free: usize) -> usize {
-        let nearly_over = self.begun.values().filter(|begun| begun.is_last).count();
-        let taken = self.ahead.len();
-        match (free + nearly_over).saturating_sub(taken) {
-            0 => 0,
-            least => least + (free + self.begun.len()) * self.pace.ahead(),
+    /// Takes in that a pair has left its slot.
+    pub(super) fn finish(&mut self, pair: &PairName) {
+        if let Some(running) = self.running.remove(pair) {
+            self.durations.add(running.since.elapsed());
+            self.memory.release(running.bytes);
+        }
+        self.is_exclusive = false;
+        self.waits_for_memory = false;
+        self.may_find_more = true;
+    }
+
+    /// Claims pairs for slots that are free or soon will be. Returns whether it asked the catalog, which it does not
+    /// while there is no use for more pairs or no chance of finding any.
+    pub(super) async fn claim(&mut self, worker: WorkerId) -> Result<bool, RunError> {
+        let wanted = self.load().pairs_to_claim(self.durations.pairs_ahead());
+        let is_blocked = self.is_exclusive || self.waits_for_memory;
+        if is_blocked || !self.may_find_more || wanted == 0 {
+            return Ok(false);
+        }
+        self.may_find_more = false;
+        self.lease(worker, wanted, false).await?;
+        Ok(true)
+    }
+
+    /// Claims one of the pairs that must run with no other beside them.
+    pub(super) async fn claim_exclusive(&mut self, worker: WorkerId) -> Result<(), RunError> {
+        self.lease(worker, 1, true).await?;
+        self.is_exclusive = !self.queue.is_empty();
+        Ok(())
+    }
+
+    /// Takes the next pair to start, if a slot is free and the memory suffices.
+    pub(super) async fn next_pair(&mut self) -> Result<Option<LeasedPair>, RunError> {
+        if self.free_slots() == 0 || self.waits_for_memory {
+            return Ok(None);
+        }
+        let Some(next) = self.queue.pop_front() else {
+            return Ok(None);
+        };
+        if !self.memory.reserve(next.bytes) {
+            self.waits_for_memory = true;
+            self.durations.disable();
+            // Keep FIFO order, so that a large pair is not starved: release the whole queue, not only this pair.
+            self.queue.push_front(next);
+            self.release_all().await?;
+            return Ok(None);
+        }
+        self.warn_if_oversized(&next);
+        let running = RunningPair {
+            since: Instant::now(),
+            bytes: next.bytes,
+            is_at_last_stage: false,
+        };
+        self.running
+            .insert(next.work.attributes.name.clone(), running);
+        Ok(Some(next))
+    }
+
+    /// Releases the leases of all pairs that have not started.
+    pub(super) async fn release_all(&mut self) -> Result<(), RunError> {
+        for pair in std::mem::take(&mut self.queue) {
+            self.context.catalog.release(pair.lease).await?;
+        }
+        Ok(())
+    }
+
+    fn load(&self) -> Load {
+        let at_last_stage = self
+            .running
+            .values()
+            .filter(|running| running.is_at_last_stage);
+        Load {
+            free: self.free_slots(),
+            running: self.running.len(),
+            soon_free: at_last_stage.count(),
+            queued: self.queue.len(),
+        }
+    }
+
+    /// Leases up to `count` pairs and appends them to the queue.
+    async fn lease(
+        &mut self,
+        worker: WorkerId,
+        count: usize,
+        exclusive: bool,
+    ) -> Result<(), RunError> {
+        let context = &self.context;
+        // A pair without a free slot may wait as long as a stage may take, before its own time begins.
+        let wait = if count > self.free_slots() {
+            context.stage_timeout.as_millis() as i64
+        } else {
+            0
+        };
+        let request = ClaimRequest {
+            worker,
+            slots: count,
+            until: context.until,
+            exclusive,
+            among: self.selection.clone(),
+            deadline: context.deadline() + wait,
+            alive_since: context.alive_since(),
+        };
+        let leases = context.catalog.claim(request).await?;
+        if leases.is_empty() {
+            return Ok(());
+        }
+        let works = context.catalog.work(&leases).await?;
+        let leased = self.estimate(leases.into_iter().zip(works)).await;
+        self.queue.extend(leased);
+        Ok(())
+    }
+
+    /// Adds the memory estimates, which read the headers of print images.
+    async fn estimate(
+        &self,
+        leased: impl Iterator<Item = (Lease, PairWork)> + Send + 'static,
+    ) -> Vec<LeasedPair> {
+        let is_limited = self.memory.is_limited();
+        let (project, limits) = (self.context.project.clone(), self.image_limits);
+        let estimate = move |(lease, work): (Lease, PairWork)| {
+            let bytes = if is_limited {
+                estimated_bytes(&project, &work.attributes, lease.cursor(), &limits)
+            } else {
+                0
+            };
+            LeasedPair { lease, work, bytes }
+        };
+        run_blocking(move || leased.map(estimate).collect()).await
+    }
+
+    /// Warns about a pair that may need more memory than all pairs together may take.
+    fn warn_if_oversized(&self, pair: &LeasedPair) {
+        if let Some(limit) = self.memory.exceeded_by(pair.bytes) {
+            let (need, limit) = (pair.bytes >> 20, limit >> 20);
+            let pair = &pair.work.attributes.name;
+            tracing::warn!(
+                "{pair} may need {need} MiB, more than the {limit} MiB of --memory: it runs with no other pair beside it"
+            );
         }
     }
 }
 
-impl Scheduler {
-    /// Takes in what an event says about the slots.
-    pub(super) fn observe(&mut self, event: &RunEvent) {
-        if let RunEvent::StageStarted { pair, stage } = event
-            && *stage == self.shared.until
-            && !self.exclusive
-        {
-            self.in_hand.nearly_over(pair);
-            self.look = true;
+/// How busy the slots are.
+#[derive(Debug, Clone, Copy)]
+struct Load {
+    free: usize,
+    running: usize,
+    /// Running pairs at their last stage.
+    soon_free: usize,
+    /// Leased pairs that wait for a slot.
+    queued: usize,
+}
+
+impl Load {
+    /// Returns how many pairs to claim, given how many each slot takes ahead: none while enough are queued.
+    const fn pairs_to_claim(self, ahead_per_slot: usize) -> usize {
+        match (self.free + self.soon_free).saturating_sub(self.queued) {
+            0 => 0,
+            needed => needed + (self.free + self.running) * ahead_per_slot,
         }
     }
+}
 
-    /// Pairs that may be taken now.
-    pub(super) fn wanted(&self) -> usize {
-        self.in_hand
-            .wanted(self.workers.saturating_sub(self.tasks.len()))
+/// Estimate of how long a pair occupies its slot: a moving average in which recent pairs weigh most.
+#[derive(Debug, Default)]
+struct DurationEstimate {
+    mean: Option<Duration>,
+    is_disabled: bool,
+}
+
+impl DurationEstimate {
+    /// Takes in how long a pair occupied its slot.
+    fn add(&mut self, elapsed: Duration) {
+        self.mean = Some(self.mean.map_or(elapsed, |mean| (mean * 3 + elapsed) / 4));
     }
 
-    /// Takes so many pairs and begins as many as there are free slots.
-    pub(super) async fn claim(&mut self, slots: usize, exclusive: bool) -> Result<(), RunError> {
-        let shared = &self.shared;
-        // One that is taken ahead may wait for a slot for as long as a stage may last.
-        let is_ahead = slots + self.tasks.len() > self.workers;
-        let wait = if is_ahead {
-            shared.stage_limit.as_millis() as i64
-        } else {
-            0
-        };
-        let leases = shared
-            .catalog
-            .claim(ClaimRequest {
-                worker: self.worker,
-                slots,
-                until: shared.until,
-                exclusive,
-                among: self.among.clone(),
-                deadline: shared.deadline() + wait,
-                alive_since: shared.alive_since(),
-            })
-            .await?;
-        self.exclusive = exclusive && !leases.is_empty();
-        if !leases.is_empty() {
-            let works = self.shared.catalog.work(&leases).await?;
-            let taken = leases.into_iter().zip(works);
-            self.in_hand.ahead.extend(self.with_needs(taken).await);
-        }
-        self.begin().await
+    /// Ends claiming ahead, because memory is short and pairs claimed ahead would have to be released.
+    const fn disable(&mut self) {
+        self.is_disabled = true;
     }
 
-    /// Begins what was taken ahead, as far as slots are free and the memory goes.
-    pub(super) async fn begin(&mut self) -> Result<(), RunError> {
-        while self.tasks.len() < self.workers && !self.is_disk_behind() {
-            let Some(taken) = self.in_hand.ahead.pop_front() else {
-                break;
-            };
-            if !self.budget.give(taken.need) {
-                self.short = true;
-                self.in_hand.pace.stay_single();
-                self.in_hand.ahead.push_front(taken);
-                // Those after one that must wait wait too, so that it is not passed over for ever.
-                return self.give_back().await;
+    /// Returns how many pairs one slot finishes within [`CLAIM_AHEAD`].
+    fn pairs_ahead(&self) -> usize {
+        match self.mean {
+            Some(mean) if !self.is_disabled => {
+                let pairs = CLAIM_AHEAD.as_micros() / mean.as_micros().max(1);
+                pairs.min(MAX_AHEAD_PER_SLOT) as usize
             }
-            self.warn(&taken);
-            self.spawn(taken);
-        }
-        Ok(())
-    }
-
-    /// Says so when a pair may need more memory than pairs may take.
-    fn warn(&self, taken: &LeasedPair) {
-        if let Some(limit) = self.budget.exceeded_by(taken.need) {
-            let (need, limit) = (taken.need >> 20, limit >> 20);
-            let pair = &taken.work.attributes.name;
-            tracing::warn!(
-                "{pair} may need {need} MiB, more than the {limit} MiB of --memory: it runs with nothing beside it"
-            );
-        }
-    }
-
-    fn spawn(&mut self, taken: LeasedPair) {
-        let LeasedPair { lease, work, need } = taken;
-        let name = work.attributes.name.clone();
-        self.in_hand.begin(name.clone());
-        let over = self::work(Arc::clone(&self.shared), lease, work);
-        self.tasks.spawn(async move { (over.await, name, need) });
-    }
-
-    /// Gives back what was taken ahead.
-    pub(super) async fn give_back(&mut self) -> Result<(), RunError> {
-        for taken in std::mem::take(&mut self.in_hand.ahead) {
-            self.shared.catalog.release(taken.lease).await?;
-        }
-        Ok(())
-    }
-
-    /// Leased pairs with the memory that they may need.
-    async fn with_needs(
-        &self,
-        leased: impl Iterator<Item = (Lease, PairWork)> + Send + 'static,
-    ) -> Vec<LeasedPair> {
-        let is_limited = self.budget.is_limited();
-        let (project, images) = (self.shared.project.clone(), self.images);
-        let look = move |(lease, work): (Lease, PairWork)| {
-            let need = if is_limited {
-                memory_budget::need(&project, &work.attributes, lease.cursor(), &images)
-            } else {
-                0
-            };
-            LeasedPair { lease, work, need }
-        };
-        match tokio::task::spawn_blocking(move || leased.map(look).collect()).await {
-            Ok(taken) => taken,
-            Err(panic) => std::panic::resume_unwind(panic.into_panic()),
+            Some(_) | None => 0,
         }
     }
 }
@@ -193,20 +299,47 @@ impl Scheduler {
 mod tests {
     use std::time::Duration;
 
-    use super::Prefetch;
-    use crate::domain::PairName;
+    use super::{DurationEstimate, Load, MAX_AHEAD_PER_SLOT};
+
+    /// Returns how many pairs a slot claims ahead after pairs of these milliseconds.
+    fn pairs_ahead(durations: &[u64]) -> usize {
+        let mut estimate = DurationEstimate::default();
+        for ms in durations {
+            estimate.add(Duration::from_millis(*ms));
+        }
+        estimate.pairs_ahead()
+    }
 
     #[test]
-    fn pairs_are_taken_ahead_when_one_is_nearly_over_and_several_where_they_are_short() {
-        let pair = PairName::new("1").expect("a name");
-        let mut in_hand = Prefetch::default();
-        assert_eq!(in_hand.wanted(2), 2);
-        in_hand.begin(pair.clone());
-        assert_eq!(in_hand.wanted(0), 0);
-        in_hand.nearly_over(&pair);
-        assert_eq!(in_hand.wanted(0), 1);
-        in_hand.pace.took(Duration::from_millis(100));
-        assert_eq!(in_hand.wanted(0), 1 + 2);
-        assert_eq!(in_hand.wanted(1), 2 + 4);
+    fn pairs_are_claimed_for_slots_that_soon_become_free_and_more_where_they_are_short() {
+        let load = |free, soon_free, queued| Load {
+            free,
+            running: 2 - free,
+            soon_free,
+            queued,
+        };
+        assert_eq!(load(2, 0, 0).pairs_to_claim(0), 2);
+        assert_eq!(load(0, 0, 0).pairs_to_claim(0), 0);
+        assert_eq!(load(0, 1, 0).pairs_to_claim(0), 1);
+        assert_eq!(load(0, 1, 1).pairs_to_claim(2), 0);
+        assert_eq!(load(0, 1, 0).pairs_to_claim(2), 1 + 4);
+        assert_eq!(load(1, 1, 0).pairs_to_claim(2), 2 + 4);
+    }
+
+    #[test]
+    fn short_pairs_are_claimed_ahead_and_long_ones_are_not() {
+        assert_eq!(pairs_ahead(&[]), 0);
+        assert_eq!(pairs_ahead(&[100]), 2);
+        assert_eq!(pairs_ahead(&[0, 0]), MAX_AHEAD_PER_SLOT as usize);
+        assert_eq!(pairs_ahead(&[5000]), 0);
+        assert_eq!(pairs_ahead(&[100, 5000]), 0, "they have become long");
+    }
+
+    #[test]
+    fn no_pairs_are_claimed_ahead_where_memory_is_short() {
+        let mut estimate = DurationEstimate::default();
+        estimate.add(Duration::from_millis(1));
+        estimate.disable();
+        assert_eq!(estimate.pairs_ahead(), 0);
     }
 }

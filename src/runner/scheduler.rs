@@ -1,130 +1,114 @@
-//! The run's loop: keeps the slots filled, hears what comes back, looks after the queue.
+//! The main loop of a run: keeps the slots filled, takes in what ends, and keeps this worker alive in the catalog.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use tokio::sync::mpsc;
-use tokio::task::{JoinError, JoinSet};
+use tokio::task::JoinSet;
 use tokio::time::{Interval, MissedTickBehavior, interval};
 
+use super::compute_thread::task_result;
+use super::error::RunError;
 use super::events::RunEvent;
-use super::input_changes;
-use super::memory_budget::MemoryBudget;
 use super::options::RunOptions;
-use super::pair_task::{PairEnd, PairOutcome, PairReport, RunContext};
-use super::policy::{self, Liveness};
+use super::pair_task::{PairOutcome, process_pair};
+use super::policy;
 use super::prefetch::Prefetch;
+use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::StopLevel;
-use super::{RunError, this_process};
-use crate::catalog::{DeadWorker, Outstanding, PairSelection, Waiting};
-use crate::domain::{PairName, UnixMillis, WorkerId};
-use crate::raster;
+use super::worker_session::{Heartbeat, WorkerSession};
+use crate::catalog::{Outstanding, PairSelection, Waiting};
+use crate::domain::{PairName, WorkerId};
 
-/// Between two looks for pairs that others give back or whose back-off is over.
-const LOOK_EVERY: Duration = Duration::from_millis(250);
+/// Interval between searches for pairs that other workers released or whose back-off is over.
+const POLL_EVERY: Duration = Duration::from_millis(250);
 
-/// Pairs a slot that may be on their way to the disk before no more are begun: what they gave is in memory.
-const MOST_ENDINGS: usize = 8;
+/// Most computed pairs per slot that are not stored yet, because their results are in memory.
+const MAX_STORING_PER_SLOT: usize = 8;
 
-/// What the loop has counted.
+/// What a run has counted.
 #[derive(Debug, Default)]
 pub(super) struct RunCounts {
     pub(super) done: u64,
     pub(super) failed: u64,
+    /// Stages computed and stored.
     pub(super) stages: u64,
     pub(super) too_many_failures: bool,
 }
 
-/// The loop's own state.
+/// The state of the main loop.
 pub(super) struct Scheduler {
-    pub(super) shared: Arc<RunContext>,
-    pub(super) worker: WorkerId,
-    pub(super) workers: usize,
-    pub(super) among: Option<PairSelection>,
-    pub(super) max_failures: Option<u64>,
-    pub(super) images: raster::ImageLimits,
-    /// Pairs that are computed, each with its name and the memory it was given.
-    pub(super) tasks: JoinSet<(PairOutcome, PairName, u64)>,
-    /// Pairs whose last files and checkpoint are on their way.
-    endings: JoinSet<PairReport>,
-    /// Checkpointer while pairs are not stored yet and a slot has nothing to do, or they are many.
-    waiting: Option<Waiting>,
-    pub(super) in_hand: Prefetch,
-    pub(super) budget: MemoryBudget,
-    /// The next pair waits for memory that somebody must give back first.
-    pub(super) short: bool,
-    /// A pair that nothing may run beside is in hand.
-    pub(super) exclusive: bool,
-    /// Whether a claim may find something that the last one did not.
-    pub(super) look: bool,
-    /// When this worker last showed that it lives, by the run's clock.
-    last_beat: UnixMillis,
-    liveness: Liveness,
-    tally: RunCounts,
+    context: Arc<RunContext>,
+    session: WorkerSession,
+    selection: Option<PairSelection>,
+    prefetch: Prefetch,
+    max_storing: usize,
+    max_failures: Option<u64>,
+    /// Pairs that are computed.
+    computing: JoinSet<(PairName, PairOutcome)>,
+    /// Pairs that are computed and whose last stages are being stored.
+    storing: JoinSet<PairReport>,
+    /// While this is held, the catalog commits at once instead of waiting for more requests.
+    flush: Option<Waiting>,
+    counts: RunCounts,
     fatal: Option<RunError>,
-    told: StopLevel,
+    /// The stop level that was last reported as an event.
+    reported_stop: StopLevel,
 }
 
 impl Scheduler {
     pub(super) fn new(
-        shared: Arc<RunContext>,
+        context: Arc<RunContext>,
         worker: WorkerId,
-        among: Option<PairSelection>,
+        selection: Option<PairSelection>,
         options: &RunOptions,
     ) -> Self {
+        let now = context.clock.now();
         Self {
-            last_beat: shared.clock.now(),
-            liveness: Liveness::new(shared.timing.lease_ms()),
-            shared,
-            worker,
-            workers: options.workers.max(1),
-            among,
+            session: WorkerSession::new(worker, now, context.timing.lease_ms()),
+            prefetch: Prefetch::new(Arc::clone(&context), selection.clone(), options),
+            context,
+            selection,
+            max_storing: options.workers.max(1) * MAX_STORING_PER_SLOT,
             max_failures: options.max_failures,
-            images: options.image_limits,
-            tasks: JoinSet::new(),
-            endings: JoinSet::new(),
-            waiting: None,
-            in_hand: Prefetch::default(),
-            budget: MemoryBudget::new(options.memory),
-            short: false,
-            exclusive: false,
-            look: true,
-            tally: RunCounts::default(),
+            computing: JoinSet::new(),
+            storing: JoinSet::new(),
+            flush: None,
+            counts: RunCounts::default(),
             fatal: None,
-            told: StopLevel::Go,
+            reported_stop: StopLevel::Go,
         }
     }
 
-    /// The number this process works under now.
+    /// Returns the id under which this process works now.
     pub(super) const fn worker(&self) -> WorkerId {
-        self.worker
+        self.session.worker()
     }
 
-    /// Works until nothing is left or the run is stopped. Gives the error that ended it, if one did.
+    /// Runs until nothing is left to do or the run is stopped. Returns what was counted, or the error that ended it.
     pub(super) async fn run(
         &mut self,
         events: &mut mpsc::UnboundedReceiver<RunEvent>,
         on_event: &mut (impl FnMut(RunEvent) + Send),
     ) -> Result<RunCounts, RunError> {
-        let timing = self.shared.timing;
-        let mut looks = every(LOOK_EVERY);
-        let mut recoveries = every(timing.rescue_every);
-        let mut heartbeats = every(timing.beat_every);
-        while !self.is_over().await? {
-            self.wait().await?;
-            let shared = Arc::clone(&self.shared);
+        let context = Arc::clone(&self.context);
+        let mut polls = every(POLL_EVERY);
+        let mut recoveries = every(context.timing.recover_every);
+        let mut heartbeats = every(context.timing.heartbeat_every);
+        while !self.fill_slots().await? {
+            self.flush_where_needed().await?;
             tokio::select! {
                 biased;
-                () = shared.stop.reached(next_level(self.told)), if self.told < StopLevel::Now => self.tell_stop(),
+                () = context.stop.reached(self.reported_stop.next()), if self.reported_stop < StopLevel::Now => self.report_stop(),
                 _ = heartbeats.tick() => self.heartbeat().await?,
                 Some(event) = events.recv() => {
-                    self.observe(&event);
+                    self.prefetch.observe(&event);
                     on_event(event);
                 }
-                Some(over) = self.tasks.join_next() => self.take(unwound(over)),
-                Some(report) = self.endings.join_next() => self.count(unwound(report)),
+                Some(computed) = self.computing.join_next() => self.finish_computing(task_result(computed)),
+                Some(report) = self.storing.join_next() => self.count(task_result(report)),
                 _ = recoveries.tick() => self.recover().await?,
-                _ = looks.tick(), if self.tasks.len() < self.workers => self.look_again().await?,
+                _ = polls.tick(), if self.prefetch.free_slots() > 0 => self.poll().await?,
             }
         }
         while let Ok(event) = events.try_recv() {
@@ -132,31 +116,27 @@ impl Scheduler {
         }
         match self.fatal.take() {
             Some(error) => Err(error),
-            None => Ok(std::mem::take(&mut self.tally)),
+            None => Ok(std::mem::take(&mut self.counts)),
         }
     }
 
-    /// Fills the slots; whether nothing is in hand and nothing can come.
-    async fn is_over(&mut self) -> Result<bool, RunError> {
-        if self.shared.is_draining() || self.fatal.is_some() {
-            self.give_back().await?;
+    /// Starts pairs in free slots. Returns whether the run is over: nothing is in progress and nothing can follow.
+    async fn fill_slots(&mut self) -> Result<bool, RunError> {
+        if self.context.is_draining() || self.fatal.is_some() {
+            self.prefetch.release_all().await?;
             return Ok(self.is_idle());
         }
-        if self.exclusive || self.short {
+        self.start_pairs().await?;
+        if !self.prefetch.claim(self.session.worker()).await? {
             return Ok(false);
         }
-        self.begin().await?;
-        let wanted = self.wanted();
-        if !self.look || self.short || wanted == 0 {
-            return Ok(false);
-        }
-        self.look = false;
-        self.claim(wanted, false).await?;
+        self.start_pairs().await?;
         if !self.is_idle() {
             return Ok(false);
         }
-        // Nothing ordinary is left or in hand: now the pairs that must run by themselves, one at a time.
-        self.claim(1, true).await?;
+        // No ordinary pair is ready or in progress: now those that must run with no other beside them.
+        self.prefetch.claim_exclusive(self.session.worker()).await?;
+        self.start_pairs().await?;
         if !self.is_idle() {
             return Ok(false);
         }
@@ -164,15 +144,31 @@ impl Scheduler {
         Ok(left.ready == 0 && left.leased == 0 && left.backoff == 0)
     }
 
-    /// While all slots are busy, what is finished may wait for company, until it is much. Else it is stored at once: the
-    /// next pair may wait for it, or the end, and a pair that nothing may run beside is to be blamed by itself if it
-    /// kills.
-    async fn wait(&mut self) -> Result<(), RunError> {
-        let is_free = self.tasks.len() < self.workers && !self.endings.is_empty();
-        let is_waiting = is_free || self.endings.len() > self.workers * MOST_ENDINGS / 2;
-        if is_waiting != self.waiting.is_some() {
-            self.waiting = if is_waiting {
-                Some(self.shared.catalog.waiting().await?)
+    /// Starts leased pairs while slots and memory are free and the disk keeps up.
+    async fn start_pairs(&mut self) -> Result<(), RunError> {
+        while self.storing.len() < self.max_storing
+            && let Some(pair) = self.prefetch.next_pair().await?
+        {
+            let name = pair.work.attributes.name.clone();
+            let task = process_pair(Arc::clone(&self.context), pair.lease, pair.work);
+            self.computing.spawn(async move { (name, task.await) });
+        }
+        Ok(())
+    }
+
+    fn is_idle(&self) -> bool {
+        self.computing.is_empty() && self.storing.is_empty()
+    }
+
+    /// Lets the catalog delay commits while all slots are busy and few pairs wait to be stored. Otherwise the next pair
+    /// or the end of the run may depend on them, and a pair with no other beside it has to be stored before it can be
+    /// blamed for the death of its process.
+    async fn flush_where_needed(&mut self) -> Result<(), RunError> {
+        let is_slot_free = self.prefetch.free_slots() > 0 && !self.storing.is_empty();
+        let is_needed = is_slot_free || self.storing.len() > self.max_storing / 2;
+        if is_needed != self.flush.is_some() {
+            self.flush = if is_needed {
+                Some(self.context.catalog.waiting().await?)
             } else {
                 None
             };
@@ -180,169 +176,107 @@ impl Scheduler {
         Ok(())
     }
 
-    /// Whether so many pairs are computed and not stored that the disk must catch up.
-    pub(super) fn is_disk_behind(&self) -> bool {
-        self.endings.len() >= self.workers * MOST_ENDINGS
-    }
-
-    /// Whether nothing is computed or on its way.
-    fn is_idle(&self) -> bool {
-        self.tasks.is_empty() && self.endings.is_empty()
-    }
-
     async fn outstanding(&self) -> Result<Outstanding, RunError> {
-        let shared = &self.shared;
-        let catalog = &shared.catalog;
-        Ok(catalog
-            .outstanding(shared.until, self.among.as_ref())
-            .await?)
+        let until = self.context.until;
+        let catalog = &self.context.catalog;
+        Ok(catalog.outstanding(until, self.selection.as_ref()).await?)
     }
 
-    /// Takes in that a pair's computing is over.
-    fn take(&mut self, (over, name, need): (PairOutcome, PairName, u64)) {
-        self.exclusive = false;
-        self.short = false;
-        self.look = true;
-        self.budget.take_back(need);
-        self.in_hand.over(&name);
-        match over {
+    fn finish_computing(&mut self, (name, outcome): (PairName, PairOutcome)) {
+        self.prefetch.finish(&name);
+        match outcome {
             PairOutcome::Ended(report) => self.count(report),
-            PairOutcome::Storing(held) => drop(self.endings.spawn(held.done())),
+            PairOutcome::Storing(checkpointer) => {
+                drop(self.storing.spawn(checkpointer.finish(PairEnd::Done)));
+            }
         }
     }
 
-    /// Takes in how a pair ended.
     fn count(&mut self, report: PairReport) {
-        self.look = true;
-        self.tally.stages += report.stages;
+        self.prefetch.expect_more();
+        self.counts.stages += report.stages;
         match report.end {
-            PairEnd::Done => self.tally.done += 1,
-            PairEnd::Failed => self.tally.failed += 1,
-            PairEnd::Later | PairEnd::GivenBack | PairEnd::Lost => {}
+            PairEnd::Done => self.counts.done += 1,
+            PairEnd::Failed => self.counts.failed += 1,
+            PairEnd::Retry | PairEnd::Released | PairEnd::LeaseLost => {}
         }
         if let Some(error) = report.fatal {
             self.drain("the run cannot go on");
             self.fatal.get_or_insert(error);
         }
-        if self
+        let is_over_limit = self
             .max_failures
-            .is_some_and(|max| self.tally.failed >= max)
-            && !self.tally.too_many_failures
-        {
-            self.tally.too_many_failures = true;
+            .is_some_and(|max| self.counts.failed >= max);
+        if is_over_limit && !self.counts.too_many_failures {
+            self.counts.too_many_failures = true;
             self.drain("too many failures");
         }
     }
 
     fn drain(&self, reason: &str) {
-        if self.shared.drain.level() == StopLevel::Go {
-            self.shared.drain.drain();
-            self.shared.tell(RunEvent::Stopping {
+        if self.context.drain.level() == StopLevel::Go {
+            self.context.drain.drain();
+            self.context.emit(RunEvent::Stopping {
                 level: StopLevel::Drain,
                 reason: reason.to_owned(),
             });
         }
     }
 
-    fn tell_stop(&mut self) {
-        self.told = self.shared.stop.level();
-        self.shared.tell(RunEvent::Stopping {
-            level: self.told,
+    fn report_stop(&mut self) {
+        self.reported_stop = self.context.stop.level();
+        self.context.emit(RunEvent::Stopping {
+            level: self.reported_stop,
             reason: "asked to stop".to_owned(),
         });
     }
 
-    /// Makes pairs ready whose time has come; looks whether others have given some back.
-    async fn look_again(&mut self) -> Result<(), RunError> {
-        if self.shared.is_draining() {
+    /// Makes pairs ready whose back-off is over, and lets the next claim look for pairs that other workers released.
+    async fn poll(&mut self) -> Result<(), RunError> {
+        if self.context.is_draining() {
             return Ok(());
         }
-        let now = self.shared.clock.now();
+        let now = self.context.clock.now();
         let left = self.outstanding().await?;
         if left.next_due.is_some_and(|due| due <= now) {
             let longest = policy::longest_backoff_ms();
-            self.shared
+            self.context
                 .catalog
                 .release_due_backoffs(now, longest)
                 .await?;
         }
-        self.look = true;
+        self.prefetch.expect_more();
         Ok(())
     }
 
-    /// A sign of life. When none can be stored for as long as a lease lasts, the run is over; when one comes too late,
-    /// because the process was held up, it goes on as another worker.
+    /// Stores a heartbeat. If the process was suspended past the end of its leases, it goes on as a new worker; if the
+    /// catalog cannot be written for as long as a lease lasts, the run ends.
     async fn heartbeat(&mut self) -> Result<(), RunError> {
-        let now = self.shared.clock.now();
-        let alive_since = self.shared.alive_since();
-        let catalog = &self.shared.catalog;
-        match catalog.heartbeat(self.worker, now, alive_since).await {
-            Ok(true) => self.last_beat = now,
-            Ok(false) => self.enter_anew(now).await?,
-            Err(error) => {
-                tracing::warn!(%error, "no sign of life could be stored");
-                if self.last_beat < alive_since {
-                    self.drain("the catalog cannot be written any more");
-                    self.fatal.get_or_insert(error.into());
-                }
+        match self.session.heartbeat(&self.context).await {
+            Heartbeat::Alive => {}
+            Heartbeat::Expired => {
+                tracing::warn!(
+                    "suspended past the end of its leases: the stages in progress run again"
+                );
+                self.prefetch.release_all().await?;
+                self.session.register_again(&self.context).await?;
+                self.prefetch.expect_more();
+            }
+            Heartbeat::Unwritable(error) => {
+                self.drain("the catalog cannot be written any more");
+                self.fatal.get_or_insert(error.into());
             }
         }
         Ok(())
     }
 
-    /// Takes a new number. What is in hand under the old one can no longer be stored; its pairs are ready again.
-    async fn enter_anew(&mut self, now: UnixMillis) -> Result<(), RunError> {
-        tracing::warn!("held up past the end of its leases: the stages in hand run again");
-        self.give_back().await?;
-        let catalog = &self.shared.catalog;
-        let old = self.worker;
-        catalog.end_worker(old, now).await?;
-        self.worker = catalog
-            .register_worker(this_process(), self.shared.fingerprints, now)
-            .await?;
-        self.last_beat = now;
-        catalog.recover(DeadWorker::Workers(vec![old]), now).await?;
-        self.look = true;
-        Ok(())
-    }
-
-    /// Takes back the leases of dead workers in other processes.
     async fn recover(&mut self) -> Result<(), RunError> {
-        let catalog = &self.shared.catalog;
-        let now = self.shared.clock.now();
-        let holders = catalog.lease_holders().await?;
-        let dead = self.liveness.observe(&holders, self.worker, now);
-        let mut recovered = 0;
-        if !dead.is_empty() {
-            let found = catalog.recover(DeadWorker::Workers(dead), now).await?;
-            input_changes::poisoned(&self.shared.project, catalog, &found.poisoned).await?;
-            recovered += found.ready;
-        }
-        if holders.iter().any(|holder| holder.worker != self.worker) {
-            let margin = self.shared.timing.deadline_margin.as_millis() as i64;
-            let overdue = catalog.recover_overdue(self.worker, margin, now).await?;
-            recovered += overdue.ready;
-        }
-        if recovered > 0 {
-            self.look = true;
-            self.shared.tell(RunEvent::Recovered { pairs: recovered });
+        let pairs = self.session.recover(&self.context).await?;
+        if pairs > 0 {
+            self.prefetch.expect_more();
+            self.context.emit(RunEvent::Recovered { pairs });
         }
         Ok(())
-    }
-}
-
-/// What a task gave; its panic is ours.
-fn unwound<T>(ended: Result<T, JoinError>) -> T {
-    match ended {
-        Ok(ended) => ended,
-        Err(panic) => std::panic::resume_unwind(panic.into_panic()),
-    }
-}
-
-const fn next_level(level: StopLevel) -> StopLevel {
-    match level {
-        StopLevel::Go => StopLevel::Drain,
-        StopLevel::Drain | StopLevel::Now => StopLevel::Now,
     }
 }
 

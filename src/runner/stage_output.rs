@@ -1,35 +1,109 @@
-//! What stages give, as numbers and files on disk, and the hashes that name them.
+//! What a stage returns to the runner: numbers and files with the hashes that identify them, or an error.
 
 use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
 
-use super::steps::StageOutput;
 use crate::catalog::MetricResult;
 use crate::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask};
 pub(super) use crate::domain::artifact_role::{DEPTH, PRINT_MASK};
 use crate::domain::{
-    ArtifactSet, ContentHash, DepthOutcome, MetricOutcome, NormalizeOutcome, RegisterOutcome,
+    ArtifactSet, ContentHash, DepthOutcome, Failure, FailureClass, MetricOutcome, NormalizeOutcome,
+    Stage,
 };
 use crate::raster::{DepthMap, Grid, Mask, png_grey8, png_grey16, png_mask};
 use crate::stages::normalize::Normalized;
 use crate::stages::register::Registered;
 use crate::store::NewArtifact;
 
+/// Grey levels of the print mask.
 const INK: u8 = 255;
-const PAPER: u8 = 0;
+const BACKGROUND: u8 = 0;
 const UNKNOWN: u8 = 128;
 
-/// A stage that leaves numbers only.
-pub(super) const fn numbers(outcome: String) -> StageOutput {
-    StageOutput {
-        outcome,
-        files: Vec::new(),
-        metrics: Vec::new(),
+/// What a stage returns.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct StageOutput {
+    /// The numbers as JSON.
+    pub(super) outcome: Value,
+    pub(super) files: Vec<NewArtifact>,
+    /// The metrics, for the last stage.
+    pub(super) metrics: Vec<MetricOutcome>,
+}
+
+/// Why a stage returned nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum ExecutionError {
+    /// The result of an earlier stage is missing, or belongs to other inputs: run again from that stage on.
+    RerunFrom(Stage),
+    /// The stage failed.
+    Failed {
+        failure: Failure,
+        /// Whether the failure may pass by itself.
+        is_transient: bool,
+    },
+}
+
+impl ExecutionError {
+    /// A failure that a retry does not change.
+    pub(super) fn failed(class: FailureClass, message: impl Into<String>) -> Self {
+        Self::Failed {
+            failure: Failure::new(class, message),
+            is_transient: false,
+        }
     }
 }
 
-/// What is told of a depth map beside its picture.
+impl StageOutput {
+    /// Numbers without files.
+    pub(super) const fn numbers(outcome: Value) -> Self {
+        Self {
+            outcome,
+            files: Vec::new(),
+            metrics: Vec::new(),
+        }
+    }
+
+    /// The output of the depth stage: the map as a 16-bit PNG.
+    pub(super) fn depth(outcome: Value, map: &DepthMap) -> Self {
+        Self {
+            files: vec![png(DEPTH, png_grey16(&map.levels))],
+            ..Self::numbers(outcome)
+        }
+    }
+
+    /// The output of the normalize stage: ink and background in one 8-bit PNG.
+    pub(super) fn normalized(outcome: Value, print_mask: &Grid<u8>) -> Self {
+        Self {
+            files: vec![png(PRINT_MASK, png_grey8(print_mask))],
+            ..Self::numbers(outcome)
+        }
+    }
+
+    /// The output of the register stage: the masks on which the metrics were computed.
+    pub(super) fn registered(
+        outcome: Value,
+        metrics: Vec<MetricOutcome>,
+        registered: &Registered,
+    ) -> Self {
+        let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
+        for canvas in &registered.canvases {
+            let role = canvas_depth_mask(canvas.metric);
+            files.push(png(&role, png_mask(&canvas.depth)));
+        }
+        Self {
+            outcome,
+            files,
+            metrics,
+        }
+    }
+}
+
+fn png(role: &str, bytes: Vec<u8>) -> NewArtifact {
+    NewArtifact::new(role, "png", bytes)
+}
+
+/// Returns the numbers that are stored beside a depth map's image.
 pub(super) fn depth_outcome(map: &DepthMap) -> DepthOutcome {
     let levels = map.levels.data();
     let seen = levels.iter().filter(|level| **level > 0).count();
@@ -41,26 +115,19 @@ pub(super) fn depth_outcome(map: &DepthMap) -> DepthOutcome {
     }
 }
 
-/// The depth stage's output.
-pub(super) fn depth(outcome: String, map: &DepthMap) -> StageOutput {
-    StageOutput {
-        files: vec![png(DEPTH, png_grey16(&map.levels))],
-        ..numbers(outcome)
-    }
-}
-
-/// Ink, paper and the unknown in one picture.
+/// Returns ink, background and unknown pixels in one image.
 pub(super) fn print_mask(ink: &Mask, known: &Mask) -> Grid<u8> {
     Grid::from_fn(ink.width(), ink.height(), |x, y| {
         match (ink.at(x, y), known.at(x, y)) {
             (true, _) => INK,
-            (false, true) => PAPER,
+            (false, true) => BACKGROUND,
             (false, false) => UNKNOWN,
         }
     })
 }
 
-/// The masks as the picture holds them, so that a run that goes on from the file sees what an unbroken one sees.
+/// Returns the masks that an image from [`print_mask`] holds. A run that continues from the file gets the same masks as
+/// one that was not interrupted.
 pub(super) fn from_print_mask(outcome: NormalizeOutcome, grey: &Grid<u8>) -> Normalized {
     Normalized {
         outcome,
@@ -69,43 +136,13 @@ pub(super) fn from_print_mask(outcome: NormalizeOutcome, grey: &Grid<u8>) -> Nor
     }
 }
 
-/// The normalize stage's output.
-pub(super) fn normalized(outcome: String, grey: &Grid<u8>) -> StageOutput {
-    StageOutput {
-        files: vec![png(PRINT_MASK, png_grey8(grey))],
-        ..numbers(outcome)
-    }
-}
-
-/// The register stage's output.
-pub(super) fn registered(
-    json: String,
-    outcome: RegisterOutcome,
-    registered: &Registered,
-) -> StageOutput {
-    let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
-    for canvas in &registered.canvases {
-        let role = canvas_depth_mask(canvas.metric);
-        files.push(png(&role, png_mask(&canvas.depth)));
-    }
-    StageOutput {
-        outcome: json,
-        files,
-        metrics: outcome.metrics,
-    }
-}
-
-fn png(role: &str, bytes: Vec<u8>) -> NewArtifact {
-    NewArtifact::new(role, "png", bytes)
-}
-
-/// Hash of a stage's result: its numbers and its files, no times.
+/// Returns the hash of a stage's result: its numbers and its files, no times.
 pub fn result_hash(outcome: &str, files: &ArtifactSet) -> ContentHash {
-    let whole = json!({ "outcome": outcome, "files": files });
-    ContentHash::of(whole.to_string().as_bytes())
+    let result = json!({ "outcome": outcome, "files": files });
+    ContentHash::of(result.to_string().as_bytes())
 }
 
-/// The metrics with the hashes that verdicts are bound to: over the numbers and the pictures a reviewer sees.
+/// Adds to each metric the hash that verdicts are bound to: over the numbers and the images that a reviewer sees.
 pub(super) fn metric_results(
     metrics: &[MetricOutcome],
     files: &ArtifactSet,
@@ -116,29 +153,25 @@ pub(super) fn metric_results(
             .and_then(|files| files.get(role))
             .map(|artifact| artifact.hash)
     };
-    metrics
-        .iter()
-        .map(|outcome| {
-            let seen = BTreeMap::from([
-                ("outcome", judged(outcome)),
-                ("depth", json!(hash_of(depth, DEPTH))),
-                ("print", json!(hash_of(Some(files), CANVAS_PRINT_MASK))),
-                (
-                    "mask",
-                    json!(hash_of(Some(files), &canvas_depth_mask(outcome.metric))),
-                ),
-            ]);
-            let whole: Value = json!(seen);
-            MetricResult {
-                outcome: *outcome,
-                result_hash: ContentHash::of(whole.to_string().as_bytes()),
-            }
-        })
-        .collect()
+    let with_hash = |outcome: &MetricOutcome| {
+        let mask = canvas_depth_mask(outcome.metric);
+        let judged = BTreeMap::from([
+            ("outcome", without_confidence(outcome)),
+            ("depth", json!(hash_of(depth, DEPTH))),
+            ("print", json!(hash_of(Some(files), CANVAS_PRINT_MASK))),
+            ("mask", json!(hash_of(Some(files), &mask))),
+        ]);
+        MetricResult {
+            outcome: *outcome,
+            result_hash: ContentHash::of(json!(judged).to_string().as_bytes()),
+        }
+    };
+    metrics.iter().map(with_hash).collect()
 }
 
-/// The numbers that a reviewer judges: all but the confidence, which may be calibrated anew under the same alignment.
-fn judged(outcome: &MetricOutcome) -> Value {
+/// Returns the numbers that a reviewer judges: all but the confidence, so that a new calibration of the same alignment
+/// keeps its verdicts.
+fn without_confidence(outcome: &MetricOutcome) -> Value {
     let mut numbers = json!(outcome);
     if let Value::Object(fields) = &mut numbers {
         fields.remove("confidence");
@@ -148,16 +181,16 @@ fn judged(outcome: &MetricOutcome) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use super::{INK, PAPER, UNKNOWN, metric_results, print_mask, result_hash};
+    use super::{BACKGROUND, INK, UNKNOWN, metric_results, print_mask, result_hash};
     use crate::domain::{ArtifactSet, MetricOutcome, ThresholdMetric};
     use crate::raster::Mask;
     use crate::report::test_fixtures;
 
     #[test]
-    fn ink_is_ink_wherever_it_lies() {
+    fn ink_counts_even_where_the_print_is_unknown() {
         let ink = Mask::from_fn(3, 1, |x, _| x == 0);
         let known = Mask::from_fn(3, 1, |x, _| x == 1);
-        assert_eq!(print_mask(&ink, &known).data(), [INK, PAPER, UNKNOWN]);
+        assert_eq!(print_mask(&ink, &known).data(), [INK, BACKGROUND, UNKNOWN]);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Stopping a run from outside: first a drain, then at once.
+//! Stopping a run from outside: first a drain, then an immediate stop.
 
 use tokio::sync::watch;
 
@@ -7,13 +7,23 @@ use tokio::sync::watch;
 pub enum StopLevel {
     /// Not at all.
     Go,
-    /// Finish the stages in hand, claim nothing new.
+    /// Finish the stages in progress, start no new ones.
     Drain,
-    /// Stop now; stages in hand are lost, what is stored stays.
+    /// Stop at once: stages in progress are lost, stored results stay.
     Now,
 }
 
-/// A handle that signal handlers and the run share.
+impl StopLevel {
+    /// Returns the next more urgent level.
+    pub(super) const fn next(self) -> Self {
+        match self {
+            Self::Go => Self::Drain,
+            Self::Drain | Self::Now => Self::Now,
+        }
+    }
+}
+
+/// A stop request that signal handlers and the run share.
 #[derive(Debug, Clone)]
 pub struct Stop {
     level: watch::Sender<StopLevel>,
@@ -26,39 +36,34 @@ impl Default for Stop {
 }
 
 impl Stop {
-    /// A handle that asks for nothing yet.
+    /// No request yet.
     pub fn new() -> Self {
         Self {
             level: watch::Sender::new(StopLevel::Go),
         }
     }
 
-    /// One step further: the first call drains, the second stops now. Gives the new level.
+    /// Raises the request by one level, first to a drain, then to an immediate stop; returns the new level.
     pub fn escalate(&self) -> StopLevel {
-        self.level.send_modify(|level| {
-            *level = match level {
-                StopLevel::Go => StopLevel::Drain,
-                StopLevel::Drain | StopLevel::Now => StopLevel::Now,
-            };
-        });
+        self.level.send_modify(|level| *level = level.next());
         self.level()
     }
 
-    /// Asks for at least a drain.
+    /// Requests a drain, unless more was requested already.
     pub fn drain(&self) {
         self.level
             .send_modify(|level| *level = (*level).max(StopLevel::Drain));
     }
 
-    /// What is asked for.
+    /// Returns the requested level.
     pub fn level(&self) -> StopLevel {
         *self.level.borrow()
     }
 
-    /// Waits until at least this much is asked for.
+    /// Waits until this level or a higher one is requested.
     pub async fn reached(&self, level: StopLevel) {
         let mut receiver = self.level.subscribe();
-        // The sender lives in `self`, so the channel cannot close while we wait.
+        // The sender lives in `self`, so the channel cannot close while this waits.
         let _ = receiver.wait_for(|now| *now >= level).await;
     }
 }

@@ -1,4 +1,4 @@
-//! The run with made-up stages: what becomes of pairs that fail, hang, panic, or are stopped.
+//! Runs with a fake executor: pairs that fail, hang, panic, or are stopped.
 
 mod fake_executor;
 mod prefetch;
@@ -11,16 +11,17 @@ use serde_json::{Map, json};
 
 use fake_executor::FakeExecutor;
 
-use super::{Rerun, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel, run_steps};
+use super::run::run_with;
+use super::{Rerun, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel};
 use crate::catalog::{Catalog, ClaimRequest, Fingerprints, ImportRow, WorkerInfo};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 use crate::store::Project;
 
-/// A project with made-up pairs.
+/// A project with pairs that only a fake executor can run, and the events of its runs.
 struct RunFixture {
     project: Project,
     catalog: Catalog,
-    steps: Arc<FakeExecutor>,
+    executor: Arc<FakeExecutor>,
     stop: Stop,
     events: Mutex<Vec<RunEvent>>,
     _dir: tempfile::TempDir,
@@ -68,7 +69,7 @@ impl RunFixture {
         Self {
             project,
             catalog,
-            steps: Arc::default(),
+            executor: Arc::default(),
             stop: Stop::new(),
             events: Mutex::default(),
             _dir: dir,
@@ -76,14 +77,14 @@ impl RunFixture {
     }
 
     async fn try_run(&self, options: &RunOptions) -> Result<RunSummary, RunError> {
-        let steps = Arc::clone(&self.steps);
+        let executor = Arc::clone(&self.executor);
         let note = |event| self.events.lock().expect("no panic holds it").push(event);
         let (project, catalog) = (&self.project, &self.catalog);
-        let summary = run_steps(
+        let summary = run_with(
             project,
             catalog,
             &fingerprints(),
-            steps,
+            executor,
             options,
             &self.stop,
             note,
@@ -116,10 +117,10 @@ async fn every_pair_is_done_and_each_stage_computed_once() {
     );
     for pair in ["a", "b", "c", "d", "e"] {
         for stage in Stage::ALL {
-            assert_eq!(world.steps.count(pair, stage), 1);
+            assert_eq!(world.executor.count(pair, stage), 1);
         }
     }
-    assert!(world.steps.most.load(Ordering::SeqCst) <= 2);
+    assert!(world.executor.most.load(Ordering::SeqCst) <= 2);
     let again = world.run(&options(2)).await;
     assert_eq!(
         (
@@ -140,7 +141,7 @@ async fn one_bad_pair_stops_nobody_and_shows() {
         (2, 2, 2)
     );
     let failures = world.catalog.failures(9).await.expect("a read");
-    let told: Vec<_> = failures
+    let messages: Vec<_> = failures
         .iter()
         .map(|failed| {
             (
@@ -149,10 +150,10 @@ async fn one_bad_pair_stops_nobody_and_shows() {
             )
         })
         .collect();
-    let told_of = "the stage panicked (made up): a defect of this program, please report it with what \
-        `run --rerun failed -v` tells";
-    let bug = (FailureClass::Bug, told_of);
-    assert_eq!(told, [(FailureClass::BadInput, "no faces"), bug]);
+    let panicked = "the stage panicked (made up): this is a bug, please report it with the output of \
+        `run --rerun failed -v`";
+    let bug = (FailureClass::Bug, panicked);
+    assert_eq!(messages, [(FailureClass::BadInput, "no faces"), bug]);
     let again = world.run(&options(2)).await;
     assert_eq!((again.failed, again.failed_in_all), (0, 2));
     let failed = RunOptions {
@@ -160,8 +161,8 @@ async fn one_bad_pair_stops_nobody_and_shows() {
         ..options(2)
     };
     assert_eq!(world.run(&failed).await.failed, 2);
-    assert_eq!(world.steps.count("panics_1", Stage::Fit), 1);
-    assert_eq!(world.steps.count("panics_1", Stage::Depth), 2);
+    assert_eq!(world.executor.count("panics_1", Stage::Fit), 1);
+    assert_eq!(world.executor.count("panics_1", Stage::Depth), 2);
 }
 
 #[tokio::test]
@@ -172,7 +173,7 @@ async fn a_pair_that_panicked_is_taken_up_when_its_mesh_is_another() {
         std::fs::write(&mesh, content).expect("written");
         world.run(&options(1)).await;
         assert_eq!(
-            world.steps.count("bursts_1", Stage::Fit),
+            world.executor.count("bursts_1", Stage::Fit),
             tries,
             "{content}"
         );
@@ -184,7 +185,7 @@ async fn a_failure_that_may_pass_is_tried_again_in_the_same_run() {
     let world = RunFixture::new(&["flaky_1"]).await;
     let summary = world.run(&options(1)).await;
     assert_eq!((summary.done, summary.failed), (1, 0));
-    assert_eq!(world.steps.count("flaky_1", Stage::Fit), 2);
+    assert_eq!(world.executor.count("flaky_1", Stage::Fit), 2);
     let detail = world.catalog.pair(&name("flaky_1")).await.expect("a read");
     let attempts = detail.expect("the pair").attempts;
     assert_eq!(
@@ -200,22 +201,22 @@ async fn a_failure_that_may_pass_is_tried_again_in_the_same_run() {
 async fn a_stage_that_takes_too_long_is_tried_alone_and_then_quarantined() {
     let world = RunFixture::new(&["a", "hangs_1"]).await;
     let limited = RunOptions {
-        stage_limit: Duration::from_secs(1),
+        stage_timeout: Duration::from_secs(1),
         ..options(2)
     };
     let summary = world.run(&limited).await;
     assert_eq!((summary.done, summary.failed), (1, 1));
-    assert_eq!(world.steps.count("hangs_1", Stage::Fit), 2);
+    assert_eq!(world.executor.count("hangs_1", Stage::Fit), 2);
     let failures = world.catalog.failures(9).await.expect("a read");
     assert_eq!(failures[0].failure.failure.class, FailureClass::Resource);
-    world.steps.open();
+    world.executor.open();
 }
 
 #[tokio::test]
 async fn what_an_earlier_stage_left_is_made_again_when_it_is_gone() {
     let world = RunFixture::new(&["loses_1"]).await;
     assert_eq!(world.run(&options(1)).await.done, 1);
-    let counts = Stage::ALL.map(|stage| world.steps.count("loses_1", stage));
+    let counts = Stage::ALL.map(|stage| world.executor.count("loses_1", stage));
     assert_eq!(counts, [1, 2, 2, 2]);
     let kept = world.catalog.counters().await.expect("counters");
     assert_eq!(kept, world.catalog.recount().await.expect("a recount"));
@@ -226,11 +227,11 @@ async fn a_drain_finishes_the_stage_in_hand_and_gives_the_attempt_back() {
     let world = RunFixture::new(&["wait_1", "wait_2"]).await;
     let options = options(1);
     let drain = async {
-        while world.steps.count("wait_1", Stage::Fit) == 0 {
+        while world.executor.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
         assert_eq!(world.stop.escalate(), StopLevel::Drain);
-        world.steps.open();
+        world.executor.open();
     };
     let (summary, ()) = tokio::join!(world.run(&options), drain);
     assert_eq!(
@@ -244,7 +245,7 @@ async fn a_drain_finishes_the_stage_in_hand_and_gives_the_attempt_back() {
         (JobStatus::Ready, 0)
     );
     assert_eq!(detail.results.next_stage, Some(Stage::Depth));
-    assert_eq!(world.steps.count("wait_2", Stage::Fit), 0);
+    assert_eq!(world.executor.count("wait_2", Stage::Fit), 0);
 }
 
 #[tokio::test]
@@ -252,7 +253,7 @@ async fn a_second_stop_waits_for_nothing_and_leaves_all_resumable() {
     let world = RunFixture::new(&["wait_1"]).await;
     let options = options(1);
     let stop = async {
-        while world.steps.count("wait_1", Stage::Fit) == 0 {
+        while world.executor.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
         world.stop.escalate();
@@ -266,7 +267,7 @@ async fn a_second_stop_waits_for_nothing_and_leaves_all_resumable() {
         (detail.results.status, detail.attempt, detail.crashes),
         (JobStatus::Ready, 0, 0)
     );
-    world.steps.open();
+    world.executor.open();
 }
 
 #[tokio::test]
@@ -331,9 +332,9 @@ async fn what_a_dead_process_left_comes_back_at_once() {
     assert_eq!(world.run(&options(2)).await.done, 2);
     let events = world.events.lock().expect("no panic holds it");
     let first = |like: fn(&RunEvent) -> bool| events.iter().position(like);
-    let recovered = first(|event| matches!(event, RunEvent::Recovered { pairs: 1 }));
+    let rescued = first(|event| matches!(event, RunEvent::Recovered { pairs: 1 }));
     let begun = first(|event| matches!(event, RunEvent::StageStarted { .. }));
-    assert!(recovered.is_some() && recovered < begun, "{events:?}");
+    assert!(rescued.is_some() && rescued < begun, "{events:?}");
 }
 
 #[tokio::test]
@@ -347,7 +348,7 @@ async fn a_second_run_is_refused_and_a_joined_one_shares_the_work() {
         },
     );
     let others = async {
-        while world.steps.count("wait_1", Stage::Fit) == 0 {
+        while world.executor.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
         let refused = world.try_run(&one).await;
@@ -358,7 +359,7 @@ async fn a_second_run_is_refused_and_a_joined_one_shares_the_work() {
             while world.status("f").await != JobStatus::Done {
                 tokio::task::yield_now().await;
             }
-            world.steps.open();
+            world.executor.open();
         };
         tokio::join!(world.run(&joined), open).0
     };
@@ -409,5 +410,5 @@ async fn a_run_up_to_a_stage_does_not_wait_for_a_later_one_to_be_tried_again() {
     assert_eq!(again.status("breaks_1").await, JobStatus::Backoff);
     // The next run takes up what the stopped one left.
     assert_eq!(again.run(&options(1)).await.done, 2);
-    assert_eq!(again.steps.count("breaks_1", Stage::Depth), 2);
+    assert_eq!(again.executor.count("breaks_1", Stage::Depth), 2);
 }

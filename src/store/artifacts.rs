@@ -1,6 +1,7 @@
-//! Artifacts: files named by their content, either whole or not there.
+//! Artifacts: files that are named by the hash of their content, and either complete or absent.
 //!
-//! Temporary name, write, fsync, rename, fsync of the directory: only then may a row of the catalog name it.
+//! A file is written under a temporary name, synced, and renamed, and its folder is synced; only then may a row of the
+//! catalog name it.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -8,7 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::Project;
 use super::atomic_write::{parent_folder, sync_folder, write_synced};
-use crate::domain::{ArtifactRef, ArtifactSet, ContentHash};
+use crate::domain::{ArtifactRef, ContentHash};
 
 /// An artifact that is not on disk yet.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -19,7 +20,7 @@ pub struct NewArtifact {
 }
 
 impl NewArtifact {
-    /// Bytes with what they are for their stage, such as `depth.png`, and the ending of the file name without the dot.
+    /// Bytes with their role in the stage, such as `depth.png`, and the file name extension without the dot.
     pub fn new(role: &str, ext: &str, bytes: Vec<u8>) -> Self {
         let reference = ArtifactRef {
             hash: ContentHash::of(&bytes),
@@ -33,12 +34,12 @@ impl NewArtifact {
         }
     }
 
-    /// What it is for its stage.
+    /// Returns its role in the stage.
     pub fn role(&self) -> &str {
         &self.role
     }
 
-    /// How it will be named.
+    /// Returns the reference under which it will be stored.
     pub const fn reference(&self) -> &ArtifactRef {
         &self.reference
     }
@@ -47,10 +48,10 @@ impl NewArtifact {
 /// Why an artifact could not be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum ArtifactError {
-    /// A row names it, but it is gone.
+    /// A row names it, but the file is missing.
     #[error("artifact {0} is missing")]
     Missing(PathBuf),
-    /// It is not what it was when it was written.
+    /// The file was changed after it was written.
     #[error("artifact {0} was changed: its bytes do not match its name")]
     Changed(PathBuf),
     /// A file operation failed.
@@ -70,21 +71,21 @@ impl ArtifactError {
     }
 }
 
-/// Makes temporary names of one process unlike each other.
+/// Makes the temporary names of this process unique.
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
 impl Project {
-    /// Where an artifact lies.
+    /// Returns the path of an artifact.
     pub fn artifact_path(&self, artifact: &ArtifactRef) -> PathBuf {
         let hex = artifact.hash.to_hex();
         let name = format!("{hex}.{}", artifact.ext);
         self.artifacts_dir().join(&hex[..2]).join(name)
     }
 
-    /// The bytes of an artifact, checked against its hash.
+    /// Reads an artifact and checks it against its hash.
     ///
     /// # Errors
-    /// When the file is missing, unreadable or not what it was.
+    /// When the file is missing, unreadable or changed.
     pub fn read_artifact(&self, artifact: &ArtifactRef) -> Result<Vec<u8>, ArtifactError> {
         let path = self.artifact_path(artifact);
         match std::fs::read(&path) {
@@ -97,19 +98,19 @@ impl Project {
         }
     }
 
-    /// Whether an artifact is there and whole, without holding it in memory; `quick` compares its length only.
+    /// Checks that an artifact is complete, without reading it into memory; `quick` compares its length only.
     ///
     /// # Errors
-    /// When the file is missing, unreadable or not what it was.
+    /// When the file is missing, unreadable or changed.
     pub fn check_artifact(&self, artifact: &ArtifactRef, quick: bool) -> Result<(), ArtifactError> {
         let path = self.artifact_path(artifact);
-        let found = match std::fs::metadata(&path) {
+        let is_complete = match std::fs::metadata(&path) {
             Ok(meta) if meta.len() != artifact.bytes => Ok(false),
             Ok(_) if quick => Ok(true),
-            Ok(_) => is_of(&path, &artifact.hash),
+            Ok(_) => has_hash(&path, &artifact.hash),
             Err(error) => Err(error),
         };
-        match found {
+        match is_complete {
             Ok(true) => Ok(()),
             Ok(false) => Err(ArtifactError::Changed(path)),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
@@ -119,52 +120,42 @@ impl Project {
         }
     }
 
-    /// Writes artifacts so that all are on disk for good when this returns. One that is there already is left.
+    /// Writes artifacts durably; complete ones that exist are left. Calls `on_written` for each file that is written under
+    /// its temporary name, before it gets its own.
     ///
     /// # Errors
-    /// When the disk refuses; what was written stays, and harms nobody.
-    pub fn write_artifacts(&self, files: &[NewArtifact]) -> Result<ArtifactSet, ArtifactError> {
-        self.write_artifacts_with(files, &|| {})
-    }
-
-    /// [`Project::write_artifacts`] that calls `tell` for each file that is on disk under a temporary name and is
-    /// about to get its own.
-    ///
-    /// # Errors
-    /// When the disk refuses; what was written stays, and harms nobody.
-    pub fn write_artifacts_with(
+    /// When one cannot be written. Those that were written stay; as no row names them, `check --repair` removes them.
+    pub fn write_artifacts(
         &self,
         files: &[NewArtifact],
-        tell: &dyn Fn(),
-    ) -> Result<ArtifactSet, ArtifactError> {
-        let mut written = ArtifactSet::new();
+        on_written: &dyn Fn(),
+    ) -> Result<(), ArtifactError> {
         let mut folders = std::collections::BTreeSet::new();
         for file in files {
             let path = self.artifact_path(&file.reference);
             let folder = parent_folder(&path);
             make_folder(&folder)?;
             if self.read_artifact(&file.reference).is_err() {
-                self.place(&path, &file.bytes, tell)?;
+                self.write_artifact(&path, &file.bytes, on_written)?;
             }
             folders.insert(folder);
-            written.insert(file.role.clone(), file.reference.clone());
         }
         for folder in &folders {
             sync(folder)?;
         }
         if !folders.is_empty() {
-            // These folders may be new, whoever made them: it may have died, or not have come to syncing, before it
-            // had their names on disk. Where nothing is new this takes no time.
+            // Sync the parents too. Another process may have created these folders and died before it synced their
+            // names. This costs nothing when nothing is new.
             sync(&self.artifacts_dir())?;
             sync(self.dir())?;
         }
-        Ok(written)
+        Ok(())
     }
 
-    /// Removes what an earlier process left half-written. Only while no other process writes.
+    /// Removes the partial files of dead processes. Only while no other process writes.
     ///
     /// # Errors
-    /// When the folder cannot be read or a file not removed.
+    /// When the folder cannot be read or a file cannot be removed.
     pub fn clear_temporary(&self) -> Result<(), ArtifactError> {
         let folder = self.temporary_dir();
         match std::fs::remove_dir_all(&folder) {
@@ -179,27 +170,32 @@ impl Project {
         self.artifacts_dir().join("tmp")
     }
 
-    fn place(&self, path: &Path, bytes: &[u8], tell: &dyn Fn()) -> Result<(), ArtifactError> {
+    fn write_artifact(
+        &self,
+        path: &Path,
+        bytes: &[u8],
+        on_written: &dyn Fn(),
+    ) -> Result<(), ArtifactError> {
         let folder = self.temporary_dir();
         make_folder(&folder)?;
         let number = NEXT.fetch_add(1, Ordering::Relaxed);
         let temporary = folder.join(format!("{}-{number}", std::process::id()));
         let outcome = write_synced(&temporary, bytes)
             .and_then(|()| {
-                tell();
+                on_written();
                 std::fs::rename(&temporary, path)
             })
             .map_err(ArtifactError::io(path));
         if outcome.is_err() {
-            // A full disk is better without it; that it cannot be removed changes nothing.
+            // Free the space on a full disk; a file that cannot be removed does no harm.
             let _ = std::fs::remove_file(&temporary);
         }
         outcome
     }
 }
 
-/// Whether the bytes of a file have this hash.
-fn is_of(path: &Path, hash: &ContentHash) -> std::io::Result<bool> {
+/// Returns whether the bytes of a file have this hash.
+fn has_hash(path: &Path, hash: &ContentHash) -> std::io::Result<bool> {
     let mut hasher = blake3::Hasher::new();
     hasher.update_reader(File::open(path)?)?;
     Ok(hasher.finalize().as_bytes() == hash.as_bytes())
@@ -224,45 +220,55 @@ mod tests {
         (dir, project)
     }
 
-    fn picture(bytes: &[u8]) -> NewArtifact {
+    fn image(bytes: &[u8]) -> NewArtifact {
         NewArtifact::new("depth.png", "png", bytes.to_owned())
     }
 
+    fn write(project: &Project, artifact: &NewArtifact) {
+        let files = std::slice::from_ref(artifact);
+        project.write_artifacts(files, &|| {}).expect("written");
+    }
+
     #[test]
-    fn what_was_written_is_read_back_and_the_same_bytes_are_one_file() {
+    fn an_artifact_is_read_back_and_the_same_bytes_are_one_file() {
         let (_dir, project) = project();
-        let first = project.write_artifacts(&[picture(b"a")]).expect("written");
-        let second = project.write_artifacts(&[picture(b"a")]).expect("written");
-        assert_eq!(first, second);
-        let artifact = &first["depth.png"];
-        assert_eq!(project.read_artifact(artifact).expect("read"), b"a");
+        let image = image(b"a");
+        for _ in 0..2 {
+            write(&project, &image);
+        }
+        let read = project.read_artifact(image.reference());
+        assert_eq!(read.expect("read"), b"a");
+        let folder = project.artifact_path(image.reference());
+        let folder = folder.parent().expect("a folder");
+        assert_eq!(std::fs::read_dir(folder).expect("a folder").count(), 1);
         let left = std::fs::read_dir(project.artifacts_dir().join("tmp")).expect("a folder");
         assert_eq!(left.count(), 0);
     }
 
     #[test]
-    fn a_changed_artifact_is_told_and_written_anew() {
+    fn a_changed_artifact_is_found_and_written_again() {
         let (_dir, project) = project();
-        let written = project.write_artifacts(&[picture(b"a")]).expect("written");
-        let artifact = &written["depth.png"];
+        let image = image(b"a");
+        write(&project, &image);
+        let artifact = image.reference();
         assert!(project.check_artifact(artifact, false).is_ok());
         std::fs::write(project.artifact_path(artifact), b"b").expect("a file");
         let outcome = project.read_artifact(artifact);
         assert!(matches!(outcome, Err(ArtifactError::Changed(_))));
         let outcome = project.check_artifact(artifact, false);
         assert!(matches!(outcome, Err(ArtifactError::Changed(_))));
-        // Of the same length: only its bytes tell.
+        // The length is the same, so only the bytes show it.
         assert!(project.check_artifact(artifact, true).is_ok());
-        project.write_artifacts(&[picture(b"a")]).expect("written");
+        write(&project, &image);
         assert_eq!(project.read_artifact(artifact).expect("read"), b"a");
     }
 
     #[test]
-    fn a_missing_artifact_is_told() {
+    fn a_missing_artifact_is_found() {
         let (_dir, project) = project();
-        let outcome = project.read_artifact(picture(b"a").reference());
+        let outcome = project.read_artifact(image(b"a").reference());
         assert!(matches!(outcome, Err(ArtifactError::Missing(_))));
-        let outcome = project.check_artifact(picture(b"a").reference(), true);
+        let outcome = project.check_artifact(image(b"a").reference(), true);
         assert!(matches!(outcome, Err(ArtifactError::Missing(_))));
     }
 }

@@ -1,16 +1,16 @@
-//! Files that appear whole or not at all: written beside their place, synced, renamed.
+//! Atomic and durable writes: a file is written beside its place, synced, and renamed.
 
 use std::fs::File;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// Writes a file so that an earlier one of its name stays until the new one is whole and on disk. What is no plain
-/// file, such as a pipe or a terminal, is written to as it is.
+/// Writes a file atomically: an earlier file of this name stays until the new one is complete and on the disk. Anything
+/// that is not a regular file, such as a pipe or a terminal, is written to directly.
 ///
 /// # Errors
-/// When it cannot be written; an earlier one is then as it was.
+/// When it cannot be written; an earlier file is unchanged then.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    // A link stays a link: what it leads to is replaced.
+    // A symbolic link stays; its target is replaced.
     let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
     if path.exists() && !path.is_file() {
         return std::fs::write(path, bytes);
@@ -20,50 +20,58 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
         .and_then(|mut file| file.write_all(bytes))
         .and_then(|()| rename_into_place(&partial, &path));
     if written.is_err() {
-        // That it cannot be removed changes nothing.
+        // A partial file that cannot be removed does no harm.
         let _ = std::fs::remove_file(&partial);
     }
     written
 }
 
-/// Writes a new file, its bytes on the disk when it returns.
+/// Writes a file whose bytes are on the disk when this returns; its name may not be.
 ///
 /// # Errors
-/// When the disk refuses; what was written stays.
+/// When it cannot be written; what was written stays.
 pub fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut file = File::create(path)?;
     file.write_all(bytes)?;
     file.sync_all()
 }
 
-/// Where a file is written before it gets its name: beside it, hidden.
+/// Returns the path at which a file is written before it gets its name: beside it, hidden.
 pub fn partial_path(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!(".{name}.mocban-partial"))
 }
 
-/// Puts a written file in its place for good: syncs it, renames it, syncs the folder.
+/// Gives a written file its name durably: syncs it, renames it, syncs the folder. Keeps the permissions of an earlier
+/// file of that name.
 ///
 /// # Errors
-/// When the disk refuses.
+/// When one of these fails.
 pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     File::open(partial)?.sync_all()?;
-    if let Ok(there) = std::fs::metadata(path) {
-        std::fs::set_permissions(partial, there.permissions())?;
+    if let Ok(earlier) = std::fs::metadata(path) {
+        std::fs::set_permissions(partial, earlier.permissions())?;
     }
     std::fs::rename(partial, path)?;
     sync_folder(&parent_folder(path))
 }
 
-/// The folder that holds the name of a file or folder.
+/// Returns the folder that holds the name of a file or folder.
 pub(super) fn parent_folder(path: &Path) -> PathBuf {
     let folder = path.parent().filter(|dir| !dir.as_os_str().is_empty());
     folder.unwrap_or(Path::new(".")).to_owned()
 }
 
 /// Makes the names in a folder durable.
+#[cfg(unix)]
 pub(super) fn sync_folder(folder: &Path) -> std::io::Result<()> {
     File::open(folder)?.sync_all()
+}
+
+/// Does nothing: only Unix opens a folder as a file. NTFS journals names.
+#[cfg(not(unix))]
+pub(super) const fn sync_folder(_folder: &Path) -> std::io::Result<()> {
+    Ok(())
 }
 
 #[cfg(test)]
@@ -71,11 +79,11 @@ mod tests {
     use super::{partial_path, write_atomic};
 
     #[test]
-    fn the_earlier_file_stays_until_the_new_one_is_whole() {
+    fn the_earlier_file_stays_until_the_new_one_is_complete() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("report.txt");
         write_atomic(&path, b"one").expect("written");
-        // Nothing can be written where a folder stands in the way.
+        // A folder at the temporary path makes the write fail.
         std::fs::create_dir(partial_path(&path)).expect("a folder");
         assert!(write_atomic(&path, b"two").is_err());
         assert_eq!(std::fs::read(&path).expect("read"), b"one");
@@ -87,7 +95,7 @@ mod tests {
 
     #[cfg(unix)]
     #[test]
-    fn a_link_stays_a_link_and_a_device_is_written_to() {
+    fn a_link_stays_a_link_and_a_device_is_written_to_directly() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let (path, link) = (dir.path().join("a.txt"), dir.path().join("link.txt"));
         std::fs::write(&path, "one").expect("written");

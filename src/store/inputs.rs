@@ -1,4 +1,4 @@
-//! Input files: read within a limit, at once or bit by bit, hashed, and told apart from what they were.
+//! Input files: reading within a size limit, hashing, and recognizing changes.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Take};
@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use crate::domain::{ContentHash, FailureClass};
 use crate::page_vec::PageVec;
 
-/// Size, modification time and number of a file: when all are as they were, the content is taken to be too.
+/// Size, modification time and inode of a file. While all three are the same, so is the content, by assumption.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FileStat(String);
 
 impl FileStat {
-    /// As the catalog keeps it.
+    /// Returns the form that the catalog stores.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -37,43 +37,43 @@ const fn inode(_meta: &std::fs::Metadata) -> u64 {
     0
 }
 
-/// An input file as read.
+/// An input file and its content.
 #[derive(Debug)]
 pub struct InputFile {
-    /// All its bytes.
+    /// The content.
     pub bytes: PageVec<u8>,
-    /// What was seen of it.
-    pub seen: InputDigest,
+    /// Its hash and stat.
+    pub digest: InputDigest,
 }
 
-/// What was seen of an input file that was read to its end.
+/// What identifies the content of an input file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputDigest {
-    /// Hash of its bytes.
+    /// Hash of the content.
     pub hash: ContentHash,
-    /// What it looked like when it was opened.
+    /// Stat at the time when it was opened.
     pub stat: FileStat,
 }
 
-/// An input file that is being read; its bytes are hashed while they are at hand.
+/// An input file that is being read. Its bytes are hashed as they are read, while they are in the CPU cache.
 #[derive(Debug)]
 pub struct InputReader {
     path: PathBuf,
     file: Take<File>,
-    /// How many bytes it had when it was opened.
+    /// Length in bytes at the time when it was opened.
     len: u64,
-    /// How many it may have, and the name of the setting that says so.
+    /// Most bytes that it may have, and the name of the setting for that.
     limit: (u64, &'static str),
     hasher: blake3::Hasher,
     stat: FileStat,
 }
 
-/// Bytes that are read and hashed at a time at most: they stay in the cache meanwhile.
-const AT_HAND: usize = 1 << 17;
+/// Most bytes that are read and hashed at a time, so that they stay in the CPU cache.
+const CHUNK: usize = 1 << 17;
 
 impl Read for InputReader {
     fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        let most = into.len().min(AT_HAND);
+        let most = into.len().min(CHUNK);
         let count = self.file.read(&mut into[..most])?;
         self.hasher.update(&into[..count]);
         Ok(count)
@@ -81,23 +81,23 @@ impl Read for InputReader {
 }
 
 impl InputReader {
-    /// How many bytes it had when it was opened.
+    /// Returns its length in bytes at the time when it was opened.
     pub const fn size(&self) -> u64 {
         self.len
     }
 
-    /// The error that reading it gave.
+    /// Adds the path to an error from reading it.
     pub fn error(&self, source: io::Error) -> InputError {
         InputError::io(&self.path, source)
     }
 
-    /// Reads what is left, and says what was seen.
+    /// Reads the rest of the file, and returns its hash and stat.
     ///
     /// # Errors
-    /// When it cannot be read, is larger than the limit by now, or has changed since it was opened.
+    /// When it cannot be read, exceeds the limit by now, or has changed since it was opened.
     pub fn finish(mut self) -> Result<InputDigest, InputError> {
         io::copy(&mut self, &mut io::sink()).map_err(|error| self.error(error))?;
-        // A file that grows while it is read must not get past the limit either.
+        // The limit also holds for a file that grows while it is read.
         let (limit, setting) = self.limit;
         if self.file.limit() == 0 {
             return Err(InputError::TooLarge {
@@ -107,7 +107,7 @@ impl InputReader {
                 setting,
             });
         }
-        // Else the hash might be of bytes that were not there yet when the others were taken for the whole.
+        // A parser that read to what was the end then may have missed bytes that the hash includes.
         let meta = self.file.get_ref().metadata();
         let now = FileStat::of(&meta.map_err(|error| self.error(error))?);
         if now != self.stat {
@@ -126,7 +126,7 @@ pub enum InputError {
     /// There is no such file.
     #[error("{0} is not there")]
     NotThere(PathBuf),
-    /// It is a directory or another thing that is no file.
+    /// The path is a directory or anything else that is not a regular file.
     #[error("{path} is {kind}, not a file")]
     NotAFile {
         /// Which path.
@@ -134,25 +134,25 @@ pub enum InputError {
         /// What it is.
         kind: &'static str,
     },
-    /// We may not read it.
+    /// The process may not read it.
     #[error("{0} may not be read: permission denied")]
     Denied(PathBuf),
-    /// It is larger than the settings allow.
+    /// The file is larger than the settings allow.
     #[error("{path} has {bytes} bytes, over the limit of {limit} ({setting})")]
     TooLarge {
         /// Which file.
         path: PathBuf,
-        /// Its size.
+        /// Its size in bytes.
         bytes: u64,
-        /// The limit.
+        /// The limit in bytes.
         limit: u64,
         /// Name of the setting.
         setting: &'static str,
     },
-    /// It is being written.
+    /// The file is being written.
     #[error("{0} changed while it was read")]
     Changed(PathBuf),
-    /// Reading failed half-way; it may go well another time.
+    /// Reading failed; it may succeed another time.
     #[error("{path}: {source}")]
     Io {
         /// Which file.
@@ -178,7 +178,7 @@ impl InputError {
         }
     }
 
-    /// What the failure means for the pair.
+    /// Returns the class of the failure.
     pub const fn class(&self) -> FailureClass {
         match self {
             Self::NotThere(_)
@@ -190,26 +190,26 @@ impl InputError {
         }
     }
 
-    /// Whether trying again by itself may help. A file that is not there is told at once instead: whoever brings
-    /// it says `retry`.
+    /// Returns whether an automatic retry may succeed. A missing file is reported at once instead; `retry` runs the pair
+    /// when the file exists.
     pub const fn is_transient(&self) -> bool {
         matches!(self, Self::Changed(_) | Self::Io { .. })
     }
 }
 
-/// What a file looks like now.
+/// Returns the stat of a file.
 ///
 /// # Errors
-/// When it is not there, no file, or not to be read.
+/// When it does not exist, is not a regular file, or cannot be read.
 pub fn stat_input(path: &Path) -> Result<FileStat, InputError> {
     let meta = std::fs::metadata(path).map_err(|error| InputError::io(path, error))?;
     Ok(FileStat::of(&check_file(path, meta)?))
 }
 
-/// Opens a file that must not be larger than `limit` bytes; `setting` names that limit to the user.
+/// Opens a file of at most `limit` bytes; `setting` is the name of that limit in error messages.
 ///
 /// # Errors
-/// When it is not there, no file, not to be read, or too large.
+/// When it does not exist, is not a regular file, cannot be read, or is too large.
 pub fn open_input(
     path: &Path,
     limit: u64,
@@ -234,36 +234,38 @@ pub fn open_input(
     })
 }
 
-/// Reads a file that must not be larger than `limit` bytes; `setting` names that limit to the user.
+/// Reads a file of at most `limit` bytes; `setting` is the name of that limit in error messages.
 ///
 /// # Errors
-/// When it is not there, no file, not to be read, or too large.
+/// When it does not exist, is not a regular file, cannot be read, or is too large.
 pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<InputFile, InputError> {
     let mut file = open_input(path, limit, setting)?;
     let about = file.size() as usize;
     let bytes = PageVec::read(&mut file, about).map_err(|error| file.error(error))?;
     Ok(InputFile {
         bytes,
-        seen: file.finish()?,
+        digest: file.finish()?,
     })
 }
 
-/// Hash of a file's content and what the file looked like, without holding it in memory.
+/// Hashes a file without reading it into memory.
 ///
 /// # Errors
-/// When it is not there, no file, or not to be read.
-pub fn hash_input(path: &Path) -> Result<(ContentHash, FileStat), InputError> {
+/// When it does not exist, is not a regular file, or cannot be read.
+pub fn hash_input(path: &Path) -> Result<InputDigest, InputError> {
     let (file, meta) = open(path)?;
     let mut hasher = blake3::Hasher::new();
     hasher
         .update_reader(file)
         .map_err(|error| InputError::io(path, error))?;
-    let hash = ContentHash::from_bytes(*hasher.finalize().as_bytes());
-    Ok((hash, FileStat::of(&meta)))
+    Ok(InputDigest {
+        hash: ContentHash::from_bytes(*hasher.finalize().as_bytes()),
+        stat: FileStat::of(&meta),
+    })
 }
 
 fn open(path: &Path) -> Result<(File, std::fs::Metadata), InputError> {
-    // Looked at before it is opened: opening a pipe would wait for its writer.
+    // Check the type before opening: opening a pipe would wait for its writer.
     let meta = std::fs::metadata(path).map_err(|error| InputError::io(path, error))?;
     check_file(path, meta)?;
     let file = File::open(path).map_err(|error| InputError::io(path, error))?;
@@ -311,7 +313,7 @@ mod tests {
     }
 
     #[test]
-    fn missing_file_and_directory_are_io_and_do_not_pass_by_themselves() {
+    fn a_missing_file_and_a_directory_are_permanent_io_errors() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let missing = read_input(&dir.path().join("none"), 10, "x").expect_err("not there");
         assert!(matches!(missing, InputError::NotThere(_)));
@@ -328,14 +330,14 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_changes_while_it_is_read_is_told_and_may_be_tried_again() {
+    fn a_file_that_changes_while_it_is_read_is_a_transient_error() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("1.obj");
         std::fs::write(&path, "v 0 0 0\n").expect("a file");
         let mut reader = open_input(&path, 100, "x").expect("a file");
         let mut bytes = Vec::new();
         reader.read_to_end(&mut bytes).expect("it is read");
-        // All was read, as far as the reader knows.
+        // The file grows after its end was reached.
         let mut file = std::fs::OpenOptions::new().append(true).open(&path);
         let more = file.as_mut().map(|file| file.write_all(b"v 1 0 0\n"));
         more.expect("opened").expect("written");
@@ -347,8 +349,8 @@ mod tests {
         );
         assert!(error.is_transient());
         let again = open_input(&path, 100, "x").expect("a file");
-        let seen = again.finish().expect("it stays as it is");
-        assert_eq!(seen.hash, ContentHash::of(b"v 0 0 0\nv 1 0 0\n"));
+        let digest = again.finish().expect("it stays the same");
+        assert_eq!(digest.hash, ContentHash::of(b"v 0 0 0\nv 1 0 0\n"));
     }
 
     #[test]
@@ -357,9 +359,9 @@ mod tests {
         let path = dir.path().join("1.png");
         std::fs::write(&path, b"print").expect("a file");
         let read = read_input(&path, 10, "x").expect("a file");
-        let (hash, stat) = hash_input(&path).expect("a file");
-        assert_eq!((read.seen.hash, &read.seen.stat), (hash, &stat));
-        assert_eq!(hash, ContentHash::of(b"print"));
-        assert_eq!(stat_input(&path).expect("a file"), stat);
+        let hashed = hash_input(&path).expect("a file");
+        assert_eq!(read.digest, hashed);
+        assert_eq!(hashed.hash, ContentHash::of(b"print"));
+        assert_eq!(stat_input(&path).expect("a file"), hashed.stat);
     }
 }

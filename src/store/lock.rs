@@ -1,7 +1,7 @@
-//! Who runs a project: locks of the operating system, which end with the process that holds them.
+//! Which processes work on a project: locks of the operating system, which end with the process that holds them.
 //!
-//! `run.lock` is held by the one process that owns the run and tells its number. `run.members` is held in common by
-//! every process that works, joined ones too: whoever gets it alone knows that no other worker lives.
+//! The process that owns the run holds `run.lock` and writes its pid into it. Every process that works holds a shared
+//! lock on `run.members`: whoever gets an exclusive lock on it knows that no other worker is alive.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
@@ -10,34 +10,38 @@ use std::time::Duration;
 
 use super::Project;
 
-/// Name of the file that all who work hold in common.
+/// Name of the file on which every working process holds a shared lock.
 const MEMBERS: &str = "run.members";
 
-/// How often the lock of the members is asked for before it is believed that others have it: somebody who looks
-/// whether anybody works has it for a moment.
-const ASKED: u32 = 20;
-const BETWEEN: Duration = Duration::from_millis(5);
+/// Attempts to get the exclusive lock, because [`RunLock::is_held`] in another process holds it for a moment.
+const ATTEMPTS: u32 = 20;
+const RETRY_AFTER: Duration = Duration::from_millis(5);
 
-/// The right to work on a project; ends when it is dropped or the process dies.
+/// The right to work on a project. Ends when this is dropped or the process dies.
 #[derive(Debug)]
 pub struct RunLock {
+    /// The locked `run.lock`, in the process that owns the run.
+    #[cfg_attr(
+        not(test),
+        expect(dead_code, reason = "the lock is held until this is dropped")
+    )]
     owner: Option<File>,
     members: File,
-    /// Where the members' file lies.
+    /// Path of `members`.
     path: PathBuf,
-    alone: bool,
+    is_exclusive: bool,
 }
 
-/// Why the lock was not to be had.
+/// Why the lock could not be acquired.
 #[derive(Debug, thiserror::Error)]
 pub enum LockError {
     /// Another process runs the project.
     #[error("the project is in use{}", .pid.map_or_else(String::new, |pid| format!(" by pid {pid}")))]
     InUse {
-        /// Which, where the lock file tells.
+        /// Its pid, if the lock file holds it.
         pid: Option<u32>,
     },
-    /// The lock file cannot be used.
+    /// A lock file cannot be used.
     #[error("{path}: {source}")]
     Io {
         /// Which file.
@@ -48,16 +52,16 @@ pub enum LockError {
 }
 
 impl RunLock {
-    /// Takes the run of a project; with `join` also beside the process that has it.
+    /// Acquires the run of a project; with `join`, beside the process that owns it.
     ///
     /// # Errors
-    /// When another process has it and `join` is not set, or the files cannot be locked.
+    /// When another process owns it and `join` is not set, or the files cannot be locked.
     pub fn acquire(project: &Project, join: bool) -> Result<Self, LockError> {
         let path = project.dir().join("run.lock");
         let mut file = open(&path)?;
         let owner = match file.try_lock() {
             Ok(()) => {
-                write_over(&mut file, &std::process::id().to_string()).map_err(io(&path))?;
+                replace_text(&mut file, &std::process::id().to_string()).map_err(io(&path))?;
                 Some(file)
             }
             Err(TryLockError::WouldBlock) if join => None,
@@ -69,46 +73,41 @@ impl RunLock {
         };
         let path = project.dir().join(MEMBERS);
         let members = open(&path)?;
-        let alone = owner.is_some() && nobody_else(&members);
-        if !alone {
+        let is_exclusive = owner.is_some() && try_exclusive(&members);
+        if !is_exclusive {
             members.lock_shared().map_err(io(&path))?;
         }
         Ok(Self {
             owner,
             members,
             path,
-            alone,
+            is_exclusive,
         })
     }
 
-    /// Whether a process works on the project now. Looks without keeping anybody out.
+    /// Returns whether a process works on the project now. Keeps no process out.
     pub fn is_held(project: &Project) -> bool {
-        // A lock needs no right to write.
+        // A lock needs no permission to write.
         match File::open(project.dir().join(MEMBERS)) {
             Ok(members) => matches!(members.try_lock(), Err(TryLockError::WouldBlock)),
             Err(_) => false,
         }
     }
 
-    /// Whether no other process works on the project, until [`RunLock::admit`].
-    pub const fn is_alone(&self) -> bool {
-        self.alone
+    /// Returns whether no other process works on the project. Ends with [`RunLock::downgrade`].
+    pub const fn is_exclusive(&self) -> bool {
+        self.is_exclusive
     }
 
-    /// Whether this process owns the run and has not joined another's.
-    pub const fn is_owner(&self) -> bool {
-        self.owner.is_some()
-    }
-
-    /// Writes what those who join must agree to. Only while alone.
+    /// Writes the terms that processes which join must agree to. Only while the lock is exclusive.
     ///
     /// # Errors
     /// When the file cannot be written.
     pub fn set_terms(&mut self, terms: &str) -> Result<(), LockError> {
-        write_over(&mut self.members, terms).map_err(io(&self.path))
+        replace_text(&mut self.members, terms).map_err(io(&self.path))
     }
 
-    /// What those who work already have agreed to; empty where nothing was written.
+    /// Returns the terms that the working processes have agreed to; empty if none were written.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -121,27 +120,27 @@ impl RunLock {
         Ok(text)
     }
 
-    /// Lets others join from here on.
+    /// Lets other processes join from now on.
     ///
     /// # Errors
-    /// When the file cannot be locked in common.
-    pub fn admit(&mut self) -> Result<(), LockError> {
-        if self.alone {
+    /// When the file cannot be locked.
+    pub fn downgrade(&mut self) -> Result<(), LockError> {
+        if self.is_exclusive {
             self.members.unlock().map_err(io(&self.path))?;
             self.members.lock_shared().map_err(io(&self.path))?;
-            self.alone = false;
+            self.is_exclusive = false;
         }
         Ok(())
     }
 }
 
-/// Takes the members' lock for this process alone, if nobody else has it for longer than a look.
-fn nobody_else(members: &File) -> bool {
-    for _ in 0..ASKED {
+/// Locks the file exclusively, unless another process keeps its lock for longer than [`RunLock::is_held`] does.
+fn try_exclusive(members: &File) -> bool {
+    for _ in 0..ATTEMPTS {
         if members.try_lock().is_ok() {
             return true;
         }
-        std::thread::sleep(BETWEEN);
+        std::thread::sleep(RETRY_AFTER);
     }
     false
 }
@@ -161,13 +160,13 @@ fn open(path: &Path) -> Result<File, LockError> {
         .map_err(io(path))
 }
 
-fn write_over(file: &mut File, text: &str) -> std::io::Result<()> {
+fn replace_text(file: &mut File, text: &str) -> std::io::Result<()> {
     file.set_len(0)?;
     file.seek(SeekFrom::Start(0))?;
     file.write_all(text.as_bytes())
 }
 
-/// The number in the file; `None` while its owner has not written it yet.
+/// Returns the pid in the file; `None` while its owner has not written it yet.
 fn read_pid(file: &mut File) -> Option<u32> {
     let mut text = String::new();
     file.read_to_string(&mut text).ok()?;
@@ -180,58 +179,58 @@ mod tests {
     use crate::store::Project;
 
     #[test]
-    fn the_second_run_is_told_who_has_it_and_may_join() {
+    fn a_second_run_is_refused_with_the_owners_pid_and_may_join() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = Project::create(dir.path()).expect("a project");
         let mut owner = RunLock::acquire(&project, false).expect("the lock");
-        assert!(owner.is_owner() && owner.is_alone());
+        assert!(owner.owner.is_some() && owner.is_exclusive());
         let refused = RunLock::acquire(&project, false).expect_err("in use");
         let me = std::process::id();
         assert!(matches!(refused, LockError::InUse { pid: Some(pid) } if pid == me));
-        owner.admit().expect("the lock in common");
+        owner.downgrade().expect("a shared lock");
         let joined = RunLock::acquire(&project, true).expect("joined");
-        assert!(!joined.is_owner() && !joined.is_alone());
+        assert!(joined.owner.is_none() && !joined.is_exclusive());
     }
 
     #[test]
-    fn an_owner_beside_a_joined_process_is_not_alone() {
+    fn an_owner_beside_a_joined_process_has_no_exclusive_lock() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = Project::create(dir.path()).expect("a project");
         let mut first = RunLock::acquire(&project, false).expect("the lock");
-        first.admit().expect("the lock in common");
+        first.downgrade().expect("a shared lock");
         let joined = RunLock::acquire(&project, true).expect("joined");
         drop(first);
         let second = RunLock::acquire(&project, false).expect("the lock");
-        assert!(second.is_owner() && !second.is_alone());
+        assert!(second.owner.is_some() && !second.is_exclusive());
         drop((second, joined));
         assert!(
             RunLock::acquire(&project, true)
                 .expect("the lock")
-                .is_alone()
+                .is_exclusive()
         );
     }
 
     #[test]
-    fn who_looks_sees_whether_anybody_works_and_disturbs_nobody() {
+    fn it_is_seen_whether_a_process_works_without_keeping_any_out() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = Project::create(dir.path()).expect("a project");
         assert!(!RunLock::is_held(&project));
         let mut owner = RunLock::acquire(&project, false).expect("the lock");
         assert!(RunLock::is_held(&project));
-        owner.admit().expect("the lock in common");
+        owner.downgrade().expect("a shared lock");
         assert!(RunLock::is_held(&project));
         drop(owner);
         assert!(!RunLock::is_held(&project));
     }
 
     #[test]
-    fn who_joins_reads_the_terms_of_the_first() {
+    fn a_process_that_joins_reads_the_terms_of_the_first() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = Project::create(dir.path()).expect("a project");
         let mut owner = RunLock::acquire(&project, false).expect("the lock");
         owner.set_terms("longer than the next").expect("written");
         owner.set_terms("in mm").expect("written");
-        owner.admit().expect("the lock in common");
+        owner.downgrade().expect("a shared lock");
         let mut joined = RunLock::acquire(&project, true).expect("joined");
         assert_eq!(joined.terms().expect("read"), "in mm");
     }

@@ -1,4 +1,4 @@
-//! The project directory: where its catalog, settings, artifacts and inputs lie.
+//! The project directory: the paths of its catalog, settings, artifacts and inputs.
 
 use std::path::{Path, PathBuf};
 
@@ -17,14 +17,14 @@ pub struct Project {
     dir: PathBuf,
 }
 
-/// What can go wrong with a project's directory.
+/// Why a project's directory cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum StoreError {
     /// The directory holds no catalog.
     #[error("no project at {0}: it has no {CATALOG_FILE}")]
     NoProject(PathBuf),
-    /// A path that the catalog cannot hold.
-    #[error("path {0:?} is not UTF-8, so the catalog cannot hold it; rename the file or folder")]
+    /// A path that the catalog cannot store.
+    #[error("path {0:?} is not UTF-8, so the catalog cannot store it; rename the file or folder")]
     NotUtf8(PathBuf),
     /// A file operation failed.
     #[error("{path}: {source}")]
@@ -44,12 +44,12 @@ impl StoreError {
 }
 
 impl Project {
-    /// A project that is there.
+    /// Opens an existing project.
     ///
     /// # Errors
     /// When the directory holds no catalog.
     pub fn open(dir: &Path) -> Result<Self, StoreError> {
-        // What else may lie there in its place is told when the catalog is opened.
+        // Whether it is a catalog is checked when it is opened.
         if !dir.join(CATALOG_FILE).exists() {
             return Err(StoreError::NoProject(dir.to_owned()));
         }
@@ -58,22 +58,22 @@ impl Project {
         })
     }
 
-    /// A project that may not be there yet: nothing is looked at or made.
+    /// Returns a project that may not exist yet; touches no file.
     pub fn at(dir: &Path) -> Self {
         Self {
             dir: dir.to_owned(),
         }
     }
 
-    /// Makes the directory where it is missing, for good. The catalog is made by `Catalog::create`.
+    /// Creates the directory durably where it is missing. `Catalog::create` creates the catalog.
     ///
     /// # Errors
-    /// When it cannot be made.
+    /// When it cannot be created.
     pub fn create(dir: &Path) -> Result<Self, StoreError> {
         let missing: Vec<_> = dir.ancestors().take_while(|dir| !dir.exists()).collect();
         std::fs::create_dir_all(dir).map_err(StoreError::io(dir))?;
-        for made in missing {
-            let folder = parent_folder(made);
+        for created in missing {
+            let folder = parent_folder(created);
             sync_folder(&folder).map_err(StoreError::io(&folder))?;
         }
         Ok(Self {
@@ -81,36 +81,36 @@ impl Project {
         })
     }
 
-    /// The directory.
+    /// Returns the directory.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
 
-    /// Path of the catalog.
+    /// Returns the path of the catalog.
     pub fn catalog_path(&self) -> PathBuf {
         self.dir.join(CATALOG_FILE)
     }
 
-    /// Path of the settings file, which may not be there.
+    /// Returns the path of the settings file, which need not exist.
     pub fn settings_path(&self) -> PathBuf {
         self.dir.join(SETTINGS_FILE)
     }
 
-    /// Folder of the artifacts.
+    /// Returns the folder of the artifacts.
     pub fn artifacts_dir(&self) -> PathBuf {
         self.dir.join(ARTIFACTS)
     }
 
-    /// Where an input lies: stored paths are relative to the project, or absolute.
+    /// Returns the path of an input from its stored path, which is relative to the project or absolute.
     pub fn input_path(&self, stored: &str) -> PathBuf {
         self.dir.join(stored)
     }
 
-    /// How a path is stored: relative to the project when it lies below it, so that a project that is moved with
-    /// its data keeps working; otherwise absolute. The file need not be there.
+    /// Returns the form in which a path is stored: relative to the project if it is below it, so that a project can be
+    /// moved with its data; otherwise absolute. The file need not exist.
     ///
     /// # Errors
-    /// When the working directory cannot be told, or the path is not UTF-8.
+    /// When the working directory is unknown, or the path is not UTF-8.
     pub fn stored_path(&self, path: &Path) -> Result<String, StoreError> {
         let absolute = std::path::absolute(path).map_err(StoreError::io(path))?;
         let dir = std::path::absolute(&self.dir).map_err(StoreError::io(&self.dir))?;
@@ -125,7 +125,7 @@ impl Project {
     }
 }
 
-/// The same with links resolved; `None` when the path is not there or not below.
+/// Returns the relative path after links are resolved; `None` when the path does not exist or is not below `dir`.
 fn below_resolved(path: &Path, dir: &Path) -> Option<PathBuf> {
     let path = path.canonicalize().ok()?;
     let dir = dir.canonicalize().ok()?;

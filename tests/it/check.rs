@@ -315,7 +315,7 @@ fn a_run_that_goes_on_is_checked_but_not_mended() {
     let before = std::fs::read(project.catalog_path()).expect("read");
 
     let mut lock = RunLock::acquire(&project, false).expect("the lock");
-    lock.admit().expect("the lock in common");
+    lock.downgrade().expect("the lock in common");
     let found = at(&project, &["check", "--json"]).expect(12);
     assert_eq!(found.json()["spare"], Value::Null);
     let refused = at(&project, &["check", "--repair"]).expect(11);

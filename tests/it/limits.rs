@@ -127,8 +127,8 @@ fn a_stage_that_panics_fails_its_pair_and_shows_the_way_to_it_only_where_that_is
     let failed = pairs(&project)[0].results.failure.clone();
     let failure = failed.expect("a failure").failure;
     assert_eq!(failure.class, FailureClass::Bug);
-    let told = "the stage panicked (asked for by a test): a defect of this program, please report it with what \
-        `run --rerun failed -v` tells";
+    let told = "the stage panicked (asked for by a test): this is a bug, please report it with the output of \
+        `run --rerun failed -v`";
     assert_eq!(failure.message, told);
     for words in ["thread '", "RUST_BACKTRACE", "failpoint.rs"] {
         assert!(!plain.err.contains(words), "{}", plain.err);
@@ -148,7 +148,7 @@ fn pairs_larger_than_the_memory_run_one_by_one_to_the_same_end() {
             .and_then(|rest| rest.split_once(" MiB, "))
             .unwrap_or_else(|| panic!("{}", small.err));
         assert!(mib.parse::<u64>().is_ok_and(|mib| mib >= 32), "{mib}");
-        let way = "more than the 1 MiB of --memory: it runs with nothing beside it\n";
+        let way = "more than the 1 MiB of --memory: it runs with no other pair beside it\n";
         assert!(rest.starts_with(way), "{rest}");
     }
     assert_eq!(small.err.matches("of --memory").count(), 2);

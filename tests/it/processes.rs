@@ -65,7 +65,7 @@ impl World {
     fn stopped(count: &str) -> (Self, Running) {
         loop {
             let world = Self::new(count);
-            let stopped = world.stopped_at("fit:filed", &[TIME_SCALE]);
+            let stopped = world.stopped_at("fit:synced", &[TIME_SCALE]);
             if lock_owner(&world.project.catalog_path()).is_none() {
                 return (world, stopped);
             }
@@ -203,8 +203,8 @@ fn who_joins_with_other_settings_is_refused_and_told_which() {
     let mut other = joined(&world.project);
     other.args(["--set", "register.smoothing_px=1.5"]);
     let refused = call(&mut other).expect(2);
-    let told = "the run that goes on has other settings (register.smoothing_px: 1.22 -> 1.5); \
-        give the same ones, or wait until it is over";
+    let told = "the run in progress has other settings (register.smoothing_px: 1.22 -> 1.5); \
+        use the same settings, or wait until it has ended";
     assert!(refused.err.contains(told), "{}", refused.err);
     std::fs::remove_file(file).expect("removed");
     assert_eq!(owner.end().0, Some(0));
@@ -233,7 +233,7 @@ fn who_is_stopped_inside_a_commit_is_named_to_those_who_wait() {
     let world = World::new("2");
     let mut stopped = world.stopped_at("fit:claiming", &[]);
     let pid = stopped.pid();
-    let found = lock_owner(&world.project.catalog_path()).expect("a holder");
+    let found = lock_owner(&world.project.catalog_path()).expect("a lock_owner");
     assert_eq!((found.pid, found.is_stopped), (pid, true));
     let mut command = joined(&world.project);
     command.stderr(File::create(world.said()).expect("a file"));
@@ -260,7 +260,7 @@ fn a_process_held_up_past_its_leases_drops_what_it_had_and_goes_on() {
     let (code, json, said) = stopped.end();
     assert_eq!(code, Some(0), "{said}");
     assert!(
-        said.contains("held up past the end of its leases"),
+        said.contains("suspended past the end of its leases"),
         "{said}"
     );
     assert_eq!(json["stages"], 8);
@@ -295,7 +295,7 @@ fn pairs_of_a_dead_process_come_back_at_once_to_one_that_is_alone() {
         (&false.into(), &1.into())
     );
     let shown = mocban(dir, &["status"]).expect(0);
-    assert!(shown.out.contains("1 interrupted"), "{}", shown.out);
+    assert!(shown.out.contains("1 cut off"), "{}", shown.out);
     assert!(!shown.out.contains("running"), "{}", shown.out);
     let begun = Instant::now();
     call(&mut run(&world.project, &[])).expect(0);

@@ -22,15 +22,15 @@ const POINTS: [(&str, Option<&str>); 14] = [
     ("fit:computed", None),
     ("depth:written:2", None),
     ("register:written", None),
-    ("fit:filed:2", None),
-    ("depth:rowed", None),
-    ("depth:stored", None),
+    ("fit:synced:2", None),
+    ("depth:recorded", None),
+    ("depth:committed", None),
     ("normalize:claiming", Some("depth")),
     ("normalize:computed", None),
-    ("normalize:stored", None),
+    ("normalize:committed", None),
     ("register:claimed", Some("normalize")),
-    ("register:rowed", None),
-    ("register:stored", None),
+    ("register:recorded", None),
+    ("register:committed", None),
 ];
 
 /// Makes a demo project of some pairs that have not run.

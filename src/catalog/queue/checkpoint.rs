@@ -90,7 +90,7 @@ pub(crate) fn step<'i>(script: &mut Script, done: impl Iterator<Item = &'i Steps
 pub(crate) fn store(script: &mut Script, made: &[&Steps], deltas: &mut Deltas) -> Result<()> {
     for (lease, done) in made.iter().map(|steps| &**steps) {
         for one in done {
-            failpoint::hit(one.stage, Point::Rowed, None);
+            failpoint::hit(one.stage, Point::Recorded, None);
         }
         if let Some(last) = done.last() {
             deltas.moved((cursor(lease.cursor), JobStatus::Leased), after(last.stage));

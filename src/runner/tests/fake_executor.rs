@@ -10,7 +10,8 @@ use crate::catalog::InputVersion;
 use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric};
 use crate::report::test_fixtures;
 use crate::runner::pair_context::PairContext;
-use crate::runner::steps::{ExecutionError, StageExecutor, StageOutput};
+use crate::runner::stage_executor::StageExecutor;
+use crate::runner::stage_output::{ExecutionError, StageOutput};
 use crate::store::NewArtifact;
 
 /// What a made-up pair does, told by its name.
@@ -113,9 +114,9 @@ impl StageExecutor for FakeExecutor {
         let last = stage == Stage::Register;
         Ok(StageOutput {
             outcome: if last {
-                json!(register).to_string()
+                json!(register)
             } else {
-                json!({ "stage": stage, "pair": name }).to_string()
+                json!({ "stage": stage, "pair": name })
             },
             files: vec![NewArtifact::new(
                 "note.txt",

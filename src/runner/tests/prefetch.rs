@@ -8,7 +8,7 @@ use tokio::time::timeout;
 use super::{RunFixture, name, options};
 use crate::catalog::{Catalog, DeadWorker};
 use crate::domain::{JobStatus, PairName, Stage, WorkerId};
-use crate::runner::clock::Clock;
+use crate::runner::policy::Clock;
 use crate::runner::{RunEvent, RunOptions, StopLevel};
 
 impl RunFixture {
@@ -19,7 +19,7 @@ impl RunFixture {
 
     /// Until a stage of a pair has begun.
     async fn begun(&self, pair: &str, stage: Stage) {
-        while self.steps.count(pair, stage) == 0 {
+        while self.executor.count(pair, stage) == 0 {
             tokio::task::yield_now().await;
         }
     }
@@ -45,7 +45,7 @@ async fn stages_are_computed_while_those_before_are_stored_and_only_what_is_stor
     let hold = async {
         world.begun("wait_1", Stage::Fit).await;
         let release = world.catalog.hold().await;
-        world.steps.open();
+        world.executor.open();
         world.begun("wait_1", Stage::Register).await;
         assert_eq!(world.position(|event| finished(event, Stage::Fit)), None);
         release.send(()).expect("the writer waits");
@@ -75,7 +75,7 @@ async fn what_is_finished_is_stored_while_a_long_stage_is_computed() {
         };
         let stored = timeout(Duration::from_mins(1), stored).await;
         let detail = world.catalog.pair(&name("lasts_1")).await;
-        world.steps.open();
+        world.executor.open();
         assert!(stored.is_ok(), "it waits for the end");
         assert_eq!(detail.expect("a read").expect("the pair").attempts.len(), 3);
     };
@@ -93,7 +93,7 @@ async fn who_needs_the_lease_back_has_what_is_on_its_way_stored_at_once() {
     let options = options(1);
     let ended = timeout(SOON, world.run(&options)).await;
     assert_eq!(ended.expect("it does not wait").done, 1);
-    assert_eq!(world.steps.count("breaks_1", Stage::Depth), 2);
+    assert_eq!(world.executor.count("breaks_1", Stage::Depth), 2);
 }
 
 #[tokio::test]
@@ -102,14 +102,14 @@ async fn nothing_is_stored_of_a_stage_that_was_computed_while_the_lease_was_lost
     let rob = async {
         world.begun("wait_1", Stage::Fit).await;
         let nobody = DeadWorker::AllExcept(WorkerId(99));
-        let recovered = world.catalog.recover(nobody, 1).await.expect("a recovery");
-        assert_eq!(recovered.ready, 1);
-        world.steps.open();
+        let rescued = world.catalog.recover(nobody, 1).await.expect("a recover");
+        assert_eq!(rescued.ready, 1);
+        world.executor.open();
     };
     let options = options(1);
     let (summary, ()) = tokio::join!(world.run(&options), rob);
     assert_eq!((summary.done, summary.stages), (1, 4));
-    assert_eq!(world.steps.count("wait_1", Stage::Fit), 2);
+    assert_eq!(world.executor.count("wait_1", Stage::Fit), 2);
     let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
     let attempts = detail.expect("the pair").attempts;
     let stored = attempts.iter().filter(|attempt| attempt.failure.is_none());
@@ -128,12 +128,12 @@ async fn the_next_pair_is_taken_ahead_and_given_back_by_a_drain() {
         while world.status("next").await != JobStatus::Ready {
             tokio::task::yield_now().await;
         }
-        world.steps.open();
+        world.executor.open();
     };
     let options = options(1);
     let (summary, ()) = tokio::join!(world.run(&options), drain);
     assert_eq!((summary.done, summary.left), (1, 2));
-    assert_eq!(world.steps.count("next", Stage::Fit), 0);
+    assert_eq!(world.executor.count("next", Stage::Fit), 0);
     let attempt = async |pair: PairName| {
         world
             .catalog
@@ -172,7 +172,7 @@ async fn no_more_are_taken_ahead_than_slots_will_be_free() {
             tokio::task::yield_now().await;
         }
         assert_eq!(world.status("other").await, JobStatus::Ready);
-        world.steps.open();
+        world.executor.open();
     };
     let options = options(2);
     let (summary, ()) = tokio::join!(world.run(&options), look);
@@ -184,7 +184,7 @@ async fn no_more_are_taken_ahead_than_slots_will_be_free() {
 async fn a_pair_taken_ahead_is_not_overdue_before_it_could_have_begun() {
     let world = RunFixture::new(&["lasts_1", "next"]).await;
     let options = options(1);
-    let limit = options.stage_limit.as_millis() as i64;
+    let limit = options.stage_timeout.as_millis() as i64;
     let clock = Clock::start();
     let look = async {
         world.begun("lasts_1", Stage::Register).await;
@@ -199,9 +199,9 @@ async fn a_pair_taken_ahead_is_not_overdue_before_it_could_have_begun() {
             .await;
         assert!(heartbeat.expect("stored"));
         let overdue = world.catalog.recover_overdue(other, 0, 0).await;
-        assert_eq!(overdue.expect("a recovery").ready, 1);
+        assert_eq!(overdue.expect("a recover").ready, 1);
         assert_eq!(world.status("next").await, JobStatus::Leased);
-        world.steps.open();
+        world.executor.open();
     };
     let (summary, ()) = tokio::join!(world.run(&options), look);
     assert_eq!(summary.done, 2);
@@ -226,7 +226,7 @@ async fn pairs_that_do_not_fit_together_run_one_after_the_other() {
                 let pairs = ["wait_1", "wait_2", "wait_3"];
                 let begun = pairs
                     .iter()
-                    .filter(|pair| world.steps.count(pair, Stage::Fit) > 0);
+                    .filter(|pair| world.executor.count(pair, Stage::Fit) > 0);
                 let begun = begun.count();
                 let mut ready = 0;
                 for pair in pairs {
@@ -237,11 +237,11 @@ async fn pairs_that_do_not_fit_together_run_one_after_the_other() {
             while !settled().await {
                 tokio::task::yield_now().await;
             }
-            world.steps.open();
+            world.executor.open();
         };
         let (summary, ()) = tokio::join!(world.run(&options), open);
         assert_eq!(summary.done, 3);
-        let most = world.steps.most.load(Ordering::SeqCst);
+        let most = world.executor.most.load(Ordering::SeqCst);
         assert_eq!(most, together, "{limit:?}");
     }
 }

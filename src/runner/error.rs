@@ -1,0 +1,52 @@
+//! Why a run cannot go on.
+
+use crate::catalog::{CatalogError, FieldChange};
+use crate::domain::PairName;
+use crate::store::{ArtifactError, LockError, StoreError};
+
+/// Why a run cannot go on. A pair that fails is no error of the run: the summary counts it.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// Another process runs this project.
+    #[error(transparent)]
+    InUse(LockError),
+    /// The lock files cannot be used.
+    #[error(transparent)]
+    Lock(LockError),
+    /// The processes that already work on the project have other settings.
+    #[error(
+        "the run in progress has other settings{}; use the same settings, or wait until it has ended",
+        list(.0)
+    )]
+    OtherSettings(Vec<FieldChange>),
+    /// Pairs were named that do not exist.
+    #[error("there is no pair {}", .0.iter().map(PairName::as_str).collect::<Vec<_>>().join(", "))]
+    NoSuchPair(Vec<PairName>),
+    /// The catalog returned an error.
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    /// The project's directory cannot be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// An artifact could not be written.
+    #[error(transparent)]
+    Artifact(#[from] ArtifactError),
+}
+
+/// Formats changed settings as ` (register.smoothing_px: 1.0 -> 1.5)`; returns nothing where none is known.
+fn list(changes: &[FieldChange]) -> String {
+    let changes: Vec<_> = changes.iter().map(ToString::to_string).collect();
+    match changes.as_slice() {
+        [] => String::new(),
+        changes => format!(" ({})", changes.join(", ")),
+    }
+}
+
+impl From<LockError> for RunError {
+    fn from(error: LockError) -> Self {
+        match error {
+            LockError::InUse { .. } => Self::InUse(error),
+            LockError::Io { .. } => Self::Lock(error),
+        }
+    }
+}

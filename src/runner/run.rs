@@ -1,0 +1,267 @@
+//! One run from start to end: takes the lock, recovers what dead processes left, finds the work, and runs the scheduler.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+
+use super::error::RunError;
+use super::events::{RunEvent, RunSummary};
+use super::input_changes;
+use super::options::{Rerun, RunOptions};
+use super::policy::{self, Clock, Timing};
+use super::run_context::RunContext;
+use super::scheduler::{RunCounts, Scheduler};
+use super::stage_executor::{PipelineExecutor, StageExecutor};
+use super::stop::{Stop, StopLevel};
+use super::worker_session::this_process;
+use crate::catalog::{
+    Catalog, DeadWorker, Fingerprints, PairSelection, Plan, RerunPolicy, StatusCounts, WorkLeft,
+};
+use crate::domain::WorkerId;
+use crate::page_vec;
+use crate::stages::Settings;
+use crate::store::{Project, RunLock};
+
+/// Returns the fingerprints of these settings, one for each stage.
+pub fn fingerprints(settings: &Settings) -> Fingerprints {
+    Fingerprints::new(|stage| settings.fingerprint_fields(stage))
+}
+
+/// Returns what [`run`] would do, for `--dry-run`. Compares the input files first, and stores which have changed.
+///
+/// # Errors
+/// When a named pair does not exist, or the catalog or the files cannot be used.
+pub async fn plan(
+    project: &Project,
+    catalog: &Catalog,
+    settings: &Settings,
+    options: &RunOptions,
+) -> Result<Plan, RunError> {
+    let selection = selection(catalog, options).await?;
+    input_changes::store_changes(project, catalog, selection.as_ref()).await?;
+    let names = options.pairs.as_deref();
+    Ok(catalog
+        .plan(&fingerprints(settings), names, options.again())
+        .await?)
+}
+
+/// Runs every stage that has no current result. Calls `on_event` as things happen.
+///
+/// # Errors
+/// When another process runs the project, a named pair does not exist, or the catalog or the disk cannot be used.
+pub async fn run(
+    project: &Project,
+    catalog: &Catalog,
+    settings: &Settings,
+    options: &RunOptions,
+    stop: &Stop,
+    on_event: impl FnMut(RunEvent) + Send,
+) -> Result<RunSummary, RunError> {
+    page_vec::keep_memory(options.memory);
+    let executor = Arc::new(PipelineExecutor::new(project, settings, options));
+    let fingerprints = fingerprints(settings);
+    run_with(
+        project,
+        catalog,
+        &fingerprints,
+        executor,
+        options,
+        stop,
+        on_event,
+    )
+    .await
+}
+
+/// Like [`run`], with any executor.
+pub(super) async fn run_with(
+    project: &Project,
+    catalog: &Catalog,
+    fingerprints: &Fingerprints,
+    executor: Arc<dyn StageExecutor>,
+    options: &RunOptions,
+    stop: &Stop,
+    mut on_event: impl FnMut(RunEvent) + Send,
+) -> Result<RunSummary, RunError> {
+    let clock = Clock::start();
+    let selection = selection(catalog, options).await?;
+    let fingerprint_ids = catalog.register_fingerprints(fingerprints).await?;
+    let mut lock = RunLock::acquire(project, options.join)?;
+    require_same_settings(catalog, &mut lock, fingerprints).await?;
+    let worker = catalog
+        .register_worker(this_process(), fingerprint_ids, clock.now())
+        .await?;
+    let prepared = async {
+        let recovered = recover(project, catalog, &mut lock, worker, clock).await?;
+        find_work(
+            project,
+            catalog,
+            fingerprints,
+            options,
+            selection.as_ref(),
+            clock,
+        )
+        .await?;
+        announce(
+            catalog,
+            options,
+            selection.as_ref(),
+            recovered,
+            &mut on_event,
+        )
+        .await
+    };
+    if let Err(error) = prepared.await {
+        // This error says more than one from ending the worker would.
+        let _ = catalog.end_worker(worker, clock.now()).await;
+        return Err(error);
+    }
+    let (events, mut received) = mpsc::unbounded_channel();
+    let context = Arc::new(RunContext {
+        catalog: catalog.clone(),
+        project: project.clone(),
+        executor,
+        fingerprints: fingerprint_ids,
+        clock,
+        timing: Timing::of_this_build(),
+        stop: stop.clone(),
+        drain: Stop::new(),
+        until: options.until,
+        stage_timeout: options.stage_timeout,
+        events,
+        compute_us: AtomicU64::new(0),
+    });
+    let mut scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
+    let counts = scheduler.run(&mut received, &mut on_event).await;
+    // End the worker after an error too, or the next run takes its end for a crash.
+    let ended = catalog.end_worker(scheduler.worker(), clock.now()).await;
+    let counts = counts?;
+    ended?;
+    let status = catalog.status(fingerprints).await?;
+    let left = catalog.work_left(options.until, selection.as_ref()).await?;
+    Ok(summary(&counts, left, status, &context))
+}
+
+/// Marks stages whose results are outdated or to be computed again, and makes pairs ready whose back-off is over.
+async fn find_work(
+    project: &Project,
+    catalog: &Catalog,
+    fingerprints: &Fingerprints,
+    options: &RunOptions,
+    selection: Option<&PairSelection>,
+    clock: Clock,
+) -> Result<(), RunError> {
+    input_changes::store_changes(project, catalog, selection).await?;
+    catalog
+        .requeue_stale(fingerprints, selection, options.again())
+        .await?;
+    let longest = policy::longest_backoff_ms();
+    catalog.release_due_backoffs(clock.now(), longest).await?;
+    Ok(())
+}
+
+/// Reports how much work there is.
+async fn announce(
+    catalog: &Catalog,
+    options: &RunOptions,
+    selection: Option<&PairSelection>,
+    recovered: u64,
+    on_event: &mut (impl FnMut(RunEvent) + Send),
+) -> Result<(), RunError> {
+    let left = catalog.work_left(options.until, selection).await?;
+    on_event(RunEvent::Started {
+        pairs: left.pairs,
+        stages: left.by_stage.iter().sum(),
+        by_stage: left.by_stage,
+        workers: options.workers,
+    });
+    if recovered > 0 {
+        on_event(RunEvent::Recovered { pairs: recovered });
+    }
+    Ok(())
+}
+
+/// Refuses settings that differ from those of the processes that work already; the first process defines them.
+async fn require_same_settings(
+    catalog: &Catalog,
+    lock: &mut RunLock,
+    fingerprints: &Fingerprints,
+) -> Result<(), RunError> {
+    if lock.is_exclusive() {
+        lock.set_terms(&fingerprints.terms())?;
+        return Ok(());
+    }
+    let terms = lock.terms()?;
+    if terms == fingerprints.terms() {
+        return Ok(());
+    }
+    let changes = catalog.changes_from(&terms, fingerprints).await?;
+    Err(RunError::OtherSettings(changes))
+}
+
+/// Takes back the leases of dead processes, if the lock proves that no other process works, and lets others join then.
+/// Returns how many pairs are ready again.
+async fn recover(
+    project: &Project,
+    catalog: &Catalog,
+    lock: &mut RunLock,
+    worker: WorkerId,
+    clock: Clock,
+) -> Result<u64, RunError> {
+    if !lock.is_exclusive() {
+        return Ok(0);
+    }
+    let recovered = catalog
+        .recover(DeadWorker::AllExcept(worker), clock.now())
+        .await?;
+    input_changes::store_of_poisoned(project, catalog, &recovered.poisoned).await?;
+    project.clear_temporary()?;
+    lock.downgrade()?;
+    Ok(recovered.ready)
+}
+
+async fn selection(
+    catalog: &Catalog,
+    options: &RunOptions,
+) -> Result<Option<PairSelection>, RunError> {
+    let Some(names) = &options.pairs else {
+        return Ok(None);
+    };
+    let unknown = catalog.unknown_names(names).await?;
+    if !unknown.is_empty() {
+        return Err(RunError::NoSuchPair(unknown));
+    }
+    Ok(Some(catalog.select(names).await?))
+}
+
+fn summary(
+    counts: &RunCounts,
+    left: WorkLeft,
+    status: StatusCounts,
+    context: &RunContext,
+) -> RunSummary {
+    RunSummary {
+        done: counts.done,
+        failed: counts.failed,
+        stages: counts.stages,
+        left: left.pairs,
+        failed_in_all: left.quarantined,
+        stopped: left.pairs > 0 && context.stop.level() > StopLevel::Go,
+        too_many_failures: counts.too_many_failures,
+        compute_time: Duration::from_micros(context.compute_us.load(Ordering::Relaxed)),
+        elapsed_ms: context.clock.elapsed_ms(),
+        status,
+    }
+}
+
+impl RunOptions {
+    /// Returns what to run again besides what changed.
+    fn again(&self) -> RerunPolicy {
+        match self.rerun {
+            None | Some(Rerun::Stale) => RerunPolicy::Changed,
+            Some(Rerun::Failed) => RerunPolicy::Failed,
+            Some(Rerun::All) => RerunPolicy::All(self.from),
+        }
+    }
+}

@@ -1,0 +1,108 @@
+//! What the parts of a run share, and what a pair's task reports at its end.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use tokio::sync::mpsc;
+
+use super::error::RunError;
+use super::events::RunEvent;
+use super::policy::{Clock, Timing};
+use super::stage_executor::StageExecutor;
+use super::stop::{Stop, StopLevel};
+use crate::catalog::{Catalog, FingerprintIds};
+use crate::domain::{Stage, UnixMillis};
+use crate::store::Project;
+
+/// What all pairs of a run have in common.
+pub(super) struct RunContext {
+    pub(super) catalog: Catalog,
+    pub(super) project: Project,
+    pub(super) executor: Arc<dyn StageExecutor>,
+    pub(super) fingerprints: FingerprintIds,
+    pub(super) clock: Clock,
+    pub(super) timing: Timing,
+    /// Raised from outside, by a signal.
+    pub(super) stop: Stop,
+    /// Raised by the run itself, such as after too many failures.
+    pub(super) drain: Stop,
+    /// Last stage to run.
+    pub(super) until: Stage,
+    /// Longest time for one stage of one pair.
+    pub(super) stage_timeout: Duration,
+    pub(super) events: mpsc::UnboundedSender<RunEvent>,
+    /// Microseconds that stages were computed, all threads together.
+    pub(super) compute_us: AtomicU64,
+}
+
+/// How a pair's task ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PairEnd {
+    /// Every stage up to the run's last one is stored.
+    Done,
+    /// The pair is quarantined.
+    Failed,
+    /// The pair will be retried.
+    Retry,
+    /// The pair was released unfinished.
+    Released,
+    /// The lease was lost to another worker.
+    LeaseLost,
+}
+
+/// What a pair's task reports at its end.
+#[derive(Debug)]
+pub(super) struct PairReport {
+    pub(super) end: PairEnd,
+    /// Number of stages that were computed and stored.
+    pub(super) stages: u64,
+    /// The error that ends the run, if there was one.
+    pub(super) fatal: Option<RunError>,
+}
+
+impl RunContext {
+    /// Returns whether no new stage may begin.
+    pub(super) fn is_draining(&self) -> bool {
+        self.stop.level().max(self.drain.level()) >= StopLevel::Drain
+    }
+
+    /// Returns the stage to run after `done`; `None` at the end of the run's stages or while the run drains.
+    pub(super) fn next_stage(&self, done: Stage) -> Option<Stage> {
+        done.next()
+            .filter(|next| *next <= self.until && !self.is_draining())
+    }
+
+    /// Returns when a stage that begins now has to be finished.
+    pub(super) fn deadline(&self) -> UnixMillis {
+        self.clock.now() + self.stage_timeout.as_millis() as i64
+    }
+
+    /// Returns the oldest heartbeat of this process with which its leases are still valid.
+    pub(super) fn alive_since(&self) -> UnixMillis {
+        self.clock.now() - self.timing.lease_ms()
+    }
+
+    /// Adds to the time that stages were computed.
+    pub(super) fn add_compute_time(&self, elapsed: Duration) {
+        let us = elapsed.as_micros() as u64;
+        self.compute_us.fetch_add(us, Ordering::Relaxed);
+    }
+
+    /// Sends an event to the caller of the run.
+    pub(super) fn emit(&self, event: RunEvent) {
+        // After a fatal error the receiver is gone; the event has no reader then.
+        let _ = self.events.send(event);
+    }
+}
+
+impl PairReport {
+    /// A pair whose processing ended with an error of the run.
+    pub(super) const fn fatal(error: RunError) -> Self {
+        Self {
+            end: PairEnd::Released,
+            stages: 0,
+            fatal: Some(error),
+        }
+    }
+}

@@ -1,0 +1,164 @@
+//! What the stages read: input files, and results of earlier stages from memory or from their artifacts.
+
+use super::options::RunOptions;
+use super::pair_context::PairContext;
+use super::stage_output::{self, ExecutionError};
+use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
+use crate::mesh;
+use crate::raster::{self, DepthMap};
+use crate::stages::normalize::Normalized;
+use crate::stages::{Print, Scan};
+use crate::store::{ArtifactError, InputError, Project, open_input, read_input};
+
+/// Where the stages of a project read from, and how large files may be.
+#[derive(Debug)]
+pub(super) struct StageInputs {
+    project: Project,
+    mesh_limits: mesh::MeshLimits,
+    image_limits: raster::ImageLimits,
+}
+
+impl StageInputs {
+    pub(super) fn new(project: &Project, options: &RunOptions) -> Self {
+        Self {
+            project: project.clone(),
+            mesh_limits: options.mesh_limits,
+            image_limits: options.image_limits,
+        }
+    }
+
+    /// Returns the fit's outcome, from memory or as stored.
+    pub(super) fn fit(pair: &PairContext) -> Result<FitOutcome, ExecutionError> {
+        let fit = pair.fit.clone();
+        fit.or_else(|| pair.outcome(Stage::Fit))
+            .ok_or(ExecutionError::RerunFrom(Stage::Fit))
+    }
+
+    /// Takes the scan that was fitted out of memory, or reads it. When the file has changed since the fit, the fit runs
+    /// again.
+    pub(super) fn fitted_scan(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
+        if let Some(scan) = pair.scan.take() {
+            return Ok(scan);
+        }
+        let fitted = pair.mesh_hash();
+        let scan = self.read_scan(pair)?;
+        if fitted == pair.mesh_hash() {
+            return Ok(scan);
+        }
+        pair.scan = Some(scan);
+        Err(ExecutionError::RerunFrom(Stage::Fit))
+    }
+
+    /// Takes the print out of memory, or reads it. When the fit has read another print, the fit runs again.
+    pub(super) fn print(&self, pair: &mut PairContext) -> Result<Print, ExecutionError> {
+        if let Some(print) = pair.print.take() {
+            return Ok(print);
+        }
+        let fit = pair.stored.get(&Stage::Fit);
+        let fitted = fit.and_then(|stored| stored.print_hash);
+        let print = self.read_print(pair)?;
+        if fitted.is_none_or(|fitted| pair.print_hash() == Some(fitted)) {
+            return Ok(print);
+        }
+        Err(ExecutionError::RerunFrom(Stage::Fit))
+    }
+
+    /// Takes the depth map out of memory, or reads its artifact.
+    pub(super) fn depth_map(&self, pair: &mut PairContext) -> Result<DepthMap, ExecutionError> {
+        if let Some(map) = pair.depth.take() {
+            return Ok(map);
+        }
+        let rerun = || ExecutionError::RerunFrom(Stage::Depth);
+        let outcome: DepthOutcome = pair.outcome(Stage::Depth).ok_or_else(rerun)?;
+        let bytes = self.artifact(pair, Stage::Depth, stage_output::DEPTH)?;
+        let levels = raster::decode_grey16(&bytes).ok().ok_or_else(rerun)?;
+        Ok(DepthMap {
+            levels,
+            scale: outcome.scale,
+        })
+    }
+
+    /// Takes the print's masks out of memory, or reads their artifact.
+    pub(super) fn normalized(&self, pair: &mut PairContext) -> Result<Normalized, ExecutionError> {
+        if let Some(normalized) = pair.normalized.take() {
+            return Ok(normalized);
+        }
+        let rerun = || ExecutionError::RerunFrom(Stage::Normalize);
+        let outcome: NormalizeOutcome = pair.outcome(Stage::Normalize).ok_or_else(rerun)?;
+        let bytes = self.artifact(pair, Stage::Normalize, stage_output::PRINT_MASK)?;
+        let grey = raster::decode_grey8(&bytes).ok().ok_or_else(rerun)?;
+        Ok(stage_output::from_print_mask(outcome, &grey))
+    }
+
+    /// Reads an artifact of an earlier stage. When it is missing or was changed, that stage runs again.
+    fn artifact(
+        &self,
+        pair: &PairContext,
+        stage: Stage,
+        role: &str,
+    ) -> Result<Vec<u8>, ExecutionError> {
+        let artifact = pair
+            .stored
+            .get(&stage)
+            .and_then(|stored| stored.files.get(role))
+            .ok_or(ExecutionError::RerunFrom(stage))?;
+        self.project
+            .read_artifact(artifact)
+            .map_err(|error| match error {
+                ArtifactError::Missing(_) | ArtifactError::Changed(_) => {
+                    tracing::warn!(pair = %pair.attributes.name, %stage, "{error}; the stage runs again");
+                    ExecutionError::RerunFrom(stage)
+                }
+                ArtifactError::Io { .. } => ExecutionError::Failed {
+                    failure: Failure::new(FailureClass::Io, error.to_string()),
+                    is_transient: true,
+                },
+            })
+    }
+
+    /// Reads the mesh file, and records its hash in the pair.
+    pub(super) fn read_scan(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
+        let stored = &pair.attributes.mesh_path;
+        let path = self.project.input_path(stored);
+        let limit = self.mesh_limits.max_bytes;
+        let mut file = open_input(&path, limit, "limits.mesh.max_bytes").map_err(unreadable)?;
+        let size = file.size();
+        let mesh = match mesh::read_from(&mut file, size, stored, &self.mesh_limits) {
+            Err(mesh::MeshReadError::Io(error)) => return Err(unreadable(file.error(error))),
+            Err(mesh::MeshReadError::Mesh(error)) => Err(error),
+            Ok(mesh) => Ok(mesh),
+        };
+        pair.inputs.mesh = Some(file.finish().map_err(unreadable)?.into());
+        let mesh = mesh.map_err(|error| {
+            let message = format!("{stored}: {error}");
+            ExecutionError::failed(error.class(), message)
+        })?;
+        Ok(mesh.into())
+    }
+
+    /// Reads the print image, and records its hash in the pair.
+    pub(super) fn read_print(&self, pair: &mut PairContext) -> Result<Print, ExecutionError> {
+        let stored = &pair.attributes.print_path;
+        let path = self.project.input_path(stored);
+        let limit = self.image_limits.max_bytes;
+        let file = read_input(&path, limit, "limits.image.max_bytes").map_err(unreadable)?;
+        pair.inputs.print = Some(file.digest.into());
+        let image = raster::decode(&file.bytes, &self.image_limits).map_err(|error| {
+            let message = format!("{stored}: {error}");
+            ExecutionError::failed(error.class(), message)
+        })?;
+        Ok(Print::from(image))
+    }
+}
+
+#[expect(
+    clippy::needless_pass_by_value,
+    reason = "its signature fits `map_err`"
+)]
+fn unreadable(error: InputError) -> ExecutionError {
+    let is_transient = error.is_transient();
+    ExecutionError::Failed {
+        failure: Failure::new(error.class(), error.to_string()),
+        is_transient,
+    }
+}

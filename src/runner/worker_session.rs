@@ -1,0 +1,187 @@
+//! This process as a worker of the catalog: registration, heartbeats, and recovery of the pairs of dead workers.
+
+use std::collections::BTreeMap;
+
+use super::error::RunError;
+use super::input_changes;
+use super::run_context::RunContext;
+use crate::catalog::{CatalogError, DeadWorker, LeaseHolder, WorkerInfo};
+use crate::domain::{UnixMillis, WorkerId};
+
+/// The worker that this process is registered as.
+#[derive(Debug)]
+pub(super) struct WorkerSession {
+    worker: WorkerId,
+    /// When the last heartbeat was stored, by the run's clock.
+    last_heartbeat: UnixMillis,
+    liveness: Liveness,
+}
+
+/// What became of a heartbeat.
+#[derive(Debug)]
+pub(super) enum Heartbeat {
+    /// The worker's leases are valid. The heartbeat was stored, or can be retried while they are.
+    Alive,
+    /// The heartbeat came after the leases had expired: another worker may hold them now.
+    Expired,
+    /// No heartbeat could be stored for as long as a lease lasts.
+    Unwritable(CatalogError),
+}
+
+impl WorkerSession {
+    /// A worker that has just been registered.
+    pub(super) const fn new(worker: WorkerId, now: UnixMillis, lease_ms: i64) -> Self {
+        Self {
+            worker,
+            last_heartbeat: now,
+            liveness: Liveness::new(lease_ms),
+        }
+    }
+
+    /// Returns the worker's current id.
+    pub(super) const fn worker(&self) -> WorkerId {
+        self.worker
+    }
+
+    /// Stores a heartbeat.
+    pub(super) async fn heartbeat(&mut self, context: &RunContext) -> Heartbeat {
+        let now = context.clock.now();
+        let alive_since = context.alive_since();
+        match context
+            .catalog
+            .heartbeat(self.worker, now, alive_since)
+            .await
+        {
+            Ok(true) => {
+                self.last_heartbeat = now;
+                Heartbeat::Alive
+            }
+            Ok(false) => Heartbeat::Expired,
+            Err(error) => {
+                tracing::warn!(%error, "the heartbeat could not be stored");
+                if self.last_heartbeat < alive_since {
+                    Heartbeat::Unwritable(error)
+                } else {
+                    Heartbeat::Alive
+                }
+            }
+        }
+    }
+
+    /// Registers the process as a new worker after its leases expired. Pairs that the old worker still holds become
+    /// ready again, and nothing that was computed under its leases can be stored.
+    pub(super) async fn register_again(&mut self, context: &RunContext) -> Result<(), RunError> {
+        let (catalog, now) = (&context.catalog, context.clock.now());
+        let expired = self.worker;
+        catalog.end_worker(expired, now).await?;
+        self.worker = catalog
+            .register_worker(this_process(), context.fingerprints, now)
+            .await?;
+        self.last_heartbeat = now;
+        catalog
+            .recover(DeadWorker::Workers(vec![expired]), now)
+            .await?;
+        Ok(())
+    }
+
+    /// Takes back the leases of dead workers and leases past their deadline; returns how many pairs are ready again.
+    pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
+        let (catalog, now) = (&context.catalog, context.clock.now());
+        let holders = catalog.lease_holders().await?;
+        let dead = self.liveness.observe(&holders, self.worker, now);
+        let mut ready = 0;
+        if !dead.is_empty() {
+            let recovered = catalog.recover(DeadWorker::Workers(dead), now).await?;
+            input_changes::store_of_poisoned(&context.project, catalog, &recovered.poisoned)
+                .await?;
+            ready += recovered.ready;
+        }
+        if holders.iter().any(|holder| holder.worker != self.worker) {
+            let margin = context.timing.deadline_margin.as_millis() as i64;
+            let overdue = catalog.recover_overdue(self.worker, margin, now).await?;
+            ready += overdue.ready;
+        }
+        Ok(ready)
+    }
+}
+
+/// Finds dead workers: those whose heartbeat stayed the same for as long as a lease lasts, by the clock of this
+/// process. The clocks of two machines are never compared.
+#[derive(Debug)]
+struct Liveness {
+    lease_ms: i64,
+    /// The last heartbeat of each worker, and when it was first seen.
+    seen: BTreeMap<WorkerId, (UnixMillis, UnixMillis)>,
+}
+
+impl Liveness {
+    const fn new(lease_ms: i64) -> Self {
+        Self {
+            lease_ms,
+            seen: BTreeMap::new(),
+        }
+    }
+
+    /// Takes in the current heartbeats of all workers with leases; returns the dead ones among them.
+    fn observe(&mut self, holders: &[LeaseHolder], me: WorkerId, now: UnixMillis) -> Vec<WorkerId> {
+        self.seen
+            .retain(|worker, _| holders.iter().any(|holder| holder.worker == *worker));
+        let mut dead = Vec::new();
+        for holder in holders.iter().filter(|holder| holder.worker != me) {
+            let (heartbeat, since) = self
+                .seen
+                .entry(holder.worker)
+                .or_insert((holder.heartbeat, now));
+            if *heartbeat != holder.heartbeat {
+                (*heartbeat, *since) = (holder.heartbeat, now);
+            } else if now - *since >= self.lease_ms {
+                dead.push(holder.worker);
+            }
+        }
+        dead
+    }
+}
+
+/// Returns what the catalog records about this process.
+pub(super) fn this_process() -> WorkerInfo {
+    let boot_id = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok();
+    WorkerInfo {
+        host: host_name(),
+        pid: std::process::id(),
+        boot_id: boot_id.map(|id| id.trim().to_owned()),
+    }
+}
+
+#[cfg(unix)]
+fn host_name() -> String {
+    let system = rustix::system::uname();
+    system.nodename().to_string_lossy().into_owned()
+}
+
+#[cfg(not(unix))]
+fn host_name() -> String {
+    std::env::var("COMPUTERNAME").unwrap_or_else(|_| "unknown".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Liveness;
+    use crate::catalog::LeaseHolder;
+    use crate::domain::WorkerId;
+
+    #[test]
+    fn a_worker_is_dead_after_a_lease_without_a_new_heartbeat() {
+        let (me, other) = (WorkerId(1), WorkerId(2));
+        let holders = |heartbeat| {
+            [me, other].map(|worker| LeaseHolder {
+                worker,
+                heartbeat: if worker == me { 0 } else { heartbeat },
+            })
+        };
+        let mut liveness = Liveness::new(60_000);
+        assert!(liveness.observe(&holders(5), me, 0).is_empty());
+        assert!(liveness.observe(&holders(6), me, 59_999).is_empty());
+        assert!(liveness.observe(&holders(6), me, 119_998).is_empty());
+        assert_eq!(liveness.observe(&holders(6), me, 119_999), [other]);
+    }
+}
