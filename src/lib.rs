@@ -2,42 +2,85 @@
 //!
 //! # Code map
 //!
-//! A **pair** is one character: a mesh of the carved block and an image of its print. Its **job** is the way
-//! through four **stages**, `fit`, `depth`, `normalize` and `register`. A worker leases the pair, runs the stages
-//! that are left and writes a **checkpoint** after each, while the next is computed: files first, then one short
-//! transaction. The stages are pure functions; the catalog is the only place with SQL, the store the only one with
-//! artifact files, and the runner ties the two to the stages.
+//! A **pair** is one character: a mesh of the carved block and an image of its print. Its **job** runs four **stages**:
+//! `fit`, `depth`, `normalize` and `register`. A worker leases the pair, runs the remaining stages and writes a
+//! **checkpoint** after each one, first the files, then one short transaction, while the next stage is computed. Stages
+//! are pure functions. The catalog is the only module with SQL, the store the only one with artifact files, and the
+//! runner connects both with the stages.
 //!
-//! To follow one pair: [`manifest`] reads its line, [`catalog`] keeps it, [`runner`] leases it and calls
-//! [`stages`] with what [`mesh`] and [`raster`] decoded, [`store`] and [`catalog`] take the results, and
-//! [`report`] and [`export`] tell them. `benches/accuracy` gives pairs of [`demo`] straight to the stages and prints how
-//! often they are right, how far off, and how long each takes.
+//! ## One pair, from manifest row to report cell
 //!
-//! `benches/queue` measures what the catalog costs on many pairs, beside other queues; `benches/speed` how long readers
-//! and stages take by the size of a scan, and `benches/peers` runs other libraries on the same files.
+//! Read these files in order to follow a pair through the program:
 //!
-//! The table below is kept by `tests/it/layers.rs`: a room imports those of its line and no others.
+//! 1. `src/manifest/csv.rs`: parses the rows of a manifest
+//! 2. `src/catalog/records/import.rs`: stores pairs and their jobs
+//! 3. `src/runner/scheduler.rs`: claims pairs and hands them to workers
+//! 4. `src/catalog/queue/claim.rs`: leases a job in one statement, with a fencing token
+//! 5. `src/runner/pair_task.rs`: processes one leased pair, stage by stage
+//! 6. `src/runner/stage_executor.rs`: reads inputs and calls the stages
+//! 7. `src/stages/fit/mod.rs`: plane, curvature and carved side
+//! 8. `src/stages/depth.rs`: depth map
+//! 9. `src/stages/normalize/mod.rs`: print and relief on a common scale
+//! 10. `src/stages/register/mod.rs`: pose, thresholds, scores and confidence
+//! 11. `src/runner/stage_output.rs`: turns a stage result into files and rows
+//! 12. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
+//! 13. `src/store/artifacts.rs`: writes artifact files by content hash
+//! 14. `src/catalog/queue/checkpoint.rs`: records a finished stage and renews or ends the lease
+//! 15. `src/catalog/records/pair_results.rs`: reads results back
+//! 16. `src/report/build.rs`: iterates over all pairs
+//! 17. `src/report/accumulate.rs`: sums results per metric
+//! 18. `src/report/render/table.rs`: formats the cells
 //!
-//! | room | what it is for | may import |
+//! A **lost lease** is noticed when something is stored: `src/catalog/queue/checkpoint.rs` (and `fail.rs` beside it)
+//! updates the job only where worker and fencing token are still those of the lease; no updated row means
+//! [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome). `src/runner/checkpointer.rs` then stores nothing more, and
+//! `src/runner/pair_task.rs` ends with `PairEnd::Lost` and drops the pair.
+//!
+//! ## A new threshold metric
+//!
+//! These files name individual metrics; everything else iterates over [`domain::ThresholdMetric::ALL`]:
+//!
+//! - `src/cli/contact_sheet.rs`: the default metric of contact sheets; no change needed
+//! - `src/cli/show.rs`: the metric of the summary; no change needed
+//! - `src/domain/metric.rs`: the variant with its definition; its `match`es fail to compile until they cover it
+//! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
+//! - `src/export/pair_files.rs`: the metric whose files are shared; no change needed
+//! - `src/stages/normalize/threshold.rs`: computes the thresholds
+//! - `src/stages/paper_method/normalize.rs`: computes the thresholds
+//! - `src/stages/paper_method/register.rs`: computes the thresholds
+//! - `src/stages/register/mod.rs`: computes the thresholds
+//! - `migrations/`: the `CHECK` lists of the metric columns
+//! - `README.md` and `docs/report.md`: the description
+//!
+//! ## Rooms
+//!
+//! Each top-level module is a room. `tests/it/layers.rs` checks that a room imports only the rooms in its line, that
+//! source files do not import each other in cycles, and that the lists above are complete.
+//!
+//! | room | purpose | may import |
 //! |---|---|---|
-//! | `domain` | nouns: ids, stages, job states, transforms, outcomes, verdicts | |
-//! | `simd` | loops over numbers, with the widest instructions that the processor has | |
-//! | `raster` | grids, masks, depth maps, pictures, warps; readers of PNG, JPEG, TIFF | `domain`, `simd` |
-//! | `page_vec` | vectors of millions of numbers | |
-//! | `mesh` | triangles and points in their own frame; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
-//! | `manifest` | lists of pairs: CSV, JSON Lines, two folders | `domain` |
-//! | `stages` | fit, depth, normalize, register as pure functions, and the scores | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
-//! | `failpoint` | named points where a test makes the process die | `domain` |
-//! | `store` | a project on disk: inputs and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster` |
-//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all the SQL there is | `domain`, `failpoint` |
-//! | `runner` | workers, policy, execution of one pair, events | `domain`, `page_vec`, `mesh`, `raster`, `stages`, `store`, `catalog`, `failpoint` |
-//! | `check` | a project held against itself, and mended | `domain`, `store`, `catalog`, `runner` |
-//! | `report` | catalog to table: plain data, then text, CSV, JSON, Markdown, LaTeX, HTML | `domain`, `raster`, `store`, `catalog` |
-//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of a report | `domain`, `raster`, `store`, `catalog`, `report` |
-//! | `review` | the review page: verdicts and alignments by hand, planted faults, a server on loopback | `domain`, `raster`, `store`, `catalog`, `report`, `export` |
-//! | `demo` | the built-in dataset: carved reliefs and prints with known truth, from one seed | `domain`, `mesh`, `raster` |
-//! | `config` | settings in layers, typed and checked, each with its origin | `domain`, `mesh`, `raster`, `stages`, `runner` |
-//! | `cli` | one thin file a command; exit codes, progress, log | all |
+//! | `domain` | ids, stages, job states, transforms, outcomes, verdicts | |
+//! | `simd` | runtime dispatch to the widest vector instructions of the processor | |
+//! | `raster` | grids, masks, depth maps, print images, warps; decoders of PNG, JPEG, TIFF | `domain`, `simd` |
+//! | `page_vec` | vectors on huge pages with a cache of freed pages | |
+//! | `mesh` | triangle meshes and point sets; readers of OBJ, PLY, STL, XYZ | `domain`, `page_vec` |
+//! | `manifest` | lists of pairs: CSV, JSON Lines, two directories | `domain` |
+//! | `stages` | fit, depth, normalize and register as pure functions; scores and confidence | `domain`, `simd`, `page_vec`, `mesh`, `raster` |
+//! | `failpoint` | named points at which a test can kill the process | `domain` |
+//! | `store` | a project on disk: input files and artifacts by content hash | `domain`, `page_vec`, `mesh`, `raster` |
+//! | `catalog` | SQLite: pairs, jobs, leases, results, verdicts; all SQL | `domain`, `failpoint` |
+//! | `runner` | workers, scheduling, retry policy, execution of a pair, events | `domain`, `page_vec`, `mesh`, `raster`, `stages`, `store`, `catalog`, `failpoint` |
+//! | `check` | consistency check and repair of a project | `domain`, `store`, `catalog`, `runner` |
+//! | `report` | statistics of the results as plain data, and renderers for text, CSV, JSON, Markdown, LaTeX and HTML | `domain`, `raster`, `store`, `catalog` |
+//! | `export` | aligned pairs for other tools, overlays, contact sheets, pictures of reports | `domain`, `raster`, `store`, `catalog`, `report` |
+//! | `review` | the review page: verdicts, manual alignments, attention checks, the local server | `domain`, `raster`, `store`, `catalog`, `report`, `export` |
+//! | `demo` | the generated dataset with ground truth | `domain`, `mesh`, `raster` |
+//! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `runner` |
+//! | `cli` | one file per command; exit codes, progress, logging | all |
+//!
+//! Benches: `benches/accuracy` runs the stages on pairs of [`demo`] and compares them with ground truth; `benches/speed`
+//! times readers and stages by scan size; `benches/queue` times the catalog on many pairs; `benches/peers` runs other
+//! tools on the same files.
 
 pub mod catalog;
 pub mod check;

@@ -165,10 +165,14 @@ fn crates_stay_in_their_rooms() {
 }
 
 #[test]
-fn only_the_progress_file_draws() {
+fn only_progress_and_screen_draw() {
     for file in room_files() {
         let draws = !names_after(&file.production_code(), "indicatif::").is_empty();
-        assert!(!draws || file.name == "cli/progress.rs", "{}", file.name);
+        assert!(
+            !draws || ["cli/progress.rs", "cli/screen.rs"].contains(&file.name.as_str()),
+            "{}",
+            file.name
+        );
     }
 }
 
@@ -343,4 +347,62 @@ fn files_do_not_import_each_other_in_cycles() {
     let mut cycles = ImportGraph::new().cycles();
     cycles.retain(|cycle| !cycle.iter().all(is_known));
     assert!(cycles.is_empty(), "import cycles: {cycles:#?}");
+}
+
+/// Longest list of files that follows one pair through the program, and their lines without unit tests.
+const MAX_WALK_FILES: usize = 18;
+const MAX_WALK_LINES: usize = 4500;
+
+/// Returns the files that start the list items of a section of the code map, relative to `src`.
+fn listed_files(heading: &str) -> Vec<String> {
+    let lib = std::fs::read_to_string(package_dir().join("src/lib.rs")).expect("readable source");
+    let heading = format!("//! ## {heading}");
+    let section = lib.lines().skip_while(|line| **line != heading).skip(1);
+    section
+        .take_while(|line| !line.starts_with("//! ## "))
+        .filter_map(|line| {
+            let (mark, file) = line.split_once("`src/")?;
+            let is_item = mark.ends_with(". ") || mark.ends_with("- ");
+            is_item.then(|| file.split('`').next().unwrap_or_default().to_owned())
+        })
+        .collect()
+}
+
+#[test]
+fn the_way_of_one_pair_is_listed_and_short() {
+    let files = source_files();
+    let listed = listed_files("One pair, from manifest row to report cell");
+    let lines: usize = listed
+        .iter()
+        .map(|name| {
+            let file = files.iter().find(|file| file.name == *name);
+            file.unwrap_or_else(|| panic!("src/{name} does not exist"))
+                .production_lines()
+        })
+        .sum();
+    assert!(
+        (1..=MAX_WALK_FILES).contains(&listed.len()),
+        "{} files",
+        listed.len()
+    );
+    assert!(lines <= MAX_WALK_LINES, "{lines} lines");
+}
+
+#[test]
+fn files_that_name_a_threshold_metric_are_listed() {
+    let variants =
+        ["NlSsim", "Density", "Ensemble", "Relief"].map(|name| format!("ThresholdMetric::{name}"));
+    let names_metric = |file: &&SourceFile| {
+        let code = file.production_code();
+        variants.iter().any(|variant| code.contains(variant))
+            || code.contains("enum ThresholdMetric")
+    };
+    let files = source_files();
+    let found: BTreeSet<String> = files
+        .iter()
+        .filter(names_metric)
+        .map(|file| file.name.clone())
+        .collect();
+    let listed: BTreeSet<String> = listed_files("A new threshold metric").into_iter().collect();
+    assert_eq!(found, listed);
 }

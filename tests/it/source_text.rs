@@ -32,6 +32,14 @@ impl SourceFile {
         without_comments(&self.text[test_module_start(&self.text)..])
     }
 
+    /// Returns the number of lines without unit tests.
+    pub(crate) fn production_lines(&self) -> usize {
+        if self.is_test {
+            return 0;
+        }
+        self.text[..test_module_start(&self.text)].lines().count()
+    }
+
     /// Returns the module path from the crate root; empty for `lib.rs` and `main.rs`.
     pub(crate) fn module(&self) -> Vec<String> {
         let name = self.name.trim_end_matches(".rs");

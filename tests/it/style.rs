@@ -12,33 +12,19 @@ const REPEATED_TYPES: &[&str] = &[
     "Agreement",
     "Ascii",
     "Canvas",
-    "Counts",
     "Drawn",
-    "Form",
-    "Header",
-    "ImportArgs",
-    "Kept",
+    "Heartbeat",
     "Lanes",
-    "Line",
     "Look",
     "Looks",
     "MetricRow",
-    "Moved",
     "Open",
     "Pictures",
-    "Place",
-    "Reader",
-    "Refused",
-    "Rerun",
     "Row",
     "Samples",
     "Seen",
-    "ShowArgs",
-    "Source",
-    "Start",
+    "Settled",
     "Sums",
-    "Trouble",
-    "View",
 ];
 
 /// Names of associated types, which repeat by nature.
@@ -73,7 +59,7 @@ const BANNED_PHRASES: &[&str] = &[
 ];
 
 /// Occurrences of banned phrases that are still in `src`. Lower the number when it drops; never raise it.
-const BANNED_PHRASES_LEFT: usize = 202;
+const BANNED_PHRASES_LEFT: usize = 164;
 
 /// Public functions of numeric rooms without a verb in front. Lower the number when it drops; never raise it.
 const MISSING_VERBS_LEFT: usize = 62;

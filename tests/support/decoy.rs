@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// Amplitude of the height noise of an uncarved plate, in shares of the character's height (about 15 µm).
 const PLATE_NOISE: f64 = 0.0016;
-/// Depth below which a vertex belongs to the base or the walls of a closed scan, in shares of the character's height.
+/// Depth below which a vertex of a closed scan belongs to the base or the walls, in shares of the character's height.
 const BASE_DEPTH: f64 = 0.165;
 
 /// A kind of pair without a correct alignment.
@@ -96,7 +96,7 @@ fn mirrored(mut mesh: Mesh) -> Mesh {
     mesh
 }
 
-/// Moves every vertex above the base onto the plane of the stroke tops and adds noise.
+/// Moves every vertex of the carved face onto the plane of the stroke tops and adds noise.
 fn flattened(pair: &DemoPair, seed: u64) -> Mesh {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut mesh = pair.mesh.clone();
@@ -106,7 +106,8 @@ fn flattened(pair: &DemoPair, seed: u64) -> Mesh {
     for index in 0..mesh.vertices.len() {
         let vertex = mesh.vertices.at(index);
         let height = (0..3).map(|i| plane.n[i] * vertex[i]).sum::<f64>() + plane.d;
-        if height >= -BASE_DEPTH * character {
+        let is_base = pair.is_closed && height < -BASE_DEPTH * character;
+        if !is_base {
             let flat = character * PLATE_NOISE * rng.random_range(-0.5..0.5);
             let moved = [0, 1, 2].map(|i| vertex[i] + (flat - height) * plane.n[i]);
             mesh.vertices.set(index, moved);
