@@ -361,8 +361,11 @@ fn listed_files(heading: &str) -> Vec<String> {
     section
         .take_while(|line| !line.starts_with("//! ## "))
         .filter_map(|line| {
-            let (mark, file) = line.split_once("`src/")?;
-            let is_item = mark.ends_with(". ") || mark.ends_with("- ");
+            let (mark, file) = line.strip_prefix("//! ")?.split_once("`src/")?;
+            let number = mark
+                .strip_suffix(". ")
+                .and_then(|number| number.parse::<u8>().ok());
+            let is_item = mark == "- " || number.is_some();
             is_item.then(|| file.split('`').next().unwrap_or_default().to_owned())
         })
         .collect()
