@@ -46,8 +46,8 @@ CREATE TABLE pair (
     imported INTEGER NOT NULL
 ) STRICT;
 
--- One hot row per pair: a cursor over the four stages. `made` is the fingerprint of the result before the cursor,
--- unless earlier results were computed with other settings since.
+-- One hot row per pair: a cursor over the four stages. `fingerprint` is that of the result before the cursor;
+-- `dirty` marks a job whose results may not agree with that fingerprint's chain or with the pair's inputs.
 CREATE TABLE job (
     pair INTEGER PRIMARY KEY REFERENCES pair (id),
     stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 4),
@@ -60,7 +60,8 @@ CREATE TABLE job (
     worker INTEGER REFERENCES worker (id),
     deadline INTEGER,
     exclusive INTEGER NOT NULL DEFAULT 0 CHECK (exclusive IN (0, 1)),
-    made INTEGER REFERENCES fingerprint (id),
+    fingerprint INTEGER REFERENCES fingerprint (id),
+    dirty INTEGER NOT NULL DEFAULT 0 CHECK (dirty IN (0, 1)),
     low_confidence INTEGER NOT NULL DEFAULT 0 CHECK (low_confidence IN (0, 1)),
     CHECK ((status = 3) = (stage = 4)),
     CHECK ((status = 1) = (worker IS NOT NULL)),
@@ -71,7 +72,7 @@ CREATE INDEX job_ready ON job (prio, stage DESC, pair) WHERE status = 0;
 CREATE INDEX job_leased ON job (worker) WHERE status = 1;
 CREATE INDEX job_backoff ON job (run_at) WHERE status = 2;
 CREATE INDEX job_quarantined ON job (pair) WHERE status = 4;
-CREATE INDEX job_mixed ON job (pair) WHERE made IS NULL AND stage > 0;
+CREATE INDEX job_dirty ON job (pair) WHERE dirty = 1;
 CREATE INDEX job_low_confidence ON job (pair) WHERE low_confidence = 1 AND status = 3;
 
 -- Why a job backs off or is quarantined, with the settings and inputs of the failed attempt.
@@ -182,32 +183,21 @@ CREATE TABLE truth (
     body TEXT NOT NULL CHECK (json_valid(body))
 ) STRICT;
 
--- Numbers of jobs by cursor and status, changed in the same transaction as the jobs.
+-- A trigger, so that no write to `pair` can forget the mark.
+CREATE TRIGGER pair_changed AFTER UPDATE OF mesh_hash, print_hash, attributes ON pair
+WHEN OLD.mesh_hash <> NEW.mesh_hash OR OLD.print_hash <> NEW.print_hash OR OLD.attributes <> NEW.attributes BEGIN
+    UPDATE job SET dirty = 1 WHERE pair = NEW.id;
+END;
+
+-- Numbers of jobs by cursor, status and fingerprint (0 for none), changed in the same transaction as the jobs.
 CREATE TABLE counter (
     stage INTEGER NOT NULL CHECK (stage BETWEEN 0 AND 4),
     status INTEGER NOT NULL CHECK (status BETWEEN 0 AND 4),
+    fingerprint INTEGER NOT NULL,
     n INTEGER NOT NULL CHECK (n >= 0),
-    PRIMARY KEY (stage, status)
+    PRIMARY KEY (stage, status, fingerprint)
 ) STRICT, WITHOUT ROWID;
-INSERT INTO counter (stage, status, n)
-SELECT stage.value, status.value, 0 FROM json_each('[0,1,2,3,4]') AS stage, json_each('[0,1,2,3,4]') AS status;
-
--- Numbers of jobs by `made`.
-CREATE TABLE made (
-    fingerprint INTEGER PRIMARY KEY REFERENCES fingerprint (id),
-    n INTEGER NOT NULL CHECK (n >= 0)
-) STRICT;
-CREATE TRIGGER job_made AFTER UPDATE OF made ON job WHEN OLD.made IS NOT NEW.made BEGIN
-    UPDATE made SET n = n - 1 WHERE fingerprint = OLD.made;
-    INSERT INTO made SELECT NEW.made, 1 WHERE NEW.made IS NOT NULL ON CONFLICT (fingerprint) DO UPDATE SET n = n + 1;
-END;
-
--- Pairs whose files or attributes changed since they may have been computed; a run removes those it has handled.
-CREATE TABLE moved (pair INTEGER PRIMARY KEY REFERENCES pair (id)) STRICT;
-CREATE TRIGGER pair_moved AFTER UPDATE OF mesh_hash, print_hash, attributes ON pair
-WHEN OLD.mesh_hash <> NEW.mesh_hash OR OLD.print_hash <> NEW.print_hash OR OLD.attributes <> NEW.attributes BEGIN
-    INSERT INTO moved VALUES (NEW.id) ON CONFLICT (pair) DO NOTHING;
-END;
+INSERT INTO counter (stage, status, fingerprint, n) SELECT 0, value, 0, 0 FROM json_each('[0,1,2,3,4]');
 
 -- Answers to attention checks, kept apart from verdicts so that no count of verdicts includes them.
 CREATE TABLE attention_check_answer (

@@ -24,12 +24,13 @@ const COPIES: [&str; 5] = [
     "UPDATE pair SET mesh_hash = one.mesh_hash, mesh_stat = one.mesh_stat, print_hash = one.print_hash,
         print_stat = one.print_stat
     FROM (SELECT * FROM pair WHERE id = 1) AS one WHERE pair.id > ?1 AND pair.id <= ?2",
-    "UPDATE job SET stage = 4, status = 3, attempt = 1, token = 1, made = (SELECT made FROM job WHERE pair = 1)
+    "UPDATE job SET stage = 4, status = 3, attempt = 1, token = 1, fingerprint = (SELECT fingerprint FROM job WHERE pair = 1)
     WHERE pair > ?1 AND pair <= ?2",
 ];
 
 const COUNT: &str = "
-UPDATE counter SET n = (SELECT count(*) FROM job AS j WHERE j.stage = counter.stage AND j.status = counter.status)";
+UPDATE counter SET n = (SELECT count(*) FROM job AS j WHERE j.stage = counter.stage AND j.status = counter.status
+    AND coalesce(j.fingerprint, 0) = counter.fingerprint)";
 
 /// Pairs of one transaction: the log holds each until it is folded back.
 const CHUNK: usize = 100_000;

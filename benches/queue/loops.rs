@@ -20,7 +20,8 @@ WHERE pair = (SELECT pair FROM job WHERE status = 0 ORDER BY prio, stage DESC, p
 RETURNING pair, token";
 const STEP: &str = "
 UPDATE job SET stage = ?2, status = iif(?2 = 4, 3, 1), worker = iif(?2 = 4, NULL, worker),
-    deadline = iif(?2 = 4, NULL, 2000), attempt = 1, crashes = 0
+    deadline = iif(?2 = 4, NULL, 2000), attempt = 1, crashes = 0,
+    fingerprint = (SELECT id FROM fingerprint WHERE stage = ?2 - 1)
 WHERE pair = ?1 AND token = ?3 AND status = 1";
 const RESULT: &str = "
 INSERT INTO stage_result
@@ -28,7 +29,9 @@ INSERT INTO stage_result
 VALUES (?1, ?2, (SELECT id FROM fingerprint WHERE stage = ?2), ?3, ?4, ?5, ?6, '{}', ?7, 1, ?8, 1)";
 const ATTEMPT: &str = "INSERT INTO attempt (pair, stage, worker, ms, at) VALUES (?1, ?2, ?3, 1, 1)";
 const SEEN: &str = "UPDATE pair SET mesh_hash = ?2, print_hash = ?3 WHERE id = ?1";
-const COUNTER: &str = "UPDATE counter SET n = n + ?3 WHERE stage = ?1 AND status = ?2";
+const COUNTER: &str = "
+UPDATE counter SET n = n + ?3 WHERE stage = ?1 AND status = ?2
+    AND fingerprint = coalesce((SELECT id FROM fingerprint WHERE stage = ?1 - 1), 0)";
 const METRIC: &str = "
 INSERT INTO metric_result
     (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,

@@ -7,7 +7,7 @@ use sqlx::pool::PoolConnection;
 use sqlx::{Sqlite, SqliteConnection, SqlitePool, Transaction};
 use tokio::sync::{mpsc, oneshot};
 
-use crate::catalog::db::commit_delay::Company;
+use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
 use crate::catalog::db::writer::{self, Message, Work};
@@ -21,7 +21,7 @@ pub struct Catalog {
     reader_pool: SqlitePool,
     /// `None` when opened to read only.
     inbox: Option<mpsc::Sender<Message>>,
-    pub(crate) company: Arc<Company>,
+    pub(crate) delay: Arc<CommitDelay>,
     pub(crate) path: Arc<Path>,
 }
 
@@ -31,7 +31,7 @@ impl Catalog {
     /// # Errors
     /// When it is no catalog, the disk is a network's, or the database refuses.
     pub async fn create(path: &Path) -> Result<Self> {
-        Self::with_writer(path, true, Company::new()).await
+        Self::with_writer(path, true, CommitDelay::new()).await
     }
 
     /// Opens a catalog that is there, to read and write.
@@ -39,7 +39,7 @@ impl Catalog {
     /// # Errors
     /// When there is none, it is no catalog, the disk is a network's, or the database refuses.
     pub async fn open(path: &Path) -> Result<Self> {
-        Self::with_writer(path, false, Company::new()).await
+        Self::with_writer(path, false, CommitDelay::new()).await
     }
 
     /// Opens a catalog to read; works while a run goes on.
@@ -50,7 +50,7 @@ impl Catalog {
         Ok(Self {
             reader_pool: open::reader_pool(path).await?,
             inbox: None,
-            company: Company::new(),
+            delay: CommitDelay::new(),
             path: path.into(),
         })
     }
@@ -58,18 +58,18 @@ impl Catalog {
     pub(crate) async fn with_writer(
         path: &Path,
         create: bool,
-        company: Arc<Company>,
+        delay: Arc<CommitDelay>,
     ) -> Result<Self> {
         let conn = open::write_conn(path, create).await?;
         let reader_pool = open::reader_pool(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();
-        let commits_with = Arc::clone(&company);
+        let commits_with = Arc::clone(&delay);
         tokio::spawn(writer::run(conn, Arc::clone(&path), inbox, commits_with));
         Ok(Self {
             reader_pool,
             inbox: Some(sender),
-            company,
+            delay,
             path,
         })
     }
@@ -89,6 +89,12 @@ impl Catalog {
 
     pub(crate) fn writer(&self) -> Result<&mpsc::Sender<Message>> {
         self.inbox.as_ref().ok_or(CatalogError::ReadOnly)
+    }
+
+    /// Sends the writer a message.
+    pub(crate) async fn send(&self, message: Message) -> Result<()> {
+        let sent = self.writer()?.send(message).await;
+        sent.or(Err(CatalogError::Closed))
     }
 
     pub(crate) async fn read_conn(&self) -> Result<PoolConnection<Sqlite>> {

@@ -17,7 +17,7 @@ pub use db::error::{CatalogError, Result};
 pub use db::error_kind::CatalogErrorKind;
 pub use db::lock_owner::{LockOwner, lock_owner};
 pub use handle::Catalog;
-pub use queue::claim::{ClaimRequest, PairSelection};
+pub use queue::claim::ClaimRequest;
 pub use queue::counters::JobCounts;
 pub use queue::fingerprint::{Fingerprint, FingerprintIds, Fingerprints};
 pub use queue::lease::{
@@ -27,6 +27,7 @@ pub use queue::lease::{
 pub use queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
 pub use queue::recovery::{DeadWorker, LeaseHolder, Recovered};
 pub use queue::requeue::RetrySelection;
+pub use queue::selection::PairSelection;
 pub use queue::staleness::RerunPolicy;
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
@@ -36,7 +37,7 @@ pub use records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults,
     ReviewerVerdict, StageCounts, StageRecord, StatusCounts, StoredFailure,
 };
-pub use records::pages::ResultPages;
+pub use records::pair_results::ResultPages;
 pub use records::pair_work::{KnownInputs, PairWork};
 pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Shown};
 pub use records::verdicts::{NewVerdict, VerdictEvent};

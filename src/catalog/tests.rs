@@ -19,7 +19,7 @@ use std::time::Duration;
 use serde_json::{Map, json};
 use tokio::sync::oneshot;
 
-use super::db::commit_delay::Company;
+use super::db::commit_delay::CommitDelay;
 use super::{
     Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
     InputVersion, InputVersions, Lease, MetricResult, RerunPolicy, StageCheckpoint, WorkerInfo,
@@ -32,7 +32,7 @@ use crate::domain::{
 impl Catalog {
     /// A new catalog whose writer lets what can wait do so for ever.
     pub(crate) async fn create_patient(path: &Path) -> super::Result<Self> {
-        Self::with_writer(path, true, Company::of(Duration::from_hours(1))).await
+        Self::with_writer(path, true, CommitDelay::of(Duration::from_hours(1))).await
     }
 
     /// Keeps the writer busy from now on, until the sender is used or dropped.
@@ -171,7 +171,11 @@ impl World {
             let all = plan(None).await.expect("a plan");
             let each = plan(Some(names.as_slice())).await.expect("a plan");
             assert_eq!(all, each, "{revision:?}");
-            let stale = self.catalog.stale(&fingerprints).await.expect("a read");
+            let stale = self
+                .catalog
+                .count_stale(&fingerprints)
+                .await
+                .expect("a read");
             let counted = self.count_stale(&fingerprints).await;
             assert_eq!(stale, counted, "{revision:?}");
         }

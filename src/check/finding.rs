@@ -128,8 +128,8 @@ impl Finding {
         Self::bare(Kind::Counter, what)
     }
 
-    /// A count or note of stale pairs that is off.
-    pub(super) const fn shortcut(line: String) -> Self {
+    /// Jobs whose fingerprint or dirty mark is wrong.
+    pub(super) const fn mark(line: String) -> Self {
         Self::bare(Kind::Counter, line)
     }
 

@@ -173,8 +173,8 @@ async fn counters(
     for drift in &drift.counters {
         summary.add(Finding::counter(drift));
     }
-    for line in drift.shortcuts {
-        summary.add(Finding::shortcut(line));
+    for line in drift.marks {
+        summary.add(Finding::mark(line));
     }
     if options.repair && is_off {
         catalog.rebuild_counters().await?;

@@ -109,7 +109,7 @@ impl Context {
             return Ok(());
         };
         let fingerprints = runner::fingerprints(&settings.config.stages);
-        let stale = catalog.stale(&fingerprints).await?;
+        let stale = catalog.count_stale(&fingerprints).await?;
         if stale > 0 {
             let pairs = count(stale, "pair");
             let verb = if stale == 1 { "is" } else { "are" };

@@ -135,7 +135,7 @@ async fn store_stages(
             });
         }
         let times: Vec<_> = batch.iter().map(|done| (done.stage, done.ms)).collect();
-        let outcome = context.catalog.checkpoint_in_time(lease, batch).await?;
+        let outcome = context.catalog.checkpoint_deferrable(lease, batch).await?;
         if !matches!(outcome, CheckpointOutcome::LeaseLost) {
             stored += times.len() as u64;
             for (stage, ms) in times {

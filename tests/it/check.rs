@@ -172,16 +172,19 @@ fn rows_and_counters_that_disagree_are_found_and_mended() {
             "UPDATE counter SET n = n + 1 WHERE stage = 0 AND status = 0",
         ),
         ("counter", "DELETE FROM counter WHERE n = 0"),
-        // What tells stale pairs without a look at each: counts by fingerprint, fingerprints of jobs, notes of other files.
-        ("counter", "UPDATE made SET n = n + 1"),
-        ("counter", "DELETE FROM made"),
+        // Counters by fingerprint, fingerprints of jobs and dirty marks.
         (
             "counter",
-            "UPDATE job SET made = (SELECT min(id) FROM fingerprint) WHERE pair = 1",
+            "UPDATE counter SET n = n + 1 WHERE stage = 4 AND status = 3",
+        ),
+        ("counter", "DELETE FROM counter WHERE fingerprint <> 0"),
+        (
+            "counter",
+            "UPDATE job SET fingerprint = (SELECT min(id) FROM fingerprint) WHERE pair = 1",
         ),
         (
             "counter",
-            "UPDATE pair SET mesh_hash = zeroblob(32) WHERE id = 1; DELETE FROM moved",
+            "UPDATE pair SET mesh_hash = zeroblob(32) WHERE id = 1; UPDATE job SET dirty = 0",
         ),
         (
             "result_missing",
@@ -200,12 +203,12 @@ fn rows_and_counters_that_disagree_are_found_and_mended() {
         // A pair without a job, and one that failed without a reason.
         (
             "job_missing",
-            "UPDATE job SET made = NULL WHERE pair = 1; DELETE FROM job WHERE pair = 1;
+            "DELETE FROM job WHERE pair = 1;
             UPDATE counter SET n = 1 WHERE stage = 4 AND status = 3",
         ),
         (
             "reason_missing",
-            "UPDATE job SET stage = 3, status = 4, made = (SELECT fingerprint FROM stage_result WHERE pair = 2 AND stage = 2)
+            "UPDATE job SET stage = 3, status = 4, fingerprint = (SELECT fingerprint FROM stage_result WHERE pair = 2 AND stage = 2)
             WHERE pair = 2;
             UPDATE counter SET n = 1 WHERE (stage, status) IN ((4, 3), (3, 4))",
         ),
@@ -239,7 +242,7 @@ fn indexes_that_disagree_with_their_tables_are_made_anew() {
     sql(&project, &meaning("0", "5"));
     sql(
         &project,
-        "UPDATE job SET stage = 0, status = 0; UPDATE counter SET n = 2 WHERE stage = 0 AND status = 0;
+        "UPDATE job SET stage = 0, status = 0, fingerprint = NULL; UPDATE counter SET n = 2 WHERE stage = 0 AND status = 0;
         UPDATE counter SET n = 0 WHERE stage = 4 AND status = 3",
     );
     sql(&project, &meaning("5", "0"));

@@ -12,9 +12,9 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::alike::{misremembered, unnoted};
-use crate::catalog::queue::counters::standings;
-use crate::catalog::queue::job_counts::{self, Census, by_fingerprint, by_status, census};
+use crate::catalog::queue::counters::CounterKey;
+use crate::catalog::queue::fragments::inconsistent;
+use crate::catalog::queue::job_counts::count_jobs;
 use crate::catalog::records::pair_work::{self, KnownInputs};
 use crate::catalog::records::stage_results;
 use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
@@ -27,8 +27,8 @@ const LINES: usize = 50;
 pub struct Drift {
     /// Counters that are off.
     pub counters: Vec<CounterDrift>,
-    /// What is kept to tell stale pairs without a look at each, a line each.
-    pub shortcuts: Vec<String>,
+    /// Fingerprints and dirty marks of jobs that do not agree with their results, one line each.
+    pub marks: Vec<String>,
 }
 
 /// A counter that does not say how many jobs there are.
@@ -80,13 +80,21 @@ const OBJECTS: &str = "
 SELECT type || ' ' || name, sql FROM sqlite_schema
 WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name <> '_sqlx_migrations' ORDER BY 1";
 
-const COUNTERS: &str = "SELECT stage, status, n FROM counter";
+const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter";
 
-const MADE: &str = "SELECT fingerprint, n FROM made";
+/// Fingerprints with the cursor of a job whose last result has them.
+const FINGERPRINTS: &str =
+    "SELECT 0 AS cursor, 0 AS id UNION ALL SELECT stage + 1, id FROM fingerprint";
 
-const KEPT_DRIFT: &str = concat!("SELECT count(*) FROM job WHERE ", misremembered!());
+const WRONG_FINGERPRINTS: &str = "
+SELECT count(*) FROM job AS j JOIN stage_result AS r ON r.pair = j.pair AND r.stage = j.stage - 1
+WHERE r.fingerprint IS NOT j.fingerprint";
 
-const MOVED_DRIFT: &str = concat!("SELECT count(*) FROM (", unnoted!(), ")");
+const UNMARKED: &str = concat!(
+    "SELECT count(*) FROM job WHERE dirty = 0 AND EXISTS (",
+    inconsistent!(),
+    ")"
+);
 
 pub(crate) const PAGE: &str = "
 SELECT p.id, p.name, p.mesh_path, p.mesh_hash, p.mesh_stat, p.print_path, p.print_hash, p.print_stat,
@@ -157,29 +165,25 @@ impl Catalog {
     pub async fn drift(&self, quick: bool) -> Result<Drift> {
         // All of one moment, so that a run that goes on beside it does not look like drift.
         let mut conn = self.snapshot().await?;
-        let counted = census(&mut conn, job_counts::ALL).await?;
-        let counters = counter_drift(&mut conn, &counted).await?;
-        let mut shortcuts = made_drift(&mut conn, &counted).await?;
-        let looks = [
+        let counters = counter_drift(&mut conn).await?;
+        let mut marks = Vec::new();
+        let checks = [
             (
-                KEPT_DRIFT,
-                "keep another fingerprint than that of their last result",
+                WRONG_FINGERPRINTS,
+                "have another fingerprint than that of their last result",
             ),
             (
-                MOVED_DRIFT,
-                "are not noted, though their files or attributes changed since",
+                UNMARKED,
+                "are not marked dirty, though their inputs or settings changed since",
             ),
         ];
-        for (sql, what) in looks.into_iter().filter(|_| !quick) {
+        for (sql, what) in checks.into_iter().filter(|_| !quick) {
             let pairs: i64 = sqlx::query_scalar(sql).fetch_one(&mut *conn).await?;
             if pairs > 0 {
-                shortcuts.push(format!("{pairs} pairs {what}"));
+                marks.push(format!("{pairs} pairs {what}"));
             }
         }
-        Ok(Drift {
-            counters,
-            shortcuts,
-        })
+        Ok(Drift { counters, marks })
     }
 
     /// The next pairs after one, by number, at most `limit`; empty at the end.
@@ -211,41 +215,31 @@ impl Catalog {
     }
 }
 
-/// Counters that are off.
-async fn counter_drift(conn: &mut SqliteConnection, counted: &Census) -> Result<Vec<CounterDrift>> {
-    let kept: Vec<(i64, i64, i64)> = sqlx::query_as(COUNTERS).fetch_all(conn).await?;
-    let counted = by_status(counted)?;
-    let drift = standings().filter_map(|(cursor, status)| {
-        let counted = counted.get(&(cursor, status)).copied().unwrap_or(0);
-        let mut kept = kept.iter();
-        let kept = kept.find(|(at, code, _)| (*at, *code) == (cursor, status.code()));
-        let kept = kept.map(|(.., n)| *n);
-        let is_right = kept.is_some_and(|kept| u64::try_from(kept) == Ok(counted));
+/// Compares the counters with the jobs.
+async fn counter_drift(conn: &mut SqliteConnection) -> Result<Vec<CounterDrift>> {
+    let stored: Vec<(i64, i64, i64, i64)> = sqlx::query_as(COUNTERS).fetch_all(&mut *conn).await?;
+    let stored = stored.into_iter();
+    let stored: BTreeMap<_, _> = stored
+        .map(|(cursor, status, fingerprint, n)| ((cursor, status, fingerprint), n))
+        .collect();
+    let counted = count_jobs(conn).await?;
+    let fingerprints: Vec<(i64, i64)> = sqlx::query_as(FINGERPRINTS).fetch_all(conn).await?;
+    let needed = fingerprints.into_iter().flat_map(|(cursor, fingerprint)| {
+        JobStatus::ALL.map(|status| CounterKey::new(cursor, status, Some(fingerprint)))
+    });
+    let keys: BTreeSet<_> = needed.chain(counted.keys().copied()).collect();
+    let drift = keys.into_iter().filter_map(|key| {
+        let counted = counted.get(&key).copied().unwrap_or(0);
+        let stored = stored.get(&(key.cursor, key.status.code(), key.fingerprint));
+        let is_right = stored.is_some_and(|n| u64::try_from(*n) == Ok(counted));
         (!is_right).then_some(CounterDrift {
-            cursor,
-            status,
-            kept,
+            cursor: key.cursor,
+            status: key.status,
+            kept: stored.copied(),
             counted,
         })
     });
     Ok(drift.collect())
-}
-
-/// Counters of fingerprints that are off, a line each.
-async fn made_drift(conn: &mut SqliteConnection, counted: &Census) -> Result<Vec<String>> {
-    let kept: Vec<(i64, i64)> = sqlx::query_as(MADE).fetch_all(conn).await?;
-    let kept: BTreeMap<i64, i64> = kept.into_iter().collect();
-    let counted = by_fingerprint(counted);
-    let fingerprints: BTreeSet<_> = kept.keys().chain(counted.keys()).collect();
-    let lines = fingerprints.into_iter().filter_map(|fingerprint| {
-        let kept = kept.get(fingerprint).copied().unwrap_or(0);
-        let counted = counted.get(fingerprint).copied().unwrap_or(0);
-        let is_off = u64::try_from(kept) != Ok(counted);
-        is_off.then(|| {
-            format!("the counter of fingerprint {fingerprint} says {kept}, there are {counted}")
-        })
-    });
-    Ok(lines.collect())
 }
 
 /// See [`Catalog::integrity`].

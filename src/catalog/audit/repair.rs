@@ -7,16 +7,15 @@ use crate::catalog::audit::integrity::{integrity, objects, wanted_objects};
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::db::rows::array;
-use crate::catalog::db::script::Script;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::alike::{made, misremembered, unnoted};
-use crate::catalog::queue::counters::{Deltas, cursor, standings};
-use crate::catalog::queue::job_counts::{self, by_fingerprint, by_status, census};
+use crate::catalog::queue::counters::{CounterKey, Deltas};
+use crate::catalog::queue::fragments::{fingerprint_before, inconsistent};
+use crate::catalog::queue::job_counts::count_jobs;
 use crate::domain::{JobStatus, PairId, Stage};
 
-const STANDING: &str = "
-SELECT item.value ->> 0 AS pair, item.value ->> 1 AS to_stage, j.stage, j.status
-FROM json_each(?1) AS item LEFT JOIN job AS j ON j.pair = item.value ->> 0";
+const POSITIONS: &str = "
+SELECT j.stage, j.status, j.fingerprint
+FROM json_each(?1) AS item CROSS JOIN job AS j ON j.pair = item.value ->> 0";
 
 const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
@@ -28,33 +27,36 @@ pub(crate) const RESTORE: &str = concat!(
     "
 UPDATE job SET stage = min(stage, item.value ->> 1), status = 0, run_at = NULL, prio = 0,
     attempt = 0, crashes = 0, exclusive = 0, worker = NULL, deadline = NULL, token = token + 1,
-    made = ",
-    made!("min(job.stage, item.value ->> 1)"),
+    fingerprint = ",
+    fingerprint_before!("min(job.stage, item.value ->> 1)"),
     "
-FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0"
+FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0
+RETURNING pair, stage, fingerprint"
 );
 
-const FORGET: &str = "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
+const CLEAR_FAILURES: &str =
+    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
 
-const RECOUNT: &str = "
-INSERT INTO counter (stage, status, n) SELECT value ->> 0, value ->> 1, value ->> 2 FROM json_each(?1)
-WHERE true ON CONFLICT (stage, status) DO UPDATE SET n = excluded.n";
-
-const REMAKE: &str = concat!(
-    "UPDATE job SET made = ",
-    made!("job.stage"),
-    " WHERE ",
-    misremembered!()
-);
-
-/// The trigger counts along, and what was off is off still.
-const RECOUNT_MADE: [&str; 2] = [
-    "DELETE FROM made",
-    "INSERT INTO made SELECT value ->> 0, value ->> 1 FROM json_each(?1)",
+/// Every counter that the catalog needs, at 0.
+const RESET_COUNTERS: [&str; 3] = [
+    "DELETE FROM counter",
+    "INSERT INTO counter (stage, status, fingerprint, n) SELECT 0, value, 0, 0 FROM json_each('[0,1,2,3,4]')",
+    "INSERT INTO counter (stage, status, fingerprint, n)
+    SELECT f.stage + 1, s.value, f.id, 0 FROM fingerprint AS f, json_each('[0,1,2,3,4]') AS s",
 ];
 
-/// One too many does no harm: a run takes out those that it has looked after.
-const NOTE_MOVED: &str = concat!("INSERT INTO moved ", unnoted!());
+const FIX_FINGERPRINTS: &str = concat!(
+    "UPDATE job SET fingerprint = ",
+    fingerprint_before!("job.stage"),
+    " WHERE fingerprint IS NOT ",
+    fingerprint_before!("job.stage")
+);
+
+const MARK_DIRTY: &str = concat!(
+    "UPDATE job SET dirty = 1 WHERE dirty = 0 AND EXISTS (",
+    inconsistent!(),
+    ")"
+);
 
 impl Catalog {
     /// Puts pairs back to be done, each from a stage on; a pair without a job gets one. The counters must be right
@@ -67,27 +69,21 @@ impl Catalog {
             .await
     }
 
-    /// Sets every counter to the number of jobs there are, and makes anew what jobs keep of their results.
+    /// Sets each job's fingerprint and dirty mark by its results, and every counter to its number of jobs.
     ///
     /// # Errors
     /// When the database refuses.
     pub async fn rebuild_counters(&self) -> Result<()> {
         self.in_transaction(|conn| {
             Box::pin(async move {
-                sqlx::query(REMAKE).execute(&mut *conn).await?;
-                let counted = census(conn, job_counts::ALL).await?;
-                let by_status = by_status(&counted)?;
-                let counters = standings().map(|(cursor, status)| {
-                    let jobs = by_status.get(&(cursor, status)).copied().unwrap_or(0);
-                    json!([cursor, status.code(), jobs])
-                });
-                let made = by_fingerprint(&counted).into_iter();
-                let made = made.map(|(fingerprint, jobs)| json!([fingerprint, jobs]));
-                let mut script = Script::default();
-                script.add(&[RECOUNT]).bind(array(counters).to_string())?;
-                script.add(&RECOUNT_MADE).bind(array(made).to_string())?;
-                script.add(&[NOTE_MOVED]);
-                script.run(conn).await?;
+                for sql in [FIX_FINGERPRINTS, MARK_DIRTY].iter().chain(&RESET_COUNTERS) {
+                    sqlx::query(*sql).execute(&mut *conn).await?;
+                }
+                let mut deltas = Deltas::default();
+                for (key, jobs) in count_jobs(conn).await? {
+                    deltas.add(key, jobs.cast_signed());
+                }
+                deltas.apply(conn).await?;
                 Ok(())
             })
         })
@@ -133,23 +129,30 @@ impl Catalog {
 async fn restore(conn: &mut SqliteConnection, pairs: &[(PairId, Stage)]) -> Result<()> {
     let items = pairs.iter();
     let items = array(items.map(|(pair, stage)| json!([pair.0, stage.index()]))).to_string();
-    let standing = sqlx::query(STANDING)
+    let mut deltas = Deltas::default();
+    let before = sqlx::query(POSITIONS)
         .bind(&items)
         .fetch_all(&mut *conn)
         .await?;
-    for sql in [NEW_JOBS, RESTORE, FORGET] {
-        sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
+    for row in &before {
+        let (cursor, status): (i64, i64) = (row.try_get("stage")?, row.try_get("status")?);
+        let key = CounterKey::new(cursor, rows::status(status)?, row.try_get("fingerprint")?);
+        deltas.add(key, -1);
     }
-    let mut deltas = Deltas::default();
-    for row in &standing {
-        let (to, at): (i64, Option<i64>) = (row.try_get("to_stage")?, row.try_get("stage")?);
-        let status: Option<i64> = row.try_get("status")?;
-        match (at, status.map(rows::status).transpose()?) {
-            (Some(at), Some(status)) => {
-                deltas.moved((at, status), (at.min(to), JobStatus::Ready));
-            }
-            _ => deltas.add((cursor(Stage::Fit), JobStatus::Ready), 1),
-        }
+    sqlx::query(NEW_JOBS)
+        .bind(&items)
+        .execute(&mut *conn)
+        .await?;
+    let after: Vec<(i64, i64, Option<i64>)> = sqlx::query_as(RESTORE)
+        .bind(&items)
+        .fetch_all(&mut *conn)
+        .await?;
+    for (_, cursor, fingerprint) in after {
+        deltas.add(CounterKey::new(cursor, JobStatus::Ready, fingerprint), 1);
     }
+    sqlx::query(CLEAR_FAILURES)
+        .bind(&items)
+        .execute(&mut *conn)
+        .await?;
     deltas.apply(conn).await
 }

@@ -3,7 +3,7 @@
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout_at};
 
-use crate::catalog::db::commit_delay::Company;
+use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::group_commit::Batch;
 use crate::catalog::db::writer::Message;
 
@@ -11,7 +11,7 @@ use crate::catalog::db::writer::Message;
 const BATCH: usize = 256;
 
 /// What has come so far.
-struct Gathering {
+struct BatchCollector {
     batch: Batch,
     /// Until when to wait for more; `None` where somebody waits for an answer.
     until: Option<Instant>,
@@ -19,15 +19,15 @@ struct Gathering {
     other: Option<Message>,
 }
 
-impl Gathering {
+impl BatchCollector {
     fn take(&mut self, message: Message) {
         match message {
-            Message::InTime(request) => self.batch.push(request),
+            Message::Deferrable(request) => self.batch.push(request),
             Message::Grouped(request) => {
                 self.batch.push(request);
                 self.until = None;
             }
-            Message::Hurry => self.until = None,
+            Message::Flush => self.until = None,
             other @ (Message::Transaction(_) | Message::Close(_)) => self.other = Some(other),
         }
     }
@@ -39,38 +39,38 @@ impl Gathering {
 
 /// The batch that begins with this message, and the message after it that is no request. Whoever was answered by the
 /// last commit is given the turn first: the next request is often already on its way.
-pub(crate) async fn gather(
+pub(crate) async fn collect(
     first: Message,
-    company: &Company,
+    delay: &CommitDelay,
     inbox: &mut mpsc::Receiver<Message>,
 ) -> (Batch, Option<Message>) {
-    let mut gathering = Gathering {
+    let mut collector = BatchCollector {
         batch: Batch::default(),
-        until: company.until(),
+        until: delay.until(),
         other: None,
     };
-    gathering.take(first);
+    collector.take(first);
     loop {
         tokio::task::yield_now().await;
-        let before = gathering.batch.len();
-        while !gathering.is_full()
+        let before = collector.batch.len();
+        while !collector.is_full()
             && let Ok(message) = inbox.try_recv()
         {
-            gathering.take(message);
+            collector.take(message);
         }
-        if gathering.is_full() {
+        if collector.is_full() {
             break;
         }
-        match gathering.until {
+        match collector.until {
             Some(until) => match timeout_at(until, inbox.recv()).await {
-                Ok(Some(message)) => gathering.take(message),
+                Ok(Some(message)) => collector.take(message),
                 Ok(None) | Err(_) => break,
             },
-            None if gathering.batch.len() == before => break,
+            None if collector.batch.len() == before => break,
             None => {}
         }
     }
-    (gathering.batch, gathering.other)
+    (collector.batch, collector.other)
 }
 
 #[cfg(test)]
@@ -80,11 +80,12 @@ mod tests {
     use tokio::sync::{mpsc, oneshot};
     use tokio::time::timeout;
 
-    use super::{BATCH, gather};
+    use super::{BATCH, collect};
     use crate::catalog::Catalog;
-    use crate::catalog::db::commit_delay::Company;
-    use crate::catalog::db::group_commit::{Heartbeat, Request};
+    use crate::catalog::db::commit_delay::CommitDelay;
+    use crate::catalog::db::request::Request;
     use crate::catalog::db::writer::Message;
+    use crate::catalog::queue::claim::Heartbeat;
     use crate::domain::WorkerId;
 
     fn request() -> Request {
@@ -103,7 +104,7 @@ mod tests {
 
     /// The same, where some come when it is waited for more.
     async fn gathered_later(messages: Vec<Message>, later: Vec<Message>) -> usize {
-        let company = Company::of(Duration::from_hours(1));
+        let delay = CommitDelay::of(Duration::from_hours(1));
         let (sender, mut inbox) = mpsc::channel(messages.len());
         for message in messages {
             sender.send(message).await.expect("room");
@@ -116,14 +117,14 @@ mod tests {
             }
         });
         let first = inbox.recv().await.expect("a message");
-        let batch = gather(first, &company, &mut inbox);
+        let batch = collect(first, &delay, &mut inbox);
         let batch = timeout(Duration::from_secs(20), batch).await;
         batch.expect("it does not wait").0.len()
     }
 
     #[tokio::test]
     async fn what_can_wait_goes_with_what_cannot() {
-        let waits = Message::InTime;
+        let waits = Message::Deferrable;
         assert_eq!(
             gathered(vec![
                 waits(request()),
@@ -142,20 +143,20 @@ mod tests {
     #[tokio::test]
     async fn what_comes_while_something_waits_goes_with_it() {
         let later = vec![
-            Message::InTime(request()),
-            Message::InTime(request()),
-            Message::Hurry,
+            Message::Deferrable(request()),
+            Message::Deferrable(request()),
+            Message::Flush,
         ];
         assert_eq!(
-            gathered_later(vec![Message::InTime(request())], later).await,
+            gathered_later(vec![Message::Deferrable(request())], later).await,
             3
         );
     }
 
     #[tokio::test]
     async fn nothing_is_waited_for_when_somebody_is_in_a_hurry_or_closes() {
-        let waits = Message::InTime;
-        assert_eq!(gathered(vec![waits(request()), Message::Hurry]).await, 1);
+        let waits = Message::Deferrable;
+        assert_eq!(gathered(vec![waits(request()), Message::Flush]).await, 1);
         let close = Message::Close(oneshot::channel().0);
         assert_eq!(gathered(vec![waits(request()), close]).await, 1);
     }
@@ -165,7 +166,7 @@ mod tests {
         let catalog = tempfile::tempdir().expect("a temporary directory");
         let path = catalog.path().join("catalog.sqlite");
         let catalog = Catalog::create_patient(&path).await.expect("a catalog");
-        let until = || catalog.company.until();
+        let until = || catalog.delay.until();
         assert!(until().is_some());
         let waiting = [catalog.waiting().await, catalog.waiting().await];
         let [one, other] = waiting.map(|waiting| waiting.expect("it is open"));
@@ -177,7 +178,7 @@ mod tests {
 
     #[tokio::test]
     async fn a_full_commit_waits_for_no_more_and_leaves_the_rest() {
-        let messages = (0..=BATCH).map(|_| Message::InTime(request()));
+        let messages = (0..=BATCH).map(|_| Message::Deferrable(request()));
         assert_eq!(gathered(messages.collect()).await, BATCH);
     }
 }

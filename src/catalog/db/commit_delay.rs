@@ -1,4 +1,4 @@
-//! Waiting for company: a request that can wait does so for a while, for others to share its commit.
+//! Waiting for delay: a request that can wait does so for a while, for others to share its commit.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,21 +6,17 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-use crate::catalog::db::error::Result;
-use crate::catalog::db::writer::Message;
-use crate::catalog::handle::Catalog;
-
 /// How long a request that can wait does so at most. A process that is killed loses what it finished in that time.
 const LONGEST: Duration = Duration::from_millis(250);
 
 /// Who waits for whom, as the writer and those who send to it know it.
 #[derive(Debug)]
-pub(crate) struct Company {
+pub(crate) struct CommitDelay {
     longest: Duration,
     waiting: AtomicUsize,
 }
 
-impl Company {
+impl CommitDelay {
     /// As in a run.
     pub(crate) fn new() -> Arc<Self> {
         Self::of(LONGEST)
@@ -39,25 +35,20 @@ impl Company {
     }
 }
 
-/// Somebody who waits for what was sent to the catalog: as long as this lives, no commit waits for company.
+/// Somebody who waits for what was sent to the catalog: as long as this lives, no commit waits for delay.
 #[derive(Debug)]
-pub struct Waiting(Arc<Company>);
+pub struct Waiting(Arc<CommitDelay>);
+
+impl Waiting {
+    /// Turns the delay off until the result is dropped.
+    pub(crate) fn new(delay: &Arc<CommitDelay>) -> Self {
+        delay.waiting.fetch_add(1, Ordering::Relaxed);
+        Self(Arc::clone(delay))
+    }
+}
 
 impl Drop for Waiting {
     fn drop(&mut self) {
         self.0.waiting.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
-impl Catalog {
-    /// Has stored at once what was sent, and what is sent while the answer lives.
-    ///
-    /// # Errors
-    /// When the catalog is closed.
-    pub async fn waiting(&self) -> Result<Waiting> {
-        self.company.waiting.fetch_add(1, Ordering::Relaxed);
-        let waiting = Waiting(Arc::clone(&self.company));
-        self.send(Message::Hurry).await?;
-        Ok(waiting)
     }
 }

@@ -1,58 +1,33 @@
-//! One group commit: requests in their order of weight, one statement for all of a kind.
+//! One group commit: the requests by kind, one statement for all requests of a kind, two round trips in all.
 
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row as _, SqliteConnection};
-use tokio::sync::oneshot;
+use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
-use crate::catalog::db::script::Script;
-use crate::catalog::queue::checkpoint;
-use crate::catalog::queue::checkpoint::Steps;
-use crate::catalog::queue::claim::{self, ClaimRequest};
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::request::{Reply, Request};
+use crate::catalog::db::script::{Script, ScriptRows, Statement};
+use crate::catalog::queue::checkpoint::{self, StoredStages};
+use crate::catalog::queue::claim::{self, ClaimRequest, ClaimedRow, Heartbeat};
 use crate::catalog::queue::counters::Deltas;
-use crate::catalog::queue::fail;
-use crate::catalog::queue::lease::{Lease, StageCheckpoint, StageFailure};
-use crate::domain::{UnixMillis, WorkerId};
+use crate::catalog::queue::fail::{self, FailedRow};
+use crate::catalog::queue::lease::{FencedRow, Lease, StageCheckpoint, StageFailure};
 
-/// Where an answer goes.
-pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;
-
-/// A sign of life.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Heartbeat {
-    pub(crate) worker: WorkerId,
-    pub(crate) now: UnixMillis,
-    pub(crate) alive_since: UnixMillis,
-}
-
-/// A request that may share a commit. The lease travels with it and comes back only if it still holds.
-pub(crate) enum Request {
-    Heartbeat(Heartbeat, Reply<bool>),
-    Checkpoint(Box<Steps>, Reply<bool>),
-    Fail(Box<(Lease, StageFailure)>, Reply<bool>),
-    Release(Lease, Reply<bool>),
-    Claim(ClaimRequest, Reply<Vec<Lease>>),
-}
-
-/// Something to be stored under a lease, and where to say whether it was.
-type Under<T> = (Box<(Lease, T)>, Reply<bool>);
+/// Something to be stored under a lease, and where to reply whether it was.
+type Leased<T> = (Box<(Lease, T)>, Reply<bool>);
 
 /// Requests of one commit by kind.
 #[derive(Default)]
 pub(crate) struct Batch {
     heartbeats: Vec<(Heartbeat, Reply<bool>)>,
-    checkpoints: Vec<Under<Vec<StageCheckpoint>>>,
-    failures: Vec<Under<StageFailure>>,
+    checkpoints: Vec<Leased<Vec<StageCheckpoint>>>,
+    failures: Vec<Leased<StageFailure>>,
     releases: Vec<(Lease, Reply<bool>)>,
     claims: Vec<(ClaimRequest, Reply<Vec<Lease>>)>,
 }
 
-/// Answers to the requests of a batch, in their order.
-pub(crate) struct Answers {
+/// Replies to the requests of a batch, in their order.
+pub(crate) struct BatchReply {
     heartbeats: Vec<bool>,
     checkpoints: Vec<bool>,
     failures: Vec<bool>,
@@ -60,44 +35,13 @@ pub(crate) struct Answers {
     claims: Vec<Vec<Lease>>,
 }
 
-/// What the changed rows of workers and jobs tell.
-#[derive(Default)]
-struct Told {
-    /// Workers whose heartbeat came in time.
-    alive: BTreeSet<i64>,
-    /// Leases that held, by pair and token.
-    held: BTreeSet<(i64, i64)>,
-    /// Jobs of the first claim.
-    taken: Vec<SqliteRow>,
-}
-
-impl Told {
-    /// Beats return one column, writes under a lease two, claims more.
-    fn of(rows: Vec<SqliteRow>) -> Result<Self> {
-        let mut told = Self::default();
-        for row in rows {
-            match row.len() {
-                1 => drop(told.alive.insert(row.try_get(0)?)),
-                2 => drop(told.held.insert((row.try_get(0)?, row.try_get(1)?))),
-                _ => told.taken.push(row),
-            }
-        }
-        Ok(told)
-    }
-
-    fn holds(&self, lease: &Lease) -> bool {
-        self.held.contains(&(lease.pair.0, lease.token))
-    }
-
-    fn each<'l>(&self, leases: impl Iterator<Item = &'l Lease>) -> Vec<bool> {
-        leases.map(|lease| self.holds(lease)).collect()
-    }
-
-    /// What is to be stored under leases that held.
-    fn under<'i, T>(&self, items: &'i [Under<T>]) -> Vec<&'i (Lease, T)> {
-        let items = items.iter().map(|(item, _)| &**item);
-        items.filter(|(lease, _)| self.holds(lease)).collect()
-    }
+/// The statements of the first round trip, which change workers and jobs as far as leases hold.
+struct JobStatements {
+    heartbeats: Vec<Statement<(i64,)>>,
+    advanced: Option<Statement<FencedRow>>,
+    failed: Option<Statement<FailedRow>>,
+    released: Option<Statement<FencedRow>>,
+    claims: Vec<Statement<ClaimedRow>>,
 }
 
 impl Batch {
@@ -119,89 +63,110 @@ impl Batch {
             + self.claims.len()
     }
 
-    /// Runs the requests in a transaction of their own: heartbeats, checkpoints, failures, releases, claims. After an error
-    /// that transaction may still be open.
-    pub(crate) async fn apply(&self, conn: &mut SqliteConnection) -> Result<Answers> {
-        let mut deltas = Deltas::default();
-        let (told, claims) = self.ask(conn, &mut deltas).await?;
-        let done = told.under(&self.checkpoints);
-        let failed = told.under(&self.failures);
-        let released = self.releases.iter().map(|(lease, _)| lease);
+    /// Runs the requests in one transaction: heartbeats, checkpoints, failures, releases, claims. After an error that
+    /// transaction may still be open.
+    pub(crate) async fn apply(&self, conn: &mut SqliteConnection) -> Result<BatchReply> {
         let mut script = Script::default();
-        checkpoint::store(&mut script, &done, &mut deltas)?;
-        fail::store(&mut script, &failed, &mut deltas)?;
-        claim::given_back(released.filter(|lease| told.holds(lease)), &mut deltas);
-        deltas.write(&mut script)?;
-        script.add(&["COMMIT"]);
+        script.execute("BEGIN IMMEDIATE");
+        let statements = self.add_jobs(&mut script)?;
+        let rows = script.run(conn).await?;
+        let mut script = Script::default();
+        let reply = self.add_records(&mut script, &statements, &rows)?;
+        script.execute("COMMIT");
         script.run(conn).await?;
+        Ok(reply)
+    }
+
+    /// Adds what changes workers and jobs.
+    fn add_jobs(&self, script: &mut Script) -> Result<JobStatements> {
         let heartbeats = self.heartbeats.iter();
-        Ok(Answers {
-            heartbeats: heartbeats
-                .map(|(heartbeat, _)| told.alive.contains(&heartbeat.worker.0))
+        let heartbeats = heartbeats.map(|(heartbeat, _)| claim::add_heartbeat(script, *heartbeat));
+        let heartbeats = heartbeats.collect::<Result<_>>()?;
+        let checkpoints = self.checkpoints.iter().map(|(item, _)| &**item);
+        let failures = self.failures.iter().map(|(item, _)| &**item);
+        let releases = self.releases.iter().map(|(lease, _)| lease);
+        Ok(JobStatements {
+            heartbeats,
+            advanced: checkpoint::add_advance(script, checkpoints)?,
+            failed: fail::add_failures(script, failures)?,
+            released: claim::add_release(script, releases)?,
+            claims: self
+                .claims
+                .iter()
+                .map(|(request, _)| claim::add_claim(script, request))
+                .collect::<Result<_>>()?,
+        })
+    }
+
+    /// Adds what is stored beside the jobs that changed, and returns the replies.
+    fn add_records(
+        &self,
+        script: &mut Script,
+        statements: &JobStatements,
+        rows: &ScriptRows,
+    ) -> Result<BatchReply> {
+        let mut deltas = Deltas::default();
+        let advanced = rows.read_if_any(statements.advanced.as_ref())?;
+        let failed = rows.read_if_any(statements.failed.as_ref())?;
+        let released = rows.read_if_any(statements.released.as_ref())?;
+        let heartbeats = statements.heartbeats.iter();
+        let heartbeats = heartbeats.map(|statement| Ok(!rows.read(statement)?.is_empty()));
+        let mut claims = Vec::with_capacity(self.claims.len());
+        for ((request, _), statement) in self.claims.iter().zip(&statements.claims) {
+            let claimed = rows.read(statement)?;
+            claims.push(claim::leases(claimed, request.worker, &mut deltas)?);
+        }
+        let stored: Vec<&StoredStages> = self
+            .checkpoints
+            .iter()
+            .map(|(item, _)| &**item)
+            .filter(|(lease, _)| lease.is_in(&advanced))
+            .collect();
+        checkpoint::add_results(script, &stored, &mut deltas)?;
+        let failures = self.failures.iter().filter_map(|(item, _)| {
+            let row = fail::row_of(&item.0, &failed)?;
+            Some((&**item, row))
+        });
+        fail::add_failure_records(script, &failures.collect::<Vec<_>>(), &mut deltas)?;
+        let releases = self.releases.iter().map(|(lease, _)| lease);
+        claim::count_released(releases.filter(|lease| lease.is_in(&released)), &mut deltas);
+        deltas.add_to(script)?;
+        let checkpoints = self.checkpoints.iter();
+        let failures = self.failures.iter();
+        let releases = self.releases.iter();
+        Ok(BatchReply {
+            heartbeats: heartbeats.collect::<Result<_>>()?,
+            checkpoints: checkpoints
+                .map(|(item, _)| item.0.is_in(&advanced))
                 .collect(),
-            checkpoints: told.each(self.checkpoints.iter().map(|(item, _)| &item.0)),
-            failures: told.each(self.failures.iter().map(|(item, _)| &item.0)),
-            releases: told.each(self.releases.iter().map(|(lease, _)| lease)),
+            failures: failures
+                .map(|(item, _)| fail::row_of(&item.0, &failed).is_some())
+                .collect(),
+            releases: releases.map(|(lease, _)| lease.is_in(&released)).collect(),
             claims,
         })
     }
 
-    /// Begins the transaction and changes workers and jobs, as far as leases hold.
-    async fn ask(
-        &self,
-        conn: &mut SqliteConnection,
-        deltas: &mut Deltas,
-    ) -> Result<(Told, Vec<Vec<Lease>>)> {
-        let mut script = Script::default();
-        script.add(&["BEGIN IMMEDIATE"]);
-        for (heartbeat, _) in &self.heartbeats {
-            claim::heartbeat(&mut script, *heartbeat)?;
-        }
-        checkpoint::step(
-            &mut script,
-            self.checkpoints.iter().map(|(item, _)| &**item),
-        )?;
-        fail::step(&mut script, self.failures.iter().map(|(item, _)| &**item))?;
-        claim::release(&mut script, self.releases.iter().map(|(lease, _)| lease))?;
-        let mut requests = self.claims.iter().map(|(request, _)| request);
-        let first = requests.next();
-        if let Some(request) = first {
-            claim::take(&mut script, request)?;
-        }
-        let told = Told::of(script.run(conn).await?)?;
-        let mut claims = Vec::with_capacity(self.claims.len());
-        if let Some(request) = first {
-            claims.push(claim::taken(&told.taken, request, deltas)?);
-        }
-        // A process asks for all it wants at once, so more than one are rare.
-        for request in requests {
-            let mut script = Script::default();
-            claim::take(&mut script, request)?;
-            claims.push(claim::taken(&script.run(conn).await?, request, deltas)?);
-        }
-        Ok((told, claims))
-    }
-
-    /// Tells everybody what became of the request. Whoever does not wait any more gets no answer.
-    pub(crate) fn answer(self, answers: Answers) {
-        for ((_, reply), alive) in self.heartbeats.into_iter().zip(answers.heartbeats) {
+    /// Sends the replies. Senders that no longer wait get none.
+    pub(crate) fn answer(self, replies: BatchReply) {
+        for ((_, reply), alive) in self.heartbeats.into_iter().zip(replies.heartbeats) {
             let _ = reply.send(Ok(alive));
         }
-        for ((_, reply), kept) in self.checkpoints.into_iter().zip(answers.checkpoints) {
+        for ((_, reply), kept) in self.checkpoints.into_iter().zip(replies.checkpoints) {
             let _ = reply.send(Ok(kept));
         }
-        for ((_, reply), kept) in self.failures.into_iter().zip(answers.failures) {
+        for ((_, reply), kept) in self.failures.into_iter().zip(replies.failures) {
             let _ = reply.send(Ok(kept));
         }
-        for ((_, reply), kept) in self.releases.into_iter().zip(answers.releases) {
+        for ((_, reply), kept) in self.releases.into_iter().zip(replies.releases) {
             let _ = reply.send(Ok(kept));
         }
-        for ((_, reply), leases) in self.claims.into_iter().zip(answers.claims) {
+        for ((_, reply), leases) in self.claims.into_iter().zip(replies.claims) {
             let _ = reply.send(Ok(leases));
         }
     }
 
-    /// Tells everybody that nothing was stored.
+    /// Replies to all requests that nothing was stored.
     pub(crate) fn refuse(self, error: &Arc<CatalogError>) {
         let shared = || CatalogError::Shared(Arc::clone(error));
         let replies = self.heartbeats.into_iter().map(|(_, reply)| reply);

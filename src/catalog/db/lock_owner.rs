@@ -2,9 +2,7 @@
 
 use std::fmt;
 use std::os::unix::fs::MetadataExt as _;
-use std::path::Path;
-
-use crate::catalog::db::open::beside;
+use std::path::{Path, PathBuf};
 
 /// The byte of the index beside the log that whoever writes has locked (SQLite's file format, "WAL-index locks").
 const WRITE_LOCK: &str = "120";
@@ -32,7 +30,7 @@ impl fmt::Display for LockOwner {
 /// The process that has the catalog locked for writing; `None` where there is none, or the system does not tell. No
 /// file of the catalog is opened: closing it again would drop the locks of this process's own connections.
 pub fn lock_owner(catalog: &Path) -> Option<LockOwner> {
-    let index = std::fs::metadata(beside(catalog, "-shm")).ok()?;
+    let index = std::fs::metadata(sidecar(catalog, "-shm")).ok()?;
     let device = index.dev();
     let (major, minor) = (rustix::fs::major(device), rustix::fs::minor(device));
     let file = format!("{major:02x}:{minor:02x}:{}", index.ino());
@@ -43,6 +41,13 @@ pub fn lock_owner(catalog: &Path) -> Option<LockOwner> {
         pid,
         is_stopped: is_stopped(&state),
     })
+}
+
+/// Returns the path of a file that SQLite keeps next to the catalog, such as `-wal`.
+pub(crate) fn sidecar(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    PathBuf::from(name)
 }
 
 /// Whose lock a line of `/proc/locks` tells of, when it is the one for writing to this catalog.

@@ -10,6 +10,7 @@ pub(crate) mod group_commit;
 pub(crate) mod lock_owner;
 pub(crate) mod network_fs;
 pub(crate) mod open;
+pub(crate) mod request;
 pub(crate) mod rows;
 pub(crate) mod script;
 pub(crate) mod writer;

@@ -1,7 +1,7 @@
 //! Opening the database: the right file, the right disk, the right settings, read back.
 
 use std::io::Read as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use sqlx::sqlite::{
@@ -13,6 +13,7 @@ use crate::catalog::db::busy_retry::BusyRetry;
 use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::error_kind::CatalogErrorKind;
+use crate::catalog::db::lock_owner::sidecar;
 use crate::catalog::db::network_fs;
 use crate::domain::FileKind;
 
@@ -133,7 +134,7 @@ async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
 
 /// Readers of a file that nobody can change. Only a log that was folded back can be left out of sight.
 async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identity)> {
-    let log = beside(path, "-wal");
+    let log = sidecar(path, "-wal");
     match std::fs::metadata(&log) {
         Ok(meta) if meta.len() > 0 => Err(CatalogError::UnfoldedLog(log)),
         Ok(_) | Err(_) if std::fs::File::open(path).is_err() => Err(error),
@@ -152,13 +153,6 @@ async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
         .await?;
     let found = identity(&mut *pool.acquire().await?).await?;
     Ok((pool, found))
-}
-
-/// A file that SQLite keeps beside the catalog.
-pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(ending);
-    PathBuf::from(name)
 }
 
 /// What lies where the catalog should be, before the database is let near it: an empty file would pass for a new

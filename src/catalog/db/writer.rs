@@ -8,13 +8,14 @@ use std::time::Duration;
 use sqlx::{Connection as _, SqliteConnection};
 use tokio::sync::{mpsc, oneshot};
 
-use crate::catalog::db::batch_collector::gather;
+use crate::catalog::db::batch_collector::collect;
 use crate::catalog::db::busy_retry::BusyRetry;
-use crate::catalog::db::commit_delay::Company;
+use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::error_kind::CatalogErrorKind;
-use crate::catalog::db::group_commit::{Answers, Batch, Request};
+use crate::catalog::db::group_commit::{Batch, BatchReply};
+use crate::catalog::db::request::Request;
 
 /// Commits after which the write-ahead log is folded back even while there is work; about 4 MiB of log.
 const COMMITS_PER_CHECKPOINT: u32 = 128;
@@ -32,9 +33,9 @@ pub(crate) enum Message {
     /// Goes into the next group commit.
     Grouped(Request),
     /// The same, but that commit may wait a little for others to share it.
-    InTime(Request),
+    Deferrable(Request),
     /// Somebody waits: the next commit is to wait no longer.
-    Hurry,
+    Flush,
     /// Runs in its own transaction.
     Transaction(TransactionTask),
     /// Ends the writer when all before it is done.
@@ -46,7 +47,7 @@ pub(crate) async fn run(
     mut conn: SqliteConnection,
     path: Arc<Path>,
     mut inbox: mpsc::Receiver<Message>,
-    company: Arc<Company>,
+    delay: Arc<CommitDelay>,
 ) {
     let mut commits = 0_u32;
     let closing = loop {
@@ -65,14 +66,14 @@ pub(crate) async fn run(
             Some(Message::Close(done)) => break Some(done),
             Some(Message::Transaction(work)) => work(&mut conn).await,
             // What it was sent for is stored already.
-            Some(Message::Hurry) => continue,
-            Some(first @ (Message::Grouped(_) | Message::InTime(_))) => {
-                let (batch, after) = gather(first, &company, &mut inbox).await;
+            Some(Message::Flush) => continue,
+            Some(first @ (Message::Grouped(_) | Message::Deferrable(_))) => {
+                let (batch, after) = collect(first, &delay, &mut inbox).await;
                 commit(&mut conn, &path, batch).await;
                 match after {
                     Some(Message::Close(done)) => break Some(done),
                     Some(Message::Transaction(work)) => work(&mut conn).await,
-                    Some(Message::Grouped(_) | Message::InTime(_) | Message::Hurry) | None => {}
+                    Some(Message::Grouped(_) | Message::Deferrable(_) | Message::Flush) | None => {}
                 }
             }
         }
@@ -117,7 +118,7 @@ fn is_of_the_file(error: &CatalogError) -> bool {
     trouble.is_some_and(|trouble| trouble != CatalogErrorKind::Contradiction)
 }
 
-async fn attempt(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Result<Answers> {
+async fn attempt(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Result<BatchReply> {
     let mut retry = BusyRetry::begin(path);
     loop {
         let outcome = batch.apply(conn).await;

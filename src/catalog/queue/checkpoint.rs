@@ -4,28 +4,27 @@ use serde::Serialize;
 use serde_json::json;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::group_commit::Request;
-use crate::catalog::db::script::Script;
-use crate::catalog::db::writer::Message;
-use crate::catalog::handle::Catalog;
-use crate::catalog::queue::counters::{Cursor, DONE, Deltas, cursor};
+use crate::catalog::db::script::{Script, Statement};
+use crate::catalog::queue::counters::{CounterKey, Cursor, DONE, Deltas, cursor};
 use crate::catalog::queue::lease::{
-    CheckpointOutcome, FingerprintId, InputVersions, Lease, StageCheckpoint,
+    FencedRow, FingerprintId, InputVersions, Lease, StageCheckpoint,
 };
 use crate::domain::{ContentHash, JobStatus, MetricOutcome, PairId, Stage, UnixMillis};
 use crate::failpoint::{self, Point};
 
 /// A lease and the stages to be stored under it, in the order they were computed.
-pub(crate) type Steps = (Lease, Vec<StageCheckpoint>);
+pub(crate) type StoredStages = (Lease, Vec<StageCheckpoint>);
 
-/// The job's step; only where the lease still holds and its worker has given a sign of life lately. Progress clears the pair of suspicion.
-pub(crate) const STEP: &str = "
+/// Advances jobs whose lease still holds and whose worker is alive. A stage that succeeds clears the suspicion that the
+/// pair kills workers. A result that does not follow on the one before marks the job dirty.
+pub(crate) const ADVANCE: &str = "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
     attempt = 1, crashes = 0, exclusive = 0, low_confidence = item.value ->> 'low_confidence',
-    made = iif((item.value ->> 'first') IS NULL
-        OR made = (SELECT upstream FROM fingerprint WHERE id = item.value ->> 'first'), item.value ->> 'made', NULL)
-FROM jsonb_each(?1) AS item
+    fingerprint = item.value ->> 'fingerprint',
+    dirty = dirty OR item.value ->> 'mixed' OR ((item.value ->> 'first') IS NOT NULL
+        AND job.fingerprint IS NOT (SELECT upstream FROM fingerprint WHERE id = item.value ->> 'first'))
+FROM jsonb_each(?) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.token = item.value ->> 'token' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
@@ -38,14 +37,14 @@ INSERT INTO stage_result
 SELECT value ->> 'pair', value ->> 'stage', value ->> 'fingerprint', unhex(value ->> 'mesh_hash'),
     unhex(value ->> 'print_hash'), value ->> 'attributes', value ->> 'outcome', value ->> 'files',
     unhex(value ->> 'result_hash'), value ->> 'ms', value ->> 'worker', value ->> 'at'
-FROM jsonb_each(?1) WHERE true
+FROM jsonb_each(?) WHERE true
 ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
     print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
     result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
 
 /// A method may give fewer metrics than the one before; what it does not give is no result any more.
 const CLEAR_METRICS: &str = "
-DELETE FROM metric_result WHERE pair IN (SELECT value ->> 'pair' FROM jsonb_each(?1))";
+DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
 const METRICS: &str = "
 INSERT INTO metric_result
@@ -58,121 +57,139 @@ SELECT value ->> 'pair', value ->> '$.row.metric', value ->> '$.row.threshold_le
     value ->> '$.row.scores.iou_box', value ->> '$.row.scores.dice', value ->> '$.row.scores.density_print',
     value ->> '$.row.scores.density_depth', value ->> '$.row.margin', value ->> '$.row.confidence',
     value ->> '$.row.at_bound', unhex(value ->> 'result_hash')
-FROM jsonb_each(?1)";
+FROM jsonb_each(?)";
 
 const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, ms, at)
-SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?1)";
+SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?)";
 
 /// What is known of the input files of pairs.
-pub(crate) const SEEN: &str = "
+pub(crate) const UPDATE_INPUTS: &str = "
 UPDATE pair SET mesh_hash = coalesce(unhex(item.value ->> 'mesh_hash'), mesh_hash),
     mesh_stat = coalesce(item.value ->> 'mesh_stat', mesh_stat),
     print_hash = coalesce(unhex(item.value ->> 'print_hash'), print_hash),
     print_stat = coalesce(item.value ->> 'print_stat', print_stat)
-FROM jsonb_each(?1) AS item WHERE pair.id = item.value ->> 'pair' AND (
+FROM jsonb_each(?) AS item WHERE pair.id = item.value ->> 'pair' AND (
     pair.mesh_hash IS NOT unhex(item.value ->> 'mesh_hash') OR pair.mesh_stat IS NOT item.value ->> 'mesh_stat'
     OR pair.print_hash IS NOT unhex(item.value ->> 'print_hash') OR pair.print_stat IS NOT item.value ->> 'print_stat')";
 
 const CLEAR_FAILURE: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?1))";
+    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
 /// What is written beside the job.
 #[cfg(test)]
-pub(crate) const ROWS: [&str; 6] = [RESULT, CLEAR_METRICS, METRICS, ATTEMPT, SEEN, CLEAR_FAILURE];
+pub(crate) const ROWS: [&str; 6] = [
+    RESULT,
+    CLEAR_METRICS,
+    METRICS,
+    ATTEMPT,
+    UPDATE_INPUTS,
+    CLEAR_FAILURE,
+];
 
-/// Adds the steps of jobs to a script; those whose leases no longer hold stay where they are.
-pub(crate) fn step<'i>(script: &mut Script, done: impl Iterator<Item = &'i Steps>) -> Result<()> {
-    over(script, &[STEP], done.filter_map(job))
+/// Adds the advance of jobs to a script; it returns those whose lease still held.
+pub(crate) fn add_advance<'i>(
+    script: &mut Script,
+    checkpoints: impl Iterator<Item = &'i StoredStages>,
+) -> Result<Option<Statement<FencedRow>>> {
+    script.add_over(ADVANCE, checkpoints.filter_map(advanced_job))
 }
 
-/// Adds what is stored beside steps that were made.
-pub(crate) fn store(script: &mut Script, made: &[&Steps], deltas: &mut Deltas) -> Result<()> {
-    for (lease, done) in made.iter().map(|steps| &**steps) {
-        for one in done {
+/// Adds the results of jobs that advanced to a script.
+pub(crate) fn add_results(
+    script: &mut Script,
+    advanced: &[&StoredStages],
+    deltas: &mut Deltas,
+) -> Result<()> {
+    for (lease, stages) in advanced.iter().map(|stored| &**stored) {
+        for one in stages {
             failpoint::hit(one.stage, Point::Recorded, None);
         }
-        if let Some(last) = done.last() {
-            deltas.moved((cursor(lease.cursor), JobStatus::Leased), after(last.stage));
+        if let Some(last) = stages.last() {
+            deltas.move_job(lease.counter_key(), key_after(last));
         }
     }
-    let each = || made.iter().flat_map(|steps| each(steps));
-    over(script, &[RESULT], each().map(result))?;
-    over(script, &[ATTEMPT], each().map(attempt))?;
-    let suspects = made.iter().filter(|(lease, _)| !lease.cleared);
-    let suspects = suspects.map(|(lease, _)| [lease.pair.0]);
-    over(script, &[CLEAR_FAILURE], suspects)?;
-    over(script, &[CLEAR_METRICS, METRICS], each().flat_map(metrics))?;
-    let seen = made.iter().filter_map(|(lease, done)| {
-        // The last one tells all that those before it told.
-        let mut told = done.iter().rev().map(|one| &one.inputs);
-        Some((lease, told.find(|inputs| inputs.is_told())?))
+    let each = || advanced.iter().flat_map(|stored| each_stage(stored));
+    script.execute_over(RESULT, each().map(result_row))?;
+    script.execute_over(ATTEMPT, each().map(attempt_row))?;
+    let uncleared = advanced.iter().filter(|(lease, _)| !lease.cleared);
+    let uncleared = uncleared.map(|(lease, _)| [lease.pair.0]);
+    script.execute_over(CLEAR_FAILURE, uncleared)?;
+    let metrics = || each().flat_map(metric_rows);
+    script.execute_over(CLEAR_METRICS, metrics().map(|row| [row.pair]))?;
+    script.execute_over(METRICS, metrics())?;
+    let inputs = advanced.iter().filter_map(|(lease, stages)| {
+        // The last stage that names inputs names all that earlier ones did.
+        let mut inputs = stages.iter().rev().map(|one| &one.inputs);
+        Some((lease.pair, inputs.find(|inputs| !inputs.is_empty())?))
     });
-    store_seen(script, seen)
+    add_inputs(script, inputs)
 }
 
 /// Each stage with its lease.
-fn each((lease, done): &Steps) -> impl Iterator<Item = (&Lease, &StageCheckpoint)> {
+fn each_stage((lease, done): &StoredStages) -> impl Iterator<Item = (&Lease, &StageCheckpoint)> {
     done.iter().map(move |one| (lease, one))
 }
 
-/// Where a job stands when a stage is stored.
-fn after(stage: Stage) -> (Cursor, JobStatus) {
-    match stage.next() {
+/// Returns where a job is counted when a stage is stored.
+fn key_after(stage: &StageCheckpoint) -> CounterKey {
+    let (cursor, status) = match stage.stage.next() {
         Some(next) => (cursor(next), JobStatus::Leased),
         None => (DONE, JobStatus::Done),
-    }
+    };
+    CounterKey::new(cursor, status, Some(stage.fingerprint.0))
 }
 
-/// One item of [`STEP`].
+/// One item of [`ADVANCE`].
 #[derive(Serialize)]
-struct Job {
+struct AdvancedJob {
     pair: i64,
     worker: i64,
     token: i64,
     next: Cursor,
     status: i64,
-    /// The fingerprint whose upstream must be that of the result before; none where there is none before.
+    /// Fingerprint of the last result.
+    fingerprint: i64,
+    /// The fingerprint whose upstream must be that of the result before; `None` where there is no result before.
     first: Option<i64>,
-    /// The fingerprint of the last result; none where the results do not follow on each other.
-    made: Option<i64>,
+    /// Whether the stages do not follow on each other.
+    mixed: i64,
     low_confidence: i64,
     deadline: Option<UnixMillis>,
     alive_since: UnixMillis,
 }
 
-/// The step over all stages that are stored at once; none for no stage.
-fn job((lease, done): &Steps) -> Option<Job> {
-    let last = done.last()?;
-    let (next, status) = after(last.stage);
+/// Combines all stages that are stored at once; `None` for no stage.
+fn advanced_job((lease, stages): &StoredStages) -> Option<AdvancedJob> {
+    let last = stages.last()?;
+    let after = key_after(last);
     let metrics = &mut last.metrics.iter();
-    let (first, made) = chain(done);
-    Some(Job {
+    let (first, follow) = chain(stages);
+    Some(AdvancedJob {
         pair: lease.pair.0,
         worker: lease.worker.0,
         token: lease.token,
-        next,
-        status: status.code(),
-        first: first.map(|fingerprint| fingerprint.0),
-        made: made.map(|fingerprint| fingerprint.0),
+        next: after.cursor,
+        status: after.status.code(),
+        fingerprint: after.fingerprint,
+        first: first.map(|FingerprintId(id)| id),
+        mixed: i64::from(!follow),
         low_confidence: i64::from(metrics.any(|metric| metric.outcome.is_low_confidence())),
-        deadline: (status == JobStatus::Leased).then_some(last.next_deadline),
+        deadline: (after.status == JobStatus::Leased).then_some(last.next_deadline),
         alive_since: last.alive_since,
     })
 }
 
-/// The fingerprints of the first and the last of the results that follow on each other up to the last; no first where that
-/// is the first stage of all. No last where some do not.
-fn chain(done: &[StageCheckpoint]) -> (Option<FingerprintId>, Option<FingerprintId>) {
-    let fresh = done.iter().rposition(|one| one.stage == Stage::Fit);
-    let chain = &done[fresh.unwrap_or(0)..];
-    let follows = |two: &[StageCheckpoint]| two[0].stage.next() == Some(two[1].stage);
-    let whole = chain.windows(2).all(follows);
-    let first = fresh.is_none().then(|| chain.first()).flatten();
-    let last = chain.last().filter(|_| whole);
+/// Returns the fingerprint of the first stage, `None` if that is the first stage of all, and whether the stages follow
+/// on each other.
+fn chain(stages: &[StageCheckpoint]) -> (Option<FingerprintId>, bool) {
+    let restart = stages.iter().rposition(|one| one.stage == Stage::Fit);
+    let chain = &stages[restart.unwrap_or(0)..];
+    let follow = |two: &[StageCheckpoint]| two[0].stage.next() == Some(two[1].stage);
+    let first = restart.is_none().then(|| chain.first()).flatten();
     (
         first.map(|one| one.fingerprint),
-        last.map(|one| one.fingerprint),
+        chain.windows(2).all(follow),
     )
 }
 
@@ -193,7 +210,7 @@ struct ResultRow<'d> {
     at: UnixMillis,
 }
 
-fn result<'d>((lease, done): (&Lease, &'d StageCheckpoint)) -> ResultRow<'d> {
+fn result_row<'d>((lease, done): (&Lease, &'d StageCheckpoint)) -> ResultRow<'d> {
     ResultRow {
         pair: lease.pair.0,
         stage: done.stage.index(),
@@ -213,7 +230,7 @@ fn result<'d>((lease, done): (&Lease, &'d StageCheckpoint)) -> ResultRow<'d> {
 /// One item of [`ATTEMPT`]: pair, stage, worker, milliseconds, time.
 type Attempt = (i64, usize, i64, u64, UnixMillis);
 
-const fn attempt((lease, done): (&Lease, &StageCheckpoint)) -> Attempt {
+const fn attempt_row((lease, done): (&Lease, &StageCheckpoint)) -> Attempt {
     let stage = done.stage.index();
     (lease.pair.0, stage, lease.worker.0, done.ms, done.at)
 }
@@ -226,7 +243,7 @@ struct MetricRow<'d> {
     result_hash: ContentHash,
 }
 
-fn metrics<'d>(
+fn metric_rows<'d>(
     (lease, done): (&'d Lease, &'d StageCheckpoint),
 ) -> impl Iterator<Item = MetricRow<'d>> {
     done.metrics.iter().map(|metric| MetricRow {
@@ -236,19 +253,21 @@ fn metrics<'d>(
     })
 }
 
-/// Adds what is known of the input files of leased pairs.
-pub(crate) fn store_seen<'a>(
+/// Adds the input files of pairs as they were read to a script.
+pub(crate) fn add_inputs<'a>(
     script: &mut Script,
-    seen: impl Iterator<Item = (&'a Lease, &'a InputVersions)>,
+    inputs: impl Iterator<Item = (PairId, &'a InputVersions)>,
 ) -> Result<()> {
-    let items = seen.filter(|(_, seen)| seen.is_told());
-    let items = items.map(|(lease, seen)| seen_row(lease.pair.0, seen));
-    over(script, &[SEEN], items)
+    let items = inputs.filter(|(_, inputs)| !inputs.is_empty());
+    script.execute_over(
+        UPDATE_INPUTS,
+        items.map(|(pair, inputs)| input_row(pair, inputs)),
+    )
 }
 
-/// One item of [`SEEN`].
+/// One item of [`UPDATE_INPUTS`].
 #[derive(Serialize)]
-pub(crate) struct SeenRow<'s> {
+pub(crate) struct InputRow<'s> {
     pair: i64,
     mesh_hash: Option<ContentHash>,
     mesh_stat: Option<&'s str>,
@@ -256,96 +275,13 @@ pub(crate) struct SeenRow<'s> {
     print_stat: Option<&'s str>,
 }
 
-pub(crate) fn seen_row(pair: i64, seen: &InputVersions) -> SeenRow<'_> {
+pub(crate) fn input_row(PairId(pair): PairId, seen: &InputVersions) -> InputRow<'_> {
     let (mesh, print) = (seen.mesh.as_ref(), seen.print.as_ref());
-    SeenRow {
+    InputRow {
         pair,
         mesh_hash: mesh.map(|seen| seen.hash),
         mesh_stat: mesh.map(|seen| seen.stat.as_str()),
         print_hash: print.map(|seen| seen.hash),
         print_stat: print.map(|seen| seen.stat.as_str()),
     }
-}
-
-/// Adds what is known of input files.
-pub(crate) fn store_inputs(script: &mut Script, seen: &[(PairId, InputVersions)]) -> Result<()> {
-    let items = seen.iter().map(|(pair, seen)| seen_row(pair.0, seen));
-    over(script, &[SEEN], items)
-}
-
-/// Adds statements over a JSON array, unless that is empty.
-pub(crate) fn over(
-    script: &mut Script,
-    statements: &[&'static str],
-    items: impl Iterator<Item = impl Serialize>,
-) -> Result<()> {
-    let mut array = String::new();
-    for item in items {
-        array.push(if array.is_empty() { '[' } else { ',' });
-        array.push_str(&serde_json::to_string(&item)?);
-    }
-    if !array.is_empty() {
-        array.push(']');
-        script.add(statements).bind(array)?;
-    }
-    Ok(())
-}
-
-impl Catalog {
-    /// Stores a finished stage in one transaction and moves the job on. The artifacts must be on disk already.
-    ///
-    /// # Errors
-    /// When the database refuses; then nothing is stored and the lease stands until it is recovered.
-    pub async fn checkpoint(
-        &self,
-        lease: Lease,
-        done: StageCheckpoint,
-    ) -> Result<CheckpointOutcome> {
-        self.store(lease, vec![done], Message::Grouped).await
-    }
-
-    /// The same for stages in the order they were computed, but it may take some time longer, for others to share its
-    /// commit; not while somebody is [`Catalog::waiting`].
-    ///
-    /// # Errors
-    /// As there.
-    pub async fn checkpoint_in_time(
-        &self,
-        lease: Lease,
-        done: Vec<StageCheckpoint>,
-    ) -> Result<CheckpointOutcome> {
-        self.store(lease, done, Message::InTime).await
-    }
-
-    async fn store(
-        &self,
-        lease: Lease,
-        done: Vec<StageCheckpoint>,
-        message: fn(Request) -> Message,
-    ) -> Result<CheckpointOutcome> {
-        let Some(last) = done.last() else {
-            return Ok(CheckpointOutcome::Lease(lease));
-        };
-        let next = last.stage.next();
-        let moved = next.map(|cursor| Lease {
-            cursor,
-            attempt: 1,
-            crashes: 0,
-            cleared: true,
-            ..copy(&lease)
-        });
-        let kept = self
-            .answered(|reply| message(Request::Checkpoint(Box::new((lease, done)), reply)))
-            .await?;
-        Ok(match (kept, moved) {
-            (false, _) => CheckpointOutcome::LeaseLost,
-            (true, Some(lease)) => CheckpointOutcome::Lease(lease),
-            (true, None) => CheckpointOutcome::Done,
-        })
-    }
-}
-
-/// The lease as it will be; the one given in is spent by the request.
-const fn copy(lease: &Lease) -> Lease {
-    Lease { ..*lease }
 }

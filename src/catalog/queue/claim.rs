@@ -1,44 +1,37 @@
-//! Leases: taking them, keeping them alive, giving them back.
+//! Statements that take leases, keep them alive and give them back.
 
 use serde_json::{Value, json};
-use sqlx::Row as _;
-use sqlx::sqlite::SqliteRow;
-use tokio::sync::oneshot;
 
-use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::group_commit::{Heartbeat, Reply, Request};
 use crate::catalog::db::rows;
-use crate::catalog::db::script::Script;
-use crate::catalog::db::writer::Message;
-use crate::catalog::handle::Catalog;
-use crate::catalog::queue::checkpoint::over;
-use crate::catalog::queue::counters::{Deltas, cursor};
-use crate::catalog::queue::lease::Lease;
+use crate::catalog::db::script::{Script, Statement};
+use crate::catalog::queue::counters::{CounterKey, Deltas, cursor};
+use crate::catalog::queue::lease::{FencedRow, FingerprintId, Lease};
+use crate::catalog::queue::selection::PairSelection;
 use crate::domain::{JobStatus, PairId, Stage, UnixMillis, WorkerId};
 use crate::failpoint::{self, Point};
 
-/// What a worker wants to take.
+/// Which pairs a worker wants to lease.
 #[derive(Debug, Clone)]
 pub struct ClaimRequest {
-    /// Who takes it.
+    /// The worker.
     pub worker: WorkerId,
-    /// At most so many.
+    /// Most pairs to lease.
     pub slots: usize,
     /// Only pairs whose next stage is this one or an earlier one.
     pub until: Stage,
-    /// Pairs that must run with nothing beside them, or the others.
+    /// Only pairs that must run exclusively, or only the others.
     pub exclusive: bool,
-    /// Only these; `None` for all.
+    /// Only these pairs; `None` for all.
     pub among: Option<PairSelection>,
-    /// When the first stage should be over.
+    /// Deadline of the first stage.
     pub deadline: UnixMillis,
-    /// Nothing is taken unless the worker's last sign of life is of then or later, by its own clock.
+    /// Lease nothing if the worker's last heartbeat is older than this, by its own clock.
     pub alive_since: UnixMillis,
 }
 
 impl ClaimRequest {
-    /// Any ordinary pairs with any stages left, whenever the worker gave its last sign of life.
+    /// Requests ordinary pairs with any stages left, whatever the worker's last heartbeat.
     pub const fn new(worker: WorkerId, slots: usize, deadline: UnixMillis) -> Self {
         Self {
             worker,
@@ -52,200 +45,141 @@ impl ClaimRequest {
     }
 }
 
-/// Some pairs of the catalog.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct PairSelection {
-    /// Numbers as a JSON array, for `json_each`.
-    pub(crate) json: String,
-    /// How many.
-    pub(crate) len: usize,
+/// A worker's sign of life.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Heartbeat {
+    pub(crate) worker: WorkerId,
+    pub(crate) now: UnixMillis,
+    pub(crate) alive_since: UnixMillis,
 }
 
-impl PairSelection {
-    /// How many pairs.
-    pub const fn len(&self) -> usize {
-        self.len
-    }
-
-    /// These pairs.
-    pub fn of(pairs: &[PairId]) -> Self {
-        Self {
-            json: rows::array(pairs.iter().map(|pair| pair.0)).to_string(),
-            len: pairs.len(),
-        }
-    }
-
-    /// Whether it is none at all.
-    pub const fn is_empty(&self) -> bool {
-        self.len == 0
-    }
-}
-
-/// Takes the first ready jobs in the order of the index `job_ready`. A bare `?5` as the limit would have the statement
-/// prepared anew each time, because the planner looks at its value.
+/// Leases the first ready jobs in the order of the index `job_ready`. With a bare `?` as the limit SQLite would prepare
+/// the statement anew each time, because its planner reads the value.
 pub(crate) const CLAIM: &str = "
-UPDATE job SET status = 1, worker = ?1, deadline = ?2, token = token + 1, attempt = attempt + 1
+UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
-    SELECT pair FROM job WHERE status = 0 AND stage <= ?3 AND exclusive = ?4
-    ORDER BY prio, stage DESC, pair LIMIT +?5)
-    AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND heartbeat >= ?6)
-RETURNING pair, stage, attempt, token, crashes, exclusive";
+    SELECT pair FROM job WHERE status = 0 AND stage <= ? AND exclusive = ?
+    ORDER BY prio, stage DESC, pair LIMIT +?)
+    AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
+RETURNING pair, stage, attempt, token, crashes, exclusive, fingerprint";
 
-/// The same among some pairs only.
+/// Like [`CLAIM`], among some pairs.
 pub(crate) const CLAIM_AMONG: &str = "
-UPDATE job SET status = 1, worker = ?1, deadline = ?2, token = token + 1, attempt = attempt + 1
+UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
-    SELECT j.pair FROM json_each(?7) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
-    WHERE j.status = 0 AND j.stage <= ?3 AND j.exclusive = ?4
-    ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?5)
-    AND EXISTS (SELECT 1 FROM worker WHERE id = ?1 AND ended IS NULL AND heartbeat >= ?6)
-RETURNING pair, stage, attempt, token, crashes, exclusive";
+    SELECT j.pair FROM json_each(?) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+    WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
+    ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?)
+    AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
+RETURNING pair, stage, attempt, token, crashes, exclusive, fingerprint";
 
 /// Gives leases back as if they had never been taken.
 pub(crate) const RELEASE: &str = "
 UPDATE job SET status = 0, worker = NULL, deadline = NULL, attempt = max(attempt - 1, 0)
-FROM jsonb_each(?1) AS item
+FROM jsonb_each(?) AS item
 WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.token = item.value ->> 2
     AND job.status = 1
 RETURNING pair, token";
 
-/// A sign of life. A worker that has ended, or whose last one is too long ago, gives none: others may have taken it for
-/// dead.
-pub(crate) const HEARTBEAT: &str = "UPDATE worker SET heartbeat = ?2 WHERE id = ?1 AND ended IS NULL AND heartbeat >= ?3 RETURNING id";
+/// Stores a heartbeat, unless the worker has ended or its last heartbeat is too old: others may have taken it for dead.
+pub(crate) const HEARTBEAT: &str = "
+UPDATE worker SET heartbeat = ? WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
 
-pub(crate) fn heartbeat(script: &mut Script, heartbeat: Heartbeat) -> Result<()> {
-    let script = script.add(&[HEARTBEAT]).bind(heartbeat.worker.0)?;
-    script.bind(heartbeat.now)?.bind(heartbeat.alive_since)?;
-    Ok(())
+/// A row of [`CLAIM`].
+#[derive(sqlx::FromRow)]
+pub(crate) struct ClaimedRow {
+    pair: i64,
+    stage: i64,
+    attempt: u32,
+    token: i64,
+    crashes: u32,
+    exclusive: bool,
+    fingerprint: Option<i64>,
+}
+
+/// Adds a heartbeat to a script; it returns the worker's id when it was stored.
+pub(crate) fn add_heartbeat(
+    script: &mut Script,
+    heartbeat: Heartbeat,
+) -> Result<Statement<(i64,)>> {
+    let statement = script.add(HEARTBEAT);
+    script.bind(heartbeat.now)?;
+    script.bind(heartbeat.worker.0)?;
+    script.bind(heartbeat.alive_since)?;
+    Ok(statement)
 }
 
 /// Adds a claim to a script.
-pub(crate) fn take(script: &mut Script, request: &ClaimRequest) -> Result<()> {
-    let sql = if request.among.is_some() {
-        CLAIM_AMONG
-    } else {
-        CLAIM
+pub(crate) fn add_claim(
+    script: &mut Script,
+    request: &ClaimRequest,
+) -> Result<Statement<ClaimedRow>> {
+    let statement = match request.among {
+        Some(_) => script.add(CLAIM_AMONG),
+        None => script.add(CLAIM),
     };
-    let script = script.add(&[sql]).bind(request.worker.0)?;
-    let script = script
-        .bind(request.deadline)?
-        .bind(cursor(request.until))?
-        .bind(i64::from(request.exclusive))?
-        .bind(request.slots as i64)?
-        .bind(request.alive_since)?;
+    script.bind(request.worker.0)?;
+    script.bind(request.deadline)?;
     if let Some(among) = &request.among {
         script.bind(among.json.clone())?;
     }
-    Ok(())
+    script.bind(cursor(request.until))?;
+    script.bind(i64::from(request.exclusive))?;
+    script.bind(request.slots as i64)?;
+    script.bind(request.worker.0)?;
+    script.bind(request.alive_since)?;
+    Ok(statement)
 }
 
-/// The leases of a claim from the rows that it returned.
-pub(crate) fn taken(
-    rows: &[SqliteRow],
-    request: &ClaimRequest,
+/// Turns the rows of a claim into leases, in the order of the claim.
+pub(crate) fn leases(
+    rows: Vec<ClaimedRow>,
+    worker: WorkerId,
     deltas: &mut Deltas,
 ) -> Result<Vec<Lease>> {
-    let mut leases = rows
-        .iter()
-        .map(|row| lease(row, request.worker))
-        .collect::<Result<Vec<_>>>()?;
+    let leases = rows.into_iter().map(|row| lease(&row, worker));
+    let mut leases = leases.collect::<Result<Vec<_>>>()?;
     // RETURNING promises no order.
     leases.sort_by_key(|lease| (std::cmp::Reverse(lease.cursor), lease.pair));
     for lease in &leases {
-        let at = cursor(lease.cursor);
-        deltas.moved((at, JobStatus::Ready), (at, JobStatus::Leased));
+        let from = lease.counter_key().with_status(JobStatus::Ready);
+        deltas.move_job(from, lease.counter_key());
         failpoint::hit(lease.cursor, Point::Claiming, None);
     }
     Ok(leases)
 }
 
-fn lease(row: &SqliteRow, worker: WorkerId) -> Result<Lease> {
+fn lease(row: &ClaimedRow, worker: WorkerId) -> Result<Lease> {
     Ok(Lease {
-        pair: PairId(row.try_get("pair")?),
+        pair: PairId(row.pair),
         worker,
-        token: row.try_get("token")?,
-        cursor: rows::stage(row.try_get("stage")?)?,
-        attempt: row.try_get("attempt")?,
-        crashes: row.try_get("crashes")?,
-        exclusive: row.try_get::<i64, _>("exclusive")? == 1,
+        token: row.token,
+        cursor: rows::stage(row.stage)?,
+        fingerprint: row.fingerprint.map(FingerprintId),
+        attempt: row.attempt,
+        crashes: row.crashes,
+        exclusive: row.exclusive,
         cleared: false,
     })
 }
 
-/// Adds the giving back of leases to a script.
-pub(crate) fn release<'l>(
+/// Adds the release of leases to a script.
+pub(crate) fn add_release<'l>(
     script: &mut Script,
     leases: impl Iterator<Item = &'l Lease>,
-) -> Result<()> {
-    over(script, &[RELEASE], leases.map(fence))
+) -> Result<Option<Statement<FencedRow>>> {
+    script.add_over(RELEASE, leases.map(fence))
 }
 
-/// Counts leases that were given back.
-pub(crate) fn given_back<'l>(leases: impl Iterator<Item = &'l Lease>, deltas: &mut Deltas) {
+/// Counts released leases.
+pub(crate) fn count_released<'l>(leases: impl Iterator<Item = &'l Lease>, deltas: &mut Deltas) {
     for lease in leases {
-        let at = cursor(lease.cursor);
-        deltas.moved((at, JobStatus::Leased), (at, JobStatus::Ready));
+        let to: CounterKey = lease.counter_key().with_status(JobStatus::Ready);
+        deltas.move_job(lease.counter_key(), to);
     }
 }
 
-/// What a write under a lease must match: pair, worker, token.
+/// Returns what a write under a lease must match: pair, worker, token.
 fn fence(lease: &Lease) -> Value {
     json!([lease.pair.0, lease.worker.0, lease.token])
-}
-
-impl Catalog {
-    /// Takes pairs to work on; fewer than asked for, or none, when no more are ready.
-    ///
-    /// # Errors
-    /// When the database refuses; then nothing is taken.
-    pub async fn claim(&self, request: ClaimRequest) -> Result<Vec<Lease>> {
-        self.grouped(|reply| Request::Claim(request, reply)).await
-    }
-
-    /// Gives a lease back as if it had never been taken; `false` when it was lost already.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn release(&self, lease: Lease) -> Result<bool> {
-        self.grouped(|reply| Request::Release(lease, reply)).await
-    }
-
-    /// A sign of life of a worker; `false` when it comes too late, because the last one is from before `alive_since`
-    /// or the worker has ended. Then its leases are over, and it must enter anew to work on.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn heartbeat(
-        &self,
-        worker: WorkerId,
-        now: UnixMillis,
-        alive_since: UnixMillis,
-    ) -> Result<bool> {
-        let heartbeat = Heartbeat {
-            worker,
-            now,
-            alive_since,
-        };
-        self.grouped(|reply| Request::Heartbeat(heartbeat, reply))
-            .await
-    }
-
-    /// Sends a request into the next group commit and waits for the answer.
-    pub(crate) async fn grouped<T>(&self, request: impl FnOnce(Reply<T>) -> Request) -> Result<T> {
-        self.answered(|reply| Message::Grouped(request(reply)))
-            .await
-    }
-
-    /// Sends the writer a message and waits for the answer.
-    pub(crate) async fn answered<T>(&self, message: impl FnOnce(Reply<T>) -> Message) -> Result<T> {
-        let (sender, receiver) = oneshot::channel();
-        self.send(message(sender)).await?;
-        receiver.await.unwrap_or(Err(CatalogError::Closed))
-    }
-
-    /// Sends the writer a message.
-    pub(crate) async fn send(&self, message: Message) -> Result<()> {
-        let sent = self.writer()?.send(message).await;
-        sent.or(Err(CatalogError::Closed))
-    }
 }

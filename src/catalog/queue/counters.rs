@@ -1,112 +1,115 @@
-//! Counts of jobs by cursor and status, moved in the same transaction as the jobs.
+//! Numbers of jobs by cursor, status and fingerprint, changed in the same transaction as the jobs.
 
 use std::collections::BTreeMap;
 
 use serde_json::json;
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::db::script::Script;
-use crate::catalog::handle::Catalog;
-use crate::catalog::queue::job_counts::{self, by_status, census};
 use crate::domain::{JobStatus, Stage};
 
 const CHANGE: &str = "
-UPDATE counter SET n = n + (d.value ->> 2) FROM jsonb_each(?1) AS d
-WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1";
+UPDATE counter SET n = n + (d.value ->> 3) FROM jsonb_each(?) AS d
+WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1 AND counter.fingerprint = d.value ->> 2";
 
-/// The counts as kept, for [`counts`].
-pub(crate) const KEPT: &str = "SELECT stage, status, n FROM counter WHERE n <> 0";
+const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter WHERE n <> 0";
 
-/// Cursor of a job: its next stage 0..4, or 4 when done.
+/// Position of a job: the index of its next stage, or 4 when it is done.
 pub(crate) type Cursor = i64;
 
-/// Cursor of a job that is done.
+/// Position of a job that is done.
 pub(crate) const DONE: Cursor = Stage::ALL.len() as Cursor;
 
-/// Cursor of a job whose next stage this is.
+/// Returns the position of a job with this next stage.
 pub(crate) const fn cursor(stage: Stage) -> Cursor {
     stage.index() as Cursor
 }
 
-/// How the counts change, gathered over a batch.
+/// What jobs are counted by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct CounterKey {
+    pub(crate) cursor: Cursor,
+    pub(crate) status: JobStatus,
+    /// Fingerprint of the result before the cursor; 0 where there is none.
+    pub(crate) fingerprint: i64,
+}
+
+impl CounterKey {
+    /// The key of a new job.
+    pub(crate) const NEW: Self = Self {
+        cursor: 0,
+        status: JobStatus::Ready,
+        fingerprint: 0,
+    };
+
+    /// Makes a key from columns of `job`.
+    pub(crate) fn new(cursor: Cursor, status: JobStatus, fingerprint: Option<i64>) -> Self {
+        Self {
+            cursor,
+            status,
+            fingerprint: fingerprint.unwrap_or(0),
+        }
+    }
+
+    /// Returns the key of the same job with another status.
+    pub(crate) const fn with_status(self, status: JobStatus) -> Self {
+        Self { status, ..self }
+    }
+}
+
+/// Changes of the counters, collected over a transaction.
 #[derive(Debug, Default)]
-pub(crate) struct Deltas(BTreeMap<(Cursor, JobStatus), i64>);
+pub(crate) struct Deltas(BTreeMap<CounterKey, i64>);
 
 impl Deltas {
-    /// A job goes from one place to another.
-    pub(crate) fn moved(&mut self, from: (Cursor, JobStatus), to: (Cursor, JobStatus)) {
+    /// Counts a job out of one place and into another.
+    pub(crate) fn move_job(&mut self, from: CounterKey, to: CounterKey) {
         self.add(from, -1);
         self.add(to, 1);
     }
 
-    /// So many jobs appear at a place, or leave it.
-    pub(crate) fn add(&mut self, at: (Cursor, JobStatus), n: i64) {
-        *self.0.entry(at).or_default() += n;
+    /// Adds to the number of jobs at a place.
+    pub(crate) fn add(&mut self, key: CounterKey, n: i64) {
+        *self.0.entry(key).or_default() += n;
     }
 
-    /// Writes the changes.
+    /// Stores the changes.
     pub(crate) async fn apply(&self, conn: &mut SqliteConnection) -> Result<()> {
         let mut script = Script::default();
-        self.write(&mut script)?;
+        self.add_to(&mut script)?;
         script.run(conn).await?;
         Ok(())
     }
 
-    /// Adds the changes to a script.
-    pub(crate) fn write(&self, script: &mut Script) -> Result<()> {
-        let rows: Vec<_> = self
-            .0
-            .iter()
-            .filter(|(_, n)| **n != 0)
-            .map(|((stage, status), n)| json!([stage, status.code(), n]))
-            .collect();
-        if rows.is_empty() {
-            return Ok(());
-        }
-        let changes = serde_json::Value::from(rows).to_string();
-        script.add(&[CHANGE]).bind(changes)?;
-        Ok(())
+    /// Adds the statement that stores the changes to a script.
+    pub(crate) fn add_to(&self, script: &mut Script) -> Result<()> {
+        let changes = self.0.iter().filter(|(_, n)| **n != 0);
+        let changes =
+            changes.map(|(key, n)| json!([key.cursor, key.status.code(), key.fingerprint, n]));
+        script.execute_over(CHANGE, changes)
     }
 }
 
-/// Every place that has a counter.
-pub(crate) fn standings() -> impl Iterator<Item = (Cursor, JobStatus)> {
-    (0..=DONE).flat_map(|cursor| JobStatus::ALL.map(|status| (cursor, status)))
-}
-
-/// Jobs by cursor and status; only what is not 0.
+/// Jobs by cursor and status; only numbers that are not 0.
 pub type JobCounts = BTreeMap<(i64, JobStatus), u64>;
 
-impl Catalog {
-    /// The counts as kept.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn counters(&self) -> Result<JobCounts> {
-        let mut conn = self.read_conn().await?;
-        counts(&mut conn, KEPT).await
-    }
-
-    /// The counts as they are when every job is counted: equal to [`Catalog::counters`], or the catalog is damaged.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn recount(&self) -> Result<JobCounts> {
-        let mut conn = self.snapshot().await?;
-        by_status(&census(&mut conn, job_counts::ALL).await?)
-    }
+/// Reads the counters that are not 0.
+pub(crate) async fn counters(conn: &mut SqliteConnection) -> Result<BTreeMap<CounterKey, u64>> {
+    let found: Vec<(i64, i64, i64, i64)> = sqlx::query_as(COUNTERS).fetch_all(conn).await?;
+    let found = found.into_iter().map(|(cursor, status, fingerprint, n)| {
+        let key = CounterKey::new(cursor, rows::status(status)?, Some(fingerprint));
+        Ok((key, n.unsigned_abs()))
+    });
+    found.collect()
 }
 
-/// Counts from a query of cursor, status and number.
-pub(crate) async fn counts(conn: &mut SqliteConnection, sql: &'static str) -> Result<JobCounts> {
-    let rows = sqlx::query(sql).fetch_all(conn).await?;
-    rows.iter()
-        .map(|row| {
-            let status = rows::status(row.try_get(1)?)?;
-            let n: i64 = row.try_get(2)?;
-            Ok(((row.try_get(0)?, status), n.unsigned_abs()))
-        })
-        .collect()
+/// Adds up numbers of jobs by cursor and status.
+pub(crate) fn by_status(counted: impl IntoIterator<Item = (CounterKey, u64)>) -> JobCounts {
+    let mut counts = JobCounts::new();
+    for (key, n) in counted {
+        *counts.entry((key.cursor, key.status)).or_default() += n;
+    }
+    counts
 }

@@ -3,13 +3,10 @@
 use serde_json::{Value, json};
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::group_commit::Request;
-use crate::catalog::db::rows;
-use crate::catalog::db::script::Script;
-use crate::catalog::handle::Catalog;
-use crate::catalog::queue::alike::made;
-use crate::catalog::queue::checkpoint::{over, store_seen};
-use crate::catalog::queue::counters::{Deltas, cursor};
+use crate::catalog::db::script::{Script, Statement};
+use crate::catalog::queue::checkpoint::add_inputs;
+use crate::catalog::queue::counters::{CounterKey, Deltas};
+use crate::catalog::queue::fragments::fingerprint_before;
 use crate::catalog::queue::lease::{FailureAction, Lease, StageFailure};
 use crate::domain::JobStatus;
 
@@ -21,22 +18,22 @@ pub(crate) const FAIL: &str = concat!(
     "
 UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.value ->> 'status',
     run_at = item.value ->> 'run_at', exclusive = max(exclusive, item.value ->> 'exclusive'),
-    worker = NULL, deadline = NULL, made = ",
-    made!("min(job.stage, item.value ->> 'stage')"),
+    worker = NULL, deadline = NULL, fingerprint = ",
+    fingerprint_before!("min(job.stage, item.value ->> 'stage')"),
     "
-FROM jsonb_each(?1) AS item
+FROM jsonb_each(?) AS item
 WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.token = item.value ->> 'token' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.value ->> 'alive_since')
-RETURNING pair, token"
+RETURNING pair, token, stage, fingerprint"
 );
 
 const FAILURE: &str = "
 INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
 SELECT value ->> 'pair', value ->> 'stage', value ->> 'class', value ->> 'message', value ->> 'fingerprint',
     unhex(value ->> 'mesh_hash'), unhex(value ->> 'print_hash'), value ->> 'attributes', value ->> 'at'
-FROM jsonb_each(?1) WHERE value ->> 'status' <> 0
+FROM jsonb_each(?) WHERE value ->> 'status' <> 0
 ON CONFLICT (pair) DO UPDATE SET stage = excluded.stage, class = excluded.class, message = excluded.message,
     fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash, print_hash = excluded.print_hash,
     attributes = excluded.attributes, at = excluded.at";
@@ -45,41 +42,55 @@ const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, class, message, ms, at)
 SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'class', value ->> 'message',
     value ->> 'ms', value ->> 'at'
-FROM jsonb_each(?1)";
+FROM jsonb_each(?)";
 
 const PRUNE: &str = "
 DELETE FROM attempt WHERE id IN (
-    SELECT old.id FROM jsonb_each(?1) AS item JOIN attempt AS old ON old.pair = item.value ->> 'pair'
-    WHERE old.id <= (SELECT id FROM attempt WHERE pair = item.value ->> 'pair' ORDER BY id DESC LIMIT 1 OFFSET ?2))";
+    SELECT old.id FROM jsonb_each(?) AS item JOIN attempt AS old ON old.pair = item.value ->> 'pair'
+    WHERE old.id <= (SELECT id FROM attempt WHERE pair = item.value ->> 'pair' ORDER BY id DESC LIMIT 1 OFFSET ?))";
 
-/// Adds the new states of jobs that failed; those whose leases no longer hold stay as they are.
-pub(crate) fn step<'i>(
-    script: &mut Script,
-    failed: impl Iterator<Item = &'i (Lease, StageFailure)>,
-) -> Result<()> {
-    over(script, &[FAIL], failed.map(json_of))
+/// A row of [`FAIL`]: the fenced job and its new position.
+#[derive(sqlx::FromRow)]
+pub(crate) struct FailedRow {
+    pub(crate) pair: i64,
+    pub(crate) token: i64,
+    stage: i64,
+    fingerprint: Option<i64>,
 }
 
-/// Adds what is stored beside failures that counted.
-pub(crate) fn store(
+/// Returns the row of the job under a lease; `None` when the lease was lost.
+pub(crate) fn row_of<'r>(lease: &Lease, rows: &'r [FailedRow]) -> Option<&'r FailedRow> {
+    rows.iter()
+        .find(|row| (row.pair, row.token) == (lease.pair.0, lease.token))
+}
+
+/// Adds the new states of failed jobs to a script; it returns those whose lease still held.
+pub(crate) fn add_failures<'i>(
     script: &mut Script,
-    failed: &[&(Lease, StageFailure)],
+    failures: impl Iterator<Item = &'i (Lease, StageFailure)>,
+) -> Result<Option<Statement<FailedRow>>> {
+    script.add_over(FAIL, failures.map(json_of))
+}
+
+/// Adds failures that counted, and their attempts, to a script.
+pub(crate) fn add_failure_records(
+    script: &mut Script,
+    failed: &[(&(Lease, StageFailure), &FailedRow)],
     deltas: &mut Deltas,
 ) -> Result<()> {
     if failed.is_empty() {
         return Ok(());
     }
-    let items = rows::array(failed.iter().map(|item| json_of(item)));
-    let script = script
-        .add(&[FAILURE, ATTEMPT, PRUNE])
-        .bind(items.to_string())?;
+    let items = || failed.iter().map(|(item, _)| json_of(item));
+    script.execute_over(FAILURE, items())?;
+    script.execute_over(ATTEMPT, items())?;
+    script.execute_over(PRUNE, items())?;
     script.bind(ATTEMPTS_KEPT)?;
-    let seen = failed.iter().map(|(lease, failed)| (lease, &failed.inputs));
-    store_seen(script, seen)?;
-    for (lease, failed) in failed.iter().map(|item| &**item) {
-        let to = cursor(lease.cursor.min(failed.stage));
-        let from = (cursor(lease.cursor), JobStatus::Leased);
-        deltas.moved(from, (to, status(failed.action)));
+    let inputs = failed.iter().map(|(item, _)| (item.0.pair, &item.1.inputs));
+    add_inputs(script, inputs)?;
+    for ((lease, failure), row) in failed.iter().map(|(item, row)| (&**item, row)) {
+        let to = CounterKey::new(row.stage, status(failure.action), row.fingerprint);
+        deltas.move_job(lease.counter_key(), to);
     }
     Ok(())
 }
@@ -106,15 +117,4 @@ fn json_of((lease, failed): &(Lease, StageFailure)) -> Value {
         "print_hash": failed.inputs.print.as_ref().map(|seen| seen.hash),
         "attributes": failed.attributes, "ms": failed.ms, "at": failed.at, "alive_since": failed.alive_since,
     })
-}
-
-impl Catalog {
-    /// Stores a failed stage; `false` when the lease was lost and nothing was stored.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn fail(&self, lease: Lease, failed: StageFailure) -> Result<bool> {
-        self.grouped(|reply| Request::Fail(Box::new((lease, failed)), reply))
-            .await
-    }
 }

@@ -1,6 +1,8 @@
 //! Fingerprints: what the result of a stage depends on besides the inputs.
 
-use serde_json::{Value, json};
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::{Map, Value, json};
 use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::CatalogError;
@@ -9,7 +11,6 @@ use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
-use crate::catalog::queue::staleness::differences;
 use crate::domain::{ContentHash, Stage};
 
 /// One stage's fingerprint.
@@ -73,6 +74,11 @@ const ENTER: &str = "
 INSERT INTO fingerprint (stage, hash, fields, upstream) VALUES (?1, ?2, ?3, ?4)
 ON CONFLICT (hash) DO UPDATE SET upstream = excluded.upstream RETURNING id";
 
+/// Counters of the jobs whose last result has a fingerprint, one per status.
+pub(crate) const ADD_COUNTERS: &str = "
+INSERT INTO counter (stage, status, fingerprint, n) SELECT ?1, value, ?2, 0 FROM json_each('[0,1,2,3,4]') WHERE true
+ON CONFLICT DO NOTHING";
+
 impl Catalog {
     /// Enters the current fingerprints where they are new; gives their numbers.
     ///
@@ -94,6 +100,11 @@ impl Catalog {
                         .bind(fingerprint.fields.to_string())
                         .bind(upstream)
                         .fetch_one(&mut *conn)
+                        .await?;
+                    sqlx::query(ADD_COUNTERS)
+                        .bind(stage.index() as i64 + 1)
+                        .bind(id)
+                        .execute(&mut *conn)
                         .await?;
                     upstream = Some(id);
                 }
@@ -164,11 +175,105 @@ pub(crate) async fn current_json(
     Ok(rows::array(ids).to_string())
 }
 
+/// Reads the settings of a fingerprint.
+pub(crate) async fn fields_of(conn: &mut SqliteConnection, fingerprint: i64) -> Result<Value> {
+    let fields: String = sqlx::query_scalar("SELECT fields FROM fingerprint WHERE id = ?1")
+        .bind(fingerprint)
+        .fetch_one(conn)
+        .await?;
+    Ok(serde_json::from_str(&fields)?)
+}
+
+/// Every stored fingerprint with its stage and upstream, compared with the current ones.
+pub(crate) struct FingerprintChains {
+    /// Stage and upstream by id.
+    stored: BTreeMap<i64, (Stage, Option<i64>)>,
+    current: [Option<FingerprintId>; 4],
+}
+
+impl FingerprintChains {
+    /// Reads all fingerprints; there are four per combination of settings that was ever used.
+    pub(crate) async fn load(
+        conn: &mut SqliteConnection,
+        fingerprints: &Fingerprints,
+    ) -> Result<Self> {
+        let current = known(conn, fingerprints).await?;
+        let found: Vec<(i64, i64, Option<i64>)> =
+            sqlx::query_as("SELECT id, stage, upstream FROM fingerprint")
+                .fetch_all(conn)
+                .await?;
+        let found = found.into_iter();
+        let stored = found.map(|(id, stage, upstream)| Ok((id, (rows::stage(stage)?, upstream))));
+        Ok(Self {
+            stored: stored.collect::<Result<_>>()?,
+            current,
+        })
+    }
+
+    /// Returns the earliest stage in the chain of a fingerprint that is not the current one, with its fingerprint.
+    pub(crate) fn first_change(&self, fingerprint: i64) -> Option<(Stage, i64)> {
+        let mut change = None;
+        let mut next = Some(fingerprint);
+        while let Some(id) = next {
+            let (stage, upstream) = *self.stored.get(&id)?;
+            if self.current[stage.index()] != Some(FingerprintId(id)) {
+                change = Some((stage, id));
+            }
+            next = upstream;
+        }
+        change
+    }
+}
+
+/// Leaves that differ between two fingerprints' fields, by name: `register.max_scale`.
+pub(crate) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
+    let (old, new) = (leaves(stage, old), leaves(stage, new));
+    let names = old.keys().chain(new.keys());
+    let names: BTreeSet<_> = names.collect();
+    names
+        .into_iter()
+        .filter(|name| old.get(*name) != new.get(*name))
+        .map(|name| FieldChange {
+            field: name.clone(),
+            old: old.get(name).cloned(),
+            new: new.get(name).cloned(),
+        })
+        .collect()
+}
+
+/// Every value that is no object, by its path without the word "settings".
+fn leaves(stage: Stage, fields: &Value) -> Map<String, Value> {
+    let mut found = Map::new();
+    let mut open = vec![(stage.name().to_owned(), fields)];
+    while let Some((path, value)) = open.pop() {
+        match value {
+            Value::Object(inner) => {
+                for (key, value) in inner {
+                    let path = if key == "settings" {
+                        path.clone()
+                    } else {
+                        format!("{path}.{key}")
+                    };
+                    open.push((path, value));
+                }
+            }
+            Value::Null
+            | Value::Bool(_)
+            | Value::Number(_)
+            | Value::String(_)
+            | Value::Array(_) => {
+                found.insert(path, value.clone());
+            }
+        }
+    }
+    found
+}
+
 #[cfg(test)]
 mod tests {
     use serde_json::json;
 
-    use super::Fingerprints;
+    use super::{Fingerprints, differences};
     use crate::domain::Stage;
 
     #[test]
@@ -180,5 +285,14 @@ mod tests {
         });
         let changed = Stage::ALL.map(|stage| old.of(stage).hash != new.of(stage).hash);
         assert_eq!(changed, [false, false, true, true]);
+    }
+
+    #[test]
+    fn a_changed_setting_is_named_with_old_and_new() {
+        let old = json!({ "revision": 1, "settings": { "max_scale": 1.2, "seed": 0 } });
+        let new = json!({ "revision": 1, "settings": { "max_scale": 1.3, "seed": 0 } });
+        let changes = differences(Stage::Register, &old, &new);
+        let text: Vec<_> = changes.iter().map(ToString::to_string).collect();
+        assert_eq!(text, ["register.max_scale: 1.2 -> 1.3"]);
     }
 }

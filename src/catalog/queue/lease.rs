@@ -1,7 +1,9 @@
 //! The right to work on one pair, and what is stored under it.
 
+use crate::catalog::queue::counters::{CounterKey, cursor};
 use crate::domain::{
-    ArtifactSet, ContentHash, Failure, MetricOutcome, PairId, Stage, UnixMillis, WorkerId,
+    ArtifactSet, ContentHash, Failure, JobStatus, MetricOutcome, PairId, Stage, UnixMillis,
+    WorkerId,
 };
 
 /// The right to work on one pair. Only a claim makes one, and only its holder can store anything for the pair.
@@ -14,6 +16,8 @@ pub struct Lease {
     pub(crate) worker: WorkerId,
     pub(crate) token: i64,
     pub(crate) cursor: Stage,
+    /// Fingerprint of the result before the cursor.
+    pub(crate) fingerprint: Option<FingerprintId>,
     pub(crate) attempt: u32,
     pub(crate) crashes: u32,
     pub(crate) exclusive: bool,
@@ -51,6 +55,25 @@ impl Lease {
     pub const fn token(&self) -> i64 {
         self.token
     }
+
+    /// Returns where the leased job is counted.
+    pub(crate) fn counter_key(&self) -> CounterKey {
+        let fingerprint = self.fingerprint.map(|FingerprintId(id)| id);
+        CounterKey::new(cursor(self.cursor), JobStatus::Leased, fingerprint)
+    }
+
+    /// Returns whether a fenced statement changed the job under this lease.
+    pub(crate) fn is_in(&self, rows: &[FencedRow]) -> bool {
+        rows.iter()
+            .any(|row| (row.pair, row.token) == (self.pair.0, self.token))
+    }
+}
+
+/// A job that a fenced statement changed: pair and token of the lease that still held.
+#[derive(Debug, Clone, Copy, sqlx::FromRow)]
+pub(crate) struct FencedRow {
+    pub(crate) pair: i64,
+    pub(crate) token: i64,
 }
 
 /// What became of a lease when something was stored under it.
@@ -83,9 +106,9 @@ pub struct InputVersions {
 }
 
 impl InputVersions {
-    /// Whether anything is told of either.
-    pub(crate) const fn is_told(&self) -> bool {
-        self.mesh.is_some() || self.print.is_some()
+    /// Returns whether neither file was read.
+    pub(crate) const fn is_empty(&self) -> bool {
+        self.mesh.is_none() && self.print.is_none()
     }
 }
 

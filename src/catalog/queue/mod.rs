@@ -1,15 +1,18 @@
-//! The work queue: leases, checkpoints, failures, recovery, staleness.
+//! The work queue: leases, checkpoints, failures, recovery of dead workers, staleness.
 
-pub(crate) mod alike;
+mod api;
 pub(crate) mod checkpoint;
 pub(crate) mod claim;
 pub(crate) mod counters;
 pub(crate) mod fail;
 pub(crate) mod fingerprint;
+pub(crate) mod fragments;
 pub(crate) mod job_counts;
 pub(crate) mod lease;
 pub(crate) mod plan;
 pub(crate) mod recovery;
 pub(crate) mod requeue;
+mod run_plan;
+pub(crate) mod selection;
 pub(crate) mod staleness;
 pub(crate) mod workers;

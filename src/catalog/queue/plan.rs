@@ -77,7 +77,7 @@ impl Plan {
     }
 
     /// Counts pairs that would not run.
-    pub(crate) const fn stays(&mut self, status: JobStatus, pairs: u64) {
+    pub(crate) const fn add_unchanged(&mut self, status: JobStatus, pairs: u64) {
         match status {
             JobStatus::Done => self.done += pairs,
             JobStatus::Quarantined => self.quarantined += pairs,

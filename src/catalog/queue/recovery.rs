@@ -9,8 +9,8 @@ use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::db::script::Script;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::checkpoint::{SEEN, over, seen_row};
-use crate::catalog::queue::counters::Deltas;
+use crate::catalog::queue::checkpoint::{UPDATE_INPUTS, input_row};
+use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::lease::InputVersions;
 use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
@@ -62,7 +62,7 @@ UPDATE job SET
     worker = NULL, deadline = NULL, token = token + 1, crashes = crashes + (item.value ->> 2),
     attempt = max(attempt - 1, 0), exclusive = max(exclusive, item.value ->> 1)
 FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = item.value ->> 0
-RETURNING pair, stage, status, crashes";
+RETURNING pair, stage, status, crashes, fingerprint";
 
 /// Notes that workers died: some, or all that did not end in order but for one.
 const DIED: &str =
@@ -86,7 +86,7 @@ UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = 
     token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), exclusive = 1
 WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))
     AND deadline + ?3 < (SELECT w.heartbeat FROM worker AS w WHERE w.id = job.worker)
-RETURNING pair, stage, status, crashes";
+RETURNING pair, stage, status, crashes, fingerprint";
 
 /// With the settings of the worker that died and the inputs as last seen.
 const CRASHED: &str = "
@@ -107,7 +107,7 @@ SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'class
 const FATAL_INPUTS: &str = "
 UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> 'mesh_hash')),
     print_hash = coalesce(failure.print_hash, unhex(item.value ->> 'print_hash'))
-FROM json_each(?1) AS item WHERE failure.pair = item.value ->> 'pair'";
+FROM json_each(?) AS item WHERE failure.pair = item.value ->> 'pair'";
 
 impl Catalog {
     /// Workers that hold leases.
@@ -164,8 +164,9 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut script = Script::default();
-                let items = seen.iter().map(|(pair, seen)| seen_row(pair.0, seen));
-                over(&mut script, &[SEEN, FATAL_INPUTS], items)?;
+                let items = || seen.iter().map(|(pair, seen)| input_row(*pair, seen));
+                script.execute_over(UPDATE_INPUTS, items())?;
+                script.execute_over(FATAL_INPUTS, items())?;
                 script.run(conn).await?;
                 Ok(())
             })
@@ -263,7 +264,8 @@ async fn brought_back(
     for row in found {
         let (pair, stage): (i64, i64) = (row.try_get(0)?, row.try_get(1)?);
         let (status, crashes): (_, i64) = (rows::status(row.try_get(2)?)?, row.try_get(3)?);
-        deltas.moved((stage, JobStatus::Leased), (stage, status));
+        let to = CounterKey::new(stage, status, row.try_get("fingerprint")?);
+        deltas.move_job(to.with_status(JobStatus::Leased), to);
         if status == JobStatus::Quarantined {
             recovered.poisoned.push(PairId(pair));
             crashed.push(json!({

@@ -1,21 +1,20 @@
 //! Taking pairs up again: after a change of settings or inputs, or because somebody asks.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
 
 use serde_json::json;
 use sqlx::{Row as _, SqliteConnection};
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
+use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::alike;
-use crate::catalog::queue::alike::made;
-use crate::catalog::queue::claim::PairSelection;
-use crate::catalog::queue::counters::{Deltas, cursor};
-use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
-use crate::catalog::queue::staleness::{Cause, RerunPolicy, Seen, decide, look};
-use crate::catalog::records::import;
+use crate::catalog::queue::counters::{CounterKey, Deltas};
+use crate::catalog::queue::fingerprint::{FingerprintChains, Fingerprints, current_json};
+use crate::catalog::queue::fragments::fingerprint_before;
+use crate::catalog::queue::selection::{PairSelection, select};
+use crate::catalog::queue::staleness::{
+    PAGE, RerunPolicy, StaleCause, StaleJob, clear_dirty, decide, groups, inspect, inspect_marked,
+};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 
 /// Which failed pairs to take up again.
@@ -33,31 +32,38 @@ pub enum RetrySelection {
 pub(crate) const REQUEUE: &str = concat!(
     "
 UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
-    exclusive = 0, made = ",
-    made!("(item.value ->> 1)"),
+    exclusive = 0, fingerprint = ",
+    fingerprint_before!("(item.value ->> 1)"),
     "
-FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1"
+FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0 AND job.status <> 1
+RETURNING pair, stage, fingerprint"
 );
 
-const FORGET: &str = "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
+/// Unmarked jobs of a group, in pages by pair.
+pub(crate) const MEMBERS: &str = "
+SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS ?4 AND dirty = 0
+ORDER BY pair LIMIT ?5";
+
+const CLEAR_FAILURES: &str =
+    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
 
 const KEPT_BACK: &str = "
-SELECT j.pair, j.stage, j.status FROM job AS j JOIN failure AS f ON f.pair = j.pair
+SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint FROM job AS j JOIN failure AS f ON f.pair = j.pair
 WHERE j.status IN (2, 4) AND (?1 IS NULL OR f.class = ?1)";
 
 const KEPT_BACK_AMONG: &str = "
-SELECT j.pair, j.stage, j.status FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
+SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
 WHERE j.status IN (2, 4)";
 
-/// A job that goes back.
-struct Moved {
+/// A job that goes back to a stage.
+struct RequeuedJob {
     pair: i64,
-    from: (i64, JobStatus),
+    from: CounterKey,
     to: Stage,
 }
 
 impl Catalog {
-    /// Sends pairs back whose settings or inputs changed, and what is asked for besides; says how many.
+    /// Sends pairs back whose settings or inputs changed, and those that the policy asks for; returns how many.
     ///
     /// # Errors
     /// When the database refuses.
@@ -65,45 +71,57 @@ impl Catalog {
         &self,
         fingerprints: &Fingerprints,
         among: Option<&PairSelection>,
-        again: RerunPolicy,
+        policy: RerunPolicy,
     ) -> Result<u64> {
         let Some(among) = among else {
-            return self.send_all_back(fingerprints, again).await;
+            return self.requeue_all_stale(fingerprints, policy).await;
         };
-        let mut sent = 0;
+        let mut requeued = 0;
         let mut after = Some(0);
         while let Some(from) = after {
             let (fingerprints, among) = (fingerprints.clone(), among.clone());
             let (moved, next) = self
                 .in_transaction(move |conn| {
-                    Box::pin(async move { page(conn, &fingerprints, &among, again, from).await })
+                    Box::pin(async move {
+                        let current = current_json(conn, &fingerprints).await?;
+                        let jobs = inspect(conn, &current, from, &among).await?;
+                        let moved = requeue(conn, &requeued_jobs(&jobs, policy)).await?;
+                        Ok((moved, jobs.last().map(|(pair, _)| *pair)))
+                    })
                 })
                 .await?;
-            sent += moved;
+            requeued += moved;
             after = next;
         }
-        Ok(sent)
+        Ok(requeued)
     }
 
-    /// Pairs that are alike go back together; only those that are not are looked at one by one. Each page is a
-    /// transaction of its own, so that others' writes are not kept waiting.
-    async fn send_all_back(&self, fingerprints: &Fingerprints, again: RerunPolicy) -> Result<u64> {
+    /// Unmarked jobs go back by group; only marked ones are inspected. Each page is a transaction of its own, so that
+    /// other writes are not kept waiting.
+    async fn requeue_all_stale(
+        &self,
+        fingerprints: &Fingerprints,
+        policy: RerunPolicy,
+    ) -> Result<u64> {
         let (current, groups) = {
             let mut conn = self.snapshot().await?;
             let current = current_json(&mut conn, fingerprints).await?;
-            let groups = alike::groups(&mut conn, &current).await?;
-            (current, groups)
+            let chains = FingerprintChains::load(&mut conn, fingerprints).await?;
+            (current, groups(&mut conn, &chains).await?)
         };
-        let mut sent = 0;
-        for group in groups {
-            let group = Arc::new(group);
+        let mut requeued = 0;
+        for (group, _) in groups {
+            // Marked jobs, and so all quarantined ones, are inspected below.
+            let is_marked = group.key.status == JobStatus::Quarantined;
+            let Some(to) = target(&group, policy).filter(|_| !is_marked) else {
+                continue;
+            };
             let mut after = Some(0);
-            while let (Some(from), Some(to)) = (after, goes_back(&group.seen, again)) {
-                let group = Arc::clone(&group);
+            while let Some(from) = after {
                 let (moved, next) = self
-                    .in_transaction(move |conn| Box::pin(group_page(conn, group, to, from)))
+                    .in_transaction(move |conn| Box::pin(requeue_group(conn, group.key, to, from)))
                     .await?;
-                sent += moved;
+                requeued += moved;
                 after = next;
             }
         }
@@ -111,12 +129,12 @@ impl Catalog {
         while let Some(from) = after {
             let current = current.clone();
             let (moved, next) = self
-                .in_transaction(move |conn| Box::pin(apart_page(conn, current, again, from)))
+                .in_transaction(move |conn| Box::pin(requeue_marked(conn, current, policy, from)))
                 .await?;
-            sent += moved;
+            requeued += moved;
             after = next;
         }
-        Ok(sent)
+        Ok(requeued)
     }
 
     /// Takes failed pairs up again; says how many. Pairs that did not fail are left as they are.
@@ -128,79 +146,77 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let found = kept_back(conn, &selection).await?;
-                apply(conn, &found).await
+                requeue(conn, &found).await
             })
         })
         .await
     }
 }
 
-/// Where a job goes back to; `None` when it stays or waits to be run anyhow.
-fn goes_back(seen: &Seen, again: RerunPolicy) -> Option<Stage> {
-    let (to, cause) = decide(seen, again)?;
-    let waits = matches!(cause, Cause::New | Cause::Unfinished | Cause::BackingOff);
+/// Returns where a job goes back to; `None` when it stays or is going to run anyway.
+fn target(job: &StaleJob, policy: RerunPolicy) -> Option<Stage> {
+    let (to, cause) = decide(job, policy)?;
+    let waits = matches!(
+        cause,
+        StaleCause::New | StaleCause::Unfinished | StaleCause::BackingOff
+    );
     (!waits).then_some(to)
 }
 
-fn moved(seen: &[Seen], again: RerunPolicy) -> Vec<Moved> {
-    let moved = |seen: &Seen| {
-        Some(Moved {
-            pair: seen.pair,
-            from: (seen.cursor, seen.status),
-            to: goes_back(seen, again)?,
+fn requeued_jobs(jobs: &[(i64, StaleJob)], policy: RerunPolicy) -> Vec<RequeuedJob> {
+    let requeued = jobs.iter().filter_map(|(pair, job)| {
+        Some(RequeuedJob {
+            pair: *pair,
+            from: job.key,
+            to: target(job, policy)?,
         })
-    };
-    seen.iter().filter_map(moved).collect()
+    });
+    requeued.collect()
 }
 
-/// One page of some pairs: how many moved, and where the next page begins.
-async fn page(
+/// Sends one page of a group back; returns how many, and the last pair of the page.
+async fn requeue_group(
     conn: &mut SqliteConnection,
-    fingerprints: &Fingerprints,
-    among: &PairSelection,
-    again: RerunPolicy,
-    after: i64,
-) -> Result<(u64, Option<i64>)> {
-    let current = current_json(conn, fingerprints).await?;
-    let found = look(conn, &current, after, among).await?;
-    let sent = apply(conn, &moved(&found, again)).await?;
-    Ok((sent, found.last().map(|seen| seen.pair)))
-}
-
-/// One page of a group that goes back.
-async fn group_page(
-    conn: &mut SqliteConnection,
-    group: Arc<alike::Group>,
+    from: CounterKey,
     to: Stage,
     after: i64,
 ) -> Result<(u64, Option<i64>)> {
-    let pairs = alike::members(conn, &group, after).await?;
-    let from = (group.seen.cursor, group.seen.status);
-    let moved = pairs.iter().map(|pair| Moved {
+    let pairs: Vec<i64> = sqlx::query_scalar(MEMBERS)
+        .bind(after)
+        .bind(from.cursor)
+        .bind(from.status.code())
+        .bind((from.fingerprint != 0).then_some(from.fingerprint))
+        .bind(PAGE as i64)
+        .fetch_all(&mut *conn)
+        .await?;
+    let jobs = pairs.iter().map(|pair| RequeuedJob {
         pair: *pair,
         from,
         to,
     });
-    let sent = apply(conn, &moved.collect::<Vec<_>>()).await?;
-    Ok((sent, pairs.last().copied()))
+    let moved = requeue(conn, &jobs.collect::<Vec<_>>()).await?;
+    Ok((moved, pairs.last().copied()))
 }
 
-/// One page of the pairs that are in no group.
-async fn apart_page(
+/// Sends one page of the marked jobs back, and unmarks those whose results agree again.
+async fn requeue_marked(
     conn: &mut SqliteConnection,
     current: String,
-    again: RerunPolicy,
+    policy: RerunPolicy,
     after: i64,
 ) -> Result<(u64, Option<i64>)> {
-    let Some((found, last)) = alike::look_apart(conn, &current, after).await? else {
+    let Some((jobs, last)) = inspect_marked(conn, &current, after).await? else {
         return Ok((0, None));
     };
-    let sent = apply(conn, &moved(&found, again)).await?;
-    alike::settle(conn, after, last).await?;
-    Ok((sent, Some(last)))
+    let moved = requeue(conn, &requeued_jobs(&jobs, policy)).await?;
+    clear_dirty(conn, after, last).await?;
+    Ok((moved, Some(last)))
 }
 
-async fn kept_back(conn: &mut SqliteConnection, selection: &RetrySelection) -> Result<Vec<Moved>> {
+async fn kept_back(
+    conn: &mut SqliteConnection,
+    selection: &RetrySelection,
+) -> Result<Vec<RequeuedJob>> {
     let found = match selection {
         RetrySelection::All => {
             sqlx::query(KEPT_BACK)
@@ -216,14 +232,11 @@ async fn kept_back(conn: &mut SqliteConnection, selection: &RetrySelection) -> R
         }
         RetrySelection::Names(names) => {
             for name in names {
-                if import::select(conn, std::slice::from_ref(name))
-                    .await?
-                    .is_empty()
-                {
+                if select(conn, std::slice::from_ref(name)).await?.is_empty() {
                     return Err(CatalogError::UnknownPair(name.clone()));
                 }
             }
-            let among = import::select(conn, names).await?;
+            let among = select(conn, names).await?;
             sqlx::query(KEPT_BACK_AMONG)
                 .bind(among.json)
                 .fetch_all(conn)
@@ -234,29 +247,40 @@ async fn kept_back(conn: &mut SqliteConnection, selection: &RetrySelection) -> R
         .iter()
         .map(|row| {
             let at: i64 = row.try_get("stage")?;
-            Ok(Moved {
+            Ok(RequeuedJob {
                 pair: row.try_get("pair")?,
-                from: (at, rows::status(row.try_get("status")?)?),
+                from: CounterKey {
+                    cursor: at,
+                    status: rows::status(row.try_get("status")?)?,
+                    fingerprint: row.try_get("fingerprint")?,
+                },
                 to: rows::stage(at)?,
             })
         })
         .collect()
 }
 
-async fn apply(conn: &mut SqliteConnection, moved: &[Moved]) -> Result<u64> {
-    if moved.is_empty() {
+async fn requeue(conn: &mut SqliteConnection, jobs: &[RequeuedJob]) -> Result<u64> {
+    if jobs.is_empty() {
         return Ok(0);
     }
-    let items = moved
-        .iter()
-        .map(|moved| json!([moved.pair, moved.to.index()]));
+    let items = jobs.iter().map(|job| json!([job.pair, job.to.index()]));
     let items = rows::array(items).to_string();
-    for sql in [REQUEUE, FORGET] {
-        sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
-    }
+    let moved: Vec<(i64, i64, Option<i64>)> = sqlx::query_as(REQUEUE)
+        .bind(&items)
+        .fetch_all(&mut *conn)
+        .await?;
+    sqlx::query(CLEAR_FAILURES)
+        .bind(&items)
+        .execute(&mut *conn)
+        .await?;
+    let from: BTreeMap<i64, CounterKey> = jobs.iter().map(|job| (job.pair, job.from)).collect();
     let mut deltas = Deltas::default();
-    for moved in moved {
-        deltas.moved(moved.from, (cursor(moved.to), JobStatus::Ready));
+    for (pair, cursor, fingerprint) in &moved {
+        if let Some(from) = from.get(pair) {
+            let to = CounterKey::new(*cursor, JobStatus::Ready, *fingerprint);
+            deltas.move_job(*from, to);
+        }
     }
     deltas.apply(conn).await?;
     Ok(moved.len() as u64)

@@ -1,29 +1,30 @@
 //! Which pairs must run again because their settings or inputs changed, and why.
+//!
+//! A job stores the fingerprint of the result before its cursor. Fingerprints form a chain, so this one number names the
+//! settings of all earlier results, and the counters by fingerprint answer for all such jobs at once. Jobs whose results
+//! may not agree with that chain or with their inputs carry the `dirty` mark. They and the quarantined jobs, whose
+//! failure has settings and inputs of its own, are found by partial indexes and inspected one by one.
 
 use std::collections::BTreeMap;
 
-use serde_json::{Map, Value};
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row as _, SqliteConnection};
 
-use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
-use crate::catalog::handle::Catalog;
-use crate::catalog::queue::alike;
-use crate::catalog::queue::claim::PairSelection;
-use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
-use crate::catalog::queue::plan::{FieldChange, Plan, PlanEntry, StaleReason};
-use crate::catalog::records::import;
-use crate::domain::{JobStatus, PairName, Stage};
+use crate::catalog::queue::counters::{CounterKey, Cursor, counters};
+use crate::catalog::queue::fingerprint::FingerprintChains;
+use crate::catalog::queue::fragments::inconsistent;
+use crate::catalog::queue::selection::PairSelection;
+use crate::domain::{JobStatus, Stage};
 
-/// Pairs looked at in one statement.
+/// Jobs inspected in one statement.
 pub(crate) const PAGE: usize = 10_000;
 
-/// What to run again besides what changed.
+/// Which pairs to run again besides the stale ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RerunPolicy {
-    /// Nothing.
+    /// None.
     Changed,
     /// Pairs that failed.
     Failed,
@@ -31,38 +32,61 @@ pub enum RerunPolicy {
     All(Stage),
 }
 
-/// Each job with its first result that was made otherwise than it would be now.
-pub(crate) const LOOK: &str = "
-WITH seen AS (
-    SELECT j.pair, j.stage, j.status, p.mesh_hash, p.print_hash, p.attributes, (
+/// Each job with its first result that has other settings or inputs than the current ones.
+pub(crate) const INSPECT: &str = "
+WITH found AS (
+    SELECT j.pair, j.stage, j.status, j.fingerprint, p.mesh_hash, p.print_hash, p.attributes, (
         SELECT min(r.stage) FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
             r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
             OR r.attributes <> p.attributes)) AS first
     FROM (SELECT value FROM json_each(?4)) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
         JOIN pair AS p ON p.id = j.pair WHERE j.pair > ?2 ORDER BY j.pair LIMIT ?3)
-SELECT seen.pair, seen.stage, seen.status, seen.first, r.fingerprint,
-    coalesce(r.mesh_hash <> seen.mesh_hash, 0) AS mesh, coalesce(r.print_hash <> seen.print_hash, 0) AS print,
-    coalesce(r.attributes <> seen.attributes, 0) AS attributes,
-    coalesce(f.fingerprint <> (?1 ->> f.stage), 0) OR coalesce(f.mesh_hash <> seen.mesh_hash, 0)
-        OR coalesce(f.print_hash <> seen.print_hash, 0) OR coalesce(f.attributes <> seen.attributes, 0) AS otherwise
-FROM seen LEFT JOIN stage_result AS r ON r.pair = seen.pair AND r.stage = seen.first
-    LEFT JOIN failure AS f ON f.pair = seen.pair ORDER BY seen.pair";
+SELECT found.pair, found.stage, found.status, coalesce(found.fingerprint, 0) AS job_fingerprint, found.first, r.fingerprint,
+    coalesce(r.mesh_hash <> found.mesh_hash, 0) AS mesh, coalesce(r.print_hash <> found.print_hash, 0) AS print,
+    coalesce(r.attributes <> found.attributes, 0) AS attributes,
+    coalesce(f.fingerprint <> (?1 ->> f.stage), 0) OR coalesce(f.mesh_hash <> found.mesh_hash, 0)
+        OR coalesce(f.print_hash <> found.print_hash, 0) OR coalesce(f.attributes <> found.attributes, 0)
+        AS failure_is_outdated
+FROM found LEFT JOIN stage_result AS r ON r.pair = found.pair AND r.stage = found.first
+    LEFT JOIN failure AS f ON f.pair = found.pair ORDER BY found.pair";
 
-/// A job as the look found it.
+/// Jobs that the counters cannot answer for, in pages by pair.
+pub(crate) const MARKED: &str = "
+SELECT pair FROM job WHERE dirty = 1 AND pair > ?1 UNION SELECT pair FROM job WHERE status = 4 AND pair > ?1
+ORDER BY 1 LIMIT ?2";
+
+/// Pairs with a result that has other settings or inputs than the current ones.
+pub(crate) const COUNT_STALE: &str = "
+SELECT (SELECT coalesce(sum(n), 0) FROM counter
+        WHERE fingerprint <> 0 AND fingerprint NOT IN (SELECT value FROM json_each(?1))) + (
+    SELECT count(*) FROM job AS j CROSS JOIN pair AS p ON p.id = j.pair
+    WHERE j.dirty = 1 AND (j.fingerprint IS NULL OR j.fingerprint IN (SELECT value FROM json_each(?1))) AND EXISTS (
+        SELECT 1 FROM stage_result AS r WHERE r.pair = j.pair AND r.stage < j.stage AND (
+            r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
+            OR r.attributes <> p.attributes)))";
+
+/// Unmarks jobs whose results agree again. Leased ones keep the mark: a result with other inputs may be on its way.
+pub(crate) const CLEAR_DIRTY: &str = concat!(
+    "
+UPDATE job SET dirty = 0 WHERE dirty = 1 AND pair > ?1 AND pair <= ?2 AND status <> 1 AND NOT EXISTS (
+    ",
+    inconsistent!(),
+    ")"
+);
+
+/// A job or a group of jobs, and what changed since its results were computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Seen {
-    pub(crate) pair: i64,
-    pub(crate) cursor: i64,
-    pub(crate) status: JobStatus,
-    /// First stage whose result would be made otherwise now, and what changed.
-    change: Option<(Stage, Cause)>,
-    /// Whether its failure was of other settings or inputs than the current ones.
-    otherwise: bool,
+pub(crate) struct StaleJob {
+    pub(crate) key: CounterKey,
+    /// First stage whose result has other settings or inputs than the current ones, and what changed.
+    pub(crate) change: Option<(Stage, StaleCause)>,
+    /// Whether its failure had other settings or inputs than the current ones.
+    pub(crate) failure_is_outdated: bool,
 }
 
-/// A reason before its field changes are looked up.
+/// Why a job has work to do, before the changed fields of its settings are looked up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Cause {
+pub(crate) enum StaleCause {
     New,
     Unfinished,
     BackingOff,
@@ -71,291 +95,212 @@ pub(crate) enum Cause {
     Mesh,
     Print,
     Manifest,
-    Asked,
+    Requested,
 }
 
-/// Where a job would start and why; `None` when it stays as it is.
-pub(crate) fn decide(seen: &Seen, again: RerunPolicy) -> Option<(Stage, Cause)> {
-    let next = usize::try_from(seen.cursor)
-        .ok()
-        .and_then(Stage::from_index);
-    if seen.status == JobStatus::Leased {
+/// Returns where a job starts and why; `None` when it stays as it is.
+pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, StaleCause)> {
+    let CounterKey { cursor, status, .. } = job.key;
+    let next = usize::try_from(cursor).ok().and_then(Stage::from_index);
+    if status == JobStatus::Leased {
         return None;
     }
-    let asked = match again {
-        RerunPolicy::All(from) => Some((next.map_or(from, |next| next.min(from)), Cause::Asked)),
-        RerunPolicy::Failed if seen.status == JobStatus::Quarantined => {
-            next.map(|at| (at, Cause::Asked))
+    let requested = match policy {
+        RerunPolicy::All(from) => {
+            let start = next.map_or(from, |next| next.min(from));
+            Some((start, StaleCause::Requested))
+        }
+        RerunPolicy::Failed if status == JobStatus::Quarantined => {
+            next.map(|at| (at, StaleCause::Requested))
         }
         RerunPolicy::Failed | RerunPolicy::Changed => None,
     };
-    // The earlier start wins; between equals the change says more than the asking.
-    match (seen.change, asked) {
-        (Some(changed), Some(asked)) if asked.0 < changed.0 => return Some(asked),
+    // The earlier start wins; of equal starts the change explains more than the request.
+    match (job.change, requested) {
+        (Some(changed), Some(requested)) if requested.0 < changed.0 => return Some(requested),
         (Some(changed), _) => return Some(changed),
-        (None, Some(asked)) => return Some(asked),
+        (None, Some(requested)) => return Some(requested),
         (None, None) => {}
     }
-    let cause = match seen.status {
-        JobStatus::Ready if seen.cursor == 0 => Cause::New,
-        JobStatus::Ready => Cause::Unfinished,
-        JobStatus::Backoff => Cause::BackingOff,
-        JobStatus::Quarantined if seen.otherwise => Cause::FailedBefore,
+    let cause = match status {
+        JobStatus::Ready if cursor == 0 => StaleCause::New,
+        JobStatus::Ready => StaleCause::Unfinished,
+        JobStatus::Backoff => StaleCause::BackingOff,
+        JobStatus::Quarantined if job.failure_is_outdated => StaleCause::FailedBefore,
         JobStatus::Quarantined | JobStatus::Done | JobStatus::Leased => return None,
     };
     next.map(|at| (at, cause))
 }
 
-/// Looks at the next of some jobs after a pair.
-pub(crate) async fn look(
+/// Inspects the next of some jobs after a pair; returns them by pair.
+pub(crate) async fn inspect(
     conn: &mut SqliteConnection,
     current: &str,
     after: i64,
     among: &PairSelection,
-) -> Result<Vec<Seen>> {
-    let query = sqlx::query(LOOK).bind(current).bind(after);
+) -> Result<Vec<(i64, StaleJob)>> {
+    let query = sqlx::query(INSPECT).bind(current).bind(after);
     let query = query.bind(PAGE as i64).bind(&among.json);
-    query.fetch_all(conn).await?.iter().map(seen).collect()
+    query.fetch_all(conn).await?.iter().map(stale_job).collect()
 }
 
-fn seen(row: &SqliteRow) -> Result<Seen> {
+fn stale_job(row: &SqliteRow) -> Result<(i64, StaleJob)> {
     let first: Option<i64> = row.try_get("first")?;
     let change = match first.map(rows::stage).transpose()? {
         Some(stage) => Some((stage, changed(row, stage)?)),
         None => None,
     };
-    Ok(Seen {
-        pair: row.try_get("pair")?,
-        cursor: row.try_get("stage")?,
-        status: rows::status(row.try_get("status")?)?,
+    let job = StaleJob {
+        key: CounterKey {
+            cursor: row.try_get("stage")?,
+            status: rows::status(row.try_get("status")?)?,
+            fingerprint: row.try_get("job_fingerprint")?,
+        },
         change,
-        otherwise: row.try_get("otherwise")?,
-    })
-}
-
-/// What the first result that would be made otherwise differs in. Inputs go before settings: they say more.
-fn changed(row: &SqliteRow, stage: Stage) -> Result<Cause> {
-    Ok(if row.try_get("mesh")? {
-        Cause::Mesh
-    } else if row.try_get("print")? {
-        Cause::Print
-    } else if row.try_get("attributes")? {
-        Cause::Manifest
-    } else {
-        Cause::Settings(stage, row.try_get("fingerprint")?)
-    })
-}
-
-impl Catalog {
-    /// What a run with these settings would do with the pairs named, or with all.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn plan(
-        &self,
-        fingerprints: &Fingerprints,
-        names: Option<&[PairName]>,
-        again: RerunPolicy,
-    ) -> Result<Plan> {
-        let mut conn = self.snapshot().await?;
-        let among = match names {
-            Some(names) => Some(import::select(&mut conn, names).await?),
-            None => None,
-        };
-        plan(&mut conn, fingerprints, among.as_ref(), again).await
-    }
-
-    /// Pairs with results that were made with other settings or inputs than those of now.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn stale(&self, fingerprints: &Fingerprints) -> Result<u64> {
-        let mut conn = self.read_conn().await?;
-        alike::stale(&mut conn, fingerprints).await
-    }
-
-    /// Why a pair would run, and from which stage; `None` when nothing is left to do.
-    ///
-    /// # Errors
-    /// When there is no such pair.
-    pub async fn why(
-        &self,
-        pair: &PairName,
-        fingerprints: &Fingerprints,
-    ) -> Result<Option<PlanEntry>> {
-        let mut conn = self.snapshot().await?;
-        let among = import::select(&mut conn, std::slice::from_ref(pair)).await?;
-        if among.is_empty() {
-            return Err(CatalogError::UnknownPair(pair.clone()));
-        }
-        let plan = plan(&mut conn, fingerprints, Some(&among), RerunPolicy::Changed).await?;
-        Ok(plan.entries.into_iter().next())
-    }
-}
-
-async fn plan(
-    conn: &mut SqliteConnection,
-    fingerprints: &Fingerprints,
-    among: Option<&PairSelection>,
-    again: RerunPolicy,
-) -> Result<Plan> {
-    let current = current_json(conn, fingerprints).await?;
-    let mut plan = Plan::default();
-    let mut entries: BTreeMap<(Stage, Cause), u64> = BTreeMap::new();
-    let mut take = |seen: &Seen, pairs: u64| match decide(seen, again) {
-        Some(key) => *entries.entry(key).or_default() += pairs,
-        None => plan.stays(seen.status, pairs),
+        failure_is_outdated: row.try_get("failure_is_outdated")?,
     };
-    match among {
-        Some(among) => look_at(conn, &current, among, &mut take).await?,
-        None => alike::look_at_all(conn, &current, &mut take).await?,
-    }
-    for ((from, cause), pairs) in entries {
-        let why = reason(conn, fingerprints, cause).await?;
-        plan.entries.push(PlanEntry { from, why, pairs });
-    }
-    Ok(plan)
+    Ok((row.try_get("pair")?, job))
 }
 
-/// Gives the state of each of some pairs to `each`.
-async fn look_at(
+/// Returns what differs in the first outdated result. Inputs go before settings, because they explain more.
+fn changed(row: &SqliteRow, stage: Stage) -> Result<StaleCause> {
+    Ok(if row.try_get("mesh")? {
+        StaleCause::Mesh
+    } else if row.try_get("print")? {
+        StaleCause::Print
+    } else if row.try_get("attributes")? {
+        StaleCause::Manifest
+    } else {
+        StaleCause::Settings(stage, row.try_get("fingerprint")?)
+    })
+}
+
+/// Inspects the next marked jobs after a pair; also returns the last pair of the page, `None` at the end.
+pub(crate) async fn inspect_marked(
     conn: &mut SqliteConnection,
     current: &str,
-    among: &PairSelection,
-    mut each: impl FnMut(&Seen, u64),
-) -> Result<()> {
-    let mut after = 0;
-    loop {
-        let page = look(conn, current, after, among).await?;
-        let Some(last) = page.last() else {
-            return Ok(());
-        };
-        after = last.pair;
-        for seen in &page {
-            each(seen, 1);
-        }
-    }
+    after: i64,
+) -> Result<Option<(Vec<(i64, StaleJob)>, i64)>> {
+    let page: Vec<i64> = sqlx::query_scalar(MARKED)
+        .bind(after)
+        .bind(PAGE as i64)
+        .fetch_all(&mut *conn)
+        .await?;
+    let Some(last) = page.last().copied() else {
+        return Ok(None);
+    };
+    let jobs = inspect(conn, current, after, &PairSelection::of_ids(&page)).await?;
+    Ok(Some((jobs, last)))
 }
 
-async fn reason(
+/// Returns the groups of unmarked jobs by the counters, those with earlier cursors first.
+///
+/// Jobs go back to a group that comes before their own, so that requeueing in this order handles each job once.
+pub(crate) async fn groups(
     conn: &mut SqliteConnection,
-    fingerprints: &Fingerprints,
-    cause: Cause,
-) -> Result<StaleReason> {
-    Ok(match cause {
-        Cause::New => StaleReason::New,
-        Cause::Unfinished => StaleReason::Unfinished,
-        Cause::BackingOff => StaleReason::BackingOff,
-        Cause::FailedBefore => StaleReason::FailedBefore,
-        Cause::Mesh => StaleReason::Mesh,
-        Cause::Print => StaleReason::Print,
-        Cause::Manifest => StaleReason::Manifest,
-        Cause::Asked => StaleReason::Asked,
-        Cause::Settings(stage, fingerprint) => {
-            let fields: String = sqlx::query_scalar("SELECT fields FROM fingerprint WHERE id = ?1")
-                .bind(fingerprint)
-                .fetch_one(conn)
-                .await?;
-            let old: Value = serde_json::from_str(&fields)?;
-            let changes = differences(stage, &old, &fingerprints.of(stage).fields);
-            StaleReason::Settings { stage, changes }
+    chains: &FingerprintChains,
+) -> Result<Vec<(StaleJob, u64)>> {
+    let counted = counters(conn).await?;
+    let groups = counted.into_iter().map(|(key, jobs)| {
+        let job = StaleJob {
+            key,
+            change: changed_settings(key, chains),
+            failure_is_outdated: false,
+        };
+        (job, jobs)
+    });
+    Ok(groups.collect())
+}
+
+/// Returns the first stage before the cursor with other settings than the current ones.
+fn changed_settings(key: CounterKey, chains: &FingerprintChains) -> Option<(Stage, StaleCause)> {
+    let (stage, old) = chains.first_change(key.fingerprint)?;
+    let is_before = (stage.index() as Cursor) < key.cursor;
+    is_before.then_some((stage, StaleCause::Settings(stage, old)))
+}
+
+/// Passes every job's state to `each`, with the number of jobs in that state.
+pub(crate) async fn inspect_all(
+    conn: &mut SqliteConnection,
+    current: &str,
+    chains: &FingerprintChains,
+    mut each: impl FnMut(&StaleJob, u64),
+) -> Result<()> {
+    let mut marked: BTreeMap<CounterKey, u64> = BTreeMap::new();
+    let mut after = 0;
+    while let Some((page, last)) = inspect_marked(conn, current, after).await? {
+        for (_, job) in &page {
+            *marked.entry(job.key).or_default() += 1;
+            each(job, 1);
         }
-    })
-}
-
-/// Leaves that differ between two fingerprints' fields, by name: `register.max_scale`.
-pub(crate) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
-    let (old, new) = (leaves(stage, old), leaves(stage, new));
-    let names = old.keys().chain(new.keys());
-    let names: std::collections::BTreeSet<_> = names.collect();
-    names
-        .into_iter()
-        .filter(|name| old.get(*name) != new.get(*name))
-        .map(|name| FieldChange {
-            field: name.clone(),
-            old: old.get(name).cloned(),
-            new: new.get(name).cloned(),
-        })
-        .collect()
-}
-
-/// Every value that is no object, by its path without the word "settings".
-fn leaves(stage: Stage, fields: &Value) -> Map<String, Value> {
-    let mut found = Map::new();
-    let mut open = vec![(stage.name().to_owned(), fields)];
-    while let Some((path, value)) = open.pop() {
-        match value {
-            Value::Object(inner) => {
-                for (key, value) in inner {
-                    let path = if key == "settings" {
-                        path.clone()
-                    } else {
-                        format!("{path}.{key}")
-                    };
-                    open.push((path, value));
-                }
-            }
-            Value::Null
-            | Value::Bool(_)
-            | Value::Number(_)
-            | Value::String(_)
-            | Value::Array(_) => {
-                found.insert(path, value.clone());
-            }
+        after = last;
+    }
+    for (job, jobs) in groups(conn, chains).await? {
+        let marked = marked.get(&job.key).copied().unwrap_or(0);
+        let unmarked = jobs.saturating_sub(marked);
+        if unmarked > 0 {
+            each(&job, unmarked);
         }
     }
-    found
+    Ok(())
+}
+
+/// Counts the pairs with a result that has other settings or inputs than the current ones.
+pub(crate) async fn count_stale(conn: &mut SqliteConnection, current: &str) -> Result<u64> {
+    let n: i64 = sqlx::query_scalar(COUNT_STALE)
+        .bind(current)
+        .fetch_one(conn)
+        .await?;
+    Ok(n.unsigned_abs())
+}
+
+/// Unmarks the jobs in a range of pairs whose results agree again.
+pub(crate) async fn clear_dirty(conn: &mut SqliteConnection, after: i64, last: i64) -> Result<()> {
+    let query = sqlx::query(CLEAR_DIRTY).bind(after).bind(last);
+    query.execute(conn).await?;
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
-    use serde_json::json;
-
-    use super::{Cause, RerunPolicy, Seen, decide, differences};
+    use super::{CounterKey, RerunPolicy, StaleCause, StaleJob, decide};
     use crate::domain::{JobStatus, Stage};
 
-    fn seen(cursor: i64, status: JobStatus) -> Seen {
-        Seen {
-            pair: 1,
-            cursor,
-            status,
+    fn job(cursor: i64, status: JobStatus) -> StaleJob {
+        StaleJob {
+            key: CounterKey {
+                cursor,
+                status,
+                fingerprint: 0,
+            },
             change: None,
-            otherwise: false,
+            failure_is_outdated: false,
         }
     }
 
     #[test]
-    fn a_changed_setting_is_named_with_old_and_new() {
-        let old = json!({ "revision": 1, "settings": { "max_scale": 1.2, "seed": 0 } });
-        let new = json!({ "revision": 1, "settings": { "max_scale": 1.3, "seed": 0 } });
-        let changes = differences(Stage::Register, &old, &new);
-        let text: Vec<_> = changes.iter().map(ToString::to_string).collect();
-        assert_eq!(text, ["register.max_scale: 1.2 -> 1.3"]);
-    }
-
-    #[test]
     fn a_pair_that_is_done_and_unchanged_stays() {
-        let done = seen(4, JobStatus::Done);
+        let done = job(4, JobStatus::Done);
         assert_eq!(decide(&done, RerunPolicy::Changed), None);
         assert_eq!(decide(&done, RerunPolicy::Failed), None);
         let all = decide(&done, RerunPolicy::All(Stage::Depth));
-        assert_eq!(all, Some((Stage::Depth, Cause::Asked)));
+        assert_eq!(all, Some((Stage::Depth, StaleCause::Requested)));
     }
 
     #[test]
     fn the_first_changed_stage_is_where_it_starts() {
-        let mut print_changed = seen(4, JobStatus::Done);
-        print_changed.change = Some((Stage::Normalize, Cause::Print));
+        let mut print_changed = job(4, JobStatus::Done);
+        print_changed.change = Some((Stage::Normalize, StaleCause::Print));
         let found = decide(&print_changed, RerunPolicy::All(Stage::Register));
-        assert_eq!(found, Some((Stage::Normalize, Cause::Print)));
+        assert_eq!(found, Some((Stage::Normalize, StaleCause::Print)));
     }
 
     #[test]
     fn a_failure_of_other_settings_is_no_failure_of_these() {
-        let mut failed = seen(1, JobStatus::Quarantined);
+        let mut failed = job(1, JobStatus::Quarantined);
         assert_eq!(decide(&failed, RerunPolicy::Changed), None);
-        failed.otherwise = true;
+        failed.failure_is_outdated = true;
         let found = decide(&failed, RerunPolicy::Changed);
-        assert_eq!(found, Some((Stage::Depth, Cause::FailedBefore)));
+        assert_eq!(found, Some((Stage::Depth, StaleCause::FailedBefore)));
     }
 }

@@ -5,9 +5,9 @@ use sqlx::{Row as _, SqliteConnection};
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::claim::PairSelection;
-use crate::catalog::queue::counters::{Deltas, KEPT, cursor};
+use crate::catalog::queue::counters::{CounterKey, Deltas, cursor};
 use crate::catalog::queue::fingerprint::FingerprintIds;
+use crate::catalog::queue::selection::PairSelection;
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 
 /// The process a worker runs in.
@@ -48,7 +48,7 @@ pub struct WorkLeft {
 /// Back-off times that are over, or so far ahead that the clock must have jumped.
 pub(crate) const DUE: &str = "
 UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
-RETURNING stage";
+RETURNING stage, fingerprint";
 
 pub(crate) const LEFT_ALL: &str = "
 SELECT
@@ -61,6 +61,8 @@ const LEFT_AMONG: &str = "
 SELECT count(*) FILTER (WHERE j.status = 0), count(*) FILTER (WHERE j.status = 1),
     count(*) FILTER (WHERE j.status = 2), min(j.run_at)
 FROM json_each(?2) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value WHERE j.stage <= ?1";
+
+const COUNT_ALL: &str = "SELECT stage, status, sum(n) FROM counter GROUP BY stage, status";
 
 const COUNT_AMONG: &str = "
 SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
@@ -107,17 +109,18 @@ impl Catalog {
     pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let stages: Vec<i64> = sqlx::query_scalar(DUE)
+                let due: Vec<(i64, Option<i64>)> = sqlx::query_as(DUE)
                     .bind(now)
                     .bind(now + longest)
                     .fetch_all(&mut *conn)
                     .await?;
                 let mut deltas = Deltas::default();
-                for stage in &stages {
-                    deltas.moved((*stage, JobStatus::Backoff), (*stage, JobStatus::Ready));
+                for (cursor, fingerprint) in &due {
+                    let to = CounterKey::new(*cursor, JobStatus::Ready, *fingerprint);
+                    deltas.move_job(to.with_status(JobStatus::Backoff), to);
                 }
                 deltas.apply(conn).await?;
-                Ok(stages.len() as u64)
+                Ok(due.len() as u64)
             })
         })
         .await
@@ -178,7 +181,7 @@ impl Catalog {
     pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
         let mut conn = self.read_conn().await?;
         let query = match among {
-            None => sqlx::query(KEPT),
+            None => sqlx::query(COUNT_ALL),
             Some(among) => sqlx::query(COUNT_AMONG).bind(&among.json),
         };
         let mut left = WorkLeft::default();

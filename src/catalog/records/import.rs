@@ -11,11 +11,11 @@ use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::claim::PairSelection;
-use crate::catalog::queue::counters::{Deltas, cursor};
+use crate::catalog::queue::counters::{CounterKey, Deltas};
+use crate::catalog::queue::selection::{PairSelection, select};
 use crate::catalog::records::ground_truth;
 use crate::catalog::records::model::PairAttributes;
-use crate::domain::{JobStatus, PairName, Stage, UnixMillis};
+use crate::domain::{PairName, UnixMillis};
 
 /// A row to import.
 pub type ImportRow = PairAttributes;
@@ -116,8 +116,7 @@ impl Catalog {
                     }
                 }
                 let mut deltas = Deltas::default();
-                let at = (cursor(Stage::Fit), JobStatus::Ready);
-                deltas.add(at, summary.added as i64);
+                deltas.add(CounterKey::NEW, summary.added as i64);
                 deltas.apply(conn).await?;
                 summary.changed.sort_by(|a, b| a.name.cmp(&b.name));
                 let stored = ground_truth::set(conn, &truths).await?;
@@ -164,22 +163,6 @@ impl Catalog {
         let mut conn = self.read_conn().await?;
         select(&mut conn, names).await
     }
-}
-
-pub(crate) async fn select(
-    conn: &mut SqliteConnection,
-    names: &[PairName],
-) -> Result<PairSelection> {
-    let ids: Vec<i64> = sqlx::query_scalar(
-        "SELECT id FROM pair WHERE name IN (SELECT value FROM json_each(?1)) ORDER BY id",
-    )
-    .bind(rows::names_json(names))
-    .fetch_all(conn)
-    .await?;
-    Ok(PairSelection {
-        len: ids.len(),
-        json: Value::from(ids).to_string(),
-    })
 }
 
 async fn import_chunk(

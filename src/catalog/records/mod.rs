@@ -5,7 +5,6 @@ pub(crate) mod import;
 pub(crate) mod look;
 pub(crate) mod manual_alignments;
 pub(crate) mod model;
-pub(crate) mod pages;
 pub(crate) mod pair_results;
 pub(crate) mod pair_work;
 pub(crate) mod review_answers;

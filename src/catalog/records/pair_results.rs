@@ -10,7 +10,6 @@ use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::counters::JobCounts;
 use crate::catalog::records::import;
 use crate::catalog::records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairDetail, PairResults, ReviewerVerdict, StageRecord,
@@ -19,8 +18,7 @@ use crate::catalog::records::model::{
 use crate::catalog::records::stage_results;
 use crate::catalog::records::verdicts;
 use crate::domain::{
-    ContentHash, Failure, FailureClass, JobStatus, PairName, RegisterOutcome, Stage,
-    ThresholdMetric,
+    ContentHash, Failure, FailureClass, PairName, RegisterOutcome, Stage, ThresholdMetric,
 };
 
 pub(crate) const PAGE: &str = "
@@ -271,14 +269,37 @@ async fn attempts(conn: &mut SqliteConnection, pair: i64) -> Result<Vec<AttemptR
         .collect()
 }
 
-/// Jobs by status from the counters.
-pub(crate) fn by_status(counts: &JobCounts) -> BTreeMap<JobStatus, u64> {
-    let mut jobs: BTreeMap<_, _> = JobStatus::ALL
-        .into_iter()
-        .map(|status| (status, 0))
-        .collect();
-    for ((_, status), n) in counts {
-        *jobs.entry(*status).or_default() += n;
+/// Pairs in the order of names, a page at a time, so that memory does not grow with their number.
+#[derive(Debug)]
+pub struct ResultPages<'a> {
+    catalog: &'a Catalog,
+    size: usize,
+    after: Option<PairName>,
+}
+
+impl Catalog {
+    /// Results of all pairs in pages of at most `size`.
+    pub const fn result_pages(&self, size: usize) -> ResultPages<'_> {
+        ResultPages {
+            catalog: self,
+            size,
+            after: None,
+        }
     }
-    jobs
+}
+
+impl ResultPages<'_> {
+    /// The next page, which is never empty; `None` at the end.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn next(&mut self) -> Result<Option<Vec<PairResults>>> {
+        let page = self.catalog.results_page(self.after.as_ref(), self.size);
+        let page = page.await?;
+        let Some(last) = page.last() else {
+            return Ok(None);
+        };
+        self.after = Some(last.attributes.name.clone());
+        Ok(Some(page))
+    }
 }

@@ -11,8 +11,8 @@ use crate::catalog::db::rows;
 use crate::catalog::db::script::Script;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::checkpoint;
-use crate::catalog::queue::claim::PairSelection;
 use crate::catalog::queue::lease::{InputVersion, InputVersions, Lease};
+use crate::catalog::queue::selection::PairSelection;
 use crate::catalog::records::import;
 use crate::catalog::records::model::{PairAttributes, StageRecord};
 use crate::catalog::records::stage_results;
@@ -119,7 +119,8 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut script = Script::default();
-                checkpoint::store_inputs(&mut script, &seen)?;
+                let inputs = seen.iter().map(|(pair, inputs)| (*pair, inputs));
+                checkpoint::add_inputs(&mut script, inputs)?;
                 script.run(conn).await?;
                 Ok(())
             })

@@ -7,11 +7,10 @@ use sqlx::{Row as _, SqliteConnection};
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::alike;
-use crate::catalog::queue::counters::{JobCounts, KEPT, counts};
-use crate::catalog::queue::fingerprint::Fingerprints;
+use crate::catalog::queue::counters::{JobCounts, by_status, counters};
+use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
+use crate::catalog::queue::staleness::count_stale;
 use crate::catalog::records::model::{StageCounts, StatusCounts};
-use crate::catalog::records::pair_results;
 use crate::domain::{JobStatus, Stage, Verdict};
 
 /// Newest verdict of each reviewer on each current result, by verdict.
@@ -35,13 +34,14 @@ impl Catalog {
     /// When the database refuses.
     pub async fn status(&self, fingerprints: &Fingerprints) -> Result<StatusCounts> {
         let mut conn = self.snapshot().await?;
-        let counted = counts(&mut conn, KEPT).await?;
+        let counted = by_status(counters(&mut conn).await?);
+        let current = current_json(&mut conn, fingerprints).await?;
         Ok(StatusCounts {
             schema: 1,
             pairs: counted.values().sum(),
-            jobs: pair_results::by_status(&counted),
+            jobs: jobs_by_status(&counted),
             stages: by_stage(&counted),
-            stale: alike::stale(&mut conn, fingerprints).await?,
+            stale: count_stale(&mut conn, &current).await?,
             low_confidence: sqlx::query_scalar::<_, i64>(LOW_CONFIDENCE)
                 .fetch_one(&mut *conn)
                 .await?
@@ -49,6 +49,18 @@ impl Catalog {
             verdicts: verdicts(&mut conn).await?,
         })
     }
+}
+
+/// Adds up numbers of jobs by status; every status is there.
+fn jobs_by_status(counts: &JobCounts) -> BTreeMap<JobStatus, u64> {
+    let mut jobs: BTreeMap<_, _> = JobStatus::ALL
+        .into_iter()
+        .map(|status| (status, 0))
+        .collect();
+    for ((_, status), n) in counts {
+        *jobs.entry(*status).or_default() += n;
+    }
+    jobs
 }
 
 /// Pairs by stage from the counters. A pair that failed at a stage is still pending at the later ones.

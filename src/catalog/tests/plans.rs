@@ -6,7 +6,6 @@ use super::World;
 use crate::catalog::audit::integrity;
 use crate::catalog::audit::repair;
 use crate::catalog::db::open;
-use crate::catalog::queue::alike;
 use crate::catalog::queue::checkpoint;
 use crate::catalog::queue::claim;
 use crate::catalog::queue::fail;
@@ -58,7 +57,7 @@ async fn a_claim_walks_the_ready_index_in_its_order() {
 #[tokio::test]
 async fn fenced_writes_find_their_jobs_by_key() {
     for sql in [
-        checkpoint::STEP,
+        checkpoint::ADVANCE,
         fail::FAIL,
         claim::RELEASE,
         requeue::REQUEUE,
@@ -111,15 +110,18 @@ async fn pairs_of_low_confidence_come_from_their_index() {
 }
 
 #[tokio::test]
-async fn stale_pairs_are_counted_without_a_look_at_every_pair() {
-    for sql in [alike::STALE, alike::APART, alike::SETTLE] {
+async fn stale_pairs_are_counted_by_counters_and_marks() {
+    for sql in [
+        staleness::COUNT_STALE,
+        staleness::MARKED,
+        staleness::CLEAR_DIRTY,
+    ] {
         let plan = plan(sql).await;
         let small = [
-            "SCAN made",
-            "SCAN moved",
-            "SCAN m",
+            "SCAN counter",
             "VIRTUAL TABLE",
-            "INDEX job_mixed",
+            "INDEX job_dirty",
+            "INDEX job_quarantined",
             "CONSTANT ROW",
         ];
         assert_only(&plan, &small);
@@ -128,25 +130,23 @@ async fn stale_pairs_are_counted_without_a_look_at_every_pair() {
 
 #[tokio::test]
 async fn jobs_are_counted_by_ranges_of_their_key() {
-    for sql in [alike::GROUPS, job_counts::ALL] {
-        let ranges = plan(sql).await;
-        let searched = "SEARCH j USING INTEGER PRIMARY KEY (rowid>? AND rowid<?)";
-        assert!(ranges.iter().any(|line| line == searched), "{ranges:?}");
-        assert_only(&ranges, &[]);
-    }
-    assert_only(&plan(job_counts::NEXT).await, &[]);
+    let ranges = plan(job_counts::COUNT_RANGE).await;
+    let searched = "SEARCH job USING INTEGER PRIMARY KEY (rowid>? AND rowid<?)";
+    assert!(ranges.iter().any(|line| line == searched), "{ranges:?}");
+    assert_only(&ranges, &[]);
+    assert_only(&plan(job_counts::NEXT_PAIR).await, &[]);
 }
 
 #[tokio::test]
-async fn a_look_goes_through_keys() {
-    let among = plan(staleness::LOOK).await;
-    assert_only(&among, &["VIRTUAL TABLE", "SCAN seen"]);
+async fn inspected_jobs_are_found_by_key() {
+    let among = plan(staleness::INSPECT).await;
+    assert_only(&among, &["VIRTUAL TABLE", "SCAN found"]);
 }
 
 /// A page of a group goes on where the one before ended.
 #[tokio::test]
 async fn members_of_a_group_are_paged_by_key() {
-    assert_only(&plan(alike::MEMBERS).await, &[]);
+    assert_only(&plan(requeue::MEMBERS).await, &[]);
 }
 
 #[tokio::test]

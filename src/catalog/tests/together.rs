@@ -1,13 +1,13 @@
 //! Stages of a pair that are stored in one commit.
 
-use super::{World, name};
-use crate::catalog::{CheckpointOutcome, Lease, PairDetail};
+use super::{World, fingerprints, name};
+use crate::catalog::{CheckpointOutcome, Lease, PairDetail, RerunPolicy};
 use crate::domain::Stage;
 
 /// Stores stages under a lease in one commit.
 async fn store(world: &World, lease: Lease, stages: &[Stage]) -> CheckpointOutcome {
     let done = stages.iter().map(|stage| world.done(*stage)).collect();
-    let kept = world.catalog.checkpoint_in_time(lease, done).await;
+    let kept = world.catalog.checkpoint_deferrable(lease, done).await;
     kept.expect("stored")
 }
 
@@ -16,11 +16,11 @@ async fn detail(world: &World, pair: &str) -> PairDetail {
     detail.expect("the pair")
 }
 
-/// The fingerprint that the job's results were made with, where they follow on each other.
-async fn made(world: &World, pair: i64) -> Option<i64> {
-    let mut conn = world.catalog.read_conn().await.expect("a reader");
-    let made = sqlx::query_scalar("SELECT made FROM job WHERE pair = ?1").bind(pair);
-    made.fetch_one(&mut *conn).await.expect("the job")
+/// The job's fingerprint, and whether it is marked dirty.
+async fn fingerprint(world: &World, pair: i64) -> (Option<i64>, bool) {
+    let mut conn = world.catalog.read_conn().await.expect("a connection");
+    let job = sqlx::query_as("SELECT fingerprint, dirty FROM job WHERE pair = ?1").bind(pair);
+    job.fetch_one(&mut *conn).await.expect("the job")
 }
 
 #[tokio::test]
@@ -50,26 +50,36 @@ async fn stages_stored_together_leave_what_they_leave_one_by_one() {
         assert_eq!(together.attempts.len(), 4);
         assert_eq!(together.mesh_hash, one_by_one.mesh_hash);
         assert_eq!(together.print_hash, one_by_one.print_hash);
-        assert_eq!(made(&world, number).await, made(&world, 1).await);
-        assert!(made(&world, number).await.is_some());
+        let found = fingerprint(&world, number).await;
+        assert_eq!(found, fingerprint(&world, 1).await);
+        assert!(matches!(found, (Some(_), false)), "{found:?}");
     }
     world.counters_hold().await;
 }
 
 #[tokio::test]
-async fn results_that_do_not_follow_on_each_other_are_not_taken_for_one_chain() {
+async fn a_job_whose_results_do_not_follow_on_each_other_is_marked_until_they_do() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);
-    let way = [Stage::Fit, Stage::Depth, Stage::Normalize, Stage::Depth];
-    let CheckpointOutcome::Lease(lease) = store(&world, lease, &way).await else {
+    let order = [Stage::Fit, Stage::Depth, Stage::Normalize, Stage::Depth];
+    let CheckpointOutcome::Lease(lease) = store(&world, lease, &order).await else {
         panic!("stages are left");
     };
     assert_eq!(lease.cursor(), Stage::Normalize);
-    assert_eq!(made(&world, 1).await, None);
+    assert!(fingerprint(&world, 1).await.1);
     world.counters_hold().await;
-    // From the first stage on it is one again.
+    // A chain from the first stage on is consistent again, which the next run finds.
     let again = [Stage::Normalize, Stage::Fit, Stage::Depth];
-    store(&world, lease, &again).await;
-    assert!(made(&world, 1).await.is_some());
+    let CheckpointOutcome::Lease(lease) = store(&world, lease, &again).await else {
+        panic!("stages are left");
+    };
+    world.counters_hold().await;
+    assert!(world.catalog.release(lease).await.expect("released"));
+    let current = fingerprints([1; 4]);
+    let requeued = world
+        .catalog
+        .requeue_stale(&current, None, RerunPolicy::Changed);
+    assert_eq!(requeued.await.expect("requeued"), 0);
+    assert!(matches!(fingerprint(&world, 1).await, (Some(_), false)));
     world.counters_hold().await;
 }

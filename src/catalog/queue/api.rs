@@ -1,0 +1,159 @@
+//! The queue's requests to the writer task, and its counters.
+
+use tokio::sync::oneshot;
+
+use crate::catalog::db::commit_delay::Waiting;
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::request::{Reply, Request};
+use crate::catalog::db::writer::Message;
+use crate::catalog::handle::Catalog;
+use crate::catalog::queue::claim::{ClaimRequest, Heartbeat};
+use crate::catalog::queue::counters::{JobCounts, by_status, counters};
+use crate::catalog::queue::job_counts::count_jobs;
+use crate::catalog::queue::lease::{CheckpointOutcome, Lease, StageCheckpoint, StageFailure};
+use crate::domain::{UnixMillis, WorkerId};
+
+impl Catalog {
+    /// Leases pairs to work on; fewer than requested, or none, when no more are ready.
+    ///
+    /// # Errors
+    /// When the database refuses; then nothing is leased.
+    pub async fn claim(&self, request: ClaimRequest) -> Result<Vec<Lease>> {
+        self.grouped(|reply| Request::Claim(request, reply)).await
+    }
+
+    /// Gives a lease back as if it had never been taken; `false` when it was already lost.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn release(&self, lease: Lease) -> Result<bool> {
+        self.grouped(|reply| Request::Release(lease, reply)).await
+    }
+
+    /// Stores a worker's heartbeat; `false` when the last one is from before `alive_since` or the worker has ended. Then
+    /// its leases are over, and it must register again.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn heartbeat(
+        &self,
+        worker: WorkerId,
+        now: UnixMillis,
+        alive_since: UnixMillis,
+    ) -> Result<bool> {
+        let heartbeat = Heartbeat {
+            worker,
+            now,
+            alive_since,
+        };
+        self.grouped(|reply| Request::Heartbeat(heartbeat, reply))
+            .await
+    }
+
+    /// Stores a finished stage in one transaction and advances the job. The artifacts must be on disk already.
+    ///
+    /// # Errors
+    /// When the database refuses; then nothing is stored, and the lease lasts until it is recovered.
+    pub async fn checkpoint(
+        &self,
+        lease: Lease,
+        stage: StageCheckpoint,
+    ) -> Result<CheckpointOutcome> {
+        self.store(lease, vec![stage], Message::Grouped).await
+    }
+
+    /// Like [`Catalog::checkpoint`], for stages in the order they were computed. The commit may be delayed, for other
+    /// requests to share it, while nobody is [`Catalog::waiting`].
+    ///
+    /// # Errors
+    /// As there.
+    pub async fn checkpoint_deferrable(
+        &self,
+        lease: Lease,
+        stages: Vec<StageCheckpoint>,
+    ) -> Result<CheckpointOutcome> {
+        self.store(lease, stages, Message::Deferrable).await
+    }
+
+    async fn store(
+        &self,
+        lease: Lease,
+        stages: Vec<StageCheckpoint>,
+        message: fn(Request) -> Message,
+    ) -> Result<CheckpointOutcome> {
+        let Some(last) = stages.last() else {
+            return Ok(CheckpointOutcome::Lease(lease));
+        };
+        let advanced = last.stage.next().map(|cursor| Lease {
+            cursor,
+            fingerprint: Some(last.fingerprint),
+            attempt: 1,
+            crashes: 0,
+            cleared: true,
+            ..duplicate(&lease)
+        });
+        let stored = self
+            .reply_to(|reply| message(Request::Checkpoint(Box::new((lease, stages)), reply)))
+            .await?;
+        Ok(match (stored, advanced) {
+            (false, _) => CheckpointOutcome::LeaseLost,
+            (true, Some(lease)) => CheckpointOutcome::Lease(lease),
+            (true, None) => CheckpointOutcome::Done,
+        })
+    }
+
+    /// Stores a failed stage; `false` when the lease was lost and nothing was stored.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn fail(&self, lease: Lease, failure: StageFailure) -> Result<bool> {
+        self.grouped(|reply| Request::Fail(Box::new((lease, failure)), reply))
+            .await
+    }
+
+    /// Reads the counters of jobs.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn counters(&self) -> Result<JobCounts> {
+        let mut conn = self.read_conn().await?;
+        Ok(by_status(counters(&mut conn).await?))
+    }
+
+    /// Counts every job; equal to [`Catalog::counters`], or the catalog is damaged.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn recount(&self) -> Result<JobCounts> {
+        let mut conn = self.snapshot().await?;
+        Ok(by_status(count_jobs(&mut conn).await?))
+    }
+
+    /// Commits what was sent at once, and without delay what is sent while the result lives.
+    ///
+    /// # Errors
+    /// When the catalog is closed.
+    pub async fn waiting(&self) -> Result<Waiting> {
+        let waiting = Waiting::new(&self.delay);
+        self.send(Message::Flush).await?;
+        Ok(waiting)
+    }
+
+    /// Sends a request into the next group commit and waits for the reply.
+    async fn grouped<T>(&self, request: impl FnOnce(Reply<T>) -> Request) -> Result<T> {
+        self.reply_to(|reply| Message::Grouped(request(reply)))
+            .await
+    }
+
+    /// Sends the writer a message and waits for the reply.
+    async fn reply_to<T>(&self, message: impl FnOnce(Reply<T>) -> Message) -> Result<T> {
+        let (sender, receiver) = oneshot::channel();
+        self.send(message(sender)).await?;
+        receiver.await.unwrap_or(Err(CatalogError::Closed))
+    }
+}
+
+/// Copies a lease that the request consumes; the copy is handed out only when the request succeeds.
+const fn duplicate(lease: &Lease) -> Lease {
+    Lease { ..*lease }
+}

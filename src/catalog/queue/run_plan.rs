@@ -1,0 +1,133 @@
+//! What a run would do: counted over all pairs, or inspected for some.
+
+use std::collections::BTreeMap;
+
+use sqlx::SqliteConnection;
+
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::handle::Catalog;
+use crate::catalog::queue::fingerprint::{
+    FingerprintChains, Fingerprints, current_json, differences, fields_of,
+};
+use crate::catalog::queue::plan::{Plan, PlanEntry, StaleReason};
+use crate::catalog::queue::selection::{PairSelection, select};
+use crate::catalog::queue::staleness::{
+    RerunPolicy, StaleCause, StaleJob, count_stale, decide, inspect, inspect_all,
+};
+use crate::domain::{PairName, Stage};
+
+impl Catalog {
+    /// Returns what a run with these settings would do with the named pairs, or with all.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn plan(
+        &self,
+        fingerprints: &Fingerprints,
+        names: Option<&[PairName]>,
+        policy: RerunPolicy,
+    ) -> Result<Plan> {
+        let mut conn = self.snapshot().await?;
+        let among = match names {
+            Some(names) => Some(select(&mut conn, names).await?),
+            None => None,
+        };
+        plan(&mut conn, fingerprints, among.as_ref(), policy).await
+    }
+
+    /// Counts the pairs with results of other settings or inputs than the current ones.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn count_stale(&self, fingerprints: &Fingerprints) -> Result<u64> {
+        let mut conn = self.snapshot().await?;
+        let current = current_json(&mut conn, fingerprints).await?;
+        count_stale(&mut conn, &current).await
+    }
+
+    /// Returns why a pair would run, and from which stage; `None` when nothing is left to do.
+    ///
+    /// # Errors
+    /// When there is no such pair.
+    pub async fn why(
+        &self,
+        pair: &PairName,
+        fingerprints: &Fingerprints,
+    ) -> Result<Option<PlanEntry>> {
+        let mut conn = self.snapshot().await?;
+        let among = select(&mut conn, std::slice::from_ref(pair)).await?;
+        if among.is_empty() {
+            return Err(CatalogError::UnknownPair(pair.clone()));
+        }
+        let plan = plan(&mut conn, fingerprints, Some(&among), RerunPolicy::Changed).await?;
+        Ok(plan.entries.into_iter().next())
+    }
+}
+
+async fn plan(
+    conn: &mut SqliteConnection,
+    fingerprints: &Fingerprints,
+    among: Option<&PairSelection>,
+    policy: RerunPolicy,
+) -> Result<Plan> {
+    let current = current_json(conn, fingerprints).await?;
+    let mut plan = Plan::default();
+    let mut entries: BTreeMap<(Stage, StaleCause), u64> = BTreeMap::new();
+    let mut add = |job: &StaleJob, pairs: u64| match decide(job, policy) {
+        Some(key) => *entries.entry(key).or_default() += pairs,
+        None => plan.add_unchanged(job.key.status, pairs),
+    };
+    if let Some(among) = among {
+        inspect_selection(conn, &current, among, &mut add).await?;
+    } else {
+        let chains = FingerprintChains::load(conn, fingerprints).await?;
+        inspect_all(conn, &current, &chains, &mut add).await?;
+    }
+    for ((from, cause), pairs) in entries {
+        let why = reason(conn, fingerprints, cause).await?;
+        plan.entries.push(PlanEntry { from, why, pairs });
+    }
+    Ok(plan)
+}
+
+/// Passes the state of each of some pairs to `each`.
+async fn inspect_selection(
+    conn: &mut SqliteConnection,
+    current: &str,
+    among: &PairSelection,
+    mut each: impl FnMut(&StaleJob, u64),
+) -> Result<()> {
+    let mut after = 0;
+    loop {
+        let page = inspect(conn, current, after, among).await?;
+        let Some((last, _)) = page.last() else {
+            return Ok(());
+        };
+        after = *last;
+        for (_, job) in &page {
+            each(job, 1);
+        }
+    }
+}
+
+async fn reason(
+    conn: &mut SqliteConnection,
+    fingerprints: &Fingerprints,
+    cause: StaleCause,
+) -> Result<StaleReason> {
+    Ok(match cause {
+        StaleCause::New => StaleReason::New,
+        StaleCause::Unfinished => StaleReason::Unfinished,
+        StaleCause::BackingOff => StaleReason::BackingOff,
+        StaleCause::FailedBefore => StaleReason::FailedBefore,
+        StaleCause::Mesh => StaleReason::Mesh,
+        StaleCause::Print => StaleReason::Print,
+        StaleCause::Manifest => StaleReason::Manifest,
+        StaleCause::Requested => StaleReason::Asked,
+        StaleCause::Settings(stage, old) => {
+            let old = fields_of(conn, old).await?;
+            let changes = differences(stage, &old, &fingerprints.of(stage).fields);
+            StaleReason::Settings { stage, changes }
+        }
+    })
+}
