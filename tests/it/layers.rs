@@ -284,7 +284,7 @@ impl ImportGraph {
 
     /// Returns the imports of a file. Re-exports are not imports: they name a thing without using it.
     fn imports(&self, index: usize) -> BTreeSet<usize> {
-        let code = self.files[index].production_code();
+        let code = without_visibility_paths(&self.files[index].production_code());
         let mut used = String::new();
         for (at, text) in code.split("\npub").enumerate() {
             let visible = text
@@ -327,6 +327,17 @@ impl ImportGraph {
         }
         groups.into_iter().collect()
     }
+}
+
+/// Replaces `pub(in path)` by `pub(crate)`: a visibility is not an import.
+fn without_visibility_paths(code: &str) -> String {
+    let mut parts = code.split("pub(in ");
+    let mut text = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        text.push_str("pub(crate");
+        text.push_str(part.find(')').map_or("", |end| &part[end..]));
+    }
+    text
 }
 
 /// Returns the nodes reachable from a node over at least one edge.
