@@ -98,9 +98,6 @@ fn plain(text: Option<&StyledStr>) -> Resettable<StyledStr> {
 const FLAGS: [char; 6] = ['h', 'n', 'q', 'v', 'V', 'w'];
 
 /// Parses a command line.
-///
-/// # Errors
-/// For a wrong command line, and for `--help` and `--version`.
 pub(super) fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
     let command = command().color(help_color(args));
     let mut cli = Cli::from_arg_matches(&command.try_get_matches_from(args)?)?;

@@ -1,4 +1,4 @@
-//! What every command starts from: the project, its settings and the output streams.
+//! The context of a command: the project, its settings and the output streams.
 
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -57,9 +57,6 @@ impl Context {
     }
 
     /// Opens the project and its catalog for reading; works during a run.
-    ///
-    /// # Errors
-    /// When there is no project, or the catalog cannot be opened.
     pub(super) async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
         let project = self.project()?;
         let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
@@ -67,9 +64,6 @@ impl Context {
     }
 
     /// Opens the project and its catalog for reading and writing.
-    ///
-    /// # Errors
-    /// When there is no project, or the catalog cannot be opened.
     pub(super) async fn open(&self) -> anyhow::Result<(Project, Catalog)> {
         let project = self.project()?;
         let catalog = Catalog::open(&project.catalog_path()).await?;
@@ -81,9 +75,6 @@ impl Context {
     }
 
     /// Loads the settings in effect for this project.
-    ///
-    /// # Errors
-    /// When one of them is invalid.
     pub(super) fn settings(&self) -> anyhow::Result<Loaded> {
         let base = match &self.global.config {
             Some(name) => match Preset::named(name) {
@@ -101,9 +92,6 @@ impl Context {
 
     /// Warns about results that were computed with other settings or files than the current ones. Invalid settings
     /// are reported elsewhere.
-    ///
-    /// # Errors
-    /// When the catalog cannot be read.
     pub(super) async fn warn_about_stale(&self, catalog: &Catalog) -> anyhow::Result<()> {
         let Ok(settings) = self.settings() else {
             return Ok(());

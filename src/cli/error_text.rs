@@ -1,4 +1,4 @@
-//! What an error means to the user: its exit code and its sentence.
+//! The exit code and the message of an error.
 
 use std::error::Error;
 use std::path::Path;
@@ -150,11 +150,11 @@ pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<St
             root_cause(error)
         ),
         Some(CatalogErrorKind::Contradiction) => format!(
-            "{path} holds rows or counters that contradict each other; `check` lists them, `check --repair` repairs them"
+            "{path} contains rows or counters that contradict each other; `check` lists them, `check --repair` repairs them"
         ),
         None => match error {
             CatalogError::Corrupt(_) | CatalogError::Json(_) => {
-                format!("{path} holds an invalid value: {error}; `check` gives details")
+                format!("{path} contains an invalid value: {error}; `check` gives details")
             }
             _ => return None,
         },

@@ -21,17 +21,11 @@ pub(super) struct Failures {
 
 impl Failures {
     /// Reads the failures, to name a few of each class.
-    ///
-    /// # Errors
-    /// When the catalog cannot be read.
     pub(super) async fn read(catalog: &Catalog) -> anyhow::Result<Self> {
         Self::read_some(catalog, READ_LIMIT, NAME_LIMIT).await
     }
 
     /// Reads the failures, to name all of them.
-    ///
-    /// # Errors
-    /// When the catalog cannot be read.
     pub(super) async fn read_all(catalog: &Catalog) -> anyhow::Result<Self> {
         Self::read_some(catalog, NO_LIMIT, NO_LIMIT).await
     }

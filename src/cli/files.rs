@@ -5,17 +5,11 @@ use std::path::{Path, PathBuf};
 use super::exit::Refusal;
 
 /// Reads a file.
-///
-/// # Errors
-/// When it cannot be read: the command line is wrong then.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
     std::fs::read(path).map_err(|error| refusal("read", path, &error))
 }
 
 /// Lists a directory.
-///
-/// # Errors
-/// When it cannot be listed.
 pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
     let refuse = |error: std::io::Error| refusal("list", dir, &error);
     let entries = std::fs::read_dir(dir).map_err(refuse)?;

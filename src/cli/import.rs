@@ -60,7 +60,7 @@ pub(super) struct ImportOutcome {
     pub(super) summary: ImportSummary,
     pub(super) truths: u64,
     missing: Vec<String>,
-    remarks: Vec<String>,
+    warnings: Vec<String>,
 }
 
 /// Imports pairs; everything is read and checked before anything is written.
@@ -72,7 +72,7 @@ pub(super) async fn import_pairs(
     context: &Context,
 ) -> anyhow::Result<ImportOutcome> {
     let mut listing = listing(args)?;
-    let remarks = std::mem::take(&mut listing.remarks);
+    let warnings = std::mem::take(&mut listing.warnings);
     let dir = context.dir();
     let truths = match &args.truth {
         Some(file) => read_truths(file, &listing.ids, &dir).await?,
@@ -90,7 +90,7 @@ pub(super) async fn import_pairs(
         summary,
         truths,
         missing,
-        remarks,
+        warnings,
     })
 }
 
@@ -252,7 +252,7 @@ pub(super) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
     if let Some(more) = outcome.missing.len().checked_sub(MAX_WARNINGS + 1) {
         output.warn(&format!("{} more files do not exist", more + 1));
     }
-    for line in &outcome.remarks {
+    for line in &outcome.warnings {
         output.warn(line);
     }
     let summary = &outcome.summary;
@@ -292,6 +292,6 @@ fn as_json(outcome: &ImportOutcome) -> Value {
         "unchanged": outcome.summary.unchanged,
         "truths": outcome.truths,
         "missing_files": outcome.missing,
-        "left_out": outcome.remarks,
+        "warnings": outcome.warnings,
     })
 }

@@ -12,9 +12,6 @@ use super::global::{Global, LogFormat};
 use super::screen::{Palette, Screen};
 
 /// Starts the log. `RUST_LOG`, if set, overrides `-v` and `-q`.
-///
-/// # Errors
-/// When the log file cannot be opened.
 pub(super) fn start(global: &Global, screen: &Screen) -> anyhow::Result<()> {
     let (writer, to_file) = writer(global, screen)?;
     let level = level(global.verbose, global.quiet, to_file);

@@ -15,7 +15,7 @@ pub(super) struct Listing {
     /// The ids of all pairs.
     pub(super) ids: RowIds,
     /// Warnings, one line each.
-    pub(super) remarks: Vec<String>,
+    pub(super) warnings: Vec<String>,
     /// What the number of a row counts: `pairs.csv: line`, or `pair` for directories.
     row_label: String,
 }
@@ -52,9 +52,6 @@ fn indented(problems: &ManifestError) -> String {
 
 impl Listing {
     /// Reads a CSV or JSON Lines file; the format follows from the extension, otherwise from the first character.
-    ///
-    /// # Errors
-    /// When it cannot be read or is refused.
     pub(super) fn from_file(file: &Path) -> anyhow::Result<Self> {
         let shown = file.display();
         if file.is_dir() {
@@ -83,7 +80,7 @@ impl Listing {
                 folder,
             },
             ids,
-            remarks: similar.remark().into_iter().collect(),
+            warnings: similar.warning().into_iter().collect(),
             row_label: format!("{shown}: line"),
         })
     }
@@ -110,16 +107,16 @@ impl Listing {
             row.unit = unit;
             similar.add(&row.name);
         }
-        let remarks = [
+        let warnings = [
             ignored_files("mesh without print", &found.meshes_alone),
             ignored_files("print without mesh", &found.prints_alone),
             ignored_files("neither mesh nor print", &found.ignored),
-            similar.remark(),
+            similar.warning(),
         ];
         Ok(Self {
             ids: rows.iter().map(|row| &row.name).collect(),
             source: ListingSource::Folders(rows),
-            remarks: remarks.into_iter().flatten().collect(),
+            warnings: warnings.into_iter().flatten().collect(),
             row_label: "pair".to_owned(),
         })
     }
@@ -170,7 +167,7 @@ impl SimilarIds {
         }
     }
 
-    fn remark(self) -> Option<String> {
+    fn warning(self) -> Option<String> {
         let name = self.first?;
         let more = match self.more {
             0 => String::new(),
@@ -221,12 +218,12 @@ mod tests {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let file = dir.path().join("pairs.csv");
         std::fs::write(&file, "id,mesh,print\nA1,m,p\nb,m,p\na1,m,p\nB,m,p\n").expect("written");
-        let remarks = Listing::from_file(&file).expect("valid").remarks;
-        assert_eq!(remarks.len(), 1);
+        let warnings = Listing::from_file(&file).expect("valid").warnings;
+        assert_eq!(warnings.len(), 1);
         assert!(
-            remarks[0]
+            warnings[0]
                 .starts_with("id a1 differs from another id only in case, and so do 1 more ids"),
-            "{remarks:?}"
+            "{warnings:?}"
         );
     }
 

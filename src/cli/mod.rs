@@ -39,7 +39,6 @@ mod time_text;
 mod truth_file;
 mod verdict;
 mod verdict_file;
-mod verdict_lines;
 
 use std::ffi::OsString;
 

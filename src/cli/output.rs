@@ -56,7 +56,7 @@ impl Output {
         }
     }
 
-    /// Writes a command that makes sense next to stderr, ready to be copied.
+    /// Suggests the next command on stderr, ready to be copied.
     pub(super) fn next(&self, command: &str) {
         if !self.json {
             let label = self.stderr.paint(Tone::Faint, "next:");
@@ -66,9 +66,6 @@ impl Output {
 }
 
 /// Writes a result to stdout and ends it with a line feed.
-///
-/// # Errors
-/// When stdout is closed.
 pub(super) fn print(text: &str) -> std::io::Result<()> {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes())?;
@@ -79,9 +76,6 @@ pub(super) fn print(text: &str) -> std::io::Result<()> {
 }
 
 /// Writes a value to stdout as one JSON document.
-///
-/// # Errors
-/// When stdout is closed.
 pub(super) fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
     print(&serde_json::to_string_pretty(value)?)?;
     Ok(())

@@ -4,7 +4,7 @@ use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressState, ProgressStyle};
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::global::ProgressMode;
 use super::run_progress::RunProgress;
@@ -56,7 +56,7 @@ impl ProgressReporter {
         match &mut self.display {
             Display::None => return,
             Display::Json => {
-                self.screen.line(&as_json(event).to_string());
+                self.screen.line(&json!(event).to_string());
                 return;
             }
             Display::Bar(bar) => update_bar(bar, &self.progress),
@@ -180,69 +180,46 @@ fn stopping_line(level: StopLevel, reason: &str) -> String {
     }
 }
 
-fn as_json(event: &RunEvent) -> Value {
-    match event {
-        RunEvent::Started {
-            pairs,
-            stages,
-            by_stage,
-            workers,
-        } => json!({"message_type": "started", "pairs": pairs, "stages": stages,
-            "by_stage": by_stage, "workers": workers}),
-        RunEvent::StageStarted { pair, stage } => {
-            json!({"message_type": "stage_started", "pair": pair, "stage": stage})
-        }
-        RunEvent::StageFinished { pair, stage, ms } => {
-            json!({"message_type": "stage_finished", "pair": pair, "stage": stage, "ms": ms})
-        }
-        RunEvent::PairDone { pair } => json!({"message_type": "pair_done", "pair": pair}),
-        RunEvent::PairFailed {
-            pair,
-            stage,
-            failure,
-            skipped,
-        } => json!({"message_type": "pair_failed", "pair": pair, "stage": stage,
-            "class": failure.class, "message": failure.message, "skipped": skipped}),
-        RunEvent::PairBackingOff {
-            pair,
-            stage,
-            failure,
-            wait_ms,
-        } => json!({"message_type": "pair_backing_off", "pair": pair, "stage": stage,
-            "class": failure.class, "message": failure.message, "wait_ms": wait_ms}),
-        RunEvent::Recovered { pairs } => json!({"message_type": "recovered", "pairs": pairs}),
-        RunEvent::Stopping { level, reason } => {
-            json!({"message_type": "stopping", "now": *level == StopLevel::Now, "reason": reason})
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Palette, RunEvent, StopLevel, event_line};
-    use crate::domain::{Failure, FailureClass, Stage};
+    use super::{Failure, PairName, Palette, RunEvent, Stage, StopLevel, event_line, json};
+    use crate::domain::FailureClass;
 
     #[test]
-    fn failure_is_one_line() {
-        let event = RunEvent::PairFailed {
-            pair: "0003".parse().expect("valid id"),
-            stage: Stage::Fit,
-            failure: Failure::new(FailureClass::BadInput, "a.stl: no faces"),
-            skipped: 4,
-        };
-        assert_eq!(
-            event_line(&event, Palette::PLAIN).as_deref(),
-            Some("failed 0003 at fit: a.stl: no faces (bad_input)")
+    fn lines_of_events() {
+        let pair: PairName = "0003".parse().expect("valid id");
+        let (stage, failure) = (
+            Stage::Fit,
+            Failure::new(FailureClass::BadInput, "a.stl: no faces"),
         );
-    }
-
-    #[test]
-    fn drain_explains_how_to_stop_now() {
-        let event = RunEvent::Stopping {
-            level: StopLevel::Drain,
+        let stopping = |level| RunEvent::Stopping {
+            level,
             reason: "interrupted".into(),
         };
-        let line = event_line(&event, Palette::PLAIN).expect("a line");
-        assert!(line.contains("Ctrl-C again"), "{line}");
+        let events = [
+            RunEvent::PairFailed {
+                pair: pair.clone(),
+                stage,
+                failure: failure.clone(),
+                skipped: 4,
+            },
+            RunEvent::PairBackingOff {
+                pair,
+                stage,
+                failure,
+                wait_ms: 30_000,
+            },
+            RunEvent::Recovered { pairs: 1 },
+            stopping(StopLevel::Drain),
+            stopping(StopLevel::Now),
+        ];
+        let lines = events
+            .each_ref()
+            .map(|event| event_line(event, Palette::PLAIN));
+        insta::assert_snapshot!(lines.map(Option::unwrap_or_default).join("\n"));
+        insta::assert_snapshot!(
+            "json",
+            events.map(|event| json!(event).to_string()).join("\n")
+        );
     }
 }

@@ -142,9 +142,6 @@ async fn compared(
 }
 
 /// Prints the report to stdout, as text or JSON.
-///
-/// # Errors
-/// When the catalog cannot be read or stdout is closed.
 pub(super) async fn print(context: &Context) -> anyhow::Result<()> {
     let format = chosen_format(ReportFormat::Text, context);
     output::print(&render(&read(context).await?, format))?;

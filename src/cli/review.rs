@@ -1,4 +1,4 @@
-//! `review`: serves the review page on this machine and says where.
+//! `review`: serves the review page on this machine.
 
 use std::io::Write as _;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
@@ -21,58 +21,58 @@ use crate::runner::{Stop, StopLevel};
 /// Arguments of `review`.
 #[derive(Debug, Args)]
 pub(super) struct ReviewArgs {
-    /// Who reads; a label for the verdicts, no login
+    /// Name of the reviewer; a label for the verdicts, not a login
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     reviewer: String,
-    /// What comes first: random estimates the accuracy; least-confident finds failures sooner, but is no sample
+    /// Order of the results: random gives an unbiased estimate of the accuracy; least-confident finds failures sooner
     #[arg(long, default_value = "random", value_parser = order)]
     order: ReviewOrder,
-    /// Only what two other reviewers contradict each other on
+    /// Only results on which two other reviewers disagree
     #[arg(long, conflicts_with = "order")]
     adjudicate: bool,
-    /// Only results of this metric; may be given many times [default: all]
+    /// Only results of this metric; may be repeated [default: all]
     #[arg(long)]
     metric: Vec<ThresholdMetric>,
-    /// Another seed gives another random order
+    /// Seed of the random order
     #[arg(long, value_name = "N", default_value = "1")]
     seed: u64,
-    /// Only the first so many results of the order
+    /// Review only the first N results
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     sample: Option<u32>,
-    /// Planted faults for each hundred results, to measure how many are caught
+    /// Planted errors per hundred results, to measure how many the reviewer catches
     #[arg(long, value_name = "PERCENT", default_value = "4", value_parser = percent)]
-    controls: f64,
-    /// Results of each hundred that are shown twice, to measure how steady the reviewer is
+    attention_checks: f64,
+    /// Results per hundred that are shown twice, to measure how consistent the reviewer is
     #[arg(long, value_name = "PERCENT", default_value = "5", value_parser = percent)]
-    repeats: f64,
-    /// Least time a picture is shown before a verdict is taken, milliseconds
+    duplicates: f64,
+    /// Shortest time in milliseconds that an image is shown before a verdict is accepted
     #[arg(long, value_name = "MS", default_value = "250", value_parser = clap::value_parser!(u64).range(0..=60_000))]
     min_view_ms: u64,
-    /// Port on this machine; 0 takes one that is the same for a project and a reviewer, or any that is free
+    /// Port on this machine; 0 chooses the same port each time for a project and reviewer, or any free port
     #[arg(long, value_name = "N", default_value = "0")]
     port: u16,
-    /// Listen on this address in the place of 127.0.0.1; whoever can reach it sees that there is a page
+    /// Listen on this address instead of 127.0.0.1; anyone who can reach it sees that the page exists
     #[arg(long, value_name = "ADDRESS")]
     listen: Option<IpAddr>,
-    /// Language of the page, en or vi [default: by LANG]
+    /// Language of the page, en or vi [default: from LANG]
     #[arg(long)]
     lang: Option<Language>,
-    /// Print the address and open no browser
+    /// Print the address without opening a browser
     #[arg(long)]
     no_open: bool,
 }
 
-/// An order that can be asked for by name.
+/// Parses an order; adjudication has its own flag.
 fn order(text: &str) -> Result<ReviewOrder, String> {
     match text.replace('-', "_").parse() {
         Ok(order @ (ReviewOrder::Random | ReviewOrder::LeastConfident)) => Ok(order),
         Ok(ReviewOrder::Adjudicate) | Err(_) => {
-            Err("an order is random or least-confident".to_owned())
+            Err("the order is random or least-confident".to_owned())
         }
     }
 }
 
-/// A share from a number of percent.
+/// Parses a percentage and returns the share.
 fn percent(text: &str) -> Result<f64, String> {
     match text.trim_end_matches('%').parse::<f64>() {
         Ok(percent) if (0.0..=100.0).contains(&percent) => Ok(percent / 100.0),
@@ -85,9 +85,8 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let keys = review::key_map(&settings.config.review.keys);
     let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
     if args.listen.is_some_and(|address| address.is_unspecified()) {
-        // The page answers to its own name only, and "any address" is none.
-        let text =
-            "--listen needs the one address of this machine under which the page is to be reached";
+        // The page accepts only requests for its own address, which an unspecified address is not.
+        let text = "--listen needs the address of this machine at which the page will be opened";
         return Err(Refusal::Usage(text.to_owned()).into());
     }
     let (project, catalog) = context.open().await?;
@@ -110,14 +109,14 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         catalog.close().await;
         return no_conflict(&args, context);
     }
-    let _file = tell(&page, &args, context)?;
+    let _file = announce(&page, &args, context)?;
     let stop = Stop::default();
     let signals = signals::watch(&stop)?;
     let drain = stop.clone();
     let served = page.serve(async move { drain.reached(StopLevel::Drain).await });
     tokio::select! {
         served = served => served?,
-        // A second signal does not wait for connections that stay open. What was acknowledged is stored.
+        // A second signal does not wait for open connections. Acknowledged answers are stored.
         () = stop.reached(StopLevel::Now) => {}
     }
     signals.abort();
@@ -141,48 +140,48 @@ fn deck(args: &ReviewArgs) -> DeckOptions {
         seed: args.seed,
         sample: args.sample.map(|sample| sample as usize),
         rates: Rates {
-            controls: args.controls,
-            repeats: args.repeats,
+            controls: args.attention_checks,
+            repeats: args.duplicates,
         },
     }
 }
 
-/// There is no page without anything to settle on it.
+/// Reports that there is nothing to adjudicate.
 fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode> {
     if context.global.json {
         output::print(&json!({"schema": 1, "url": null}).to_string())?;
     }
     let reviewer = &args.reviewer;
     context.output.info(&format!(
-        "no conflict waits for {reviewer}: no two others contradict each other on a result that nobody has settled"
+        "there is nothing to adjudicate for {reviewer}: no two other reviewers disagree on an open result"
     ));
     context.output.next(&context.command("agreement"));
     Ok(ExitCode::Done)
 }
 
-/// How far a reviewer is, such as `lan has answered 0 of 54 pictures: 50 results, and 4 to test the reviewer`.
+/// Returns a reviewer's progress: `lan has answered 0 of 54 images: 50 results and 4 attention checks or duplicates`.
 fn progress(reviewer: &str, cards: Cards) -> String {
     let Cards {
         all,
         results,
         answered,
     } = cards;
-    let told = format!(
+    let text = format!(
         "{reviewer} has answered {answered} of {}",
-        count(all as u64, "picture")
+        count(all as u64, "image")
     );
     match all - results {
-        0 => told,
-        tests => format!(
-            "{told}: {}, and {tests} to test the reviewer",
+        0 => text,
+        checks => format!(
+            "{text}: {} and {checks} attention checks or duplicates",
             count(results as u64, "result")
         ),
     }
 }
 
-/// Says where the page is, and opens it where a person sits. The file it is opened by lives as long as what is given
-/// back.
-fn tell(
+/// Prints the page's address and opens it in a browser. Returns the file through which it is opened, which must exist
+/// until the browser has read it.
+fn announce(
     page: &Review,
     args: &ReviewArgs,
     context: &Context,
@@ -194,25 +193,25 @@ fn tell(
         output::print(&url)?;
     }
     context.output.info(&format!(
-        "{}; the address opens once, in one browser; Ctrl-C ends",
+        "{}; the address works once, in one browser; press Ctrl-C to end",
         progress(&args.reviewer, page.cards())
     ));
     if address.ip().is_loopback() {
         let port = address.port();
         context.output.info(&format!(
-            "on a far machine, first: ssh -L {port}:127.0.0.1:{port} THAT-MACHINE"
+            "if this machine is remote, first run: ssh -L {port}:127.0.0.1:{port} MACHINE"
         ));
     } else {
         context.output.warn(&format!(
-            "the page listens on {address}, not only for this machine, and what it sends is not encrypted"
+            "the page listens on {address}, which other machines can reach, and its traffic is not encrypted"
         ));
     }
     let is_for_script = args.no_open || context.global.json || context.global.quiet;
     Ok(if is_for_script { None } else { open(&url) })
 }
 
-/// Opens the address in the system's browser by way of a file that only this user can read, so that the token is in
-/// no list of processes. That there is no browser is no error: the address is printed.
+/// Opens the address in the system's browser through a file that only this user can read, so that the token does not
+/// appear in the list of processes. A missing browser is not an error: the address is printed.
 fn open(url: &str) -> Option<tempfile::NamedTempFile> {
     let program = if cfg!(target_os = "macos") {
         "open"
@@ -227,11 +226,11 @@ fn open(url: &str) -> Option<tempfile::NamedTempFile> {
         "<meta http-equiv=\"refresh\" content=\"0;url={url}\">"
     )
     .ok()?;
-    open_by(program, file.path());
+    start_browser(program, file.path());
     Some(file)
 }
 
-fn open_by(program: &str, path: &Path) {
+fn start_browser(program: &str, path: &Path) {
     let started = Command::new(program)
         .arg(path)
         .stdin(Stdio::null())
@@ -243,7 +242,7 @@ fn open_by(program: &str, path: &Path) {
     }
 }
 
-/// Vietnamese where the system speaks it.
+/// Returns Vietnamese if the locale is Vietnamese, otherwise English.
 fn language_of_system() -> Language {
     let names = ["LC_ALL", "LC_MESSAGES", "LANG"];
     let set = names.iter().filter_map(|name| std::env::var(name).ok());
@@ -262,7 +261,7 @@ mod tests {
     use crate::review::key_map;
 
     #[test]
-    fn the_settings_give_every_action_a_key_of_its_own() {
+    fn default_settings_give_every_action_its_own_key() {
         let settings = load(&Sources::default()).expect("the defaults");
         let keys = &settings.config.review.keys;
         let map = key_map(keys).expect("the default keys");
@@ -271,7 +270,7 @@ mod tests {
     }
 
     #[test]
-    fn what_tests_the_reviewer_is_counted_apart() {
+    fn attention_checks_and_duplicates_are_counted_separately() {
         let cards = |all, results| Cards {
             all,
             results,
@@ -279,16 +278,16 @@ mod tests {
         };
         assert_eq!(
             progress("lan", cards(54, 50)),
-            "lan has answered 7 of 54 pictures: 50 results, and 4 to test the reviewer"
+            "lan has answered 7 of 54 images: 50 results and 4 attention checks or duplicates"
         );
         assert_eq!(
             progress("lan", cards(50, 50)),
-            "lan has answered 7 of 50 pictures"
+            "lan has answered 7 of 50 images"
         );
     }
 
     #[test]
-    fn percentages_and_orders_are_read() {
+    fn percentages_and_orders_are_parsed() {
         assert_eq!(percent("4"), Ok(0.04));
         assert_eq!(percent("12.5%"), Ok(0.125));
         assert!(percent("101").is_err() && percent("-1").is_err() && percent("NaN").is_err());

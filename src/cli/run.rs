@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use serde_json::{Value, json};
 
 use super::context::Context;
@@ -16,7 +16,7 @@ use super::{select, signals};
 use crate::catalog::{Catalog, Plan};
 use crate::config::Config;
 use crate::domain::{JobStatus, Stage};
-use crate::runner::{self, RunOptions, RunSummary, Stop};
+use crate::runner::{self, Rerun, RunOptions, RunSummary, Stop};
 use crate::store::{Project, RunLock};
 
 /// Arguments of `run`.
@@ -40,32 +40,21 @@ pub(super) struct RunArgs {
     /// Stop after this many pairs have failed
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
     pub(super) max_failures: Option<u64>,
-    /// Also run these pairs again; pairs whose settings or files changed always run again
-    #[arg(long, value_name = "WHICH")]
-    pub(super) rerun: Option<RerunArg>,
+    /// Also run these pairs again: failed, stale (settings or files changed, which every run includes) or all
+    #[arg(long, value_name = "WHICH", value_parser = rerun)]
+    pub(super) rerun: Option<Rerun>,
     /// Run only this stage, and earlier stages where their results are missing; later stages wait for another run
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
 }
 
-/// Pairs to run again.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum RerunArg {
-    /// Pairs that failed.
-    Failed,
-    /// Pairs whose settings or files changed, which every run includes.
-    Stale,
-    /// Every pair.
-    All,
-}
-
-impl From<RerunArg> for runner::Rerun {
-    fn from(rerun: RerunArg) -> Self {
-        match rerun {
-            RerunArg::Failed => Self::Failed,
-            RerunArg::Stale => Self::Stale,
-            RerunArg::All => Self::All,
-        }
+/// Parses which pairs to run again.
+fn rerun(text: &str) -> Result<Rerun, String> {
+    match text {
+        "failed" => Ok(Rerun::Failed),
+        "stale" => Ok(Rerun::Stale),
+        "all" => Ok(Rerun::All),
+        _ => Err("the pairs to run again are failed, stale or all".to_owned()),
     }
 }
 
@@ -118,7 +107,7 @@ async fn options(args: &RunArgs, config: &Config, catalog: &Catalog) -> anyhow::
         join: args.join,
         max_failures: args.max_failures,
         pairs,
-        rerun: args.rerun.map(Into::into),
+        rerun: args.rerun,
         from: args.stage.unwrap_or(plain.from),
         until: args.stage.unwrap_or(plain.until),
         ..plain
@@ -145,9 +134,6 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
 }
 
 /// Runs with progress on stderr and signal handling, then closes the catalog.
-///
-/// # Errors
-/// As [`runner::run`].
 pub(super) async fn drive(
     project: &Project,
     catalog: Catalog,
@@ -343,11 +329,10 @@ mod tests {
                 pairs: 24,
             }],
             done: 2,
-            ..Plan::default()
+            quarantined: 1,
+            leased: 3,
         };
-        assert_eq!(
-            plan_text(&plan, false),
-            "24 pairs would run, 2 done\n  24  from register  register.max_scale: 1.2 -> 1.3\n"
-        );
+        insta::assert_snapshot!(plan_text(&plan, false));
+        insta::assert_snapshot!("during_a_run", plan_text(&plan, true));
     }
 }

@@ -26,9 +26,6 @@ pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result
 }
 
 /// Looks up one pair.
-///
-/// # Errors
-/// As [`pairs`].
 pub(super) async fn pair(catalog: &Catalog, typed: &str) -> anyhow::Result<PairName> {
     let names = pairs(catalog, &[typed.to_owned()]).await?;
     names

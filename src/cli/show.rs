@@ -115,9 +115,6 @@ fn as_json(
 }
 
 /// Reads the manual alignments of a pair that were not undone, oldest first.
-///
-/// # Errors
-/// When the catalog cannot be read.
 async fn manual_results(
     catalog: &Catalog,
     results: &PairResults,

@@ -5,9 +5,6 @@ use tokio::task::JoinHandle;
 use crate::runner::Stop;
 
 /// Watches Ctrl-C, SIGTERM and a closed terminal until the handle is aborted.
-///
-/// # Errors
-/// When the system does not install a handler.
 #[cfg(unix)]
 pub(super) fn watch(stop: &Stop) -> std::io::Result<JoinHandle<()>> {
     use tokio::signal::unix::{SignalKind, signal};
@@ -28,9 +25,6 @@ pub(super) fn watch(stop: &Stop) -> std::io::Result<JoinHandle<()>> {
 }
 
 /// Watches Ctrl-C until the handle is aborted.
-///
-/// # Errors
-/// Never.
 #[cfg(not(unix))]
 pub(super) fn watch(stop: &Stop) -> std::io::Result<JoinHandle<()>> {
     let stop = stop.clone();

@@ -145,7 +145,7 @@ fn screen(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
         stage_table(&status.counts, palette),
     ];
     if status.failed() > 0 {
-        parts.push(format!("{}\n", label("failed", palette)));
+        parts.push(format!("{}\n", palette.paint(Tone::Strong, "failed")));
         parts.push(status.failures.text());
     }
     if status.interrupted() > 0 {
@@ -327,16 +327,16 @@ mod tests {
     }
 
     #[test]
-    fn screen_has_a_headline_and_a_row_for_each_count() {
-        let text = screen(&status(3, 1), "demo", Palette::PLAIN);
-        let lines: Vec<&str> = text.lines().collect();
-        assert_eq!(
-            lines[0],
-            "project      demo · 4 pairs · 3 done · 1 waiting · 75.0 %"
-        );
-        assert_eq!(lines[1], "stages       fit  depth  normalize  register");
-        assert_eq!(lines[2], "  done         3      3          3         3");
-        assert_eq!(lines.len(), 5);
+    fn screens_of_all_states() {
+        let mut all = status(3, 1);
+        all.counts.jobs.insert(JobStatus::Leased, 2);
+        insta::assert_snapshot!("running", screen(&all, "demo", Palette::PLAIN));
+        all.running = false;
+        all.counts.stale = 1;
+        all.counts.low_confidence = 2;
+        all.counts.verdicts = [(Verdict::Pass, 4), (Verdict::Unsure, 1)].into();
+        insta::assert_snapshot!("interrupted", screen(&all, "demo", Palette::PLAIN));
+        insta::assert_snapshot!("next_steps", next_steps(&all).join("\n"));
     }
 
     #[test]

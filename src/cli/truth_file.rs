@@ -84,8 +84,8 @@ mod tests {
     #[test]
     fn quoted_text_is_sanitized_and_short() {
         for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(301)] {
-            let said = refusal(Path::new("truth.jsonl"), 1, &rude).to_string();
-            assert!(!said.contains(&rude), "{said:?}");
+            let text = refusal(Path::new("truth.jsonl"), 1, &rude).to_string();
+            assert!(!text.contains(&rude), "{text:?}");
         }
     }
 

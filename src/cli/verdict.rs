@@ -1,4 +1,4 @@
-//! `verdict`: what people say of the results, in an append-only log.
+//! `verdict`: people's verdicts on the results, in an append-only log.
 
 use std::path::PathBuf;
 
@@ -11,22 +11,22 @@ use super::output;
 use super::screen::{Palette, Tone};
 use super::table::{Align, columns, count};
 use super::time_text::{duration, utc};
-use super::verdict_file::VerdictRow;
-use super::{files, select, verdict_file, verdict_lines};
+use super::verdict_file::{self, VerdictRow};
+use super::{files, select};
 use crate::catalog::{Catalog, Look, NewVerdict, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 
-/// What to do with verdicts.
+/// Commands on verdicts.
 #[derive(Debug, Subcommand)]
 pub(super) enum VerdictCommand {
     /// Record one verdict on the current result of a pair
     Set(VerdictSetArgs),
-    /// Record the verdicts of a CSV file (pair, verdict, reviewer, and if wanted metric, reason, note, at), or of the
-    /// verdicts.jsonl of an export or a backup
+    /// Record the verdicts of a CSV file (columns pair, verdict, reviewer, and optionally metric, reason, note, at), or
+    /// of the verdicts.jsonl of an export or a backup
     Import(VerdictImportArgs),
     /// Print the log, oldest first
     Log(VerdictLogArgs),
-    /// Take back the newest verdict; the log keeps both
+    /// Undo the newest verdict; the log keeps it, marked as undone
     Undo(VerdictUndoArgs),
 }
 
@@ -35,21 +35,21 @@ pub(super) enum VerdictCommand {
 pub(super) struct VerdictSetArgs {
     /// The pair
     pub(super) pair: String,
-    /// pass, fail or unsure
+    /// The verdict: pass, fail or unsure
     pub(super) verdict: Verdict,
-    /// Who read it
+    /// Name of the reviewer
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     pub(super) reviewer: String,
-    /// One metric's result: `nl_ssim`, density, ensemble or relief [default: all there are]
+    /// Only the result of this metric: `nl_ssim`, density, ensemble or relief [default: all]
     #[arg(long)]
     pub(super) metric: Option<ThresholdMetric>,
-    /// Why it failed: angle, `strokes_lost`, `background_in`, `shift_or_scale`, mirrored or `wrong_pair`
+    /// Reason of a failure: angle, `strokes_lost`, `background_in`, `shift_or_scale`, mirrored or `wrong_pair`
     #[arg(long)]
     pub(super) reason: Option<Reason>,
-    /// In your own words
+    /// Free text
     #[arg(long, value_name = "TEXT")]
     pub(super) note: Option<String>,
-    /// How far the relief still had to be turned to lie on the print, degrees clockwise
+    /// Remaining rotation of the relief to match the print, degrees clockwise
     #[arg(long, value_name = "DEGREES", allow_negative_numbers = true, value_parser = angle)]
     pub(super) angle: Option<f64>,
 }
@@ -71,21 +71,21 @@ pub(super) struct VerdictLogArgs {
 /// Arguments of `verdict undo`.
 #[derive(Debug, Args)]
 pub(super) struct VerdictUndoArgs {
-    /// The newest of this reviewer [default: of anybody]
+    /// Only verdicts of this reviewer [default: of anyone]
     #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     pub(super) reviewer: Option<String>,
 }
 
-/// A reviewer's name: not empty, on one line.
+/// Parses a reviewer's name, which is one line of text.
 pub(super) fn reviewer_name(text: &str) -> Result<String, String> {
     let name = text.trim();
     if name.is_empty() || name.chars().any(char::is_control) {
-        return Err("a reviewer needs a name on one line".to_owned());
+        return Err("the reviewer's name must be one line of text".to_owned());
     }
     Ok(name.to_owned())
 }
 
-/// An angle of at most half a turn.
+/// Parses an angle from -180 to 180 degrees.
 fn angle(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(angle) if angle.abs() <= 180.0 => Ok(angle),
@@ -120,24 +120,21 @@ async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode
         },
         at: None,
     };
-    let said = format!("{} of {}: {}", new.pair, on(new.metric), new.verdict);
+    let metric = new.metric.map_or("all metrics", ThresholdMetric::name);
+    let text = format!("{}, {metric}: {}", new.pair, new.verdict);
     catalog.verdict_set(vec![new], now()).await?;
     catalog.close().await;
-    context.output.info(&said);
+    context.output.info(&text);
     Ok(ExitCode::Done)
-}
-
-fn on(metric: Option<ThresholdMetric>) -> &'static str {
-    metric.map_or("all metrics", ThresholdMetric::name)
 }
 
 async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let bytes = files::read(&args.file)?;
     let (_project, catalog) = context.open().await?;
     let parse = if files::is_jsonl(&args.file, &bytes) {
-        verdict_lines::parse
+        verdict_file::parse_jsonl
     } else {
-        verdict_file::parse
+        verdict_file::parse_csv
     };
     let rows = parse(&bytes).map_err(|error| error.in_file(&args.file))?;
     let names: Vec<_> = rows.iter().map(|row| row.verdict.pair.clone()).collect();
@@ -145,23 +142,25 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     verdict_file::refuse_unknown(&rows, &unknown).map_err(|error| error.in_file(&args.file))?;
     let all = rows.len() as u64;
     let rows = on_current_results(&catalog, rows).await?;
-    let kept = rows.len() as u64;
+    let current = rows.len() as u64;
     let verdicts = rows.into_iter().map(|row| row.verdict).collect();
     let number = catalog.verdict_set(verdicts, now()).await?;
     catalog.close().await;
     if context.global.json {
         output::print_json(
-            &json!({"schema": 1, "recorded": number, "left_out": all - kept, "known": kept - number}),
+            &json!({"schema": 1, "recorded": number, "left_out": all - current, "known": current - number}),
         )?;
     }
-    if all > kept {
-        let left_out = count(all - kept, "verdict");
-        let why = "on a result that the pair does not have here";
-        context.output.warn(&format!("{left_out} left out: {why}"));
+    if all > current {
+        let left_out = count(all - current, "verdict");
+        let reason = "the judged result is not the current one of the pair";
+        context
+            .output
+            .warn(&format!("{left_out} left out: {reason}"));
     }
-    if kept > number {
-        let known = count(kept - number, "verdict");
-        context.output.info(&format!("{known} there already"));
+    if current > number {
+        let known = count(current - number, "verdict");
+        context.output.info(&format!("{known} already recorded"));
     }
     context
         .output
@@ -170,15 +169,15 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-/// Those of the rows that name no result, or one that is current here.
+/// Returns the rows that name no result, or the current result of their pair.
 async fn on_current_results(
     catalog: &Catalog,
     rows: Vec<VerdictRow>,
 ) -> anyhow::Result<Vec<VerdictRow>> {
-    let mut kept = Vec::with_capacity(rows.len());
+    let mut current = Vec::with_capacity(rows.len());
     for row in rows {
         let Some(judged) = row.judged else {
-            kept.push(row);
+            current.push(row);
             continue;
         };
         let detail = catalog.pair(&row.verdict.pair).await?;
@@ -188,10 +187,10 @@ async fn on_current_results(
             metric.result_hash == judged && named.is_none_or(|named| named == metric.outcome.metric)
         });
         if is_current {
-            kept.push(row);
+            current.push(row);
         }
     }
-    Ok(kept)
+    Ok(current)
 }
 
 async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode> {
@@ -225,14 +224,14 @@ async fn undo(args: VerdictUndoArgs, context: &Context) -> anyhow::Result<ExitCo
     }
     for event in &undone {
         context.output.info(&format!(
-            "taken back: {} of {} {} by {}",
+            "undone: {} for {} {} by {}",
             event.verdict, event.pair, event.metric, event.reviewer
         ));
     }
     Ok(ExitCode::Done)
 }
 
-/// The log as lines, one an event.
+/// Formats the log, one line per event.
 pub(super) fn log_text(events: &[VerdictEvent], palette: Palette) -> String {
     let rows: Vec<Vec<String>> = events.iter().map(|event| log_row(event, palette)).collect();
     columns(&rows, &[Align::Left; 9])
@@ -244,10 +243,10 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
         Verdict::Fail => Tone::Bad,
         Verdict::Unsure => Tone::Warn,
     };
-    let standing = match (event.undone_at, event.current) {
-        (Some(at), _) => format!("taken back {}", utc(at)),
+    let state = match (event.undone_at, event.current) {
+        (Some(at), _) => format!("undone {}", utc(at)),
         (None, true) => String::new(),
-        (None, false) => "verdict for an older result".to_owned(),
+        (None, false) => "on an older result".to_owned(),
     };
     vec![
         utc(event.at),
@@ -258,14 +257,14 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
         event
             .reason
             .map_or_else(String::new, |reason| reason.to_string()),
-        looked(&event.look),
+        view_text(&event.look),
         event.note.clone().unwrap_or_default(),
-        standing,
+        state,
     ]
 }
 
-/// How long it was looked at, and by how much it was found turned.
-fn looked(look: &Look) -> String {
+/// Formats how long the reviewer looked, and the remaining rotation that was read.
+fn view_text(look: &Look) -> String {
     let shown = look.shown_ms.map(duration);
     let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
     let parts: Vec<String> = shown.into_iter().chain(angle).collect();

@@ -1,27 +1,31 @@
-//! A CSV file of verdicts: read whole or refused by line number. Separators and encoding are told from the file.
+//! Files of verdicts, CSV or JSON Lines: accepted as a whole, or refused by line number.
 
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use csv::StringRecord;
+use serde::Deserialize;
 
 use super::time_text::parse_utc;
 use crate::catalog::{Look, NewVerdict};
 use crate::config::hint;
-use crate::domain::{ContentHash, PairName, UnixMillis, sanitize};
+use crate::domain::{
+    ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict, sanitize,
+};
 use crate::manifest::{LineCounter, as_utf8, delimiter};
 
 const COLUMNS: [&str; 7] = [
     "pair", "verdict", "reviewer", "metric", "reason", "note", "at",
 ];
-const NEEDED: usize = 3;
+/// The first columns, which every file must have.
+const REQUIRED: usize = 3;
 
-/// One verdict and the line it stands on.
+/// One verdict and its line number.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct VerdictRow {
     pub(super) line: u64,
     pub(super) verdict: NewVerdict,
-    /// The result that it judged, where the file says so.
+    /// The judged result, if the file names it.
     pub(super) judged: Option<ContentHash>,
 }
 
@@ -43,36 +47,36 @@ impl VerdictFileError {
         }
     }
 
-    /// The same with the file's name.
+    /// Adds the name of the file.
     pub(super) fn in_file(mut self, file: &Path) -> Self {
         self.file = Some(file.to_owned());
         self
     }
 }
 
-/// Reads all rows.
+/// Parses a CSV file; separator and encoding are detected.
 ///
 /// # Errors
-/// At the first line that is wrong.
-pub(super) fn parse(bytes: &[u8]) -> Result<Vec<VerdictRow>, VerdictFileError> {
+/// At the first invalid line.
+pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, VerdictFileError> {
     let text = as_utf8(bytes).map_err(|error| VerdictFileError::new(1, &error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter(&text))
         .trim(csv::Trim::All)
         .from_reader(&*text);
     let refused = |error: &csv::Error| csv_error(error, &text);
-    let places = places(reader.headers().map_err(|error| refused(&error))?)?;
+    let positions = positions(reader.headers().map_err(|error| refused(&error))?)?;
     let mut lines = LineCounter::new(&text);
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| refused(&error))?;
         let line = lines.at(record.position()) as u64;
-        rows.push(row(&record, line, &places)?);
+        rows.push(row(&record, line, &positions)?);
     }
     Ok(rows)
 }
 
-/// Refuses rows on pairs that are not there.
+/// Refuses rows of unknown pairs.
 ///
 /// # Errors
 /// At the first such row.
@@ -89,47 +93,47 @@ pub(super) fn refuse_unknown(
     }
 }
 
-/// Where each of [`COLUMNS`] stands in the file.
-fn places(headers: &StringRecord) -> Result<[Option<usize>; 7], VerdictFileError> {
+/// Returns the position of each of [`COLUMNS`] in the file.
+fn positions(headers: &StringRecord) -> Result<[Option<usize>; 7], VerdictFileError> {
     if let Some(unknown) = headers.iter().find(|name| !COLUMNS.contains(name)) {
         let reason = format!("there is no column {unknown}{}", hint(unknown, COLUMNS));
         return Err(VerdictFileError::new(1, &reason));
     }
-    let places = COLUMNS.map(|name| headers.iter().position(|header| header == name));
-    for (name, place) in COLUMNS.iter().zip(places).take(NEEDED) {
-        if place.is_none() {
+    let positions = COLUMNS.map(|name| headers.iter().position(|header| header == name));
+    for (name, position) in COLUMNS.iter().zip(positions).take(REQUIRED) {
+        if position.is_none() {
             return Err(VerdictFileError::new(
                 1,
                 &format!("column {name} is missing"),
             ));
         }
     }
-    Ok(places)
+    Ok(positions)
 }
 
 fn row(
     record: &StringRecord,
     line: u64,
-    places: &[Option<usize>; 7],
+    positions: &[Option<usize>; 7],
 ) -> Result<VerdictRow, VerdictFileError> {
     let cell = |column: usize| {
-        places[column]
-            .and_then(|place| record.get(place))
+        positions[column]
+            .and_then(|position| record.get(position))
             .filter(|text| !text.is_empty())
     };
-    let needed = |column: usize| {
+    let required = |column: usize| {
         cell(column)
             .ok_or_else(|| VerdictFileError::new(line, &format!("{} is empty", COLUMNS[column])))
     };
     let verdict = NewVerdict {
-        pair: word(needed(0)?, line)?,
-        verdict: word(needed(1)?, line)?,
-        reviewer: needed(2)?.to_owned(),
-        metric: cell(3).map(|text| word(text, line)).transpose()?,
-        reason: cell(4).map(|text| word(text, line)).transpose()?,
+        pair: value(required(0)?, line)?,
+        verdict: value(required(1)?, line)?,
+        reviewer: required(2)?.to_owned(),
+        metric: cell(3).map(|text| value(text, line)).transpose()?,
+        reason: cell(4).map(|text| value(text, line)).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
         look: Look::default(),
-        at: cell(6).map(|text| moment(text, line)).transpose()?,
+        at: cell(6).map(|text| time(text, line)).transpose()?,
     };
     Ok(VerdictRow {
         line,
@@ -138,7 +142,7 @@ fn row(
     })
 }
 
-fn moment(text: &str, line: u64) -> Result<UnixMillis, VerdictFileError> {
+fn time(text: &str, line: u64) -> Result<UnixMillis, VerdictFileError> {
     parse_utc(text).ok_or_else(|| {
         let reason =
             format!("at is {text:?}, not a time such as 2026-11-21 or 2026-11-21 04:10:03");
@@ -146,7 +150,7 @@ fn moment(text: &str, line: u64) -> Result<UnixMillis, VerdictFileError> {
     })
 }
 
-fn word<T>(text: &str, line: u64) -> Result<T, VerdictFileError>
+fn value<T>(text: &str, line: u64) -> Result<T, VerdictFileError>
 where
     T: FromStr<Err: std::fmt::Display>,
 {
@@ -166,34 +170,106 @@ fn csv_error(error: &csv::Error, text: &[u8]) -> VerdictFileError {
     VerdictFileError::new(line, &reason)
 }
 
+/// A line as `verdict log --json`, exports and backups write it; other fields are ignored.
+#[derive(Debug, Deserialize)]
+struct VerdictLine {
+    pair: PairName,
+    verdict: Verdict,
+    reviewer: String,
+    metric: Option<ThresholdMetric>,
+    result_hash: Option<ContentHash>,
+    reason: Option<Reason>,
+    note: Option<String>,
+    event: Option<String>,
+    seen: Option<ContentHash>,
+    shown_ms: Option<u64>,
+    angle_read_deg: Option<f64>,
+    review_order: Option<ReviewOrder>,
+    at: Option<UnixMillis>,
+    undone_at: Option<UnixMillis>,
+}
+
+/// Parses a JSON Lines file; undone verdicts are ignored.
+///
+/// # Errors
+/// At the first invalid line.
+pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, VerdictFileError> {
+    let text = as_utf8(bytes).map_err(|error| VerdictFileError::new(1, &error.to_string()))?;
+    let lines = (1..).zip(text.split(|byte| *byte == b'\n'));
+    let lines = lines.filter(|(_, content)| !content.trim_ascii().is_empty());
+    let rows = lines.map(|(line, content)| {
+        let parsed: VerdictLine = serde_json::from_slice(content)
+            .map_err(|error| VerdictFileError::new(line, &json_error(&error)))?;
+        if parsed.reviewer.trim().is_empty() {
+            return Err(VerdictFileError::new(line, "reviewer is empty"));
+        }
+        Ok(parsed
+            .undone_at
+            .is_none()
+            .then(|| row_of_line(line, parsed)))
+    });
+    rows.filter_map(Result::transpose).collect()
+}
+
+fn row_of_line(line: u64, parsed: VerdictLine) -> VerdictRow {
+    let verdict = NewVerdict {
+        pair: parsed.pair,
+        metric: parsed.metric,
+        verdict: parsed.verdict,
+        reviewer: parsed.reviewer,
+        reason: parsed.reason,
+        note: parsed.note,
+        look: Look {
+            event: parsed.event,
+            seen: parsed.seen,
+            shown_ms: parsed.shown_ms,
+            angle_read_deg: parsed.angle_read_deg,
+            review_order: parsed.review_order,
+        },
+        at: parsed.at,
+    };
+    VerdictRow {
+        line,
+        verdict,
+        judged: parsed.result_hash,
+    }
+}
+
+/// Returns the parser's message without its line number, because each line is parsed separately.
+fn json_error(error: &serde_json::Error) -> String {
+    let message = error.to_string();
+    let reason = message.split(" at line ").next().unwrap_or(&message);
+    reason.to_owned()
+}
+
 #[cfg(test)]
 mod tests {
-    use super::{parse, refuse_unknown};
+    use super::{parse_csv, parse_jsonl, refuse_unknown};
     use crate::domain::{Reason, ThresholdMetric, Verdict};
 
     fn error(text: &str) -> String {
-        parse(text.as_bytes()).expect_err("refused").to_string()
+        parse_csv(text.as_bytes()).expect_err("refused").to_string()
     }
 
     #[test]
-    fn columns_may_stand_in_any_order_and_be_left_out() {
+    fn columns_may_be_in_any_order_and_optional_ones_missing() {
         let text = "reviewer,pair,verdict,metric,reason,note\n\
                     lan,0001,pass,,,\n\
                     lan,0002,fail,density,strokes_lost,\"thin, broken\"\n";
-        let rows = parse(text.as_bytes()).expect("valid");
+        let rows = parse_csv(text.as_bytes()).expect("valid");
         assert_eq!(rows[0].verdict.verdict, Verdict::Pass);
         assert_eq!(rows[0].verdict.metric, None);
         assert_eq!(rows[1].line, 3);
         assert_eq!(rows[1].verdict.metric, Some(ThresholdMetric::Density));
         assert_eq!(rows[1].verdict.reason, Some(Reason::StrokesLost));
         assert_eq!(rows[1].verdict.note.as_deref(), Some("thin, broken"));
-        assert_eq!(parse(b"pair,verdict,reviewer\n").expect("valid"), []);
+        assert_eq!(parse_csv(b"pair,verdict,reviewer\n").expect("valid"), []);
     }
 
     #[test]
-    fn a_time_is_kept_and_what_is_none_is_refused() {
+    fn times_are_parsed_and_other_texts_refused() {
         let rows =
-            parse(b"pair,verdict,reviewer,at\n1,pass,lan,2026-11-21 04:10:03\n1,pass,lan,\n");
+            parse_csv(b"pair,verdict,reviewer,at\n1,pass,lan,2026-11-21 04:10:03\n1,pass,lan,\n");
         let rows = rows.expect("valid");
         assert_eq!(rows[0].verdict.at, Some(1_795_234_203_000));
         assert_eq!(rows[1].verdict.at, None);
@@ -205,8 +281,8 @@ mod tests {
     }
 
     #[test]
-    fn what_spreadsheets_write_is_read() {
-        let plain = parse(b"pair,verdict,reviewer,note\n1,pass,lan,\"a, b\"\n").expect("valid");
+    fn files_of_spreadsheets_are_read() {
+        let plain = parse_csv(b"pair,verdict,reviewer,note\n1,pass,lan,\"a, b\"\n").expect("valid");
         let semicolons = "pair;verdict;reviewer;note\r\n1;pass;lan;a, b\r\n";
         let tabs = semicolons.replace(';', "\t");
         let utf16: Vec<u8> = "\u{feff}"
@@ -215,16 +291,16 @@ mod tests {
             .flat_map(|c| (c as u16).to_le_bytes())
             .collect();
         for bytes in [semicolons.as_bytes(), tabs.as_bytes(), &utf16] {
-            assert_eq!(parse(bytes).expect("valid"), plain);
+            assert_eq!(parse_csv(bytes).expect("valid"), plain);
         }
-        let cut = parse(&utf16[..utf16.len() - 1]).expect_err("cut short");
+        let cut = parse_csv(&utf16[..utf16.len() - 1]).expect_err("truncated");
         assert!(cut.to_string().contains("UTF-16"), "{cut}");
-        let latin = parse(b"pair;verdict;reviewer\n1;pass;Nguy\xean\n").expect_err("not UTF-8");
+        let latin = parse_csv(b"pair;verdict;reviewer\n1;pass;Nguy\xean\n").expect_err("not UTF-8");
         assert!(latin.to_string().contains("CSV UTF-8"), "{latin}");
     }
 
     #[test]
-    fn wrong_line_is_named_by_its_number() {
+    fn invalid_line_is_reported_by_number() {
         assert_eq!(
             error("pair,verdict,reviewer\n1,pass,lan\n2,maybe,lan\n"),
             "line 3: \"maybe\" is not a verdict (pass, fail, unsure); no verdict was recorded"
@@ -239,13 +315,56 @@ mod tests {
     }
 
     #[test]
-    fn pair_that_is_not_there_is_named_by_its_line() {
-        let rows = parse(b"pair,verdict,reviewer\n1,pass,lan\n2,pass,lan\n").expect("valid");
+    fn unknown_pair_is_reported_by_line() {
+        let rows = parse_csv(b"pair,verdict,reviewer\n1,pass,lan\n2,pass,lan\n").expect("valid");
         let unknown = ["2".parse().expect("valid id")];
         let error = refuse_unknown(&rows, &unknown).expect_err("refused");
         assert!(
             error.to_string().starts_with("line 3: there is no pair 2"),
             "{error}"
         );
+    }
+
+    #[test]
+    fn json_lines_are_read_back_without_undone_verdicts() {
+        let text = r#"{"id":1,"act":1,"pair":"0001","metric":"density","verdict":"fail","reviewer":"lan","reason":"angle","note":"a, b","at":5,"undone_at":null,"current":true}
+
+{"pair":"0001","verdict":"pass","reviewer":"lan","undone_at":7}
+{"pair":"0002","verdict":"pass","reviewer":"lan"}
+"#;
+        let rows = parse_jsonl(text.as_bytes()).expect("valid");
+        assert_eq!(rows.iter().map(|row| row.line).collect::<Vec<_>>(), [1, 4]);
+        let first = &rows[0].verdict;
+        assert_eq!(first.metric, Some(ThresholdMetric::Density));
+        assert_eq!(first.verdict, Verdict::Fail);
+        assert_eq!(first.reason, Some(Reason::Angle));
+        assert_eq!(first.note.as_deref(), Some("a, b"));
+        assert_eq!(rows[1].verdict.metric, None);
+    }
+
+    #[test]
+    fn invalid_json_line_is_reported_by_number() {
+        let good = r#"{"pair":"1","verdict":"pass","reviewer":"lan"}"#;
+        for (line, why) in [
+            (
+                r#"{"pair":"1","verdict":"maybe","reviewer":"lan"}"#,
+                "maybe",
+            ),
+            (
+                r#"{"pair":"1","verdict":"pass","reviewer":" "}"#,
+                "reviewer is empty",
+            ),
+            (r#"{"pair":"1","verdict":"pass"}"#, "reviewer"),
+            ("pass", "expected"),
+        ] {
+            let text = format!("{good}\n{line}\n");
+            let error = parse_jsonl(text.as_bytes())
+                .expect_err("refused")
+                .to_string();
+            assert!(
+                error.starts_with("line 2: ") && error.contains(why),
+                "{error}"
+            );
+        }
     }
 }

@@ -22,7 +22,7 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
 /// # Errors
 /// All problems, by the line where each row starts.
 pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError> {
-    let text = as_utf8(bytes).map_err(|error| Problem::whole(error.to_string()))?;
+    let text = as_utf8(bytes).map_err(|error| Problem::of_list(error.to_string()))?;
     let bytes = &*text;
     let mut reader = ::csv::ReaderBuilder::new()
         .delimiter(delimiter(bytes))
@@ -32,13 +32,13 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowId
         .from_reader(bytes);
     let mut lines = LineCounter::new(bytes);
     let mut records = reader.byte_records().map(|record| {
-        let record = record.map_err(|error| Problem::whole(error.to_string()))?;
+        let record = record.map_err(|error| Problem::of_list(error.to_string()))?;
         let line = lines.at(record.position());
         Ok::<_, Problem>((line, record))
     });
     let header = match records.next() {
         Some(header) => CsvHeader::parse(&header?)?,
-        None => return Err(Problem::whole("the list is empty").into()),
+        None => return Err(Problem::of_list("the list is empty").into()),
     };
     let mut rows = RowCollector::new(each);
     for record in records {
@@ -71,7 +71,7 @@ impl CsvHeader {
         let mut columns = Vec::new();
         for (number, field) in (1..).zip(record) {
             let Ok(name) = std::str::from_utf8(field) else {
-                problems.push(Problem::line(
+                problems.push(Problem::at_line(
                     *line,
                     format!("the name of column {number} is not UTF-8"),
                 ));
@@ -82,12 +82,12 @@ impl CsvHeader {
                 && let Some(first) = seen.insert(column_name(&column).to_owned(), number)
             {
                 let reason = format!("columns {first} and {number} are both named {name:?}");
-                problems.push(Problem::line(*line, reason));
+                problems.push(Problem::at_line(*line, reason));
             }
             columns.push(column);
         }
         let missing = REQUIRED.iter().filter(|name| !seen.contains_key(**name));
-        problems.extend(missing.map(|name| Problem::line(*line, missing_column(name, record))));
+        problems.extend(missing.map(|name| Problem::at_line(*line, missing_column(name, record))));
         if problems.is_empty() {
             Ok(Self { columns })
         } else {
@@ -101,7 +101,7 @@ impl CsvHeader {
             return Ok(None);
         }
         if record.len() != self.columns.len() {
-            return Err(Problem::line(
+            return Err(Problem::at_line(
                 line,
                 format!(
                     "the row has {} cells, the header has {}",
@@ -117,7 +117,7 @@ impl CsvHeader {
         for (column, cell) in self.columns.iter().zip(record) {
             let Ok(cell) = std::str::from_utf8(cell) else {
                 let name = column_name(column);
-                return Err(Problem::line(
+                return Err(Problem::at_line(
                     line,
                     format!("the cell of column {name:?} is not UTF-8"),
                 ));

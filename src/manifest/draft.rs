@@ -44,7 +44,7 @@ impl<'e> RowCollector<'e> {
         let mut reasons = Vec::new();
         let name = self.name(&draft, &mut reasons);
         let row = complete(draft, name, &mut reasons);
-        let problems = reasons.into_iter().map(|why| Problem::line(line, why));
+        let problems = reasons.into_iter().map(|why| Problem::at_line(line, why));
         let before = self.problems.len();
         self.problems.extend(problems);
         if before == self.problems.len() {

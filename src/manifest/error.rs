@@ -19,7 +19,7 @@ pub enum ProblemLocation {
     /// A file of a directory.
     File(PathBuf),
     /// The whole list.
-    Whole,
+    List,
 }
 
 impl fmt::Display for ProblemLocation {
@@ -27,7 +27,7 @@ impl fmt::Display for ProblemLocation {
         match self {
             Self::Line(line) => write!(f, "line {line}: "),
             Self::File(path) => write!(f, "{}: ", sanitize(&path.to_string_lossy(), 4096)),
-            Self::Whole => Ok(()),
+            Self::List => Ok(()),
         }
     }
 }
@@ -43,7 +43,7 @@ pub struct Problem {
 
 impl Problem {
     /// Creates a problem of a line.
-    pub(super) fn line(line: usize, reason: impl Into<String>) -> Self {
+    pub(super) fn at_line(line: usize, reason: impl Into<String>) -> Self {
         Self {
             location: ProblemLocation::Line(line),
             reason: sanitize(&reason.into(), MAX_CHARS),
@@ -51,9 +51,9 @@ impl Problem {
     }
 
     /// Creates a problem of the whole list.
-    pub(super) fn whole(reason: impl Into<String>) -> Self {
+    pub(super) fn of_list(reason: impl Into<String>) -> Self {
         Self {
-            location: ProblemLocation::Whole,
+            location: ProblemLocation::List,
             reason: sanitize(&reason.into(), MAX_CHARS),
         }
     }
@@ -79,7 +79,7 @@ impl ManifestError {
             return Err(Self { problems });
         }
         if is_empty {
-            return Err(Problem::whole("the list contains no pairs").into());
+            return Err(Problem::of_list("the list contains no pairs").into());
         }
         Ok(())
     }
@@ -115,8 +115,8 @@ mod tests {
         for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(5000)] {
             let location = ProblemLocation::File(rude.as_str().into());
             for text in [
-                Problem::line(1, rude.as_str()).to_string(),
-                Problem::whole(rude.as_str()).to_string(),
+                Problem::at_line(1, rude.as_str()).to_string(),
+                Problem::of_list(rude.as_str()).to_string(),
                 location.to_string(),
             ] {
                 assert!(!text.contains(&rude), "{text:?}");
@@ -126,7 +126,9 @@ mod tests {
 
     #[test]
     fn twenty_problems_are_shown_and_the_rest_counted() {
-        let problems = (1..=23).map(|line| Problem::line(line, "no id")).collect();
+        let problems = (1..=23)
+            .map(|line| Problem::at_line(line, "no id"))
+            .collect();
         let text = ManifestError { problems }.to_string();
         assert_eq!(text.lines().count(), 21);
         assert!(text.starts_with("line 1: no id\nline 2: no id\n"));

@@ -25,7 +25,7 @@ pub fn read_jsonl(
     bytes: &[u8],
     each: &mut dyn FnMut(ManifestRow),
 ) -> Result<RowIds, ManifestError> {
-    let text = as_utf8(bytes).map_err(|error| Problem::whole(error.to_string()))?;
+    let text = as_utf8(bytes).map_err(|error| Problem::of_list(error.to_string()))?;
     let bytes = &*text;
     let mut rows = RowCollector::new(each);
     for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
@@ -35,7 +35,7 @@ pub fn read_jsonl(
         }
         match draft(line, content) {
             Ok(draft) => rows.push(draft),
-            Err(reason) => rows.problems.push(Problem::line(line, reason)),
+            Err(reason) => rows.problems.push(Problem::at_line(line, reason)),
         }
     }
     rows.finish()

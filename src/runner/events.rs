@@ -2,12 +2,15 @@
 
 use std::time::Duration;
 
+use serde::{Serialize, Serializer};
+
 use super::stop::StopLevel;
 use crate::catalog::StatusCounts;
 use crate::domain::{Failure, PairName, Stage};
 
 /// Something that happened in a run.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "message_type", rename_all = "snake_case")]
 pub enum RunEvent {
     /// The run starts.
     Started {
@@ -48,6 +51,7 @@ pub enum RunEvent {
         /// The stage.
         stage: Stage,
         /// Class and message.
+        #[serde(flatten)]
         failure: Failure,
         /// Stages of the pair that will not run, this one included: the progress bar advances by them.
         skipped: u64,
@@ -59,6 +63,7 @@ pub enum RunEvent {
         /// The stage.
         stage: Stage,
         /// Class and message.
+        #[serde(flatten)]
         failure: Failure,
         /// Wait before the retry in milliseconds.
         wait_ms: u64,
@@ -71,10 +76,19 @@ pub enum RunEvent {
     /// The run is stopping.
     Stopping {
         /// How soon.
+        #[serde(rename = "now", serialize_with = "is_now")]
         level: StopLevel,
         /// Why, in a few words: asked to stop, or too many failures.
         reason: String,
     },
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes fields by reference"
+)]
+fn is_now<S: Serializer>(level: &StopLevel, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_bool(*level == StopLevel::Now)
 }
 
 /// How a run ended.
