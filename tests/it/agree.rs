@@ -26,7 +26,11 @@ fn set(project: &Project, pair: &Value, verdict: &str, reviewer: &str) {
 
 /// `lan` fails all on the page, faults and repeats too; `minh` passes all pairs but the first.
 fn reviewer_pairs(project: &Project) -> Vec<Value> {
-    let page = Page::open(project, "lan", &["--controls", "50", "--repeats", "20"]);
+    let page = Page::open(
+        project,
+        "lan",
+        &["--attention-checks", "50", "--duplicates", "20"],
+    );
     let deck = page.deck();
     judge_all(&page, &deck, "fail");
     let told = page.get("/api/deck").json();
@@ -78,7 +82,7 @@ fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
     assert_ne!(settled["pair"], pairs[0], "on which they agree");
     let after = told(&project, &["agreement", "--json"]);
     assert_eq!(count(&after["conflicts"]), n - agreed - 1);
-    assert_eq!(after["reviewer_pairs"], found["two_readers"]);
+    assert_eq!(after["reviewer_pairs"], found["reviewer_pairs"]);
     let text = mocban(project.dir(), &["agreement"]).expect(0).out;
     let waiting = format!("Conflicts waiting: {}\n", n - agreed - 1);
     assert!(
@@ -135,7 +139,7 @@ fn results_are_measured_against_the_newest_alignment_by_hand() {
     let page = Page::open(
         &project,
         "lan",
-        &["--controls", "0", "--metric", "ensemble"],
+        &["--attention-checks", "0", "--metric", "ensemble"],
     );
     let item = page.deck().remove(0);
     let id = item["id"].as_str().expect("an id");

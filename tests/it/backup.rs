@@ -1,4 +1,4 @@
-//! `backup` through the real binary: taken while a run writes, restored, and never half there.
+//! `backup` through the real binary: during a run, restored, and never incomplete.
 
 use std::process::Stdio;
 
@@ -20,45 +20,45 @@ fn files(dir: &std::path::Path) -> Vec<String> {
 }
 
 #[test]
-fn a_backup_taken_while_a_run_writes_is_restored_to_the_same_export() {
+fn backup_taken_during_a_run_restores_to_the_same_export() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let whole = project(dir.path(), "whole", "3");
-    std::fs::write(whole.settings_path(), "[depth]\nlongest_px = 96\n").expect("written");
-    let blank = copy(&whole, &dir.path().join("blank"));
+    let original = project(dir.path(), "original", "3");
+    std::fs::write(original.settings_path(), "[depth]\nlongest_px = 96\n").expect("written");
+    let blank = copy(&original, &dir.path().join("blank"));
     let file = dir.path().join("b.sqlite");
     let backup = ["backup", file.to_str().expect("UTF-8")];
 
-    let mut child = run(&whole, &["-j", "1"])
+    let mut child = run(&original, &["-j", "1"])
         .stderr(Stdio::null())
         .spawn()
         .expect("the binary starts");
-    while stages_done(&whole) < 2 {
+    while stages_done(&original) < 2 {
         std::thread::yield_now();
     }
-    at(&whole, &backup).expect(0);
+    at(&original, &backup).expect(0);
     assert!(
         child.try_wait().expect("a child").is_none(),
         "the run ended before the backup"
     );
     assert!(child.wait().expect("a child").success());
-    let wanted = exported(&whole, "wanted");
+    let expected = exported(&original, "expected");
 
-    // The inputs are where they were; the artifacts are gone with the old project.
+    // The inputs are unchanged; the artifacts are lost with the old project.
     std::fs::copy(&file, blank.catalog_path()).expect("copied");
     let settings = dir.path().join("b.mocban.toml");
     std::fs::copy(settings, blank.settings_path()).expect("copied");
-    let mended = at(&blank, &["check", "--repair", "--json"])
+    let repaired = at(&blank, &["check", "--repair", "--json"])
         .expect(0)
         .json();
-    assert_eq!(mended["pairs"], 3);
-    assert!(mended["damage"]["file_missing"]["found"].as_u64() >= Some(1));
+    assert_eq!(repaired["pairs"], 3);
+    assert!(repaired["damage"]["file_missing"]["found"].as_u64() >= Some(1));
     at(&blank, &["run"]).expect(0);
     at(&blank, &["check"]).expect(0);
-    assert!(exported(&blank, "restored") == wanted, "another export");
+    assert!(exported(&blank, "restored") == expected, "another export");
 }
 
 #[test]
-fn verdicts_survive_a_restore_and_go_beside_it_as_lines() {
+fn verdicts_survive_a_restore_and_are_saved_as_lines_too() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let file = dir.path().join("blocks.sqlite");
@@ -78,7 +78,7 @@ fn verdicts_survive_a_restore_and_go_beside_it_as_lines() {
     let restored = Project::open(&dir.path().join("q")).expect("a project");
     at(&restored, &["check", "--repair"]).expect(0);
     at(&restored, &["run"]).expect(0);
-    // The same results, so the verdicts are on the current ones again.
+    // The results are the same, so the verdicts apply to them again.
     assert_eq!(
         at(&restored, &["verdict", "log", "--json"]).expect(0).out,
         log
@@ -88,7 +88,7 @@ fn verdicts_survive_a_restore_and_go_beside_it_as_lines() {
 }
 
 #[test]
-fn verdicts_that_an_export_wrote_are_taken_into_another_project() {
+fn exported_verdicts_can_be_imported_into_another_project() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let log = at(&project, &["verdict", "log", "--json"]).expect(0).out;
@@ -98,8 +98,8 @@ fn verdicts_that_an_export_wrote_are_taken_into_another_project() {
         .and_then(|line| serde_json::from_str(line).ok())
         .expect("a line");
     let pair = first["pair"].as_str().expect("a name");
-    let undone = ["verdict", "set", pair, "fail", "--reviewer", "lan"];
-    at(&project, &undone).expect(0);
+    let to_undo = ["verdict", "set", pair, "fail", "--reviewer", "lan"];
+    at(&project, &to_undo).expect(0);
     at(&project, &["verdict", "undo"]).expect(0);
     let out = dir.path().join("out");
     at(&project, &["export", "-o", out.to_str().expect("UTF-8")]).expect(0);
@@ -133,7 +133,7 @@ fn verdicts_that_an_export_wrote_are_taken_into_another_project() {
     assert_eq!(of(&other), of(&project));
     assert_eq!(of(&other).len(), 4);
 
-    // What was said of another result is not said of this one.
+    // A verdict on another result is not recorded.
     let text = std::fs::read_to_string(&lines).expect("read");
     let first = text.lines().next().expect("a line");
     let hash = "0".repeat(64);
@@ -149,26 +149,26 @@ fn verdicts_that_an_export_wrote_are_taken_into_another_project() {
 }
 
 #[test]
-fn a_backup_that_fails_leaves_the_earlier_one_and_nothing_half_made() {
+fn failed_backup_leaves_the_previous_one_and_no_partial_files() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let file = dir.path().join("b.sqlite");
     let backup = ["backup", file.to_str().expect("UTF-8")];
     at(&project, &backup).expect(0);
     let (good, names) = (std::fs::read(&file).expect("read"), files(dir.path()));
-    let spoilt = crate::odd::spoil(&project, 5, 7);
+    let intact = crate::odd::corrupt_catalog(&project, 5, 7);
     let refused = at(&project, &backup).expect(1);
     assert!(refused.err.contains("is damaged"), "{}", refused.err);
     assert!(std::fs::read(&file).expect("read") == good);
     assert_eq!(files(dir.path()), names);
-    // Half a copy that a killed process left is in nobody's way.
-    std::fs::write(project.catalog_path(), spoilt).expect("mended");
+    // A partial copy that a killed process left does not matter.
+    std::fs::write(project.catalog_path(), intact).expect("restored");
     sql(&project, "UPDATE pair SET block = 'b1'");
     std::fs::write(dir.path().join(".b.sqlite.mocban-partial"), "half").expect("written");
     at(&project, &backup).expect(0);
     assert!(std::fs::read(&file).expect("read") != good);
     assert_eq!(files(dir.path()), names);
-    // Settings that the project has no more would not be its own.
+    // Settings that the project no longer has are removed from the backup.
     std::fs::remove_file(project.settings_path()).expect("settings");
     at(&project, &backup).expect(0);
     let settings = "b.mocban.toml";
@@ -177,7 +177,7 @@ fn a_backup_that_fails_leaves_the_earlier_one_and_nothing_half_made() {
 }
 
 #[test]
-fn a_backup_overwrites_nothing_but_a_backup() {
+fn backup_overwrites_only_a_backup() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let thesis = dir.path().join("thesis.docx");

@@ -1,4 +1,4 @@
-//! `check` and `check --repair` through the real binary: what is damaged is found, put back, and comes out the same.
+//! `check` and `check --repair` through the real binary: damage is found and repaired, and the results are the same.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use sqlx::{ConnectOptions as _, Connection as _};
 use crate::cli::{Call, mocban};
 use crate::resume::{copy, pairs};
 
-/// A demo of two small pairs, aligned and judged, made once; tests work on copies.
+/// A demo of two small pairs, aligned and judged, created once; tests work on copies.
 static DONE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let demo = ["demo", "done", "--pairs", "2", "--no-run"];
@@ -33,7 +33,7 @@ static DONE: LazyLock<tempfile::TempDir> = LazyLock::new(|| {
     dir
 });
 
-/// A copy of that project of a test's own.
+/// Copies that project for a test.
 pub(crate) fn done(dir: &Path) -> Project {
     let original = Project::open(&DONE.path().join("done")).expect("a project");
     copy(&original, &dir.join("p"))
@@ -46,7 +46,7 @@ pub(crate) fn at(project: &Project, args: &[&str]) -> Call {
     mocban(project.dir(), &[&quiet[..], args].concat())
 }
 
-/// Changes the catalog behind the program's back.
+/// Changes the catalog directly, without the program.
 pub(crate) fn sql(project: &Project, statements: &str) {
     let options = SqliteConnectOptions::new().filename(project.catalog_path());
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
@@ -64,14 +64,14 @@ pub(crate) fn sql(project: &Project, statements: &str) {
     });
 }
 
-/// Every file of an export with its bytes.
+/// Exports and returns every file with its bytes.
 pub(crate) fn exported(project: &Project, name: &str) -> Vec<(PathBuf, Vec<u8>)> {
     let root = project.dir().with_file_name(name);
     at(project, &["export", "-o", root.to_str().expect("UTF-8")]).expect(0);
     below(&root)
 }
 
-/// Every file below a folder with its bytes.
+/// Returns every file below a directory with its bytes.
 pub(crate) fn below(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let (mut open, mut files) = (vec![root.to_owned()], Vec::new());
     while let Some(dir) = open.pop() {
@@ -90,7 +90,7 @@ pub(crate) fn below(root: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     files
 }
 
-/// How often each stage of a pair was finished.
+/// Counts how often each stage of a pair was finished.
 fn finished(project: &Project, pair: usize) -> [usize; 4] {
     let found = &pairs(project)[pair];
     Stage::ALL.map(|stage| {
@@ -100,7 +100,7 @@ fn finished(project: &Project, pair: usize) -> [usize; 4] {
     })
 }
 
-/// Path of a pair's artifact.
+/// Returns the path of a pair's artifact.
 fn artifact(project: &Project, pair: usize, stage: Stage, role: &str) -> PathBuf {
     let found = &pairs(project)[pair].results;
     let record = found.stage(stage).expect("a result");
@@ -116,7 +116,6 @@ fn verdicts(project: &Project) -> String {
     at(project, &["verdict", "log", "--json"]).expect(0).out
 }
 
-/// A result file that a row names but that is missing or changed is found by `check` and the stage runs again.
 #[test]
 fn missing_and_changed_files_are_found_and_their_stages_run_again() {
     let dir = tempfile::tempdir().expect("a temporary directory");
@@ -133,7 +132,7 @@ fn missing_and_changed_files_are_found_and_their_stages_run_again() {
     bytes[middle] ^= 1;
     std::fs::write(&changed, bytes).expect("written");
 
-    // Looking changes nothing, however often.
+    // Checking changes nothing, however often.
     for _ in 0..2 {
         let found = at(&project, &["check"]).expect(12);
         for path in [&missing, &changed] {
@@ -142,16 +141,16 @@ fn missing_and_changed_files_are_found_and_their_stages_run_again() {
         }
         assert!(found.next()[0].ends_with("check --repair"));
     }
-    // A change that keeps the length is told only by reading every byte.
+    // A change that keeps the length is found only by reading every byte.
     let quick = at(&project, &["check", "--quick", "--json"])
         .expect(12)
         .json();
     assert_eq!(kinds(&quick), ["file_missing".to_owned()].into());
 
-    let mended = at(&project, &["check", "--repair", "--json"])
+    let repaired = at(&project, &["check", "--repair", "--json"])
         .expect(0)
         .json();
-    assert_eq!(mended["repaired"]["put_back"], 2);
+    assert_eq!(repaired["repaired"]["put_back"], 2);
     at(&project, &["check"]).expect(0);
     at(&project, &["run"]).expect(0);
     assert_eq!(finished(&project, 0), [1, 2, 2, 2]);
@@ -162,7 +161,7 @@ fn missing_and_changed_files_are_found_and_their_stages_run_again() {
 }
 
 #[test]
-fn rows_and_counters_that_disagree_are_found_and_mended() {
+fn rows_and_counters_that_disagree_are_found_and_repaired() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let (before, said) = (exported(&project, "before"), verdicts(&project));
@@ -217,10 +216,10 @@ fn rows_and_counters_that_disagree_are_found_and_mended() {
         sql(&project, statements);
         let found = at(&project, &["check", "--json"]).expect(12).json();
         assert_eq!(kinds(&found), [kind.to_owned()].into(), "{statements}");
-        let mended = at(&project, &["check", "--repair", "--json"])
+        let repaired = at(&project, &["check", "--repair", "--json"])
             .expect(0)
             .json();
-        assert_eq!(mended["damage"][kind]["left"], 0, "{statements}");
+        assert_eq!(repaired["damage"][kind]["left"], 0, "{statements}");
         at(&project, &["check"]).expect(0);
         at(&project, &["run"]).expect(0);
     }
@@ -229,35 +228,35 @@ fn rows_and_counters_that_disagree_are_found_and_mended() {
 }
 
 #[test]
-fn indexes_that_disagree_with_their_tables_are_made_anew() {
+fn indexes_that_disagree_with_their_tables_are_rebuilt() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
-    // While the index means other rows, a job becomes ready; then it means ready ones again.
-    let meaning = |from: &str, to: &str| {
+    // A job becomes ready while the index covers other rows; then the index covers ready jobs again.
+    let redefine = |from: &str, to: &str| {
         format!(
             "PRAGMA writable_schema = ON; UPDATE sqlite_schema SET sql = replace(sql, 'status = {from}', 'status = {to}')
             WHERE name = 'job_ready'"
         )
     };
-    sql(&project, &meaning("0", "5"));
+    sql(&project, &redefine("0", "5"));
     sql(
         &project,
         "UPDATE job SET stage = 0, status = 0, fingerprint = NULL; UPDATE counter SET n = 2 WHERE stage = 0 AND status = 0;
         UPDATE counter SET n = 0 WHERE stage = 4 AND status = 3",
     );
-    sql(&project, &meaning("5", "0"));
+    sql(&project, &redefine("5", "0"));
     let found = at(&project, &["check", "--json"]).expect(12).json();
     assert_eq!(kinds(&found), ["database".to_owned()].into());
-    let mended = at(&project, &["check", "--repair", "--json"])
+    let repaired = at(&project, &["check", "--repair", "--json"])
         .expect(0)
         .json();
-    assert_eq!(mended["repaired"]["indexes"], true);
+    assert_eq!(repaired["repaired"]["indexes"], true);
     at(&project, &["run"]).expect(0);
     assert_eq!(finished(&project, 0), [2; 4]);
 }
 
 #[test]
-fn a_database_with_faults_of_its_own_is_not_written_to() {
+fn damaged_database_is_not_written_to() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     sql(
@@ -276,7 +275,7 @@ fn a_database_with_faults_of_its_own_is_not_written_to() {
 }
 
 #[test]
-fn files_that_no_row_names_are_told_and_removed_but_no_others() {
+fn unreferenced_files_are_reported_and_removed_but_no_others() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let artifacts = project.artifacts_dir();
@@ -296,10 +295,10 @@ fn files_that_no_row_names_are_told_and_removed_but_no_others() {
     assert_eq!(told["spare"]["bytes"], 10);
     assert_eq!(told["spare"]["strangers"], 1);
     assert!(ours.iter().all(|path| path.exists()));
-    let mended = at(&project, &["check", "--repair", "--json"])
+    let repaired = at(&project, &["check", "--repair", "--json"])
         .expect(0)
         .json();
-    assert_eq!(mended["spare"]["removed"], 2);
+    assert_eq!(repaired["spare"]["removed"], 2);
     assert!(!ours.iter().any(|path| path.exists()));
     assert!(theirs.exists());
     at(&project, &["check"]).expect(0);
@@ -307,7 +306,7 @@ fn files_that_no_row_names_are_told_and_removed_but_no_others() {
 }
 
 #[test]
-fn a_run_that_goes_on_is_checked_but_not_mended() {
+fn project_is_checked_but_not_repaired_during_a_run() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let missing = artifact(&project, 0, Stage::Depth, "depth.png");
@@ -322,9 +321,9 @@ fn a_run_that_goes_on_is_checked_but_not_mended() {
     let found = at(&project, &["check", "--json"]).expect(12);
     assert_eq!(found.json()["spare"], Value::Null);
     let refused = at(&project, &["check", "--repair"]).expect(11);
-    let me = format!("in use by pid {}", std::process::id());
-    assert!(refused.err.contains(&me), "{}", refused.err);
-    // One that joined is a run as well, though the owner is gone.
+    let owner = format!("in use by pid {}", std::process::id());
+    assert!(refused.err.contains(&owner), "{}", refused.err);
+    // A process that joined is a run as well, even after the first one ended.
     let joined = RunLock::acquire(&project, true).expect("joined");
     drop(lock);
     at(&project, &["check", "--repair"]).expect(11);
@@ -332,14 +331,14 @@ fn a_run_that_goes_on_is_checked_but_not_mended() {
     assert_eq!(std::fs::read(project.catalog_path()).expect("read"), before);
     assert!(spare.exists());
 
-    // And a run is refused while a repair holds the lock; afterwards both go through.
+    // Without the lock, both the repair and the run succeed.
     at(&project, &["check", "--repair"]).expect(0);
     assert!(!spare.exists());
     at(&project, &["run"]).expect(0);
 }
 
 #[test]
-fn inputs_that_are_gone_or_changed_are_notes_and_no_damage() {
+fn missing_or_changed_inputs_are_notes_not_damage() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = done(dir.path());
     let found = pairs(&project);

@@ -1,11 +1,11 @@
-//! The binary: exit codes, help, JSON.
+//! The real binary: exit codes, help, JSON. The helpers here are used by most other modules.
 
 use std::path::Path;
 use std::process::Command;
 
 use serde_json::Value;
 
-/// What one call of the binary gave.
+/// The outcome of one call of the binary.
 pub(crate) struct Call {
     pub(crate) code: i32,
     pub(crate) out: String,
@@ -13,12 +13,12 @@ pub(crate) struct Call {
 }
 
 impl Call {
-    /// stdout as JSON.
+    /// Parses stdout as JSON.
     pub(crate) fn json(&self) -> Value {
         serde_json::from_str(&self.out).expect("JSON on stdout")
     }
 
-    /// The commands after `next:`, ready to be run.
+    /// Returns the commands after `next:`, ready to be run.
     pub(crate) fn next(&self) -> Vec<String> {
         self.err
             .lines()
@@ -27,7 +27,7 @@ impl Call {
             .collect()
     }
 
-    /// Fails with both streams unless the code is as wanted.
+    /// Checks the exit code; on failure shows both streams.
     #[track_caller]
     pub(crate) fn expect(self, code: i32) -> Self {
         assert_eq!(
@@ -39,12 +39,12 @@ impl Call {
     }
 }
 
-/// Calls the binary in a directory, with nothing of our own environment that changes what it says.
+/// Calls the binary in a directory, without environment variables that change its output.
 pub(crate) fn mocban(dir: &Path, args: &[&str]) -> Call {
     call(binary().current_dir(dir).args(args))
 }
 
-/// The binary, ready to be called.
+/// Returns the binary, ready to be called.
 pub(crate) fn binary() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_mocban"));
     for (name, _) in std::env::vars_os() {
@@ -87,7 +87,7 @@ fn help_is_data_and_usage_errors_are_not() {
 }
 
 #[test]
-fn directory_without_project_is_code_10_with_a_way_on() {
+fn directory_without_project_is_code_10_with_next_steps() {
     let dir = empty();
     for command in [
         &["run"] as &[&str],
@@ -117,7 +117,7 @@ fn directory_without_project_is_code_10_with_a_way_on() {
 }
 
 #[test]
-fn error_is_an_object_where_json_was_asked_for() {
+fn error_is_an_object_with_json() {
     let dir = empty();
     let refused = mocban(dir.path(), &["status", "--json"]).expect(10);
     let first = refused.err.lines().next().expect("a line");
@@ -127,7 +127,7 @@ fn error_is_an_object_where_json_was_asked_for() {
 }
 
 #[test]
-fn wrong_settings_are_code_2_and_name_file_and_key() {
+fn invalid_settings_are_code_2_with_file_and_key() {
     let dir = empty();
     let file = dir.path().join("mocban.toml");
     std::fs::write(&file, "[run]\nwrokers = 2\n").expect("a small file");
@@ -141,7 +141,7 @@ fn wrong_settings_are_code_2_and_name_file_and_key() {
 }
 
 #[test]
-fn settings_show_their_origins_and_read_back_the_same() {
+fn settings_show_their_origins_and_parse_to_the_same_values() {
     let dir = empty();
     std::fs::write(dir.path().join("mocban.toml"), "preset = \"paper\"\n").expect("a small file");
     let shown = call(
@@ -173,7 +173,7 @@ fn settings_show_their_origins_and_read_back_the_same() {
 }
 
 #[test]
-fn colour_is_for_those_who_ask() {
+fn colour_is_used_only_on_request_off_a_terminal() {
     let dir = empty();
     let plain = mocban(dir.path(), &["config", "show"]).expect(0);
     assert!(!plain.out.contains('\u{1b}'));
@@ -184,7 +184,7 @@ fn colour_is_for_those_who_ask() {
 }
 
 #[test]
-fn completions_and_manual_pages_are_made() {
+fn completions_and_manual_pages_are_written() {
     let dir = empty();
     for shell in ["bash", "zsh", "fish"] {
         let script = mocban(dir.path(), &["completions", shell]).expect(0);
@@ -196,7 +196,7 @@ fn completions_and_manual_pages_are_made() {
     assert!(dir.path().join("pages/mocban-verdict-set.1").is_file());
 }
 
-/// A project `p` of two pairs whose files do not exist, imported from `pairs.csv` beside it.
+/// Returns a directory with the project `p` of two pairs whose files do not exist, and its list `pairs.csv`.
 fn imported() -> tempfile::TempDir {
     let dir = empty();
     let text = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";
@@ -238,7 +238,7 @@ fn refused_manifest_names_its_lines_and_leaves_nothing_behind() {
 }
 
 #[test]
-fn missing_files_are_warned_of_by_line_and_fail_their_pairs_alone() {
+fn missing_files_cause_a_warning_by_line_and_fail_only_their_pairs() {
     let dir = empty();
     let text = "id,mesh,print\na,a.stl,a.png\nb,b.stl,b.png\n";
     std::fs::write(dir.path().join("pairs.csv"), text).expect("a small file");
@@ -283,7 +283,7 @@ fn missing_files_are_warned_of_by_line_and_fail_their_pairs_alone() {
 }
 
 #[test]
-fn unknown_pair_is_code_4_with_the_nearest_ids() {
+fn unknown_pair_is_code_4_with_similar_ids() {
     let dir = imported();
     let refused = mocban(dir.path(), &["-C", "p", "show", "aa"]).expect(4);
     assert_eq!(refused.err, "error: there is no pair aa; similar ids: a\n");
@@ -320,7 +320,7 @@ fn refused_verdict_file_records_nothing() {
 }
 
 #[test]
-fn every_next_line_can_be_run_as_it_stands() {
+fn every_next_line_can_be_run_unchanged() {
     let dir = empty();
     std::fs::create_dir(dir.path().join("my scans")).expect("a folder");
     let text = "id,mesh,print\na,a.stl,a.png\n";
@@ -363,7 +363,7 @@ fn project_that_was_moved_finds_its_files() {
 }
 
 #[test]
-fn project_in_use_is_code_11_and_can_still_be_looked_at() {
+fn project_in_use_is_code_11_and_can_still_be_read() {
     let dir = imported();
     let lock = std::fs::File::create(dir.path().join("p/run.lock")).expect("a lock file");
     lock.lock().expect("nobody else has it");
@@ -378,7 +378,7 @@ fn project_in_use_is_code_11_and_can_still_be_looked_at() {
 }
 
 #[test]
-fn progress_as_json_is_a_line_an_event() {
+fn progress_as_json_is_one_line_per_event() {
     let dir = imported();
     let ran = mocban(dir.path(), &["-C", "p", "--progress", "json", "run"]).expect(3);
     let types: Vec<String> = ran

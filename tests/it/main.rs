@@ -13,6 +13,7 @@ mod crowd;
 mod decoy;
 mod decoys;
 mod demo;
+mod error_snapshots;
 #[cfg(target_os = "linux")]
 mod fault;
 #[cfg(target_os = "linux")]
@@ -49,6 +50,7 @@ mod sample_files;
 mod semi_real;
 #[cfg(target_os = "linux")]
 mod shim;
+mod snapshots;
 mod source_text;
 mod style;
 mod test_size;

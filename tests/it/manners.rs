@@ -1,11 +1,11 @@
-//! What commands say when something is not there, in the way, too long to list, or cut short.
+//! Messages of commands when something is missing, exists already, is too long to list, or is interrupted.
 
 use std::process::{Command, Stdio};
 
 use crate::cli::{binary, empty, mocban};
 
 #[test]
-fn a_file_that_is_not_there_is_a_wrong_command_line() {
+fn missing_file_is_a_usage_error() {
     let dir = empty();
     for args in [
         &["import", "nothere.csv"][..],
@@ -15,7 +15,7 @@ fn a_file_that_is_not_there_is_a_wrong_command_line() {
         assert!(refused.err.contains("nothere"), "{}", refused.err);
     }
     let left = std::fs::read_dir(dir.path()).expect("readable").count();
-    assert_eq!(left, 0, "nothing is made");
+    assert_eq!(left, 0, "nothing is created");
     std::fs::write(
         dir.path().join("pairs.csv"),
         "id,mesh,print\na,a.stl,a.png\n",
@@ -28,7 +28,7 @@ fn a_file_that_is_not_there_is_a_wrong_command_line() {
 }
 
 #[test]
-fn status_names_every_failed_pair_where_all_are_asked_for() {
+fn status_lists_every_failed_pair_on_request() {
     let dir = empty();
     let rows = (0..5).map(|i| format!("p{i},p{i}.stl,p{i}.png\n"));
     let list = format!("id,mesh,print\n{}", rows.collect::<String>());
@@ -57,7 +57,7 @@ fn status_names_every_failed_pair_where_all_are_asked_for() {
 }
 
 #[test]
-fn a_demo_in_the_place_of_another_says_how_that_goes_on() {
+fn demo_in_the_directory_of_another_explains_how_to_continue_that() {
     let dir = empty();
     let demo = |tier: &str| {
         mocban(
@@ -75,7 +75,7 @@ fn a_demo_in_the_place_of_another_says_how_that_goes_on() {
 }
 
 #[test]
-fn a_demo_that_is_stopped_while_its_files_are_made_says_so() {
+fn demo_stopped_while_writing_its_files_reports_that() {
     let dir = empty();
     let mut child = binary()
         .current_dir(dir.path())
@@ -85,8 +85,8 @@ fn a_demo_that_is_stopped_while_its_files_are_made_says_so() {
         .spawn()
         .expect("the binary starts");
     let meshes = dir.path().join("d/data/meshes");
-    let is_begun = || std::fs::read_dir(&meshes).is_ok_and(|mut files| files.next().is_some());
-    while !is_begun() {
+    let has_started = || std::fs::read_dir(&meshes).is_ok_and(|mut files| files.next().is_some());
+    while !has_started() {
         assert_eq!(child.try_wait().expect("a child"), None);
         std::thread::yield_now();
     }

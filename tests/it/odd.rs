@@ -1,4 +1,4 @@
-//! Odd things on disk: each gives one clear sentence with the file and what to do, and nothing is lost.
+//! Unusual states of the disk: each gives one clear sentence with the file and the way out, and nothing is lost.
 
 use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::process::CommandExt as _;
@@ -9,30 +9,30 @@ use mocban::store::Project;
 use crate::check::{at, below, done, exported, sql};
 use crate::cli::{binary, call, empty, mocban};
 
-/// Writes garbage over the catalog from one eighth of it to another; gives what it was.
-pub(crate) fn spoil(project: &Project, from: usize, to: usize) -> Vec<u8> {
+/// Overwrites the catalog with garbage between two eighths of its length; returns its former content.
+pub(crate) fn corrupt_catalog(project: &Project, from: usize, to: usize) -> Vec<u8> {
     let path = project.catalog_path();
-    let whole = std::fs::read(&path).expect("read");
-    let mut bytes = whole.clone();
+    let intact = std::fs::read(&path).expect("read");
+    let mut bytes = intact.clone();
     let (from, to) = (bytes.len() * from / 8, bytes.len() * to / 8);
     for (index, byte) in bytes[from..to].iter_mut().enumerate() {
         *byte = (index * 37 % 251) as u8;
     }
     std::fs::write(path, bytes).expect("written");
-    whole
+    intact
 }
 
-/// Words of the database that no user should have to read.
+/// Words of the database that no user should see.
 const RAW: [&str; 4] = ["code:", "returned from database", "SQLITE_", "malformed"];
 
 #[track_caller]
-fn plain(said: &str, wanted: &str) {
-    assert!(said.contains(wanted), "{wanted}: {said}");
-    assert!(!RAW.iter().any(|raw| said.contains(raw)), "{said}");
+fn plain(message: &str, expected: &str) {
+    assert!(message.contains(expected), "{expected}: {message}");
+    assert!(!RAW.iter().any(|raw| message.contains(raw)), "{message}");
 }
 
 #[test]
-fn a_catalog_that_is_none_is_told_in_a_sentence() {
+fn file_that_is_not_a_catalog_is_reported_in_a_sentence() {
     let dir = empty();
     let file = dir.path().join("catalog.sqlite");
     let import = ["import", "pairs.csv"];
@@ -59,7 +59,7 @@ fn a_catalog_that_is_none_is_told_in_a_sentence() {
             assert_eq!(std::fs::read(&file).expect("read"), bytes);
         }
     }
-    // As a kill in the first moment of an import leaves it: the import is done again.
+    // A kill at the start of an import leaves this; the import can be repeated.
     std::fs::write(&file, "").expect("written");
     mocban(dir.path(), &import).expect(0);
     std::fs::remove_file(&file).expect("removed");
@@ -93,11 +93,11 @@ fn a_database_of_another_version_or_program_is_refused_and_left_alone() {
 }
 
 #[test]
-fn a_catalog_with_garbage_in_its_middle_is_told_and_no_repair_writes_to_it() {
+fn catalog_with_garbage_inside_is_reported_and_not_repaired() {
     let dir = empty();
     let project = done(dir.path());
-    // Where rows lie and nothing of the schema.
-    let whole = spoil(&project, 2, 3);
+    // Where rows are stored, but not the schema.
+    let intact = corrupt_catalog(&project, 1, 2);
     for command in [&["report"][..], &["export", "-o", "x"], &["run"]] {
         let refused = at(&project, command).expect(1);
         plain(&refused.err, "is damaged");
@@ -112,9 +112,9 @@ fn a_catalog_with_garbage_in_its_middle_is_told_and_no_repair_writes_to_it() {
     let after = std::fs::read(project.catalog_path()).expect("read");
     assert!(after == before, "the repair wrote to a damaged catalog");
 
-    // Where not even the schema can be read, there is nothing to list.
-    std::fs::write(project.catalog_path(), whole).expect("mended");
-    spoil(&project, 1, 7);
+    // If not even the schema can be read, there is nothing to list.
+    std::fs::write(project.catalog_path(), intact).expect("restored");
+    corrupt_catalog(&project, 1, 7);
     for command in [&["check"][..], &["check", "--repair"]] {
         let refused = at(&project, command).expect(12);
         plain(&refused.err, "too damaged to be read");
@@ -122,7 +122,7 @@ fn a_catalog_with_garbage_in_its_middle_is_told_and_no_repair_writes_to_it() {
 }
 
 #[test]
-fn counters_that_are_off_end_a_run_in_a_sentence_that_leads_to_their_mending() {
+fn wrong_counters_end_a_run_with_a_sentence_that_names_the_repair() {
     let dir = empty();
     let project = done(dir.path());
     sql(&project, "UPDATE counter SET n = 0");
@@ -134,7 +134,7 @@ fn counters_that_are_off_end_a_run_in_a_sentence_that_leads_to_their_mending() {
     at(&project, &["check"]).expect(0);
 }
 
-/// Calls the binary as somebody who may read but not write there.
+/// Calls the binary as a user who may read but not write there.
 fn as_nobody(project: &Project, args: &[&str]) -> crate::cli::Call {
     let mut command = binary();
     command
@@ -150,7 +150,7 @@ fn as_nobody(project: &Project, args: &[&str]) -> crate::cli::Call {
     call(&mut command)
 }
 
-/// Takes from everybody the right to write below a directory, or gives it back to the owner.
+/// Removes the permission to write below a directory, or restores it for the owner.
 fn set_writable(dir: &Path, writable: bool) {
     use std::os::unix::fs::PermissionsExt as _;
     for entry in std::fs::read_dir(dir).expect("a folder") {
@@ -168,7 +168,7 @@ fn set_writable(dir: &Path, writable: bool) {
 }
 
 #[test]
-fn a_project_that_cannot_be_written_to_can_be_looked_at() {
+fn read_only_project_can_be_read() {
     use std::os::unix::fs::PermissionsExt as _;
     let dir = empty();
     let open = std::fs::Permissions::from_mode(0o755);
@@ -188,7 +188,7 @@ fn a_project_that_cannot_be_written_to_can_be_looked_at() {
         plain(&refused.err, "cannot be written to; status, show, report");
     }
 
-    // A log that was never folded back must not be passed over in silence.
+    // A write-ahead log that was never checkpointed must not be ignored silently.
     set_writable(project.dir(), true);
     std::fs::write(project.dir().join("catalog.sqlite-wal"), [7; 64]).expect("written");
     set_writable(project.dir(), false);
@@ -198,7 +198,7 @@ fn a_project_that_cannot_be_written_to_can_be_looked_at() {
 }
 
 #[test]
-fn an_export_that_would_lack_files_leaves_the_earlier_one() {
+fn export_that_would_lack_files_leaves_the_previous_one() {
     let dir = empty();
     let project = done(dir.path());
     let before = exported(&project, "out");
@@ -213,7 +213,7 @@ fn an_export_that_would_lack_files_leaves_the_earlier_one() {
         again.err
     );
     assert!(below(&dir.path().join("out")) == before);
-    // In a new place it is written, and says what it lacks.
+    // In a new directory it is written, with a list of what is missing.
     at(&project, &["export", "-o", "../new"]).expect(3);
     let lines = std::fs::read_to_string(dir.path().join("new/pairs.jsonl")).expect("read");
     assert!(lines.contains("is missing"), "{lines}");
@@ -229,7 +229,7 @@ fn an_export_that_would_lack_files_leaves_the_earlier_one() {
 }
 
 #[test]
-fn stale_results_are_warned_of_in_report_and_export() {
+fn report_and_export_warn_about_stale_results() {
     let dir = empty();
     let project = done(dir.path());
     let warning = "warning: 2 pairs are stale";
@@ -244,7 +244,7 @@ fn stale_results_are_warned_of_in_report_and_export() {
 }
 
 #[test]
-fn verdicts_are_read_as_spreadsheets_write_them() {
+fn verdict_files_of_spreadsheets_are_read() {
     let dir = empty();
     let project = done(dir.path());
     let file = project.dir().join("verdicts.csv");
@@ -272,7 +272,7 @@ fn verdicts_are_read_as_spreadsheets_write_them() {
 }
 
 #[test]
-fn a_path_that_is_not_utf8_leaves_no_project_behind() {
+fn path_that_is_not_utf8_leaves_no_project() {
     use std::os::unix::ffi::OsStrExt as _;
     let dir = empty();
     let odd = dir.path().join(std::ffi::OsStr::from_bytes(b"scans-\xff"));

@@ -1,4 +1,4 @@
-//! One pair end to end, as the README tells it.
+//! One pair end to end, as in the README.
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -41,8 +41,8 @@ fn readme_walk_from_demo_to_export() {
     let depth = shown["files"]["depth.png"].as_str().expect("a path");
     assert!(dir.path().join(depth).is_file(), "{depth}");
 
-    verdicts_count_until_they_are_taken_back(&at, id);
-    only_the_touched_stage_runs_again(&at);
+    verdicts_count_until_they_are_undone(&at, id);
+    only_the_changed_stage_runs_again(&at);
 
     let compared = at(&["report", "--compare", "demo", "--json"])
         .expect(0)
@@ -63,7 +63,7 @@ fn readme_walk_from_demo_to_export() {
     }
 }
 
-fn verdicts_count_until_they_are_taken_back(at: &dyn Fn(&[&str]) -> crate::cli::Call, id: &str) {
+fn verdicts_count_until_they_are_undone(at: &dyn Fn(&[&str]) -> crate::cli::Call, id: &str) {
     let acc = || {
         let report = at(&["report", "--format", "json"]).expect(0).json();
         assert_eq!(report["rows"][0]["metric"], "nl_ssim");
@@ -93,7 +93,7 @@ fn verdicts_count_until_they_are_taken_back(at: &dyn Fn(&[&str]) -> crate::cli::
     assert_eq!(log.out.lines().count(), 8);
 }
 
-fn only_the_touched_stage_runs_again(at: &dyn Fn(&[&str]) -> crate::cli::Call) {
+fn only_the_changed_stage_runs_again(at: &dyn Fn(&[&str]) -> crate::cli::Call) {
     let set = ["--set", "register.window=uniform7"];
     let plan = at(&[&set[..], &["run", "--dry-run"]].concat()).expect(0);
     let wanted = "1  from register  register.window: \"gaussian\" -> \"uniform7\"";
@@ -107,7 +107,7 @@ fn only_the_touched_stage_runs_again(at: &dyn Fn(&[&str]) -> crate::cli::Call) {
 }
 
 #[test]
-fn the_papers_preset_keeps_to_its_three_metrics() {
+fn paper_preset_has_only_its_three_metrics() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let at = |args: &[&str]| mocban(dir.path(), &[&["-C", "demo"], args].concat());
     mocban(
@@ -146,7 +146,7 @@ fn the_papers_preset_keeps_to_its_three_metrics() {
 }
 
 #[test]
-fn first_signal_drains_and_the_next_run_goes_on() {
+fn first_signal_drains_and_the_next_run_continues() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     mocban(dir.path(), &["demo", "demo", "--pairs", "2", "--no-run"]).expect(0);
     let mut child = binary()

@@ -10,7 +10,14 @@ use crate::cli::mocban;
 use crate::page::{Page, read_project};
 
 /// No planted cards, so that what is pressed is what is logged; no least time, so that the test is not made to wait.
-pub(crate) const PLAIN: [&str; 6] = ["--controls", "0", "--repeats", "0", "--min-view-ms", "0"];
+pub(crate) const PLAIN: [&str; 6] = [
+    "--attention-checks",
+    "0",
+    "--duplicates",
+    "0",
+    "--min-view-ms",
+    "0",
+];
 
 /// Opens a reviewer's page in a tab and waits for its first card.
 pub(crate) fn enter<'a>(browser: &'a Browser, page: &Page, size: [u32; 2]) -> Tab<'a> {
@@ -413,9 +420,9 @@ fn a_note_is_typed_with_keys_that_judge_and_judges_nothing() {
     );
     // The same place a second time is too soon where a least time is set.
     let slow = [
-        "--controls",
+        "--attention-checks",
         "0",
-        "--repeats",
+        "--duplicates",
         "0",
         "--min-view-ms",
         "60000",

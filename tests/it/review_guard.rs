@@ -17,7 +17,11 @@ impl World {
     fn new() -> Self {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = read_project(&dir);
-        let page = Page::open(&project, "lan", &["--controls", "0", "--repeats", "0"]);
+        let page = Page::open(
+            &project,
+            "lan",
+            &["--attention-checks", "0", "--duplicates", "0"],
+        );
         let item = page.deck().remove(0);
         Self {
             page,

@@ -18,7 +18,11 @@ fn alignments(project: &Project) -> Vec<StoredAlignment> {
 fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let page = Page::open(&project, "lan", &["--controls", "0", "--repeats", "0"]);
+    let page = Page::open(
+        &project,
+        "lan",
+        &["--attention-checks", "0", "--duplicates", "0"],
+    );
     let item = page.deck().remove(0);
     let id = item["id"].as_str().expect("an id");
     let begin = || page.get(&format!("/api/correction/{id}")).json();
@@ -113,7 +117,11 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
 fn a_correction_is_told_of_no_repeat_before_it_is_answered() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let page = Page::open(&project, "lan", &["--controls", "0", "--repeats", "100"]);
+    let page = Page::open(
+        &project,
+        "lan",
+        &["--attention-checks", "0", "--duplicates", "100"],
+    );
     let deck = page.deck();
     let start = |item: &Value| {
         let id = item["id"].as_str().expect("an id");
@@ -141,7 +149,14 @@ fn a_correction_is_told_of_no_repeat_before_it_is_answered() {
 fn scores_are_the_same_in_the_page_by_hand_and_in_show() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let plain = ["--controls", "0", "--repeats", "0", "--metric", "density"];
+    let plain = [
+        "--attention-checks",
+        "0",
+        "--duplicates",
+        "0",
+        "--metric",
+        "density",
+    ];
     let page = Page::open(&project, "lan", &plain);
     let item = page.deck().remove(0);
     let id = item["id"].as_str().expect("an id");

@@ -93,7 +93,11 @@ fn no_acknowledged_verdict_is_lost_or_doubled() {
     let mut dice = ChaCha8Rng::seed_from_u64(7);
     let mut diary = Diary::default();
     for _ in 0..kills {
-        let mut page = Page::open(&project, "lan", &["--controls", "0", "--repeats", "0"]);
+        let mut page = Page::open(
+            &project,
+            "lan",
+            &["--attention-checks", "0", "--duplicates", "0"],
+        );
         let deck = page.deck();
         let moment = Duration::from_micros(dice.random_range(0..60_000));
         let (shot, died) = mpsc::channel::<()>();

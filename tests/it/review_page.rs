@@ -42,7 +42,11 @@ fn set(project: &Project, args: &[&str]) -> Call {
 fn page_and_command_line_write_the_same_events() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let page = Page::open(&project, "lan", &["--controls", "0", "--repeats", "0"]);
+    let page = Page::open(
+        &project,
+        "lan",
+        &["--attention-checks", "0", "--duplicates", "0"],
+    );
     let item = page.deck().remove(0);
     let mut body = answer("e1", &item, "fail");
     body["reason"] = json!("strokes_lost");
@@ -83,7 +87,7 @@ fn page_and_command_line_write_the_same_events() {
 fn order_names_and_pictures_are_the_same_after_a_restart_and_others_for_another_reviewer() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let untested = ["--controls", "0", "--repeats", "0"];
+    let untested = ["--attention-checks", "0", "--duplicates", "0"];
     let first = Page::open(&project, "lan", &untested);
     let again = Page::open(&project, "lan", &untested);
     let other = Page::open(&project, "minh", &untested);
@@ -106,7 +110,11 @@ fn order_names_and_pictures_are_the_same_after_a_restart_and_others_for_another_
 fn results_that_look_the_same_are_one_card() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let page = Page::open(&project, "lan", &["--controls", "0", "--repeats", "0"]);
+    let page = Page::open(
+        &project,
+        "lan",
+        &["--attention-checks", "0", "--duplicates", "0"],
+    );
     let deck = page.deck();
     for (i, item) in deck.iter().enumerate() {
         let reply = page.post("/api/answer", &answer(&format!("e{i}"), item, "pass"));
@@ -127,7 +135,11 @@ fn results_that_look_the_same_are_one_card() {
 fn planted_faults_are_stored_apart_and_nothing_in_the_page_tells_them() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let page = Page::open(&project, "lan", &["--controls", "50", "--repeats", "20"]);
+    let page = Page::open(
+        &project,
+        "lan",
+        &["--attention-checks", "50", "--duplicates", "20"],
+    );
     let deck = page.deck();
     let mut shapes: BTreeMap<bool, BTreeSet<String>> = BTreeMap::new();
     for (i, item) in deck.iter().enumerate() {
@@ -199,7 +211,11 @@ fn planted_faults_are_stored_apart_and_nothing_in_the_page_tells_them() {
 fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let first = Page::open(&project, "lan", &["--controls", "0", "--repeats", "0"]);
+    let first = Page::open(
+        &project,
+        "lan",
+        &["--attention-checks", "0", "--duplicates", "0"],
+    );
     let item = first.deck().remove(0);
     first
         .post("/api/answer", &answer("e1", &item, "pass"))
@@ -215,7 +231,7 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
             &["review", "--reviewer", reviewer, "--adjudicate"],
         );
         let told = told.expect(0);
-        assert!(told.err.contains("no conflict waits"), "{}", told.err);
+        assert!(told.err.contains("nothing to adjudicate"), "{}", told.err);
         assert_eq!(told.out, "", "no address");
     };
     // Who is party cannot settle.
@@ -255,7 +271,14 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
 fn a_jump_leads_to_the_first_picture_of_a_pair_alone() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let many = ["--controls", "50", "--repeats", "50", "--metric", "density"];
+    let many = [
+        "--attention-checks",
+        "50",
+        "--duplicates",
+        "50",
+        "--metric",
+        "density",
+    ];
     let page = Page::open(&project, "lan", &many);
     let told = page.get("/api/deck").json();
     let pairs = told["pairs"].as_array().expect("names");
@@ -285,7 +308,7 @@ fn a_jump_leads_to_the_first_picture_of_a_pair_alone() {
 fn a_result_that_changed_meanwhile_is_not_shown_but_what_was_seen_is_stored() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let page = Page::open(&project, "lan", &["--controls", "0"]);
+    let page = Page::open(&project, "lan", &["--attention-checks", "0"]);
     let item = page.deck().remove(0);
     let smaller = ["--set", "depth.longest_px=80", "run", "--rerun", "stale"];
     mocban(project.dir(), &smaller).expect(0);
