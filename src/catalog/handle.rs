@@ -1,4 +1,4 @@
-//! The open catalog: its connections and the way to the writer task.
+//! The open catalog: its read connections and its channel to the writer task.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,42 +10,43 @@ use tokio::sync::{mpsc, oneshot};
 use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
-use crate::catalog::db::writer::{self, Message, Work};
+use crate::catalog::db::request::{Message, Work};
+use crate::catalog::db::writer;
 
-/// Requests that may wait for the writer before senders do.
+/// Capacity of the writer's channel.
 const INBOX: usize = 1024;
 
-/// A catalog, open. Clones share the connections.
+/// An open catalog. Clones share the connections.
 #[derive(Debug, Clone)]
 pub struct Catalog {
     reader_pool: SqlitePool,
-    /// `None` when opened to read only.
+    /// `None` for a read-only catalog.
     inbox: Option<mpsc::Sender<Message>>,
     pub(crate) delay: Arc<CommitDelay>,
     pub(crate) path: Arc<Path>,
 }
 
 impl Catalog {
-    /// Opens the catalog file, making it where there is none.
+    /// Opens the catalog, or creates it.
     ///
     /// # Errors
-    /// When it is no catalog, the disk is a network's, or the database refuses.
+    /// When the file is not a catalog, is on a network file system, or the database refuses.
     pub async fn create(path: &Path) -> Result<Self> {
         Self::with_writer(path, true, CommitDelay::new()).await
     }
 
-    /// Opens a catalog that is there, to read and write.
+    /// Opens an existing catalog to read and write.
     ///
     /// # Errors
-    /// When there is none, it is no catalog, the disk is a network's, or the database refuses.
+    /// When there is no file, it is not a catalog or on a network file system, or the database refuses.
     pub async fn open(path: &Path) -> Result<Self> {
         Self::with_writer(path, false, CommitDelay::new()).await
     }
 
-    /// Opens a catalog to read; works while a run goes on.
+    /// Opens an existing catalog to read, also while a run is active.
     ///
     /// # Errors
-    /// When there is none or it is no catalog.
+    /// When there is no file or it is not a catalog.
     pub async fn open_read_only(path: &Path) -> Result<Self> {
         Ok(Self {
             reader_pool: open::reader_pool(path).await?,
@@ -74,14 +75,14 @@ impl Catalog {
         })
     }
 
-    /// Waits until everything sent is stored, folds the log back and closes the connections.
+    /// Waits until everything sent is stored, checkpoints the log and closes the connections.
     pub async fn close(self) {
-        // Readers first: an open reader keeps the log from being folded back whole.
+        // Readers first: an open reader prevents a complete checkpoint.
         self.reader_pool.close().await;
         if let Some(inbox) = self.inbox {
             let (sender, receiver) = oneshot::channel();
             if inbox.send(Message::Close(sender)).await.is_ok() {
-                // An error means the writer has ended already, which is what we wait for.
+                // An error means that the writer has already ended.
                 let _ = receiver.await;
             }
         }
@@ -101,12 +102,12 @@ impl Catalog {
         Ok(self.reader_pool.acquire().await?)
     }
 
-    /// A read transaction: everything read in it is of one moment.
+    /// Begins a read transaction: a consistent view of one moment.
     pub(crate) async fn snapshot(&self) -> Result<Transaction<'static, Sqlite>> {
         Ok(self.reader_pool.begin().await?)
     }
 
-    /// Runs `work` in its own write transaction.
+    /// Runs `work` in its own write transaction on the writer task.
     pub(crate) async fn in_transaction<T: Send + 'static>(
         &self,
         work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,

@@ -1,7 +1,8 @@
-//! The catalog: what is known of every pair, and the queue of work. The only room with SQL.
+//! The catalog: what is stored of every pair, and the queue of work. The only module with SQL.
 //!
-//! One writer task owns the only write connection and commits in groups; readers have their own connections and
-//! work while a run goes on. All times come in as arguments.
+//! `db` holds connections, the writer task and errors; `queue` the jobs; `records` what is read and written of pairs;
+//! `audit` checks and repairs. One writer task owns the only write connection and commits requests in groups; reads
+//! have their own connections and work during a run. All times are arguments.
 
 mod audit;
 mod db;

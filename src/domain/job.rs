@@ -62,15 +62,15 @@ impl std::fmt::Display for JobStatus {
     }
 }
 
-/// How many workers may die over a pair before it is quarantined.
+/// Number of workers that may die over a pair before it is quarantined.
 pub const CRASH_LIMIT: u32 = 3;
 
-/// Whether a pair is to blame for its dead workers.
+/// Returns whether a pair is to blame for its dead workers.
 ///
-/// `crashes` counts workers that died with this pair alone in hand since its last finished stage, `deaths` all that
-/// died of late. Where pairs kill their workers, nearly all deaths are one pair's, but for a first one that it shared
-/// with others. Every further death that was not its own speaks for a cause outside, such as somebody who kills
-/// processes, and the pair is allowed as many more.
+/// `crashes` counts workers that died with only this pair leased since its last finished stage, `deaths` all recent
+/// deaths. If a pair kills workers, nearly all deaths are its own, except perhaps a first one that it shared with
+/// others. Each further death of another worker suggests an external cause, such as somebody who kills processes, and
+/// raises the pair's limit by one.
 pub const fn is_poisoned(crashes: u32, deaths: u32) -> bool {
     crashes >= CRASH_LIMIT + deaths.saturating_sub(crashes + 1)
 }

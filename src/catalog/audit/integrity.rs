@@ -1,4 +1,4 @@
-//! What the catalog says of itself: the database's own checks, its schema, counters against rows, pages of rows.
+//! Checks of the catalog: SQLite's own checks, the schema, counters and marks against rows, pages of rows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -19,54 +19,54 @@ use crate::catalog::records::pair_work::{self, KnownInputs};
 use crate::catalog::records::stage_results;
 use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
 
-/// Lines of each check that are read at most.
+/// Most lines of each check.
 const LINES: usize = 50;
 
-/// What is kept beside the rows and does not agree with them; empty when all does.
+/// Derived values that do not agree with the rows; empty when all do.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Drift {
-    /// Counters that are off.
+    /// Wrong counters.
     pub counters: Vec<CounterDrift>,
     /// Fingerprints and dirty marks of jobs that do not agree with their results, one line each.
     pub marks: Vec<String>,
 }
 
-/// A counter that does not say how many jobs there are.
+/// A wrong counter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CounterDrift {
-    /// Number of the next stage, 0 to 4.
+    /// Index of the next stage, 0 to 4.
     pub cursor: i64,
     /// The status.
     pub status: JobStatus,
-    /// What the counter says; `None` when there is none.
+    /// The counter's value; `None` when its row is missing.
     pub kept: Option<i64>,
-    /// Jobs that there are.
+    /// The number of jobs.
     pub counted: u64,
 }
 
-/// A pair with all that is stored of it, as it is stored.
+/// A pair with everything stored of it, unparsed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AuditedPair {
     /// The user's id.
     pub name: PairName,
-    /// Paths and content of its files as last read, with its number.
+    /// Its id, and paths and content of its files as last read.
     pub inputs: KnownInputs,
-    /// Where its job stands: status and number of the next stage; `None` when it has no job.
+    /// Status and cursor of its job; `None` when it has no job.
     pub job: Option<(JobStatus, i64)>,
     /// Whether a failure is stored.
     pub has_failure: bool,
-    /// Every stage's stored result, also of stages that are to run again.
+    /// Every stored result, also of stages that are to run again.
     pub results: BTreeMap<Stage, AuditedResult>,
-    /// Metrics that have a row.
+    /// Metrics with a row.
     pub metrics: BTreeSet<ThresholdMetric>,
 }
 
-/// A result as it is stored.
+/// A stored result, unparsed.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AuditedResult {
-    /// The stage's numbers as JSON text.
+    /// The outcome as JSON text.
     pub outcome: String,
-    /// Its artifacts as JSON text.
+    /// The artifacts as JSON text.
     pub files: String,
     /// Hash over both.
     pub result_hash: ContentHash,
@@ -82,7 +82,7 @@ WHERE sql IS NOT NULL AND name NOT LIKE 'sqlite%' AND name <> '_sqlx_migrations'
 
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter";
 
-/// Fingerprints with the cursor of a job whose last result has them.
+/// Each fingerprint with the cursor of a job whose last result has it.
 const FINGERPRINTS: &str =
     "SELECT 0 AS cursor, 0 AS id UNION ALL SELECT stage + 1, id FROM fingerprint";
 
@@ -107,8 +107,8 @@ SELECT r.pair, r.stage, r.outcome, r.files, r.result_hash
 FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value";
 
 impl Catalog {
-    /// What SQLite finds wrong with the file, at most 50 lines; empty when it is sound. `quick` leaves out whether
-    /// indexes agree with their tables.
+    /// Runs SQLite's integrity check; returns at most 50 lines, none when the file is sound. `quick` does not compare
+    /// indexes with tables.
     ///
     /// # Errors
     /// When the check cannot be made.
@@ -128,7 +128,7 @@ impl Catalog {
         }
     }
 
-    /// Rows that name a row that is not there, at most 50.
+    /// Returns rows with broken references, at most 50.
     ///
     /// # Errors
     /// When the database refuses.
@@ -138,7 +138,7 @@ impl Catalog {
         Ok(lines.fetch_all(&mut *conn).await?)
     }
 
-    /// Tables, indexes and triggers that are not as this program makes them: gone, changed or added.
+    /// Compares tables, indexes and triggers with this program's schema.
     ///
     /// # Errors
     /// When the database refuses.
@@ -158,12 +158,12 @@ impl Catalog {
         Ok(gone.chain(other).collect())
     }
 
-    /// What is kept beside the rows and does not agree with them. `quick` leaves out what a look at each pair would tell.
+    /// Compares counters and marks with the rows. `quick` leaves out the marks, which need every pair's results.
     ///
     /// # Errors
     /// When the database refuses.
     pub async fn drift(&self, quick: bool) -> Result<Drift> {
-        // All of one moment, so that a run that goes on beside it does not look like drift.
+        // One transaction, so that a concurrent run does not look like drift.
         let mut conn = self.snapshot().await?;
         let counters = counter_drift(&mut conn).await?;
         let mut marks = Vec::new();
@@ -186,7 +186,7 @@ impl Catalog {
         Ok(Drift { counters, marks })
     }
 
-    /// The next pairs after one, by number, at most `limit`; empty at the end.
+    /// Returns the next pairs after a pair, at most `limit`; none at the end.
     ///
     /// # Errors
     /// When the database refuses or holds what it must not.
@@ -242,7 +242,7 @@ async fn counter_drift(conn: &mut SqliteConnection) -> Result<Vec<CounterDrift>>
     Ok(drift.collect())
 }
 
-/// See [`Catalog::integrity`].
+/// Runs SQLite's integrity check; see [`Catalog::integrity`].
 pub(crate) async fn integrity(conn: &mut SqliteConnection, quick: bool) -> Result<Vec<String>> {
     let sql = if quick {
         "PRAGMA quick_check(50)"
@@ -254,20 +254,20 @@ pub(crate) async fn integrity(conn: &mut SqliteConnection, quick: bool) -> Resul
     Ok(lines)
 }
 
-/// Whether a line of SQLite's check says that the disk refused to read a page: that tells nothing of the page.
+/// Returns whether a line of SQLite's check reports an I/O error, which says nothing about the page.
 fn is_unread(line: &str) -> bool {
     let code = line.rsplit_once("error code=").map(|(_, code)| code.trim());
     let code: Option<i64> = code.and_then(|code| code.parse().ok());
     code.and_then(CatalogErrorKind::of_code) == Some(CatalogErrorKind::Disk)
 }
 
-/// Tables, indexes and triggers by kind and name, with the statement that makes each.
+/// Returns tables, indexes and triggers by kind and name, with their SQL.
 pub(crate) async fn objects(conn: &mut SqliteConnection) -> Result<BTreeMap<String, String>> {
     let found: Vec<(String, String)> = sqlx::query_as(OBJECTS).fetch_all(conn).await?;
     Ok(found.into_iter().collect())
 }
 
-/// [`objects`] of a new catalog.
+/// Returns the [`objects`] of a new catalog.
 pub(crate) async fn wanted_objects() -> Result<BTreeMap<String, String>> {
     let options = SqliteConnectOptions::new().in_memory(true);
     let mut conn = options.connect().await?;

@@ -1,4 +1,4 @@
-//! Mending what a check found. Only while no run goes on; verdicts and the history of results are never touched.
+//! Repairs what a check found. Only without an active run; verdicts and the history of results are never changed.
 
 use serde_json::json;
 use sqlx::{AssertSqlSafe, Row as _, SqliteConnection};
@@ -21,8 +21,8 @@ const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
 SELECT value ->> 0, 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = value ->> 0)";
 
-/// Back to a stage and never forward. A lease is no hindrance: no process lives that could hold it, and the new token
-/// shuts out one that does.
+/// Sends jobs back to a stage, never forward, also leased ones: no living process can hold the lease, and the new token
+/// fences out one that does.
 pub(crate) const RESTORE: &str = concat!(
     "
 UPDATE job SET stage = min(stage, item.value ->> 1), status = 0, run_at = NULL, prio = 0,
@@ -59,8 +59,8 @@ const MARK_DIRTY: &str = concat!(
 );
 
 impl Catalog {
-    /// Puts pairs back to be done, each from a stage on; a pair without a job gets one. The counters must be right
-    /// already: see [`Catalog::rebuild_counters`].
+    /// Sends pairs back, each to a stage; a pair without a job gets one. The counters must be right already: see
+    /// [`Catalog::rebuild_counters`].
     ///
     /// # Errors
     /// When the database refuses; then nothing is changed.
@@ -90,7 +90,7 @@ impl Catalog {
         .await
     }
 
-    /// Makes every index anew from its table; says what SQLite finds wrong afterwards.
+    /// Rebuilds every index from its table; returns what SQLite finds wrong afterwards.
     ///
     /// # Errors
     /// When the database refuses.
@@ -104,7 +104,7 @@ impl Catalog {
         .await
     }
 
-    /// Makes indexes and triggers that are gone. Tables are left as they are.
+    /// Recreates missing indexes and triggers. Tables do not change.
     ///
     /// # Errors
     /// When the database refuses.
@@ -115,7 +115,7 @@ impl Catalog {
                 let found = objects(conn).await?;
                 for (name, sql) in wanted {
                     if !name.starts_with("table ") && !found.contains_key(&name) {
-                        // From our own migrations.
+                        // SQL of our own migrations.
                         sqlx::query(AssertSqlSafe(sql)).execute(&mut *conn).await?;
                     }
                 }

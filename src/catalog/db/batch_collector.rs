@@ -1,21 +1,21 @@
-//! Requests that share a commit: all that wait, and where those can wait a little, what comes meanwhile.
+//! Collects the requests of the next group commit.
 
 use tokio::sync::mpsc;
 use tokio::time::{Instant, timeout_at};
 
 use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::group_commit::Batch;
-use crate::catalog::db::writer::Message;
+use crate::catalog::db::request::Message;
 
 /// Most requests in one commit.
 const BATCH: usize = 256;
 
-/// What has come so far.
+/// The requests collected so far.
 struct BatchCollector {
     batch: Batch,
-    /// Until when to wait for more; `None` where somebody waits for an answer.
+    /// How long to wait for more requests; `None` when somebody waits for a reply.
     until: Option<Instant>,
-    /// A message that is no request ends the batch.
+    /// A message that is not a request ends the batch.
     other: Option<Message>,
 }
 
@@ -37,8 +37,8 @@ impl BatchCollector {
     }
 }
 
-/// The batch that begins with this message, and the message after it that is no request. Whoever was answered by the
-/// last commit is given the turn first: the next request is often already on its way.
+/// Collects the batch that begins with a message, and the message after it that is not a request. Yields first, because
+/// senders that the last commit answered often send their next request at once.
 pub(crate) async fn collect(
     first: Message,
     delay: &CommitDelay,
@@ -83,8 +83,8 @@ mod tests {
     use super::{BATCH, collect};
     use crate::catalog::Catalog;
     use crate::catalog::db::commit_delay::CommitDelay;
+    use crate::catalog::db::request::Message;
     use crate::catalog::db::request::Request;
-    use crate::catalog::db::writer::Message;
     use crate::catalog::queue::claim::Heartbeat;
     use crate::domain::WorkerId;
 
@@ -97,12 +97,12 @@ mod tests {
         Request::Heartbeat(heartbeat, oneshot::channel().0)
     }
 
-    /// Requests in the batch that begins with the first of these, where nothing else ever comes.
+    /// Counts the requests in the batch that begins with the first message, when nothing else ever arrives.
     async fn gathered(messages: Vec<Message>) -> usize {
         gathered_later(messages, Vec::new()).await
     }
 
-    /// The same, where some come when it is waited for more.
+    /// Like `gathered`, where further messages arrive while the collector waits.
     async fn gathered_later(messages: Vec<Message>, later: Vec<Message>) -> usize {
         let delay = CommitDelay::of(Duration::from_hours(1));
         let (sender, mut inbox) = mpsc::channel(messages.len());

@@ -1,4 +1,4 @@
-//! Waiting for what other processes have locked, over and above the database's own waiting.
+//! Retries while another process has the catalog locked, beyond SQLite's own busy timeout.
 
 use std::path::Path;
 use std::time::Duration;
@@ -9,14 +9,14 @@ use crate::catalog::db::error::Result;
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::lock_owner::lock_owner;
 
-/// How long in all.
+/// Longest wait.
 const LONGEST_WAIT: Duration = Duration::from_mins(1);
-/// After so long it is said who is waited for.
+/// Wait after which the lock's owner is logged.
 const QUIET_WAIT: Duration = Duration::from_secs(5);
-/// Between two tries: some locks are refused at once.
+/// Time between two attempts: SQLite refuses some locks at once.
 const RETRY_EVERY: Duration = Duration::from_millis(5);
 
-/// Tries again for as long as others have the catalog locked, so that "busy" reaches no caller before its time.
+/// Retries while the catalog is locked, so that "busy" does not reach a caller too early.
 pub(crate) struct BusyRetry<'p> {
     catalog: &'p Path,
     begun: Instant,
@@ -24,7 +24,7 @@ pub(crate) struct BusyRetry<'p> {
 }
 
 impl<'p> BusyRetry<'p> {
-    /// From now on, with this catalog.
+    /// Starts to wait for this catalog.
     pub(crate) fn begin(catalog: &'p Path) -> Self {
         Self {
             catalog,
@@ -33,7 +33,7 @@ impl<'p> BusyRetry<'p> {
         }
     }
 
-    /// What to wait for before the next try; `None` where this was the last one.
+    /// Returns what to await before the next attempt; `None` after the last one.
     pub(crate) fn wait<T>(&mut self, outcome: &Result<T>) -> Option<Sleep> {
         let error = outcome.as_ref().err()?;
         let waited = self.begun.elapsed();
@@ -77,7 +77,7 @@ mod tests {
         options.connect().await.expect("a connection")
     }
 
-    /// What a write comes to while another connection has the database locked.
+    /// Returns the error of a write while another connection has the database locked.
     async fn busy() -> Result<()> {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("catalog.sqlite");
@@ -89,14 +89,14 @@ mod tests {
         Err(refused.expect_err("locked").into())
     }
 
-    /// One that has waited for so long.
+    /// Returns a retry that has waited this long already.
     fn after(waited: Duration) -> BusyRetry<'static> {
         let mut retry = BusyRetry::begin(Path::new("catalog.sqlite"));
         retry.begun -= waited;
         retry
     }
 
-    /// A log that counts its warnings.
+    /// A subscriber that counts warnings.
     #[derive(Default)]
     struct Warnings(Arc<AtomicUsize>);
 

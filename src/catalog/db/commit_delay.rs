@@ -1,4 +1,4 @@
-//! Waiting for delay: a request that can wait does so for a while, for others to share its commit.
+//! The delay of a commit whose requests nobody waits for, so that later requests share it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// How long a request that can wait does so at most. A process that is killed loses what it finished in that time.
+/// Longest delay. A process that is killed loses what it finished in that time.
 const LONGEST: Duration = Duration::from_millis(250);
 
-/// Who waits for whom, as the writer and those who send to it know it.
+/// The delay, and how many callers currently forbid it.
 #[derive(Debug)]
 pub(crate) struct CommitDelay {
     longest: Duration,
@@ -17,25 +17,25 @@ pub(crate) struct CommitDelay {
 }
 
 impl CommitDelay {
-    /// As in a run.
+    /// Returns the delay of a run.
     pub(crate) fn new() -> Arc<Self> {
         Self::of(LONGEST)
     }
 
-    /// Requests that can wait do so for this long.
+    /// Returns a delay of this length.
     pub(crate) fn of(longest: Duration) -> Arc<Self> {
         let waiting = AtomicUsize::new(0);
         Arc::new(Self { longest, waiting })
     }
 
-    /// Until when to wait for others; `None` where somebody waits already.
+    /// Returns when the delay of a commit ends; `None` when somebody waits.
     pub(crate) fn until(&self) -> Option<Instant> {
         let nobody = self.waiting.load(Ordering::Relaxed) == 0;
         nobody.then(|| Instant::now() + self.longest)
     }
 }
 
-/// Somebody who waits for what was sent to the catalog: as long as this lives, no commit waits for delay.
+/// Turns the commit delay off while it lives.
 #[derive(Debug)]
 pub struct Waiting(Arc<CommitDelay>);
 

@@ -1,4 +1,4 @@
-//! A copy of the catalog as it is at one moment, made while a run may be writing.
+//! Copies the catalog while a run may be writing.
 
 use std::path::Path;
 
@@ -13,16 +13,15 @@ use crate::catalog::db::open::{Identity, identity};
 use crate::catalog::handle::Catalog;
 
 impl Catalog {
-    /// Copies the catalog to a file that is not there yet, and reads the copy back. All in it is of one moment. Nothing
-    /// is synced to disk.
+    /// Copies the catalog as of one moment to a new file and verifies the copy. Nothing is synced to disk.
     ///
     /// # Errors
-    /// When the database or the disk refuse, or the copy is not sound; what was written of it stays.
+    /// When the database or the disk refuses, or the copy is damaged; a partial copy is left behind.
     pub async fn copy_to(&self, file: &Path) -> Result<()> {
         let Some(name) = file.to_str() else {
             return Err(CatalogError::NotUtf8(file.to_owned()));
         };
-        // A connection that may only query may not copy either, so one is taken out of the pool.
+        // VACUUM INTO is refused under `query_only`, so this connection leaves the pool.
         let mut conn = self.read_conn().await?.detach();
         sqlx::query("PRAGMA query_only = 0")
             .execute(&mut conn)
@@ -49,7 +48,7 @@ impl Catalog {
     }
 }
 
-/// Blames the copy for what the disk refused: the catalog itself is only read.
+/// Attributes a disk error to the copy: the catalog itself is only read.
 fn not_copied(file: &Path, error: sqlx::Error) -> CatalogError {
     let reason = match CatalogErrorKind::of(&error) {
         Some(CatalogErrorKind::Full) => "the disk is full",

@@ -1,4 +1,4 @@
-//! What can go wrong with the catalog.
+//! Errors of the catalog.
 
 use std::path::PathBuf;
 
@@ -10,10 +10,10 @@ pub enum CatalogError {
     /// There is no catalog file.
     #[error("no catalog at {0}")]
     Missing(PathBuf),
-    /// A directory lies where the file should be.
+    /// The path is a directory.
     #[error("{0} is a directory where the catalog should be a file; move it away")]
     IsDirectory(PathBuf),
-    /// The file has no bytes.
+    /// The file is empty.
     #[error(
         "{0} is empty (0 bytes), so nothing is known of this project; put a backup in its place, or import its pairs again"
     )]
@@ -25,7 +25,7 @@ pub enum CatalogError {
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What it is instead.
+        /// What it is.
         reason: String,
     },
     /// The file was written by another version of the program.
@@ -37,28 +37,28 @@ pub enum CatalogError {
         path: PathBuf,
         /// Version of its schema.
         found: i64,
-        /// Version of ours.
+        /// Version of this program's schema.
         known: i64,
     },
-    /// Pages of the file contradict each other.
+    /// The file is corrupt.
     #[error(
         "{0} is damaged: some of it is not what the database wrote, or the disk cannot read it; `check` tells how far it can be read, and a backup can take its place"
     )]
     Damaged(PathBuf),
-    /// The disk would not give some of it.
+    /// The disk failed to read part of the file.
     #[error(
         "{0}: the disk refused to read some of it, so it is not known whether it is whole; look after the disk and call again"
     )]
     Unread(PathBuf),
-    /// There was no file, and none can be made.
+    /// The file cannot be created.
     #[error("{0} cannot be made: its folder takes no new file, or the disk refuses")]
     NotMade(PathBuf),
-    /// The file or its directory cannot be written to.
+    /// The file or its directory is read-only.
     #[error(
         "{0} cannot be written to; status, show, report and export work here, all else needs a copy that can be written"
     )]
     NotWritable(PathBuf),
-    /// The last writer did not fold its log back, and it cannot be done here.
+    /// The write-ahead log was not checkpointed, and cannot be here.
     #[error(
         "{0} holds changes that are not in the catalog yet, and nothing can be written here; copy the project to where it can be written"
     )]
@@ -73,23 +73,23 @@ pub enum CatalogError {
         /// Name of the file system.
         kind: &'static str,
     },
-    /// A path that SQLite cannot take.
+    /// A path that is not UTF-8.
     #[error("path {0:?} is not UTF-8")]
     NotUtf8(PathBuf),
-    /// The rows of an import ended before they were all there.
+    /// The rows of an import ended early.
     #[error("the list was not read to its end, nothing was imported")]
     CutShort,
-    /// A setting of the database did not take.
+    /// A pragma did not take effect.
     #[error("the database set {name} to {found}, not {wanted}")]
     Pragma {
         /// Which setting.
         name: &'static str,
-        /// What was asked for.
+        /// The wanted value.
         wanted: &'static str,
-        /// What it is.
+        /// The actual value.
         found: String,
     },
-    /// A pair nobody imported.
+    /// An unknown pair.
     #[error("there is no pair {0}")]
     UnknownPair(PairName),
     /// A verdict on a pair that has no result yet.
@@ -98,25 +98,25 @@ pub enum CatalogError {
     /// A verdict on a metric that has no result.
     #[error("pair {0} has no result of {1} to judge yet")]
     NoMetricResult(PairName, ThresholdMetric),
-    /// Nothing of this reviewer is left to take back.
+    /// The reviewer has no verdict left to undo.
     #[error("there is no verdict of {0} to take back")]
     NothingToUndo(String),
-    /// A row that breaks the rules of the schema.
+    /// A row that violates the schema's rules.
     #[error("the catalog holds a row it must not: {0}")]
     Corrupt(String),
-    /// A write through a catalog that was opened to read.
+    /// A write through a read-only catalog.
     #[error("the catalog was opened to read only")]
     ReadOnly,
-    /// An error that several callers of one commit share.
+    /// An error shared by the callers of one commit.
     #[error("{0}")]
     Shared(std::sync::Arc<CatalogError>),
     /// The writer task has ended.
     #[error("the catalog is closed")]
     Closed,
-    /// From the database.
+    /// An error of SQLite.
     #[error("catalog: {0}")]
     Database(#[from] sqlx::Error),
-    /// The schema could not be brought up to date.
+    /// The schema could not be created.
     #[error("catalog schema: {0}")]
     Migrate(#[from] sqlx::migrate::MigrateError),
     /// A stored value that is not JSON of its type.

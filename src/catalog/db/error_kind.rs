@@ -1,33 +1,33 @@
-//! What an error of the database means for the file it lies in.
+//! Kinds of database errors, by SQLite's result codes.
 
 use crate::catalog::db::error::CatalogError;
 
-/// What is wrong with the catalog's file, in place of the database's own words.
+/// The kind of a database error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CatalogErrorKind {
-    /// Its pages contradict each other.
+    /// The file is corrupt.
     Damaged,
-    /// It is no database at all.
+    /// The file is not a database.
     NotADatabase,
-    /// It cannot be written to.
+    /// The file is read-only.
     ReadOnly,
-    /// It, or a file beside it, cannot be opened.
+    /// The file, or one next to it, cannot be opened.
     CannotOpen,
     /// The disk is full.
     Full,
     /// Another process kept it locked for too long.
     Busy,
-    /// The disk refused to read or write.
+    /// An I/O error.
     Disk,
-    /// A write broke a rule of the schema: rows or counters contradict each other already.
+    /// A write violated a constraint: rows or counters already contradict each other.
     Contradiction,
 }
 
 impl CatalogErrorKind {
-    /// By SQLite's result code, extended ones included.
+    /// Returns the kind of a SQLite result code; extended codes count as their base code.
     pub(crate) const fn of_code(code: i64) -> Option<Self> {
         match code & 0xff {
-            // The last is of a reader that others kept out while the log was looked through.
+            // SQLITE_PROTOCOL: a reader lost the race for the log's locks too often.
             5 | 6 | 15 => Some(Self::Busy),
             8 => Some(Self::ReadOnly),
             10 => Some(Self::Disk),
@@ -47,7 +47,7 @@ impl CatalogErrorKind {
 }
 
 impl CatalogError {
-    /// What it means for the file; `None` when the file is not to blame or the error says so itself.
+    /// Returns the kind; `None` when the error has none or names it itself.
     pub fn kind(&self) -> Option<CatalogErrorKind> {
         match self {
             Self::Database(error) | Self::Migrate(sqlx::migrate::MigrateError::Execute(error)) => {

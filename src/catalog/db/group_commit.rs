@@ -13,10 +13,10 @@ use crate::catalog::queue::counters::Deltas;
 use crate::catalog::queue::fail::{self, FailedRow};
 use crate::catalog::queue::lease::{FencedRow, Lease, StageCheckpoint, StageFailure};
 
-/// Something to be stored under a lease, and where to reply whether it was.
+/// Something to store under a lease, and where to reply whether the lease held.
 type Leased<T> = (Box<(Lease, T)>, Reply<bool>);
 
-/// Requests of one commit by kind.
+/// The requests of one commit by kind.
 #[derive(Default)]
 pub(crate) struct Batch {
     heartbeats: Vec<(Heartbeat, Reply<bool>)>,
@@ -77,7 +77,7 @@ impl Batch {
         Ok(reply)
     }
 
-    /// Adds what changes workers and jobs.
+    /// Adds the statements that change workers and jobs.
     fn add_jobs(&self, script: &mut Script) -> Result<JobStatements> {
         let heartbeats = self.heartbeats.iter();
         let heartbeats = heartbeats.map(|(heartbeat, _)| claim::add_heartbeat(script, *heartbeat));
@@ -98,7 +98,7 @@ impl Batch {
         })
     }
 
-    /// Adds what is stored beside the jobs that changed, and returns the replies.
+    /// Adds the statements that store results, failures and counters; returns the replies.
     fn add_records(
         &self,
         script: &mut Script,
@@ -180,7 +180,7 @@ impl Batch {
         }
     }
 
-    /// The same requests, each in a batch of its own, in the order they would have run.
+    /// Splits the batch into one batch per request, in the order of execution.
     pub(crate) fn split(self) -> Vec<Self> {
         let heartbeats = self
             .heartbeats

@@ -1,18 +1,18 @@
-//! Who keeps others from writing to the catalog, as the system tells it.
+//! Finds the process that holds the catalog's write lock.
 
 use std::fmt;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
-/// The byte of the index beside the log that whoever writes has locked (SQLite's file format, "WAL-index locks").
+/// Byte of the `-shm` file that a writer locks (SQLite's file format, "WAL-index locks").
 const WRITE_LOCK: &str = "120";
 
-/// A process that writes to the catalog.
+/// A process that holds the write lock.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LockOwner {
-    /// Its number.
+    /// Its process id.
     pub pid: u32,
-    /// Whether a signal has stopped it, so that it keeps what it has for as long as nobody lets it go on.
+    /// Whether it is stopped by a signal, and so keeps the lock until it is continued.
     pub is_stopped: bool,
 }
 
@@ -27,8 +27,8 @@ impl fmt::Display for LockOwner {
     }
 }
 
-/// The process that has the catalog locked for writing; `None` where there is none, or the system does not tell. No
-/// file of the catalog is opened: closing it again would drop the locks of this process's own connections.
+/// Returns the process that holds the write lock; `None` where there is none or the system does not tell. Opens no file
+/// of the catalog, because closing it would drop the locks of this process's own connections.
 pub fn lock_owner(catalog: &Path) -> Option<LockOwner> {
     let index = std::fs::metadata(sidecar(catalog, "-shm")).ok()?;
     let device = index.dev();
@@ -50,7 +50,7 @@ pub(crate) fn sidecar(path: &Path, ending: &str) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Whose lock a line of `/proc/locks` tells of, when it is the one for writing to this catalog.
+/// Returns the process of a line of `/proc/locks` that describes the write lock on this file.
 fn writer(line: &str, file: &str) -> Option<u32> {
     let words: Vec<_> = line.split_whitespace().collect();
     let [_, "POSIX", _, "WRITE", pid, of, WRITE_LOCK, _] = words[..] else {
@@ -59,7 +59,7 @@ fn writer(line: &str, file: &str) -> Option<u32> {
     (of == file).then(|| pid.parse().ok())?
 }
 
-/// By `/proc/PID/stat`: the state follows the name in brackets.
+/// Returns whether `/proc/PID/stat` shows a stopped process; the state follows the name in brackets.
 fn is_stopped(stat: &str) -> bool {
     let state = stat.rsplit(") ").next();
     state.is_some_and(|state| state.starts_with('T'))

@@ -1,11 +1,11 @@
-//! Whether a directory is on a network file system, where the write-ahead log's shared memory does not work.
+//! Detects network file systems, where the shared memory of the write-ahead log does not work.
 
 use std::path::Path;
 
 use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 
-/// File systems by the number that `statfs` gives (statfs(2) and the kernels' `magic.h`).
+/// Network file systems by `f_type` (statfs(2) and the kernel's `magic.h`).
 const MAGICS: [(u64, &str); 20] = [
     (0x6969, "nfs"),
     (0x517b, "smb"),
@@ -29,10 +29,10 @@ const MAGICS: [(u64, &str); 20] = [
     (0x7c7c_6673, "prl_fs"),
 ];
 
-/// The number all file systems share that run outside the kernel.
+/// `f_type` of every FUSE file system.
 const FUSE: u64 = 0x6573_5546;
 
-/// Those of them that reach over a network, by the name after `fuse.` in the table of mounts.
+/// FUSE file systems that use a network, by the name after `fuse.` in the mount table.
 const FUSE_NETWORKS: [&str; 18] = [
     "sshfs",
     "rclone",
@@ -54,10 +54,10 @@ const FUSE_NETWORKS: [&str; 18] = [
     "google-drive-ocamlfuse",
 ];
 
-/// Refuses the directory of a catalog that is on a network file system.
+/// Refuses a catalog on a network file system.
 ///
 /// # Errors
-/// When it is. Where it cannot be told, it is taken to be local.
+/// When it is on one. An unknown file system counts as local.
 pub(crate) fn refuse(catalog: &Path) -> Result<()> {
     let dir = catalog.parent().filter(|dir| !dir.as_os_str().is_empty());
     let dir = dir.unwrap_or(Path::new("."));
@@ -83,7 +83,7 @@ fn found(_dir: &Path) -> Option<&'static str> {
     None
 }
 
-/// The type in the table of mounts of the file system a directory is on.
+/// Returns the file system type of a directory in the mount table.
 #[cfg(target_os = "linux")]
 fn mount_type(dir: &Path) -> Option<String> {
     use std::os::unix::fs::MetadataExt as _;
@@ -97,7 +97,7 @@ fn mount_type(dir: &Path) -> Option<String> {
     type_of_device(&table, &number).map(ToOwned::to_owned)
 }
 
-/// Looks a device up in `/proc/self/mountinfo`: its number is the third field, the type the first after a lone `-`.
+/// Finds a device in `/proc/self/mountinfo`: its number is the third field, the type the first after a lone `-`.
 fn type_of_device<'a>(table: &'a str, number: &str) -> Option<&'a str> {
     let line = table
         .lines()
@@ -105,7 +105,7 @@ fn type_of_device<'a>(table: &'a str, number: &str) -> Option<&'a str> {
     line.split_once(" - ")?.1.split(' ').next()
 }
 
-/// Name of a network file system by its number, and for those outside the kernel by its type; `None` for a local one.
+/// Returns the name of a network file system by `f_type`, and of a FUSE one by mount type; `None` for a local one.
 fn network_kind(magic: u64, mount: Option<&str>) -> Option<&'static str> {
     if magic == FUSE {
         let name = mount?.strip_prefix("fuse.")?;

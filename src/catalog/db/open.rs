@@ -1,4 +1,4 @@
-//! Opening the database: the right file, the right disk, the right settings, read back.
+//! Opens the database and verifies file, disk and settings.
 
 use std::io::Read as _;
 use std::path::Path;
@@ -17,18 +17,18 @@ use crate::catalog::db::lock_owner::sidecar;
 use crate::catalog::db::network_fs;
 use crate::domain::FileKind;
 
-/// How long a connection waits for another process's write.
+/// SQLite's busy timeout of a connection.
 const BUSY_TIMEOUT: Duration = Duration::from_secs(10);
-/// Marks a database as a catalog: "mocb".
+/// `application_id` of a catalog: "mocb".
 const APPLICATION_ID: i64 = 1_836_016_482;
 /// Version of the schema. Versions 1 to 5 were never released.
 const SCHEMA_VERSION: i64 = 6;
-/// Read connections of a process.
+/// Read connections per process.
 const READERS: u32 = 4;
 
 pub(crate) static MIGRATOR: sqlx::migrate::Migrator = sqlx::migrate!("./migrations");
 
-/// What every connection has in common.
+/// Returns the options of every connection.
 fn options(path: &Path) -> SqliteConnectOptions {
     SqliteConnectOptions::new()
         .filename(path)
@@ -39,7 +39,7 @@ fn options(path: &Path) -> SqliteConnectOptions {
         .pragma("temp_store", "MEMORY")
 }
 
-/// The write connection, with the schema brought up to date. Makes the file when `create` is set.
+/// Opens the write connection. Creates file and schema when `create` is set.
 pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnection> {
     network_fs::refuse(path)?;
     look(path, create)?;
@@ -89,7 +89,7 @@ async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
 }
 
 async fn try_connect(path: &Path, create: bool) -> Result<SqliteConnection> {
-    // The writer runs the checkpoints itself, so that no commit is made to wait for one.
+    // The writer task checkpoints the log itself, so that no commit waits for it.
     let mut conn = options(path)
         .create_if_missing(create)
         .journal_mode(SqliteJournalMode::Wal)
@@ -120,7 +120,7 @@ pub(crate) async fn reader_pool(path: &Path) -> Result<SqlitePool> {
     }
 }
 
-/// Readers beside writers.
+/// Opens read connections to a catalog that may be written to.
 async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
     let mut retry = BusyRetry::begin(path);
     loop {
@@ -132,7 +132,7 @@ async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
     }
 }
 
-/// Readers of a file that nobody can change. Only a log that was folded back can be left out of sight.
+/// Opens a file that cannot change. Only a log that was checkpointed may be ignored.
 async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identity)> {
     let log = sidecar(path, "-wal");
     match std::fs::metadata(&log) {
@@ -147,7 +147,7 @@ async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identit
 async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
     let pool = SqlitePoolOptions::new()
         .max_connections(READERS)
-        // A connection to a file does not get lost, so none is asked whether it is still there.
+        // A connection to a file does not break, so it is not tested before use.
         .test_before_acquire(false)
         .connect_with(options)
         .await?;
@@ -155,8 +155,8 @@ async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
     Ok((pool, found))
 }
 
-/// What lies where the catalog should be, before the database is let near it: an empty file would pass for a new
-/// catalog. The file is not opened, because closing it again would drop the locks of this process's connections.
+/// Checks the file before SQLite opens it, because SQLite takes an empty file for a new database. Does not open the
+/// file, because closing it would drop the locks of this process's connections.
 fn look(path: &Path, create: bool) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(meta) if meta.is_dir() => Err(CatalogError::IsDirectory(path.to_owned())),
@@ -231,7 +231,7 @@ fn wrong_identity(path: &Path, (id, version): (i64, i64)) -> CatalogError {
     }
 }
 
-/// Whether the file or its directory cannot be written to, as readers beside writers need it.
+/// Returns whether the file or its directory is read-only.
 fn is_kept_out(error: &CatalogError) -> bool {
     matches!(
         error.kind(),
@@ -247,10 +247,10 @@ fn not_writable(path: &Path, error: CatalogError) -> CatalogError {
     }
 }
 
-/// Says plainly when the file is no database, or no longer a whole one.
+/// Replaces the error when the file is not a database, or is corrupt.
 fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
     match error.kind() {
-        // No connection can be open on a file that is no database, so it may be looked into.
+        // No connection can be open on a file that is not a database, so it may be read here.
         Some(CatalogErrorKind::NotADatabase) => CatalogError::Foreign {
             path: path.to_owned(),
             reason: kind(path).to_owned(),
@@ -260,7 +260,7 @@ fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
     }
 }
 
-/// What a file is that is no database.
+/// Describes a file that is not a database.
 fn kind(path: &Path) -> &'static str {
     let mut head = [0; 512];
     let read = std::fs::File::open(path).and_then(|mut file| file.read(&mut head));

@@ -1,5 +1,8 @@
-//! Requests that the writer commits together, and where it sends the replies.
+//! Messages to the writer task: requests that share a commit, separate transactions, and where replies go.
 
+use std::pin::Pin;
+
+use sqlx::SqliteConnection;
 use tokio::sync::oneshot;
 
 use crate::catalog::db::error::Result;
@@ -17,4 +20,24 @@ pub(crate) enum Request {
     Fail(Box<(Lease, StageFailure)>, Reply<bool>),
     Release(Lease, Reply<bool>),
     Claim(ClaimRequest, Reply<Vec<Lease>>),
+}
+
+/// A future that borrows the write connection.
+pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
+/// A separate transaction; it sends its own reply.
+pub(crate) type TransactionTask =
+    Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, ()> + Send>;
+
+/// A message to the writer task.
+pub(crate) enum Message {
+    /// Joins the next group commit.
+    Grouped(Request),
+    /// Joins the next group commit, which may be delayed for others to share it.
+    Deferrable(Request),
+    /// Ends the delay of the next commit, because somebody waits for it.
+    Flush,
+    /// Runs in its own transaction.
+    Transaction(TransactionTask),
+    /// Ends the writer after everything sent before.
+    Close(oneshot::Sender<()>),
 }

@@ -1,7 +1,6 @@
-//! The one task that writes: takes all requests that wait, commits them together, answers after the commit.
+//! The writer task: commits waiting requests together and replies after the commit.
 
 use std::path::Path;
-use std::pin::Pin;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -15,34 +14,14 @@ use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::group_commit::{Batch, BatchReply};
-use crate::catalog::db::request::Request;
+use crate::catalog::db::request::{Message, TransactionTask, Work};
 
-/// Commits after which the write-ahead log is folded back even while there is work; about 4 MiB of log.
+/// Commits after which the write-ahead log is checkpointed even under load; about 4 MiB of log.
 const COMMITS_PER_CHECKPOINT: u32 = 128;
-/// How long nothing must come in before the log is folded back.
+/// Idle time after which the write-ahead log is checkpointed.
 const IDLE: Duration = Duration::from_millis(250);
 
-/// A future that borrows the write connection.
-pub(crate) type Work<'c, T> = Pin<Box<dyn Future<Output = T> + Send + 'c>>;
-/// A transaction of its own; it sends its own answer.
-pub(crate) type TransactionTask =
-    Box<dyn for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, ()> + Send>;
-
-/// What the writer is told.
-pub(crate) enum Message {
-    /// Goes into the next group commit.
-    Grouped(Request),
-    /// The same, but that commit may wait a little for others to share it.
-    Deferrable(Request),
-    /// Somebody waits: the next commit is to wait no longer.
-    Flush,
-    /// Runs in its own transaction.
-    Transaction(TransactionTask),
-    /// Ends the writer when all before it is done.
-    Close(oneshot::Sender<()>),
-}
-
-/// The writer's loop. Ends at `Close` or when nobody can send any more.
+/// Runs the writer until `Close`, or until no sender is left.
 pub(crate) async fn run(
     mut conn: SqliteConnection,
     path: Arc<Path>,
@@ -65,7 +44,7 @@ pub(crate) async fn run(
             None => break None,
             Some(Message::Close(done)) => break Some(done),
             Some(Message::Transaction(work)) => work(&mut conn).await,
-            // What it was sent for is stored already.
+            // Everything sent before it is stored already.
             Some(Message::Flush) => continue,
             Some(first @ (Message::Grouped(_) | Message::Deferrable(_))) => {
                 let (batch, after) = collect(first, &delay, &mut inbox).await;
@@ -88,13 +67,13 @@ pub(crate) async fn run(
         tracing::warn!(%error, "the catalog did not close cleanly");
     }
     if let Some(done) = closing {
-        // Whoever asked may have gone; then nobody needs the answer.
+        // The caller may have stopped waiting.
         let _ = done.send(());
     }
 }
 
-/// Commits a batch and answers. When it fails, each request is tried alone, so that one that cannot be stored
-/// does not take the others with it. What lock or disk refuse is no request's fault.
+/// Commits a batch and replies. When it fails, each request is tried alone, so that one that cannot be stored does not
+/// fail the others; errors of lock or disk fail them all.
 async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
     match attempt(conn, path, &batch).await {
         Ok(answers) => batch.answer(answers),
@@ -112,7 +91,7 @@ async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
     }
 }
 
-/// Whether the file is in trouble, whatever is written to it.
+/// Returns whether an error concerns the file rather than a request.
 fn is_of_the_file(error: &CatalogError) -> bool {
     let trouble = error.kind();
     trouble.is_some_and(|trouble| trouble != CatalogErrorKind::Contradiction)
@@ -132,7 +111,7 @@ async fn attempt(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Res
     }
 }
 
-/// Begins a write transaction, when no other process has one.
+/// Begins a write transaction, as soon as no other process has one.
 async fn begin(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
     let mut retry = BusyRetry::begin(path);
     loop {
@@ -145,7 +124,7 @@ async fn begin(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
     }
 }
 
-/// Commits what went well and takes back what did not.
+/// Commits after success and rolls back after an error.
 async fn end<T>(conn: &mut SqliteConnection, outcome: Result<T>) -> Result<T> {
     let outcome = match outcome {
         Ok(value) => match sqlx::query("COMMIT").execute(&mut *conn).await {
@@ -158,22 +137,22 @@ async fn end<T>(conn: &mut SqliteConnection, outcome: Result<T>) -> Result<T> {
     outcome
 }
 
-/// Takes back what a transaction did that went wrong.
+/// Rolls the current transaction back.
 async fn rollback(conn: &mut SqliteConnection) {
-    // Some errors, such as a full disk, have rolled back already; then there is nothing to take back.
+    // SQLite has already rolled back after some errors, such as a full disk.
     if let Err(error) = sqlx::query("ROLLBACK").execute(conn).await {
         tracing::debug!(%error, "nothing to roll back");
     }
 }
 
 async fn wal_checkpoint(conn: &mut SqliteConnection, pragma: &'static str) {
-    // Readers may hold it back; then the next one does it.
+    // A reader may block it; the next checkpoint tries again.
     if let Err(error) = sqlx::query(pragma).execute(conn).await {
         tracing::debug!(%error, "the write-ahead log was not folded back");
     }
 }
 
-/// Runs `work` in its own transaction through the writer.
+/// Runs `work` in its own transaction on the writer task.
 pub(crate) async fn in_transaction<T: Send + 'static>(
     inbox: &mpsc::Sender<Message>,
     path: &Arc<Path>,

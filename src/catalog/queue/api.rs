@@ -4,8 +4,7 @@ use tokio::sync::oneshot;
 
 use crate::catalog::db::commit_delay::Waiting;
 use crate::catalog::db::error::{CatalogError, Result};
-use crate::catalog::db::request::{Reply, Request};
-use crate::catalog::db::writer::Message;
+use crate::catalog::db::request::{Message, Reply, Request};
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::claim::{ClaimRequest, Heartbeat};
 use crate::catalog::queue::counters::{JobCounts, by_status, counters};
@@ -30,8 +29,8 @@ impl Catalog {
         self.grouped(|reply| Request::Release(lease, reply)).await
     }
 
-    /// Stores a worker's heartbeat; `false` when the last one is from before `alive_since` or the worker has ended. Then
-    /// its leases are over, and it must register again.
+    /// Stores a worker's heartbeat; `false` when the last one is from before `alive_since` or the worker has ended.
+    /// Then its leases are over, and it must register again.
     ///
     /// # Errors
     /// When the database refuses.

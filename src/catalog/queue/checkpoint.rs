@@ -1,4 +1,4 @@
-//! Storing a finished stage: the job's step and the results, fenced by the lease.
+//! Statements that store finished stages, fenced by the lease.
 
 use serde::Serialize;
 use serde_json::json;
@@ -42,7 +42,7 @@ ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh
     print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
     result_hash = excluded.result_hash, ms = excluded.ms, worker = excluded.worker, at = excluded.at";
 
-/// A method may give fewer metrics than the one before; what it does not give is no result any more.
+/// Removes old metrics first: another method may return fewer.
 const CLEAR_METRICS: &str = "
 DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
@@ -63,7 +63,7 @@ const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, ms, at)
 SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?)";
 
-/// What is known of the input files of pairs.
+/// Updates the input files of pairs.
 pub(crate) const UPDATE_INPUTS: &str = "
 UPDATE pair SET mesh_hash = coalesce(unhex(item.value ->> 'mesh_hash'), mesh_hash),
     mesh_stat = coalesce(item.value ->> 'mesh_stat', mesh_stat),
@@ -76,7 +76,7 @@ FROM jsonb_each(?) AS item WHERE pair.id = item.value ->> 'pair' AND (
 const CLEAR_FAILURE: &str =
     "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
-/// What is written beside the job.
+/// The statements of [`add_results`].
 #[cfg(test)]
 pub(crate) const ROWS: [&str; 6] = [
     RESULT,
@@ -126,7 +126,7 @@ pub(crate) fn add_results(
     add_inputs(script, inputs)
 }
 
-/// Each stage with its lease.
+/// Pairs each stage with its lease.
 fn each_stage((lease, done): &StoredStages) -> impl Iterator<Item = (&Lease, &StageCheckpoint)> {
     done.iter().map(move |one| (lease, one))
 }

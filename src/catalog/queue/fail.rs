@@ -1,4 +1,4 @@
-//! Storing a failed stage: what it means for the job, why, and the attempt.
+//! Statements that store a failed stage, fenced by the lease.
 
 use serde_json::{Value, json};
 
@@ -10,10 +10,10 @@ use crate::catalog::queue::fragments::fingerprint_before;
 use crate::catalog::queue::lease::{FailureAction, Lease, StageFailure};
 use crate::domain::JobStatus;
 
-/// Attempts that are kept of a pair that fails again and again.
+/// Attempts kept per pair.
 const ATTEMPTS_KEPT: i64 = 64;
 
-/// The job's new state; only where the lease still holds.
+/// Sets the new state of failed jobs whose lease still holds and whose worker is alive.
 pub(crate) const FAIL: &str = concat!(
     "
 UPDATE job SET stage = min(job.stage, item.value ->> 'stage'), status = item.value ->> 'status',

@@ -1,4 +1,4 @@
-//! Fingerprints: what the result of a stage depends on besides the inputs.
+//! Fingerprints of settings: what the result of a stage depends on besides its inputs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -13,10 +13,10 @@ use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
 use crate::domain::{ContentHash, Stage};
 
-/// One stage's fingerprint.
+/// The fingerprint of one stage's settings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Fingerprint {
-    /// Hash over the stage, its fields and the fingerprint before it.
+    /// Hash over the stage, its fields and the previous stage's fingerprint.
     pub hash: ContentHash,
     /// Revision and settings of the stage.
     pub fields: Value,
@@ -27,8 +27,8 @@ pub struct Fingerprint {
 pub struct Fingerprints([Fingerprint; 4]);
 
 impl Fingerprints {
-    /// Fingerprints from each stage's fields. A stage's hash takes in the one before it, so that a changed setting
-    /// changes the fingerprints of its stage and of all later ones.
+    /// Computes the fingerprints of each stage's fields. A stage's hash includes the previous one, so that a changed
+    /// setting changes the fingerprints of its stage and of all later ones.
     pub fn new(fields: impl Fn(Stage) -> Value) -> Self {
         let mut upstream: Option<ContentHash> = None;
         Self(Stage::ALL.map(|stage| {
@@ -40,12 +40,12 @@ impl Fingerprints {
         }))
     }
 
-    /// The fingerprint of a stage.
+    /// Returns the fingerprint of a stage.
     pub fn of(&self, stage: Stage) -> &Fingerprint {
         &self.0[stage.index()]
     }
 
-    /// The fingerprints in a line, for processes to compare; [`Catalog::changes_from`] reads it.
+    /// Returns the hashes on one line, for processes to compare; [`Catalog::changes_from`] reads it.
     pub fn terms(&self) -> String {
         self.0
             .each_ref()
@@ -54,17 +54,17 @@ impl Fingerprints {
     }
 }
 
-/// Numbers of the current fingerprints in the catalog.
+/// Row ids of the current fingerprints.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FingerprintIds([FingerprintId; 4]);
 
 impl FingerprintIds {
-    /// The fingerprint of a stage.
+    /// Returns the fingerprint of a stage.
     pub const fn of(&self, stage: Stage) -> FingerprintId {
         self.0[stage.index()]
     }
 
-    /// The numbers as a JSON array by stage.
+    /// Returns the ids as a JSON array by stage.
     pub(crate) fn json(self) -> String {
         rows::array(self.0.map(|FingerprintId(id)| id)).to_string()
     }
@@ -80,7 +80,7 @@ INSERT INTO counter (stage, status, fingerprint, n) SELECT ?1, value, ?2, 0 FROM
 ON CONFLICT DO NOTHING";
 
 impl Catalog {
-    /// Enters the current fingerprints where they are new; gives their numbers.
+    /// Stores the current fingerprints where they are new; returns their ids.
     ///
     /// # Errors
     /// When the database refuses.
@@ -122,8 +122,8 @@ impl Catalog {
 }
 
 impl Catalog {
-    /// What differs between fingerprints as [`Fingerprints::terms`] told them and these; what the catalog does not know of is
-    /// left out.
+    /// Compares the line of another process's [`Fingerprints::terms`] with these fingerprints; unknown hashes are
+    /// skipped.
     ///
     /// # Errors
     /// When the database refuses.
@@ -149,7 +149,7 @@ impl Catalog {
     }
 }
 
-/// Numbers of the fingerprints that the catalog knows.
+/// Returns the ids of the fingerprints that the catalog knows.
 pub(crate) async fn known(
     conn: &mut SqliteConnection,
     fingerprints: &Fingerprints,
@@ -165,7 +165,7 @@ pub(crate) async fn known(
     Ok(ids)
 }
 
-/// The fingerprints as a JSON array of stage and number for `json_each`; a number no result has where it is unknown.
+/// Returns the ids as a JSON array by stage for `json_each`; -1, which no result has, for unknown ones.
 pub(crate) async fn current_json(
     conn: &mut SqliteConnection,
     fingerprints: &Fingerprints,
@@ -225,7 +225,7 @@ impl FingerprintChains {
     }
 }
 
-/// Leaves that differ between two fingerprints' fields, by name: `register.max_scale`.
+/// Returns the settings that differ, by name: `register.max_scale`.
 pub(crate) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
     let (old, new) = (leaves(stage, old), leaves(stage, new));
     let names = old.keys().chain(new.keys());
@@ -241,7 +241,7 @@ pub(crate) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldCh
         .collect()
 }
 
-/// Every value that is no object, by its path without the word "settings".
+/// Flattens nested objects; names leave out the key `settings`.
 fn leaves(stage: Stage, fields: &Value) -> Map<String, Value> {
     let mut found = Map::new();
     let mut open = vec![(stage.name().to_owned(), fields)];

@@ -1,4 +1,4 @@
-//! The right to work on one pair, and what is stored under it.
+//! Leases, and what is stored under them.
 
 use crate::catalog::queue::counters::{CounterKey, cursor};
 use crate::domain::{
@@ -6,10 +6,10 @@ use crate::domain::{
     WorkerId,
 };
 
-/// The right to work on one pair. Only a claim makes one, and only its holder can store anything for the pair.
+/// The right to work on one pair. Only a claim creates one, and only its owner can store anything for the pair.
 ///
-/// `token` fences it: each claim and each recovery raises the job's token, so that a lease that was taken away
-/// changes nothing any more.
+/// `token` is the fencing token: each claim and each recovery raises the job's token, so that writes under an older
+/// lease change nothing.
 #[derive(Debug)]
 pub struct Lease {
     pub(crate) pair: PairId,
@@ -21,37 +21,37 @@ pub struct Lease {
     pub(crate) attempt: u32,
     pub(crate) crashes: u32,
     pub(crate) exclusive: bool,
-    /// Whether a stage was stored under it, so that no failure is known of the pair any more.
+    /// Whether a stage was stored under it, which removed the pair's failure.
     pub(crate) cleared: bool,
 }
 
 impl Lease {
-    /// The pair.
+    /// Returns the pair.
     pub const fn pair(&self) -> PairId {
         self.pair
     }
 
-    /// First stage that has no result yet.
+    /// Returns the first stage without a result.
     pub const fn cursor(&self) -> Stage {
         self.cursor
     }
 
-    /// Which try of this stage it is, from 1.
+    /// Returns the number of the attempt at this stage, from 1.
     pub const fn attempt(&self) -> u32 {
         self.attempt
     }
 
-    /// Workers that died over the pair since its last finished stage.
+    /// Returns how many workers died over the pair since its last finished stage.
     pub const fn crashes(&self) -> u32 {
         self.crashes
     }
 
-    /// Whether nothing else may run beside it, because it needed too much or a worker died over it.
+    /// Returns whether nothing may run beside it, because it needed too much memory or a worker died over it.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
     }
 
-    /// The fence: of two leases on a pair the one with the higher token is the later.
+    /// Returns the fencing token: of two leases on a pair the later one has the higher token.
     pub const fn token(&self) -> i64 {
         self.token
     }
@@ -76,27 +76,27 @@ pub(crate) struct FencedRow {
     pub(crate) token: i64,
 }
 
-/// What became of a lease when something was stored under it.
+/// The state of a lease after a checkpoint.
 #[derive(Debug)]
 pub enum CheckpointOutcome {
-    /// Stored; the lease goes on with the next stage.
+    /// Stored; the lease continues with the next stage.
     Lease(Lease),
     /// Stored; the pair is done.
     Done,
-    /// The lease is lost: nothing was stored, the work is dropped.
+    /// The lease was lost and nothing was stored.
     LeaseLost,
 }
 
-/// An input file as a stage read it.
+/// The content of an input file as a stage read it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputVersion {
     /// Hash of its bytes.
     pub hash: ContentHash,
-    /// Size, time and number of the file at that moment, as the store writes them.
+    /// Size, time and inode of the file at that moment, as the store writes them.
     pub stat: String,
 }
 
-/// The input files of a pair as its worker read them; `None` for one that was not read.
+/// The input files of a pair as its worker read them; `None` for a file that was not read.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct InputVersions {
     /// The mesh.
@@ -112,85 +112,85 @@ impl InputVersions {
     }
 }
 
-/// One metric's numbers with the hash that verdicts are bound to.
+/// The scores of one metric with the hash that verdicts are bound to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MetricResult {
-    /// The numbers.
+    /// The scores.
     pub outcome: MetricOutcome,
-    /// Hash over the numbers and the pictures a reviewer sees.
+    /// Hash over the scores and the pictures that a reviewer sees.
     pub result_hash: ContentHash,
 }
 
-/// A stage that is done: everything its checkpoint stores.
+/// A finished stage: everything that its checkpoint stores.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageCheckpoint {
     /// Which stage.
     pub stage: Stage,
-    /// Number of the fingerprint it was computed with.
+    /// Fingerprint of its settings.
     pub fingerprint: FingerprintId,
-    /// Content of the mesh it was computed from.
+    /// Hash of the mesh.
     pub mesh_hash: ContentHash,
-    /// Content of the print, for stages that see it.
+    /// Hash of the print, for stages that read it.
     pub print_hash: Option<ContentHash>,
-    /// What the manifest said that it depends on.
+    /// The manifest attributes it depends on, as JSON.
     pub attributes: String,
-    /// The numbers as JSON.
+    /// The outcome as JSON.
     pub outcome: String,
-    /// The artifacts by role.
+    /// Artifacts by role.
     pub files: ArtifactSet,
     /// Hash over outcome and files.
     pub result_hash: ContentHash,
-    /// The metrics' results, for the last stage.
+    /// Results of the metrics, for the last stage.
     pub metrics: Vec<MetricResult>,
-    /// Input files as read for this pair.
+    /// Input files that this pair's stages read.
     pub inputs: InputVersions,
     /// Computing time in milliseconds.
     pub ms: u64,
-    /// When it was done.
+    /// When it finished.
     pub at: UnixMillis,
-    /// When the next stage should be over.
+    /// Deadline of the next stage.
     pub next_deadline: UnixMillis,
-    /// The lease stands only if the worker's last sign of life is of then or later, by its own clock.
+    /// The lease is over if the worker's last heartbeat is older than this, by its own clock.
     pub alive_since: UnixMillis,
 }
 
-/// What a failure means for the job.
+/// What happens to a failed job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailureAction {
-    /// Again at this time.
+    /// Retry at a time.
     BackOff {
         /// When.
         run_at: UnixMillis,
     },
-    /// Again at once, with nothing beside it.
+    /// Retry at once, with nothing beside it.
     RetryExclusive,
-    /// Not again until somebody asks.
+    /// No retry until somebody asks for it.
     Quarantine,
 }
 
-/// A stage that failed.
+/// A failed stage.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StageFailure {
     /// Which stage.
     pub stage: Stage,
     /// Class and message.
     pub failure: Failure,
-    /// What it means for the job.
+    /// What happens to the job.
     pub action: FailureAction,
-    /// Number of the fingerprint it was run with.
+    /// Fingerprint of its settings.
     pub fingerprint: FingerprintId,
-    /// What the manifest said.
+    /// The manifest attributes it depends on, as JSON.
     pub attributes: String,
-    /// Input files as read for this pair.
+    /// Input files that were read.
     pub inputs: InputVersions,
-    /// Computing time in milliseconds, where something was computed.
+    /// Computing time in milliseconds, if anything was computed.
     pub ms: Option<u64>,
     /// When it failed.
     pub at: UnixMillis,
-    /// The lease stands only if the worker's last sign of life is of then or later, by its own clock.
+    /// The lease is over if the worker's last heartbeat is older than this, by its own clock.
     pub alive_since: UnixMillis,
 }
 
-/// A fingerprint's number in the catalog.
+/// Row id of a fingerprint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct FingerprintId(pub(crate) i64);

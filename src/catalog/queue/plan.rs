@@ -1,21 +1,21 @@
-//! What a run would do, and why: plain values with their sentences.
+//! The plan of a run, and the reasons as text.
 
 use serde::Serialize;
 use serde_json::Value;
 
 use crate::domain::{JobStatus, Stage};
 
-/// Why a pair has work before it.
+/// Why a pair has work to do.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case", tag = "reason")]
 pub enum StaleReason {
     /// It has never run.
     New,
-    /// An earlier run ended before it was done, or it was taken up again by `retry`.
+    /// An earlier run ended before it was done, or `retry` requeued it.
     Unfinished,
-    /// It waits to be tried again after a failure that may pass.
+    /// It waits for its next attempt after a transient failure.
     BackingOff,
-    /// It failed for good, but with other settings or inputs than the current ones.
+    /// It failed permanently, but with other settings or inputs than the current ones.
     FailedBefore,
     /// The settings of `stage` or the program's revision of it changed.
     Settings {
@@ -28,24 +28,24 @@ pub enum StaleReason {
     Mesh,
     /// The print file's bytes changed.
     Print,
-    /// The unit or the side it was scanned from was told otherwise at an import.
+    /// An import changed the unit or the scanned side.
     Manifest,
-    /// It was asked for (`--rerun`).
+    /// It was requested (`--rerun`).
     Asked,
 }
 
-/// A setting that is not what it was.
+/// A changed setting.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FieldChange {
     /// Name such as `register.max_scale`.
     pub field: String,
-    /// Value then; `None` when it was not there.
+    /// Old value; `None` when the setting is new.
     pub old: Option<Value>,
-    /// Value now; `None` when it is gone.
+    /// New value; `None` when the setting was removed.
     pub new: Option<Value>,
 }
 
-/// Pairs with the same work before them for the same reason.
+/// Pairs with the same first stage and the same reason.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlanEntry {
     /// First stage to run.
@@ -53,25 +53,25 @@ pub struct PlanEntry {
     /// Why.
     #[serde(flatten)]
     pub why: StaleReason,
-    /// How many pairs.
+    /// Number of pairs.
     pub pairs: u64,
 }
 
-/// What a run would do.
+/// The plan of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Plan {
     /// Work by first stage and reason.
     pub entries: Vec<PlanEntry>,
     /// Pairs with nothing left to do.
     pub done: u64,
-    /// Pairs that failed for good and stay so.
+    /// Quarantined pairs that stay so.
     pub quarantined: u64,
-    /// Pairs that a run in another process has in hand.
+    /// Pairs leased by another process.
     pub leased: u64,
 }
 
 impl Plan {
-    /// Pairs that would run.
+    /// Returns the number of pairs that would run.
     pub fn pairs(&self) -> u64 {
         self.entries.iter().map(|entry| entry.pairs).sum()
     }
@@ -82,14 +82,14 @@ impl Plan {
             JobStatus::Done => self.done += pairs,
             JobStatus::Quarantined => self.quarantined += pairs,
             JobStatus::Leased => self.leased += pairs,
-            // These always have work before them.
+            // These always have work to do.
             JobStatus::Ready | JobStatus::Backoff => {}
         }
     }
 }
 
 impl std::fmt::Display for FieldChange {
-    /// `register.max_scale: 1.2 -> 1.3`
+    /// Writes `register.max_scale: 1.2 -> 1.3`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let show = |value: &Option<Value>| match value {
             Some(value) => value.to_string(),
@@ -106,7 +106,7 @@ impl std::fmt::Display for FieldChange {
 }
 
 impl std::fmt::Display for StaleReason {
-    /// A fragment that says why, such as `the print changed`.
+    /// Writes a fragment such as `the print changed`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let text = match self {
             Self::New => "not run yet",
@@ -123,7 +123,7 @@ impl std::fmt::Display for StaleReason {
     }
 }
 
-/// Names the first few changes.
+/// Writes the first few changes.
 fn settings(
     f: &mut std::fmt::Formatter<'_>,
     stage: Stage,

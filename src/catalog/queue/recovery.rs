@@ -1,4 +1,4 @@
-//! Taking leases back from workers that died or hang, and finding the pairs that kill them.
+//! Recovers leases of workers that died or hang, and quarantines pairs that kill workers.
 
 use std::collections::BTreeMap;
 
@@ -14,30 +14,30 @@ use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::lease::InputVersions;
 use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
-/// A worker that holds leases, and when it last gave a sign of life by its own clock.
+/// A worker that holds leases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LeaseHolder {
-    /// Which worker.
+    /// The worker.
     pub worker: WorkerId,
-    /// Its last heartbeat. Compare it with an earlier look, never with this machine's clock.
+    /// Its last heartbeat, by its own clock. Compare it with an earlier one, never with this machine's clock.
     pub heartbeat: UnixMillis,
 }
 
-/// What a recovery brought back.
+/// The result of a recovery.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Recovered {
-    /// How many pairs are ready again.
+    /// Number of pairs that are ready again.
     pub ready: u64,
-    /// Pairs that killed too many workers: quarantined.
+    /// Pairs that killed too many workers and are now quarantined.
     pub poisoned: Vec<PairId>,
 }
 
-/// Which leases to take back: those of some workers, or all but one's.
+/// Which workers are dead.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DeadWorker {
     /// These.
     Workers(Vec<WorkerId>),
-    /// Everybody else, because the lock proves that no other process lives.
+    /// All but one, because the lock proves that no other process is alive.
     AllExcept(WorkerId),
 }
 
@@ -46,15 +46,15 @@ SELECT w.id, w.heartbeat FROM worker AS w
 WHERE w.id IN (SELECT worker FROM job WHERE status = 1)
 ORDER BY w.id";
 
-/// Workers among some, whether each died (did not end in order), and how many leases it left.
+/// Returns for some workers whether each died (did not end properly) and how many leases it left.
 pub(crate) const LEFT_BY: &str = "
 SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
 FROM job AS j JOIN worker AS w ON w.id = j.worker
 WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.id";
 
-/// Takes leases back: worker, whether it died, whether its pair is to blame. A crash counts as a crash and not as a
-/// try, so that a failure that may pass later keeps all its tries. Pairs of a worker that died are suspect:
-/// they run after the others, each by itself. The condition is `domain::is_poisoned`.
+/// Recovers leases by worker. The second value says whether the worker died, the third whether its pair is blamed. A
+/// crash does not count as an attempt, so that a transient failure keeps all its attempts. Pairs of a worker that died
+/// run exclusively, after the others. The condition is `domain::is_poisoned`.
 pub(crate) const RECOVER: &str = "
 UPDATE job SET
     status = iif((item.value ->> 2)
@@ -64,23 +64,23 @@ UPDATE job SET
 FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = item.value ->> 0
 RETURNING pair, stage, status, crashes, fingerprint";
 
-/// Notes that workers died: some, or all that did not end in order but for one.
+/// Marks workers as dead, unless they ended properly.
 const DIED: &str =
     "UPDATE worker SET died = 1 WHERE ended IS NULL AND id IN (SELECT value FROM json_each(?1))";
 const ALL_DIED: &str = "
 UPDATE worker SET died = 1 WHERE ended IS NULL AND id <> ?1
     AND id IN (SELECT id FROM worker ORDER BY id DESC LIMIT 33)";
 
-/// How many of the newest 32 workers died.
+/// Counts the dead among the newest 32 workers.
 const DEATHS: &str = "
 SELECT count(*) FROM (SELECT died, ended FROM worker ORDER BY id DESC LIMIT 32) WHERE died AND ended IS NULL";
 
-/// Whose leases are taken back.
+/// Leases of some workers.
 pub(crate) const AFFECTED_PAIRS: &str = "
 SELECT pair, worker FROM job WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))";
 
-/// Takes back leases of other workers that still give signs of life long after the lease's deadline. Heartbeat and deadline
-/// are both by the worker's own clock: two clocks are never compared.
+/// Recovers leases of other workers that still send heartbeats long after the lease's deadline. Heartbeat and deadline
+/// are both by the worker's own clock; two clocks are never compared.
 pub(crate) const OVERDUE: &str = "
 UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = NULL,
     token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), exclusive = 1
@@ -88,7 +88,7 @@ WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))
     AND deadline + ?3 < (SELECT w.heartbeat FROM worker AS w WHERE w.id = job.worker)
 RETURNING pair, stage, status, crashes, fingerprint";
 
-/// With the settings of the worker that died and the inputs as last seen.
+/// Stores the failure with the settings of the dead worker and the inputs as last read.
 const CRASHED: &str = "
 INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
 SELECT p.id, item.value ->> 'stage', item.value ->> 'class', item.value ->> 'message',
@@ -110,7 +110,7 @@ UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> 
 FROM json_each(?) AS item WHERE failure.pair = item.value ->> 'pair'";
 
 impl Catalog {
-    /// Workers that hold leases.
+    /// Returns the workers that hold leases.
     ///
     /// # Errors
     /// When the database refuses.
@@ -128,11 +128,12 @@ impl Catalog {
             .collect()
     }
 
-    /// Takes back the leases of dead workers: ready again, or quarantined when too many died over the pair.
+    /// Recovers the leases of dead workers: pairs become ready again, or are quarantined when too many workers died
+    /// over them.
     ///
-    /// A pair is blamed for a death only when its worker held no other, and poisoned only as `is_poisoned` says.
-    /// So a process that is killed from outside, however often, hardly ever brings its pairs into quarantine: only one
-    /// that was alone in hand at nearly every death there was, which is what a pair that kills looks like.
+    /// A pair is blamed for a death only when its worker held no other lease, and quarantined only when `is_poisoned`
+    /// says so. Killing a process from outside, however often, therefore rarely quarantines a pair: only one that was
+    /// the only lease at nearly every death, which is the pattern of a pair that kills workers.
     ///
     /// # Errors
     /// When the database refuses.
@@ -155,8 +156,8 @@ impl Catalog {
         .await
     }
 
-    /// Notes what the input files of pairs are that killed their workers, where no stage ever said so: a file that is
-    /// mended later must be told from the one that did it.
+    /// Stores the inputs of quarantined pairs that no stage has read: a file that is repaired later must differ from
+    /// the one that killed the workers.
     ///
     /// # Errors
     /// When the database refuses.
@@ -174,8 +175,8 @@ impl Catalog {
         .await
     }
 
-    /// Takes back the leases of other workers that have outlived the lease's deadline by more than `margin_ms`: they
-    /// hang although their process lives. A living process looks after its deadlines itself, so this is rare.
+    /// Recovers the leases of other workers that exceed their deadline by more than `margin_ms` although the process is
+    /// alive. This is rare, because a living process enforces its own deadlines.
     ///
     /// # Errors
     /// When the database refuses.
@@ -207,7 +208,7 @@ async fn overdue(
     brought_back(conn, &found, &affected, now).await
 }
 
-/// Items of [`RECOVER`] for some workers.
+/// Builds the items of [`RECOVER`] for some workers.
 async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
     let found = sqlx::query(LEFT_BY).bind(workers).fetch_all(conn).await?;
     let mut items = Vec::with_capacity(found.len());
@@ -220,7 +221,7 @@ async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
     Ok(Value::from(items).to_string())
 }
 
-/// Notes who died; gives those that may hold leases, as a JSON array.
+/// Marks the dead workers; returns those that may hold leases, as a JSON array.
 async fn mark_dead(conn: &mut SqliteConnection, dead: &DeadWorker) -> Result<String> {
     match dead {
         DeadWorker::Workers(workers) => {
@@ -235,14 +236,14 @@ async fn mark_dead(conn: &mut SqliteConnection, dead: &DeadWorker) -> Result<Str
     }
 }
 
-/// Workers with leases but for one, as a JSON array.
+/// Returns the workers with leases except one, as a JSON array.
 async fn holders_but(conn: &mut SqliteConnection, me: WorkerId) -> Result<String> {
     let holders: Vec<i64> = sqlx::query_scalar(HOLDERS).fetch_all(conn).await?;
     let others = holders.into_iter().filter(|worker| *worker != me.0);
     Ok(rows::array(others).to_string())
 }
 
-/// The pairs of some workers, each with its worker.
+/// Returns the leased pairs of some workers, each with its worker.
 async fn affected_pairs(conn: &mut SqliteConnection, workers: &str) -> Result<BTreeMap<i64, i64>> {
     let found: Vec<(i64, i64)> = sqlx::query_as(AFFECTED_PAIRS)
         .bind(workers)
@@ -251,7 +252,7 @@ async fn affected_pairs(conn: &mut SqliteConnection, workers: &str) -> Result<BT
     Ok(found.into_iter().collect())
 }
 
-/// Counts what came back, and says why the quarantined ones are.
+/// Counts the recovered pairs, and stores why the quarantined ones failed.
 async fn brought_back(
     conn: &mut SqliteConnection,
     found: &[sqlx::sqlite::SqliteRow],

@@ -1,4 +1,4 @@
-//! Taking pairs up again: after a change of settings or inputs, or because somebody asks.
+//! Requeues pairs: after a change of settings or inputs, or on request.
 
 use std::collections::BTreeMap;
 
@@ -17,10 +17,10 @@ use crate::catalog::queue::staleness::{
 };
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 
-/// Which failed pairs to take up again.
+/// Which failed pairs to requeue.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum RetrySelection {
-    /// These pairs, whatever keeps them: failed or backing off.
+    /// These pairs, if they failed or back off.
     Names(Vec<PairName>),
     /// All that failed or back off with this class.
     Class(FailureClass),
@@ -28,7 +28,7 @@ pub enum RetrySelection {
     All,
 }
 
-/// Back to a stage, as if newly imported; never a job that somebody works on.
+/// Sends jobs back to a stage as if newly imported, unless they are leased.
 pub(crate) const REQUEUE: &str = concat!(
     "
 UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
@@ -63,7 +63,7 @@ struct RequeuedJob {
 }
 
 impl Catalog {
-    /// Sends pairs back whose settings or inputs changed, and those that the policy asks for; returns how many.
+    /// Requeues pairs whose settings or inputs changed, and those that the policy asks for; returns how many.
     ///
     /// # Errors
     /// When the database refuses.
@@ -96,8 +96,8 @@ impl Catalog {
         Ok(requeued)
     }
 
-    /// Unmarked jobs go back by group; only marked ones are inspected. Each page is a transaction of its own, so that
-    /// other writes are not kept waiting.
+    /// Unmarked jobs go back by group; only marked ones are inspected. Each page is a separate transaction, so that
+    /// other writes do not wait.
     async fn requeue_all_stale(
         &self,
         fingerprints: &Fingerprints,
@@ -137,7 +137,7 @@ impl Catalog {
         Ok(requeued)
     }
 
-    /// Takes failed pairs up again; says how many. Pairs that did not fail are left as they are.
+    /// Requeues failed pairs; returns how many. Pairs that did not fail do not change.
     ///
     /// # Errors
     /// When a named pair is not there; then nothing changes.
@@ -174,7 +174,7 @@ fn requeued_jobs(jobs: &[(i64, StaleJob)], policy: RerunPolicy) -> Vec<RequeuedJ
     requeued.collect()
 }
 
-/// Sends one page of a group back; returns how many, and the last pair of the page.
+/// Requeues one page of a group; returns how many, and the last pair of the page.
 async fn requeue_group(
     conn: &mut SqliteConnection,
     from: CounterKey,
@@ -198,7 +198,7 @@ async fn requeue_group(
     Ok((moved, pairs.last().copied()))
 }
 
-/// Sends one page of the marked jobs back, and unmarks those whose results agree again.
+/// Requeues one page of the marked jobs, and unmarks those whose results agree again.
 async fn requeue_marked(
     conn: &mut SqliteConnection,
     current: String,

@@ -1,9 +1,9 @@
 //! Which pairs must run again because their settings or inputs changed, and why.
 //!
-//! A job stores the fingerprint of the result before its cursor. Fingerprints form a chain, so this one number names the
-//! settings of all earlier results, and the counters by fingerprint answer for all such jobs at once. Jobs whose results
-//! may not agree with that chain or with their inputs carry the `dirty` mark. They and the quarantined jobs, whose
-//! failure has settings and inputs of its own, are found by partial indexes and inspected one by one.
+//! A job stores the fingerprint of the result before its cursor. Fingerprints form a chain, so this one number names
+//! the settings of all earlier results, and the counters by fingerprint answer for all such jobs at once. Jobs whose
+//! results may not agree with that chain or with their inputs carry the `dirty` mark. They and the quarantined jobs,
+//! whose failure has settings and inputs of its own, are found by partial indexes and inspected one by one.
 
 use std::collections::BTreeMap;
 

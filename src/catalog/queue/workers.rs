@@ -1,4 +1,4 @@
-//! Upkeep of the queue: workers, back-off times, what is left.
+//! Worker registration, due back-offs and open work.
 
 use sqlx::{Row as _, SqliteConnection};
 
@@ -13,15 +13,15 @@ use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 /// The process a worker runs in.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct WorkerInfo {
-    /// Name of the machine.
+    /// Host name.
     pub host: String,
-    /// Process number.
+    /// Process id.
     pub pid: u32,
-    /// Which start of the machine, where it can be told.
+    /// Boot id of the machine, where known.
     pub boot_id: Option<String>,
 }
 
-/// Work that is left among some pairs or all.
+/// Open work among some pairs or all.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Outstanding {
     /// Ready pairs with a stage to run.
@@ -30,22 +30,22 @@ pub struct Outstanding {
     pub leased: u64,
     /// Pairs that back off from such a stage.
     pub backoff: u64,
-    /// When the first of those is due.
+    /// Time of the first due back-off.
     pub next_due: Option<UnixMillis>,
 }
 
-/// Stages that are left among some pairs or all.
+/// Open stages among some pairs or all.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct WorkLeft {
-    /// Pairs with a stage before them that is not kept back by a failure.
+    /// Pairs with open stages that are not quarantined.
     pub pairs: u64,
-    /// Those stages by stage.
+    /// Open stages by stage.
     pub by_stage: [u64; 4],
-    /// Pairs that failed for good.
+    /// Quarantined pairs.
     pub quarantined: u64,
 }
 
-/// Back-off times that are over, or so far ahead that the clock must have jumped.
+/// Due back-offs, including those implausibly far in the future (clock jump).
 pub(crate) const DUE: &str = "
 UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
 RETURNING stage, fingerprint";
@@ -69,7 +69,7 @@ SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job A
 GROUP BY j.stage, j.status";
 
 impl Catalog {
-    /// Enters a process that will work with these fingerprints; its number is never used again.
+    /// Registers a worker process with the fingerprints it computes with; ids are never reused.
     ///
     /// # Errors
     /// When the database refuses.
@@ -83,7 +83,7 @@ impl Catalog {
             .await
     }
 
-    /// Says that a worker ended in order.
+    /// Records that a worker ended properly.
     ///
     /// # Errors
     /// When the database refuses.
@@ -101,8 +101,8 @@ impl Catalog {
         .await
     }
 
-    /// Makes pairs ready whose back-off is over; also those due more than `longest` ahead, which only a clock
-    /// that jumped can bring about. Says how many.
+    /// Makes pairs with due back-offs ready, also those due more than `longest` milliseconds ahead, which only a clock
+    /// jump can cause. Returns how many.
     ///
     /// # Errors
     /// When the database refuses.
@@ -126,7 +126,7 @@ impl Catalog {
         .await
     }
 
-    /// What is left to do up to a stage; `ready` stops counting at 1000.
+    /// Returns the open work up to a stage; `ready` stops counting at 1000.
     ///
     /// # Errors
     /// When the database refuses.
@@ -174,7 +174,7 @@ async fn insert_worker(
 }
 
 impl Catalog {
-    /// What is left to do up to a stage, from the counters, or counted among some pairs.
+    /// Returns the open stages up to a stage, from the counters, or counted among some pairs.
     ///
     /// # Errors
     /// When the database refuses.
