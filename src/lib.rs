@@ -34,7 +34,7 @@
 //! A **lost lease** is noticed when something is stored: `src/catalog/queue/checkpoint.rs` (and `fail.rs` beside it)
 //! updates the job only where worker and fencing token are still those of the lease; no updated row means
 //! [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome). `src/runner/checkpointer.rs` then stores nothing more, and
-//! `src/runner/pair_task.rs` ends with `PairEnd::Lost` and drops the pair.
+//! `src/runner/pair_task.rs` ends with `PairEnd::LeaseLost` and drops the pair.
 //!
 //! ## A new threshold metric
 //!

@@ -13,10 +13,10 @@ use super::progress::ProgressReporter;
 use super::table::{Align, columns, count};
 use super::time_text::duration;
 use super::{select, signals};
-use crate::catalog::{Catalog, Plan};
+use crate::catalog::{Catalog, Plan, RerunPolicy};
 use crate::config::Config;
 use crate::domain::{JobStatus, Stage};
-use crate::runner::{self, Rerun, RunOptions, RunSummary, Stop};
+use crate::runner::{self, RunOptions, RunSummary, Stop};
 use crate::store::{Project, RunLock};
 
 /// Arguments of `run`.
@@ -42,18 +42,18 @@ pub(super) struct RunArgs {
     pub(super) max_failures: Option<u64>,
     /// Also run these pairs again: failed, stale (settings or files changed, which every run includes) or all
     #[arg(long, value_name = "WHICH", value_parser = rerun)]
-    pub(super) rerun: Option<Rerun>,
+    pub(super) rerun: Option<RerunPolicy>,
     /// Run only this stage, and earlier stages where their results are missing; later stages wait for another run
     #[arg(long, value_name = "STAGE")]
     pub(super) stage: Option<Stage>,
 }
 
 /// Parses which pairs to run again.
-fn rerun(text: &str) -> Result<Rerun, String> {
+fn rerun(text: &str) -> Result<RerunPolicy, String> {
     match text {
-        "failed" => Ok(Rerun::Failed),
-        "stale" => Ok(Rerun::Stale),
-        "all" => Ok(Rerun::All),
+        "failed" => Ok(RerunPolicy::Failed),
+        "stale" => Ok(RerunPolicy::Changed),
+        "all" => Ok(RerunPolicy::All(Stage::Fit)),
         _ => Err("the pairs to run again are failed, stale or all".to_owned()),
     }
 }
@@ -107,8 +107,10 @@ async fn options(args: &RunArgs, config: &Config, catalog: &Catalog) -> anyhow::
         join: args.join,
         max_failures: args.max_failures,
         pairs,
-        rerun: args.rerun,
-        from: args.stage.unwrap_or(plain.from),
+        rerun: match (args.rerun, args.stage) {
+            (Some(RerunPolicy::All(_)), Some(stage)) => RerunPolicy::All(stage),
+            (rerun, _) => rerun.unwrap_or(plain.rerun),
+        },
         until: args.stage.unwrap_or(plain.until),
         ..plain
     })

@@ -1,6 +1,6 @@
 //! Stores the stages of one pair under its lease, in a task of its own, so that the thread that computes does not wait
-//! for the disk. A stage's files are on the disk before a row names them; stages are stored in their order, and those
-//! that are computed while others are stored share a transaction. The lease comes back when all are stored.
+//! for the disk. A stage's files are on the disk before a row names them. Stages are stored in their order; stages that
+//! arrive while others are stored share a transaction. The lease comes back when all are stored.
 
 use std::io;
 use std::sync::Arc;
@@ -23,19 +23,19 @@ use crate::store::{ArtifactError, NewArtifact, Project};
 pub(super) struct Checkpointer {
     context: Arc<RunContext>,
     stages: mpsc::UnboundedSender<ComputedStage>,
-    task: JoinHandle<Result<Settled, RunError>>,
+    task: JoinHandle<Result<StoredStages, RunError>>,
 }
 
-/// What a checkpointer leaves behind.
-pub(super) struct Settled {
+/// What a checkpointer has stored, and what is left of the lease.
+pub(super) struct StoredStages {
     lease: CheckpointOutcome,
     /// Number of stages stored.
     pub(super) stages: u64,
-    /// Whether every stage was stored that was sent; `false` when the run was told to stop at once.
+    /// Whether every stage that was sent is stored; `false` after a request to stop at once.
     is_complete: bool,
 }
 
-impl Settled {
+impl StoredStages {
     /// Returns the lease, if it is still held and every stage that was sent is stored.
     ///
     /// # Errors
@@ -47,8 +47,8 @@ impl Settled {
         }
     }
 
-    /// Releases a lease that is left, and returns how the pair ended: as given, unless the lease was lost or not every
-    /// stage was stored.
+    /// Releases a remaining lease, and returns how the pair ended: `end`, unless the lease was lost or not every stage was
+    /// stored.
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
         let stages = self.stages;
         let end = match &self.lease {
@@ -93,7 +93,7 @@ impl Checkpointer {
     }
 
     /// Waits until the stages that were sent are stored, without delay for a larger commit, because the caller waits.
-    pub(super) async fn settle(self) -> Result<Settled, RunError> {
+    pub(super) async fn settle(self) -> Result<StoredStages, RunError> {
         let _flush = self.context.catalog.waiting().await?;
         drop(self.stages);
         task_result(self.task.await)
@@ -103,7 +103,7 @@ impl Checkpointer {
     pub(super) async fn finish(self, end: PairEnd) -> PairReport {
         let context = Arc::clone(&self.context);
         let settled = if end == PairEnd::Done {
-            // Nobody waits for it, so the last stages may share a commit with those of other pairs.
+            // No slot waits for this pair, so its last stages may share a commit with other pairs.
             drop(self.stages);
             task_result(self.task.await)
         } else {
@@ -122,13 +122,13 @@ async fn store_stages(
     pair: PairName,
     mut lease: Lease,
     mut stages: mpsc::UnboundedReceiver<ComputedStage>,
-) -> Result<Settled, RunError> {
+) -> Result<StoredStages, RunError> {
     let mut stored = 0;
     while let Some(first) = stages.recv().await {
         let (batch, is_complete) = write_batch(&context, &pair, first, &mut stages).await?;
         if batch.is_empty() {
             let (lease, stages) = (CheckpointOutcome::Lease(lease), stored);
-            return Ok(Settled {
+            return Ok(StoredStages {
                 lease,
                 stages,
                 is_complete,
@@ -147,7 +147,7 @@ async fn store_stages(
             CheckpointOutcome::Lease(next) if is_complete => lease = next,
             lease => {
                 let stages = stored;
-                return Ok(Settled {
+                return Ok(StoredStages {
                     lease,
                     stages,
                     is_complete,
@@ -156,14 +156,14 @@ async fn store_stages(
         }
     }
     let (lease, stages) = (CheckpointOutcome::Lease(lease), stored);
-    Ok(Settled {
+    Ok(StoredStages {
         lease,
         stages,
         is_complete: true,
     })
 }
 
-/// Writes the files of a stage and of those that have arrived meanwhile. The second value is `false` when the run was
+/// Writes the files of a stage and of all stages that have arrived since. The second value is `false` when the run was
 /// told to stop before all were written.
 async fn write_batch(
     context: &RunContext,

@@ -50,7 +50,7 @@ pub(super) enum ComputeEvent {
     /// A stage failed; this is the last event.
     Failed {
         failure: Failure,
-        /// Whether the failure may pass by itself.
+        /// Whether a retry may succeed.
         is_transient: bool,
         /// The input files as read.
         inputs: InputVersions,
@@ -100,7 +100,7 @@ impl ComputeThread {
     }
 }
 
-/// Computes stages until there is no next one, one fails, or nobody receives the events any more.
+/// Computes stages until there is no next one, one fails, or the receiver of the events is closed.
 fn run_stages(
     executor: &dyn StageExecutor,
     mut stage: Stage,

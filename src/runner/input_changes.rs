@@ -85,8 +85,8 @@ fn changes(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersi
     (changed.mesh.is_some() || changed.print.is_some()).then_some((known.pair, changed))
 }
 
-/// Returns the current state of a file that differs from the known one. A missing file does not count, because results
-/// made from it stay valid, except where the manifest names another path than before.
+/// Returns the current state of a file that differs from the known one. A missing file does not count as changed, because
+/// results computed from it stay valid, except where the manifest names another path than before.
 fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Option<InputVersion> {
     let known = known?;
     let path = project.input_path(stored);

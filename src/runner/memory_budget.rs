@@ -127,10 +127,9 @@ fn has_extension(path: &Path, extensions: &[&str]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::{MemoryBudget, PAIR_BYTES, PIXEL_BYTES, estimated_bytes, print_bytes};
-    use crate::catalog::PairAttributes;
     use crate::domain::Stage;
     use crate::raster;
-    use crate::report::test_fixtures;
+    use crate::runner::tests::values;
     use crate::store::Project;
 
     #[test]
@@ -176,11 +175,7 @@ mod tests {
         };
         write("1.obj", 1000);
         write("1.jpg", 100);
-        let attributes = PairAttributes {
-            mesh_path: "1.obj".to_owned(),
-            print_path: "1.jpg".to_owned(),
-            ..test_fixtures::pending("1").attributes
-        };
+        let attributes = values::pair_attributes("1.obj", "1.jpg");
         let few = raster::ImageLimits {
             max_pixels: 10,
             ..raster::ImageLimits::SUGGESTED

@@ -15,9 +15,10 @@
 //!    other pair beside it, or quarantine.
 //!
 //! A lease can be lost, because this process was suspended and another one took the pair. Each write names the lease's
-//! token, and the catalog refuses one that is not current. The `checkpointer` notices that first: `CheckpointOutcome::LeaseLost` ends its
-//! task, no later stage is stored, and the pair ends as `PairEnd::LeaseLost`. `worker_session` notices it for the whole
-//! process, when a heartbeat comes after the leases have expired: the process registers as a new worker.
+//! token, and the catalog refuses one that is not current. The `checkpointer` notices that first: on
+//! `CheckpointOutcome::LeaseLost` its task ends, no later stage is stored, and the pair ends as `PairEnd::LeaseLost`.
+//! `worker_session` notices it for the whole process, when a heartbeat comes after the leases have expired: the process
+//! registers as a new worker.
 
 mod bare;
 mod checkpointer;
@@ -47,7 +48,7 @@ pub use bare::bare;
 pub use error::RunError;
 pub use events::{RunEvent, RunSummary};
 pub use free_memory::default_memory_limit;
-pub use options::{Rerun, RunOptions};
+pub use options::RunOptions;
 pub use run::{fingerprints, plan, run};
 pub use stage_output::result_hash;
 pub use stop::{Stop, StopLevel};

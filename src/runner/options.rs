@@ -2,19 +2,9 @@
 
 use std::time::Duration;
 
+use crate::catalog::RerunPolicy;
 use crate::domain::{PairName, Stage};
 use crate::{mesh, raster};
-
-/// What to run again besides stages without a current result. Results of changed settings or inputs are never current.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Rerun {
-    /// Failed pairs.
-    Failed,
-    /// Nothing more: the default.
-    Stale,
-    /// Every pair, from the stage [`RunOptions::from`] on.
-    All,
-}
 
 /// Options of a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,10 +20,8 @@ pub struct RunOptions {
     pub max_failures: Option<u64>,
     /// Only these pairs; `None` for all.
     pub pairs: Option<Vec<PairName>>,
-    /// What to run again.
-    pub rerun: Option<Rerun>,
-    /// First stage that [`Rerun::All`] runs again.
-    pub from: Stage,
+    /// What to run besides stages without a current result.
+    pub rerun: RerunPolicy,
     /// Last stage to run.
     pub until: Stage,
     /// Longest time for one stage of one pair.
@@ -52,8 +40,7 @@ impl Default for RunOptions {
             join: false,
             max_failures: None,
             pairs: None,
-            rerun: None,
-            from: Stage::Fit,
+            rerun: RerunPolicy::Changed,
             until: Stage::Register,
             stage_timeout: Duration::from_mins(10),
             mesh_limits: mesh::MeshLimits::SUGGESTED,

@@ -20,7 +20,7 @@ pub(super) struct StoredStage {
     pub(super) print_hash: Option<ContentHash>,
 }
 
-/// What a pair's stages share. Each value in memory is there from the stage that made it to the last one that needs it.
+/// What a pair's stages share. A value stays in memory from the stage that computes it to the last one that needs it.
 #[derive(Debug)]
 pub(super) struct PairContext {
     /// The pair as imported.

@@ -232,7 +232,7 @@ impl PairSummary {
 /// How a stage failed.
 struct FailedStage {
     failure: Failure,
-    /// Whether the failure may pass by itself.
+    /// Whether a retry may succeed.
     is_transient: bool,
     /// The input files as read, if the pair's data was not lost.
     inputs: Option<InputVersions>,

@@ -17,7 +17,7 @@ const BACKOFF_CAP: Duration = Duration::from_mins(1);
 pub(super) struct FailedAttempt {
     pub(super) pair: PairId,
     pub(super) class: FailureClass,
-    /// Whether the failure may pass by itself.
+    /// Whether a retry may succeed.
     pub(super) is_transient: bool,
     /// Number of the attempt, from 1.
     pub(super) attempt: u32,
@@ -58,8 +58,8 @@ pub(super) const fn longest_backoff_ms() -> i64 {
     BACKOFF_CAP.as_millis() as i64 * 3 / 2
 }
 
-/// Intervals by which workers know that the others live. A lease lasts as long for its holder as for those who watch
-/// it, each by its own clock: whoever is taken for dead knows it too. The pairs of a dead worker are ready again within
+/// Intervals by which workers observe each other. Holder and observers measure a lease by their own clocks and with the
+/// same length, so that a worker that is considered dead knows it too. The pairs of a dead worker are ready again within
 /// a minute: one lease and two recovery intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Timing {

@@ -1,5 +1,5 @@
-//! The pairs that this process has leased: those in a slot, and a queue of those that will soon be, so that no core
-//! waits for a claim.
+//! The pairs that this process has leased: running pairs, and a queue of pairs that start as soon as a slot is free, so
+//! that no core waits for a claim.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -113,8 +113,8 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
-    /// Claims pairs for slots that are free or soon will be. Returns whether it asked the catalog, which it does not
-    /// while there is no use for more pairs or no chance of finding any.
+    /// Claims pairs for slots that are free or soon become free. Returns `false` without a claim while no pairs are needed
+    /// or none can be found.
     pub(super) async fn claim(&mut self, worker: WorkerId) -> Result<bool, RunError> {
         let wanted = self.load().pairs_to_claim(self.durations.pairs_ahead());
         let is_blocked = self.is_exclusive || self.waits_for_memory;

@@ -9,7 +9,7 @@ use tokio::sync::mpsc;
 use super::error::RunError;
 use super::events::{RunEvent, RunSummary};
 use super::input_changes;
-use super::options::{Rerun, RunOptions};
+use super::options::RunOptions;
 use super::policy::{self, Clock, Timing};
 use super::run_context::RunContext;
 use super::scheduler::{RunCounts, Scheduler};
@@ -17,7 +17,7 @@ use super::stage_executor::{PipelineExecutor, StageExecutor};
 use super::stop::{Stop, StopLevel};
 use super::worker_session::this_process;
 use crate::catalog::{
-    Catalog, DeadWorker, Fingerprints, PairSelection, Plan, RerunPolicy, StatusCounts, WorkLeft,
+    Catalog, DeadWorker, Fingerprints, PairSelection, Plan, StatusCounts, WorkLeft,
 };
 use crate::domain::WorkerId;
 use crate::page_vec;
@@ -43,7 +43,7 @@ pub async fn plan(
     input_changes::store_changes(project, catalog, selection.as_ref()).await?;
     let names = options.pairs.as_deref();
     Ok(catalog
-        .plan(&fingerprints(settings), names, options.again())
+        .plan(&fingerprints(settings), names, options.rerun)
         .await?)
 }
 
@@ -154,7 +154,7 @@ async fn find_work(
 ) -> Result<(), RunError> {
     input_changes::store_changes(project, catalog, selection).await?;
     catalog
-        .requeue_stale(fingerprints, selection, options.again())
+        .requeue_stale(fingerprints, selection, options.rerun)
         .await?;
     let longest = policy::longest_backoff_ms();
     catalog.release_due_backoffs(clock.now(), longest).await?;
@@ -252,16 +252,5 @@ fn summary(
         compute_time: Duration::from_micros(context.compute_us.load(Ordering::Relaxed)),
         elapsed_ms: context.clock.elapsed_ms(),
         status,
-    }
-}
-
-impl RunOptions {
-    /// Returns what to run again besides what changed.
-    fn again(&self) -> RerunPolicy {
-        match self.rerun {
-            None | Some(Rerun::Stale) => RerunPolicy::Changed,
-            Some(Rerun::Failed) => RerunPolicy::Failed,
-            Some(Rerun::All) => RerunPolicy::All(self.from),
-        }
     }
 }

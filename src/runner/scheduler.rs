@@ -16,7 +16,7 @@ use super::policy;
 use super::prefetch::Prefetch;
 use super::run_context::{PairEnd, PairReport, RunContext};
 use super::stop::StopLevel;
-use super::worker_session::{Heartbeat, WorkerSession};
+use super::worker_session::{HeartbeatOutcome, WorkerSession};
 use crate::catalog::{Outstanding, PairSelection, Waiting};
 use crate::domain::{PairName, WorkerId};
 
@@ -134,7 +134,7 @@ impl Scheduler {
         if !self.is_idle() {
             return Ok(false);
         }
-        // No ordinary pair is ready or in progress: now those that must run with no other beside them.
+        // No other pair is ready or in progress: now claim the pairs that must run exclusively.
         self.prefetch.claim_exclusive(self.session.worker()).await?;
         self.start_pairs().await?;
         if !self.is_idle() {
@@ -253,8 +253,8 @@ impl Scheduler {
     /// catalog cannot be written for as long as a lease lasts, the run ends.
     async fn heartbeat(&mut self) -> Result<(), RunError> {
         match self.session.heartbeat(&self.context).await {
-            Heartbeat::Alive => {}
-            Heartbeat::Expired => {
+            HeartbeatOutcome::Alive => {}
+            HeartbeatOutcome::Expired => {
                 tracing::warn!(
                     "suspended past the end of its leases: the stages in progress run again"
                 );
@@ -262,7 +262,7 @@ impl Scheduler {
                 self.session.register_again(&self.context).await?;
                 self.prefetch.expect_more();
             }
-            Heartbeat::Unwritable(error) => {
+            HeartbeatOutcome::Unwritable(error) => {
                 self.drain("the catalog cannot be written any more");
                 self.fatal.get_or_insert(error.into());
             }

@@ -39,7 +39,7 @@ pub(super) enum ExecutionError {
     /// The stage failed.
     Failed {
         failure: Failure,
-        /// Whether the failure may pass by itself.
+        /// Whether a retry may succeed.
         is_transient: bool,
     },
 }
@@ -184,7 +184,7 @@ mod tests {
     use super::{BACKGROUND, INK, UNKNOWN, metric_results, print_mask, result_hash};
     use crate::domain::{ArtifactSet, MetricOutcome, ThresholdMetric};
     use crate::raster::Mask;
-    use crate::report::test_fixtures;
+    use crate::runner::tests::values;
 
     #[test]
     fn ink_counts_even_where_the_print_is_unknown() {
@@ -196,7 +196,7 @@ mod tests {
     #[test]
     fn a_verdict_outlives_another_confidence_but_not_another_alignment() {
         let hash = |change: fn(&mut MetricOutcome)| {
-            let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
+            let mut outcome = values::metric_outcome(ThresholdMetric::Density);
             change(&mut outcome);
             metric_results(&[outcome], &ArtifactSet::new(), None)[0].result_hash
         };

@@ -2,6 +2,7 @@
 
 mod fake_executor;
 mod prefetch;
+pub(super) mod values;
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
@@ -12,8 +13,8 @@ use serde_json::{Map, json};
 use fake_executor::FakeExecutor;
 
 use super::run::run_with;
-use super::{Rerun, RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel};
-use crate::catalog::{Catalog, ClaimRequest, Fingerprints, ImportRow, WorkerInfo};
+use super::{RunError, RunEvent, RunOptions, RunSummary, Stop, StopLevel};
+use crate::catalog::{Catalog, ClaimRequest, Fingerprints, ImportRow, RerunPolicy, WorkerInfo};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 use crate::store::Project;
 
@@ -47,6 +48,7 @@ impl RunFixture {
         Self::with(pairs, async |path| Catalog::create(path).await).await
     }
 
+    /// With a catalog that `create` makes.
     async fn with<E: std::fmt::Debug>(
         pairs: &[&str],
         create: impl AsyncFn(&std::path::Path) -> Result<Catalog, E>,
@@ -78,7 +80,7 @@ impl RunFixture {
 
     async fn try_run(&self, options: &RunOptions) -> Result<RunSummary, RunError> {
         let executor = Arc::clone(&self.executor);
-        let note = |event| self.events.lock().expect("no panic holds it").push(event);
+        let record = |event| self.events.lock().expect("an unpoisoned lock").push(event);
         let (project, catalog) = (&self.project, &self.catalog);
         let summary = run_with(
             project,
@@ -87,18 +89,18 @@ impl RunFixture {
             executor,
             options,
             &self.stop,
-            note,
+            record,
         )
         .await;
-        let kept = catalog.counters().await.expect("counters");
-        assert_eq!(kept, catalog.recount().await.expect("a recount"));
+        let counters = catalog.counters().await.expect("counters");
+        assert_eq!(counters, catalog.recount().await.expect("a recount"));
         summary
     }
 
     async fn run(&self, options: &RunOptions) -> RunSummary {
         self.try_run(options)
             .await
-            .expect("the run goes on to its end")
+            .expect("a run without a fatal error")
     }
 
     async fn status(&self, pair: &str) -> JobStatus {
@@ -108,20 +110,20 @@ impl RunFixture {
 }
 
 #[tokio::test]
-async fn every_pair_is_done_and_each_stage_computed_once() {
-    let world = RunFixture::new(&["a", "b", "c", "d", "e"]).await;
-    let summary = world.run(&options(2)).await;
+async fn every_pair_is_done_and_each_stage_is_computed_once() {
+    let fixture = RunFixture::new(&["a", "b", "c", "d", "e"]).await;
+    let summary = fixture.run(&options(2)).await;
     assert_eq!(
         (summary.done, summary.failed, summary.stages, summary.left),
         (5, 0, 20, 0)
     );
     for pair in ["a", "b", "c", "d", "e"] {
         for stage in Stage::ALL {
-            assert_eq!(world.executor.count(pair, stage), 1);
+            assert_eq!(fixture.executor.count(pair, stage), 1);
         }
     }
-    assert!(world.executor.most.load(Ordering::SeqCst) <= 2);
-    let again = world.run(&options(2)).await;
+    assert!(fixture.executor.most.load(Ordering::SeqCst) <= 2);
+    let again = fixture.run(&options(2)).await;
     assert_eq!(
         (
             again.done,
@@ -133,14 +135,14 @@ async fn every_pair_is_done_and_each_stage_computed_once() {
 }
 
 #[tokio::test]
-async fn one_bad_pair_stops_nobody_and_shows() {
-    let world = RunFixture::new(&["a", "bad_1", "panics_1", "z"]).await;
-    let summary = world.run(&options(2)).await;
+async fn a_bad_pair_does_not_stop_the_others_and_shows_in_the_summary() {
+    let fixture = RunFixture::new(&["a", "bad_1", "panics_1", "z"]).await;
+    let summary = fixture.run(&options(2)).await;
     assert_eq!(
         (summary.done, summary.failed, summary.failed_in_all),
         (2, 2, 2)
     );
-    let failures = world.catalog.failures(9).await.expect("a read");
+    let failures = fixture.catalog.failures(9).await.expect("a read");
     let messages: Vec<_> = failures
         .iter()
         .map(|failed| {
@@ -154,26 +156,26 @@ async fn one_bad_pair_stops_nobody_and_shows() {
         `run --rerun failed -v`";
     let bug = (FailureClass::Bug, panicked);
     assert_eq!(messages, [(FailureClass::BadInput, "no faces"), bug]);
-    let again = world.run(&options(2)).await;
+    let again = fixture.run(&options(2)).await;
     assert_eq!((again.failed, again.failed_in_all), (0, 2));
     let failed = RunOptions {
-        rerun: Some(Rerun::Failed),
+        rerun: RerunPolicy::Failed,
         ..options(2)
     };
-    assert_eq!(world.run(&failed).await.failed, 2);
-    assert_eq!(world.executor.count("panics_1", Stage::Fit), 1);
-    assert_eq!(world.executor.count("panics_1", Stage::Depth), 2);
+    assert_eq!(fixture.run(&failed).await.failed, 2);
+    assert_eq!(fixture.executor.count("panics_1", Stage::Fit), 1);
+    assert_eq!(fixture.executor.count("panics_1", Stage::Depth), 2);
 }
 
 #[tokio::test]
-async fn a_pair_that_panicked_is_taken_up_when_its_mesh_is_another() {
-    let world = RunFixture::new(&["bursts_1"]).await;
-    let mesh = world.project.input_path("bursts_1.stl");
+async fn a_pair_that_panicked_runs_again_when_its_mesh_changes() {
+    let fixture = RunFixture::new(&["bursts_1"]).await;
+    let mesh = fixture.project.input_path("bursts_1.stl");
     for (content, tries) in [("one", 1), ("one", 1), ("another one", 2)] {
         std::fs::write(&mesh, content).expect("written");
-        world.run(&options(1)).await;
+        fixture.run(&options(1)).await;
         assert_eq!(
-            world.executor.count("bursts_1", Stage::Fit),
+            fixture.executor.count("bursts_1", Stage::Fit),
             tries,
             "{content}"
         );
@@ -181,12 +183,16 @@ async fn a_pair_that_panicked_is_taken_up_when_its_mesh_is_another() {
 }
 
 #[tokio::test]
-async fn a_failure_that_may_pass_is_tried_again_in_the_same_run() {
-    let world = RunFixture::new(&["flaky_1"]).await;
-    let summary = world.run(&options(1)).await;
+async fn a_transient_failure_is_retried_in_the_same_run() {
+    let fixture = RunFixture::new(&["flaky_1"]).await;
+    let summary = fixture.run(&options(1)).await;
     assert_eq!((summary.done, summary.failed), (1, 0));
-    assert_eq!(world.executor.count("flaky_1", Stage::Fit), 2);
-    let detail = world.catalog.pair(&name("flaky_1")).await.expect("a read");
+    assert_eq!(fixture.executor.count("flaky_1", Stage::Fit), 2);
+    let detail = fixture
+        .catalog
+        .pair(&name("flaky_1"))
+        .await
+        .expect("a read");
     let attempts = detail.expect("the pair").attempts;
     assert_eq!(
         attempts
@@ -198,86 +204,89 @@ async fn a_failure_that_may_pass_is_tried_again_in_the_same_run() {
 }
 
 #[tokio::test]
-async fn a_stage_that_takes_too_long_is_tried_alone_and_then_quarantined() {
-    let world = RunFixture::new(&["a", "hangs_1"]).await;
+async fn a_stage_that_times_out_is_retried_exclusively_and_then_quarantined() {
+    let fixture = RunFixture::new(&["a", "hangs_1"]).await;
     let limited = RunOptions {
         stage_timeout: Duration::from_secs(1),
         ..options(2)
     };
-    let summary = world.run(&limited).await;
+    let summary = fixture.run(&limited).await;
     assert_eq!((summary.done, summary.failed), (1, 1));
-    assert_eq!(world.executor.count("hangs_1", Stage::Fit), 2);
-    let failures = world.catalog.failures(9).await.expect("a read");
+    assert_eq!(fixture.executor.count("hangs_1", Stage::Fit), 2);
+    let failures = fixture.catalog.failures(9).await.expect("a read");
     assert_eq!(failures[0].failure.failure.class, FailureClass::Resource);
-    world.executor.open();
+    fixture.executor.open();
 }
 
 #[tokio::test]
-async fn what_an_earlier_stage_left_is_made_again_when_it_is_gone() {
-    let world = RunFixture::new(&["loses_1"]).await;
-    assert_eq!(world.run(&options(1)).await.done, 1);
-    let counts = Stage::ALL.map(|stage| world.executor.count("loses_1", stage));
+async fn an_earlier_stage_runs_again_when_its_result_is_missing() {
+    let fixture = RunFixture::new(&["loses_1"]).await;
+    assert_eq!(fixture.run(&options(1)).await.done, 1);
+    let counts = Stage::ALL.map(|stage| fixture.executor.count("loses_1", stage));
     assert_eq!(counts, [1, 2, 2, 2]);
-    let kept = world.catalog.counters().await.expect("counters");
-    assert_eq!(kept, world.catalog.recount().await.expect("a recount"));
+    let counters = fixture.catalog.counters().await.expect("counters");
+    assert_eq!(
+        counters,
+        fixture.catalog.recount().await.expect("a recount")
+    );
 }
 
 #[tokio::test]
-async fn a_drain_finishes_the_stage_in_hand_and_gives_the_attempt_back() {
-    let world = RunFixture::new(&["wait_1", "wait_2"]).await;
+async fn a_drain_finishes_the_stage_in_progress_and_does_not_count_the_attempt() {
+    let fixture = RunFixture::new(&["wait_1", "wait_2"]).await;
     let options = options(1);
     let drain = async {
-        while world.executor.count("wait_1", Stage::Fit) == 0 {
+        while fixture.executor.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
-        assert_eq!(world.stop.escalate(), StopLevel::Drain);
-        world.executor.open();
+        assert_eq!(fixture.stop.escalate(), StopLevel::Drain);
+        fixture.executor.open();
     };
-    let (summary, ()) = tokio::join!(world.run(&options), drain);
+    let (summary, ()) = tokio::join!(fixture.run(&options), drain);
     assert_eq!(
         (summary.stages, summary.left, summary.stopped),
         (1, 2, true)
     );
-    let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
+    let detail = fixture.catalog.pair(&name("wait_1")).await.expect("a read");
     let detail = detail.expect("the pair");
     assert_eq!(
         (detail.results.status, detail.attempt),
         (JobStatus::Ready, 0)
     );
     assert_eq!(detail.results.next_stage, Some(Stage::Depth));
-    assert_eq!(world.executor.count("wait_2", Stage::Fit), 0);
+    assert_eq!(fixture.executor.count("wait_2", Stage::Fit), 0);
 }
 
 #[tokio::test]
-async fn a_second_stop_waits_for_nothing_and_leaves_all_resumable() {
-    let world = RunFixture::new(&["wait_1"]).await;
+async fn an_immediate_stop_leaves_every_pair_resumable() {
+    let fixture = RunFixture::new(&["wait_1"]).await;
     let options = options(1);
     let stop = async {
-        while world.executor.count("wait_1", Stage::Fit) == 0 {
+        while fixture.executor.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
-        world.stop.escalate();
-        assert_eq!(world.stop.escalate(), StopLevel::Now);
+        fixture.stop.escalate();
+        assert_eq!(fixture.stop.escalate(), StopLevel::Now);
     };
-    let (summary, ()) = tokio::join!(world.run(&options), stop);
+    let (summary, ()) = tokio::join!(fixture.run(&options), stop);
     assert_eq!((summary.stages, summary.stopped), (0, true));
-    let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
+    let detail = fixture.catalog.pair(&name("wait_1")).await.expect("a read");
     let detail = detail.expect("the pair");
     assert_eq!(
         (detail.results.status, detail.attempt, detail.crashes),
         (JobStatus::Ready, 0, 0)
     );
-    world.executor.open();
+    fixture.executor.open();
 }
 
 #[tokio::test]
 async fn too_many_failures_drain_the_run() {
-    let world = RunFixture::new(&["bad_1", "bad_2", "bad_3", "bad_4"]).await;
+    let fixture = RunFixture::new(&["bad_1", "bad_2", "bad_3", "bad_4"]).await;
     let few = RunOptions {
         max_failures: Some(2),
         ..options(1)
     };
-    let summary = world.run(&few).await;
+    let summary = fixture.run(&few).await;
     assert_eq!(
         (summary.failed, summary.too_many_failures, summary.left),
         (2, true, 2)
@@ -285,61 +294,61 @@ async fn too_many_failures_drain_the_run() {
 }
 
 #[tokio::test]
-async fn a_selection_runs_alone_and_an_unknown_name_runs_nothing() {
-    let world = RunFixture::new(&["a", "b", "c"]).await;
+async fn only_selected_pairs_run_and_an_unknown_name_is_an_error() {
+    let fixture = RunFixture::new(&["a", "b", "c"]).await;
     let some = |names: &[&str]| RunOptions {
         pairs: Some(names.iter().map(|text| name(text)).collect()),
         ..options(2)
     };
-    let refused = world.try_run(&some(&["b", "nobody"])).await;
+    let refused = fixture.try_run(&some(&["b", "nobody"])).await;
     assert!(matches!(refused, Err(RunError::NoSuchPair(names)) if names == [name("nobody")]));
-    assert_eq!(world.run(&some(&["b"])).await.done, 1);
-    assert_eq!(world.status("a").await, JobStatus::Ready);
-    assert_eq!(world.status("b").await, JobStatus::Done);
+    assert_eq!(fixture.run(&some(&["b"])).await.done, 1);
+    assert_eq!(fixture.status("a").await, JobStatus::Ready);
+    assert_eq!(fixture.status("b").await, JobStatus::Done);
 }
 
 #[tokio::test]
-async fn a_run_up_to_a_stage_stops_there() {
-    let world = RunFixture::new(&["a", "b"]).await;
+async fn a_run_up_to_a_stage_ends_there() {
+    let fixture = RunFixture::new(&["a", "b"]).await;
     let early = RunOptions {
         until: Stage::Depth,
         ..options(2)
     };
-    let summary = world.run(&early).await;
+    let summary = fixture.run(&early).await;
     assert_eq!((summary.done, summary.stages, summary.left), (2, 4, 0));
-    assert_eq!(world.run(&options(2)).await.stages, 4);
+    assert_eq!(fixture.run(&options(2)).await.stages, 4);
 }
 
 #[tokio::test]
-async fn what_a_dead_process_left_comes_back_at_once() {
-    let world = RunFixture::new(&["a", "b"]).await;
+async fn pairs_of_a_dead_process_are_recovered_at_once() {
+    let fixture = RunFixture::new(&["a", "b"]).await;
     let info = WorkerInfo {
         host: "here".to_owned(),
         pid: 1,
         boot_id: None,
     };
-    let ids = world.catalog.register_fingerprints(&fingerprints()).await;
-    let dead = world
+    let ids = fixture.catalog.register_fingerprints(&fingerprints()).await;
+    let dead = fixture
         .catalog
         .register_worker(info, ids.expect("fingerprints"), 1)
         .await
         .expect("a worker");
     let request = ClaimRequest::new(dead, 1, 1);
     assert_eq!(
-        world.catalog.claim(request).await.expect("a claim").len(),
+        fixture.catalog.claim(request).await.expect("a claim").len(),
         1
     );
-    assert_eq!(world.run(&options(2)).await.done, 2);
-    let events = world.events.lock().expect("no panic holds it");
+    assert_eq!(fixture.run(&options(2)).await.done, 2);
+    let events = fixture.events.lock().expect("an unpoisoned lock");
     let first = |like: fn(&RunEvent) -> bool| events.iter().position(like);
-    let rescued = first(|event| matches!(event, RunEvent::Recovered { pairs: 1 }));
-    let begun = first(|event| matches!(event, RunEvent::StageStarted { .. }));
-    assert!(rescued.is_some() && rescued < begun, "{events:?}");
+    let recovered = first(|event| matches!(event, RunEvent::Recovered { pairs: 1 }));
+    let started = first(|event| matches!(event, RunEvent::StageStarted { .. }));
+    assert!(recovered.is_some() && recovered < started, "{events:?}");
 }
 
 #[tokio::test]
 async fn a_second_run_is_refused_and_a_joined_one_shares_the_work() {
-    let world = RunFixture::new(&["wait_1", "b", "c", "d", "e", "f"]).await;
+    let fixture = RunFixture::new(&["wait_1", "b", "c", "d", "e", "f"]).await;
     let (one, joined) = (
         options(1),
         RunOptions {
@@ -348,53 +357,53 @@ async fn a_second_run_is_refused_and_a_joined_one_shares_the_work() {
         },
     );
     let others = async {
-        while world.executor.count("wait_1", Stage::Fit) == 0 {
+        while fixture.executor.count("wait_1", Stage::Fit) == 0 {
             tokio::task::yield_now().await;
         }
-        let refused = world.try_run(&one).await;
+        let refused = fixture.try_run(&one).await;
         let me = std::process::id();
         let in_use = format!("the project is in use by pid {me}");
         assert_eq!(refused.expect_err("in use").to_string(), in_use);
         let open = async {
-            while world.status("f").await != JobStatus::Done {
+            while fixture.status("f").await != JobStatus::Done {
                 tokio::task::yield_now().await;
             }
-            world.executor.open();
+            fixture.executor.open();
         };
-        tokio::join!(world.run(&joined), open).0
+        tokio::join!(fixture.run(&joined), open).0
     };
-    let (owner, joiner) = tokio::join!(world.run(&one), others);
+    let (owner, joiner) = tokio::join!(fixture.run(&one), others);
     assert_eq!(owner.done + joiner.done, 6);
     assert!(joiner.done >= 5);
-    assert_eq!(world.status("wait_1").await, JobStatus::Done);
+    assert_eq!(fixture.status("wait_1").await, JobStatus::Done);
 }
 
 #[tokio::test]
-async fn a_disk_that_refuses_ends_the_run_and_blames_no_pair() {
-    let world = RunFixture::new(&["a"]).await;
-    std::fs::write(world.project.artifacts_dir(), b"in the way").expect("a file");
-    let outcome = world.try_run(&options(1)).await;
+async fn a_disk_error_ends_the_run_and_fails_no_pair() {
+    let fixture = RunFixture::new(&["a"]).await;
+    std::fs::write(fixture.project.artifacts_dir(), b"in the way").expect("a file");
+    let outcome = fixture.try_run(&options(1)).await;
     assert!(matches!(outcome, Err(RunError::Artifact(_))), "{outcome:?}");
-    assert_eq!(world.status("a").await, JobStatus::Ready);
-    std::fs::remove_file(world.project.artifacts_dir()).expect("removed");
-    assert_eq!(world.run(&options(1)).await.done, 1);
+    assert_eq!(fixture.status("a").await, JobStatus::Ready);
+    std::fs::remove_file(fixture.project.artifacts_dir()).expect("removed");
+    assert_eq!(fixture.run(&options(1)).await.done, 1);
 }
 
-/// A pair that is past the last stage to run and backs off is nothing to wait for.
+/// A pair that backs off at a stage after the run's last one is not waited for.
 #[tokio::test]
-async fn a_run_up_to_a_stage_does_not_wait_for_a_later_one_to_be_tried_again() {
-    let world = RunFixture::new(&["breaks_1", "a"]).await;
+async fn a_run_up_to_a_stage_does_not_wait_for_the_retry_of_a_later_one() {
+    let fixture = RunFixture::new(&["breaks_1", "a"]).await;
     let first = RunOptions {
         pairs: Some(vec![name("breaks_1")]),
         ..options(1)
     };
     let stop = async {
-        while world.status("breaks_1").await != JobStatus::Backoff {
+        while fixture.status("breaks_1").await != JobStatus::Backoff {
             tokio::task::yield_now().await;
         }
-        world.stop.escalate();
+        fixture.stop.escalate();
     };
-    let (summary, ()) = tokio::join!(world.run(&first), stop);
+    let (summary, ()) = tokio::join!(fixture.run(&first), stop);
     assert_eq!((summary.stages, summary.left), (1, 1));
     let early = RunOptions {
         until: Stage::Fit,
@@ -402,13 +411,13 @@ async fn a_run_up_to_a_stage_does_not_wait_for_a_later_one_to_be_tried_again() {
     };
     let again = RunFixture {
         stop: Stop::new(),
-        ..world
+        ..fixture
     };
     let ended = tokio::time::timeout(Duration::from_secs(20), again.run(&early)).await;
-    let summary = ended.expect("it does not wait");
+    let summary = ended.expect("no timeout");
     assert_eq!((summary.done, summary.stages, summary.left), (1, 1, 0));
     assert_eq!(again.status("breaks_1").await, JobStatus::Backoff);
-    // The next run takes up what the stopped one left.
+    // The next run completes what the stopped one left.
     assert_eq!(again.run(&options(1)).await.done, 2);
     assert_eq!(again.executor.count("breaks_1", Stage::Depth), 2);
 }

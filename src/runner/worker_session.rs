@@ -19,7 +19,7 @@ pub(super) struct WorkerSession {
 
 /// What became of a heartbeat.
 #[derive(Debug)]
-pub(super) enum Heartbeat {
+pub(super) enum HeartbeatOutcome {
     /// The worker's leases are valid. The heartbeat was stored, or can be retried while they are.
     Alive,
     /// The heartbeat came after the leases had expired: another worker may hold them now.
@@ -44,7 +44,7 @@ impl WorkerSession {
     }
 
     /// Stores a heartbeat.
-    pub(super) async fn heartbeat(&mut self, context: &RunContext) -> Heartbeat {
+    pub(super) async fn heartbeat(&mut self, context: &RunContext) -> HeartbeatOutcome {
         let now = context.clock.now();
         let alive_since = context.alive_since();
         match context
@@ -54,15 +54,15 @@ impl WorkerSession {
         {
             Ok(true) => {
                 self.last_heartbeat = now;
-                Heartbeat::Alive
+                HeartbeatOutcome::Alive
             }
-            Ok(false) => Heartbeat::Expired,
+            Ok(false) => HeartbeatOutcome::Expired,
             Err(error) => {
                 tracing::warn!(%error, "the heartbeat could not be stored");
                 if self.last_heartbeat < alive_since {
-                    Heartbeat::Unwritable(error)
+                    HeartbeatOutcome::Unwritable(error)
                 } else {
-                    Heartbeat::Alive
+                    HeartbeatOutcome::Alive
                 }
             }
         }

@@ -1,7 +1,7 @@
 //! Which processes work on a project: locks of the operating system, which end with the process that holds them.
 //!
 //! The process that owns the run holds `run.lock` and writes its pid into it. Every process that works holds a shared
-//! lock on `run.members`: whoever gets an exclusive lock on it knows that no other worker is alive.
+//! lock on `run.members`: a process that gets an exclusive lock on it knows that no other worker is alive.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};

@@ -1,15 +1,15 @@
-/* Makes a chosen call of the operating system fail in the process it is loaded into.
+/* Makes chosen system calls fail in the process that preloads this library.
  *
  * FAULT_CALL     open, read, write, sync, rename, truncate, unlink, mkdir or lock
- * FAULT_PATH     pattern (fnmatch) that the file's whole path must match; of a rename, either path
- * FAULT_NTH      which of the matching calls, from 1; 0 for none
- * FAULT_TIMES    how many from there on, 1 when left out; 0 for all
- * FAULT_ERROR    number of the error; 0 lets the call through
- * FAULT_SHORT    set: the first of them writes half of the bytes and says so, as a nearly full disk does
- * FAULT_DELAY_MS milliseconds that each of them is held up first
- * FAULT_NO_SLEEP set: the process never sleeps, so that one that waits for a lock is through with it at once
+ * FAULT_PATH     pattern (fnmatch) for the file's absolute path; for a rename, for either path
+ * FAULT_NTH      number of the first matching call that fails, from 1; 0 for none
+ * FAULT_TIMES    number of calls that fail from there on, 1 by default; 0 for all
+ * FAULT_ERROR    error number; with 0 the call succeeds
+ * FAULT_SHORT    if set, the first of these calls writes half of its bytes, like on a nearly full disk
+ * FAULT_DELAY_MS delay before each of these calls in milliseconds
+ * FAULT_NO_SLEEP if set, the process never sleeps, so that waiting for a lock takes no time
  * FAULT_LOG      file that gets a line for every matching call
- * FAULT_MARK     file that gets a line for every call that was struck
+ * FAULT_MARK     file that gets a line for every call with an injected fault
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -36,13 +36,13 @@ static struct {
     int error, half, no_sleep;
 } plan;
 
-static atomic_long seen;
+static atomic_long calls;
 
 static void *real(const char *name) { return dlsym(RTLD_NEXT, name); }
 
-static long number(const char *name, long otherwise) {
+static long number(const char *name, long fallback) {
     const char *text = getenv(name);
-    return text ? atol(text) : otherwise;
+    return text ? atol(text) : fallback;
 }
 
 __attribute__((constructor)) static void read_plan(void) {
@@ -58,7 +58,7 @@ __attribute__((constructor)) static void read_plan(void) {
     plan.no_sleep = getenv("FAULT_NO_SLEEP") != NULL;
 }
 
-/* Adds a line to a file, past our own calls. */
+/* Adds a line to a file by raw system calls, which this library does not intercept. */
 static void note(const char *file, const char *call, const char *path) {
     char line[PATH_MAX + 32];
     int length = snprintf(line, sizeof line, "%s %s\n", call, path);
@@ -71,7 +71,7 @@ static void note(const char *file, const char *call, const char *path) {
 
 enum verdict { PASS, FAIL, HALF };
 
-/* What is to become of a call; sets errno where it is to fail. */
+/* Decides about a call; sets errno if it is to fail. */
 static enum verdict judge(const char *call, const char *path, const char *other) {
     if (!plan.call || !plan.path || strcmp(call, plan.call) != 0) {
         return PASS;
@@ -80,7 +80,7 @@ static enum verdict judge(const char *call, const char *path, const char *other)
         return PASS;
     }
     int before = errno;
-    long which = atomic_fetch_add(&seen, 1) + 1;
+    long which = atomic_fetch_add(&calls, 1) + 1;
     if (plan.log) {
         note(plan.log, call, path);
     }
@@ -102,7 +102,7 @@ static enum verdict judge(const char *call, const char *path, const char *other)
     return plan.error ? FAIL : PASS;
 }
 
-/* The same for a call on an open file. */
+/* Decides about a call on an open file. */
 static enum verdict judge_file(const char *call, int fd) {
     if (!plan.call || strcmp(call, plan.call) != 0) {
         return PASS;
@@ -169,13 +169,13 @@ int unlink(const char *path) { return judge("unlink", path, NULL) == FAIL ? -1 :
 
 int mkdir(const char *path, mode_t mode) { return judge("mkdir", path, NULL) == FAIL ? -1 : REAL(mkdir)(path, mode); }
 
-/* Whether another process may hold SQLite's lock against us for long: to write, to recover, to fold the log back. The
- * marks of readers, bytes 124 to 127 of the index, are never held so for more than an instant. */
+/* Returns whether another process may hold this SQLite lock for long: to write, to recover, or to checkpoint the WAL. The
+ * read marks, bytes 124 to 127 of the index, are locked exclusively for an instant only. */
 static int is_contended(const struct flock *lock) {
     return lock->l_type == F_WRLCK && (lock->l_start < 124 || lock->l_start > 127);
 }
 
-/* Both names of the call lead here. */
+/* Implements fcntl and fcntl64. */
 static int control(const char *name, int fd, int command, void *argument) {
     if (command == F_SETLK && is_contended(argument) && judge_file("lock", fd) == FAIL) {
         return -1;

@@ -1,12 +1,11 @@
-/* Writes down, in the process it is loaded into, what a disk that loses its power would still hold.
+/* Records, in the process that preloads this library, what a disk would hold after a power cut.
  *
- * SHADOW_OF  the folder that is watched, without links in its path
- * SHADOW_IN  where it is written down, outside of it
+ * SHADOW_OF  the folder to watch, without links in its path
+ * SHADOW_IN  the folder for the record, outside of SHADOW_OF
  *
- * Every successful sync of a file or folder below SHADOW_OF adds one line, `NUMBER file INODE` or
- * `NUMBER folder INODE`, to SHADOW_IN/log; NUMBER.file holds the synced bytes, and NUMBER.names the names that there
- * are in all folders at that moment, lines of `FOLDER-INODE INODE d|f NAME`.
- * A synced file stays open, so that no other file gets its inode.
+ * Every successful sync of a file or folder below SHADOW_OF adds a line `NUMBER file INODE` or `NUMBER folder INODE` to
+ * SHADOW_IN/log. NUMBER.file holds the synced bytes, and NUMBER.names all names at that time, in lines of
+ * `FOLDER-INODE INODE d|f NAME`. A synced file stays open, so that no other file gets its inode.
  */
 #define _GNU_SOURCE
 #include <dirent.h>
@@ -21,18 +20,18 @@
 #include <unistd.h>
 
 static const char *watched, *notes;
-static pthread_mutex_t turn = PTHREAD_MUTEX_INITIALIZER;
+static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
 static long number;
-static ino_t held[65536];
-static size_t holds;
+static ino_t open_inodes[65536];
+static size_t open_count;
 
 __attribute__((constructor)) static void begin(void) {
     watched = getenv("SHADOW_OF");
     notes = getenv("SHADOW_IN");
 }
 
-static void must(int holds_true, const char *what) {
-    if (!holds_true) {
+static void must(int condition, const char *what) {
+    if (!condition) {
         perror(what);
         abort();
     }
@@ -58,18 +57,18 @@ static int is_below(int fd) {
     return strncmp(path, watched, root) == 0 && (path[root] == '/' || path[root] == 0);
 }
 
-static void hold(int fd, ino_t inode) {
-    for (size_t i = 0; i < holds; i++) {
-        if (held[i] == inode) {
+static void keep_open(int fd, ino_t inode) {
+    for (size_t i = 0; i < open_count; i++) {
+        if (open_inodes[i] == inode) {
             return;
         }
     }
-    must(holds < sizeof held / sizeof *held && fcntl(fd, F_DUPFD_CLOEXEC, 0) >= 0, "a file held open");
-    held[holds++] = inode;
+    must(open_count < sizeof open_inodes / sizeof *open_inodes && fcntl(fd, F_DUPFD_CLOEXEC, 0) >= 0, "a file kept open");
+    open_inodes[open_count++] = inode;
 }
 
-/* A file that may only be written is opened anew to be read. That is never closed: closing it would give back SQLite's
- * locks on the file. */
+/* Copies the bytes of a file. A write-only file is opened again to be read, and that descriptor is never closed, because
+ * closing it would release SQLite's locks on the file. */
 static void copy_bytes(int fd) {
     char name[32], link[64], bytes[65536];
     snprintf(name, sizeof name, "%ld.file", number);
@@ -88,7 +87,7 @@ static void list(FILE *out, const char *path) {
     struct stat folder;
     DIR *open = opendir(path);
     if (!open || fstat(dirfd(open), &folder) != 0) {
-        /* Gone since its name was read. */
+        /* Removed since its name was read. */
         if (open) {
             closedir(open);
         }
@@ -110,12 +109,12 @@ static void list(FILE *out, const char *path) {
     closedir(open);
 }
 
-static void write_down(int fd) {
+static void record(int fd) {
     struct stat found;
     must(fstat(fd, &found) == 0, "a synced file");
     int is_folder = S_ISDIR(found.st_mode);
     number++;
-    hold(fd, found.st_ino);
+    keep_open(fd, found.st_ino);
     if (!is_folder) {
         copy_bytes(fd);
     }
@@ -134,13 +133,13 @@ static int sync_with(const char *name, int fd) {
     if (!watched || !notes || !is_below(fd)) {
         return real(fd);
     }
-    pthread_mutex_lock(&turn);
-    int outcome = real(fd);
-    if (outcome == 0) {
-        write_down(fd);
+    pthread_mutex_lock(&mutex);
+    int result = real(fd);
+    if (result == 0) {
+        record(fd);
     }
-    pthread_mutex_unlock(&turn);
-    return outcome;
+    pthread_mutex_unlock(&mutex);
+    return result;
 }
 
 int fsync(int fd) { return sync_with("fsync", fd); }

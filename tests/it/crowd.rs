@@ -1,5 +1,5 @@
-//! A crowd of hostile pairs through the real binary, good ones among them: each is told in a sentence, none stops the
-//! others, and the good ones come out as if they were alone. `MOCBAN_HOSTILE` says how many.
+//! Many hostile pairs with a few good ones among them: each hostile pair is reported in one sentence, none stops the
+//! others, and the good pairs have the same results as without them. `MOCBAN_HOSTILE` sets the number of hostile pairs.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,11 +18,11 @@ use crate::hostile_pairs::{HostilePair, HostilePairs};
 use crate::sample_files::assert_one_sentence;
 use crate::test_size::size_from_env;
 
-/// Good pairs in the crowd.
+/// Number of good pairs among the hostile ones.
 const GOOD: u64 = 2;
-/// What a run is given and may take, far less than the headers of its files ask for.
+/// Memory limit of a run, and most that it may take: far less than the headers of its files ask for.
 const MEMORY_MIB: u64 = 256;
-/// Longest time for a stage, seconds.
+/// Longest time for a stage in seconds.
 const STAGE_LIMIT_S: u64 = 60;
 
 fn good_pairs(dir: &Path) -> Vec<ManifestRow> {
@@ -35,7 +35,7 @@ fn good_pairs(dir: &Path) -> Vec<ManifestRow> {
     parse_csv(&fs::read(files.manifest).expect("a manifest")).expect("rows")
 }
 
-/// Lists the hostile pairs with the good ones spread among them, and the good ones alone.
+/// Writes a manifest of the hostile pairs with the good ones spread among them, and one of the good ones alone.
 fn write_lists(dir: &Path, hostile: &[HostilePair]) {
     let good = good_pairs(dir);
     let row = |id: &str, mesh: &Path, print: &Path| {
@@ -60,7 +60,7 @@ fn write_lists(dir: &Path, hostile: &[HostilePair]) {
     fs::write(dir.join("alone.csv"), alone).expect("written");
 }
 
-/// Calls the binary and looks at its memory while it works: the code and both streams, and the most it held in KiB.
+/// Runs the binary and watches its memory; returns the exit code with both streams, and the peak in KiB.
 pub(crate) fn watched(dir: &Path, args: &[&str]) -> (Call, u64) {
     let mut command = binary();
     command
@@ -82,17 +82,17 @@ pub(crate) fn watched(dir: &Path, args: &[&str]) -> (Call, u64) {
     std::thread::scope(|scope| {
         let out = scope.spawn(|| read(&mut streams.0));
         let err = scope.spawn(|| read(&mut streams.1));
-        let mut most = 0;
+        let mut peak = 0;
         let code = loop {
-            // The kernel keeps the peak; it goes with the process, so it is asked for now and then.
-            most = most.max(peak_kib(&status).unwrap_or(0));
+            // The kernel's record of the peak ends with the process, so it is read repeatedly.
+            peak = peak.max(peak_kib(&status).unwrap_or(0));
             if let Some(code) = child.try_wait().expect("waited for") {
                 break code.code().expect("no signal");
             }
             std::thread::sleep(Duration::from_millis(5));
         };
         let (out, err) = (out.join().expect("read"), err.join().expect("read"));
-        (Call { code, out, err }, most)
+        (Call { code, out, err }, peak)
     })
 }
 
@@ -106,7 +106,7 @@ fn peak_kib(status: &Path) -> Option<u64> {
     line.trim().strip_suffix(" kB")?.parse().ok()
 }
 
-/// The lines of an export by pair, in their order.
+/// Returns the lines of an export by pair, in their order.
 fn lines(export: &Path) -> BTreeMap<String, Vec<Value>> {
     let text = fs::read_to_string(export.join("pairs.jsonl")).expect("an export");
     let mut lines: BTreeMap<String, Vec<Value>> = BTreeMap::new();
@@ -118,7 +118,7 @@ fn lines(export: &Path) -> BTreeMap<String, Vec<Value>> {
     lines
 }
 
-/// No words of a panic, of Rust or of the database on either stream.
+/// Asserts that neither stream has text of a panic, of Rust's debug format or of the database.
 #[track_caller]
 fn assert_plain(call: &Call) {
     for stream in [&call.out, &call.err] {
@@ -136,8 +136,8 @@ fn assert_plain(call: &Call) {
     }
 }
 
-/// One sentence with the file that is to blame, and a class that is no defect of ours.
-fn assert_told(pair: &HostilePair, line: &Value) {
+/// Asserts that the error is one sentence with the faulty file, and that its class is not that of a bug.
+fn assert_reported(pair: &HostilePair, line: &Value) {
     let (class, message) = (
         &line["error_class"],
         line["error"].as_str().unwrap_or_default(),
@@ -159,8 +159,8 @@ fn assert_told(pair: &HostilePair, line: &Value) {
     assert!(named, "{}: {message}", pair.id);
 }
 
-/// The good pairs alone, in a project of their own: what their export holds.
-fn alone(dir: &Path) -> PathBuf {
+/// Runs the good pairs in another project; returns the folder of its export.
+fn export_good_pairs(dir: &Path) -> PathBuf {
     mocban(dir, &["-C", "clean", "import", "data/alone.csv"]).expect(0);
     mocban(dir, &["-C", "clean", "run"]).expect(0);
     mocban(dir, &["-C", "clean", "export", "-o", "clean-out"]).expect(0);
@@ -168,23 +168,23 @@ fn alone(dir: &Path) -> PathBuf {
 }
 
 #[test]
-fn a_crowd_of_hostile_pairs_harms_nobody_and_is_told_pair_by_pair() {
+fn many_hostile_pairs_are_reported_one_by_one_and_change_no_other_result() {
     let count = size_from_env("MOCBAN_HOSTILE", 240);
     let dir = empty();
     let data = dir.path().join("data");
     fs::create_dir(&data).expect("a folder");
-    let mut maker = HostilePairs::new(&data, 4);
-    let hostile: Vec<_> = (0..count).map(|_| maker.make()).collect();
+    let mut generator = HostilePairs::new(&data, 4);
+    let hostile: Vec<_> = (0..count).map(|_| generator.make()).collect();
     write_lists(&data, &hostile);
 
-    let begun = Instant::now();
+    let start = Instant::now();
     let (imported, import_kib) = watched(dir.path(), &["import", "data/crowd.csv"]);
     assert_plain(&imported.expect(0));
     let limit = format!("run.stage_timeout_s={STAGE_LIMIT_S}");
     let memory = format!("{MEMORY_MIB}M");
     let (ran, run_kib) = watched(dir.path(), &["--set", &limit, "run", "--memory", &memory]);
     assert_plain(&ran.expect(3));
-    let took = begun.elapsed();
+    let elapsed = start.elapsed();
     assert!(run_kib >> 10 < MEMORY_MIB, "{} MiB", run_kib >> 10);
 
     let status = mocban(dir.path(), &["status", "--json"]).expect(0).json();
@@ -204,32 +204,32 @@ fn a_crowd_of_hostile_pairs_harms_nobody_and_is_told_pair_by_pair() {
     mocban(dir.path(), &["check"]).expect(0);
 
     let out = dir.path().join("out");
-    let told = lines(&out);
+    let exported = lines(&out);
     let mut classes: BTreeMap<String, u64> = BTreeMap::new();
     for pair in &hostile {
-        let line = &told[&pair.id][0];
+        let line = &exported[&pair.id][0];
         if line["status"] == "done" {
             continue;
         }
-        assert_told(pair, line);
+        assert_reported(pair, line);
         *classes.entry(line["error_class"].to_string()).or_default() += 1;
     }
-    let clean = alone(dir.path());
+    let clean = export_good_pairs(dir.path());
     for (id, line) in lines(&clean) {
-        assert_eq!(told[&id], line);
+        assert_eq!(exported[&id], line);
         let folder = Path::new("pairs").join(&id);
-        let (beside, alone) = (below(&out.join(&folder)), below(&clean.join(&folder)));
+        let (among, alone) = (below(&out.join(&folder)), below(&clean.join(&folder)));
         let names = |files: &[(PathBuf, Vec<u8>)]| {
             files.iter().map(|file| file.0.clone()).collect::<Vec<_>>()
         };
-        assert_eq!(names(&beside), names(&alone), "{id}");
-        for (beside, alone) in beside.iter().zip(&alone) {
-            assert!(beside == alone, "{id}: {}", alone.0.display());
+        assert_eq!(names(&among), names(&alone), "{id}");
+        for (among, alone) in among.iter().zip(&alone) {
+            assert!(among == alone, "{id}: {}", alone.0.display());
         }
     }
     eprintln!(
         "{count} hostile pairs in {:.1} s: {done} done, {classes:?}; peak {} MiB in import, {} MiB in run",
-        took.as_secs_f64(),
+        elapsed.as_secs_f64(),
         import_kib >> 10,
         run_kib >> 10
     );

@@ -1,4 +1,4 @@
-//! A fault of the disk, as `tests/faults/faults.c` brings it about.
+//! Disk faults that `tests/faults/faults.c` injects.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -7,24 +7,24 @@ use std::process::Command;
 
 use crate::shim::FAULTS;
 
-/// The disk refused.
+/// Input/output error.
 pub(crate) const EIO: i32 = 5;
-/// Somebody else holds the lock.
+/// Another process holds the lock.
 pub(crate) const EAGAIN: i32 = 11;
 /// The disk is full.
 pub(crate) const ENOSPC: i32 = 28;
 
-/// Calls of the operating system that fail.
+/// System calls that fail.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Fault {
     call: &'static str,
     /// Which files, as a pattern.
     path: &'static str,
-    /// 0 where the calls are let through in the end.
+    /// The error number; 0 where the calls succeed in the end.
     error: i32,
-    /// How many fail, 0 for all from there on.
+    /// How many calls fail; 0 for all from the first one on.
     times: u32,
-    /// The first writes half of its bytes instead.
+    /// The first call writes only half of its bytes.
     half: bool,
     delay_ms: u32,
 }
@@ -42,37 +42,37 @@ impl Fault {
         }
     }
 
-    /// One call that writes half of what it should.
+    /// One call that writes half of its bytes.
     pub(crate) const fn half(path: &'static str) -> Self {
         Self::once("write", path, 0).half_first()
     }
 
-    /// Every call takes so long.
+    /// Every call takes this long.
     pub(crate) const fn slow(call: &'static str, path: &'static str, delay_ms: u32) -> Self {
         Self {
             delay_ms,
-            ..Self::once(call, path, 0).on()
+            ..Self::once(call, path, 0).and_later()
         }
     }
 
-    /// And all after it.
-    pub(crate) const fn on(self) -> Self {
+    /// Also all calls after the first.
+    pub(crate) const fn and_later(self) -> Self {
         self.times(0)
     }
 
-    /// So many in a row.
+    /// This many calls in a row.
     pub(crate) const fn times(self, times: u32) -> Self {
         Self { times, ..self }
     }
 
-    /// The first writes half of its bytes before the others fail.
+    /// The first call writes half of its bytes before the others fail.
     pub(crate) const fn half_first(self) -> Self {
         Self { half: true, ..self }
     }
 
-    /// Lets the n-th call of a command fail, none for 0. The pattern is one of paths below `root`; calls and those
-    /// that were struck are noted in `notes`.
-    pub(crate) fn strike<'c>(
+    /// Makes the n-th matching call of a command fail; none with 0. The pattern is relative to `root`; matching calls and
+    /// injected faults are logged in `notes`.
+    pub(crate) fn inject<'c>(
         &self,
         nth: usize,
         root: &Path,
@@ -92,17 +92,17 @@ impl Fault {
             .env("FAULT_DELAY_MS", self.delay_ms.to_string())
             .env("FAULT_NO_SLEEP", "1")
             .env("FAULT_LOG", notes.join("calls"))
-            .env("FAULT_MARK", notes.join("struck"))
+            .env("FAULT_MARK", notes.join("injected"))
     }
 
-    /// How many calls a command made that it could have struck.
+    /// Returns how many matching calls a command made.
     pub(crate) fn calls(notes: &Path) -> usize {
         lines(&notes.join("calls"))
     }
 
-    /// How many it struck.
-    pub(crate) fn struck(notes: &Path) -> usize {
-        lines(&notes.join("struck"))
+    /// Returns how many faults were injected.
+    pub(crate) fn injected(notes: &Path) -> usize {
+        lines(&notes.join("injected"))
     }
 }
 
@@ -134,7 +134,7 @@ fn lines(file: &Path) -> usize {
     std::fs::read_to_string(file).map_or(0, |text| text.lines().count())
 }
 
-/// So many numbers from 1 to the last, evenly; the one in the middle when it is one.
+/// Returns `wanted` numbers from 1 to `last`, evenly spaced; for one, the middle.
 pub(crate) fn spread(last: usize, wanted: usize) -> BTreeSet<usize> {
     match wanted.min(last) {
         0 | 1 => BTreeSet::from([last.div_ceil(2)]),

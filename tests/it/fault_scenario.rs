@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::cli::{Call, call};
 use crate::fault::{Fault, spread};
 use crate::test_size::size_from_env;
-use crate::unbroken::World;
+use crate::uninterrupted::Comparison;
 
 /// The expected outcome of a command under a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,19 +22,19 @@ pub(crate) enum End {
 /// A command that runs while the disk fails.
 pub(crate) struct FaultScenario {
     /// Prepares a directory for the command.
-    pub(crate) before: fn(&World, &Path),
+    pub(crate) before: fn(&Comparison, &Path),
     /// Returns the command for that directory.
     pub(crate) command: fn(&Path) -> Command,
     /// Checks the state after the command, given whether it succeeded, and completes the work.
-    pub(crate) after: fn(&World, &Path, bool),
+    pub(crate) after: fn(&Comparison, &Path, bool),
 }
 
 impl FaultScenario {
     /// Counts the calls of the fault's kind in a run without faults.
-    fn calls(&self, world: &World, fault: &Fault) -> usize {
-        let (root, notes) = (world.folder("counted"), world.folder("notes"));
-        (self.before)(world, &root);
-        call(fault.strike(0, &root, &notes, &mut (self.command)(&root))).expect(0);
+    fn calls(&self, comparison: &Comparison, fault: &Fault) -> usize {
+        let (root, notes) = (comparison.folder("counted"), comparison.folder("notes"));
+        (self.before)(comparison, &root);
+        call(fault.inject(0, &root, &notes, &mut (self.command)(&root))).expect(0);
         let calls = Fault::calls(&notes);
         assert!(calls > 0, "{fault}: the command makes no such call");
         calls
@@ -42,28 +42,28 @@ impl FaultScenario {
 
     /// Runs the command with a fault at the n-th call, then checks and completes it without faults. Returns the exit
     /// code, or `None` when the command made fewer calls.
-    fn check(&self, world: &World, fault: &Fault, nth: usize, end: End) -> Option<i32> {
-        let (root, notes) = (world.folder("struck"), world.folder("notes"));
-        (self.before)(world, &root);
-        let result = call(fault.strike(nth, &root, &notes, &mut (self.command)(&root)));
-        if Fault::struck(&notes) == 0 {
+    fn check(&self, comparison: &Comparison, fault: &Fault, nth: usize, end: End) -> Option<i32> {
+        let (root, notes) = (comparison.folder("injected"), comparison.folder("notes"));
+        (self.before)(comparison, &root);
+        let result = call(fault.inject(nth, &root, &notes, &mut (self.command)(&root)));
+        if Fault::injected(&notes) == 0 {
             return None;
         }
         let at = format!("{fault}, call {nth}: code {}, {}", result.code, result.err);
         assert_outcome(&result, end, &root, &at);
-        (self.after)(world, &root, result.code == 0);
+        (self.after)(comparison, &root, result.code == 0);
         Some(result.code)
     }
 
     /// Injects each fault at `points` calls, spread evenly over all calls it applies to.
     #[expect(clippy::print_stderr, reason = "figures of the long test")]
     pub(crate) fn check_all(&self, faults: &[(Fault, End)], points: usize) {
-        let world = World::new("1");
+        let comparison = Comparison::new("1");
         for (fault, end) in faults {
-            let calls = self.calls(&world, fault);
+            let calls = self.calls(&comparison, fault);
             let chosen = spread(calls, points);
             let codes: Vec<_> = (chosen.iter())
-                .map(|nth| self.check(&world, fault, *nth, *end))
+                .map(|nth| self.check(&comparison, fault, *nth, *end))
                 .collect();
             let injected = codes.iter().flatten().count();
             assert!(injected > 0, "{fault}: no fault was injected");

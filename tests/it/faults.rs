@@ -1,5 +1,6 @@
-//! Faults of the disk under the real binary: what fails says so in a sentence and leaves nothing half-made, and the
-//! next call ends as if nothing had been. `MOCBAN_FAULT_MOMENTS` says at how many calls each strikes: 24 take minutes.
+//! Disk faults while the binary runs: a command that fails says so in one sentence and leaves nothing incomplete, and the
+//! next command succeeds as if there had been no fault. `MOCBAN_FAULT_MOMENTS` sets at how many system calls each fault is
+//! injected; 24 take minutes.
 
 use std::path::Path;
 use std::process::Command;
@@ -10,7 +11,7 @@ use crate::cli::{binary, call, mocban};
 use crate::fault::{EAGAIN, EIO, ENOSPC, Fault};
 use crate::fault_scenario::{End, FaultScenario, fault_points};
 use crate::resume::{copy, copy_folder, run};
-use crate::unbroken::{World, files};
+use crate::uninterrupted::{Comparison, files};
 
 const WAL: &str = "p/catalog.sqlite-wal";
 const INDEX: &str = "p/catalog.sqlite-shm";
@@ -18,22 +19,25 @@ const CATALOG: &str = "p/catalog.sqlite";
 const TEMPORARY: &str = "p/artifacts/tmp/*";
 const PLACED: &str = "p/artifacts/??/*";
 
-/// The catalog's faults in a run.
+/// Faults of the catalog's files during a run.
 const OF_THE_CATALOG: &[(Fault, End)] = &[
     (Fault::once("write", WAL, ENOSPC), End::Fails),
-    (Fault::once("write", WAL, EIO).on(), End::Fails),
+    (Fault::once("write", WAL, EIO).and_later(), End::Fails),
     (Fault::half(WAL), End::Succeeds),
     (
-        Fault::once("write", WAL, ENOSPC).on().half_first(),
+        Fault::once("write", WAL, ENOSPC).and_later().half_first(),
         End::Fails,
     ),
     (Fault::once("sync", WAL, EIO), End::Either),
-    (Fault::once("sync", WAL, EIO).on(), End::Either),
+    (Fault::once("sync", WAL, EIO).and_later(), End::Either),
     (Fault::once("open", WAL, EIO), End::Either),
     (Fault::once("unlink", WAL, EIO), End::Succeeds),
     (Fault::once("truncate", WAL, EIO), End::Succeeds),
     (Fault::once("write", CATALOG, EIO), End::Succeeds),
-    (Fault::once("write", CATALOG, ENOSPC).on(), End::Succeeds),
+    (
+        Fault::once("write", CATALOG, ENOSPC).and_later(),
+        End::Succeeds,
+    ),
     (Fault::once("sync", CATALOG, EIO), End::Succeeds),
     (Fault::once("read", CATALOG, EIO), End::Fails),
     (Fault::once("open", CATALOG, EIO), End::Either),
@@ -41,18 +45,23 @@ const OF_THE_CATALOG: &[(Fault, End)] = &[
     (Fault::once("write", INDEX, ENOSPC), End::Fails),
 ];
 
-/// The faults of everything else that a run writes.
+/// Faults of the other files during a run.
 const OF_THE_FILES: &[(Fault, End)] = &[
     (Fault::once("open", TEMPORARY, ENOSPC), End::Fails),
     (Fault::once("write", TEMPORARY, ENOSPC), End::Fails),
     (Fault::half(TEMPORARY), End::Succeeds),
     (
-        Fault::once("write", TEMPORARY, ENOSPC).on().half_first(),
+        Fault::once("write", TEMPORARY, ENOSPC)
+            .and_later()
+            .half_first(),
         End::Fails,
     ),
     (Fault::once("sync", TEMPORARY, EIO), End::Fails),
     (Fault::once("rename", PLACED, EIO), End::Fails),
-    (Fault::once("rename", PLACED, ENOSPC).on(), End::Fails),
+    (
+        Fault::once("rename", PLACED, ENOSPC).and_later(),
+        End::Fails,
+    ),
     (Fault::once("sync", "p/artifacts/??", EIO), End::Fails),
     (Fault::once("sync", "p/artifacts", EIO), End::Fails),
     (Fault::once("mkdir", "p/artifacts*", ENOSPC), End::Fails),
@@ -60,8 +69,8 @@ const OF_THE_FILES: &[(Fault, End)] = &[
     (Fault::once("write", "p/run.*", ENOSPC), End::Fails),
     (Fault::once("open", "p/run.*", EIO), End::Fails),
     (Fault::once("open", "p/data/*", EIO), End::Either),
-    (Fault::once("write", "*", ENOSPC).on(), End::Either),
-    (Fault::once("sync", "*", EIO).on(), End::Either),
+    (Fault::once("write", "*", ENOSPC).and_later(), End::Either),
+    (Fault::once("sync", "*", EIO).and_later(), End::Either),
     (Fault::slow("sync", "*", 5), End::Succeeds),
 ];
 
@@ -72,17 +81,17 @@ const OF_AN_IMPORT: &[(Fault, End)] = &[
         Fault::once("write", "p/catalog.sqlite*", ENOSPC),
         End::Either,
     ),
-    (Fault::once("write", "*", ENOSPC).on(), End::Either),
+    (Fault::once("write", "*", ENOSPC).and_later(), End::Either),
     (Fault::half("p/catalog.sqlite*"), End::Succeeds),
     (Fault::once("sync", "*", EIO), End::Either),
-    (Fault::once("sync", "*", EIO).on(), End::Either),
+    (Fault::once("sync", "*", EIO).and_later(), End::Either),
 ];
 
 /// Faults of an export.
 const OF_AN_EXPORT: &[(Fault, End)] = &[
     (Fault::once("open", ".out*", ENOSPC), End::Fails),
     (Fault::once("write", ".out*", ENOSPC), End::Fails),
-    (Fault::once("write", "*", EIO).on(), End::Fails),
+    (Fault::once("write", "*", EIO).and_later(), End::Fails),
     (Fault::half(".out*"), End::Succeeds),
     (Fault::once("mkdir", ".out*", ENOSPC), End::Fails),
     (Fault::once("rename", "out", EIO), End::Fails),
@@ -93,10 +102,10 @@ const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("open", ".b.*", ENOSPC), End::Either),
     (Fault::once("write", ".b.*", ENOSPC), End::Fails),
     (Fault::once("write", ".b.v*", ENOSPC), End::Fails),
-    (Fault::once("write", "*", EIO).on(), End::Fails),
+    (Fault::once("write", "*", EIO).and_later(), End::Fails),
     (Fault::half(".b.v*"), End::Succeeds),
     (Fault::once("sync", ".b.*", EIO), End::Fails),
-    (Fault::once("sync", "*", EIO).on(), End::Fails),
+    (Fault::once("sync", "*", EIO).and_later(), End::Fails),
     (Fault::once("rename", "b.sqlite", EIO), End::Fails),
     (Fault::once("rename", "b.v*", EIO), End::Fails),
     (Fault::once("rename", "b.m*", EIO), End::Fails),
@@ -105,16 +114,16 @@ const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("read", CATALOG, EIO), End::Fails),
 ];
 
-/// Faults of a check: what cannot be read is not said to be damaged.
+/// Faults of a check: a file that cannot be read is not reported as damaged.
 const OF_A_CHECK: &[(Fault, End)] = &[
     (Fault::once("read", CATALOG, EIO), End::Either),
-    (Fault::once("read", CATALOG, EIO).on(), End::Fails),
+    (Fault::once("read", CATALOG, EIO).and_later(), End::Fails),
 ];
 
 /// Faults of a repair.
 const OF_A_REPAIR: &[(Fault, End)] = &[
     (Fault::once("write", WAL, ENOSPC), End::Fails),
-    (Fault::once("write", WAL, EIO).on(), End::Fails),
+    (Fault::once("write", WAL, EIO).and_later(), End::Fails),
     (Fault::half(WAL), End::Succeeds),
     (Fault::once("sync", WAL, EIO), End::Either),
     (Fault::once("open", CATALOG, EIO), End::Either),
@@ -122,10 +131,10 @@ const OF_A_REPAIR: &[(Fault, End)] = &[
     (Fault::once("open", PLACED, EIO), End::Succeeds),
     (Fault::once("unlink", PLACED, EIO), End::Succeeds),
     (Fault::once("open", "p/run.*", EIO), End::Fails),
-    (Fault::once("write", "*", ENOSPC).on(), End::Fails),
+    (Fault::once("write", "*", ENOSPC).and_later(), End::Fails),
 ];
 
-/// Locks that are not to be had for so many tries: SQLite gives up after about a hundred.
+/// Locks that are refused for many attempts: SQLite itself gives up after about a hundred.
 const LOCKED: &[(Fault, End)] = &[
     (Fault::once("lock", INDEX, EAGAIN).times(300), End::Succeeds),
     (
@@ -135,22 +144,22 @@ const LOCKED: &[(Fault, End)] = &[
 ];
 
 const RUN: FaultScenario = FaultScenario {
-    before: |world, root| {
-        copy(&world.fresh, &root.join("p"));
+    before: |comparison, root| {
+        copy(&comparison.fresh, &root.join("p"));
     },
     command: |root| run(&Project::at(&root.join("p")), &["-j", "1"]),
-    after: |world, root, done| {
+    after: |comparison, root, done| {
         mocban(root, &["-C", "p", "check"]).expect(0);
         let project = Project::at(&root.join("p"));
         if !done {
             call(&mut run(&project, &[])).expect(0);
             mocban(root, &["-C", "p", "check"]).expect(0);
         }
-        world.wanted.is_met_by(&project);
+        comparison.expected.assert_met_by(&project);
     },
 };
 
-/// Imports the data of a project into a new one.
+/// Returns the command that imports the data of a project into a new one.
 fn import(root: &Path) -> Command {
     let mut command = binary();
     let (project, data) = (root.join("p"), root.join("p/data"));
@@ -161,11 +170,11 @@ fn import(root: &Path) -> Command {
 }
 
 const IMPORT: FaultScenario = FaultScenario {
-    before: |world, root| {
-        copy_folder(&world.fresh.dir().join("data"), &root.join("p/data"));
+    before: |comparison, root| {
+        copy_folder(&comparison.fresh.dir().join("data"), &root.join("p/data"));
     },
     command: import,
-    after: |world, root, done| {
+    after: |comparison, root, done| {
         let files = || -> Vec<_> {
             std::fs::read_dir(root.join("p"))
                 .expect("a folder")
@@ -177,11 +186,11 @@ const IMPORT: FaultScenario = FaultScenario {
         }
         let project = Project::at(&root.join("p"));
         call(&mut run(&project, &[])).expect(0);
-        world.wanted.is_met_by(&project);
+        comparison.expected.assert_met_by(&project);
     },
 };
 
-/// Exports the project that ran without a break.
+/// Returns the command that exports the completed project.
 fn export(root: &Path) -> Command {
     let mut command = binary();
     command.arg("-C").arg(root.join("p")).arg("export");
@@ -190,25 +199,25 @@ fn export(root: &Path) -> Command {
 }
 
 const EXPORT: FaultScenario = FaultScenario {
-    before: put_done,
+    before: copy_completed,
     command: export,
-    after: |world, root, done| {
+    after: |comparison, root, done| {
         if !done {
             assert!(!root.join("out").exists());
         }
         call(&mut export(root)).expect(0);
-        world.wanted.is_exported_to(&root.join("out"));
+        comparison.expected.assert_exported_to(&root.join("out"));
         let hidden = std::fs::read_dir(root).expect("a folder").count();
         assert_eq!(hidden, 2);
     },
 };
 
-/// Puts the project that ran without a break in a folder.
-fn put_done(world: &World, root: &Path) {
-    copy(world.wanted.project(), &root.join("p"));
+/// Copies the completed project to a folder.
+fn copy_completed(comparison: &Comparison, root: &Path) {
+    copy(comparison.expected.project(), &root.join("p"));
 }
 
-/// A backup beside the project.
+/// Returns the command that writes a backup beside the project.
 fn backup(root: &Path) -> Command {
     let mut command = binary();
     command.arg("-C").arg(root.join("p")).arg("backup");
@@ -220,7 +229,7 @@ fn bytes(path: &Path) -> Vec<u8> {
     std::fs::read(path).expect("a file")
 }
 
-/// The names in a folder.
+/// Returns the names in a folder.
 fn names(root: &Path) -> Vec<String> {
     let inside = std::fs::read_dir(root).expect("a folder");
     let name = |entry: std::io::Result<std::fs::DirEntry>| {
@@ -232,12 +241,12 @@ fn names(root: &Path) -> Vec<String> {
     names
 }
 
-/// What a backup is.
+/// The files of a backup.
 const BACKED_UP: [&str; 3] = ["b.mocban.toml", "b.sqlite", "b.verdicts.jsonl"];
 
 const BACKUP: FaultScenario = FaultScenario {
-    before: |world, root| {
-        put_done(world, root);
+    before: |comparison, root| {
+        copy_completed(comparison, root);
         let settings = Project::at(&root.join("p")).settings_path();
         std::fs::write(&settings, "[run]\nworkers = 1\n").expect("written");
         call(&mut backup(root)).expect(0);
@@ -251,20 +260,20 @@ const BACKUP: FaultScenario = FaultScenario {
     },
     command: backup,
     after: |_, root, done| {
-        let whole = [&BACKED_UP[..], &["earlier", "p"]].concat();
+        let complete = [&BACKED_UP[..], &["earlier", "p"]].concat();
         let is_earlier = |name: &str| {
             let earlier = root.join("earlier").join(name);
             bytes(&root.join(name)) == bytes(&earlier)
         };
         if !done {
-            assert_eq!(names(root), whole);
+            assert_eq!(names(root), complete);
             for name in BACKED_UP {
                 assert!(is_earlier(name), "another {name}");
             }
             call(&mut backup(root)).expect(0);
         }
         call(&mut backup(root)).expect(0);
-        assert_eq!(names(root), whole);
+        assert_eq!(names(root), complete);
         for name in BACKED_UP {
             assert!(!is_earlier(name), "the earlier {name}");
         }
@@ -292,7 +301,7 @@ fn check(root: &Path) -> Command {
 }
 
 const CHECK: FaultScenario = FaultScenario {
-    before: put_done,
+    before: copy_completed,
     command: check,
     after: |_, root, _| {
         call(&mut check(root)).expect(0);
@@ -300,20 +309,20 @@ const CHECK: FaultScenario = FaultScenario {
 };
 
 const REPAIR: FaultScenario = FaultScenario {
-    before: |world, root| {
-        put_done(world, root);
+    before: |comparison, root| {
+        copy_completed(comparison, root);
         let folder = root.join("p/artifacts");
         let found = files(&folder);
         let mut pictures = found.keys().filter(|path| path.extension().is_some());
         let mut picture = || folder.join(pictures.next().expect("a picture"));
         std::fs::remove_file(picture()).expect("removed");
         std::fs::write(picture(), "another").expect("written");
-        let named_by_none = format!("{}.png", "0".repeat(64));
+        let orphan = format!("{}.png", "0".repeat(64));
         std::fs::create_dir_all(folder.join("00")).expect("a folder");
-        std::fs::write(folder.join("00").join(named_by_none), "spare").expect("written");
+        std::fs::write(folder.join("00").join(orphan), "spare").expect("written");
     },
     command: repair,
-    after: |world, root, done| {
+    after: |comparison, root, done| {
         if !done {
             call(&mut repair(root)).expect(0);
         }
@@ -322,43 +331,43 @@ const REPAIR: FaultScenario = FaultScenario {
         call(&mut run(&project, &[])).expect(0);
         mocban(root, &["-C", "p", "check"]).expect(0);
         call(&mut export(root)).expect(0);
-        world.wanted.is_exported_to(&root.join("out"));
+        comparison.expected.assert_exported_to(&root.join("out"));
     },
 };
 
 #[test]
-fn a_refusing_disk_under_the_catalog_is_told_of_and_costs_nothing() {
+fn a_disk_fault_of_the_catalog_is_reported_and_loses_nothing() {
     RUN.check_all(OF_THE_CATALOG, fault_points());
 }
 
 #[test]
-fn a_refusing_disk_under_the_files_is_told_of_and_costs_nothing() {
+fn a_disk_fault_of_other_files_is_reported_and_loses_nothing() {
     RUN.check_all(OF_THE_FILES, fault_points());
 }
 
 #[test]
-fn an_import_or_export_that_the_disk_refuses_leaves_nothing_half_made() {
+fn an_import_or_export_that_fails_on_the_disk_leaves_nothing_incomplete() {
     IMPORT.check_all(OF_AN_IMPORT, fault_points());
     EXPORT.check_all(OF_AN_EXPORT, fault_points());
 }
 
 #[test]
-fn a_backup_that_the_disk_refuses_leaves_the_earlier_one_in_place() {
+fn a_backup_that_fails_on_the_disk_leaves_the_earlier_one_in_place() {
     BACKUP.check_all(OF_A_BACKUP, fault_points());
 }
 
 #[test]
-fn a_check_that_the_disk_refuses_finds_no_damage() {
+fn a_check_that_fails_on_the_disk_finds_no_damage() {
     CHECK.check_all(OF_A_CHECK, 4 * fault_points());
 }
 
 #[test]
-fn a_repair_that_the_disk_refuses_is_told_of_and_done_by_the_next() {
+fn a_repair_that_fails_on_the_disk_is_reported_and_done_by_the_next() {
     REPAIR.check_all(OF_A_REPAIR, fault_points());
 }
 
 /// Another process holds each lock of the database for longer than SQLite itself waits.
 #[test]
-fn a_locked_catalog_is_waited_for() {
+fn a_run_waits_for_a_locked_catalog() {
     RUN.check_all(LOCKED, 4 * fault_points());
 }

@@ -1,5 +1,6 @@
-//! The real binary under random `kill -9` until its run is done: nothing lost, nothing doubled, the same bytes.
-//! `MOCBAN_KILLS` says how often, `MOCBAN_KILLED_PAIRS` over how many pairs: 300 over 200 is a look of some minutes.
+//! The binary under random `kill -9` until its run is done: nothing is lost, nothing is stored twice, and the results are
+//! the same bytes. `MOCBAN_KILLS` sets the number of kills and `MOCBAN_KILLED_PAIRS` the number of pairs; 300 and 200 take
+//! some minutes.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -10,15 +11,15 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::resume::{copy, project, run};
 use crate::test_size::size_from_env;
-use crate::unbroken::{Wanted, files};
+use crate::uninterrupted::{Expected, files};
 
-/// Deaths with no pair in hand that come before the shots.
-const OPENING: u32 = 12;
+/// Deaths during a claim, before the random kills.
+const DEATHS_WHILE_CLAIMING: u32 = 12;
 
-/// Lets runs die while they claim, so that nothing is in hand: from these deaths the catalog knows that they come from
-/// outside. Without them a pair that is alone in hand at the first three shots is rightly taken for what kills.
-fn opening(project: &Project) {
-    for _ in 0..OPENING {
+/// Lets runs die while they claim and no pair is leased: from these deaths the catalog concludes that the cause is outside.
+/// Without them, a pair that happens to be the only leased one at the first three kills is correctly quarantined.
+fn die_while_claiming(project: &Project) {
+    for _ in 0..DEATHS_WHILE_CLAIMING {
         let died = run(project, &[])
             .env("MOCBAN_BREAK_AT", "fit:claiming")
             .output()
@@ -27,15 +28,15 @@ fn opening(project: &Project) {
     }
 }
 
-/// How long shots are held off. A machine that has much else to do gets nowhere in half a second, and then a pair is
-/// rightly taken for what kills; so each three shots in a row without a new file of results double the time.
-struct Mercy {
+/// The time that a run gets before it is killed. On a busy machine half a second may be too short for any progress, and
+/// then a pair is correctly quarantined; so the time doubles after every three runs without a new artifact.
+struct Patience {
     files: usize,
-    in_vain: u32,
+    runs_without_progress: u32,
 }
 
-impl Mercy {
-    /// How many times as long as usual the next shot may come, by what lies in the folder of results.
+impl Patience {
+    /// Returns the factor on the time of the next run, from the number of artifacts now.
     fn next(&mut self, project: &Project) -> u64 {
         let folder = project.artifacts_dir();
         let found = if folder.exists() {
@@ -43,63 +44,63 @@ impl Mercy {
         } else {
             0
         };
-        self.in_vain = if found > self.files {
+        self.runs_without_progress = if found > self.files {
             0
         } else {
-            self.in_vain + 1
+            self.runs_without_progress + 1
         };
         self.files = self.files.max(found);
-        1 << (self.in_vain / 3).min(8)
+        1 << (self.runs_without_progress / 3).min(8)
     }
 }
 
-/// Starts the run again and again and kills it after 50 to 500 ms, longer where nothing comes of it, until one ends
-/// by itself; says how often it was killed.
-fn run_under_fire(project: &Project, dice: &mut ChaCha8Rng) -> usize {
-    let mut mercy = Mercy {
+/// Starts the run repeatedly and kills it after 50 to 500 ms, later where there is no progress, until one run ends by
+/// itself. Returns the number of kills.
+fn run_with_kills(project: &Project, dice: &mut ChaCha8Rng) -> usize {
+    let mut patience = Patience {
         files: 0,
-        in_vain: 0,
+        runs_without_progress: 0,
     };
     for kills in 0.. {
         let jobs = if dice.random_bool(0.5) { "1" } else { "2" };
-        let longest = 500 * mercy.next(project);
+        let longest = 500 * patience.next(project);
         let mut child = run(project, &["-j", jobs])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
             .expect("the binary starts");
-        let shot = Instant::now() + Duration::from_millis(dice.random_range(50..=longest));
-        while Instant::now() < shot {
-            if let Some(ended) = child.try_wait().expect("a child that can be asked") {
+        let kill_at = Instant::now() + Duration::from_millis(dice.random_range(50..=longest));
+        while Instant::now() < kill_at {
+            if let Some(ended) = child.try_wait().expect("the child's state") {
                 assert!(ended.success(), "{ended:?}");
                 return kills;
             }
-            // The moment of the shot is what is tested: there is no event to wait for.
+            // The kill has to come at a random moment, so there is no event to wait for.
             std::thread::sleep(Duration::from_millis(1));
         }
         child.kill().expect("killed");
         child.wait().expect("dead");
     }
-    unreachable!("the loop has no end of its own")
+    unreachable!("the loop ends with a return")
 }
 
 /// Kills runs of copies of a project until there were enough kills.
 #[test]
-fn twenty_kills_lose_nothing_and_double_nothing() {
+fn random_kills_lose_nothing_and_repeat_nothing() {
     let count = size_from_env("MOCBAN_KILLED_PAIRS", 8);
     let kills = size_from_env("MOCBAN_KILLS", 20);
     let dir = tempfile::tempdir().expect("a temporary directory");
     let fresh = project(dir.path(), "fresh", &count.to_string());
-    let wanted = Wanted::of(&fresh, &dir.path().join("unbroken"));
+    let expected = Expected::of(&fresh, &dir.path().join("uninterrupted"));
     let mut dice = ChaCha8Rng::seed_from_u64(4);
     let (mut done, mut copies) = (0, 0);
     while done < kills {
         let parent = dir.path().join(format!("broken-{copies}"));
         let broken = copy(&fresh, &parent.join("p"));
-        opening(&broken);
-        done += run_under_fire(&broken, &mut dice);
+        die_while_claiming(&broken);
+        done += run_with_kills(&broken, &mut dice);
         copies += 1;
-        wanted.is_met_by(&broken);
+        expected.assert_met_by(&broken);
         std::fs::remove_dir_all(parent).expect("removed");
     }
     eprintln!("{done} kills over {count} pairs, run to the end {copies} times");

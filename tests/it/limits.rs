@@ -1,4 +1,4 @@
-//! Pairs that kill, hang or need too much, and runs with too many failures: through the real binary.
+//! Pairs that kill their process, hang, or need too much memory, and runs with too many failures.
 
 use std::process::Stdio;
 
@@ -6,14 +6,14 @@ use mocban::domain::{FailureClass, JobStatus};
 use mocban::store::Project;
 
 use crate::cli::call;
-use crate::resume::{finished, pairs, project, run};
+use crate::resume::{attempts, pairs, project, run};
 
 fn status(project: &Project) -> Vec<JobStatus> {
     let all = pairs(project);
     all.iter().map(|pair| pair.results.status).collect()
 }
 
-/// Runs until a run ends by itself; how often it died, and its exit code.
+/// Runs until a run ends by itself; returns how often it died before, and its exit code.
 fn deaths(project: &Project, jobs: &str, point: &str) -> (u32, Option<i32>) {
     for deaths in 0..10 {
         let mut command = run(project, &["-j", jobs]);
@@ -30,18 +30,18 @@ fn deaths(project: &Project, jobs: &str, point: &str) -> (u32, Option<i32>) {
 }
 
 #[test]
-fn a_pair_that_kills_its_process_is_quarantined_after_three_and_stops_nobody() {
+fn a_pair_that_kills_its_process_three_times_is_quarantined_and_the_others_finish() {
     for jobs in ["1", "2"] {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = project(dir.path(), "p", "3");
         let (deaths, code) = deaths(&project, jobs, "fit:computed@upright-0001");
-        // The first may be shared with a pair beside it, or with one that waits for company to be stored.
+        // The first death may be blamed on two pairs, because another was running or not stored yet.
         assert!((3..=4).contains(&deaths), "{deaths} deaths");
         assert_eq!(code, Some(3));
         let all = pairs(&project);
-        let stand: Vec<_> = all.iter().map(|pair| pair.results.status).collect();
+        let statuses: Vec<_> = all.iter().map(|pair| pair.results.status).collect();
         assert_eq!(
-            stand,
+            statuses,
             [JobStatus::Done, JobStatus::Quarantined, JobStatus::Done]
         );
         let failure = all[1].results.failure.as_ref().expect("a failure");
@@ -51,19 +51,19 @@ fn a_pair_that_kills_its_process_is_quarantined_after_three_and_stops_nobody() {
             "3 workers died or hung over it at fit"
         );
 
-        // It stays so, until somebody asks or its mesh is another.
+        // The pair stays quarantined until a retry or a change of its mesh.
         call(&mut run(&project, &[])).expect(3);
         let mesh = project.input_path(&all[1].results.attributes.mesh_path);
         let mut bytes = std::fs::read(&mesh).expect("a mesh");
         bytes.push(b'\n');
         std::fs::write(&mesh, bytes).expect("written");
         call(&mut run(&project, &[])).expect(0);
-        assert_eq!(finished(&project), [1; 12]);
+        assert_eq!(attempts(&project), [1; 12]);
     }
 }
 
 #[test]
-fn a_stage_past_its_deadline_is_tried_alone_then_quarantined() {
+fn a_stage_that_times_out_is_retried_exclusively_then_quarantined() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "2");
     let file = dir.path().join("held");
@@ -85,7 +85,7 @@ fn a_stage_past_its_deadline_is_tried_alone_then_quarantined() {
 }
 
 #[test]
-fn too_many_failures_stop_the_claiming_and_show_in_the_exit_code() {
+fn too_many_failures_end_the_run_and_show_in_the_exit_code() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "4");
     for pair in &pairs(&project)[..3] {
@@ -104,7 +104,7 @@ fn too_many_failures_stop_the_claiming_and_show_in_the_exit_code() {
         status(&project),
         [bad, bad, JobStatus::Ready, JobStatus::Ready]
     );
-    // One bad pair stops nobody, but shows.
+    // A bad pair does not stop the others, but shows in the exit code.
     let ended = call(&mut run(&project, &["--json"])).expect(3).json();
     assert_eq!(
         (&ended["done"], &ended["failed_in_all"]),
@@ -113,7 +113,7 @@ fn too_many_failures_stop_the_claiming_and_show_in_the_exit_code() {
 }
 
 #[test]
-fn a_stage_that_panics_fails_its_pair_and_shows_the_way_to_it_only_where_that_is_asked_for() {
+fn a_stage_that_panics_fails_its_pair_and_shows_a_backtrace_only_with_verbose() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "2");
     let panics = |args: &[&str]| {
@@ -127,32 +127,32 @@ fn a_stage_that_panics_fails_its_pair_and_shows_the_way_to_it_only_where_that_is
     let failed = pairs(&project)[0].results.failure.clone();
     let failure = failed.expect("a failure").failure;
     assert_eq!(failure.class, FailureClass::Bug);
-    let told = "the stage panicked (asked for by a test): this is a bug, please report it with the output of \
+    let expected = "the stage panicked (asked for by a test): this is a bug, please report it with the output of \
         `run --rerun failed -v`";
-    assert_eq!(failure.message, told);
-    for words in ["thread '", "RUST_BACKTRACE", "failpoint.rs"] {
-        assert!(!plain.err.contains(words), "{}", plain.err);
+    assert_eq!(failure.message, expected);
+    for text in ["thread '", "RUST_BACKTRACE", "failpoint.rs"] {
+        assert!(!plain.err.contains(text), "{}", plain.err);
     }
     assert!(verbose.err.contains("failpoint.rs"), "{}", verbose.err);
 }
 
 #[test]
-fn pairs_larger_than_the_memory_run_one_by_one_to_the_same_end() {
+fn pairs_larger_than_the_memory_limit_run_one_at_a_time() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "2");
     let small = call(&mut run(&project, &["-j", "2", "--memory", "1M"])).expect(0);
     for pair in &pairs(&project) {
         let needs = format!("{} may need ", pair.results.attributes.name);
-        let told = small.err.split_once(&needs).map(|(_, rest)| rest);
-        let (mib, rest) = told
+        let warning = small.err.split_once(&needs).map(|(_, rest)| rest);
+        let (mib, rest) = warning
             .and_then(|rest| rest.split_once(" MiB, "))
             .unwrap_or_else(|| panic!("{}", small.err));
         assert!(mib.parse::<u64>().is_ok_and(|mib| mib >= 32), "{mib}");
-        let way = "more than the 1 MiB of --memory: it runs with no other pair beside it\n";
-        assert!(rest.starts_with(way), "{rest}");
+        let reason = "more than the 1 MiB of --memory: it runs with no other pair beside it\n";
+        assert!(rest.starts_with(reason), "{rest}");
     }
     assert_eq!(small.err.matches("of --memory").count(), 2);
-    assert_eq!(finished(&project), [1; 8]);
+    assert_eq!(attempts(&project), [1; 8]);
     assert!(pairs(&project).iter().all(|pair| pair.attempt == 1));
     let refused = call(&mut run(&project, &["--memory", "much"])).expect(2);
     assert!(refused.err.contains("such as 4G"), "{}", refused.err);

@@ -56,4 +56,4 @@ mod style;
 mod test_size;
 mod tiff_file;
 mod tiff_kinds;
-mod unbroken;
+mod uninterrupted;

@@ -1,4 +1,4 @@
-//! Memory of a run through the real binary: pairs with large prints stay within `--memory` together.
+//! Memory of a run: pairs with large prints stay within `--memory` together.
 
 use std::path::Path;
 
@@ -11,27 +11,27 @@ use crate::resume::{copy, pairs, project};
 
 /// Pairs with large prints.
 const PAIRS: u64 = 4;
-/// Pixels that each of these has at most, and little less.
+/// Most pixels of each print; each has only a few less.
 const PIXELS: usize = 5_000_000;
-/// What the pairs may take together: enough for one of them, at up to 50 bytes a pixel, and for no two.
+/// Memory limit of the pairs together: enough for one of them, at up to 50 bytes a pixel, and too little for two.
 const MEMORY_MIB: u64 = 400;
 
-/// Makes a print as many times wider and higher as it may be, with the same picture on it.
+/// Scales a print up to nearly [`PIXELS`] pixels.
 fn enlarge(path: &Path) {
     let bytes = std::fs::read(path).expect("a print");
     let small = decode(&bytes, &ImageLimits::SUGGESTED)
         .expect("a picture")
         .rgb;
     let times = (PIXELS / small.data().len()).isqrt();
-    let colour = |x: usize, y: usize| {
+    let color = |x: usize, y: usize| {
         let of_16_bits = small.at(x / times, y / times);
         of_16_bits.map(|channel| (channel >> 8) as u8)
     };
-    let large = Grid::from_fn(small.width() * times, small.height() * times, colour);
+    let large = Grid::from_fn(small.width() * times, small.height() * times, color);
     std::fs::write(path, jpeg_rgb8(&large, 90)).expect("written");
 }
 
-/// Runs a project with as many workers as pairs; the most memory it held, in MiB.
+/// Runs a project with as many workers as pairs; returns its peak memory in MiB.
 fn peak_mib(project: &Project, memory: &str) -> u64 {
     let jobs = PAIRS.to_string();
     let small = ["--set", "depth.longest_px=96"];
@@ -44,7 +44,7 @@ fn peak_mib(project: &Project, memory: &str) -> u64 {
 }
 
 #[test]
-fn large_prints_stay_within_the_memory_together() {
+fn pairs_with_large_prints_stay_within_the_memory_limit_together() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let bounded = project(dir.path(), "bounded", &PAIRS.to_string());
     for pair in pairs(&bounded) {
@@ -56,7 +56,7 @@ fn large_prints_stay_within_the_memory_together() {
     assert!(within <= MEMORY_MIB, "{within} MiB");
     assert!(
         beyond > MEMORY_MIB,
-        "{beyond} MiB where there is no limit: nothing was tried"
+        "{beyond} MiB without a limit: the limit was not tested"
     );
     eprintln!("{MEMORY_MIB} MiB allowed: {within} MiB; no limit: {beyond} MiB");
 }

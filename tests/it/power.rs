@@ -1,9 +1,8 @@
-//! Power cuts under the real binary: what the disk would hold after each sync is put together, opened, checked, and
-//! run to the end.
+//! Power cuts while the binary runs: the state of the disk after each sync is rebuilt, opened, checked, and run to the
+//! end.
 //!
-//! A file's bytes are on the disk when they were synced. When its name is there too is answered in two ways, because
-//! file systems differ: at the sync of its folder and not before, or at once. Both must do, with bytes and names in
-//! whatever order.
+//! The bytes of a file are on the disk once they are synced. When its name is there depends on the file system: only after
+//! its folder is synced, or at once. Both cases are tested, and bytes and names may reach the disk in any order.
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt as _;
@@ -14,10 +13,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use mocban::store::Project;
 
 use crate::cli::{binary, call, mocban};
-use crate::resume::{copy, copy_folder, finished, run, stages_done};
+use crate::resume::{attempts, copy, copy_folder, run, stages_done};
 use crate::shim::SHADOW;
 use crate::test_size::size_from_env;
-use crate::unbroken::World;
+use crate::uninterrupted::Comparison;
 
 type Inode = u64;
 
@@ -30,7 +29,7 @@ struct Entry {
 
 type Folders = BTreeMap<Inode, BTreeMap<String, Entry>>;
 
-/// What a disk holds: names by folder, and by file where its bytes lie for us.
+/// The state of a disk: the names in each folder, and for each file the path of a copy of its bytes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct Disk {
     root: Inode,
@@ -44,7 +43,7 @@ struct Sync {
     inode: Inode,
     /// The file's bytes; `None` for a folder.
     bytes: Option<PathBuf>,
-    /// All names that there were.
+    /// All names at that time.
     names: Folders,
 }
 
@@ -58,18 +57,18 @@ enum Names {
 }
 
 impl Disk {
-    /// A project as it lies there, all of it on the disk; `bytes` is a copy of it that stays as it is.
+    /// The state in which all of a project is on the disk. `bytes` is a copy of it that does not change.
     fn of(project: &Path, bytes: &Path) -> Self {
         let mut disk = Self {
             root: inode(project),
             folders: Folders::new(),
             files: BTreeMap::new(),
         };
-        disk.take_in(project, bytes);
+        disk.add_folder(project, bytes);
         disk
     }
 
-    fn take_in(&mut self, folder: &Path, bytes: &Path) {
+    fn add_folder(&mut self, folder: &Path, bytes: &Path) {
         let mut names = BTreeMap::new();
         for entry in std::fs::read_dir(folder).expect("a folder") {
             let entry = entry.expect("an entry");
@@ -77,7 +76,7 @@ impl Disk {
             let name = name.to_str().expect("UTF-8").to_owned();
             let (inode, is_folder) = (inode(&path), path.is_dir());
             if is_folder {
-                self.take_in(&path, &bytes.join(&name));
+                self.add_folder(&path, &bytes.join(&name));
             } else {
                 self.files.insert(inode, bytes.join(&name));
             }
@@ -86,24 +85,25 @@ impl Disk {
         self.folders.insert(inode(folder), names);
     }
 
-    /// What names are there before the bytes of a sync are.
-    fn name(&mut self, sync: &Sync, names: Names) {
+    /// Applies the names that reach the disk before the bytes of a sync.
+    fn apply_names(&mut self, sync: &Sync, names: Names) {
         if names == Names::Early {
             self.folders.clone_from(&sync.names);
         }
     }
 
-    fn sync(&mut self, sync: &Sync, names: Names) {
-        self.name(sync, names);
+    /// Applies a sync.
+    fn apply(&mut self, sync: &Sync, names: Names) {
+        self.apply_names(sync, names);
         if let Some(bytes) = &sync.bytes {
             self.files.insert(sync.inode, bytes.clone());
         } else {
-            let there = sync.names.get(&sync.inode).cloned();
-            self.folders.insert(sync.inode, there.unwrap_or_default());
+            let entries = sync.names.get(&sync.inode).cloned();
+            self.folders.insert(sync.inode, entries.unwrap_or_default());
         }
     }
 
-    /// Puts the files where a program can open them.
+    /// Writes the disk's files to a folder.
     fn write(&self, to: &Path) {
         self.write_folder(self.root, to);
     }
@@ -124,10 +124,10 @@ impl Disk {
 }
 
 fn inode(path: &Path) -> Inode {
-    std::fs::metadata(path).expect("it is there").ino()
+    std::fs::metadata(path).expect("a file").ino()
 }
 
-/// Names by folder, from lines of `FOLDER INODE d|f NAME`.
+/// Parses names by folder from lines of `FOLDER INODE d|f NAME`.
 fn names(text: &str) -> Folders {
     let mut folders = Folders::new();
     for line in text.lines() {
@@ -142,14 +142,14 @@ fn names(text: &str) -> Folders {
     folders
 }
 
-/// A run whose syncs were written down.
+/// A command and the syncs that it made.
 struct Recorded {
     start: Disk,
     syncs: Vec<Sync>,
 }
 
 impl Recorded {
-    /// Calls a command and writes down the syncs below a folder; `notes` is a folder that is not there yet.
+    /// Runs a command and records its syncs below a folder. `notes` is a folder that does not exist yet.
     fn of(root: &Path, notes: &Path, start: Disk, command: &mut Command) -> Self {
         std::fs::create_dir(notes).expect("a folder");
         command.env("SHADOW_OF", root).env("SHADOW_IN", notes);
@@ -159,23 +159,23 @@ impl Recorded {
         Self { start, syncs }
     }
 
-    /// What the disk may hold at one moment or another; each but the first differs from the one before it.
+    /// Returns the successive states of the disk, each different from the one before it.
     fn disks(&self, names: Names) -> Vec<Disk> {
         let mut disks = vec![self.start.clone()];
         let mut disk = self.start.clone();
         for sync in &self.syncs {
-            disk.name(sync, names);
+            disk.apply_names(sync, names);
             disks.push(disk.clone());
-            disk.sync(sync, names);
+            disk.apply(sync, names);
             disks.push(disk.clone());
         }
         disks.dedup();
         disks
     }
 
-    /// What is on the disk at the end.
+    /// Returns the last state of the disk.
     fn end(&self, names: Names) -> Disk {
-        self.disks(names).pop().expect("the start at least")
+        self.disks(names).pop().expect("at least the first state")
     }
 }
 
@@ -191,9 +191,9 @@ fn read_sync(notes: &Path, line: &str) -> Sync {
     }
 }
 
-impl World {
-    /// A run of the project from its beginning.
-    fn recorded(&self, args: &[&str]) -> Recorded {
+impl Comparison {
+    /// Runs a copy of the project and records its syncs.
+    fn record_run(&self, args: &[&str]) -> Recorded {
         let root = self.folder("recorded");
         let project = copy(&self.fresh, &root.join("p"));
         let start = Disk::of(project.dir(), self.fresh.dir());
@@ -201,31 +201,31 @@ impl World {
         Recorded::of(project.dir(), &root.join("notes"), start, &mut command)
     }
 
-    /// Opens a disk, checks it, and runs it to the end.
-    fn is_met_by(&self, disk: &Disk, name: &str) {
+    /// Opens the project on a disk, checks it, completes its run, and compares the results.
+    fn assert_recovers(&self, disk: &Disk, name: &str) {
         let parent = self.dir.path().join(name);
-        let broken = parent.join("p");
-        disk.write(&broken);
-        // No row names a file that is not there, and nothing else is wrong either.
+        let path = parent.join("p");
+        disk.write(&path);
+        // Every row's files exist, and nothing else is damaged either.
         let checked = mocban(&parent, &["-C", "p", "check"]);
         assert_eq!(checked.code, 0, "{name}: {}{}", checked.out, checked.err);
-        let project = Project::open(&broken).expect("a project");
+        let project = Project::open(&path).expect("a project");
         let ended = call(&mut run(&project, &["-j", "1"]));
         assert_eq!(ended.code, 0, "{name}: {}", ended.err);
         mocban(&parent, &["-C", "p", "check"]).expect(0);
-        self.wanted.is_met_by(&project);
+        self.expected.assert_met_by(&project);
         std::fs::remove_dir_all(parent).expect("removed");
     }
 
-    /// Does that with many, on all cores.
-    fn is_met_by_all(&self, disks: &[(String, Disk)]) {
+    /// Does that for many disks, on all cores.
+    fn assert_all_recover(&self, disks: &[(String, Disk)]) {
         let next = AtomicUsize::new(0);
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         std::thread::scope(|scope| {
             for _ in 0..cores {
                 scope.spawn(|| {
                     while let Some((name, disk)) = disks.get(next.fetch_add(1, Ordering::Relaxed)) {
-                        self.is_met_by(disk, name);
+                        self.assert_recovers(disk, name);
                     }
                 });
             }
@@ -233,7 +233,7 @@ impl World {
     }
 }
 
-/// Both answers' disks, each with a name.
+/// Returns the states of the disk in both cases, each with a name.
 fn all(recorded: &Recorded) -> Vec<(String, Disk)> {
     let named = |names| {
         let disks = recorded.disks(names).into_iter().enumerate();
@@ -242,42 +242,41 @@ fn all(recorded: &Recorded) -> Vec<(String, Disk)> {
     named(Names::Late).chain(named(Names::Early)).collect()
 }
 
-/// About so many of them, evenly; an odd step, because names and bytes take turns.
+/// Returns about `wanted` of the disks, evenly spaced. The step is odd, because names and bytes alternate.
 fn some(disks: Vec<(String, Disk)>, wanted: usize) -> Vec<(String, Disk)> {
     let step = disks.len().div_ceil(wanted) | 1;
     disks.into_iter().step_by(step).collect()
 }
 
-/// Cuts the power during a run at some moments.
 #[test]
-fn a_power_cut_at_some_syncs_loses_nothing_that_was_stored() {
-    let moments = size_from_env("MOCBAN_POWER_CUTS", 36);
-    let world = World::new("2");
-    let recorded = world.recorded(&["-j", "2"]);
+fn a_power_cut_after_any_sync_loses_nothing_that_was_stored() {
+    let cuts = size_from_env("MOCBAN_POWER_CUTS", 36);
+    let comparison = Comparison::new("2");
+    let recorded = comparison.record_run(&["-j", "2"]);
     let disks = all(&recorded);
     let (syncs, found) = (recorded.syncs.len(), disks.len());
-    let chosen = some(disks, moments);
+    let chosen = some(disks, cuts);
     assert!(chosen.len() > 1, "nothing was synced");
-    world.is_met_by_all(&chosen);
+    comparison.assert_all_recover(&chosen);
     eprintln!(
-        "{syncs} syncs, {found} disks, {} opened and run to the end",
+        "{syncs} syncs, {found} states of the disk, {} of them run to the end",
         chosen.len()
     );
 }
 
 #[test]
-fn stages_come_to_the_disk_in_their_order_and_all_of_them() {
-    let world = World::new("1");
-    let recorded = world.recorded(&["-j", "1"]);
+fn all_stages_reach_the_disk_in_their_order() {
+    let comparison = Comparison::new("1");
+    let recorded = comparison.record_run(&["-j", "1"]);
     let disks = recorded.disks(Names::Late).into_iter().enumerate();
     let done = disks.map(|(index, disk)| {
-        let broken = world.folder(&format!("done-{index}"));
-        disk.write(&broken);
-        stages_done(&Project::open(&broken).expect("a project"))
+        let folder = comparison.folder(&format!("done-{index}"));
+        disk.write(&folder);
+        stages_done(&Project::open(&folder).expect("a project"))
     });
     let mut done: Vec<_> = done.collect();
     done.dedup();
-    // Short stages may come together.
+    // Short stages may be stored together.
     assert!(done.is_sorted(), "{done:?}");
     assert_eq!(
         (done.first(), done.last()),
@@ -286,16 +285,16 @@ fn stages_come_to_the_disk_in_their_order_and_all_of_them() {
     );
 }
 
-/// A process makes a folder of artifacts and dies before its name is on the disk; another finds it there.
+/// A process creates a folder of artifacts and dies before the folder's name is on the disk; the next process finds it.
 #[test]
-fn a_folder_that_another_process_made_is_on_the_disk_before_a_row_is() {
-    let world = World::new("1");
-    let root = world.folder("found");
-    let project = copy(&world.fresh, &root.join("p"));
-    let start = Disk::of(project.dir(), world.fresh.dir());
-    // What a dead process left, none of it on the disk.
-    for folder in world
-        .wanted
+fn a_folder_that_another_process_created_is_synced_before_a_row_is() {
+    let comparison = Comparison::new("1");
+    let root = comparison.folder("found");
+    let project = copy(&comparison.fresh, &root.join("p"));
+    let start = Disk::of(project.dir(), comparison.fresh.dir());
+    // The folders of a dead process, none of them on the disk.
+    for folder in comparison
+        .expected
         .project()
         .artifacts_dir()
         .read_dir()
@@ -307,35 +306,35 @@ fn a_folder_that_another_process_made_is_on_the_disk_before_a_row_is() {
     let mut command = run(&project, &["-j", "1"]);
     let recorded = Recorded::of(project.dir(), &root.join("notes"), start, &mut command);
     let disks: Vec<_> = all(&recorded);
-    world.is_met_by_all(&some(disks, 6));
-    world.is_met_by(&recorded.end(Names::Late), "end");
+    comparison.assert_all_recover(&some(disks, 6));
+    comparison.assert_recovers(&recorded.end(Names::Late), "end");
 }
 
 #[test]
-fn an_import_is_on_the_disk_when_it_says_so_and_can_be_made_again_before() {
-    let world = World::new("1");
-    let root = world.folder("imported");
-    let data = world.fresh.dir().join("data");
+fn an_import_is_durable_when_it_ends_and_can_be_repeated_before() {
+    let comparison = Comparison::new("1");
+    let root = comparison.folder("imported");
+    let data = comparison.fresh.dir().join("data");
     copy_folder(&data, &root.join("data"));
-    let start = Disk::of(&root, world.fresh.dir());
+    let start = Disk::of(&root, comparison.fresh.dir());
     let mut command = import(&root);
-    let notes = world.dir.path().join("notes");
+    let notes = comparison.dir.path().join("notes");
     let recorded = Recorded::of(&root, &notes, start, &mut command);
     for names in [Names::Late, Names::Early] {
         let disks = recorded.disks(names);
         for disk in disks.iter().step_by(5) {
-            let root = world.folder("cut");
+            let root = comparison.folder("cut");
             disk.write(&root);
             call(&mut import(&root)).expect(0);
-            is_run_to_the_end(&root);
+            assert_completes(&root);
         }
-        let root = world.folder("cut");
+        let root = comparison.folder("cut");
         recorded.end(names).write(&root);
-        is_run_to_the_end(&root);
+        assert_completes(&root);
     }
 }
 
-/// Imports the data beside a project that is not there.
+/// Returns the command that imports the data beside a project that does not exist yet.
 fn import(root: &Path) -> Command {
     let mut command = binary();
     command.arg("-C").arg(root.join("p")).arg("import");
@@ -343,9 +342,10 @@ fn import(root: &Path) -> Command {
     command
 }
 
-fn is_run_to_the_end(root: &Path) {
+/// Checks the project `p` in a folder and runs it.
+fn assert_completes(root: &Path) {
     mocban(root, &["-C", "p", "check"]).expect(0);
     let project = Project::open(&root.join("p")).expect("a project");
     call(&mut run(&project, &[])).expect(0);
-    assert_eq!(finished(&project), [1; 4]);
+    assert_eq!(attempts(&project), [1; 4]);
 }

@@ -1,4 +1,5 @@
-//! The real binary, killed and run again: nothing is computed twice, nothing is lost, the results are the same.
+//! The binary killed at every failpoint and run again: no stage is stored twice, none is lost, and the results are the same.
+//! Also the helpers with which other modules run projects and read their results.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -9,13 +10,13 @@ use mocban::store::Project;
 
 use crate::cli::{binary, call, mocban};
 
-/// Small depth maps: what is tested is not the alignment.
-const FAST: [&str; 2] = ["--set", "depth.longest_px=96"];
+/// Small depth maps, because these tests are not about the alignment.
+const SMALL_DEPTH: [&str; 2] = ["--set", "depth.longest_px=96"];
 
-/// Every named point between claim, artifact, row and commit, in an order in which six pairs come by, and the last stage
-/// of a run that goes to its end before. What is done together is stored together: where a stage is to be claimed by
-/// itself, all before it are done first. A file that is there is not written again, so the points that need one come
-/// early, the second depth map before any other.
+/// Every failpoint between claim, files, rows and commit, in an order in which six pairs reach them, each with the last
+/// stage of a run that completes before it. Such a run is needed where a stage must be claimed by itself, because stages
+/// computed together are stored together. Points that need a file to be written come early, because existing files are
+/// not written again.
 const POINTS: [(&str, Option<&str>); 14] = [
     ("fit:claiming", None),
     ("fit:claimed", None),
@@ -33,28 +34,28 @@ const POINTS: [(&str, Option<&str>); 14] = [
     ("register:committed", None),
 ];
 
-/// Makes a demo project of some pairs that have not run.
+/// Creates a demo project whose pairs have not run.
 pub(crate) fn project(dir: &Path, name: &str, pairs: &str) -> Project {
     mocban(dir, &["demo", name, "--pairs", pairs, "--no-run"]).expect(0);
     Project::open(&dir.join(name)).expect("a project")
 }
 
-/// The same project again in another folder.
+/// Copies a project to another folder.
 pub(crate) fn copy(project: &Project, to: &Path) -> Project {
     copy_folder(project.dir(), to);
     Project::open(to).expect("a project")
 }
 
-/// A folder again with all below it.
+/// Copies a folder with everything below it.
 pub(crate) fn copy_folder(from: &Path, to: &Path) {
-    let mut open = vec![(from.to_owned(), to.to_owned())];
-    while let Some((from, to)) = open.pop() {
+    let mut folders = vec![(from.to_owned(), to.to_owned())];
+    while let Some((from, to)) = folders.pop() {
         std::fs::create_dir_all(&to).expect("a folder");
         for entry in std::fs::read_dir(from).expect("a folder") {
             let from = entry.expect("an entry").path();
             let to = to.join(from.file_name().expect("a name"));
             if from.is_dir() {
-                open.push((from, to));
+                folders.push((from, to));
             } else {
                 std::fs::copy(from, to).expect("copied");
             }
@@ -62,23 +63,23 @@ pub(crate) fn copy_folder(from: &Path, to: &Path) {
     }
 }
 
-/// `run` with some arguments, ready to be called.
+/// Returns the command `run` with these arguments.
 pub(crate) fn run(project: &Project, args: &[&str]) -> Command {
-    run_telling(project, "none", args)
+    run_with_progress(project, "none", args)
 }
 
-/// The same with progress in some form on stderr.
-pub(crate) fn run_telling(project: &Project, progress: &str, args: &[&str]) -> Command {
+/// Like [`run`], with progress in this format on stderr.
+pub(crate) fn run_with_progress(project: &Project, progress: &str, args: &[&str]) -> Command {
     let mut command = binary();
     command.arg("-C").arg(project.dir());
     command
         .args(["--progress", progress, "run"])
-        .args(FAST)
+        .args(SMALL_DEPTH)
         .args(args);
     command
 }
 
-/// Every pair as stored.
+/// Returns every pair as stored, after checking the counters.
 pub(crate) fn pairs(project: &Project) -> Vec<PairDetail> {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
@@ -89,14 +90,14 @@ pub(crate) fn pairs(project: &Project) -> Vec<PairDetail> {
             let detail = catalog.pair(&name).await.expect("a read");
             found.push(detail.expect("the pair"));
         }
-        let kept = catalog.counters().await.expect("counters");
-        assert_eq!(kept, catalog.recount().await.expect("a recount"));
+        let counters = catalog.counters().await.expect("counters");
+        assert_eq!(counters, catalog.recount().await.expect("a recount"));
         catalog.close().await;
         found
     })
 }
 
-/// All that a result is, without times: numbers, files, hashes.
+/// Returns everything in the results but times: numbers, files, hashes. Checks each artifact against its hash.
 pub(crate) fn results(project: &Project) -> Vec<String> {
     let mut lines = Vec::new();
     for pair in pairs(project) {
@@ -106,7 +107,7 @@ pub(crate) fn results(project: &Project) -> Vec<String> {
             for artifact in stage.files.values() {
                 project
                     .read_artifact(artifact)
-                    .expect("the artifact is whole");
+                    .expect("an unchanged artifact");
             }
             let (outcome, hash) = (&stage.outcome, stage.result_hash);
             let files = &stage.files;
@@ -125,14 +126,14 @@ pub(crate) fn results(project: &Project) -> Vec<String> {
     lines
 }
 
-/// How many files of results are written and have not got their names.
-fn half_placed(project: &Project) -> usize {
+/// Returns how many artifacts are left under temporary names.
+fn temporary_files(project: &Project) -> usize {
     let temporary = project.artifacts_dir().join("tmp");
     std::fs::read_dir(temporary).map_or(0, Iterator::count)
 }
 
-/// How often each stage of each pair was finished.
-pub(crate) fn finished(project: &Project) -> Vec<usize> {
+/// Returns how many successful attempts each stage of each pair has.
+pub(crate) fn attempts(project: &Project) -> Vec<usize> {
     let mut counts = Vec::new();
     for pair in pairs(project) {
         for stage in Stage::ALL {
@@ -144,7 +145,7 @@ pub(crate) fn finished(project: &Project) -> Vec<usize> {
     counts
 }
 
-/// Stages that are done, all pairs together, by a reader beside the run.
+/// Returns how many stages are done, all pairs together, read while a run may be in progress.
 pub(crate) fn stages_done(project: &Project) -> u64 {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
@@ -157,13 +158,13 @@ pub(crate) fn stages_done(project: &Project) -> u64 {
 }
 
 #[test]
-fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
+fn a_run_killed_at_every_failpoint_and_resumed_gives_the_results_of_an_uninterrupted_one() {
     let dir = tempfile::tempdir().expect("a temporary directory");
-    let unbroken = project(dir.path(), "unbroken", "6");
-    let broken = copy(&unbroken, &dir.path().join("broken"));
-    let killed = copy(&unbroken, &dir.path().join("killed"));
-    call(&mut run(&unbroken, &[])).expect(0);
-    let wanted = results(&unbroken);
+    let uninterrupted = project(dir.path(), "uninterrupted", "6");
+    let broken = copy(&uninterrupted, &dir.path().join("broken"));
+    let killed = copy(&uninterrupted, &dir.path().join("killed"));
+    call(&mut run(&uninterrupted, &[])).expect(0);
+    let expected = results(&uninterrupted);
 
     for (point, until) in POINTS {
         if let Some(until) = until {
@@ -174,21 +175,21 @@ fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
             .output();
         let died = died.expect("the binary starts");
         assert_eq!(died.status.code(), None, "{point} was not reached");
-        // A file of each pair may have been on its way to the disk meanwhile.
+        // Each pair may have had a file that was being written.
         let least = usize::from(point.contains(":written"));
-        assert!((least..=6).contains(&half_placed(&broken)), "{point}");
+        assert!((least..=6).contains(&temporary_files(&broken)), "{point}");
     }
     call(&mut run(&broken, &[])).expect(0);
-    assert_eq!(half_placed(&broken), 0);
-    assert_eq!(results(&broken), wanted);
-    assert_eq!(finished(&broken), [1; 24]);
+    assert_eq!(temporary_files(&broken), 0);
+    assert_eq!(results(&broken), expected);
+    assert_eq!(attempts(&broken), [1; 24]);
 
     let mut child = run(&killed, &[])
         .stderr(Stdio::null())
         .spawn()
         .expect("the binary starts");
     while stages_done(&killed) < 2 {
-        let ended = child.try_wait().expect("a child that can be asked");
+        let ended = child.try_wait().expect("the child's state");
         assert!(
             ended.is_none(),
             "the run ended before it was killed: {ended:?}"
@@ -198,15 +199,15 @@ fn a_run_that_dies_anywhere_and_goes_on_gives_what_an_unbroken_one_gives() {
     child.kill().expect("killed");
     child.wait().expect("dead");
     call(&mut run(&killed, &["-j", "1"])).expect(0);
-    assert_eq!(results(&killed), wanted);
-    assert_eq!(finished(&killed), [1; 24]);
+    assert_eq!(results(&killed), expected);
+    assert_eq!(attempts(&killed), [1; 24]);
 }
 
 #[test]
-fn stages_are_computed_while_files_of_those_before_are_on_their_way() {
+fn stages_are_computed_while_files_of_earlier_stages_are_written() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let broken = project(dir.path(), "broken", "1");
-    // It would wait for ever for the depth map's file if the stages after it did.
+    // The file of the depth map is never finished: later stages are computed only if they do not wait for it.
     let died = run(&broken, &["-j", "1"])
         .env("MOCBAN_HOLD_AT", "depth:written")
         .env("MOCBAN_HOLD_FILE", dir.path().join("held"))
@@ -214,7 +215,10 @@ fn stages_are_computed_while_files_of_those_before_are_on_their_way() {
         .output()
         .expect("the binary starts");
     assert_eq!(died.status.code(), None);
-    assert!(stages_done(&broken) <= 1, "a row names what is not on disk");
+    assert!(
+        stages_done(&broken) <= 1,
+        "a row names a file that is not on the disk"
+    );
     call(&mut run(&broken, &[])).expect(0);
-    assert_eq!(finished(&broken), [1; 4]);
+    assert_eq!(attempts(&broken), [1; 4]);
 }

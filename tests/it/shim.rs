@@ -1,16 +1,16 @@
-//! The small C libraries of `tests/faults`, built once and loaded into the real binary.
+//! The C libraries of `tests/faults`, compiled once and preloaded into the binary.
 
 use std::path::PathBuf;
 use std::process::Command;
 use std::sync::LazyLock;
 
-/// Makes a chosen call of the operating system fail.
+/// Makes chosen system calls fail.
 pub(crate) static FAULTS: LazyLock<Shim> = LazyLock::new(|| Shim::built("faults"));
 
-/// Writes down what a disk that loses its power would still hold.
+/// Records the state of the disk after each sync.
 pub(crate) static SHADOW: LazyLock<Shim> = LazyLock::new(|| Shim::built("shadow"));
 
-/// A library that lies in a folder of its own.
+/// A compiled library in a temporary folder.
 pub(crate) struct Shim {
     library: PathBuf,
     _dir: tempfile::TempDir,
@@ -30,15 +30,15 @@ impl Shim {
             .output();
         let shown = compiler.display();
         let built = built.map_err(|error| {
-            format!("{shown}: {error}; a C compiler is needed, as for the SQLite that is built in")
+            format!("{shown}: {error}; a C compiler is needed, as for the bundled SQLite")
         });
         let built = built.expect("a C compiler");
-        let said = String::from_utf8_lossy(&built.stderr);
-        assert!(built.status.success(), "{source}: {said}");
+        let stderr = String::from_utf8_lossy(&built.stderr);
+        assert!(built.status.success(), "{source}: {stderr}");
         Self { library, _dir: dir }
     }
 
-    /// Loads it into a command that is about to start.
+    /// Preloads the library into a command.
     pub(crate) fn load<'c>(&self, command: &'c mut Command) -> &'c mut Command {
         command.env("LD_PRELOAD", &self.library)
     }

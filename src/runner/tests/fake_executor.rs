@@ -1,4 +1,4 @@
-//! Made-up stages that fail, hang, panic and wait as a pair's name says.
+//! Fake stages that fail, hang, panic or wait, depending on the pair's name.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,47 +6,49 @@ use std::sync::{Condvar, Mutex};
 
 use serde_json::json;
 
+use super::values;
 use crate::catalog::InputVersion;
 use crate::domain::{ContentHash, Failure, FailureClass, RegisterOutcome, Stage, ThresholdMetric};
-use crate::report::test_fixtures;
 use crate::runner::pair_context::PairContext;
 use crate::runner::stage_executor::StageExecutor;
 use crate::runner::stage_output::{ExecutionError, StageOutput};
 use crate::store::NewArtifact;
 
-/// What a made-up pair does, told by its name.
+/// Runs fake stages: the part of a pair's name before the first `_` selects what its stages do.
 #[derive(Debug, Default)]
 pub(super) struct FakeExecutor {
-    /// Times each pair and stage was computed.
+    /// How often each stage of each pair was computed.
     computed: Mutex<BTreeMap<(String, Stage), usize>>,
     running: AtomicUsize,
-    /// Most stages at the same time.
+    /// Most stages that ran at the same time.
     pub(super) most: AtomicUsize,
-    /// Stages of pairs named `wait..` hold until this is opened.
+    /// Stages of some pairs wait until this is opened.
     gate: (Mutex<bool>, Condvar),
 }
 
 impl FakeExecutor {
+    /// Returns how often a stage of a pair was computed.
     pub(super) fn count(&self, pair: &str, stage: Stage) -> usize {
-        let computed = self.computed.lock().expect("no panic holds it");
+        let computed = self.computed.lock().expect("an unpoisoned lock");
         computed
             .get(&(pair.to_owned(), stage))
             .copied()
             .unwrap_or(0)
     }
 
+    /// Opens the gate for good.
     pub(super) fn open(&self) {
-        *self.gate.0.lock().expect("no panic holds it") = true;
+        *self.gate.0.lock().expect("an unpoisoned lock") = true;
         self.gate.1.notify_all();
     }
 
     fn wait(&self) {
-        let open = self.gate.0.lock().expect("no panic holds it");
+        let open = self.gate.0.lock().expect("an unpoisoned lock");
         drop(
             self.gate
                 .1
                 .wait_while(open, |open| !*open)
-                .expect("no panic holds it"),
+                .expect("an unpoisoned lock"),
         );
     }
 
@@ -89,7 +91,7 @@ impl StageExecutor for FakeExecutor {
     fn run(&self, stage: Stage, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let name = pair.attributes.name.as_str().to_owned();
         let tries = {
-            let mut computed = self.computed.lock().expect("no panic holds it");
+            let mut computed = self.computed.lock().expect("an unpoisoned lock");
             let count = computed.entry((name.clone(), stage)).or_default();
             *count += 1;
             *count
@@ -106,9 +108,7 @@ impl StageExecutor for FakeExecutor {
         pair.inputs.mesh = Some(seen("mesh"));
         pair.inputs.print = (stage >= Stage::Normalize).then(|| seen("print"));
         let register = RegisterOutcome {
-            metrics: ThresholdMetric::ALL
-                .map(|metric| test_fixtures::metric(metric, 0.5, &[]).outcome)
-                .to_vec(),
+            metrics: ThresholdMetric::ALL.map(values::metric_outcome).to_vec(),
             evidence: None,
         };
         let last = stage == Stage::Register;

@@ -1,4 +1,4 @@
-//! What goes on while a checkpoint is on its way or a pair is nearly over, and which pairs are taken then.
+//! What runs while stages are being stored, and which pairs are claimed ahead.
 
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -12,22 +12,22 @@ use crate::runner::policy::Clock;
 use crate::runner::{RunEvent, RunOptions, StopLevel};
 
 impl RunFixture {
-    /// With a catalog that stores nothing that can wait before it is told to.
+    /// With a catalog that delays every commit that may be delayed until it is flushed.
     async fn patient(pairs: &[&str]) -> Self {
         Self::with(pairs, async |path| Catalog::create_patient(path).await).await
     }
 
-    /// Until a stage of a pair has begun.
-    async fn begun(&self, pair: &str, stage: Stage) {
+    /// Waits until a stage of a pair has started.
+    async fn started(&self, pair: &str, stage: Stage) {
         while self.executor.count(pair, stage) == 0 {
             tokio::task::yield_now().await;
         }
     }
 
-    /// Where among the events the first one is that is like this.
-    fn position(&self, like: impl Fn(&RunEvent) -> bool) -> Option<usize> {
-        let events = self.events.lock().expect("no panic holds it");
-        events.iter().position(like)
+    /// Returns the index of the first event that matches.
+    fn position(&self, matches: impl Fn(&RunEvent) -> bool) -> Option<usize> {
+        let events = self.events.lock().expect("an unpoisoned lock");
+        events.iter().position(matches)
     }
 }
 
@@ -40,33 +40,36 @@ fn finished(event: &RunEvent, wanted: Stage) -> bool {
 }
 
 #[tokio::test]
-async fn stages_are_computed_while_those_before_are_stored_and_only_what_is_stored_is_told() {
-    let world = RunFixture::new(&["wait_1"]).await;
+async fn stages_are_computed_while_earlier_ones_are_stored_and_reported_when_stored() {
+    let fixture = RunFixture::new(&["wait_1"]).await;
     let hold = async {
-        world.begun("wait_1", Stage::Fit).await;
-        let release = world.catalog.hold().await;
-        world.executor.open();
-        world.begun("wait_1", Stage::Register).await;
-        assert_eq!(world.position(|event| finished(event, Stage::Fit)), None);
+        fixture.started("wait_1", Stage::Fit).await;
+        let release = fixture.catalog.hold().await;
+        fixture.executor.open();
+        fixture.started("wait_1", Stage::Register).await;
+        assert_eq!(fixture.position(|event| finished(event, Stage::Fit)), None);
         release.send(()).expect("the writer waits");
     };
     let options = options(1);
-    let (summary, ()) = tokio::join!(world.run(&options), hold);
+    let (summary, ()) = tokio::join!(fixture.run(&options), hold);
     assert_eq!((summary.done, summary.stages), (1, 4));
-    let told = Stage::ALL.map(|stage| world.position(|event| finished(event, stage)));
-    assert!(told.is_sorted() && told[0].is_some(), "{told:?}");
-    assert!(world.position(|event| started(event, Stage::Register)) < told[0]);
-    let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
+    let reported = Stage::ALL.map(|stage| fixture.position(|event| finished(event, stage)));
+    assert!(
+        reported.is_sorted() && reported[0].is_some(),
+        "{reported:?}"
+    );
+    assert!(fixture.position(|event| started(event, Stage::Register)) < reported[0]);
+    let detail = fixture.catalog.pair(&name("wait_1")).await.expect("a read");
     assert_eq!(detail.expect("the pair").attempts.len(), 4);
 }
 
 #[tokio::test]
-async fn what_is_finished_is_stored_while_a_long_stage_is_computed() {
-    let world = RunFixture::new(&["lasts_1"]).await;
+async fn finished_stages_are_stored_while_a_long_stage_is_computed() {
+    let fixture = RunFixture::new(&["lasts_1"]).await;
     let look = async {
-        world.begun("lasts_1", Stage::Register).await;
+        fixture.started("lasts_1", Stage::Register).await;
         let stored = async {
-            while world
+            while fixture
                 .position(|event| finished(event, Stage::Normalize))
                 .is_none()
             {
@@ -74,86 +77,86 @@ async fn what_is_finished_is_stored_while_a_long_stage_is_computed() {
             }
         };
         let stored = timeout(Duration::from_mins(1), stored).await;
-        let detail = world.catalog.pair(&name("lasts_1")).await;
-        world.executor.open();
-        assert!(stored.is_ok(), "it waits for the end");
+        let detail = fixture.catalog.pair(&name("lasts_1")).await;
+        fixture.executor.open();
+        assert!(stored.is_ok(), "it is stored only at the end");
         assert_eq!(detail.expect("a read").expect("the pair").attempts.len(), 3);
     };
     let options = options(1);
-    let (summary, ()) = tokio::join!(world.run(&options), look);
+    let (summary, ()) = tokio::join!(fixture.run(&options), look);
     assert_eq!((summary.done, summary.stages), (1, 4));
 }
 
-/// Less than passes between two signs of life, which take along what waits.
+/// Less than the interval between heartbeats, which flush delayed commits.
 const SOON: Duration = Duration::from_secs(8);
 
 #[tokio::test]
-async fn who_needs_the_lease_back_has_what_is_on_its_way_stored_at_once() {
-    let world = RunFixture::patient(&["breaks_1"]).await;
+async fn stages_are_stored_at_once_when_the_lease_is_needed_to_store_a_failure() {
+    let fixture = RunFixture::patient(&["breaks_1"]).await;
     let options = options(1);
-    let ended = timeout(SOON, world.run(&options)).await;
-    assert_eq!(ended.expect("it does not wait").done, 1);
-    assert_eq!(world.executor.count("breaks_1", Stage::Depth), 2);
+    let ended = timeout(SOON, fixture.run(&options)).await;
+    assert_eq!(ended.expect("no timeout").done, 1);
+    assert_eq!(fixture.executor.count("breaks_1", Stage::Depth), 2);
 }
 
 #[tokio::test]
-async fn nothing_is_stored_of_a_stage_that_was_computed_while_the_lease_was_lost() {
-    let world = RunFixture::new(&["wait_1"]).await;
-    let rob = async {
-        world.begun("wait_1", Stage::Fit).await;
-        let nobody = DeadWorker::AllExcept(WorkerId(99));
-        let rescued = world.catalog.recover(nobody, 1).await.expect("a recover");
-        assert_eq!(rescued.ready, 1);
-        world.executor.open();
+async fn a_stage_computed_after_the_lease_was_lost_is_not_stored() {
+    let fixture = RunFixture::new(&["wait_1"]).await;
+    let take_lease = async {
+        fixture.started("wait_1", Stage::Fit).await;
+        let all = DeadWorker::AllExcept(WorkerId(99));
+        let recovered = fixture.catalog.recover(all, 1).await.expect("recovered");
+        assert_eq!(recovered.ready, 1);
+        fixture.executor.open();
     };
     let options = options(1);
-    let (summary, ()) = tokio::join!(world.run(&options), rob);
+    let (summary, ()) = tokio::join!(fixture.run(&options), take_lease);
     assert_eq!((summary.done, summary.stages), (1, 4));
-    assert_eq!(world.executor.count("wait_1", Stage::Fit), 2);
-    let detail = world.catalog.pair(&name("wait_1")).await.expect("a read");
+    assert_eq!(fixture.executor.count("wait_1", Stage::Fit), 2);
+    let detail = fixture.catalog.pair(&name("wait_1")).await.expect("a read");
     let attempts = detail.expect("the pair").attempts;
     let stored = attempts.iter().filter(|attempt| attempt.failure.is_none());
     assert_eq!(stored.count(), 4);
 }
 
 #[tokio::test]
-async fn the_next_pair_is_taken_ahead_and_given_back_by_a_drain() {
-    let world = RunFixture::new(&["lasts_1", "next", "other"]).await;
+async fn the_next_pair_is_claimed_ahead_and_released_by_a_drain() {
+    let fixture = RunFixture::new(&["lasts_1", "next", "other"]).await;
     let drain = async {
-        world.begun("lasts_1", Stage::Register).await;
-        while world.status("next").await != JobStatus::Leased {
+        fixture.started("lasts_1", Stage::Register).await;
+        while fixture.status("next").await != JobStatus::Leased {
             tokio::task::yield_now().await;
         }
-        assert_eq!(world.stop.escalate(), StopLevel::Drain);
-        while world.status("next").await != JobStatus::Ready {
+        assert_eq!(fixture.stop.escalate(), StopLevel::Drain);
+        while fixture.status("next").await != JobStatus::Ready {
             tokio::task::yield_now().await;
         }
-        world.executor.open();
+        fixture.executor.open();
     };
     let options = options(1);
-    let (summary, ()) = tokio::join!(world.run(&options), drain);
+    let (summary, ()) = tokio::join!(fixture.run(&options), drain);
     assert_eq!((summary.done, summary.left), (1, 2));
-    assert_eq!(world.executor.count("next", Stage::Fit), 0);
+    assert_eq!(fixture.executor.count("next", Stage::Fit), 0);
     let attempt = async |pair: PairName| {
-        world
+        fixture
             .catalog
             .pair(&pair)
             .await
-            .map(|pair| pair.expect("it").attempt)
+            .map(|pair| pair.expect("the pair").attempt)
     };
     assert_eq!(attempt(name("next")).await.expect("a read"), 0);
-    assert_eq!(world.status("other").await, JobStatus::Ready);
+    assert_eq!(fixture.status("other").await, JobStatus::Ready);
 }
 
-/// Nor does the run wait for company when it could begin them.
+/// The run does not delay commits either while it could start pairs.
 #[tokio::test]
-async fn no_more_pairs_are_begun_than_the_disk_keeps_up_with() {
+async fn no_more_pairs_start_than_the_disk_keeps_up_with() {
     let names: Vec<String> = (0..60).map(|number| format!("pair_{number}")).collect();
-    let world = RunFixture::patient(&names.iter().map(String::as_str).collect::<Vec<_>>()).await;
+    let fixture = RunFixture::patient(&names.iter().map(String::as_str).collect::<Vec<_>>()).await;
     let options = options(1);
-    let ended = timeout(SOON, world.run(&options)).await;
-    assert_eq!(ended.expect("it does not wait").done, 60);
-    let events = world.events.lock().expect("no panic holds it");
+    let ended = timeout(SOON, fixture.run(&options)).await;
+    assert_eq!(ended.expect("no timeout").done, 60);
+    let events = fixture.events.lock().expect("an unpoisoned lock");
     let (mut in_memory, mut most) = (0_i32, 0);
     for event in events.iter() {
         in_memory += i32::from(started(event, Stage::Fit));
@@ -165,55 +168,55 @@ async fn no_more_pairs_are_begun_than_the_disk_keeps_up_with() {
 }
 
 #[tokio::test]
-async fn no_more_are_taken_ahead_than_slots_will_be_free() {
-    let world = RunFixture::new(&["lasts_1", "lasts_2", "next_1", "next_2", "other"]).await;
+async fn no_more_pairs_are_claimed_ahead_than_slots_become_free() {
+    let fixture = RunFixture::new(&["lasts_1", "lasts_2", "next_1", "next_2", "other"]).await;
     let look = async {
-        while world.status("next_2").await != JobStatus::Leased {
+        while fixture.status("next_2").await != JobStatus::Leased {
             tokio::task::yield_now().await;
         }
-        assert_eq!(world.status("other").await, JobStatus::Ready);
-        world.executor.open();
+        assert_eq!(fixture.status("other").await, JobStatus::Ready);
+        fixture.executor.open();
     };
     let options = options(2);
-    let (summary, ()) = tokio::join!(world.run(&options), look);
+    let (summary, ()) = tokio::join!(fixture.run(&options), look);
     assert_eq!(summary.done, 5);
 }
 
-/// It may have to wait for the one before it for as long as a stage may last, and then has its own time.
+/// It may wait for the pair before it as long as a stage may take, and has its own time after that.
 #[tokio::test]
-async fn a_pair_taken_ahead_is_not_overdue_before_it_could_have_begun() {
-    let world = RunFixture::new(&["lasts_1", "next"]).await;
+async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
+    let fixture = RunFixture::new(&["lasts_1", "next"]).await;
     let options = options(1);
     let limit = options.stage_timeout.as_millis() as i64;
     let clock = Clock::start();
     let look = async {
-        world.begun("lasts_1", Stage::Register).await;
-        while world.status("next").await != JobStatus::Leased {
+        fixture.started("lasts_1", Stage::Register).await;
+        while fixture.status("next").await != JobStatus::Leased {
             tokio::task::yield_now().await;
         }
-        // As if its worker had gone on for one and a half times that long.
+        // Pretend that the worker has been running for one and a half times that long.
         let (me, other) = (WorkerId(1), WorkerId(99));
-        let heartbeat = world
+        let heartbeat = fixture
             .catalog
             .heartbeat(me, clock.now() + limit * 3 / 2, 0)
             .await;
         assert!(heartbeat.expect("stored"));
-        let overdue = world.catalog.recover_overdue(other, 0, 0).await;
-        assert_eq!(overdue.expect("a recover").ready, 1);
-        assert_eq!(world.status("next").await, JobStatus::Leased);
-        world.executor.open();
+        let overdue = fixture.catalog.recover_overdue(other, 0, 0).await;
+        assert_eq!(overdue.expect("recovered").ready, 1);
+        assert_eq!(fixture.status("next").await, JobStatus::Leased);
+        fixture.executor.open();
     };
-    let (summary, ()) = tokio::join!(world.run(&options), look);
+    let (summary, ()) = tokio::join!(fixture.run(&options), look);
     assert_eq!(summary.done, 2);
 }
 
-/// Both are leased in one claim; the second is given back when it does not fit, before the first can end.
+/// One claim leases them all; a pair that does not fit is released before the first one ends.
 #[tokio::test]
-async fn pairs_that_do_not_fit_together_run_one_after_the_other() {
-    let world = RunFixture::new(&["wait_1", "wait_2", "wait_3"]).await;
+async fn pairs_that_exceed_the_memory_together_run_one_after_the_other() {
+    let fixture = RunFixture::new(&["wait_1", "wait_2", "wait_3"]).await;
     for (limit, together) in [(None, 3), (Some(80 << 20), 2), (Some(1), 1)] {
-        let world = if limit.is_none() {
-            &world
+        let fixture = if limit.is_none() {
+            &fixture
         } else {
             &RunFixture::new(&["wait_1", "wait_2", "wait_3"]).await
         };
@@ -224,24 +227,24 @@ async fn pairs_that_do_not_fit_together_run_one_after_the_other() {
         let open = async {
             let settled = async || {
                 let pairs = ["wait_1", "wait_2", "wait_3"];
-                let begun = pairs
+                let started = pairs
                     .iter()
-                    .filter(|pair| world.executor.count(pair, Stage::Fit) > 0);
-                let begun = begun.count();
+                    .filter(|pair| fixture.executor.count(pair, Stage::Fit) > 0);
+                let started = started.count();
                 let mut ready = 0;
                 for pair in pairs {
-                    ready += usize::from(world.status(pair).await == JobStatus::Ready);
+                    ready += usize::from(fixture.status(pair).await == JobStatus::Ready);
                 }
-                begun > 0 && begun + ready == 3
+                started > 0 && started + ready == 3
             };
             while !settled().await {
                 tokio::task::yield_now().await;
             }
-            world.executor.open();
+            fixture.executor.open();
         };
-        let (summary, ()) = tokio::join!(world.run(&options), open);
+        let (summary, ()) = tokio::join!(fixture.run(&options), open);
         assert_eq!(summary.done, 3);
-        let most = world.executor.most.load(Ordering::SeqCst);
+        let most = fixture.executor.most.load(Ordering::SeqCst);
         assert_eq!(most, together, "{limit:?}");
     }
 }
