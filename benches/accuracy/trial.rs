@@ -4,7 +4,10 @@ use std::num::NonZeroUsize;
 
 use mocban::demo::{DemoPair, Tier};
 use mocban::domain::{MetricOutcome, ThresholdMetric};
-use mocban::report::ground_truth::{TruthErrors, TruthRecord, tops_iou};
+use mocban::report::{
+    ground_truth::{TruthErrors, TruthRecord},
+    tops_iou,
+};
 use mocban::stages::AlignedPair;
 
 use super::case::Case;

@@ -13,12 +13,12 @@ pub(super) struct AgreementArgs {}
 
 pub(super) async fn agreement(_: AgreementArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let (_project, catalog) = context.open_read_only().await?;
-    let found = report::agree(&catalog).await?;
+    let found = report::agreement(&catalog).await?;
     catalog.close().await;
     if context.global.json {
         output::print_json(&serde_json::to_value(&found)?)?;
     } else {
-        output::print(&report::agree_text(&found))?;
+        output::print(&report::agreement_text(&found))?;
     }
     if found.conflicts > 0 {
         let next = "review --adjudicate --reviewer NAME";

@@ -1,31 +1,31 @@
-//! The contact sheet of a project: its worst pairs first, on one picture.
+//! The contact sheet of a project: one image with many pairs, the worst first.
 
 use rayon::prelude::*;
 
 use super::pictures::{ContactSheetCell, Rgb, contact_sheet, tile_side};
-use super::tiles::tiles;
+use super::source_print::result_images;
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{JobStatus, PairName, ThresholdMetric};
-use crate::raster;
+use crate::raster::ImageLimits;
 use crate::report::ground_truth::TruthErrors;
-use crate::report::{Consensus, TruthEvaluation, with_truth};
+use crate::report::{Consensus, TruthEvaluation, evaluate_pairs};
 use crate::store::Project;
 
-/// Pairs in memory at a time while the worst are looked for.
+/// Pairs in memory at a time while the worst are selected.
 const PAGE: usize = 256;
 
-/// What comes first on a sheet. Failed pairs come before all others but in the order of names.
+/// The order of pairs on a contact sheet. Failed pairs come first, except by name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactSheetOrder {
-    /// The farthest from the truth; without truth, the lowest `IoU`.
+    /// Largest error against ground truth; without ground truth, lowest `IoU`.
     Worst,
-    /// The lowest `IoU` on the canvas.
+    /// Lowest `IoU` on the canvas.
     Score,
-    /// The smallest lead over the next best pose.
+    /// Smallest margin over the second-best pose.
     Margin,
-    /// The least confident; those without a confidence last.
+    /// Least confident; results without a confidence last.
     Confidence,
-    /// The first name.
+    /// By name.
     Name,
 }
 
@@ -39,7 +39,7 @@ impl ContactSheetOrder {
         Self::Name,
     ];
 
-    /// Name on the command line.
+    /// Returns the name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Worst => "worst",
@@ -73,24 +73,24 @@ impl std::str::FromStr for ContactSheetOrder {
 /// What to draw.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactSheetOptions {
-    /// Whose results.
+    /// The metric whose results are drawn.
     pub metric: ThresholdMetric,
     /// Only these pairs; all when `None`.
     pub pairs: Option<Vec<PairName>>,
-    /// What comes first.
+    /// The order of the pairs.
     pub order: ContactSheetOrder,
     /// Most pairs on the sheet.
     pub limit: usize,
     /// Pairs in a row, 1 to 12.
     pub columns: usize,
     /// Limits on the print images.
-    pub limits: raster::ImageLimits,
+    pub limits: ImageLimits,
 }
 
-/// A sheet, and how much of the project is on it.
+/// A contact sheet, and how much of the project it shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ContactSheet {
-    /// The picture.
+    /// The image.
     pub picture: Rgb,
     /// Pairs on it.
     pub shown: usize,
@@ -98,10 +98,10 @@ pub struct ContactSheet {
     pub of: usize,
 }
 
-/// Why there is no sheet.
+/// Why images cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
-    /// The catalog refused.
+    /// The catalog cannot be read.
     #[error(transparent)]
     Catalog(#[from] CatalogError),
     /// A thread was lost.
@@ -109,17 +109,17 @@ pub enum DrawError {
     Stopped(#[from] tokio::task::JoinError),
 }
 
-/// A pair that may get on the sheet.
+/// A pair that may be drawn.
 struct SheetCandidate {
-    /// Lowest first.
+    /// Sort key, lowest first.
     rank: f64,
     pair: PairResults,
     truth: Option<TruthErrors>,
 }
 
-/// Draws the contact sheet of a project as its catalog stands. Unfinished pairs are not on it.
+/// Draws the contact sheet of a project from the current state of its catalog, without unfinished pairs.
 ///
-/// A picture that cannot be made is left blank, with the reason in the cell.
+/// An image that cannot be drawn is left blank, with the reason in the cell.
 ///
 /// # Errors
 /// When the catalog cannot be read.
@@ -142,7 +142,7 @@ pub async fn draw_contact_sheet(
     Ok(tokio::task::spawn_blocking(picture).await?)
 }
 
-/// The pairs that go on the sheet, in order, and of how many.
+/// Returns the pairs to draw, in order, and the number of candidates.
 async fn choose(
     catalog: &Catalog,
     project: &Project,
@@ -151,22 +151,22 @@ async fn choose(
     let (mut chosen, mut of) = (Vec::new(), 0);
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
-        let wanted = page.into_iter().filter(|pair| wants(options, pair));
-        for (pair, truth) in with_truth(project, wanted.collect()).await? {
+        let wanted = page.into_iter().filter(|pair| is_shown(options, pair));
+        for (pair, truth) in evaluate_pairs(project, wanted.collect()).await? {
             of += 1;
             chosen.push(SheetCandidate::new(pair, &truth, options));
         }
-        // The sort is stable and pairs come by name, so that equal ranks stay in the order of names.
+        // The sort is stable and pairs come by name, so pairs of equal rank are sorted by name.
         chosen.sort_by(|a, b| a.rank.total_cmp(&b.rank));
         chosen.truncate(options.limit);
     }
     Ok((chosen, of))
 }
 
-/// Whether a pair was asked for and has something to show.
-fn wants(options: &ContactSheetOptions, pair: &PairResults) -> bool {
-    let asked = |names: &Vec<PairName>| names.contains(&pair.attributes.name);
-    options.pairs.as_ref().is_none_or(asked)
+/// Returns whether a pair was requested and has something to show.
+fn is_shown(options: &ContactSheetOptions, pair: &PairResults) -> bool {
+    let is_requested = |names: &Vec<PairName>| names.contains(&pair.attributes.name);
+    options.pairs.as_ref().is_none_or(is_requested)
         && (pair.status == JobStatus::Quarantined || pair.metric(options.metric).is_some())
 }
 
@@ -178,7 +178,7 @@ impl SheetCandidate {
     }
 }
 
-/// Place of a pair on the sheet, lowest first.
+/// Returns the sort key of a pair, lowest first.
 fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &ContactSheetOptions) -> f64 {
     if options.order == ContactSheetOrder::Name {
         return 0.0;
@@ -205,10 +205,10 @@ fn cell(
     let standing = pair.metric(options.metric).map(Consensus::of);
     let off_truth = candidate.truth.is_some_and(|errors| !errors.pass());
     let side = tile_side(options.columns);
-    let (tiles, trouble) = tiles(project, pair, options.metric, side, &options.limits);
+    let (tiles, problem) = result_images(project, pair, options.metric, side, &options.limits);
     ContactSheetCell {
         id: title(pair, options.metric),
-        note: trouble.unwrap_or_else(|| note(candidate, options.metric)),
+        note: problem.unwrap_or_else(|| note(candidate, options.metric)),
         wrong: pair.metric(options.metric).is_none()
             || off_truth
             || standing == Some(Consensus::Failed),
@@ -216,19 +216,19 @@ fn cell(
     }
 }
 
-/// The id, how sure the result is where that is known, and what reviewers say where anybody has.
+/// Returns the id, the confidence where it is known, and the verdict where there is one.
 fn title(pair: &PairResults, metric: ThresholdMetric) -> String {
     let mut title = pair.attributes.name.to_string();
     if let Some(record) = pair.metric(metric) {
-        let sure = record.outcome.confidence;
-        title.extend(sure.map(|sure| format!("  sure {sure:.2}")));
+        let confidence = record.outcome.confidence;
+        title.extend(confidence.map(|confidence| format!("  conf {confidence:.2}")));
         let verdict = Consensus::of(record).verdict();
         title.extend(verdict.map(|verdict| format!("  {verdict}")));
     }
     title
 }
 
-/// The numbers of a pair, or why it failed.
+/// Returns scores and errors of a pair, or why it failed.
 fn note(candidate: &SheetCandidate, metric: ThresholdMetric) -> String {
     let pair = &candidate.pair;
     match (pair.metric(metric), &candidate.truth, &pair.failure) {
@@ -248,7 +248,7 @@ fn note(candidate: &SheetCandidate, metric: ThresholdMetric) -> String {
     }
 }
 
-/// One decimal where it tells something.
+/// Formats with one decimal below 10 and none above.
 fn short(value: f64) -> String {
     if value < 9.95 {
         format!("{value:.1}")
@@ -259,9 +259,9 @@ fn short(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{ContactSheetOptions, ContactSheetOrder, rank, title, wants};
+    use super::{ContactSheetOptions, ContactSheetOrder, is_shown, rank, title};
     use crate::domain::{FailureClass, PairName, ThresholdMetric, Verdict};
-    use crate::raster;
+    use crate::raster::ImageLimits;
     use crate::report::test_fixtures;
 
     fn options(order: ContactSheetOrder) -> ContactSheetOptions {
@@ -271,7 +271,7 @@ mod tests {
             order,
             limit: 50,
             columns: 5,
-            limits: raster::ImageLimits::SUGGESTED,
+            limits: ImageLimits::SUGGESTED,
         }
     }
 
@@ -295,17 +295,20 @@ mod tests {
     #[test]
     fn the_least_confident_come_first_and_the_unknown_last() {
         let order = options(ContactSheetOrder::Confidence);
-        let (low_confidence, sure) = (test_fixtures::sure("b", 0.2), test_fixtures::sure("a", 0.9));
+        let (low, high) = (
+            test_fixtures::with_confidence("b", 0.2),
+            test_fixtures::with_confidence("a", 0.9),
+        );
         let rank = |pair| rank(pair, None, &order);
-        assert!(rank(&low_confidence) < rank(&sure));
-        assert!(rank(&sure) < rank(&test_fixtures::done("c", 0.1, &[])));
-        assert_eq!(title(&low_confidence, order.metric), "b  sure 0.20");
-        let read = test_fixtures::done("c", 0.1, &[Verdict::Fail]);
-        assert_eq!(title(&read, order.metric), "c  fail");
+        assert!(rank(&low) < rank(&high));
+        assert!(rank(&high) < rank(&test_fixtures::done("c", 0.1, &[])));
+        assert_eq!(title(&low, order.metric), "b  conf 0.20");
+        let judged = test_fixtures::done("c", 0.1, &[Verdict::Fail]);
+        assert_eq!(title(&judged, order.metric), "c  fail");
     }
 
     #[test]
-    fn truth_outweighs_the_score_in_worst() {
+    fn ground_truth_outweighs_the_score_in_worst() {
         let (near, far) = (
             test_fixtures::truth(1.0, 1.0, 0.9),
             test_fixtures::truth(90.0, 30.0, 0.1),
@@ -321,12 +324,12 @@ mod tests {
     }
 
     #[test]
-    fn unfinished_and_unasked_pairs_are_not_shown() {
-        let mut asked = options(ContactSheetOrder::Name);
-        assert!(!wants(&asked, &test_fixtures::pending("a")));
-        assert!(wants(&asked, &test_fixtures::done("a", 0.9, &[])));
-        asked.pairs = Some(vec![PairName::new("b").expect("an id")]);
-        assert!(!wants(&asked, &test_fixtures::done("a", 0.9, &[])));
+    fn unfinished_and_unrequested_pairs_are_not_shown() {
+        let mut requested = options(ContactSheetOrder::Name);
+        assert!(!is_shown(&requested, &test_fixtures::pending("a")));
+        assert!(is_shown(&requested, &test_fixtures::done("a", 0.9, &[])));
+        requested.pairs = Some(vec![PairName::new("b").expect("an id")]);
+        assert!(!is_shown(&requested, &test_fixtures::done("a", 0.9, &[])));
     }
 
     #[test]

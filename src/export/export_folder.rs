@@ -1,4 +1,4 @@
-//! An export folder that appears whole or not at all.
+//! An export folder that is replaced atomically.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -7,19 +7,19 @@ use std::path::{Path, PathBuf};
 
 use super::pair_files::PAIRS;
 
-/// The list of lines; a folder with it is an export.
+/// The file of lines; a folder with it is an export.
 pub(super) const LINES: &str = "pairs.jsonl";
 
-/// The verdict log, as it was when the export was made.
+/// The log of verdicts.
 pub(super) const VERDICTS: &str = "verdicts.jsonl";
-/// The log of answers to planted faults and repeats.
-pub(super) const CONTROLS: &str = "controls.jsonl";
-/// The log of alignments by hand.
-pub(super) const ALIGNMENTS: &str = "alignments.jsonl";
-/// All that lies in an export.
-const KNOWN: [&str; 5] = [LINES, PAIRS, VERDICTS, CONTROLS, ALIGNMENTS];
+/// The log of answers to attention checks.
+pub(super) const ATTENTION_CHECKS: &str = "attention_checks.jsonl";
+/// The log of manual alignments.
+pub(super) const MANUAL_ALIGNMENTS: &str = "manual_alignments.jsonl";
+/// Every entry of an export folder.
+const KNOWN: [&str; 5] = [LINES, PAIRS, VERDICTS, ATTENTION_CHECKS, MANUAL_ALIGNMENTS];
 
-/// A folder being filled beside the one it will become. Dropped unfinished, it is removed.
+/// A folder that is filled next to its target and then replaces it. It is removed when dropped unfinished.
 #[derive(Debug)]
 pub(super) struct Folder {
     target: PathBuf,
@@ -27,21 +27,21 @@ pub(super) struct Folder {
     finished: bool,
 }
 
-/// Why a folder cannot be filled.
+/// Why an export folder cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum FolderError {
-    /// It holds something else.
+    /// The folder holds something else.
     #[error("{path} holds {entry}, so it is not an earlier export; choose an empty or new folder")]
     NotAnExport {
         /// The folder.
         path: PathBuf,
-        /// Something in it that no export writes.
+        /// An entry that no export writes.
         entry: String,
     },
-    /// It has no name of its own, as `/` has none.
+    /// The folder has no name, like `/`.
     #[error("{0} cannot be replaced by an export; name a folder")]
     NoName(PathBuf),
-    /// The file system refused.
+    /// An operation on the file system failed.
     #[error("{path}: {source}")]
     Io {
         /// Which file or folder.
@@ -52,17 +52,17 @@ pub enum FolderError {
 }
 
 impl Folder {
-    /// Makes an empty folder beside `target`, which must be new, empty or an earlier export.
+    /// Creates an empty folder next to `target`, which must be new, empty or an earlier export.
     ///
     /// # Errors
-    /// When the target holds something else, or the folder cannot be made.
+    /// When the target holds something else, or the folder cannot be created.
     pub(super) fn begin(target: &Path) -> Result<Self, FolderError> {
         refuse_foreign(target)?;
         let (parent, name) = place(target)?;
         fs::create_dir_all(&parent).map_err(at(&parent))?;
         let old = parent.join(hidden(&name, "old"));
         if old.exists() && !target.exists() {
-            // A process died between its two renames.
+            // An earlier process died between its two renames.
             fs::rename(&old, target).map_err(at(&old))?;
         }
         let partial = parent.join(hidden(&name, "partial"));
@@ -75,17 +75,17 @@ impl Folder {
         })
     }
 
-    /// Where to write.
+    /// Returns the folder to write to.
     pub(super) fn path(&self) -> &Path {
         &self.partial
     }
 
-    /// Whether an earlier export is there, which finishing would replace.
+    /// Returns whether finishing would replace an earlier export.
     pub(super) fn replaces(&self) -> bool {
         self.target.join(LINES).exists()
     }
 
-    /// Puts the folder in the place of the target, once all of it is on disk.
+    /// Syncs the folder to disk and replaces the target with it.
     ///
     /// # Errors
     /// When it cannot be renamed; an earlier export then stays.
@@ -116,13 +116,13 @@ impl Folder {
 impl Drop for Folder {
     fn drop(&mut self) {
         if !self.finished {
-            // What is left is hidden and removed by the next export to the same place.
+            // The next export to the same target removes what is left.
             let _ = fs::remove_dir_all(&self.partial);
         }
     }
 }
 
-/// Brings everything below a folder to disk.
+/// Syncs the file system of a folder to disk.
 #[cfg(target_os = "linux")]
 fn sync(folder: &Path) -> io::Result<()> {
     Ok(rustix::fs::syncfs(fs::File::open(folder)?)?)
@@ -133,7 +133,7 @@ fn sync(folder: &Path) -> io::Result<()> {
     fs::File::open(folder)?.sync_all()
 }
 
-/// Swaps two folders in one step, so that at no moment neither is there; `false` where the file system cannot.
+/// Swaps two folders atomically; returns `false` where the file system cannot.
 #[cfg(target_os = "linux")]
 fn exchange(one: &Path, other: &Path) -> bool {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
@@ -145,7 +145,7 @@ fn exchange(_one: &Path, _other: &Path) -> bool {
     false
 }
 
-/// The folder a target lies in, and its name there.
+/// Returns the parent and the name of a target.
 fn place(target: &Path) -> Result<(PathBuf, std::ffi::OsString), FolderError> {
     let whole = match fs::canonicalize(target) {
         Ok(whole) => whole,
@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn an_earlier_export_is_replaced_whole() {
+    fn an_earlier_export_is_replaced_completely() {
         let dir = tempfile::tempdir().expect("a folder");
         let target = dir.path().join("deep/out");
         for text in ["one", "two"] {
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn an_export_that_lost_its_place_half_way_gets_it_back() {
+    fn an_export_interrupted_between_renames_is_restored() {
         let dir = tempfile::tempdir().expect("a folder");
         let (target, old) = (dir.path().join("out"), dir.path().join(".out.mocban-old"));
         fs::create_dir(&old).expect("made");
@@ -264,7 +264,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_of_something_else_is_refused_untouched() {
+    fn a_foreign_folder_is_refused_and_unchanged() {
         let dir = tempfile::tempdir().expect("a folder");
         fs::write(dir.path().join(LINES), "").expect("written");
         fs::write(dir.path().join("thesis.tex"), "").expect("written");

@@ -1,38 +1,39 @@
-//! One line of `pairs.jsonl`: a pair and a metric.
+//! One line of `pairs.jsonl`: the result of one pair and metric.
+
+use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::manual_alignment::LineManualAlignment;
 use super::pair_files::Files;
-use crate::catalog::{MetricRecord, PairResults};
+use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults, StoredAlignment};
 use crate::domain::{
     Affine2, ContentHash, DepthOutcome, Failure, FailureClass, FitOutcome, JobStatus,
     MetricOutcome, NormalizeOutcome, PairName, PrintFromMesh, Rigid3, Stage, ThresholdMetric,
-    Verdict,
+    UnixMillis, Verdict,
 };
 use crate::report::Consensus;
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 
-/// How far a pair is.
+/// State of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LineStatus {
-    /// Aligned; every number and file is there.
+    /// Aligned; every number and file exists.
     Done,
-    /// It failed, or its files cannot be read any more; `error` says why.
+    /// It failed, or its files cannot be read; `error` holds the reason.
     Failed,
     /// Not aligned yet.
     Pending,
 }
 
-/// A line. What does not exist is null; field names are fixed.
+/// A line. A value that does not exist is null; field names are fixed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExportLine {
     /// The pair's id.
     pub id: PairName,
-    /// How the depth threshold was chosen.
+    /// The metric that chose the depth threshold.
     pub metric: ThresholdMetric,
-    /// How far the pair is.
+    /// State of the pair.
     pub status: LineStatus,
     /// Class of the failure.
     pub error_class: Option<FailureClass>,
@@ -46,33 +47,33 @@ pub struct ExportLine {
     pub maps: Maps,
     /// Files below the export folder.
     pub files: Option<Files>,
-    /// What the result was made from.
+    /// Hashes of the inputs and of the result.
     #[serde(flatten)]
     pub hashes: Hashes,
-    /// What reviewers together say of this result.
+    /// The consensus of the reviewers on this result.
     pub verdict: Option<Verdict>,
-    /// The newest alignment by hand, where people made one.
-    pub by_hand: Option<LineManualAlignment>,
-    /// Computing time of the pair's stages, where times were asked for.
+    /// The newest valid manual alignment, where there is one.
+    pub manual_alignment: Option<LineManualAlignment>,
+    /// Computing time of the pair's stages, seconds, where times were requested.
     pub seconds: Option<f64>,
 }
 
 /// Threshold, pose and scores.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Numbers {
-    /// Height over the fitted surface from which on the depth map is stroke, mesh units.
+    /// Height above the fitted surface from which the depth map counts as stroke, mesh units.
     pub threshold_depth: Option<f64>,
-    /// Grey level 0..=65535 that parts ink from paper.
+    /// Grey level 0..=65535 that separates ink from background.
     pub threshold_print: Option<f64>,
-    /// How far the depth map is turned, degrees in (-180, 180], clockwise on the screen.
+    /// Rotation of the depth map, degrees in (-180, 180], clockwise on the screen.
     pub angle_deg: Option<f64>,
     /// Print pixels per depth-map pixel.
     pub scale: Option<f64>,
-    /// Where the centre of the depth map goes relative to the print's, print pixels.
+    /// Offset of the depth map's centre from the print's, print pixels.
     pub shift_px: Option<[f64; 2]>,
     /// Structural similarity on the canvas.
     pub ssim: Option<f64>,
-    /// The same without the luminance factor.
+    /// Structural similarity without the luminance factor.
     pub nl_ssim: Option<f64>,
     /// Intersection over union of the canvas masks by pixel.
     pub iou: Option<f64>,
@@ -82,9 +83,9 @@ pub struct Numbers {
     pub dice: Option<f64>,
     /// Share of the canvas that is ink.
     pub density_print: Option<f64>,
-    /// Share of the canvas that is stroke top.
+    /// Share of the canvas that is stroke.
     pub density_depth: Option<f64>,
-    /// Calibrated chance that the alignment is right, 0..=1; null under a method that gives none.
+    /// Calibrated probability that the alignment is right, 0..=1; null under a method that gives none.
     pub confidence: Option<f64>,
 }
 
@@ -101,20 +102,70 @@ pub struct Maps {
     pub print_from_depth: Option<[[f64; 3]; 3]>,
 }
 
-/// What a result was made from, and the result itself.
+/// Hashes of a result and of what it was made from.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Hashes {
-    /// Content of the mesh file.
+    /// Of the mesh file's content.
     pub mesh_hash: Option<ContentHash>,
-    /// Content of the print file.
+    /// Of the print file's content.
     pub print_hash: Option<ContentHash>,
-    /// This metric's result.
+    /// Of this metric's result.
     pub result_hash: Option<ContentHash>,
-    /// Settings of all stages.
+    /// Of the settings of all stages.
     pub config_hash: Option<ContentHash>,
 }
 
-/// The outcomes of a finished pair that its lines share.
+/// A manual alignment of the current mesh and print.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LineManualAlignment {
+    /// Who made it.
+    pub reviewer: String,
+    /// When.
+    pub at: UnixMillis,
+    /// 3x4: mesh point to print pixel and height.
+    pub print_from_mesh: PrintFromMesh,
+    /// 3x3: depth-map pixel to print pixel; null where the depth map has changed since.
+    pub print_from_depth: Option<[[f64; 3]; 3]>,
+    /// Intersection over union of the masks on the canvas of the line's scores.
+    pub iou: f64,
+    /// Dice coefficient of the same masks.
+    pub dice: f64,
+    /// The reviewer's note.
+    pub note: Option<String>,
+}
+
+impl LineManualAlignment {
+    fn of(stored: StoredAlignment) -> Self {
+        let made = stored.made;
+        let Affine2([first, second]) = made.print_from_depth;
+        Self {
+            reviewer: made.reviewer,
+            at: stored.at,
+            print_from_mesh: made.print_from_mesh,
+            print_from_depth: stored
+                .on_current_depth
+                .then_some([first, second, [0.0, 0.0, 1.0]]),
+            iou: made.iou,
+            dice: made.dice,
+            note: made.note,
+        }
+    }
+}
+
+/// Returns the newest manual alignment of each pair, without undone and outdated ones.
+///
+/// # Errors
+/// When the catalog cannot be read.
+pub(super) async fn newest_manual_alignments(
+    catalog: &Catalog,
+) -> Result<BTreeMap<PairName, LineManualAlignment>, CatalogError> {
+    let newest = catalog.newest_hand_alignments().await?.into_iter();
+    Ok(newest
+        .map(|(pair, stored)| (pair, LineManualAlignment::of(stored)))
+        .collect())
+}
+
+/// The outcomes of a finished pair that all its lines share.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Outcomes {
     fit: FitOutcome,
@@ -123,18 +174,18 @@ pub(super) struct Outcomes {
 }
 
 impl Outcomes {
-    /// Reads them from the stored results.
-    pub(super) fn read(aligned: &PairArtifacts<'_>) -> Result<Self, PairArtifactsError> {
+    /// Parses the stored results.
+    pub(super) fn read(artifacts: &PairArtifacts<'_>) -> Result<Self, PairArtifactsError> {
         Ok(Self {
-            fit: aligned.outcome(Stage::Fit)?,
-            depth: aligned.outcome(Stage::Depth)?,
-            normalize: aligned.outcome(Stage::Normalize)?,
+            fit: artifacts.outcome(Stage::Fit)?,
+            depth: artifacts.outcome(Stage::Depth)?,
+            normalize: artifacts.outcome(Stage::Normalize)?,
         })
     }
 }
 
 impl ExportLine {
-    /// The line of a pair without result.
+    /// Returns the line of a pair without a result.
     pub(super) fn without_result(pair: &PairResults, metric: ThresholdMetric) -> Self {
         let failure = pair.failure.as_ref().map(|stored| &stored.failure);
         Self {
@@ -151,12 +202,12 @@ impl ExportLine {
                 ..hashes(pair)
             },
             verdict: None,
-            by_hand: None,
+            manual_alignment: None,
             seconds: None,
         }
     }
 
-    /// The line of a pair whose result cannot be read any more.
+    /// Returns the line of a pair whose result cannot be read.
     pub(super) fn unreadable(pair: &PairResults, metric: ThresholdMetric, why: &Failure) -> Self {
         Self {
             status: LineStatus::Failed,
@@ -166,7 +217,7 @@ impl ExportLine {
         }
     }
 
-    /// The line of a result.
+    /// Returns the line of a result.
     pub(super) fn of(
         pair: &PairResults,
         record: &MetricRecord,
@@ -228,7 +279,7 @@ impl Maps {
     }
 }
 
-/// Hashes that the lines of a pair share.
+/// Returns the hashes that all lines of a pair share.
 fn hashes(pair: &PairResults) -> Hashes {
     Hashes {
         mesh_hash: pair.stage(Stage::Fit).map(|record| record.mesh_hash),
@@ -287,7 +338,7 @@ mod tests {
         "result_hash",
         "config_hash",
         "verdict",
-        "by_hand",
+        "manual_alignment",
         "seconds",
     ];
 

@@ -1,31 +1,33 @@
-//! The pictures of a report's page: what reviewers failed or contradict each other on, what is off the truth, and some
-//! by lot.
+//! The images of the HTML report: results that reviewers failed or disagree on, results off the ground truth, and a
+//! random sample.
 
 use rayon::prelude::*;
 
 use super::contact_sheet::DrawError;
-use super::tiles::tiles;
+use super::source_print::result_images;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults, VerdictEvent};
 use crate::domain::{ContentHash, SeededRandom, ThresholdMetric};
-use crate::raster::{self, jpeg_rgb8};
-use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, said};
+use crate::raster::{ImageLimits, jpeg_rgb8};
+use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason, verdict_text};
 use crate::report::ground_truth::TruthErrors;
-use crate::report::pair_artifacts::alike;
+use crate::report::number_format::NumberStyle::{Degrees, Percent, Share};
+use crate::report::number_format::format_number;
+use crate::report::pair_artifacts::group_identical;
 use crate::report::{Consensus, TruthEvaluation};
 use crate::store::Project;
 
-/// Longest side of a picture in pixels.
+/// Longest side of an image, pixels.
 const SIDE: usize = 280;
-/// Quality of the pictures, of 100.
+/// JPEG quality of the images, 0..=100.
 const QUALITY: u8 = 82;
-/// Most results drawn of each kind.
-const MOST: usize = 80;
-/// Pairs drawn by lot.
-const BY_LOT: usize = 20;
-/// Whose result of a pair is drawn by lot.
-const LOT_METRIC: ThresholdMetric = ThresholdMetric::Ensemble;
+/// Most results drawn for each reason.
+const MAX_PER_REASON: usize = 80;
+/// Pairs in the random sample.
+const SAMPLE_SIZE: usize = 20;
+/// The metric whose results are sampled.
+const SAMPLE_METRIC: ThresholdMetric = ThresholdMetric::Ensemble;
 
-/// A result to be drawn: of one metric, or of several that came to the same.
+/// A result to be drawn: of one metric, or of several that look the same.
 #[derive(Debug)]
 struct GallerySubject {
     pair: PairResults,
@@ -34,91 +36,96 @@ struct GallerySubject {
     log: Vec<VerdictEvent>,
 }
 
-/// The results to draw: at most 80 that reviewers failed, 80 on which they contradict each other, 80 off the truth,
-/// and 20 by lot.
+/// The results to draw: at most 80 that reviewers failed, 80 on which they disagree, 80 off the ground truth, and a
+/// random sample of 20.
 #[derive(Debug)]
 pub struct GallerySelection {
     seed: u64,
-    lots: SeededRandom,
+    random: SeededRandom,
+    /// For each of [`FOUND`], the number of results in the project and those to draw.
     found: [(u64, Vec<GallerySubject>); 3],
-    by_lot: Vec<(f64, GallerySubject)>,
+    /// The pairs with the smallest random numbers, sorted by these.
+    sample: Vec<(f64, GallerySubject)>,
     pairs: u64,
 }
 
-/// Kinds that are chosen for what was found, in the order of [`GallerySelection::found`].
+/// The reasons that select a result by its verdicts or errors.
 const FOUND: [GalleryReason; 3] = [
     GalleryReason::Failed,
     GalleryReason::Conflict,
     GalleryReason::OffTruth,
 ];
 
-/// Draws the pictures of a project's report. One that cannot be made is left out, with the reason.
+/// Draws the images of a project's report. An image that cannot be drawn is left out, with the reason.
 ///
 /// # Errors
 /// When the catalog cannot be read.
 pub async fn draw_gallery(
-    mut chosen: GallerySelection,
+    mut selection: GallerySelection,
     catalog: &Catalog,
     project: &Project,
-    limits: raster::ImageLimits,
+    limits: ImageLimits,
 ) -> Result<Gallery, DrawError> {
-    chosen.read_log(catalog).await?;
+    selection.read_log(catalog).await?;
     let project = project.clone();
-    let draw = move || chosen.draw(&project, &limits);
+    let draw = move || selection.draw(&project, &limits);
     Ok(tokio::task::spawn_blocking(draw).await?)
 }
 
 impl GallerySelection {
-    /// Nothing yet; the seed is that of the lot.
+    /// Returns an empty selection; `seed` is that of the random sample.
     pub fn new(seed: u64) -> Self {
         Self {
             seed,
-            lots: SeededRandom::new(seed, "report"),
+            random: SeededRandom::new(seed, "report"),
             found: Default::default(),
-            by_lot: Vec::new(),
+            sample: Vec::new(),
             pairs: 0,
         }
     }
 
-    /// Takes a pair's results in, where they are to be drawn. Pairs come in the order of their names.
+    /// Adds a pair's results, as far as they are to be drawn. Pairs are added in the order of their names.
     pub fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
-        for records in alike(&pair.metrics) {
-            for ((of, subjects), kind) in self.found.iter_mut().zip(FOUND) {
-                let is_of_kind = |record: &&MetricRecord| is_of(kind, record, truth);
-                let metrics: Vec<_> = records.iter().copied().filter(is_of_kind).collect();
-                *of += u64::from(!metrics.is_empty());
-                if !metrics.is_empty() && subjects.len() < MOST {
-                    subjects.push(GallerySubject::new(pair, &metrics, truth));
+        for records in group_identical(&pair.metrics) {
+            for ((total, subjects), reason) in self.found.iter_mut().zip(FOUND) {
+                let applies = |record: &&MetricRecord| reason_applies(reason, record, truth);
+                let matching: Vec<_> = records.iter().copied().filter(applies).collect();
+                *total += u64::from(!matching.is_empty());
+                if !matching.is_empty() && subjects.len() < MAX_PER_REASON {
+                    subjects.push(GallerySubject::new(pair, &matching, truth));
                 }
             }
-            if records
-                .iter()
-                .any(|record| record.outcome.metric == LOT_METRIC)
-            {
-                self.cast(pair, &records, truth);
+            let is_sampled = |record: &&MetricRecord| record.outcome.metric == SAMPLE_METRIC;
+            if records.iter().any(is_sampled) {
+                self.add_to_sample(pair, &records, truth);
             }
         }
     }
 
-    /// Takes a pair in by lot; who drew the highest goes.
-    fn cast(&mut self, pair: &PairResults, records: &[&MetricRecord], truth: &TruthEvaluation) {
+    /// Adds a pair to the sample if its random number is among the smallest.
+    fn add_to_sample(
+        &mut self,
+        pair: &PairResults,
+        records: &[&MetricRecord],
+        truth: &TruthEvaluation,
+    ) {
         self.pairs += 1;
         let name = ContentHash::of(pair.attributes.name.as_str().as_bytes());
-        let lot = self.lots.draw(&name, "picture");
-        let place = self.by_lot.partition_point(|(other, _)| *other <= lot);
-        if place < BY_LOT {
+        let number = self.random.draw(&name, "picture");
+        let place = self.sample.partition_point(|(other, _)| *other <= number);
+        if place < SAMPLE_SIZE {
             let subject = GallerySubject::new(pair, records, truth);
-            self.by_lot.insert(place, (lot, subject));
-            self.by_lot.truncate(BY_LOT);
+            self.sample.insert(place, (number, subject));
+            self.sample.truncate(SAMPLE_SIZE);
         }
     }
 
-    /// Reads what was said of what is shown.
+    /// Reads the verdicts on what is shown.
     async fn read_log(&mut self, catalog: &Catalog) -> Result<(), CatalogError> {
         let found = self.found.iter_mut().flat_map(|(_, subjects)| subjects);
-        let by_lot = self.by_lot.iter_mut().map(|(_, subject)| subject);
-        for subject in found.chain(by_lot) {
-            if subject.is_read() {
+        let sample = self.sample.iter_mut().map(|(_, subject)| subject);
+        for subject in found.chain(sample) {
+            if subject.is_judged() {
                 subject.log = catalog
                     .verdict_log(Some(&subject.pair.attributes.name))
                     .await?;
@@ -127,23 +134,27 @@ impl GallerySelection {
         Ok(())
     }
 
-    fn draw(self, project: &Project, limits: &raster::ImageLimits) -> Gallery {
-        let mut by_lot: Vec<GallerySubject> = self.by_lot.into_iter().map(|(_, lot)| lot).collect();
-        by_lot.sort_by(|a, b| a.pair.attributes.name.cmp(&b.pair.attributes.name));
+    fn draw(self, project: &Project, limits: &ImageLimits) -> Gallery {
+        let mut sample: Vec<GallerySubject> = self
+            .sample
+            .into_iter()
+            .map(|(_, subject)| subject)
+            .collect();
+        sample.sort_by(|a, b| a.pair.attributes.name.cmp(&b.pair.attributes.name));
         let found = FOUND.into_iter().zip(self.found);
-        let all = found
-            .map(|(kind, (of, subjects))| (kind, of, subjects))
-            .chain([(GalleryReason::Lot, self.pairs, by_lot)]);
-        let groups = all.filter(|(_, of, _)| *of > 0);
+        let groups = found
+            .map(|(reason, (total, subjects))| (reason, total, subjects))
+            .chain([(GalleryReason::Random, self.pairs, sample)])
+            .filter(|(_, total, _)| *total > 0);
         Gallery {
             seed: self.seed,
             groups: groups
-                .map(|(kind, of, subjects)| GalleryGroup {
-                    kind,
-                    of,
-                    shots: subjects
+                .map(|(reason, total, subjects)| GalleryGroup {
+                    reason,
+                    total,
+                    items: subjects
                         .par_iter()
-                        .map(|subject| subject.shot(project, limits))
+                        .map(|subject| subject.item(project, limits))
                         .collect(),
                 })
                 .collect(),
@@ -151,16 +162,16 @@ impl GallerySelection {
     }
 }
 
-/// Whether a result is shown for this.
-fn is_of(kind: GalleryReason, record: &MetricRecord, truth: &TruthEvaluation) -> bool {
-    match kind {
+/// Returns whether a result is shown for a reason.
+fn reason_applies(reason: GalleryReason, record: &MetricRecord, truth: &TruthEvaluation) -> bool {
+    match reason {
         GalleryReason::Failed => Consensus::of(record) == Consensus::Failed,
         GalleryReason::Conflict => Consensus::of(record) == Consensus::Conflict,
         GalleryReason::OffTruth => truth
             .errors
             .get(&record.outcome.metric)
             .is_some_and(|errors| !errors.pass()),
-        GalleryReason::Lot => false,
+        GalleryReason::Random => false,
     }
 }
 
@@ -175,56 +186,56 @@ impl GallerySubject {
         }
     }
 
-    /// The result of the first of its metrics.
+    /// Returns the result of its first metric.
     fn record(&self) -> Option<&MetricRecord> {
         self.pair.metric(self.metrics[0])
     }
 
-    fn is_read(&self) -> bool {
+    fn is_judged(&self) -> bool {
         self.record()
             .is_some_and(|record| !record.verdicts.is_empty())
     }
 
-    fn shot(&self, project: &Project, limits: &raster::ImageLimits) -> GalleryItem {
+    fn item(&self, project: &Project, limits: &ImageLimits) -> GalleryItem {
         let attributes = &self.pair.attributes;
-        let (tiles, trouble) = tiles(project, &self.pair, self.metrics[0], SIDE, limits);
+        let (images, problem) = result_images(project, &self.pair, self.metrics[0], SIDE, limits);
         GalleryItem {
             pair: attributes.name.clone(),
             character: attributes.character.clone(),
             files: [attributes.mesh_path.clone(), attributes.print_path.clone()],
             metrics: self.metrics.clone(),
             numbers: self.numbers(),
-            said: self.said(),
-            pictures: tiles.map(|tile| tile.map(|tile| jpeg_rgb8(&tile, QUALITY))),
-            trouble,
+            verdicts: self.verdicts(),
+            images: images.map(|image| image.map(|image| jpeg_rgb8(&image, QUALITY))),
+            problem,
         }
     }
 
-    /// Scores, confidence and distance from the truth, as far as there are any.
+    /// Returns scores, confidence and errors against ground truth, as far as there are any.
     fn numbers(&self) -> String {
         let Some(record) = self.record() else {
             return String::new();
         };
-        let mut words = format!("IoU {:.3}", record.outcome.scores.iou);
-        let sure = record.outcome.confidence;
-        words.extend(sure.map(|sure| format!(", confidence {sure:.2}")));
-        words.extend(self.truth.map(|errors| {
-            format!(
-                ", off the truth by {:.1}\u{b0} and {:.1} % of the height",
-                errors.angle_deg, errors.tre_pct
-            )
+        let share = |value| format_number(value, Share);
+        let mut text = format!("IoU {}", share(record.outcome.scores.iou));
+        let confidence = record.outcome.confidence;
+        text.extend(confidence.map(|confidence| format!(", confidence {}", share(confidence))));
+        text.extend(self.truth.map(|errors| {
+            let angle = format_number(errors.angle_deg, Degrees);
+            let landmarks = format_number(errors.tre_pct, Percent);
+            format!(", off the truth by {angle}\u{b0} and {landmarks} % of the height")
         }));
         let mask = self.truth.and_then(|errors| errors.mask_iou);
-        words.extend(mask.map(|iou| format!(", IoU with the true tops {iou:.2}")));
-        words
+        text.extend(mask.map(|iou| format!(", IoU with the true stroke tops {}", share(iou))));
+        text
     }
 
-    /// The newest word of each reviewer on this result, by reviewer.
-    fn said(&self) -> Vec<String> {
+    /// Returns the newest verdict of each reviewer on this result, by reviewer.
+    fn verdicts(&self) -> Vec<String> {
         let Some(record) = self.record() else {
             return Vec::new();
         };
-        let counts = |reviewer: &str| {
+        let newest = |reviewer: &str| {
             let mut log = self.log.iter().rev();
             log.find(|event| {
                 event.reviewer == reviewer
@@ -233,22 +244,22 @@ impl GallerySubject {
                     && event.result_hash == record.result_hash
             })
         };
-        let reviewers = record.verdicts.iter();
-        reviewers
-            .filter_map(|read| counts(&read.reviewer))
-            .map(said)
+        let verdicts = record.verdicts.iter();
+        verdicts
+            .filter_map(|given| newest(&given.reviewer))
+            .map(verdict_text)
             .collect()
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{BY_LOT, GallerySelection, MOST};
+    use super::{GallerySelection, MAX_PER_REASON, SAMPLE_SIZE};
     use crate::domain::Verdict::{Fail, Pass};
     use crate::report::{TruthEvaluation, test_fixtures};
 
-    fn chosen(seed: u64, pairs: usize) -> GallerySelection {
-        let mut chosen = GallerySelection::new(seed);
+    fn selection(seed: u64, pairs: usize) -> GallerySelection {
+        let mut selection = GallerySelection::new(seed);
         for i in 0..pairs {
             let verdicts: &[_] = match i % 3 {
                 0 => &[Fail],
@@ -261,41 +272,48 @@ mod tests {
             } else {
                 TruthEvaluation::default()
             };
-            chosen.add(&pair, &truth);
+            selection.add(&pair, &truth);
         }
-        chosen
+        selection
     }
 
     #[test]
-    fn failures_conflicts_and_what_is_off_the_truth_are_found_once_a_pair() {
-        let chosen = chosen(1, 30);
-        let counts = chosen
+    fn results_that_look_the_same_are_selected_once() {
+        let selection = selection(1, 30);
+        let counts = selection
             .found
             .each_ref()
-            .map(|(of, shown)| (*of, shown.len()));
+            .map(|(total, subjects)| (*total, subjects.len()));
         assert_eq!(counts, [(10, 10), (10, 10), (1, 1)]);
-        assert_eq!(chosen.found[0].1[0].metrics.len(), 4, "all look the same");
+        assert_eq!(
+            selection.found[0].1[0].metrics.len(),
+            4,
+            "all look the same"
+        );
     }
 
     #[test]
-    fn more_failures_than_are_drawn_are_still_counted() {
-        let chosen = chosen(1, 3 * MOST + 3);
-        let (of, shown) = &chosen.found[0];
-        assert_eq!((*of, shown.len()), (MOST as u64 + 1, MOST));
+    fn failures_beyond_the_limit_are_still_counted() {
+        let selection = selection(1, 3 * MAX_PER_REASON + 3);
+        let (total, subjects) = &selection.found[0];
+        assert_eq!(
+            (*total, subjects.len()),
+            (MAX_PER_REASON as u64 + 1, MAX_PER_REASON)
+        );
     }
 
     #[test]
-    fn the_lot_falls_on_twenty_by_the_seed_alone() {
+    fn the_sample_depends_on_seed_and_names_only() {
         let names = |seed, pairs| -> Vec<String> {
-            let by_lot = chosen(seed, pairs).by_lot;
-            let names = by_lot
+            let sample = selection(seed, pairs).sample;
+            let names = sample
                 .iter()
-                .map(|(_, lot)| lot.pair.attributes.name.to_string());
+                .map(|(_, subject)| subject.pair.attributes.name.to_string());
             names.collect()
         };
         assert_eq!(names(1, 90), names(1, 90));
         assert_ne!(names(1, 90), names(2, 90));
-        assert_eq!(names(1, 90).len(), BY_LOT);
+        assert_eq!(names(1, 90).len(), SAMPLE_SIZE);
         assert_eq!(names(1, 7).len(), 7);
     }
 }

@@ -1,6 +1,6 @@
-//! `export --to jsonl`: a line a pair and metric in `pairs.jsonl`, their files below `pairs/`.
+//! `export --to jsonl`: one line per pair and metric in `pairs.jsonl`, files below `pairs/`.
 //!
-//! The same results give the same bytes. Times differ from run to run, so they are left out unless asked for.
+//! Equal results give equal bytes. Times differ from run to run, so they are left out unless requested.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -9,9 +9,10 @@ use std::path::{Path, PathBuf};
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::export_folder::{ALIGNMENTS, CONTROLS, Folder, FolderError, LINES, VERDICTS};
-use super::export_line::{ExportLine, LineStatus, Outcomes};
-use super::manual_alignment;
+use super::export_folder::{
+    ATTENTION_CHECKS, Folder, FolderError, LINES, MANUAL_ALIGNMENTS, VERDICTS,
+};
+use super::export_line::{ExportLine, LineStatus, Outcomes, newest_manual_alignments};
 use super::pair_files::{EncodedAlignment, FilesError, PAIRS, PairFiles};
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Failure, FailureClass, MetricOutcome, PairName, ThresholdMetric};
@@ -25,7 +26,7 @@ const PAGE: usize = 64;
 /// What to export.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct JsonlOptions {
-    /// Metrics that the method in force gives; a pair without result has a line for each.
+    /// Metrics of the current method; a pair without a result has a line for each.
     pub metrics: &'static [ThresholdMetric],
     /// Whether to write computing times; the bytes then differ from run to run.
     pub with_times: bool,
@@ -38,18 +39,18 @@ pub struct JsonlOptions {
 pub struct ExportSummary {
     /// Pairs with files.
     pub done: u64,
-    /// Pairs without result: failed or not finished.
+    /// Pairs without a result: failed or not finished.
     pub without_result: u64,
-    /// Pairs whose result is there but cannot be read, and why.
+    /// Pairs whose result cannot be read, and why.
     pub unreadable: Vec<(PairName, String)>,
-    /// Whether an earlier export stayed in place, because this one lacks files of pairs that are done.
+    /// Whether an earlier export was kept because this one lacks files of finished pairs.
     pub kept_earlier: bool,
 }
 
 /// Why nothing was exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// The catalog refused.
+    /// The catalog cannot be read.
     #[error(transparent)]
     Catalog(#[from] CatalogError),
     /// The folder cannot be used.
@@ -70,8 +71,8 @@ pub enum ExportError {
 
 /// Exports every pair of a project to a folder, which is new, empty or an earlier export that is replaced.
 ///
-/// A pair whose files cannot be read any more is told in its lines and in the summary; the others go on. But such an
-/// export never takes the place of an earlier one: that stays, and the new one is dropped.
+/// A pair whose files cannot be read is reported in its lines and in the summary, and the others are exported. Such an
+/// export never replaces an earlier one: the earlier one is kept and the new one discarded.
 ///
 /// # Errors
 /// When the folder cannot be written or the catalog cannot be read; an earlier export then stays as it was.
@@ -84,12 +85,12 @@ pub async fn to_jsonl(
     let folder = Folder::begin(dir)?;
     let mut lines = ExportLineWriter::create(folder.path())?;
     let mut summary = ExportSummary::default();
-    let by_hand = manual_alignment::newest(catalog).await?;
+    let manual_alignments = newest_manual_alignments(catalog).await?;
     let mut pages = catalog.result_pages(PAGE);
     while let Some(page) = pages.next().await? {
         for mut pair in write_page(project, folder.path(), page, options).await? {
             for line in &mut pair.lines {
-                line.by_hand = by_hand.get(&line.id).cloned();
+                line.manual_alignment = manual_alignments.get(&line.id).cloned();
             }
             lines.write(&pair.lines)?;
             summary.count(pair);
@@ -104,7 +105,7 @@ pub async fn to_jsonl(
     Ok(summary)
 }
 
-/// A log as JSON, a line each.
+/// Returns a log as JSON lines.
 pub fn json_lines<T: Serialize>(log: &[T]) -> String {
     let line = |event| {
         let text = serde_json::to_string(event);
@@ -113,17 +114,17 @@ pub fn json_lines<T: Serialize>(log: &[T]) -> String {
     log.iter().map(line).collect()
 }
 
-/// What people said and did, oldest first, with what was taken back. Of the other two
-/// nothing is written where there is nothing.
+/// Writes the logs of verdicts, attention checks and manual alignments, oldest first, with undone entries. The last two
+/// are left out when empty.
 async fn write_logs(catalog: &Catalog, root: &Path) -> Result<(), ExportError> {
     write_log(root, VERDICTS, &catalog.verdict_log(None).await?)?;
     let checks = catalog.attention_check_answers().await?;
     if !checks.is_empty() {
-        write_log(root, CONTROLS, &checks)?;
+        write_log(root, ATTENTION_CHECKS, &checks)?;
     }
     let alignments = catalog.manual_alignments().await?;
     if !alignments.is_empty() {
-        write_log(root, ALIGNMENTS, &alignments)?;
+        write_log(root, MANUAL_ALIGNMENTS, &alignments)?;
     }
     Ok(())
 }
@@ -133,7 +134,7 @@ fn write_log<T: Serialize>(root: &Path, name: &str, log: &[T]) -> Result<(), Exp
     std::fs::write(&path, json_lines(log)).map_err(|source| ExportError::Write { path, source })
 }
 
-/// A pair's lines, and why its files are not there although it is done.
+/// A pair's lines, and why its files are missing although it is finished.
 struct PairLines {
     name: PairName,
     lines: Vec<ExportLine>,
@@ -156,7 +157,7 @@ impl ExportSummary {
     }
 }
 
-/// Writes the files of a page on all cores.
+/// Writes the files of a page of pairs on all cores.
 async fn write_page(
     project: &Project,
     root: &Path,
@@ -197,7 +198,7 @@ fn pair_lines(
         }),
         Err(FilesError::Write { path, source }) => Err(ExportError::Write { path, source }),
         Err(error) => {
-            // Half of a pair's files would look like all of them.
+            // An incomplete folder would look like a complete one.
             let _ = std::fs::remove_dir_all(root.join(PAIRS).join(name.as_str()));
             let failure = Failure::new(FailureClass::Io, error.to_string());
             let metrics = pair.metrics.iter().map(|record| record.outcome.metric);
@@ -218,18 +219,18 @@ fn finished_lines(
     options: JsonlOptions,
 ) -> Result<Vec<ExportLine>, FilesError> {
     let files = PairFiles::read(project, pair, &options.limits)?;
-    let outcomes = Outcomes::read(files.aligned())?;
+    let outcomes = Outcomes::read(files.artifacts())?;
     files.write_shared(root)?;
     let mut drawn: Vec<(&MetricOutcome, EncodedAlignment)> = Vec::new();
     let mut lines = Vec::new();
     for record in &pair.metrics {
         let outcome = &record.outcome;
-        // Metrics often choose the same threshold; what they share is drawn once.
-        let twin = drawn
+        // Metrics often have the same alignment, which is drawn once.
+        let same = drawn
             .iter()
             .position(|(other, _)| same_alignment(other, outcome));
-        let index = twin.unwrap_or(drawn.len());
-        if twin.is_none() {
+        let index = same.unwrap_or(drawn.len());
+        if same.is_none() {
             drawn.push((outcome, files.draw(outcome)));
         }
         let written = files.write_metric(root, outcome.metric, &drawn[index].1)?;
@@ -241,7 +242,7 @@ fn finished_lines(
     Ok(lines)
 }
 
-/// `pairs.jsonl` while it is written.
+/// Writes `pairs.jsonl`.
 struct ExportLineWriter {
     path: PathBuf,
     file: BufWriter<File>,

@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::pictures::PrintView;
+use super::source_print::{SourcePrint, SourcePrintError};
 use crate::catalog::PairResults;
 use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
-use crate::domain::{ContentHash, DepthScale, FileKind, MetricOutcome, Stage, ThresholdMetric};
+use crate::domain::{DepthScale, MetricOutcome, Stage, ThresholdMetric};
 use crate::raster::{
-    self, DecodeError, DepthMap, Mask, PrintImage, png_grey16, png_mask, png_rgb8, warp_depth,
-    warp_mask,
+    DepthMap, ImageLimits, Mask, png_grey16, png_mask, png_rgb8, warp_depth, warp_mask,
 };
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::Project;
@@ -23,9 +23,9 @@ pub(super) const PAIRS: &str = "pairs";
 pub struct Files {
     /// The print image as given.
     pub print: String,
-    /// Its ink, in its own frame and size.
+    /// Its ink mask, in the print's frame and size.
     pub print_mask: String,
-    /// The depth map, 16 bits; `depth.json` beside it tells how to read it.
+    /// The depth map, 16 bits; `depth.json` next to it holds the scale.
     pub depth: String,
     /// Its strokes at this metric's threshold, in the depth map's frame.
     pub depth_mask: String,
@@ -35,9 +35,9 @@ pub struct Files {
     pub aligned_mask: String,
     /// The strokes on the canvas the scores were computed on.
     pub canvas_depth_mask: String,
-    /// The ink on that canvas.
+    /// The ink mask on that canvas.
     pub canvas_print_mask: String,
-    /// The print with the edges of the strokes, enlarged, for people.
+    /// The print with the edges of the strokes, enlarged for viewing.
     pub overlay: String,
 }
 
@@ -62,29 +62,13 @@ impl Files {
 /// Why the files of a pair cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub enum FilesError {
-    /// A result or artifact cannot be read; the pair is told and the others go on.
+    /// A result or artifact cannot be read; the other pairs go on.
     #[error(transparent)]
-    PairArtifacts(#[from] PairArtifactsError),
-    /// The print cannot be read any more.
-    #[error("{path}: {source}")]
-    SourcePrint {
-        /// The print.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The print cannot be decoded any more, as with lower limits.
-    #[error("{path}: {source}")]
-    Decode {
-        /// The print.
-        path: PathBuf,
-        /// Why.
-        source: DecodeError,
-    },
-    /// The print is another than the one that was aligned.
-    #[error("{0} has changed since it was aligned; run again")]
-    Changed(PathBuf),
-    /// The export folder cannot be written to; nothing can go on.
+    Artifacts(#[from] PairArtifactsError),
+    /// The print cannot be used; the other pairs go on.
+    #[error(transparent)]
+    Print(#[from] SourcePrintError),
+    /// The export folder cannot be written to; the export stops.
     #[error("{path}: {source}")]
     Write {
         /// The file.
@@ -94,27 +78,27 @@ pub enum FilesError {
     },
 }
 
-/// What a depth PNG's levels mean; written beside it.
+/// The meaning of a depth PNG's levels; written next to it.
 #[derive(Debug, Serialize)]
 struct Sidecar<'a> {
     /// Level of pixels without data.
     no_data: u16,
     #[serde(flatten)]
     scale: &'a DepthScale,
-    /// Millimetres in a mesh unit, where the unit is known.
+    /// Millimetres per mesh unit, where the unit is known.
     mm_per_mesh_unit: Option<f64>,
 }
 
-/// Everything of a pair that is drawn or copied, in memory.
+/// The inputs and artifacts of a pair from which its files are made.
 pub(super) struct PairFiles<'a> {
-    aligned: PairArtifacts<'a>,
+    artifacts: PairArtifacts<'a>,
     name: &'a str,
     print: SourcePrint,
     print_mask: Mask,
     depth: DepthMap,
 }
 
-/// The files of one alignment, encoded.
+/// The images of one alignment, encoded.
 pub(super) struct EncodedAlignment {
     depth_mask: Vec<u8>,
     aligned_depth: Vec<u8>,
@@ -122,84 +106,33 @@ pub(super) struct EncodedAlignment {
     overlay: Vec<u8>,
 }
 
-/// A print as given and as decoded.
-#[derive(Debug)]
-pub struct SourcePrint {
-    bytes: Vec<u8>,
-    /// As decoded.
-    pub picture: PrintImage,
-}
-
-impl SourcePrint {
-    /// Reads a pair's print and makes sure it is the one that was aligned.
-    ///
-    /// # Errors
-    /// When it cannot be read or decoded, or is another one.
-    pub fn read(
-        project: &Project,
-        pair: &PairResults,
-        limits: &raster::ImageLimits,
-    ) -> Result<Self, FilesError> {
-        let path = project.input_path(&pair.attributes.print_path);
-        let bytes = match std::fs::read(&path) {
-            Ok(bytes) => bytes,
-            Err(source) => return Err(FilesError::SourcePrint { path, source }),
-        };
-        let aligned = pair
-            .stage(Stage::Normalize)
-            .and_then(|record| record.print_hash);
-        if aligned.is_some_and(|hash| hash != ContentHash::of(&bytes)) {
-            return Err(FilesError::Changed(path));
-        }
-        match raster::decode(&bytes, limits) {
-            Ok(picture) => Ok(Self { bytes, picture }),
-            Err(source) => Err(FilesError::Decode { path, source }),
-        }
-    }
-
-    /// Ending of the file name that goes with the content.
-    fn ext(&self) -> &'static str {
-        match FileKind::of(&self.bytes) {
-            FileKind::Png => "png",
-            FileKind::Jpeg => "jpg",
-            FileKind::Tiff => "tif",
-            FileKind::OtherImage(_)
-            | FileKind::Ply
-            | FileKind::OtherMesh(_)
-            | FileKind::Other(_)
-            | FileKind::Text
-            | FileKind::Binary => "img",
-        }
-    }
-}
-
 impl<'a> PairFiles<'a> {
-    /// Reads what the files are made from.
+    /// Reads the inputs and artifacts.
     pub(super) fn read(
         project: &'a Project,
         pair: &'a PairResults,
-        limits: &raster::ImageLimits,
+        limits: &ImageLimits,
     ) -> Result<Self, FilesError> {
-        let aligned = PairArtifacts::new(project, pair);
+        let artifacts = PairArtifacts::new(project, pair);
         Ok(Self {
-            aligned,
+            artifacts,
             name: pair.attributes.name.as_str(),
             print: SourcePrint::read(project, pair, limits)?,
-            print_mask: aligned.print_mask()?,
-            depth: aligned.depth()?,
+            print_mask: artifacts.print_mask()?,
+            depth: artifacts.depth()?,
         })
     }
 
-    /// The results this was read for.
-    pub(super) const fn aligned(&self) -> &PairArtifacts<'a> {
-        &self.aligned
+    /// Returns the stored results.
+    pub(super) const fn artifacts(&self) -> &PairArtifacts<'a> {
+        &self.artifacts
     }
 
-    /// Writes the files that all metrics share.
+    /// Writes the files shared by all metrics.
     pub(super) fn write_shared(&self, root: &Path) -> Result<(), FilesError> {
         let files = self.files(ThresholdMetric::NlSsim);
-        let canvas = self.aligned.bytes(Stage::Register, CANVAS_PRINT_MASK)?;
-        let depth = self.aligned.bytes(Stage::Depth, DEPTH)?;
+        let canvas = self.artifacts.bytes(Stage::Register, CANVAS_PRINT_MASK)?;
+        let depth = self.artifacts.bytes(Stage::Depth, DEPTH)?;
         write(root, &files.print, &self.print.bytes)?;
         write(root, &files.print_mask, &png_mask(&self.print_mask))?;
         write(root, &files.depth, &depth)?;
@@ -211,7 +144,7 @@ impl<'a> PairFiles<'a> {
         write(root, &files.canvas_print_mask, &canvas)
     }
 
-    /// Draws what depends on the alignment alone.
+    /// Draws the images that depend on the alignment only.
     pub(super) fn draw(&self, outcome: &MetricOutcome) -> EncodedAlignment {
         let (width, height) = (self.print_mask.width(), self.print_mask.height());
         let print_from_depth = &outcome.print_from_depth;
@@ -227,7 +160,7 @@ impl<'a> PairFiles<'a> {
         }
     }
 
-    /// Writes the files of one metric; says where all files of its line are.
+    /// Writes the files of one metric; returns the paths of all files of its line.
     pub(super) fn write_metric(
         &self,
         root: &Path,
@@ -236,7 +169,7 @@ impl<'a> PairFiles<'a> {
     ) -> Result<Files, FilesError> {
         let files = self.files(metric);
         let role = canvas_depth_mask(metric);
-        let canvas = self.aligned.bytes(Stage::Register, &role)?;
+        let canvas = self.artifacts.bytes(Stage::Register, &role)?;
         write(root, &files.depth_mask, &drawn.depth_mask)?;
         write(root, &files.aligned_depth, &drawn.aligned_depth)?;
         write(root, &files.aligned_mask, &drawn.aligned_mask)?;
@@ -246,7 +179,7 @@ impl<'a> PairFiles<'a> {
     }
 
     fn files(&self, metric: ThresholdMetric) -> Files {
-        Files::of(self.name, metric, self.print.ext())
+        Files::of(self.name, metric, self.print.extension())
     }
 
     fn sidecar(&self) -> String {
@@ -262,11 +195,12 @@ impl<'a> PairFiles<'a> {
     }
 }
 
-/// Writes a file below the export folder, making the folders it lies in.
+/// Writes a file below the export folder, and creates its parent folders.
 fn write(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FilesError> {
     let path = root.join(below);
-    let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-    made.and_then(|()| std::fs::write(&path, bytes))
+    let created = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+    created
+        .and_then(|()| std::fs::write(&path, bytes))
         .map_err(|source| FilesError::Write { path, source })
 }
 
@@ -276,7 +210,7 @@ mod tests {
     use crate::domain::ThresholdMetric;
 
     #[test]
-    fn metrics_share_what_is_the_same_and_part_what_is_not() {
+    fn metrics_share_files_that_do_not_depend_on_them() {
         let density = Files::of("b01-2", ThresholdMetric::Density, "jpg");
         let ensemble = Files::of("b01-2", ThresholdMetric::Ensemble, "jpg");
         assert_eq!(density.print, "pairs/b01-2/print.jpg");

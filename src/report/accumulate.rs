@@ -1,64 +1,45 @@
-//! Adds pairs up to a report, one at a time, without keeping them.
+//! Adds pairs up to a report, one at a time.
 //!
-//! What stays in memory a pair, for medians and percentiles: the time of each stage, the threshold of each metric, three
-//! numbers a metric where there is truth, its confidence where it is judged, and sums of scores for the bootstrap up to a
-//! hundred thousand pairs or blocks.
+//! Kept in memory a pair, for medians and percentiles: the time of each stage, the threshold of each metric, the errors
+//! where there is ground truth, its confidence where it is judged, and sums of scores for the bootstrap of up to a
+//! hundred thousand units.
 
 use std::collections::BTreeMap;
 
 use super::adjudication::AdjudicationSums;
 use super::attention_checks::AttentionCheckRates;
-use super::comparison::McNemarTests;
+use super::comparison::{Basis, ComparisonSums};
 use super::consensus::Consensus;
 use super::fail_reasons::FailReasonSums;
-use super::ground_truth::TruthErrors;
-use super::ground_truth_sums::TruthSums;
-use super::interval::IntervalMethod;
+use super::ground_truth::{TruthErrors, TruthSums};
 use super::manual_alignment::{ManualErrorSums, ManualErrors};
-use super::model::{Basis, FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
+use super::model::{FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
 use super::risk_coverage::ConfidenceSamples;
-use super::score_bootstrap::{Drawn, Samples};
+use super::score_bootstrap::{BootstrapResults, ScoreSample};
 use super::stage_times::StageTimeSamples;
-use super::stats::wilson_95;
+use super::stats::{IntervalMethod, ratio};
 use super::thresholds::ThresholdSamples;
-use super::warnings;
+use super::truth_evaluation::{TruthEvaluation, TruthProblems};
+use super::warnings::warnings;
 use crate::catalog::{MetricRecord, PairResults};
-use crate::domain::{FailureClass, JobStatus, ThresholdMetric};
+use crate::domain::{FailureClass, JobStatus, Scores, ThresholdMetric};
 
-/// What the truth says of one pair.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct TruthEvaluation {
-    /// Errors by metric; empty where there is no truth or it cannot be used.
-    pub errors: BTreeMap<ThresholdMetric, TruthErrors>,
-    /// Why a truth that is there cannot be used.
-    pub problem: Option<String>,
-}
-
-/// The sums so far.
+/// A report while pairs are counted.
 #[derive(Debug, Clone)]
 pub struct ReportAccumulator {
     pairs: u64,
     progress: PairProgress,
-    columns: [MetricSums; ThresholdMetric::ALL.len()],
-    samples: Samples,
-    by_verdicts: McNemarTests,
-    by_truth: McNemarTests,
-    sure_by_verdicts: ConfidenceSamples,
-    sure_by_truth: ConfidenceSamples,
+    metrics: [MetricSums; ThresholdMetric::ALL.len()],
+    scores: ScoreSample,
+    verdict_comparisons: ComparisonSums,
+    truth_comparisons: ComparisonSums,
+    verdict_confidences: ConfidenceSamples,
+    truth_confidences: ConfidenceSamples,
     failures: BTreeMap<FailureClass, FailureGroup>,
-    cuts: ThresholdSamples,
+    thresholds: ThresholdSamples,
     times: StageTimeSamples,
-    caught: Option<AttentionCheckRates>,
+    attention_checks: Option<AttentionCheckRates>,
     truth_problems: TruthProblems,
-}
-
-/// Truths that could not be used.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub(super) struct TruthProblems {
-    /// How many.
-    pub(super) count: u64,
-    /// The first, in words.
-    pub(super) first: Option<String>,
 }
 
 /// The sums of one metric.
@@ -73,13 +54,10 @@ struct MetricSums {
     stale: u64,
     rules: AdjudicationSums,
     reasons: FailReasonSums,
-    ssim: f64,
-    nl_ssim: f64,
-    iou: f64,
-    iou_box: f64,
-    dice: f64,
+    /// Of SSIM, NL-SSIM, `IoU`, `IoU` of boxes, Dice.
+    scores: [f64; 5],
     truth: TruthSums,
-    by_hand: ManualErrorSums,
+    manual: ManualErrorSums,
 }
 
 impl Default for ReportAccumulator {
@@ -87,58 +65,58 @@ impl Default for ReportAccumulator {
         Self {
             pairs: 0,
             progress: PairProgress::default(),
-            columns: ThresholdMetric::ALL.map(MetricSums::new),
-            samples: Samples::default(),
-            by_verdicts: McNemarTests::default(),
-            by_truth: McNemarTests::default(),
-            sure_by_verdicts: ConfidenceSamples::default(),
-            sure_by_truth: ConfidenceSamples::default(),
+            metrics: ThresholdMetric::ALL.map(MetricSums::new),
+            scores: ScoreSample::default(),
+            verdict_comparisons: ComparisonSums::default(),
+            truth_comparisons: ComparisonSums::default(),
+            verdict_confidences: ConfidenceSamples::default(),
+            truth_confidences: ConfidenceSamples::default(),
             failures: BTreeMap::new(),
-            cuts: ThresholdSamples::default(),
+            thresholds: ThresholdSamples::default(),
             times: StageTimeSamples::default(),
-            caught: None,
+            attention_checks: None,
             truth_problems: TruthProblems::default(),
         }
     }
 }
 
 impl ReportAccumulator {
-    /// Counts one pair in. Pairs come in the order of their names, so that sums are the same every time.
+    /// Counts one pair. Pairs are added in the order of their names, so that sums are reproducible.
     pub fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
         self.pairs += 1;
         self.count_status(pair);
-        self.count_truth_problem(pair, truth);
-        self.cuts.add(pair);
+        self.truth_problems.add(pair, truth);
+        self.thresholds.add(pair);
         self.times.add(&pair.stages);
-        for column in &mut self.columns {
-            if let Some(record) = pair.metric(column.metric) {
-                column.add(record, truth.errors.get(&column.metric));
+        for sums in &mut self.metrics {
+            if let Some(record) = pair.metric(sums.metric) {
+                sums.add(record, truth.errors.get(&sums.metric));
             }
         }
-        let told = |metric| Consensus::of(pair.metric(metric)?).told();
+        let passed = |metric| Consensus::of(pair.metric(metric)?).passed();
         let right = |metric| truth.errors.get(&metric).map(TruthErrors::pass);
-        let sure = |metric| pair.metric(metric)?.outcome.confidence;
-        self.samples.add(pair, told);
-        self.by_verdicts.add(told);
-        self.by_truth.add(right);
-        self.sure_by_verdicts
-            .add(|metric| sure(metric).zip(told(metric)));
-        self.sure_by_truth
-            .add(|metric| sure(metric).zip(right(metric)));
+        let confidence = |metric| pair.metric(metric)?.outcome.confidence;
+        self.scores.add(pair, passed);
+        self.verdict_comparisons.add(passed);
+        self.truth_comparisons.add(right);
+        self.verdict_confidences
+            .add(|metric| confidence(metric).zip(passed(metric)));
+        self.truth_confidences
+            .add(|metric| confidence(metric).zip(right(metric)));
     }
 
-    /// Counts in how far a pair's results are from its alignment by hand.
-    pub fn add_by_hand(&mut self, errors: &BTreeMap<ThresholdMetric, ManualErrors>) {
-        for column in &mut self.columns {
-            if let Some(errors) = errors.get(&column.metric) {
-                column.by_hand.add(*errors);
+    /// Counts a pair's errors against its manual alignment.
+    pub fn add_manual_errors(&mut self, errors: &BTreeMap<ThresholdMetric, ManualErrors>) {
+        for sums in &mut self.metrics {
+            if let Some(errors) = errors.get(&sums.metric) {
+                sums.manual.add(*errors);
             }
         }
     }
 
-    /// Takes in the planted faults that reviewers caught; none where none were answered.
-    pub fn caught(&mut self, caught: AttentionCheckRates) {
-        self.caught = (caught.all.n > 0).then_some(caught);
+    /// Sets the planted faults that reviewers detected; ignored where none were answered.
+    pub fn set_attention_checks(&mut self, rates: AttentionCheckRates) {
+        self.attention_checks = (rates.all.n > 0).then_some(rates);
     }
 
     fn count_status(&mut self, pair: &PairResults) {
@@ -165,7 +143,7 @@ impl ReportAccumulator {
             pairs: Vec::new(),
         });
         group.count += 1;
-        if group.pairs.len() < FailureGroup::SHOWN {
+        if group.pairs.len() < FailureGroup::MAX_LISTED {
             group.pairs.push(FailureExample {
                 id: pair.attributes.name.clone(),
                 stage: stored.stage,
@@ -174,38 +152,35 @@ impl ReportAccumulator {
         }
     }
 
-    fn count_truth_problem(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
-        if let Some(problem) = &truth.problem {
-            self.truth_problems.count += 1;
-            let first = || format!("{}: {problem}", pair.attributes.name);
-            self.truth_problems.first.get_or_insert_with(first);
-        }
-    }
-
-    /// The report over all pairs counted.
+    /// Returns the report on all pairs added.
     pub fn finish(self) -> Report {
-        let told = self.columns.into_iter().filter(MetricSums::is_told);
-        let drawn = self.samples.finish();
-        let rows: Vec<MetricRow> = told.map(|column| column.finish(&drawn)).collect();
-        let mut comparisons = self.by_verdicts.finish(Basis::Verdicts);
-        comparisons.extend(self.by_truth.finish(Basis::Truth));
-        let mut coverage = self.sure_by_verdicts.finish(Basis::Verdicts);
-        coverage.extend(self.sure_by_truth.finish(Basis::Truth));
+        let metrics = self.metrics.into_iter().filter(MetricSums::has_row);
+        let bootstrap = self.scores.finish();
+        let rows: Vec<MetricRow> = metrics.map(|sums| sums.finish(&bootstrap)).collect();
+        let mut comparisons = self.verdict_comparisons.finish(Basis::Verdicts);
+        comparisons.extend(self.truth_comparisons.finish(Basis::Truth));
+        let mut risk_coverage = self.verdict_confidences.finish(Basis::Verdicts);
+        risk_coverage.extend(self.truth_confidences.finish(Basis::Truth));
         Report {
             schema: SCHEMA,
             pairs: self.pairs,
             interval: IntervalMethod::default(),
             progress: self.progress,
-            warnings: warnings::of(self.progress, &rows, &self.truth_problems, drawn.lack),
+            warnings: warnings(
+                self.progress,
+                &rows,
+                &self.truth_problems,
+                bootstrap.skipped,
+            ),
             rows,
             comparisons,
-            score_comparisons: drawn.comparisons,
-            bootstrap: drawn.bootstrap,
-            coverage,
+            score_comparisons: bootstrap.comparisons,
+            bootstrap: bootstrap.settings,
+            risk_coverage,
             failures: self.failures.into_values().collect(),
-            thresholds: self.cuts.finish(),
+            thresholds: self.thresholds.finish(),
             times: self.times.finish(),
-            caught: self.caught,
+            attention_checks: self.attention_checks,
         }
     }
 }
@@ -222,40 +197,42 @@ impl MetricSums {
             stale: 0,
             rules: AdjudicationSums::default(),
             reasons: FailReasonSums::default(),
-            ssim: 0.0,
-            nl_ssim: 0.0,
-            iou: 0.0,
-            iou_box: 0.0,
-            dice: 0.0,
+            scores: [0.0; 5],
             truth: TruthSums::default(),
-            by_hand: ManualErrorSums::default(),
+            manual: ManualErrorSums::default(),
         }
     }
 
-    /// Whether the report has a row for it: the paper's always, others where there are results.
-    fn is_told(&self) -> bool {
+    /// Returns whether the report has a row for the metric: the paper's always, others where they have results.
+    fn has_row(&self) -> bool {
         self.n > 0 || ThresholdMetric::PAPER.contains(&self.metric)
     }
 
     fn add(&mut self, record: &MetricRecord, truth: Option<&TruthErrors>) {
-        let scores = &record.outcome.scores;
         self.n += 1;
-        self.ssim += scores.ssim;
-        self.nl_ssim += scores.nl_ssim;
-        self.iou += scores.iou;
-        self.iou_box += scores.iou_box;
-        self.dice += scores.dice;
+        let Scores {
+            ssim,
+            nl_ssim,
+            iou,
+            iou_box,
+            dice,
+            ..
+        } = record.outcome.scores;
+        let scores = [ssim, nl_ssim, iou, iou_box, dice];
+        for (sum, score) in self.scores.iter_mut().zip(scores) {
+            *sum += score;
+        }
         self.rules.add(record);
         self.reasons.add(record);
-        self.count_standing(Consensus::of(record));
+        self.count_consensus(Consensus::of(record));
         if let Some(errors) = truth {
             self.truth.add(errors);
         }
     }
 
-    fn count_standing(&mut self, standing: Consensus) {
-        match standing {
-            Consensus::Unread => {}
+    fn count_consensus(&mut self, consensus: Consensus) {
+        match consensus {
+            Consensus::Unjudged => {}
             Consensus::Stale => self.stale += 1,
             Consensus::Passed => self.passed += 1,
             Consensus::Failed => self.failed += 1,
@@ -267,62 +244,58 @@ impl MetricSums {
         }
     }
 
-    fn finish(self, drawn: &Drawn) -> MetricRow {
-        let mean = |sum: f64| share(sum, self.n);
-        let told = self.passed + self.failed;
+    fn finish(self, bootstrap: &BootstrapResults) -> MetricRow {
+        let [ssim, nl_ssim, iou, iou_box, dice] = self.scores.map(|sum| ratio(sum, self.n));
+        let decided = self.passed + self.failed;
+        let judged = decided + self.unsure;
         MetricRow {
             metric: self.metric,
             n: self.n,
-            read: told + self.unsure,
+            judged,
             passed: self.passed,
             failed: self.failed,
             unsure: self.unsure,
             conflicts: self.conflicts,
             stale: self.stale,
-            acc: share(self.passed as f64, told),
-            acc_ci95: wilson_95(self.passed, told),
-            rules: (told + self.unsure > 0).then(|| self.rules.finish()),
+            acc: ratio(self.passed as f64, decided),
+            acc_ci95: IntervalMethod::Wilson.interval_95(self.passed, decided),
+            rules: (judged > 0).then(|| self.rules.finish()),
             failed_reasons: self.reasons.finish(),
-            ssim: mean(self.ssim),
-            nl_ssim: mean(self.nl_ssim),
-            iou: mean(self.iou),
-            iou_box: mean(self.iou_box),
-            dice: mean(self.dice),
-            means_ci95: drawn.means[self.metric as usize],
+            ssim,
+            nl_ssim,
+            iou,
+            iou_box,
+            dice,
+            means_ci95: bootstrap.means[self.metric as usize],
             truth: self.truth.finish(),
-            by_hand: self.by_hand.finish(),
+            manual_alignment: self.manual.finish(),
         }
     }
 }
 
-/// Sum over count; `None` of nothing.
-pub(super) fn share(sum: f64, n: u64) -> Option<f64> {
-    (n > 0).then(|| sum / n as f64)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{ReportAccumulator, TruthEvaluation};
+    use super::ReportAccumulator;
     use crate::domain::{FailureClass, ThresholdMetric, Verdict};
-    use crate::report::test_fixtures;
+    use crate::report::{TruthEvaluation, test_fixtures};
 
     #[test]
     fn means_are_over_finished_pairs_only() {
-        let mut tally = ReportAccumulator::default();
+        let mut report = ReportAccumulator::default();
         let none = TruthEvaluation::default();
-        tally.add(&test_fixtures::done("a", 0.8, &[]), &none);
-        tally.add(
+        report.add(&test_fixtures::done("a", 0.8, &[]), &none);
+        report.add(
             &test_fixtures::failed("b", FailureClass::BadInput, "b.stl is empty"),
             &none,
         );
-        tally.add(&test_fixtures::done("c", 0.6, &[]), &none);
-        tally.add(&test_fixtures::pending("d"), &none);
-        let report = tally.finish();
+        report.add(&test_fixtures::done("c", 0.6, &[]), &none);
+        report.add(&test_fixtures::pending("d"), &none);
+        let report = report.finish();
         assert_eq!((report.pairs, report.progress.pending), (4, 1));
         for row in &report.rows {
             assert_eq!(row.n, 2);
             assert!((row.iou.expect("two pairs") - 0.7).abs() < 1e-12);
-            assert_eq!((row.acc, row.acc_ci95, row.read), (None, None, 0));
+            assert_eq!((row.acc, row.acc_ci95, row.judged), (None, None, 0));
             assert_eq!(row.truth, None);
         }
         assert_eq!(report.failures.len(), 1);
@@ -330,20 +303,23 @@ mod tests {
     }
 
     #[test]
-    fn unsure_is_read_but_neither_passed_nor_failed() {
-        let mut tally = ReportAccumulator::default();
+    fn unsure_is_judged_but_neither_passed_nor_failed() {
+        let mut report = ReportAccumulator::default();
         let all = [Verdict::Pass, Verdict::Pass, Verdict::Fail, Verdict::Unsure];
         for (name, verdict) in ["a", "b", "c", "d"].into_iter().zip(all) {
-            tally.add(
+            report.add(
                 &test_fixtures::done(name, 0.8, &[verdict]),
                 &TruthEvaluation::default(),
             );
         }
-        let report = tally.finish();
+        let report = report.finish();
         let row = report
             .row(ThresholdMetric::Density)
             .expect("every metric has a row");
-        assert_eq!((row.read, row.passed, row.failed, row.unsure), (4, 2, 1, 1));
+        assert_eq!(
+            (row.judged, row.passed, row.failed, row.unsure),
+            (4, 2, 1, 1)
+        );
         assert_eq!(row.acc, Some(2.0 / 3.0));
     }
 
@@ -361,27 +337,26 @@ mod tests {
     }
 
     #[test]
-    fn the_papers_method_has_the_papers_rows_and_no_complaint() {
-        let mut tally = ReportAccumulator::default();
+    fn the_papers_method_has_the_papers_rows_only() {
+        let mut report = ReportAccumulator::default();
         let pair = test_fixtures::done_by_paper("a", 0.8, &[Verdict::Pass]);
-        tally.add(&pair, &TruthEvaluation::default());
-        let report = tally.finish();
+        report.add(&pair, &TruthEvaluation::default());
+        let report = report.finish();
         let metrics: Vec<_> = report.rows.iter().map(|row| row.metric).collect();
         assert_eq!(metrics, ThresholdMetric::PAPER);
         assert_eq!(report.comparisons.len(), 3);
-        // But that one pair is few.
         assert_eq!(report.warnings.len(), 1, "{:?}", report.warnings);
-        assert!(report.warnings[0].contains("takes 10 pairs at least"));
+        assert!(report.warnings[0].contains("needs at least 10 pairs"));
     }
 
     #[test]
-    fn failures_beyond_the_shown_are_still_counted() {
-        let mut tally = ReportAccumulator::default();
+    fn failures_beyond_the_listed_are_still_counted() {
+        let mut report = ReportAccumulator::default();
         for i in 0..130 {
             let pair = test_fixtures::failed(&format!("p{i:03}"), FailureClass::Io, "gone");
-            tally.add(&pair, &TruthEvaluation::default());
+            report.add(&pair, &TruthEvaluation::default());
         }
-        let report = tally.finish();
+        let report = report.finish();
         assert_eq!(report.failures[0].count, 130);
         assert_eq!(report.failures[0].pairs.len(), 100);
     }

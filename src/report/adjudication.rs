@@ -1,77 +1,75 @@
-//! What becomes of Acc when reviewers contradict each other: three ways to count, side by side.
+//! How Acc depends on the rule for results on which reviewers disagree.
 
 use serde::Serialize;
 
-use super::consensus::{Consensus, split};
-use super::interval::IntervalMethod;
-use super::rate::Rate;
+use super::consensus::{Consensus, partition_verdicts};
+use super::stats::{IntervalMethod, Rate};
 use crate::catalog::MetricRecord;
 use crate::domain::Verdict;
 
-/// Passed results under each rule, of those that passed or failed under it.
+/// Acc of a metric under three rules: passed results of those that passed or failed under the rule.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AdjudicationRules {
-    /// Results that two reviewers or more have passed or failed by themselves; where there are none, all rules say the
-    /// same.
-    pub told_twice: u64,
-    /// One reviewer who fails it is enough.
+    /// Results that at least two reviewers independently passed or failed; without any, all rules agree.
+    pub double_read: u64,
+    /// A result fails if any reviewer fails it.
     pub either_fails: Rate,
-    /// Reviewers agree, or somebody settled it; a conflict that waits is left out. This is the Acc of the table.
+    /// A disputed result counts as adjudicated and is left out until it is. This is the Acc of the table.
     pub adjudicated: Rate,
-    /// All reviewers who could tell fail it.
+    /// A result fails only if every reviewer who decided fails it.
     pub both_fail: Rate,
 }
 
 impl AdjudicationRules {
-    /// Names of the rules, in their order.
-    pub const NAMES: [&str; 3] = ["either_fails", "adjudicated", "both_fail"];
-
-    /// What follows from each rule, in the order of [`Self::NAMES`].
+    /// Returns the rates in the order any, adjudicated, all.
     pub const fn rates(&self) -> [Rate; 3] {
         [self.either_fails, self.adjudicated, self.both_fail]
     }
 
-    /// The same with another interval.
-    pub(super) fn with_interval(self, interval: IntervalMethod) -> Self {
+    /// Returns the same rates with intervals computed by `method`.
+    pub(super) fn with_interval(self, method: IntervalMethod) -> Self {
         Self {
-            told_twice: self.told_twice,
-            either_fails: self.either_fails.with_interval(interval),
-            adjudicated: self.adjudicated.with_interval(interval),
-            both_fail: self.both_fail.with_interval(interval),
+            double_read: self.double_read,
+            either_fails: self.either_fails.with_interval(method),
+            adjudicated: self.adjudicated.with_interval(method),
+            both_fail: self.both_fail.with_interval(method),
         }
     }
 }
 
-/// The sums so far: passed and told under each rule.
+/// Counts under each rule: passed, and passed or failed.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct AdjudicationSums {
-    told_twice: u64,
+    double_read: u64,
     either_fails: [u64; 2],
     adjudicated: [u64; 2],
     both_fail: [u64; 2],
 }
 
 impl AdjudicationSums {
-    /// Counts one result in.
+    /// Counts one result.
     pub(super) fn add(&mut self, record: &MetricRecord) {
-        let own = split(record).1;
-        let said = |wanted| own.iter().filter(|read| read.verdict == wanted).count();
-        let (passes, fails) = (said(Verdict::Pass), said(Verdict::Fail));
-        self.told_twice += u64::from(passes + fails > 1);
+        let independent = partition_verdicts(record).1;
+        let count_of = |wanted| {
+            let given = independent.iter().filter(|given| given.verdict == wanted);
+            given.count()
+        };
+        let (passes, fails) = (count_of(Verdict::Pass), count_of(Verdict::Fail));
+        self.double_read += u64::from(passes + fails > 1);
         if passes + fails > 0 {
             count(&mut self.either_fails, fails == 0);
             count(&mut self.both_fail, passes > 0);
         }
-        if let Some(passed) = Consensus::of(record).told() {
+        if let Some(passed) = Consensus::of(record).passed() {
             count(&mut self.adjudicated, passed);
         }
     }
 
-    /// The shares that follow.
+    /// Returns the rates.
     pub(super) fn finish(self) -> AdjudicationRules {
-        let rate = |[passed, told]: [u64; 2]| Rate::new(passed, told);
+        let rate = |[passed, decided]: [u64; 2]| Rate::new(passed, decided);
         AdjudicationRules {
-            told_twice: self.told_twice,
+            double_read: self.double_read,
             either_fails: rate(self.either_fails),
             adjudicated: rate(self.adjudicated),
             both_fail: rate(self.both_fail),
@@ -79,9 +77,9 @@ impl AdjudicationSums {
     }
 }
 
-fn count([passed, told]: &mut [u64; 2], is_passed: bool) {
+fn count([passed, decided]: &mut [u64; 2], is_passed: bool) {
     *passed += u64::from(is_passed);
-    *told += 1;
+    *decided += 1;
 }
 
 #[cfg(test)]
@@ -93,8 +91,8 @@ mod tests {
 
     fn of(results: &[(&[Verdict], Option<Verdict>)]) -> AdjudicationRules {
         let mut sums = AdjudicationSums::default();
-        for (own, word) in results {
-            let verdicts: Vec<Verdict> = own.iter().copied().chain(*word).collect();
+        for (own, adjudication) in results {
+            let verdicts: Vec<Verdict> = own.iter().copied().chain(*adjudication).collect();
             let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, &verdicts);
             for settled in &mut record.verdicts[own.len()..] {
                 settled.review_order = Some(ReviewOrder::Adjudicate);
@@ -105,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_settled_conflict_fails_for_either_passes_for_both_and_follows_the_word() {
+    fn a_settled_conflict_fails_by_any_passes_by_all_and_follows_the_adjudication() {
         let found = of(&[
             (&[Pass, Pass], None),
             (&[Pass, Fail], Some(Fail)),
@@ -122,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn a_conflict_that_waits_is_left_out_of_the_adjudicated_only() {
+    fn an_open_conflict_is_left_out_of_the_adjudicated_rate_only() {
         let found = of(&[
             (&[Pass, Fail], None),
             (&[Pass, Unsure], None),
@@ -133,7 +131,7 @@ mod tests {
             counts.map(|rate| (rate.count, rate.n)),
             [(1, 2), (1, 1), (2, 2)]
         );
-        assert_eq!(found.told_twice, 1);
+        assert_eq!(found.double_read, 1);
     }
 
     #[test]

@@ -1,100 +1,94 @@
-//! Answers to what only tests a reviewer: planted faults and repeats.
+//! Reviewers' answers to attention checks: planted faults, and results shown a second time.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::interval::IntervalMethod;
-use super::rate::Rate;
+use super::stats::{IntervalMethod, Rate};
 use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
 use crate::domain::Verdict;
 
-/// Planted faults that reviewers failed, of those that they answered; unsure is not caught.
+/// Planted faults that reviewers failed, of those that they answered. An unsure answer does not detect the fault.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct AttentionCheckRates {
     /// Of every kind.
     #[serde(flatten)]
     pub all: Rate,
     /// By kind of fault.
-    pub by_fault: BTreeMap<&'static str, Rate>,
+    pub by_kind: BTreeMap<&'static str, Rate>,
 }
 
 impl AttentionCheckRates {
-    /// Of a reviewer's answers; those to repeats are left out.
-    pub(super) fn of<'a>(answers: impl Iterator<Item = &'a AttentionCheckAnswer>) -> Self {
-        let mut told: BTreeMap<_, Vec<bool>> = BTreeMap::new();
-        for answer in answers.filter(|answer| answer.check.is_fault()) {
-            let of_kind = told.entry(answer.check.name()).or_default();
+    /// Returns the rates of one reviewer; answers to duplicates are left out.
+    pub(super) fn of<'a>(answers: impl IntoIterator<Item = &'a AttentionCheckAnswer>) -> Self {
+        let mut outcomes: BTreeMap<_, Vec<bool>> = BTreeMap::new();
+        for answer in answers.into_iter().filter(|answer| answer.check.is_fault()) {
+            let of_kind = outcomes.entry(answer.check.name()).or_default();
             of_kind.push(answer.verdict == Verdict::Fail);
         }
+        let by_kind = outcomes.into_iter();
+        Self::from_kinds(by_kind.map(|(kind, outcomes)| (kind, Rate::of(outcomes))))
+    }
+
+    /// Returns the rates of several reviewers together.
+    pub(super) fn total(reviewers: impl IntoIterator<Item = Self>) -> Self {
+        let mut by_kind: BTreeMap<_, Vec<Rate>> = BTreeMap::new();
+        for (kind, rate) in reviewers.into_iter().flat_map(|rates| rates.by_kind) {
+            by_kind.entry(kind).or_default().push(rate);
+        }
+        let by_kind = by_kind.into_iter();
+        Self::from_kinds(by_kind.map(|(kind, rates)| (kind, Rate::total(rates))))
+    }
+
+    fn from_kinds(by_kind: impl Iterator<Item = (&'static str, Rate)>) -> Self {
+        let by_kind: BTreeMap<_, _> = by_kind.collect();
         Self {
-            all: Rate::of(told.values().flatten().copied()),
-            by_fault: told
-                .into_iter()
-                .map(|(name, told)| (name, Rate::of(told)))
-                .collect(),
+            all: Rate::total(by_kind.values().copied()),
+            by_kind,
         }
     }
 
-    /// Of several reviewers together.
-    pub(super) fn total<'a>(reviewers: impl Iterator<Item = &'a Self> + Clone) -> Self {
-        let mut by_fault: BTreeMap<_, Vec<Rate>> = BTreeMap::new();
-        for (name, rate) in reviewers.clone().flat_map(|caught| &caught.by_fault) {
-            by_fault.entry(*name).or_default().push(*rate);
-        }
-        Self {
-            all: Rate::total(reviewers.map(|caught| caught.all)),
-            by_fault: by_fault
-                .into_iter()
-                .map(|(name, rates)| (name, Rate::total(rates.into_iter())))
-                .collect(),
-        }
-    }
-
-    /// The same with another interval.
+    /// Returns the same rates with intervals computed by `method`.
     #[must_use]
-    pub fn with_interval(self, interval: IntervalMethod) -> Self {
-        let by_fault = self.by_fault.into_iter();
+    pub fn with_interval(self, method: IntervalMethod) -> Self {
+        let by_kind = self.by_kind.into_iter();
         Self {
-            all: self.all.with_interval(interval),
-            by_fault: by_fault
-                .map(|(name, rate)| (name, rate.with_interval(interval)))
+            all: self.all.with_interval(method),
+            by_kind: by_kind
+                .map(|(kind, rate)| (kind, rate.with_interval(method)))
                 .collect(),
         }
     }
 }
 
-/// Planted faults that all reviewers of a project caught.
+/// Returns the rates of all reviewers of a project together.
 ///
 /// # Errors
 /// When the catalog cannot be read.
-pub(super) async fn caught(catalog: &Catalog) -> Result<AttentionCheckRates, CatalogError> {
-    let answers = by_reviewer(catalog).await?;
-    let reviewers: Vec<AttentionCheckRates> = answers
-        .values()
-        .map(|answers| AttentionCheckRates::of(newest(answers).into_iter()))
-        .collect();
-    Ok(AttentionCheckRates::total(reviewers.iter()))
+pub(super) async fn project_rates(catalog: &Catalog) -> Result<AttentionCheckRates, CatalogError> {
+    let answers = answers_by_reviewer(catalog).await?;
+    let rates = |answers: &Vec<_>| AttentionCheckRates::of(newest(answers));
+    Ok(AttentionCheckRates::total(answers.values().map(rates)))
 }
 
-/// Answers that were not taken back, by reviewer, oldest first.
+/// Returns each reviewer's answers that were not undone, oldest first.
 ///
 /// # Errors
 /// When the catalog cannot be read.
-pub(super) async fn by_reviewer(
+pub(super) async fn answers_by_reviewer(
     catalog: &Catalog,
 ) -> Result<BTreeMap<String, Vec<AttentionCheckAnswer>>, CatalogError> {
-    let mut checks: BTreeMap<String, Vec<AttentionCheckAnswer>> = BTreeMap::new();
+    let mut by_reviewer: BTreeMap<String, Vec<AttentionCheckAnswer>> = BTreeMap::new();
     for answer in catalog.attention_check_answers().await? {
         if answer.undone_at.is_none() {
-            let of_reviewer = checks.entry(answer.reviewer.clone()).or_default();
-            of_reviewer.push(answer);
+            let answers = by_reviewer.entry(answer.reviewer.clone()).or_default();
+            answers.push(answer);
         }
     }
-    Ok(checks)
+    Ok(by_reviewer)
 }
 
-/// The newest of a reviewer's answers to each thing that was shown; they come oldest first.
+/// Returns the newest of a reviewer's answers to each thing that was shown; `answers` are sorted oldest first.
 pub(super) fn newest(answers: &[AttentionCheckAnswer]) -> Vec<&AttentionCheckAnswer> {
     let shown = |answer: &AttentionCheckAnswer| {
         let hashes = (answer.result_hash, answer.look.seen);

@@ -1,170 +1,190 @@
-//! Metrics against each other on the same pairs.
+//! Metrics compared pair by pair, by which results are right.
 
-use super::model::{Basis, Comparison};
-use super::stats::{MOST_PAIRS, holm, mcnemar_exact, pairs_needed};
+use serde::Serialize;
+
+use super::number_format::format_count;
+use super::stats::{McNemarTest, SIGNIFICANCE_LEVEL, holm_of_known};
 use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
 
-/// Level below which a difference is said to be there.
-pub(super) const LEVEL: f64 = 0.05;
-/// Name of the test, with what makes it that one.
-const TEST: &str = "McNemar, exact, two-sided";
+/// Above this number of pairs the sample size is not spelled out.
+const MAX_SAMPLE_SIZE: f64 = 100_000.0;
 
-/// Metrics that are compared: every two of the paper's, and the mask true to the wood with the one matched to the print.
-pub(super) const PAIRS: [(ThresholdMetric, ThresholdMetric); 4] = [
+/// The metrics that are compared: every two of the paper's, and the mask true to the block with the one matched to the
+/// print.
+pub const COMPARED_METRICS: [(ThresholdMetric, ThresholdMetric); 4] = [
     (Ensemble, NlSsim),
     (Ensemble, Density),
     (NlSsim, Density),
     (Relief, Ensemble),
 ];
 
-/// Counts of the metrics of [`PAIRS`].
-#[derive(Debug, Clone)]
-pub(super) struct McNemarTests([McNemarTest; PAIRS.len()]);
-
-/// Counts of two metrics.
-#[derive(Debug, Clone, Copy)]
-struct McNemarTest {
-    a: ThresholdMetric,
-    b: ThresholdMetric,
-    n: u64,
-    a_only: u64,
-    b_only: u64,
+/// What decides whether a result is right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Basis {
+    /// Reviewers' verdicts.
+    Verdicts,
+    /// Ground truth.
+    Truth,
 }
 
-impl Default for McNemarTests {
-    fn default() -> Self {
-        Self(PAIRS.map(|(a, b)| McNemarTest {
-            a,
-            b,
-            n: 0,
-            a_only: 0,
-            b_only: 0,
-        }))
+impl Basis {
+    /// Both, in the order of reports.
+    pub const ALL: [Self; 2] = [Self::Verdicts, Self::Truth];
+
+    /// Returns the name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Verdicts => "verdicts",
+            Self::Truth => "truth",
+        }
+    }
+
+    /// Returns the noun for the pairs whose results are known to be right or wrong.
+    const fn pairs(self) -> &'static str {
+        match self {
+            Self::Verdicts => "judged pairs",
+            Self::Truth => "pairs with ground truth",
+        }
     }
 }
 
-impl McNemarTests {
-    /// Counts one pair in; `right` tells whether a metric's result is right, where that is known.
+/// Two metrics on the same pairs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// What decides whether a result is right.
+    pub basis: Basis,
+    /// The first metric.
+    pub a: ThresholdMetric,
+    /// The second metric.
+    pub b: ThresholdMetric,
+    /// Pairs on which both are known to be right or wrong.
+    pub n: u64,
+    /// Pairs on which only `a` is right.
+    pub a_only: u64,
+    /// Pairs on which only `b` is right.
+    pub b_only: u64,
+    /// Name of the test that gave `p`.
+    pub test: &'static str,
+    /// Its two-sided p-value; `None` without discordant pairs.
+    pub p: Option<f64>,
+    /// `p` after Holm's correction over the comparisons of this basis.
+    pub p_holm: Option<f64>,
+    /// What follows, in whole sentences.
+    pub conclusion: String,
+}
+
+/// The tests of [`COMPARED_METRICS`] while pairs are counted.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct ComparisonSums([McNemarTest; COMPARED_METRICS.len()]);
+
+impl ComparisonSums {
+    /// Counts one pair; `right` returns whether a metric's result is right, where that is known.
     pub(super) fn add(&mut self, right: impl Fn(ThresholdMetric) -> Option<bool>) {
-        for duel in &mut self.0 {
-            if let (Some(a), Some(b)) = (right(duel.a), right(duel.b)) {
-                duel.n += 1;
-                duel.a_only += u64::from(a && !b);
-                duel.b_only += u64::from(b && !a);
+        for (test, (a, b)) in self.0.iter_mut().zip(COMPARED_METRICS) {
+            if let (Some(a), Some(b)) = (right(a), right(b)) {
+                test.add(a, b);
             }
         }
     }
 
-    /// The comparisons of all metrics that were judged on the same pairs.
+    /// Returns the comparisons of all metrics that were judged on the same pairs.
     pub(super) fn finish(self, basis: Basis) -> Vec<Comparison> {
-        let duels: Vec<McNemarTest> = self.0.into_iter().filter(|duel| duel.n > 0).collect();
-        let ps: Vec<Option<f64>> = duels
-            .iter()
-            .map(|duel| mcnemar_exact(duel.a_only, duel.b_only))
-            .collect();
-        let corrected = after_holm(&ps);
-        let both = ps.into_iter().zip(corrected);
-        duels
+        let compared = self.0.into_iter().zip(COMPARED_METRICS);
+        let compared: Vec<_> = compared.filter(|(test, _)| test.n > 0).collect();
+        let p_values: Vec<Option<f64>> = compared.iter().map(|(test, _)| test.p()).collect();
+        let adjusted = holm_of_known(&p_values);
+        compared
             .into_iter()
-            .zip(both)
-            .map(|(duel, (p, p_holm))| duel.finish(basis, p.zip(p_holm)))
+            .zip(adjusted)
+            .map(|((test, metrics), p_holm)| comparison(basis, metrics, test, p_holm))
             .collect()
     }
 }
 
-/// Holm's correction where there is a p. A comparison that has none, as without discordant pairs, has nothing to tell
-/// apart: it is as sure as p = 1.
-pub(super) fn after_holm(ps: &[Option<f64>]) -> Vec<Option<f64>> {
-    let all: Vec<f64> = ps.iter().map(|p| p.unwrap_or(1.0)).collect();
-    let corrected = ps.iter().zip(holm(&all));
-    corrected.map(|(p, p_holm)| p.map(|_| p_holm)).collect()
-}
-
-impl McNemarTest {
-    fn finish(self, basis: Basis, p: Option<(f64, f64)>) -> Comparison {
-        Comparison {
-            basis,
-            a: self.a,
-            b: self.b,
-            n: self.n,
-            a_only: self.a_only,
-            b_only: self.b_only,
-            test: TEST,
-            p: p.map(|(p, _)| p),
-            p_holm: p.map(|(_, p_holm)| p_holm),
-            words: self.words(p),
-        }
-    }
-
-    /// What follows from p, raw and corrected.
-    fn words(&self, p: Option<(f64, f64)>) -> String {
-        let better = if self.a_only > self.b_only {
-            self.a
-        } else {
-            self.b
-        };
-        match p {
-            None => "right on the same pairs".to_owned(),
-            Some((_, p_holm)) if p_holm < LEVEL => format!("{} is better", better.title()),
-            Some((p, _)) if p < LEVEL => format!(
-                "{} looks better, but not after correction for several comparisons",
-                better.title()
-            ),
-            Some(_) => format!("cannot tell them apart; {}", self.needed()),
-        }
-    }
-
-    /// How many pairs would tell them apart.
-    fn needed(&self) -> String {
-        if self.a_only == self.b_only {
-            return "as many are right for the one only as for the other".to_owned();
-        }
-        match pairs_needed(self.a_only, self.b_only, self.n, LEVEL) {
-            Some(pairs) => format!("at this rate about {} pairs would", grouped(rounded(pairs))),
-            None => format!("at this rate {} pairs would not", grouped(MOST_PAIRS)),
-        }
+fn comparison(
+    basis: Basis,
+    (a, b): (ThresholdMetric, ThresholdMetric),
+    test: McNemarTest,
+    p_holm: Option<f64>,
+) -> Comparison {
+    Comparison {
+        basis,
+        a,
+        b,
+        n: test.n,
+        a_only: test.a_only,
+        b_only: test.b_only,
+        test: McNemarTest::NAME,
+        p: test.p(),
+        p_holm,
+        conclusion: conclusion(basis, (a, b), test, p_holm),
     }
 }
 
-/// To three digits.
-fn rounded(number: u64) -> u64 {
-    let unit = 10_u64.pow(number.checked_ilog10().unwrap_or(0).saturating_sub(2));
-    (number + unit / 2) / unit * unit
+/// Returns what follows from a test, before and after the correction.
+fn conclusion(
+    basis: Basis,
+    (a, b): (ThresholdMetric, ThresholdMetric),
+    test: McNemarTest,
+    p_holm: Option<f64>,
+) -> String {
+    let better = if test.a_only > test.b_only { a } else { b }.title();
+    let Some((p, p_holm)) = test.p().zip(p_holm) else {
+        return "Both are right on the same pairs.".to_owned();
+    };
+    if p_holm < SIGNIFICANCE_LEVEL {
+        return format!("{better} is right significantly more often.");
+    }
+    if p < SIGNIFICANCE_LEVEL {
+        return format!(
+            "{better} is right more often, but not significantly after correction for several comparisons."
+        );
+    }
+    match test.sample_size() {
+        None => "No significant difference: each alone is right on as many pairs.".to_owned(),
+        Some(pairs) => format!(
+            "No significant difference. At this rate, {} {} would be needed to show a difference between {} and {} \
+             (80 % power, 5 % level).",
+            about(pairs),
+            basis.pairs(),
+            a.title(),
+            b.title()
+        ),
+    }
 }
 
-/// With a comma before every three digits.
-fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
+/// Returns a sample size to two significant digits, as the estimate is no better.
+fn about(pairs: f64) -> String {
+    if pairs > MAX_SAMPLE_SIZE {
+        return format!("more than {}", format_count(MAX_SAMPLE_SIZE as u64));
     }
-    text
+    let unit = 10.0_f64.powf((pairs.log10().floor() - 1.0).max(0.0));
+    format!(
+        "about {}",
+        format_count(((pairs / unit).ceil() * unit) as u64)
+    )
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{McNemarTests, grouped, rounded};
+    use super::{Basis, Comparison, ComparisonSums, about};
     use crate::domain::ThresholdMetric;
-    use crate::report::model::Basis;
 
-    /// `(times, [nl_ssim, density, ensemble])`
-    fn finish(worlds: &[(usize, [Option<bool>; 3])]) -> Vec<crate::report::Comparison> {
-        let mut duels = McNemarTests::default();
-        for (times, right) in worlds {
+    /// Compares over `(times, [nl_ssim, density, ensemble])`.
+    fn compare(outcomes: &[(usize, [Option<bool>; 3])]) -> Vec<Comparison> {
+        let mut sums = ComparisonSums::default();
+        for (times, right) in outcomes {
             for _ in 0..*times {
-                duels.add(|metric| right.get(metric as usize).copied().flatten());
+                sums.add(|metric| right.get(metric as usize).copied().flatten());
             }
         }
-        duels.finish(Basis::Verdicts)
+        sums.finish(Basis::Verdicts)
     }
 
     #[test]
-    fn the_papers_counts_do_not_tell_ensemble_from_structure() {
-        let found = finish(&[
+    fn the_papers_counts_do_not_separate_ensemble_from_structure() {
+        let found = compare(&[
             (574, [Some(true), Some(true), Some(true)]),
             (3, [Some(false), Some(true), Some(true)]),
             (9, [Some(true), Some(false), Some(true)]),
@@ -174,79 +194,67 @@ mod tests {
         assert_eq!((found[0].n, found[0].a_only, found[0].b_only), (587, 3, 1));
         assert_eq!(found[0].p, Some(0.625));
         assert_eq!(
-            found[0].words,
-            "cannot tell them apart; at this rate about 2,940 pairs would"
+            found[0].conclusion,
+            "No significant difference. At this rate, about 4,700 judged pairs would be needed to show a difference \
+             between Ensemble and Non-luminous SSIM (80 % power, 5 % level)."
         );
         assert!((found[1].p.expect("ten discordant") - 0.021_484_375).abs() < 1e-12);
         assert!((found[1].p_holm.expect("ten discordant") - 0.064_453_125).abs() < 1e-12);
-        assert!(found[1].words.contains("not after correction"));
+        assert!(found[1].conclusion.contains("not significantly after"));
     }
 
     /// 3, 9 and 1 failures of 587, where the ensemble's is one of structure's, and structure's are of density's.
     #[test]
-    fn the_papers_failures_one_within_the_other_need_three_times_as_many_pairs() {
-        let found = finish(&[
+    fn nested_failures_of_the_paper_equal_statsmodels() {
+        let found = compare(&[
             (578, [Some(true), Some(true), Some(true)]),
             (1, [Some(false), Some(false), Some(false)]),
             (2, [Some(false), Some(false), Some(true)]),
             (6, [Some(true), Some(false), Some(true)]),
         ]);
-        let said = "cannot tell them apart; at this rate about 1,760 pairs would";
-        assert_eq!((found[0].p, found[0].words.as_str()), (Some(0.5), said));
+        assert!(found[0].conclusion.contains("about 2,400 judged pairs"));
         // statsmodels 0.15.0 `mcnemar(exact=True)` and `multipletests(method="holm")`.
         let wanted = [(0.5, 0.5), (0.007_812_5, 0.023_437_5), (0.031_25, 0.062_5)];
         for (found, (p, holm)) in found.iter().zip(wanted) {
             assert!((found.p.expect("discordant pairs") - p).abs() < 1e-12);
             assert!((found.p_holm.expect("discordant pairs") - holm).abs() < 1e-12);
         }
-        assert_eq!(found[1].words, "Ensemble is better");
+        let better = "Ensemble is right significantly more often.";
+        assert_eq!(found[1].conclusion, better);
     }
 
     #[test]
-    fn where_no_number_of_pairs_would_tell_none_is_said() {
-        let found = finish(&[
+    fn an_even_split_names_no_sample_size() {
+        let found = compare(&[
             (2, [Some(true), Some(false), Some(true)]),
             (2, [Some(true), Some(true), Some(false)]),
         ]);
-        assert_eq!(
-            found[1].words,
-            "cannot tell them apart; as many are right for the one only as for the other"
-        );
+        assert!(found[1].conclusion.contains("each alone"), "{found:?}");
     }
 
     #[test]
-    fn numbers_are_rounded_to_three_digits_and_grouped() {
-        let said = |number| grouped(rounded(number));
-        assert_eq!(
-            [6, 999, 1761, 2935].map(said),
-            ["6", "999", "1,760", "2,940"]
-        );
-        assert_eq!(grouped(1_234_567), "1,234,567");
+    fn sample_sizes_have_two_digits_and_a_limit() {
+        let wanted = ["about 7", "about 99", "about 240", "about 4,700"];
+        assert_eq!([6.3, 99.0, 233.1, 4605.0].map(about), wanted);
+        assert_eq!(about(100_001.0), "more than 100,000");
     }
 
     #[test]
     fn only_pairs_judged_for_both_count() {
-        let found = finish(&[
+        let found = compare(&[
             (4, [Some(true), None, Some(true)]),
             (2, [None, None, Some(true)]),
         ]);
         assert_eq!(found.len(), 1);
         assert_eq!((found[0].n, found[0].p), (4, None));
-        assert_eq!(found[0].words, "right on the same pairs");
+        assert_eq!(found[0].conclusion, "Both are right on the same pairs.");
     }
 
     #[test]
-    fn a_metric_nobody_has_results_of_is_not_compared_and_does_not_weaken_the_others() {
-        let found = finish(&[(9, [Some(true), Some(false), Some(true)])]);
+    fn metrics_without_results_do_not_enlarge_the_family_of_tests() {
+        let found = compare(&[(9, [Some(true), Some(false), Some(true)])]);
         assert_eq!(found.len(), 3);
         let (p, holm) = (found[1].p.expect("nine"), found[1].p_holm.expect("nine"));
         assert!((holm - 3.0 * p).abs() < 1e-12, "{p} {holm}");
-    }
-
-    #[test]
-    fn a_plain_difference_is_named() {
-        let found = finish(&[(20, [Some(false), Some(true), Some(true)])]);
-        assert_eq!(found[0].words, "Ensemble is better");
-        assert_eq!(found[2].words, "Pixel density is better");
     }
 }

@@ -3,72 +3,78 @@
 use crate::catalog::{MetricRecord, ReviewerVerdict};
 use crate::domain::{ReviewOrder, Verdict};
 
-/// Where a result stands with its reviewers.
+/// The joint verdict of all reviewers on a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Consensus {
-    /// Nobody has read it or an earlier result.
-    Unread,
-    /// An earlier result was read, this one was not.
+    /// Nobody judged this or an earlier result.
+    Unjudged,
+    /// Only an earlier result was judged.
     Stale,
-    /// Every reviewer who could tell passed it, or who settled what they contradict each other on.
+    /// Every reviewer who decided passed it, or the adjudicator of a conflict did.
     Passed,
-    /// Every reviewer who could tell failed it, or who settled what they contradict each other on.
+    /// Every reviewer who decided failed it, or the adjudicator of a conflict did.
     Failed,
-    /// No reviewer could tell.
+    /// All reviewers were unsure.
     Unsure,
-    /// Some passed it and some failed it; it counts as unsure until they agree or somebody has settled it.
+    /// Some passed and some failed it. It counts as unsure until somebody adjudicates.
     Conflict,
 }
 
 impl Consensus {
-    /// The standing of a current result.
+    /// Returns the consensus on a current result.
     pub fn of(record: &MetricRecord) -> Self {
-        let (words, read) = split(record);
-        let all = || record.verdicts.iter().collect();
-        let is_settled =
-            contradict(&read) && words.iter().any(|word| word.verdict != Verdict::Unsure);
-        let deciding: Vec<&ReviewerVerdict> = if is_settled { words } else { all() };
-        let says = |verdict| deciding.iter().any(|read| read.verdict == verdict);
-        match (says(Verdict::Pass), says(Verdict::Fail)) {
+        let (adjudications, independent) = partition_verdicts(record);
+        let decides = |verdict: &&ReviewerVerdict| verdict.verdict != Verdict::Unsure;
+        let is_settled = is_disputed(&independent) && adjudications.iter().any(decides);
+        let deciding: Vec<&ReviewerVerdict> = if is_settled {
+            adjudications
+        } else {
+            record.verdicts.iter().collect()
+        };
+        let any = |wanted| deciding.iter().any(|verdict| verdict.verdict == wanted);
+        match (any(Verdict::Pass), any(Verdict::Fail)) {
             (true, true) => Self::Conflict,
             (true, false) => Self::Passed,
             (false, true) => Self::Failed,
-            (false, false) if says(Verdict::Unsure) => Self::Unsure,
+            (false, false) if any(Verdict::Unsure) => Self::Unsure,
             (false, false) if record.older_verdicts > 0 => Self::Stale,
-            (false, false) => Self::Unread,
+            (false, false) => Self::Unjudged,
         }
     }
 
-    /// The verdict it amounts to; `None` where nobody has read the current result.
+    /// Returns the verdict it amounts to; `None` where nobody judged the current result.
     pub const fn verdict(self) -> Option<Verdict> {
         match self {
             Self::Passed => Some(Verdict::Pass),
             Self::Failed => Some(Verdict::Fail),
             Self::Unsure | Self::Conflict => Some(Verdict::Unsure),
-            Self::Unread | Self::Stale => None,
+            Self::Unjudged | Self::Stale => None,
         }
     }
 
-    /// Right or wrong, where reviewers have told.
-    pub const fn told(self) -> Option<bool> {
+    /// Returns whether the result passed; `None` where reviewers did not decide.
+    pub const fn passed(self) -> Option<bool> {
         match self {
             Self::Passed => Some(true),
             Self::Failed => Some(false),
-            Self::Unsure | Self::Conflict | Self::Unread | Self::Stale => None,
+            Self::Unsure | Self::Conflict | Self::Unjudged | Self::Stale => None,
         }
     }
 }
 
-/// The words of those who were shown a conflict to settle it, and the verdicts of those who read by themselves.
-pub(crate) fn split(record: &MetricRecord) -> (Vec<&ReviewerVerdict>, Vec<&ReviewerVerdict>) {
-    let is_word = |read: &&ReviewerVerdict| read.review_order == Some(ReviewOrder::Adjudicate);
-    record.verdicts.iter().partition(is_word)
+/// Splits verdicts into adjudications, given by reviewers who were shown a conflict, and independent ones.
+pub(crate) fn partition_verdicts(
+    record: &MetricRecord,
+) -> (Vec<&ReviewerVerdict>, Vec<&ReviewerVerdict>) {
+    let is_adjudication =
+        |verdict: &&ReviewerVerdict| verdict.review_order == Some(ReviewOrder::Adjudicate);
+    record.verdicts.iter().partition(is_adjudication)
 }
 
-/// Whether one passes what another fails.
-pub(crate) fn contradict(verdicts: &[&ReviewerVerdict]) -> bool {
-    let says = |verdict| verdicts.iter().any(|read| read.verdict == verdict);
-    says(Verdict::Pass) && says(Verdict::Fail)
+/// Returns whether one reviewer passes what another fails.
+pub(crate) fn is_disputed(verdicts: &[&ReviewerVerdict]) -> bool {
+    let any = |wanted| verdicts.iter().any(|verdict| verdict.verdict == wanted);
+    any(Verdict::Pass) && any(Verdict::Fail)
 }
 
 #[cfg(test)]
@@ -77,39 +83,39 @@ mod tests {
     use crate::domain::{ReviewOrder, ThresholdMetric, Verdict};
     use crate::report::test_fixtures;
 
-    fn standing(verdicts: &[Verdict], older: u64) -> Consensus {
+    fn consensus(verdicts: &[Verdict], older: u64) -> Consensus {
         let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, verdicts);
         record.older_verdicts = older;
         Consensus::of(&record)
     }
 
     #[test]
-    fn reviewers_who_cannot_tell_leave_the_word_to_those_who_can() {
+    fn unsure_reviewers_leave_the_decision_to_the_others() {
         assert_eq!(
-            standing(&[Verdict::Unsure, Verdict::Pass], 0),
+            consensus(&[Verdict::Unsure, Verdict::Pass], 0),
             Consensus::Passed
         );
         assert_eq!(
-            standing(&[Verdict::Fail, Verdict::Unsure], 0),
+            consensus(&[Verdict::Fail, Verdict::Unsure], 0),
             Consensus::Failed
         );
-        assert_eq!(standing(&[Verdict::Unsure], 0), Consensus::Unsure);
+        assert_eq!(consensus(&[Verdict::Unsure], 0), Consensus::Unsure);
     }
 
     #[test]
-    fn contradiction_counts_as_unsure() {
-        let both = standing(&[Verdict::Fail, Verdict::Pass], 0);
+    fn a_conflict_counts_as_unsure() {
+        let both = consensus(&[Verdict::Fail, Verdict::Pass], 0);
         assert_eq!(both, Consensus::Conflict);
         assert_eq!(both.verdict(), Some(Verdict::Unsure));
     }
 
     #[test]
-    fn the_word_on_a_conflict_settles_it_unless_it_is_unsure_or_contradicted() {
-        let settled = |words: &[Verdict]| {
-            let verdicts = [&[Verdict::Pass, Verdict::Fail], words].concat();
+    fn an_adjudication_settles_a_conflict_unless_it_is_unsure_or_disputed() {
+        let settled = |adjudications: &[Verdict]| {
+            let verdicts = [&[Verdict::Pass, Verdict::Fail], adjudications].concat();
             let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, &verdicts);
-            for word in &mut record.verdicts[2..] {
-                word.review_order = Some(ReviewOrder::Adjudicate);
+            for adjudication in &mut record.verdicts[2..] {
+                adjudication.review_order = Some(ReviewOrder::Adjudicate);
             }
             Consensus::of(&record)
         };
@@ -126,10 +132,10 @@ mod tests {
     }
 
     #[test]
-    fn verdict_on_an_older_result_is_no_verdict() {
-        assert_eq!(standing(&[], 2), Consensus::Stale);
-        assert_eq!(standing(&[], 0), Consensus::Unread);
-        assert_eq!(standing(&[Verdict::Pass], 2), Consensus::Passed);
+    fn a_verdict_on_an_older_result_is_no_verdict() {
+        assert_eq!(consensus(&[], 2), Consensus::Stale);
+        assert_eq!(consensus(&[], 0), Consensus::Unjudged);
+        assert_eq!(consensus(&[Verdict::Pass], 2), Consensus::Passed);
         assert_eq!(Consensus::Stale.verdict(), None);
     }
 }

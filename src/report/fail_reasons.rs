@@ -2,44 +2,39 @@
 
 use serde::Serialize;
 
-use super::consensus::{Consensus, split};
+use super::consensus::Consensus;
 use crate::catalog::{MetricRecord, ReviewerVerdict};
 use crate::domain::{Reason, Verdict};
 
-/// Failed results for which a reason was given.
+/// The number of failed results for which a reason was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct FailReasonCount {
-    /// The reason; `None` where nobody gave one.
+    /// The reason; `None` for results without any.
     pub reason: Option<Reason>,
-    /// How many.
+    /// Number of results.
     pub count: u64,
 }
 
-/// The counts so far: the reasons in their order, then those without.
+/// Counts by reason in the order of [`Reason::ALL`]; the last is of results without a reason.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FailReasonSums([u64; Reason::ALL.len() + 1]);
 
 impl FailReasonSums {
-    /// Counts one result in, if it failed: once for each reason that was given.
+    /// Counts one result, if it failed: once for each reason given.
     pub(super) fn add(&mut self, record: &MetricRecord) {
         if Consensus::of(record) != Consensus::Failed {
             return;
         }
-        let (words, own) = split(record);
-        let failing = |read: &&ReviewerVerdict| read.verdict == Verdict::Fail;
-        let given: Vec<Reason> = words
-            .into_iter()
-            .chain(own)
-            .filter(failing)
-            .filter_map(|read| read.reason)
-            .collect();
+        let fails = |given: &&ReviewerVerdict| given.verdict == Verdict::Fail;
+        let given = record.verdicts.iter().filter(fails);
+        let reasons: Vec<Reason> = given.filter_map(|given| given.reason).collect();
         for (count, reason) in self.0.iter_mut().zip(Reason::ALL) {
-            *count += u64::from(given.contains(&reason));
+            *count += u64::from(reasons.contains(&reason));
         }
-        self.0[Reason::ALL.len()] += u64::from(given.is_empty());
+        self.0[Reason::ALL.len()] += u64::from(reasons.is_empty());
     }
 
-    /// The reasons that were given, in their order; those without last.
+    /// Returns the counts that are not 0.
     pub(super) fn finish(self) -> Vec<FailReasonCount> {
         let reasons = Reason::ALL.into_iter().map(Some).chain([None]);
         reasons

@@ -1,12 +1,12 @@
-//! The pictures of a report's page and what is said of each: drawn elsewhere, plain data here.
+//! The images of the HTML report with what is known of each; plain data, drawn elsewhere.
 
 use crate::catalog::VerdictEvent;
 use crate::domain::{PairName, ThresholdMetric, Verdict};
 
-/// All pictures of a page.
+/// All images of a report.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Gallery {
-    /// The seed of what was drawn by lot.
+    /// Seed of the random choice.
     pub seed: u64,
     /// In the order in which they are shown.
     pub groups: Vec<GalleryGroup>,
@@ -16,11 +16,11 @@ pub struct Gallery {
 #[derive(Debug, Clone, PartialEq)]
 pub struct GalleryGroup {
     /// Why they are shown.
-    pub kind: GalleryReason,
-    /// How many there are in the project.
-    pub of: u64,
-    /// Those that were drawn.
-    pub shots: Vec<GalleryItem>,
+    pub reason: GalleryReason,
+    /// Number of such results in the project.
+    pub total: u64,
+    /// The results that were drawn.
+    pub items: Vec<GalleryItem>,
 }
 
 /// Why a result is shown.
@@ -28,46 +28,46 @@ pub struct GalleryGroup {
 pub enum GalleryReason {
     /// Reviewers failed it.
     Failed,
-    /// Reviewers contradict each other on it.
+    /// Reviewers disagree on it.
     Conflict,
-    /// It is off the true alignment.
+    /// It misses the ground truth.
     OffTruth,
-    /// By lot.
-    Lot,
+    /// It was chosen at random.
+    Random,
 }
 
 impl GalleryReason {
-    /// Every kind, in the order of the page.
-    pub const ALL: [Self; 4] = [Self::Failed, Self::Conflict, Self::OffTruth, Self::Lot];
+    /// Every reason, in the order of the report.
+    pub const ALL: [Self; 4] = [Self::Failed, Self::Conflict, Self::OffTruth, Self::Random];
 }
 
-/// One result with its pictures.
+/// One result with its images.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GalleryItem {
     /// The pair.
     pub pair: PairName,
-    /// The character, where it is told.
+    /// The character, where it is known.
     pub character: Option<String>,
     /// Paths of mesh and print.
     pub files: [String; 2],
-    /// The metrics that came to this result.
+    /// The metrics with this result.
     pub metrics: Vec<ThresholdMetric>,
-    /// Its numbers in words.
+    /// Scores and errors as text.
     pub numbers: String,
-    /// What reviewers said of it, each with the reason and the note.
-    pub said: Vec<String>,
-    /// Print, relief laid on it, and overlay as JPEG, as far as they could be drawn.
-    pub pictures: [Option<Vec<u8>>; 3],
-    /// Why one of them is missing.
-    pub trouble: Option<String>,
+    /// Verdicts, each with reviewer, reason and note.
+    pub verdicts: Vec<String>,
+    /// Print, aligned relief and overlay as JPEG, as far as they could be drawn.
+    pub images: [Option<Vec<u8>>; 3],
+    /// Why an image is missing.
+    pub problem: Option<String>,
 }
 
-/// What a reviewer said in one act, such as `lan: fail, angle (“upper half”)`.
-pub fn said(event: &VerdictEvent) -> String {
-    let mut words = format!("{}: {}", event.reviewer, event.verdict);
+/// Returns a verdict as text, such as `lan: fail, angle (“upper half”)`.
+pub fn verdict_text(event: &VerdictEvent) -> String {
+    let mut text = format!("{}: {}", event.reviewer, event.verdict);
     let reason = event.reason.filter(|_| event.verdict == Verdict::Fail);
-    words.extend(reason.map(|reason| format!(", {}", reason.title())));
+    text.extend(reason.map(|reason| format!(", {}", reason.title())));
     let note = event.note.as_deref().filter(|note| !note.trim().is_empty());
-    words.extend(note.map(|note| format!(" (\u{201c}{}\u{201d})", note.trim())));
-    words
+    text.extend(note.map(|note| format!(" (\u{201c}{}\u{201d})", note.trim())));
+    text
 }

@@ -1,28 +1,23 @@
-//! How far a found alignment is from the true one.
+//! The error of an alignment against ground truth.
 
 use serde::{Deserialize, Serialize};
 
-use crate::domain::{MetricOutcome, PairName, PrintFromMesh, Rigid3};
-use crate::raster::{DepthMap, Grid, Mask, warp_mask};
+use super::stats::{IntervalMethod, median, ratio};
+use crate::domain::{PairName, PrintFromMesh, Rigid3};
 
-/// Largest angle error that counts as right, degrees (the paper's rule).
+/// Largest angle error of a right alignment, degrees (the paper's rule).
 pub const MAX_ANGLE_DEG: f64 = 5.0;
-/// Largest landmark error that counts as right, percent of the character's height.
+/// Largest mean landmark error of a right alignment, percent of the character's height.
 pub const MAX_TRE_PCT: f64 = 5.0;
-/// Smallest intersection over union with the true stroke tops that counts as right.
+/// Smallest intersection over union with the true stroke tops of a right alignment.
 pub const MIN_MASK_IOU: f64 = 0.7;
-
-/// A pixel of a tops mask that is a true stroke top.
-const TOP: u8 = 255;
-/// A pixel of a tops mask that is left out of the score: a neighbour's stroke or a border line.
-const LEFT_OUT: u8 = 128;
 
 /// One line of `truth.jsonl`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct TruthRecord {
     /// The pair.
     pub id: PairName,
-    /// Mesh points to print pixels and height over the true plane.
+    /// Maps mesh points to print pixels and the height over the true plane.
     pub print_from_mesh: PrintFromMesh,
     /// The plane of the stroke tops in mesh coordinates.
     pub plane: TruthPlane,
@@ -30,7 +25,7 @@ pub struct TruthRecord {
     pub landmarks: Vec<[f64; 3]>,
     /// Height of the character in the print, print pixels.
     pub char_height_px: f64,
-    /// Path of the tops mask in the print's frame, where there is one.
+    /// Path of the mask of true stroke tops in the print's frame, where there is one.
     #[serde(default)]
     pub tops_mask: Option<String>,
 }
@@ -38,28 +33,28 @@ pub struct TruthRecord {
 /// A plane `n . x + d = 0`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TruthPlane {
-    /// Unit normal, out of the block.
+    /// Unit normal, pointing out of the block.
     pub n: [f64; 3],
     /// Offset, mesh units.
     pub d: f64,
 }
 
-/// Why a truth cannot be used.
+/// Why ground truth cannot be used.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TruthError {
-    /// Not a record of the form.
+    /// Not a record of `truth.jsonl`.
     #[error("truth is not of the form of truth.jsonl: {0}")]
     Form(String),
     /// A normal of length 0 or not finite.
     #[error("the true plane's normal {0:?} is no direction")]
     Normal([f64; 3]),
-    /// A true map that sends the plane to a line or a point.
+    /// A true map that is singular on the plane.
     #[error("the true print_from_mesh flattens the plane")]
     Flat,
-    /// No landmark to measure at.
+    /// A record without landmarks.
     #[error("the truth has no landmarks")]
     NoLandmarks,
-    /// A character of no height.
+    /// A character height that is not positive.
     #[error("the character's height is {0} px")]
     Height(f64),
     /// A tops mask that cannot be read.
@@ -75,28 +70,28 @@ pub enum TruthError {
     },
 }
 
-/// Distance of one result from the truth.
+/// The error of one result against ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TruthErrors {
-    /// Angle between the true and the found map on the true plane, degrees in 0..=180; 180 when mirrored.
+    /// Rotation from the true to the found map on the true plane, degrees in 0..=180; 180 when mirrored.
     pub angle_deg: f64,
-    /// Whether the found map reads in mirror writing.
+    /// Whether the found map mirrors the character.
     pub mirrored: bool,
-    /// Mean distance of the landmarks in the print, percent of the character's height.
+    /// Mean distance of the mapped landmarks in the print (target registration error), percent of the character's height.
     pub tre_pct: f64,
-    /// Intersection over union of the depth mask with the true stroke tops, where a tops mask is given.
+    /// Intersection over union of the depth mask with the true stroke tops, 0..=1, where there is a mask of these.
     pub mask_iou: Option<f64>,
 }
 
 impl TruthErrors {
-    /// Whether angle, landmarks and mask are all right.
+    /// Returns whether angle, landmarks and mask are all within their limits.
     pub fn pass(&self) -> bool {
         self.angle_deg <= MAX_ANGLE_DEG
             && self.tre_pct <= MAX_TRE_PCT
             && self.mask_iou.is_none_or(|iou| iou >= MIN_MASK_IOU)
     }
 
-    /// How wrong the result is: the worst of its errors as a multiple of what is still right, so that it passes up to 1.
+    /// Returns the largest error as a multiple of its limit; at most 1 for a result that passes.
     pub fn severity(&self) -> f64 {
         let mask = self
             .mask_iou
@@ -108,10 +103,10 @@ impl TruthErrors {
 }
 
 impl TruthRecord {
-    /// Reads a stored record and checks that something can be measured with it.
+    /// Parses a stored record and checks that errors can be measured with it.
     ///
     /// # Errors
-    /// When it is not of the form, or its plane, map, landmarks or height are empty.
+    /// When it has another form, or its plane, map, landmarks or height are degenerate.
     pub fn read(value: &serde_json::Value) -> Result<Self, TruthError> {
         let record =
             Self::deserialize(value).map_err(|error| TruthError::Form(error.to_string()))?;
@@ -131,10 +126,10 @@ impl TruthRecord {
         Ok(record)
     }
 
-    /// Errors of a found map; `mask_iou` is measured apart by [`mask_iou`].
+    /// Measures the error of a found map; `mask_iou` is passed through.
     ///
     /// # Errors
-    /// When the true plane has no direction or the true map flattens it.
+    /// When the true plane has no normal or the true map is singular on it.
     pub fn measure(
         &self,
         found: &PrintFromMesh,
@@ -142,31 +137,35 @@ impl TruthRecord {
     ) -> Result<TruthErrors, TruthError> {
         let tangents = self.tangents()?;
         let truth = in_plane(&self.print_from_mesh, tangents);
-        let turn = in_plane(found, tangents).after(&truth.inverse().ok_or(TruthError::Flat)?);
-        let mirrored = turn.determinant() < 0.0;
+        let relative = in_plane(found, tangents).after(&truth.inverse().ok_or(TruthError::Flat)?);
+        let mirrored = relative.determinant() < 0.0;
         Ok(TruthErrors {
-            angle_deg: if mirrored { 180.0 } else { turn.angle_deg() },
+            angle_deg: if mirrored {
+                180.0
+            } else {
+                relative.angle_deg()
+            },
             mirrored,
             tre_pct: 100.0 * self.landmark_distance_px(found) / self.char_height_px,
             mask_iou,
         })
     }
 
-    /// Angle between the true plane's normal and that of a found plane, degrees in 0..=180.
+    /// Returns the angle between the normals of the true and a found plane, degrees in 0..=180.
     ///
     /// # Errors
-    /// When the true plane has no direction.
+    /// When the true plane has no normal.
     pub fn normal_error_deg(&self, plane_from_mesh: &Rigid3) -> Result<f64, TruthError> {
         let [across, down] = self.tangents()?;
         let [x, y, z, _] = plane_from_mesh.0[2];
         let along = |axis: [f64; 3]| x * axis[0] + y * axis[1] + z * axis[2];
-        // Near zero the sine tells small angles that the cosine does not.
+        // The sine resolves small angles, which the cosine does not.
         let sin = along(across).hypot(along(down));
         let cos = along(self.plane.n);
         Ok(sin.atan2(cos / length(self.plane.n)).to_degrees())
     }
 
-    /// Mean distance in the print between where landmarks are and where the found map sends them, print pixels.
+    /// Returns the mean distance between the true and the found image of the landmarks, print pixels.
     fn landmark_distance_px(&self, found: &PrintFromMesh) -> f64 {
         let sum: f64 = self
             .landmarks
@@ -180,7 +179,7 @@ impl TruthRecord {
         sum / self.landmarks.len() as f64
     }
 
-    /// Two directions that span the true plane at right angles.
+    /// Returns two orthonormal directions that span the true plane.
     fn tangents(&self) -> Result<[[f64; 3]; 2], TruthError> {
         let n = self.plane.n;
         let unit = |v: [f64; 3]| {
@@ -209,11 +208,11 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
-/// The linear part of a map on the directions of a plane: print pixels along x and y.
+/// The linear part of a map restricted to two directions of a plane, print pixels.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Linear2([[f64; 2]; 2]);
 
-/// A map of space restricted to two directions.
+/// Restricts a map of space to two directions.
 fn in_plane(map: &PrintFromMesh, tangents: [[f64; 3]; 2]) -> Linear2 {
     let row = |r: [f64; 4]| tangents.map(|t| r[0] * t[0] + r[1] * t[1] + r[2] * t[2]);
     Linear2([row(map.0[0]), row(map.0[1])])
@@ -245,66 +244,88 @@ impl Linear2 {
     }
 }
 
-/// Intersection over union of a metric's depth mask, laid on the print, with the true stroke tops.
-pub fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f64 {
-    let mask = depth.stroke_mask(outcome.threshold_level);
-    let (width, height) = (tops.width(), tops.height());
-    let aligned = warp_mask(&mask, &outcome.print_from_depth, width, height);
-    mask_iou(&aligned, tops).expect("the mask was warped to the size of the tops")
+/// A metric's errors against ground truth; never mixed with verdicts.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TruthSummary {
+    /// Results with usable ground truth.
+    pub n: u64,
+    /// Results with angle, landmarks and mask all within their limits.
+    pub passed: u64,
+    /// `passed / n`.
+    pub acc: Option<f64>,
+    /// The 95 % interval of `acc`, by the report's method.
+    pub acc_ci95: Option<[f64; 2]>,
+    /// Share with an angle error of at most 5 degrees.
+    pub angle_le_5deg: Option<f64>,
+    /// Median angle error, degrees.
+    pub angle_median_deg: Option<f64>,
+    /// Median landmark error, percent of the character's height.
+    pub tre_median_pct: Option<f64>,
+    /// Median intersection over union with the true stroke tops, where there are masks of these.
+    pub mask_iou_median: Option<f64>,
+    /// Mirrored results.
+    pub mirrored: u64,
 }
 
-/// Intersection over union of a depth mask with the true stroke tops, both in the print's frame.
-///
-/// Pixels the tops mask leaves out (128) count for neither. Two empty masks agree on nothing: 0.
-///
-/// # Errors
-/// When the sizes differ.
-pub fn mask_iou(depth_mask: &Mask, tops: &Grid<u8>) -> Result<f64, TruthError> {
-    let (found, wanted) = (
-        [tops.width(), tops.height()],
-        [depth_mask.width(), depth_mask.height()],
-    );
-    if found != wanted {
-        return Err(TruthError::MaskSize { found, wanted });
+/// The errors of one metric's results.
+#[derive(Debug, Clone, Default)]
+pub(super) struct TruthSums(Vec<TruthErrors>);
+
+impl TruthSums {
+    /// Counts one result.
+    pub(super) fn add(&mut self, errors: &TruthErrors) {
+        self.0.push(*errors);
     }
-    let (mut both, mut either) = (0_u64, 0_u64);
-    for (set, top) in depth_mask.data().iter().zip(tops.data()) {
-        if *top == LEFT_OUT {
-            continue;
-        }
-        both += u64::from(*set && *top == TOP);
-        either += u64::from(*set || *top == TOP);
+
+    /// Returns the summary; `None` without any result.
+    pub(super) fn finish(self) -> Option<TruthSummary> {
+        let n = self.0.len() as u64;
+        let count = |is: fn(&TruthErrors) -> bool| {
+            let found = self.0.iter().filter(|errors| is(errors));
+            found.count() as u64
+        };
+        let median_of = |value: fn(&TruthErrors) -> Option<f64>| {
+            median(&mut self.0.iter().filter_map(value).collect::<Vec<_>>())
+        };
+        let passed = count(TruthErrors::pass);
+        let angle_right = count(|errors| errors.angle_deg <= MAX_ANGLE_DEG);
+        (n > 0).then(|| TruthSummary {
+            n,
+            passed,
+            acc: ratio(passed as f64, n),
+            acc_ci95: IntervalMethod::Wilson.interval_95(passed, n),
+            angle_le_5deg: ratio(angle_right as f64, n),
+            angle_median_deg: median_of(|errors| Some(errors.angle_deg)),
+            tre_median_pct: median_of(|errors| Some(errors.tre_pct)),
+            mask_iou_median: median_of(|errors| errors.mask_iou),
+            mirrored: count(|errors| errors.mirrored),
+        })
     }
-    Ok(if either == 0 {
-        0.0
-    } else {
-        both as f64 / either as f64
-    })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{TruthError, TruthErrors, TruthRecord, mask_iou};
+    use super::{TruthError, TruthErrors, TruthRecord, TruthSums};
     use crate::domain::{Affine2, PrintFromMesh, Rigid3};
-    use crate::raster::{Grid, Mask};
 
-    /// A tilted plane seen in mirror writing, ten pixels a unit; landmarks on a cross of arm 3.
-    fn map_turned(angle_rad: f64, shift: [f64; 2]) -> (PrintFromMesh, Rigid3) {
+    /// A tilted plane seen mirrored, ten pixels a unit.
+    fn rotated_map(angle_rad: f64, shift: [f64; 2]) -> (PrintFromMesh, Rigid3) {
         let (s, c) = 0.4_f64.sin_cos();
         let plane_from_mesh = Rigid3::to_frame(
             [[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]],
             [5.0, -2.0, 1.0],
         );
         let mirror = Affine2([[-10.0, 0.0, 50.0], [0.0, 10.0, 60.0]]);
-        let turn = Affine2::similarity(1.0, angle_rad, shift);
+        let rotation = Affine2::similarity(1.0, angle_rad, shift);
         (
-            PrintFromMesh::new(&turn, &mirror, &plane_from_mesh),
+            PrintFromMesh::new(&rotation, &mirror, &plane_from_mesh),
             plane_from_mesh,
         )
     }
 
+    /// Ground truth with landmarks on a cross of arm 3.
     fn record() -> TruthRecord {
-        let (print_from_mesh, plane_from_mesh) = map_turned(0.0, [0.0, 0.0]);
+        let (print_from_mesh, plane_from_mesh) = rotated_map(0.0, [0.0, 0.0]);
         let back = plane_from_mesh.inverse();
         let landmarks = [
             [3.0, 0.0, 0.0],
@@ -329,28 +350,28 @@ mod tests {
     }
 
     #[test]
-    fn truth_in_gives_error_zero() {
-        let found = errors(&map_turned(0.0, [0.0, 0.0]).0);
+    fn the_true_map_has_no_error() {
+        let found = errors(&rotated_map(0.0, [0.0, 0.0]).0);
         assert!(found.angle_deg < 1e-9 && found.tre_pct < 1e-9 && !found.mirrored);
         assert!(found.pass());
     }
 
     #[test]
-    fn turn_and_shift_are_measured() {
-        let turned = errors(&map_turned(7.0_f64.to_radians(), [0.0, 0.0]).0);
-        assert!((turned.angle_deg - 7.0).abs() < 1e-9);
-        assert!(!turned.pass());
-        let back = errors(&map_turned((-4.0_f64).to_radians(), [0.0, 0.0]).0);
+    fn rotation_and_shift_are_measured() {
+        let rotated = errors(&rotated_map(7.0_f64.to_radians(), [0.0, 0.0]).0);
+        assert!((rotated.angle_deg - 7.0).abs() < 1e-9);
+        assert!(!rotated.pass());
+        let back = errors(&rotated_map((-4.0_f64).to_radians(), [0.0, 0.0]).0);
         assert!((back.angle_deg - 4.0).abs() < 1e-9);
-        let shifted = errors(&map_turned(0.0, [3.0, 0.0]).0);
+        let shifted = errors(&rotated_map(0.0, [3.0, 0.0]).0);
         assert!((shifted.tre_pct - 5.0).abs() < 1e-9, "{}", shifted.tre_pct);
         assert!(shifted.angle_deg < 1e-9);
-        let upside_down = errors(&map_turned(std::f64::consts::PI, [0.0, 0.0]).0);
+        let upside_down = errors(&rotated_map(std::f64::consts::PI, [0.0, 0.0]).0);
         assert!((upside_down.angle_deg - 180.0).abs() < 1e-9 && !upside_down.mirrored);
     }
 
     #[test]
-    fn normal_error_is_the_tilt_and_knows_the_other_side() {
+    fn normal_error_is_the_tilt_up_to_180_degrees() {
         let record = record();
         let plane = |tilt_rad: f64| {
             let (s, c) = (0.4 + tilt_rad).sin_cos();
@@ -365,8 +386,8 @@ mod tests {
     }
 
     #[test]
-    fn mirrored_map_is_told_and_never_passes() {
-        let (mut map, _) = map_turned(0.0, [0.0, 0.0]);
+    fn a_mirrored_map_is_recognized_and_never_passes() {
+        let (mut map, _) = rotated_map(0.0, [0.0, 0.0]);
         map.0[0] = map.0[0].map(|value| -value);
         let found = errors(&map);
         assert!(found.mirrored);
@@ -375,8 +396,8 @@ mod tests {
     }
 
     #[test]
-    fn a_poor_mask_fails_and_no_mask_does_not() {
-        let (map, _) = map_turned(0.0, [0.0, 0.0]);
+    fn a_poor_mask_fails_and_a_missing_one_does_not() {
+        let (map, _) = rotated_map(0.0, [0.0, 0.0]);
         let pass = |iou| record().measure(&map, iou).map(|errors| errors.pass());
         assert_eq!(pass(Some(0.69)), Ok(false));
         assert_eq!(pass(Some(0.7)), Ok(true));
@@ -388,25 +409,12 @@ mod tests {
     }
 
     #[test]
-    fn left_out_pixels_count_for_neither_mask() {
-        let tops = Grid::from_vec(4, 1, vec![255, 255, 128, 0]).expect("four values");
-        let mask = Mask::from_vec(4, 1, vec![true, false, true, true]).expect("four values");
-        assert_eq!(mask_iou(&mask, &tops), Ok(1.0 / 3.0));
-        assert_eq!(
-            mask_iou(&Mask::new(4, 1, false), &Grid::new(4, 1, 128)),
-            Ok(0.0)
-        );
-        let other = mask_iou(&Mask::new(3, 1, false), &tops);
-        assert!(matches!(other, Err(TruthError::MaskSize { .. })));
-    }
-
-    #[test]
-    fn useless_truth_is_refused_with_its_reason() {
+    fn degenerate_truth_is_refused_with_its_reason() {
         let refuse = |change: fn(&mut TruthRecord)| {
             let mut record = record();
             change(&mut record);
             let value = serde_json::to_value(record).expect("a record is JSON");
-            TruthRecord::read(&value).expect_err("the record is useless")
+            TruthRecord::read(&value).expect_err("the record is degenerate")
         };
         assert_eq!(refuse(|r| r.landmarks.clear()), TruthError::NoLandmarks);
         assert_eq!(refuse(|r| r.char_height_px = 0.0), TruthError::Height(0.0));
@@ -420,5 +428,30 @@ mod tests {
         );
         let form = TruthRecord::read(&serde_json::json!({ "id": "a" }));
         assert!(matches!(form, Err(TruthError::Form(_))));
+    }
+
+    #[test]
+    fn summary_has_shares_and_medians() {
+        let errors = |angle_deg, tre_pct, mask_iou| TruthErrors {
+            angle_deg,
+            mirrored: false,
+            tre_pct,
+            mask_iou: Some(mask_iou),
+        };
+        let mut sums = TruthSums::default();
+        for result in [
+            errors(1.0, 2.0, 0.9),
+            errors(9.0, 2.0, 0.9),
+            errors(3.0, 4.0, 0.6),
+        ] {
+            sums.add(&result);
+        }
+        let found = sums.finish().expect("three results");
+        assert_eq!((found.n, found.passed, found.mirrored), (3, 1, 0));
+        assert_eq!(found.angle_le_5deg, Some(2.0 / 3.0));
+        assert_eq!(found.angle_median_deg, Some(3.0));
+        assert_eq!(found.tre_median_pct, Some(2.0));
+        assert_eq!(found.mask_iou_median, Some(0.9));
+        assert_eq!(TruthSums::default().finish(), None);
     }
 }

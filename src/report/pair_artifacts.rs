@@ -193,7 +193,7 @@ pub fn same_alignment(a: &MetricOutcome, b: &MetricOutcome) -> bool {
 }
 
 /// Results with those that look the same in one group, each group in the place of its first.
-pub fn alike<'a>(
+pub fn group_identical<'a>(
     records: impl IntoIterator<Item = &'a MetricRecord>,
 ) -> Vec<Vec<&'a MetricRecord>> {
     let mut groups: Vec<Vec<&MetricRecord>> = Vec::new();

@@ -1,15 +1,14 @@
-//! How far reviewers can be trusted: each with the others, with themselves, and on planted faults.
+//! Agreement of reviewers with each other, with themselves, and with attention checks.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::agreement::{Agreement, Crosstab};
 use super::attention_checks::{self, AttentionCheckRates};
-use super::build::PAGE;
-use super::consensus::{Consensus, split};
-use super::pair_artifacts::alike;
-use super::rate::Rate;
+use super::build::PAIRS_PER_PAGE;
+use super::consensus::{Consensus, partition_verdicts};
+use super::pair_artifacts::group_identical;
+use super::stats::{AgreementTable, IntervalMethod, Rate, ratio};
 use crate::catalog::{
     AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults,
 };
@@ -18,22 +17,27 @@ use crate::domain::{AttentionCheck, ContentHash, PairName, Verdict};
 /// Version of the JSON form.
 const SCHEMA: u32 = 1;
 
+/// Results that both reviewers must have passed or failed before kappa and AC1 are reported.
+///
+/// At 30 the 95 % interval of full agreement still extends down to 0.89.
+pub const MIN_RESULTS: u64 = 30;
+
 /// Agreement of all reviewers of a project.
 ///
-/// Results of one pair that look the same count once. Who settles what others contradict each other on has seen their
-/// verdicts and is not compared with them.
+/// Results of one pair that look the same count once. Adjudicators have seen the verdicts of others, so their
+/// adjudications are not compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReviewerAgreement {
     /// Version of this form.
     pub schema: u32,
-    /// Pictures on which reviewers contradict each other and nobody has settled it.
+    /// Results on which reviewers disagree and that nobody adjudicated.
     pub conflicts: u64,
-    /// Every two reviewers who have read the same results, by name.
+    /// Every two reviewers who judged the same results, by name.
     pub reviewer_pairs: Vec<ReviewerPair>,
     /// Every reviewer, by name.
     pub reviewers: Vec<ReviewerRecord>,
     /// Planted faults that all reviewers together failed, of those that they answered.
-    pub caught: Rate,
+    pub attention_checks: Rate,
 }
 
 /// Two reviewers on the same results.
@@ -41,43 +45,66 @@ pub struct ReviewerAgreement {
 pub struct ReviewerPair {
     /// The first by name.
     pub a: String,
-    /// The second.
+    /// The second by name.
     pub b: String,
-    /// How far they agree.
+    /// Their agreement.
     #[serde(flatten)]
-    pub agreement: Agreement,
+    pub agreement: VerdictAgreement,
 }
 
-/// What is known of one reviewer alone.
+/// The agreement of two reviewers. A number that does not exist is `None`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct VerdictAgreement {
+    /// Results that both passed or failed; all numbers except `unsure` are over these.
+    pub n: u64,
+    /// Results that both judged and at least one was unsure about.
+    pub unsure: u64,
+    /// Results with equal verdicts.
+    pub agreed: u64,
+    /// `agreed / n`.
+    pub agreement: Option<f64>,
+    /// Wilson's 95 % interval of `agreement`.
+    pub agreement_ci95: Option<[f64; 2]>,
+    /// Cohen's kappa; see [`AgreementTable::cohen_kappa`].
+    pub kappa: Option<f64>,
+    /// Gwet's AC1; see [`AgreementTable::gwet_ac1`].
+    pub ac1: Option<f64>,
+    /// Results that at least one failed.
+    pub failed_by_any: u64,
+    /// Results that both failed.
+    pub failed_by_both: u64,
+    /// Whether `n` is at least [`MIN_RESULTS`].
+    pub sufficient: bool,
+}
+
+/// One reviewer's record.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ReviewerRecord {
     /// The reviewer.
     pub reviewer: String,
-    /// Pictures of current results that they have judged.
-    pub read: u64,
+    /// Current results that they judged.
+    pub judged: u64,
     /// Results shown a second time that got the same verdict again.
-    pub repeats: Rate,
-    /// Planted faults that they failed, of those that they answered; unsure is not caught.
-    pub caught: Rate,
-    /// The same by kind of fault.
-    pub caught_by_fault: BTreeMap<&'static str, Rate>,
+    pub duplicates: Rate,
+    /// Planted faults that they failed, of those that they answered.
+    pub attention_checks: AttentionCheckRates,
 }
 
-/// Reads the agreement of a project as its catalog stands.
+/// Computes the agreement of a project's reviewers from the current state of its catalog.
 ///
 /// # Errors
 /// When the catalog cannot be read.
-pub async fn agree(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogError> {
+pub async fn agreement(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogError> {
     let mut counts = AgreementCounts::default();
-    let mut pages = catalog.result_pages(PAGE);
+    let mut pages = catalog.result_pages(PAIRS_PER_PAGE);
     while let Some(page) = pages.next().await? {
         for pair in &page {
             counts.add(pair);
         }
     }
-    for (reviewer, answers) in &attention_checks::by_reviewer(catalog).await? {
+    for (reviewer, answers) in &attention_checks::answers_by_reviewer(catalog).await? {
         let own = own_verdicts(catalog, reviewer).await?;
-        counts.test(reviewer, answers, &own);
+        counts.add_checks(reviewer, answers, &own);
     }
     Ok(counts.finish())
 }
@@ -87,7 +114,7 @@ type OwnVerdicts = BTreeMap<(PairName, ContentHash), Verdict>;
 
 async fn own_verdicts(catalog: &Catalog, reviewer: &str) -> Result<OwnVerdicts, CatalogError> {
     let answers = catalog.answers(reviewer).await?.into_iter();
-    // Oldest first, so that the newest stays.
+    // Answers come oldest first, so the newest of each result is kept.
     Ok(answers
         .filter_map(|answer| match answer.on {
             AnsweredOn::Result(hash) => Some(((answer.pair, hash), answer.verdict)),
@@ -96,110 +123,129 @@ async fn own_verdicts(catalog: &Catalog, reviewer: &str) -> Result<OwnVerdicts, 
         .collect())
 }
 
-/// The sums so far.
+/// Two reviewers' verdicts on the same results, counted.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct VerdictTable {
+    decided: AgreementTable,
+    unsure: u64,
+}
+
+impl VerdictTable {
+    /// Counts one result.
+    pub(super) fn add(&mut self, first: Verdict, second: Verdict) {
+        if first == Verdict::Unsure || second == Verdict::Unsure {
+            self.unsure += 1;
+        } else {
+            self.decided
+                .add(first == Verdict::Pass, second == Verdict::Pass);
+        }
+    }
+
+    /// Returns the agreement.
+    pub(super) fn finish(self) -> VerdictAgreement {
+        let (n, agreed) = (self.decided.n(), self.decided.agreed());
+        VerdictAgreement {
+            n,
+            unsure: self.unsure,
+            agreed,
+            agreement: ratio(agreed as f64, n),
+            agreement_ci95: IntervalMethod::Wilson.interval_95(agreed, n),
+            kappa: self.decided.cohen_kappa(),
+            ac1: self.decided.gwet_ac1(),
+            failed_by_any: self.decided.failed_by_any(),
+            failed_by_both: self.decided.both_fail,
+            sufficient: n >= MIN_RESULTS,
+        }
+    }
+}
+
+/// The counts so far.
 #[derive(Debug, Default)]
 struct AgreementCounts {
     conflicts: u64,
-    reviewer_pairs: BTreeMap<(String, String), Crosstab>,
+    reviewer_pairs: BTreeMap<(String, String), VerdictTable>,
     reviewers: BTreeMap<String, ReviewerRecord>,
 }
 
 impl AgreementCounts {
-    /// Counts the pictures of one pair in.
+    /// Counts the distinct results of one pair.
     fn add(&mut self, pair: &PairResults) {
-        for picture in pictures(pair) {
-            self.conflicts += u64::from(picture.is_conflict);
-            for (i, (a, first)) in picture.read.iter().enumerate() {
-                self.reviewer(a).read += 1;
-                for (b, second) in &picture.read[i + 1..] {
+        for group in group_identical(&pair.metrics) {
+            let is_conflict = |record: &&MetricRecord| Consensus::of(record) == Consensus::Conflict;
+            self.conflicts += u64::from(group.iter().any(is_conflict));
+            let verdicts: Vec<(&str, Verdict)> = independent_verdicts(&group).into_iter().collect();
+            for (i, (a, first)) in verdicts.iter().enumerate() {
+                self.record(a).judged += 1;
+                for (b, second) in &verdicts[i + 1..] {
                     let two = ((*a).to_owned(), (*b).to_owned());
-                    self.reviewer_pairs
-                        .entry(two)
-                        .or_default()
-                        .add(*first, *second);
+                    let table = self.reviewer_pairs.entry(two).or_default();
+                    table.add(*first, *second);
                 }
             }
         }
     }
 
-    /// Holds a reviewer's answers to controls against what they should be.
-    fn test(&mut self, reviewer: &str, answers: &[AttentionCheckAnswer], own: &OwnVerdicts) {
+    /// Counts a reviewer's answers to attention checks.
+    fn add_checks(&mut self, reviewer: &str, answers: &[AttentionCheckAnswer], own: &OwnVerdicts) {
         let answers = attention_checks::newest(answers);
-        let repeats = answers
+        let duplicates = answers
             .iter()
             .filter(|answer| answer.check == AttentionCheck::Duplicate);
-        let same = repeats.filter_map(|answer| {
+        let same = duplicates.filter_map(|answer| {
             let first = own.get(&(answer.pair.clone(), answer.result_hash))?;
             Some(*first == answer.verdict)
         });
-        let record = self.reviewer(reviewer);
-        record.repeats = Rate::of(same);
-        let caught = AttentionCheckRates::of(answers.iter().copied());
-        (record.caught, record.caught_by_fault) = (caught.all, caught.by_fault);
+        let record = self.record(reviewer);
+        record.duplicates = Rate::of(same);
+        record.attention_checks = AttentionCheckRates::of(answers.iter().copied());
     }
 
-    fn reviewer(&mut self, name: &str) -> &mut ReviewerRecord {
-        let record = self.reviewers.entry(name.to_owned());
+    fn record(&mut self, reviewer: &str) -> &mut ReviewerRecord {
+        let record = self.reviewers.entry(reviewer.to_owned());
         record.or_insert_with(|| ReviewerRecord {
-            reviewer: name.to_owned(),
+            reviewer: reviewer.to_owned(),
             ..ReviewerRecord::default()
         })
     }
 
     fn finish(self) -> ReviewerAgreement {
         let reviewer_pairs = self.reviewer_pairs.into_iter();
+        let reviewers: Vec<ReviewerRecord> = self.reviewers.into_values().collect();
         ReviewerAgreement {
             schema: SCHEMA,
             conflicts: self.conflicts,
             reviewer_pairs: reviewer_pairs
-                .map(|((a, b), crosstab)| ReviewerPair {
+                .map(|((a, b), table)| ReviewerPair {
                     a,
                     b,
-                    agreement: crosstab.finish(),
+                    agreement: table.finish(),
                 })
                 .collect(),
-            caught: Rate::total(self.reviewers.values().map(|record| record.caught)),
-            reviewers: self.reviewers.into_values().collect(),
+            attention_checks: Rate::total(
+                reviewers.iter().map(|record| record.attention_checks.all),
+            ),
+            reviewers,
         }
     }
 }
 
-/// A picture with the verdicts of those who judged it by themselves, in the order of their names.
-struct DistinctResult<'a> {
-    read: Vec<(&'a str, Verdict)>,
-    is_conflict: bool,
-}
-
-/// The pictures of a pair: results that look the same are one.
-fn pictures(pair: &PairResults) -> Vec<DistinctResult<'_>> {
-    let groups = alike(&pair.metrics);
-    groups
-        .iter()
-        .map(|group| DistinctResult::of(group))
-        .collect()
-}
-
-impl<'a> DistinctResult<'a> {
-    fn of(group: &[&'a MetricRecord]) -> Self {
-        let mut read = BTreeMap::new();
-        for record in group {
-            for verdict in split(record).1 {
-                // The page gives all of them one verdict; where it was given one by one, the first stands.
-                read.entry(verdict.reviewer.as_str())
-                    .or_insert(verdict.verdict);
-            }
-        }
-        let is_conflict = |record: &&MetricRecord| Consensus::of(record) == Consensus::Conflict;
-        Self {
-            read: read.into_iter().collect(),
-            is_conflict: group.iter().any(is_conflict),
+/// Returns the verdicts on results that look the same, by reviewer, without adjudications.
+fn independent_verdicts<'a>(group: &[&'a MetricRecord]) -> BTreeMap<&'a str, Verdict> {
+    let mut by_reviewer = BTreeMap::new();
+    for record in group {
+        for given in partition_verdicts(record).1 {
+            // The review page stores one verdict for all of them; where they differ, the first counts.
+            by_reviewer
+                .entry(given.reviewer.as_str())
+                .or_insert(given.verdict);
         }
     }
+    by_reviewer
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{AgreementCounts, OwnVerdicts};
+    use super::{AgreementCounts, MIN_RESULTS, OwnVerdicts, VerdictTable};
     use crate::catalog::{AttentionCheckAnswer, Look, MetricRecord, ReviewerVerdict};
     use crate::domain::{
         AttentionCheck, ContentHash, PairName, ReviewOrder, ThresholdMetric, Verdict,
@@ -234,17 +280,17 @@ mod tests {
         apart.metrics[0].outcome.threshold_level += 1;
         counts.add(&apart);
         let found = counts.finish();
-        assert_eq!((found.conflicts, found.reviewers[0].read), (1, 3));
+        assert_eq!((found.conflicts, found.reviewers[0].judged), (1, 3));
         let two = &found.reviewer_pairs[0];
         assert_eq!((two.a.as_str(), two.b.as_str()), ("r0", "r1"));
         assert_eq!((two.agreement.n, two.agreement.agreed), (3, 2));
     }
 
     #[test]
-    fn who_settles_a_conflict_is_compared_with_nobody() {
+    fn an_adjudicator_is_compared_with_nobody() {
         let mut counts = AgreementCounts::default();
         let mut pair = test_fixtures::done("a", 0.8, &[Verdict::Pass, Verdict::Fail]);
-        let settle = |record: &mut MetricRecord| {
+        let adjudicate = |record: &mut MetricRecord| {
             record.verdicts.push(ReviewerVerdict {
                 reviewer: "third".to_owned(),
                 verdict: Verdict::Fail,
@@ -252,7 +298,7 @@ mod tests {
                 review_order: Some(ReviewOrder::Adjudicate),
             });
         };
-        pair.metrics.iter_mut().for_each(settle);
+        pair.metrics.iter_mut().for_each(adjudicate);
         counts.add(&pair);
         let found = counts.finish();
         assert_eq!((found.conflicts, found.reviewer_pairs.len()), (0, 1));
@@ -272,7 +318,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fault_is_caught_by_a_fail_and_the_newest_answer_counts() {
+    fn a_fail_detects_a_fault_and_the_newest_answer_counts() {
         let turned = AttentionCheck::Turned { angle_deg: 9.0 };
         let answers = [
             answer("a", turned, Verdict::Pass),
@@ -281,17 +327,21 @@ mod tests {
             answer("b", AttentionCheck::Mirrored, Verdict::Fail),
         ];
         let mut counts = AgreementCounts::default();
-        counts.test("lan", &answers, &OwnVerdicts::new());
+        counts.add_checks("lan", &answers, &OwnVerdicts::new());
         let found = counts.finish();
         let lan = &found.reviewers[0];
-        assert_eq!((lan.caught.count, lan.caught.n), (2, 3));
-        let turned = lan.caught_by_fault["turned"];
+        assert_eq!(
+            (lan.attention_checks.all.count, lan.attention_checks.all.n),
+            (2, 3)
+        );
+        let turned = lan.attention_checks.by_kind["turned"];
         assert_eq!((turned.count, turned.n), (1, 2));
-        assert_eq!((lan.caught, lan.repeats.n), (found.caught, 0));
+        assert_eq!(lan.attention_checks.all, found.attention_checks);
+        assert_eq!(lan.duplicates.n, 0);
     }
 
     #[test]
-    fn a_repeat_is_held_against_the_reviewers_own_verdict() {
+    fn a_duplicate_is_compared_with_the_reviewers_own_verdict() {
         let own = OwnVerdicts::from(["a", "b"].map(|name| {
             let first = answer(name, AttentionCheck::Duplicate, Verdict::Pass);
             ((first.pair, first.result_hash), Verdict::Pass)
@@ -299,13 +349,42 @@ mod tests {
         let answers = [
             answer("a", AttentionCheck::Duplicate, Verdict::Pass),
             answer("b", AttentionCheck::Duplicate, Verdict::Fail),
-            // Its first look was taken back.
+            // The first verdict on it was undone.
             answer("c", AttentionCheck::Duplicate, Verdict::Pass),
         ];
         let mut counts = AgreementCounts::default();
-        counts.test("lan", &answers, &own);
+        counts.add_checks("lan", &answers, &own);
         let lan = counts.finish().reviewers.remove(0);
-        assert_eq!((lan.repeats.count, lan.repeats.n), (1, 2));
-        assert_eq!((lan.caught.n, lan.caught.share), (0, None));
+        assert_eq!((lan.duplicates.count, lan.duplicates.n), (1, 2));
+        assert_eq!(
+            (lan.attention_checks.all.n, lan.attention_checks.all.share),
+            (0, None)
+        );
+    }
+
+    #[test]
+    fn unsure_verdicts_neither_agree_nor_disagree() {
+        let mut table = VerdictTable::default();
+        for (first, second) in [
+            (Verdict::Pass, Verdict::Pass),
+            (Verdict::Fail, Verdict::Pass),
+            (Verdict::Unsure, Verdict::Pass),
+            (Verdict::Fail, Verdict::Unsure),
+        ] {
+            table.add(first, second);
+        }
+        let found = table.finish();
+        assert_eq!((found.n, found.agreed, found.unsure), (2, 1, 2));
+        assert_eq!((found.failed_by_any, found.failed_by_both), (1, 0));
+        assert!(!found.sufficient);
+    }
+
+    #[test]
+    fn thirty_results_are_sufficient() {
+        let mut table = VerdictTable::default();
+        (1..MIN_RESULTS).for_each(|_| table.add(Verdict::Pass, Verdict::Pass));
+        assert!(!table.finish().sufficient);
+        table.add(Verdict::Fail, Verdict::Pass);
+        assert!(table.finish().sufficient);
     }
 }

@@ -1,63 +1,100 @@
-//! Accuracy against coverage: how right those results are that stay when the least confident are left out.
+//! Risk-coverage curves: the accuracy of the results that remain when the least confident are left out.
 
-use super::model::{Basis, RiskCoverage, RiskCoveragePoint};
-use super::stats::wilson_95;
+use serde::Serialize;
+
+use super::comparison::Basis;
+use super::stats::{IntervalMethod, ratio};
 use crate::domain::ThresholdMetric;
 
-/// Percent of the results that are kept, the most confident ones.
-pub const KEPT_PERCENT: [u64; 7] = [100, 99, 97, 95, 90, 80, 50];
-/// Failures are looked for among so many percent, the least confident ones.
-pub const LEAST_PERCENT: u64 = 3;
+/// Coverages of a curve: percent of the results that are kept, the most confident ones.
+pub const COVERAGE_PERCENT: [u64; 7] = [100, 99, 97, 95, 90, 80, 50];
+/// Percent of the results, the least confident ones, among which failures are counted.
+pub const LEAST_CONFIDENT_PERCENT: u64 = 3;
 
-/// Confidences of all metrics with what became of them.
-#[derive(Debug, Clone, Default)]
-pub(super) struct ConfidenceSamples([ConfidenceOutcomes; ThresholdMetric::ALL.len()]);
+/// The risk-coverage curve of one metric.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct RiskCoverageCurve {
+    /// What decides whether a result is right.
+    pub basis: Basis,
+    /// The metric.
+    pub metric: ThresholdMetric,
+    /// Results that have a confidence and are known to be right or wrong.
+    pub n: u64,
+    /// The wrong ones of these.
+    pub failures: u64,
+    /// Number of the least confident 3 %, rounded up.
+    pub least_n: u64,
+    /// The wrong ones among the least confident 3 %.
+    pub failures_in_least: u64,
+    /// From full coverage down to half.
+    pub points: Vec<RiskCoveragePoint>,
+}
 
-/// Confidence and outcome of one metric's results.
+/// The results kept at one coverage.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RiskCoveragePoint {
+    /// Share of the results that is kept, 0..=1.
+    pub coverage: f64,
+    /// Number of results kept, rounded down.
+    pub n: u64,
+    /// The right ones of these.
+    pub passed: u64,
+    /// `passed / n`; `None` where nothing is kept.
+    pub acc: Option<f64>,
+    /// The 95 % interval of `acc`, by the report's method.
+    pub acc_ci95: Option<[f64; 2]>,
+    /// The lowest confidence that is kept.
+    pub least_confidence: Option<f64>,
+}
+
+/// Confidence and outcome of every metric's results, in the order of [`ThresholdMetric::ALL`].
 #[derive(Debug, Clone, Default)]
-struct ConfidenceOutcomes(Vec<(f64, bool)>);
+pub(super) struct ConfidenceSamples([Vec<(f64, bool)>; ThresholdMetric::ALL.len()]);
 
 impl ConfidenceSamples {
-    /// Counts one pair in; `judged` tells a metric's confidence and whether its result is right, where both are known.
-    pub(super) fn add(&mut self, judged: impl Fn(ThresholdMetric) -> Option<(f64, bool)>) {
-        for (column, metric) in self.0.iter_mut().zip(ThresholdMetric::ALL) {
-            column.0.extend(judged(metric));
+    /// Counts one pair; `outcome` returns a metric's confidence and whether its result is right, where both are known.
+    pub(super) fn add(&mut self, outcome: impl Fn(ThresholdMetric) -> Option<(f64, bool)>) {
+        for (samples, metric) in self.0.iter_mut().zip(ThresholdMetric::ALL) {
+            samples.extend(outcome(metric));
         }
     }
 
-    /// The curves of all metrics that have any.
-    pub(super) fn finish(self, basis: Basis) -> Vec<RiskCoverage> {
-        let columns = self.0.into_iter().zip(ThresholdMetric::ALL);
-        columns
-            .filter(|(judged, _)| !judged.0.is_empty())
-            .map(|(judged, metric)| judged.finish(basis, metric))
+    /// Returns the curve of every metric that has results with a confidence.
+    pub(super) fn finish(self, basis: Basis) -> Vec<RiskCoverageCurve> {
+        let by_metric = self.0.into_iter().zip(ThresholdMetric::ALL);
+        by_metric
+            .filter(|(samples, _)| !samples.is_empty())
+            .map(|(samples, metric)| curve(samples, basis, metric))
             .collect()
     }
 }
 
-impl ConfidenceOutcomes {
-    fn finish(mut self, basis: Basis, metric: ThresholdMetric) -> RiskCoverage {
-        // The sort is stable: of equally confident results the first by name stays the longest.
-        self.0.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let kept = |percent| self.0.len() * percent as usize / 100;
-        let failures = |judged: &[(f64, bool)]| judged.iter().filter(|(_, right)| !right).count();
-        let least = &self.0[kept(100 - LEAST_PERCENT)..];
-        RiskCoverage {
-            basis,
-            metric,
-            n: self.0.len() as u64,
-            failures: failures(&self.0) as u64,
-            least_n: least.len() as u64,
-            failures_in_least: failures(least) as u64,
-            points: KEPT_PERCENT
-                .iter()
-                .map(|percent| point(*percent, &self.0[..kept(*percent)]))
-                .collect(),
-        }
+fn curve(
+    mut samples: Vec<(f64, bool)>,
+    basis: Basis,
+    metric: ThresholdMetric,
+) -> RiskCoverageCurve {
+    // The sort is stable: among equal confidences the first pair by name is kept longest.
+    samples.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let kept = |percent| samples.len() * percent as usize / 100;
+    let failures =
+        |samples: &[(f64, bool)]| samples.iter().filter(|(_, right)| !right).count() as u64;
+    let least = &samples[kept(100 - LEAST_CONFIDENT_PERCENT)..];
+    RiskCoverageCurve {
+        basis,
+        metric,
+        n: samples.len() as u64,
+        failures: failures(&samples),
+        least_n: least.len() as u64,
+        failures_in_least: failures(least),
+        points: COVERAGE_PERCENT
+            .iter()
+            .map(|percent| point(*percent, &samples[..kept(*percent)]))
+            .collect(),
     }
 }
 
-/// One point of a curve from the results that are kept, the most confident first.
+/// Returns one point of a curve from the results that are kept, the most confident first.
 fn point(percent: u64, kept: &[(f64, bool)]) -> RiskCoveragePoint {
     let n = kept.len() as u64;
     let passed = kept.iter().filter(|(_, right)| *right).count() as u64;
@@ -65,21 +102,21 @@ fn point(percent: u64, kept: &[(f64, bool)]) -> RiskCoveragePoint {
         coverage: percent as f64 / 100.0,
         n,
         passed,
-        acc: (n > 0).then(|| passed as f64 / n as f64),
-        acc_ci95: wilson_95(passed, n),
+        acc: ratio(passed as f64, n),
+        acc_ci95: IntervalMethod::Wilson.interval_95(passed, n),
         least_confidence: kept.last().map(|(confidence, _)| *confidence),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ConfidenceSamples, KEPT_PERCENT};
+    use super::{COVERAGE_PERCENT, ConfidenceSamples, RiskCoverageCurve};
     use crate::domain::ThresholdMetric;
-    use crate::report::model::{Basis, RiskCoverage};
+    use crate::report::comparison::Basis;
     use crate::report::stats::wilson_95;
 
     /// The curve of density over results in the order given.
-    fn curve(judged: &[(f64, bool)]) -> RiskCoverage {
+    fn curve(judged: &[(f64, bool)]) -> RiskCoverageCurve {
         let mut confidences = ConfidenceSamples::default();
         for one in judged {
             confidences.add(|metric| (metric == ThresholdMetric::Density).then_some(*one));
@@ -118,12 +155,12 @@ mod tests {
     }
 
     #[test]
-    fn the_least_confident_and_those_kept_are_all_there_is() {
+    fn kept_results_and_the_least_confident_add_up_to_all() {
         for n in [1_usize, 2, 24, 33, 34, 587] {
             let judged: Vec<_> = (0..n).map(|i| (i as f64 / n as f64, true)).collect();
             let found = curve(&judged);
             let kept = found.points[2].n;
-            assert_eq!(KEPT_PERCENT[2], 97);
+            assert_eq!(COVERAGE_PERCENT[2], 97);
             assert_eq!(kept + found.least_n, n as u64);
             assert_eq!(found.least_n, (n as u64 * 3).div_ceil(100));
         }

@@ -1,15 +1,79 @@
-//! Metrics against each other by their scores on the same pairs.
+//! Metrics compared by their scores on the same pairs.
 
 use serde::Serialize;
 
-use super::comparison::{LEVEL, after_holm};
-use super::score::Score;
-use super::score_bootstrap::ResamplingUnit;
-use crate::domain::ThresholdMetric;
+use super::stats::{ResamplingUnit, SIGNIFICANCE_LEVEL, holm_of_known};
+use crate::domain::{Scores, ThresholdMetric};
 
-/// A score's mean difference between two metrics, and what drawing anew says of it.
+/// A score of the paper's table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Score {
+    /// Structural similarity.
+    Ssim,
+    /// Intersection over union by pixel.
+    Iou,
+    /// Intersection over union of the bounding boxes.
+    IouBox,
+    /// Dice coefficient by pixel.
+    Dice,
+}
+
+impl Score {
+    /// Every score, in the order of the table.
+    pub const ALL: [Self; 4] = [Self::Ssim, Self::Iou, Self::IouBox, Self::Dice];
+    /// The scores by which metrics are compared.
+    pub const COMPARED: [Self; 3] = [Self::Ssim, Self::Iou, Self::Dice];
+
+    /// Returns the header of its column.
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Ssim => "SSIM",
+            Self::Iou => "IoU",
+            Self::IouBox => "IoU box",
+            Self::Dice => "Dice",
+        }
+    }
+
+    /// Returns its value: 0..=1, except SSIM, which may be negative.
+    pub const fn of(self, scores: &Scores) -> f64 {
+        match self {
+            Self::Ssim => scores.ssim,
+            Self::Iou => scores.iou,
+            Self::IouBox => scores.iou_box,
+            Self::Dice => scores.dice,
+        }
+    }
+}
+
+/// Two metrics by one score on the same pairs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ScoreComparison {
+    /// The score.
+    pub score: Score,
+    /// The first metric.
+    pub a: ThresholdMetric,
+    /// The second metric.
+    pub b: ThresholdMetric,
+    /// Pairs with results of both.
+    pub n: u64,
+    /// Mean of the first minus mean of the second.
+    pub difference: f64,
+    /// The 95 % interval of the difference; `None` with too few units.
+    pub ci95: Option<[f64; 2]>,
+    /// Name of the test that gave interval and `p`.
+    pub test: &'static str,
+    /// Its two-sided p-value; `None` with too few units.
+    pub p: Option<f64>,
+    /// `p` after Holm's correction over the comparisons by this score.
+    pub p_holm: Option<f64>,
+    /// What follows, as a sentence without its full stop.
+    pub conclusion: String,
+}
+
+/// The mean difference of a score between two metrics, before the correction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Difference {
+pub(super) struct ScoreDifference {
     pub(super) score: Score,
     pub(super) a: ThresholdMetric,
     pub(super) b: ThresholdMetric,
@@ -19,50 +83,28 @@ pub(super) struct Difference {
     pub(super) p: Option<f64>,
 }
 
-/// Two metrics by one score on the same pairs.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ScoreComparison {
-    /// Which score.
-    pub score: Score,
-    /// The first metric.
-    pub a: ThresholdMetric,
-    /// The second.
-    pub b: ThresholdMetric,
-    /// Pairs with results of both.
-    pub n: u64,
-    /// Mean of the first less mean of the second.
-    pub difference: f64,
-    /// The 95 % interval of it; `None` where there are too few units.
-    pub ci95: Option<[f64; 2]>,
-    /// Name of the test that gave interval and `p`.
-    pub test: &'static str,
-    /// Its two-sided p; `None` as the interval.
-    pub p: Option<f64>,
-    /// The same after Holm's correction over the comparisons by this score.
-    pub p_holm: Option<f64>,
-    /// What follows, in words.
-    pub words: String,
-}
-
-/// Name of the test, with what makes it that one.
+/// Name of the test.
 const TEST: &str = "paired bootstrap, percentile, two-sided";
 
-/// The comparisons that follow, Holm's correction done for each score by itself.
-pub(super) fn compared(found: &[Difference], by: ResamplingUnit) -> Vec<ScoreComparison> {
-    let of_one_score = found.chunk_by(|a, b| a.score == b.score);
-    of_one_score
+/// Returns the comparisons of differences that are sorted by score, with Holm's correction within each score.
+pub(super) fn compare_scores(
+    differences: &[ScoreDifference],
+    unit: ResamplingUnit,
+) -> Vec<ScoreComparison> {
+    let families = differences.chunk_by(|a, b| a.score == b.score);
+    families
         .flat_map(|family| {
-            let ps: Vec<Option<f64>> = family.iter().map(|one| one.p).collect();
-            let corrected = after_holm(&ps);
-            let both = family.iter().zip(corrected);
-            both.map(|(one, p_holm)| one.finish(p_holm, by))
+            let p_values: Vec<Option<f64>> = family.iter().map(|one| one.p).collect();
+            let adjusted = holm_of_known(&p_values);
+            let both = family.iter().zip(adjusted);
+            both.map(|(one, p_holm)| one.finish(p_holm, unit))
                 .collect::<Vec<_>>()
         })
         .collect()
 }
 
-impl Difference {
-    fn finish(&self, p_holm: Option<f64>, by: ResamplingUnit) -> ScoreComparison {
+impl ScoreDifference {
+    fn finish(&self, p_holm: Option<f64>, unit: ResamplingUnit) -> ScoreComparison {
         ScoreComparison {
             score: self.score,
             a: self.a,
@@ -73,61 +115,63 @@ impl Difference {
             test: TEST,
             p: self.p,
             p_holm,
-            words: self.words(self.p.zip(p_holm), by),
+            conclusion: self.conclusion(self.p.zip(p_holm), unit),
         }
     }
 
-    fn words(&self, p: Option<(f64, f64)>, by: ResamplingUnit) -> String {
+    fn conclusion(&self, p: Option<(f64, f64)>, unit: ResamplingUnit) -> String {
         let higher = if self.mean > 0.0 { self.a } else { self.b }.title();
         match p {
-            None => format!("too few {} to tell", by.plural()),
-            Some(_) if self.ci95 == Some([0.0; 2]) => "the same on all pairs".to_owned(),
-            Some((_, p_holm)) if p_holm < LEVEL => format!("{higher} is higher"),
-            Some((p, _)) if p < LEVEL => {
-                format!("{higher} looks higher, but not after correction for several comparisons")
+            None => format!("too few {} for a test", unit.plural()),
+            Some(_) if self.ci95 == Some([0.0; 2]) => "equal on all pairs".to_owned(),
+            Some((_, p_holm)) if p_holm < SIGNIFICANCE_LEVEL => {
+                format!("{higher} is significantly higher")
             }
-            Some(_) => "cannot tell them apart".to_owned(),
+            Some((p, _)) if p < SIGNIFICANCE_LEVEL => {
+                format!(
+                    "{higher} is higher, but not significantly after correction for several comparisons"
+                )
+            }
+            Some(_) => "no significant difference".to_owned(),
         }
     }
 }
 
-/// What follows for every two metrics, the scores of the same words together, such as
-/// `Ensemble v. Relief: Ensemble is higher (SSIM, IoU); cannot tell them apart (Dice)`.
-pub(super) fn in_words(found: &[ScoreComparison]) -> Vec<String> {
-    let mut pairs: Vec<(ThresholdMetric, ThresholdMetric)> = Vec::new();
+/// Returns a sentence for every two metrics, scores with the same conclusion together, such as
+/// `Ensemble v. Relief: Ensemble is significantly higher (SSIM, IoU); no significant difference (Dice).`
+pub(super) fn conclusions(found: &[ScoreComparison]) -> Vec<String> {
+    let mut compared: Vec<(ThresholdMetric, ThresholdMetric)> = Vec::new();
     for one in found {
-        if !pairs.contains(&(one.a, one.b)) {
-            pairs.push((one.a, one.b));
+        if !compared.contains(&(one.a, one.b)) {
+            compared.push((one.a, one.b));
         }
     }
-    pairs
-        .into_iter()
-        .map(|(a, b)| {
-            let mut said: Vec<(&str, Vec<&str>)> = Vec::new();
-            for one in found.iter().filter(|one| (one.a, one.b) == (a, b)) {
-                match said.iter_mut().find(|(words, _)| *words == one.words) {
-                    Some((_, scores)) => scores.push(one.score.title()),
-                    None => said.push((&one.words, vec![one.score.title()])),
-                }
+    let sentence = |(a, b): (ThresholdMetric, ThresholdMetric)| {
+        let mut scores_by_conclusion: Vec<(&str, Vec<&str>)> = Vec::new();
+        for one in found.iter().filter(|one| (one.a, one.b) == (a, b)) {
+            let mut known = scores_by_conclusion.iter_mut();
+            match known.find(|(conclusion, _)| *conclusion == one.conclusion) {
+                Some((_, scores)) => scores.push(one.score.title()),
+                None => scores_by_conclusion.push((&one.conclusion, vec![one.score.title()])),
             }
-            let parts: Vec<String> = said
-                .iter()
-                .map(|(words, scores)| format!("{words} ({})", scores.join(", ")))
-                .collect();
-            format!("{} v. {}: {}", a.title(), b.title(), parts.join("; "))
-        })
-        .collect()
+        }
+        let parts: Vec<String> = scores_by_conclusion
+            .iter()
+            .map(|(conclusion, scores)| format!("{conclusion} ({})", scores.join(", ")))
+            .collect();
+        format!("{} v. {}: {}.", a.title(), b.title(), parts.join("; "))
+    };
+    compared.into_iter().map(sentence).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Difference, compared, in_words};
+    use super::{Score, ScoreDifference, compare_scores, conclusions};
     use crate::domain::ThresholdMetric::{Density, Ensemble, NlSsim, Relief};
-    use crate::report::score::Score;
-    use crate::report::score_bootstrap::ResamplingUnit;
+    use crate::report::stats::ResamplingUnit;
 
-    fn difference(score: Score, difference: f64, p: Option<f64>) -> Difference {
-        Difference {
+    fn difference(score: Score, difference: f64, p: Option<f64>) -> ScoreDifference {
+        ScoreDifference {
             score,
             a: Ensemble,
             b: Density,
@@ -139,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn holm_is_over_the_comparisons_of_one_score() {
+    fn holm_is_applied_within_each_score() {
         let mut found = vec![
             difference(Score::Ssim, 0.1, Some(0.01)),
             difference(Score::Ssim, 0.1, Some(0.03)),
@@ -147,48 +191,47 @@ mod tests {
             difference(Score::Iou, -0.1, Some(0.04)),
         ];
         (found[1].b, found[2].a) = (NlSsim, Relief);
-        let found = compared(&found, ResamplingUnit::Pair);
+        let found = compare_scores(&found, ResamplingUnit::Pair);
         // statsmodels 0.15.0 `multipletests([0.01, 0.03, 0.5], method="holm")`.
         let wanted = [0.03, 0.06, 0.5, 0.04];
         for (one, wanted) in found.iter().zip(wanted) {
             assert!((one.p_holm.expect("a p") - wanted).abs() < 1e-12);
         }
-        let words: Vec<&str> = found.iter().map(|one| one.words.as_str()).collect();
-        assert_eq!(words[0], "Ensemble is higher");
-        assert!(words[1].starts_with("Ensemble looks higher, but not after"));
-        assert_eq!(
-            words[2..],
-            ["cannot tell them apart", "Pixel density is higher"]
-        );
+        let said: Vec<&str> = found.iter().map(|one| one.conclusion.as_str()).collect();
+        assert_eq!(said[0], "Ensemble is significantly higher");
+        assert!(said[1].starts_with("Ensemble is higher, but not significantly after"));
+        let last = [
+            "no significant difference",
+            "Pixel density is significantly higher",
+        ];
+        assert_eq!(said[2..], last);
     }
 
     #[test]
-    fn scores_of_the_same_words_are_told_together() {
+    fn scores_with_the_same_conclusion_share_a_sentence() {
         let found = [
             difference(Score::Ssim, 0.1, Some(0.001)),
             difference(Score::Iou, 0.01, Some(0.3)),
             difference(Score::Dice, 0.1, Some(0.001)),
         ];
         assert_eq!(
-            in_words(&compared(&found, ResamplingUnit::Pair)),
+            conclusions(&compare_scores(&found, ResamplingUnit::Pair)),
             [
-                "Ensemble v. Pixel density: Ensemble is higher (SSIM, Dice); cannot tell them apart (IoU)"
+                "Ensemble v. Pixel density: Ensemble is significantly higher (SSIM, Dice); no significant difference \
+                 (IoU)."
             ]
         );
-        let few = compared(&[difference(Score::Iou, 0.1, None)], ResamplingUnit::Block);
-        assert_eq!(
-            (few[0].p_holm, few[0].words.as_str()),
-            (None, "too few blocks to tell")
-        );
+        let few = difference(Score::Iou, 0.1, None);
+        let few = compare_scores(&[few], ResamplingUnit::Block);
+        assert_eq!(few[0].p_holm, None);
+        assert_eq!(few[0].conclusion, "too few blocks for a test");
     }
 
     #[test]
-    fn equal_scores_are_said_to_be_the_same() {
+    fn equal_scores_are_called_equal() {
         let mut same = difference(Score::Dice, 0.0, Some(1.0));
         same.ci95 = Some([0.0; 2]);
-        assert_eq!(
-            compared(&[same], ResamplingUnit::Pair)[0].words,
-            "the same on all pairs"
-        );
+        let found = compare_scores(&[same], ResamplingUnit::Pair);
+        assert_eq!(found[0].conclusion, "equal on all pairs");
     }
 }

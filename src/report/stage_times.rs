@@ -1,4 +1,4 @@
-//! How long the stages took, over the pairs whose current results they made.
+//! Computing times of the stages, over the pairs whose current results they made.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use crate::domain::Stage;
 /// Computing times of one stage.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StageTimes {
-    /// Which stage.
+    /// The stage.
     pub stage: Stage,
     /// Pairs that have a result of it.
     pub n: u64,
@@ -17,23 +17,23 @@ pub struct StageTimes {
     pub median_ms: f64,
     /// 95th percentile, milliseconds.
     pub p95_ms: f64,
-    /// All together, seconds of computing.
+    /// Sum, seconds.
     pub total_s: f64,
 }
 
-/// The times so far by stage, milliseconds.
+/// Computing times by stage, milliseconds.
 #[derive(Debug, Clone, Default)]
 pub(super) struct StageTimeSamples([Vec<f64>; Stage::ALL.len()]);
 
 impl StageTimeSamples {
-    /// Counts the stages of one pair in.
+    /// Counts the stages of one pair.
     pub(super) fn add(&mut self, stages: &[StageRecord]) {
         for record in stages {
             self.0[record.stage.index()].push(record.ms as f64);
         }
     }
 
-    /// The times of every stage that has any, in order.
+    /// Returns the times of every stage that has results, in order.
     pub(super) fn finish(self) -> Vec<StageTimes> {
         let by_stage = Stage::ALL.into_iter().zip(self.0);
         by_stage

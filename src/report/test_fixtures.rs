@@ -1,20 +1,25 @@
-//! Small catalog rows for the tests of report and export.
+//! Small catalog rows for unit tests.
 
 use std::collections::BTreeMap;
 
-use super::accumulate::TruthEvaluation;
+use super::accumulate::ReportAccumulator;
+use super::attention_checks::AttentionCheckRates;
 use super::ground_truth::TruthErrors;
-use super::model::MetricRow;
+use super::manual_alignment::ManualErrors;
+use super::model::{MetricRow, Report};
+use super::reviewer_agreement::{ReviewerAgreement, ReviewerPair, ReviewerRecord, VerdictTable};
 use super::score_bootstrap::MeanIntervals;
+use super::stats::Rate;
+use super::truth_evaluation::TruthEvaluation;
 use crate::catalog::{
     MetricRecord, PairAttributes, PairResults, ReviewerVerdict, StageRecord, StoredFailure,
 };
 use crate::domain::{
-    Affine2, ContentHash, Failure, FailureClass, JobStatus, MetricOutcome, PairName, Scores, Stage,
-    ThresholdMetric, Verdict,
+    Affine2, ContentHash, Failure, FailureClass, JobStatus, MetricOutcome, PairName, Reason,
+    Scores, Stage, ThresholdMetric, Verdict,
 };
 
-/// A result with an IoU and the Dice that belongs to it; the verdicts are of reviewers `r0`, `r1`, ...
+/// Returns a result with an IoU and the matching Dice; the verdicts are of reviewers `r0`, `r1`, ...
 pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) -> MetricRecord {
     MetricRecord {
         outcome: MetricOutcome {
@@ -53,7 +58,7 @@ pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) ->
     }
 }
 
-/// A finished pair with the same IoU and verdicts for all metrics.
+/// Returns a finished pair with the same IoU and verdicts for all metrics.
 pub(crate) fn done(name: &str, iou: f64, verdicts: &[Verdict]) -> PairResults {
     PairResults {
         status: JobStatus::Done,
@@ -66,7 +71,7 @@ pub(crate) fn done(name: &str, iou: f64, verdicts: &[Verdict]) -> PairResults {
     }
 }
 
-/// The same under the paper's method, which gives no `relief`.
+/// Returns a pair finished by the paper's method, which has no `relief`.
 pub(crate) fn done_by_paper(name: &str, iou: f64, verdicts: &[Verdict]) -> PairResults {
     let mut pair = done(name, iou, verdicts);
     pair.metrics
@@ -74,8 +79,8 @@ pub(crate) fn done_by_paper(name: &str, iou: f64, verdicts: &[Verdict]) -> PairR
     pair
 }
 
-/// A finished pair nobody has read, with the same confidence for all metrics.
-pub(crate) fn sure(name: &str, confidence: f64) -> PairResults {
+/// Returns a finished pair without verdicts and with the same confidence for all metrics.
+pub(crate) fn with_confidence(name: &str, confidence: f64) -> PairResults {
     let mut pair = done(name, 0.8, &[]);
     for record in &mut pair.metrics {
         record.outcome.confidence = Some(confidence);
@@ -83,7 +88,7 @@ pub(crate) fn sure(name: &str, confidence: f64) -> PairResults {
     pair
 }
 
-/// A pair that failed at its first stage.
+/// Returns a pair that failed in its first stage.
 pub(crate) fn failed(name: &str, class: FailureClass, message: &str) -> PairResults {
     PairResults {
         status: JobStatus::Quarantined,
@@ -96,7 +101,7 @@ pub(crate) fn failed(name: &str, class: FailureClass, message: &str) -> PairResu
     }
 }
 
-/// A stage's result that took so long, without numbers and files.
+/// Returns a stage's result with a computing time, without numbers and files.
 pub(crate) fn stage(stage: Stage, ms: u64) -> StageRecord {
     let hash = ContentHash::of(stage.name().as_bytes());
     StageRecord {
@@ -113,7 +118,7 @@ pub(crate) fn stage(stage: Stage, ms: u64) -> StageRecord {
     }
 }
 
-/// A pair nothing was done with.
+/// Returns a pair that waits for its first stage.
 pub(crate) fn pending(name: &str) -> PairResults {
     PairResults {
         attributes: PairAttributes {
@@ -135,7 +140,7 @@ pub(crate) fn pending(name: &str) -> PairResults {
     }
 }
 
-/// The same errors for all metrics.
+/// Returns an evaluation with the same errors for all metrics.
 pub(crate) fn truth(angle_deg: f64, tre_pct: f64, mask_iou: f64) -> TruthEvaluation {
     let errors = TruthErrors {
         angle_deg,
@@ -149,12 +154,12 @@ pub(crate) fn truth(angle_deg: f64, tre_pct: f64, mask_iou: f64) -> TruthEvaluat
     }
 }
 
-/// A row of 587 pairs nobody has read.
+/// Returns a row of 587 pairs without verdicts.
 pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> MetricRow {
     MetricRow {
         metric,
         n: 587,
-        read: 0,
+        judged: 0,
         passed: 0,
         failed: 0,
         unsure: 0,
@@ -171,6 +176,96 @@ pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> MetricRow {
         dice: Some(dice),
         means_ci95: MeanIntervals::default(),
         truth: None,
-        by_hand: None,
+        manual_alignment: None,
     }
+}
+
+/// Returns the agreement of two reviewers who both passed `pass` results and disagree on others.
+pub(crate) fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
+    let mut table = VerdictTable::default();
+    (0..pass).for_each(|_| table.add(Verdict::Pass, Verdict::Pass));
+    for i in 0..disputed {
+        let [first, second] = if i == 0 {
+            [Verdict::Pass, Verdict::Fail]
+        } else {
+            [Verdict::Fail, Verdict::Pass]
+        };
+        table.add(first, second);
+    }
+    let reviewer = |name: &str, detected: Rate| ReviewerRecord {
+        reviewer: name.to_owned(),
+        judged: pass + disputed,
+        duplicates: Rate::default(),
+        attention_checks: AttentionCheckRates {
+            all: detected,
+            by_kind: BTreeMap::new(),
+        },
+    };
+    ReviewerAgreement {
+        schema: 1,
+        conflicts: disputed,
+        reviewer_pairs: vec![ReviewerPair {
+            a: "lan".to_owned(),
+            b: "minh".to_owned(),
+            agreement: table.finish(),
+        }],
+        reviewers: vec![
+            reviewer("lan", Rate::new(19, 20)),
+            reviewer("minh", Rate::default()),
+        ],
+        attention_checks: Rate::new(19, 20),
+    }
+}
+
+/// Returns a report with something in every field: verdicts, a conflict, ground truth, blocks, confidences, attention
+/// checks, manual alignments, times and failures.
+pub(crate) fn full_report() -> Report {
+    let mut report = ReportAccumulator::default();
+    for i in 0..36_u32 {
+        let verdicts: &[Verdict] = match i % 12 {
+            0 => &[Verdict::Pass, Verdict::Fail],
+            1 => &[Verdict::Fail],
+            2 => &[Verdict::Unsure],
+            3 => &[],
+            _ => &[Verdict::Pass, Verdict::Pass],
+        };
+        let mut pair = done(&format!("p{i:02}"), 0.8, verdicts);
+        pair.attributes.block = Some(format!("block {}", i / 3));
+        pair.stages = Stage::ALL
+            .map(|kind| stage(kind, u64::from(10 + i)))
+            .to_vec();
+        for (k, record) in (0_u32..).zip(&mut pair.metrics) {
+            let outcome = &mut record.outcome;
+            outcome.scores.iou = 0.7 + f64::from((i * 7 + k * 5) % 10) / 50.0;
+            outcome.scores.dice = 2.0 * outcome.scores.iou / (1.0 + outcome.scores.iou);
+            outcome.confidence = Some(f64::from(i) / 40.0);
+            outcome.threshold_level = 20_000 + 500 * (i as u16);
+            if let [given] = &mut record.verdicts[..] {
+                given.reason = [Some(Reason::Angle), None][(k % 2) as usize];
+            }
+        }
+        let wrong_until = if i % 2 == 0 { 3 } else { 1 };
+        let mut errors = truth(if i < wrong_until { 40.0 } else { 0.5 }, 1.25, 0.9);
+        if i % 9 == 5 {
+            errors.errors.remove(&ThresholdMetric::Density);
+        }
+        report.add(&pair, &errors);
+        if i < 4 {
+            let errors = ManualErrors::of(f64::from(2 * i), f64::from(i), 0.5);
+            report.add_manual_errors(&ThresholdMetric::ALL.map(|metric| (metric, errors)).into());
+        }
+    }
+    report.add(
+        &failed("q0", FailureClass::BadInput, "q0.stl is empty"),
+        &TruthEvaluation::default(),
+    );
+    report.add(&pending("q1"), &TruthEvaluation::default());
+    report.set_attention_checks(AttentionCheckRates {
+        all: Rate::new(20, 22),
+        by_kind: BTreeMap::from([
+            ("threshold", Rate::new(1, 2)),
+            ("turned", Rate::new(19, 20)),
+        ]),
+    });
+    report.finish()
 }

@@ -1,4 +1,4 @@
-//! Where the metrics cut the relief: the distribution of their thresholds.
+//! The distribution of the thresholds that metrics chose.
 
 use serde::Serialize;
 
@@ -6,17 +6,17 @@ use super::stats::{median, quantile};
 use crate::catalog::PairResults;
 use crate::domain::ThresholdMetric;
 
-/// Bins of a distribution, each as wide as the others.
+/// Equal bins of a distribution.
 pub const BINS: usize = 40;
-/// Levels of a depth map, from the lowest point to the highest.
+/// Steps between the lowest and the highest level of a depth map.
 const LEVELS: f64 = 65_534.0;
 
-/// The cuts of one metric as heights in the depth maps: 0 is the lowest point of a map, 1 the highest.
+/// The thresholds of one metric as relative heights: 0 is the lowest point of a depth map, 1 the highest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThresholdDistribution {
-    /// Which metric.
+    /// The metric.
     pub metric: ThresholdMetric,
-    /// Results.
+    /// Number of results.
     pub n: u64,
     /// 5th percentile.
     pub p5: f64,
@@ -28,46 +28,46 @@ pub struct ThresholdDistribution {
     pub bins: Vec<u64>,
 }
 
-/// The cuts so far, by metric.
+/// Relative heights of the thresholds, by metric.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ThresholdSamples([Vec<f64>; ThresholdMetric::ALL.len()]);
 
 impl ThresholdSamples {
-    /// Counts the results of one pair in.
+    /// Counts the results of one pair.
     pub(super) fn add(&mut self, pair: &PairResults) {
-        for (cuts, metric) in self.0.iter_mut().zip(ThresholdMetric::ALL) {
+        for (heights, metric) in self.0.iter_mut().zip(ThresholdMetric::ALL) {
             let found = pair.metric(metric);
-            cuts.extend(found.map(|record| height(record.outcome.threshold_level)));
+            heights.extend(found.map(|record| height(record.outcome.threshold_level)));
         }
     }
 
-    /// The distribution of every metric that has results.
+    /// Returns the distribution of every metric that has results.
     pub(super) fn finish(self) -> Vec<ThresholdDistribution> {
         let by_metric = ThresholdMetric::ALL.into_iter().zip(self.0);
         by_metric
-            .filter_map(|(metric, mut cuts)| {
+            .filter_map(|(metric, mut heights)| {
                 Some(ThresholdDistribution {
                     metric,
-                    n: cuts.len() as u64,
-                    p5: quantile(&mut cuts, 0.05)?,
-                    median: median(&mut cuts)?,
-                    p95: quantile(&mut cuts, 0.95)?,
-                    bins: bins(&cuts),
+                    n: heights.len() as u64,
+                    p5: quantile(&mut heights, 0.05)?,
+                    median: median(&mut heights)?,
+                    p95: quantile(&mut heights, 0.95)?,
+                    bins: histogram(&heights),
                 })
             })
             .collect()
     }
 }
 
-/// A level of a depth map as a share of its heights; level 1 is the lowest, 0 holds no data.
+/// Returns the relative height of a depth-map level; level 1 is the lowest, 0 holds no data.
 fn height(level: u16) -> f64 {
     f64::from(level.saturating_sub(1)) / LEVELS
 }
 
-fn bins(cuts: &[f64]) -> Vec<u64> {
+fn histogram(heights: &[f64]) -> Vec<u64> {
     let mut bins = vec![0; BINS];
-    for cut in cuts {
-        bins[((cut * BINS as f64) as usize).min(BINS - 1)] += 1;
+    for height in heights {
+        bins[((height * BINS as f64) as usize).min(BINS - 1)] += 1;
     }
     bins
 }
@@ -84,15 +84,15 @@ mod tests {
     }
 
     #[test]
-    fn every_cut_is_in_one_bin_the_ends_too() {
-        let mut cuts = ThresholdSamples::default();
+    fn every_threshold_is_in_one_bin_even_at_the_ends() {
+        let mut samples = ThresholdSamples::default();
         for (name, level) in [("a", 1), ("b", 32_768), ("c", 65_535)] {
             let mut pair = test_fixtures::done(name, 0.8, &[]);
             pair.metrics.truncate(1);
             pair.metrics[0].outcome.threshold_level = level;
-            cuts.add(&pair);
+            samples.add(&pair);
         }
-        let found = cuts.finish();
+        let found = samples.finish();
         assert_eq!(found.len(), 1, "only one metric has results");
         assert_eq!((found[0].metric, found[0].n), (ThresholdMetric::NlSsim, 3));
         assert_eq!(found[0].median, 0.5);

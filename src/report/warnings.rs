@@ -1,18 +1,21 @@
-//! What a reader of the table must know, in whole sentences.
+//! What qualifies the numbers of a report, in whole sentences.
 
-use super::accumulate::TruthProblems;
 use super::model::{MetricRow, PairProgress};
-use super::score_bootstrap::{BootstrapSkipped, FEWEST_UNITS, MOST_UNITS};
+use super::number_format::NumberStyle::Share;
+use super::number_format::{counted, format_count, format_number};
+use super::score_bootstrap::BootstrapSkipped;
+use super::stats::{MAX_UNITS, MIN_UNITS};
+use super::truth_evaluation::TruthProblems;
 
-/// Slack for rounding in sums before a mean is called impossible.
+/// Tolerance for rounding in sums before a mean is called impossible.
 const ROUNDING: f64 = 1e-9;
 
-/// Every warning that the numbers call for.
-pub(super) fn of(
+/// Returns every warning that the numbers call for.
+pub(super) fn warnings(
     progress: PairProgress,
     rows: &[MetricRow],
     truth: &TruthProblems,
-    lack: Option<BootstrapSkipped>,
+    skipped: Option<BootstrapSkipped>,
 ) -> Vec<String> {
     let mut warnings = Vec::new();
     warnings.extend(missing_pairs(progress));
@@ -22,118 +25,113 @@ pub(super) fn of(
         warnings.extend(mirrored(row));
     }
     warnings.extend(unusable_truth(truth));
-    warnings.extend(lack.map(nothing_drawn));
+    warnings.extend(skipped.map(bootstrap_skipped));
     warnings
 }
 
-/// Why means have no intervals and metrics are not compared by their scores.
-fn nothing_drawn(lack: BootstrapSkipped) -> String {
-    let why = match lack {
+fn bootstrap_skipped(skipped: BootstrapSkipped) -> String {
+    let why = match skipped {
         BootstrapSkipped::TooMany => format!(
-            "there are more than {MOST_UNITS}, and chance hardly moves a mean over so many pairs"
+            "there are more than {}, and sampling error is negligible",
+            counted(MAX_UNITS as u64, "pair")
         ),
-        BootstrapSkipped::TooFew { units, by } => {
-            let what = by.plural();
-            format!("that takes {FEWEST_UNITS} {what} at least; here: {units}")
-        }
+        BootstrapSkipped::TooFew { units, by } => format!(
+            "an interval needs at least {MIN_UNITS} {} and there are {units}",
+            by.plural()
+        ),
     };
-    format!("Means have no intervals, and metrics are not compared by their scores: {why}.")
+    format!("Means have no intervals, and metrics are not compared by score, because {why}.")
 }
 
-/// Pairs that are in no row.
 fn missing_pairs(progress: PairProgress) -> Option<String> {
-    let pairs = progress.done + progress.failed + progress.pending;
+    let missing = progress.failed + progress.pending;
     let counts = [
         (progress.failed, "failed"),
         (progress.pending, "not finished"),
     ];
     let counts = list(counts)?;
-    Some(format!("In no row, of {pairs} in all: {counts}."))
+    let verb = if missing == 1 { "is" } else { "are" };
+    let pairs = counted(progress.done + missing, "pair");
+    let missing = format_count(missing);
+    Some(format!("{missing} of {pairs} {verb} in no row: {counts}."))
 }
 
-/// Counts that are not 0, such as `2 failed, 1 not finished`; `None` when all are.
+/// Returns the counts that are not 0, such as `2 failed, 1 not finished`; `None` when all are.
 fn list<const N: usize>(counts: [(u64, &str); N]) -> Option<String> {
-    let said: Vec<String> = counts
+    let parts: Vec<String> = counts
         .into_iter()
         .filter(|(n, _)| *n > 0)
-        .map(|(n, what)| format!("{n} {what}"))
+        .map(|(n, what)| format!("{} {what}", format_count(n)))
         .collect();
-    (!said.is_empty()).then(|| said.join(", "))
+    (!parts.is_empty()).then(|| parts.join(", "))
 }
 
-/// Dice is `2 J / (1 + J)` of the IoU `J` for each pair, a concave function: its mean cannot lie above the
-/// function's value at the mean IoU.
+/// Compares the mean Dice with the largest one that the mean `IoU` allows.
+///
+/// For each pair Dice is `2 J / (1 + J)` of the `IoU` J. The function is concave, so the mean Dice cannot lie above its
+/// value at the mean `IoU`.
 fn impossible_dice(row: &MetricRow) -> Option<String> {
     let (iou, dice) = (row.iou?, row.dice?);
     let bound = 2.0 * iou / (1.0 + iou);
+    let [iou, shown_bound, shown_dice] =
+        [iou, bound, dice].map(|score| format_number(score, Share));
     (dice > bound + ROUNDING).then(|| {
         format!(
-            "{}: a mean Dice of {dice:.3} is above {bound:.3}, the most that a mean IoU of {iou:.3} allows; \
-             the two cannot be of the same masks.",
+            "{}: a mean Dice of {shown_dice} is above {shown_bound}, the most that a mean IoU of {iou} allows; the two \
+             cannot be of the same masks.",
             row.metric.title()
         )
     })
 }
 
-/// Verdicts that tell nothing about the current results.
+/// Names verdicts that say nothing about the current results.
 fn uncounted_verdicts(row: &MetricRow) -> Option<String> {
     let counts = list([
-        (row.stale, "unread with a verdict for an older result"),
-        (
-            row.conflicts,
-            "unsure because reviewers contradict each other",
-        ),
+        (row.stale, "have a verdict on an earlier result only"),
+        (row.conflicts, "are unsure because reviewers disagree"),
     ])?;
-    Some(format!(
-        "{}, of {} results: {counts}.",
-        row.metric.title(),
-        row.n
-    ))
+    Some(of_results(row, &counts))
 }
 
-/// Results whose true map says that they read in mirror writing.
 fn mirrored(row: &MetricRow) -> Option<String> {
-    let counts = list([(
-        row.truth.as_ref()?.mirrored,
-        "in mirror writing (angle error 180 degrees)",
-    )])?;
-    Some(format!(
-        "{}, of {} results: {counts}.",
-        row.metric.title(),
-        row.n
-    ))
+    let mirrored = row.truth.as_ref()?.mirrored;
+    let counts = list([(mirrored, "are mirrored (angle error 180 degrees)")])?;
+    Some(of_results(row, &counts))
 }
 
-/// Truths that could not be used.
+fn of_results(row: &MetricRow, counts: &str) -> String {
+    let results = counted(row.n, "result");
+    format!("{}: of {results}, {counts}.", row.metric.title())
+}
+
 fn unusable_truth(truth: &TruthProblems) -> Option<String> {
     truth.first.as_ref().map(|first| {
-        format!(
-            "Truths that cannot be used and are left out: {}. The first: {first}.",
-            truth.count
-        )
+        let records = counted(truth.count, "ground truth record");
+        format!("{records} cannot be used and count nowhere. The first: {first}.")
     })
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{impossible_dice, missing_pairs, nothing_drawn};
+    use super::{bootstrap_skipped, impossible_dice, missing_pairs};
     use crate::domain::ThresholdMetric;
     use crate::report::model::PairProgress;
-    use crate::report::score_bootstrap::{BootstrapSkipped, ResamplingUnit};
+    use crate::report::score_bootstrap::BootstrapSkipped;
+    use crate::report::stats::ResamplingUnit;
     use crate::report::test_fixtures;
 
     #[test]
-    fn why_nothing_was_drawn_is_said() {
-        let few = nothing_drawn(BootstrapSkipped::TooFew {
+    fn the_reason_for_no_bootstrap_is_given() {
+        let few = bootstrap_skipped(BootstrapSkipped::TooFew {
             units: 5,
             by: ResamplingUnit::Block,
         });
         assert!(
-            few.ends_with(": that takes 10 blocks at least; here: 5."),
+            few.ends_with("because an interval needs at least 10 blocks and there are 5."),
             "{few}"
         );
-        let many = nothing_drawn(BootstrapSkipped::TooMany);
-        assert!(many.contains("there are more than 100000"), "{many}");
+        let many = bootstrap_skipped(BootstrapSkipped::TooMany);
+        assert!(many.contains("there are more than 100,000"), "{many}");
     }
 
     #[test]
@@ -146,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn equal_masks_everywhere_meet_the_bound_without_a_warning() {
+    fn equal_masks_meet_the_bound_without_a_warning() {
         let iou = 0.7;
         let dice = 2.0 * iou / (1.0 + iou);
         assert_eq!(
@@ -156,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn failed_and_unfinished_pairs_are_said() {
+    fn failed_and_unfinished_pairs_are_named() {
         let said = |done, failed, pending| {
             missing_pairs(PairProgress {
                 done,
@@ -166,6 +164,9 @@ mod tests {
         };
         assert_eq!(said(5, 0, 0), None);
         let three = said(5, 2, 1).expect("three are missing");
-        assert_eq!(three, "In no row, of 8 in all: 2 failed, 1 not finished.");
+        assert_eq!(
+            three,
+            "3 of 8 pairs are in no row: 2 failed, 1 not finished."
+        );
     }
 }

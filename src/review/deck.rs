@@ -8,8 +8,8 @@ use super::known::Known;
 use super::order;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use crate::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, ThresholdMetric, Verdict};
-use crate::report::consensus::{contradict, split};
-use crate::report::pair_artifacts::{PairArtifacts, alike};
+use crate::report::consensus::{is_disputed, partition_verdicts};
+use crate::report::pair_artifacts::{PairArtifacts, group_identical};
 use crate::store::Project;
 
 /// Pairs in memory at a time.
@@ -120,7 +120,7 @@ fn cards_of(pair: &PairResults, options: &DeckOptions) -> Vec<Card> {
     let is_asked = |record: &&MetricRecord| {
         options.order != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reviewer)
     };
-    let groups = alike(pair.metrics.iter().filter(is_of_metric).filter(is_asked));
+    let groups = group_identical(pair.metrics.iter().filter(is_of_metric).filter(is_asked));
     let card = |group: Vec<&MetricRecord>| {
         let outcome_of_metric = group[0].outcome;
         Card {
@@ -166,12 +166,12 @@ fn is_good(record: &MetricRecord) -> bool {
 
 /// Whether others contradict each other on it and nobody else has settled it. Who is party to it cannot settle it.
 fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
-    let (words, read) = split(record);
+    let (words, read) = partition_verdicts(record);
     let is_party = read.iter().any(|read| read.reviewer == reviewer);
     let is_settled = words
         .iter()
         .any(|word| word.reviewer != reviewer && word.verdict != Verdict::Unsure);
-    contradict(&read) && !is_party && !is_settled
+    is_disputed(&read) && !is_party && !is_settled
 }
 
 /// Faults made from these cards. A pair whose files cannot be read gets none.

@@ -9,7 +9,7 @@ use super::card::Card;
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Affine2, NormalizeOutcome, Stage};
 use crate::export::pictures::{PrintView, shaded};
-use crate::export::{FilesError, SourcePrint};
+use crate::export::{SourcePrint, SourcePrintError};
 use crate::raster::{self, DepthMap, Mask, png_mask, png_rgb8};
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::Project;
@@ -80,7 +80,7 @@ pub(super) enum PictureError {
     PairArtifacts(#[from] PairArtifactsError),
     /// The print cannot be read.
     #[error(transparent)]
-    Print(#[from] FilesError),
+    Print(#[from] SourcePrintError),
     /// Another result has come since.
     #[error("this pair was aligned anew meanwhile; reload the page")]
     Gone,

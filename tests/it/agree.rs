@@ -24,7 +24,7 @@ fn set(project: &Project, pair: &Value, verdict: &str, reviewer: &str) {
     mocban(project.dir(), &args).expect(0);
 }
 
-/// `lan` fails all on the page, faults and repeats too; `minh` passes all pairs but the first.
+/// `lan` fails everything on the page, attention checks included; `minh` passes all pairs except the first.
 fn reviewer_pairs(project: &Project) -> Vec<Value> {
     let page = Page::open(
         project,
@@ -57,23 +57,26 @@ fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
     let (n, agreed) = (count(&two["n"]), count(&two["agreed"]));
     assert!(n > agreed && (1..=4).contains(&agreed), "{two}");
     assert_eq!(
-        (count(&two["flagged"]), count(&two["flagged_by_both"])),
+        (count(&two["failed_by_any"]), count(&two["failed_by_both"])),
         (n, agreed)
     );
     // One who always says the same agrees as often as chance would.
     assert!(two["kappa"].as_f64().expect("chance is not sure").abs() < 1e-12);
-    assert_eq!(two["enough"], json!(n >= 30));
+    assert_eq!(two["sufficient"], json!(n >= 30));
     assert_eq!(count(&found["conflicts"]), n - agreed);
     let [lan, minh] = [0, 1].map(|i| &found["reviewers"][i]);
-    assert_eq!((count(&lan["read"]), count(&minh["read"])), (n, n));
-    let (caught, repeats) = (&lan["caught"], &lan["repeats"]);
-    assert!(count(&caught["n"]) > 5 && count(&repeats["n"]) > 0, "{lan}");
+    assert_eq!((count(&lan["judged"]), count(&minh["judged"])), (n, n));
+    let (checks, duplicates) = (&lan["attention_checks"], &lan["duplicates"]);
+    assert!(
+        count(&checks["n"]) > 5 && count(&duplicates["n"]) > 0,
+        "{lan}"
+    );
     assert_eq!(
-        (&caught["share"], &repeats["share"]),
+        (&checks["share"], &duplicates["share"]),
         (&json!(1.0), &json!(1.0))
     );
-    assert_eq!(minh["caught"]["n"], 0);
-    report_tells_the_same(&project, caught);
+    assert_eq!(minh["attention_checks"]["n"], 0);
+    report_agrees(&project, checks);
 
     let page = Page::open(&project, "ba", &["--adjudicate"]);
     let settled = page.deck().remove(0);
@@ -91,14 +94,14 @@ fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
     );
 }
 
-fn report_tells_the_same(project: &Project, caught: &Value) {
+fn report_agrees(project: &Project, checks: &Value) {
     let report = told(project, &["report", "-f", "json"]);
     for name in ["n", "count", "share", "ci95"] {
-        assert_eq!(report["caught"][name], caught[name], "{name}");
+        assert_eq!(report["attention_checks"][name], checks[name], "{name}");
     }
     for row in report["rows"].as_array().expect("rows") {
         let rules = &row["rules"];
-        assert_eq!(rules["told_twice"], 15);
+        assert_eq!(rules["double_read"], 15);
         assert_eq!(rules["either_fails"]["count"], 0);
         assert_eq!(
             (&rules["adjudicated"]["n"], &row["failed"]),
@@ -107,13 +110,13 @@ fn report_tells_the_same(project: &Project, caught: &Value) {
         assert_eq!(rules["both_fail"]["count"], 14);
     }
     let exact = told(project, &["report", "-f", "json", "--ci", "exact"]);
-    assert_ne!(exact["caught"]["ci95"], caught["ci95"]);
+    assert_ne!(exact["attention_checks"]["ci95"], checks["ci95"]);
     let csv = mocban(project.dir(), &["report", "-f", "csv"])
         .expect(0)
         .out;
     let heads = csv.lines().next().expect("a line of heads");
     assert!(
-        heads.contains(",both_fail_acc,") && heads.contains(",by_hand_n,"),
+        heads.contains(",both_fail_acc,") && heads.contains(",manual_alignment_n,"),
         "{heads}"
     );
     let page = mocban(project.dir(), &["report", "-f", "html"])
@@ -121,9 +124,9 @@ fn report_tells_the_same(project: &Project, caught: &Value) {
         .out;
     for part in [
         "Failed by reviewers",
-        "Reviewers contradict each other",
-        "By lot",
-        "Planted faults",
+        "Reviewers disagree",
+        "Random sample",
+        "Attention checks",
     ] {
         assert!(page.contains(part), "{part}");
     }
@@ -131,11 +134,12 @@ fn report_tells_the_same(project: &Project, caught: &Value) {
 }
 
 #[test]
-fn results_are_measured_against_the_newest_alignment_by_hand() {
+fn results_are_measured_against_the_newest_manual_alignment() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let by_hand = || told(&project, &["report", "-f", "json"])["rows"][2]["by_hand"].clone();
-    assert_eq!(by_hand(), Value::Null);
+    let manual =
+        || told(&project, &["report", "-f", "json"])["rows"][2]["manual_alignment"].clone();
+    assert_eq!(manual(), Value::Null);
     let page = Page::open(
         &project,
         "lan",
@@ -159,7 +163,7 @@ fn results_are_measured_against_the_newest_alignment_by_hand() {
         );
     };
     laid("h1", &start["view_from_depth"]);
-    let same = by_hand();
+    let same = manual();
     assert_eq!(
         (&same["n"], &same["angle_le_5deg"]),
         (&json!(1), &json!(1.0))
@@ -173,7 +177,7 @@ fn results_are_measured_against_the_newest_alignment_by_hand() {
     let columns = [turn(a, d), turn(b, e), turn(c, f)];
     let rows = [0, 1].map(|i| columns.map(|column| column[i]));
     laid("h2", &json!(rows));
-    let turned = by_hand();
+    let turned = manual();
     assert_eq!(
         (&turned["n"], &turned["angle_le_5deg"]),
         (&json!(1), &json!(0.0))
@@ -183,7 +187,7 @@ fn results_are_measured_against_the_newest_alignment_by_hand() {
     assert!(number(&turned["shift_p95_pct"]) > 1.0, "{turned}");
     let text = mocban(project.dir(), &["report"]).expect(0).out;
     assert!(
-        text.contains("\nBy hand ") && text.contains("  12.00  12.00  "),
+        text.contains("\nManual ") && text.contains("  12.00  12.00  "),
         "{text}"
     );
 }

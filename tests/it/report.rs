@@ -331,7 +331,7 @@ fn failed_pair_is_told_in_both(report: &Report, export: &Path) {
 fn truth_is_there_and_apart(report: &Report) {
     for row in &report.rows {
         let truth = row.truth.as_ref().expect("the demo has truth");
-        assert_eq!((truth.n, row.acc, row.read), (2, None, 0));
+        assert_eq!((truth.n, row.acc, row.judged), (2, None, 0));
         assert!(truth.mask_iou_median.is_some(), "{:?}", report.warnings);
     }
 }
@@ -359,7 +359,7 @@ async fn verdicts_make_acc(world: &World) {
         .expect("both have results");
     let report = world.report().await;
     for row in &report.rows {
-        assert_eq!((row.read, row.passed, row.failed), (2, 1, 1));
+        assert_eq!((row.judged, row.passed, row.failed), (2, 1, 1));
         assert_eq!(row.acc, Some(0.5));
     }
     assert_eq!(report.comparisons.len(), 8);

@@ -378,8 +378,8 @@ fn a_relief_is_laid_by_keys_and_mouse() {
             at(1).atan2(at(0)).to_degrees()
         };
         let turns = mine.iter().map(|line| {
-            let turn =
-                angle(&line["by_hand"]["print_from_depth"]) - angle(&line["print_from_depth"]);
+            let turn = angle(&line["manual_alignment"]["print_from_depth"])
+                - angle(&line["print_from_depth"]);
             (turn + 540.0).rem_euclid(360.0) - 180.0
         });
         let turns: Vec<f64> = turns.collect();

@@ -71,7 +71,8 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
         "{a:?} {b:?}"
     );
     mocban(project.dir(), &["export", "-o", "out"]).expect(0);
-    let log = std::fs::read_to_string(project.dir().join("out/alignments.jsonl")).expect("a log");
+    let log =
+        std::fs::read_to_string(project.dir().join("out/manual_alignments.jsonl")).expect("a log");
     assert_eq!(log.lines().count(), 2);
     // An export with all it may hold is replaced as any other.
     mocban(project.dir(), &["export", "-o", "out"]).expect(0);
@@ -81,10 +82,10 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
         .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
     for line in lines {
         if line["id"] != item["pair"] {
-            assert_eq!(line["by_hand"], Value::Null);
+            assert_eq!(line["manual_alignment"], Value::Null);
             continue;
         }
-        let by_hand = &line["by_hand"];
+        let by_hand = &line["manual_alignment"];
         assert_eq!(by_hand["reviewer"], "lan");
         assert_eq!(by_hand["print_from_mesh"], json!(second.print_from_mesh));
         assert_ne!(by_hand["print_from_mesh"], line["print_from_mesh"]);

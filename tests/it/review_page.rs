@@ -126,7 +126,7 @@ fn results_that_look_the_same_are_one_card() {
         .json();
     let rows = report["rows"].as_array().expect("rows");
     for row in rows {
-        assert_eq!(row["read"], 15, "{row}");
+        assert_eq!(row["judged"], 15, "{row}");
     }
     assert!(deck.len() < 15 * rows.len(), "{} cards", deck.len());
 }

@@ -4,7 +4,10 @@ use mocban::config::{self, Sources};
 use mocban::demo::{DemoPair, PairGenerator, Tier};
 use mocban::domain::MetricOutcome;
 use mocban::raster;
-use mocban::report::ground_truth::{TruthErrors, TruthRecord, tops_iou};
+use mocban::report::{
+    ground_truth::{TruthErrors, TruthRecord},
+    tops_iou,
+};
 use mocban::stages::{AlignedPair, Settings, StageError};
 use rayon::prelude::*;
 

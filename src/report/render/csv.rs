@@ -1,174 +1,220 @@
-//! The report as CSV (RFC 4180): one line a metric, numbers in full.
+//! The report as CSV (RFC 4180): one line a metric, numbers with all digits.
 
-use super::csv_fields;
-use crate::report::interval::IntervalMethod;
-use crate::report::model::{
-    Basis, MetricRow, Report, RiskCoverage, RiskCoveragePoint, TruthSummary,
-};
-use crate::report::risk_coverage::{KEPT_PERCENT, LEAST_PERCENT};
+use serde_json::{Value, json};
 
-/// Names of the columns, in order; those of [`coverage_names`] follow, for reviewers and then for truth,
-/// and those of [`csv_fields`].
-const COLUMNS: [&str; 27] = [
-    "metric",
-    "n",
-    "read",
-    "passed",
-    "failed",
-    "unsure",
-    "conflicts",
-    "stale",
-    "acc",
-    "acc_ci95_low",
-    "acc_ci95_high",
-    "ssim",
-    "nl_ssim",
-    "iou",
-    "iou_box",
-    "dice",
-    "truth_n",
-    "truth_passed",
-    "truth_acc",
-    "truth_acc_ci95_low",
-    "truth_acc_ci95_high",
-    "truth_angle_le_5deg",
-    "truth_angle_median_deg",
-    "truth_tre_median_pct",
-    "truth_mask_iou_median",
-    "truth_mirrored",
-    "ci95",
-];
+use crate::domain::Reason;
+use crate::report::comparison::Basis;
+use crate::report::model::{MetricRow, Report};
+use crate::report::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT};
 
-/// The report as CSV. What does not exist is an empty field.
+/// A column: its name, and the JSON pointer of its value in [`document`].
+struct CsvColumn {
+    name: String,
+    pointer: String,
+}
+
+/// Returns the report as CSV. A value that does not exist is an empty field.
 pub(super) fn render(report: &Report) -> String {
-    let names = COLUMNS.map(field).into_iter();
-    let later = csv_fields::names();
-    let coverage = BASES.into_iter().flat_map(coverage_names);
-    let mut text = line(names.chain(coverage).chain(later));
+    let columns = columns();
+    let mut text = line(columns.iter().map(|column| escape(&column.name)));
     for row in &report.rows {
-        let curves = BASES.map(|basis| report.coverage(basis, row.metric));
-        let numbers = curves.into_iter().flat_map(coverage_fields);
-        let first = fields(row, report.interval).into_iter().chain(numbers);
-        text += &line(first.chain(csv_fields::values(report, row)));
+        let document = document(report, row);
+        text += &line(columns.iter().map(|column| field(&document, column)));
     }
     text
 }
 
-/// Both judges, in the order of their columns.
-const BASES: [Basis; 2] = [Basis::Verdicts, Basis::Truth];
-
-/// Columns of accuracy against coverage; `acc_at_97` is the Acc of the 97 % most confident results.
-fn coverage_names(basis: Basis) -> Vec<String> {
-    let judge = match basis {
-        Basis::Verdicts => "",
-        Basis::Truth => "truth_",
-    };
-    let mut names = vec![
-        format!("{judge}confidence_n"),
-        format!("{judge}confidence_failures"),
-        format!("{judge}confidence_failures_in_least_{LEAST_PERCENT}"),
-    ];
-    names.extend(KEPT_PERCENT.iter().flat_map(|percent| {
-        [
-            format!("{judge}acc_at_{percent}"),
-            format!("{judge}acc_at_{percent}_ci95_low"),
-            format!("{judge}acc_at_{percent}_ci95_high"),
-            format!("{judge}least_confidence_at_{percent}"),
-        ]
-    }));
-    names
-}
-
-fn coverage_fields(curve: Option<&RiskCoverage>) -> Vec<String> {
-    let count = |read: fn(&RiskCoverage) -> u64| {
-        curve.map_or_else(String::new, |curve| read(curve).to_string())
-    };
-    let mut fields = vec![
-        count(|curve| curve.n),
-        count(|curve| curve.failures),
-        count(|curve| curve.failures_in_least),
-    ];
-    for i in 0..KEPT_PERCENT.len() {
-        fields.extend(point_fields(curve.and_then(|curve| curve.points.get(i))));
+/// Returns a row's JSON with what the report holds elsewhere of its metric.
+fn document(report: &Report, row: &MetricRow) -> Value {
+    let mut value = serde_json::to_value(row).expect("a row is JSON");
+    let truth_ci95 = row.truth.as_ref().and_then(|truth| truth.acc_ci95);
+    let has_interval = row.acc_ci95.or(truth_ci95).is_some();
+    value["interval"] = json!(has_interval.then(|| report.interval.name()));
+    let is_resampled = row.means_ci95.ssim.is_some();
+    let bootstrap = report.bootstrap.filter(|_| is_resampled);
+    value["bootstrap_by"] = json!(bootstrap.map(|settings| settings.by.plural()));
+    let mut thresholds = report.thresholds.iter();
+    value["thresholds"] = json!(thresholds.find(|found| found.metric == row.metric));
+    for (key, basis) in [
+        ("verdict_curve", Basis::Verdicts),
+        ("truth_curve", Basis::Truth),
+    ] {
+        value[key] = json!(report.risk_coverage(basis, row.metric));
     }
-    fields
+    if row.judged > 0 {
+        for reason in reasons() {
+            value["reasons"][reason_name(reason)] = json!(row.failed_for(reason));
+        }
+    }
+    value
 }
 
-fn point_fields(point: Option<&RiskCoveragePoint>) -> [String; 4] {
-    let [low, high] = bounds(point.and_then(|point| point.acc_ci95));
-    let value = |read: fn(&RiskCoveragePoint) -> Option<f64>| number(point.and_then(read));
-    [
-        value(|point| point.acc),
-        low,
-        high,
-        value(|point| point.least_confidence),
-    ]
+fn reasons() -> impl Iterator<Item = Option<Reason>> {
+    Reason::ALL.into_iter().map(Some).chain([None])
 }
 
-fn fields(row: &MetricRow, interval: IntervalMethod) -> Vec<String> {
-    let [low, high] = bounds(row.acc_ci95);
-    let mut fields = vec![
-        field(row.metric.name()),
-        row.n.to_string(),
-        row.read.to_string(),
-        row.passed.to_string(),
-        row.failed.to_string(),
-        row.unsure.to_string(),
-        row.conflicts.to_string(),
-        row.stale.to_string(),
-        number(row.acc),
-        low,
-        high,
-        number(row.ssim),
-        number(row.nl_ssim),
-        number(row.iou),
-        number(row.iou_box),
-        number(row.dice),
+fn reason_name(reason: Option<Reason>) -> &'static str {
+    reason.map_or("no_reason", Reason::name)
+}
+
+/// Returns the columns in their order.
+fn columns() -> Vec<CsvColumn> {
+    let mut columns = Vec::new();
+    let fields = [
+        "metric",
+        "n",
+        "judged",
+        "passed",
+        "failed",
+        "unsure",
+        "conflicts",
+        "stale",
+        "acc",
+        "acc_ci95",
+        "ssim",
+        "nl_ssim",
+        "iou",
+        "iou_box",
+        "dice",
     ];
-    fields.extend(truth_fields(row.truth.as_ref()));
-    fields.push(interval_name(row, interval));
-    fields
+    push_all(&mut columns, "", "", &fields);
+    let fields = [
+        "n",
+        "passed",
+        "acc",
+        "acc_ci95",
+        "angle_le_5deg",
+        "angle_median_deg",
+        "tre_median_pct",
+        "mask_iou_median",
+        "mirrored",
+    ];
+    push_all(&mut columns, "truth_", "/truth", &fields);
+    push_all(&mut columns, "", "", &["interval"]);
+    push_risk_coverage(&mut columns, "", "/verdict_curve");
+    push_risk_coverage(&mut columns, "truth_", "/truth_curve");
+    push_all(&mut columns, "rules_", "/rules", &["double_read"]);
+    for rule in ["either_fails", "adjudicated", "both_fail"] {
+        let pointer = |field: &str| format!("/rules/{rule}/{field}");
+        push(&mut columns, format!("{rule}_n"), pointer("n"));
+        push(&mut columns, format!("{rule}_acc"), pointer("share"));
+        push(&mut columns, format!("{rule}_acc_ci95"), pointer("ci95"));
+    }
+    for reason in reasons().map(reason_name) {
+        push(
+            &mut columns,
+            format!("failed_{reason}"),
+            format!("/reasons/{reason}"),
+        );
+    }
+    push_all(
+        &mut columns,
+        "threshold_",
+        "/thresholds",
+        &["p5", "median", "p95"],
+    );
+    for mean in ["ssim", "iou", "iou_box", "dice", "acc_by_block"] {
+        push(
+            &mut columns,
+            format!("{mean}_ci95"),
+            format!("/means_ci95/{mean}"),
+        );
+    }
+    push_all(&mut columns, "", "", &["bootstrap_by"]);
+    let fields = [
+        "n",
+        "angle_le_5deg",
+        "angle_median_deg",
+        "angle_p95_deg",
+        "shift_median_pct",
+        "shift_p95_pct",
+        "scale_median_pct",
+        "scale_p95_pct",
+        "mirrored",
+    ];
+    push_all(
+        &mut columns,
+        "manual_alignment_",
+        "/manual_alignment",
+        &fields,
+    );
+    columns
 }
 
-/// What the intervals of the line are; nothing where it has none.
-fn interval_name(row: &MetricRow, interval: IntervalMethod) -> String {
-    let of_truth = row.truth.as_ref().and_then(|truth| truth.acc_ci95);
-    let any = row.acc_ci95.or(of_truth);
-    any.map_or_else(String::new, |_| interval.name().to_owned())
+/// Adds the columns of a risk-coverage curve; `acc_at_97` is the Acc of the 97 % most confident results.
+fn push_risk_coverage(columns: &mut Vec<CsvColumn>, prefix: &str, parent: &str) {
+    let counts = [
+        ("n".to_owned(), "n"),
+        ("failures".to_owned(), "failures"),
+        (
+            format!("failures_in_least_{LEAST_CONFIDENT_PERCENT}"),
+            "failures_in_least",
+        ),
+    ];
+    for (name, field) in counts {
+        push(
+            columns,
+            format!("{prefix}confidence_{name}"),
+            format!("{parent}/{field}"),
+        );
+    }
+    for (i, percent) in COVERAGE_PERCENT.into_iter().enumerate() {
+        let pointer = |field: &str| format!("{parent}/points/{i}/{field}");
+        push(columns, format!("{prefix}acc_at_{percent}"), pointer("acc"));
+        push(
+            columns,
+            format!("{prefix}acc_at_{percent}_ci95"),
+            pointer("acc_ci95"),
+        );
+        push(
+            columns,
+            format!("{prefix}least_confidence_at_{percent}"),
+            pointer("least_confidence"),
+        );
+    }
 }
 
-fn truth_fields(truth: Option<&TruthSummary>) -> [String; 10] {
-    let value = |read: fn(&TruthSummary) -> Option<f64>| number(truth.and_then(read));
-    let count = |read: fn(&TruthSummary) -> u64| {
-        truth.map_or_else(String::new, |truth| read(truth).to_string())
-    };
-    let [low, high] = bounds(truth.and_then(|truth| truth.acc_ci95));
-    [
-        count(|truth| truth.n),
-        count(|truth| truth.passed),
-        value(|truth| truth.acc),
-        low,
-        high,
-        value(|truth| truth.angle_le_5deg),
-        value(|truth| truth.angle_median_deg),
-        value(|truth| truth.tre_median_pct),
-        value(|truth| truth.mask_iou_median),
-        count(|truth| truth.mirrored),
-    ]
+/// Adds the fields of one JSON object.
+fn push_all(columns: &mut Vec<CsvColumn>, prefix: &str, parent: &str, fields: &[&str]) {
+    for field in fields {
+        push(
+            columns,
+            format!("{prefix}{field}"),
+            format!("{parent}/{field}"),
+        );
+    }
 }
 
-pub(super) fn bounds(bounds: Option<[f64; 2]>) -> [String; 2] {
-    bounds.map_or_else(Default::default, |bounds| {
-        bounds.map(|bound| number(Some(bound)))
-    })
+/// Adds a column, or two for the bounds of an interval.
+fn push(columns: &mut Vec<CsvColumn>, name: String, pointer: String) {
+    if !name.ends_with("ci95") {
+        columns.push(CsvColumn { name, pointer });
+        return;
+    }
+    for (i, bound) in ["low", "high"].into_iter().enumerate() {
+        columns.push(CsvColumn {
+            name: format!("{name}_{bound}"),
+            pointer: format!("{pointer}/{i}"),
+        });
+    }
 }
 
-pub(super) fn number(value: Option<f64>) -> String {
-    value.map_or_else(String::new, |value| value.to_string())
+fn field(document: &Value, column: &CsvColumn) -> String {
+    match document.pointer(&column.pointer) {
+        Some(Value::String(text)) => escape(text),
+        Some(Value::Number(number)) => match (number.as_u64(), number.as_f64()) {
+            (Some(count), _) => count.to_string(),
+            (None, Some(number)) => number.to_string(),
+            (None, None) => number.to_string(),
+        },
+        Some(Value::Null | Value::Bool(_) | Value::Array(_) | Value::Object(_)) | None => {
+            String::new()
+        }
+    }
 }
 
-/// A text field: quoted where it must be, and with `'` before what a spreadsheet would take for a formula.
-fn field(text: &str) -> String {
+/// Returns a text field: quoted where needed, with `'` before what a spreadsheet would take for a formula.
+fn escape(text: &str) -> String {
     let guarded = if text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
         format!("'{text}")
     } else {
@@ -187,42 +233,70 @@ fn line(fields: impl Iterator<Item = String>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{BASES, COLUMNS, coverage_names, csv_fields, field, render};
-    use crate::domain::Verdict;
-    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
+    use super::{escape, render};
+    use crate::domain::{Reason, Verdict};
+    use crate::report::stats::wilson_95;
+    use crate::report::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
 
-    #[test]
-    fn every_line_has_every_field_and_ends_with_crlf() {
-        let mut tally = ReportAccumulator::default();
-        tally.add(
-            &test_fixtures::done("a", 0.75, &[Verdict::Pass]),
-            &TruthEvaluation::default(),
-        );
-        tally.add(
-            &test_fixtures::done("b", 0.75, &[]),
-            &test_fixtures::truth(1.5, 2.0, 0.9),
-        );
-        let text = render(&tally.finish());
-        let lines: Vec<&str> = text.split("\r\n").collect();
-        assert_eq!(lines.len(), 6);
-        assert_eq!(lines[5], "");
-        for line in &lines[..5] {
-            let coverage: usize = BASES.map(|basis| coverage_names(basis).len()).iter().sum();
-            let all = COLUMNS.len() + coverage + csv_fields::names().len();
-            assert_eq!(line.split(',').count(), all, "{line}");
+    /// The fields of one row under their names.
+    fn fields(report: &Report, row: usize) -> impl Fn(&str) -> String + use<> {
+        let text = render(report);
+        let lines: Vec<Vec<String>> = text
+            .lines()
+            .map(|line| line.split(',').map(str::to_owned).collect())
+            .collect();
+        move |name| {
+            let index = lines[0].iter().position(|found| found == name);
+            lines[row + 1][index.expect(name)].clone()
         }
-        let golden = "nl_ssim,2,1,1,0,0,0,0,1,0.20654931437723745,1,0.81,0.82,0.75,0.9,";
-        assert!(lines[1].starts_with(golden), "{}", lines[1]);
-        let truth: Vec<_> = lines[1].split(',').take(COLUMNS.len()).collect();
-        assert!(
-            truth.join(",").ends_with(",1,1.5,2,0.9,0,wilson"),
-            "{}",
-            lines[1]
-        );
     }
 
     #[test]
-    fn what_is_not_there_is_an_empty_field() {
+    fn every_line_has_every_field_and_ends_with_crlf() {
+        let mut report = ReportAccumulator::default();
+        report.add(
+            &test_fixtures::done("a", 0.75, &[Verdict::Pass]),
+            &TruthEvaluation::default(),
+        );
+        report.add(
+            &test_fixtures::done("b", 0.75, &[]),
+            &test_fixtures::truth(1.5, 2.0, 0.9),
+        );
+        let report = report.finish();
+        let text = render(&report);
+        let lines: Vec<&str> = text.split("\r\n").collect();
+        assert_eq!((lines.len(), lines[5]), (6, ""));
+        let columns = lines[0].split(',').count();
+        assert!(
+            lines[..5]
+                .iter()
+                .all(|line| line.split(',').count() == columns)
+        );
+        let golden = "nl_ssim,2,1,1,0,0,0,0,1,0.20654931437723745,1,0.81,0.82,0.75,0.9,";
+        assert!(lines[1].starts_with(golden), "{}", lines[1]);
+        let value = fields(&report, 0);
+        let names = [
+            "truth_angle_le_5deg",
+            "truth_angle_median_deg",
+            "truth_tre_median_pct",
+        ];
+        assert_eq!(names.map(&value), ["1", "1.5", "2"]);
+        let names = ["truth_mask_iou_median", "truth_mirrored", "interval"];
+        assert_eq!(names.map(&value), ["0.9", "0", "wilson"]);
+    }
+
+    #[test]
+    fn every_column_has_a_value_in_a_full_report() {
+        let report = test_fixtures::full_report();
+        let text = render(&report);
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
+        for (name, value) in lines[0].iter().zip(&lines[3]) {
+            assert!(!value.is_empty(), "{name} is empty");
+        }
+    }
+
+    #[test]
+    fn a_missing_value_is_an_empty_field() {
         let text = render(&ReportAccumulator::default().finish());
         let line = text.lines().nth(2).expect("density");
         assert!(line.starts_with("density,0,0,0,0,0,0,0,"), "{line}");
@@ -230,18 +304,13 @@ mod tests {
     }
 
     #[test]
-    fn coverage_stands_under_its_names() {
-        let mut tally = ReportAccumulator::default();
+    fn risk_coverage_is_under_its_names() {
+        let mut report = ReportAccumulator::default();
         for (name, confidence, angle_deg) in [("a", 0.75, 1.0), ("b", 0.25, 90.0)] {
             let truth = test_fixtures::truth(angle_deg, 1.0, 0.9);
-            tally.add(&test_fixtures::sure(name, confidence), &truth);
+            report.add(&test_fixtures::with_confidence(name, confidence), &truth);
         }
-        let text = render(&tally.finish());
-        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split(',').collect()).collect();
-        let value = |name: &str| {
-            let place = lines[0].iter().position(|found| *found == name);
-            lines[4][place.expect(name)]
-        };
+        let value = fields(&report.finish(), 3);
         assert_eq!(value("metric"), "relief");
         assert_eq!(value("truth_confidence_n"), "2");
         assert_eq!(value("truth_confidence_failures_in_least_3"), "1");
@@ -252,10 +321,40 @@ mod tests {
     }
 
     #[test]
+    fn rules_reasons_and_thresholds_are_under_their_names() {
+        let mut report = ReportAccumulator::default();
+        for (name, first, second) in [
+            ("a", Verdict::Pass, Verdict::Pass),
+            ("b", Verdict::Pass, Verdict::Fail),
+            ("c", Verdict::Fail, Verdict::Fail),
+        ] {
+            let mut pair = test_fixtures::done(name, 0.8, &[first, second]);
+            for record in &mut pair.metrics {
+                record.verdicts[1].reason = Some(Reason::Mirrored);
+            }
+            report.add(&pair, &TruthEvaluation::default());
+        }
+        let value = fields(&report.finish(), 0);
+        assert_eq!(value("rules_double_read"), "3");
+        assert_eq!(value("either_fails_n"), "3");
+        assert_eq!(value("either_fails_acc"), (1.0 / 3.0).to_string());
+        assert_eq!(value("adjudicated_n"), "2");
+        assert_eq!(value("both_fail_acc"), (2.0 / 3.0).to_string());
+        let low = wilson_95(2, 3).expect("three")[0];
+        assert_eq!(value("both_fail_acc_ci95_low"), low.to_string());
+        assert_eq!(value("failed_mirrored"), "1");
+        assert_eq!(
+            [value("failed_angle"), value("failed_no_reason")],
+            ["0", "0"]
+        );
+        assert!(value("threshold_median").starts_with("0.4577"));
+    }
+
+    #[test]
     fn formulas_are_disarmed_and_quotes_doubled() {
-        assert_eq!(field("=1+1"), "'=1+1");
-        assert_eq!(field("-id"), "'-id");
-        assert_eq!(field("a,\"b\"\n"), "\"a,\"\"b\"\"\n\"");
-        assert_eq!(field("ensemble"), "ensemble");
+        assert_eq!(escape("=1+1"), "'=1+1");
+        assert_eq!(escape("-id"), "'-id");
+        assert_eq!(escape("a,\"b\"\n"), "\"a,\"\"b\"\"\n\"");
+        assert_eq!(escape("ensemble"), "ensemble");
     }
 }

@@ -1,41 +1,40 @@
 //! The report as LaTeX tables with `booktabs` rules and `siunitx` columns.
 
-use super::table::{self, ColumnFormat, Table, TableColumn};
-use super::{coverage_tables, scored};
+use super::comparison_tables::{comparisons, score_comparisons};
+use super::report_tables::{headline, tables};
+use super::risk_coverage_tables::full_tables;
+use super::table::{ColumnFormat, Table, TableColumn};
 use crate::report::model::Report;
 
-/// The report as LaTeX, to be read in by `\input`.
+/// Returns the report as LaTeX, for `\input`.
 pub(super) fn render(report: &Report) -> String {
     let mut blocks = vec![format!(
-        "% Needs \\usepackage{{booktabs}} and \\usepackage{{siunitx}}.\n% {}\n",
-        comment(&table::headline(report))
+        "% Needs \\usepackage{{booktabs}} and \\usepackage{{siunitx}}.\n\
+         % Thousands: \\sisetup{{group-digits = integer, group-minimum-digits = 4, group-separator = {{,}}}}.\n\
+         % {}\n",
+        comment(&headline(report))
     )];
     for warning in &report.warnings {
         blocks.push(format!("% Note: {}\n", comment(warning)));
     }
-    let mut tables = table::tables(report);
-    tables.extend(coverage_tables::full(report));
-    blocks.extend(
-        tables
-            .iter()
-            .chain(table::comparisons(report).as_ref())
-            .chain(scored::comparisons(report).as_ref())
-            .map(float),
-    );
+    let mut tables = tables(report);
+    tables.extend(full_tables(report));
+    tables.extend(comparisons(report));
+    tables.extend(score_comparisons(report));
+    blocks.extend(tables.iter().map(float));
     blocks.join("\n")
 }
 
-/// One table with its caption.
+/// Returns a floating table with its caption.
 fn float(table: &Table) -> String {
-    let columns: Vec<String> = (0..table.columns.len()).map(|i| column(table, i)).collect();
-    let heads = table.columns.iter().map(head);
-    let mut body = line(heads) + "    \\midrule\n";
+    let columns: Vec<String> = (0..table.columns.len())
+        .map(|i| column_type(table, i))
+        .collect();
+    let headers = table.columns.iter().map(header);
+    let mut body = line(headers) + "    \\midrule\n";
     for row in &table.rows {
-        body += &line(
-            row.iter()
-                .zip(&table.columns)
-                .map(|(cell, column)| shown(cell.as_deref(), *column)),
-        );
+        let cells = row.iter().zip(&table.columns);
+        body += &line(cells.map(|(cell, column)| cell_text(cell.as_deref(), *column)));
     }
     format!(
         "\\begin{{table}}\n  \\centering\\small\\setlength{{\\tabcolsep}}{{3pt}}\n  \\caption{{{}}}\n  \\begin{{tabular}}{{{}}}\n    \\toprule\n{body}    \
@@ -45,44 +44,36 @@ fn float(table: &Table) -> String {
     )
 }
 
-/// The column type; a number column is as wide as its longest cell.
-fn column(table: &Table, index: usize) -> String {
-    match table.columns[index].kind {
-        ColumnFormat::Words | ColumnFormat::IntervalMethod => "l".to_owned(),
-        ColumnFormat::Number(decimals) => {
-            let whole = |cell: Option<&String>| {
-                cell.map_or(1, |text| text.split('.').next().map_or(1, str::len))
-            };
-            let digits = table
-                .rows
-                .iter()
-                .map(|row| whole(row[index].as_ref()))
-                .fold(1, usize::max);
-            format!("S[table-format={digits}.{decimals}]")
-        }
+/// Returns the column type; a number column is as wide as its longest integer part.
+fn column_type(table: &Table, index: usize) -> String {
+    let ColumnFormat::Number(decimals) = table.columns[index].format else {
+        return "l".to_owned();
+    };
+    let integer_digits = |row: &Vec<Option<String>>| {
+        let number = row[index].as_deref().map_or("", |text| text);
+        let integer = number.split('.').next().unwrap_or_default();
+        integer.chars().filter(|c| *c != ',').count()
+    };
+    let digits = table.rows.iter().map(integer_digits).fold(1, usize::max);
+    format!("S[table-format={digits}.{decimals}]")
+}
+
+/// Returns a header; braces keep `siunitx` from reading it as a number.
+fn header(column: &TableColumn) -> String {
+    match column.format {
+        ColumnFormat::Text | ColumnFormat::Interval => escape(column.header),
+        ColumnFormat::Number(_) => format!("{{{}}}", escape(column.header)),
     }
 }
 
-/// A head; braces keep `siunitx` from reading it as a number.
-fn head(column: &TableColumn) -> String {
-    match column.kind {
-        ColumnFormat::Words | ColumnFormat::IntervalMethod => escape(column.head),
-        ColumnFormat::Number(_) => format!("{{{}}}", escape(column.head)),
-    }
-}
-
-fn shown(cell: Option<&str>, column: TableColumn) -> String {
-    match (cell, column.kind) {
-        (None, _) => missing(column).to_owned(),
-        (Some(text), ColumnFormat::IntervalMethod) => escape(text).replace('-', "--"),
-        (Some(text), ColumnFormat::Words | ColumnFormat::Number(_)) => escape(text),
-    }
-}
-
-const fn missing(column: TableColumn) -> &'static str {
-    match column.kind {
-        ColumnFormat::Words | ColumnFormat::IntervalMethod => "--",
-        ColumnFormat::Number(_) => "{--}",
+fn cell_text(cell: Option<&str>, column: TableColumn) -> String {
+    match (cell, column.format) {
+        (None, ColumnFormat::Text | ColumnFormat::Interval) => "--".to_owned(),
+        (None, ColumnFormat::Number(_)) => "{--}".to_owned(),
+        (Some(text), ColumnFormat::Interval) => escape(text).replace('-', "--"),
+        (Some(text), ColumnFormat::Text) => escape(text),
+        // To siunitx a comma is a decimal marker; it separates thousands itself.
+        (Some(text), ColumnFormat::Number(_)) => text.replace(',', ""),
     }
 }
 
@@ -90,12 +81,12 @@ fn line(cells: impl Iterator<Item = String>) -> String {
     format!("    {} \\\\\n", cells.collect::<Vec<_>>().join(" & "))
 }
 
-/// Text that cannot end its comment line.
+/// Returns text that cannot end its comment line.
 fn comment(text: &str) -> String {
     text.replace(['\n', '\r'], " ")
 }
 
-/// Text that LaTeX sets as it is.
+/// Escapes text so that LaTeX shows it unchanged.
 fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for c in text.chars() {
@@ -119,41 +110,10 @@ fn escape(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{escape, render};
-    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
-
-    const GOLDEN: &str = r"\begin{table}
-  \centering\small\setlength{\tabcolsep}{3pt}
-  \caption{Acc is the share passed of those passed or failed by reviewers; SSIM, IoU and Dice are means over the n finished pairs, by pixel; IoU box is of bounding boxes.}
-  \begin{tabular}{l S[table-format=2.0] S[table-format=1.3] l S[table-format=1.3] S[table-format=1.3] S[table-format=1.3] S[table-format=1.3]}
-    \toprule
-    Method & {n} & {Acc} & 95\% Wilson & {SSIM} & {IoU} & {IoU box} & {Dice} \\
-    \midrule
-    Non-luminous SSIM & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
-    Pixel density & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
-    Ensemble & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
-    Relief & 12 & {--} & -- & 0.810 & 0.750 & 0.900 & 0.857 \\
-    \bottomrule
-  \end{tabular}
-\end{table}
-";
+    use super::escape;
 
     #[test]
-    fn table_is_booktabs_with_columns_as_wide_as_their_numbers() {
-        let mut tally = ReportAccumulator::default();
-        for i in 0..12 {
-            tally.add(
-                &test_fixtures::done(&format!("p{i:02}"), 0.75, &[]),
-                &TruthEvaluation::default(),
-            );
-        }
-        let text = render(&tally.finish());
-        assert!(text.contains(GOLDEN), "{text}");
-        assert!(text.starts_with("% Needs"));
-    }
-
-    #[test]
-    fn nothing_in_a_cell_is_a_command() {
+    fn cells_cannot_hold_commands() {
         assert_eq!(
             escape(r"a_b & 5 % \x {y}"),
             r"a\_b \& 5 \% \textbackslash{}x \{y\}"

@@ -1,43 +1,43 @@
-//! The forms a report can be printed in.
+//! The formats of a report.
 
 mod agreement_text;
-mod coverage_tables;
+mod comparison_tables;
 mod csv;
-mod csv_fields;
-mod failed;
 mod html;
 mod latex;
 mod markdown;
-mod scored;
+mod report_tables;
+mod risk_coverage_tables;
+#[cfg(test)]
+mod snapshot_tests;
 mod table;
 mod text;
-mod work;
 
 use super::gallery::Gallery;
 use super::model::Report;
 
-pub use agreement_text::agree_text;
-pub use html::{Cover, MOST_BYTES, page};
+pub use agreement_text::agreement_text;
+pub use html::{Cover, MAX_PAGE_BYTES, page};
 
-/// A form of the report.
+/// A format of the report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ReportFormat {
     /// Aligned tables for a terminal of 80 columns.
     Text,
-    /// The report as it is, every number in full.
+    /// The whole report, numbers with all digits.
     Json,
-    /// One line a metric, every number in full (RFC 4180).
+    /// One line a metric, numbers with all digits (RFC 4180).
     Csv,
     /// Tables of GitHub's dialect.
     Markdown,
     /// Tables with `booktabs` and `siunitx`.
     Latex,
-    /// One page with its pictures in it, which needs no script and no other file.
+    /// One page with its images in it, which needs no script and no other file.
     Html,
 }
 
 impl ReportFormat {
-    /// Every form.
+    /// Every format.
     pub const ALL: [Self; 6] = [
         Self::Text,
         Self::Json,
@@ -47,7 +47,7 @@ impl ReportFormat {
         Self::Html,
     ];
 
-    /// Name on the command line.
+    /// Returns the name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Text => "text",
@@ -79,7 +79,7 @@ impl std::str::FromStr for ReportFormat {
     }
 }
 
-/// The report in a form; ends with a line end. [`page`] gives the page with pictures.
+/// Returns the report in a format; ends with a line end. [`page`] returns the HTML page with images.
 pub fn render(report: &Report, format: ReportFormat) -> String {
     match format {
         ReportFormat::Text => text::render(report),
@@ -91,7 +91,7 @@ pub fn render(report: &Report, format: ReportFormat) -> String {
     }
 }
 
-/// The report as indented JSON.
+/// Returns the report as indented JSON.
 fn json(report: &Report) -> String {
     let mut text = serde_json::to_string_pretty(report)
         .expect("a report holds only strings, finite numbers, lists and fields");
@@ -115,13 +115,13 @@ mod tests {
     }
 
     #[test]
-    fn json_has_the_fixed_names_and_nulls_where_nobody_read() {
-        let mut tally = ReportAccumulator::default();
-        tally.add(
+    fn json_has_the_fixed_names_and_nulls_without_verdicts() {
+        let mut report = ReportAccumulator::default();
+        report.add(
             &test_fixtures::done("a", 0.75, &[]),
             &TruthEvaluation::default(),
         );
-        let text = render(&tally.finish(), ReportFormat::Json);
+        let text = render(&report.finish(), ReportFormat::Json);
         let value: Value = serde_json::from_str(&text).expect("the report is JSON");
         assert_eq!((&value["schema"], &value["pairs"]), (&json!(1), &json!(1)));
         let metrics: Vec<_> = value["rows"].as_array().expect("rows").iter().collect();
@@ -130,7 +130,7 @@ mod tests {
         for (row, metric) in metrics.iter().zip(names) {
             assert_eq!(row["metric"], metric);
             assert_eq!(
-                (&row["n"], &row["read"], &row["passed"]),
+                (&row["n"], &row["judged"], &row["passed"]),
                 (&json!(1), &json!(0), &json!(0))
             );
             assert_eq!(
@@ -148,19 +148,22 @@ mod tests {
     }
 
     #[test]
-    fn every_form_names_the_interval_that_was_asked_for() {
-        let mut tally = ReportAccumulator::default();
+    fn every_format_names_the_interval_that_was_asked_for() {
+        let mut report = ReportAccumulator::default();
         for (name, verdict) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
             let pair = test_fixtures::done(name, 0.75, &[verdict]);
-            tally.add(&pair, &test_fixtures::truth(1.0, 2.0, 0.9));
+            report.add(&pair, &test_fixtures::truth(1.0, 2.0, 0.9));
         }
-        let report = tally.finish().with_interval(IntervalMethod::Exact);
+        let report = report.finish().with_interval(IntervalMethod::Exact);
         let row = &report.rows[0];
-        assert_eq!(row.acc_ci95, IntervalMethod::Exact.of(1, 2));
+        assert_eq!(row.acc_ci95, IntervalMethod::Exact.interval_95(1, 2));
         let truth = row.truth.as_ref().expect("both have truth");
-        assert_eq!(truth.acc_ci95, IntervalMethod::Exact.of(2, 2));
-        let rules = row.rules.expect("both are read");
-        assert_eq!(rules.adjudicated.ci95, IntervalMethod::Exact.of(1, 2));
+        assert_eq!(truth.acc_ci95, IntervalMethod::Exact.interval_95(2, 2));
+        let rules = row.rules.expect("both are judged");
+        assert_eq!(
+            rules.adjudicated.ci95,
+            IntervalMethod::Exact.interval_95(1, 2)
+        );
         for format in ReportFormat::ALL {
             let text = render(&report, format);
             let names = [
@@ -176,12 +179,12 @@ mod tests {
 
     #[test]
     fn json_truth_has_the_fixed_names() {
-        let mut tally = ReportAccumulator::default();
-        tally.add(
+        let mut report = ReportAccumulator::default();
+        report.add(
             &test_fixtures::done("a", 0.75, &[]),
             &test_fixtures::truth(1.0, 2.0, 0.9),
         );
-        let text = render(&tally.finish(), ReportFormat::Json);
+        let text = render(&report.finish(), ReportFormat::Json);
         let value: Value = serde_json::from_str(&text).expect("the report is JSON");
         let truth = &value["rows"][2]["truth"];
         let expected = json!({

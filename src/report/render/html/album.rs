@@ -1,53 +1,54 @@
-//! The pictures of the page, as many as there is room for.
+//! The images of the page, as many as there is room for.
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use maud::{Markup, PreEscaped, html};
 
 use crate::report::gallery::{Gallery, GalleryItem, GalleryReason};
+use crate::report::number_format::format_count;
 
-/// What the three pictures of a shot are, for who cannot see them.
+/// Descriptions of the three images of a result.
 const LAYERS: [&str; 3] = [
     "print",
-    "relief laid on the print",
+    "relief aligned to the print",
     "edges of the relief's strokes over the print",
 ];
 
-/// The groups that have something to show.
+/// The groups of images on the page.
 pub(super) struct Album {
     seed: u64,
     groups: Vec<AlbumGroup>,
 }
 
 struct AlbumGroup {
-    kind: GalleryReason,
-    of: u64,
-    shots: Vec<String>,
+    reason: GalleryReason,
+    total: u64,
+    figures: Vec<String>,
 }
 
 impl Album {
-    /// As many pictures as take at most `room` bytes, a kind having no more than the others while they all have some.
+    /// Returns as many images as fit into `room` bytes, taking one of each group in turn.
     pub(super) fn new(gallery: &Gallery, room: usize) -> Self {
-        let page = |kind, of| AlbumGroup {
-            kind,
-            of,
-            shots: Vec::new(),
+        let empty = |reason, total| AlbumGroup {
+            reason,
+            total,
+            figures: Vec::new(),
         };
         let mut groups: Vec<AlbumGroup> = gallery
             .groups
             .iter()
-            .map(|group| page(group.kind, group.of))
+            .map(|group| empty(group.reason, group.total))
             .collect();
         let mut left = room;
-        let longest = gallery.groups.iter().map(|group| group.shots.len()).max();
+        let longest = gallery.groups.iter().map(|group| group.items.len()).max();
         for round in 0..longest.unwrap_or(0) {
-            for (page, group) in groups.iter_mut().zip(&gallery.groups) {
-                let Some(shot) = group.shots.get(round).filter(|shot| size(shot) <= left) else {
+            for (shown, group) in groups.iter_mut().zip(&gallery.groups) {
+                let Some(item) = group.items.get(round).filter(|item| size(item) <= left) else {
                     continue;
                 };
-                let drawn = figure(shot).into_string();
-                if let Some(rest) = left.checked_sub(drawn.len()) {
+                let figure = figure(item).into_string();
+                if let Some(rest) = left.checked_sub(figure.len()) {
                     left = rest;
-                    page.shots.push(drawn);
+                    shown.figures.push(figure);
                 }
             }
         }
@@ -57,96 +58,96 @@ impl Album {
         }
     }
 
-    /// Whether there is nothing to show.
+    /// Returns whether there are no groups.
     pub(super) const fn is_empty(&self) -> bool {
         self.groups.is_empty()
     }
 
-    /// All groups with what they are.
+    /// Returns all groups with their introductions.
     pub(super) fn body(&self) -> Markup {
         html! {
-            p { "Each result three times: the print, the relief laid on it in raking light, and the edges of the relief's \
-                strokes over the print in orange. What looks the same under several methods is shown once." }
-            @for page in &self.groups { (self.group(page)) }
+            p { "Each result has three images: the print, the aligned relief lit from the side, and the print with the \
+                edges of the relief's strokes in orange. Results that look the same for several methods are shown once." }
+            @for group in &self.groups { (self.group(group)) }
         }
     }
 
-    fn group(&self, page: &AlbumGroup) -> Markup {
-        let (id, title, what) = words(page.kind);
+    fn group(&self, group: &AlbumGroup) -> Markup {
+        let (id, title, introduction) = texts(group.reason);
         html! {
-            h3 id={ "pictures-" (id) } { (title) }
+            h3 id={ "images-" (id) } { (title) }
             p {
-                (what) " " (page.shots.len()) " of " (page.of) " are shown"
-                @if page.kind == GalleryReason::Lot { ", drawn by lot with the seed " (self.seed) }
+                (introduction) " " (group.figures.len()) " of " (format_count(group.total)) " are shown"
+                @if group.reason == GalleryReason::Random { ", chosen at random with seed " (self.seed) }
                 "."
             }
-            ul.shots { @for shot in &page.shots { li { (PreEscaped(shot)) } } }
+            ul.items { @for figure in &group.figures { li { (PreEscaped(figure)) } } }
         }
     }
 }
 
-/// Name in addresses, title and sentence of a kind.
-const fn words(kind: GalleryReason) -> (&'static str, &'static str, &'static str) {
-    match kind {
+/// Returns the name in addresses, the title and the introduction of a group.
+const fn texts(reason: GalleryReason) -> (&'static str, &'static str, &'static str) {
+    match reason {
         GalleryReason::Failed => (
             "failed",
             "Failed by reviewers",
-            "Results that reviewers failed, in the order of names.",
+            "Results that reviewers failed, by name.",
         ),
         GalleryReason::Conflict => (
             "conflict",
-            "Reviewers contradict each other",
-            "Results that one passed and another failed, and nobody has settled.",
+            "Reviewers disagree",
+            "Results that one reviewer passed and another failed, and that nobody has adjudicated.",
         ),
         GalleryReason::OffTruth => (
             "off-truth",
-            "Off the truth",
+            "Off the ground truth",
             "Results that miss the true alignment or the true stroke tops.",
         ),
-        GalleryReason::Lot => (
-            "lot",
-            "By lot",
-            "Results of the ensemble, whatever was said of them.",
+        GalleryReason::Random => (
+            "random",
+            "Random sample",
+            "Results of the ensemble, independent of any verdict.",
         ),
     }
 }
 
-/// Bytes that the pictures of a shot take at least.
-fn size(shot: &GalleryItem) -> usize {
-    let pictures = shot.pictures.iter().flatten();
-    pictures.map(|picture| picture.len().div_ceil(3) * 4).sum()
+/// Returns the least number of bytes that the images of a result take as base64.
+fn size(item: &GalleryItem) -> usize {
+    let images = item.images.iter().flatten();
+    images.map(|image| image.len().div_ceil(3) * 4).sum()
 }
 
-fn figure(shot: &GalleryItem) -> Markup {
-    let methods: Vec<&str> = shot.metrics.iter().map(|metric| metric.title()).collect();
-    let [mesh, print] = &shot.files;
+fn figure(item: &GalleryItem) -> Markup {
+    let methods: Vec<&str> = item.metrics.iter().map(|metric| metric.title()).collect();
+    let [mesh, print] = &item.files;
     html! {
-        figure class="shot" {
+        figure class="item" {
             div.three {
-                @for (picture, layer) in shot.pictures.iter().zip(LAYERS) { (image(shot, picture.as_deref(), layer)) }
+                @for (bytes, layer) in item.images.iter().zip(LAYERS) { (image(item, bytes.as_deref(), layer)) }
             }
             figcaption {
-                strong { (shot.pair) } @if let Some(character) = &shot.character { " " span.character title=(code_points(character)) { (character) } }
+                strong { (item.pair) } @if let Some(character) = &item.character { " " span.character title=(code_points(character)) { (character) } }
                 span.methods { (methods.join(", ")) }
-                @if !shot.numbers.is_empty() { span { (shot.numbers) } }
-                @for said in &shot.said { span.said { (said) } }
-                @if let Some(trouble) = &shot.trouble { span.said { "not drawn: " (trouble) } }
+                @if !item.numbers.is_empty() { span { (item.numbers) } }
+                @for verdict in &item.verdicts { span.verdict { (verdict) } }
+                @if let Some(problem) = &item.problem { span.verdict { "not drawn: " (problem) } }
                 span.files { (mesh) " · " (print) }
             }
         }
     }
 }
 
-/// A character by its numbers, such as `U+20041`, for who has no font with it.
+/// Returns the code points of a character, such as `U+20041`, for readers without a font for it.
 fn code_points(character: &str) -> String {
     let points = character.chars().map(|c| format!("U+{:04X}", u32::from(c)));
     points.collect::<Vec<_>>().join(" ")
 }
 
-fn image(shot: &GalleryItem, picture: Option<&[u8]>, layer: &str) -> Markup {
-    let alt = format!("{}: {layer}", shot.pair);
-    let Some(bytes) = picture else {
-        return html! { span.missing { "no picture" } };
+fn image(item: &GalleryItem, bytes: Option<&[u8]>, layer: &str) -> Markup {
+    let alt = format!("{}: {layer}", item.pair);
+    let Some(bytes) = bytes else {
+        return html! { span.missing { "no image" } };
     };
     let source = format!("data:image/jpeg;base64,{}", BASE64_STANDARD.encode(bytes));
     html! { img alt=(alt) src=(source); }

@@ -1,25 +1,25 @@
-//! Tables as HTML: a caption, heads with their scope, the first cell of a row as its head.
+//! Tables as HTML: a caption, headers with their scope, the first cell of a row as its header.
 
 use maud::{Markup, html};
 
 use crate::report::render::table::{ColumnFormat, Table, TableColumn};
 
-/// A table in a frame that scrolls sideways where it is too wide.
+/// Returns a table in a frame that scrolls sideways where it is too wide.
 pub(super) fn table(table: &Table) -> Markup {
     html! {
         div.wide tabindex="0" role="region" aria-label=(name(table)) {
             table {
                 caption { span { (table.caption) } }
-                thead { tr { @for column in &table.columns { th scope="col" class=(class(column)) { (column.head) } } } }
+                thead { tr { @for column in &table.columns { th scope="col" class=(class(column)) { (column.header) } } } }
                 tbody { @for row in &table.rows { (line(table, row)) } }
             }
         }
     }
 }
 
-/// What the table is of: the head of its first column.
+/// Returns the name of a table: the header of its first column.
 fn name(table: &Table) -> &str {
-    table.columns.first().map_or("", |column| column.head)
+    table.columns.first().map_or("", |column| column.header)
 }
 
 fn line(table: &Table, row: &[Option<String>]) -> Markup {
@@ -27,29 +27,29 @@ fn line(table: &Table, row: &[Option<String>]) -> Markup {
         tr {
             @for (i, (cell, column)) in row.iter().zip(&table.columns).enumerate() {
                 @if i == 0 {
-                    th scope="row" { (shown(cell.as_deref(), column.kind)) }
+                    th scope="row" { (cell_text(cell.as_deref(), column.format)) }
                 } @else {
-                    td class=(class(column)) { (shown(cell.as_deref(), column.kind)) }
+                    td class=(class(column)) { (cell_text(cell.as_deref(), column.format)) }
                 }
             }
         }
     }
 }
 
-/// A cell with the dash or the minus that its hyphen stands for.
-fn shown(cell: Option<&str>, kind: ColumnFormat) -> Markup {
-    match (cell, kind) {
-        (Some(text), ColumnFormat::IntervalMethod) => html! { (text.replace('-', "\u{2013}")) },
+/// Returns a cell with its hyphen replaced by an en dash or a minus sign.
+fn cell_text(cell: Option<&str>, format: ColumnFormat) -> Markup {
+    match (cell, format) {
+        (Some(text), ColumnFormat::Interval) => html! { (text.replace('-', "\u{2013}")) },
         (Some(text), ColumnFormat::Number(_)) => html! { (text.replace('-', "\u{2212}")) },
-        (Some(text), ColumnFormat::Words) => html! { (text) },
+        (Some(text), ColumnFormat::Text) => html! { (text) },
         (None, _) => html! { span.none title="does not exist" { "\u{2013}" } },
     }
 }
 
 const fn class(column: &TableColumn) -> &'static str {
-    match column.kind {
-        ColumnFormat::Words => "words",
-        ColumnFormat::IntervalMethod => "interval",
+    match column.format {
+        ColumnFormat::Text => "text",
+        ColumnFormat::Interval => "interval",
         ColumnFormat::Number(_) => "number",
     }
 }

@@ -1,4 +1,4 @@
-//! The report as one page that holds its style and pictures, and needs no script.
+//! The report as one HTML page that holds its style and images, and needs no script.
 
 mod album;
 mod markup;
@@ -8,31 +8,31 @@ mod sections;
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 use self::album::Album;
-use super::table;
+use super::report_tables::headline;
 use crate::report::gallery::Gallery;
 use crate::report::model::Report;
 
-/// Most bytes of a page.
-pub const MOST_BYTES: usize = 10_000_000;
-/// Room left for what is said of how many pictures are shown.
-const SLACK: usize = 10_000;
+/// Maximal size of a page, bytes.
+pub const MAX_PAGE_BYTES: usize = 10_000_000;
+/// Bytes reserved for the sentences on how many images are shown.
+const RESERVED_BYTES: usize = 10_000;
 const STYLE: &str = include_str!("../../../../assets/report/report.css");
-/// Nothing is fetched, and nothing runs.
+/// Forbids the page to load or run anything.
 const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'";
 
-/// What stands on the page beside its numbers.
+/// What the page shows besides the report.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Cover {
     /// Name of the project.
     pub project: Option<String>,
-    /// When it was made, such as `2026-11-21`.
+    /// The date, such as `2026-11-21`.
     pub date: Option<String>,
 }
 
-/// The page, at most [`MOST_BYTES`] long: where there are more pictures, fewer are shown, and it says of how many.
+/// Returns the page, at most [`MAX_PAGE_BYTES`] long: with too many images it shows fewer and says of how many.
 pub fn page(report: &Report, gallery: &Gallery, cover: &Cover) -> String {
     let bare = document(report, &Album::new(gallery, 0), cover).into_string();
-    let room = MOST_BYTES.saturating_sub(bare.len() + SLACK);
+    let room = MAX_PAGE_BYTES.saturating_sub(bare.len() + RESERVED_BYTES);
     let mut page = document(report, &Album::new(gallery, room), cover).into_string();
     page.push('\n');
     page
@@ -53,11 +53,11 @@ fn document(report: &Report, album: &Album, cover: &Cover) -> Markup {
                 style { (PreEscaped(STYLE)) }
             }
             body {
-                a.skip href="#main" { "To the report" }
+                a.skip href="#main" { "Skip to the report" }
                 header {
-                    p.kind { "Report of aligned woodblock characters" }
+                    p.kind { "Report on aligned woodblock characters" }
                     h1 { (title) }
-                    p { (table::headline(report)) @if let Some(date) = &cover.date { " · made " (date) } }
+                    p { (headline(report)) @if let Some(date) = &cover.date { " · " (date) } }
                 }
                 nav aria-label="Contents" {
                     ol { @for section in &sections { li { a href={ "#" (section.id) } { (section.title) } } } }
@@ -71,7 +71,7 @@ fn document(report: &Report, album: &Album, cover: &Cover) -> Markup {
                     }
                 }
                 footer {
-                    p { "Made by mocban " (env!("CARGO_PKG_VERSION")) ". The same numbers in full: "
+                    p { "mocban " (env!("CARGO_PKG_VERSION")) ". All digits: "
                         code { "mocban report --format json" } "." }
                 }
             }
@@ -81,41 +81,41 @@ fn document(report: &Report, album: &Album, cover: &Cover) -> Markup {
 
 #[cfg(test)]
 mod tests {
-    use super::{Cover, MOST_BYTES, page};
+    use super::{Cover, MAX_PAGE_BYTES, page};
     use crate::domain::{PairName, ThresholdMetric, Verdict};
     use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason};
     use crate::report::{Report, ReportAccumulator, TruthEvaluation, test_fixtures};
 
     fn report() -> Report {
-        let mut tally = ReportAccumulator::default();
+        let mut report = ReportAccumulator::default();
         for (name, second) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
             let pair = test_fixtures::done(name, 0.75, &[Verdict::Pass, second]);
-            tally.add(&pair, &test_fixtures::truth(1.0, 2.0, 0.9));
+            report.add(&pair, &test_fixtures::truth(1.0, 2.0, 0.9));
         }
         let class = crate::domain::FailureClass::BadInput;
         let failed = test_fixtures::failed("c", class, "<script>alert(1)</script>.stl is empty");
-        tally.add(&failed, &TruthEvaluation::default());
-        tally.finish()
+        report.add(&failed, &TruthEvaluation::default());
+        report.finish()
     }
 
-    fn shot(name: &str, bytes: usize) -> GalleryItem {
+    fn item(name: &str, bytes: usize) -> GalleryItem {
         GalleryItem {
             pair: PairName::new(name).expect("test names are ids"),
             character: Some("<b>".to_owned()),
             files: ["a\"><img src=x>.stl".to_owned(), "a&b.png".to_owned()],
             metrics: ThresholdMetric::ALL.to_vec(),
             numbers: "IoU 0.8".to_owned(),
-            said: vec!["lan: fail (“<i>why</i>”)".to_owned()],
-            pictures: [1_u8, 2, 3].map(|byte| Some(vec![byte; bytes])),
-            trouble: None,
+            verdicts: vec!["lan: fail (“<i>why</i>”)".to_owned()],
+            images: [1_u8, 2, 3].map(|byte| Some(vec![byte; bytes])),
+            problem: None,
         }
     }
 
-    fn gallery(shots: usize, bytes: usize) -> Gallery {
-        let group = |kind| GalleryGroup {
-            kind,
-            of: 400,
-            shots: (0..shots).map(|i| shot(&format!("p{i}"), bytes)).collect(),
+    fn gallery(items: usize, bytes: usize) -> Gallery {
+        let group = |reason| GalleryGroup {
+            reason,
+            total: 400,
+            items: (0..items).map(|i| item(&format!("p{i}"), bytes)).collect(),
         };
         Gallery {
             seed: 11,
@@ -124,11 +124,11 @@ mod tests {
     }
 
     #[test]
-    fn a_page_never_exceeds_ten_megabytes_and_says_how_many_are_shown() {
+    fn a_page_never_exceeds_its_limit_and_says_how_many_images_it_shows() {
         for (shots, bytes) in [(0, 0), (20, 20_000), (80, 60_000), (3, 4_000_000)] {
             let text = page(&report(), &gallery(shots, bytes), &Cover::default());
-            assert!(text.len() <= MOST_BYTES, "{}", text.len());
-            let shown = text.matches("<figure class=\"shot\"").count();
+            assert!(text.len() <= MAX_PAGE_BYTES, "{}", text.len());
+            let shown = text.matches("<figure class=\"item\"").count();
             let all_fit = shots * bytes * 4 < 6_000_000;
             assert_eq!(shown == 4 * shots, all_fit, "{shown} of {shots} x {bytes}");
             let said: usize = (0..=shots)
@@ -139,10 +139,10 @@ mod tests {
     }
 
     #[test]
-    fn where_few_fit_each_kind_has_its_share() {
+    fn with_little_room_each_group_has_its_share() {
         let text = page(&report(), &gallery(80, 60_000), &Cover::default());
-        for kind in ["failed", "conflict", "off-truth", "lot"] {
-            let group = text.split(&format!("id=\"pictures-{kind}\"")).nth(1);
+        for kind in ["failed", "conflict", "off-truth", "random"] {
+            let group = text.split(&format!("id=\"images-{kind}\"")).nth(1);
             let group = group.expect(kind).split("</ul>").next().expect(kind);
             let shown = group.matches("<figure").count();
             assert!((10..=11).contains(&shown), "{kind}: {shown}");
@@ -150,7 +150,7 @@ mod tests {
     }
 
     #[test]
-    fn names_notes_and_errors_cannot_leave_their_place() {
+    fn names_notes_and_errors_cannot_add_markup() {
         let cover = Cover {
             project: Some("</title><script>".to_owned()),
             date: None,
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_comes_from_outside_and_every_link_leads_somewhere() {
+    fn the_page_loads_nothing_and_every_link_has_a_target() {
         let text = page(&report(), &gallery(1, 9), &Cover::default());
         for attribute in ["src=\"", "href=\""] {
             for rest in text.split(attribute).skip(1) {
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn every_table_has_a_caption_and_heads_with_a_scope() {
+    fn every_table_has_a_caption_and_headers_with_a_scope() {
         let text = page(&report(), &Gallery::default(), &Cover::default());
         let count = |part: &str| text.matches(part).count();
         assert!(count("<table") > 5);

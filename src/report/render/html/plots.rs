@@ -1,35 +1,37 @@
-//! Small drawings of the numbers in the tables beside them, as SVG in the colours of the page.
+//! Plots of the numbers in the tables next to them, as SVG in the colours of the page.
 
 use maud::{Markup, html};
 
-use crate::report::model::{Basis, Report};
-use crate::report::render::table::fixed;
+use crate::report::comparison::Basis;
+use crate::report::model::Report;
+use crate::report::number_format::NumberStyle::{self, Milliseconds, Share};
+use crate::report::number_format::format_number;
 use crate::report::thresholds::ThresholdDistribution;
 
-/// Width of a drawing in its own units.
+/// Width of a plot in SVG units.
 const WIDTH: f64 = 460.0;
-/// Where a drawing's rows begin, right of their names.
+/// Left end of the rows, right of their names.
 const LEFT: f64 = 130.0;
-/// Where they end, left of the numbers.
+/// Right end of the rows, left of the numbers.
 const RIGHT: f64 = 400.0;
 /// Height of a row.
 const ROW: f64 = 26.0;
-/// Height of the scale below the rows.
+/// Height of the axis below the rows.
 const SCALE: f64 = 24.0;
 /// Height of the bars of a distribution.
 const BARS: f64 = 54.0;
-/// Parts of a scale that are marked.
-const MARKS: usize = 5;
+/// Intervals of an axis.
+const TICKS: usize = 5;
 
 /// One row: a name, a value, and the ends of the line through it.
 struct PlotRow {
     name: &'static str,
     value: f64,
     ends: [f64; 2],
-    told: String,
+    label: String,
 }
 
-/// Acc of every method with its interval; nothing where there is none.
+/// Returns Acc of every metric with its interval; empty without any.
 pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
     let found = report.rows.iter().filter_map(|row| {
         let truth = row.truth.as_ref();
@@ -45,106 +47,106 @@ pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
             name: row.metric.title(),
             value,
             ends: ends?,
-            told: format!("{value:.3}"),
+            label: format_number(value, Share),
         })
     });
     let rows: Vec<PlotRow> = found.collect();
     let lowest = rows.iter().map(|row| row.ends[0]).fold(1.0, f64::min);
-    // The scale begins at a tenth, so that near-perfect rows can still be told apart.
+    // The axis begins at a multiple of 0.1 that leaves near-perfect rows distinguishable.
     let from = ((lowest * 10.0).floor() / 10.0).min(0.9);
-    let by = match basis {
-        Basis::Verdicts => "by reviewers",
-        Basis::Truth => "by truth",
-    };
-    let what = format!("Acc {by} with its {} interval", report.interval.title());
-    lines(&rows, [from, 1.0], 2, &what)
+    let (by, interval) = (basis.name(), report.interval.title());
+    let caption = format!("Acc by {by} with its {interval} interval");
+    dot_plot(&rows, [from, 1.0], Share, &caption)
 }
 
-/// The median time of every stage with its 95th percentile, in milliseconds.
+/// Returns the median time of every stage with its 95th percentile, in milliseconds.
 pub(super) fn times(report: &Report) -> Markup {
     let found = report.times.iter().map(|time| PlotRow {
         name: time.stage.name(),
         value: time.median_ms,
         ends: [time.median_ms, time.p95_ms],
-        told: format!("{:.0}", time.median_ms),
+        label: format_number(time.median_ms, Milliseconds),
     });
     let rows: Vec<PlotRow> = found.collect();
     let longest = rows.iter().map(|row| row.ends[1]).fold(1.0, f64::max);
-    let what = "Milliseconds a pair by stage: the median, with a line to the 95th percentile";
-    lines(&rows, [0.0, round_up(longest)], 0, what)
+    let caption = "Milliseconds a pair by stage: the median, with a line to the 95th percentile";
+    dot_plot(&rows, [0.0, round_up(longest)], Milliseconds, caption)
 }
 
-/// The next number of one digit and zeros.
+/// Rounds up to a number of one digit and zeros.
 fn round_up(number: f64) -> f64 {
     let unit = 10.0_f64.powf(number.log10().floor());
     (number / unit).ceil() * unit
 }
 
-/// Rows of points on lines over a scale; nothing without rows.
-fn lines(rows: &[PlotRow], [from, to]: [f64; 2], decimals: usize, what: &str) -> Markup {
+/// Returns rows of points on lines above an axis; empty without rows.
+fn dot_plot(rows: &[PlotRow], [from, to]: [f64; 2], style: NumberStyle, caption: &str) -> Markup {
     let place = |value: f64| LEFT + (RIGHT - LEFT) * (value - from) / (to - from);
     let below = ROW * rows.len() as f64;
-    let told: Vec<String> = rows
+    let labels: Vec<String> = rows
         .iter()
-        .map(|row| format!("{} {}", row.name, row.told))
+        .map(|row| format!("{} {}", row.name, row.label))
         .collect();
-    let alt = format!("{what}: {}", told.join(", "));
+    let alt = format!("{caption}: {}", labels.join(", "));
     let drawing = html! {
-        @for i in 0..=MARKS {
-            @let value = from + (to - from) * i as f64 / MARKS as f64;
+        @for i in 0..=TICKS {
+            @let value = from + (to - from) * i as f64 / TICKS as f64;
             line.grid x1=(at(place(value))) x2=(at(place(value))) y1="0" y2=(at(below)) {}
-            text.mark x=(at(place(value))) y=(at(below + 16.0)) { (fixed(Some(value), decimals).unwrap_or_default()) }
+            text.mark x=(at(place(value))) y=(at(below + 16.0)) { (tick(value, style)) }
         }
         @for (i, row) in rows.iter().enumerate() {
             @let y = ROW * (i as f64 + 0.5);
             text.name x="0" y=(at(y + 4.0)) { (row.name) }
             line.span x1=(at(place(row.ends[0]))) x2=(at(place(row.ends[1]))) y1=(at(y)) y2=(at(y)) {}
             circle.point cx=(at(place(row.value))) cy=(at(y)) r="4.5" {}
-            text.told x=(at(RIGHT + 12.0)) y=(at(y + 4.0)) { (row.told) }
+            text.value x=(at(RIGHT + 12.0)) y=(at(y + 4.0)) { (row.label) }
         }
     };
-    html! { @if !rows.is_empty() { (figure(below + SCALE, &alt, what, &drawing)) } }
+    html! { @if !rows.is_empty() { (figure(below + SCALE, &alt, caption, &drawing)) } }
 }
 
-/// The distribution of every metric's thresholds, one under the other on the same scale.
+/// Returns the distribution of every metric's thresholds, one below the other on the same axis.
 pub(super) fn thresholds(report: &Report) -> Markup {
     let found = &report.thresholds;
     let below = (BARS + 14.0) * found.len() as f64;
-    let what =
-        "Results by the height of their cut, from the lowest point of a depth map to its highest";
-    let told: Vec<String> = found
+    let caption =
+        "Results by relative threshold height, from the lowest point of a depth map to its highest";
+    let labels: Vec<String> = found
         .iter()
-        .map(|cuts| format!("{} median {:.3}", cuts.metric.title(), cuts.median))
+        .map(|found| {
+            let median = format_number(found.median, Share);
+            format!("{} median {median}", found.metric.title())
+        })
         .collect();
-    let alt = format!("{what}: {}", told.join(", "));
+    let alt = format!("{caption}: {}", labels.join(", "));
     let drawing = html! {
-        @for (i, cuts) in found.iter().enumerate() { (bars(cuts, (BARS + 14.0) * i as f64)) }
-        @for i in 0..=MARKS {
-            @let share = i as f64 / MARKS as f64;
+        @for (i, found) in found.iter().enumerate() { (bars(found, (BARS + 14.0) * i as f64)) }
+        @for i in 0..=TICKS {
+            @let share = i as f64 / TICKS as f64;
             text.mark x=(at(LEFT + (RIGHT - LEFT) * share)) y=(at(below + 12.0)) { (format!("{share:.1}")) }
         }
     };
-    figure(below + SCALE, &alt, what, &drawing)
+    figure(below + SCALE, &alt, caption, &drawing)
 }
 
-fn bars(cuts: &ThresholdDistribution, top: f64) -> Markup {
-    let most = cuts.bins.iter().copied().max().unwrap_or(0).max(1) as f64;
-    let wide = (RIGHT - LEFT) / cuts.bins.len() as f64;
+fn bars(found: &ThresholdDistribution, top: f64) -> Markup {
+    let most = found.bins.iter().copied().max().unwrap_or(0).max(1) as f64;
+    let wide = (RIGHT - LEFT) / found.bins.len() as f64;
     let base = top + BARS;
-    let median = LEFT + (RIGHT - LEFT) * cuts.median;
+    let median = LEFT + (RIGHT - LEFT) * found.median;
     html! {
-        text.name x="0" y=(at(base - 4.0)) { (cuts.metric.title()) }
-        @for (i, n) in cuts.bins.iter().enumerate().filter(|(_, n)| **n > 0) {
+        text.name x="0" y=(at(base - 4.0)) { (found.metric.title()) }
+        @for (i, n) in found.bins.iter().enumerate().filter(|(_, n)| **n > 0) {
             @let tall = (BARS - 8.0) * *n as f64 / most;
             rect.bar x=(at(LEFT + wide * i as f64 + 0.5)) y=(at(base - tall)) width=(at(wide - 1.0)) height=(at(tall)) {}
         }
         line.axis x1=(at(LEFT)) x2=(at(RIGHT)) y1=(at(base)) y2=(at(base)) {}
         line.median x1=(at(median)) x2=(at(median)) y1=(at(top + 4.0)) y2=(at(base)) {}
-        text.told x=(at(RIGHT + 12.0)) y=(at(base - 4.0)) { (format!("{:.3}", cuts.median)) }
+        text.value x=(at(RIGHT + 12.0)) y=(at(base - 4.0)) { (format_number(found.median, Share)) }
     }
 }
 
-/// A drawing of a height with its caption, and its numbers for who cannot see it.
+/// Returns a plot with its caption, and its numbers for screen readers.
 fn figure(height: f64, alt: &str, caption: &str, drawing: &Markup) -> Markup {
     let frame = format!("0 0 {WIDTH} {height}");
     html! {
@@ -155,27 +157,34 @@ fn figure(height: f64, alt: &str, caption: &str, drawing: &Markup) -> Markup {
     }
 }
 
-/// A coordinate.
+/// Formats a coordinate.
 fn at(place: f64) -> String {
     format!("{place:.1}")
+}
+
+/// Formats an axis label; shares need only two decimals there.
+fn tick(value: f64, style: NumberStyle) -> String {
+    match style {
+        Share => format!("{value:.2}"),
+        other => format_number(value, other),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::{accuracy, round_up, thresholds, times};
     use crate::domain::{Stage, Verdict};
-    use crate::report::model::Basis;
-    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
+    use crate::report::{Basis, ReportAccumulator, TruthEvaluation, test_fixtures};
 
     #[test]
-    fn points_stand_where_their_numbers_are_on_the_scale() {
-        let mut tally = ReportAccumulator::default();
+    fn points_are_at_their_numbers_on_the_axis() {
+        let mut report = ReportAccumulator::default();
         for (name, verdict) in [("a", Verdict::Pass), ("b", Verdict::Fail)] {
             let pair = test_fixtures::done(name, 0.8, &[verdict]);
-            tally.add(&pair, &TruthEvaluation::default());
+            report.add(&pair, &TruthEvaluation::default());
         }
-        let report = tally.finish();
-        // 1 of 2 has the interval 0.095 to 0.905, so that the scale goes from 0 to 1, and the half lies in its middle.
+        let report = report.finish();
+        // 1 of 2 has the interval 0.095 to 0.905, so the axis goes from 0 to 1 with 0.5 in its middle.
         let drawn = accuracy(&report, Basis::Verdicts).into_string();
         assert_eq!(drawn.matches("cx=\"265.0\"").count(), 4, "{drawn}");
         assert!(drawn.contains("Ensemble 0.500"), "{drawn}");
@@ -183,14 +192,14 @@ mod tests {
     }
 
     #[test]
-    fn times_and_thresholds_are_drawn_once_a_row() {
-        let mut tally = ReportAccumulator::default();
+    fn times_and_thresholds_have_one_plot_a_row() {
+        let mut report = ReportAccumulator::default();
         let mut pair = test_fixtures::done("a", 0.8, &[]);
         pair.stages = [(Stage::Fit, 40), (Stage::Depth, 80)]
             .map(|(stage, ms)| test_fixtures::stage(stage, ms))
             .to_vec();
-        tally.add(&pair, &TruthEvaluation::default());
-        let report = tally.finish();
+        report.add(&pair, &TruthEvaluation::default());
+        let report = report.finish();
         let drawn = times(&report).into_string();
         assert!(
             drawn.contains("cx=\"265.0\"") && drawn.contains("cx=\"400.0\""),
@@ -202,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scale_ends_at_a_round_number() {
+    fn an_axis_ends_at_a_round_number() {
         assert_eq!([37.0, 100.0, 101.0].map(round_up), [40.0, 100.0, 200.0]);
     }
 }

@@ -1,0 +1,113 @@
+//! The print image of a pair, and the three images of a result that people look at.
+
+use std::path::PathBuf;
+
+use super::pictures::{PrintView, Rgb};
+use crate::catalog::PairResults;
+use crate::domain::{ContentHash, FileKind, Stage, ThresholdMetric};
+use crate::raster::{self, DecodeError, ImageLimits, PrintImage};
+use crate::report::pair_artifacts::PairArtifacts;
+use crate::store::Project;
+
+/// Why a print cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum SourcePrintError {
+    /// The file cannot be read.
+    #[error("{path}: {source}")]
+    Read {
+        /// The print.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file cannot be decoded, for example because limits were lowered.
+    #[error("{path}: {source}")]
+    Decode {
+        /// The print.
+        path: PathBuf,
+        /// Why.
+        source: DecodeError,
+    },
+    /// The file is not the one that was aligned.
+    #[error("{0} has changed since it was aligned; run again")]
+    Changed(PathBuf),
+}
+
+/// A print image as a file and decoded.
+#[derive(Debug)]
+pub struct SourcePrint {
+    pub(super) bytes: Vec<u8>,
+    /// The decoded image.
+    pub picture: PrintImage,
+}
+
+impl SourcePrint {
+    /// Reads a pair's print and checks that it is the one that was aligned.
+    ///
+    /// # Errors
+    /// When it cannot be read or decoded, or has changed.
+    pub fn read(
+        project: &Project,
+        pair: &PairResults,
+        limits: &ImageLimits,
+    ) -> Result<Self, SourcePrintError> {
+        let path = project.input_path(&pair.attributes.print_path);
+        let bytes = match std::fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(source) => return Err(SourcePrintError::Read { path, source }),
+        };
+        let aligned = pair
+            .stage(Stage::Normalize)
+            .and_then(|record| record.print_hash);
+        if aligned.is_some_and(|hash| hash != ContentHash::of(&bytes)) {
+            return Err(SourcePrintError::Changed(path));
+        }
+        match raster::decode(&bytes, limits) {
+            Ok(picture) => Ok(Self { bytes, picture }),
+            Err(source) => Err(SourcePrintError::Decode { path, source }),
+        }
+    }
+
+    /// Returns the file name extension of its format.
+    pub(super) fn extension(&self) -> &'static str {
+        match FileKind::of(&self.bytes) {
+            FileKind::Png => "png",
+            FileKind::Jpeg => "jpg",
+            FileKind::Tiff => "tif",
+            FileKind::OtherImage(_)
+            | FileKind::Ply
+            | FileKind::OtherMesh(_)
+            | FileKind::Other(_)
+            | FileKind::Text
+            | FileKind::Binary => "img",
+        }
+    }
+}
+
+/// Draws print, aligned relief and overlay of a metric's result, each at most `side` pixels wide and high.
+///
+/// Also returns why an image that should exist is missing. A print that cannot be read leaves all three out.
+pub(super) fn result_images(
+    project: &Project,
+    pair: &PairResults,
+    metric: ThresholdMetric,
+    side: usize,
+    limits: &ImageLimits,
+) -> ([Option<Rgb>; 3], Option<String>) {
+    let Ok(print) = SourcePrint::read(project, pair, limits) else {
+        return ([None, None, None], None);
+    };
+    let view = PrintView::of_side(&print.picture, side);
+    let plain = Some(view.print(&print.picture));
+    let Some(record) = pair.metric(metric) else {
+        return ([plain, None, None], None);
+    };
+    match PairArtifacts::new(project, pair).depth() {
+        Ok(depth) => {
+            let relief = view.relief(&depth, &record.outcome.print_from_depth);
+            let overlay = view.overlay(&print.picture, &depth, &record.outcome);
+            ([plain, Some(relief), Some(overlay)], None)
+        }
+        Err(error) => ([plain, None, None], Some(error.to_string())),
+    }
+}

@@ -1,0 +1,143 @@
+//! Risk-coverage curves as tables: short ones for a terminal, and with every number for a document.
+
+use super::table::Table;
+use crate::report::comparison::Basis;
+use crate::report::model::Report;
+use crate::report::number_format::NumberStyle::Percent;
+use crate::report::number_format::{counted, format_count};
+use crate::report::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT, RiskCoverageCurve};
+
+/// Headers of the columns of [`short_tables`], one for each of [`COVERAGE_PERCENT`].
+const HEADERS: [&str; COVERAGE_PERCENT.len()] =
+    ["100 %", "99 %", "97 %", "95 %", "90 %", "80 %", "50 %"];
+
+/// Returns a table for each basis, with a row a metric.
+pub(super) fn short_tables(report: &Report) -> Vec<Table> {
+    by_basis(report, |basis, curves| {
+        let mut table = Table::of(curves.iter().copied())
+            .text(title(basis), |curve| curve.metric.title())
+            .count("n", |curve| curve.n);
+        for (i, header) in HEADERS.into_iter().enumerate() {
+            table = table.share(header, |curve| curve.points.get(i)?.acc);
+        }
+        table.caption(caption(basis, curves))
+    })
+}
+
+/// Returns a table for each basis, with a row a metric and coverage.
+pub(super) fn full_tables(report: &Report) -> Vec<Table> {
+    by_basis(report, |basis, curves| {
+        let points = curves.iter().flat_map(|curve| {
+            let points = curve.points.iter();
+            points.map(|point| (curve.metric.title(), point))
+        });
+        Table::of(points)
+            .text(title(basis), |(metric, _)| *metric)
+            .number("coverage %", Percent, |(_, point)| {
+                Some(100.0 * point.coverage)
+            })
+            .count("n", |(_, point)| point.n)
+            .share("Acc", |(_, point)| point.acc)
+            .interval(report.interval.title(), |(_, point)| point.acc_ci95)
+            .share("least confidence", |(_, point)| point.least_confidence)
+            .caption(caption(basis, curves))
+    })
+}
+
+fn by_basis(report: &Report, table: impl Fn(Basis, &[&RiskCoverageCurve]) -> Table) -> Vec<Table> {
+    let of_basis = |basis| {
+        let curves = report.risk_coverage.iter();
+        let curves: Vec<_> = curves.filter(|curve| curve.basis == basis).collect();
+        (!curves.is_empty()).then(|| table(basis, &curves))
+    };
+    Basis::ALL.into_iter().filter_map(of_basis).collect()
+}
+
+const fn title(basis: Basis) -> &'static str {
+    match basis {
+        Basis::Verdicts => "Coverage, verdicts",
+        Basis::Truth => "Coverage, truth",
+    }
+}
+
+fn caption(basis: Basis, curves: &[&RiskCoverageCurve]) -> String {
+    let with_failures = curves.iter().filter(|curve| curve.failures > 0);
+    let mut sentences = vec![format!(
+        "Acc by {} of the most confident results, at the share of results that is kept (coverage).",
+        basis.name()
+    )];
+    sentences.extend(with_failures.map(|curve| failures(curve)));
+    sentences.join(" ")
+}
+
+/// Returns how many of a metric's failures its confidence reveals.
+fn failures(curve: &RiskCoverageCurve) -> String {
+    format!(
+        "{}: the least confident {LEAST_CONFIDENT_PERCENT} % ({} of {}) hold {} of {}.",
+        curve.metric.title(),
+        format_count(curve.least_n),
+        counted(curve.n, "result"),
+        format_count(curve.failures_in_least),
+        counted(curve.failures, "failure")
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{HEADERS, full_tables, short_tables};
+    use crate::report::risk_coverage::COVERAGE_PERCENT;
+    use crate::report::{ReportAccumulator, TruthEvaluation, test_fixtures};
+
+    #[test]
+    fn headers_name_the_coverages() {
+        let wanted = COVERAGE_PERCENT.map(|percent| format!("{percent} %"));
+        assert_eq!(HEADERS.map(str::to_owned), wanted);
+    }
+
+    #[test]
+    fn failures_among_the_least_confident_are_counted_in_the_caption() {
+        let mut report = ReportAccumulator::default();
+        let results = [(0.9, 1.0), (0.2, 170.0), (0.8, 1.0)];
+        for (i, (confidence, angle_deg)) in results.into_iter().enumerate() {
+            let pair = test_fixtures::with_confidence(&format!("p{i}"), confidence);
+            report.add(&pair, &test_fixtures::truth(angle_deg, 1.0, 0.9));
+        }
+        let report = report.finish();
+        let [table] = &short_tables(&report)[..] else {
+            panic!("one basis: there are no verdicts");
+        };
+        let wanted = "Ensemble: the least confident 3 % (1 of 3 results) hold 1 of 1 failure.";
+        assert!(table.caption.contains(wanted), "{}", table.caption);
+        let row: Vec<_> = table.rows[3].iter().flatten().map(String::as_str).collect();
+        assert_eq!(row[..4], ["Relief", "3", "0.667", "1.000"]);
+        let [table] = &full_tables(&report)[..] else {
+            panic!("one basis: there are no verdicts");
+        };
+        assert_eq!(table.rows.len(), report.rows.len() * COVERAGE_PERCENT.len());
+        let row: Vec<_> = table.rows[1].iter().flatten().map(String::as_str).collect();
+        let wanted = [
+            "Non-luminous SSIM",
+            "99.0",
+            "2",
+            "1.000",
+            "0.342-1.000",
+            "0.800",
+        ];
+        assert_eq!(row, wanted);
+    }
+
+    #[test]
+    fn without_confidence_there_is_no_table() {
+        let mut report = ReportAccumulator::default();
+        report.add(
+            &test_fixtures::done("a", 0.8, &[]),
+            &test_fixtures::truth(1.0, 1.0, 0.9),
+        );
+        report.add(
+            &test_fixtures::with_confidence("b", 0.8),
+            &TruthEvaluation::default(),
+        );
+        let report = report.finish();
+        assert!(short_tables(&report).is_empty() && full_tables(&report).is_empty());
+    }
+}

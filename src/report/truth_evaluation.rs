@@ -1,0 +1,224 @@
+//! The stored results of a pair measured against its ground truth.
+
+use std::collections::BTreeMap;
+
+use rayon::prelude::*;
+
+use super::ground_truth::{TruthError, TruthErrors, TruthRecord};
+use super::pair_artifacts::{PairArtifacts, PairArtifactsError, same_alignment};
+use crate::catalog::{MetricRecord, PairResults};
+use crate::domain::{MetricOutcome, ThresholdMetric};
+use crate::raster::{self, DepthMap, Grid, ImageLimits, Mask, warp_mask};
+use crate::store::Project;
+
+/// A pixel of a tops mask that is a true stroke top.
+const TOP: u8 = 255;
+/// A pixel of a tops mask that is left out of the score: a neighbour's stroke or a border line.
+const IGNORED: u8 = 128;
+
+/// One pair's errors against ground truth.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TruthEvaluation {
+    /// Errors by metric; empty without usable ground truth.
+    pub errors: BTreeMap<ThresholdMetric, TruthErrors>,
+    /// Why existing ground truth cannot be used.
+    pub problem: Option<String>,
+}
+
+/// Ground truth that could not be used.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct TruthProblems {
+    /// Number of pairs.
+    pub(super) count: u64,
+    /// The first pair with its problem.
+    pub(super) first: Option<String>,
+}
+
+impl TruthProblems {
+    /// Counts one pair, if its ground truth cannot be used.
+    pub(super) fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
+        if let Some(problem) = &truth.problem {
+            self.count += 1;
+            let first = || format!("{}: {problem}", pair.attributes.name);
+            self.first.get_or_insert_with(first);
+        }
+    }
+}
+
+/// Why a pair cannot be measured.
+#[derive(Debug, thiserror::Error)]
+enum EvaluationError {
+    #[error(transparent)]
+    Truth(#[from] TruthError),
+    #[error(transparent)]
+    Artifacts(#[from] PairArtifactsError),
+}
+
+/// Returns pairs with their evaluations, computed on all cores.
+///
+/// # Errors
+/// When a thread is lost.
+pub async fn evaluate_pairs(
+    project: &Project,
+    pairs: Vec<PairResults>,
+) -> Result<Vec<(PairResults, TruthEvaluation)>, tokio::task::JoinError> {
+    if pairs.iter().all(|pair| pair.truth.is_none()) {
+        let none = |pair| (pair, TruthEvaluation::default());
+        return Ok(pairs.into_iter().map(none).collect());
+    }
+    let project = project.clone();
+    tokio::task::spawn_blocking(move || {
+        let evaluations: Vec<TruthEvaluation> = pairs
+            .par_iter()
+            .map(|pair| evaluate(&project, pair))
+            .collect();
+        pairs.into_iter().zip(evaluations).collect()
+    })
+    .await
+}
+
+/// Measures a pair; the evaluation is empty without ground truth or results.
+fn evaluate(project: &Project, pair: &PairResults) -> TruthEvaluation {
+    let Some(truth) = pair.truth.as_ref().filter(|_| !pair.metrics.is_empty()) else {
+        return TruthEvaluation::default();
+    };
+    match errors_by_metric(project, pair, truth) {
+        Ok(errors) => TruthEvaluation {
+            errors,
+            problem: None,
+        },
+        Err(error) => TruthEvaluation {
+            errors: BTreeMap::new(),
+            problem: Some(error.to_string()),
+        },
+    }
+}
+
+fn errors_by_metric(
+    project: &Project,
+    pair: &PairResults,
+    truth: &serde_json::Value,
+) -> Result<BTreeMap<ThresholdMetric, TruthErrors>, EvaluationError> {
+    let (record, artifacts) = (TruthRecord::read(truth)?, PairArtifacts::new(project, pair));
+    let tops = match &record.tops_mask {
+        Some(path) => Some(TrueTops::read(project, path, &artifacts)?),
+        None => None,
+    };
+    let mut by_metric = BTreeMap::new();
+    let mut measured: Vec<&MetricRecord> = Vec::new();
+    for found in &pair.metrics {
+        let outcome = &found.outcome;
+        // Metrics with the same alignment have the same errors, so the mask is warped once.
+        let mut same = measured.iter();
+        let same = same.find(|other| same_alignment(&other.outcome, outcome));
+        let known = same.and_then(|same| by_metric.get(&same.outcome.metric));
+        let errors = match known {
+            Some(errors) => *errors,
+            None => measure(&record, &artifacts, tops.as_ref(), outcome)?,
+        };
+        by_metric.insert(outcome.metric, errors);
+        measured.push(found);
+    }
+    Ok(by_metric)
+}
+
+fn measure(
+    record: &TruthRecord,
+    artifacts: &PairArtifacts<'_>,
+    tops: Option<&TrueTops>,
+    outcome: &MetricOutcome,
+) -> Result<TruthErrors, EvaluationError> {
+    let found = artifacts.print_from_mesh(&outcome.print_from_depth)?;
+    let iou = tops.map(|tops| tops_iou(&tops.depth, outcome, &tops.tops));
+    Ok(record.measure(&found, iou)?)
+}
+
+/// The true stroke tops of a pair, and the depth map to compare with them.
+struct TrueTops {
+    tops: Grid<u8>,
+    depth: DepthMap,
+}
+
+impl TrueTops {
+    fn read(
+        project: &Project,
+        path: &str,
+        artifacts: &PairArtifacts<'_>,
+    ) -> Result<Self, EvaluationError> {
+        let print = artifacts.print_mask()?;
+        let tops = read_tops(project, path)?;
+        check_size(&tops, [print.width(), print.height()])?;
+        let depth = artifacts.depth()?;
+        Ok(Self { tops, depth })
+    }
+}
+
+/// Reads the grey values of a tops mask, whatever its image format.
+fn read_tops(project: &Project, path: &str) -> Result<Grid<u8>, TruthError> {
+    let path = project.input_path(path);
+    let refused = |why: String| TruthError::Mask(format!("{}: {why}", path.display()));
+    let bytes = std::fs::read(&path).map_err(|error| refused(error.to_string()))?;
+    let picture = raster::decode(&bytes, &ImageLimits::SUGGESTED)
+        .map_err(|error| refused(error.to_string()))?;
+    Ok(picture.rgb.map(|colour| (colour[0] / 257) as u8))
+}
+
+/// Returns the intersection over union of a metric's depth mask, warped to the print, with the true stroke tops.
+pub fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f64 {
+    let mask = depth.stroke_mask(outcome.threshold_level);
+    let (width, height) = (tops.width(), tops.height());
+    let warped = warp_mask(&mask, &outcome.print_from_depth, width, height);
+    mask_iou(&warped, tops).expect("the mask was warped to the size of the tops")
+}
+
+/// Returns the intersection over union of a depth mask with the true stroke tops, both in the print's frame, in 0..=1.
+///
+/// Pixels that are 128 in the tops mask count for neither. Two empty masks give 0.
+///
+/// # Errors
+/// When the sizes differ.
+pub fn mask_iou(depth_mask: &Mask, tops: &Grid<u8>) -> Result<f64, TruthError> {
+    check_size(tops, [depth_mask.width(), depth_mask.height()])?;
+    let (mut both, mut either) = (0_u64, 0_u64);
+    for (set, top) in depth_mask.data().iter().zip(tops.data()) {
+        if *top == IGNORED {
+            continue;
+        }
+        both += u64::from(*set && *top == TOP);
+        either += u64::from(*set || *top == TOP);
+    }
+    Ok(if either == 0 {
+        0.0
+    } else {
+        both as f64 / either as f64
+    })
+}
+
+fn check_size(tops: &Grid<u8>, wanted: [usize; 2]) -> Result<(), TruthError> {
+    let found = [tops.width(), tops.height()];
+    if found == wanted {
+        Ok(())
+    } else {
+        Err(TruthError::MaskSize { found, wanted })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mask_iou;
+    use crate::raster::{Grid, Mask};
+    use crate::report::ground_truth::TruthError;
+
+    #[test]
+    fn ignored_pixels_count_for_neither_mask() {
+        let tops = Grid::from_vec(4, 1, vec![255, 255, 128, 0]).expect("four values");
+        let mask = Mask::from_vec(4, 1, vec![true, false, true, true]).expect("four values");
+        assert_eq!(mask_iou(&mask, &tops), Ok(1.0 / 3.0));
+        assert_eq!(
+            mask_iou(&Mask::new(4, 1, false), &Grid::new(4, 1, 128)),
+            Ok(0.0)
+        );
+        let other = mask_iou(&Mask::new(3, 1, false), &tops);
+        assert!(matches!(other, Err(TruthError::MaskSize { .. })));
+    }
+}
