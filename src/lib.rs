@@ -14,15 +14,15 @@
 //!
 //! 1. `src/manifest/csv.rs`: parses the rows of a manifest
 //! 2. `src/catalog/records/import.rs`: stores pairs and their jobs
-//! 3. `src/runner/scheduler.rs`: claims pairs and hands them to workers
+//! 3. `src/runner/scheduler.rs`: starts a task for each pair that `prefetch.rs` claims
 //! 4. `src/catalog/queue/claim.rs`: leases a job in one statement, with a fencing token
-//! 5. `src/runner/pair_task.rs`: processes one leased pair, stage by stage
-//! 6. `src/runner/stage_executor.rs`: reads inputs and calls the stages
+//! 5. `src/runner/pair_task.rs`: follows one leased pair through its stages, on a thread of its own
+//! 6. `src/runner/stage_executor.rs`: calls the stages
 //! 7. `src/stages/fit/mod.rs`: plane, curvature and carved side
 //! 8. `src/stages/depth.rs`: depth map
 //! 9. `src/stages/normalize/mod.rs`: print and relief on a common scale
 //! 10. `src/stages/register/mod.rs`: pose, thresholds, scores and confidence
-//! 11. `src/runner/stage_output.rs`: turns a stage result into files and rows
+//! 11. `src/runner/stage_output.rs`: encodes a stage's result as JSON, files and hashes
 //! 12. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
 //! 13. `src/store/artifacts.rs`: writes artifact files by content hash
 //! 14. `src/catalog/queue/checkpoint.rs`: records a finished stage and renews or ends the lease

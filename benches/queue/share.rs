@@ -159,7 +159,7 @@ async fn without(project: &Project, workers: usize) -> anyhow::Result<Took> {
     catalog.close().await;
     let wanted = pairs.len();
     let watch = Watch::start()?;
-    let (done, at_work) = runner::bare(project, &settings, &options, pairs).await;
+    let (done, at_work) = runner::run_without_catalog(project, &settings, &options, pairs).await;
     let took = watch.stop(at_work / workers as u32)?;
     anyhow::ensure!(done == wanted, "{done} pairs done of {wanted}");
     Ok(took)

@@ -20,7 +20,7 @@
 //! `worker_session` notices it for the whole process, when a heartbeat comes after the leases have expired: the process
 //! registers as a new worker.
 
-mod bare;
+mod baseline;
 mod checkpointer;
 mod compute_thread;
 mod error;
@@ -44,7 +44,7 @@ mod stop;
 mod tests;
 mod worker_session;
 
-pub use bare::bare;
+pub use baseline::run_without_catalog;
 pub use error::RunError;
 pub use events::{RunEvent, RunSummary};
 pub use free_memory::default_memory_limit;
