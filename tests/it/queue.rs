@@ -1,4 +1,4 @@
-//! The queue through the real binary: changed files and settings, missing files, two processes.
+//! The job queue through the real binary: changed files and settings, missing files, two processes.
 
 use std::io::Write as _;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use mocban::store::{Project, RunLock};
 use crate::cli::call;
 use crate::resume::{pairs, project, run};
 
-/// How often each stage of each pair was finished, pair by pair.
+/// Returns how often each stage of each pair was finished.
 fn finished(project: &Project) -> Vec<[usize; 4]> {
     let of = |pair: &mocban::catalog::PairDetail| {
         Stage::ALL.map(|stage| {
@@ -29,8 +29,8 @@ fn print(project: &Project, index: usize) -> PathBuf {
     project.input_path(&pairs(project)[index].results.attributes.print_path)
 }
 
-/// The same picture or mesh in other bytes: every reader of ours leaves what comes after the end alone.
-fn lengthen(path: &std::path::Path) {
+/// Appends a byte, which changes the content hash but not the decoded mesh or image.
+fn append_byte(path: &std::path::Path) {
     let mut file = std::fs::OpenOptions::new()
         .append(true)
         .open(path)
@@ -39,7 +39,7 @@ fn lengthen(path: &std::path::Path) {
 }
 
 #[test]
-fn only_what_changed_runs_again() {
+fn only_affected_stages_run_again() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "2");
     let away = print(&project, 1).with_extension("away");
@@ -50,7 +50,7 @@ fn only_what_changed_runs_again() {
     assert_eq!(failure.failure.class, FailureClass::Io);
     assert!(failure.failure.message.ends_with("is not there"));
 
-    // The file comes, `retry` takes the pair up.
+    // The file was added: the failed pair runs.
     std::fs::rename(&away, print(&project, 1)).expect("moved");
     call(&mut run(&project, &["--rerun", "failed"])).expect(0);
     assert_eq!(finished(&project), [[1; 4]; 2]);
@@ -59,19 +59,19 @@ fn only_what_changed_runs_again() {
         .map(|pair| pair.results.metrics)
         .collect();
 
-    // A new time is not a new content.
+    // A new modification time alone changes nothing.
     let file = std::fs::File::options().write(true).open(mesh(&project, 0));
     let now = std::time::SystemTime::now();
     file.expect("a file").set_modified(now).expect("touched");
     call(&mut run(&project, &[])).expect(0);
     assert_eq!(finished(&project), [[1; 4]; 2]);
 
-    // New bytes are, for that pair alone.
-    lengthen(&print(&project, 0));
+    // New content affects that pair only.
+    append_byte(&print(&project, 0));
     call(&mut run(&project, &[])).expect(0);
     assert_eq!(finished(&project), [[2; 4], [1; 4]]);
 
-    // A setting of the last stage touches no other.
+    // A setting of the last stage affects no other stage.
     let mut changed = run(&project, &[]);
     changed.args(["--set", "register.smoothing_px=1.5"]);
     call(&mut changed).expect(0);
@@ -85,7 +85,7 @@ fn only_what_changed_runs_again() {
 }
 
 #[test]
-fn a_project_in_use_is_refused_by_the_number_of_the_process() {
+fn a_project_in_use_is_refused_with_the_process_id() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = project(dir.path(), "p", "1");
     let lock = RunLock::acquire(&project, false).expect("the lock");
