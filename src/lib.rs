@@ -25,16 +25,16 @@
 //! 11. `src/runner/stage_output.rs`: encodes a stage's result as JSON, files and hashes
 //! 12. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
 //! 13. `src/store/artifacts.rs`: writes artifact files by content hash
-//! 14. `src/catalog/queue/checkpoint.rs`: records a finished stage and renews or ends the lease
+//! 14. `src/catalog/queue/checkpoint.rs`: records a finished stage and renews or ends the lease; called through `api.rs`
 //! 15. `src/catalog/records/pair_results.rs`: reads results back
 //! 16. `src/report/build.rs`: iterates over all pairs
 //! 17. `src/report/accumulate.rs`: sums results per metric
 //! 18. `src/report/render/table.rs`: formats the cells
 //!
-//! A **lost lease** is noticed when something is stored: `src/catalog/queue/checkpoint.rs` (and `fail.rs` beside it)
-//! updates the job only where worker and fencing token are still those of the lease; no updated row means
-//! [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome). `src/runner/checkpointer.rs` then stores nothing more, and
-//! `src/runner/pair_task.rs` ends with `PairEnd::LeaseLost` and drops the pair.
+//! A **lost lease** is noticed when something is stored. The statements of `src/catalog/queue/checkpoint.rs` and `fail.rs`
+//! update a job only where worker and fencing token are still those of the lease. When no row was updated,
+//! `src/catalog/queue/api.rs` returns [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome); the checkpointer then
+//! stores nothing more, and `src/runner/pair_task.rs` drops the pair with `PairEnd::LeaseLost`.
 //!
 //! ## A new threshold metric
 //!

@@ -13,7 +13,6 @@ const REPEATED_TYPES: &[&str] = &[
     "Ascii",
     "Canvas",
     "Drawn",
-    "Heartbeat",
     "Lanes",
     "Look",
     "Looks",
@@ -22,8 +21,7 @@ const REPEATED_TYPES: &[&str] = &[
     "Pictures",
     "Row",
     "Samples",
-    "Seen",
-    "Settled",
+    "StoredStages",
     "Sums",
 ];
 
@@ -59,7 +57,7 @@ const BANNED_PHRASES: &[&str] = &[
 ];
 
 /// Occurrences of banned phrases that are still in `src`. Lower the number when it drops; never raise it.
-const BANNED_PHRASES_LEFT: usize = 164;
+const BANNED_PHRASES_LEFT: usize = 143;
 
 /// Public functions of numeric rooms without a verb in front. Lower the number when it drops; never raise it.
 const MISSING_VERBS_LEFT: usize = 62;
