@@ -36,6 +36,9 @@
 //! `src/catalog/queue/api.rs` returns [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome); the checkpointer then
 //! stores nothing more, and `src/runner/pair_task.rs` drops the pair with `PairEnd::LeaseLost`.
 //!
+//! The carved side is decided in `fit`, which therefore reads the print; [`stages::pipeline`] shows both methods side by
+//! side and says what it would cost to decide the side later.
+//!
 //! ## A new threshold metric
 //!
 //! These files name individual metrics; everything else iterates over [`domain::ThresholdMetric::ALL`]:
@@ -45,10 +48,10 @@
 //! - `src/domain/metric.rs`: the variant with its definition; its `match`es fail to compile until they cover it
 //! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
 //! - `src/export/pair_files.rs`: the metric whose files are shared; no change needed
-//! - `src/stages/normalize/threshold.rs`: computes the thresholds
 //! - `src/stages/paper_method/normalize.rs`: computes the thresholds
 //! - `src/stages/paper_method/register.rs`: computes the thresholds
-//! - `src/stages/register/mod.rs`: computes the thresholds
+//! - `src/stages/register/confidence.rs`: compares every mask with the one by relief; no change needed
+//! - `src/stages/register/metric_thresholds.rs`: computes the thresholds
 //! - `migrations/`: the `CHECK` lists of the metric columns
 //! - `README.md` and `docs/report.md`: the description
 //!

@@ -1,4 +1,4 @@
-//! How often the stages are right, and how far off they are.
+//! Table of accuracy against the ground truth.
 
 use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
@@ -30,7 +30,7 @@ Acc: angle within 5°, landmarks within 5 % of the character's height, tops IoU 
 the character's height) and normal: median / 95th percentile; tops IoU (depth mask with the true stroke tops): \
 median / 5th percentile; print IoU: median. These are over the pairs that did not fail.";
 
-/// A row for each tier, method and metric.
+/// Makes a row for each tier, method and metric.
 pub(super) fn table(tiers: &[Tier], methods: &[Method], trials: &[Trial]) -> String {
     let mut table = Table::new("Accuracy", &HEADS);
     for tier in tiers {
@@ -47,7 +47,7 @@ pub(super) fn table(tiers: &[Tier], methods: &[Method], trials: &[Trial]) -> Str
     table.render(NOTE)
 }
 
-/// The metrics that any trial has, in their order; the first of all where every trial failed.
+/// Returns the metrics that any trial has, in order; the first metric where every trial failed.
 pub(super) fn metrics(trials: &[&Trial]) -> Vec<ThresholdMetric> {
     let has = |metric: &ThresholdMetric| trials.iter().any(|trial| trial.found(*metric).is_some());
     let found: Vec<_> = ThresholdMetric::ALL.into_iter().filter(has).collect();
@@ -57,7 +57,7 @@ pub(super) fn metrics(trials: &[&Trial]) -> Vec<ThresholdMetric> {
     found
 }
 
-/// The cells that count pairs.
+/// Returns the cells that count pairs.
 fn shares(trials: &[&Trial], metric: ThresholdMetric) -> [String; 5] {
     let right = |is_right: fn(&Found) -> bool| {
         let found = trials.iter().filter_map(|trial| trial.found(metric));
@@ -73,7 +73,7 @@ fn shares(trials: &[&Trial], metric: ThresholdMetric) -> [String; 5] {
     ]
 }
 
-/// The cells that measure distances.
+/// Returns the cells that measure distances.
 fn distances(trials: &[&Trial], metric: ThresholdMetric) -> [String; 4] {
     let of_found = |value: fn(&Found) -> Option<f64>| -> Vec<f64> {
         let found = trials.iter().filter_map(|trial| trial.found(metric));
@@ -91,7 +91,7 @@ fn distances(trials: &[&Trial], metric: ThresholdMetric) -> [String; 4] {
     ]
 }
 
-/// A share with its interval.
+/// Formats a share with its interval.
 pub(super) fn share(right: usize, n: usize) -> String {
     let Some([low, high]) = wilson_95(right as u64, n as u64) else {
         return number(None, 0);

@@ -1,25 +1,25 @@
-//! Which pair of which data.
+//! Identity of a generated pair.
 
 use mocban::demo::{DemoPair, PairGenerator, Tier};
 use mocban::mesh::write::MeshFormat;
 
 use super::run::Input;
 
-/// A pair by what it is made from.
+/// A pair by tier, seed and index.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Case {
     /// Its tier.
     pub(super) tier: Tier,
     /// Seed of the data.
     pub(super) seed: u64,
-    /// Place in the data.
+    /// Index in the data.
     pub(super) index: u64,
-    /// About how many vertices the scan has, if that is not left to chance.
+    /// Approximate number of vertices of the scan; `None` for a random number.
     vertices: Option<u32>,
 }
 
 impl Case {
-    /// A pair by tier, seed and place.
+    /// Creates a case from tier, seed and index.
     pub(super) const fn new(tier: Tier, seed: u64, index: u64, vertices: Option<u32>) -> Self {
         Self {
             tier,
@@ -29,12 +29,12 @@ impl Case {
         }
     }
 
-    /// All pairs of its kind.
+    /// Returns the generator of the tier and seed.
     pub(super) fn pairs(&self) -> PairGenerator {
         PairGenerator::new(self.tier, self.seed).with_vertices(self.vertices)
     }
 
-    /// Makes the pair and what the stages are given of it.
+    /// Generates the pair and the files that the stages read.
     pub(super) fn make(&self) -> anyhow::Result<(DemoPair, Input)> {
         let pair = self.pairs().pair(self.index)?;
         let mesh = MeshFormat::StlBinary.encode(&pair.mesh);

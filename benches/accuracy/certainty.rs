@@ -1,4 +1,4 @@
-//! Whether the method knows when it is not sure.
+//! Table of how well confidence separates right results from wrong ones.
 
 use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
@@ -8,23 +8,23 @@ use super::markdown::Table;
 use super::method::Method;
 use super::trial::{Found, Trial, of};
 
-/// Share of the pairs that a reader would look at again.
+/// Share of the pairs that a reviewer would check.
 const LEAST_SURE: f64 = 0.03;
 
 const NOTE: &str = "\
-Wrong pairs that did not fail; how many of them are among the 3 % of the pairs (at least one) the method is least sure \
-of; how often a pair with a higher confidence than another is the right one of a right and a wrong pair (0.5 is \
-chance, 1 perfect); Acc of the pairs that are left without those 3 %.";
+Wrong pairs that did not fail; how many of them are among the 3 % of the pairs (at least one) with the lowest \
+confidence; share of all couples of a right and a wrong pair in which the right one has the higher confidence (AUC: 0.5 \
+is chance, 1 perfect); Acc of the other 97 %.";
 
-/// A row for each tier, method and metric that says how sure it is; none when nothing does.
+/// Makes a row for each tier, method and metric with a confidence; `None` when there is no confidence.
 pub(super) fn table(tiers: &[Tier], methods: &[Method], trials: &[Trial]) -> Option<String> {
     let heads = [
         "tier",
         "preset",
         "metric",
         "wrong",
-        "among the least sure 3 %",
-        "order",
+        "among the lowest 3 %",
+        "AUC",
         "Acc of the other 97 %",
     ];
     let mut table = Table::new("Confidence", &heads);
@@ -47,7 +47,7 @@ pub(super) fn table(tiers: &[Tier], methods: &[Method], trials: &[Trial]) -> Opt
     (!is_empty).then(|| table.render(NOTE))
 }
 
-/// Confidence and whether the pair is right, the least sure first.
+/// Returns confidence and whether the pair is right, the least confident first.
 fn by_confidence(trials: &[&Trial], metric: ThresholdMetric) -> Vec<(f64, bool)> {
     let found = trials.iter().filter_map(|trial| trial.found(metric));
     let sure = |found: &Found| Some((found.confidence?, found.errors.pass()));

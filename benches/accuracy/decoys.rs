@@ -1,4 +1,4 @@
-//! Whether pairs without a right answer are told.
+//! Table of how many decoys, pairs without a right answer, are rejected.
 
 use mocban::demo::Tier;
 use mocban::domain::ThresholdMetric;
@@ -16,19 +16,19 @@ use super::run::{Input, Run};
 use super::trial::Trial;
 use super::workers::in_order;
 
-/// Share of the right pairs that may be told as well.
+/// Share of the right pairs that may be rejected.
 const FALSE_ALARMS: f64 = 0.01;
 
 const NOTE: &str = "\
-Told by a stage: the pair ended in an error. Told: that, or a confidence of the metric below the level under which 1 % \
-of the preset's right pairs of all tiers lie.";
+Rejected by a stage: the pair ended in an error. Rejected: that, or a confidence of the metric below the level under \
+which 1 % of the preset's right pairs of all tiers lie.";
 
-/// What became of a decoy.
+/// Result of a decoy.
 pub(super) struct Answer {
     tier: Tier,
     kind: Decoy,
     method: &'static str,
-    /// Confidence of the alignment, where it says so; `Err` when a stage gave up.
+    /// Confidence of the alignment, where there is one; `Err` when a stage failed.
     outcome: Result<Option<f64>, ()>,
 }
 
@@ -57,7 +57,8 @@ pub(super) fn all(
     Ok(answers.into_iter().flatten().collect())
 }
 
-fn input(case: &Case, kind: Decoy) -> anyhow::Result<Input> {
+/// Makes a decoy of a case.
+pub(super) fn input(case: &Case, kind: Decoy) -> anyhow::Result<Input> {
     let decoy = decoy_pair(&case.pairs(), kind, case.index)?;
     Ok(Input {
         mesh: MeshFormat::StlBinary.encode(&decoy.mesh),
@@ -74,7 +75,7 @@ fn outcome(run: &Run, metric: ThresholdMetric) -> anyhow::Result<Result<Option<f
     Ok(Ok(numbers.number("metric.confidence")))
 }
 
-/// A row for each tier, method and kind.
+/// Makes a row for each tier, method and kind.
 pub(super) fn table(
     options: &Options,
     methods: &[Method],
@@ -86,11 +87,11 @@ pub(super) fn table(
         "preset",
         "decoy",
         "n",
-        "told by a stage",
+        "rejected by a stage",
         "level",
-        "told",
+        "rejected",
     ];
-    let mut table = Table::new("Pairs without a right answer", &heads);
+    let mut table = Table::new("Decoys", &heads);
     for tier in &options.tiers {
         for method in methods {
             let level = level(trials, method, options.metric);
@@ -113,19 +114,24 @@ pub(super) fn table(
 }
 
 fn row(answers: &[&Answer], level: Option<f64>) -> [String; 4] {
-    let count = |is_told: &dyn Fn(&Answer) -> bool| {
-        let told = answers.iter().filter(|answer| is_told(answer)).count();
-        share(told, answers.len())
+    let count = |is_rejected: &dyn Fn(&Answer) -> bool| {
+        let rejected = answers.iter().filter(|answer| is_rejected(answer)).count();
+        share(rejected, answers.len())
     };
     let by_stage = count(&|answer| answer.outcome.is_err());
-    let told = count(&|answer| match answer.outcome {
+    let rejected = count(&|answer| match answer.outcome {
         Err(()) => true,
         Ok(confidence) => confidence.is_some_and(|sure| level.is_some_and(|level| sure < level)),
     });
-    [answers.len().to_string(), by_stage, number(level, 3), told]
+    [
+        answers.len().to_string(),
+        by_stage,
+        number(level, 3),
+        rejected,
+    ]
 }
 
-/// The confidence below which right pairs are told by mistake as often as is allowed.
+/// Returns the confidence below which the allowed share of right pairs lies.
 fn level(trials: &[Trial], method: &Method, metric: ThresholdMetric) -> Option<f64> {
     let of_method = trials.iter().filter(|trial| trial.method == method.name);
     let found = of_method.filter_map(|trial| trial.found(metric));

@@ -1,4 +1,4 @@
-//! Every number of every pair and metric as CSV, to calibrate with.
+//! Every number of every pair and metric as CSV, for calibration.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use super::times::Part;
 use super::trial::{Found, Trial};
 
-/// Columns before the outcomes' own.
+/// Columns before those of the outcomes.
 const HEADS: [&str; 13] = [
     "tier",
     "seed",
@@ -43,7 +43,7 @@ pub(super) fn write(path: &Path, trials: &[Trial]) -> anyhow::Result<()> {
     text().with_context(|| path.display().to_string())
 }
 
-/// The paths that any result has, in order.
+/// Returns the paths that any result has, in order.
 fn paths(trials: &[Trial]) -> BTreeSet<&String> {
     let found = trials
         .iter()
@@ -85,7 +85,7 @@ fn line(trial: &Trial, found: Result<&Found, &String>, paths: &BTreeSet<&String>
     cells
 }
 
-/// The cells from `metric` to `tops_iou`.
+/// Returns the cells from `metric` to `tops_iou`.
 fn truth(found: Result<&Found, &String>) -> [String; 7] {
     match found {
         Ok(Found { metric, errors, .. }) => [

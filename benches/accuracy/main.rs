@@ -1,16 +1,17 @@
-//! Accuracy and speed of the four stages on data with known truth: the tables on which every change is judged.
+//! Accuracy and speed of the four stages on generated pairs with ground truth.
 //!
 //! ```text
 //! cargo bench --bench accuracy
 //! cargo bench --bench accuracy -- --tiers pose,hard --pairs 587 --seeds 7 --presets default,paper
 //! cargo bench --bench accuracy -- --set register.window=uniform7 --worst 50 --sheets sheets --pairs-csv pairs.csv
 //! cargo bench --bench accuracy -- --decoys
+//! cargo bench --bench accuracy -- --fit-confidence --seeds 11,12 --held-out-seeds 13
 //! cargo bench --bench accuracy -- --vertices 60000 --workers 1
 //! ```
 //!
 //! The pairs are those of `mocban demo`, made in memory from tier, seed and index, and given to the stages as a binary
-//! STL and the print's file. Neither unit nor side is told: the harder question. The tables are Markdown on the
-//! standard output. `cargo test --all-targets` runs one pair a tier, to see that the program works.
+//! STL and the print's file. Neither unit nor carved side is given, which is harder. The tables are Markdown on standard
+//! output. `cargo test --all-targets` runs one pair a tier as a smoke test.
 
 mod accuracy;
 mod case;
@@ -18,6 +19,7 @@ mod certainty;
 #[path = "../../tests/support/decoy.rs"]
 mod decoy;
 mod decoys;
+mod fit_confidence;
 mod lines;
 mod markdown;
 mod method;
@@ -39,6 +41,13 @@ use options::Options;
 fn main() -> anyhow::Result<()> {
     let options = Options::parse();
     let (methods, cases) = (options.methods()?, options.cases());
+    if options.fit_confidence {
+        let texts = methods
+            .iter()
+            .map(|method| fit_confidence::report(&options, method));
+        let text = texts.collect::<anyhow::Result<Vec<_>>>()?.join("\n");
+        return Ok(std::io::stdout().write_all(text.as_bytes())?);
+    }
     let trials = trial::all(&cases, &methods, options.workers)?;
     let mut tables = vec![
         accuracy::table(&options.tiers, &methods, &trials),
@@ -46,8 +55,8 @@ fn main() -> anyhow::Result<()> {
     ];
     tables.extend(certainty::table(&options.tiers, &methods, &trials));
     if options.decoys {
-        let told = decoys::all(&cases, &methods, &options)?;
-        tables.push(decoys::table(&options, &methods, &trials, &told));
+        let answers = decoys::all(&cases, &methods, &options)?;
+        tables.push(decoys::table(&options, &methods, &trials, &answers));
     }
     if let Some(path) = &options.pairs_csv {
         lines::write(path, &trials)?;

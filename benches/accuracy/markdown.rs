@@ -1,4 +1,4 @@
-//! Tables in Markdown that can be read as plain text too.
+//! Markdown tables that are readable as plain text.
 
 /// A table of text cells.
 pub(super) struct Table {
@@ -7,7 +7,7 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// A table without rows.
+    /// Creates a table without rows.
     pub(super) fn new(title: &'static str, heads: &[&str]) -> Self {
         Self {
             title,
@@ -20,7 +20,7 @@ impl Table {
         self.rows.push(row);
     }
 
-    /// The title, the table, and what has to be known to read it.
+    /// Renders title, table and note.
     pub(super) fn render(&self, note: &str) -> String {
         let widths = self.widths();
         let mut lines: Vec<String> = self.rows.iter().map(|row| line(row, &widths)).collect();

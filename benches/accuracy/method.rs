@@ -1,4 +1,4 @@
-//! A preset with the settings laid over it.
+//! A preset with overridden settings.
 
 use mocban::config::{self, BaseLayer, Preset, Sources};
 use mocban::stages::Settings;
@@ -13,7 +13,7 @@ pub(super) struct Method {
 }
 
 impl Method {
-    /// A preset under values as `--set` takes them. The environment has no say.
+    /// Loads a preset with values as `--set` takes them. The environment is ignored.
     pub(super) fn load(preset: Preset, sets: &[String]) -> anyhow::Result<Self> {
         let loaded = config::load(&Sources {
             base: BaseLayer::Preset(preset),

@@ -1,11 +1,11 @@
-//! Every number of a result by its path, such as `normalize.poses.0.score`.
+//! Every number of a result by its path, such as `normalize.inks.0.threshold_print`.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 use serde_json::Value;
 
-/// Values as text by path; what is not there has none.
+/// Values as text by path.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Numbers(BTreeMap<String, String>);
 
@@ -16,17 +16,17 @@ impl Numbers {
         Ok(())
     }
 
-    /// A value as text.
+    /// Returns a value as text.
     pub(super) fn text(&self, path: &str) -> Option<&str> {
         self.0.get(path).map(String::as_str)
     }
 
-    /// A value as a number.
+    /// Returns a value as a number.
     pub(super) fn number(&self, path: &str) -> Option<f64> {
         self.text(path)?.parse().ok()
     }
 
-    /// Every path there is.
+    /// Returns every path.
     pub(super) fn paths(&self) -> impl Iterator<Item = &String> {
         self.0.keys()
     }

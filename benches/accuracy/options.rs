@@ -1,4 +1,4 @@
-//! What the program is asked to do.
+//! Command-line options.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
@@ -11,7 +11,7 @@ use mocban::domain::ThresholdMetric;
 use super::case::Case;
 use super::method::Method;
 
-/// Pairs of each tier and seed when nothing else is asked for.
+/// Default number of pairs of each tier and seed.
 const PAIRS: u64 = 60;
 
 /// Accuracy and speed of the four stages on the built-in data, as Markdown.
@@ -24,7 +24,7 @@ pub(super) struct Options {
     /// Pairs of each tier and seed; the real tier has 20 [default: 60, and 1 under `cargo test`]
     #[arg(long, value_name = "N")]
     pairs: Option<u64>,
-    /// Scans of about so many vertices [default: 20,000 to 150,000]
+    /// Approximate number of vertices of the scans [default: 20,000 to 150,000]
     #[arg(long, value_name = "N")]
     vertices: Option<u32>,
     /// Seeds of the data
@@ -33,46 +33,66 @@ pub(super) struct Options {
     /// Presets to compare: default, paper
     #[arg(long, value_delimiter = ',', default_value = "default", value_parser = preset)]
     presets: Vec<Preset>,
-    /// A setting laid over each preset; repeatable
+    /// A setting that overrides each preset; repeatable
     #[arg(long = "set", value_name = "SECTION.KEY=VALUE")]
     sets: Vec<String>,
-    /// Pairs at work at a time, each on one core [default: the cores there are]
+    /// Pairs computed at the same time, each on one core [default: all cores]
     #[arg(long, value_name = "N", default_value_t = cores(), hide_default_value = true)]
     pub(super) workers: NonZeroUsize,
-    /// The metric that sheets and the question of decoys go by
+    /// The metric for contact sheets and decoys
     #[arg(long, default_value = ThresholdMetric::ALL[ThresholdMetric::ALL.len() - 1].name())]
     pub(super) metric: ThresholdMetric,
     /// Also run pairs without a right answer: a wrong print, a mirrored mesh, an uncarved mesh
     #[arg(long)]
     pub(super) decoys: bool,
-    /// How many of the worst pairs go on a contact sheet
+    /// Fit the weights of the confidence model on these pairs and their decoys, and print nothing else
+    #[arg(long)]
+    pub(super) fit_confidence: bool,
+    /// Seeds of the pairs on which fitted weights are checked
+    #[arg(
+        long,
+        value_delimiter = ',',
+        default_value = "1001",
+        requires = "fit_confidence"
+    )]
+    held_out_seeds: Vec<u64>,
+    /// Number of the worst pairs on a contact sheet
     #[arg(long, value_name = "N", default_value_t = 50, requires = "sheets")]
     pub(super) worst: usize,
-    /// Where contact sheets go: one PNG a tier and preset
+    /// Folder for contact sheets, one PNG a tier and preset
     #[arg(long, value_name = "DIR")]
     pub(super) sheets: Option<PathBuf>,
-    /// Where every number of every pair and metric goes
+    /// CSV file for every number of every pair and metric
     #[arg(long, value_name = "FILE")]
     pub(super) pairs_csv: Option<PathBuf>,
-    /// Given by `cargo bench`
+    /// Passed by `cargo bench`
     #[arg(long, hide = true)]
     bench: bool,
 }
 
 impl Options {
-    /// The presets with the settings laid over them.
+    /// Returns the presets with the overridden settings.
     pub(super) fn methods(&self) -> anyhow::Result<Vec<Method>> {
         let load = |preset: &Preset| Method::load(*preset, &self.sets);
         self.presets.iter().map(load).collect()
     }
 
-    /// The pairs, by tier, seed and index.
+    /// Returns the pairs, by tier, seed and index.
     pub(super) fn cases(&self) -> Vec<Case> {
+        self.cases_of(&self.seeds)
+    }
+
+    /// Returns the pairs on which fitted weights are checked.
+    pub(super) fn held_out_cases(&self) -> Vec<Case> {
+        self.cases_of(&self.held_out_seeds)
+    }
+
+    fn cases_of(&self, seeds: &[u64]) -> Vec<Case> {
         let wanted = self.pairs.unwrap_or(if self.bench { PAIRS } else { 1 });
         let mut cases = Vec::new();
         for tier in &self.tiers {
             let count = wanted.min(tier.max_pairs().unwrap_or(u64::MAX));
-            for seed in &self.seeds {
+            for seed in seeds {
                 let case = |index| Case::new(*tier, *seed, index, self.vertices);
                 cases.extend((0..count).map(case));
             }

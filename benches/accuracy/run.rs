@@ -1,15 +1,13 @@
-//! A mesh and a print on their way through the stages.
+//! One run of the four stages on a mesh and a print.
 
 use mocban::domain::FitOutcome;
 use mocban::mesh;
 use mocban::raster;
-use mocban::stages::{
-    AlignedPair, Print, Scan, Settings, StageError, depth, fit, normalize, register,
-};
+use mocban::stages::{AlignedPair, Print, Scan, Settings, StageError, pipeline};
 
 use super::times::{Part, Times};
 
-/// What the stages are given.
+/// Input files of a run.
 pub(super) struct Input {
     /// A binary STL.
     pub(super) mesh: Vec<u8>,
@@ -17,17 +15,17 @@ pub(super) struct Input {
     pub(super) print: Vec<u8>,
 }
 
-/// What became of an input.
+/// Result of a run.
 pub(super) struct Run {
     /// How long each part took.
     pub(super) times: Times,
-    /// The plane, if it came so far.
+    /// The plane, if the fit succeeded.
     pub(super) fit: Option<FitOutcome>,
-    /// The print as read and what the stages found, or why there is nothing.
+    /// The print as read and the results of the stages, or the error.
     pub(super) result: Result<(Print, AlignedPair), Failed>,
 }
 
-/// Why nothing was found.
+/// Why a run failed.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum Failed {
     /// The mesh cannot be read.
@@ -36,7 +34,7 @@ pub(super) enum Failed {
     /// The print cannot be read.
     #[error(transparent)]
     Print(#[from] raster::DecodeError),
-    /// A stage gave up.
+    /// A stage found no result.
     #[error(transparent)]
     Stage(#[from] StageError),
 }
@@ -50,7 +48,7 @@ impl Run {
     }
 }
 
-/// The way of an input; `fit` keeps the plane when a later stage gives up.
+/// Runs the stages; `fit` keeps the plane when a later stage fails.
 fn align(
     input: &Input,
     settings: &Settings,
@@ -65,23 +63,23 @@ fn align(
     })?;
     let plane = times
         .book(Part::Fit, || {
-            fit::fit(&scan, Some(&print), None, &settings.fit)
+            pipeline::fit(&scan, Some(&print), None, settings)
         })
         .map_err(StageError::from)?;
     let plane = &*fit.insert(plane);
     let depth = times
         .book(Part::Depth, || {
-            depth::depth(&scan, plane, None, &settings.depth)
+            pipeline::depth(&scan, plane, None, settings)
         })
         .map_err(StageError::from)?;
     let normalized = times
         .book(Part::Normalize, || {
-            normalize::normalize(&depth, &print, &settings.normalize)
+            pipeline::normalize(&depth, &print, settings)
         })
         .map_err(StageError::from)?;
     let registered = times
         .book(Part::Register, || {
-            register::register(&depth, &normalized, &settings.register)
+            pipeline::register(&depth, &normalized, settings)
         })
         .map_err(StageError::from)?;
     let aligned = AlignedPair {

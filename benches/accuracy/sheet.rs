@@ -1,4 +1,4 @@
-//! The worst pairs of a tier and method on one picture.
+//! Contact sheets of the worst pairs of each tier and method.
 
 use std::path::Path;
 
@@ -19,8 +19,8 @@ const COLUMNS: usize = 4;
 /// A pixel of a tops mask that is a true stroke top.
 const TOP: u8 = 255;
 
-/// Draws a sheet for each tier and method. A pair shows its print, the relief turned onto it, and the print with the
-/// edges of the true tops in blue and those of the depth mask in vermillion over them.
+/// Draws a sheet for each tier and method. Each pair shows its print, the aligned relief, and the print with the edges
+/// of the true tops in blue and of the depth mask in vermillion.
 pub(super) fn write(
     dir: &Path,
     options: &Options,
@@ -38,7 +38,7 @@ pub(super) fn write(
     Ok(())
 }
 
-/// The trials that go on a sheet, those that failed first, then the farthest from the truth.
+/// Returns the trials of a sheet: failed ones first, then by their distance from the truth.
 fn worst<'a>(
     trials: &'a [Trial],
     tier: Tier,
@@ -54,7 +54,7 @@ fn worst<'a>(
     worst
 }
 
-/// Pictures are not kept while all pairs run: the few on the sheet run again.
+/// Images are not kept while all pairs run: the few on the sheet run again.
 fn draw(worst: &[&Trial], method: &Method, options: &Options) -> anyhow::Result<Rgb> {
     let cells = in_order(worst.len(), options.workers, |index| {
         let trial = worst[index];
@@ -70,7 +70,7 @@ fn draw(worst: &[&Trial], method: &Method, options: &Options) -> anyhow::Result<
     Ok(contact_sheet(&cells, COLUMNS))
 }
 
-/// The errors, or why there are none.
+/// Returns the errors, or the reason for a failure.
 fn note(trial: &Trial, metric: ThresholdMetric) -> String {
     match (&trial.outcome, trial.found(metric)) {
         (Ok(_), Some(found)) => {
@@ -92,13 +92,13 @@ fn tiles(run: &Run, tops: &Grid<u8>, print: &[u8], metric: ThresholdMetric) -> [
         let plain = |print: PrintImage| PrintView::of_side(&print, side).print(&print);
         return [decode(print).map(plain), None, None];
     };
-    let view = PrintView::of_side(print.picture(), side);
-    let plain = Some(view.print(print.picture()));
+    let view = PrintView::of_side(print.image(), side);
+    let plain = Some(view.print(print.image()));
     let Some(found) = aligned.metric(metric) else {
         return [plain, None, None];
     };
     let tops = tops.map(|value| *value == TOP);
     let relief = view.relief(&aligned.depth, &found.print_from_depth);
-    let overlay = view.overlay_on_truth(print.picture(), &tops, &aligned.depth, found);
+    let overlay = view.overlay_on_truth(print.image(), &tops, &aligned.depth, found);
     [plain, Some(relief), Some(overlay)]
 }

@@ -1,4 +1,4 @@
-//! Where the time goes.
+//! Time of each part by tier and method.
 
 use mocban::demo::Tier;
 use mocban::report::stats::median;
@@ -12,7 +12,7 @@ const NOTE: &str = "\
 Mean milliseconds a pair on one core (time of the thread, so that other work on the machine does not count), over the \
 pairs that went all the way; for stages with the share of the four. Vertices: median, each counted once.";
 
-/// A row for each tier and method.
+/// Makes a row for each tier and method.
 pub(super) fn table(tiers: &[Tier], methods: &[Method], trials: &[Trial]) -> String {
     let mut heads = vec!["tier", "preset", "pairs", "vertices"];
     heads.extend(Part::ALL.map(Part::name));
@@ -36,7 +36,7 @@ fn vertices(trials: &[&Trial]) -> String {
     number(median(&mut counts), 0)
 }
 
-/// Each part, the four stages, everything.
+/// Returns the times of each part, of the four stages and of all parts.
 fn times(trials: &[&Trial]) -> Vec<String> {
     let mean = |parts: &[Part]| {
         let sum: f64 = trials.iter().map(|trial| trial.times.sum_ms(parts)).sum();

@@ -1,8 +1,8 @@
-//! How long each part of a pair's way takes on one core.
+//! Time of each part of a run on one core.
 
 use rustix::time::{ClockId, clock_gettime};
 
-/// A part of a pair's way that is timed on its own.
+/// A part of a run that is timed separately.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Part {
     /// Bytes of a binary STL to a mesh.
@@ -13,14 +13,14 @@ pub(super) enum Part {
     Fit,
     /// Mesh and plane to depth map.
     Depth,
-    /// Depth map and print to masks and poses.
+    /// Depth map and print to ink masks and relief heights.
     Normalize,
-    /// Masks and poses to alignments.
+    /// Ink and relief to alignments.
     Register,
 }
 
 impl Part {
-    /// Every part in its order.
+    /// Every part, in order.
     pub(super) const ALL: [Self; 6] = [
         Self::ReadMesh,
         Self::ReadPrint,
@@ -50,7 +50,7 @@ impl Part {
 pub(super) struct Times([f64; Part::ALL.len()]);
 
 impl Times {
-    /// Does the work and books its time.
+    /// Runs the work and adds its time to a part.
     pub(super) fn book<T>(&mut self, part: Part, work: impl FnOnce() -> T) -> T {
         let before = thread_ms();
         let done = work();
@@ -58,18 +58,18 @@ impl Times {
         done
     }
 
-    /// Milliseconds of a part.
+    /// Returns the milliseconds of a part.
     pub(super) const fn ms(&self, part: Part) -> f64 {
         self.0[part as usize]
     }
 
-    /// Milliseconds of several parts.
+    /// Returns the milliseconds of several parts.
     pub(super) fn sum_ms(&self, parts: &[Part]) -> f64 {
         parts.iter().map(|part| self.ms(*part)).sum()
     }
 }
 
-/// Time this thread has spent on a core, milliseconds: what else runs on the machine does not count.
+/// Returns the processor time of this thread in milliseconds: other work on the machine does not count.
 fn thread_ms() -> f64 {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     now.tv_sec as f64 * 1e3 + now.tv_nsec as f64 / 1e6

@@ -1,4 +1,4 @@
-//! A pair aligned by a method, held against the truth.
+//! A pair aligned by a method and compared with the ground truth.
 
 use std::num::NonZeroUsize;
 
@@ -17,13 +17,13 @@ use super::run::Run;
 use super::times::Times;
 use super::workers::in_order;
 
-/// What became of a pair under a method.
+/// Result of a pair under a method.
 pub(super) struct Trial {
     /// The pair.
     pub(super) case: Case,
     /// Its id within tier and seed.
     pub(super) id: String,
-    /// What it shows.
+    /// Its character.
     pub(super) character: String,
     /// Name of the method.
     pub(super) method: &'static str,
@@ -33,11 +33,11 @@ pub(super) struct Trial {
     pub(super) times: Times,
     /// Angle between the found plane's normal and the true one, degrees, if there is a plane.
     pub(super) normal_deg: Option<f64>,
-    /// One result a metric, or why there is none.
+    /// One result a metric, or the error.
     pub(super) outcome: Result<Vec<Found>, String>,
 }
 
-/// A metric's alignment and how far it is from the truth.
+/// A metric's alignment and its distance from the truth.
 pub(super) struct Found {
     /// Which metric.
     pub(super) metric: ThresholdMetric,
@@ -45,7 +45,7 @@ pub(super) struct Found {
     pub(super) errors: TruthErrors,
     /// Intersection over union with the print's ink on the canvas.
     pub(super) print_iou: f64,
-    /// How sure the method is, 0..=1, where it says so.
+    /// Confidence, 0..=1, where the method has one.
     pub(super) confidence: Option<f64>,
     /// Every number of the four stages.
     pub(super) numbers: Numbers,
@@ -74,7 +74,7 @@ pub(super) fn all(
     Ok(trials.into_iter().flatten().collect())
 }
 
-/// The trials of a tier under a method.
+/// Returns the trials of a tier under a method.
 pub(super) fn of<'a>(trials: &'a [Trial], tier: Tier, method: &Method) -> Vec<&'a Trial> {
     let name = method.name;
     trials
@@ -112,20 +112,20 @@ impl Trial {
         })
     }
 
-    /// A metric's result.
+    /// Returns a metric's result.
     pub(super) fn found(&self, metric: ThresholdMetric) -> Option<&Found> {
         let found = self.outcome.as_ref().ok()?;
         found.iter().find(|found| found.metric == metric)
     }
 
-    /// How wrong a metric's result is, greatest where nothing was found.
+    /// Returns how wrong a metric's result is; infinite for a failed pair.
     pub(super) fn severity(&self, metric: ThresholdMetric) -> f64 {
         self.found(metric)
             .map_or(f64::INFINITY, |found| found.errors.severity())
     }
 }
 
-/// The results of all metrics.
+/// Returns the results of all metrics.
 fn found(
     pair: &DemoPair,
     truth: &TruthRecord,

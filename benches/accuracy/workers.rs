@@ -1,4 +1,4 @@
-//! Work on several cores with results in the order of the work.
+//! Parallel work with results in the order of the items.
 
 use std::num::NonZeroUsize;
 use std::panic::resume_unwind;
@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use indicatif::ProgressBar;
 
-/// The results of `work` on 0..count. What a piece of work does in parallel stays on its worker's one thread, so that
-/// the time of a thread is the time of its piece.
+/// Returns the results of `work` on 0..count. Each worker has one thread, so that the time of the thread is the time of
+/// its item.
 pub(super) fn in_order<T: Send>(
     count: usize,
     workers: NonZeroUsize,
@@ -39,7 +39,7 @@ pub(super) fn in_order<T: Send>(
     Ok(done.into_iter().map(|(_, result)| result).collect())
 }
 
-/// Runs work in a pool of one thread.
+/// Runs work in a thread pool of one thread.
 fn alone<T: Send>(work: impl FnOnce() -> T + Send) -> anyhow::Result<T> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     Ok(pool.install(work))

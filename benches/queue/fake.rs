@@ -71,8 +71,9 @@ impl Fake {
         let metrics = if last { metrics() } else { Vec::new() };
         let outcome = if last {
             json!(RegisterOutcome {
+                ink: 0,
                 metrics: metrics.iter().map(|metric| metric.outcome).collect(),
-                evidence: None,
+                features: None,
             })
         } else {
             json!({ "stage": stage })

@@ -4,7 +4,6 @@ use criterion::{BatchSize, Criterion};
 use mocban::config::{Sources, load};
 use mocban::mesh::{self, Mesh};
 use mocban::raster::{self, PrintImage};
-use mocban::stages::normalize::Normalized;
 use mocban::stages::{AlignedPair, Print, Scan, Settings, depth, fit, normalize, register};
 
 use super::files::{Files, bytes};
@@ -52,44 +51,17 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
             &settings.normalize,
         ));
     });
-    let mut register = |name: &str, normalized: &Normalized| {
-        bench(name, &mut |_, _| {
-            drop(register::register(
-                &aligned.depth,
-                normalized,
-                &settings.register,
-            ));
-        });
-    };
-    register("register", &aligned.normalized);
-    // What registers one mask only, to be held against what does nothing else.
-    for side in [256, 512] {
-        register(
-            &format!("register_one_{side}"),
-            &one_mask(&aligned, side, &settings, &print)?,
-        );
-    }
+    bench("register", &mut |_, _| {
+        drop(register::register(
+            &aligned.depth,
+            &aligned.normalized,
+            &settings.register,
+        ));
+    });
     let mut whole = criterion.benchmark_group("pair");
     whole.bench_function(files.size, |b| b.iter(|| pair(&stl, &png, &settings)));
     whole.finish();
     Ok(())
-}
-
-/// What register starts from, on a canvas of `side` pixels, for one metric alone.
-fn one_mask(
-    aligned: &AlignedPair,
-    side: u32,
-    settings: &Settings,
-    print: &Print,
-) -> anyhow::Result<Normalized> {
-    let canvas = normalize::NormalizeParams {
-        canvas_px: side,
-        character_px: side * 3 / 4,
-        ..settings.normalize.clone()
-    };
-    let mut normalized = normalize::normalize(&aligned.depth, print, &canvas)?;
-    normalized.outcome.thresholds.truncate(1);
-    Ok(normalized)
 }
 
 /// A pair from its files' bytes to its alignment.

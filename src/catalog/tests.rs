@@ -217,8 +217,9 @@ async fn enter(catalog: &Catalog, fingerprints: FingerprintIds, clock: UnixMilli
 
 fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
     let register = RegisterOutcome {
+        ink: 0,
         metrics: ThresholdMetric::ALL.map(metric).to_vec(),
-        evidence: None,
+        features: None,
     };
     let last = stage == Stage::Register;
     let metrics = register.metrics.iter().map(|outcome| MetricResult {

@@ -37,7 +37,7 @@ pub(super) async fn export(args: ExportArgs, context: &Context) -> anyhow::Resul
     let config = context.settings()?.config;
     context.warn_about_stale(&catalog).await?;
     let options = JsonlOptions {
-        metrics: config.stages.normalize.method.metrics(),
+        metrics: config.stages.pipeline.method.metrics(),
         with_times: args.with_times,
         limits: config.limits.image,
     };

@@ -7,7 +7,8 @@ use super::table::{Align, columns};
 use super::time_text::{duration, utc};
 use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
 use crate::domain::{
-    DepthOutcome, FitOutcome, JobStatus, NormalizeOutcome, Stage, ThresholdMetric, Verdict,
+    DepthOutcome, FitOutcome, InkHypothesis, JobStatus, NormalizeOutcome, Stage, ThresholdMetric,
+    Verdict,
 };
 use crate::report::ManualCorrection;
 use crate::store::Project;
@@ -194,15 +195,17 @@ fn numbers(record: &StageRecord) -> String {
             .parse::<DepthOutcome>()
             .map(|depth| depth_numbers(&depth)),
         Stage::Normalize => record.parse::<NormalizeOutcome>().map(|found| {
-            let polarity = if found.light_on_dark {
-                "light on dark"
-            } else {
-                "dark on light"
+            let text = |ink: &InkHypothesis| {
+                let polarity = if ink.light_on_dark {
+                    "light on dark"
+                } else {
+                    "dark on light"
+                };
+                let threshold = ink.threshold_print;
+                format!("print threshold {threshold:.0} of 65535, {polarity}")
             };
-            format!(
-                "print threshold {:.0} of 65535, {polarity}",
-                found.threshold_print
-            )
+            let texts: Vec<String> = found.inks.iter().map(text).collect();
+            texts.join("; or ")
         }),
         Stage::Register => Ok(String::new()),
     };

@@ -10,7 +10,7 @@ use super::sources::Preset;
 use super::tree::{Change, Tree};
 use crate::mesh;
 use crate::raster;
-use crate::stages::{Settings, depth, fit, normalize, register};
+use crate::stages::{PipelineParams, Settings, depth, fit, normalize, register};
 
 /// Every setting, checked.
 #[derive(Debug, Clone, PartialEq)]
@@ -61,6 +61,7 @@ pub struct ReviewSettings {
 struct Document {
     limits: InputLimits,
     run: RunSettings,
+    pipeline: PipelineParams,
     fit: fit::FitParams,
     depth: depth::DepthParams,
     normalize: normalize::NormalizeParams,
@@ -74,6 +75,7 @@ impl From<Document> for Config {
             limits: document.limits,
             run: document.run,
             stages: Settings {
+                pipeline: document.pipeline,
                 fit: document.fit,
                 depth: document.depth,
                 normalize: document.normalize,

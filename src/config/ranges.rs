@@ -49,10 +49,10 @@ const RANGES: &[(&str, Range)] = &[
     ("normalize.print_grey", range(0.0, 255.0)),
     ("normalize.canvas_px", range(64.0, 2048.0)),
     ("normalize.character_px", range(32.0, 2048.0)),
-    ("normalize.scale_band", range(1.0, 2.0)),
-    ("normalize.threshold_min", range(0.0, 1.0)),
-    ("normalize.threshold_max", range(0.0, 1.0)),
-    ("normalize.ink_spread", range(1.0, 3.0)),
+    ("register.scale_band", range(1.0, 2.0)),
+    ("register.threshold_min", range(0.0, 1.0)),
+    ("register.threshold_max", range(0.0, 1.0)),
+    ("register.ink_spread", range(1.0, 3.0)),
     ("normalize.density_greys", range(0.0, 255.0)),
     ("normalize.structure_greys", range(0.0, 255.0)),
     ("register.working_px", range(32.0, 1024.0)),
@@ -65,7 +65,7 @@ const RANGES: &[(&str, Range)] = &[
 /// Pairs of settings of which the first must be below the second.
 const ASCENDING: &[(&str, &str)] = &[
     ("normalize.character_px", "normalize.canvas_px"),
-    ("normalize.threshold_min", "normalize.threshold_max"),
+    ("register.threshold_min", "register.threshold_max"),
 ];
 
 /// Checks every number against its range, and settings against each other.
@@ -80,9 +80,6 @@ pub(super) fn check(tree: &Tree) -> Result<(), ConfigError> {
         if let (Some(low), Some(high)) = (find(low), find(high)) {
             check_ascending(low, high)?;
         }
-    }
-    if let (Some(normalize), Some(register)) = (find("normalize.method"), find("register.method")) {
-        check_methods(normalize, register)?;
     }
     Ok(())
 }
@@ -124,24 +121,6 @@ fn check_ascending(low: &Setting, high: &Setting) -> Result<(), ConfigError> {
         }
         _ => Ok(()),
     }
-}
-
-/// Refuses `bounding_box` with `refine`: refinement starts from a pose that `bounding_box` does not search, so every pair would fail.
-fn check_methods(normalize: &Setting, register: &Setting) -> Result<(), ConfigError> {
-    let is = |setting: &Setting, name: &str| setting.value.as_str() == Some(name);
-    if !(is(normalize, "bounding_box") && is(register, "refine")) {
-        return Ok(());
-    }
-    Err(match register.origin {
-        Origin::Default => invalid(
-            normalize,
-            "needs register.method = \"exhaustive\"".to_owned(),
-        ),
-        Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => invalid(
-            register,
-            "needs normalize.method = \"pose_first\"".to_owned(),
-        ),
-    })
 }
 
 fn invalid(setting: &Setting, reason: String) -> ConfigError {
@@ -187,8 +166,8 @@ mod tests {
             "--set: normalize.canvas_px = 128: must be above normalize.character_px = 192"
         );
         assert_eq!(
-            complaint("normalize.method", "bounding_box".into()),
-            "--set: normalize.method = \"bounding_box\": needs register.method = \"exhaustive\""
+            complaint("register.threshold_min", 0.9.into()),
+            "--set: register.threshold_min = 0.9: must be below register.threshold_max = 0.6"
         );
         let greys = toml::Value::from(vec![9, 5]);
         assert!(complaint("normalize.density_greys", greys).ends_with("above the last"));

@@ -4,10 +4,17 @@ use super::ThresholdMetric;
 
 /// The depth map, 16 bits a pixel; from the depth stage.
 pub const DEPTH: &str = "depth.png";
-/// The print's ink in the print image's frame: 255 ink, 0 paper, 128 where nothing is known; from normalize.
-pub const PRINT_MASK: &str = "print_mask.png";
 /// The print mask on the canvas: 255 ink; from register.
 pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
+
+/// One interpretation of the print's ink, counted from 0, in the print image's frame: 255 ink, 0 background, 128 where
+/// nothing is known; from normalize. `RegisterOutcome::ink` says which one was used.
+pub fn print_mask(ink: usize) -> String {
+    match ink {
+        0 => "print_mask.png".to_owned(),
+        other => format!("print_mask_{other}.png"),
+    }
+}
 
 /// A metric's depth mask on the canvas: 255 stroke; from register.
 pub fn canvas_depth_mask(metric: ThresholdMetric) -> String {

@@ -1,33 +1,52 @@
-//! The ways of choosing the depth threshold: the three that the paper compares, and one by the relief alone.
+//! The metrics by which the depth threshold is chosen: the paper's three and one from the relief alone.
 
 use serde::{Deserialize, Serialize};
 
 /// How the height at which a depth map becomes a mask is chosen (paper III-C).
 ///
-/// The paper's three match the mask to the print and so copy its ink spread; [`Self::Relief`] does not look at the
-/// print and is true to the wood.
+/// `P` is the ink mask of the print and `D(t)` the depth mask of the heights from threshold `t` up, both on one canvas.
+/// Under the default method they are compared after alignment, where both images hold data, over 40 equal steps of `t`
+/// from `register.threshold_min` to `register.threshold_max` of the relief below the tops. Under the paper's method they
+/// are compared before alignment, wrapped by box and centroid, over the authors' ranges of grey.
+///
+/// The paper's three match the print and so reproduce its ink spread; [`Self::Relief`] is true to the wood.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ThresholdMetric {
-    /// The threshold with the highest mean of `(2 s_xy + C) / (s_x^2 + s_y^2 + C)`: SSIM without its
-    /// luminance factor (Wang et al. 2004, doi:10.1109/TIP.2003.819861). Higher is better.
+    /// `argmax_t mean((2 s_xy + C) / (s_x^2 + s_y^2 + C))` with the local variances and the covariance of `P` and `D(t)`:
+    /// SSIM without its luminance factor (Wang et al. 2004, doi:10.1109/TIP.2003.819861). The score is that mean.
     NlSsim,
-    /// The threshold whose share of ink is closest to the print's, the same or slightly denser.
-    /// Lower difference is better.
+    /// `argmin_t |a(D(t)) / a(P) * s - 1|` with areas `a` and the ink spread `s` (`register.ink_spread`). The score is
+    /// minus that value. Under the paper's method `argmin_t |d(D(t)) - d(P)|` with densities `d`, the shares of the
+    /// canvas.
     Density,
-    /// Both: the better by the registered masks' agreement, as the settings say.
+    /// `argmax_t` of the same mean as [`Self::NlSsim`] among the thresholds with `|ln(a(D(t)) / A)| <= ln 1.12`, where
+    /// `A` is the area of [`Self::Relief`]'s mask clamped to `a(P) / 2.2 ..= 1.15 a(P)`; where none is that close, the
+    /// threshold nearest to [`Self::Relief`]'s. The score is that mean. Under the paper's method the better of
+    /// [`Self::NlSsim`] and [`Self::Density`] by the IoU of the registered masks.
     Ensemble,
-    /// A fixed share of the relief below the fitted tops, from geometry alone. No score: the print has no say.
+    /// The threshold at which the stroke tops end and the walls begin, from the histogram of heights alone: the geometric
+    /// mean of 0.075 of the relief (the usual depth) and the depth below the peak at which heights are no more frequent
+    /// than `min(2.5 w, (w + peak) / 2)`, where `w` is the median frequency on the walls; that depth is clamped to
+    /// 0.02..=0.25. It does not depend on the print and has no score (0). Not part of the paper's method.
     Relief,
 }
 
 impl ThresholdMetric {
     /// Every metric: the paper's in the order of its table, then ours.
     pub const ALL: [Self; 4] = [Self::NlSsim, Self::Density, Self::Ensemble, Self::Relief];
-    /// The paper's three, which every method gives.
+    /// The paper's three, which both methods give.
     pub const PAPER: [Self; 3] = [Self::NlSsim, Self::Density, Self::Ensemble];
 
-    /// Name in JSON, in the catalog and on the command line.
+    /// Returns the name in JSON, in the catalog and on the command line.
+    ///
+    /// # Examples
+    /// ```
+    /// use mocban::domain::ThresholdMetric;
+    ///
+    /// assert_eq!(ThresholdMetric::NlSsim.name(), "nl_ssim");
+    /// assert_eq!("relief".parse(), Ok(ThresholdMetric::Relief));
+    /// ```
     pub const fn name(self) -> &'static str {
         match self {
             Self::NlSsim => "nl_ssim",
@@ -37,7 +56,7 @@ impl ThresholdMetric {
         }
     }
 
-    /// Name in the printed table; the paper's as the paper has them.
+    /// Returns the name in the printed table; the paper's metrics as the paper names them.
     pub const fn title(self) -> &'static str {
         match self {
             Self::NlSsim => "Non-luminous SSIM",

@@ -27,8 +27,8 @@ pub use ids::{PairId, PairName, PairNameError, WorkerId};
 pub use job::{CRASH_LIMIT, JobStatus, is_poisoned};
 pub use metric::ThresholdMetric;
 pub use outcome::{
-    Bow, DepthOutcome, DepthScale, FitOutcome, MetricOutcome, NormalizeOutcome, Pose, PoseFeatures,
-    RegisterOutcome, Scores, SideEvidence, ThresholdChoice,
+    Bow, DepthOutcome, DepthScale, FitOutcome, InkHypothesis, MetricOutcome, NormalizeOutcome,
+    PoseFeatures, RegisterOutcome, ReliefHeights, Scores, SideEvidence, ThresholdChoice,
 };
 pub use review_order::ReviewOrder;
 pub use sanitize::sanitize;

@@ -15,6 +15,14 @@ pub struct Bow(pub [f64; 6]);
 
 impl Bow {
     /// Height of the surface at a point of the plane.
+    ///
+    /// # Examples
+    /// ```
+    /// use mocban::domain::Bow;
+    ///
+    /// let bow = Bow([0.0, 0.0, 0.0, 0.5, 0.0, 0.0]);
+    /// assert_eq!(bow.height(2.0, 9.0), 2.0);
+    /// ```
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let c = &self.0;
         c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y
@@ -92,15 +100,6 @@ pub struct DepthOutcome {
     pub coverage: f64,
 }
 
-/// A way of laying the depth map on the print, with the score that found it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Pose {
-    /// Depth-map pixels to print-image pixels.
-    pub print_from_depth: Affine2,
-    /// Score of the search, higher is better; comparable within one pair only.
-    pub score: f64,
-}
-
 /// The threshold one metric chose.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ThresholdChoice {
@@ -114,26 +113,70 @@ pub struct ThresholdChoice {
     pub at_bound: bool,
 }
 
-/// Numbers of the normalize stage.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct NormalizeOutcome {
-    /// Grey level (0..=65535) that parts ink from paper in the print.
+/// One interpretation of the print as ink and background. More than one is kept where the image leaves the polarity
+/// or stains unclear; the register stage chooses.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct InkHypothesis {
+    /// Grey level (0..=65535) between ink and background.
     pub threshold_print: f64,
     /// Whether the print is light on dark, as a rubbing is.
     pub light_on_dark: bool,
+    /// Print pixels to the pair's canvas: the ink's longest side has a fixed length, its centroid is in the middle.
+    pub canvas_from_print: Affine2,
+}
+
+/// Heights of the parts of the carving over the fitted surface.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct ReliefHeights {
+    /// Height at which most of the stroke tops lie, mesh units.
+    pub top: f64,
+    /// Median height of the ground, mesh units.
+    pub ground: f64,
+    /// Depth below `top` at which the tops end and the walls begin, as a share of [`Self::depth`].
+    pub tops_end: f64,
+}
+
+impl ReliefHeights {
+    /// Returns the depth of the carving, `top - ground`, mesh units.
+    pub fn depth(&self) -> f64 {
+        self.top - self.ground
+    }
+
+    /// Returns the depth-map level, 1..=65535, at a depth below the tops given as a share of the relief.
+    ///
+    /// # Examples
+    /// ```
+    /// use mocban::domain::{Affine2, DepthScale, ReliefHeights};
+    ///
+    /// let relief = ReliefHeights { top: 0.0, ground: -1.0, tops_end: 0.08 };
+    /// let scale = DepthScale {
+    ///     height_min: -1.0,
+    ///     height_per_level: 0.001,
+    ///     mesh_unit_per_px: 0.02,
+    ///     depth_from_plane: Affine2::IDENTITY,
+    ///     bow: None,
+    ///     unit: None,
+    /// };
+    /// let level = relief.level_at(&scale, relief.tops_end);
+    /// assert!((scale.height(level) - -0.08).abs() < 0.001);
+    /// ```
+    pub fn level_at(&self, scale: &DepthScale, share: f64) -> u16 {
+        let height = self.top - share * self.depth();
+        let steps = (height - scale.height_min) / scale.height_per_level;
+        (1.0 + steps.round()).clamp(1.0, 65_535.0) as u16
+    }
+}
+
+/// Numbers of the normalize stage.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct NormalizeOutcome {
     /// Side of the pair's square canvas in pixels.
     pub canvas_px: u32,
-    /// Print pixels to the pair's canvas.
-    pub canvas_from_print: Affine2,
-    /// Poses found before thresholds were chosen, best first; empty when the method registers afterwards.
-    pub poses: Vec<Pose>,
-    /// Best pose of the relief read in the mirror, where it was searched for.
-    #[serde(default)]
-    pub mirrored: Option<Pose>,
-    /// Whether the pose search ended at a bound of its scale or shift.
-    pub search_at_bound: bool,
-    /// One choice a metric that the method gives; without the ensemble where that is settled by registering the
-    /// others.
+    /// Interpretations of the print, the likeliest first; at least one.
+    pub inks: Vec<InkHypothesis>,
+    /// Heights of tops and ground, from which soft strokes are computed; `None` under the paper's method.
+    pub relief: Option<ReliefHeights>,
+    /// Thresholds chosen before registration: empty unless under the paper's method, which leaves out the ensemble.
     pub thresholds: Vec<ThresholdChoice>,
 }
 
@@ -162,9 +205,9 @@ pub struct PoseFeatures {
     /// Correlation of relief and ink over what both know, over what each holds; at most 1.
     pub correlation: f64,
     /// Share of the tops that have printed, 0..=1.
-    pub tops_met: f64,
+    pub tops_covered: f64,
     /// Share of the ink that has tops under it, 0..=1.
-    pub ink_met: f64,
+    pub ink_covered: f64,
     /// Score of the best pose at another angle, over that of the best pose.
     pub other_angle: f64,
     /// Score of the best pose of the mirrored relief, over that of the best pose.
@@ -217,9 +260,11 @@ impl MetricOutcome {
 /// Numbers of the register stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct RegisterOutcome {
+    /// Which of the normalize stage's interpretations of the print was used, counted from 0.
+    pub ink: usize,
     /// One result a metric that the method gives, in the order of [`ThresholdMetric::ALL`].
     pub metrics: Vec<MetricOutcome>,
-    /// What speaks for and against the pose that all metrics share, where the method gathers it.
+    /// Evidence for and against the pose that all metrics share; `None` under the paper's method.
     #[serde(default)]
-    pub evidence: Option<PoseFeatures>,
+    pub features: Option<PoseFeatures>,
 }

@@ -7,9 +7,9 @@ use serde::Serialize;
 use super::pair_files::Files;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults, StoredAlignment};
 use crate::domain::{
-    Affine2, ContentHash, DepthOutcome, Failure, FailureClass, FitOutcome, JobStatus,
-    MetricOutcome, NormalizeOutcome, PairName, PrintFromMesh, Rigid3, Stage, ThresholdMetric,
-    UnixMillis, Verdict,
+    Affine2, ContentHash, DepthOutcome, Failure, FailureClass, FitOutcome, InkHypothesis,
+    JobStatus, MetricOutcome, NormalizeOutcome, PairName, PrintFromMesh, RegisterOutcome, Rigid3,
+    Stage, ThresholdMetric, UnixMillis, Verdict,
 };
 use crate::report::Consensus;
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
@@ -170,16 +170,19 @@ pub(super) async fn newest_manual_alignments(
 pub(super) struct Outcomes {
     fit: FitOutcome,
     depth: DepthOutcome,
-    normalize: NormalizeOutcome,
+    /// Interpretation of the print that was used.
+    ink: Option<InkHypothesis>,
 }
 
 impl Outcomes {
     /// Parses the stored results.
     pub(super) fn read(artifacts: &PairArtifacts<'_>) -> Result<Self, PairArtifactsError> {
+        let normalize: NormalizeOutcome = artifacts.outcome(Stage::Normalize)?;
+        let register: RegisterOutcome = artifacts.outcome(Stage::Register)?;
         Ok(Self {
             fit: artifacts.outcome(Stage::Fit)?,
             depth: artifacts.outcome(Stage::Depth)?,
-            normalize: artifacts.outcome(Stage::Normalize)?,
+            ink: normalize.inks.get(register.ink).copied(),
         })
     }
 }
@@ -225,7 +228,7 @@ impl ExportLine {
         files: Files,
     ) -> Self {
         Self {
-            numbers: Numbers::of(&record.outcome, &outcomes.normalize),
+            numbers: Numbers::of(&record.outcome, outcomes.ink.as_ref()),
             maps: Maps::of(&record.outcome, outcomes),
             files: Some(files),
             hashes: Hashes {
@@ -239,11 +242,11 @@ impl ExportLine {
 }
 
 impl Numbers {
-    fn of(outcome: &MetricOutcome, normalize: &NormalizeOutcome) -> Self {
+    fn of(outcome: &MetricOutcome, ink: Option<&InkHypothesis>) -> Self {
         let scores = &outcome.scores;
         Self {
             threshold_depth: Some(outcome.threshold_depth),
-            threshold_print: Some(normalize.threshold_print),
+            threshold_print: ink.map(|ink| ink.threshold_print),
             angle_deg: Some(outcome.angle_deg),
             scale: Some(outcome.scale),
             shift_px: Some(outcome.shift_px),

@@ -3,9 +3,10 @@
 use serde::de::DeserializeOwned;
 
 use crate::catalog::{MetricRecord, PairResults, StageRecord};
-use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, PRINT_MASK};
+use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, print_mask};
 use crate::domain::{
-    Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, PrintFromMesh, Stage,
+    Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh,
+    RegisterOutcome, Stage,
 };
 use crate::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
 use crate::store::{self, Project};
@@ -40,9 +41,9 @@ pub enum PairArtifactsError {
     Store(#[from] store::ArtifactError),
     /// The artifact is not the picture it should be.
     #[error("{role}: {source}")]
-    DistinctResult {
+    Image {
         /// Which artifact.
-        role: &'static str,
+        role: String,
         /// Why.
         source: PngError,
     },
@@ -113,8 +114,8 @@ impl<'a> PairArtifacts<'a> {
         let outcome: DepthOutcome = self.outcome(Stage::Depth)?;
         let levels = decode_grey16(&self.bytes(Stage::Depth, DEPTH)?);
         Ok(DepthMap {
-            levels: levels.map_err(|source| PairArtifactsError::DistinctResult {
-                role: DEPTH,
+            levels: levels.map_err(|source| PairArtifactsError::Image {
+                role: DEPTH.to_owned(),
                 source,
             })?,
             scale: outcome.scale,
@@ -126,8 +127,25 @@ impl<'a> PairArtifacts<'a> {
     /// # Errors
     /// When the result or its picture cannot be read.
     pub fn print_mask(&self) -> Result<Mask, PairArtifactsError> {
-        let grey = self.grey(Stage::Normalize, PRINT_MASK)?;
+        let register = self.outcome::<RegisterOutcome>(Stage::Register);
+        let ink = register.map_or(0, |outcome| outcome.ink);
+        let grey = self.grey(Stage::Normalize, &print_mask(ink))?;
         Ok(grey.map(|value| *value == INK))
+    }
+
+    /// Returns the map from print pixels to the canvas of the scores.
+    ///
+    /// # Errors
+    /// When a result cannot be read.
+    pub fn canvas_from_print(&self) -> Result<Affine2, PairArtifactsError> {
+        let normalize: NormalizeOutcome = self.outcome(Stage::Normalize)?;
+        let register: RegisterOutcome = self.outcome(Stage::Register)?;
+        let ink = normalize.inks.get(register.ink);
+        let missing = || PairArtifactsError::NoArtifact {
+            stage: Stage::Normalize,
+            role: print_mask(register.ink),
+        };
+        ink.map(|ink| ink.canvas_from_print).ok_or_else(missing)
     }
 
     /// The ink of the print on the canvas of the scores.
@@ -139,9 +157,11 @@ impl<'a> PairArtifacts<'a> {
         Ok(grey.map(|value| *value == INK))
     }
 
-    fn grey(&self, stage: Stage, role: &'static str) -> Result<Grid<u8>, PairArtifactsError> {
-        decode_grey8(&self.bytes(stage, role)?)
-            .map_err(|source| PairArtifactsError::DistinctResult { role, source })
+    fn grey(&self, stage: Stage, role: &str) -> Result<Grid<u8>, PairArtifactsError> {
+        decode_grey8(&self.bytes(stage, role)?).map_err(|source| PairArtifactsError::Image {
+            role: role.to_owned(),
+            source,
+        })
     }
 
     /// Depth-map pixels to print pixels under a map from the mesh, on the fitted plane; `None` where the depth map

@@ -7,7 +7,7 @@ use tokio::sync::{Mutex, OnceCell};
 
 use super::card::Card;
 use crate::catalog::{Catalog, CatalogError, PairResults};
-use crate::domain::{Affine2, NormalizeOutcome, Stage};
+use crate::domain::{Affine2, Stage};
 use crate::export::pictures::{PrintView, shaded};
 use crate::export::{SourcePrint, SourcePrintError};
 use crate::raster::{self, DepthMap, Mask, png_mask, png_rgb8};
@@ -98,10 +98,9 @@ pub(super) struct Canvas {
 
 impl Canvas {
     fn read(aligned: &PairArtifacts<'_>) -> Result<Self, PictureError> {
-        let normalized: NormalizeOutcome = aligned.outcome(Stage::Normalize)?;
         Ok(Self {
             ink: aligned.canvas_print_mask()?,
-            from_print: normalized.canvas_from_print,
+            from_print: aligned.canvas_from_print()?,
         })
     }
 }

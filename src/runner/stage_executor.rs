@@ -10,7 +10,8 @@ use super::stage_inputs::StageInputs;
 use super::stage_output::{self, ExecutionError, StageOutput};
 use crate::domain::{FailureClass, Stage};
 use crate::raster::DepthMap;
-use crate::stages::{Settings, StageError, depth, fit, normalize, register};
+use crate::stages::normalize::{NormalizeError, Normalized};
+use crate::stages::{Settings, StageError, pipeline};
 use crate::store::Project;
 
 /// Runs stages on a pair's thread. Tests replace it by stages that fail or hang.
@@ -48,13 +49,14 @@ impl PipelineExecutor {
 
     fn fit(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let scan = self.inputs.read_scan(pair)?;
-        // The paper's fit does not read the print, so its results stay valid when the print changes.
-        let print = match self.settings.fit.method {
-            fit::FitMethod::UpperSurface => Some(self.inputs.read_print(pair)?),
-            fit::FitMethod::Paper => None,
+        // A fit that does not read the print stays valid when the print changes.
+        let print = if self.settings.fit_reads_print() {
+            Some(self.inputs.read_print(pair)?)
+        } else {
+            None
         };
         let face_down = pair.attributes.scanned_face_down;
-        let outcome = fit::fit(&scan, print.as_ref(), face_down, &self.settings.fit)
+        let outcome = pipeline::fit(&scan, print.as_ref(), face_down, &self.settings)
             .map_err(|error| in_file(&pair.attributes.mesh_path, &error.into()))?;
         let (outcome, json) = round_trip(&outcome)?;
         (pair.scan, pair.print) = (Some(scan), print);
@@ -66,7 +68,7 @@ impl PipelineExecutor {
         let fit = StageInputs::fit(pair)?;
         // No later stage needs the scan: it is dropped here, so that another pair can use its memory.
         let scan = self.inputs.fitted_scan(pair)?;
-        let map = depth::depth(&scan, &fit, pair.attributes.unit, &self.settings.depth)
+        let map = pipeline::depth(&scan, &fit, pair.attributes.unit, &self.settings)
             .map_err(|error| in_file(&pair.attributes.mesh_path, &error.into()))?;
         let (outcome, json) = round_trip(&stage_output::depth_outcome(&map))?;
         let output = StageOutput::depth(json, &map);
@@ -80,30 +82,37 @@ impl PipelineExecutor {
     fn normalize(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let depth = self.inputs.depth_map(pair)?;
         let print = self.inputs.print(pair)?;
-        let normalized =
-            normalize::normalize(&depth, &print, &self.settings.normalize).map_err(|error| {
-                // Only a print without ink is a fault of the print.
-                let path = match error {
-                    normalize::NormalizeError::Print(_) => &pair.attributes.print_path,
-                    normalize::NormalizeError::NoStrokes
-                    | normalize::NormalizeError::Mirrored { .. }
-                    | normalize::NormalizeError::NoMatch { .. } => &pair.attributes.mesh_path,
-                };
-                in_file(path, &error.into())
-            })?;
+        let normalized = pipeline::normalize(&depth, &print, &self.settings).map_err(|error| {
+            let path = match error {
+                NormalizeError::Print(_) => &pair.attributes.print_path,
+                NormalizeError::NoStrokes => &pair.attributes.mesh_path,
+            };
+            in_file(path, &error.into())
+        })?;
         pair.depth = Some(depth);
         let (outcome, json) = round_trip(&normalized.outcome)?;
-        let mask = stage_output::print_mask(&normalized.ink, &normalized.known);
-        let output = StageOutput::normalized(json, &mask);
-        pair.normalized = Some(stage_output::from_print_mask(outcome, &mask));
+        let masks = normalized.prints.iter();
+        let masks: Vec<_> = masks.map(stage_output::encode_print_masks).collect();
+        let output = StageOutput::normalized(json, &masks);
+        pair.normalized = Some(Normalized {
+            outcome,
+            prints: masks.iter().map(stage_output::decode_print_masks).collect(),
+        });
         Ok(output)
     }
 
     fn register(&self, pair: &mut PairContext) -> Result<StageOutput, ExecutionError> {
         let depth = self.inputs.depth_map(pair)?;
         let normalized = self.inputs.normalized(pair)?;
-        let registered = register::register(&depth, &normalized, &self.settings.register)
-            .map_err(|error| in_file(&pair.attributes.print_path, &error.into()))?;
+        let registered =
+            pipeline::register(&depth, &normalized, &self.settings).map_err(|error| {
+                let path = if error.is_of_the_mesh() {
+                    &pair.attributes.mesh_path
+                } else {
+                    &pair.attributes.print_path
+                };
+                in_file(path, &error.into())
+            })?;
         let (outcome, json) = round_trip(&registered.outcome)?;
         Ok(StageOutput::registered(json, outcome.metrics, &registered))
     }

@@ -85,9 +85,13 @@ impl StageInputs {
         }
         let rerun = || ExecutionError::RerunFrom(Stage::Normalize);
         let outcome: NormalizeOutcome = pair.outcome(Stage::Normalize).ok_or_else(rerun)?;
-        let bytes = self.artifact(pair, Stage::Normalize, stage_output::PRINT_MASK)?;
-        let grey = raster::decode_grey8(&bytes).ok().ok_or_else(rerun)?;
-        Ok(stage_output::from_print_mask(outcome, &grey))
+        let mut prints = Vec::new();
+        for ink in 0..outcome.inks.len() {
+            let bytes = self.artifact(pair, Stage::Normalize, &stage_output::print_mask(ink))?;
+            let grey = raster::decode_grey8(&bytes).ok().ok_or_else(rerun)?;
+            prints.push(stage_output::decode_print_masks(&grey));
+        }
+        Ok(Normalized { outcome, prints })
     }
 
     /// Reads an artifact of an earlier stage. When it is missing or was changed, that stage runs again.

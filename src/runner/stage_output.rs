@@ -6,13 +6,12 @@ use serde_json::{Value, json};
 
 use crate::catalog::MetricResult;
 use crate::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask};
-pub(super) use crate::domain::artifact_role::{DEPTH, PRINT_MASK};
+pub(super) use crate::domain::artifact_role::{DEPTH, print_mask};
 use crate::domain::{
-    ArtifactSet, ContentHash, DepthOutcome, Failure, FailureClass, MetricOutcome, NormalizeOutcome,
-    Stage,
+    ArtifactSet, ContentHash, DepthOutcome, Failure, FailureClass, MetricOutcome, Stage,
 };
-use crate::raster::{DepthMap, Grid, Mask, png_grey8, png_grey16, png_mask};
-use crate::stages::normalize::Normalized;
+use crate::raster::{DepthMap, Grid, png_grey8, png_grey16, png_mask};
+use crate::stages::normalize::PrintMasks;
 use crate::stages::register::Registered;
 use crate::store::NewArtifact;
 
@@ -72,10 +71,13 @@ impl StageOutput {
         }
     }
 
-    /// The output of the normalize stage: ink and background in one 8-bit PNG.
-    pub(super) fn normalized(outcome: Value, print_mask: &Grid<u8>) -> Self {
+    /// The output of the normalize stage: an 8-bit PNG of ink and background for each interpretation of the print.
+    pub(super) fn normalized(outcome: Value, print_masks: &[Grid<u8>]) -> Self {
+        let masks = print_masks.iter().enumerate();
         Self {
-            files: vec![png(PRINT_MASK, png_grey8(print_mask))],
+            files: masks
+                .map(|(ink, grey)| png(&print_mask(ink), png_grey8(grey)))
+                .collect(),
             ..Self::numbers(outcome)
         }
     }
@@ -115,8 +117,8 @@ pub(super) fn depth_outcome(map: &DepthMap) -> DepthOutcome {
     }
 }
 
-/// Returns ink, background and unknown pixels in one image.
-pub(super) fn print_mask(ink: &Mask, known: &Mask) -> Grid<u8> {
+/// Encodes ink, background and unknown pixels as one image.
+pub(super) fn encode_print_masks(PrintMasks { ink, known }: &PrintMasks) -> Grid<u8> {
     Grid::from_fn(ink.width(), ink.height(), |x, y| {
         match (ink.at(x, y), known.at(x, y)) {
             (true, _) => INK,
@@ -126,11 +128,10 @@ pub(super) fn print_mask(ink: &Mask, known: &Mask) -> Grid<u8> {
     })
 }
 
-/// Returns the masks that an image from [`print_mask`] holds. A run that continues from the file gets the same masks as
-/// one that was not interrupted.
-pub(super) fn from_print_mask(outcome: NormalizeOutcome, grey: &Grid<u8>) -> Normalized {
-    Normalized {
-        outcome,
+/// Decodes an image from [`encode_print_masks`]. An uninterrupted run uses the decoded masks too, so that a resumed run
+/// computes the same.
+pub(super) fn decode_print_masks(grey: &Grid<u8>) -> PrintMasks {
+    PrintMasks {
         ink: grey.map(|grey| *grey == INK),
         known: grey.map(|grey| *grey != UNKNOWN),
     }
@@ -181,16 +182,18 @@ fn without_confidence(outcome: &MetricOutcome) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use super::{BACKGROUND, INK, UNKNOWN, metric_results, print_mask, result_hash};
+    use super::{BACKGROUND, INK, UNKNOWN, encode_print_masks, metric_results, result_hash};
     use crate::domain::{ArtifactSet, MetricOutcome, ThresholdMetric};
     use crate::raster::Mask;
     use crate::runner::tests::values;
+    use crate::stages::normalize::PrintMasks;
 
     #[test]
     fn ink_counts_even_where_the_print_is_unknown() {
         let ink = Mask::from_fn(3, 1, |x, _| x == 0);
         let known = Mask::from_fn(3, 1, |x, _| x == 1);
-        assert_eq!(print_mask(&ink, &known).data(), [INK, BACKGROUND, UNKNOWN]);
+        let grey = encode_print_masks(&PrintMasks { ink, known });
+        assert_eq!(grey.data(), [INK, BACKGROUND, UNKNOWN]);
     }
 
     #[test]

@@ -10,10 +10,10 @@ use crate::raster::{DepthMap, Grid};
 /// Raised whenever the same inputs and settings may give another result than before.
 pub const REVISION: u32 = 5;
 
-/// A depth map's longest side in pixels may not pass this: 16-bit maps of 268 million pixels help nobody.
+/// Largest longest side of a depth map in pixels: 16-bit maps of 268 million pixels help nobody.
 const LONGEST_PX_LIMIT: f64 = 16_384.0;
 
-/// What fixes the size of a pixel.
+/// What sets the size of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ResolutionBy {
@@ -23,11 +23,11 @@ pub enum ResolutionBy {
     PxPerMm,
 }
 
-/// Settings of the stage.
+/// Settings of the depth stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DepthParams {
-    /// What fixes the size of a pixel.
+    /// What sets the size of a pixel.
     pub resolution_by: ResolutionBy,
     /// Longest side of the map in pixels, 32..=16384.
     pub longest_px: u32,
@@ -35,20 +35,20 @@ pub struct DepthParams {
     pub px_per_mm: f64,
 }
 
-/// Why the stage found no result.
+/// Why the depth stage found no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum DepthError {
-    /// Pixels per mm were asked for a mesh of unknown unit.
+    /// Pixels per millimetre were requested for a mesh of unknown unit.
     #[error(
         "depth.resolution_by is px_per_mm but the unit of the mesh is not known; give it in the manifest"
     )]
     UnitUnknown,
-    /// The map would be absurdly large.
+    /// The map would be too large.
     #[error(
         "depth map would be {longest_px:.0} px long, more than {LONGEST_PX_LIMIT}; lower depth.px_per_mm or check the unit"
     )]
     TooLarge {
-        /// Longest side that was asked for.
+        /// Requested longest side in pixels.
         longest_px: f64,
     },
     /// No ray meets the surface.
@@ -57,7 +57,7 @@ pub enum DepthError {
 }
 
 impl DepthError {
-    /// What the failure means for the pair.
+    /// Returns what the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
             Self::UnitUnknown | Self::TooLarge { .. } => FailureClass::BadInput,
@@ -68,11 +68,27 @@ impl DepthError {
 
 /// Renders the heights over the fitted surface, mirrored so that the map reads like the print.
 ///
-/// Each pixel whose centre ray meets the mesh is set, exactly once, to the surface nearest to the viewer: the
-/// highest. Level 0 is "no data"; 1..=65535 are linear in height, [`DepthScale`] says how.
+/// Each pixel whose centre ray meets the mesh is set, exactly once, to the highest surface. Level 0 is "no data";
+/// levels
+/// 1..=65535 are linear in height, see [`DepthScale`]. `unit` is the mesh's unit, where it is known.
 ///
 /// # Errors
-/// When the resolution cannot be had, or nothing is seen.
+/// When the resolution cannot be reached, or no ray meets the mesh.
+///
+/// # Examples
+/// ```
+/// # use mocban::{config, demo, raster};
+/// # let settings = config::load(&config::Sources::default())?.config.stages;
+/// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
+/// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
+/// use mocban::stages::{Print, Scan, depth, fit};
+///
+/// let (scan, print) = (Scan::from(pair.mesh), Print::from(image));
+/// let plane = fit::fit(&scan, Some(&print), None, &settings.fit)?;
+/// let map = depth::depth(&scan, &plane, None, &settings.depth)?;
+/// assert_eq!(map.levels.width().max(map.levels.height()), 512);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn depth(
     scan: &Scan,
     fit: &FitOutcome,
@@ -90,7 +106,7 @@ pub fn depth(
     if let Some(bow) = &fit.bow {
         let rows = heights.data_mut().chunks_exact_mut(view.width);
         for (y, row) in rows.enumerate() {
-            // Integers of 32 bits become floats several at a time.
+            // Conversions from 32-bit integers to floats are vectorized.
             for (x, height) in (0_i32..).zip(row) {
                 let [u, v] = plane_from_px.apply([f64::from(x), y as f64]);
                 *height -= bow.height(u, v) as f32;
@@ -112,7 +128,7 @@ pub fn depth(
     })
 }
 
-/// Longest side in pixels for bounds in the plane, mesh units.
+/// Returns the longest side in pixels for bounds in the plane, mesh units.
 fn longest_px(
     [low, high]: [[f64; 2]; 2],
     unit: Option<LengthUnit>,
@@ -131,13 +147,13 @@ fn longest_px(
     Ok((longest_px.round() as usize).max(8))
 }
 
-/// Heights to levels 1..=65535 over their whole range; `None` when no pixel holds data.
+/// Quantizes heights to levels 1..=65535 over their range; `None` when no pixel holds data.
 fn quantise(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
     let [low, high] = range(heights.data())?.map(f64::from);
     let step = ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE));
     let levels = heights.map(|z| {
         let steps = ((f64::from(*z) - low) / step).clamp(0.0, 65_534.0);
-        // Half up: a call of `round` takes longer than all else here.
+        // Rounds half up; a call of `round` would take longer than the rest of the loop.
         let whole = steps as i32;
         let level = 1 + whole + i32::from(steps - f64::from(whole) >= 0.5);
         if *z == NO_HIT { 0 } else { level as u16 }
@@ -145,9 +161,9 @@ fn quantise(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
     Some((levels, low, step))
 }
 
-/// The lowest and the highest; `None` when no pixel holds data.
+/// Returns the lowest and the highest height; `None` when no pixel holds data.
 fn range(heights: &[f32]) -> Option<[f32; 2]> {
-    // Side by side, which a minimum over all one after another cannot be.
+    // In lanes: a sequential minimum is not vectorized.
     const LANES: usize = 16;
     let (mut lows, mut highs) = ([f32::INFINITY; LANES], [NO_HIT; LANES]);
     let mut take = |lane: usize, z: f32| {

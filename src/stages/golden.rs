@@ -1,11 +1,11 @@
-//! Pictures of the known world as they should be, with a tolerance.
+//! Golden images of the synthetic pair, compared within a tolerance.
 //!
-//! `MOCBAN_REGENERATE=1 cargo test golden` writes them anew; look at them before they go in.
+//! `MOCBAN_REGENERATE=1 cargo test golden` rewrites them; look at the difference before committing.
 
 use std::path::PathBuf;
 
 use super::AlignedPair;
-use super::testing::{World, print, settings, some_turn};
+use super::testing::{SyntheticSheet, print, settings, some_turn};
 use crate::raster::{Grid, decode_grey8, png_grey8};
 
 /// A pixel may differ by this much of 255 ...
@@ -37,9 +37,9 @@ fn depth_map_and_mask_are_as_they_were() {
     let mut settings = settings();
     settings.depth.longest_px = 160;
     let (picture, _) = print(14.0, 3.0);
-    let world = World {
+    let world = SyntheticSheet {
         turn: some_turn(2),
-        ..World::default()
+        ..SyntheticSheet::default()
     };
     let mesh = world.mesh();
     let aligned = AlignedPair::new(&mesh.into(), &picture, &settings).expect("an alignment");

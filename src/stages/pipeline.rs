@@ -1,34 +1,176 @@
-//! A pair taken through all four stages at once, nothing kept in between.
+//! The two pipelines, stage by stage and side by side; one setting, `pipeline.method`, chooses.
+//!
+//! | stage | `default` | `paper` (arXiv 2411.05524) |
+//! |---|---|---|
+//! | fit | one-sided robust surface over the tops, both sides of the mesh; the print helps to find the carved side | PCA, upper set, spaced selection, RANSAC, PCA (III-A) |
+//! | depth | z-buffer along the normal, heights over the surface (III-B) | the same |
+//! | normalize | ink of the print under every likely polarity, heights of tops and ground | fixed grey, wrap by box and centroid, density and structure thresholds (III-C) |
+//! | register | pose search on soft strokes, refinement, then thresholds in the aligned frame, scores, confidence | rotations at equal steps, shifts climbed on IoU, scores (III-D) |
+//!
+//! The side is decided in fit, although that makes fit depend on the print. An open sheet shows relief from both sides,
+//! and its winding and the sharpness of its layers mislead too often: both sides would stay in question for most scans.
+//! Then fit would refine two surfaces and depth render, encode and store two maps: about 2.5 and 4 ms more of about
+//! 33 ms a pair of 60,000 vertices (16 % or more; 25 % at 530,000), where 3 % was the limit. What fit decides by is a
+//! rendering of 96 pixels a side.
 
-use super::normalize::Normalized;
-use super::register::Registered;
-use super::{Print, Scan, Settings, StageError, depth, fit, normalize, register};
-use crate::domain::{FitOutcome, MetricOutcome, PrintFromMesh, ThresholdMetric};
+use super::depth::{self, DepthError};
+use super::fit::{self, FitError};
+use super::normalize::{self, NormalizeError, Normalized};
+use super::paper_method;
+use super::print::Print;
+use super::register::{self, RegisterError, Registered};
+use super::scan::Scan;
+use super::settings::{AlignmentMethod, Settings};
+use crate::domain::{
+    FailureClass, FitOutcome, LengthUnit, MetricOutcome, PrintFromMesh, ThresholdMetric,
+};
 use crate::raster::DepthMap;
 
-/// What the four stages make of a mesh and a print.
+/// Why a stage found no result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum StageError {
+    /// From the fit stage.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// From the depth stage.
+    #[error(transparent)]
+    Depth(#[from] DepthError),
+    /// From the normalize stage.
+    #[error(transparent)]
+    Normalize(#[from] NormalizeError),
+    /// From the register stage.
+    #[error(transparent)]
+    Register(#[from] RegisterError),
+}
+
+impl StageError {
+    /// Returns what the failure means for the pair.
+    pub fn class(&self) -> FailureClass {
+        match self {
+            Self::Fit(error) => error.class(),
+            Self::Depth(error) => error.class(),
+            Self::Normalize(error) => error.class(),
+            Self::Register(error) => error.class(),
+        }
+    }
+}
+
+impl Settings {
+    /// Returns whether the fit stage reads the print. Where it does not, a changed print leaves its results valid.
+    pub const fn fit_reads_print(&self) -> bool {
+        match self.pipeline.method {
+            AlignmentMethod::Default => true,
+            AlignmentMethod::Paper => false,
+        }
+    }
+}
+
+/// Finds the character plane and the carved side of a mesh. `scanned_face_down` is the manifest's attribute.
+///
+/// # Errors
+/// When no plane is found or nothing is carved.
+pub fn fit(
+    scan: &Scan,
+    print: Option<&Print>,
+    scanned_face_down: Option<bool>,
+    settings: &Settings,
+) -> Result<FitOutcome, FitError> {
+    match settings.pipeline.method {
+        AlignmentMethod::Default => fit::fit(scan, print, scanned_face_down, &settings.fit),
+        AlignmentMethod::Paper => paper_method::fit::fit(scan, &settings.fit),
+    }
+}
+
+/// Renders the depth map, which reads like the print. `unit` is the mesh's, where it is known.
+///
+/// # Errors
+/// When the resolution cannot be reached or no ray meets the mesh.
+pub fn depth(
+    scan: &Scan,
+    fit: &FitOutcome,
+    unit: Option<LengthUnit>,
+    settings: &Settings,
+) -> Result<DepthMap, DepthError> {
+    depth::depth(scan, fit, unit, &settings.depth)
+}
+
+/// Prepares print and depth map for registration.
+///
+/// # Errors
+/// When the print shows no ink or the depth map no strokes.
+pub fn normalize(
+    depth: &DepthMap,
+    print: &Print,
+    settings: &Settings,
+) -> Result<Normalized, NormalizeError> {
+    match settings.pipeline.method {
+        AlignmentMethod::Default => normalize::normalize(depth, print, &settings.normalize),
+        AlignmentMethod::Paper => {
+            paper_method::normalize::normalize(depth, print, &settings.normalize)
+        }
+    }
+}
+
+/// Aligns the depth map with the print and scores each metric's masks.
+///
+/// # Errors
+/// When no pose is found or trusted, or a threshold leaves no strokes.
+pub fn register(
+    depth: &DepthMap,
+    normalized: &Normalized,
+    settings: &Settings,
+) -> Result<Registered, RegisterError> {
+    match settings.pipeline.method {
+        AlignmentMethod::Default => register::register(depth, normalized, &settings.register),
+        AlignmentMethod::Paper => {
+            paper_method::register::register(depth, normalized, &settings.register)
+        }
+    }
+}
+
+/// Results of the four stages for one mesh and print.
 #[derive(Debug, Clone)]
 pub struct AlignedPair {
     /// The plane.
     pub fit: FitOutcome,
     /// The depth map, which reads like the print.
     pub depth: DepthMap,
-    /// Ink, canvas, poses and thresholds.
+    /// Ink and canvas of the print, heights of the relief.
     pub normalized: Normalized,
     /// One alignment a metric.
     pub registered: Registered,
 }
 
 impl AlignedPair {
-    /// Runs the four stages, with neither unit nor side told.
+    /// Runs the four stages without a known unit or side.
     ///
     /// # Errors
-    /// Those of the first stage that finds no result.
+    /// The error of the first stage that finds no result.
+    ///
+    /// # Examples
+    /// ```
+    /// # use mocban::{config, demo, raster};
+    /// # let settings = config::load(&config::Sources::default())?.config.stages;
+    /// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
+    /// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
+    /// use mocban::domain::ThresholdMetric;
+    /// use mocban::stages::{AlignedPair, AlignmentMethod, Print};
+    ///
+    /// let (scan, print) = (pair.mesh.into(), Print::from(image));
+    /// let ours = AlignedPair::new(&scan, &print, &settings)?;
+    /// assert!(ours.metric(ThresholdMetric::Relief).is_some());
+    ///
+    /// let mut paper = settings.clone();
+    /// paper.pipeline.method = AlignmentMethod::Paper;
+    /// let theirs = AlignedPair::new(&scan, &print, &paper)?;
+    /// assert_eq!(theirs.metrics().len(), 3);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn new(scan: &Scan, print: &Print, settings: &Settings) -> Result<Self, StageError> {
-        let fit = fit::fit(scan, Some(print), None, &settings.fit)?;
-        let depth = depth::depth(scan, &fit, None, &settings.depth)?;
-        let normalized = normalize::normalize(&depth, print, &settings.normalize)?;
-        let registered = register::register(&depth, &normalized, &settings.register)?;
+        let fit = fit(scan, Some(print), None, settings)?;
+        let depth = depth(scan, &fit, None, settings)?;
+        let normalized = normalize(&depth, print, settings)?;
+        let registered = register(&depth, &normalized, settings)?;
         Ok(Self {
             fit,
             depth,
@@ -37,17 +179,35 @@ impl AlignedPair {
         })
     }
 
-    /// One alignment a metric.
+    /// Returns one alignment a metric.
     pub fn metrics(&self) -> &[MetricOutcome] {
         &self.registered.outcome.metrics
     }
 
-    /// A metric's alignment, if the settings ask for the metric.
+    /// Returns a metric's alignment, if the method gives the metric.
     pub fn metric(&self, metric: ThresholdMetric) -> Option<&MetricOutcome> {
         self.metrics().iter().find(|found| found.metric == metric)
     }
 
-    /// Where the mesh's points fall in print pixels under a metric's alignment.
+    /// Returns the map from mesh points to print pixels under a metric's alignment.
+    ///
+    /// # Examples
+    /// ```
+    /// # use mocban::{config, demo, raster};
+    /// # let settings = config::load(&config::Sources::default())?.config.stages;
+    /// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
+    /// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
+    /// use mocban::domain::ThresholdMetric;
+    /// use mocban::stages::{AlignedPair, Print};
+    ///
+    /// let vertex = pair.mesh.vertices.at(0);
+    /// let aligned = AlignedPair::new(&pair.mesh.into(), &Print::from(image), &settings)?;
+    /// let metric = aligned.metric(ThresholdMetric::Relief).ok_or("no result")?;
+    /// // Print pixel of a mesh vertex, and its height over the plane in mesh units.
+    /// let [x, y, height] = aligned.print_from_mesh(metric).apply(vertex);
+    /// assert!(x.is_finite() && y.is_finite() && height.is_finite());
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
     pub fn print_from_mesh(&self, metric: &MetricOutcome) -> PrintFromMesh {
         PrintFromMesh::new(
             &metric.print_from_depth,

@@ -1,11 +1,11 @@
-//! A print and its ink, which fit and normalize both ask for and which is read once.
+//! A print and its binarizations, which fit and normalize share.
 
 use std::sync::OnceLock;
 
 use super::binarize::{BinarizeError, InkMask, hypotheses};
 use crate::raster::PrintImage;
 
-/// A print as the stages see it: the whole picture as decoded, and its ink once somebody has asked.
+/// An image of a print as decoded, and its binarizations, which are computed on first use.
 #[derive(Debug, Clone)]
 pub struct Print {
     picture: PrintImage,
@@ -13,12 +13,12 @@ pub struct Print {
 }
 
 impl Print {
-    /// The picture as decoded.
-    pub const fn picture(&self) -> &PrintImage {
+    /// Returns the image as decoded.
+    pub const fn image(&self) -> &PrintImage {
         &self.picture
     }
 
-    /// The ink under every polarity that the picture leaves possible, the likelier first; at least one.
+    /// Returns the ink under every interpretation that the image leaves possible, the likeliest first; at least one.
     pub(super) fn hypotheses(&self) -> Result<&[InkMask], BinarizeError> {
         let read = self.hypotheses.get_or_init(|| hypotheses(&self.picture));
         read.as_deref().map_err(|error| *error)

@@ -1,8 +1,8 @@
-//! Where the bulk of a scan lies: a fleck far away must not shrink everything else.
+//! Bounds of the bulk of a scan: a speck far away must not shrink everything else.
 
-/// About so many points are looked at.
+/// Number of points that are sampled, about.
 const LOOKED_AT: usize = 4_000;
-/// This share of the points at either end of an axis may be flecks.
+/// Share of the points at either end of an axis that may be specks.
 const FLECKS: f64 = 0.002;
 /// The rest, widened by this share of its length on each side, is the bulk.
 const WIDENED: f64 = 0.25;
@@ -10,33 +10,33 @@ const WIDENED: f64 = 0.25;
 /// A box along the axes, `[low, high]`.
 pub(super) type Bounds<const N: usize> = [[f64; N]; 2];
 
-/// The first and the last of the values that belong to the bulk; a scan without flecks keeps all of its bounds.
+/// Returns the first and the last value of the bulk; a scan without specks keeps its exact bounds.
 pub(super) fn bulk_along(values: &[f32]) -> [f64; 2] {
     let mut bulk = Bulk::of(values.len(), |k| values[k]);
     let (runs, rest) = values.as_chunks::<LANES>();
     for run in runs {
         bulk.take(*run);
     }
-    // Nothing passes that is not a number.
+    // NaN is never taken.
     bulk.take(std::array::from_fn(|k| {
         rest.get(k).copied().unwrap_or(f32::NAN)
     }));
     bulk.taken().map(f64::from)
 }
 
-/// Values side by side.
-type Lanes = [f32; LANES];
+/// Values of one block.
+type ValueBlock = [f32; LANES];
 
-/// The ends of those values taken so far that belong to the bulk.
+/// Running minimum and maximum of the values of the bulk.
 pub(super) struct Bulk {
     least: f32,
     most: f32,
-    low: Lanes,
-    high: Lanes,
+    low: ValueBlock,
+    high: ValueBlock,
 }
 
 impl Bulk {
-    /// Of so many values, none taken yet; some are looked at to tell what belongs to the bulk.
+    /// Samples `count` values to decide what belongs to the bulk; none is taken yet.
     pub(super) fn of(count: usize, value: impl Fn(usize) -> f32) -> Self {
         let [least, most] = limits(count, |k| f64::from(value(k)));
         Self {
@@ -47,11 +47,11 @@ impl Bulk {
         }
     }
 
-    /// Takes some of the values.
+    /// Takes a block of values.
     #[inline]
-    pub(super) fn take(&mut self, values: Lanes) {
+    pub(super) fn take(&mut self, values: ValueBlock) {
         for (k, v) in values.into_iter().enumerate() {
-            // Plain comparisons, which are one instruction for many lanes.
+            // Plain comparisons are vectorized.
             let (low, high) = (&mut self.low[k], &mut self.high[k]);
             *low = if v >= self.least && v < *low { v } else { *low };
             *high = if v <= self.most && v > *high {
@@ -62,12 +62,12 @@ impl Bulk {
         }
     }
 
-    /// Whether a value belongs to the bulk.
+    /// Returns whether a value belongs to the bulk.
     pub(super) fn holds(&self, value: f32) -> bool {
         (self.least..=self.most).contains(&value)
     }
 
-    /// The first and the last of the values taken that belong to the bulk.
+    /// Returns the first and the last of the taken values that belong to the bulk.
     pub(super) fn taken(&self) -> [f32; 2] {
         [
             self.low.into_iter().fold(f32::INFINITY, f32::min),
@@ -76,16 +76,16 @@ impl Bulk {
     }
 }
 
-/// Values that are compared side by side.
+/// Number of values in a block.
 const LANES: usize = 8;
 
-/// A box somewhat wider than the bulk: points outside it along an axis are flecks.
+/// Returns a box somewhat wider than the bulk: points outside it along an axis are specks.
 pub(super) fn room<T: Copy + Into<f64>>(points: &[[T; 3]]) -> Bounds<3> {
     let along = [0, 1, 2].map(|axis| limits(points.len(), |k| points[k][axis].into()));
     [0, 1].map(|end| along.map(|limits| limits[end]))
 }
 
-/// Between which of so many values one belongs to the bulk.
+/// Returns the limits of the bulk of `count` values.
 fn limits(count: usize, value: impl Fn(usize) -> f64) -> [f64; 2] {
     if count == 0 {
         return [f64::INFINITY, f64::NEG_INFINITY];
@@ -100,7 +100,7 @@ fn limits(count: usize, value: impl Fn(usize) -> f64) -> [f64; 2] {
     [low - slack, high + slack]
 }
 
-/// The value that `rank` of the values lie below; quick where that is few. There are more than `rank` values.
+/// Returns the value that `rank` of the values lie below; fast for a small `rank`. There are more than `rank` values.
 fn smallest(values: impl Iterator<Item = f64>, rank: usize) -> f64 {
     let mut kept = Vec::with_capacity(4 * (rank + 1));
     let mut limit = f64::INFINITY;
@@ -116,7 +116,7 @@ fn smallest(values: impl Iterator<Item = f64>, rank: usize) -> f64 {
     *kept.select_nth_unstable_by(rank, f64::total_cmp).1
 }
 
-/// Whether a point lies in the box, borders included.
+/// Returns whether a point lies in the box, borders included.
 pub(super) fn holds<const N: usize>([low, high]: &Bounds<N>, point: &[f64; N]) -> bool {
     (0..N).all(|k| (low[k]..=high[k]).contains(&point[k]))
 }

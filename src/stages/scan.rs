@@ -1,11 +1,11 @@
-//! A scan and its surface, which fit and depth both look at and which is made ready once.
+//! A scan and its indexed surface, which fit and depth share.
 
 use std::sync::OnceLock;
 
 use super::zbuffer::IndexedSurface;
 use crate::mesh::Mesh;
 
-/// A scan as the stages see it: the mesh as read, and its surface once somebody has looked at it.
+/// A mesh as read, and its surface, which is indexed on first use.
 #[derive(Debug)]
 pub struct Scan {
     mesh: Mesh,
@@ -13,12 +13,12 @@ pub struct Scan {
 }
 
 impl Scan {
-    /// The mesh as read.
+    /// Returns the mesh as read.
     pub const fn mesh(&self) -> &Mesh {
         &self.mesh
     }
 
-    /// The surface ready to be looked at along any direction.
+    /// Returns the surface, ready to be rendered along any direction.
     pub(super) fn shell(&self) -> &IndexedSurface {
         self.shell.get_or_init(|| IndexedSurface::new(&self.mesh))
     }

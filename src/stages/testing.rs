@@ -1,4 +1,4 @@
-//! A small world with known answers: a carved character without symmetry, and its print.
+//! A synthetic pair with known alignment: a carved character without symmetry, and its print.
 
 use std::sync::LazyLock;
 
@@ -6,7 +6,12 @@ use nalgebra::{Matrix3, Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{AlignedPair, Print, Settings, StageError, depth, fit, normalize, register};
+use super::depth::{DepthParams, ResolutionBy};
+use super::fit::FitParams;
+use super::normalize::NormalizeParams;
+use super::register::RegisterParams;
+use super::score::SsimWindow;
+use super::{AlignedPair, AlignmentMethod, PipelineParams, Print, Settings, StageError};
 use crate::domain::{Affine2, MetricOutcome, PrintFromMesh};
 use crate::mesh::Mesh;
 use crate::raster::{Grid, PrintImage};
@@ -18,24 +23,24 @@ const SHEET_MM: f64 = 12.0;
 /// Depth of the carving, millimetres.
 const RELIEF_MM: f64 = 1.2;
 
-/// How a sheet is made.
+/// Parameters of a synthetic sheet.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct World {
-    /// Turn of the sheet before anything else: axis-angle in radians.
+pub(super) struct SyntheticSheet {
+    /// Rotation of the sheet: axis times angle in radians.
     pub(super) turn: [f64; 3],
     /// Mesh units per millimetre.
     pub(super) scale: f64,
     pub(super) origin: [f64; 3],
-    /// Faces wound so that they look inwards.
+    /// Whether faces are wound inwards.
     pub(super) inward: bool,
     /// Height of the bow at the rim, millimetres.
     pub(super) bow_mm: f64,
     pub(super) noise_mm: f64,
-    /// The geometry itself mirrored: a pair that must not pass.
+    /// Whether the geometry is mirrored: a pair that must not pass.
     pub(super) mirrored: bool,
 }
 
-impl Default for World {
+impl Default for SyntheticSheet {
     fn default() -> Self {
         Self {
             turn: [0.0; 3],
@@ -49,7 +54,8 @@ impl Default for World {
     }
 }
 
-/// Strokes of the character as it reads in print; x right, y down, millimetres from the middle.
+/// Returns whether a place is on a stroke of the character as it reads in print; x right, y down, millimetres from the
+/// middle.
 fn stroke(x: f64, y: f64) -> bool {
     let bar = |x0: f64, x1: f64, y0: f64, y1: f64| (x0..x1).contains(&x) && (y0..y1).contains(&y);
     bar(-4.0, 4.2, -4.2, -3.2)
@@ -60,12 +66,12 @@ fn stroke(x: f64, y: f64) -> bool {
         || (x - 0.2).hypot(y + 1.9) < 0.75
 }
 
-impl World {
+impl SyntheticSheet {
     fn rotation(&self) -> Rotation3<f64> {
         Rotation3::new(Vector3::from(self.turn))
     }
 
-    /// Mesh point of a place on the sheet: `x`, `y` as read in print, `z` up out of the block, millimetres.
+    /// Returns the mesh point of a place on the sheet: `x`, `y` as read in print, `z` out of the block, millimetres.
     pub(super) fn place(&self, x: f64, y: f64, z: f64) -> [f64; 3] {
         // Carved in mirror writing: what reads to the right lies to the left; y of the block points up.
         let side = if self.mirrored { 1.0 } else { -1.0 };
@@ -73,7 +79,7 @@ impl World {
         (p + Vector3::from(self.origin)).into()
     }
 
-    /// Outward normal of the sheet in the mesh frame.
+    /// Returns the outward normal of the sheet in the mesh frame.
     pub(super) fn normal(&self) -> Vector3<f64> {
         self.rotation() * Vector3::z()
     }
@@ -108,7 +114,7 @@ impl World {
     }
 }
 
-/// Place of a vertex along a side, millimetres from the middle.
+/// Returns the position of a vertex along a side, millimetres from the middle.
 fn at(i: usize) -> f64 {
     (i as f64 / (SIDE - 1) as f64 - 0.5) * SHEET_MM
 }
@@ -138,7 +144,8 @@ static CARVED: LazyLock<Grid<f64>> = LazyLock::new(|| {
     })
 });
 
-/// The print: `px_per_mm` pixels a millimetre, turned by `turn_deg` clockwise, with `print_from_sheet` as truth.
+/// Renders the print at `px_per_mm` pixels per millimetre, rotated clockwise by `turn_deg`; returns the true
+/// `print_from_sheet` too.
 pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
     let size = (SHEET_MM * px_per_mm) as usize;
     let middle = (size - 1) as f64 / 2.0;
@@ -164,11 +171,13 @@ pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
     (PrintImage { rgb }.into(), print_from_sheet)
 }
 
-/// The default settings of all stages.
+/// The default settings of all stages, at a smaller depth map.
 pub(super) fn settings() -> Settings {
     Settings {
-        fit: fit::FitParams {
-            method: fit::FitMethod::UpperSurface,
+        pipeline: PipelineParams {
+            method: AlignmentMethod::Default,
+        },
+        fit: FitParams {
             curved_blocks: true,
             seed: 1,
             spaced_points: 1000,
@@ -177,21 +186,31 @@ pub(super) fn settings() -> Settings {
             ransac_distance: 0.005,
             min_relief: 0.005,
         },
-        depth: depth::DepthParams {
-            resolution_by: depth::ResolutionBy::LongestSide,
+        depth: DepthParams {
+            resolution_by: ResolutionBy::LongestSide,
             longest_px: 400,
             px_per_mm: 40.0,
         },
-        normalize: normalize::tests_support::params(),
-        register: register::RegisterParams {
-            method: register::RegisterMethod::Refine,
+        normalize: NormalizeParams {
+            canvas_px: 256,
+            character_px: 192,
+            print_grey: 127,
+            density_greys: [50, 139],
+            structure_greys: [90, 149],
+            window: SsimWindow::Gaussian,
+        },
+        register: RegisterParams {
+            scale_band: 1.6,
             working_px: 192,
-            anisotropic_scale: false,
-            min_confidence: 0.3,
             smoothing_px: 1.2,
+            anisotropic_scale: false,
+            threshold_min: 0.01,
+            threshold_max: 0.6,
+            ink_spread: 1.3,
+            min_confidence: 0.3,
+            window: SsimWindow::Gaussian,
             coarse_angles: 60,
             fine_angles: 60,
-            window: super::score::SsimWindow::Gaussian,
         },
     }
 }
@@ -199,15 +218,11 @@ pub(super) fn settings() -> Settings {
 /// The paper's settings of all stages.
 pub(super) fn paper_settings() -> Settings {
     let mut settings = settings();
-    settings.fit.method = fit::FitMethod::Paper;
-    settings.fit.curved_blocks = false;
-    settings.normalize.method = normalize::NormalizeMethod::BoundingBox;
-    settings.normalize.print_threshold = normalize::PrintThreshold::Fixed;
-    settings.register.method = register::RegisterMethod::Exhaustive;
+    settings.pipeline.method = AlignmentMethod::Paper;
     settings
 }
 
-/// Runs the four stages; `print_from_mesh` of each metric with its outcome.
+/// Runs the four stages; returns `print_from_mesh` of each metric with its outcome.
 pub(super) fn run(
     mesh: &Mesh,
     print: &Print,
@@ -218,8 +233,12 @@ pub(super) fn run(
     Ok(aligned.metrics().iter().map(of).collect())
 }
 
-/// Mean distance in pixels between where truth and the answer put points of the strokes.
-pub(super) fn landmark_error_px(world: &World, truth: &Affine2, found: &PrintFromMesh) -> f64 {
+/// Returns the mean distance in pixels between the true and the found positions of points on the strokes.
+pub(super) fn landmark_error_px(
+    world: &SyntheticSheet,
+    truth: &Affine2,
+    found: &PrintFromMesh,
+) -> f64 {
     let places = [
         [-3.5, -3.7],
         [3.9, -3.7],
@@ -236,7 +255,7 @@ pub(super) fn landmark_error_px(world: &World, truth: &Affine2, found: &PrintFro
     places.into_iter().map(error).sum::<f64>() / places.len() as f64
 }
 
-/// A rotation as axis-angle that looks random but is not.
+/// Returns an arbitrary fixed rotation as axis times angle.
 pub(super) fn some_turn(k: u64) -> [f64; 3] {
     let mut rng = ChaCha8Rng::seed_from_u64(k);
     let mut random = || rng.random::<f64>() * 2.0 - 1.0;

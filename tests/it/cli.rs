@@ -165,9 +165,9 @@ fn settings_show_their_origins_and_parse_to_the_same_values() {
     assert_eq!(again["settings"]["fit.seed"]["value"], 9);
     assert_eq!(again["settings"]["run.workers"]["value"], 3);
     let paper = plain(&["config", "show", "--json", "--config", "paper"]);
-    let method = &paper["settings"]["register.method"];
+    let method = &paper["settings"]["pipeline.method"];
     assert_eq!(
-        again["settings"]["register.method"]["value"],
+        again["settings"]["pipeline.method"]["value"],
         method["value"]
     );
 }

@@ -108,8 +108,9 @@ impl StageExecutor for FakeExecutor {
         pair.inputs.mesh = Some(seen("mesh"));
         pair.inputs.print = (stage >= Stage::Normalize).then(|| seen("print"));
         let register = RegisterOutcome {
+            ink: 0,
             metrics: ThresholdMetric::ALL.map(values::metric_outcome).to_vec(),
-            evidence: None,
+            features: None,
         };
         let last = stage == Stage::Register;
         Ok(StageOutput {

@@ -1,28 +1,31 @@
-//! The brightness of the paper around each pixel, seen past strokes: what is dark and narrow is ink, what is dark and
-//! wide is a stain.
+//! Brightness of the background at each pixel, estimated by a grey-scale closing: what is dark and narrow is ink, what
+//! is
+//! dark and wide is a stain.
 
 use crate::raster::{Grid, Mask, resample};
 use crate::stages::blur::gaussian_blur;
 
-/// Paper changes slowly: it is looked at on this many cells along the longest side.
+/// Number of cells along the longest side: the background changes slowly.
 const CELLS: f64 = 96.0;
-/// Half the width of what counts as narrow, as a share of the longest side: no stroke is wider, and hardly any stroke.
+/// Half the width of what counts as narrow, as a share of the longest side: wider than every stroke, and wider than
+/// most.
 pub(super) const NARROW: f64 = 0.12;
 pub(super) const STROKE: f64 = 0.05;
-/// A cell that is known to less than this share says nothing.
+/// Least share of a cell that must be known for it to count.
 const LEAST_KNOWN: f32 = 0.3;
-/// A cell that says nothing: `f32::max` and `f32::min` pass over it.
+/// Value of a cell without data: `f32::max` and `f32::min` ignore it.
 const EMPTY: f32 = f32::NAN;
 
-/// Brightness of the paper under and around each pixel, 0..=1: the grey closed by a square into which fits what is at
-/// most twice `narrow` wide, a share of the longest side.
+/// Returns the brightness of the background under and around each pixel, 0..=1: the grey closed by a square of half
+/// width
+/// `narrow`, a share of the longest side.
 pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let (width, height) = (grey.width(), grey.height());
     let Some(bounds) = known.bounding_box() else {
         return grey.clone();
     };
-    // Middle on middle of what is known, so that a print turned by a right angle, or with more white around it, gives
-    // the same cells.
+    // Cells are centred on the middle of the known area, so that a print rotated by a right angle or with a wider white
+    // margin gives the same cells.
     let lengths = [bounds.width(), bounds.height()];
     let longest = lengths[0].max(lengths[1]) as f64;
     let scale = (CELLS / longest).min(1.0);
@@ -60,11 +63,11 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     resample(&smooth, 1.0 / scale, back, [width, height]).map(|value| value + mean)
 }
 
-/// The extreme value of the square around each cell; `pick` passes over cells that hold nothing.
+/// Returns the extreme value of the square around each cell; `pick` ignores cells without data.
 fn extreme(cells: &Grid<f32>, reach: usize, pick: impl Fn(f32, f32) -> f32) -> Grid<f32> {
     let along_rows = |cells: &Grid<f32>| {
         let (width, height) = (cells.width(), cells.height());
-        // Turned over on the way: twice gives both axes.
+        // Transposes on the way, so that two calls cover both axes.
         let mut turned = Grid::new(height, width, EMPTY);
         for y in 0..height {
             let spans = doubled(cells.row(y), reach, &pick);
@@ -77,10 +80,10 @@ fn extreme(cells: &Grid<f32>, reach: usize, pick: impl Fn(f32, f32) -> f32) -> G
     along_rows(&along_rows(cells))
 }
 
-/// The extreme of the window of `reach` cells each way around each cell, from windows that double in width.
+/// Returns the extreme of the window of `reach` cells to either side of each cell, by windows that double in width.
 fn doubled(row: &[f32], reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Vec<f32> {
     let (len, window) = (row.len(), 2 * reach + 1);
-    // The window of a cell begins at it, until the end: there it is put around it.
+    // The row is padded so that the window that starts at an index is centred on the cell with that index.
     let mut spans = vec![EMPTY; reach];
     spans.extend_from_slice(row);
     spans.resize(len + 2 * reach, EMPTY);

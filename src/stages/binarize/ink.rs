@@ -1,4 +1,4 @@
-//! The print's ink: where there is paper at all, which side of the grey threshold is ink, how much ink each pixel has.
+//! Ink of the print: where the image is known, which side of the threshold is ink, and how much ink each pixel has.
 
 use super::background::{self, NARROW, STROKE};
 use super::otsu::{self, Split};
@@ -7,33 +7,34 @@ use crate::raster::{Grid, Mask, PrintImage};
 use crate::stages::components::{ConnectedComponents, remove_specks};
 use crate::stages::pose::SoftMask;
 
-/// A pixel is white beyond the cut when its darkest channel is above this share of full white.
+/// A pixel is white outside the cut when its darkest channel is above this share of full white.
 const WHITE: f32 = 0.965;
-/// Paper darker than this is told apart from the white beyond the cut.
+/// Background darker than this can be distinguished from the white outside the cut.
 const PAPER_TELLABLE: f64 = 0.945;
-/// Coloured paper covers at least this share of the image; less is but the soft edge of ink on white paper.
+/// Least share of the image that coloured background covers; less is only the soft edge of ink on white paper.
 const LEAST_PAPER: f64 = 0.2;
-/// White must cover at least this share of the image to count as "beyond the cut".
+/// Least share of the image that the white outside the cut covers.
 const LEAST_WHITE: f64 = 0.004;
-/// This much of the way from the darkest to the paper is pale; least share of what is dark that is where there may be
-/// stains.
+/// Position between the darkest grey and the background below which a pixel is pale; least share of pale pixels among
+/// the
+/// dark ones where stains are possible.
 const PALE: f64 = 0.35;
 const LEAST_PALE: f64 = 0.15;
-/// Least difference between ink and paper, as a share of the lighter of the two: scanners that fill but a part of
-/// their 16 bits leave dark pictures.
+/// Least difference between ink and background, as a share of the lighter one: scanners that fill only part of their 16
+/// bits produce dark images.
 const LEAST_CONTRAST: f64 = 0.08;
-/// And of full white: below it there is but noise.
+/// Least difference as a share of full white: below it there is only noise.
 const NOISE: f64 = 0.012;
 /// Least share of ink in a print.
 const LEAST_INK: f64 = 0.002;
 
-/// A print must have at least this many pixels each way.
+/// Least width and height of a print in pixels.
 const LEAST_PRINT_PX: usize = 16;
 
-/// Why a print shows no ink. None of these can be mended by trying again.
+/// Why a print shows no ink. A retry does not help.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum BinarizeError {
-    /// The image has hardly any pixels.
+    /// The image is too small.
     #[error("print of {width} x {height} px is too small, needs {LEAST_PRINT_PX} px each way")]
     TooSmall {
         /// Columns.
@@ -41,7 +42,7 @@ pub enum BinarizeError {
         /// Rows.
         height: usize,
     },
-    /// One grey all over.
+    /// The image has one grey only.
     #[error(
         "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white"
     )]
@@ -65,16 +66,16 @@ pub enum BinarizeError {
     },
 }
 
-/// The ink of a print.
+/// One interpretation of a print as ink and background.
 #[derive(Debug, Clone)]
 pub(in crate::stages) struct InkMask {
-    /// Which pixels are ink.
+    /// Pixels that are ink.
     pub(in crate::stages) mask: Mask,
-    /// How much ink, and where the image is paper or ink at all.
+    /// Amount of ink, 0..=1, and where the image is ink or background at all.
     pub(in crate::stages) soft: SoftMask,
-    /// Grey between ink and paper, 0..=1.
+    /// Grey between ink and background, 0..=1.
     pub(in crate::stages) threshold: f64,
-    /// Whether ink is lighter than paper, as in a rubbing.
+    /// Whether ink is lighter than the background, as in a rubbing.
     pub(in crate::stages) light_on_dark: bool,
 }
 
@@ -86,12 +87,12 @@ fn grey_of(picture: &PrintImage) -> Result<Grid<f32>, BinarizeError> {
     Ok(picture.rgb.map(|c| luminance(*c)))
 }
 
-/// Rec. 601 luma of 0..=1.
+/// Returns the Rec. 601 luma, 0..=1.
 fn luminance(c: [u16; 3]) -> f32 {
     (0.299 * f32::from(c[0]) + 0.587 * f32::from(c[1]) + 0.114 * f32::from(c[2])) / 65_535.0
 }
 
-/// The paper's mask: darker than a fixed grey is ink, all of the image is known.
+/// Binarizes as the paper does: pixels darker than a fixed grey are ink, the whole image is known.
 pub(in crate::stages) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeError> {
     let threshold = f64::from(grey) / 255.0;
     let grey = &grey_of(picture)?;
@@ -109,8 +110,9 @@ pub(in crate::stages) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask
     })
 }
 
-/// Our masks: white beyond the cut left out, paper levelled, threshold found. One for each polarity that the picture
-/// leaves possible, the likelier first, and one that sees past small stains where there may be some.
+/// Binarizes adaptively: white outside the cut is left out, the background is divided out, and Otsu's method finds the
+/// threshold. Returns one interpretation for each polarity that the image leaves possible, the likelier first, and one
+/// that ignores small stains where there may be some.
 pub(in crate::stages) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeError> {
     let grey = &grey_of(picture)?;
     let known = known(picture, grey);
@@ -145,7 +147,7 @@ pub(in crate::stages) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>
     if polarities.contains(&false) && may_be_stained(&values, levelled) {
         inks.push(past_stains(grey, &known));
     }
-    // If none holds ink, the likeliest says why.
+    // If none has ink, the error of the likeliest is reported.
     if inks.iter().all(Result::is_err) {
         inks.truncate(1);
         return inks.into_iter().collect();
@@ -153,7 +155,7 @@ pub(in crate::stages) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>
     Ok(inks.into_iter().flatten().collect())
 }
 
-/// Whether much of what is dark, of values in their order, is so little dark that it may be stains.
+/// Returns whether many of the dark values are so pale that they may be stains. `sorted` is in ascending order.
 fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
     let Some(split) = split else { return false };
     let below = |limit: f64| sorted.partition_point(|v| f64::from(*v) < limit);
@@ -163,14 +165,14 @@ fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
     pale as f64 > LEAST_PALE * dark as f64
 }
 
-/// The ink where what is wider than most strokes is a stain.
+/// Binarizes with what is wider than most strokes taken as a stain.
 fn past_stains(grey: &Grid<f32>, known: &Mask) -> Result<InkMask, BinarizeError> {
     let even = evened(grey, known, STROKE);
     let split = otsu::split(&mut held(&even, known));
     read(grey, &even, split, known, false)
 }
 
-/// The ink of one polarity, from the grey over the paper's around it.
+/// Binarizes one polarity from the grey divided by the background.
 fn read(
     grey: &Grid<f32>,
     even: &Grid<f32>,
@@ -204,7 +206,8 @@ fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
     pairs.filter(|(_, k)| **k).map(|(g, _)| *g).collect()
 }
 
-/// Where the image is paper or ink: all but the white that reaches the border, if paper is not as white itself.
+/// Returns where the image is ink or background: everything but the white at the border, unless the background is as
+/// white.
 fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     let white = picture.rgb.map(|c| {
         let darkest = c[0].min(c[1]).min(c[2]);
@@ -215,7 +218,7 @@ fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     if beyond.density() < LEAST_WHITE {
         return all;
     }
-    // The cut's edge mixes paper with white.
+    // Pixels at the edge of the cut mix background and white.
     let inside = beyond.dilate().map(|b| !b);
     let mut values = held(grey, &inside);
     let Some(split) = otsu::split(&mut values) else {
@@ -233,7 +236,7 @@ fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     }
 }
 
-/// Grey over the paper's around it.
+/// Divides the grey by the background.
 fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let level = background::level(grey, known, narrow);
     Grid::from_fn(grey.width(), grey.height(), |x, y| {
@@ -241,7 +244,7 @@ fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     })
 }
 
-/// 0 at paper, 1 at ink, by the classes' medians; nothing but where the cleaned mask, or its rim, has ink.
+/// Returns 0 at the background and 1 at ink, by the medians of the classes; 0 away from the cleaned mask and its rim.
 fn amount(even: &Grid<f32>, ink: &Mask, split: Split) -> Grid<f32> {
     let near = ink.dilate();
     let span = (split.high - split.low).max(1e-6);

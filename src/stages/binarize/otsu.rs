@@ -1,9 +1,9 @@
-//! Otsu's split of values into two classes (1979, doi:10.1109/TSMC.1979.4310076).
+//! Otsu's threshold between two classes of values (1979, doi:10.1109/TSMC.1979.4310076).
 
-/// Two classes of values and where they part.
+/// Two classes of values and the threshold between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::stages) struct Split {
-    /// Halfway between the classes' nearest members.
+    /// Middle of the classes' nearest members.
     pub(in crate::stages) threshold: f64,
     /// Median of the lower class.
     pub(in crate::stages) low: f64,
@@ -11,15 +11,13 @@ pub(in crate::stages) struct Split {
     pub(in crate::stages) high: f64,
 }
 
-/// Parts values where the variance between the classes is greatest; `None` for fewer than two values.
-///
-/// Sorts the values.
+/// Splits values where the variance between the classes is largest; `None` for fewer than two values. Sorts the values.
 pub(in crate::stages) fn split(values: &mut [f32]) -> Option<Split> {
     sort(values);
     split_sorted(values)
 }
 
-/// The same without the lowest and the highest one in so many of the values.
+/// Splits values without the lowest and the highest one in `one_in` of them. Sorts the values.
 pub(in crate::stages) fn split_inner(values: &mut [f32], one_in: usize) -> Option<Split> {
     sort(values);
     let cut = values.len() / one_in;
@@ -51,11 +49,11 @@ fn split_sorted(values: &[f32]) -> Option<Split> {
     })
 }
 
-/// Digits of a value's bits, lowest first: how far down they begin, and how many there are.
+/// Shifts of the digits of a key, lowest first, and number of values of a digit.
 const DIGITS: [u32; 3] = [0, 11, 22];
 const DIGIT_VALUES: usize = 1 << 11;
 
-/// Sorts by digits of the bits, which takes three passes however many values there are; in the order of `total_cmp`.
+/// Sorts in the order of `total_cmp`: radix sort with three digits.
 fn sort(values: &mut [f32]) {
     if values.len() < DIGIT_VALUES {
         values.sort_unstable_by(f32::total_cmp);
@@ -82,7 +80,7 @@ const fn digit(key: u32, shift: u32) -> usize {
     (key >> shift) as usize % DIGIT_VALUES
 }
 
-/// Orders keys by one digit, of whose values there are so many each; those alike in it keep their order.
+/// Sorts keys by one digit, stably. `counts` holds how often each digit value occurs.
 fn by_digit(keys: &[u32], sorted: &mut [u32], counts: &[u32; DIGIT_VALUES], shift: u32) {
     let mut places = *counts;
     let mut next = 0;
@@ -98,7 +96,7 @@ fn by_digit(keys: &[u32], sorted: &mut [u32], counts: &[u32; DIGIT_VALUES], shif
 
 const SIGN: u32 = 1 << 31;
 
-/// Bits that order as the values do: the negative ones turned over, the others put above them.
+/// Returns an integer key that sorts like the value: negative values inverted, others offset above them.
 fn key(value: f32) -> u32 {
     let bits = value.to_bits();
     if bits & SIGN == 0 { bits | SIGN } else { !bits }

@@ -1,17 +1,18 @@
-//! Whether ink is darker or lighter than paper.
+//! Polarity of the print: whether ink is darker or lighter than the background.
 
 use super::otsu::Split;
 use crate::raster::{Grid, Mask};
 
-/// Both witnesses of the polarity must speak this loudly together for it to be clear; louder for ink that is lighter
-/// than paper, as in rubbings: heavy ink within a frame passes for dark paper.
+/// Least sum of the evidence for the polarity to be clear; larger for ink that is lighter than the background, as in
+/// rubbings: heavy ink inside a frame looks like a dark background.
 const CLEAR: f64 = 0.8;
 const CLEAR_LIGHT: f64 = 1.6;
-/// Width of the rim that tells paper from ink, as a share of the shorter side.
+/// Width of the rim that is compared with the rest, as a share of the shorter side.
 const RIM: f64 = 0.06;
 
-/// Whether ink is likelier to be lighter than paper, and whether that is clear. Stains and frame lines mislead: where
-/// the picture as it is and what is dark beside its surroundings do not both say so, the other way stays possible.
+/// Returns whether ink is probably lighter than the background, and whether that is clear. Stains and frame lines
+/// mislead:
+/// where the image and its version with the background divided out disagree, both polarities stay possible.
 pub(super) fn polarity(
     even: &Grid<f32>,
     levelled: Option<Split>,
@@ -27,9 +28,9 @@ pub(super) fn polarity(
     (sum > 0.0, plain * levelled > 0.0 && sum.abs() > clear)
 }
 
-/// How much speaks for the dark class being the paper; below zero it is ink. Ink is the smaller class, and paper
-/// reaches the rim. Heavy ink bends the first rule and border lines the second, so both have a say, the first a
-/// double one.
+/// Returns the evidence that the dark class is the background; negative for ink. Ink is the smaller class, and
+/// background
+/// reaches the rim. Heavy ink breaks the first rule and border lines the second, so both count, the first twice.
 fn paper_darkness(dark: &Mask, known: &Mask) -> f64 {
     let of_known = known.count().max(1) as f64;
     let pairs = dark.data().iter().zip(known.data());
@@ -37,7 +38,7 @@ fn paper_darkness(dark: &Mask, known: &Mask) -> f64 {
     2.0 * (share - 0.5) + (rim_share(dark, known) - 0.5)
 }
 
-/// Share of dark pixels in the rim of what is known.
+/// Returns the share of dark pixels in the rim of the known area.
 fn rim_share(dark: &Mask, known: &Mask) -> f64 {
     let (width, height) = (known.width(), known.height());
     let reach = ((width.min(height) as f64 * RIM).round() as usize).max(1);

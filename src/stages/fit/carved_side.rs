@@ -1,10 +1,12 @@
-//! Which side of the plane is carved: told from evidence, not assumed.
+//! Decides which side of the plane is carved.
 //!
-//! Three witnesses speak. The winding of the faces is right in most files and wrong in all of some. The tops of
-//! strokes are planed wood, so their heights crowd at one level; ground is gouged. And the relief of the right side
-//! agrees with the print: its witness weighs most, and is the only one that knows the character.
+//! Four kinds of evidence are combined as log-odds. The winding of the faces is right in most files, but wrong
+//! everywhere in some. Stroke tops are planed wood, so their heights are concentrated at one level; ground is gouged.
+//! The manifest may say how the block was scanned. And the relief of the carved side agrees with the print, which
+//! weighs
+//! most: it is the only evidence that knows the character.
 
-use super::surface::{Samples, Surface, quantile};
+use super::surface::{HeightSamples, Surface, quantile};
 use crate::domain::{Bow, Rigid3, SideEvidence};
 use crate::stages::pose::{
     BeamWidth, ImagePyramid, RefinementPass, Refiner, SearchRange, SoftMask, search_coarse_to_fine,
@@ -12,22 +14,22 @@ use crate::stages::pose::{
 use crate::stages::print::Print;
 use crate::stages::zbuffer::IndexedSurface;
 
-/// A side with less than this share of the other's relief is the back of the block.
+/// A side with less than this share of the other side's relief is the back of the block.
 const BACK: f64 = 0.35;
-/// Weights of the witnesses in the log-odds: winding from wholly in to wholly out, ratio of the layers' sharpness,
-/// ratio of the agreement with the print, word of the manifest.
+/// Weights in the log-odds: winding from -1 (inward) to 1 (outward), logarithm of the ratio of the layers' widths,
+/// logarithm of the ratio of the agreements with the print, attribute of the manifest.
 const WINDING: f64 = 2.0;
 const SHARPNESS: f64 = 0.7;
 const AGREEMENT: f64 = 14.0;
 const MANIFEST: f64 = 0.4;
-/// A face that agrees with the print so well is the carved one: none of 500 backs came above 0.55
-/// while walls and frame lines still counted.
+/// A side with this agreement is the carved one without asking the other: none of 500 backs came above 0.55 while walls
+/// and frame lines still counted.
 const SURE: f64 = 0.62;
-/// What is taken for the agreement of a face that need not be asked.
+/// Agreement that is assumed for a side that was not compared.
 const UNASKED: f64 = 0.45;
-/// No face agrees less than this.
+/// Lower bound of the agreement.
 const LEAST_AGREEMENT: f64 = 0.02;
-/// The search against the print: as in normalisation, but not as close.
+/// Limits of the search against the print: as in registration, but coarser.
 const LIMITS: SearchRange = SearchRange {
     max_scale: 1.6,
     beam_width: mirrored(5),
@@ -47,7 +49,7 @@ const PASSES: [RefinementPass; 2] = [
     },
 ];
 
-/// A face is seen from outside, in mirror writing: no other reading counts.
+/// A side is rendered from outside, so in mirror writing: no other reading counts.
 const fn mirrored(count: usize) -> BeamWidth {
     BeamWidth {
         upright: 0,
@@ -55,55 +57,55 @@ const fn mirrored(count: usize) -> BeamWidth {
     }
 }
 
-/// Working size at which a face is judged: what correlates must also have printed.
+/// Working size at which the agreement is measured.
 const JUDGED_PX: usize = 56;
-/// Nearness to the tops below which nothing prints. The search is content with slopes; to judge by, they are too broad
-/// for thin strokes.
+/// Nearness to the tops below which nothing prints. The search uses slopes too; for the agreement they are too broad
+/// around thin strokes.
 const PRINTS: f32 = 0.7;
 /// Working size of the print and the tops.
 const BASE_PX: usize = 72;
 
-/// What was seen from one side.
+/// Surface and measurements of one side.
 #[derive(Debug, Clone)]
-pub(super) struct Face {
+pub(super) struct FittedSide {
     pub(super) plane_from_mesh: Rigid3,
     pub(super) bow: Option<Bow>,
     pub(super) bow_height: f64,
     pub(super) relief: f64,
     pub(super) extent: f64,
     pub(super) surface: Surface,
-    /// Width of the heights' crowd at the extreme layer, as a share of the relief.
+    /// Width of the layer of heights at the tops, as a share of the relief.
     pub(super) layer_width: f64,
-    /// Nearness to the tops as seen from outside, so in mirror writing.
+    /// Nearness to the tops seen from outside, so in mirror writing.
     pub(super) tops: SoftMask,
 }
 
-/// What else is known of the side.
+/// Further evidence for the side.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Witness<'a> {
+pub(super) struct SideInputs<'a> {
     pub(super) shell: &'a IndexedSurface,
     pub(super) print: Option<&'a Print>,
     pub(super) scanned_face_down: Option<bool>,
 }
 
-/// The carved one of two faces with the evidence for it; `None` when neither shows a surface.
+/// Returns the carved one of two sides with the evidence for it; `None` when neither shows a surface.
 pub(super) fn choose(
-    faces: [Option<Face>; 2],
-    witness: Witness<'_>,
-) -> Option<(Face, SideEvidence)> {
+    faces: [Option<FittedSide>; 2],
+    inputs: SideInputs<'_>,
+) -> Option<(FittedSide, SideEvidence)> {
     let (first, second) = match faces {
         [Some(a), Some(b)] => (a, b),
         [Some(only), None] | [None, Some(only)] => {
-            let winding = witness.shell.upward_facing_share(&only.plane_from_mesh);
+            let winding = inputs.shell.upward_facing_share(&only.plane_from_mesh);
             let evidence = evidence(&only, 1.0, winding);
             return Some((only, evidence));
         }
         [None, None] => return None,
     };
-    let winding = witness.shell.upward_facing_share(&first.plane_from_mesh);
-    let odds = log_odds(&first, &second, winding, witness);
+    let winding = inputs.shell.upward_facing_share(&first.plane_from_mesh);
+    let odds = log_odds(&first, &second, winding, inputs);
     let confidence = (odds.abs() / 2.0).tanh();
-    // What looks out on one side looks in on the other.
+    // Faces that point outward on one side point inward on the other.
     let (face, winding) = if odds >= 0.0 {
         (first, winding)
     } else {
@@ -113,7 +115,7 @@ pub(super) fn choose(
     Some((face, evidence))
 }
 
-fn evidence(face: &Face, confidence: f64, winding: Option<f64>) -> SideEvidence {
+fn evidence(face: &FittedSide, confidence: f64, winding: Option<f64>) -> SideEvidence {
     SideEvidence {
         winding,
         flatness: face.surface.tops,
@@ -121,8 +123,13 @@ fn evidence(face: &Face, confidence: f64, winding: Option<f64>) -> SideEvidence 
     }
 }
 
-/// Log-odds that the first face is the carved one.
-fn log_odds(first: &Face, second: &Face, winding: Option<f64>, witness: Witness<'_>) -> f64 {
+/// Returns the log-odds that the first side is the carved one.
+fn log_odds(
+    first: &FittedSide,
+    second: &FittedSide,
+    winding: Option<f64>,
+    inputs: SideInputs<'_>,
+) -> f64 {
     if first.relief < BACK * second.relief {
         return -10.0;
     }
@@ -134,11 +141,11 @@ fn log_odds(first: &Face, second: &Face, winding: Option<f64>, witness: Witness<
         .ln()
         .clamp(-1.5, 1.5);
     let up = first.plane_from_mesh.0[2][2];
-    let manifest = witness
+    let manifest = inputs
         .scanned_face_down
         .map_or(0.0, |down| if down { -up } else { up });
     let unseen = WINDING * winding + SHARPNESS * sharpness + MANIFEST * manifest;
-    let agreement = witness.print.map_or(0.0, |print| {
+    let agreement = inputs.print.map_or(0.0, |print| {
         if unseen >= 0.0 {
             agreement(first, second, print)
         } else {
@@ -148,9 +155,9 @@ fn log_odds(first: &Face, second: &Face, winding: Option<f64>, witness: Witness<
     unseen + AGREEMENT * agreement
 }
 
-/// Log of the ratio between the agreements with the print of the likelier face and of the other, which is asked only
-/// where the likelier one leaves a doubt; 0 when the print shows no ink.
-fn agreement(likelier: &Face, other: &Face, print: &Print) -> f64 {
+/// Returns the logarithm of the likelier side's agreement with the print over the other's, which is measured only where
+/// the likelier one leaves a doubt; 0 when the print shows no ink.
+fn agreement(likelier: &FittedSide, other: &FittedSide, print: &Print) -> f64 {
     let Ok(hypotheses) = print.hypotheses() else {
         return 0.0;
     };
@@ -158,7 +165,7 @@ fn agreement(likelier: &Face, other: &Face, print: &Print) -> f64 {
         .iter()
         .filter_map(|ink| ImagePyramid::new(&ink.soft, BASE_PX))
         .collect();
-    let score = |face: &Face| {
+    let score = |face: &FittedSide| {
         let scores = inks.iter().map(|ink| best_score(ink, &face.tops));
         scores.fold(LEAST_AGREEMENT, f64::max)
     };
@@ -167,7 +174,8 @@ fn agreement(likelier: &Face, other: &Face, print: &Print) -> f64 {
     (first / second).ln()
 }
 
-/// How well a face, read in the mirror, agrees with the ink: correlation times the share of the tops that has printed.
+/// Returns the agreement of a side, read in the mirror, with the ink: correlation times the share of the tops that
+/// printed.
 fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
     let Some(wood) = ImagePyramid::new(tops, BASE_PX) else {
         return 0.0;
@@ -184,9 +192,9 @@ fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
     scores.fold(0.0, f64::max)
 }
 
-/// How widely the heights spread at their extreme layer: half the heights of the upper part of the relief lie within
-/// this share of it.
-pub(super) fn layer_width(samples: &Samples, surface: &Surface, relief: f64) -> f64 {
+/// Returns the width of the layer of heights at the tops: the interquartile range of the upper part of the relief, as a
+/// share of the relief.
+pub(super) fn layer_width(samples: &HeightSamples, surface: &Surface, relief: f64) -> f64 {
     let mut upper: Vec<f64> = samples
         .residuals(surface)
         .into_iter()

@@ -1,15 +1,14 @@
 //! Points of a height map, and weighted least squares over them.
 //!
-//! A surface is fitted in some thirty passes: points are kept side by side, so that several are weighed and summed at a
-//! time.
+//! A surface is fitted in about thirty passes, so points are stored in blocks of lanes that are summed together.
 
 use nalgebra::{Matrix6, Vector6};
 
 use crate::simd::dispatch;
 
-/// Points that are looked at together.
+/// Points in a block.
 const LANES: usize = 4;
-type Lanes = [f64; LANES];
+type PointLanes = [f64; LANES];
 
 /// Coefficients of 1, u, v, u^2, u v, v^2.
 pub(super) type Coefficients = [f64; 6];
@@ -17,16 +16,16 @@ pub(super) type Coefficients = [f64; 6];
 /// Points u, v, z.
 #[derive(Debug, Default)]
 pub(super) struct Points {
-    /// u, v and z of a few points each; zeros after the last point.
-    blocks: Vec<[Lanes; 3]>,
+    /// u, v and z of a block of points; zeros after the last point.
+    blocks: Vec<[PointLanes; 3]>,
     count: usize,
 }
 
-/// What a coefficient is taken to be before any point is seen.
+/// Gaussian prior of a coefficient.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prior {
     pub(super) mean: f64,
-    /// Weight of the prior.
+    /// Inverse variance, in the units of the points' weights.
     pub(super) precision: f64,
 }
 
@@ -55,15 +54,16 @@ impl Points {
             .take(self.count)
     }
 
-    /// How high each point lies over a surface.
+    /// Returns the height of each point over a surface.
     pub(super) fn residuals(&self, c: &Coefficients) -> Vec<f64> {
         let mut residuals: Vec<f64> = self.blocks.iter().flat_map(|b| over::<6>(b, c)).collect();
         residuals.truncate(self.count);
         residuals
     }
 
-    /// The surface of the first `TERMS` (3 or 6) coefficients that fits best where each point weighs what its height
-    /// over another one, `from`, earns.
+    /// Solves the weighted least squares for the first `TERMS` (3 or 6) coefficients. `weight` gives the weight of a
+    /// point by
+    /// its height over the surface `from`.
     pub(super) fn solve<const TERMS: usize>(
         &self,
         from: &Coefficients,
@@ -71,11 +71,11 @@ impl Points {
         priors: &[Prior; 6],
     ) -> Coefficients {
         let (blocks, whole) = (&self.blocks, self.count / LANES);
-        // Sums and points of its own: what may lie in one place is not computed side by side.
+        // Local sums and copied points: possible aliasing would prevent vectorization.
         let mut sums = dispatch(
             #[inline(always)]
             || {
-                let mut sums = Sums::default();
+                let mut sums = MomentSums::default();
                 for block in &blocks[..whole] {
                     let block = *block;
                     let mut weights = over::<TERMS>(&block, from);
@@ -96,20 +96,20 @@ impl Points {
     }
 }
 
-/// Nothing is known before.
+/// Priors without weight.
 pub(super) const OPEN: [Prior; 6] = [Prior {
     mean: 0.0,
     precision: 0.0,
 }; 6];
 
-/// Height of a surface.
+/// Returns the height of a surface at a point.
 pub(super) fn value(c: &Coefficients, [u, v]: [f64; 2]) -> f64 {
     c[0] + c[1] * u + c[2] * v + c[3] * (u * u) + c[4] * (u * v) + c[5] * (v * v)
 }
 
-/// How high points lie over a surface of which only the first `TERMS` coefficients count.
+/// Returns the heights of points over a surface of which only the first `TERMS` coefficients count.
 #[inline(always)]
-fn over<const TERMS: usize>([u, v, z]: &[Lanes; 3], c: &Coefficients) -> Lanes {
+fn over<const TERMS: usize>([u, v, z]: &[PointLanes; 3], c: &Coefficients) -> PointLanes {
     let mut over = [0.0; LANES];
     for k in 0..LANES {
         let mut height = c[0] + c[1] * u[k] + c[2] * v[k];
@@ -121,9 +121,9 @@ fn over<const TERMS: usize>([u, v, z]: &[Lanes; 3], c: &Coefficients) -> Lanes {
     over
 }
 
-/// Products lane by lane; a loop, since what is not inlined gains nothing by wide instructions.
+/// Multiplies lane by lane; a loop, because only inlined code uses the wide instructions.
 #[inline(always)]
-fn times(a: &Lanes, b: &Lanes) -> Lanes {
+fn times(a: &PointLanes, b: &PointLanes) -> PointLanes {
     let mut products = [0.0; LANES];
     for k in 0..LANES {
         products[k] = a[k] * b[k];
@@ -131,21 +131,21 @@ fn times(a: &Lanes, b: &Lanes) -> Lanes {
     products
 }
 
-/// Powers of u and v up to the second, and up to the fourth: as products of two of the former.
+/// Number of monomials of u and v up to the second and up to the fourth degree.
 const SECOND: usize = 6;
 const FOURTH: usize = 15;
 
 /// Weighted sums over points of `u^i v^j`, by degree, and of the first six of them times z.
 #[derive(Default)]
-struct Sums {
-    powers: [Lanes; FOURTH],
-    heights: [Lanes; SECOND],
+struct MomentSums {
+    powers: [PointLanes; FOURTH],
+    heights: [PointLanes; SECOND],
 }
 
-impl Sums {
+impl MomentSums {
     #[inline(always)]
-    fn add<const TERMS: usize>(&mut self, [u, v, z]: &[Lanes; 3], weights: Lanes) {
-        let mut put = |place: usize, product: &Lanes| {
+    fn add<const TERMS: usize>(&mut self, [u, v, z]: &[PointLanes; 3], weights: PointLanes) {
+        let mut put = |place: usize, product: &PointLanes| {
             for k in 0..LANES {
                 self.powers[place][k] += product[k];
                 if place < TERMS {
@@ -153,7 +153,7 @@ impl Sums {
                 }
             }
         };
-        // Each degree from the one before: all times u, and the last times v.
+        // Each degree from the one before: all times u, then the last one times v.
         let (one, first) = (weights, [times(&weights, u), times(&weights, v)]);
         let second = [
             times(&first[0], u),
@@ -187,9 +187,9 @@ impl Sums {
         }
     }
 
-    /// The normal equations of the first few coefficients, solved; zeros where they say nothing.
+    /// Solves the normal equations of the first few coefficients; zeros where they are singular.
     fn solve(&self, terms: usize, priors: &[Prior; 6]) -> Coefficients {
-        let total = |lanes: &Lanes| lanes.iter().sum::<f64>();
+        let total = |lanes: &PointLanes| lanes.iter().sum::<f64>();
         let mut normal = Matrix6::<f64>::identity();
         let mut side = Vector6::<f64>::zeros();
         for i in 0..terms {
@@ -206,9 +206,9 @@ impl Sums {
     }
 }
 
-/// Place among the powers of the product of two of the first six.
+/// Returns the index among the monomials of the product of two of the first six.
 fn product(i: usize, j: usize) -> usize {
-    // Exponents of v; the degree is that of the row of 1, u v, uu uv vv that holds the place.
+    // Degree and exponent of v of each monomial 1, u, v, uu, uv, vv.
     let of = |k: usize| [(0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2)][k];
     let ((a, p), (b, q)) = (of(i), of(j));
     let degree: usize = a + b;

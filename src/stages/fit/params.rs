@@ -4,39 +4,27 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::FailureClass;
 
-/// How the plane is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FitMethod {
-    /// PCA, sides, upper set, spaced selection, RANSAC + PCA: the paper's.
-    Paper,
-    /// One-sided robust surface over the tops, seen from each side.
-    UpperSurface,
-}
-
-/// Settings of the stage.
+/// Settings of the fit stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitParams {
-    /// How the plane is found.
-    pub method: FitMethod,
-    /// Whether `upper_surface` may fit a second-degree surface where the block is bent.
+    /// Whether a second-degree surface may be fitted where the block is bent.
     pub curved_blocks: bool,
-    /// Seed of the random choices of `paper`.
+    /// Paper's method: seed of the random choices.
     pub seed: u64,
-    /// How many points the spaced selection of `paper` takes, 3 or more.
+    /// Paper's method: number of points of the spaced selection, 3 or more.
     pub spaced_points: u32,
-    /// Spacing of that selection as a share of the mesh's extent, above 0.
+    /// Paper's method: spacing of that selection as a share of the mesh's extent, above 0.
     pub spacing: f64,
-    /// RANSAC draws of `paper`, 1 or more.
+    /// Paper's method: RANSAC draws, 1 or more.
     pub ransac_draws: u32,
-    /// Inlier distance of that RANSAC as a share of the mesh's extent, above 0.
+    /// Paper's method: inlier distance of that RANSAC as a share of the mesh's extent, above 0.
     pub ransac_distance: f64,
     /// Smallest relief as a share of the mesh's extent; below it there is no carving to align.
     pub min_relief: f64,
 }
 
-/// Why the stage found no result.
+/// Why the fit stage found no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// Fewer than three points.
@@ -79,7 +67,7 @@ pub enum FitError {
 }
 
 impl FitError {
-    /// What the failure means for the pair.
+    /// Returns what the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
             Self::TooFewPoints(_)

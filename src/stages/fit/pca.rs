@@ -8,7 +8,7 @@ use crate::mesh::Mesh;
 use crate::stages::robust_bounds::{Bounds, holds};
 use crate::stages::zbuffer::{IndexedSurface, Moments};
 
-/// A surface given by points alone needs this many: 25 along a side show a stroke or two at best.
+/// Least number of points of a surface without faces: 25 along a side show one or two strokes.
 const LEAST_POINTS: usize = 600;
 
 /// Centre and principal axes, longest first, with the variance along each.
@@ -20,7 +20,7 @@ pub(in crate::stages) struct Axes {
 }
 
 impl Axes {
-    /// Of points, each with a weight.
+    /// Computes the axes of weighted points.
     pub(in crate::stages) fn of_points(
         points: impl Iterator<Item = ([f64; 3], f64)> + Clone,
     ) -> Self {
@@ -39,7 +39,9 @@ impl Axes {
         Self::from_moments(centre, spread / total)
     }
 
-    /// Of a surface; of the vertices where there is no area. Flecks far from the bulk do not count.
+    /// Computes the axes of a surface by area, or of the vertices where there is no area. Specks far from the bulk are
+    /// left
+    /// out.
     pub(in crate::stages) fn of_surface(mesh: &Mesh, shell: &IndexedSurface) -> Self {
         if let Some(moments) = Moments::of(shell) {
             return Self::from_moments(moments.centre, moments.covariance);
@@ -60,7 +62,7 @@ impl Axes {
         }
     }
 
-    /// Refuses points that span no surface.
+    /// Returns an error for points that span no surface.
     pub(in crate::stages) fn require_surface(&self, mesh: &Mesh) -> Result<(), FitError> {
         let count = mesh.vertices.len();
         let scale = self.centre.norm_squared().max(1e-300);
@@ -77,14 +79,14 @@ impl Axes {
         Ok(())
     }
 
-    /// Normal of the plane through the centre that leaves the least variance.
+    /// Returns the normal of the plane through the centre with the least variance.
     pub(in crate::stages) fn normal(&self) -> Vector3<f64> {
         self.directions[2]
     }
 }
 
-/// A right-handed plane frame with this normal whose x axis is as close to the mesh's x as it can be, so that an
-/// upright scan stays upright; close to the mesh's y where the normal runs along x.
+/// Returns a right-handed plane frame with this normal whose x axis is as close as possible to the mesh's x, so that an
+/// upright scan stays upright; to the mesh's y where the normal runs along x.
 pub(in crate::stages) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
     let along = if normal.normalize().x.abs() < 0.9 {
         Vector3::x()
@@ -94,7 +96,7 @@ pub(in crate::stages) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Ri
     frame_along(normal, along, origin)
 }
 
-/// A right-handed plane frame with this normal whose x axis is as close to `along` as it can be.
+/// Returns a right-handed plane frame with this normal whose x axis is as close as possible to `along`.
 pub(in crate::stages) fn frame_along(
     normal: Vector3<f64>,
     along: Vector3<f64>,

@@ -1,7 +1,8 @@
-//! A one-sided robust surface over what stands highest in a height map.
+//! A one-sided robust surface over the highest parts of a height map.
 //!
-//! Tops of strokes are the original face of the block: much lies below them, nothing above. So a point above the
-//! surface costs much, one far below it nothing at all.
+//! Stroke tops are the original face of the block: much lies below them, nothing above. So a point above the surface
+//! has
+//! a high cost and a point far below it none.
 
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
 use crate::domain::Rigid3;
@@ -10,56 +11,56 @@ use crate::stages::components::ConnectedComponents;
 use crate::stages::pose::SoftMask;
 use crate::stages::zbuffer::{NO_HIT, Viewport};
 
-/// Expectile of the first, convex pass: points above weigh this, points below one less it.
+/// Expectile of the first, convex passes: weight of points above the surface; points below weigh one minus this.
 const ENVELOPE: f64 = 0.97;
 /// Weight of a point above the surface in the passes that follow.
 const ABOVE: f64 = 3.0;
-/// How far below the surface a point still counts, as a share of the height range, pass by pass.
+/// Distance below the surface at which a point stops counting, as a share of the height range, pass by pass.
 const WINDOWS: [f64; 5] = [0.35, 0.22, 0.14, 0.10, 0.08];
-/// Passes of the first kind, and of each window.
+/// Number of convex passes, and of passes for each window.
 const ENVELOPE_PASSES: usize = 8;
 const NARROW_PASSES: usize = 2;
-/// So many of the windows are wide: few points are enough.
+/// Number of wide windows, for which a quarter of the points is enough.
 const AFAR: usize = 3;
-/// Tops this close to the cut, in pixels of the rendering, run into it.
+/// Tops this close to the cut of the mesh, in pixels of the rendering, belong to neighbours.
 const CUT_PX: i64 = 2;
-/// Weight of a point that is no top of the character's.
+/// Weight of a point that is not on a top of the character.
 const HARDLY: f64 = 1e-6;
-/// Without the tops at the cut at least this share of all must be left.
+/// Least share of the tops that must remain without those at the cut.
 const LEAST_OWN: f64 = 0.4;
-/// Margin of the view, a share of each side, that the depth of the carving is not read from.
+/// Margin of the view, as a share of each side, that is left out when the depth of the carving is measured.
 const MARGIN: f64 = 0.15;
-/// Neighbouring pixels of a top err together: so many of them count as one.
+/// Number of neighbouring pixels of a top whose errors are correlated, so that they count as one.
 const CORRELATED_PX: f64 = 40.0;
-/// Standard deviation of the tops' unevenness as a share of the height range.
+/// Standard deviation of the tops' roughness, as a share of the height range.
 const TOP_SIGMA: f64 = 0.05;
-/// The tops' plane is parallel to the carved ground within this slope (one standard deviation).
+/// Standard deviation of the slope between the tops' plane and the carved ground.
 const TILT_SIGMA: f64 = 0.05;
-/// Second-degree coefficients in units of the extent (one standard deviation): a bow of 2-8 % of the extent.
+/// Standard deviation of the second-degree coefficients in units of the extent: a bow of 2 to 8 % of the extent.
 const BOW_SIGMA: f64 = 0.15;
-/// The same around the ground's, where the ground is seen well.
+/// The same about the ground's coefficients, where enough ground is visible.
 const GROUND_BOW_SIGMA: f64 = 0.03;
-/// The ground is looked for from this quantile of the heights over the mean plane, within these shares of the height
-/// range, and is seen well where the last one holds this share of what is seen.
+/// Ground: starting quantile of the heights over the mean plane, windows as shares of the height range, and least share
+/// of the visible area within the last window.
 const GROUND_START: f64 = 0.25;
 const GROUND_WINDOWS: [f64; 4] = [0.35, 0.22, 0.14, 0.1];
 const LEAST_GROUND: f64 = 0.3;
-/// A surface with less support lies on few strokes.
+/// A surface with less support rests on few strokes.
 const SPARSE: f64 = 0.2;
-/// Soft tops fade to nothing at this share of the relief under the surface.
+/// Soft tops fall to zero at this share of the relief below the surface.
 const SOFT_SPAN: f64 = 0.5;
-/// A bow must explain this much more of the tops than the plane does.
+/// Ratio of supports by which a bow must beat the plane.
 const BOW_GAIN: f64 = 1.04;
 
-/// Heights of a view as points, scaled by the extent: u, v in about -0.5..0.5.
+/// Heights of a view as points, scaled by the extent: u, v in about -0.5..=0.5.
 #[derive(Debug)]
-pub(super) struct Samples {
+pub(super) struct HeightSamples {
     points: Points,
-    /// Those of every other row and column: enough to come near the surface.
+    /// Every other row and column: enough for the first, wide windows.
     few: Points,
-    /// The plane through the middle of all heights.
+    /// Least-squares plane of all heights.
     mean_plane: Coefficients,
-    /// Where each point lies in the rendering, and the rendering's size.
+    /// Index of each point in the rendering, and the rendering's size.
     places: Vec<usize>,
     size: [usize; 2],
     centre: [f64; 2],
@@ -67,20 +68,20 @@ pub(super) struct Samples {
     range: f64,
 }
 
-/// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in scaled units, and how well it holds.
+/// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in scaled units, and how well it fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Surface {
     coefficients: Coefficients,
-    /// Share of the seen area that supports it, less what stands above it.
+    /// Share of the visible area that supports it, minus a penalty for what lies above it.
     pub(super) support: f64,
-    /// Share of the seen area within the last window.
+    /// Share of the visible area within the last window.
     pub(super) tops: f64,
-    /// Root mean square of those, mesh units.
+    /// Root mean square residual of that area, mesh units.
     pub(super) rms: f64,
 }
 
-impl Samples {
-    /// The seen pixels of a rendering; `None` when fewer than 16 are seen.
+impl HeightSamples {
+    /// Collects the visible pixels of a rendering; `None` when fewer than 16 are visible.
     pub(super) fn new(heights: &Grid<f32>, view: &Viewport) -> Option<Self> {
         let back = view.px_from_plane.inverse()?;
         let extent = view.unit_per_px * heights.width().max(heights.height()) as f64;
@@ -132,7 +133,7 @@ impl Samples {
         }
     }
 
-    /// The same points in another frame that leans little from this one.
+    /// Transforms the points to another frame with a small rotation from this one.
     pub(super) fn turned(&self, other_from_this: &Rigid3) -> Self {
         let at = |[u, v, z]: [f64; 3]| {
             let [x, y] = [
@@ -154,7 +155,7 @@ impl Samples {
         Self::of(points, self.places.clone(), self.size, [x, y], self.extent)
     }
 
-    /// The surface over the tops; second-degree only when allowed and earned.
+    /// Fits the surface over the tops; second-degree only when allowed and when it fits better.
     pub(super) fn fit(&self, allow_bow: bool) -> Surface {
         let ground = self.mean_plane;
         let envelope = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
@@ -182,7 +183,7 @@ impl Samples {
         }
     }
 
-    /// Passes with a shrinking window below the surface.
+    /// Refines a surface with a shrinking window below it.
     fn narrow<const TERMS: usize>(&self, start: Coefficients, priors: &[Prior; 6]) -> Surface {
         let few = self.seen_from_afar(priors);
         let mut c = start;
@@ -199,7 +200,7 @@ impl Samples {
         self.judge(c)
     }
 
-    /// The few points with priors that weigh as much beside them as those given do beside all.
+    /// Returns the subsampled points with priors of the same relative weight.
     fn seen_from_afar(&self, priors: &[Prior; 6]) -> (&Points, [Prior; 6]) {
         let share = self.few.len() as f64 / self.points.len() as f64;
         let lighter = |prior: Prior| Prior {
@@ -209,7 +210,7 @@ impl Samples {
         (&self.few, priors.map(lighter))
     }
 
-    /// How well a surface holds at the narrowest window.
+    /// Measures how well a surface fits at the narrowest window.
     fn judge(&self, coefficients: Coefficients) -> Surface {
         let w = WINDOWS[WINDOWS.len() - 1] * self.range;
         let (mut support, mut tops, mut squares) = (0.0, 0.0, 0.0);
@@ -235,7 +236,8 @@ impl Samples {
         }
     }
 
-    /// What the coefficients are taken to be where the tops say little: tilted and bent as `mean` is, the second degree
+    /// Returns priors for the coefficients, which decide where the tops say little: tilt and bend of `mean`, the
+    /// second degree
     /// within `bow_sigma`.
     fn priors(&self, mean: Coefficients, bow_sigma: f64) -> [Prior; 6] {
         let noise = CORRELATED_PX * (TOP_SIGMA * self.range).powi(2);
@@ -249,15 +251,16 @@ impl Samples {
         })
     }
 
-    /// The same where much of the ground is seen: a block bends as a whole, so the tops bend as the ground does. Few
-    /// strokes would bend the surface as they like.
+    /// Returns priors from the ground where enough of it is visible: a block bends as a whole, so the tops bend as the
+    /// ground
+    /// does. Without them few strokes would leave the bend undetermined.
     fn beliefs_along_ground(&self) -> Option<[Prior; 6]> {
         let [a, b, c, ..] = self.mean_plane;
         let [_, _, _, p, q, r] = self.ground()?;
         Some(self.priors([a, b, c, p, q, r], GROUND_BOW_SIGMA))
     }
 
-    /// The second-degree surface of the carved ground, where enough of it is seen.
+    /// Fits a second-degree surface to the carved ground; `None` where too little of it is visible.
     fn ground(&self) -> Option<Coefficients> {
         let mut c = self.mean_plane;
         c[0] += quantile(&mut self.points.residuals(&c), GROUND_START);
@@ -274,7 +277,7 @@ impl Samples {
         (near as f64 / residuals.len() as f64 > LEAST_GROUND).then_some(c)
     }
 
-    /// Residual of every seen pixel over a surface, mesh units.
+    /// Returns the residual of every visible pixel over a surface, mesh units.
     pub(super) fn residuals(&self, surface: &Surface) -> Vec<f64> {
         let mut residuals = self.points.residuals(&surface.coefficients);
         for r in &mut residuals {
@@ -283,7 +286,8 @@ impl Samples {
         residuals
     }
 
-    /// The same without a margin of the view: side walls, and a foot that juts out, are neither tops nor ground.
+    /// Returns the residuals without a margin of the view: side walls and a protruding foot are neither tops nor
+    /// ground.
     pub(super) fn inner_residuals(&self, surface: &Surface) -> Vec<f64> {
         let [width, height] = self.size;
         let inside = |i: usize, side: usize| {
@@ -299,7 +303,7 @@ impl Samples {
         if inner.len() < 16 { residuals } else { inner }
     }
 
-    /// Nearness to the surface as a picture: 1 on it, 0 from half the relief down.
+    /// Returns the nearness to the surface as an image: 1 on it, 0 from half the relief down.
     pub(super) fn soft_tops(&self, surface: &Surface, relief: f64) -> SoftMask {
         let [width, height] = self.size;
         let mut soft = SoftMask {
@@ -314,9 +318,10 @@ impl Samples {
         soft
     }
 
-    /// The plane through a surface's tops, `z = a + b x + c y` in plane coordinates and mesh units.
+    /// Returns the plane through a surface's tops, `z = a + b x + c y` in plane coordinates and mesh units.
     ///
-    /// Tops that run into the cut belong to neighbours: they tell the surface, but not where on it the character is.
+    /// Tops that reach the cut belong to neighbours: they help to fit the surface, but do not mark the character's
+    /// place on it.
     pub(super) fn plane_of_tops(&self, surface: &Surface) -> [f64; 3] {
         let c = surface.coefficients;
         let is_bent = c[3..].iter().any(|c| *c != 0.0);
@@ -326,8 +331,7 @@ impl Samples {
         [a, b, c]
     }
 
-    /// The plane that lies best in a bent surface where the tops of the character are; where all else lies hardly
-    /// counts.
+    /// Returns the plane that fits a bent surface best at the tops of the character; other points hardly count.
     fn plane_in(&self, c: &Coefficients) -> Coefficients {
         let own = self.own_tops(c);
         let (mut all, mut tops) = (Points::default(), Points::default());
@@ -344,7 +348,7 @@ impl Samples {
         plane_of(&tops, &priors)
     }
 
-    /// Where the tops of the character itself are; all tops where hardly any are left without those at the cut.
+    /// Returns the mask of the character's own tops; all tops where hardly any remain without those at the cut.
     fn own_tops(&self, c: &Coefficients) -> Mask {
         let window = WINDOWS[WINDOWS.len() - 1] * self.range;
         let [width, height] = self.size;
@@ -365,7 +369,7 @@ impl Samples {
         }
     }
 
-    /// The surface in plane coordinates and mesh units: coefficients of 1, x, y, x^2, xy, y^2.
+    /// Returns the surface in plane coordinates and mesh units: coefficients of 1, x, y, x^2, xy, y^2.
     pub(super) fn in_plane_units(&self, surface: &Surface) -> [f64; 6] {
         let c = surface.coefficients;
         let e = self.extent;
@@ -383,19 +387,19 @@ impl Samples {
     }
 }
 
-/// Nearly all of heights over their mean plane.
+/// Returns the range of heights over their mean plane without the extreme 3 % at either end.
 fn height_range(mut residuals: Vec<f64>) -> f64 {
     (quantile(&mut residuals, 0.97) - quantile(&mut residuals, 0.03)).max(1e-9)
 }
 
-/// The value below which a share of the values lies; reorders them.
+/// Returns the value below which a share of the values lies; reorders them.
 pub(in crate::stages) fn quantile(values: &mut [f64], share: f64) -> f64 {
     let k = ((values.len() - 1) as f64 * share) as usize;
     *values.select_nth_unstable_by(k, f64::total_cmp).1
 }
 
-/// Full weight just under the surface, fading to none at `window` below; above it heavier, but a spike of more
-/// than three windows is not believed. Plain comparisons, so that several are weighed at a time.
+/// Weight of a residual: 1 just below the surface, falling to 0 at `window` below; higher above it, but 0 for spikes of
+/// more than three windows. Plain comparisons, so that the loop is vectorized.
 #[inline(always)]
 fn one_sided_weight(r: f64, window: f64) -> f64 {
     let below = smooth_weight(r, window);
@@ -403,7 +407,7 @@ fn one_sided_weight(r: f64, window: f64) -> f64 {
     if r > 3.0 * window { 0.0 } else { near }
 }
 
-/// Full weight on the surface, fading to none at `window` from it.
+/// Weight of a residual: 1 on the surface, falling to 0 at `window` on both sides.
 #[inline(always)]
 fn smooth_weight(r: f64, window: f64) -> f64 {
     let t = r / window;

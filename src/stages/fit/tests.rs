@@ -2,12 +2,13 @@
 
 use nalgebra::Vector3;
 
-use super::{FitError, FitMethod, fit};
+use super::{FitError, fit};
 use crate::domain::{FailureClass, FitOutcome};
 use crate::mesh::Mesh;
-use crate::stages::testing::{World, print, settings, some_turn};
+use crate::stages::paper_method;
+use crate::stages::testing::{SyntheticSheet, print, settings, some_turn};
 
-fn normal_error_deg(world: &World, found: &FitOutcome) -> f64 {
+fn normal_error_deg(world: &SyntheticSheet, found: &FitOutcome) -> f64 {
     let [x, y, z, _] = found.plane_from_mesh.0[2];
     Vector3::new(x, y, z).angle(&world.normal()).to_degrees()
 }
@@ -15,10 +16,10 @@ fn normal_error_deg(world: &World, found: &FitOutcome) -> f64 {
 #[test]
 fn plane_and_side_of_any_pose() {
     for k in 0..6 {
-        let world = World {
+        let world = SyntheticSheet {
             turn: some_turn(k),
             inward: k % 2 == 0,
-            ..World::default()
+            ..SyntheticSheet::default()
         };
         let found = fit(
             &world.mesh().into(),
@@ -36,10 +37,10 @@ fn plane_and_side_of_any_pose() {
 
 #[test]
 fn bow_is_found_only_where_there_is_one() {
-    let bent = World {
+    let bent = SyntheticSheet {
         bow_mm: 0.5,
         turn: some_turn(4),
-        ..World::default()
+        ..SyntheticSheet::default()
     };
     let found = fit(
         &bent.mesh().into(),
@@ -53,9 +54,9 @@ fn bow_is_found_only_where_there_is_one() {
         "{}",
         found.bow_height
     );
-    let flat = World {
+    let flat = SyntheticSheet {
         turn: some_turn(4),
-        ..World::default()
+        ..SyntheticSheet::default()
     };
     let found = fit(
         &flat.mesh().into(),
@@ -69,24 +70,19 @@ fn bow_is_found_only_where_there_is_one() {
 
 #[test]
 fn the_papers_plane_is_close_on_an_open_mesh() {
-    let mut params = settings().fit;
-    params.method = FitMethod::Paper;
     for k in 0..4 {
-        let world = World {
+        let world = SyntheticSheet {
             turn: some_turn(k),
-            ..World::default()
+            ..SyntheticSheet::default()
         };
-        let found = fit(
-            &world.mesh().into(),
-            Some(&print(14.0, 2.0).0),
-            None,
-            &params,
-        )
-        .expect("a plane");
+        let found = paper_method::fit::fit(&world.mesh().into(), &settings().fit).expect("a plane");
         let error = normal_error_deg(&world, &found);
         assert!(error < 3.0, "{error} degrees in pose {k}");
     }
 }
+
+/// A fit of points without faces.
+type FitPoints<'a> = &'a dyn Fn(Vec<[f64; 3]>) -> Result<FitOutcome, FitError>;
 
 #[test]
 fn points_that_span_no_surface_are_refused() {
@@ -95,12 +91,10 @@ fn points_that_span_no_surface_are_refused() {
         triangles: Vec::new().into(),
     };
     let params = settings().fit;
-    for method in [FitMethod::Paper, FitMethod::UpperSurface] {
-        let params = super::FitParams {
-            method,
-            ..params.clone()
-        };
-        let fit = |vertices| fit(&mesh(vertices).into(), None, None, &params);
+    let ours = |vertices| fit(&mesh(vertices).into(), None, None, &params);
+    let the_papers = |vertices| paper_method::fit::fit(&mesh(vertices).into(), &params);
+    let methods: [FitPoints<'_>; 2] = [&ours, &the_papers];
+    for (k, fit) in methods.into_iter().enumerate() {
         assert_eq!(fit(vec![[0.0; 3]; 2]), Err(FitError::TooFewPoints(2)));
         assert_eq!(fit(vec![[1.0, 2.0, 3.0]; 9]), Err(FitError::OnePoint(9)));
         let line = (0..50)
@@ -115,6 +109,6 @@ fn points_that_span_no_surface_are_refused() {
             .map(|i| [f64::from(i % 30), f64::from(i / 30), 0.0])
             .collect();
         let refused = fit(plate).expect_err("nothing is carved");
-        assert_eq!(refused.class(), FailureClass::NoSolution, "{method:?}");
+        assert_eq!(refused.class(), FailureClass::NoSolution, "method {k}");
     }
 }

@@ -1,39 +1,40 @@
-//! The heap of heights that the tops make, and where it ends: the foot between worn tops and walls.
+//! Histogram of the heights below the tops, and the depth at which the tops end.
 //!
-//! Walls slope, so each depth holds about as much of them; tops crowd at one depth, worn ones a little below. A cut
-//! loses least of the tops and takes in least of the walls where both are about as frequent.
+//! Walls slope, so they hold about the same area at each depth; tops are concentrated at one depth, worn ones a little
+//! below. A threshold loses least of the tops and includes least of the walls where both are about equally frequent.
 
-use super::relief::Relief;
+use crate::domain::ReliefHeights;
 
-/// Bins a share of the relief, and the depths they cover.
+/// Width of a bin and range of depths, as shares of the relief.
 const BIN: f64 = 0.005;
 const FROM: f64 = -0.3;
 const TO: f64 = 1.2;
-/// The tops' crowd is looked for this near to the first guess.
+/// Largest distance of the peak from the first estimate of the tops.
 const NEAR: f64 = 0.25;
-/// Depths at which walls are seen by themselves.
+/// Range of depths that holds only walls.
 const WALLS: [f64; 2] = [0.10, 0.50];
-/// Bins averaged, for the tops and for the walls.
+/// Number of bins averaged, for the tops and for the walls.
 const FINE: usize = 3;
 const COARSE: usize = 16;
-/// The tops end where heights are this many times as frequent as on the walls: walls and tops still half each, and
-/// a little for the noise that widens the heap. Measured on two independent kinds of made reliefs; flat around 2.5.
-/// Where walls are frequent all over, half-way between both will do.
+/// Frequency at the end of the tops, as a multiple of the frequency on the walls: walls, as much of the tops, and a
+/// little
+/// for noise that widens the histogram. Measured on two independent kinds of generated reliefs; flat around 2.5. Where
+/// walls are frequent everywhere, the middle between walls and peak is used.
 const EDGE: f64 = 2.5;
-/// Where the tops of most reliefs end, and the range in which a found end is believed. One scan's heights tell it with
-/// much noise, so the answer lies half-way between both: nearer to the truth on three kinds of made reliefs.
+/// Usual depth at which tops end, and the range to which a measured depth is clamped. One scan's histogram is noisy, so
+/// the result is the geometric mean of both: nearer to the truth on three kinds of generated reliefs.
 const USUAL: f64 = 0.075;
 const RANGE: [f64; 2] = [0.02, 0.25];
 
-/// How frequent each depth under the tops is.
+/// Frequency of each depth below the tops.
 #[derive(Debug, Clone)]
 pub(super) struct HeightHistogram {
     counts: Vec<f64>,
 }
 
 impl HeightHistogram {
-    /// Counts heights by their depth under the tops.
-    pub(super) fn of(heights: &[f32], relief: &Relief) -> Self {
+    /// Counts heights by their depth below the tops.
+    pub(super) fn of(heights: &[f32], relief: &ReliefHeights) -> Self {
         let mut counts = vec![0.0; ((TO - FROM) / BIN).round() as usize];
         for height in heights {
             let share = (relief.top - f64::from(*height)) / relief.depth();
@@ -45,13 +46,13 @@ impl HeightHistogram {
         Self { counts }
     }
 
-    /// Depth at which most heights crowd near the tops.
+    /// Returns the depth of the peak near the tops, as a share of the relief.
     pub(super) fn peak(&self) -> f64 {
         middle(peak_bin(&smoothed(&self.counts, FINE)))
     }
 
-    /// Depth at which the tops end, going down from depth zero.
-    pub(super) fn edge(&self) -> f64 {
+    /// Returns the depth at which the tops end, as a share of the relief.
+    pub(super) fn tops_end(&self) -> f64 {
         let fine = smoothed(&self.counts, FINE);
         let coarse = smoothed(&self.counts, COARSE);
         let mut walls = coarse[bin_of(WALLS[0])..bin_of(WALLS[1])].to_vec();
@@ -66,7 +67,7 @@ impl HeightHistogram {
     }
 }
 
-/// Bin near depth zero that holds most.
+/// Returns the fullest bin near depth zero.
 fn peak_bin(fine: &[f64]) -> usize {
     let near = bin_of(-NEAR)..bin_of(NEAR);
     near.max_by(|a, b| fine[*a].total_cmp(&fine[*b]))
@@ -81,7 +82,7 @@ fn middle(bin: usize) -> f64 {
     FROM + (bin as f64 + 0.5) * BIN
 }
 
-/// Running means over `width` bins.
+/// Computes running means over `width` bins.
 fn smoothed(counts: &[f64], width: usize) -> Vec<f64> {
     let half = width / 2;
     (0..counts.len())
@@ -94,21 +95,26 @@ fn smoothed(counts: &[f64], width: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{HeightHistogram, Relief};
+    use super::HeightHistogram;
+    use crate::domain::ReliefHeights;
 
     #[test]
     fn tops_end_where_walls_begin() {
-        let relief = Relief {
+        let relief = ReliefHeights {
             top: 0.0,
             ground: -1.0,
-            edge: 0.0,
+            tops_end: 0.0,
         };
-        // A crowd of tops within 0.04 of the relief, walls evenly below it, ground at the end.
+        // Tops within 0.04 of the relief, walls evenly below them, ground at the end.
         let tops = (0..4000).map(|i| -0.04 + 0.08 * (i % 100) as f32 / 100.0);
         let walls = (0..3000).map(|i| -(i as f32) / 3000.0);
         let heights: Vec<f32> = tops.chain(walls).chain([-1.0; 3000]).collect();
-        let heap = HeightHistogram::of(&heights, &relief);
-        assert!((0.03..0.06).contains(&heap.edge()), "{}", heap.edge());
-        assert!(heap.peak().abs() <= 0.045);
+        let histogram = HeightHistogram::of(&heights, &relief);
+        assert!(
+            (0.03..0.06).contains(&histogram.tops_end()),
+            "{}",
+            histogram.tops_end()
+        );
+        assert!(histogram.peak().abs() <= 0.045);
     }
 }

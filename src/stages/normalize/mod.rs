@@ -1,136 +1,56 @@
-//! Depth map and print to masks on one canvas (paper III-C).
+//! Prepares print and relief for registration: ink of the print, heights of tops and ground of the depth map.
 //!
-//! Two methods behind one entry. [`NormalizeMethod::BoundingBox`] is the paper's: wrap both by their boxes and choose thresholds
-//! before the rotation is known. [`NormalizeMethod::PoseFirst`] is ours: find the pose first with soft relief, which needs no
-//! threshold, then choose each threshold in the aligned frame.
+//! Neither a pose nor a threshold is chosen here: soft strokes, computed from the heights where they are resampled, need
+//! no threshold, and thresholds only mean something once the pose is known. The paper's order is in
+//! `paper_method::normalize`.
 
 mod height_histogram;
+mod normalized;
 mod params;
-mod pose_search;
 mod relief;
-mod threshold;
 
-pub use params::{NormalizeError, NormalizeMethod, NormalizeParams, PrintThreshold};
-pub use relief::Relief;
-pub(super) use relief::soft_stroke;
+pub(super) use normalized::box_wrap;
+pub use normalized::{Normalized, PrintMasks};
+pub use params::{NormalizeError, NormalizeParams};
+pub(super) use relief::{relative_depths, soft_stroke, stroke_growth};
 
-use super::binarize;
-use super::paper_method::normalize::{self as bounding_box, box_wrap};
 use super::print::Print;
-use crate::domain::{Affine2, NormalizeOutcome, Pose};
-use crate::raster::{DepthMap, Mask};
+use crate::raster::DepthMap;
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 9;
+pub const REVISION: u32 = 10;
 
-/// What the stage gives.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Normalized {
-    /// The numbers.
-    pub outcome: NormalizeOutcome,
-    /// Ink of the print, in the print image frame.
-    pub ink: Mask,
-    /// Where the print image is paper or ink; outside it (white beyond the cut) nothing is known.
-    pub known: Mask,
-}
-
-/// What the pose search found; empty for the method that registers afterwards.
-#[derive(Debug, Default)]
-struct Search {
-    poses: Vec<Pose>,
-    mirrored: Option<Pose>,
-    at_bound: bool,
-}
-
-impl Search {
-    /// Score of the best pose as read.
-    fn score(&self) -> f64 {
-        self.poses.first().map_or(0.0, |pose| pose.score)
-    }
-}
-
-/// Finds the print's ink, the canvas, and each metric's depth threshold.
+/// Finds the print's ink under every interpretation that the image leaves possible, and the heights of tops and ground.
 ///
-/// `depth` reads like the print; `print` is the whole image as given. The outcome's poses map depth-map pixels to
-/// print pixels, best first; `wrap` leaves them to the register stage.
+/// `depth` reads like the print; `print` is the whole image as given. Masks are in the print image's frame, heights in
+/// mesh units over the fitted surface.
 ///
 /// # Errors
-/// When the print shows no ink, the depth map no strokes, or no pose fits.
+/// When the print shows no ink or the depth map only one height.
+///
+/// # Examples
+/// ```
+/// # use mocban::{config, demo, raster};
+/// # let settings = config::load(&config::Sources::default())?.config.stages;
+/// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
+/// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
+/// use mocban::stages::{Print, Scan, depth, fit, normalize};
+///
+/// let (scan, print) = (Scan::from(pair.mesh), Print::from(image));
+/// let plane = fit::fit(&scan, Some(&print), None, &settings.fit)?;
+/// let map = depth::depth(&scan, &plane, None, &settings.depth)?;
+/// let normalized = normalize::normalize(&map, &print, &settings.normalize)?;
+/// // One mask for each interpretation of the print, the likeliest first.
+/// assert_eq!(normalized.prints.len(), normalized.outcome.inks.len());
+/// assert!(normalized.outcome.relief.is_some_and(|relief| relief.depth() > 0.0));
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn normalize(
     depth: &DepthMap,
     print: &Print,
     params: &NormalizeParams,
 ) -> Result<Normalized, NormalizeError> {
-    let hypotheses = match params.print_threshold {
-        PrintThreshold::Adaptive => print.hypotheses()?.to_vec(),
-        PrintThreshold::Fixed => vec![binarize::fixed(print.picture(), params.print_grey)?],
-    };
-    let (ink, canvas_from_print, search, thresholds) = match params.method {
-        NormalizeMethod::PoseFirst => {
-            let relief = Relief::of(depth).ok_or(NormalizeError::NoStrokes)?;
-            let (ink, search) = pose_search::search(depth, &relief, hypotheses, params)?;
-            let canvas = canvas_from_print(&ink.mask, params).ok_or(NormalizeError::NoStrokes)?;
-            let thresholds =
-                pose_search::thresholds(depth, &relief, &ink, &canvas, &search, params)?;
-            (ink, canvas, search, thresholds)
-        }
-        NormalizeMethod::BoundingBox => {
-            let ink = hypotheses
-                .into_iter()
-                .next()
-                .ok_or(NormalizeError::NoStrokes)?;
-            let canvas = canvas_from_print(&ink.mask, params).ok_or(NormalizeError::NoStrokes)?;
-            let thresholds = bounding_box::choose(depth, &ink, &canvas, params)?;
-            (ink, canvas, Search::default(), thresholds)
-        }
-    };
-    Ok(Normalized {
-        outcome: NormalizeOutcome {
-            threshold_print: ink.threshold * 65_535.0,
-            light_on_dark: ink.light_on_dark,
-            canvas_px: params.canvas_px,
-            canvas_from_print,
-            poses: search.poses,
-            mirrored: search.mirrored,
-            search_at_bound: search.at_bound,
-            thresholds,
-        },
-        ink: ink.mask,
-        known: ink.soft.known,
-    })
-}
-
-/// The pair's canvas: the ink's longest side takes `character_px`, its centroid is in the middle.
-fn canvas_from_print(ink: &Mask, params: &NormalizeParams) -> Option<Affine2> {
-    box_wrap(
-        ink,
-        params.canvas_px as usize,
-        f64::from(params.character_px),
-    )
-}
-
-#[cfg(test)]
-pub(super) mod tests_support {
-    //! Settings for tests of this room.
-
-    use super::{NormalizeMethod, NormalizeParams, PrintThreshold};
-    use crate::stages::score::SsimWindow;
-
-    /// The default method at full size.
-    pub(crate) fn params() -> NormalizeParams {
-        NormalizeParams {
-            method: NormalizeMethod::PoseFirst,
-            print_threshold: PrintThreshold::Adaptive,
-            print_grey: 127,
-            canvas_px: 256,
-            character_px: 192,
-            scale_band: 1.6,
-            threshold_min: 0.01,
-            threshold_max: 0.6,
-            ink_spread: 1.3,
-            density_greys: [50, 139],
-            structure_greys: [90, 149],
-            window: SsimWindow::Gaussian,
-        }
-    }
+    let inks = print.hypotheses()?;
+    let relief = relief::relief_heights(depth).ok_or(NormalizeError::NoStrokes)?;
+    Normalized::new(inks, Some(relief), params)
 }

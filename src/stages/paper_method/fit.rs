@@ -7,10 +7,19 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 use crate::domain::{FitOutcome, SideEvidence};
-use crate::mesh::{Mesh, Vertices};
+use crate::mesh::Vertices;
 use crate::stages::fit::{Axes, FitError, FitParams, frame, quantile};
+use crate::stages::scan::Scan;
 
-pub(in crate::stages) fn fit(mesh: &Mesh, params: &FitParams) -> Result<FitOutcome, FitError> {
+/// Fits the plane of the upper set (III-A). The plane frame is in mesh units.
+///
+/// # Errors
+/// When the vertices span no surface, nothing is carved, or RANSAC finds no plane.
+pub(in crate::stages) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitError> {
+    let mesh = scan.mesh();
+    if mesh.vertices.len() < 3 {
+        return Err(FitError::TooFewPoints(mesh.vertices.len()));
+    }
     let points = distinct(&mesh.vertices);
     let all = Axes::of_points(points.iter().map(|p| (*p, 1.0)));
     all.require_surface(mesh)?;
@@ -54,7 +63,7 @@ pub(in crate::stages) fn fit(mesh: &Mesh, params: &FitParams) -> Result<FitOutco
     })
 }
 
-/// Each place once, so that a triangle soup and an indexed mesh give the same plane.
+/// Returns each distinct point once, so that a triangle soup and an indexed mesh give the same plane.
 fn distinct(vertices: &Vertices) -> Vec<[f64; 3]> {
     let mut points: Vec<[f64; 3]> = vertices.iter().collect();
     points.sort_by(|a, b| {
@@ -68,8 +77,8 @@ fn distinct(vertices: &Vertices) -> Vec<[f64; 3]> {
     points
 }
 
-/// The upper set T: of the two sides of the PCA plane, the one whose points lie closer to their own centroid on
-/// average. Ground reaches out to the rim of the cut on all sides; strokes keep to the middle.
+/// Returns the upper set T: the side of the PCA plane whose points are closer to their own centroid on average. Ground
+/// reaches the rim of the cut on all sides; strokes keep to the middle.
 fn upper_set(points: &[[f64; 3]], all: &Axes) -> (Vec<[f64; 3]>, Vector3<f64>, f64) {
     let normal = all.normal();
     let (above, below): (Vec<_>, Vec<_>) = points
@@ -84,7 +93,7 @@ fn upper_set(points: &[[f64; 3]], all: &Axes) -> (Vec<[f64; 3]>, Vector3<f64>, f
     }
 }
 
-/// Mean distance of points to their own centroid.
+/// Returns the mean distance of points to their own centroid.
 fn mean_distance(points: &[[f64; 3]]) -> f64 {
     let n = points.len().max(1) as f64;
     let centroid = points
@@ -99,7 +108,7 @@ fn mean_distance(points: &[[f64; 3]]) -> f64 {
         / n
 }
 
-/// From the farthest of the plane down, each point farther than `spacing` from all taken ones, until enough.
+/// Selects points from the farthest from the plane down, each farther than `spacing` from all selected ones.
 fn spaced_selection(upper: &[[f64; 3]], all: &Axes, spacing: f64, wanted: u32) -> Vec<[f64; 3]> {
     let normal = all.normal();
     let height = |p: &[f64; 3]| (Vector3::from(*p) - all.centre).dot(&normal).abs();
@@ -126,7 +135,7 @@ fn spaced_selection(upper: &[[f64; 3]], all: &Axes, spacing: f64, wanted: u32) -
     taken
 }
 
-/// The points near the plane through three of them that has most points near it.
+/// Returns the inliers of the plane through three of the points that has most inliers.
 fn ransac(
     taken: &[[f64; 3]],
     distance: f64,

@@ -1,20 +1,21 @@
-//! The paper's normalisation (III-C): both pictures cropped to their box and brought to one size before anything is
-//! turned, then a grey threshold searched over the wrapped pictures.
+//! The paper's normalization (III-C): both images cropped to their box and scaled to one size before the rotation is
+//! known, then a grey threshold searched on the wrapped images.
 //!
-//! Where the text is silent the authors' own program decides: greys stretched so that the 1st percentile of
-//! nearness is 49 and the 95th 201, dark is near, each threshold tried at four quarter turns.
+//! Where the text leaves a choice open, the authors' program decides: greys are stretched so that the 1st percentile of
+//! nearness is 49 and the 95th 201, dark is near, and each threshold is tried at four rotations by 90 degrees.
 
 use crate::domain::{Affine2, ThresholdChoice, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
-use crate::stages::binarize::InkMask;
+use crate::stages::binarize::{self, InkMask};
 use crate::stages::components::remove_specks;
-use crate::stages::normalize::{NormalizeError, NormalizeParams};
+use crate::stages::normalize::{NormalizeError, NormalizeParams, Normalized, box_wrap};
+use crate::stages::print::Print;
 use crate::stages::score::SsimReference;
 
-/// Greys of the two percentiles, and the percentiles.
+/// Percentiles and their greys.
 const STRETCH: [(f64, f64); 2] = [(0.01, 49.0), (0.95, 201.0)];
 
-/// Depth-map levels by grey: the stretched picture of the authors' figure, dark is near.
+/// Depth-map levels by grey of the stretched image; dark is near.
 struct Greys {
     near: f64,
     per_level: f64,
@@ -26,7 +27,7 @@ impl Greys {
         if levels.is_empty() {
             return None;
         }
-        // Nearness runs down the levels: the highest is the darkest.
+        // The highest level is the nearest and so the darkest.
         levels.sort_unstable_by(|a, b| b.cmp(a));
         let at = |share: f64| f64::from(levels[((levels.len() - 1) as f64 * share) as usize]);
         let [(low, dark), (high, light)] = STRETCH;
@@ -40,7 +41,7 @@ impl Greys {
         })
     }
 
-    /// The lowest level that is darker than a grey.
+    /// Returns the lowest level that is darker than a grey.
     fn level(&self, grey: u8) -> u16 {
         (self.near - f64::from(grey) / self.per_level)
             .ceil()
@@ -48,7 +49,7 @@ impl Greys {
     }
 }
 
-/// One threshold tried.
+/// A candidate threshold with its scores.
 #[derive(Debug, Clone, Copy)]
 struct Tried {
     level: u16,
@@ -57,9 +58,27 @@ struct Tried {
     density_gap: f64,
 }
 
-/// Chooses the density and the structure threshold on the wrapped pictures. The ensemble keeps the better of the
-/// two once they are registered.
-pub(in crate::stages) fn choose(
+/// Binarizes the print at a fixed grey and chooses the density and the structure threshold on both pictures wrapped by
+/// box and centroid.
+///
+/// # Errors
+/// When the print shows no ink or no threshold leaves strokes.
+pub(in crate::stages) fn normalize(
+    depth: &DepthMap,
+    print: &Print,
+    params: &NormalizeParams,
+) -> Result<Normalized, NormalizeError> {
+    let ink = binarize::fixed(print.image(), params.print_grey)?;
+    let normalized = Normalized::new(std::slice::from_ref(&ink), None, params)?;
+    let canvas_from_print = normalized.outcome.inks[0].canvas_from_print;
+    let thresholds = choose(depth, &ink, &canvas_from_print, params)?;
+    Ok(normalized.with_thresholds(thresholds))
+}
+
+/// Chooses the density and the structure threshold on the wrapped images. The ensemble keeps the better of the two
+/// after
+/// registration.
+fn choose(
     depth: &DepthMap,
     print: &InkMask,
     canvas_from_print: &Affine2,
@@ -105,7 +124,7 @@ pub(in crate::stages) fn choose(
     ])
 }
 
-/// Scores one threshold at four quarter turns; `None` when it leaves no strokes.
+/// Scores one threshold at four rotations by 90 degrees; `None` when it leaves no strokes.
 fn attempt(
     depth: &DepthMap,
     canvas: &SsimReference,
@@ -135,26 +154,10 @@ fn attempt(
     })
 }
 
-/// Strokes of the depth map at a level, specks removed.
+/// Returns the stroke mask of a level without specks.
 fn mask_above(depth: &DepthMap, level: u16) -> Mask {
     let raw = depth.levels.map(|l| *l >= level && *l > 0);
     remove_specks(&raw, raw.data().len())
-}
-
-/// W(I): the box's longest side to `character_px`, the centroid to the middle of a square canvas.
-pub(in crate::stages) fn box_wrap(
-    mask: &Mask,
-    canvas_px: usize,
-    character_px: f64,
-) -> Option<Affine2> {
-    let bounds = mask.bounding_box()?;
-    let [x, y] = mask.centroid()?;
-    let scale = character_px / bounds.width().max(bounds.height()) as f64;
-    let middle = (canvas_px - 1) as f64 / 2.0;
-    Some(Affine2::scale_shift(
-        scale,
-        [middle - scale * x, middle - scale * y],
-    ))
 }
 
 fn quarter_turn(mask: &Mask) -> Mask {

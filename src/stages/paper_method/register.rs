@@ -1,21 +1,29 @@
-//! The paper's registration (III-D) as its authors' program does it: the depth mask turned through a full
-//! circle and wrapped at each angle, then finely about the best angle; at each angle the shift climbed pixel by pixel on the masks' IoU.
+//! The paper's registration (III-D) as its authors' program does it: the depth mask is rotated through a full circle
+//! and
+//! wrapped at each angle, then in finer steps about the best angle; at each angle the shift is climbed pixel by pixel
+//! on
+//! the masks' IoU.
 //!
-//! The text judges six sectors at one angle each, which misses by up to half a sector; the program tries 60 angles
-//! and 60 more about the best.
+//! The text judges six sectors at one angle each, which misses by up to half a sector; the program tries 60 angles and
+//! 60
+//! more about the best.
 
 use crate::domain::{Affine2, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};
 use crate::stages::components::remove_specks;
 use crate::stages::normalize::Normalized;
-use crate::stages::register::{Alignment, RegisterError, RegisterParams, chosen};
+use crate::stages::register::{
+    Alignment, RegisterError, RegisterParams, Registered, canvas_print, score_alignments,
+};
 
-/// The fine pass spans this many coarse steps to each side.
+/// The paper's method has one interpretation of the print.
+const INK: usize = 0;
+/// Span of the fine pass to each side, in coarse steps.
 const FINE_REACH: f64 = 3.0;
-/// Longest climb in pixels.
+/// Maximum number of one-pixel steps of a climb.
 const MOST_STEPS: usize = 64;
 
-/// A turn of the wrapped mask with its climbed shift.
+/// A rotation of the wrapped mask with its climbed shift.
 #[derive(Debug, Clone, Copy)]
 struct Turn {
     angle_deg: f64,
@@ -23,42 +31,50 @@ struct Turn {
     iou: f64,
 }
 
-/// Registers the density and the structure mask; the ensemble is the better of the two by IoU.
-pub(in crate::stages) fn align(
+/// Registers the density and the structure mask, keeps the better of the two by IoU as the ensemble, and scores all
+/// three.
+///
+/// # Errors
+/// When normalization chose no threshold or a mask is empty.
+pub(in crate::stages) fn register(
     depth: &DepthMap,
-    canvas_print: &Mask,
     normalized: &Normalized,
     params: &RegisterParams,
-) -> Result<Vec<Alignment>, RegisterError> {
-    let one = |metric| align_one(depth, canvas_print, normalized, metric, params);
-    let structure = one(ThresholdMetric::NlSsim)?;
-    let density = one(ThresholdMetric::Density)?;
-    let better = if structure.1 >= density.1 {
-        structure.0
+) -> Result<Registered, RegisterError> {
+    let target = canvas_print(normalized, INK);
+    let one = |metric| align(depth, &target, normalized, metric, params);
+    let (structure, structure_iou) = one(ThresholdMetric::NlSsim)?;
+    let (density, density_iou) = one(ThresholdMetric::Density)?;
+    let better = if structure_iou >= density_iou {
+        structure
     } else {
-        density.0
+        density
     };
     let ensemble = Alignment {
         metric: ThresholdMetric::Ensemble,
         ..better
     };
-    Ok(vec![structure.0, density.0, ensemble])
+    let alignments = [structure, density, ensemble];
+    score_alignments(depth, normalized, INK, target, &alignments, params.window)
 }
 
-/// One metric's alignment with its IoU.
-fn align_one(
+/// Registers the mask of one metric's threshold and returns the alignment with its IoU.
+fn align(
     depth: &DepthMap,
     canvas_print: &Mask,
     normalized: &Normalized,
     metric: ThresholdMetric,
     params: &RegisterParams,
 ) -> Result<(Alignment, f64), RegisterError> {
-    let (level, at_bound) = chosen(normalized, metric)?;
-    let raw = depth.stroke_mask(level);
+    let mut thresholds = normalized.outcome.thresholds.iter();
+    let threshold = thresholds
+        .find(|choice| choice.metric == metric)
+        .ok_or(RegisterError::NoThreshold(metric))?;
+    let raw = depth.stroke_mask(threshold.level);
     let mask = remove_specks(&raw, raw.data().len());
-    let character_px = longest_side(canvas_print).ok_or(RegisterError::NoStrokes(metric))?;
+    let character_px = longest_side(canvas_print).ok_or(RegisterError::EmptyMask(metric))?;
     let side = canvas_print.width();
-    let turner = Turner::new(&mask, side, character_px).ok_or(RegisterError::NoStrokes(metric))?;
+    let turner = Turner::new(&mask, side, character_px).ok_or(RegisterError::EmptyMask(metric))?;
     let target = Packed::of(canvas_print);
     let attempt =
         |angle_deg: f64| climb(&target, &Packed::of(&turner.turned(angle_deg)), angle_deg);
@@ -78,17 +94,16 @@ fn align_one(
     let rival = best_of_others(&first, best.angle_deg, FINE_REACH * coarse);
     let shift = Affine2::scale_shift(1.0, [best.shift[0] as f64, best.shift[1] as f64]);
     let canvas_from_depth = shift.after(&turner.canvas_from_depth(best.angle_deg));
-    let print_from_canvas = normalized
-        .outcome
+    let print_from_canvas = normalized.outcome.inks[INK]
         .canvas_from_print
         .inverse()
         .ok_or(RegisterError::NoPose)?;
     let alignment = Alignment {
         metric,
-        level,
+        level: threshold.level,
         print_from_depth: print_from_canvas.after(&canvas_from_depth),
         margin: best.iou - rival,
-        at_bound,
+        at_bound: threshold.at_bound,
     };
     Ok((alignment, best.iou))
 }
@@ -98,11 +113,11 @@ fn longest_side(mask: &Mask) -> Option<f64> {
         .map(|b| b.width().max(b.height()) as f64)
 }
 
-/// A mask that is turned first and wrapped afterwards: the box of a turned character is another one.
+/// A mask that is rotated first and wrapped afterwards: rotation changes the bounding box.
 struct Turner {
     /// Set pixels of the depth mask.
     points: Vec<[f64; 2]>,
-    /// The mask at about the canvas's size, so that a turn need not average again.
+    /// The mask at about the canvas's size, so that a rotation need not average again.
     small: Mask,
     small_from_depth: Affine2,
     side: usize,
@@ -132,7 +147,8 @@ impl Turner {
         })
     }
 
-    /// Turn, then W: the turned box's longest side to the character's, the centroid to the middle.
+    /// Returns the rotation followed by the wrap W: longest side of the rotated box to the character's, centroid to
+    /// the middle.
     fn canvas_from_depth(&self, angle_deg: f64) -> Affine2 {
         let turn = Affine2::similarity(1.0, angle_deg.to_radians(), [0.0, 0.0]);
         let (mut low, mut high, mut sum) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], [0.0; 2]);
@@ -151,7 +167,7 @@ impl Turner {
         Affine2::scale_shift(scale, shift).after(&turn)
     }
 
-    /// The turned and wrapped mask.
+    /// Returns the rotated and wrapped mask.
     fn turned(&self, angle_deg: f64) -> Mask {
         let from_depth = self.canvas_from_depth(angle_deg);
         match self.small_from_depth.inverse() {
@@ -168,7 +184,7 @@ fn best_of(turns: &[Turn]) -> Option<Turn> {
         .reduce(|a, b| if b.iou > a.iou { b } else { a })
 }
 
-/// Best IoU among turns farther than `apart_deg` from an angle; 0 when there is none.
+/// Returns the best IoU among rotations farther than `apart_deg` from an angle; 0 when there is none.
 fn best_of_others(turns: &[Turn], angle_deg: f64, apart_deg: f64) -> f64 {
     let apart = |turn: &&Turn| {
         let d = (turn.angle_deg - angle_deg).rem_euclid(360.0);
@@ -181,7 +197,7 @@ fn best_of_others(turns: &[Turn], angle_deg: f64, apart_deg: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// From no shift, always to the best of the four neighbours while that is better.
+/// Climbs from no shift to the best of the four neighbours while that is better.
 fn climb(target: &Packed, moving: &Packed, angle_deg: f64) -> Turn {
     let mut best = Turn {
         angle_deg,
@@ -203,7 +219,7 @@ fn climb(target: &Packed, moving: &Packed, angle_deg: f64) -> Turn {
     best
 }
 
-/// A mask as bits, a row in whole words, for counting overlaps.
+/// A mask as bits, each row padded to whole words, for counting overlaps.
 struct Packed {
     words: Vec<u64>,
     per_row: usize,
@@ -231,7 +247,8 @@ impl Packed {
         }
     }
 
-    /// IoU with another mask of the same size shifted by whole pixels; what leaves the canvas is lost.
+    /// Returns the IoU with another mask of the same size shifted by whole pixels; pixels that leave the canvas are
+    /// lost.
     fn iou(&self, moving: &Self, [dx, dy]: [i64; 2]) -> f64 {
         let mut both = 0;
         for y in 0..self.rows as i64 {
@@ -254,7 +271,7 @@ impl Packed {
     }
 }
 
-/// Word `k` of a row shifted right by `dx` pixels.
+/// Returns word `k` of a row shifted right by `dx` pixels.
 fn shifted(row: &[u64], k: usize, dx: i64) -> u64 {
     let first = k as i64 * 64 - dx;
     let (word, bit) = (first.div_euclid(64), first.rem_euclid(64));

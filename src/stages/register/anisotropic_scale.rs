@@ -1,20 +1,21 @@
-//! The last few parts in a thousand: relief stretched along one axis, as paper shrinks across its grain.
+//! Scale that differs between two perpendicular axes: paper shrinks by about 1 % across its grain.
 
 use crate::domain::Affine2;
 use crate::stages::pose::{Loss, PoseCandidate, Refiner};
 
-/// Rounds of stretching and refining; each is a fraction of the last.
+/// Rounds of scaling and refining; each changes a fraction of what the one before changed.
 const ROUNDS: usize = 2;
 /// Steps of a refinement between two rounds.
 const STEPS: usize = 6;
-/// Stretch that is tried to either side, and the most that a round takes.
+/// Change of scale that is tried to either side, and the largest of one round.
 const TRIED: f64 = 0.008;
 const MOST: f64 = 0.012;
 
-/// The pose with the stretch that fits best, in two directions that make any: along an axis, and along a diagonal.
+/// Returns the pose with the anisotropic scale that fits best. Scaling along an axis and along a diagonal together give
+/// every direction.
 ///
-/// `middle` is that of the relief, in the moving image's pixels; the pose's score is the refiner's.
-pub(super) fn stretched(
+/// `middle` is the middle of the relief in pixels of the moving image; the pose's score must be the refiner's.
+pub(super) fn with_anisotropic_scale(
     refiner: &Refiner,
     pose: &PoseCandidate,
     middle: [f64; 2],
@@ -34,7 +35,7 @@ pub(super) fn stretched(
     if best.score > pose.score { best } else { *pose }
 }
 
-/// Place of the top of a parabola through values at -1, 0 and 1, within the most that a round takes.
+/// Returns the position of the maximum of a parabola through values at -1, 0 and 1, limited to the change of one round.
 fn summit(before: f64, at: f64, after: f64) -> f64 {
     let bend = before - 2.0 * at + after;
     if bend >= 0.0 {
@@ -43,8 +44,8 @@ fn summit(before: f64, at: f64, after: f64) -> f64 {
     (0.5 * (before - after) / bend).clamp(-MOST / TRIED, MOST / TRIED)
 }
 
-/// Stretches about the middle by `1 + e` along x and `1 - e` along y, and likewise along the diagonals, so that areas
-/// hardly change.
+/// Scales about the middle by `1 + e` along x and `1 - e` along y, and likewise by `f` along the diagonals; areas hardly
+/// change.
 fn stretch(pose: &PoseCandidate, middle: [f64; 2], [e, f]: [f64; 2]) -> PoseCandidate {
     let [x, y] = pose.fixed_from_moving.apply(middle);
     let about = Affine2([[1.0 + e, f, -e * x - f * y], [f, 1.0 - e, e * y - f * x]]);

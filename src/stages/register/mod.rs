@@ -1,156 +1,113 @@
-//! Masks to alignment and scores (paper III-D).
+//! Finds the pose, chooses each metric's depth threshold in the aligned frame, and scores the masks.
 //!
-//! [`RegisterMethod::Exhaustive`] is the paper's: turns of the wrapped mask, the shift of each by climbing. [`RegisterMethod::Refine`] is
-//! ours: the pose that normalisation found, refined at full size.
+//! The pose is found from soft strokes, without a threshold: coarse to fine over all rotations and a band of scales
+//! ([`pose_search`]), then refined at full size against its competitors ([`refine`]). The paper's order is in
+//! `paper_method::register`.
 
-mod alignment;
 mod anisotropic_scale;
 mod confidence;
+mod metric_thresholds;
 mod params;
+mod pose_search;
 mod refine;
+mod scoring;
 mod soft_thresholds;
 
-pub(super) use alignment::{Alignment, chosen};
-pub use params::{RegisterError, RegisterMethod, RegisterParams};
+pub use confidence::ConfidenceInputs;
+pub use params::{RegisterError, RegisterParams};
+pub(super) use scoring::{Alignment, canvas_print, score_alignments};
+pub use scoring::{CanvasMasks, Registered};
 
-use super::normalize::{Normalized, Relief};
-use super::paper_method::register as exhaustive;
-use super::score::{self, SsimReference};
-use crate::domain::{
-    Affine2, MetricOutcome, PoseFeatures, RegisterOutcome, Scores, ThresholdMetric,
-};
-use crate::raster::{DepthMap, Mask, warp_mask};
+use super::normalize::{Normalized, relative_depths, stroke_growth};
+use crate::domain::PoseFeatures;
+use crate::raster::DepthMap;
+use metric_thresholds::HalfCanvas;
 
 /// Raised whenever the same inputs and settings may give another result than before.
-pub const REVISION: u32 = 10;
+pub const REVISION: u32 = 11;
 
-/// Mirrored must win by this factor to be named the cause: symmetric characters score alike both ways.
+/// A mirrored pose must win by this factor to be named the cause: symmetric characters score alike both ways.
 const MIRROR_WINS: f64 = 1.06;
 
-/// The depth mask of one metric on the pair's canvas.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CanvasMasks {
-    /// Which metric.
-    pub metric: ThresholdMetric,
-    /// The depth mask brought there by the alignment.
-    pub depth: Mask,
-}
-
-/// What the stage gives.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Registered {
-    /// The numbers.
-    pub outcome: RegisterOutcome,
-    /// The print mask on the canvas, one for all metrics.
-    pub canvas_print: Mask,
-    /// One canvas a metric, in the order of the outcome.
-    pub canvases: Vec<CanvasMasks>,
-}
-
-/// Aligns the depth map with the print for each metric's threshold and scores the masks on the canvas.
+/// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
 ///
-/// The canvas is the print character's: see [`super::normalize`]. Every metric is scored on the same print mask.
+/// `depth` and `normalized` are the results of the earlier stages. Poses map depth-map pixels to print-image pixels;
+/// all metrics share one pose.
 ///
 /// # Errors
-/// When there is no pose to refine, the best one is not to be trusted, or a threshold leaves no strokes.
+/// When nothing correlates, the relief matches in mirror writing, the confidence is below `min_confidence`, or a
+/// threshold leaves no strokes.
+///
+/// # Examples
+/// ```
+/// # use mocban::{config, demo, raster};
+/// # let settings = config::load(&config::Sources::default())?.config.stages;
+/// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
+/// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
+/// use mocban::stages::{Print, Scan, depth, fit, normalize, register};
+///
+/// let (scan, print) = (Scan::from(pair.mesh), Print::from(image));
+/// let plane = fit::fit(&scan, Some(&print), None, &settings.fit)?;
+/// let map = depth::depth(&scan, &plane, None, &settings.depth)?;
+/// let normalized = normalize::normalize(&map, &print, &settings.normalize)?;
+/// let registered = register::register(&map, &normalized, &settings.register)?;
+/// for metric in &registered.outcome.metrics {
+///     assert!(metric.confidence.is_some_and(|confidence| confidence > 0.5));
+/// }
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn register(
     depth: &DepthMap,
     normalized: &Normalized,
     params: &RegisterParams,
 ) -> Result<Registered, RegisterError> {
-    let side = normalized.outcome.canvas_px as usize;
-    let canvas_from_print = normalized.outcome.canvas_from_print;
-    let canvas_print = warp_mask(&normalized.ink, &canvas_from_print, side, side);
-    let (alignments, evidence) = match params.method {
-        RegisterMethod::Refine => {
-            let relief = Relief::of(depth).ok_or(RegisterError::NoPose)?;
-            let (alignments, evidence) = refine::align(depth, &relief, normalized, params)?;
-            require_match(&evidence, params)?;
-            (alignments, Some((evidence, relief)))
-        }
-        RegisterMethod::Exhaustive => (
-            exhaustive::align(depth, &canvas_print, normalized, params)?,
-            None,
-        ),
-    };
-    let print_means = SsimReference::new(&canvas_print, params.window);
-    let masks = masks(&alignments, |pose, levels| {
-        depth.warped_stroke_masks(&canvas_from_print.after(pose), [side; 2], levels)
-    });
-    let mut metrics: Vec<MetricOutcome> = Vec::new();
-    for (k, (alignment, mask)) in alignments.iter().zip(&masks).enumerate() {
-        if mask.count() == 0 {
-            return Err(RegisterError::NoStrokes(alignment.metric));
-        }
-        // Metrics often choose the same threshold.
-        let mut before = alignments[..k].iter();
-        let twin = before.position(|other| other.is_as(alignment));
-        let scores = twin.map_or_else(
-            || score::score_masks(&print_means, mask),
-            |twin| metrics[twin].scores,
-        );
-        metrics.push(outcome(depth, normalized, alignment, scores));
-    }
-    if let Some((evidence, relief)) = &evidence {
-        trust(&mut metrics, evidence, |level| relief.growth(depth, level));
-    }
-    Ok(Registered {
-        outcome: RegisterOutcome {
-            metrics,
-            evidence: evidence.map(|(evidence, _)| evidence),
-        },
-        canvas_print,
-        canvases: alignments
-            .iter()
-            .zip(masks)
-            .map(|(alignment, depth)| CanvasMasks {
-                metric: alignment.metric,
-                depth,
-            })
-            .collect(),
-    })
-}
-
-/// The mask of each alignment; `strokes` makes those of some levels at one pose.
-fn masks(alignments: &[Alignment], strokes: impl Fn(&Affine2, &[u16]) -> Vec<Mask>) -> Vec<Mask> {
-    let mut masks = Vec::new();
-    for alike in alignments.chunk_by(|one, other| one.print_from_depth == other.print_from_depth) {
-        let levels: Vec<u16> = alike.iter().map(|alignment| alignment.level).collect();
-        masks.extend(strokes(&alike[0].print_from_depth, &levels));
-    }
-    masks
-}
-
-/// Gives each metric its confidence: the pose's, and the mask's beside the one that the relief alone chose. `growth` is
-/// that of the strokes at a level.
-fn trust(metrics: &mut [MetricOutcome], evidence: &PoseFeatures, growth: impl Fn(u16) -> f64) {
-    let pose = confidence::of_pose(evidence);
-    let rim = |outcome: &MetricOutcome| {
-        growth(outcome.threshold_level) * outcome.scores.density_depth.sqrt()
-    };
-    let own = metrics
+    let relief = normalized.outcome.relief.ok_or(RegisterError::NoStrokes)?;
+    let depths = relative_depths(depth, &relief);
+    let search = pose_search::search(&depths, &normalized.prints, params)?;
+    let print = &normalized.prints[search.ink];
+    let refined = refine::refine(&depths, print, &search, params).ok_or(RegisterError::NoPose)?;
+    require_match(&refined.features, params)?;
+    let canvas_from_print = normalized.outcome.inks[search.ink].canvas_from_print;
+    let canvas = HalfCanvas::new(
+        depth,
+        print,
+        &canvas_from_print,
+        &refined.print_from_depth,
+        normalized.outcome.canvas_px,
+    );
+    let thresholds = metric_thresholds::choose(depth, &relief, &canvas, params)?;
+    let alignments: Vec<Alignment> = thresholds
         .iter()
-        .find(|outcome| outcome.metric == ThresholdMetric::Relief);
-    let own = own.map(|outcome| (outcome.scores.density_depth, rim(outcome)));
-    for outcome in metrics {
-        let scores = outcome.scores;
-        let (relief, relief_rim) = own.unwrap_or((scores.density_depth, f64::INFINITY));
-        let areas = confidence::Areas {
-            mask: scores.density_depth,
-            relief,
-            ink: scores.density_print,
-            rim: rim(outcome).min(relief_rim),
-        };
-        outcome.confidence = Some(pose * confidence::of_mask(evidence, areas));
-    }
+        .map(|choice| Alignment {
+            metric: choice.metric,
+            level: choice.level,
+            print_from_depth: refined.print_from_depth,
+            margin: refined.margin,
+            at_bound: search.at_bound || choice.at_bound,
+        })
+        .collect();
+    let canvas_print = canvas_print(normalized, search.ink);
+    let mut registered = score_alignments(
+        depth,
+        normalized,
+        search.ink,
+        canvas_print,
+        &alignments,
+        params.window,
+    )?;
+    let growth = |level| stroke_growth(depth, &relief, level);
+    registered.confidence_inputs =
+        confidence::set_confidence(&mut registered.outcome.metrics, &refined.features, growth);
+    registered.outcome.features = Some(refined.features);
+    Ok(registered)
 }
 
-/// Refuses what cannot be told to be the same character.
-fn require_match(evidence: &PoseFeatures, params: &RegisterParams) -> Result<(), RegisterError> {
-    let confidence = confidence::of_pose(evidence);
-    if evidence.mirrored > MIRROR_WINS && params.min_confidence > 0.0 {
+/// Refuses pairs that are mirrored or whose pose is not likely enough.
+fn require_match(features: &PoseFeatures, params: &RegisterParams) -> Result<(), RegisterError> {
+    let confidence = confidence::of_pose(features);
+    if features.mirrored > MIRROR_WINS && params.min_confidence > 0.0 {
         Err(RegisterError::Mirrored {
-            times: evidence.mirrored,
+            times: features.mirrored,
         })
     } else if confidence >= params.min_confidence {
         Ok(())
@@ -159,33 +116,6 @@ fn require_match(evidence: &PoseFeatures, params: &RegisterParams) -> Result<(),
             confidence,
             needs: params.min_confidence,
         })
-    }
-}
-
-fn outcome(
-    depth: &DepthMap,
-    normalized: &Normalized,
-    alignment: &Alignment,
-    scores: Scores,
-) -> MetricOutcome {
-    let middle =
-        |width: usize, height: usize| [(width - 1) as f64 / 2.0, (height - 1) as f64 / 2.0];
-    let [u, v] = middle(normalized.ink.width(), normalized.ink.height());
-    let [x, y] = alignment
-        .print_from_depth
-        .apply(middle(depth.levels.width(), depth.levels.height()));
-    MetricOutcome {
-        metric: alignment.metric,
-        threshold_level: alignment.level,
-        threshold_depth: depth.scale.height(alignment.level),
-        print_from_depth: alignment.print_from_depth,
-        angle_deg: alignment.print_from_depth.angle_deg(),
-        scale: alignment.print_from_depth.scale(),
-        shift_px: [x - u, y - v],
-        scores,
-        margin: alignment.margin,
-        confidence: None,
-        at_bound: alignment.at_bound,
     }
 }
 

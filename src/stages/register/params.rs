@@ -5,66 +5,74 @@ use serde::{Deserialize, Serialize};
 use crate::domain::{FailureClass, ThresholdMetric};
 use crate::stages::score::SsimWindow;
 
-/// How the alignment is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RegisterMethod {
-    /// Robust sub-pixel refinement of the pose that normalisation found.
-    Refine,
-    /// Turns of the wrapped mask with climbed shifts: the paper's.
-    Exhaustive,
-}
-
-/// Settings of the stage.
+/// Settings of the register stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegisterParams {
-    /// How the alignment is found.
-    pub method: RegisterMethod,
-    /// `refine`: working size in pixels along the character, 32..=1024.
+    /// Largest ratio, up or down, between the sizes of print and depth map that the pose search tries, 1..=2.
+    pub scale_band: f64,
+    /// Working size of the refinement in pixels along the character, 32..=1024.
     pub working_px: u32,
-    /// `refine`: smoothing in working pixels, 0..=10.
+    /// Smoothing of the refinement in working pixels (sigma), 0..=10.
     pub smoothing_px: f64,
-    /// `refine`: whether the pose may stretch the relief along one axis, as paper shrinks across its grain.
+    /// Whether the pose may scale the relief differently along two axes, as paper shrinks across its grain.
     pub anisotropic_scale: bool,
-    /// `refine`: a pair with less confidence than this is refused, 0..=1.
+    /// Smallest depth below the tops that is tried as a threshold, as a share of the relief.
+    pub threshold_min: f64,
+    /// Largest depth below the tops that is tried as a threshold, as a share of the relief.
+    pub threshold_max: f64,
+    /// Ratio between the area of the ink and of the wood that printed it, 1 or more: `density` aims at the print's
+    /// density divided by this.
+    pub ink_spread: f64,
+    /// A pair with less confidence than this is refused, 0..=1.
     pub min_confidence: f64,
-    /// `exhaustive`: how many angles of a full turn are tried first, 4 or more.
-    pub coarse_angles: u32,
-    /// `exhaustive`: how many angles within three coarse steps each side are tried next, 2 or more.
-    pub fine_angles: u32,
-    /// Window of SSIM in the scores.
+    /// Window of SSIM, in the scores and where `nl_ssim` chooses its threshold.
     pub window: SsimWindow,
+    /// Paper's method: number of angles over the full circle that are tried first, 4 or more.
+    pub coarse_angles: u32,
+    /// Paper's method: number of angles within three coarse steps each side that are tried next, 2 or more.
+    pub fine_angles: u32,
 }
 
-/// Why the stage found no result.
+/// Why the register stage found no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RegisterError {
-    /// Normalisation left no pose and the method needs one.
-    #[error(
-        "register.method is refine but normalisation found no pose; set normalize.method to pose_first"
-    )]
+    /// Print or relief holds nothing to register.
+    #[error("print or relief has no strokes to register")]
     NoPose,
+    /// No threshold leaves strokes on the canvas.
+    #[error("no threshold gives the depth map any strokes")]
+    NoStrokes,
     /// A threshold was not chosen for a metric.
-    #[error("normalisation chose no threshold for {0}")]
+    #[error("normalize chose no threshold for {0}")]
     NoThreshold(ThresholdMetric),
     /// The mask of a threshold is empty.
     #[error("the depth map has no strokes at the threshold of {0}")]
-    NoStrokes(ThresholdMetric),
+    EmptyMask(ThresholdMetric),
     /// The relief reads in mirror writing.
     #[error(
         "the relief matches the print better in mirror writing ({times:.2} times as well); was the mesh mirrored?"
     )]
     Mirrored {
-        /// Score of the mirrored relief over that as read.
+        /// Score of the mirrored relief divided by the score as read.
         times: f64,
     },
-    /// Relief and print do not show the same character, or cannot be told to.
+    /// Nothing correlates.
+    #[error(
+        "no pose of the relief matches the print: the best correlation is {best:.3}, needs {needs}"
+    )]
+    NoCorrelation {
+        /// Best correlation.
+        best: f64,
+        /// Smallest that counts.
+        needs: f64,
+    },
+    /// Relief and print show different characters, or too little speaks for the same one.
     #[error(
         "relief and print do not match: confidence {confidence:.2} is below register.min_confidence {needs}; is it the print of another character?"
     )]
     NoMatch {
-        /// Chance that the best pose is right.
+        /// Probability that the best pose is right.
         confidence: f64,
         /// The setting.
         needs: f64,
@@ -72,14 +80,29 @@ pub enum RegisterError {
 }
 
 impl RegisterError {
-    /// What the failure means for the pair.
+    /// Returns what the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
             Self::NoPose
+            | Self::NoStrokes
             | Self::NoThreshold(_)
-            | Self::NoStrokes(_)
+            | Self::EmptyMask(_)
             | Self::Mirrored { .. }
+            | Self::NoCorrelation { .. }
             | Self::NoMatch { .. } => FailureClass::NoSolution,
+        }
+    }
+
+    /// Returns whether the mesh is the likelier cause, not the print.
+    pub const fn is_of_the_mesh(&self) -> bool {
+        match self {
+            Self::NoPose
+            | Self::NoStrokes
+            | Self::NoThreshold(_)
+            | Self::EmptyMask(_)
+            | Self::Mirrored { .. }
+            | Self::NoCorrelation { .. } => true,
+            Self::NoMatch { .. } => false,
         }
     }
 }

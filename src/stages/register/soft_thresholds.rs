@@ -1,18 +1,18 @@
-//! The relief's strokes at several cuts, and the one between them that fits the print's.
+//! Soft strokes of the relief at several thresholds, and the threshold between them that fits the print best.
 
 use crate::stages::pose::{PoseCandidate, PyramidLevel, Refiner};
 
-/// Cuts under the tops, as shares of the relief. The ink of a print spreads; strokes cut too thin or too thick for it
-/// would pull the scale.
+/// Thresholds below the tops, as shares of the relief. The ink of a print spreads; strokes too thin or too thick for it
+/// would bias the scale.
 const CUTS: [f64; 5] = [0.05, 0.11, 0.2, 0.32, 0.47];
-/// How many of them are tried once a cut is known about.
+/// Number of them that are tried once a threshold is known roughly.
 const NEAR: usize = 3;
 
-/// Cuts that are tried while poses are compared.
+/// Thresholds that are tried while poses are compared.
 pub(super) const FEW_CUTS: [f64; NEAR] = [0.08, 0.2, 0.4];
 
-/// The cuts around one that is known about.
-pub(super) fn near(cut: f64) -> &'static [f64] {
+/// Returns the thresholds around one that is known roughly.
+pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
     let far = |at: usize| {
         (CUTS[at + NEAR / 2] / cut.max(f64::MIN_POSITIVE))
             .ln()
@@ -23,36 +23,36 @@ pub(super) fn near(cut: f64) -> &'static [f64] {
     &CUTS[first..first + NEAR]
 }
 
-/// The strokes of each cut, the shallowest first, ready to be laid on the print's ink.
-pub(super) struct Cuts<'a> {
+/// Strokes of each threshold, the shallowest first, ready to be refined against the print's ink.
+pub(super) struct SoftThresholds<'a> {
     cuts: &'a [f64],
     refiners: Vec<Refiner<'a>>,
 }
 
-/// The strokes that fit best at a pose.
-pub(super) struct Fitting<'a, 'b> {
-    /// They, ready to be laid on the ink.
+/// The threshold whose strokes fit best at a pose.
+pub(super) struct BestThreshold<'a, 'b> {
+    /// Its strokes, ready to be refined against the ink.
     pub(super) strokes: &'b Refiner<'a>,
     /// The pose with its score.
     pub(super) found: PoseCandidate,
-    /// The cut that fits best, between those that were tried: a choice between cuts that fit alike would make the
-    /// answer jump.
+    /// The threshold that fits best, interpolated between the tried ones: a choice among equally good ones
+    /// would make the answer discontinuous.
     pub(super) cut: f64,
-    /// Which of those that were tried came nearest.
+    /// Index of the tried threshold that came nearest.
     pub(super) nearest: usize,
 }
 
-impl<'a> Cuts<'a> {
-    /// Of one layer a cut.
-    pub(super) fn new(cuts: &'a [f64], ink: &'a PyramidLevel, woods: &'a [PyramidLevel]) -> Self {
+impl<'a> SoftThresholds<'a> {
+    /// Prepares one level of strokes for each threshold.
+    pub(super) fn new(cuts: &'a [f64], ink: &'a PyramidLevel, strokes: &'a [PyramidLevel]) -> Self {
         Self {
             cuts,
-            refiners: Refiner::for_levels(ink, woods),
+            refiners: Refiner::for_levels(ink, strokes),
         }
     }
 
-    /// What fits best at a pose.
-    pub(super) fn fitting<'b>(&'b self, pose: &PoseCandidate) -> Option<Fitting<'a, 'b>> {
+    /// Finds the threshold that fits best at a pose.
+    pub(super) fn best_at<'b>(&'b self, pose: &PoseCandidate) -> Option<BestThreshold<'a, 'b>> {
         let scores: Vec<f64> = self
             .refiners
             .iter()
@@ -62,7 +62,7 @@ impl<'a> Cuts<'a> {
         let at = summit(&scores);
         let cut = |k: usize| self.cuts[k.min(self.cuts.len() - 1)];
         let first = at as usize;
-        Some(Fitting {
+        Some(BestThreshold {
             strokes: self.refiners.get(best)?,
             found: PoseCandidate {
                 score: scores[best],
@@ -73,19 +73,23 @@ impl<'a> Cuts<'a> {
         })
     }
 
-    /// The scores of two poses, each with the strokes of one of the cuts, on the same ground.
-    pub(super) fn duel(&self, [one, two]: [(usize, &PoseCandidate); 2]) -> [f64; 2] {
+    /// Scores two poses, each with the strokes of one threshold, on the area that both have in common.
+    pub(super) fn compare_on_common_area(
+        &self,
+        [one, two]: [(usize, &PoseCandidate); 2],
+    ) -> [f64; 2] {
         self.refiners[one.0].duel(one.1, &self.refiners[two.0], two.1)
     }
 }
 
-/// Which value is the highest.
+/// Returns the index of the highest value.
 fn highest(values: &[f64]) -> usize {
     let order = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
     (0..values.len()).max_by(order).unwrap_or(0)
 }
 
-/// Place of the highest value, by a parabola through it and its neighbours, in steps from the first.
+/// Returns the position of the maximum in steps from the first value, by a parabola through the highest value and its
+/// neighbours.
 fn summit(values: &[f64]) -> f64 {
     let best = highest(values);
     let last = values.len().saturating_sub(1);
@@ -102,13 +106,13 @@ fn summit(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{CUTS, near, summit};
+    use super::{CUTS, cuts_near, summit};
 
     #[test]
-    fn cuts_near_one_lie_around_it() {
-        assert_eq!(near(0.01), &CUTS[..3]);
-        assert_eq!(near(0.2), &CUTS[1..4]);
-        assert_eq!(near(0.4), &CUTS[2..]);
+    fn thresholds_near_one_lie_around_it() {
+        assert_eq!(cuts_near(0.01), &CUTS[..3]);
+        assert_eq!(cuts_near(0.2), &CUTS[1..4]);
+        assert_eq!(cuts_near(0.4), &CUTS[2..]);
     }
 
     #[test]

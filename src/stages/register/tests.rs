@@ -4,21 +4,20 @@ use super::RegisterError;
 use crate::domain::{MetricOutcome, PrintFromMesh, ThresholdMetric};
 use crate::mesh::Mesh;
 use crate::stages::StageError;
-use crate::stages::normalize;
 use crate::stages::testing::{
-    World, landmark_error_px, paper_settings, print, run, settings, some_turn,
+    SyntheticSheet, landmark_error_px, paper_settings, print, run, settings, some_turn,
 };
 
 #[test]
 fn any_pose_unit_and_winding_comes_out_right() {
     let (picture, truth) = print(14.0, 3.0);
     for k in 0..4 {
-        let world = World {
+        let world = SyntheticSheet {
             turn: some_turn(k),
             scale: [1.0, 0.1, 0.001, 1.0 / 25.4][k as usize],
             origin: [40.0, -300.0, 7.0],
             inward: k % 2 == 1,
-            ..World::default()
+            ..SyntheticSheet::default()
         };
         let results = run(&world.mesh(), &picture, &settings()).expect("an alignment");
         for (found, metric) in results {
@@ -31,10 +30,10 @@ fn any_pose_unit_and_winding_comes_out_right() {
 #[test]
 fn a_bent_block_aligns_as_well() {
     let (picture, truth) = print(12.0, -4.0);
-    let world = World {
+    let world = SyntheticSheet {
         bow_mm: 0.5,
         turn: some_turn(11),
-        ..World::default()
+        ..SyntheticSheet::default()
     };
     let results = run(&world.mesh(), &picture, &settings()).expect("an alignment");
     let error = landmark_error_px(&world, &truth, &results[0].0);
@@ -44,20 +43,15 @@ fn a_bent_block_aligns_as_well() {
 #[test]
 fn a_mirrored_mesh_never_passes() {
     let (picture, _) = print(14.0, 0.0);
-    let world = World {
+    let world = SyntheticSheet {
         mirrored: true,
         turn: some_turn(3),
-        ..World::default()
+        ..SyntheticSheet::default()
     };
     let refused = run(&world.mesh(), &picture, &settings());
     let error = refused.expect_err("mirror writing reads wrong");
-    // Told by the search where it is plain, by the last look where it takes that.
     assert!(
-        matches!(
-            error,
-            StageError::Normalize(normalize::NormalizeError::Mirrored { .. })
-                | StageError::Register(RegisterError::Mirrored { .. })
-        ),
+        matches!(error, StageError::Register(RegisterError::Mirrored { .. })),
         "{error}"
     );
 }
@@ -65,7 +59,7 @@ fn a_mirrored_mesh_never_passes() {
 #[test]
 fn the_papers_method_aligns_an_upright_pair() {
     let (picture, truth) = print(14.0, 8.0);
-    let world = World::default();
+    let world = SyntheticSheet::default();
     let results = run(&world.mesh(), &picture, &paper_settings()).expect("an alignment");
     let error = landmark_error_px(&world, &truth, &results[2].0);
     assert!(error < 4.0, "{error} px");
@@ -78,19 +72,19 @@ fn metrics(results: &[(PrintFromMesh, MetricOutcome)]) -> Vec<ThresholdMetric> {
 
 #[test]
 fn the_papers_method_gives_the_papers_metrics_and_ours_one_more() {
-    let ((picture, _), mesh) = (print(12.0, 0.0), World::default().mesh());
+    let ((picture, _), mesh) = (print(12.0, 0.0), SyntheticSheet::default().mesh());
     let paper = run(&mesh, &picture, &paper_settings()).expect("an alignment");
     let ours = run(&mesh, &picture, &settings()).expect("an alignment");
     for (results, settings) in [(paper, paper_settings()), (ours, settings())] {
-        assert_eq!(metrics(&results), settings.normalize.method.metrics());
+        assert_eq!(metrics(&results), settings.pipeline.method.metrics());
     }
 }
 
 #[test]
 fn the_print_has_no_say_in_the_cut_of_relief() {
-    let ((picture, _), mesh) = (print(14.0, 3.0), World::default().mesh());
+    let ((picture, _), mesh) = (print(14.0, 3.0), SyntheticSheet::default().mesh());
     let mut spread = settings();
-    spread.normalize.ink_spread = 0.8;
+    spread.register.ink_spread = 0.8;
     let [one, other] = [settings(), spread].map(|settings| {
         let results = run(&mesh, &picture, &settings).expect("an alignment");
         assert_eq!(results[1].1.metric, ThresholdMetric::Density);
@@ -104,9 +98,9 @@ fn the_print_has_no_say_in_the_cut_of_relief() {
 #[test]
 fn a_fleck_far_away_changes_nothing() {
     let (picture, truth) = print(14.0, 3.0);
-    let world = World {
+    let world = SyntheticSheet {
         turn: some_turn(5),
-        ..World::default()
+        ..SyntheticSheet::default()
     };
     let mut mesh = world.mesh();
     let first = mesh.vertices.len() as u32;
@@ -136,7 +130,7 @@ fn as_shuffled_soup(mesh: &Mesh) -> Mesh {
 }
 
 /// Largest distance in print pixels between two answers over the sheet.
-fn apart_px(world: &World, a: &PrintFromMesh, b: &PrintFromMesh) -> f64 {
+fn apart_px(world: &SyntheticSheet, a: &PrintFromMesh, b: &PrintFromMesh) -> f64 {
     let corners = [[-4.0, -4.0], [4.0, -4.0], [-4.0, 4.0], [4.0, 4.0]];
     let apart = |[x, y]: [f64; 2]| {
         let place = world.place(x, y, 0.0);
@@ -149,9 +143,9 @@ fn apart_px(world: &World, a: &PrintFromMesh, b: &PrintFromMesh) -> f64 {
 #[test]
 fn order_and_repetition_of_vertices_and_the_depth_resolution_change_nothing() {
     let (picture, _) = print(14.0, 3.0);
-    let world = World {
+    let world = SyntheticSheet {
         turn: some_turn(8),
-        ..World::default()
+        ..SyntheticSheet::default()
     };
     let mesh = world.mesh();
     let plain = run(&mesh, &picture, &settings()).expect("an alignment");
@@ -169,9 +163,9 @@ fn order_and_repetition_of_vertices_and_the_depth_resolution_change_nothing() {
 
 #[test]
 fn a_turned_and_moved_print_turns_and_moves_the_alignment() {
-    let world = World {
+    let world = SyntheticSheet {
         turn: some_turn(9),
-        ..World::default()
+        ..SyntheticSheet::default()
     };
     let mesh = world.mesh();
     let angles = [3.0, 143.0].map(|turn_deg| {

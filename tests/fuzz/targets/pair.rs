@@ -8,7 +8,7 @@ use libfuzzer_sys::fuzz_target;
 use mocban::config::{Config, Sources, load};
 use mocban::mesh;
 use mocban::raster::{PrintImage, decode};
-use mocban::stages::{StageError, depth, fit, normalize, register};
+use mocban::stages::{AlignedPair, Print, StageError};
 
 const LIMITS: mesh::MeshLimits = mesh::MeshLimits {
     max_bytes: 1 << 20,
@@ -38,11 +38,7 @@ fn align(bytes: &[u8], print: &PrintImage) -> Result<(), StageError> {
     let Ok(mesh) = mesh::read(bytes, "scan.stl", &LIMITS) else {
         return Ok(());
     };
-    let scan = mesh.into();
-    let fit = fit::fit(&scan, Some(print), None, &settings.fit)?;
-    let map = depth::depth(&scan, &fit, None, &settings.depth)?;
-    let masks = normalize::normalize(&map, print, &settings.normalize)?;
-    register::register(&map, &masks, &settings.register)?;
+    AlignedPair::new(&mesh.into(), &Print::from(print.clone()), settings)?;
     Ok(())
 }
 

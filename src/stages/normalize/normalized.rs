@@ -1,0 +1,103 @@
+//! Result of the normalize stage and the canvas on which a pair's masks are compared.
+
+use super::params::{NormalizeError, NormalizeParams};
+use crate::domain::{Affine2, InkHypothesis, NormalizeOutcome, ReliefHeights, ThresholdChoice};
+use crate::raster::Mask;
+use crate::stages::binarize::InkMask;
+use crate::stages::pose::SoftMask;
+
+/// Masks of one interpretation of the print, in the print image's frame and size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PrintMasks {
+    /// Pixels that are ink.
+    pub ink: Mask,
+    /// Pixels that are ink or background; outside (white beyond the cut of the image) nothing is known.
+    pub known: Mask,
+}
+
+impl PrintMasks {
+    /// Returns the ink mask as a soft mask of zeros and ones.
+    pub(in crate::stages) fn soft_ink(&self) -> SoftMask {
+        SoftMask {
+            amount: self.ink.map(|set| f32::from(u8::from(*set))),
+            known: self.known.clone(),
+        }
+    }
+}
+
+/// Result of the normalize stage.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Normalized {
+    /// The numbers.
+    pub outcome: NormalizeOutcome,
+    /// The print's masks, one for each of the outcome's interpretations and in their order; at least one.
+    pub prints: Vec<PrintMasks>,
+}
+
+impl Normalized {
+    /// Gathers the interpretations of a print, each with its canvas.
+    ///
+    /// # Errors
+    /// When no interpretation has ink.
+    pub(in crate::stages) fn new(
+        inks: &[InkMask],
+        relief: Option<ReliefHeights>,
+        params: &NormalizeParams,
+    ) -> Result<Self, NormalizeError> {
+        let (mut hypotheses, mut prints) = (Vec::new(), Vec::new());
+        for ink in inks {
+            let wrap = box_wrap(
+                &ink.mask,
+                params.canvas_px as usize,
+                f64::from(params.character_px),
+            );
+            let Some(canvas_from_print) = wrap else {
+                continue;
+            };
+            hypotheses.push(InkHypothesis {
+                threshold_print: ink.threshold * 65_535.0,
+                light_on_dark: ink.light_on_dark,
+                canvas_from_print,
+            });
+            prints.push(PrintMasks {
+                ink: ink.mask.clone(),
+                known: ink.soft.known.clone(),
+            });
+        }
+        if prints.is_empty() {
+            return Err(NormalizeError::NoStrokes);
+        }
+        Ok(Self {
+            outcome: NormalizeOutcome {
+                canvas_px: params.canvas_px,
+                inks: hypotheses,
+                relief,
+                thresholds: Vec::new(),
+            },
+            prints,
+        })
+    }
+
+    /// Adds thresholds that are chosen before registration.
+    pub(in crate::stages) fn with_thresholds(mut self, thresholds: Vec<ThresholdChoice>) -> Self {
+        self.outcome.thresholds = thresholds;
+        self
+    }
+}
+
+/// Returns the paper's wrap W(I) (III-C), image pixels to canvas pixels: the longest side of the mask's bounding box
+/// becomes `character_px` and its centroid the middle of a canvas of `canvas_px` pixels; `None` for an empty mask.
+pub(in crate::stages) fn box_wrap(
+    mask: &Mask,
+    canvas_px: usize,
+    character_px: f64,
+) -> Option<Affine2> {
+    let bounds = mask.bounding_box()?;
+    let [x, y] = mask.centroid()?;
+    let scale = character_px / bounds.width().max(bounds.height()) as f64;
+    let middle = (canvas_px - 1) as f64 / 2.0;
+    Some(Affine2::scale_shift(
+        scale,
+        [middle - scale * x, middle - scale * y],
+    ))
+}

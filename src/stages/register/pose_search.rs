@@ -1,0 +1,151 @@
+//! Coarse-to-fine search of the pose on soft strokes: no threshold is needed before the pose is known.
+
+use super::params::{RegisterError, RegisterParams};
+use crate::raster::Mask;
+use crate::stages::normalize::{PrintMasks, soft_stroke};
+use crate::stages::pose::{
+    BeamWidth, ImagePyramid, PoseCandidate, RefinementPass, SearchRange, SoftMask,
+    search_coarse_to_fine,
+};
+
+/// Refinement passes after the search.
+const PASSES: [RefinementPass; 2] = [
+    RefinementPass {
+        size_px: 36,
+        sigma_px: 0.8,
+        max_steps: 7,
+        beam_width: keep(4, 2),
+    },
+    RefinementPass {
+        size_px: 60,
+        sigma_px: 1.0,
+        max_steps: 6,
+        beam_width: keep(3, 1),
+    },
+];
+
+const fn keep(upright: usize, mirrored: usize) -> BeamWidth {
+    BeamWidth { upright, mirrored }
+}
+/// Largest working size of print and relief in pixels.
+const BASE_PX: usize = 72;
+/// Soft strokes of the search fall from the tops to half the relief: neither the right threshold nor an exact plane is
+/// needed.
+const SEARCH_CUT: f64 = 0.25;
+const SEARCH_SOFTNESS: f64 = 0.5;
+/// Number of poses that are refined.
+const KEEP: BeamWidth = keep(9, 3);
+/// A smaller correlation means that nothing matches.
+const LEAST_SCORE: f64 = 0.12;
+/// Factor by which the mirrored relief must win for the pair to be refused: symmetric characters score alike both ways.
+const MIRROR_WINS: f64 = 1.3;
+/// Distance of the logarithm of the scale from the band's end at which the scale counts as at the bound.
+const BOUND: f64 = 0.02;
+
+/// Poses of the relief on one interpretation of the print.
+#[derive(Debug)]
+pub(super) struct PoseSearch {
+    /// The interpretation of the print that the relief agrees with best.
+    pub(super) ink: usize,
+    /// Poses as read, best first; at least one.
+    pub(super) poses: Vec<PoseCandidate>,
+    /// Best pose of the relief read in the mirror.
+    pub(super) mirrored: Option<PoseCandidate>,
+    /// Whether the best pose's scale lies at the end of the band.
+    pub(super) at_bound: bool,
+}
+
+impl PoseSearch {
+    fn score(&self) -> f64 {
+        self.poses.first().map_or(0.0, |pose| pose.score)
+    }
+}
+
+/// Searches the poses of the relief on every interpretation of the print and returns the best interpretation's.
+///
+/// `depths` holds depths below the tops as shares of the relief, in depth-map pixels; poses map those to print pixels.
+///
+/// # Errors
+/// The error of the likeliest interpretation when none matches.
+pub(super) fn search(
+    depths: &SoftMask,
+    prints: &[PrintMasks],
+    params: &RegisterParams,
+) -> Result<PoseSearch, RegisterError> {
+    let wood = ImagePyramid::new(depths, BASE_PX).ok_or(RegisterError::NoPose)?;
+    let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
+    let depth_px = longest(&depths.known);
+    let mut best: Option<PoseSearch> = None;
+    let mut failure = None;
+    for (ink, print) in prints.iter().enumerate() {
+        match find_poses(&wood, depth_px, ink, print, params) {
+            Ok(search) => {
+                if best.as_ref().is_none_or(|b| search.score() > b.score()) {
+                    best = Some(search);
+                }
+            }
+            Err(error) => {
+                failure.get_or_insert(error);
+            }
+        }
+    }
+    best.ok_or(failure.unwrap_or(RegisterError::NoPose))
+}
+
+/// Searches the poses on one interpretation of the print; `depth_px` is the longest side of the relief's valid box.
+fn find_poses(
+    wood: &ImagePyramid,
+    depth_px: f64,
+    ink: usize,
+    print: &PrintMasks,
+    params: &RegisterParams,
+) -> Result<PoseSearch, RegisterError> {
+    let print_base = ImagePyramid::new(&print.soft_ink(), BASE_PX).ok_or(RegisterError::NoPose)?;
+    let limits = SearchRange {
+        max_scale: params.scale_band,
+        beam_width: KEEP,
+    };
+    let found = search_coarse_to_fine(&print_base, wood, limits, &PASSES);
+    require_upright(&found)?;
+    let print_px = longest(&print.known);
+    let is_at_bound = |pose: &PoseCandidate| {
+        let ratio = pose.fixed_from_moving.scale() * depth_px / print_px;
+        params.scale_band > 1.0 && ratio.ln().abs() > params.scale_band.ln() - BOUND
+    };
+    let (mirrored, poses): (Vec<PoseCandidate>, Vec<PoseCandidate>) =
+        found.into_iter().partition(|pose| pose.mirrored);
+    Ok(PoseSearch {
+        ink,
+        at_bound: poses.first().is_some_and(is_at_bound),
+        poses,
+        mirrored: mirrored.first().copied(),
+    })
+}
+
+/// Returns the longest side of the box around what is known, pixels; 1 when nothing is.
+fn longest(known: &Mask) -> f64 {
+    known
+        .bounding_box()
+        .map_or(1.0, |b| b.width().max(b.height()) as f64)
+}
+
+/// Refuses mirror writing and relief that correlates with nothing.
+fn require_upright(found: &[PoseCandidate]) -> Result<(), RegisterError> {
+    let best = |mirrored: bool| {
+        let of_kind = found.iter().filter(|pose| pose.mirrored == mirrored);
+        of_kind.map(|pose| pose.score).fold(0.0, f64::max)
+    };
+    let (upright, mirrored) = (best(false), best(true));
+    if mirrored > upright * MIRROR_WINS && mirrored > LEAST_SCORE {
+        return Err(RegisterError::Mirrored {
+            times: mirrored / upright.max(LEAST_SCORE * LEAST_SCORE),
+        });
+    }
+    if upright < LEAST_SCORE {
+        return Err(RegisterError::NoCorrelation {
+            best: upright,
+            needs: LEAST_SCORE,
+        });
+    }
+    Ok(())
+}

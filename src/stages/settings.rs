@@ -1,0 +1,96 @@
+//! Settings of all four stages.
+
+use serde::{Deserialize, Serialize};
+
+use super::depth::{self, DepthParams};
+use super::fit::{self, FitParams};
+use super::normalize::{self, NormalizeParams};
+use super::register::{self, RegisterParams};
+use crate::domain::{Stage, ThresholdMetric};
+
+/// Which of the two pipelines runs; see `stages::pipeline`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum AlignmentMethod {
+    /// The best that is known: the pose first, thresholds in the aligned frame.
+    Default,
+    /// The paper's (arXiv 2411.05524): thresholds first, then an exhaustive search of the rotation.
+    Paper,
+}
+
+impl AlignmentMethod {
+    /// Returns the metrics that get a threshold, in the order of [`ThresholdMetric::ALL`].
+    ///
+    /// # Examples
+    /// ```
+    /// use mocban::stages::AlignmentMethod;
+    ///
+    /// assert_eq!(AlignmentMethod::Default.metrics().len(), 4);
+    /// assert_eq!(AlignmentMethod::Paper.metrics().len(), 3);
+    /// ```
+    pub const fn metrics(self) -> &'static [ThresholdMetric] {
+        match self {
+            Self::Default => &ThresholdMetric::ALL,
+            Self::Paper => &ThresholdMetric::PAPER,
+        }
+    }
+}
+
+/// Settings of the pipeline as a whole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PipelineParams {
+    /// Which of the two pipelines runs.
+    pub method: AlignmentMethod,
+}
+
+/// Settings of all four stages.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Settings {
+    /// The pipeline as a whole.
+    pub pipeline: PipelineParams,
+    /// Mesh to plane.
+    pub fit: FitParams,
+    /// Mesh and plane to depth map.
+    pub depth: DepthParams,
+    /// Depth map and print to ink and relief heights.
+    pub normalize: NormalizeParams,
+    /// Ink and relief to alignment.
+    pub register: RegisterParams,
+}
+
+impl Settings {
+    /// Returns what a stage's result depends on besides its inputs: the stage's revision, the method where the stage
+    /// differs by it, and the stage's own settings.
+    ///
+    /// # Examples
+    /// ```
+    /// use mocban::config::{Sources, load};
+    /// use mocban::domain::Stage;
+    ///
+    /// let before = load(&Sources::default())?.config.stages;
+    /// let mut after = before.clone();
+    /// after.register.smoothing_px = 2.0;
+    /// assert_eq!(before.fingerprint_fields(Stage::Fit), after.fingerprint_fields(Stage::Fit));
+    /// assert_ne!(before.fingerprint_fields(Stage::Register), after.fingerprint_fields(Stage::Register));
+    /// # Ok::<(), mocban::config::ConfigError>(())
+    /// ```
+    pub fn fingerprint_fields(&self, stage: Stage) -> serde_json::Value {
+        let method = self.pipeline.method;
+        match stage {
+            Stage::Fit => serde_json::json!({
+                "revision": fit::REVISION, "method": method, "settings": self.fit,
+            }),
+            Stage::Depth => serde_json::json!({
+                "revision": depth::REVISION, "settings": self.depth,
+            }),
+            Stage::Normalize => serde_json::json!({
+                "revision": normalize::REVISION, "method": method, "settings": self.normalize,
+            }),
+            Stage::Register => serde_json::json!({
+                "revision": register::REVISION, "method": method, "settings": self.register,
+            }),
+        }
+    }
+}
