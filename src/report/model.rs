@@ -6,7 +6,6 @@ use super::adjudication::AdjudicationRules;
 use super::attention_checks::AttentionCheckRates;
 use super::comparison::{Basis, Comparison};
 use super::fail_reasons::FailReasonCount;
-use super::ground_truth::TruthSummary;
 use super::manual_alignment::ManualAlignmentErrors;
 use super::risk_coverage::RiskCoverageCurve;
 use super::score_bootstrap::{BootstrapSettings, MeanIntervals};
@@ -14,6 +13,7 @@ use super::score_comparison::ScoreComparison;
 use super::stage_times::StageTimes;
 use super::stats::IntervalMethod;
 use super::thresholds::ThresholdDistribution;
+use super::truth_summary::TruthSummary;
 use crate::domain::{FailureClass, PairName, Reason, Stage, ThresholdMetric};
 
 /// Version of the JSON form.

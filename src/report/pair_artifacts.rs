@@ -1,4 +1,4 @@
-//! What a pair's stored results and artifacts say together: maps, depth map, masks.
+//! The stored outcomes and artifacts of a pair: maps, depth map, masks.
 
 use serde::de::DeserializeOwned;
 
@@ -11,16 +11,16 @@ use crate::domain::{
 use crate::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
 use crate::store::{self, Project};
 
-/// Ink in a stored print mask; paper is 0 and what is unknown 128.
+/// Ink in a stored print mask; the background is 0, unknown pixels are 128.
 const INK: u8 = 255;
 
 /// Why a stored result cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum PairArtifactsError {
-    /// The catalog says the stage is done but holds no result.
+    /// The catalog holds no result of the stage.
     #[error("there is no result of {0}")]
     NoResult(Stage),
-    /// A stored outcome of another form.
+    /// The stored outcome has another form.
     #[error("the stored result of {stage} cannot be read: {source}")]
     Outcome {
         /// Which stage.
@@ -28,7 +28,7 @@ pub enum PairArtifactsError {
         /// Why.
         source: serde_json::Error,
     },
-    /// The result names no such artifact.
+    /// The result has no such artifact.
     #[error("the result of {stage} has no {role}")]
     NoArtifact {
         /// Which stage.
@@ -39,7 +39,7 @@ pub enum PairArtifactsError {
     /// The artifact cannot be read.
     #[error(transparent)]
     Store(#[from] store::ArtifactError),
-    /// The artifact is not the picture it should be.
+    /// The artifact is not a valid image.
     #[error("{role}: {source}")]
     Image {
         /// Which artifact.
@@ -49,7 +49,7 @@ pub enum PairArtifactsError {
     },
 }
 
-/// A finished pair together with its project's files.
+/// Reads the stored outcomes and artifacts of a finished pair.
 #[derive(Debug, Clone, Copy)]
 pub struct PairArtifacts<'a> {
     project: &'a Project,
@@ -57,12 +57,12 @@ pub struct PairArtifacts<'a> {
 }
 
 impl<'a> PairArtifacts<'a> {
-    /// A pair of a project.
+    /// Returns the reader for a pair of a project.
     pub const fn new(project: &'a Project, pair: &'a PairResults) -> Self {
         Self { project, pair }
     }
 
-    /// The current result of a stage.
+    /// Returns the current result of a stage.
     ///
     /// # Errors
     /// When there is none.
@@ -72,7 +72,7 @@ impl<'a> PairArtifacts<'a> {
             .ok_or(PairArtifactsError::NoResult(stage))
     }
 
-    /// The numbers of a stage, such as [`FitOutcome`].
+    /// Parses the outcome of a stage, such as [`FitOutcome`].
     ///
     /// # Errors
     /// When there are none or they are of another form.
@@ -82,7 +82,7 @@ impl<'a> PairArtifacts<'a> {
             .map_err(|source| PairArtifactsError::Outcome { stage, source })
     }
 
-    /// An artifact of a stage by its role.
+    /// Returns an artifact of a stage by its role.
     ///
     /// # Errors
     /// When the result has none of that role.
@@ -98,7 +98,7 @@ impl<'a> PairArtifacts<'a> {
         self.stage(stage)?.files.get(role).ok_or_else(missing)
     }
 
-    /// The bytes of an artifact, checked against its hash.
+    /// Reads an artifact and checks its hash.
     ///
     /// # Errors
     /// When there is none, or the file is missing or changed.
@@ -106,7 +106,7 @@ impl<'a> PairArtifacts<'a> {
         Ok(self.project.read_artifact(self.artifact(stage, role)?)?)
     }
 
-    /// The depth map with its scale.
+    /// Reads the depth map with its scale.
     ///
     /// # Errors
     /// When the result or its picture cannot be read.
@@ -148,7 +148,7 @@ impl<'a> PairArtifacts<'a> {
         ink.map(|ink| ink.canvas_from_print).ok_or_else(missing)
     }
 
-    /// The ink of the print on the canvas of the scores.
+    /// Reads the ink mask of the print on the canvas of the scores.
     ///
     /// # Errors
     /// When the result or its picture cannot be read.
@@ -207,12 +207,12 @@ impl<'a> PairArtifacts<'a> {
     }
 }
 
-/// Whether two metrics came to the same threshold and place, so that all their pictures are the same.
+/// Returns whether two metrics have the same threshold and alignment, so that all their images are equal.
 pub fn same_alignment(a: &MetricOutcome, b: &MetricOutcome) -> bool {
     a.threshold_level == b.threshold_level && a.print_from_depth == b.print_from_depth
 }
 
-/// Results with those that look the same in one group, each group in the place of its first.
+/// Groups results with equal images, in the order of their first members.
 pub fn group_identical<'a>(
     records: impl IntoIterator<Item = &'a MetricRecord>,
 ) -> Vec<Vec<&'a MetricRecord>> {

@@ -1,11 +1,11 @@
-//! A small built-in face of 5 x 7 dots, for ids and numbers on pictures.
+//! A built-in font of 5 x 7 dots, for ids and numbers on images.
 
-/// Dots across a letter.
+/// Width of a glyph, dots.
 pub(super) const WIDTH: usize = 5;
-/// Rows of a letter without its tail.
+/// Height of a glyph, dots.
 pub(super) const HEIGHT: usize = 7;
 
-/// The rows of a letter, top first; bit 4 is the leftmost dot. Letters the face lacks are an empty box.
+/// Returns the rows of a glyph, top first; bit 4 is the leftmost dot. An unknown letter is an empty box.
 pub(super) fn glyph(letter: char) -> [u8; HEIGHT] {
     GLYPHS
         .iter()
@@ -104,7 +104,7 @@ mod tests {
     use super::{GLYPHS, WIDTH, glyph};
 
     #[test]
-    fn every_letter_of_an_id_is_there_and_is_its_own() {
+    fn every_letter_of_an_id_has_a_distinct_glyph() {
         let letters = ('0'..='9')
             .chain('A'..='Z')
             .chain('a'..='z')
@@ -122,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn unknown_letter_is_a_box() {
+    fn an_unknown_letter_is_a_box() {
         assert_eq!(glyph('\u{5b57}')[0], 31);
     }
 }

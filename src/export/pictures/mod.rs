@@ -1,4 +1,4 @@
-//! Pictures for people: overlays, lit reliefs, contact sheets.
+//! Images for people: overlays, shaded reliefs, contact sheets.
 
 mod font;
 mod overlay;

@@ -1,20 +1,20 @@
-//! A print with the edges of the aligned depth mask, the aligned relief, and the print itself, in one frame.
+//! The print, the aligned relief, and the print with the edges of the aligned depth mask, in one frame.
 
 use super::paint::{Rgb, eight_bits, resized};
 use super::relief::shaded;
 use crate::domain::{Affine2, MetricOutcome};
 use crate::raster::{DepthMap, Grid, Mask, PrintImage, warp_depth, warp_mask};
 
-/// Vermillion of Okabe and Ito's palette: told from ink and paper with every kind of colour vision.
+/// Vermillion of the palette of Okabe and Ito, which is distinct from ink and background for every colour vision.
 const EDGE: [u8; 3] = [213, 94, 0];
-/// Blue of the same palette: the edges of the true stroke tops.
+/// Blue of the same palette, for the edges of the true stroke tops.
 const TRUE_EDGE: [u8; 3] = [0, 114, 178];
-/// An edge is one pixel wide for each so many pixels of the longest side.
+/// Pixels of the longest side per pixel of edge width.
 const SIDE_PER_EDGE_PX: usize = 240;
-/// Longest side that a saved overlay has at least, pixels.
+/// Minimal longest side of a saved overlay, pixels.
 const OVERLAY_SIDE: usize = 480;
 
-/// The print image's frame enlarged or shrunk: where pictures for people are drawn.
+/// The frame of the print image, scaled for viewing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PrintView {
     width: usize,
@@ -23,7 +23,7 @@ pub struct PrintView {
 }
 
 impl PrintView {
-    /// The print's frame so that its longest side is `side` pixels.
+    /// Returns the view whose longest side is `side` pixels.
     pub fn of_side(print: &PrintImage, side: usize) -> Self {
         let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
         let scale = side as f64 / size[0].max(size[1]) as f64;
@@ -31,14 +31,14 @@ impl PrintView {
         Self::new(scale, width, height)
     }
 
-    /// The print's frame enlarged by a whole number, so that the longest side is large enough to judge by.
+    /// Returns the view enlarged by the smallest integer that makes it large enough to judge.
     pub fn to_judge_by(print: &PrintImage) -> Self {
         let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
         let factor = OVERLAY_SIDE.div_ceil(size[0].max(size[1]));
         Self::new(factor as f64, size[0] * factor, size[1] * factor)
     }
 
-    /// Pixels cover squares, so that the corner of the image, at -0.5, stays the corner.
+    /// Pixels cover squares, so the corner of the image, at -0.5, remains the corner.
     fn new(scale: f64, width: usize, height: usize) -> Self {
         let shift = (scale - 1.0) / 2.0;
         Self {
@@ -48,12 +48,12 @@ impl PrintView {
         }
     }
 
-    /// The print as it is.
+    /// Draws the print.
     pub fn print(&self, print: &PrintImage) -> Rgb {
         resized(&eight_bits(print), self.width, self.height)
     }
 
-    /// The depth map laid on the print, lit from the side.
+    /// Draws the depth map aligned to the print, lit from the upper left.
     pub fn relief(&self, depth: &DepthMap, print_from_depth: &Affine2) -> Rgb {
         let view_from_depth = self.from_print.after(print_from_depth);
         let levels = warp_depth(depth, &view_from_depth, self.width, self.height);
@@ -61,14 +61,14 @@ impl PrintView {
         shaded(&levels, depth.scale.height_per_level / side)
     }
 
-    /// The print with the edges of the depth mask on it.
+    /// Draws the print with the edges of the aligned depth mask.
     pub fn overlay(&self, print: &PrintImage, depth: &DepthMap, outcome: &MetricOutcome) -> Rgb {
         let mut picture = self.print(print);
-        self.draw_edges(&mut picture, &self.laid_on(depth, outcome), EDGE);
+        self.draw_edges(&mut picture, &self.warped_mask(depth, outcome), EDGE);
         picture
     }
 
-    /// The overlay with the edges of the true stroke tops, a mask in the print's frame, below those of the depth mask.
+    /// Draws the overlay with the edges of the true stroke tops, a mask in the print's frame, below those of the depth mask.
     pub fn overlay_on_truth(
         &self,
         print: &PrintImage,
@@ -79,30 +79,30 @@ impl PrintView {
         let tops = self.mask(tops, &Affine2::IDENTITY);
         let mut picture = self.print(print);
         self.draw_edges(&mut picture, &tops, TRUE_EDGE);
-        self.draw_edges(&mut picture, &self.laid_on(depth, outcome), EDGE);
+        self.draw_edges(&mut picture, &self.warped_mask(depth, outcome), EDGE);
         picture
     }
 
-    /// A mask in the view, given what takes its pixels to print pixels.
+    /// Warps a mask to the view; `print_from_mask` maps its pixels to print pixels.
     pub fn mask(&self, mask: &Mask, print_from_mask: &Affine2) -> Mask {
         let view_from_mask = self.from_print.after(print_from_mask);
         warp_mask(mask, &view_from_mask, self.width, self.height)
     }
 
-    /// Print pixels to pixels of the view.
+    /// Returns the map from print pixels to pixels of the view.
     pub const fn from_print(&self) -> &Affine2 {
         &self.from_print
     }
 
-    /// A metric's depth mask in the view.
-    fn laid_on(&self, depth: &DepthMap, outcome: &MetricOutcome) -> Mask {
+    /// Warps a metric's depth mask to the view.
+    fn warped_mask(&self, depth: &DepthMap, outcome: &MetricOutcome) -> Mask {
         let strokes = depth.stroke_mask(outcome.threshold_level);
         self.mask(&strokes, &outcome.print_from_depth)
     }
 
     fn draw_edges(&self, onto: &mut Rgb, mask: &Mask, colour: [u8; 3]) {
-        let reach = (self.width.max(self.height) / SIDE_PER_EDGE_PX).max(1);
-        let edges = edges(mask, reach);
+        let width = (self.width.max(self.height) / SIDE_PER_EDGE_PX).max(1);
+        let edges = edges(mask, width);
         for (pixel, edge) in onto.data_mut().iter_mut().zip(edges.data()) {
             if *edge {
                 *pixel = colour;
@@ -111,14 +111,14 @@ impl PrintView {
     }
 }
 
-/// Set pixels with an unset one within `reach` along a row or a column. The end of the picture is no edge.
-fn edges(mask: &Mask, reach: usize) -> Grid<bool> {
-    let reach = reach as i64;
+/// Returns the set pixels with an unset one within `width` along a row or column. The border of the image is no edge.
+fn edges(mask: &Mask, width: usize) -> Grid<bool> {
+    let width = width as i64;
     Grid::from_fn(mask.width(), mask.height(), |x, y| {
         let (x, y) = (x as i64, y as i64);
         let unset = |dx, dy| mask.get(x + dx, y + dy) == Some(false);
         mask.get(x, y) == Some(true)
-            && (1..=reach).any(|r| unset(r, 0) || unset(-r, 0) || unset(0, r) || unset(0, -r))
+            && (1..=width).any(|r| unset(r, 0) || unset(-r, 0) || unset(0, r) || unset(0, -r))
     })
 }
 
@@ -129,7 +129,7 @@ mod tests {
     use crate::raster::{DepthMap, Grid, Mask, PrintImage};
     use crate::report::test_fixtures;
 
-    /// A bar of 4 x 20 px at (8, 5) over ground in a map of 30 x 30 px.
+    /// A bar of 4 x 20 px at (8, 5) on a lower level in a map of 30 x 30 px.
     fn depth() -> DepthMap {
         DepthMap::of_levels(Grid::from_fn(30, 30, |x, y| {
             if (8..12).contains(&x) && (5..25).contains(&y) {
@@ -140,28 +140,28 @@ mod tests {
         }))
     }
 
-    fn paper() -> PrintImage {
+    fn blank_print() -> PrintImage {
         PrintImage {
             rgb: Grid::new(30, 30, [60_000; 3]),
         }
     }
 
     #[test]
-    fn overlay_draws_the_bar_where_the_alignment_puts_it() {
+    fn overlay_draws_the_bar_at_its_aligned_place() {
         let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
         outcome.print_from_depth = Affine2::scale_shift(1.0, [10.0, 0.0]);
-        let view = PrintView::of_side(&paper(), 30);
-        let picture = view.overlay(&paper(), &depth(), &outcome);
+        let view = PrintView::of_side(&blank_print(), 30);
+        let picture = view.overlay(&blank_print(), &depth(), &outcome);
         let edge: Vec<_> = (0..30).filter(|x| picture.at(*x, 15) == EDGE).collect();
         assert_eq!(edge, [18, 21]);
     }
 
     #[test]
-    fn enlarged_view_keeps_places() {
+    fn an_enlarged_view_keeps_positions() {
         let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
         outcome.print_from_depth = Affine2::IDENTITY;
-        let view = PrintView::to_judge_by(&paper());
-        let picture = view.overlay(&paper(), &depth(), &outcome);
+        let view = PrintView::to_judge_by(&blank_print());
+        let picture = view.overlay(&blank_print(), &depth(), &outcome);
         assert_eq!((picture.width(), picture.height()), (480, 480));
         let row: Vec<_> = (0..480).filter(|x| picture.at(*x, 240) == EDGE).collect();
         // The bar covers depth pixels 8..12, that is print 7.5..11.5 in centres: 8 * 16 to 12 * 16 enlarged.
@@ -172,12 +172,12 @@ mod tests {
     }
 
     #[test]
-    fn true_edges_are_drawn_below_those_that_were_found() {
+    fn true_edges_are_drawn_below_the_found_ones() {
         let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
         outcome.print_from_depth = Affine2::scale_shift(1.0, [3.0, 0.0]);
         let tops = Mask::from_fn(30, 30, |x, y| (8..12).contains(&x) && (5..25).contains(&y));
-        let view = PrintView::of_side(&paper(), 30);
-        let picture = view.overlay_on_truth(&paper(), &tops, &depth(), &outcome);
+        let view = PrintView::of_side(&blank_print(), 30);
+        let picture = view.overlay_on_truth(&blank_print(), &tops, &depth(), &outcome);
         let columns =
             |colour| -> Vec<_> { (0..30).filter(|x| picture.at(*x, 15) == colour).collect() };
         assert_eq!(columns(TRUE_EDGE), [8]);
@@ -185,15 +185,15 @@ mod tests {
     }
 
     #[test]
-    fn strokes_cut_by_the_picture_have_no_edge_there() {
+    fn strokes_cut_by_the_border_have_no_edge_there() {
         let mask = Mask::from_fn(6, 6, |x, _| x < 3);
         let found = edges(&mask, 1);
         assert_eq!(found.row(0), [false, false, true, false, false, false]);
     }
 
     #[test]
-    fn relief_follows_the_alignment() {
-        let view = PrintView::of_side(&paper(), 30);
+    fn the_relief_follows_the_alignment() {
+        let view = PrintView::of_side(&blank_print(), 30);
         let still = view.relief(&depth(), &Affine2::IDENTITY);
         let moved = view.relief(&depth(), &Affine2::scale_shift(1.0, [5.0, 0.0]));
         assert_eq!(still.at(10, 15), moved.at(15, 15));

@@ -1,23 +1,23 @@
-//! Painting on colour grids: copying, resizing, writing.
+//! Drawing on colour images: copying, resizing, text.
 
 use super::font;
 use crate::raster::{Grid, PrintImage};
 
-/// An 8-bit colour picture.
+/// An 8-bit colour image.
 pub type Rgb = Grid<[u8; 3]>;
 
-/// Ink of letters.
+/// Colour of text.
 pub(super) const TEXT: [u8; 3] = [20, 20, 20];
-/// What lies under everything.
-pub(super) const GROUND: [u8; 3] = [255, 255, 255];
+/// Background colour.
+pub(super) const BACKGROUND: [u8; 3] = [255, 255, 255];
 
-/// A decoded print with 8 bits a channel.
+/// Converts a decoded print to 8 bits per channel.
 pub(super) fn eight_bits(print: &PrintImage) -> Rgb {
     let narrow = |wide: u16| ((u32::from(wide) + 128) / 257) as u8;
     print.rgb.map(|colour| colour.map(narrow))
 }
 
-/// A picture in another size: the mean of what each pixel covers when it shrinks, plain enlarged pixels when it grows.
+/// Resizes an image: by the mean over each covered area when it shrinks, by nearest neighbour when it grows.
 pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
     if (image.width(), image.height()) == (width, height) {
         return image.clone();
@@ -27,7 +27,7 @@ pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
     Rgb::from_fn(width, height, |x, y| mean(image, &columns[x], &rows[y]))
 }
 
-/// The source pixels one output pixel covers along a side, with their shares.
+/// The source pixels that one output pixel covers along an axis, with their weights.
 type Span = Vec<(usize, f64)>;
 
 fn spans(from: usize, to: usize) -> Vec<Span> {
@@ -59,7 +59,7 @@ fn mean(image: &Rgb, columns: &Span, rows: &Span) -> [u8; 3] {
     sum.map(|total| (total / weight).round() as u8)
 }
 
-/// Copies a picture onto another with its top left corner at (x, y); what lies outside is cut off.
+/// Copies an image onto another with its top left corner at (x, y), clipped.
 pub(super) fn copy(onto: &mut Rgb, image: &Rgb, x: usize, y: usize) {
     for row in 0..image.height().min(onto.height().saturating_sub(y)) {
         for column in 0..image.width().min(onto.width().saturating_sub(x)) {
@@ -68,7 +68,7 @@ pub(super) fn copy(onto: &mut Rgb, image: &Rgb, x: usize, y: usize) {
     }
 }
 
-/// Fills a box with a colour; what lies outside is cut off.
+/// Fills a rectangle with a colour, clipped.
 pub(super) fn fill(onto: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8; 3]) {
     for y in at[1]..(at[1] + size[1]).min(onto.height()) {
         for x in at[0]..(at[0] + size[0]).min(onto.width()) {
@@ -77,18 +77,18 @@ pub(super) fn fill(onto: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8
     }
 }
 
-/// Width of a text in pixels with dots of `dot` pixels.
+/// Returns the width of a text in pixels, with dots of `dot` pixels.
 pub(super) const fn text_width(letters: usize, dot: usize) -> usize {
     letters * (font::WIDTH + 1) * dot
 }
 
-/// Height of a line of text in pixels with dots of `dot` pixels, its gap below included.
+/// Returns the line height in pixels, with dots of `dot` pixels.
 pub(super) const fn text_height(dot: usize) -> usize {
     (font::HEIGHT + 2) * dot
 }
 
-/// As much of a text as fits, ending in `..` where it was cut.
-pub(super) fn cut_to(text: &str, width: usize, dot: usize) -> String {
+/// Shortens a text to a width in pixels, with a final `..` where it was cut.
+pub(super) fn truncated(text: &str, width: usize, dot: usize) -> String {
     let most = width / text_width(1, dot);
     if text.chars().count() <= most {
         return text.to_owned();
@@ -97,7 +97,7 @@ pub(super) fn cut_to(text: &str, width: usize, dot: usize) -> String {
     kept + ".."
 }
 
-/// Writes a text with its top left corner at (x, y) and dots of `dot` pixels.
+/// Draws a text with its top left corner at (x, y) and dots of `dot` pixels.
 pub(super) fn write(onto: &mut Rgb, text: &str, x: usize, y: usize, dot: usize, colour: [u8; 3]) {
     for (i, letter) in text.chars().enumerate() {
         let left = x + text_width(i, dot);
@@ -116,11 +116,11 @@ pub(super) fn write(onto: &mut Rgb, text: &str, x: usize, y: usize, dot: usize, 
 
 #[cfg(test)]
 mod tests {
-    use super::{Rgb, copy, cut_to, eight_bits, resized, write};
+    use super::{Rgb, copy, eight_bits, resized, truncated, write};
     use crate::raster::{Grid, PrintImage};
 
     #[test]
-    fn shrinking_keeps_the_mean_and_growing_keeps_the_pixels() {
+    fn shrinking_averages_and_growing_repeats_pixels() {
         let image = Rgb::from_vec(2, 1, vec![[0, 10, 100], [200, 30, 100]]).expect("two pixels");
         assert_eq!(resized(&image, 1, 1).data(), [[100, 20, 100]]);
         let grown = resized(&image, 4, 2);
@@ -132,14 +132,14 @@ mod tests {
     }
 
     #[test]
-    fn sixteen_bits_narrow_to_the_eight_they_came_from() {
+    fn sixteen_bits_convert_back_to_eight() {
         let rgb = Grid::from_fn(256, 1, |x, _| [x as u16 * 257; 3]);
         let narrow = eight_bits(&PrintImage { rgb });
         assert!((0..256).all(|x| narrow.at(x, 0) == [x as u8; 3]));
     }
 
     #[test]
-    fn painting_outside_is_cut_off() {
+    fn drawing_is_clipped() {
         let mut sheet = Rgb::new(8, 8, [255; 3]);
         write(&mut sheet, "W", 6, 3, 2, [0; 3]);
         copy(&mut sheet, &Rgb::new(5, 5, [9; 3]), 7, 7);
@@ -149,7 +149,7 @@ mod tests {
 
     #[test]
     fn long_text_ends_in_dots() {
-        assert_eq!(cut_to("b01-0002", 48, 1), "b01-0002");
-        assert_eq!(cut_to("b01-00023", 48, 1), "b01-00..");
+        assert_eq!(truncated("b01-0002", 48, 1), "b01-0002");
+        assert_eq!(truncated("b01-00023", 48, 1), "b01-00..");
     }
 }

@@ -1,26 +1,26 @@
-//! Heights as a person sees them: lit from the side by a low lamp.
+//! Hill shading of depth maps.
 
 use super::paint::Rgb;
 use crate::raster::Grid;
 
-/// Height of the lamp over the horizon, radians; low, so that shallow relief shows.
-const LAMP_ALTITUDE_RAD: f64 = 35.0 * std::f64::consts::PI / 180.0;
-/// Share of the grey that comes from height itself, so that tops and ground differ where both are level.
+/// Altitude of the light above the horizon, radians; low, to show shallow relief.
+const LIGHT_ALTITUDE_RAD: f64 = 35.0 * std::f64::consts::PI / 180.0;
+/// Share of the grey value that depends on height, so that level tops and background differ.
 const HEIGHT_SHARE: f64 = 0.3;
-/// Share of red, green and blue in full light: the colour of wood.
+/// Red, green and blue in full light, 0..=1: the colour of wood.
 const WOOD: [f64; 3] = [1.0, 0.95, 0.86];
-/// Where there is no data.
-const NOTHING: [u8; 3] = [226, 232, 240];
+/// Colour of pixels without data.
+const NO_DATA: [u8; 3] = [226, 232, 240];
 
-/// A hill-shaded picture of depth levels (0 = no data), lit from the upper left.
+/// Returns a hill-shaded image of depth levels (0 = no data), lit from the upper left.
 ///
-/// `slope_per_level` is the height between two levels over the side of a pixel, both in mesh units.
+/// `slope_per_level` is the height of one level divided by the side of a pixel, both in mesh units.
 pub fn shaded(levels: &Grid<u16>, slope_per_level: f64) -> Rgb {
     let smooth = smoothed(levels);
     let range = range(levels);
     Rgb::from_fn(levels.width(), levels.height(), |x, y| {
         match smooth.at(x, y) {
-            None => NOTHING,
+            None => NO_DATA,
             Some(level) => {
                 let across = slope(&smooth, [x, y], [1, 0]) * slope_per_level;
                 let down = slope(&smooth, [x, y], [0, 1]) * slope_per_level;
@@ -32,15 +32,15 @@ pub fn shaded(levels: &Grid<u16>, slope_per_level: f64) -> Rgb {
     })
 }
 
-/// Lambert's cosine of a slope under the lamp at the upper left, 0..=1.
+/// Returns Lambert's cosine of a slope under light from the upper left, 0..=1.
 fn light(across: f64, down: f64) -> f64 {
-    let (sin, cos) = LAMP_ALTITUDE_RAD.sin_cos();
+    let (sin, cos) = LIGHT_ALTITUDE_RAD.sin_cos();
     let toward = cos * std::f64::consts::FRAC_1_SQRT_2;
     let normal = (across * across + down * down + 1.0).sqrt();
     ((toward * (across + down) + sin) / normal).max(0.0)
 }
 
-/// Mean of each pixel and its neighbours that hold data: scanner noise would hide the strokes.
+/// Returns 3 x 3 means over pixels with data, because scanner noise would hide the strokes.
 fn smoothed(levels: &Grid<u16>) -> Grid<Option<f64>> {
     Grid::from_fn(levels.width(), levels.height(), |x, y| {
         if levels.at(x, y) == 0 {
@@ -56,7 +56,7 @@ fn smoothed(levels: &Grid<u16>) -> Grid<Option<f64>> {
     })
 }
 
-/// Levels a pixel along a direction: between both neighbours, or to the one that holds data.
+/// Returns the slope along a direction, levels per pixel: the central difference, or a one-sided one next to missing data.
 fn slope(heights: &Grid<Option<f64>>, [x, y]: [usize; 2], [dx, dy]: [i64; 2]) -> f64 {
     let at = |step: i64| {
         heights
@@ -71,7 +71,7 @@ fn slope(heights: &Grid<Option<f64>>, [x, y]: [usize; 2], [dx, dy]: [i64; 2]) ->
     }
 }
 
-/// The lowest and the highest level that hold data; 0 and 0 without any.
+/// Returns the lowest and the highest level with data; 0 and 0 without any.
 fn range(levels: &Grid<u16>) -> [f64; 2] {
     let held = levels.data().iter().copied().filter(|level| *level > 0);
     let low = held.clone().min().unwrap_or(0);
@@ -81,11 +81,11 @@ fn range(levels: &Grid<u16>) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use super::{NOTHING, shaded};
+    use super::{NO_DATA, shaded};
     use crate::raster::Grid;
 
     #[test]
-    fn walls_toward_the_lamp_are_bright_and_those_away_dark() {
+    fn walls_facing_the_light_are_bright_and_others_dark() {
         // A ridge along y: up to the right from x = 4, down from x = 12.
         let ridge = Grid::from_fn(20, 9, |x, _| match x {
             0..4 | 17.. => 1000,
@@ -102,13 +102,13 @@ mod tests {
     }
 
     #[test]
-    fn no_data_is_told_from_ground() {
+    fn missing_data_has_its_own_colour() {
         let picture = shaded(
             &Grid::from_fn(5, 5, |x, _| if x < 2 { 0 } else { 500 }),
             0.01,
         );
-        assert_eq!(picture.at(1, 1), NOTHING);
-        assert_ne!(picture.at(3, 1), NOTHING);
-        assert_eq!(shaded(&Grid::new(2, 2, 0), 0.01).data(), [NOTHING; 4]);
+        assert_eq!(picture.at(1, 1), NO_DATA);
+        assert_ne!(picture.at(3, 1), NO_DATA);
+        assert_eq!(shaded(&Grid::new(2, 2, 0), 0.01).data(), [NO_DATA; 4]);
     }
 }

@@ -1,26 +1,26 @@
-//! The contact sheet: many pairs on one picture, so that a person sees fifty results at a glance.
+//! Layout and drawing of contact sheets: many pairs on one image.
 
 use super::paint::{
-    GROUND, Rgb, TEXT, copy, cut_to, fill, resized, text_height, text_width, write,
+    BACKGROUND, Rgb, TEXT, copy, fill, resized, text_height, text_width, truncated, write,
 };
 
-/// Width of a sheet in pixels.
+/// Width of a contact sheet, pixels.
 pub const SHEET_WIDTH: usize = 2000;
-/// Pictures in a cell: print, relief, overlay.
+/// Images in a cell: print, relief, overlay.
 const TILES: usize = 3;
-/// Space around cells and between pictures, pixels.
+/// Space around cells and between images, pixels.
 const GAP: usize = 6;
-/// Cells narrower than this have small letters.
+/// Cells narrower than this have small text, pixels.
 const WIDE_CELL: usize = 300;
-/// Size of the letters' dots in a long note, pixels.
+/// Dot size of the text of a long note, pixels.
 const SMALL: usize = 1;
-/// More columns than this leave nothing to see.
+/// Most columns that leave the images large enough.
 const MAX_COLUMNS: usize = 12;
-/// Frame of a cell that is wrong.
+/// Frame colour of a wrong result.
 const WRONG: [u8; 3] = [213, 94, 0];
-/// Frame of any other cell.
+/// Frame colour of other results.
 const FRAME: [u8; 3] = [205, 205, 205];
-/// Where a picture is missing.
+/// Colour of a missing image.
 const MISSING: [u8; 3] = [240, 240, 240];
 
 /// One pair on the sheet.
@@ -28,15 +28,15 @@ const MISSING: [u8; 3] = [240, 240, 240];
 pub struct ContactSheetCell {
     /// The pair's id.
     pub id: String,
-    /// Its numbers, or why it failed, in a few words.
+    /// Its scores, or why it failed.
     pub note: String,
-    /// Whether it is known to be wrong: failed, failed by reviewers, or off the truth.
+    /// Whether it is known to be wrong: failed, failed by reviewers, or off the ground truth.
     pub wrong: bool,
-    /// Print, relief turned onto the print, and overlay, where they exist.
+    /// Print, aligned relief and overlay, where they exist.
     pub tiles: [Option<Rgb>; TILES],
 }
 
-/// Sizes of a sheet's parts in pixels.
+/// Sizes of the parts of a contact sheet, pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct SheetLayout {
     columns: usize,
@@ -61,16 +61,16 @@ impl SheetLayout {
     }
 }
 
-/// Longest side of the pictures in the cells of a sheet with so many columns, pixels.
+/// Returns the longest side of the images on a sheet with this many columns, pixels.
 pub fn tile_side(columns: usize) -> usize {
     SheetLayout::new(columns).tile
 }
 
-/// Cells in rows of 1 to 12 columns, [`SHEET_WIDTH`] pixels wide; larger pictures are shrunk.
+/// Draws cells in rows of 1 to 12 columns, [`SHEET_WIDTH`] pixels wide; larger images are shrunk.
 pub fn contact_sheet(cells: &[ContactSheetCell], columns: usize) -> Rgb {
     let layout = SheetLayout::new(columns);
     let height = cells.len().div_ceil(layout.columns).max(1) * layout.cell[1];
-    let mut sheet = Rgb::new(SHEET_WIDTH, height, GROUND);
+    let mut sheet = Rgb::new(SHEET_WIDTH, height, BACKGROUND);
     for (i, cell) in cells.iter().enumerate() {
         let corner = [
             i % layout.columns * layout.cell[0],
@@ -95,7 +95,7 @@ fn paint(sheet: &mut Rgb, [x, y]: [usize; 2], cell: &ContactSheetCell, layout: &
     for (text, top) in texts {
         write(
             sheet,
-            &cut_to(text, width, layout.dot),
+            &truncated(text, width, layout.dot),
             left,
             top,
             layout.dot,
@@ -108,12 +108,12 @@ fn paint(sheet: &mut Rgb, [x, y]: [usize; 2], cell: &ContactSheetCell, layout: &
     }
     if let [_, None, None] = cell.tiles {
         let corner = [left + layout.tile + 2 * GAP, y + 3 * GAP + 2 * line];
-        paint_story(sheet, corner, &cell.note, layout);
+        paint_note(sheet, corner, &cell.note, layout);
     }
 }
 
-/// The whole note, over the places of the relief and the overlay that are not there.
-fn paint_story(sheet: &mut Rgb, [x, y]: [usize; 2], note: &str, layout: &SheetLayout) {
+/// Draws the whole note in place of the missing relief and overlay.
+fn paint_note(sheet: &mut Rgb, [x, y]: [usize; 2], note: &str, layout: &SheetLayout) {
     let letters = (2 * layout.tile - 2 * GAP) / text_width(1, SMALL);
     let lines = (layout.tile - GAP) / text_height(SMALL);
     let note: Vec<char> = note.chars().collect();
@@ -123,7 +123,7 @@ fn paint_story(sheet: &mut Rgb, [x, y]: [usize; 2], note: &str, layout: &SheetLa
     }
 }
 
-/// A picture in the middle of its square.
+/// Draws an image centred in its square.
 fn paint_tile(sheet: &mut Rgb, [x, y]: [usize; 2], tile: Option<&Rgb>, side: usize) {
     let Some(tile) = tile else {
         fill(sheet, [x, y], [side, side], MISSING);
@@ -173,7 +173,7 @@ mod tests {
     }
 
     #[test]
-    fn fifty_cells_fit_on_one_readable_sheet() {
+    fn fifty_cells_fit_on_one_sheet() {
         let cells: Vec<_> = (0..50).map(|i| cell(&format!("p{i:03}"), false)).collect();
         let sheet = contact_sheet(&cells, 5);
         assert_eq!(sheet.width(), SHEET_WIDTH);
@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn wrong_cells_are_framed_and_missing_pictures_are_blank() {
+    fn wrong_cells_are_framed_and_missing_images_are_blank() {
         let sheet = contact_sheet(&[cell("a", true), cell("b", false)], 2);
         assert_eq!(sheet.at(3, 3), WRONG);
         assert_ne!(sheet.at(SHEET_WIDTH / 2 + 3, 3), WRONG);
@@ -190,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_reason_is_written_out_where_the_pictures_are_missing() {
+    fn a_long_reason_replaces_missing_images() {
         let mut failed = cell("a", true);
         failed.note = "bad_input: ".to_owned() + &"x".repeat(300);
         let (short, long) = (cell("a", true), failed);
@@ -203,7 +203,7 @@ mod tests {
     }
 
     #[test]
-    fn many_columns_and_no_cells_do_not_break_it() {
+    fn extreme_numbers_of_columns_and_cells_are_accepted() {
         assert_eq!(contact_sheet(&[], 5).width(), SHEET_WIDTH);
         assert!(contact_sheet(&[cell("a", false)], 400).height() > 0);
         assert!(contact_sheet(&[cell("a", false)], 0).height() > 0);

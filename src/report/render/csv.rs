@@ -8,7 +8,7 @@ use crate::report::model::{MetricRow, Report};
 use crate::report::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT};
 
 /// A column: its name, and the JSON pointer of its value in [`document`].
-struct CsvColumn {
+struct CsvField {
     name: String,
     pointer: String,
 }
@@ -58,7 +58,7 @@ fn reason_name(reason: Option<Reason>) -> &'static str {
 }
 
 /// Returns the columns in their order.
-fn columns() -> Vec<CsvColumn> {
+fn columns() -> Vec<CsvField> {
     let mut columns = Vec::new();
     let fields = [
         "metric",
@@ -142,7 +142,7 @@ fn columns() -> Vec<CsvColumn> {
 }
 
 /// Adds the columns of a risk-coverage curve; `acc_at_97` is the Acc of the 97 % most confident results.
-fn push_risk_coverage(columns: &mut Vec<CsvColumn>, prefix: &str, parent: &str) {
+fn push_risk_coverage(columns: &mut Vec<CsvField>, prefix: &str, parent: &str) {
     let counts = [
         ("n".to_owned(), "n"),
         ("failures".to_owned(), "failures"),
@@ -175,7 +175,7 @@ fn push_risk_coverage(columns: &mut Vec<CsvColumn>, prefix: &str, parent: &str) 
 }
 
 /// Adds the fields of one JSON object.
-fn push_all(columns: &mut Vec<CsvColumn>, prefix: &str, parent: &str, fields: &[&str]) {
+fn push_all(columns: &mut Vec<CsvField>, prefix: &str, parent: &str, fields: &[&str]) {
     for field in fields {
         push(
             columns,
@@ -186,20 +186,20 @@ fn push_all(columns: &mut Vec<CsvColumn>, prefix: &str, parent: &str, fields: &[
 }
 
 /// Adds a column, or two for the bounds of an interval.
-fn push(columns: &mut Vec<CsvColumn>, name: String, pointer: String) {
+fn push(columns: &mut Vec<CsvField>, name: String, pointer: String) {
     if !name.ends_with("ci95") {
-        columns.push(CsvColumn { name, pointer });
+        columns.push(CsvField { name, pointer });
         return;
     }
     for (i, bound) in ["low", "high"].into_iter().enumerate() {
-        columns.push(CsvColumn {
+        columns.push(CsvField {
             name: format!("{name}_{bound}"),
             pointer: format!("{pointer}/{i}"),
         });
     }
 }
 
-fn field(document: &Value, column: &CsvColumn) -> String {
+fn field(document: &Value, column: &CsvField) -> String {
     match document.pointer(&column.pointer) {
         Some(Value::String(text)) => escape(text),
         Some(Value::Number(number)) => match (number.as_u64(), number.as_f64()) {

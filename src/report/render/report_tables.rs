@@ -3,12 +3,12 @@
 use super::comparison_tables::mean_intervals;
 use super::table::Table;
 use crate::domain::Reason;
-use crate::report::ground_truth::TruthSummary;
 use crate::report::manual_alignment::ManualAlignmentErrors;
 use crate::report::model::{MetricRow, Report};
 use crate::report::number_format::NumberStyle::{Degrees, Milliseconds, Percent, Seconds};
 use crate::report::number_format::{counted, format_count};
 use crate::report::stats::Rate;
+use crate::report::truth_summary::TruthSummary;
 
 /// Returns the tables a report calls for: scores always, others where there is something to show.
 pub(super) fn tables(report: &Report) -> Vec<Table> {
