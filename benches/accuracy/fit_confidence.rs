@@ -9,8 +9,9 @@
 use std::fmt::Write as _;
 
 use mocban::report::ground_truth::{
-    MAX_ANGLE_DEG, MAX_TRE_PCT, MIN_MASK_IOU, TruthErrors, TruthRecord, tops_iou,
+    MAX_ANGLE_DEG, MAX_TRE_PCT, MIN_MASK_IOU, TruthErrors, TruthRecord,
 };
+use mocban::report::tops_iou;
 use mocban::stages::AlignedPair;
 use mocban::stages::register::ConfidenceInputs;
 use nalgebra::{DMatrix, DVector};
