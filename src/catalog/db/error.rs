@@ -101,6 +101,14 @@ pub enum CatalogError {
     /// The reviewer has no verdict left to undo.
     #[error("there is no verdict of {0} to take back")]
     NothingToUndo(String),
+    /// The counters do not add up to the number of jobs.
+    #[error("the counters add up to {counted} jobs, but there are {jobs}")]
+    WrongCounters {
+        /// Sum of the counters.
+        counted: u64,
+        /// Number of jobs.
+        jobs: u64,
+    },
     /// A row that violates the schema's rules.
     #[error("the catalog holds a row it must not: {0}")]
     Corrupt(String),

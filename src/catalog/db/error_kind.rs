@@ -53,6 +53,7 @@ impl CatalogError {
             Self::Database(error) | Self::Migrate(sqlx::migrate::MigrateError::Execute(error)) => {
                 CatalogErrorKind::of(error)
             }
+            Self::WrongCounters { .. } => Some(CatalogErrorKind::Contradiction),
             Self::Shared(error) => error.kind(),
             _ => None,
         }

@@ -107,7 +107,9 @@ impl Catalog {
             let mut conn = self.snapshot().await?;
             let current = current_json(&mut conn, fingerprints).await?;
             let chains = FingerprintChains::load(&mut conn, fingerprints).await?;
-            (current, groups(&mut conn, &chains).await?)
+            let groups = groups(&mut conn, &chains).await?;
+            assert_complete(&mut conn, &groups).await?;
+            (current, groups)
         };
         let mut requeued = 0;
         for (group, _) in groups {
@@ -150,6 +152,19 @@ impl Catalog {
             })
         })
         .await
+    }
+}
+
+/// Refuses groups that do not cover all jobs: a wrong counter would hide stale ones.
+async fn assert_complete(conn: &mut SqliteConnection, groups: &[(StaleJob, u64)]) -> Result<()> {
+    let jobs: i64 = sqlx::query_scalar("SELECT count(*) FROM job")
+        .fetch_one(conn)
+        .await?;
+    let (jobs, counted) = (jobs.unsigned_abs(), groups.iter().map(|(_, n)| n).sum());
+    if counted == jobs {
+        Ok(())
+    } else {
+        Err(CatalogError::WrongCounters { counted, jobs })
     }
 }
 
