@@ -297,7 +297,7 @@ fn pairs_of_a_dead_process_are_recovered_at_once_by_the_only_process() {
         (&false.into(), &1.into())
     );
     let shown = mocban(dir, &["status"]).expect(0);
-    assert!(shown.out.contains("1 cut off"), "{}", shown.out);
+    assert!(shown.out.contains("1 interrupted"), "{}", shown.out);
     assert!(!shown.out.contains("running"), "{}", shown.out);
     let start = Instant::now();
     call(&mut run(&fixture.project, &[])).expect(0);
