@@ -110,8 +110,11 @@ fn files_are_short_enough_to_read_at_once() {
             }
         }
     }
-    let known: BTreeSet<String> = LONG_FILES.iter().map(|name| (*name).to_owned()).collect();
-    assert_eq!(long, known, "files of more than {MAX_LINES} lines");
+    long.retain(|name| !LONG_FILES.contains(&name.as_str()));
+    assert!(
+        long.is_empty(),
+        "files of more than {MAX_LINES} lines: {long:?}"
+    );
 }
 
 #[test]
