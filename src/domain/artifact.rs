@@ -1,4 +1,4 @@
-//! Names of files that stages leave behind: by content, so that the same bytes are one file.
+//! References to artifacts, the files that stages produce. They are named by content, so equal files are stored once.
 
 use std::collections::BTreeMap;
 
@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use super::ContentHash;
 
-/// One artifact: its content hash, its ending and its length.
+/// Reference to one artifact: content hash, extension and length.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ArtifactRef {
-    /// Hash of the bytes; also the file's name.
+    /// Hash of the bytes, which is also the file name.
     pub hash: ContentHash,
-    /// Ending of the file name without the dot, such as `png`.
+    /// File extension without the dot, such as `png`.
     pub ext: String,
     /// Length in bytes.
     pub bytes: u64,

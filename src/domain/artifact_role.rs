@@ -1,8 +1,8 @@
-//! Roles of artifacts: what a file that a stage left behind is for.
+//! Artifact roles: the purpose of each file that a stage produces.
 
 use super::ThresholdMetric;
 
-/// The depth map, 16 bits a pixel; from the depth stage.
+/// Depth map with 16 bits per pixel; from depth.
 pub const DEPTH: &str = "depth.png";
 /// The print mask on the canvas: 255 ink; from register.
 pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";

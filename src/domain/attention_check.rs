@@ -1,29 +1,29 @@
-//! What is shown to a reviewer only to test the reviewer.
+//! Attention checks: items of the review queue that measure how reliable a reviewer is.
 
 use serde::{Deserialize, Serialize};
 
-/// A planted fault, or a result shown a second time. Answers to them are no verdicts.
+/// A planted fault, or a result shown a second time. Answers to attention checks are not verdicts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum AttentionCheck {
-    /// A good result turned by so much, degrees clockwise on the screen.
+    /// A good result, rotated.
     Turned {
-        /// How far.
+        /// Rotation in degrees, clockwise on the screen.
         angle_deg: f64,
     },
-    /// A good result with the relief in mirror writing.
+    /// A good result with the relief mirrored.
     Mirrored,
-    /// A good result cut at another level of the depth map.
+    /// A good result with another threshold.
     Threshold {
-        /// Depth-map levels from this one up were shown as stroke.
+        /// Depth-map levels at or above this one were shown as stroke.
         level: u16,
     },
-    /// A result that the reviewer had judged before.
+    /// A result that the reviewer has judged before.
     Duplicate,
 }
 
 impl AttentionCheck {
-    /// Name in JSON and in the catalog.
+    /// Returns the name in JSON and in the catalog.
     pub const fn name(&self) -> &'static str {
         match self {
             Self::Turned { .. } => "turned",
@@ -33,7 +33,7 @@ impl AttentionCheck {
         }
     }
 
-    /// Whether it is a fault, so that a reviewer who fails it has caught it.
+    /// Returns whether it is a fault, which an attentive reviewer fails.
     pub const fn is_fault(&self) -> bool {
         match self {
             Self::Turned { .. } | Self::Mirrored | Self::Threshold { .. } => true,
@@ -48,18 +48,18 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn name_is_the_one_in_json() {
-        for control in [
+    fn name_equals_the_kind_in_json() {
+        for check in [
             AttentionCheck::Turned { angle_deg: -9.5 },
             AttentionCheck::Mirrored,
             AttentionCheck::Threshold { level: 7 },
             AttentionCheck::Duplicate,
         ] {
-            let value = json!(control);
-            assert_eq!(value["kind"], control.name());
+            let value = json!(check);
+            assert_eq!(value["kind"], check.name());
             assert_eq!(
                 serde_json::from_value::<AttentionCheck>(value).ok(),
-                Some(control)
+                Some(check)
             );
         }
     }

@@ -1,25 +1,25 @@
-//! Why a stage did not finish, and what that means for the pair.
+//! Failures of stages, by class.
 
 use serde::{Deserialize, Serialize};
 
-/// Class of a failure; it alone decides between retry and quarantine.
+/// Class of a failure. It decides between retry and quarantine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FailureClass {
-    /// The file itself is wrong: empty, truncated, not a number, no faces. Quarantined.
+    /// The input file is invalid: empty, truncated, NaN coordinates, no faces. Quarantined.
     BadInput,
-    /// The input is sound but the method found no answer, such as a plate without relief. Quarantined.
+    /// The input is valid, but the method finds no solution, as for a plate without relief. Quarantined.
     NoSolution,
-    /// Reading or writing failed, or a file is not there. Retried with back-off.
+    /// Reading or writing failed, or a file is missing. Retried with back-off.
     Io,
-    /// Too much memory or time. Retried alone, then quarantined.
+    /// The stage needs too much memory or time. Retried exclusively, then quarantined.
     Resource,
     /// A defect of this program, such as a caught panic. Quarantined.
     Bug,
 }
 
 impl FailureClass {
-    /// Every class.
+    /// All classes.
     pub const ALL: [Self; 5] = [
         Self::BadInput,
         Self::NoSolution,
@@ -28,7 +28,7 @@ impl FailureClass {
         Self::Bug,
     ];
 
-    /// Name in JSON, in the catalog and on the command line.
+    /// Returns the name in JSON, in the catalog and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::BadInput => "bad_input",
@@ -61,18 +61,18 @@ impl std::str::FromStr for FailureClass {
     }
 }
 
-/// A failure as it is stored and shown: its class and one sentence that names the file and the reason.
+/// A failure as it is stored and shown: its class and a message with the file and the reason.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{message}")]
 pub struct Failure {
-    /// Decides retry or quarantine.
+    /// Decides between retry and quarantine.
     pub class: FailureClass,
-    /// Lower-case fragment with the values in it.
+    /// Lower-case fragment with the values.
     pub message: String,
 }
 
 impl Failure {
-    /// A failure of a class with its sentence.
+    /// Returns a failure of a class with its message.
     pub fn new(class: FailureClass, message: impl Into<String>) -> Self {
         Self {
             class,

@@ -1,21 +1,28 @@
-//! What some bytes are, told from their first bytes: for choosing a reader and for saying why there is none.
+//! File type detection by signature, to choose a decoder and for error messages.
 
-/// Kind of a file by its content, never by its name.
+/// File type by content, never by name.
+///
+/// ```
+/// use mocban::domain::FileKind;
+///
+/// assert_eq!(FileKind::of(b"\x89PNG\r\n\x1a\n...."), FileKind::Png);
+/// assert_eq!(FileKind::of(b"%PDF-1.7").name(), "PDF document");
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FileKind {
     /// Portable Network Graphics.
     Png,
-    /// JPEG in any wrapping.
+    /// JPEG in any container.
     Jpeg,
     /// TIFF or `BigTIFF`, either byte order.
     Tiff,
-    /// An image format that is not read.
+    /// An unsupported image format.
     OtherImage(&'static str),
     /// A mesh in the Stanford polygon format.
     Ply,
-    /// A 3D format that is not read.
+    /// An unsupported 3D format.
     OtherMesh(&'static str),
-    /// Anything else with a known signature.
+    /// Another format with a known signature.
     Other(&'static str),
     /// Printable text without a signature.
     Text,
@@ -55,7 +62,7 @@ const SIGNATURES: [(&[u8], FileKind); 28] = [
 ];
 
 impl FileKind {
-    /// Kind of a file that begins with these bytes.
+    /// Returns the type of a file that begins with these bytes.
     pub fn of(bytes: &[u8]) -> Self {
         if bytes.starts_with(b"RIFF") && bytes.get(8..12) == Some(b"WEBP") {
             return Self::OtherImage("a WebP image");
@@ -85,7 +92,7 @@ impl FileKind {
         }
     }
 
-    /// The kind in words, to stand after "the file is".
+    /// Returns a description that completes "the file is".
     pub const fn description(self) -> &'static str {
         match self {
             Self::Png => "a PNG image",
@@ -98,11 +105,11 @@ impl FileKind {
         }
     }
 
-    /// The kind in words without an article.
+    /// Returns the description without the article.
     pub fn name(self) -> &'static str {
-        let words = self.description();
-        let bare = words.strip_prefix("a ").or(words.strip_prefix("an "));
-        bare.unwrap_or(words)
+        let text = self.description();
+        let name = text.strip_prefix("a ").or(text.strip_prefix("an "));
+        name.unwrap_or(text)
     }
 }
 
@@ -117,7 +124,7 @@ mod tests {
     use super::FileKind;
 
     #[test]
-    fn kinds_are_told_by_content() {
+    fn types_are_detected_by_content() {
         assert_eq!(FileKind::of(b"\x89PNG\r\n\x1a\n...."), FileKind::Png);
         assert_eq!(FileKind::of(b"\xff\xd8\xff\xe0"), FileKind::Jpeg);
         assert_eq!(FileKind::of(b"MM\0*rest"), FileKind::Tiff);

@@ -1,39 +1,47 @@
-//! BLAKE3 hashes that name contents: input files, artifacts, fingerprints, results.
+//! BLAKE3 hashes that identify contents: input files, artifacts, fingerprints, results.
 
 use serde::{Deserialize, Serialize};
 
 /// A 256-bit BLAKE3 hash; 64 lower-case hexadecimal digits in text.
+///
+/// ```
+/// use mocban::domain::ContentHash;
+///
+/// let hash = ContentHash::of(b"mocban");
+/// assert_eq!(hash.to_hex().parse(), Ok(hash));
+/// assert!(hash.to_hex().starts_with(&hash.short()));
+/// ```
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct ContentHash([u8; 32]);
 
-/// Text that is not 64 hexadecimal digits.
+/// The text is not 64 hexadecimal digits.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{0:?} is not a hash of 64 hexadecimal digits")]
 pub struct ContentHashError(String);
 
 impl ContentHash {
-    /// Hash of some bytes.
+    /// Computes the hash of the bytes.
     pub fn of(bytes: &[u8]) -> Self {
         Self(*blake3::hash(bytes).as_bytes())
     }
 
-    /// From the 32 bytes themselves, as the catalog stores them.
+    /// Wraps the 32 bytes of a hash, as the catalog stores them.
     pub const fn from_bytes(bytes: [u8; 32]) -> Self {
         Self(bytes)
     }
 
-    /// The 32 bytes.
+    /// Returns the 32 bytes.
     pub const fn as_bytes(&self) -> &[u8; 32] {
         &self.0
     }
 
-    /// 64 hexadecimal digits.
+    /// Returns 64 hexadecimal digits.
     pub fn to_hex(self) -> String {
         blake3::Hash::from_bytes(self.0).to_hex().to_string()
     }
 
-    /// The first twelve digits: enough for a person to tell two results apart.
+    /// Returns the first 12 digits, which suffice to distinguish results in messages.
     pub fn short(self) -> String {
         self.to_hex()[..12].to_owned()
     }

@@ -1,41 +1,48 @@
-//! Identities: the user's name of a pair, and the catalog's numbers.
+//! Identifiers: the user's id of a pair, and row ids of the catalog.
 
 use serde::{Deserialize, Serialize};
 
 use super::sanitize;
 
-/// A pair's number in the catalog.
+/// Row id of a pair in the catalog.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct PairId(pub i64);
 
-/// One start of a worker process; never used again.
+/// Row id of one start of a worker process; never reused.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct WorkerId(pub i64);
 
-/// The user's id of a pair: 1 to 128 characters of `[A-Za-z0-9_-]`, so that it can be a file name everywhere.
+/// The user's id of a pair: 1 to 128 characters of `[A-Za-z0-9_-]`, so that it is a valid file name on every system.
+///
+/// ```
+/// use mocban::domain::PairName;
+///
+/// assert_eq!(PairName::new("b01_0002").map(|name| name.to_string()), Ok("b01_0002".to_owned()));
+/// assert!(PairName::new("b01/0002").is_err());
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct PairName(String);
 
-/// An id that cannot be a file name.
+/// Why an id is not valid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum PairNameError {
-    /// No characters at all.
+    /// The id is empty.
     #[error("the id is empty")]
     Empty,
-    /// A character outside `[A-Za-z0-9_-]`.
+    /// The id has a character outside `[A-Za-z0-9_-]`.
     #[error("id \"{shown}\" holds {1:?}; an id is made of letters A-Z, digits, _ and -", shown = sanitize(.0, 48))]
     Character(String, char),
-    /// Longer than a file name may be with our endings.
+    /// The id is too long for file names derived from it.
     #[error("id of {0} characters is longer than 128")]
     TooLong(usize),
 }
 
 impl PairName {
-    /// Longest id in characters.
+    /// Maximum length in characters.
     pub const MAX_LEN: usize = 128;
 
-    /// Checks an id.
+    /// Validates an id.
     ///
     /// # Errors
     /// When it is empty, too long, or holds a character that is not allowed.
@@ -55,7 +62,7 @@ impl PairName {
         Ok(Self(text.to_owned()))
     }
 
-    /// The id as typed.
+    /// Returns the id.
     pub fn as_str(&self) -> &str {
         &self.0
     }
@@ -94,10 +101,10 @@ mod tests {
     use super::{PairName, PairNameError};
 
     #[test]
-    fn a_refused_id_is_shown_plain_and_short() {
-        for rude in ["a\u{1b}[2J".to_owned(), "\u{e9}".repeat(60)] {
-            let refused = PairName::new(&rude).expect_err("a refusal").to_string();
-            assert!(!refused.contains(&rude), "{refused:?}");
+    fn an_invalid_id_is_shown_sanitized_and_short() {
+        for text in ["a\u{1b}[2J".to_owned(), "\u{e9}".repeat(60)] {
+            let refused = PairName::new(&text).expect_err("an error").to_string();
+            assert!(!refused.contains(&text), "{refused:?}");
         }
     }
 

@@ -1,4 +1,4 @@
-//! Nouns of the project: small values without files, SQL, async or image buffers.
+//! Domain types: small values without files, SQL, async code or image buffers.
 
 mod artifact;
 pub mod artifact_role;
@@ -38,5 +38,5 @@ pub use transform::{Affine2, PrintFromMesh, Rigid3};
 pub use unit::LengthUnit;
 pub use verdict::{Reason, Verdict};
 
-/// Milliseconds since the Unix epoch. "Now" is always an argument.
+/// Milliseconds since the Unix epoch. The current time is always passed as an argument.
 pub type UnixMillis = i64;

@@ -1,24 +1,24 @@
-//! In which order results come to a reviewer.
+//! Order of the review queue.
 
 use serde::{Deserialize, Serialize};
 
-/// The order of a review.
+/// Order in which results are reviewed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ReviewOrder {
-    /// By lot from a seed: what was read so far stands for all.
+    /// Seeded shuffle; the results reviewed so far are a random sample.
     Random,
-    /// the least confident first, to find failures: what was read so far does not stand for all.
+    /// Least confident first, to find failures; the results reviewed so far are not a representative sample.
     LeastConfident,
-    /// Only what other reviewers contradict each other on.
+    /// Only results on which other reviewers disagree.
     Adjudicate,
 }
 
 impl ReviewOrder {
-    /// Every order.
+    /// All orders.
     pub const ALL: [Self; 3] = [Self::Random, Self::LeastConfident, Self::Adjudicate];
 
-    /// Name in JSON and in the catalog.
+    /// Returns the name in JSON and in the catalog.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Random => "random",

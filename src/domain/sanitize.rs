@@ -1,14 +1,21 @@
-//! Words out of files, as they may stand in a message.
+//! Sanitizing of text from files before it is printed.
 
-/// The beginning of a text on one line: what a screen would not show, or would obey, comes as an escape; what is
-/// longer than `most` characters, escapes counted as they are shown, ends in three dots.
+/// Returns a text on one line, safe for terminals: control and invisible characters become escapes. A text longer than
+/// `most` characters, with escapes counted as displayed, is cut and ends in three dots.
+///
+/// ```
+/// use mocban::domain::sanitize;
+///
+/// assert_eq!(sanitize("a\tb\u{1b}[2J", 40), "a b\\u{1b}[2J");
+/// assert_eq!(sanitize("abcdef", 3), "abc...");
+/// ```
 pub fn sanitize(text: &str, most: usize) -> String {
     let (mut shown, mut count) = (String::new(), 0);
     for c in text.chars() {
         let piece = match c {
             '"' | '\'' | '\\' => c.to_string(),
             '\n' | '\r' | '\t' => " ".to_owned(),
-            // Behind another character, so that an accent over a letter stays one.
+            // Escaped after another character, so that a combining accent is kept.
             _ => format!(".{c}").escape_debug().skip(1).collect(),
         };
         count += piece.chars().count();
@@ -26,7 +33,7 @@ mod tests {
     use super::sanitize;
 
     #[test]
-    fn what_is_shown_is_one_short_line_without_commands_to_the_screen() {
+    fn text_becomes_one_short_line_without_control_characters() {
         assert_eq!(
             sanitize("rows of Tr\u{1ea7}n \"\u{660e}\"", 40),
             "rows of Tr\u{1ea7}n \"\u{660e}\""

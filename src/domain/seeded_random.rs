@@ -1,34 +1,45 @@
-//! Chance that comes out the same every time.
+//! Reproducible random numbers.
 
 use super::ContentHash;
 
-/// A lot drawn for a thing: the same for the same seed, person, thing and purpose.
+/// Random numbers that depend only on seed, name, subject and purpose, not on the order in which they are drawn.
+///
+/// ```
+/// use mocban::domain::{ContentHash, SeededRandom};
+///
+/// let random = SeededRandom::new(7, "lan");
+/// let subject = ContentHash::of(b"a result");
+/// let number = random.draw(&subject, "order");
+/// assert!((0.0..1.0).contains(&number));
+/// assert_eq!(number, SeededRandom::new(7, "lan").draw(&subject, "order"));
+/// assert_ne!(number, random.draw(&subject, "another purpose"));
+/// ```
 #[derive(Debug, Clone)]
 pub struct SeededRandom {
     seed: u64,
-    who: String,
+    name: String,
 }
 
 impl SeededRandom {
-    /// Random numbers of a seed for a reviewer, or for whoever draws.
-    pub fn new(seed: u64, who: &str) -> Self {
+    /// Returns the random numbers of a seed and a name, such as the reviewer's.
+    pub fn new(seed: u64, name: &str) -> Self {
         Self {
             seed,
-            who: who.to_owned(),
+            name: name.to_owned(),
         }
     }
 
-    /// A number from 0 up to 1, evenly.
-    pub fn draw(&self, thing: &ContentHash, purpose: &str) -> f64 {
+    /// Returns a number in 0..1, uniformly distributed.
+    pub fn draw(&self, subject: &ContentHash, purpose: &str) -> f64 {
         let mut bytes = self.seed.to_le_bytes().to_vec();
-        for part in [self.who.as_bytes(), thing.as_bytes(), purpose.as_bytes()] {
+        for part in [self.name.as_bytes(), subject.as_bytes(), purpose.as_bytes()] {
             bytes.extend((part.len() as u64).to_le_bytes());
             bytes.extend(part);
         }
         let hash = ContentHash::of(&bytes);
         let mut head = [0; 8];
         head.copy_from_slice(&hash.as_bytes()[..8]);
-        // 53 bits fill the fraction of an f64.
+        // An f64 has a 53-bit significand.
         (u64::from_le_bytes(head) >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
@@ -39,11 +50,11 @@ mod tests {
     use crate::domain::ContentHash;
 
     #[test]
-    fn lots_fall_evenly() {
-        let lots = SeededRandom::new(7, "ana");
+    fn numbers_are_uniform() {
+        let random = SeededRandom::new(7, "ana");
         let low = (0..2000_u32).filter(|i| {
-            let thing = ContentHash::of(&i.to_le_bytes());
-            lots.draw(&thing, "control") < 0.25
+            let subject = ContentHash::of(&i.to_le_bytes());
+            random.draw(&subject, "control") < 0.25
         });
         let low = low.count();
         assert!((430..570).contains(&low), "{low}");

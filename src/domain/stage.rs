@@ -1,8 +1,15 @@
-//! The four stages a pair goes through, in order.
+//! The four stages of the pipeline, in order.
 
 use serde::{Deserialize, Serialize};
 
-/// A stage of the pipeline. The order of the variants is the order of the work.
+/// A stage of the pipeline. Variants are in processing order.
+///
+/// ```
+/// use mocban::domain::Stage;
+///
+/// assert_eq!(Stage::Fit.next(), Some(Stage::Depth));
+/// assert_eq!(Stage::Register.next(), None);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Stage {
@@ -17,25 +24,25 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// Every stage in order.
+    /// All stages in order.
     pub const ALL: [Self; 4] = [Self::Fit, Self::Depth, Self::Normalize, Self::Register];
 
-    /// Position in the order, 0..4: the cursor value of a job whose next stage this is.
+    /// Returns the position in the order, 0 to 3: the cursor of a job whose next stage this is.
     pub const fn index(self) -> usize {
         self as usize
     }
 
-    /// The stage at a cursor; `None` when all four are behind it.
+    /// Returns the stage at a cursor; `None` after the last stage.
     pub fn from_index(index: usize) -> Option<Self> {
         Self::ALL.get(index).copied()
     }
 
-    /// The stage after this one, if there is one.
+    /// Returns the next stage, or `None` after the last.
     pub fn next(self) -> Option<Self> {
         Self::from_index(self.index() + 1)
     }
 
-    /// Lower-case name, as typed on the command line and written to JSON.
+    /// Returns the lower-case name used on the command line and in JSON.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Fit => "fit",
@@ -68,7 +75,7 @@ mod tests {
     use super::Stage;
 
     #[test]
-    fn index_and_name_lead_back_to_the_stage() {
+    fn index_and_name_round_trip() {
         for stage in Stage::ALL {
             assert_eq!(Stage::from_index(stage.index()), Some(stage));
             assert_eq!(stage.name().parse(), Ok(stage));

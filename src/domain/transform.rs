@@ -1,19 +1,35 @@
 //! Maps between frames, named `to_from_from`: mesh, plane, depth map, print image, canvas.
 //!
 //! Matrices are row-major and act on column vectors. Pixel frames have x to the right, y down, and (0, 0) at the
-//! centre of the top-left pixel, so a positive angle turns clockwise on the screen.
+//! centre of the top-left pixel, so a positive angle is a clockwise rotation on the screen.
 
 use serde::{Deserialize, Serialize};
 
-/// An affine map of the plane: two rows of three.
+/// An affine map of the plane as a 2x3 matrix.
+///
+/// ```
+/// use mocban::domain::Affine2;
+///
+/// let depth_from_plane = Affine2::scale_shift(40.0, [100.0, 90.0]);
+/// let print_from_depth = Affine2::similarity(0.5, 90_f64.to_radians(), [10.0, 20.0]);
+/// let print_from_plane = print_from_depth.after(&depth_from_plane);
+/// let [x, y] = print_from_plane.apply([0.0, 0.0]);
+/// assert!((x - -35.0).abs() < 1e-9 && (y - 70.0).abs() < 1e-9);
+///
+/// assert!((print_from_plane.angle_deg() - 90.0).abs() < 1e-9);
+/// assert!((print_from_plane.scale() - 20.0).abs() < 1e-9);
+/// let plane_from_print = print_from_plane.inverse().expect("a similarity is invertible");
+/// let [x, y] = plane_from_print.apply([x, y]);
+/// assert!(x.abs() < 1e-9 && y.abs() < 1e-9);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Affine2(pub [[f64; 3]; 2]);
 
 impl Affine2 {
-    /// The map that changes nothing.
+    /// The identity.
     pub const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
 
-    /// Turn by `angle_rad` (clockwise on the screen), scale, then shift.
+    /// Returns the similarity that rotates by `angle_rad` (clockwise on the screen), scales, then shifts.
     pub fn similarity(scale: f64, angle_rad: f64, shift: [f64; 2]) -> Self {
         let (sin, cos) = angle_rad.sin_cos();
         Self([
@@ -22,18 +38,18 @@ impl Affine2 {
         ])
     }
 
-    /// Scale, then shift.
+    /// Returns the map that scales, then shifts.
     pub fn scale_shift(scale: f64, shift: [f64; 2]) -> Self {
         Self([[scale, 0.0, shift[0]], [0.0, scale, shift[1]]])
     }
 
-    /// Where a point goes.
+    /// Maps a point.
     pub fn apply(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [a, b] = self.0;
         [a[0] * x + a[1] * y + a[2], b[0] * x + b[1] * y + b[2]]
     }
 
-    /// `c_from_b.after(&b_from_a)` is `c_from_a`.
+    /// Composes two maps: `c_from_b.after(&b_from_a)` is `c_from_a`.
     #[must_use]
     pub fn after(&self, first: &Self) -> Self {
         let [a, b] = self.0;
@@ -48,12 +64,12 @@ impl Affine2 {
         Self([row(a), row(b)])
     }
 
-    /// Determinant of the linear part: negative for a map that mirrors.
+    /// Returns the determinant of the linear part; negative for a reflection.
     pub fn determinant(&self) -> f64 {
         self.0[0][0] * self.0[1][1] - self.0[0][1] * self.0[1][0]
     }
 
-    /// The map back; `None` when this one flattens the plane.
+    /// Returns the inverse; `None` for a singular map.
     pub fn inverse(&self) -> Option<Self> {
         let det = self.determinant();
         if !det.is_finite() || det == 0.0 {
@@ -66,17 +82,17 @@ impl Affine2 {
         ]))
     }
 
-    /// Pixels of a picture so wide to those of its mirror image, left and right changed.
+    /// Returns the horizontal reflection of an image of the given width.
     pub fn mirror(width_px: u32) -> Self {
         Self([[-1.0, 0.0, f64::from(width_px) - 1.0], [0.0, 1.0, 0.0]])
     }
 
-    /// Square root of the area factor.
+    /// Returns the scale: the square root of the factor by which areas change.
     pub fn scale(&self) -> f64 {
         self.determinant().abs().sqrt()
     }
 
-    /// Turn of the x axis in degrees, in (-180, 180], positive clockwise on the screen.
+    /// Returns the rotation of the x axis in degrees, in (-180, 180], positive clockwise on the screen.
     pub fn angle_deg(&self) -> f64 {
         let angle = self.0[1][0].atan2(self.0[0][0]).to_degrees();
         if angle <= -180.0 {
@@ -87,12 +103,22 @@ impl Affine2 {
     }
 }
 
-/// A rigid motion of space as a 4x4 matrix, such as `plane_from_mesh`.
+/// A rigid transform of space as a 4x4 matrix, such as `plane_from_mesh`.
+///
+/// ```
+/// use mocban::domain::Rigid3;
+///
+/// // x of the new frame is y of the old one, and so on; the origin is at [1, 2, 3].
+/// let axes = [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]];
+/// let plane_from_mesh = Rigid3::to_frame(axes, [1.0, 2.0, 3.0]);
+/// assert_eq!(plane_from_mesh.apply([1.0, 2.5, 3.0]), [0.5, 0.0, 0.0]);
+/// assert_eq!(plane_from_mesh.inverse().apply([0.5, 0.0, 0.0]), [1.0, 2.5, 3.0]);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Rigid3(pub [[f64; 4]; 4]);
 
 impl Rigid3 {
-    /// The motion that takes `origin` to zero and the three unit `axes` (right-handed) to x, y, z.
+    /// Returns the transform that maps `origin` to zero and the right-handed unit `axes` to x, y, z.
     pub fn to_frame(axes: [[f64; 3]; 3], origin: [f64; 3]) -> Self {
         let row = |axis: [f64; 3]| {
             let shift = -(axis[0] * origin[0] + axis[1] * origin[1] + axis[2] * origin[2]);
@@ -106,20 +132,20 @@ impl Rigid3 {
         ])
     }
 
-    /// Where a point goes.
+    /// Maps a point.
     pub fn apply(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let dot = |r: [f64; 4]| r[0] * x + r[1] * y + r[2] * z + r[3];
         [dot(self.0[0]), dot(self.0[1]), dot(self.0[2])]
     }
 
-    /// This motion after another.
+    /// Composes two transforms: `c_from_b.after(&b_from_a)` is `c_from_a`.
     #[must_use]
     pub fn after(&self, first: &Self) -> Self {
         let cell = |i: usize, j: usize| (0..4).map(|k| self.0[i][k] * first.0[k][j]).sum();
         Self(std::array::from_fn(|i| std::array::from_fn(|j| cell(i, j))))
     }
 
-    /// The motion back: the transpose of the rotation.
+    /// Returns the inverse, by transposing the rotation.
     #[must_use]
     pub fn inverse(&self) -> Self {
         let m = &self.0;
@@ -135,8 +161,8 @@ impl Rigid3 {
     }
 }
 
-/// The product of the whole system, 3x4: rows 1 and 2 give the print pixel of a mesh point `[X Y Z 1]`, row 3
-/// its height over the character plane in mesh units.
+/// The result of the pipeline, a 3x4 matrix: rows 1 and 2 give the print pixel of a mesh point `[X Y Z 1]`, row 3 its
+/// height over the character plane in mesh units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PrintFromMesh(pub [[f64; 4]; 3]);
 
@@ -160,7 +186,7 @@ impl PrintFromMesh {
         Self([row(a), row(b), m[2]])
     }
 
-    /// Print pixel x, y and height over the plane of a mesh point.
+    /// Maps a mesh point to print pixel x, y and height over the plane in mesh units.
     pub fn apply(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let dot = |r: [f64; 4]| r[0] * x + r[1] * y + r[2] * z + r[3];
         [dot(self.0[0]), dot(self.0[1]), dot(self.0[2])]
@@ -176,14 +202,14 @@ mod tests {
     }
 
     #[test]
-    fn positive_angle_turns_right_to_down() {
-        let turn = Affine2::similarity(1.0, std::f64::consts::FRAC_PI_2, [0.0, 0.0]);
-        assert!(close(&turn.apply([1.0, 0.0]), &[0.0, 1.0]));
-        assert!((turn.angle_deg() - 90.0).abs() < 1e-12);
+    fn positive_angle_rotates_right_to_down() {
+        let rotation = Affine2::similarity(1.0, std::f64::consts::FRAC_PI_2, [0.0, 0.0]);
+        assert!(close(&rotation.apply([1.0, 0.0]), &[0.0, 1.0]));
+        assert!((rotation.angle_deg() - 90.0).abs() < 1e-12);
     }
 
     #[test]
-    fn inverse_leads_back() {
+    fn inverse_undoes_the_map() {
         let there = Affine2::similarity(2.5, 0.7, [3.0, -4.0]);
         let back = there.inverse().expect("a similarity has an inverse");
         assert!(close(&back.after(&there).apply([5.0, 6.0]), &[5.0, 6.0]));
@@ -208,10 +234,10 @@ mod tests {
         );
         let depth_from_plane = Affine2([[-40.0, 0.0, 100.0], [0.0, 40.0, 90.0]]);
         let print_from_depth = Affine2::similarity(0.3, -0.2, [5.0, 6.0]);
-        let whole = PrintFromMesh::new(&print_from_depth, &depth_from_plane, &plane_from_mesh);
+        let product = PrintFromMesh::new(&print_from_depth, &depth_from_plane, &plane_from_mesh);
         let point = [1.5, 2.25, 2.0];
         let [x, y, z] = plane_from_mesh.apply(point);
         let [u, v] = print_from_depth.apply(depth_from_plane.apply([x, y]));
-        assert!(close(&whole.apply(point), &[u, v, z]));
+        assert!(close(&product.apply(point), &[u, v, z]));
     }
 }

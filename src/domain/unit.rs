@@ -1,8 +1,16 @@
-//! Length units a mesh may be given in.
+//! Length units of meshes.
 
 use serde::{Deserialize, Serialize};
 
-/// Unit of a mesh's coordinates. A mesh of unknown unit has none, and nothing in mm is said of it.
+/// Unit of a mesh's coordinates. Without a unit, no lengths in mm are reported.
+///
+/// ```
+/// use mocban::domain::LengthUnit;
+///
+/// let unit: LengthUnit = "in".parse()?;
+/// assert_eq!(unit.mm(), 25.4);
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LengthUnit {
@@ -17,10 +25,10 @@ pub enum LengthUnit {
 }
 
 impl LengthUnit {
-    /// Every unit.
+    /// All units.
     pub const ALL: [Self; 4] = [Self::Mm, Self::Cm, Self::M, Self::In];
 
-    /// Millimetres in one of this unit.
+    /// Returns the length of one unit in millimetres.
     pub const fn mm(self) -> f64 {
         match self {
             Self::Mm => 1.0,
@@ -30,7 +38,7 @@ impl LengthUnit {
         }
     }
 
-    /// Name in manifests and sidecars.
+    /// Returns the name in manifests and sidecar files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Mm => "mm",

@@ -6,19 +6,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// Angle within about 5 degrees and the character whole (the paper's rule).
+    /// Angle within about 5 degrees and all strokes present (the paper's criterion).
     Pass,
-    /// The rule does not hold.
+    /// The criterion is not met.
     Fail,
-    /// The reviewer cannot tell; counted apart, never as a pass or a fail.
+    /// The reviewer cannot decide; counted separately, never as a pass or a fail.
     Unsure,
 }
 
 impl Verdict {
-    /// Every verdict.
+    /// All verdicts.
     pub const ALL: [Self; 3] = [Self::Pass, Self::Fail, Self::Unsure];
 
-    /// Name in JSON, in the catalog and on the command line.
+    /// Returns the name in JSON, in the catalog and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Pass => "pass",
@@ -49,22 +49,22 @@ impl std::str::FromStr for Verdict {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {
-    /// Turned by more than about 5 degrees.
+    /// Rotated by more than about 5 degrees.
     Angle,
-    /// The threshold cut strokes away.
+    /// The threshold removes strokes.
     StrokesLost,
-    /// The threshold let the ground in.
+    /// The threshold includes background.
     BackgroundIn,
-    /// Shifted or scaled wrongly.
+    /// Wrong shift or scale.
     ShiftOrScale,
-    /// Reads in mirror writing.
+    /// The relief is mirrored.
     Mirrored,
     /// Mesh and print are of different characters, or one is unusable.
     WrongPair,
 }
 
 impl Reason {
-    /// Every reason, in the order of the keys 1 to 6.
+    /// All reasons, in the order of the keys 1 to 6.
     pub const ALL: [Self; 6] = [
         Self::Angle,
         Self::StrokesLost,
@@ -74,7 +74,7 @@ impl Reason {
         Self::WrongPair,
     ];
 
-    /// Name in JSON, in the catalog and on the command line.
+    /// Returns the name in JSON, in the catalog and on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Angle => "angle",
@@ -86,12 +86,12 @@ impl Reason {
         }
     }
 
-    /// In words.
+    /// Returns the name for tables and messages.
     pub const fn title(self) -> &'static str {
         match self {
             Self::Angle => "angle",
             Self::StrokesLost => "strokes lost",
-            Self::BackgroundIn => "ground in",
+            Self::BackgroundIn => "background included",
             Self::ShiftOrScale => "shift or scale",
             Self::Mirrored => "mirrored",
             Self::WrongPair => "wrong pair",
