@@ -1,69 +1,69 @@
-// The page put together: what each key and button does.
+// Connects the parts of the page: what each key and button does.
 
-import { leastViewMs, language, queue, say } from "./boot.js";
-import { Correction } from "./correction.js";
-import { Deck } from "./deck.js";
-import { label, listen } from "./keys.js";
-import { Outbox } from "./outbox.js";
-import { pictures } from "./pictures.js";
-import * as screen from "./screen.js";
-import { Stage } from "./stage.js";
+import { AlignmentEditor } from "./alignment-editor.js";
+import { minViewMs, reviewOrder, translate } from "./config.js";
+import { images } from "./image-cache.js";
+import { labelKeys, listen } from "./keyboard.js";
+import { ReviewQueue } from "./queue.js";
+import { RetryQueue } from "./retry-queue.js";
+import * as ui from "./ui.js";
+import { Viewer } from "./viewer.js";
 
-const AHEAD = 5;
+const PREFETCH = 5;
 const HISTORY = 24;
 const MODES = ["two_up", "overlay", "edges", "onion", "checker", "difference", "reveal"];
 const REASONS = ["angle", "strokes_lost", "background_in", "shift_or_scale", "mirrored", "wrong_pair"];
 
-const deck = new Deck();
-const stage = new Stage(document.getElementById("canvas"));
+const queue = new ReviewQueue();
+const viewer = new Viewer(document.getElementById("canvas"));
 const reviewer = document.querySelector("header b").textContent;
-const outbox = new Outbox(reviewer, saved, refused);
+const requests = new RetryQueue(reviewer, onSaveState, onRejected);
 const times = [];
 let shownAt = null;
 let note = null;
-let correction = null;
+let editor = null;
 
-/** What is on its way, and why it does not arrive; the end says whether everything did. */
-function saved(waiting, trouble) {
-  // A try that fails again must not cover why no more is taken.
-  screen.saved(waiting, trouble === "lost" && outbox.isFull ? "blocked" : trouble);
-  if (deck.items.length > 0 && !deck.current) screen.head(null, deck, waiting);
+/** Shows how many requests are pending and why; updates the end text. */
+function onSaveState(pendingCount, problem) {
+  // A further failed attempt must not hide the reason why no answer is accepted.
+  ui.saveState(pendingCount, problem === "disconnected" && requests.isFull ? "blocked" : problem);
+  if (queue.items.length > 0 && !queue.current) ui.heading(null, queue, pendingCount);
 }
 
-/** Shows the current card; it is there at once when it was decoded ahead. */
+/** Shows the current item, at once if its images are prefetched. */
 async function show(pressedAt) {
-  const item = deck.current;
-  leaveCorrection();
+  const item = queue.current;
+  closeEditor();
   note = item?.answer?.note ?? null;
   shownAt = null;
-  const found = item && pictures(item.id);
-  if (found?.ready) return picture(item, found.ready, pressedAt);
-  stage.clear();
-  around(item, null);
-  if (!item) return screen.tell(document.getElementById("pair").textContent);
+  const found = item && images(item.id);
+  if (found?.ready) return display(item, found.ready, pressedAt);
+  viewer.clear();
+  updateSurroundings(item, null);
+  if (!item) return ui.announce(document.getElementById("pair").textContent);
   try {
     const layers = await found.loading;
-    if (deck.current === item) picture(item, layers, pressedAt);
+    if (queue.current === item) display(item, layers, pressedAt);
   } catch (error) {
-    if (deck.current === item) screen.alert(say("no_picture", { why: error.message }));
+    if (queue.current === item) ui.alert(translate("no_image", { why: error.message }));
   }
 }
 
-/** The picture first; all that stands around it when it is on the screen. */
-function picture(item, layers, pressedAt) {
-  stage.show(layers);
+/** Draws the image first, and updates everything else after it is painted. */
+function display(item, layers, pressedAt) {
+  viewer.show(layers);
   afterPaint(() => {
-    if (deck.current !== item) return;
+    if (queue.current !== item) return;
     shownAt = performance.now();
     if (pressedAt) document.body.dataset.paintMs = String(Math.round(shownAt - pressedAt));
-    screen.measure(pressedAt ? say("painted", { ms: document.body.dataset.paintMs }) : "");
-    around(item, layers);
+    ui.paintTime(pressedAt ? translate("painted", { ms: document.body.dataset.paintMs }) : "");
+    updateSurroundings(item, layers);
     document.body.dataset.shown = item.id;
-    lookAhead(item);
+    prefetch(item);
   });
 }
 
-/** Calls back when what was drawn in this turn is on its way to the screen. */
+/** Calls `then` after the browser has painted the current frame. */
 function afterPaint(then) {
   requestAnimationFrame(() => {
     const { port1, port2 } = new MessageChannel();
@@ -72,228 +72,232 @@ function afterPaint(then) {
   });
 }
 
-function around(item, layers) {
-  if (!outbox.trouble) screen.calm();
-  screen.head(item, deck, outbox.waiting);
-  screen.history(deck, HISTORY, go);
-  screen.sides(layers);
-  screen.pace(times.slice(-200));
+function updateSurroundings(item, layers) {
+  if (!requests.problem) ui.hideAlert();
+  ui.heading(item, queue, requests.pendingCount);
+  ui.history(queue, HISTORY, go);
+  ui.sideImages(layers);
+  ui.pace(times.slice(-200));
   refresh();
 }
 
-/** Decodes what comes next; the page tells when all of it is there. */
-async function lookAhead(item) {
-  await Promise.allSettled(deck.ahead(AHEAD).map(({ id }) => pictures(id).loading));
-  document.body.dataset.ahead = item.id;
+/** Prefetches the images of the next items; the page is marked when all are there. */
+async function prefetch(item) {
+  await Promise.allSettled(queue.upcoming(PREFETCH).map(({ id }) => images(id).loading));
+  document.body.dataset.prefetched = item.id;
 }
 
-/** Marks what is on, in words and buttons. */
+/** Updates the active buttons and the caption. */
 function refresh() {
-  const on = new Set([stage.mode]);
-  for (const [name, isOn] of Object.entries(stage.overlays)) if (isOn) on.add(name);
-  if (stage.rocking) on.add("rock");
-  if (stage.lens.zoom > 1) on.add("zoom");
-  if (correction) on.add("correct");
-  const answer = deck.current?.answer;
+  const on = new Set([viewer.mode]);
+  for (const [name, isOn] of Object.entries(viewer.overlays)) if (isOn) on.add(name);
+  if (viewer.flickerTimer) on.add("auto_flicker");
+  if (viewer.viewport.zoom > 1) on.add("zoom");
+  if (editor) on.add("align");
+  const answer = queue.current?.answer;
   if (answer) on.add(answer.verdict).add(answer.reason);
   if (note) on.add("note");
-  screen.pressed(on);
-  screen.legend(correction ? [] : stage.legend(), underStage());
+  ui.markActive(on);
+  ui.legend(editor ? [] : viewer.legend(), caption());
 }
 
-/** What is said under the picture, besides what colours mean. */
-function underStage() {
-  if (correction) return `${correction.words()} — ${say("correct_hint")}`;
-  if (stage.turn) return say("turned_by", { deg: stage.turn.toFixed(2) });
-  const corrected = stage.layers && deck.current?.corrected;
-  return corrected ? screen.laid(corrected) : "";
+/** Returns the text below the image, apart from the legend. */
+function caption() {
+  if (editor) return `${editor.summary()} — ${translate("alignment_hint")}`;
+  if (viewer.rotation) return translate("rotated_by", { deg: viewer.rotation.toFixed(2) });
+  const alignment = viewer.layers && queue.current?.manual_alignment;
+  return alignment ? ui.alignmentText(alignment) : "";
 }
 
-function give(verdict, reason, pressedAt) {
-  const item = deck.current;
+function answer(verdict, reason, pressedAt) {
+  const item = queue.current;
   if (!item) return;
-  if (outbox.isFull) return screen.alert(say("blocked"));
-  if (shownAt === null || pressedAt - shownAt < leastViewMs) return screen.tell(say("too_soon"));
-  const body = { ...answerTo(item, verdict, reason), shown_ms: Math.round(pressedAt - shownAt) };
+  if (requests.isFull) return ui.alert(translate("blocked"));
+  if (shownAt === null || pressedAt - shownAt < minViewMs) return ui.announce(translate("too_soon"));
+  const body = { ...answerBody(item, verdict, reason), shown_ms: Math.round(pressedAt - shownAt) };
   times.push(body.shown_ms);
-  deck.answer(item, body);
-  deck.advance();
+  queue.answer(item, body);
+  queue.advance();
   show(pressedAt);
   send(item, body);
 }
 
-/** An answer as it stands on the page now. */
-function answerTo(item, verdict, reason) {
-  const turned = stage.turn === 0 ? null : Number(stage.turn.toFixed(2));
-  return { event: crypto.randomUUID(), item: item.id, verdict, reason, note, angle_read_deg: turned };
+/** Returns the answer to send, with the note and rotation currently on the page. */
+function answerBody(item, verdict, reason) {
+  const angle = viewer.rotation === 0 ? null : Number(viewer.rotation.toFixed(2));
+  return { event: crypto.randomUUID(), item: item.id, verdict, reason, note, angle_read_deg: angle };
 }
 
 function send(item, body) {
-  screen.tell(`${deck.name(item)}: ${screen.words(body)}`);
-  outbox.put("/api/answer", body).then(() => {
-    if (queue === "adjudicate") about(item);
+  ui.announce(`${queue.label(item)}: ${ui.answerText(body)}`);
+  requests.push("/api/answer", body).then(() => {
+    if (reviewOrder === "adjudicate") showDetails(item);
   });
 }
 
 function undo(pressedAt) {
-  const act = deck.last();
-  if (!act) return screen.tell(say("nothing_to_undo"));
-  if (outbox.isFull) return screen.alert(say("blocked"));
-  const item = deck.forget(act.event) ?? deck.items.find(({ id }) => id === act.id);
-  if (item) deck.goTo(item);
+  const last = queue.lastEvent();
+  if (!last) return ui.announce(translate("nothing_to_undo"));
+  if (requests.isFull) return ui.alert(translate("blocked"));
+  const item = queue.removeAnswer(last.event) ?? queue.items.find(({ id }) => id === last.id);
+  if (item) queue.goTo(item);
   show(pressedAt);
-  outbox.put("/api/undo", { event: act.event });
-  screen.tell(`${say("undone")}: ${item ? deck.name(item) : ""}`);
+  requests.push("/api/undo", { event: last.event });
+  ui.announce(`${translate("undone")}: ${item ? queue.label(item) : ""}`);
 }
 
-/** The server will never take it: the card is open again, and why is said. */
-function refused(letter, why) {
-  if (letter.path === "/api/answer") deck.forget(letter.body.event);
+/** Reopens the item of a request that the server rejected for good, and shows why. */
+function onRejected(request, why) {
+  if (request.path === "/api/answer") queue.removeAnswer(request.body.event);
   show();
-  screen.alert(say("was_refused", { why }));
+  ui.alert(translate("rejected", { why }));
 }
 
 function go(item) {
-  if (!deck.goTo(item)) return false;
+  if (!queue.goTo(item)) return false;
   show(performance.now());
   return true;
 }
 
-/** What is known of a card, once it is answered. */
-async function about(item = deck.current) {
-  if (!item?.answer) return screen.tell(say("answer_first"));
-  await outbox.sending;
-  const answer = await fetch(`/api/about/${item.id}`);
-  if (!answer.ok) return screen.tell(say("answer_first"));
-  const { pair, metrics, iou, dice, others } = await answer.json();
+/** Announces pair, metrics and scores of an answered item. */
+async function showDetails(item = queue.current) {
+  if (!item?.answer) return ui.announce(translate("answer_first"));
+  await requests.sending;
+  const response = await fetch(`/api/details/${item.id}`);
+  if (!response.ok) return ui.announce(translate("answer_first"));
+  const { pair, metrics, iou, dice, others } = await response.json();
   const number = (value) => value.toFixed(3);
-  const said = others.map((other) => `${other.reviewer}: ${screen.words(other)}${other.note ? ` (${other.note})` : ""}`);
+  const verdicts = others.map((other) => `${other.reviewer}: ${ui.answerText(other)}${other.note ? ` (${other.note})` : ""}`);
   const parts = [
     pair,
-    `${say("metrics")} ${metrics.join(", ")}`,
-    `${say("iou")} ${number(iou)}`,
-    `${say("dice")} ${number(dice)}`,
-    ...(said.length > 0 ? [`${say("others")}: ${said.join("; ")}`] : []),
+    `${translate("metrics")}: ${metrics.join(", ")}`,
+    `${translate("iou")} ${number(iou)}`,
+    `${translate("dice")} ${number(dice)}`,
+    ...(verdicts.length > 0 ? [`${translate("other_reviewers")}: ${verdicts.join("; ")}`] : []),
   ];
-  screen.tell(parts.join(" · "));
+  ui.announce(parts.join(" · "));
 }
 
-async function correct() {
-  const item = deck.current;
-  const layers = item && pictures(item.id).ready;
-  if (correction || !layers) return leaveCorrection();
-  stage.lens.reset();
-  const begun = await Correction.begin(item, layers, stage, refresh).catch((error) => {
-    screen.alert(error.message);
+/** Opens the alignment editor, or closes it if it is open. */
+async function toggleEditor() {
+  const item = queue.current;
+  const layers = item && images(item.id).ready;
+  if (editor || !layers) return closeEditor();
+  viewer.viewport.reset();
+  const opened = await AlignmentEditor.open(item, layers, viewer, refresh).catch((error) => {
+    ui.alert(error.message);
     return null;
   });
-  if (!begun) return;
-  if (deck.current !== item) return begun.leave();
-  correction = begun;
-  stage.guest = begun;
-  stage.draw();
+  if (!opened) return;
+  if (queue.current !== item) return opened.close();
+  editor = opened;
+  viewer.editor = opened;
+  viewer.draw();
   refresh();
 }
 
-function leaveCorrection() {
-  if (!correction) return;
-  correction.leave();
-  correction = null;
-  stage.guest = null;
-  stage.draw();
+function closeEditor() {
+  if (!editor) return;
+  editor.close();
+  editor = null;
+  viewer.editor = null;
+  viewer.draw();
   refresh();
 }
 
-async function saveCorrection() {
-  if (outbox.isFull) return screen.alert(say("blocked"));
-  const { item, map } = correction;
-  const stored = await outbox.put("/api/align", correction.body(crypto.randomUUID(), note));
-  item.corrected = { ...stored, map };
-  screen.tell(`${say("corrected")}: ${say("iou")} ${stored.iou.toFixed(3)}, ${say("dice")} ${stored.dice.toFixed(3)}`);
-  leaveCorrection();
+async function saveAlignment() {
+  if (requests.isFull) return ui.alert(translate("blocked"));
+  const { item, map } = editor;
+  const stored = await requests.push("/api/align", editor.body(crypto.randomUUID(), note));
+  item.manual_alignment = { ...stored, map };
+  ui.announce(`${translate("alignment_saved")}: ${translate("iou")} ${stored.iou.toFixed(3)}, ${translate("dice")} ${stored.dice.toFixed(3)}`);
+  closeEditor();
 }
 
-async function takeNote() {
-  const item = deck.current;
+async function editNote() {
+  const item = queue.current;
   if (!item) return;
-  if (outbox.isFull) return screen.alert(say("blocked"));
-  const text = await screen.askNote(note);
-  if (text === null || deck.current !== item || (text || null) === note) return refresh();
+  if (requests.isFull) return ui.alert(translate("blocked"));
+  const text = await ui.askNote(note);
+  if (text === null || queue.current !== item || (text || null) === note) return refresh();
   note = text || null;
-  // On a card that is answered the note is an answer again, with the same verdict.
+  // On an answered item the note is sent as a new answer with the same verdict.
   if (item.answer) {
-    const body = { ...answerTo(item, item.answer.verdict, item.answer.reason), shown_ms: null };
-    deck.answer(item, body);
+    const body = { ...answerBody(item, item.answer.verdict, item.answer.reason), shown_ms: null };
+    queue.answer(item, body);
     send(item, body);
   }
   refresh();
 }
 
-/** What an action does; `at` is when the key or button was pressed. */
-const deeds = {
-  pass: (at) => give("pass", null, at),
-  fail: (at) => give("fail", null, at),
-  unsure: (at) => give("unsure", null, at),
+/** Handlers by action; `at` is the time of the key press or click. */
+const actions = {
+  pass: (at) => answer("pass", null, at),
+  fail: (at) => answer("fail", null, at),
+  unsure: (at) => answer("unsure", null, at),
   undo,
-  note: takeNote,
-  flicker: () => stage.hold(true),
-  rock: () => stage.rock(),
-  protractor: () => stage.toggle("protractor"),
-  strokes: () => stage.toggle("strokes"),
-  zoom: () => stage.layers && stage.zoom(),
-  turn_left: (at, event) => stage.turnBy(event?.shiftKey ? -0.25 : -1),
-  turn_right: (at, event) => stage.turnBy(event?.shiftKey ? 0.25 : 1),
-  less: () => stage.adjust(-1),
-  more: () => stage.adjust(1),
-  reset: () => stage.turnBy(-stage.turn),
-  next: (at) => deck.step(1) && show(at),
-  previous: (at) => deck.step(-1) && show(at),
-  jump: () => screen.askPair(deck.pairs, async (name) => {
-    const item = await deck.find(name);
+  note: editNote,
+  flicker: () => viewer.setFlicker(true),
+  auto_flicker: () => viewer.toggleAutoFlicker(),
+  angle_guides: () => viewer.toggle("angle_guides"),
+  stroke_map: () => viewer.toggle("stroke_map"),
+  zoom: () => viewer.layers && viewer.zoom(),
+  rotate_left: (at, event) => viewer.rotateBy(event?.shiftKey ? -0.25 : -1),
+  rotate_right: (at, event) => viewer.rotateBy(event?.shiftKey ? 0.25 : 1),
+  less: () => viewer.adjust(-1),
+  more: () => viewer.adjust(1),
+  reset: () => viewer.rotateBy(-viewer.rotation),
+  next: (at) => queue.step(1) && show(at),
+  previous: (at) => queue.step(-1) && show(at),
+  jump: () => ui.askPair(queue.pairs, async (name) => {
+    const item = await queue.find(name);
     return Boolean(item) && go(item);
   }),
-  info: () => about(),
-  help: () => screen.help(),
-  correct,
-  save: () => correction && saveCorrection(),
-  leave: () => leaveCorrection(),
+  details: () => showDetails(),
+  help: () => ui.help(),
+  align: toggleEditor,
+  save: () => editor && saveAlignment(),
+  cancel: () => closeEditor(),
   other_language: () => document.getElementById("language").click(),
 };
-for (const reason of REASONS) deeds[reason] = (at) => give("fail", reason, at);
-for (const mode of MODES) deeds[mode] = () => stage.setMode(mode);
+for (const reason of REASONS) actions[reason] = (at) => answer("fail", reason, at);
+for (const mode of MODES) actions[mode] = () => viewer.setMode(mode);
 
-/** Holding a key down moves things, but judges nothing twice. */
-const MAY_REPEAT = new Set(["turn_left", "turn_right", "less", "more", "next", "previous", "larger", "smaller"]);
+/** Actions that repeat while their key is held. Verdicts do not. */
+const MAY_REPEAT = new Set(["rotate_left", "rotate_right", "less", "more", "next", "previous", "larger", "smaller"]);
 
-/** What goes on to another picture, and would lose a correction that is not saved. */
-const LEAVES = new Set(["pass", "fail", "unsure", "undo", "next", "previous", "jump", ...REASONS]);
+/** Actions that leave the current item and would lose an unsaved alignment. */
+const LEAVES_ITEM = new Set(["pass", "fail", "unsure", "undo", "next", "previous", "jump", ...REASONS]);
 
-function act(action, event, at) {
+function perform(action, event, at) {
   const isArrow = event?.code?.startsWith("Arrow");
   if (event?.repeat && !MAY_REPEAT.has(action) && !isArrow) return;
-  if (correction && event && correction.key(action, event)) return;
-  if (correction && LEAVES.has(action)) return screen.tell(say("correct_first"));
-  deeds[action]?.(at, event);
-  // What goes on to another picture marks things when that is on the screen.
-  if (!LEAVES.has(action)) refresh();
+  if (editor && event && editor.handleKey(action, event)) return;
+  if (editor && LEAVES_ITEM.has(action)) return ui.announce(translate("unsaved_alignment"));
+  actions[action]?.(at, event);
+  // An action that leaves the item refreshes when the next image is displayed.
+  if (!LEAVES_ITEM.has(action)) refresh();
 }
 
 addEventListener("click", (event) => {
-  const button = event.target.closest("[data-do]");
+  const button = event.target.closest("[data-action]");
   if (!button) return;
-  act(button.dataset.do, null, event.timeStamp);
-  // After a click the keys are the page's again; who goes by Tab keeps the place.
+  perform(button.dataset.action, null, event.timeStamp);
+  // After a mouse click, return the keys to the page. Keyboard users keep the focus.
   if (event.detail > 0) button.blur();
 });
-listen((action, event) => act(action, event, event.timeStamp), (action) => action === "flicker" && !stage.rocking && stage.hold(false));
-label();
+listen(
+  (action, event) => perform(action, event, event.timeStamp),
+  (action) => action === "flicker" && !viewer.flickerTimer && viewer.setFlicker(false),
+);
+labelKeys();
 
 try {
-  outbox.start();
-  await deck.load(outbox.letters);
-  screen.saved(outbox.waiting, null);
+  requests.start();
+  await queue.load(requests.requests);
+  ui.saveState(requests.pendingCount, null);
   await show();
   document.body.dataset.ready = "true";
 } catch (error) {
-  screen.alert(error.message);
+  ui.alert(error.message);
 }

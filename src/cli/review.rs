@@ -15,7 +15,9 @@ use super::signals;
 use super::table::count;
 use super::verdict::reviewer_name;
 use crate::domain::{ReviewOrder, ThresholdMetric};
-use crate::review::{self, Cards, DeckOptions, Language, Rates, Review, ReviewOptions};
+use crate::review::{
+    self, CheckRates, Language, QueueCounts, QueueOptions, ReviewOptions, ReviewServer,
+};
 use crate::runner::{Stop, StopLevel};
 
 /// Arguments of `review`.
@@ -101,10 +103,10 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
         min_view_ms: args.min_view_ms,
         limits: settings.config.limits.image,
         now,
-        deck: deck(&args),
+        queue: queue_options(&args),
     };
-    let page = review::open(catalog.clone(), project, options).await?;
-    if args.adjudicate && page.cards().all == 0 {
+    let page = review::bind(catalog.clone(), project, options).await?;
+    if args.adjudicate && page.counts().items == 0 {
         drop(page);
         catalog.close().await;
         return no_conflict(&args, context);
@@ -128,8 +130,8 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     Ok(ExitCode::Done)
 }
 
-fn deck(args: &ReviewArgs) -> DeckOptions {
-    DeckOptions {
+fn queue_options(args: &ReviewArgs) -> QueueOptions {
+    QueueOptions {
         reviewer: args.reviewer.clone(),
         metrics: args.metric.clone(),
         order: if args.adjudicate {
@@ -139,9 +141,9 @@ fn deck(args: &ReviewArgs) -> DeckOptions {
         },
         seed: args.seed,
         sample: args.sample.map(|sample| sample as usize),
-        rates: Rates {
-            controls: args.attention_checks,
-            repeats: args.duplicates,
+        rates: CheckRates {
+            faults: args.attention_checks,
+            duplicates: args.duplicates,
         },
     }
 }
@@ -160,17 +162,17 @@ fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode>
 }
 
 /// Returns a reviewer's progress: `lan has answered 0 of 54 images: 50 results and 4 attention checks or duplicates`.
-fn progress(reviewer: &str, cards: Cards) -> String {
-    let Cards {
-        all,
+fn progress(reviewer: &str, counts: QueueCounts) -> String {
+    let QueueCounts {
+        items,
         results,
         answered,
-    } = cards;
+    } = counts;
     let text = format!(
         "{reviewer} has answered {answered} of {}",
-        count(all as u64, "image")
+        count(items as u64, "image")
     );
-    match all - results {
+    match items - results {
         0 => text,
         checks => format!(
             "{text}: {} and {checks} attention checks or duplicates",
@@ -182,7 +184,7 @@ fn progress(reviewer: &str, cards: Cards) -> String {
 /// Prints the page's address and opens it in a browser. Returns the file through which it is opened, which must exist
 /// until the browser has read it.
 fn announce(
-    page: &Review,
+    page: &ReviewServer,
     args: &ReviewArgs,
     context: &Context,
 ) -> anyhow::Result<Option<tempfile::NamedTempFile>> {
@@ -194,7 +196,7 @@ fn announce(
     }
     context.output.info(&format!(
         "{}; the address works once, in one browser; press Ctrl-C to end",
-        progress(&args.reviewer, page.cards())
+        progress(&args.reviewer, page.counts())
     ));
     if address.ip().is_loopback() {
         let port = address.port();
@@ -255,7 +257,7 @@ fn language_of_system() -> Language {
 
 #[cfg(test)]
 mod tests {
-    use super::{Cards, order, percent, progress};
+    use super::{QueueCounts, order, percent, progress};
     use crate::config::{Sources, load};
     use crate::domain::ReviewOrder;
     use crate::review::key_map;
@@ -271,17 +273,17 @@ mod tests {
 
     #[test]
     fn attention_checks_and_duplicates_are_counted_separately() {
-        let cards = |all, results| Cards {
-            all,
+        let counts = |items, results| QueueCounts {
+            items,
             results,
             answered: 7,
         };
         assert_eq!(
-            progress("lan", cards(54, 50)),
+            progress("lan", counts(54, 50)),
             "lan has answered 7 of 54 images: 50 results and 4 attention checks or duplicates"
         );
         assert_eq!(
-            progress("lan", cards(50, 50)),
+            progress("lan", counts(50, 50)),
             "lan has answered 7 of 50 images"
         );
     }

@@ -4,7 +4,7 @@ use super::ThresholdMetric;
 
 /// Depth map with 16 bits per pixel; from depth.
 pub const DEPTH: &str = "depth.png";
-/// The print mask on the canvas: 255 ink; from register.
+/// Ink mask on the canvas: 255 ink; from register.
 pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
 
 /// One interpretation of the print's ink, counted from 0, in the print image's frame: 255 ink, 0 background, 128 where
@@ -16,7 +16,7 @@ pub fn print_mask(ink: usize) -> String {
     }
 }
 
-/// A metric's depth mask on the canvas: 255 stroke; from register.
+/// Returns the role of a metric's stroke mask on the canvas: 255 stroke; from register.
 pub fn canvas_depth_mask(metric: ThresholdMetric) -> String {
     format!("canvas_depth_mask.{metric}.png")
 }

@@ -1,87 +1,48 @@
-//! The page's script and style, built in: nothing comes from outside.
+//! Scripts and styles of the page, compiled in. The page loads nothing from other hosts.
 
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 const ICON: &str = "image/svg+xml";
 
-/// Name, type and text.
+/// Name, content type and text of an asset.
+macro_rules! asset {
+    ($name:literal, $kind:ident) => {
+        (
+            $name,
+            $kind,
+            include_str!(concat!("../../assets/review/", $name)),
+        )
+    };
+}
+
 const ASSETS: [(&str, &str, &str); 14] = [
-    (
-        "review.css",
-        STYLE,
-        include_str!("../../assets/review/review.css"),
-    ),
-    (
-        "icon.svg",
-        ICON,
-        include_str!("../../assets/review/icon.svg"),
-    ),
-    (
-        "main.js",
-        SCRIPT,
-        include_str!("../../assets/review/main.js"),
-    ),
-    (
-        "boot.js",
-        SCRIPT,
-        include_str!("../../assets/review/boot.js"),
-    ),
-    (
-        "deck.js",
-        SCRIPT,
-        include_str!("../../assets/review/deck.js"),
-    ),
-    (
-        "outbox.js",
-        SCRIPT,
-        include_str!("../../assets/review/outbox.js"),
-    ),
-    (
-        "pictures.js",
-        SCRIPT,
-        include_str!("../../assets/review/pictures.js"),
-    ),
-    (
-        "painter.js",
-        SCRIPT,
-        include_str!("../../assets/review/painter.js"),
-    ),
-    (
-        "masks.js",
-        SCRIPT,
-        include_str!("../../assets/review/masks.js"),
-    ),
-    (
-        "stage.js",
-        SCRIPT,
-        include_str!("../../assets/review/stage.js"),
-    ),
-    (
-        "lens.js",
-        SCRIPT,
-        include_str!("../../assets/review/lens.js"),
-    ),
-    (
-        "keys.js",
-        SCRIPT,
-        include_str!("../../assets/review/keys.js"),
-    ),
-    (
-        "correction.js",
-        SCRIPT,
-        include_str!("../../assets/review/correction.js"),
-    ),
-    (
-        "screen.js",
-        SCRIPT,
-        include_str!("../../assets/review/screen.js"),
-    ),
+    asset!("review.css", STYLE),
+    asset!("icon.svg", ICON),
+    asset!("main.js", SCRIPT),
+    asset!("config.js", SCRIPT),
+    asset!("queue.js", SCRIPT),
+    asset!("retry-queue.js", SCRIPT),
+    asset!("image-cache.js", SCRIPT),
+    asset!("render-worker.js", SCRIPT),
+    asset!("masks.js", SCRIPT),
+    asset!("viewer.js", SCRIPT),
+    asset!("viewport.js", SCRIPT),
+    asset!("keyboard.js", SCRIPT),
+    asset!("alignment-editor.js", SCRIPT),
+    asset!("ui.js", SCRIPT),
 ];
 
-/// Type and text of an asset.
+/// Returns content type and text of an asset.
 pub(super) fn find(name: &str) -> Option<(&'static str, &'static str)> {
-    let found = ASSETS.iter().find(|(known, ..)| *known == name);
+    let found = ASSETS.iter().find(|(asset, ..)| *asset == name);
     found.map(|(_, kind, text)| (*kind, *text))
+}
+
+/// Returns the text of every script.
+#[cfg(test)]
+pub(super) fn scripts() -> impl Iterator<Item = &'static str> {
+    let scripts = ASSETS.iter().filter(|(_, kind, _)| *kind == SCRIPT);
+    scripts.map(|(_, _, text)| *text)
 }
 
 #[cfg(test)]
@@ -89,9 +50,9 @@ mod tests {
     use super::ASSETS;
 
     #[test]
-    fn nothing_in_the_page_comes_from_outside() {
+    fn assets_refer_to_no_other_host() {
         for (name, _, text) in ASSETS {
-            // The name of the form that an icon is in is no address to fetch.
+            // The XML namespace of the icon is not fetched.
             let text = text.replace("http://www.w3.org/2000/svg", "");
             for outside in ["http:", "https:", "//cdn", "@import", "eval("] {
                 assert!(!text.contains(outside), "{name} has {outside}");
@@ -100,10 +61,10 @@ mod tests {
     }
 
     #[test]
-    fn every_module_that_is_imported_is_there() {
+    fn every_imported_module_exists() {
         for (name, _, text) in ASSETS {
-            let named = ["from \"./", "Worker(\"/assets/"].into_iter();
-            for after in named.flat_map(|start| text.split(start).skip(1)) {
+            let with_id = ["from \"./", "Worker(\"/assets/"].into_iter();
+            for after in with_id.flat_map(|start| text.split(start).skip(1)) {
                 let module = after.split('"').next().unwrap_or_default();
                 assert!(super::find(module).is_some(), "{name} imports {module}");
             }

@@ -1,4 +1,5 @@
-//! What a request must have before anything is done for it: our own host, the cookie, and for writes the page's word.
+//! Checks of every request before it reaches a handler: `Host`, session cookie, and for writes `Origin`, content type
+//! and CSRF token. Adds the security headers to every response.
 
 use std::sync::Arc;
 
@@ -7,16 +8,16 @@ use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header}
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
 
-use super::desk::Desk;
+use super::state::ServerState;
 
-/// Largest body of a request in bytes: a verdict with a long note is far below.
+/// Maximum request body in bytes; a verdict with a long note is far smaller.
 pub(super) const BODY_LIMIT: usize = 16 * 1024;
-/// Header in which writes bring the page's word.
-pub(super) const CSRF_HEADER: &str = "x-mocban-word";
-/// Address that takes the token.
+/// Request header that carries the CSRF token.
+pub(super) const CSRF_HEADER: &str = "x-csrf-token";
+/// Path that accepts the one-time token.
 pub(super) const START: &str = "/start";
 
-/// Headers of every answer.
+/// Security headers of every response.
 const HEADERS: [(HeaderName, &str); 7] = [
     (
         header::CONTENT_SECURITY_POLICY,
@@ -37,84 +38,88 @@ const HEADERS: [(HeaderName, &str); 7] = [
     ),
 ];
 
-/// Why a request is refused.
+/// Why a request is rejected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Refused {
-    /// Sent to another name than ours, as by DNS rebinding.
+pub(super) enum Rejection {
+    /// `Host` is not ours, as after DNS rebinding.
     Host,
-    /// Without the cookie of this start.
+    /// The session cookie is missing or of an earlier start.
     Cookie,
-    /// Written from another page, or from none.
+    /// `Origin` is missing or of another site.
     Origin,
-    /// A body of another type than JSON, as a form of another page could send.
+    /// The body is not JSON; a form on another site could send it.
     ContentType,
-    /// Without the word that only the page knows.
-    Word,
+    /// The CSRF token is missing or wrong.
+    CsrfToken,
 }
 
-impl Refused {
+impl Rejection {
     const fn status(self) -> StatusCode {
         match self {
             Self::Host => StatusCode::MISDIRECTED_REQUEST,
             Self::Cookie => StatusCode::UNAUTHORIZED,
-            Self::Origin | Self::Word => StatusCode::FORBIDDEN,
+            Self::Origin | Self::CsrfToken => StatusCode::FORBIDDEN,
             Self::ContentType => StatusCode::UNSUPPORTED_MEDIA_TYPE,
         }
     }
 
-    const fn sentence(self) -> &'static str {
+    const fn message(self) -> &'static str {
         match self {
-            Self::Host => {
-                "this page goes by another name; open the address that the command printed"
-            }
+            Self::Host => "this host name is not served; open the address that the command printed",
             Self::Cookie => "open the address that the command printed; it works once",
             Self::Origin => "only the review page may write here",
-            Self::ContentType => "only application/json is taken",
-            Self::Word => "the page is of an earlier start; reload it",
+            Self::ContentType => "only application/json is accepted",
+            Self::CsrfToken => "the server was restarted; reload the page",
         }
     }
 }
 
-/// Checks a request and puts the headers on whatever is answered.
-pub(super) async fn guard(State(desk): State<Arc<Desk>>, request: Request, next: Next) -> Response {
-    let mut answer = match check(&desk, &request) {
+/// Rejects unauthorised requests and adds the security headers to every response.
+pub(super) async fn guard(
+    State(state): State<Arc<ServerState>>,
+    request: Request,
+    next: Next,
+) -> Response {
+    let mut response = match check(&state, &request) {
         Ok(()) => next.run(request).await,
-        Err(refused) => (refused.status(), refused.sentence()).into_response(),
+        Err(rejection) => (rejection.status(), rejection.message()).into_response(),
     };
-    let headers = answer.headers_mut();
+    let headers = response.headers_mut();
     for (name, value) in HEADERS {
         headers.insert(name, HeaderValue::from_static(value));
     }
-    answer
+    response
 }
 
-fn check(desk: &Desk, request: &Request) -> Result<(), Refused> {
+fn check(state: &ServerState, request: &Request) -> Result<(), Rejection> {
     let headers = request.headers();
-    let host = text(headers, &header::HOST).ok_or(Refused::Host)?;
-    if !desk.hosts.iter().any(|known| known == host) {
-        return Err(Refused::Host);
+    let host = text(headers, &header::HOST).ok_or(Rejection::Host)?;
+    if !state.hosts.iter().any(|allowed| allowed == host) {
+        return Err(Rejection::Host);
     }
     let is_read = matches!(*request.method(), Method::GET | Method::HEAD);
     if is_read && request.uri().path() == START {
         return Ok(());
     }
-    if !text(headers, &header::COOKIE).is_some_and(|cookie| desk.session.knows(cookie)) {
-        return Err(Refused::Cookie);
+    if !text(headers, &header::COOKIE).is_some_and(|cookie| state.session.has_cookie(cookie)) {
+        return Err(Rejection::Cookie);
     }
     if is_read {
         return Ok(());
     }
     let origin = text(headers, &header::ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
     if origin != Some(host) {
-        return Err(Refused::Origin);
+        return Err(Rejection::Origin);
     }
     let kind = text(headers, &header::CONTENT_TYPE).and_then(|kind| kind.split(';').next());
     if kind.map(str::trim) != Some("application/json") {
-        return Err(Refused::ContentType);
+        return Err(Rejection::ContentType);
     }
-    let word = headers.get(CSRF_HEADER).and_then(|word| word.to_str().ok());
-    if !word.is_some_and(|word| desk.session.is_from_page(word)) {
-        return Err(Refused::Word);
+    let token = headers
+        .get(CSRF_HEADER)
+        .and_then(|token| token.to_str().ok());
+    if !token.is_some_and(|token| state.session.is_csrf_token(token)) {
+        return Err(Rejection::CsrfToken);
     }
     Ok(())
 }

@@ -1,10 +1,10 @@
-//! Which key does what: by its place on the keyboard (`event.code`), because Vietnamese typing uses letters and digits
-//! as tone marks.
+//! Key bindings by physical key (`KeyboardEvent.code`), because Vietnamese input methods use letters and digits as tone
+//! marks.
 
 use std::collections::BTreeMap;
 
-/// Everything a key can do, in the order of the help.
-pub(super) const ACTIONS: [&str; 40] = [
+/// Actions that judge an item.
+pub(super) const VERDICT_ACTIONS: [&str; 11] = [
     "pass",
     "fail",
     "angle",
@@ -16,6 +16,9 @@ pub(super) const ACTIONS: [&str; 40] = [
     "unsure",
     "note",
     "undo",
+];
+/// Actions that change how an item is displayed.
+pub(super) const VIEW_ACTIONS: [&str; 17] = [
     "two_up",
     "overlay",
     "edges",
@@ -24,65 +27,76 @@ pub(super) const ACTIONS: [&str; 40] = [
     "difference",
     "reveal",
     "flicker",
-    "rock",
-    "protractor",
-    "strokes",
+    "auto_flicker",
+    "angle_guides",
+    "stroke_map",
     "zoom",
-    "turn_left",
-    "turn_right",
+    "rotate_left",
+    "rotate_right",
     "less",
     "more",
     "reset",
+];
+/// Actions that move through the queue, or open a dialog.
+pub(super) const NAVIGATION_ACTIONS: [&str; 6] = [
     "next",
     "previous",
     "jump",
-    "info",
+    "details",
     "help",
-    "correct",
-    "mirror",
-    "larger",
-    "smaller",
-    "save",
-    "leave",
     "other_language",
 ];
+/// Actions of the manual alignment.
+pub(super) const ALIGNMENT_ACTIONS: [&str; 6] =
+    ["align", "mirror", "larger", "smaller", "save", "cancel"];
 
-/// Why keys cannot be laid like that.
+/// Returns every action, in the order of the help.
+pub(super) fn actions() -> impl Iterator<Item = &'static str> {
+    let groups: [&[&str]; 4] = [
+        &VERDICT_ACTIONS,
+        &VIEW_ACTIONS,
+        &NAVIGATION_ACTIONS,
+        &ALIGNMENT_ACTIONS,
+    ];
+    groups.into_iter().flatten().copied()
+}
+
+/// Why key bindings are not valid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum KeyError {
-    /// A name that is no action.
+    /// There is no action of this name.
     #[error("review.keys.{0}: there is no such action")]
     Unknown(String),
-    /// Two actions on one key.
+    /// Two actions have the same key.
     #[error("review.keys: {key} is given to both {first} and {second}")]
     Twice {
         /// The key.
         key: String,
-        /// One action.
+        /// The first action.
         first: String,
-        /// The other.
+        /// The other action.
         second: String,
     },
-    /// A key that is no `KeyboardEvent.code`.
+    /// The key is not a `KeyboardEvent.code`.
     #[error(
-        "review.keys.{action} is {key:?}, not the place of a key such as \"KeyP\", \"Digit1\" or \"\" for none"
+        "review.keys.{action} is {key:?}, not a physical key such as \"KeyP\", \"Digit1\" or \"\" for none"
     )]
     Form {
         /// The action.
         action: String,
-        /// What it was given.
+        /// The invalid key.
         key: String,
     },
 }
 
-/// Turns actions with their keys into keys with their actions. An empty key switches the action's key off.
+/// Converts a map of actions to keys into a map of keys to actions. An empty key disables the binding.
 ///
 /// # Errors
-/// When an action is not known, or a key is given twice.
+/// When an action is unknown, a key is not valid, or two actions have the same key.
 pub fn key_map(keys: &BTreeMap<String, String>) -> Result<BTreeMap<String, String>, KeyError> {
-    let mut actions: BTreeMap<String, String> = BTreeMap::new();
+    let mut bindings: BTreeMap<String, String> = BTreeMap::new();
     for (action, key) in keys {
-        if !ACTIONS.contains(&action.as_str()) {
+        if actions().all(|known| known != action) {
             return Err(KeyError::Unknown(action.clone()));
         }
         if !key.bytes().all(|byte| byte.is_ascii_alphanumeric()) {
@@ -94,7 +108,7 @@ pub fn key_map(keys: &BTreeMap<String, String>) -> Result<BTreeMap<String, Strin
         if key.is_empty() {
             continue;
         }
-        if let Some(first) = actions.insert(key.clone(), action.clone()) {
+        if let Some(first) = bindings.insert(key.clone(), action.clone()) {
             return Err(KeyError::Twice {
                 key: key.clone(),
                 first,
@@ -102,7 +116,7 @@ pub fn key_map(keys: &BTreeMap<String, String>) -> Result<BTreeMap<String, Strin
             });
         }
     }
-    Ok(actions)
+    Ok(bindings)
 }
 
 #[cfg(test)]
@@ -119,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_key_switches_an_action_off() {
+    fn an_empty_key_disables_a_binding() {
         let keys = map(&[("pass", "KeyP"), ("fail", "")]).expect("valid");
         assert_eq!(
             keys.into_iter().collect::<Vec<_>>(),
@@ -128,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn keys_that_cannot_be_are_refused() {
+    fn invalid_bindings_are_refused() {
         assert!(matches!(map(&[("pas", "KeyP")]), Err(KeyError::Unknown(_))));
         assert!(matches!(
             map(&[("pass", "<p>")]),

@@ -1,12 +1,13 @@
-//! The page's HTML. The script fills in what changes; everything here is the same for every card.
+//! HTML of the page. It is the same for every item; the script fills in what changes.
 
 use maud::{DOCTYPE, Markup, html};
 
-use super::desk::Desk;
-use super::words::Language;
+use super::i18n::Language;
+use super::keys::{ALIGNMENT_ACTIONS, NAVIGATION_ACTIONS, VERDICT_ACTIONS, VIEW_ACTIONS};
+use super::queue_options::QueueOptions;
 use crate::domain::{Reason, ReviewOrder};
 
-/// Ways to look that have a button, in the order of their keys.
+/// Display modes with a button, in the order of their keys.
 const MODES: [&str; 7] = [
     "two_up",
     "overlay",
@@ -16,10 +17,16 @@ const MODES: [&str; 7] = [
     "difference",
     "reveal",
 ];
-/// Switches that lie over a way to look.
-const SWITCHES: [&str; 5] = ["rock", "protractor", "strokes", "zoom", "correct"];
+/// Switches that work in every display mode.
+const SWITCHES: [&str; 5] = [
+    "auto_flicker",
+    "angle_guides",
+    "stroke_map",
+    "zoom",
+    "align",
+];
 
-/// A whole document.
+/// Returns a whole document.
 fn document(language: Language, title: &str, head: &Markup, body: &Markup) -> Markup {
     html! {
         (DOCTYPE)
@@ -36,9 +43,9 @@ fn document(language: Language, title: &str, head: &Markup, body: &Markup) -> Ma
     }
 }
 
-/// The page that the start address shows for a moment: going on from here, the cookie goes along.
-pub(super) fn onward(language: Language) -> Markup {
-    let title = language.say("onward");
+/// Returns the page of the start address, which navigates on with the new cookie.
+pub(super) fn forward(language: Language) -> Markup {
+    let title = language.translate("forward");
     let head = html! { meta http-equiv="refresh" content="0;url=/"; };
     document(
         language,
@@ -48,29 +55,29 @@ pub(super) fn onward(language: Language) -> Markup {
     )
 }
 
-/// What a used token gets.
-pub(super) fn refused(language: Language) -> Markup {
-    let text = language.say("refused");
+/// Returns the page for a one-time token that was used before.
+pub(super) fn token_used(language: Language) -> Markup {
+    let text = language.translate("token_used");
     document(
         language,
-        language.say("title"),
+        language.translate("title"),
         &html! {},
         &html! { h1 { (text) } },
     )
 }
 
-/// The review page.
-pub(super) fn review(desk: &Desk, language: Language) -> Markup {
-    let title = format!("{} · {}", language.say("title"), desk.deck_options.reviewer);
+/// Returns the review page.
+pub(super) fn review(options: &QueueOptions, language: Language) -> Markup {
+    let title = format!("{} · {}", language.translate("title"), options.reviewer);
     let head = html! {
         link rel="stylesheet" href="/assets/review.css";
         link rel="icon" href="/assets/icon.svg";
         script type="module" src="/assets/main.js" {}
     };
     let body = html! {
-        a.skip href="#stage" { (language.say("skip")) }
-        (top(desk, language))
-        noscript { p.alert { (language.say("no_script")) } }
+        a.skip href="#viewer" { (language.translate("skip")) }
+        (top(options, language))
+        noscript { p.alert { (language.translate("no_script")) } }
         p #alert .alert role="alert" hidden {}
         (modes(language))
         main {
@@ -78,41 +85,50 @@ pub(super) fn review(desk: &Desk, language: Language) -> Markup {
                 (figure("print", language))
                 (figure("print_mask", language))
             }
-            (stage(language))
+            (viewer(language))
             div.side {
                 (figure("relief", language))
                 (figure("depth_mask", language))
             }
         }
         (verdict_bar(language))
-        (help(language, desk.deck_options.tests_the_reviewer()))
+        (help(language, options.has_attention_checks()))
         (jump(language))
-        p #live .quiet aria-live="polite" {}
+        p #live .live aria-live="polite" {}
     };
     document(language, &title, &head, &body)
 }
 
-fn top(desk: &Desk, language: Language) -> Markup {
+fn top(options: &QueueOptions, language: Language) -> Markup {
     let other = language.other();
-    let label = match desk.deck_options.order {
+    let label = match options.order {
         ReviewOrder::Random => None,
-        ReviewOrder::LeastConfident => Some(language.say("risk_label")),
-        ReviewOrder::Adjudicate => Some(language.say("adjudicate_label")),
+        ReviewOrder::LeastConfident => Some(language.translate("least_confident_label")),
+        ReviewOrder::Adjudicate => Some(language.translate("adjudicate_label")),
     };
     html! {
         header {
-            h1 #pair { (language.say("loading")) }
+            h1 #pair { (language.translate("loading")) }
             span #progress {}
-            progress #bar value="0" max="1" aria-label=(language.say("title")) {}
+            progress #bar value="0" max="1" aria-label=(language.translate("progress_bar")) {}
             @if let Some(label) = label { strong.label { (label) } }
-            span.gap {}
+            span.spacer {}
             span #pace {}
-            span #saved .saved role="status" { (language.say("saved")) }
-            span { (language.say("reviewer")) ": " b { (desk.deck_options.reviewer) } }
+            span #saved .saved role="status" { (language.translate("saved")) }
+            span { (language.translate("reviewer")) ": " b { (options.reviewer) } }
             a #language href={ "/?lang=" (other.name()) } hreflang=(other.name()) lang=(other.name()) {
-                (language.say("other_language"))
+                (language.translate("other_language"))
             }
-            button type="button" data-do="help" { (language.say("help")) " " kbd data-key="help" {} }
+            (button("help", language))
+        }
+    }
+}
+
+/// Returns a button for an action, labelled with its name and key.
+fn button(action: &'static str, language: Language) -> Markup {
+    html! {
+        button type="button" data-action=(action) {
+            (language.translate(action)) " " kbd data-key=(action) {}
         }
     }
 }
@@ -120,37 +136,37 @@ fn top(desk: &Desk, language: Language) -> Markup {
 fn figure(layer: &'static str, language: Language) -> Markup {
     html! {
         figure {
-            figcaption { (language.say(layer)) }
-            canvas id={ "side-" (layer) } role="img" aria-label=(language.say(layer)) {}
+            figcaption { (language.translate(layer)) }
+            canvas id={ "side-" (layer) } role="img" aria-label=(language.translate(layer)) {}
         }
     }
 }
 
-fn stage(language: Language) -> Markup {
+fn viewer(language: Language) -> Markup {
     html! {
-        section #stage tabindex="-1" aria-label=(language.say("stage")) {
+        section #viewer tabindex="-1" aria-label=(language.translate("viewer")) {
             div.picture {
-                canvas #canvas role="img" aria-label=(language.say("stage")) {}
+                canvas #canvas role="img" aria-label=(language.translate("viewer")) {}
             }
-            p.under { span #legend {} span.gap {} span #measure {} }
+            p.caption { span #legend {} span.spacer {} span #paint-time {} }
         }
     }
 }
 
 fn modes(language: Language) -> Markup {
     html! {
-        div.modes role="group" aria-label=(language.say("modes")) {
-            @for mode in MODES { (look(mode, language)) }
-            span.rule {}
-            @for switch in SWITCHES { (look(switch, language)) }
+        div.modes role="group" aria-label=(language.translate("modes")) {
+            @for mode in MODES { (toggle(mode, language)) }
+            span.divider {}
+            @for switch in SWITCHES { (toggle(switch, language)) }
         }
     }
 }
 
-fn look(action: &'static str, language: Language) -> Markup {
+fn toggle(action: &'static str, language: Language) -> Markup {
     html! {
-        button type="button" data-do=(action) aria-pressed="false" {
-            (language.say(action)) " " kbd data-key=(action) {}
+        button type="button" data-action=(action) aria-pressed="false" {
+            (language.translate(action)) " " kbd data-key=(action) {}
         }
     }
 }
@@ -158,34 +174,30 @@ fn look(action: &'static str, language: Language) -> Markup {
 fn verdict_bar(language: Language) -> Markup {
     html! {
         footer {
-            div.verdicts role="group" aria-label=(language.say("question")) {
-                span.question { (language.say("question")) }
+            div.verdicts role="group" aria-label=(language.translate("question")) {
+                span.question { (language.translate("question")) }
                 (verdict("pass", "✓", language))
                 (verdict("fail", "✗", language))
                 (verdict("unsure", "?", language))
-                span.gap {}
-                button type="button" data-do="note" { (language.say("note")) " " kbd data-key="note" {} }
-                button type="button" data-do="undo" { (language.say("undo")) " " kbd data-key="undo" {} }
+                span.spacer {}
+                (button("note", language))
+                (button("undo", language))
             }
-            div.reasons role="group" aria-label=(language.say("why")) {
-                span { (language.say("why")) }
-                @for reason in Reason::ALL {
-                    button type="button" data-do=(reason.name()) {
-                        (language.say(reason.name())) " " kbd data-key=(reason.name()) {}
-                    }
-                }
+            div.reasons role="group" aria-label=(language.translate("reasons")) {
+                span { (language.translate("reasons")) }
+                @for reason in Reason::ALL { (button(reason.name(), language)) }
             }
             div #note-row hidden {
-                label for="note" { (language.say("note")) }
+                label for="note" { (language.translate("note")) }
                 input #note type="text" maxlength="2000" autocomplete="off";
-                span { (language.say("note_hint")) }
+                span { (language.translate("note_hint")) }
             }
-            nav.history aria-label=(language.say("history")) {
-                button type="button" data-do="previous" { (language.say("previous")) " " kbd data-key="previous" {} }
+            nav.history aria-label=(language.translate("history")) {
+                (button("previous", language))
                 ol #history {}
-                button type="button" data-do="next" { (language.say("next")) " " kbd data-key="next" {} }
-                button type="button" data-do="jump" { (language.say("jump")) " " kbd data-key="jump" {} }
-                button type="button" data-do="info" { (language.say("info")) " " kbd data-key="info" {} }
+                (button("next", language))
+                (button("jump", language))
+                (button("details", language))
             }
         }
     }
@@ -193,41 +205,41 @@ fn verdict_bar(language: Language) -> Markup {
 
 fn verdict(action: &'static str, sign: &str, language: Language) -> Markup {
     html! {
-        button.verdict type="button" data-do=(action) {
-            span aria-hidden="true" { (sign) } " " (language.say(action)) " " kbd data-key=(action) {}
+        button.verdict type="button" data-action=(action) {
+            span aria-hidden="true" { (sign) } " " (language.translate(action)) " " kbd data-key=(action) {}
         }
     }
 }
 
-fn help(language: Language, tests_the_reviewer: bool) -> Markup {
+fn help(language: Language, has_attention_checks: bool) -> Markup {
     let list = |actions: &[&'static str]| {
         html! {
             dl {
                 @for action in actions {
-                    div { dt { kbd data-key=(action) {} } dd { (language.say(action)) } }
+                    div { dt { kbd data-key=(action) {} } dd { (language.translate(action)) } }
                 }
             }
         }
     };
-    let groups = [
-        ("verdicts", &super::keys::ACTIONS[..11]),
-        ("looking", &super::keys::ACTIONS[11..28]),
-        ("going", &super::keys::ACTIONS[28..33]),
-        ("by_hand", &super::keys::ACTIONS[33..39]),
+    let groups: [(&'static str, &[&'static str]); 4] = [
+        ("verdicts", &VERDICT_ACTIONS),
+        ("modes", &VIEW_ACTIONS),
+        ("navigation", &NAVIGATION_ACTIONS),
+        ("manual_alignment", &ALIGNMENT_ACTIONS),
     ];
     html! {
         dialog #help aria-labelledby="help-title" {
             form.title method="dialog" {
-                h2 #help-title { (language.say("help")) }
-                button { (language.say("close")) }
+                h2 #help-title { (language.translate("help")) }
+                button { (language.translate("close")) }
             }
             div.groups {
                 @for (name, actions) in groups {
-                    section { h3 { (Language::say(language, name)) } (list(actions)) }
+                    section { h3 { (language.translate(name)) } (list(actions)) }
                 }
             }
-            p { (language.say("by_hand")) ": " (language.say("correct_hint")) }
-            @if tests_the_reviewer { p { (language.say("tested")) } }
+            p { (language.translate("manual_alignment")) ": " (language.translate("alignment_hint")) }
+            @if has_attention_checks { p { (language.translate("attention_checks")) } }
         }
     }
 }
@@ -235,15 +247,71 @@ fn help(language: Language, tests_the_reviewer: bool) -> Markup {
 fn jump(language: Language) -> Markup {
     html! {
         dialog #jump aria-labelledby="jump-title" {
-            h2 #jump-title { (language.say("jump")) }
+            h2 #jump-title { (language.translate("jump")) }
             form method="dialog" {
-                label for="jump-to" { (language.say("jump_hint")) }
+                label for="jump-to" { (language.translate("jump_hint")) }
                 input #jump-to type="text" list="pairs" autocomplete="off";
                 datalist #pairs {}
                 p #jump-error role="alert" {}
-                button value="go" { (language.say("next")) }
-                button value="" formnovalidate { (language.say("close")) }
+                button value="go" { (language.translate("go")) }
+                button value="" formnovalidate { (language.translate("close")) }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{forward, review, token_used};
+    use crate::domain::ReviewOrder;
+    use crate::review::{CheckRates, Language, QueueOptions};
+
+    fn options(order: ReviewOrder, faults: f64) -> QueueOptions {
+        QueueOptions {
+            reviewer: "lan".to_owned(),
+            metrics: Vec::new(),
+            order,
+            seed: 1,
+            sample: None,
+            rates: CheckRates {
+                faults,
+                duplicates: 0.0,
+            },
+        }
+    }
+
+    /// The text of a document, one element a line, so that a snapshot reads like the page.
+    fn lines(html: &str) -> String {
+        html.replace("><", ">\n<")
+    }
+
+    #[test]
+    fn page_in_english() {
+        let page = review(&options(ReviewOrder::Random, 0.04), Language::English);
+        insta::assert_snapshot!(lines(&page.into_string()));
+    }
+
+    #[test]
+    fn page_in_vietnamese() {
+        let options = options(ReviewOrder::LeastConfident, 0.0);
+        let page = review(&options, Language::Vietnamese);
+        insta::assert_snapshot!(lines(&page.into_string()));
+    }
+
+    #[test]
+    fn small_pages_in_both_languages() {
+        let pages = Language::ALL.map(|language| {
+            let pages = [forward(language), token_used(language)];
+            pages.map(|page| lines(&page.into_string())).join("\n\n")
+        });
+        insta::assert_snapshot!(pages.join("\n\n"));
+    }
+
+    #[test]
+    fn conflicts_are_labelled() {
+        let page = review(&options(ReviewOrder::Adjudicate, 0.04), Language::English);
+        let page = page.into_string();
+        assert!(page.contains("Disagreements of other reviewers"), "{page}");
+        assert!(!page.contains("attention checks"), "{page}");
     }
 }

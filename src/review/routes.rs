@@ -1,6 +1,6 @@
-//! What the server answers, address by address. Whoever comes here has passed the guard.
+//! Request handlers. Every request has passed the guard before it arrives here.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use axum::extract::rejection::JsonRejection;
@@ -11,115 +11,115 @@ use axum::routing::{get, post};
 use axum::{Json, Router, middleware};
 use serde_json::{Value, json};
 
-use super::answer::{AnswerBody, BadAnswer, UndoBody};
+use super::alignment_editor::{self, AlignmentBody, AlignmentSummary};
+use super::answer::{AnswerBody, InvalidInput, UndoBody};
 use super::assets;
-use super::card::Card;
-use super::correction::{self, AlignBody, Corrected};
-use super::deck::DeckError;
-use super::desk::Desk;
 use super::guard::{BODY_LIMIT, START, guard};
-use super::known::Known;
+use super::history::ReviewerHistory;
+use super::i18n::Language;
+use super::item::ReviewItem;
+use super::item_images::{ImageError, ImageLayer};
 use super::page;
-use super::pictures::{Layer, PictureError};
-use super::words::Language;
+use super::review_queue::QueueError;
+use super::state::ServerState;
 use crate::catalog::CatalogError;
 use crate::domain::{PairName, ReviewOrder};
 use crate::report::pair_artifacts::PairArtifactsError;
 
-/// Everything there is, behind the guard.
-pub(super) fn router(desk: &Arc<Desk>) -> Router {
+/// Returns the router with all routes behind the guard.
+pub(super) fn router(state: &Arc<ServerState>) -> Router {
     Router::new()
-        .route(START, get(begin))
+        .route(START, get(start))
         .route("/", get(index))
         .route("/assets/{name}", get(asset))
-        .route("/picture/{id}/{layer}", get(picture))
-        .route("/api/boot", get(boot))
-        .route("/api/deck", get(deck))
-        .route("/api/about/{id}", get(about))
+        .route("/image/{id}/{layer}", get(image))
+        .route("/api/config", get(config))
+        .route("/api/queue", get(queue))
+        .route("/api/details/{id}", get(details))
         .route("/api/find/{pair}", get(find))
-        .route("/api/correction/{id}", get(correction_start))
+        .route("/api/alignment/{id}", get(alignment))
         .route("/api/answer", post(answer))
         .route("/api/undo", post(undo))
         .route("/api/align", post(align))
         .layer(DefaultBodyLimit::max(BODY_LIMIT))
-        .layer(middleware::from_fn_with_state(Arc::clone(desk), guard))
-        .with_state(Arc::clone(desk))
+        .layer(middleware::from_fn_with_state(Arc::clone(state), guard))
+        .with_state(Arc::clone(state))
 }
 
-/// Why a request cannot be answered.
+/// Why a request fails.
 #[derive(Debug, thiserror::Error)]
-enum Trouble {
-    #[error("there is no such card")]
-    NoCard,
+enum ApiError {
+    #[error("there is no such item")]
+    NoItem,
     #[error("answer it first")]
     NotAnswered,
     #[error("{0}")]
     Body(#[from] JsonRejection),
     #[error(transparent)]
-    Answer(#[from] BadAnswer),
+    Input(#[from] InvalidInput),
     #[error(transparent)]
     Catalog(#[from] CatalogError),
     #[error(transparent)]
-    Deck(#[from] DeckError),
+    Queue(#[from] QueueError),
     #[error(transparent)]
-    Picture(#[from] PictureError),
+    Image(#[from] ImageError),
     #[error(transparent)]
     PairArtifacts(#[from] PairArtifactsError),
 }
 
-impl Trouble {
+impl ApiError {
     fn status(&self) -> StatusCode {
         match self {
-            Self::NoCard | Self::Catalog(CatalogError::NothingToUndo(_)) => StatusCode::NOT_FOUND,
+            Self::NoItem | Self::Catalog(CatalogError::NothingToUndo(_)) => StatusCode::NOT_FOUND,
             Self::NotAnswered => StatusCode::FORBIDDEN,
             Self::Body(rejection) => rejection.status(),
-            Self::Answer(_) => StatusCode::UNPROCESSABLE_ENTITY,
-            Self::Picture(PictureError::Gone) => StatusCode::GONE,
-            // The page sends again what the server could not store.
-            Self::Catalog(_) | Self::Deck(_) | Self::Picture(_) | Self::PairArtifacts(_) => {
+            Self::Input(_) => StatusCode::UNPROCESSABLE_ENTITY,
+            Self::Image(ImageError::Gone) => StatusCode::GONE,
+            // The page resends what the server could not store.
+            Self::Catalog(_) | Self::Queue(_) | Self::Image(_) | Self::PairArtifacts(_) => {
                 StatusCode::SERVICE_UNAVAILABLE
             }
         }
     }
 }
 
-impl IntoResponse for Trouble {
+impl IntoResponse for ApiError {
     fn into_response(self) -> Response {
         let status = self.status();
         if status.is_server_error() {
-            tracing::warn!(error = %self, "the review page was not answered");
+            tracing::warn!(error = %self, "a request of the review page failed");
         }
         (status, Json(json!({ "error": self.to_string() }))).into_response()
     }
 }
 
-type Answered<T = Json<Value>> = Result<T, Trouble>;
+type ApiResult<T = Json<Value>> = Result<T, ApiError>;
 
-/// Takes the token and gives the cookie. A page that goes on by itself, not a redirect: the cookie goes only with
-/// what begins on this site.
-async fn begin(State(desk): State<Arc<Desk>>, RawQuery(query): RawQuery) -> Response {
+/// Accepts the one-time token and sets the session cookie. Responds with a page that navigates by itself instead of a
+/// redirect: a `SameSite=Strict` cookie is sent only with navigation that starts on this site.
+async fn start(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Response {
     let query = query.unwrap_or_default();
     let token = query.strip_prefix("token=").unwrap_or_default();
-    if desk.session.open(token) {
-        let cookie = [(header::SET_COOKIE, desk.session.set_cookie())];
-        return (cookie, Html(page::onward(desk.language).into_string())).into_response();
+    if state.session.open(token) {
+        let cookie = [(header::SET_COOKIE, state.session.set_cookie())];
+        return (cookie, Html(page::forward(state.language).into_string())).into_response();
     }
-    // An old address in the history of a browser that has the cookie leads on as well.
+    // A browser that already has the cookie may reopen the address from its history.
     if token.is_empty() {
         return Redirect::to("/").into_response();
     }
-    let refused = page::refused(desk.language).into_string();
+    let refused = page::token_used(state.language).into_string();
     (StatusCode::FORBIDDEN, Html(refused)).into_response()
 }
 
-async fn index(State(desk): State<Arc<Desk>>, RawQuery(query): RawQuery) -> Html<String> {
-    let asked = query
+async fn index(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Html<String> {
+    let requested = query
         .as_deref()
         .and_then(|query| query.strip_prefix("lang="));
-    let language = asked
+    let language = requested
         .and_then(|name| name.parse().ok())
-        .unwrap_or(desk.language);
-    Html(page::review(&desk, language).into_string())
+        .unwrap_or(state.language);
+    Html(page::review(&state.queue_options, language).into_string())
 }
 
 async fn asset(Path(name): Path<String>) -> Response {
@@ -129,161 +129,170 @@ async fn asset(Path(name): Path<String>) -> Response {
     }
 }
 
-/// What the script starts from.
-async fn boot(State(desk): State<Arc<Desk>>) -> Json<Value> {
+/// Returns what the script needs to start: CSRF token, key bindings, messages.
+async fn config(State(state): State<Arc<ServerState>>) -> Json<Value> {
+    let messages = Language::ALL.map(|language| (language.name(), language.messages()));
     Json(json!({
-        "word": desk.session.csrf(),
-        "keys": desk.keys,
-        "review_order": desk.deck_options.order,
-        "min_view_ms": desk.min_view_ms,
-        "words": Language::ALL.map(|language| (language.name(), language.words()))
-            .into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+        "csrf_token": state.session.csrf_token(),
+        "keys": state.keys,
+        "review_order": state.queue_options.order,
+        "min_view_ms": state.min_view_ms,
+        "messages": BTreeMap::from(messages),
     }))
 }
 
-async fn deck(State(desk): State<Arc<Desk>>) -> Answered {
-    let deck = desk.deal().await?;
-    let hides_pairs = desk.deck_options.tests_the_reviewer();
-    let items = deck.cards.iter().map(|card| {
-        let answer = deck.known.answer(card).map(|answer| {
+async fn queue(State(state): State<Arc<ServerState>>) -> ApiResult {
+    let queue = state.load_queue().await?;
+    let hides_pairs = state.queue_options.has_attention_checks();
+    let items = queue.items.iter().map(|item| {
+        let answer = queue.history.answer(item).map(|answer| {
             json!({
                 "event": answer.event, "verdict": answer.verdict, "reason": answer.reason,
                 "note": answer.note, "at": answer.at,
             })
         });
-        let correction = deck.known.correction(card);
+        let alignment = queue.history.alignment(item);
         json!({
-            "id": card.id,
-            "pair": (!hides_pairs).then_some(&card.pair),
+            "id": item.id,
+            "pair": (!hides_pairs).then_some(&item.pair),
             "answer": answer,
-            "corrected": correction.and_then(|made| Corrected::of(card, made)),
+            "manual_alignment": alignment.and_then(|made| AlignmentSummary::of(item, made)),
         })
     });
-    let pairs: BTreeSet<&PairName> = deck.cards.iter().map(|card| &card.pair).collect();
+    let pairs: BTreeSet<&PairName> = queue.items.iter().map(|item| &item.pair).collect();
     Ok(Json(
         json!({ "items": items.collect::<Vec<_>>(), "pairs": pairs }),
     ))
 }
 
-/// The first card of a pair, for who jumps to it; never one of its others, so that none tells that there are any.
-async fn find(State(desk): State<Arc<Desk>>, Path(pair): Path<String>) -> Answered {
-    let deck = desk.deal().await?;
-    let mut cards = deck.cards.iter();
-    let first = cards.find(|card| card.pair.as_str() == pair);
-    Ok(Json(json!({ "id": first.ok_or(Trouble::NoCard)?.id })))
+/// Returns the first item of a pair. Never returns another one, because that would reveal duplicates.
+async fn find(State(state): State<Arc<ServerState>>, Path(pair): Path<String>) -> ApiResult {
+    let queue = state.load_queue().await?;
+    let mut items = queue.items.iter();
+    let first = items.find(|item| item.pair.as_str() == pair);
+    Ok(Json(json!({ "id": first.ok_or(ApiError::NoItem)?.id })))
 }
 
-async fn picture(
-    State(desk): State<Arc<Desk>>,
+async fn image(
+    State(state): State<Arc<ServerState>>,
     Path((id, layer)): Path<(String, String)>,
-) -> Answered<Response> {
-    let card = card(&desk, &id)?;
-    let layer = Layer::named(&layer).ok_or(Trouble::NoCard)?;
-    let drawn = desk.pictures(&card).await?;
+) -> ApiResult<Response> {
+    let item = served_item(&state, &id)?;
+    let layer = ImageLayer::from_name(&layer).ok_or(ApiError::NoItem)?;
+    let images = state.images(&item).await?;
     let kind = [(header::CONTENT_TYPE, "image/png")];
-    Ok((kind, drawn.layer(layer)).into_response())
+    Ok((kind, images.layer(layer)).into_response())
 }
 
-/// What is told of a card once it is answered: for planted faults and repeats as for all others.
-async fn about(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answered {
-    let card = card(&desk, &id)?;
-    let known = Known::read(&desk.catalog, &desk.deck_options).await?;
-    if known.answer(&card).is_none() {
-        return Err(Trouble::NotAnswered);
+/// Returns pair, metrics and scores of an answered item, for attention checks as for results.
+async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) -> ApiResult {
+    let item = served_item(&state, &id)?;
+    let history = ReviewerHistory::read(&state.catalog, &state.queue_options).await?;
+    if history.answer(&item).is_none() {
+        return Err(ApiError::NotAnswered);
     }
-    let drawn = desk.pictures(&card).await?;
-    let agreement = correction::agreement(&drawn, &card.view.print_from_depth);
-    let metrics = card.results.iter().map(|(metric, _)| metric.title());
-    let others = match desk.deck_options.order {
-        ReviewOrder::Adjudicate => others(&desk, &card).await?,
-        // What others said of a planted fault does not exist, so it cannot be shown for anything.
+    let images = state.images(&item).await?;
+    let scores = alignment_editor::mask_scores(&images, &item.view.print_from_depth);
+    let metrics = item.results.iter().map(|(metric, _)| metric.title());
+    let others = match state.queue_options.order {
+        ReviewOrder::Adjudicate => other_verdicts(&state, &item).await?,
+        // Planted faults have no verdicts of others, so showing any would reveal the faults.
         ReviewOrder::Random | ReviewOrder::LeastConfident => Vec::new(),
     };
     Ok(Json(json!({
-        "pair": card.pair, "metrics": metrics.collect::<Vec<_>>(), "iou": agreement.iou, "dice": agreement.dice, "others": others,
+        "pair": item.pair, "metrics": metrics.collect::<Vec<_>>(), "iou": scores.iou, "dice": scores.dice, "others": others,
     })))
 }
 
-/// What other reviewers said of a card's results.
-async fn others(desk: &Desk, card: &Card) -> Result<Vec<Value>, CatalogError> {
-    let log = desk.catalog.verdict_log(Some(&card.pair)).await?;
-    let is_on_card = |hash| card.results.iter().any(|(_, of_card)| *of_card == hash);
-    let mut said: Vec<Value> = Vec::new();
+/// Returns the verdicts of other reviewers on an item's results, each once.
+async fn other_verdicts(
+    state: &ServerState,
+    item: &ReviewItem,
+) -> Result<Vec<Value>, CatalogError> {
+    let log = state.catalog.verdict_log(Some(&item.pair)).await?;
+    let is_on_item = |hash| item.results.iter().any(|(_, of_item)| *of_item == hash);
+    let mut verdicts: Vec<Value> = Vec::new();
     for event in log {
-        let is_other = event.reviewer != desk.deck_options.reviewer && event.undone_at.is_none();
-        let line = json!({
+        let is_other = event.reviewer != state.queue_options.reviewer && event.undone_at.is_none();
+        let verdict = json!({
             "reviewer": event.reviewer, "verdict": event.verdict, "reason": event.reason, "note": event.note,
         });
-        if is_other && is_on_card(event.result_hash) && !said.contains(&line) {
-            said.push(line);
+        if is_other && is_on_item(event.result_hash) && !verdicts.contains(&verdict) {
+            verdicts.push(verdict);
         }
     }
-    Ok(said)
+    Ok(verdicts)
 }
 
-async fn correction_start(State(desk): State<Arc<Desk>>, Path(id): Path<String>) -> Answered {
-    let card = card(&desk, &id)?;
-    let drawn = desk.pictures(&card).await?;
-    let known = Known::read(&desk.catalog, &desk.deck_options).await?;
-    let before = known.correction(&card);
-    Ok(Json(json!(correction::start(&card, &drawn, before))))
+/// Returns the initial state of the alignment editor.
+async fn alignment(State(state): State<Arc<ServerState>>, Path(id): Path<String>) -> ApiResult {
+    let item = served_item(&state, &id)?;
+    let images = state.images(&item).await?;
+    let history = ReviewerHistory::read(&state.catalog, &state.queue_options).await?;
+    let previous = history.alignment(&item);
+    Ok(Json(json!(alignment_editor::start(
+        &item, &images, previous
+    ))))
 }
 
 async fn answer(
-    State(desk): State<Arc<Desk>>,
+    State(state): State<Arc<ServerState>>,
     body: Result<Json<AnswerBody>, JsonRejection>,
-) -> Answered {
+) -> ApiResult {
     let Json(body) = body?;
-    let card = card(&desk, &body.item)?;
-    let verdict = body.verdict(&card, &desk)?;
-    let stored = desk.catalog.answer(verdict, card.shown(), (desk.now)());
+    let item = served_item(&state, &body.item)?;
+    let verdict = body.verdict(&item, &state)?;
+    let stored = state.catalog.answer(verdict, item.shown(), (state.now)());
     let is_new = stored.await?;
     Ok(Json(json!({ "stored": body.event, "new": is_new })))
 }
 
 async fn undo(
-    State(desk): State<Arc<Desk>>,
+    State(state): State<Arc<ServerState>>,
     body: Result<Json<UndoBody>, JsonRejection>,
-) -> Answered {
+) -> ApiResult {
     let Json(body) = body?;
-    let reviewer = &desk.deck_options.reviewer;
-    let taken = desk.catalog.take_back(&body.event, reviewer, (desk.now)());
-    taken.await?;
+    let reviewer = &state.queue_options.reviewer;
+    let undone = state
+        .catalog
+        .take_back(&body.event, reviewer, (state.now)());
+    undone.await?;
     Ok(Json(json!({ "undone": body.event })))
 }
 
 async fn align(
-    State(desk): State<Arc<Desk>>,
-    body: Result<Json<AlignBody>, JsonRejection>,
-) -> Answered {
+    State(state): State<Arc<ServerState>>,
+    body: Result<Json<AlignmentBody>, JsonRejection>,
+) -> ApiResult {
     let Json(body) = body?;
-    let card = card(&desk, &body.item)?;
-    let drawn = desk.pictures(&card).await?;
-    let map = body.print_from_depth(&drawn)?;
-    let agreement = correction::agreement(&drawn, &map);
-    let found = desk
+    let item = served_item(&state, &body.item)?;
+    let images = state.images(&item).await?;
+    let map = body.print_from_depth(&images)?;
+    let scores = alignment_editor::mask_scores(&images, &map);
+    let found = state
         .catalog
-        .pair(&card.pair)
+        .pair(&item.pair)
         .await?
-        .ok_or(Trouble::NoCard)?;
-    let reviewer = &desk.deck_options.reviewer;
-    let mut made = correction::made(
-        &desk.project,
+        .ok_or(ApiError::NoItem)?;
+    let reviewer = &state.queue_options.reviewer;
+    let mut record = alignment_editor::to_record(
+        &state.project,
         &found.results,
-        &card,
+        &item,
         reviewer,
         map,
-        &agreement,
+        &scores,
     )?;
-    made.note = body.note()?;
-    made.event = body.event;
-    let told = json!(Corrected::of(&card, &made));
-    desk.catalog
-        .store_manual_alignment(made, (desk.now)())
+    record.note = body.note()?;
+    record.event = body.event;
+    let summary = json!(AlignmentSummary::of(&item, &record));
+    state
+        .catalog
+        .store_manual_alignment(record, (state.now)())
         .await?;
-    Ok(Json(told))
+    Ok(Json(summary))
 }
 
-fn card(desk: &Desk, id: &str) -> Result<Arc<Card>, Trouble> {
-    desk.card(id).ok_or(Trouble::NoCard)
+fn served_item(state: &ServerState, id: &str) -> Result<Arc<ReviewItem>, ApiError> {
+    state.item(id).ok_or(ApiError::NoItem)
 }

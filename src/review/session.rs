@@ -1,4 +1,4 @@
-//! Who may use the page: a token that opens it once, then a cookie; writes need a second word that only the page knows.
+//! Session secrets: a token that opens the page once, then a session cookie; writes also need a CSRF token.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -7,68 +7,68 @@ use rand::rngs::SysRng;
 
 use crate::domain::ContentHash;
 
-/// The secrets of one start of the server.
+/// Secrets of one start of the server.
 #[derive(Debug)]
 pub(super) struct Session {
     token: String,
     cookie: String,
-    csrf: String,
+    csrf_token: String,
     cookie_name: String,
     is_opened: AtomicBool,
 }
 
 impl Session {
-    /// New secrets from the system.
+    /// Draws new secrets from the operating system.
     ///
     /// # Errors
-    /// When the system has no randomness.
+    /// When the operating system provides no randomness.
     pub(super) fn new(port: u16) -> std::io::Result<Self> {
         Ok(Self {
             token: secret()?,
             cookie: secret()?,
-            csrf: secret()?,
-            // Cookies do not know ports: two servers on one machine must not overwrite each other's.
+            csrf_token: secret()?,
+            // Cookies are shared by all ports of a host: two servers must not overwrite each other's.
             cookie_name: format!("mocban_review_{port}"),
             is_opened: AtomicBool::new(false),
         })
     }
 
-    /// The token of the start address.
+    /// Returns the one-time token of the start address.
     pub(super) fn token(&self) -> &str {
         &self.token
     }
 
-    /// The word that writes must bring.
-    pub(super) fn csrf(&self) -> &str {
-        &self.csrf
+    /// Returns the CSRF token.
+    pub(super) fn csrf_token(&self) -> &str {
+        &self.csrf_token
     }
 
-    /// Takes the token once; from then on it opens nothing.
+    /// Accepts the one-time token; returns false if it is wrong or already used.
     pub(super) fn open(&self, token: &str) -> bool {
-        same(token, &self.token) && !self.is_opened.swap(true, Ordering::SeqCst)
+        is_equal(token, &self.token) && !self.is_opened.swap(true, Ordering::SeqCst)
     }
 
-    /// The cookie as it is set.
+    /// Returns the value of the `Set-Cookie` header.
     pub(super) fn set_cookie(&self) -> String {
         let (name, value) = (&self.cookie_name, &self.cookie);
         format!("{name}={value}; HttpOnly; SameSite=Strict; Path=/")
     }
 
-    /// Whether a `Cookie` header holds ours.
-    pub(super) fn knows(&self, header: &str) -> bool {
+    /// Returns whether a `Cookie` header contains the session cookie.
+    pub(super) fn has_cookie(&self, header: &str) -> bool {
         let mut pairs = header
             .split(';')
             .filter_map(|pair| pair.trim().split_once('='));
-        pairs.any(|(name, value)| name == self.cookie_name && same(value, &self.cookie))
+        pairs.any(|(name, value)| name == self.cookie_name && is_equal(value, &self.cookie))
     }
 
-    /// Whether the word of a write is ours.
-    pub(super) fn is_from_page(&self, csrf: &str) -> bool {
-        same(csrf, &self.csrf)
+    /// Returns whether the CSRF token is right.
+    pub(super) fn is_csrf_token(&self, token: &str) -> bool {
+        is_equal(token, &self.csrf_token)
     }
 }
 
-/// 256 bits in hexadecimal.
+/// Returns 256 random bits in hexadecimal.
 fn secret() -> std::io::Result<String> {
     let mut bytes = [0; 32];
     SysRng
@@ -77,8 +77,8 @@ fn secret() -> std::io::Result<String> {
     Ok(ContentHash::from_bytes(bytes).to_hex())
 }
 
-/// Compares by hash, so that the time it takes tells nothing of where two words part.
-fn same(a: &str, b: &str) -> bool {
+/// Compares two secrets by their hashes, so that the time taken does not depend on the secret.
+fn is_equal(a: &str, b: &str) -> bool {
     ContentHash::of(a.as_bytes()) == ContentHash::of(b.as_bytes())
 }
 
@@ -102,9 +102,9 @@ mod tests {
         let set = session.set_cookie();
         let ours = set.split(';').next().expect("name and value");
         assert!(set.contains("HttpOnly") && set.contains("SameSite=Strict"));
-        assert!(session.knows(&format!("a=b; {ours}; c=d")));
-        assert!(!session.knows("mocban_review_8000=; x"));
-        assert!(!session.knows(&ours.replace("8000", "8001")));
-        assert!(!Session::new(8000).expect("secrets").knows(ours));
+        assert!(session.has_cookie(&format!("a=b; {ours}; c=d")));
+        assert!(!session.has_cookie("mocban_review_8000=; x"));
+        assert!(!session.has_cookie(&ours.replace("8000", "8001")));
+        assert!(!Session::new(8000).expect("secrets").has_cookie(ours));
     }
 }

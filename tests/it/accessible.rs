@@ -1,11 +1,11 @@
-//! What axe-core finds in the pages, where `AXE_JS` names its file and there is a browser.
+//! Accessibility of the pages by axe-core; skipped without a browser or `AXE_JS`, the path of `axe.min.js`.
 
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
 use crate::review_browser::{PLAIN, enter, judge};
 
-/// The text of axe-core; `None` where there is none, which is said.
+/// Returns the text of axe-core; `None` if there is none, with a line on stderr.
 #[expect(
     clippy::print_stderr,
     reason = "the one line that says why a test was skipped"
@@ -18,7 +18,7 @@ fn axe() -> Option<String> {
     Some(std::fs::read_to_string(path).expect("axe.min.js"))
 }
 
-/// Fails where something serious is found; `what` says what is open.
+/// Fails if axe finds a serious violation; `what` names the state of the page.
 fn nothing_serious(tab: &Tab<'_>, what: &str) {
     let found = tab.eval(
         "axe.run().then(({ passes, violations }) => ({
@@ -27,6 +27,7 @@ fn nothing_serious(tab: &Tab<'_>, what: &str) {
                 ({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(' ')}`),
         }))",
     );
+    tab.shot(&what.replace([',', ' '], "_"));
     assert!(found["passes"].as_u64() > Some(10), "{found}");
     assert_eq!(found["serious"], serde_json::json!([]), "{what}");
 }
@@ -50,7 +51,7 @@ fn axe_finds_nothing_serious_in_the_review_page() {
         judge(&tab, "Digit1");
         judge(&tab, "KeyP");
         tab.eval(&format!("{axe}; null"));
-        nothing_serious(&tab, &format!("{language}, a card"));
+        nothing_serious(&tab, &format!("{language}, an item"));
         for key in ["KeyH", "KeyJ"] {
             tab.key(key);
             tab.wait("document.querySelector('dialog[open]')");
@@ -60,9 +61,9 @@ fn axe_finds_nothing_serious_in_the_review_page() {
         }
         tab.key("KeyC");
         tab.wait("document.getElementById('legend').textContent.includes('IoU')");
-        nothing_serious(&tab, &format!("{language}, a correction"));
+        nothing_serious(&tab, &format!("{language}, the alignment editor"));
         tab.key("Enter");
-        tab.wait("!document.querySelector('[data-do=correct]').classList.contains('on')");
+        tab.wait("!document.querySelector('[data-action=align]').classList.contains('on')");
         tab.key("KeyP");
         tab.wait("document.getElementById('bar').value === 3");
         nothing_serious(&tab, &format!("{language}, the end"));

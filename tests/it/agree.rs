@@ -10,9 +10,9 @@ fn told(project: &Project, args: &[&str]) -> Value {
     mocban(project.dir(), args).expect(0).json()
 }
 
-/// Judges every card of a deck the same.
-fn judge_all(page: &Page, deck: &[Value], verdict: &str) {
-    for (i, item) in deck.iter().enumerate() {
+/// Answers every item of a queue with the same verdict.
+fn judge_all(page: &Page, queue: &[Value], verdict: &str) {
+    for (i, item) in queue.iter().enumerate() {
         let reply = page.post("/api/answer", &answer(&format!("e{i}"), item, verdict));
         assert_eq!(reply.expect("a reply").status, 200);
     }
@@ -31,9 +31,9 @@ fn reviewer_pairs(project: &Project) -> Vec<Value> {
         "lan",
         &["--attention-checks", "50", "--duplicates", "20"],
     );
-    let deck = page.deck();
-    judge_all(&page, &deck, "fail");
-    let told = page.get("/api/deck").json();
+    let queue = page.queue();
+    judge_all(&page, &queue, "fail");
+    let told = page.get("/api/queue").json();
     let pairs = told["pairs"].as_array().expect("names").clone();
     for (i, pair) in pairs.iter().enumerate() {
         set(project, pair, if i == 0 { "fail" } else { "pass" }, "minh");
@@ -79,7 +79,7 @@ fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
     report_agrees(&project, checks);
 
     let page = Page::open(&project, "ba", &["--adjudicate"]);
-    let settled = page.deck().remove(0);
+    let settled = page.queue().remove(0);
     let reply = page.post("/api/answer", &answer("s1", &settled, "pass"));
     assert_eq!(reply.expect("a reply").status, 200);
     assert_ne!(settled["pair"], pairs[0], "on which they agree");
@@ -145,9 +145,9 @@ fn results_are_measured_against_the_newest_manual_alignment() {
         "lan",
         &["--attention-checks", "0", "--metric", "ensemble"],
     );
-    let item = page.deck().remove(0);
+    let item = page.queue().remove(0);
     let id = item["id"].as_str().expect("an id");
-    let start = page.get(&format!("/api/correction/{id}")).json();
+    let start = page.get(&format!("/api/alignment/{id}")).json();
     let number = |value: &Value| value.as_f64().expect("a number");
     let [[a, b, c], [d, e, f]] =
         [0, 1].map(|i| [0, 1, 2].map(|j| number(&start["view_from_depth"][i][j])));

@@ -1,5 +1,5 @@
-//! Chromium without a window, spoken to through a pair of pipes in its own debugging protocol: JSON objects, each
-//! ended by a zero byte. Where there is no Chromium, tests say so in a line and are skipped.
+//! Headless Chromium, controlled by the `DevTools` protocol over two pipes: JSON objects, each terminated by a zero byte.
+//! Tests are skipped with a line on stderr if there is no Chromium.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -10,12 +10,12 @@ use std::process::{Child, Command, Stdio};
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use serde_json::{Value, json};
 
-/// Names under which it is installed.
+/// Names of the executable.
 const NAMES: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-/// How long a page may take until something is as it should be.
-const PATIENCE_MS: u32 = 60_000;
+/// Maximum time until a condition holds.
+const TIMEOUT_MS: u32 = 60_000;
 
-/// A browser that is running.
+/// A running browser.
 pub(crate) struct Browser {
     child: Child,
     pipes: RefCell<Pipes>,
@@ -27,10 +27,10 @@ struct Pipes {
     from: BufReader<File>,
     calls: u64,
     /// Errors of scripts.
-    troubles: Vec<String>,
+    script_errors: Vec<String>,
 }
 
-/// Where Chromium is: `CHROME`, or by its names on the path.
+/// Finds Chromium: `CHROME`, or one of its names on `PATH`.
 fn program() -> Option<PathBuf> {
     if let Some(named) = std::env::var_os("CHROME") {
         return Some(named.into());
@@ -44,7 +44,7 @@ fn program() -> Option<PathBuf> {
 }
 
 impl Browser {
-    /// Starts one; `None` where there is none, which is said.
+    /// Starts a browser; `None` if there is none, with a line on stderr.
     #[expect(
         clippy::print_stderr,
         reason = "the one line that says why a test was skipped"
@@ -58,7 +58,7 @@ impl Browser {
         let [to, from] = ["to", "from"].map(|name| dir.path().join(name));
         let made = Command::new("mkfifo").args([&to, &from]).status();
         assert!(made.expect("mkfifo starts").success());
-        // The shell opens the pipes as 3 and 4, where the browser looks for them.
+        // The shell opens the pipes as file descriptors 3 and 4, which the browser uses.
         let child = Command::new("sh")
             .arg("-c")
             .arg("exec 3<\"$0\" 4>\"$1\"; shift; exec \"$@\"")
@@ -80,7 +80,7 @@ impl Browser {
             .stderr(Stdio::null())
             .spawn()
             .expect("a shell");
-        // Each waits for the other end, in the order of the shell.
+        // Opening a pipe blocks until the other end is open, so the order is that of the shell.
         let to = File::options().write(true).open(to).expect("a pipe");
         let from = BufReader::new(File::open(from).expect("a pipe"));
         Some(Self {
@@ -89,21 +89,21 @@ impl Browser {
                 to,
                 from,
                 calls: 0,
-                troubles: Vec::new(),
+                script_errors: Vec::new(),
             }),
             _dir: dir,
         })
     }
 
-    /// Calls a method, of a tab or of the browser itself.
+    /// Calls a method of a tab or of the browser; panics on an error.
     fn call(&self, tab: Option<&str>, method: &str, params: &Value) -> Value {
-        let told = self.ask(tab, method, params);
-        assert!(told["error"].is_null(), "{method}: {told}");
-        told["result"].clone()
+        let response = self.request(tab, method, params);
+        assert!(response["error"].is_null(), "{method}: {response}");
+        response["result"].clone()
     }
 
-    /// The same with whatever is answered.
-    fn ask(&self, tab: Option<&str>, method: &str, params: &Value) -> Value {
+    /// Calls a method and returns the response.
+    fn request(&self, tab: Option<&str>, method: &str, params: &Value) -> Value {
         let mut pipes = self.pipes.borrow_mut();
         pipes.calls += 1;
         let id = pipes.calls;
@@ -123,17 +123,17 @@ impl Browser {
                 .read_until(0, &mut bytes)
                 .expect("the browser speaks");
             assert_eq!(bytes.pop(), Some(0), "the browser is gone");
-            let told: Value = serde_json::from_slice(&bytes).expect("JSON");
-            if told["method"] == "Runtime.exceptionThrown" {
-                pipes.troubles.push(told["params"].to_string());
+            let response: Value = serde_json::from_slice(&bytes).expect("JSON");
+            if response["method"] == "Runtime.exceptionThrown" {
+                pipes.script_errors.push(response["params"].to_string());
             }
-            if told["id"] == id {
-                return told;
+            if response["id"] == id {
+                return response;
             }
         }
     }
 
-    /// A new tab of a size.
+    /// Opens a tab of the given size.
     pub(crate) fn tab(&self, width: u32, height: u32) -> Tab<'_> {
         let target = self.call(
             None,
@@ -160,8 +160,11 @@ impl Drop for Browser {
         let _ = self.child.kill();
         let _ = self.child.wait();
         if !std::thread::panicking() {
-            let troubles = &self.pipes.borrow().troubles;
-            assert!(troubles.is_empty(), "errors in scripts: {troubles:?}");
+            let script_errors = &self.pipes.borrow().script_errors;
+            assert!(
+                script_errors.is_empty(),
+                "errors in scripts: {script_errors:?}"
+            );
         }
     }
 }
@@ -177,19 +180,19 @@ impl Tab<'_> {
         self.browser.call(Some(&self.session), method, params)
     }
 
-    /// Goes to an address.
+    /// Navigates to a URL.
     pub(crate) fn open(&self, url: &str) {
         self.call("Page.navigate", &json!({ "url": url }));
     }
 
-    /// Loads the page anew.
+    /// Reloads the page.
     pub(crate) fn reload(&self) {
-        // What the old page told must not pass for the new one's.
+        // The marks of the old page must not be taken for those of the new one.
         self.eval("delete document.body.dataset.ready, delete document.body.dataset.shown");
         self.call("Page.reload", &json!({}));
     }
 
-    /// Asks for dark pages or light ones.
+    /// Sets the preferred colour scheme.
     pub(crate) fn dark(&self, dark: bool) {
         let scheme = if dark { "dark" } else { "light" };
         let features = json!([{ "name": "prefers-color-scheme", "value": scheme }]);
@@ -199,37 +202,40 @@ impl Tab<'_> {
         );
     }
 
-    /// The value of an expression; what is promised is waited for.
+    /// Evaluates an expression and awaits a promise.
     pub(crate) fn eval(&self, expression: &str) -> Value {
         let params =
             json!({ "expression": expression, "awaitPromise": true, "returnByValue": true });
-        let told = self.call("Runtime.evaluate", &params);
-        assert!(told["exceptionDetails"].is_null(), "{expression}: {told}");
-        told["result"]["value"].clone()
+        let response = self.call("Runtime.evaluate", &params);
+        assert!(
+            response["exceptionDetails"].is_null(),
+            "{expression}: {response}"
+        );
+        response["result"]["value"].clone()
     }
 
-    /// Waits until an expression is true, over loads of other pages.
+    /// Waits until an expression is true, also across navigation.
     #[track_caller]
     pub(crate) fn wait(&self, condition: &str) {
-        let look = format!(
+        let poll = format!(
             "new Promise((done) => {{
-                const end = Date.now() + {PATIENCE_MS};
-                const look = () => {{
+                const end = Date.now() + {TIMEOUT_MS};
+                const poll = () => {{
                     const found = Boolean({condition});
                     if (found || Date.now() > end) done(found);
-                    else setTimeout(look, 5);
+                    else setTimeout(poll, 5);
                 }};
-                look();
+                poll();
             }})"
         );
-        let params = json!({ "expression": look, "awaitPromise": true, "returnByValue": true });
+        let params = json!({ "expression": poll, "awaitPromise": true, "returnByValue": true });
         for _ in 0..200 {
-            let told = self
+            let response = self
                 .browser
-                .ask(Some(&self.session), "Runtime.evaluate", &params);
-            let result = &told["result"];
-            // An error: the page went away while it was asked.
-            if told["error"].is_null() && result["exceptionDetails"].is_null() {
+                .request(Some(&self.session), "Runtime.evaluate", &params);
+            let result = &response["result"];
+            // An error means that the page navigated away meanwhile.
+            if response["error"].is_null() && result["exceptionDetails"].is_null() {
                 assert_eq!(
                     result["result"]["value"],
                     true,
@@ -242,7 +248,7 @@ impl Tab<'_> {
         unreachable!("no page stays: {condition}");
     }
 
-    /// Presses and lets go a key by its place.
+    /// Presses and releases a physical key.
     pub(crate) fn key(&self, code: &str) {
         self.key_down(code);
         self.key_up(code);
@@ -263,13 +269,13 @@ impl Tab<'_> {
         let key = if named { code } else { &key };
         let mut event = json!({ "type": kind, "code": code, "key": key });
         if code == "Escape" {
-            // A dialog goes by the old number.
+            // Dialogs react to the legacy key code.
             event["windowsVirtualKeyCode"] = json!(27);
         }
         self.call("Input.dispatchKeyEvent", &event);
     }
 
-    /// Types text into what has the focus.
+    /// Types text into the focused element.
     pub(crate) fn text(&self, text: &str) {
         self.call("Input.insertText", &json!({ "text": text }));
     }
@@ -288,7 +294,7 @@ impl Tab<'_> {
         }
     }
 
-    /// A picture of the page into a folder, where `MOCBAN_SCREENSHOTS` names one.
+    /// Saves a screenshot to the folder `MOCBAN_SCREENSHOTS`, if set.
     pub(crate) fn shot(&self, name: &str) {
         let Some(folder) = std::env::var_os("MOCBAN_SCREENSHOTS") else {
             return;

@@ -1,4 +1,4 @@
-//! The review page's server, started as a user does and spoken to byte by byte.
+//! Starts the review server as a user does, and sends raw HTTP requests.
 
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
@@ -11,10 +11,10 @@ use serde_json::{Value, json};
 use crate::cli::{binary, call};
 use crate::resume::{copy, project, run};
 
-/// Pairs of the project that is read; four results each or nearly so.
+/// Number of pairs of the shared project, with up to four results each.
 const PAIRS: &str = "15";
 
-/// A project of its own in which every pair has results. They are computed once for all tests.
+/// Copies a project in which every pair has results. They are computed once for all tests.
 pub(crate) fn read_project(dir: &tempfile::TempDir) -> Project {
     static MADE: OnceLock<(tempfile::TempDir, Project)> = OnceLock::new();
     let (_, made) = MADE.get_or_init(|| {
@@ -26,7 +26,7 @@ pub(crate) fn read_project(dir: &tempfile::TempDir) -> Project {
     copy(made, &dir.path().join("p"))
 }
 
-/// What was answered.
+/// An HTTP response.
 #[derive(Debug)]
 pub(crate) struct Reply {
     pub(crate) status: u16,
@@ -35,12 +35,12 @@ pub(crate) struct Reply {
 }
 
 impl Reply {
-    /// The body as JSON.
+    /// Parses the body as JSON.
     pub(crate) fn json(&self) -> Value {
         serde_json::from_slice(&self.body).expect("JSON")
     }
 
-    /// A header's value.
+    /// Returns the value of a header.
     pub(crate) fn header(&self, name: &str) -> Option<&str> {
         let lines = self.head.lines().filter_map(|line| line.split_once(": "));
         let mut named = lines.filter(|(found, _)| found.eq_ignore_ascii_case(name));
@@ -48,21 +48,21 @@ impl Reply {
     }
 }
 
-/// A server, and what its page knows.
+/// A server, and the secrets of its page.
 pub(crate) struct Page {
     child: Child,
     site: Site,
 }
 
-/// What a page knows of its server.
+/// Address and secrets of a server.
 #[derive(Clone)]
 pub(crate) struct Site {
-    /// The address to open.
+    /// The start URL.
     pub(crate) url: String,
-    /// Name and port.
+    /// Host name and port.
     pub(crate) host: String,
     pub(crate) cookie: String,
-    pub(crate) word: String,
+    pub(crate) csrf_token: String,
 }
 
 impl std::ops::Deref for Page {
@@ -74,7 +74,7 @@ impl std::ops::Deref for Page {
 }
 
 impl Page {
-    /// Starts the server of a reviewer, without going in.
+    /// Starts the server of a reviewer without a session.
     pub(crate) fn start(project: &Project, reviewer: &str, args: &[&str]) -> Self {
         let mut command = review(project, reviewer);
         let mut child = command
@@ -86,19 +86,19 @@ impl Page {
         let mut line = String::new();
         let out = child.stdout.take().expect("a pipe");
         BufReader::new(out).read_line(&mut line).expect("a line");
-        let told: Value = serde_json::from_str(&line).expect("JSON on stdout");
-        let url = told["url"].as_str().expect("an address").to_owned();
+        let message: Value = serde_json::from_str(&line).expect("JSON on stdout");
+        let url = message["url"].as_str().expect("an address").to_owned();
         let host = url["http://".len()..].split('/').next().expect("a host");
         let site = Site {
             host: host.to_owned(),
             url,
             cookie: String::new(),
-            word: String::new(),
+            csrf_token: String::new(),
         };
         Self { child, site }
     }
 
-    /// Starts the server and goes in as a browser does.
+    /// Starts the server and opens a session as a browser does.
     pub(crate) fn open(project: &Project, reviewer: &str, args: &[&str]) -> Self {
         let mut page = Self::start(project, reviewer, args);
         let start = page.url["http://".len() + page.host.len()..].to_owned();
@@ -109,15 +109,15 @@ impl Page {
             .next()
             .expect("a value")
             .clone_into(&mut page.site.cookie);
-        let boot = page.get("/api/boot").json();
-        boot["word"]
+        let boot = page.get("/api/config").json();
+        boot["csrf_token"]
             .as_str()
-            .expect("a word")
-            .clone_into(&mut page.site.word);
+            .expect("a token")
+            .clone_into(&mut page.site.csrf_token);
         page
     }
 
-    /// Dies at once, as by `kill -9`.
+    /// Kills the server as by `kill -9`.
     pub(crate) fn kill(&mut self) {
         self.child.kill().expect("killed");
         self.child.wait().expect("dead");
@@ -125,19 +125,19 @@ impl Page {
 }
 
 impl Site {
-    /// The address that listens.
+    /// Returns the socket address.
     pub(crate) fn address(&self) -> SocketAddr {
         self.host.parse().expect("an address")
     }
 
-    /// Headers of a write as the page sends it.
+    /// Returns the headers of a write request of the page.
     pub(crate) fn headers(&self) -> Vec<(&'static str, String)> {
         vec![
             ("host", self.host.clone()),
             ("cookie", self.cookie.clone()),
             ("origin", format!("http://{}", self.host)),
             ("content-type", "application/json".to_owned()),
-            ("x-mocban-word", self.word.clone()),
+            ("x-csrf-token", self.csrf_token.clone()),
         ]
     }
 
@@ -146,7 +146,7 @@ impl Site {
         send(self.address(), "GET", path, &headers, b"").expect("a reply")
     }
 
-    /// Writes as the page does; an error when the server is gone.
+    /// Sends a write request of the page; fails if the server is gone.
     pub(crate) fn post(&self, path: &str, body: &Value) -> std::io::Result<Reply> {
         let body = body.to_string();
         send(
@@ -158,16 +158,16 @@ impl Site {
         )
     }
 
-    /// The cards in order.
-    pub(crate) fn deck(&self) -> Vec<Value> {
-        let deck = self.get("/api/deck").json();
-        deck["items"].as_array().expect("items").clone()
+    /// Returns the items in order.
+    pub(crate) fn queue(&self) -> Vec<Value> {
+        let queue = self.get("/api/queue").json();
+        queue["items"].as_array().expect("items").clone()
     }
 }
 
 impl Drop for Page {
     fn drop(&mut self) {
-        // One that was killed before cannot be killed again.
+        // Fails if the server was killed before.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -180,7 +180,7 @@ fn review(project: &Project, reviewer: &str) -> Command {
     command
 }
 
-/// An answer as the page sends it.
+/// Returns an answer as the page sends it.
 pub(crate) fn answer(event: &str, item: &Value, verdict: &str) -> Value {
     json!({
         "event": event, "item": item["id"], "verdict": verdict, "reason": null, "note": null,
@@ -188,7 +188,7 @@ pub(crate) fn answer(event: &str, item: &Value, verdict: &str) -> Value {
     })
 }
 
-/// Sends a request with these headers and no others, and reads to the end.
+/// Sends a request with exactly these headers, and reads the whole response.
 pub(crate) fn send(
     to: SocketAddr,
     method: &str,
@@ -208,16 +208,16 @@ pub(crate) fn send(
     }
     let mut stream = TcpStream::connect(to)?;
     stream.write_all(format!("{}\r\n\r\n", lines.join("\r\n")).as_bytes())?;
-    // A server that refuses by the head may have closed before the body is through.
+    // A server that rejects the headers may close before the body is sent.
     let _ = stream.write_all(body);
     let mut bytes = Vec::new();
-    // And then the connection may end roughly behind a whole reply.
+    // The connection may then be reset after a complete response.
     let _ = stream.read_to_end(&mut bytes);
-    whole(bytes).ok_or_else(|| std::io::ErrorKind::UnexpectedEof.into())
+    parse(bytes).ok_or_else(|| std::io::ErrorKind::UnexpectedEof.into())
 }
 
-/// A reply that came to its end.
-fn whole(mut bytes: Vec<u8>) -> Option<Reply> {
+/// Parses a response; `None` if it is not complete.
+fn parse(mut bytes: Vec<u8>) -> Option<Reply> {
     let end = bytes.windows(4).position(|four| four == b"\r\n\r\n")?;
     let body = bytes.split_off(end + 4);
     let head = String::from_utf8(bytes).ok()?;

@@ -1,4 +1,4 @@
-//! The review page in a browser: by keys only, over a reload, with two reviewers, without the server, by hand.
+//! The review page in a browser: keyboard only, reload, two reviewers, lost server, manual alignment.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -9,7 +9,7 @@ use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{Page, read_project};
 
-/// No planted cards, so that what is pressed is what is logged; no least time, so that the test is not made to wait.
+/// No attention checks, so that the log holds exactly what was pressed; no minimum view time, so that tests do not wait.
 pub(crate) const PLAIN: [&str; 6] = [
     "--attention-checks",
     "0",
@@ -19,7 +19,7 @@ pub(crate) const PLAIN: [&str; 6] = [
     "0",
 ];
 
-/// Opens a reviewer's page in a tab and waits for its first card.
+/// Opens a reviewer's page in a tab and waits for its first item.
 pub(crate) fn enter<'a>(browser: &'a Browser, page: &Page, size: [u32; 2]) -> Tab<'a> {
     let tab = browser.tab(size[0], size[1]);
     tab.open(&page.url);
@@ -27,8 +27,8 @@ pub(crate) fn enter<'a>(browser: &'a Browser, page: &Page, size: [u32; 2]) -> Ta
     tab
 }
 
-/// Opens a page on a project of its own, where there is a browser.
-fn on_a_page(look: impl FnOnce(&Project, &Tab<'_>)) {
+/// Opens a page on a new project; skips if there is no browser.
+fn on_a_page(test: impl FnOnce(&Project, &Tab<'_>)) {
     let Some(browser) = Browser::start() else {
         return;
     };
@@ -36,7 +36,7 @@ fn on_a_page(look: impl FnOnce(&Project, &Tab<'_>)) {
     let project = read_project(&dir);
     let page = Page::start(&project, "lan", &PLAIN);
     let tab = enter(&browser, &page, [1440, 900]);
-    look(&project, &tab);
+    test(&project, &tab);
 }
 
 fn ready(tab: &Tab<'_>) {
@@ -46,14 +46,14 @@ fn ready(tab: &Tab<'_>) {
 fn shown(tab: &Tab<'_>) -> String {
     tab.eval("document.body.dataset.shown")
         .as_str()
-        .expect("a card")
+        .expect("an item")
         .to_owned()
 }
 
-/// Presses a key that judges, when the next cards are there, and waits for the next one.
+/// Presses a verdict key once the next items are prefetched, and waits for the next item.
 pub(crate) fn judge(tab: &Tab<'_>, key: &str) {
     let before = shown(tab);
-    tab.wait("document.body.dataset.ahead === document.body.dataset.shown");
+    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
     tab.key(key);
     tab.wait(&format!("document.body.dataset.shown !== '{before}'"));
 }
@@ -62,10 +62,10 @@ fn saved(tab: &Tab<'_>) {
     tab.wait("document.getElementById('saved').textContent.includes('✓')");
 }
 
-/// The acts that stand, of a reviewer: the verdict and the reason by number of the act.
-fn standing(project: &Project, reviewer: &str) -> BTreeMap<i64, (String, Option<String>)> {
-    let told = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
-    let events = told
+/// Returns a reviewer's current verdicts and reasons by number of the act.
+fn current_verdicts(project: &Project, reviewer: &str) -> BTreeMap<i64, (String, Option<String>)> {
+    let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
+    let events = output
         .out
         .lines()
         .map(|line| serde_json::from_str::<Value>(line).expect("JSON"));
@@ -84,7 +84,7 @@ fn standing(project: &Project, reviewer: &str) -> BTreeMap<i64, (String, Option<
 }
 
 #[test]
-fn fifty_cards_are_judged_by_keys_alone_over_a_reload_and_ten_undone() {
+fn fifty_items_are_judged_by_keys_with_a_reload_and_ten_undone() {
     on_a_page(|project, tab| {
         let keys = ["KeyP", "KeyP", "Digit1", "KeyU", "KeyF", "Digit6"];
         let mut paints = Vec::new();
@@ -104,7 +104,7 @@ fn fifty_cards_are_judged_by_keys_alone_over_a_reload_and_ten_undone() {
             );
         }
         saved(tab);
-        let said: Vec<_> = standing(project, "lan").into_values().collect();
+        let said: Vec<_> = current_verdicts(project, "lan").into_values().collect();
         let wanted =
             |verdict: &str, reason: Option<&str>| (verdict.to_owned(), reason.map(str::to_owned));
         let of_key = [
@@ -125,14 +125,14 @@ fn fifty_cards_are_judged_by_keys_alone_over_a_reload_and_ten_undone() {
         }
         saved(tab);
         assert_eq!(tab.eval("document.getElementById('bar').value"), 40);
-        let left: Vec<_> = standing(project, "lan").into_values().collect();
+        let left: Vec<_> = current_verdicts(project, "lan").into_values().collect();
         assert_eq!(left, pressed[..40]);
         judge(tab, "KeyP");
         saved(tab);
-        assert_eq!(standing(project, "lan").len(), 41);
+        assert_eq!(current_verdicts(project, "lan").len(), 41);
         paints.sort_unstable();
         eprintln!(
-            "key to picture: median {} ms, nine in ten {} ms, worst {} ms",
+            "key to image: median {} ms, nine in ten {} ms, worst {} ms",
             paints[25], paints[45], paints[49]
         );
         assert!(paints[25] <= 50, "{paints:?}");
@@ -140,7 +140,7 @@ fn fifty_cards_are_judged_by_keys_alone_over_a_reload_and_ten_undone() {
 }
 
 #[test]
-fn every_way_to_look_is_a_picture_of_its_own() {
+fn every_display_mode_draws_a_different_image() {
     let Some(browser) = Browser::start() else {
         return;
     };
@@ -165,14 +165,14 @@ fn every_way_to_look_is_a_picture_of_its_own() {
         assert!(seen.insert(canvas(&tab)), "{mode}");
         assert_eq!(
             tab.eval(&format!(
-                "document.querySelector('[data-do={mode}]').ariaPressed"
+                "document.querySelector('[data-action={mode}]').ariaPressed"
             )),
             "true"
         );
         tab.shot(mode);
     }
     tab.key("KeyE");
-    assert!(!seen.insert(canvas(&tab)), "the edges again");
+    assert!(!seen.insert(canvas(&tab)), "edges again");
     for key in ["KeyD", "KeyS", "BracketRight", "KeyZ"] {
         tab.key(key);
         assert!(seen.insert(canvas(&tab)), "{key}");
@@ -185,7 +185,7 @@ fn every_way_to_look_is_a_picture_of_its_own() {
     assert_ne!(canvas(&tab), still);
     tab.key_up("Space");
     assert_eq!(canvas(&tab), still);
-    // To look is not to judge.
+    // Changing the display stores no verdict.
     assert_eq!(tab.eval("document.getElementById('bar').value"), 0);
 }
 
@@ -201,7 +201,7 @@ fn mode_key(mode: &str) -> &'static str {
 }
 
 #[test]
-fn two_reviewers_judge_at_once() {
+fn two_reviewers_judge_at_the_same_time() {
     let (Some(first), Some(second)) = (Browser::start(), Browser::start()) else {
         return;
     };
@@ -216,17 +216,17 @@ fn two_reviewers_judge_at_once() {
     }
     tabs.iter().for_each(saved);
     for (reviewer, verdict) in [("lan", "pass"), ("minh", "fail")] {
-        let acts = standing(&project, reviewer);
+        let acts = current_verdicts(&project, reviewer);
         assert_eq!(acts.len(), 12, "{reviewer}");
         assert!(acts.values().all(|(said, _)| said == verdict), "{acts:?}");
     }
-    // The second reviewer's page says nothing of the first one's answers.
+    // The second reviewer's page does not show the first one's answers.
     let history = tabs[1].eval("document.getElementById('history').textContent");
     assert!(!history.to_string().contains('✓'), "{history}");
 }
 
 #[test]
-fn answers_wait_for_a_server_that_is_gone_and_three_are_enough() {
+fn at_most_three_answers_wait_for_a_lost_server() {
     let Some(browser) = Browser::start() else {
         return;
     };
@@ -237,7 +237,7 @@ fn answers_wait_for_a_server_that_is_gone_and_three_are_enough() {
     let tab = enter(&browser, &page, [1024, 768]);
     judge(&tab, "KeyP");
     saved(&tab);
-    tab.wait("document.body.dataset.ahead === document.body.dataset.shown");
+    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
     page.kill();
     for waiting in 1..=3 {
         let before = shown(&tab);
@@ -256,12 +256,12 @@ fn answers_wait_for_a_server_that_is_gone_and_three_are_enough() {
     let next = Page::start(&project, "lan", &again);
     let _other = enter(&browser, &next, [1024, 768]);
     saved(&tab);
-    assert_eq!(standing(&project, "lan").len(), 4);
+    assert_eq!(current_verdicts(&project, "lan").len(), 4);
     assert_eq!(tab.eval("document.getElementById('alert').hidden"), true);
 }
 
 #[test]
-fn the_end_says_what_is_not_saved() {
+fn the_end_says_how_many_answers_are_not_saved() {
     let Some(browser) = Browser::start() else {
         return;
     };
@@ -273,29 +273,29 @@ fn the_end_says_what_is_not_saved() {
     let tab = enter(&browser, &page, [1024, 768]);
     judge(&tab, "KeyP");
     saved(&tab);
-    tab.wait("document.body.dataset.ahead === document.body.dataset.shown");
+    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
     page.kill();
     judge(&tab, "KeyP");
-    tab.wait("document.body.dataset.ahead === document.body.dataset.shown");
+    tab.wait("document.body.dataset.prefetched === document.body.dataset.shown");
     tab.key("KeyP");
     let head = |text: &str| {
         tab.wait(&format!(
             "document.getElementById('pair').textContent.startsWith('{text}')"
         ));
     };
-    head("All is read, but 2 not saved yet");
+    head("All images are reviewed, but 2 not saved yet");
     let next = Page::start(&project, "lan", &[&few[..], &["--port", &port]].concat());
     let _other = enter(&browser, &next, [1024, 768]);
-    head("All is read. Thank you.");
-    assert_eq!(standing(&project, "lan").len(), 3);
+    head("All images are reviewed. Thank you.");
+    assert_eq!(current_verdicts(&project, "lan").len(), 3);
 }
 
 #[test]
-fn keys_are_the_pages_again_as_soon_as_a_dialog_is_shut() {
+fn keys_work_as_soon_as_a_dialog_is_closed() {
     on_a_page(|_, tab| {
         tab.key("KeyJ");
         tab.wait("document.activeElement.id === 'jump-to'");
-        // In one turn of the script: what has the focus is still the dialog's, which no screen shows any more.
+        // In the same task of the event loop, the focus is still inside the closed dialog.
         tab.eval(
         "document.getElementById('jump').close();
         document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyC', bubbles: true }));
@@ -306,7 +306,7 @@ fn keys_are_the_pages_again_as_soon_as_a_dialog_is_shut() {
 }
 
 #[test]
-fn a_relief_is_laid_by_keys_and_mouse() {
+fn a_relief_is_aligned_by_keys_and_mouse() {
     on_a_page(|project, tab| {
         let pair = tab.eval("document.getElementById('pair').textContent");
         tab.key("KeyC");
@@ -321,16 +321,16 @@ fn a_relief_is_laid_by_keys_and_mouse() {
         for _ in 0..5 {
             tab.key("BracketRight");
         }
-        let turned = iou();
-        assert!(turned < before, "{turned} {before}");
+        let rotated = iou();
+        assert!(rotated < before, "{rotated} {before}");
         let middle = tab.eval(
             "(({ left, top, width, height }) => [left + width / 2, top + height / 2])
             (document.getElementById('canvas').getBoundingClientRect())",
         );
         let at = [0, 1].map(|i| middle[i].as_f64().expect("a number"));
         tab.drag(at, [at[0] + 60.0, at[1]]);
-        assert!(iou() < turned);
-        tab.shot("correction");
+        assert!(iou() < rotated);
+        tab.shot("alignment");
         tab.key("Digit0");
         assert!((iou() - before).abs() < 1e-9);
         for _ in 0..5 {
@@ -340,30 +340,34 @@ fn a_relief_is_laid_by_keys_and_mouse() {
             tab.eval("document.getElementById('legend').textContent")
                 .to_string()
         };
-        // Mirrored, it is still turned by as much.
+        // Mirroring keeps the rotation.
         for _ in 0..2 {
             tab.key("KeyM");
-            assert!(legend().contains("turned by 5.00°"), "{}", legend());
+            assert!(legend().contains("rotated by 5.00°"), "{}", legend());
         }
-        let laid = iou();
-        // A verdict would go on to the next and lose it.
+        let saved_iou = iou();
+        // A verdict would leave the item and lose the alignment.
         tab.key("KeyP");
-        tab.wait("document.getElementById('live').textContent.startsWith('First save')");
+        tab.wait("document.getElementById('live').textContent.startsWith('Save the alignment')");
         tab.key("Enter");
         tab.wait(
-        "document.getElementById('live').textContent.startsWith('Saved as an alignment by hand')",
-    );
-        // It is told where it was made, and goes on from there.
-        tab.wait("document.getElementById('legend').textContent.includes('corrected by hand by lan: turned 5.0°')");
-        assert!(legend().contains(&format!("IoU {laid:.3}")), "{}", legend());
+            "document.getElementById('live').textContent.startsWith('Manual alignment saved')",
+        );
+        // The page shows the alignment, and the editor continues from it.
+        tab.wait("document.getElementById('legend').textContent.includes('aligned manually by lan: rotated 5.0°')");
+        assert!(
+            legend().contains(&format!("IoU {saved_iou:.3}")),
+            "{}",
+            legend()
+        );
         tab.reload();
         ready(tab);
         tab.wait(
-            "document.getElementById('legend').textContent.includes('corrected by hand by lan')",
+            "document.getElementById('legend').textContent.includes('aligned manually by lan')",
         );
         tab.key("KeyC");
-        tab.wait("document.getElementById('legend').textContent.includes('turned by 5.00°')");
-        assert!((iou() - laid).abs() < 1e-9, "{}", legend());
+        tab.wait("document.getElementById('legend').textContent.includes('rotated by 5.00°')");
+        assert!((iou() - saved_iou).abs() < 1e-9, "{}", legend());
         tab.key("Digit0");
         assert!((iou() - before).abs() < 1e-9);
         tab.key("Escape");
@@ -388,14 +392,14 @@ fn a_relief_is_laid_by_keys_and_mouse() {
             "{turns:?}"
         );
         assert!(
-            standing(project, "lan").is_empty(),
-            "a correction is no verdict"
+            current_verdicts(project, "lan").is_empty(),
+            "an alignment is not a verdict"
         );
     });
 }
 
 #[test]
-fn a_note_is_typed_with_keys_that_judge_and_judges_nothing() {
+fn typing_a_note_with_verdict_keys_stores_no_verdict() {
     let Some(browser) = Browser::start() else {
         return;
     };
@@ -412,13 +416,13 @@ fn a_note_is_typed_with_keys_that_judge_and_judges_nothing() {
     assert_eq!(tab.eval("document.getElementById('bar').value"), 0);
     judge(&tab, "KeyP");
     tab.wait("document.getElementById('saved').textContent === 'đã lưu ✓'");
-    let told = mocban(project.dir(), &["verdict", "log"]).expect(0);
+    let output = mocban(project.dir(), &["verdict", "log"]).expect(0);
     assert!(
-        told.out.lines().all(|line| line.contains("nét mờ")),
+        output.out.lines().all(|line| line.contains("nét mờ")),
         "{}",
-        told.out
+        output.out
     );
-    // The same place a second time is too soon where a least time is set.
+    // A verdict before the minimum view time is not accepted.
     let slow = [
         "--attention-checks",
         "0",
@@ -430,6 +434,6 @@ fn a_note_is_typed_with_keys_that_judge_and_judges_nothing() {
     let page = Page::start(&project, "minh", &slow);
     let tab = enter(&browser, &page, [1024, 768]);
     tab.key("KeyP");
-    tab.wait("document.getElementById('live').textContent === 'Look first'");
-    assert!(standing(&project, "minh").is_empty());
+    tab.wait("document.getElementById('live').textContent === 'Please look at the image first'");
+    assert!(current_verdicts(&project, "minh").is_empty());
 }

@@ -1,4 +1,4 @@
-//! The review page under attack: what does not come from its own page is refused, each for its own reason.
+//! Attacks on the review server: requests that do not come from its own page are rejected.
 
 use mocban::store::Project;
 use serde_json::{Value, json};
@@ -22,7 +22,7 @@ impl World {
             "lan",
             &["--attention-checks", "0", "--duplicates", "0"],
         );
-        let item = page.deck().remove(0);
+        let item = page.queue().remove(0);
         Self {
             page,
             item,
@@ -31,12 +31,12 @@ impl World {
         }
     }
 
-    /// A verdict as the page sends it, but for one header: another value, or none.
+    /// Sends a verdict with one header changed or removed.
     fn with(&self, header: &str, value: Option<&str>) -> Reply {
         let mut headers = self.page.headers();
         headers.retain(|(name, _)| *name != header);
         if let Some(value) = value {
-            let known = ["host", "cookie", "origin", "content-type", "x-mocban-word"];
+            let known = ["host", "cookie", "origin", "content-type", "x-csrf-token"];
             let name = known
                 .into_iter()
                 .find(|name| *name == header)
@@ -48,7 +48,7 @@ impl World {
         send(to, "POST", "/api/answer", &headers, body.as_bytes()).expect("a reply")
     }
 
-    /// Nothing of all that was sent is stored; and then the same with everything right is.
+    /// Checks that nothing was stored so far, and that a correct request is.
     fn nothing_is_stored(&self) {
         let log = || mocban(self.project.dir(), &["verdict", "log"]).expect(0);
         assert_eq!(log().out, "");
@@ -59,7 +59,7 @@ impl World {
 }
 
 #[test]
-fn a_foreign_host_is_refused_before_all_else() {
+fn a_foreign_host_is_rejected_first() {
     let world = World::new();
     let port = world.page.address().port();
     for host in [
@@ -81,9 +81,9 @@ fn a_foreign_host_is_refused_before_all_else() {
     for path in [
         "/",
         "/start?token=x",
-        "/api/deck",
+        "/api/queue",
         "/assets/main.js",
-        "/picture/a/print",
+        "/image/a/print",
     ] {
         let reply = send(world.page.address(), "GET", path, &same, b"").expect("a reply");
         assert_eq!(reply.status, 421, "{path}");
@@ -92,7 +92,7 @@ fn a_foreign_host_is_refused_before_all_else() {
 }
 
 #[test]
-fn localhost_by_name_is_ours() {
+fn localhost_is_an_accepted_host() {
     let world = World::new();
     let named = format!("localhost:{}", world.page.address().port());
     let headers = [("host", named), ("cookie", world.page.cookie.clone())];
@@ -119,22 +119,19 @@ fn a_foreign_or_missing_origin_is_refused() {
 }
 
 #[test]
-fn without_the_cookie_there_is_nothing() {
+fn nothing_is_served_without_the_cookie() {
     let world = World::new();
     for cookie in [None, Some("mocban_review=x"), Some("")] {
         assert_eq!(world.with("cookie", cookie).status, 401, "{cookie:?}");
     }
     let headers = [("host", world.page.host.clone())];
-    let picture = format!(
-        "/picture/{}/print",
-        world.item["id"].as_str().expect("an id")
-    );
+    let image = format!("/image/{}/print", world.item["id"].as_str().expect("an id"));
     for path in [
         "/",
-        "/api/deck",
-        "/api/boot",
+        "/api/queue",
+        "/api/config",
         "/assets/main.js",
-        &picture,
+        &image,
         "/nowhere",
     ] {
         let reply = send(world.page.address(), "GET", path, &headers, b"").expect("a reply");
@@ -161,16 +158,16 @@ fn the_token_opens_once() {
 }
 
 #[test]
-fn a_write_without_the_pages_word_is_refused() {
+fn a_write_without_the_csrf_token_is_refused() {
     let world = World::new();
-    for word in [None, Some(""), Some("guess")] {
-        assert_eq!(world.with("x-mocban-word", word).status, 403, "{word:?}");
+    for token in [None, Some(""), Some("guess")] {
+        assert_eq!(world.with("x-csrf-token", token).status, 403, "{token:?}");
     }
     world.nothing_is_stored();
 }
 
 #[test]
-fn a_body_that_a_form_can_send_is_refused() {
+fn a_content_type_that_a_form_can_send_is_refused() {
     let world = World::new();
     for kind in [
         None,
@@ -195,11 +192,11 @@ fn a_large_body_is_refused() {
 }
 
 #[test]
-fn paths_lead_nowhere_but_to_what_is_named() {
+fn paths_reach_only_named_resources() {
     let world = World::new();
     let id = world.item["id"].as_str().expect("an id");
     let pair = world.item["pair"].as_str().expect("a name");
-    assert_eq!(world.page.get(&format!("/picture/{id}/print")).status, 200);
+    assert_eq!(world.page.get(&format!("/image/{id}/print")).status, 200);
     for path in [
         "/assets/../Cargo.toml",
         "/assets/..%2f..%2fcatalog.sqlite",
@@ -207,11 +204,11 @@ fn paths_lead_nowhere_but_to_what_is_named() {
         "/assets//etc/passwd",
         "/../catalog.sqlite",
         "/catalog.sqlite",
-        &format!("/picture/{pair}/print"),
-        &format!("/picture/{id}/..%2f..%2fcatalog.sqlite"),
-        &format!("/picture/{id}/print.png"),
-        "/picture/..%2f..%2fetc/passwd",
-        "/picture/%00/print",
+        &format!("/image/{pair}/print"),
+        &format!("/image/{id}/..%2f..%2fcatalog.sqlite"),
+        &format!("/image/{id}/print.png"),
+        "/image/..%2f..%2fetc/passwd",
+        "/image/%00/print",
     ] {
         let status = world.page.get(path).status;
         assert!([400, 404].contains(&status), "{path}: {status}");
@@ -219,7 +216,7 @@ fn paths_lead_nowhere_but_to_what_is_named() {
 }
 
 #[test]
-fn other_methods_and_senseless_answers_are_refused() {
+fn other_methods_and_invalid_answers_are_refused() {
     let world = World::new();
     let headers = world.page.headers();
     for method in ["PUT", "DELETE", "PATCH"] {
@@ -248,10 +245,10 @@ fn other_methods_and_senseless_answers_are_refused() {
 }
 
 #[test]
-fn every_answer_carries_the_policy() {
+fn every_response_has_the_security_headers() {
     let world = World::new();
     let refused = world.with("host", Some("evil.example"));
-    for reply in [world.page.get("/"), world.page.get("/api/deck"), refused] {
+    for reply in [world.page.get("/"), world.page.get("/api/queue"), refused] {
         let policy = reply.header("content-security-policy").expect("a policy");
         assert!(policy.starts_with("default-src 'none';"), "{policy}");
         assert!(!policy.contains("unsafe"), "{policy}");
@@ -263,7 +260,7 @@ fn every_answer_carries_the_policy() {
 }
 
 #[test]
-fn a_reviewers_name_is_text_and_no_markup() {
+fn a_reviewers_name_is_escaped() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let name = "<script>alert('lan')</script>&\"";
     let page = Page::open(&read_project(&dir), name, &[]);

@@ -1,5 +1,5 @@
-//! The review page's server under random `kill -9`: no acknowledged verdict is lost, none is doubled.
-//! `MOCBAN_REVIEW_KILLS` says how often.
+//! The review server under random `kill -9`: no acknowledged verdict is lost or stored twice.
+//! `MOCBAN_REVIEW_KILLS` sets the number of kills.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::mpsc;
@@ -14,19 +14,19 @@ use crate::cli::mocban;
 use crate::page::{Page, Site, answer, read_project};
 use crate::test_size::size_from_env;
 
-/// What a reviewer did, in order, and how far it got.
+/// The requests of a reviewer and their outcome.
 #[derive(Default)]
 struct Diary {
-    /// Acts that were acknowledged, by number: the verdict, or `None` where it was taken back.
+    /// Acknowledged events by id: the verdict, or `None` if it was undone.
     acknowledged: BTreeMap<String, Option<&'static str>>,
-    /// The act that was under way when the server died, to be sent again.
+    /// The request that was in flight when the server died; it is sent again.
     open: Option<(&'static str, Value)>,
     acts: u32,
 }
 
 impl Diary {
-    /// Reads card after card until the server is gone; now and then takes the last answer back.
-    fn read(&mut self, site: &Site, deck: &[Value], dice: &mut ChaCha8Rng) {
+    /// Answers random items until the server is gone; sometimes undoes the last answer.
+    fn review(&mut self, site: &Site, queue: &[Value], dice: &mut ChaCha8Rng) {
         if let Some((path, body)) = self.open.take()
             && !self.send(site, path, body)
         {
@@ -35,7 +35,7 @@ impl Diary {
         loop {
             self.acts += 1;
             let event = format!("e{}", self.acts);
-            let item = &deck[dice.random_range(0..deck.len())];
+            let item = &queue[dice.random_range(0..queue.len())];
             let verdict = if dice.random_bool(0.2) {
                 "fail"
             } else {
@@ -50,14 +50,14 @@ impl Diary {
         }
     }
 
-    /// Sends an act; says whether it was acknowledged.
+    /// Sends a request; returns whether it was acknowledged.
     fn send(&mut self, site: &Site, path: &'static str, body: Value) -> bool {
         let Ok(reply) = site.post(path, &body) else {
             self.open = Some((path, body));
             return false;
         };
-        let told = String::from_utf8_lossy(&reply.body);
-        assert_eq!(reply.status, 200, "{told}");
+        let output = String::from_utf8_lossy(&reply.body);
+        assert_eq!(reply.status, 200, "{output}");
         let event = body["event"].as_str().expect("a number").to_owned();
         let verdict = match body["verdict"].as_str() {
             Some("fail") => Some("fail"),
@@ -69,12 +69,12 @@ impl Diary {
     }
 }
 
-/// Every act in the log: its verdict, or `None` where it was taken back, and that it is there once a metric.
+/// Returns every event in the log with its verdict, or `None` if it was undone. Fails if one is stored twice for a metric.
 fn stored(project: &Project) -> BTreeMap<String, Option<String>> {
-    let told = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
+    let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
     let mut rows = BTreeSet::new();
     let mut acts = BTreeMap::new();
-    for line in told.out.lines() {
+    for line in output.out.lines() {
         let event: Value = serde_json::from_str(line).expect("JSON");
         let number = event["event"].as_str().expect("a number").to_owned();
         let row = format!("{number} {}", event["metric"]);
@@ -98,23 +98,23 @@ fn no_acknowledged_verdict_is_lost_or_doubled() {
             "lan",
             &["--attention-checks", "0", "--duplicates", "0"],
         );
-        let deck = page.deck();
+        let queue = page.queue();
         let moment = Duration::from_micros(dice.random_range(0..60_000));
         let (shot, died) = mpsc::channel::<()>();
         std::thread::scope(|scope| {
             let reading = scope.spawn({
-                let (site, deck, diary) = (Site::clone(&page), &deck, &mut diary);
+                let (site, queue, diary) = (Site::clone(&page), &queue, &mut diary);
                 let mut dice = ChaCha8Rng::seed_from_u64(dice.random());
-                move || diary.read(&site, deck, &mut dice)
+                move || diary.review(&site, queue, &mut dice)
             });
-            // The moment of the shot is what is tested: there is no event to wait for.
+            // The kill comes at a random time, so there is no event to wait for.
             let _ = died.recv_timeout(moment);
             page.kill();
             drop(shot);
             reading.join().expect("the reviewer");
         });
     }
-    // What was under way at the last shot is sent once more.
+    // The request in flight at the last kill is sent again.
     let page = Page::open(&project, "lan", &[]);
     if let Some((path, body)) = diary.open.take() {
         assert!(diary.send(&page, path, body));

@@ -1,4 +1,4 @@
-//! What the review page's server stores and tells: bound to what was seen, blind, the same after a restart.
+//! What the review server stores and reveals: bound to what was shown, blind, the same after a restart.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 use crate::cli::{Call, mocban};
 use crate::page::{Page, answer, read_project};
 
-/// Reads something of a project's catalog.
+/// Opens a project's catalog and reads from it.
 pub(crate) fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -> T {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {
@@ -22,15 +22,15 @@ pub(crate) fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -
     })
 }
 
-fn controls(project: &Project) -> Vec<AttentionCheckAnswer> {
+fn check_answers(project: &Project) -> Vec<AttentionCheckAnswer> {
     ask(project, async |catalog| {
         catalog.attention_check_answers().await.expect("answers")
     })
 }
 
 fn log(project: &Project) -> Vec<Value> {
-    let told = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
-    let lines = told.out.lines().map(serde_json::from_str);
+    let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
+    let lines = output.out.lines().map(serde_json::from_str);
     lines.collect::<Result<_, _>>().expect("JSON lines")
 }
 
@@ -47,7 +47,7 @@ fn page_and_command_line_write_the_same_events() {
         "lan",
         &["--attention-checks", "0", "--duplicates", "0"],
     );
-    let item = page.deck().remove(0);
+    let item = page.queue().remove(0);
     let mut body = answer("e1", &item, "fail");
     body["reason"] = json!("strokes_lost");
     body["note"] = json!(" mờ ở góc ");
@@ -68,14 +68,14 @@ fn page_and_command_line_write_the_same_events() {
         assert_eq!(event["current"], true);
         assert!(event["seen"].is_string());
     }
-    let answered = |page: &Page| page.deck()[0]["answer"]["verdict"].clone();
+    let answered = |page: &Page| page.queue()[0]["answer"]["verdict"].clone();
     assert_eq!(answered(&page), "fail");
     mocban(project.dir(), &["verdict", "undo", "--reviewer", "lan"]).expect(0);
     assert_eq!(answered(&page), Value::Null);
     let pair = item["pair"].as_str().expect("a name");
     set(&project, &[pair, "pass", "--reviewer", "lan"]);
     assert_eq!(answered(&page), "pass");
-    let event = page.deck()[0]["answer"]["event"].clone();
+    let event = page.queue()[0]["answer"]["event"].clone();
     let undone = page
         .post("/api/undo", &json!({ "event": event }))
         .expect("a reply");
@@ -84,21 +84,21 @@ fn page_and_command_line_write_the_same_events() {
 }
 
 #[test]
-fn order_names_and_pictures_are_the_same_after_a_restart_and_others_for_another_reviewer() {
+fn order_and_ids_survive_a_restart_and_differ_between_reviewers() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let untested = ["--attention-checks", "0", "--duplicates", "0"];
-    let first = Page::open(&project, "lan", &untested);
-    let again = Page::open(&project, "lan", &untested);
-    let other = Page::open(&project, "minh", &untested);
-    assert_eq!(first.deck(), again.deck());
+    let unchecked = ["--attention-checks", "0", "--duplicates", "0"];
+    let first = Page::open(&project, "lan", &unchecked);
+    let again = Page::open(&project, "lan", &unchecked);
+    let other = Page::open(&project, "minh", &unchecked);
+    assert_eq!(first.queue(), again.queue());
     let ids = |page: &Page| -> BTreeSet<String> {
-        let deck = page.deck();
-        deck.iter().map(|item| item["id"].to_string()).collect()
+        let queue = page.queue();
+        queue.iter().map(|item| item["id"].to_string()).collect()
     };
     assert!(ids(&first).is_disjoint(&ids(&other)));
     let pairs = |page: &Page| -> Vec<Value> {
-        page.deck()
+        page.queue()
             .iter()
             .map(|item| item["pair"].clone())
             .collect()
@@ -107,7 +107,7 @@ fn order_names_and_pictures_are_the_same_after_a_restart_and_others_for_another_
 }
 
 #[test]
-fn results_that_look_the_same_are_one_card() {
+fn results_that_look_the_same_are_one_item() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let page = Page::open(
@@ -115,12 +115,12 @@ fn results_that_look_the_same_are_one_card() {
         "lan",
         &["--attention-checks", "0", "--duplicates", "0"],
     );
-    let deck = page.deck();
-    for (i, item) in deck.iter().enumerate() {
+    let queue = page.queue();
+    for (i, item) in queue.iter().enumerate() {
         let reply = page.post("/api/answer", &answer(&format!("e{i}"), item, "pass"));
         assert_eq!(reply.expect("a reply").status, 200);
     }
-    // Every result has its verdict though some were shown together.
+    // Every result has a verdict, although some were shown together.
     let report = mocban(project.dir(), &["report", "--format", "json"])
         .expect(0)
         .json();
@@ -128,11 +128,11 @@ fn results_that_look_the_same_are_one_card() {
     for row in rows {
         assert_eq!(row["judged"], 15, "{row}");
     }
-    assert!(deck.len() < 15 * rows.len(), "{} cards", deck.len());
+    assert!(queue.len() < 15 * rows.len(), "{} items", queue.len());
 }
 
 #[test]
-fn planted_faults_are_stored_apart_and_nothing_in_the_page_tells_them() {
+fn attention_checks_are_stored_apart_and_not_revealed_by_the_page() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let page = Page::open(
@@ -140,39 +140,44 @@ fn planted_faults_are_stored_apart_and_nothing_in_the_page_tells_them() {
         "lan",
         &["--attention-checks", "50", "--duplicates", "20"],
     );
-    let deck = page.deck();
+    let queue = page.queue();
     let mut shapes: BTreeMap<bool, BTreeSet<String>> = BTreeMap::new();
-    for (i, item) in deck.iter().enumerate() {
-        let before = controls(&project).len();
+    for (i, item) in queue.iter().enumerate() {
+        let before = check_answers(&project).len();
         let reply = page.post("/api/answer", &answer(&format!("e{i}"), item, "pass"));
-        let is_control = controls(&project).len() > before;
-        // No pair, which would be known again; the same fields of the same form, whatever it is.
+        let is_check = check_answers(&project).len() > before;
+        // The pair is hidden, and all kinds of items have the same fields.
         assert_eq!(item["pair"], Value::Null);
         let keys: Vec<_> = item.as_object().expect("fields").keys().cloned().collect();
-        let mut told = reply.expect("a reply").json();
-        told["stored"] = json!("");
+        let mut output = reply.expect("a reply").json();
+        output["stored"] = json!("");
         shapes
-            .entry(is_control)
+            .entry(is_check)
             .or_default()
-            .insert(format!("{keys:?} {told}"));
+            .insert(format!("{keys:?} {output}"));
         if i % 9 == 0 {
             let id = item["id"].as_str().expect("an id");
-            let about = page.get(&format!("/api/about/{id}")).json();
-            let fields: Vec<_> = about.as_object().expect("fields").keys().cloned().collect();
+            let details = page.get(&format!("/api/details/{id}")).json();
+            let fields: Vec<_> = details
+                .as_object()
+                .expect("fields")
+                .keys()
+                .cloned()
+                .collect();
             assert_eq!(fields, ["dice", "iou", "metrics", "others", "pair"]);
-            assert_eq!(about["others"], json!([]));
+            assert_eq!(details["others"], json!([]));
         }
     }
     assert_eq!(shapes[&true], shapes[&false]);
-    let controls = controls(&project);
-    let faults = controls
+    let checks = check_answers(&project);
+    let faults = checks
         .iter()
         .filter(|answer| answer.check.is_fault())
         .count();
     assert!(
-        faults > 5 && controls.len() > faults,
+        faults > 5 && checks.len() > faults,
         "{faults} of {}",
-        controls.len()
+        checks.len()
     );
     assert_eq!(
         log(&project)
@@ -181,34 +186,36 @@ fn planted_faults_are_stored_apart_and_nothing_in_the_page_tells_them() {
             .count(),
         0
     );
-    let whole = [
+    let text = [
         page.get("/").body,
-        page.get("/api/deck").body,
-        page.get("/api/boot").body,
+        page.get("/api/queue").body,
+        page.get("/api/config").body,
     ]
     .concat();
-    let whole = String::from_utf8(whole).expect("UTF-8");
+    let text = String::from_utf8(text).expect("UTF-8");
     for word in [
         "control",
         "planted",
         "repeat",
+        "duplicate",
         "turned\"",
+        "threshold\"",
         "nl_ssim",
         "ensemble",
         "confidence",
     ] {
-        assert!(!whole.contains(word), "the page says {word}");
+        assert!(!text.contains(word), "the page contains {word}");
     }
-    // Read again, everything is answered: controls and repeats as well.
+    // After a reload everything is answered, attention checks included.
     assert!(
-        page.deck()
+        page.queue()
             .iter()
             .all(|item| item["answer"]["verdict"] == "pass")
     );
 }
 
 #[test]
-fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer() {
+fn verdicts_of_others_are_shown_to_an_adjudicator_after_the_answer() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let first = Page::open(
@@ -216,7 +223,7 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
         "lan",
         &["--attention-checks", "0", "--duplicates", "0"],
     );
-    let item = first.deck().remove(0);
+    let item = first.queue().remove(0);
     first
         .post("/api/answer", &answer("e1", &item, "pass"))
         .expect("a reply");
@@ -226,39 +233,43 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
         &[pair, "fail", "--reviewer", "minh", "--reason", "angle"],
     );
     let idle = |reviewer: &str| {
-        let told = mocban(
+        let output = mocban(
             project.dir(),
             &["review", "--reviewer", reviewer, "--adjudicate"],
         );
-        let told = told.expect(0);
-        assert!(told.err.contains("nothing to adjudicate"), "{}", told.err);
-        assert_eq!(told.out, "", "no address");
+        let output = output.expect(0);
+        assert!(
+            output.err.contains("nothing to adjudicate"),
+            "{}",
+            output.err
+        );
+        assert_eq!(output.out, "", "no address");
     };
-    // Who is party cannot settle.
+    // A reviewer who is party to the conflict cannot settle it.
     idle("lan");
     let third = Page::open(&project, "hoa", &["--adjudicate"]);
-    let deck = third.deck();
-    assert_eq!(deck.len(), 1);
-    let about = format!("/api/about/{}", deck[0]["id"].as_str().expect("an id"));
-    assert_eq!(third.get(&about).status, 403);
+    let queue = third.queue();
+    assert_eq!(queue.len(), 1);
+    let details = format!("/api/details/{}", queue[0]["id"].as_str().expect("an id"));
+    assert_eq!(third.get(&details).status, 403);
     third
-        .post("/api/answer", &answer("h1", &deck[0], "fail"))
+        .post("/api/answer", &answer("h1", &queue[0], "fail"))
         .expect("a reply");
-    let told = third.get(&about).json();
-    let said: BTreeSet<String> = told["others"]
+    let output = third.get(&details).json();
+    let verdicts: BTreeSet<String> = output["others"]
         .as_array()
         .expect("others")
         .iter()
         .map(|other| format!("{} {}", other["reviewer"], other["verdict"]))
         .collect();
     let wanted = ["\"lan\" \"pass\"", "\"minh\" \"fail\""].map(str::to_owned);
-    assert_eq!(said, BTreeSet::from(wanted));
-    // It is settled.
+    assert_eq!(verdicts, BTreeSet::from(wanted));
+    // The conflict is settled.
     idle("dung");
     let log = log(&project);
-    let word = log.iter().filter(|event| event["reviewer"] == "hoa");
-    assert!(word.clone().count() > 0);
-    for event in word {
+    let rulings = log.iter().filter(|event| event["reviewer"] == "hoa");
+    assert!(rulings.clone().count() > 0);
+    for event in rulings {
         assert_eq!(event["review_order"], "adjudicate");
     }
     assert!(
@@ -268,7 +279,7 @@ fn what_others_said_is_told_to_none_but_who_settles_it_and_then_after_the_answer
 }
 
 #[test]
-fn a_jump_leads_to_the_first_picture_of_a_pair_alone() {
+fn a_jump_finds_only_the_first_item_of_a_pair() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let many = [
@@ -280,40 +291,40 @@ fn a_jump_leads_to_the_first_picture_of_a_pair_alone() {
         "density",
     ];
     let page = Page::open(&project, "lan", &many);
-    let told = page.get("/api/deck").json();
-    let pairs = told["pairs"].as_array().expect("names");
+    let output = page.get("/api/queue").json();
+    let pairs = output["pairs"].as_array().expect("names");
     assert_eq!(pairs.len(), 15);
-    let cards = told["items"].as_array().expect("cards");
-    assert!(cards.len() > pairs.len(), "{}", cards.len());
-    let place = |id: &Value| cards.iter().position(|card| card["id"] == *id);
-    let pair_of = |card: &Value, event: &str| {
-        page.post("/api/answer", &answer(event, card, "pass"))
+    let items = output["items"].as_array().expect("items");
+    assert!(items.len() > pairs.len(), "{}", items.len());
+    let place = |id: &Value| items.iter().position(|item| item["id"] == *id);
+    let pair_of = |item: &Value, event: &str| {
+        page.post("/api/answer", &answer(event, item, "pass"))
             .expect("a reply");
-        let id = card["id"].as_str().expect("an id");
-        page.get(&format!("/api/about/{id}")).json()["pair"].clone()
+        let id = item["id"].as_str().expect("an id");
+        page.get(&format!("/api/details/{id}")).json()["pair"].clone()
     };
-    let of_card: Vec<Value> = (0..cards.len())
-        .map(|i| pair_of(&cards[i], &format!("e{i}")))
+    let pairs_of_items: Vec<Value> = (0..items.len())
+        .map(|i| pair_of(&items[i], &format!("e{i}")))
         .collect();
     for pair in pairs {
         let name = pair.as_str().expect("a name");
         let found = page.get(&format!("/api/find/{name}")).json();
-        let first = of_card.iter().position(|of| of == pair);
+        let first = pairs_of_items.iter().position(|of| of == pair);
         assert_eq!(place(&found["id"]), first, "{name}");
     }
     assert_eq!(page.get("/api/find/nobody").status, 404);
 }
 
 #[test]
-fn a_result_that_changed_meanwhile_is_not_shown_but_what_was_seen_is_stored() {
+fn a_changed_result_is_not_shown_but_the_answer_is_stored() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let page = Page::open(&project, "lan", &["--attention-checks", "0"]);
-    let item = page.deck().remove(0);
+    let item = page.queue().remove(0);
     let smaller = ["--set", "depth.longest_px=80", "run", "--rerun", "stale"];
     mocban(project.dir(), &smaller).expect(0);
     let id = item["id"].as_str().expect("an id");
-    assert_eq!(page.get(&format!("/picture/{id}/print")).status, 410);
+    assert_eq!(page.get(&format!("/image/{id}/print")).status, 410);
     let mut body = answer("e1", &item, "fail");
     body["reason"] = json!("wrong_pair");
     assert_eq!(
@@ -330,5 +341,71 @@ fn a_result_that_changed_meanwhile_is_not_shown_but_what_was_seen_is_stored() {
             .next()
     });
     assert_eq!(detail, Some((Verdict::Fail, Some(Reason::WrongPair))));
-    assert_ne!(page.deck()[0]["id"], item["id"]);
+    assert_ne!(page.queue()[0]["id"], item["id"]);
+}
+
+/// Replaces what differs between runs.
+fn redacted(mut value: Value, fields: &[&str]) -> Value {
+    match &mut value {
+        Value::Object(object) => {
+            for (name, value) in object {
+                *value = if fields.contains(&name.as_str()) && !value.is_null() {
+                    json!(format!("[{name}]"))
+                } else {
+                    redacted(value.take(), fields)
+                };
+            }
+        }
+        Value::Array(values) => {
+            for value in values {
+                *value = redacted(value.take(), fields);
+            }
+        }
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
+    }
+    value
+}
+
+#[test]
+fn the_api_of_a_small_queue() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let small = [
+        "--attention-checks",
+        "0",
+        "--duplicates",
+        "0",
+        "--metric",
+        "density",
+        "--sample",
+        "2",
+    ];
+    let page = Page::open(&project, "lan", &small);
+    let config = page.get("/api/config").json();
+    let mut body = answer("e1", &page.queue()[0], "fail");
+    body["reason"] = json!("strokes_lost");
+    body["note"] = json!("nét mờ");
+    let stored = page.post("/api/answer", &body).expect("a reply").json();
+    let id = page.queue()[0]["id"].as_str().expect("an id").to_owned();
+    let fields = [
+        "csrf_token",
+        "messages",
+        "id",
+        "pair",
+        "pairs",
+        "at",
+        "iou",
+        "dice",
+    ];
+    let queue = page.get("/api/queue").json();
+    let details = page.get(&format!("/api/details/{id}")).json();
+    let missing = page.get("/api/details/none").json();
+    let undone = page.post("/api/undo", &json!({ "event": "e1" }));
+    insta::assert_json_snapshot!(redacted(
+        json!({
+            "config": config, "answer": stored, "queue": queue, "details": details, "missing": missing,
+            "undo": undone.expect("a reply").json(),
+        }),
+        &fields
+    ));
 }

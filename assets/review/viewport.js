@@ -1,8 +1,8 @@
-// Which part of a picture the stage shows: zoom and pan, shared by everything drawn on it.
+// The visible part of the image: zoom and pan, shared by everything the viewer draws.
 
-const STEPS = [1, 2, 4];
+const ZOOM_STEPS = [1, 2, 4];
 
-export class Lens {
+export class Viewport {
   constructor() {
     this.reset();
   }
@@ -13,29 +13,29 @@ export class Lens {
     this.y = 0;
   }
 
-  /** The next zoom, about a point of the picture. */
-  step(point, size) {
-    this.zoom = STEPS[(STEPS.indexOf(this.zoom) + 1) % STEPS.length];
+  /** Switches to the next zoom step, centred on a point of the image. */
+  zoomAt(point, size) {
+    this.zoom = ZOOM_STEPS[(ZOOM_STEPS.indexOf(this.zoom) + 1) % ZOOM_STEPS.length];
     this.x = point.x - size.width / 2;
     this.y = point.y - size.height / 2;
-    this.hold(size);
+    this.clamp(size);
   }
 
-  /** Moves the picture by pixels of the picture. */
+  /** Pans by image pixels. */
   pan(dx, dy, size) {
     this.x -= dx;
     this.y -= dy;
-    this.hold(size);
+    this.clamp(size);
   }
 
-  /** Keeps the picture under the lens. */
-  hold({ width, height }) {
-    const room = (side) => (side / 2) * (1 - 1 / this.zoom);
-    this.x = Math.min(Math.max(this.x, -room(width)), room(width));
-    this.y = Math.min(Math.max(this.y, -room(height)), room(height));
+  /** Keeps the view inside the image. */
+  clamp({ width, height }) {
+    const limit = (side) => (side / 2) * (1 - 1 / this.zoom);
+    this.x = Math.min(Math.max(this.x, -limit(width)), limit(width));
+    this.y = Math.min(Math.max(this.y, -limit(height)), limit(height));
   }
 
-  /** How a picture of a size lies in a box of the screen. */
+  /** Returns how an image of a size is placed in a box of the screen. */
   frame(size, box) {
     const fit = Math.min(box.width / size.width, box.height / size.height);
     const scale = fit * this.zoom;
@@ -54,7 +54,7 @@ export class Lens {
   }
 }
 
-/** The point of the picture under a point of the screen. */
-export function under(frame, { x, y }) {
+/** Converts a point of the screen to a point of the image. */
+export function imagePoint(frame, { x, y }) {
   return { x: (x - frame.left) / frame.scale, y: (y - frame.top) / frame.scale };
 }

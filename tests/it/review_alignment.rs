@@ -1,4 +1,4 @@
-//! Corrections by hand as the server takes and tells them: beside the result, in the same measure, to no repeat.
+//! Manual alignments: stored and exported, scored like results, hidden from duplicates.
 
 use mocban::catalog::StoredAlignment;
 use mocban::store::Project;
@@ -15,7 +15,7 @@ fn alignments(project: &Project) -> Vec<StoredAlignment> {
 }
 
 #[test]
-fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
+fn a_manual_alignment_is_stored_with_the_result_and_exported() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let page = Page::open(
@@ -23,12 +23,12 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
         "lan",
         &["--attention-checks", "0", "--duplicates", "0"],
     );
-    let item = page.deck().remove(0);
+    let item = page.queue().remove(0);
     let id = item["id"].as_str().expect("an id");
-    let begin = || page.get(&format!("/api/correction/{id}")).json();
-    let start = begin();
+    let start_of_editor = || page.get(&format!("/api/alignment/{id}")).json();
+    let start = start_of_editor();
     assert_eq!(
-        [&item["corrected"], &start["laid"]],
+        [&item["manual_alignment"], &start["previous"]],
         [&Value::Null, &Value::Null]
     );
     let mut map = start["view_from_depth"].clone();
@@ -74,7 +74,7 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
     let log =
         std::fs::read_to_string(project.dir().join("out/manual_alignments.jsonl")).expect("a log");
     assert_eq!(log.lines().count(), 2);
-    // An export with all it may hold is replaced as any other.
+    // An export with an alignment log can be replaced.
     mocban(project.dir(), &["export", "-o", "out"]).expect(0);
     let lines = std::fs::read_to_string(project.dir().join("out/pairs.jsonl")).expect("lines");
     let lines = lines
@@ -90,13 +90,13 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
         assert_eq!(by_hand["print_from_mesh"], json!(second.print_from_mesh));
         assert_ne!(by_hand["print_from_mesh"], line["print_from_mesh"]);
     }
-    // The page tells it and begins there; so does `show`.
+    // The page and `show` report the alignment, and the editor starts from it.
     let near = |a: &Value, b: f64| (a.as_f64().expect("a number") - b).abs() < 1e-6;
-    let told = &page.deck()[0]["corrected"];
-    assert!(near(&told["turned_deg"], 0.0), "{told}");
-    assert!(near(&told["shifted_px"][0], b[0] - a[0]), "{told}");
+    let summary = &page.queue()[0]["manual_alignment"];
+    assert!(near(&summary["rotation_deg"], 0.0), "{summary}");
+    assert!(near(&summary["shift_px"][0], b[0] - a[0]), "{summary}");
     assert!(near(
-        &begin()["laid"][0][2],
+        &start_of_editor()["previous"][0][2],
         map[0][2].as_f64().expect("a number")
     ));
     let pair = item["pair"].as_str().expect("a name");
@@ -104,18 +104,21 @@ fn an_alignment_by_hand_is_stored_beside_the_result_and_exported() {
         .expect(0)
         .json();
     assert_eq!(shown["manual_alignments"][1]["reviewer"], "lan");
-    let words = mocban(project.dir(), &["show", pair]).expect(0).out;
-    assert!(words.contains("lan: rotated 0.0°, shifted"), "{words}");
+    let text = mocban(project.dir(), &["show", pair]).expect(0).out;
+    assert!(text.contains("lan: rotated 0.0°, shifted"), "{text}");
     let undone = page
         .post("/api/undo", &json!({ "event": "a1" }))
         .expect("a reply");
     assert_eq!(undone.status, 200);
     assert!(alignments(&project)[1].undone_at.is_some());
-    assert!(near(&page.deck()[0]["corrected"]["shifted_px"][0], 0.0));
+    assert!(near(
+        &page.queue()[0]["manual_alignment"]["shift_px"][0],
+        0.0
+    ));
 }
 
 #[test]
-fn a_correction_is_told_of_no_repeat_before_it_is_answered() {
+fn an_alignment_is_hidden_on_a_duplicate_until_it_is_answered() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let page = Page::open(
@@ -123,31 +126,33 @@ fn a_correction_is_told_of_no_repeat_before_it_is_answered() {
         "lan",
         &["--attention-checks", "0", "--duplicates", "100"],
     );
-    let deck = page.deck();
+    let queue = page.queue();
     let start = |item: &Value| {
         let id = item["id"].as_str().expect("an id");
-        page.get(&format!("/api/correction/{id}")).json()
+        page.get(&format!("/api/alignment/{id}")).json()
     };
-    let item = &deck[0];
+    let item = &queue[0];
     let body = json!({
         "event": "a1", "item": item["id"], "view_from_depth": start(item)["view_from_depth"], "note": null,
     });
     assert_eq!(page.post("/api/align", &body).expect("a reply").status, 200);
-    let corrected = |page: &Page| {
-        let deck = page.deck();
-        let told = deck.iter().filter(|item| !item["corrected"].is_null());
-        told.map(|item| item["id"].clone()).collect::<Vec<_>>()
+    let aligned = |page: &Page| {
+        let queue = page.queue();
+        let items = queue
+            .iter()
+            .filter(|item| !item["manual_alignment"].is_null());
+        items.map(|item| item["id"].clone()).collect::<Vec<_>>()
     };
-    assert!(corrected(&page).is_empty());
-    assert!(deck.iter().all(|item| start(item)["laid"].is_null()));
+    assert!(aligned(&page).is_empty());
+    assert!(queue.iter().all(|item| start(item)["previous"].is_null()));
     page.post("/api/answer", &answer("e1", item, "pass"))
         .expect("a reply");
-    assert_eq!(corrected(&page), [item["id"].clone()]);
-    assert!(!start(item)["laid"].is_null());
+    assert_eq!(aligned(&page), [item["id"].clone()]);
+    assert!(!start(item)["previous"].is_null());
 }
 
 #[test]
-fn scores_are_the_same_in_the_page_by_hand_and_in_show() {
+fn page_editor_and_show_report_equal_scores() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     let plain = [
@@ -159,14 +164,14 @@ fn scores_are_the_same_in_the_page_by_hand_and_in_show() {
         "density",
     ];
     let page = Page::open(&project, "lan", &plain);
-    let item = page.deck().remove(0);
+    let item = page.queue().remove(0);
     let id = item["id"].as_str().expect("an id");
     page.post("/api/answer", &answer("e1", &item, "pass"))
         .expect("a reply");
-    let about = page.get(&format!("/api/about/{id}")).json();
-    let map = page.get(&format!("/api/correction/{id}")).json()["view_from_depth"].clone();
+    let details = page.get(&format!("/api/details/{id}")).json();
+    let map = page.get(&format!("/api/alignment/{id}")).json()["view_from_depth"].clone();
     let body = json!({ "event": "a1", "item": id, "view_from_depth": map, "note": null });
-    let laid = page.post("/api/align", &body).expect("a reply").json();
+    let aligned = page.post("/api/align", &body).expect("a reply").json();
     let pair = item["pair"].as_str().expect("a name");
     let shown = mocban(project.dir(), &["--json", "show", pair])
         .expect(0)
@@ -176,6 +181,9 @@ fn scores_are_the_same_in_the_page_by_hand_and_in_show() {
     for score in ["iou", "dice"] {
         let number = |value: &Value| (value.as_f64().expect("a number") * 1e4).round();
         let shown = number(&density.expect("a result")["scores"][score]);
-        assert_eq!([number(&about[score]), number(&laid[score])], [shown; 2]);
+        assert_eq!(
+            [number(&details[score]), number(&aligned[score])],
+            [shown; 2]
+        );
     }
 }

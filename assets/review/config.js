@@ -1,0 +1,27 @@
+// Configuration from the server: CSRF token, key bindings, messages.
+
+export const language = document.documentElement.lang;
+
+let config = await load();
+
+async function load() {
+  const response = await fetch("/api/config");
+  if (!response.ok) throw new Error(await response.text());
+  return response.json();
+}
+
+/** Loads the configuration again; a restarted server has a new CSRF token. */
+export async function reload() {
+  config = await load();
+}
+
+export const csrfToken = () => config.csrf_token;
+export const keys = () => config.keys;
+export const reviewOrder = config.review_order;
+export const minViewMs = config.min_view_ms;
+
+/** Returns the message of a key, with `{name}` replaced by the values. */
+export function translate(key, values = {}) {
+  const text = config.messages[language]?.[key] ?? key;
+  return text.replace(/\{(\w+)\}/g, (placeholder, name) => values[name] ?? placeholder);
+}

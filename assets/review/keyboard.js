@@ -1,0 +1,48 @@
+// Key bindings by physical key. Keys typed into a field are ignored here.
+
+import { keys } from "./config.js";
+
+/** Labels of keys without a letter. */
+const LABELS = {
+  Backspace: "⌫", Space: "␣", ArrowRight: "→", ArrowLeft: "←", BracketLeft: "[", BracketRight: "]", Comma: ",",
+  Period: ".", Equal: "=", Minus: "−", Enter: "⏎", Escape: "Esc", Slash: "/", Semicolon: ";", Quote: "'",
+};
+
+function labelOf(code) {
+  return LABELS[code] ?? code.replace(/^(Key|Digit|Numpad)/, "");
+}
+
+/** Writes the key of each action into its `kbd` elements. */
+export function labelKeys() {
+  const codes = Object.fromEntries(Object.entries(keys()).map(([code, action]) => [action, code]));
+  for (const element of document.querySelectorAll("kbd[data-key]")) {
+    const code = codes[element.dataset.key];
+    element.textContent = code ? labelOf(code) : "";
+    element.hidden = !code;
+    const button = element.closest("button");
+    if (button && code) button.setAttribute("aria-keyshortcuts", labelOf(code));
+  }
+}
+
+/** An element of a closed dialog may keep the focus for a moment; keys are no longer typed into it. */
+const isTyping = (target) =>
+  target.closest?.("input, textarea, select, dialog") && !target.closest("dialog:not([open])");
+/** Returns whether the focused control handles the key itself. */
+const isHandledByControl = (event) =>
+  ["Enter", "Space"].includes(event.code) && event.target.closest?.("button, a, summary");
+
+/** Calls `press(action, event)` on key down and `release(action)` on key up. */
+export function listen(press, release) {
+  addEventListener("keydown", (event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.isComposing || isTyping(event.target)) return;
+    const action = keys()[event.code] ?? (event.code.startsWith("Arrow") ? event.code : undefined);
+    if (!action || isHandledByControl(event)) return;
+    event.preventDefault();
+    press(action, event);
+  });
+  addEventListener("keyup", (event) => {
+    const action = keys()[event.code];
+    if (action) release(action);
+  });
+  addEventListener("blur", () => release("flicker"));
+}

@@ -1,0 +1,158 @@
+// Everything on the page around the viewer: heading, counts, history, announcements, dialogs.
+
+import { language, reviewOrder, translate } from "./config.js";
+
+const byId = (id) => document.getElementById(id);
+const SIGNS = { pass: "✓", fail: "✗", unsure: "?" };
+const SIDES = ["print", "print_mask", "relief", "depth_mask"];
+const LAYERS = { print: "print", print_mask: "printMask", relief: "relief", depth_mask: "depthMask" };
+
+export function heading(item, queue, pendingCount) {
+  byId("pair").textContent = item ? queue.label(item) : endText(queue, pendingCount);
+  const [done, all] = [queue.answeredCount, queue.items.length];
+  byId("progress").textContent = translate("progress", { done, all });
+  byId("bar").max = Math.max(all, 1);
+  byId("bar").value = done;
+}
+
+/** Returns the heading when no item is left. */
+function endText(queue, pendingCount) {
+  if (queue.items.length === 0) return reviewOrder === "adjudicate" ? translate("empty_adjudicate") : translate("empty");
+  return pendingCount > 0 ? translate("done_not_saved", { n: pendingCount }) : translate("done");
+}
+
+/** Draws the four small images. */
+export function sideImages(layers) {
+  for (const side of SIDES) {
+    const canvas = byId(`side-${side}`);
+    canvas.width = layers?.width ?? 1;
+    canvas.height = layers?.height ?? 1;
+    if (layers) canvas.getContext("2d").drawImage(layers[LAYERS[side]], 0, 0);
+  }
+}
+
+export function saveState(pendingCount, problem) {
+  const element = byId("saved");
+  element.textContent = pendingCount === 0 ? `${translate("saved")} ✓` : translate("not_saved", { n: pendingCount });
+  element.classList.toggle("waiting", pendingCount > 0);
+  if (problem) alert(translate(problem));
+  else if (pendingCount === 0) hideAlert();
+}
+
+/** Shows the median time per answer. */
+export function pace(times) {
+  if (times.length === 0) return;
+  const sorted = [...times].sort((a, b) => a - b);
+  const median = sorted[Math.floor(sorted.length / 2)] / 1000;
+  const s = median.toLocaleString(language, { maximumFractionDigits: 1, minimumFractionDigits: 1 });
+  byId("pace").textContent = translate("median", { s });
+}
+
+/** Returns an answer as text. */
+export function answerText(answer) {
+  const reason = answer.reason ? `: ${translate(answer.reason)}` : "";
+  return `${translate(answer.verdict)}${reason}`;
+}
+
+/** Formats a number with a fixed number of digits, without a sign on zero. */
+export const fixed = (value, digits) => value.toFixed(digits).replace(/^-(0(\.0*)?)$/, "$1");
+
+/** Returns a manual alignment as text. */
+export function alignmentText({ reviewer, rotation_deg: deg, shift_px: [x, y], scale, mirrored, iou }) {
+  return translate("aligned_by", {
+    reviewer, deg: fixed(deg, 1), px: Math.hypot(x, y).toFixed(1), scale: scale.toFixed(3),
+    mirrored: mirrored ? translate("and_mirrored") : "", iou: iou.toFixed(3),
+  });
+}
+
+/** Lists the latest answers, newest first; a click goes to the item. */
+export function history(queue, count, go) {
+  const rows = queue.latest(count).map((item) => {
+    const row = document.createElement("li");
+    const button = document.createElement("button");
+    button.type = "button";
+    button.className = item.answer.verdict;
+    button.textContent = `${SIGNS[item.answer.verdict]} ${queue.label(item)}`;
+    button.title = answerText(item.answer);
+    button.setAttribute("aria-label", `${queue.label(item)}, ${answerText(item.answer)}`);
+    if (item === queue.current) button.setAttribute("aria-current", "true");
+    button.addEventListener("click", () => go(item));
+    row.append(button);
+    return row;
+  });
+  byId("history").replaceChildren(...rows);
+}
+
+/** Marks the buttons of the current answer and of active modes. */
+export function markActive(names) {
+  for (const button of document.querySelectorAll("[data-action]")) {
+    const on = names.has(button.dataset.action);
+    button.classList.toggle("on", on);
+    if (button.hasAttribute("aria-pressed")) button.setAttribute("aria-pressed", String(on));
+  }
+}
+
+export function legend(entries, extra) {
+  const marks = entries.map(([colour, text]) => {
+    const mark = document.createElement("span");
+    const swatch = document.createElement("i");
+    swatch.className = "swatch";
+    swatch.style.setProperty("background", colour);
+    mark.append(swatch, text);
+    return mark;
+  });
+  byId("legend").replaceChildren(...marks, extra);
+}
+
+export const paintTime = (text) => (byId("paint-time").textContent = text);
+
+/** Announces a text in the live region, for screen readers too. */
+export const announce = (text) => (byId("live").textContent = text);
+
+export function alert(text) {
+  const element = byId("alert");
+  if (element.textContent !== text) element.textContent = text;
+  element.hidden = false;
+}
+
+export const hideAlert = () => (byId("alert").hidden = true);
+
+/** Asks for a note; resolves with the text, or null if it is discarded. */
+export function askNote(previous) {
+  const [row, field] = [byId("note-row"), byId("note")];
+  row.hidden = false;
+  field.value = previous ?? "";
+  field.focus();
+  return new Promise((resolve) => {
+    const close = (text) => {
+      row.hidden = true;
+      field.onkeydown = null;
+      field.onblur = null;
+      field.blur();
+      resolve(text);
+    };
+    field.onkeydown = (event) => {
+      if (event.isComposing) return;
+      if (event.key === "Enter") close(field.value.trim());
+      if (event.key === "Escape") close(null);
+    };
+    field.onblur = () => close(field.value.trim());
+  });
+}
+
+/** Asks for an item by the id of its pair or by its number. */
+export function askPair(names, go) {
+  const [dialog, field] = [byId("jump"), byId("jump-to")];
+  byId("jump-error").textContent = "";
+  byId("pairs").replaceChildren(...names.slice(0, 2000).map((name) => new Option(name, name)));
+  field.value = "";
+  dialog.onsubmit = async (event) => {
+    if (event.submitter?.value !== "go") return;
+    event.preventDefault();
+    if (await go(field.value.trim())) dialog.close();
+    else byId("jump-error").textContent = translate("no_such_pair");
+  };
+  dialog.showModal();
+}
+
+export const help = () => byId("help").showModal();

@@ -1,0 +1,259 @@
+//! Attention checks: planted faults and duplicates, shown among the results to measure how reliable a reviewer is.
+
+use super::item::{ItemView, ReviewItem};
+use crate::domain::{AttentionCheck, SeededRandom};
+use crate::raster::{DepthMap, Mask};
+
+/// How many attention checks are added to a queue.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CheckRates {
+    /// Planted faults per result, 0 to 1.
+    pub faults: f64,
+    /// Share of the results that are shown a second time, 0 to 1.
+    pub duplicates: f64,
+}
+
+/// Range of planted rotations in degrees: above the tolerance of 5 degrees, but not obvious at first sight.
+const ROTATION_DEG: [f64; 2] = [7.0, 15.0];
+/// `IoU` of a relief with its mirror image above which mirroring it is not a visible fault.
+const MAX_SYMMETRY_IOU: f64 = 0.6;
+/// Target stroke area, relative to the result, of a fault that loses strokes.
+const REDUCED_STROKES: f64 = 0.45;
+/// Target stroke area, relative to the result, of a fault that includes background.
+const ENLARGED_STROKES: f64 = 1.9;
+/// Minimum number of items between a result and its duplicate.
+const DUPLICATE_GAP: f64 = 10.0;
+/// Range of the random distance that is added to the minimum.
+const DUPLICATE_SPREAD: f64 = 30.0;
+
+/// Selects the items from which a fault is made.
+pub(super) fn select_for_faults<'a>(
+    items: &'a [ReviewItem],
+    rates: &CheckRates,
+    random: &SeededRandom,
+) -> Vec<&'a ReviewItem> {
+    let reliable = items.iter().filter(|item| item.is_reliable);
+    reliable
+        .filter(|item| random.draw(&item.view.hash(), "control") < rates.faults)
+        .collect()
+}
+
+/// Makes a fault from a good result: mirrored, wrong threshold, or rotated. Falls back to a rotation where the other
+/// change would not be a visible fault, as for a mirrored symmetric relief.
+pub(super) fn plant_fault(
+    item: &ReviewItem,
+    depth: &DepthMap,
+    random: &SeededRandom,
+) -> ReviewItem {
+    let draw = |purpose| random.draw(&item.view.hash(), purpose);
+    let strokes = depth.stroke_mask(item.view.level);
+    let (check, view) = match draw("kind") {
+        ..0.2 if !is_symmetric(&strokes) => (AttentionCheck::Mirrored, item.view.mirrored()),
+        0.2..0.5 => match faulty_threshold(depth, item.view.level, draw("cut") < 0.5) {
+            Some(level) => (
+                AttentionCheck::Threshold { level },
+                ItemView {
+                    level,
+                    ..item.view.clone()
+                },
+            ),
+            None => rotated(item, draw("turn")),
+        },
+        _ => rotated(item, draw("turn")),
+    };
+    ReviewItem {
+        check: Some(check),
+        view,
+        ..item.clone()
+    }
+}
+
+/// Rotates the relief of an item; `number` in 0..1 selects direction and angle.
+fn rotated(item: &ReviewItem, number: f64) -> (AttentionCheck, ItemView) {
+    let [min, max] = ROTATION_DEG;
+    let sign = if number < 0.5 { -1.0 } else { 1.0 };
+    let share = (2.0 * number).fract();
+    let angle_deg = sign * (min + share * (max - min));
+    (
+        AttentionCheck::Turned { angle_deg },
+        item.view.rotated(angle_deg),
+    )
+}
+
+/// Returns whether the strokes nearly cover their mirror image, mirrored about the centre of their bounding box.
+fn is_symmetric(strokes: &Mask) -> bool {
+    let Some(found) = strokes.bounding_box() else {
+        return true;
+    };
+    let flipped = Mask::from_fn(strokes.width(), strokes.height(), |x, y| {
+        let across = (found.x0 + found.x1) as i64 - x as i64;
+        strokes.get(across, y as i64).unwrap_or(false)
+    });
+    strokes.overlap(&flipped).iou > MAX_SYMMETRY_IOU
+}
+
+/// Returns a threshold at which many strokes are lost or much background is included; `None` if the relief has no
+/// such level.
+fn faulty_threshold(depth: &DepthMap, level: u16, loses_strokes: bool) -> Option<u16> {
+    let mut levels = depth.valid_levels();
+    levels.sort_unstable_by(|a, b| b.cmp(a));
+    let area = levels.partition_point(|found| *found >= level);
+    let share = if loses_strokes {
+        REDUCED_STROKES
+    } else {
+        ENLARGED_STROKES
+    };
+    let wanted = (area as f64 * share) as usize;
+    let faulty = *levels.get(wanted)?;
+    let ratio = levels.partition_point(|found| *found >= faulty) as f64 / area.max(1) as f64;
+    let is_fault = if loses_strokes {
+        (0.1..0.7).contains(&ratio)
+    } else {
+        (1.5..3.0).contains(&ratio)
+    };
+    is_fault.then_some(faulty)
+}
+
+/// Inserts faults and duplicates among the results, so that the position of an item does not reveal its kind.
+pub(super) fn interleave(
+    results: Vec<ReviewItem>,
+    faults: Vec<ReviewItem>,
+    rates: &CheckRates,
+    random: &SeededRandom,
+) -> Vec<ReviewItem> {
+    let count = results.len() as f64;
+    let mut placed: Vec<(f64, ReviewItem)> = Vec::with_capacity(results.len() + faults.len());
+    for (index, item) in results.into_iter().enumerate() {
+        let index = index as f64;
+        let hash = item.view.hash();
+        if random.draw(&hash, "repeat") < rates.duplicates {
+            let distance = DUPLICATE_GAP + DUPLICATE_SPREAD * random.draw(&hash, "repeat after");
+            // Near the end of the queue the distance is cut short.
+            let position = (index + distance).min(count) + 0.25;
+            if position - index > DUPLICATE_GAP / 2.0 {
+                let duplicate = ReviewItem {
+                    check: Some(AttentionCheck::Duplicate),
+                    ..item.clone()
+                };
+                placed.push((position, duplicate));
+            }
+        }
+        placed.push((index, item));
+    }
+    for fault in faults {
+        let number = random.draw(&fault.view.hash(), "place");
+        placed.push((number * count + 0.5, fault));
+    }
+    placed.sort_by(|a, b| a.0.total_cmp(&b.0));
+    placed.into_iter().map(|(_, item)| item).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{CheckRates, interleave, plant_fault, select_for_faults};
+    use crate::domain::{AttentionCheck, SeededRandom};
+    use crate::raster::{DepthMap, Grid};
+    use crate::review::item::ReviewItem;
+    use crate::review::item::test_fixtures::item;
+
+    const RATES: CheckRates = CheckRates {
+        faults: 0.1,
+        duplicates: 0.1,
+    };
+
+    fn depth(level: impl Fn(usize, usize) -> u16) -> DepthMap {
+        DepthMap::of_levels(Grid::from_fn(101, 51, level))
+    }
+
+    /// Returns an asymmetric wedge on a slope.
+    fn wedge() -> DepthMap {
+        depth(|x, y| (if x < 20 + y { 600 } else { 0 }) + (x * 4 + y) as u16 + 1)
+    }
+
+    fn planted(depth: &DepthMap) -> Vec<ReviewItem> {
+        let random = SeededRandom::new(3, "ana");
+        (0..300)
+            .map(|n| plant_fault(&item(n), depth, &random))
+            .collect()
+    }
+
+    #[test]
+    fn every_kind_of_fault_is_planted_and_differs_from_the_result() {
+        let faults = planted(&wedge());
+        let good = item(0).view;
+        let count = |name: &str| {
+            let of_kind = faults.iter().filter(|item| {
+                let check = item.check.expect("an attention check");
+                assert!(check.is_fault());
+                check.name() == name
+            });
+            of_kind.count()
+        };
+        for name in ["turned", "mirrored", "threshold"] {
+            assert!(count(name) > 20, "{name}: {}", count(name));
+        }
+        for fault in &faults {
+            match fault.check.expect("an attention check") {
+                AttentionCheck::Turned { angle_deg } => {
+                    assert!((7.0..=15.0).contains(&angle_deg.abs()), "{angle_deg}");
+                }
+                AttentionCheck::Mirrored => {
+                    assert!(fault.view.print_from_depth.determinant() < 0.0);
+                }
+                AttentionCheck::Threshold { level } => {
+                    let area = |level| wedge().stroke_mask(level).count() as f64;
+                    let share = area(level) / area(good.level);
+                    assert!(!(0.7..=1.5).contains(&share), "{share}");
+                }
+                AttentionCheck::Duplicate => unreachable!("plant_fault makes no duplicates"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_symmetric_relief_is_never_mirrored() {
+        let bar = depth(|x, _| if (40..61).contains(&x) { 900 } else { 100 });
+        for fault in planted(&bar) {
+            assert_ne!(fault.check, Some(AttentionCheck::Mirrored));
+        }
+    }
+
+    #[test]
+    fn duplicates_keep_a_distance_and_faults_are_spread_evenly() {
+        let random = SeededRandom::new(5, "ana");
+        let results: Vec<ReviewItem> = (0..400).map(item).collect();
+        let faults: Vec<ReviewItem> = select_for_faults(&results, &RATES, &random)
+            .into_iter()
+            .map(|item| plant_fault(item, &wedge(), &random))
+            .collect();
+        let planted = faults.len();
+        assert!((20..70).contains(&planted), "{planted}");
+        let queue = interleave(results, faults, &RATES, &random);
+        let duplicates: Vec<usize> = (0..queue.len())
+            .filter(|i| queue[*i].check == Some(AttentionCheck::Duplicate))
+            .collect();
+        assert!((20..70).contains(&duplicates.len()), "{}", duplicates.len());
+        assert_eq!(queue.len(), 400 + planted + duplicates.len());
+        for place in duplicates {
+            let first = queue
+                .iter()
+                .position(|item| item.check.is_none() && item.pair == queue[place].pair);
+            let distance = place - first.expect("its result");
+            assert!(distance > 5, "{distance}");
+        }
+        let halves = queue.split_at(queue.len() / 2);
+        for half in [halves.0, halves.1] {
+            let faults = half.iter().filter_map(|item| item.check);
+            assert!(faults.filter(AttentionCheck::is_fault).count() > planted / 4);
+        }
+    }
+
+    #[test]
+    fn no_fault_is_planted_in_unreliable_results() {
+        let mut unreliable: Vec<ReviewItem> = (0..400).map(item).collect();
+        for item in &mut unreliable {
+            item.is_reliable = false;
+        }
+        assert!(select_for_faults(&unreliable, &RATES, &SeededRandom::new(5, "ana")).is_empty());
+    }
+}

@@ -1,0 +1,63 @@
+//! The reviewer's history: current answers and manual alignments, by item.
+
+use std::collections::BTreeMap;
+
+use super::item::ReviewItem;
+use super::queue_options::QueueOptions;
+use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, ManualAlignment};
+use crate::domain::ContentHash;
+
+/// The latest answers and manual alignments of a reviewer.
+#[derive(Debug, Default)]
+pub(super) struct ReviewerHistory {
+    answers: BTreeMap<AnsweredOn, Answer>,
+    alignments: BTreeMap<ContentHash, ManualAlignment>,
+    /// Whether a pair may be recognised, because there are no attention checks.
+    is_open: bool,
+}
+
+impl ReviewerHistory {
+    /// Reads the answers and alignments that have not been undone.
+    ///
+    /// # Errors
+    /// When the catalog cannot be read.
+    pub(super) async fn read(
+        catalog: &Catalog,
+        options: &QueueOptions,
+    ) -> Result<Self, CatalogError> {
+        let answers = catalog.answers(&options.reviewer).await?.into_iter();
+        let alignments = catalog.manual_alignments().await?.into_iter();
+        let current = alignments.filter(|stored| {
+            stored.made.reviewer == options.reviewer
+                && stored.holds
+                && stored.on_current_depth
+                && stored.undone_at.is_none()
+        });
+        Ok(Self {
+            // Oldest first, so that the latest one replaces the others.
+            answers: answers.map(|answer| (answer.on, answer)).collect(),
+            alignments: current
+                .map(|stored| (stored.made.seen, stored.made))
+                .collect(),
+            is_open: !options.has_attention_checks(),
+        })
+    }
+
+    /// Returns the answer to an item.
+    pub(super) fn answer(&self, item: &ReviewItem) -> Option<&Answer> {
+        if item.check.is_some() {
+            return self.answers.get(&AnsweredOn::Check(item.view.hash()));
+        }
+        let on_results = item.results.iter();
+        on_results
+            .filter_map(|(_, hash)| self.answers.get(&AnsweredOn::Result(*hash)))
+            .max_by_key(|answer| answer.at)
+    }
+
+    /// Returns the manual alignment of what an item shows. A duplicate shows the same as an earlier item, so with
+    /// attention checks an alignment is revealed only after the item is answered.
+    pub(super) fn alignment(&self, item: &ReviewItem) -> Option<&ManualAlignment> {
+        let found = self.alignments.get(&item.view.hash());
+        found.filter(|_| self.is_open || self.answer(item).is_some())
+    }
+}

@@ -1,0 +1,251 @@
+//! The review queue: everything a reviewer is to judge, in order. Results that look the same are one item.
+
+use std::sync::Arc;
+
+use super::check_items;
+use super::history::ReviewerHistory;
+use super::item::{ItemView, ReviewItem};
+use super::order;
+use super::queue_options::QueueOptions;
+use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
+use crate::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
+use crate::report::consensus::{is_disputed, partition_verdicts};
+use crate::report::pair_artifacts::{PairArtifacts, group_identical};
+use crate::store::Project;
+
+/// Number of pairs read from the catalog at a time.
+const PAGE_PAIRS: usize = 256;
+/// Confidence from which a result is reliable enough to plant a fault in it.
+const RELIABLE_CONFIDENCE: f64 = 0.8;
+
+/// Items in order, and what the reviewer has done so far.
+#[derive(Debug, Default)]
+pub(super) struct ReviewQueue {
+    pub(super) items: Vec<Arc<ReviewItem>>,
+    pub(super) history: ReviewerHistory,
+}
+
+impl ReviewQueue {
+    /// Reads the queue of a reviewer from the current state of the catalog.
+    ///
+    /// # Errors
+    /// When the catalog cannot be read, or a blocking task fails.
+    pub(super) async fn read(
+        catalog: &Catalog,
+        project: &Project,
+        options: &QueueOptions,
+    ) -> Result<Self, QueueError> {
+        let key = catalog.review_key().await?;
+        let random = SeededRandom::new(options.seed, &options.reviewer);
+        let mut items = all_items(catalog, options).await?;
+        if let Some(count) = options.sample {
+            order::sample(&mut items, options.order, options.seed, count);
+        }
+        order::sort(&mut items, options.order, &random);
+        if options.has_attention_checks() {
+            let selected = check_items::select_for_faults(&items, &options.rates, &random);
+            let faults = faults(catalog, project, selected, &random).await?;
+            items = check_items::interleave(items, faults, &options.rates, &random);
+        }
+        let items = items.into_iter();
+        let items = items.map(|item| Arc::new(item.with_id(&key, &options.reviewer)));
+        Ok(Self {
+            items: items.collect(),
+            history: ReviewerHistory::read(catalog, options).await?,
+        })
+    }
+}
+
+/// Why the queue cannot be built.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum QueueError {
+    /// The catalog cannot be read.
+    #[error(transparent)]
+    Catalog(#[from] CatalogError),
+    /// A blocking task panicked.
+    #[error("planting faults stopped: {0}")]
+    Stopped(#[from] tokio::task::JoinError),
+}
+
+async fn all_items(
+    catalog: &Catalog,
+    options: &QueueOptions,
+) -> Result<Vec<ReviewItem>, CatalogError> {
+    let mut items = Vec::new();
+    let mut pages = catalog.result_pages(PAGE_PAIRS);
+    while let Some(page) = pages.next().await? {
+        for pair in &page {
+            items.extend(items_of_pair(pair, options));
+        }
+    }
+    Ok(items)
+}
+
+/// Returns the items of one pair: one for each group of results that look the same.
+fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> {
+    let (Some(depth), Some(print)) = (pair.stage(Stage::Depth), pair.stage(Stage::Normalize))
+    else {
+        return Vec::new();
+    };
+    let (Ok(outcome), Some(print_hash)) = (depth.parse::<DepthOutcome>(), print.print_hash) else {
+        return Vec::new();
+    };
+    let wanted = &options.metrics;
+    let is_of_metric =
+        |record: &&MetricRecord| wanted.is_empty() || wanted.contains(&record.outcome.metric);
+    // Adjudication covers disputed results only. Undisputed ones that look the same get no verdict, because such a
+    // selection would bias their accuracy.
+    let is_wanted = |record: &&MetricRecord| {
+        options.order != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reviewer)
+    };
+    let groups = group_identical(pair.metrics.iter().filter(is_of_metric).filter(is_wanted));
+    let item = |group: Vec<&MetricRecord>| {
+        let first = group[0].outcome;
+        ReviewItem {
+            id: String::new(),
+            pair: pair.attributes.name.clone(),
+            results: group
+                .iter()
+                .map(|record| (record.outcome.metric, record.result_hash))
+                .collect(),
+            check: None,
+            view: ItemView {
+                print_hash,
+                depth_hash: depth.result_hash,
+                depth_px: ItemView::size(&outcome),
+                level: first.threshold_level,
+                print_from_depth: first.print_from_depth,
+            },
+            uncertainty: uncertainty(group[0]),
+            is_reliable: group.iter().all(|record| is_reliable(record)),
+        }
+    };
+    groups.into_iter().map(item).collect()
+}
+
+/// Returns how uncertain a result is, from 0 to 1.75: low confidence, low similarity, a search that ended at a bound.
+fn uncertainty(record: &MetricRecord) -> f64 {
+    let outcome = &record.outcome;
+    let doubt = 1.0 - outcome.confidence.unwrap_or(0.5);
+    let dissimilarity = 1.0 - outcome.scores.nl_ssim;
+    doubt + 0.5 * dissimilarity + if outcome.at_bound { 0.25 } else { 0.0 }
+}
+
+/// Returns whether a fault can be planted in a result: it has high confidence and nobody failed it.
+fn is_reliable(record: &MetricRecord) -> bool {
+    let outcome = &record.outcome;
+    let mut verdicts = record.verdicts.iter().map(|read| read.verdict);
+    outcome
+        .confidence
+        .is_none_or(|confidence| confidence >= RELIABLE_CONFIDENCE)
+        && !outcome.at_bound
+        && verdicts.all(|verdict| verdict == Verdict::Pass)
+}
+
+/// Returns whether others disagree on a result and nobody but this reviewer has settled it. A reviewer who is party to
+/// the disagreement cannot settle it.
+fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
+    let (rulings, verdicts) = partition_verdicts(record);
+    let is_party = verdicts.iter().any(|read| read.reviewer == reviewer);
+    let is_settled = rulings
+        .iter()
+        .any(|ruling| ruling.reviewer != reviewer && ruling.verdict != Verdict::Unsure);
+    is_disputed(&verdicts) && !is_party && !is_settled
+}
+
+/// Makes faults from the selected items. Pairs whose files cannot be read are skipped.
+async fn faults(
+    catalog: &Catalog,
+    project: &Project,
+    selected: Vec<&ReviewItem>,
+    random: &SeededRandom,
+) -> Result<Vec<ReviewItem>, QueueError> {
+    let mut faults = Vec::with_capacity(selected.len());
+    for item in selected {
+        let Some(detail) = catalog.pair(&item.pair).await? else {
+            continue;
+        };
+        let (project, item, random) = (project.clone(), item.clone(), random.clone());
+        let fault = tokio::task::spawn_blocking(move || {
+            let depth = PairArtifacts::new(&project, &detail.results).depth().ok()?;
+            Some(check_items::plant_fault(&item, &depth, &random))
+        });
+        faults.extend(fault.await?);
+    }
+    Ok(faults)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{is_open_conflict, is_reliable, items_of_pair};
+    use crate::catalog::ReviewerVerdict;
+    use crate::domain::{ReviewOrder, ThresholdMetric, Verdict};
+    use crate::report::test_fixtures;
+    use crate::review::{CheckRates, QueueOptions};
+
+    fn options(order: ReviewOrder, faults: f64, duplicates: f64) -> QueueOptions {
+        QueueOptions {
+            reviewer: "ana".to_owned(),
+            metrics: Vec::new(),
+            order,
+            seed: 1,
+            sample: None,
+            rates: CheckRates { faults, duplicates },
+        }
+    }
+
+    fn read(reviewer: &str, verdict: Verdict, order: ReviewOrder) -> ReviewerVerdict {
+        ReviewerVerdict {
+            reviewer: reviewer.to_owned(),
+            verdict,
+            reason: None,
+            review_order: Some(order),
+        }
+    }
+
+    #[test]
+    fn a_conflict_is_open_to_third_reviewers_until_one_settles_it() {
+        let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]);
+        record.verdicts = vec![read("ana", Verdict::Pass, ReviewOrder::Random)];
+        assert!(!is_open_conflict(&record, "chi"));
+        record
+            .verdicts
+            .push(read("bo", Verdict::Fail, ReviewOrder::Random));
+        assert!(is_open_conflict(&record, "chi"));
+        assert!(!is_open_conflict(&record, "ana"));
+        record
+            .verdicts
+            .push(read("chi", Verdict::Fail, ReviewOrder::Adjudicate));
+        assert!(
+            is_open_conflict(&record, "chi"),
+            "it stays with its adjudicator"
+        );
+        assert!(!is_open_conflict(&record, "dung"));
+    }
+
+    #[test]
+    fn no_fault_is_planted_in_a_failed_result() {
+        let record =
+            |verdicts: &[Verdict]| test_fixtures::metric(ThresholdMetric::Density, 0.8, verdicts);
+        assert!(is_reliable(&record(&[])) && is_reliable(&record(&[Verdict::Pass])));
+        assert!(!is_reliable(&record(&[Verdict::Pass, Verdict::Fail])));
+    }
+
+    #[test]
+    fn a_pair_without_results_has_no_item() {
+        let options = options(ReviewOrder::Random, 0.0, 0.0);
+        assert_eq!(items_of_pair(&test_fixtures::pending("a"), &options), []);
+    }
+
+    #[test]
+    fn a_queue_has_attention_checks_unless_it_adjudicates() {
+        let checks =
+            |order, faults, duplicates| options(order, faults, duplicates).has_attention_checks();
+        assert!(
+            checks(ReviewOrder::Random, 0.04, 0.0)
+                && checks(ReviewOrder::LeastConfident, 0.0, 0.05)
+        );
+        assert!(!checks(ReviewOrder::Random, 0.0, 0.0));
+        assert!(!checks(ReviewOrder::Adjudicate, 0.04, 0.05));
+    }
+}
