@@ -1,7 +1,11 @@
-//! Vectors that may hold millions of numbers, on pages of memory of their own where they do, large ones if there are.
+//! Vectors of plain numbers that use huge pages when they are large, with a cache of freed pages.
 //!
-//! The system clears memory page by page as it is first touched. For a vector of many megabytes that takes longer than
-//! filling it, unless the pages are large; so pages that are not needed any more are kept for the next vector.
+//! The kernel clears each page when it is first touched. For a vector of many megabytes that takes longer than filling
+//! it, so huge pages are requested and freed pages are reused for the next vector.
+//!
+//! It stays because of memory: `Vec` with `mimalloc` 3 as the global allocator (crate 0.1.52, one thread, minima of 7
+//! alternating runs) takes the same time, 45.9 against 46.2 ms for a pair of 60,000 vertices and 104.8 against 106.2 ms
+//! for one of 500,000, but its peak resident memory is 28 MB larger: 71 against 43 MB for a pair of 60,000 vertices.
 
 mod page_cache;
 
@@ -14,53 +18,54 @@ use bytemuck::Pod;
 use page_cache::PageBuffer;
 pub use page_cache::keep_memory;
 
-/// Bytes from which on a vector lies on pages of its own.
-const LARGE: usize = 1 << 20;
-/// A vector of plain numbers that may be large. What it cannot do a slice can, or [`Vec`] before it is turned into one.
-pub struct PageVec<T>(Place<T>);
+/// Vectors of at least this many bytes use pages.
+const MIN_PAGED_BYTES: usize = 1 << 20;
 
-enum Place<T> {
-    Small(Vec<T>),
-    PageBuffer { pages: PageBuffer, len: usize },
+/// A vector of plain numbers that may be large. It dereferences to a slice.
+pub struct PageVec<T>(Storage<T>);
+
+enum Storage<T> {
+    Heap(Vec<T>),
+    Pages { pages: PageBuffer, len: usize },
 }
 
 impl<T: Pod> PageVec<T> {
-    /// Without elements, and with room for so many.
+    /// Creates an empty vector with room for `capacity` elements.
     pub fn with_capacity(capacity: usize) -> Self {
         let bytes = capacity.saturating_mul(size_of::<T>());
-        let is_large = cfg!(target_os = "linux") && bytes >= LARGE;
+        let is_large = cfg!(target_os = "linux") && bytes >= MIN_PAGED_BYTES;
         let pages = is_large.then(|| Self::on_pages(bytes)).flatten();
-        pages.unwrap_or_else(|| Self(Place::Small(Vec::with_capacity(capacity))))
+        pages.unwrap_or_else(|| Self(Storage::Heap(Vec::with_capacity(capacity))))
     }
 
-    /// On pages of its own; `None` where the system gives none.
+    /// Creates an empty vector on pages; `None` if the system has none.
     fn on_pages(bytes: usize) -> Option<Self> {
-        let pages = PageBuffer::of(bytes)?;
-        Some(Self(Place::PageBuffer { pages, len: 0 }))
+        let pages = PageBuffer::allocate(bytes)?;
+        Some(Self(Storage::Pages { pages, len: 0 }))
     }
 
-    /// How many elements there is room for.
+    /// Returns the number of elements that fit the reserved memory.
     pub fn capacity(&self) -> usize {
         match &self.0 {
-            Place::Small(vec) => vec.capacity(),
-            Place::PageBuffer { pages, .. } => pages.len() / size_of::<T>(),
+            Storage::Heap(vec) => vec.capacity(),
+            Storage::Pages { pages, .. } => pages.len() / size_of::<T>(),
         }
     }
 
-    /// Adds an element at the end.
+    /// Appends an element.
     #[inline]
     pub fn push(&mut self, element: T) {
         match &mut self.0 {
-            Place::Small(vec) => vec.push(element),
-            Place::PageBuffer { .. } => self.push_on_pages(element),
+            Storage::Heap(vec) => vec.push(element),
+            Storage::Pages { .. } => self.push_on_pages(element),
         }
     }
 
-    /// Apart, so that what is small is pushed without a call.
+    /// Not inlined, so that pushing to a small vector needs no call.
     #[inline(never)]
     fn push_on_pages(&mut self, element: T) {
-        if let Place::PageBuffer { pages, len } = &mut self.0
-            && let Some(place) = slots(pages).get_mut(*len)
+        if let Storage::Pages { pages, len } = &mut self.0
+            && let Some(place) = as_elements(pages).get_mut(*len)
         {
             *place = element;
             *len += 1;
@@ -70,12 +75,12 @@ impl<T: Pod> PageVec<T> {
         }
     }
 
-    /// Adds elements at the end.
+    /// Appends elements.
     pub fn extend_from_slice(&mut self, elements: &[T]) {
         match &mut self.0 {
-            Place::Small(vec) => vec.extend_from_slice(elements),
-            Place::PageBuffer { pages, len } => {
-                if let Some(room) = slots(pages)[*len..].get_mut(..elements.len()) {
+            Storage::Heap(vec) => vec.extend_from_slice(elements),
+            Storage::Pages { pages, len } => {
+                if let Some(room) = as_elements(pages)[*len..].get_mut(..elements.len()) {
                     room.copy_from_slice(elements);
                     *len += elements.len();
                 } else {
@@ -85,7 +90,7 @@ impl<T: Pod> PageVec<T> {
         }
     }
 
-    /// Makes twice the room.
+    /// Doubles the capacity.
     fn grow(&mut self) {
         let mut larger = Self::with_capacity(2 * self.capacity().max(1));
         larger.extend_from_slice(self);
@@ -94,17 +99,17 @@ impl<T: Pod> PageVec<T> {
 }
 
 impl PageVec<u8> {
-    /// All bytes to the end, of which there are about so many.
+    /// Reads to the end of a source of about `about` bytes.
     ///
     /// # Errors
-    /// When they cannot be read.
+    /// Returns an error if the source fails.
     pub fn read(mut from: impl Read, about: usize) -> io::Result<Self> {
         let mut bytes = Self::with_capacity(about);
         match &mut bytes.0 {
-            Place::Small(vec) => {
+            Storage::Heap(vec) => {
                 from.read_to_end(vec)?;
             }
-            Place::PageBuffer { pages, len } => {
+            Storage::Pages { pages, len } => {
                 *len = fill(&mut from, pages)?;
                 if *len == pages.len() {
                     let mut rest = Vec::new();
@@ -117,10 +122,10 @@ impl PageVec<u8> {
     }
 }
 
-/// Reads until some bytes are full or the source ends; says how many are.
+/// Reads until a buffer is full or the source ends, and returns the number of bytes read.
 ///
 /// # Errors
-/// When the source fails.
+/// Returns an error if the source fails.
 pub fn fill(source: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
     let mut full = 0;
     while full < bytes.len() {
@@ -134,8 +139,8 @@ pub fn fill(source: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
     Ok(full)
 }
 
-/// Pages as elements; what is left of their end is none.
-fn slots<T: Pod>(pages: &mut PageBuffer) -> &mut [T] {
+/// Returns pages as elements; the remainder at their end is unused.
+fn as_elements<T: Pod>(pages: &mut PageBuffer) -> &mut [T] {
     let whole = pages.len() - pages.len() % size_of::<T>();
     bytemuck::cast_slice_mut(&mut pages[..whole])
 }
@@ -145,10 +150,8 @@ impl<T: Pod> Deref for PageVec<T> {
 
     fn deref(&self) -> &[T] {
         match &self.0 {
-            Place::Small(vec) => vec,
-            Place::PageBuffer { pages, len } => {
-                bytemuck::cast_slice(&pages[..len * size_of::<T>()])
-            }
+            Storage::Heap(vec) => vec,
+            Storage::Pages { pages, len } => bytemuck::cast_slice(&pages[..len * size_of::<T>()]),
         }
     }
 }
@@ -156,8 +159,8 @@ impl<T: Pod> Deref for PageVec<T> {
 impl<T: Pod> DerefMut for PageVec<T> {
     fn deref_mut(&mut self) -> &mut [T] {
         match &mut self.0 {
-            Place::Small(vec) => vec,
-            Place::PageBuffer { pages, len } => &mut slots(pages)[..*len],
+            Storage::Heap(vec) => vec,
+            Storage::Pages { pages, len } => &mut as_elements(pages)[..*len],
         }
     }
 }
@@ -166,9 +169,9 @@ impl<T: Pod> Extend<T> for PageVec<T> {
     fn extend<I: IntoIterator<Item = T>>(&mut self, elements: I) {
         let mut elements = elements.into_iter();
         match &mut self.0 {
-            Place::Small(vec) => return vec.extend(elements),
-            Place::PageBuffer { pages, len } => {
-                for place in &mut slots(pages)[*len..] {
+            Storage::Heap(vec) => return vec.extend(elements),
+            Storage::Pages { pages, len } => {
+                for place in &mut as_elements(pages)[*len..] {
                     let Some(element) = elements.next() else {
                         return;
                     };
@@ -192,7 +195,7 @@ impl<T: Pod> FromIterator<T> for PageVec<T> {
 
 impl<T> From<Vec<T>> for PageVec<T> {
     fn from(vec: Vec<T>) -> Self {
-        Self(Place::Small(vec))
+        Self(Storage::Heap(vec))
     }
 }
 
@@ -248,17 +251,17 @@ impl<'a, T: Pod> IntoIterator for &'a mut PageVec<T> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{LARGE, PageVec, Place};
+    use super::{MIN_PAGED_BYTES, PageVec, Storage};
 
     type Element = [u32; 3];
 
     #[test]
     fn what_is_large_lies_on_pages_of_its_own() {
-        let count = LARGE / size_of::<Element>() + 1;
+        let count = MIN_PAGED_BYTES / size_of::<Element>() + 1;
         let is_on_pages = |count| {
             let empty = PageVec::<Element>::with_capacity(count);
             assert!(empty.is_empty() && empty.capacity() >= count);
-            matches!(empty.0, Place::PageBuffer { .. })
+            matches!(empty.0, Storage::Pages { .. })
         };
         assert_eq!(is_on_pages(count), cfg!(target_os = "linux"));
         assert!(!is_on_pages(9));
@@ -266,8 +269,13 @@ mod tests {
 
     #[test]
     fn what_was_longer_or_shorter_than_told_is_read_whole() {
-        let source: Vec<u8> = (0..LARGE + 9).map(|k| (k % 251) as u8).collect();
-        for (len, told) in [(5, 0), (5, 9), (LARGE, LARGE + 7), (LARGE + 9, LARGE)] {
+        let source: Vec<u8> = (0..MIN_PAGED_BYTES + 9).map(|k| (k % 251) as u8).collect();
+        for (len, told) in [
+            (5, 0),
+            (5, 9),
+            (MIN_PAGED_BYTES, MIN_PAGED_BYTES + 7),
+            (MIN_PAGED_BYTES + 9, MIN_PAGED_BYTES),
+        ] {
             let read = PageVec::read(&source[..len], told).expect("memory refuses nothing");
             assert!(*read == source[..len], "{len} {told}");
         }

@@ -1,47 +1,47 @@
-//! Loops over numbers side by side, on as many at a time as the processor can.
+//! Runtime SIMD dispatch, and scalar operations that vectorise.
 //!
-//! The program is built for the oldest processors of its kind. What is called here is built a second time for newer
-//! ones, and chosen when it runs. Both compute the same to the bit: nothing is fused or reordered.
+//! The program is compiled for the baseline of its architecture. Dispatched code is compiled again for newer
+//! instruction sets and selected at run time. All variants compute the same bits: nothing is fused or reordered.
 
-/// Runs `work` with the widest instructions that the processor has. Only what is inlined into it gains: mark it, and the
-/// functions that it calls, `#[inline(always)]`.
+/// Runs `work` with the widest instruction set of the processor. Only inlined code gains: mark it and the functions
+/// that it calls `#[inline(always)]`.
 #[inline(always)]
 pub(crate) fn dispatch<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
 }
 
-/// Plain comparisons, which are one instruction for many lanes; `f32::min` minds what is not a number.
+/// Returns the smaller number by a plain comparison, one instruction for many lanes; `f32::min` treats NaN specially.
 #[inline(always)]
-pub(crate) fn lower(a: f32, b: f32) -> f32 {
+pub(crate) fn min_f32(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 #[inline(always)]
-pub(crate) fn higher(a: f32, b: f32) -> f32 {
+pub(crate) fn max_f32(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Numbers of this size have no bits for parts of one.
-const WHOLE: f32 = 12_582_912.0;
+/// Floats of this magnitude (1.5 x 2^23) have no fraction bits.
+const INTEGER_BIAS: f32 = 12_582_912.0;
 
-/// The whole number at or below one that is small beside [`WHOLE`]. Casts and `floor` are not computed side by side.
+/// Rounds down a number that is small compared with [`INTEGER_BIAS`]; casts and `floor` do not vectorise.
 #[inline(always)]
-pub(crate) fn whole_below(v: f32) -> f32 {
-    let nearest = (v + WHOLE) - WHOLE;
+pub(crate) fn floor_f32(v: f32) -> f32 {
+    let nearest = (v + INTEGER_BIAS) - INTEGER_BIAS;
     if nearest > v { nearest - 1.0 } else { nearest }
 }
 
-/// The whole number at or above one that is small beside [`WHOLE`].
+/// Rounds up a number that is small compared with [`INTEGER_BIAS`].
 #[inline(always)]
-pub(crate) fn whole_above(v: f32) -> f32 {
-    let nearest = (v + WHOLE) - WHOLE;
+pub(crate) fn ceil_f32(v: f32) -> f32 {
+    let nearest = (v + INTEGER_BIAS) - INTEGER_BIAS;
     if nearest < v { nearest + 1.0 } else { nearest }
 }
 
-/// A whole number from 0 up that is small beside [`WHOLE`].
+/// Converts a whole number in 0..2^22 to an integer.
 #[inline(always)]
-pub(crate) fn index(whole: f32) -> u32 {
-    (whole + WHOLE).to_bits() - WHOLE.to_bits()
+pub(crate) fn index_from_f32(whole: f32) -> u32 {
+    (whole + INTEGER_BIAS).to_bits() - INTEGER_BIAS.to_bits()
 }
 
 #[cfg(test)]

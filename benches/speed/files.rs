@@ -1,4 +1,4 @@
-//! A scan and its print as files, made once.
+//! A scan and its print as files, generated once.
 
 use std::path::{Path, PathBuf};
 
@@ -9,7 +9,7 @@ use mocban::mesh::write::MeshFormat;
 /// Seed of the pair.
 const SEED: u64 = 61;
 
-/// The files' names without the size, and how the mesh is written in each.
+/// Extensions and formats of the mesh files.
 pub(super) const MESHES: [(&str, MeshFormat); 3] = [
     ("stl", MeshFormat::StlBinary),
     ("ply", MeshFormat::PlyLittleEndian),
@@ -18,47 +18,47 @@ pub(super) const MESHES: [(&str, MeshFormat); 3] = [
 
 /// A pair of one size.
 pub(super) struct Files {
-    /// The size as it stands in the benchmarks' names.
+    /// The size in the names of benchmarks.
     pub(super) size: &'static str,
     dir: PathBuf,
 }
 
 impl Files {
-    /// The scan of a size from its folder, made if it is not there.
-    pub(super) fn kept(size: &'static str, vertices: u32) -> anyhow::Result<Self> {
+    /// Opens the folder of a size; generates its files if it does not exist.
+    pub(super) fn open_or_generate(size: &'static str, vertices: u32) -> anyhow::Result<Self> {
         let root = Path::new(env!("CARGO_TARGET_TMPDIR")).join("speed");
         let dir = root.join(size);
         if !dir.exists() {
             let pair = PairGenerator::new(Tier::Pose, SEED)
                 .with_vertices(Some(vertices))
                 .pair(0)?;
-            // Under another name until all of it is there.
-            let half = root.join(format!("{size}.half"));
-            std::fs::create_dir_all(&half)?;
-            for (ending, format) in MESHES {
+            // Under another name until it is complete.
+            let partial = root.join(format!("{size}.partial"));
+            std::fs::create_dir_all(&partial)?;
+            for (extension, format) in MESHES {
                 std::fs::write(
-                    half.join(format!("scan.{ending}")),
+                    partial.join(format!("scan.{extension}")),
                     format.encode(&pair.mesh),
                 )?;
             }
-            std::fs::write(half.join("print.png"), &pair.print)?;
-            std::fs::rename(&half, &dir)?;
+            std::fs::write(partial.join("print.png"), &pair.print)?;
+            std::fs::rename(&partial, &dir)?;
         }
         Ok(Self { size, dir })
     }
 
-    /// Path of the mesh in a format, by its ending.
-    pub(super) fn mesh(&self, ending: &str) -> PathBuf {
-        self.dir.join(format!("scan.{ending}"))
+    /// Returns the path of the mesh with an extension.
+    pub(super) fn mesh(&self, extension: &str) -> PathBuf {
+        self.dir.join(format!("scan.{extension}"))
     }
 
-    /// Path of the print.
+    /// Returns the path of the print.
     pub(super) fn print(&self) -> PathBuf {
         self.dir.join("print.png")
     }
 }
 
-/// The bytes of a file.
+/// Reads a file.
 pub(super) fn bytes(path: &Path) -> anyhow::Result<Vec<u8>> {
     std::fs::read(path).with_context(|| path.display().to_string())
 }

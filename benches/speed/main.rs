@@ -1,4 +1,4 @@
-//! How long each reader, each stage and a whole pair take, by the size of the scan.
+//! Times each reader, each stage and a complete pair by the size of the scan.
 //!
 //! ```text
 //! cargo bench --bench speed
@@ -6,9 +6,9 @@
 //! cargo bench --bench speed -- --save-baseline before
 //! ```
 //!
-//! The scans are those of `mocban demo` in the tier `pose`, one a size, kept as files under `target/tmp/speed`, where
-//! other programs can be given the same (`benches/peers`). One thread, in memory: files are read before the clock starts,
-//! but for `read/raw`. `cargo test --all-targets` runs each once on the smallest, to see that the program works.
+//! The scans are those of `mocban demo` in the tier `pose`, one of each size, stored under `target/tmp/speed` so that
+//! `benches/peers` can give them to other programs. One thread; files are read before the clock starts, except for
+//! `read/raw` and `read/file`. `cargo test --all-targets` runs each benchmark once on the smallest scan.
 
 mod files;
 mod readers;
@@ -21,11 +21,11 @@ use criterion::Criterion;
 
 use files::Files;
 
-/// About how many vertices the scans have, corners that triangles share counted once.
+/// Approximate numbers of vertices; corners that triangles share count once.
 const SIZES: [(&str, u32); 3] = [("60k", 54_100), ("500k", 480_000), ("2M", 1_950_000)];
 
 fn main() -> anyhow::Result<()> {
-    // Without `--bench`, as `cargo test` calls it, everything runs once.
+    // `cargo test` calls it without `--bench`: everything runs once.
     let sizes = if std::env::args().any(|arg| arg == "--bench") {
         &SIZES[..]
     } else {
@@ -37,7 +37,7 @@ fn main() -> anyhow::Result<()> {
         .measurement_time(Duration::from_secs(2))
         .configure_from_args();
     for (name, vertices) in sizes {
-        let files = Files::kept(name, *vertices)?;
+        let files = Files::open_or_generate(name, *vertices)?;
         readers::measure(&mut criterion, &files)?;
         stages::measure(&mut criterion, &files)?;
     }

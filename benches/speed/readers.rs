@@ -1,4 +1,4 @@
-//! Reading meshes, beside reading their bytes, and the OBJ also by `tobj`.
+//! Times reading meshes and their raw bytes, and reading the OBJ with `tobj`.
 
 use std::fs::File;
 use std::path::Path;
@@ -9,33 +9,33 @@ use mocban::mesh::{self, Mesh};
 use super::files::{Files, MESHES, bytes};
 
 pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Result<()> {
-    for (ending, _) in MESHES {
-        let path = files.mesh(ending);
-        let held = bytes(&path)?;
-        let name = format!("scan.{ending}");
-        let mut group = criterion.benchmark_group(format!("read/{ending}"));
-        group.throughput(Throughput::Bytes(held.len() as u64));
+    for (extension, _) in MESHES {
+        let path = files.mesh(extension);
+        let content = bytes(&path)?;
+        let name = format!("scan.{extension}");
+        let mut group = criterion.benchmark_group(format!("read/{extension}"));
+        group.throughput(Throughput::Bytes(content.len() as u64));
         group.bench_function(files.size, |b| {
-            b.iter(|| mesh::read(&held, &name, &mesh::MeshLimits::SUGGESTED));
+            b.iter(|| mesh::read(&content, &name, &mesh::MeshLimits::SUGGESTED));
         });
         group.finish();
-        if ending == "obj" {
+        if extension == "obj" {
             criterion
                 .benchmark_group("read/tobj_obj")
-                .bench_function(files.size, |b| b.iter(|| by_tobj(&held)));
+                .bench_function(files.size, |b| b.iter(|| by_tobj(&content)));
         }
         criterion
-            .benchmark_group(format!("read/file_{ending}"))
+            .benchmark_group(format!("read/file_{extension}"))
             .bench_function(files.size, |b| b.iter(|| from_file(&path, &name)));
-        let mut raw = criterion.benchmark_group(format!("read/raw_{ending}"));
-        raw.throughput(Throughput::Bytes(held.len() as u64));
+        let mut raw = criterion.benchmark_group(format!("read/raw_{extension}"));
+        raw.throughput(Throughput::Bytes(content.len() as u64));
         raw.bench_function(files.size, |b| b.iter(|| bytes(&path)));
         raw.finish();
     }
     Ok(())
 }
 
-/// From the file itself, as a run reads it.
+/// Reads from the file itself, as a run does.
 fn from_file(path: &Path, name: &str) -> anyhow::Result<Mesh> {
     let mut file = File::open(path)?;
     let about = file.metadata()?.len();

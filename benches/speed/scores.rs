@@ -1,4 +1,4 @@
-//! Scores and files of canvases.
+//! Times scores and PNG files of canvases.
 
 use criterion::{BenchmarkId, Criterion};
 use mocban::raster::{Grid, Mask, png_grey16};
@@ -30,12 +30,12 @@ pub(super) fn measure(criterion: &mut Criterion) {
     png.finish();
 }
 
-/// Rings about as wide as strokes, moved by a share of their width.
-fn rings(side: usize, moved: f64) -> Mask {
+/// Draws rings about as wide as strokes, shifted by a share of their width.
+fn rings(side: usize, shift: f64) -> Mask {
     let width = side as f64 / 14.0;
     Mask::from_fn(side, side, |x, y| {
         let middle = side as f64 / 2.0;
-        let radius = (x as f64 - middle - moved * width).hypot(y as f64 - middle);
+        let radius = (x as f64 - middle - shift * width).hypot(y as f64 - middle);
         ((radius / width) as usize).is_multiple_of(2)
     })
 }

@@ -159,7 +159,8 @@ impl Scene {
         let style = ScanStyle::draw(self.tier.is_damaged(), vertices, rng);
         let mut mesh = scan(&surface, &cut_outline(&self.artwork, rng), &style, rng);
         let pose = ScanPose::draw(self.tier, rng);
-        mesh.vertices.change(|vertex| pose.mesh_from_block(vertex));
+        mesh.vertices
+            .map_in_place(|vertex| pose.mesh_from_block(vertex));
         let truth_source = TruthSource {
             strokes: &self.artwork.strokes,
             remaining: &remaining,

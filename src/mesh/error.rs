@@ -1,25 +1,27 @@
-//! Why a mesh could not be read.
+//! Errors of the mesh readers, and the limits they check.
+
+use serde::{Deserialize, Serialize};
 
 use crate::domain::{FailureClass, FileKind};
 
 /// Why a mesh could not be read from a file.
 #[derive(Debug, thiserror::Error)]
 pub enum MeshReadError {
-    /// Reading failed half-way.
+    /// Reading the source failed.
     #[error(transparent)]
     Io(#[from] std::io::Error),
-    /// What was read is no mesh.
+    /// The content is not a valid mesh.
     #[error(transparent)]
     Mesh(#[from] MeshError),
 }
 
-/// Why a mesh could not be read. The messages leave the file's name to the caller.
+/// Why a mesh could not be read. The caller adds the file's name.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum MeshError {
-    /// No bytes at all.
+    /// The file has no bytes.
     #[error("the file is empty (0 bytes)")]
     Empty,
-    /// The content is of no format that is read.
+    /// The content is of an unsupported format.
     #[error("the file is {0}; OBJ, PLY and STL meshes and XYZ points are read")]
     NotAMesh(FileKind),
     /// More than the settings allow.
@@ -27,7 +29,7 @@ pub enum MeshError {
     TooMany {
         /// Bytes, vertices or triangles.
         what: &'static str,
-        /// How many there are, by the header or as far as was read.
+        /// Count in the header, or as far as was read.
         count: u64,
         /// The setting's value.
         limit: u64,
@@ -39,21 +41,21 @@ pub enum MeshError {
     Truncated {
         /// Format and encoding.
         format: &'static str,
-        /// What is missing, in the plural.
+        /// What is missing, plural.
         what: String,
-        /// How many are whole.
+        /// Complete ones.
         have: u64,
-        /// How many the header promises.
+        /// Count in the header.
         want: u64,
     },
-    /// The file ends early, and nothing in it says how much there should be.
+    /// The file ends early, and no count says how much is missing.
     #[error("the {format} is truncated: it ends after {have} facets without {missing}")]
     EndMissing {
         /// Format and encoding.
         format: &'static str,
-        /// Whole facets before the end.
+        /// Complete facets.
         have: u64,
-        /// The word that is missing.
+        /// The missing keyword.
         missing: &'static str,
     },
     /// A coordinate that is NaN or infinite.
@@ -64,23 +66,23 @@ pub enum MeshError {
         /// The coordinate.
         value: f64,
     },
-    /// Not a single vertex.
+    /// The file has no vertices.
     #[error("the mesh has no vertices")]
     NoVertices,
-    /// A format of faces without any.
+    /// A file of a format of faces has none.
     #[error("the mesh has no faces")]
     NoFaces,
-    /// A face names a vertex that is not there.
+    /// A face refers to a missing vertex.
     #[error("face {face} refers to vertex {index}, but the file has {vertices} vertices")]
     IndexOutOfRange {
         /// Position in the file, counted from 1.
         face: u64,
-        /// The index as the file has it.
+        /// The index as written.
         index: i64,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: u64,
     },
-    /// A line of a text format that cannot be read.
+    /// A line of a text format cannot be parsed.
     #[error("line {line}: {reason}")]
     Line {
         /// Counted from 1.
@@ -88,10 +90,10 @@ pub enum MeshError {
         /// What is wrong with it.
         reason: String,
     },
-    /// A header that does not make sense.
+    /// The PLY header is invalid.
     #[error("the PLY header is wrong: {0}")]
     Header(String),
-    /// A row of a PLY body that cannot be read.
+    /// A row of a PLY body cannot be parsed.
     #[error("{element} {row}: {reason}")]
     Row {
         /// Name of the element.
@@ -104,23 +106,23 @@ pub enum MeshError {
 }
 
 impl MeshError {
-    /// Decides retry or quarantine. The file is at fault in every case: one over a limit can only be read by
-    /// raising the setting that the message names.
+    /// Returns the failure class. The file is at fault in every case: one over a limit can only be read by raising the
+    /// setting that the message names.
     pub const fn class(&self) -> FailureClass {
         FailureClass::BadInput
     }
 }
 
-/// Checks that a vertex is finite; `vertex` counts from 1.
-pub(super) fn finite(position: [f64; 3], vertex: u64) -> Result<[f64; 3], MeshError> {
+/// Checks that a vertex is finite and returns it; `vertex` counts from 1.
+pub(super) fn check_finite(position: [f64; 3], vertex: u64) -> Result<[f64; 3], MeshError> {
     match position.into_iter().find(|value| !value.is_finite()) {
         Some(value) => Err(MeshError::NotFinite { vertex, value }),
         None => Ok(position),
     }
 }
 
-/// Checks that vertices are finite, of which `before` came before.
-pub(super) fn all_finite<T: Copy + Into<f64>>(
+/// Checks that vertices are finite; `before` vertices precede them in the file.
+pub(super) fn check_all_finite<T: Copy + Into<f64>>(
     positions: &[[T; 3]],
     before: usize,
 ) -> Result<(), MeshError> {
@@ -129,7 +131,64 @@ pub(super) fn all_finite<T: Copy + Into<f64>>(
         return Ok(());
     }
     for (vertex, position) in (before as u64 + 1..).zip(positions) {
-        finite(position.map(Into::into), vertex)?;
+        check_finite(position.map(Into::into), vertex)?;
     }
     Ok(())
+}
+
+/// Limits on meshes, checked before memory is reserved.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshLimits {
+    /// Largest file in bytes; 2 GiB holds any scan of one character.
+    pub max_bytes: u64,
+    /// Most vertices; 50 million take 0.6 GB in single precision, 1.2 GB in double.
+    pub max_vertices: u64,
+    /// Most triangles after triangulation; 100 million take 1.2 GB.
+    pub max_triangles: u64,
+}
+
+impl MeshLimits {
+    /// 2 GiB, 50 million vertices, 100 million triangles.
+    pub const SUGGESTED: Self = Self {
+        max_bytes: 2 << 30,
+        max_vertices: 50_000_000,
+        max_triangles: 100_000_000,
+    };
+
+    pub(super) fn check_bytes(&self, count: u64) -> Result<(), MeshError> {
+        check_count("bytes", count, self.max_bytes, "limits.mesh.max_bytes")
+    }
+
+    /// Checks a number of vertices; never allows more than a 32-bit index can address.
+    pub(super) fn check_vertices(&self, count: u64) -> Result<(), MeshError> {
+        let limit = self.max_vertices.min(u64::from(u32::MAX));
+        check_count("vertices", count, limit, "limits.mesh.max_vertices")
+    }
+
+    pub(super) fn check_triangles(&self, count: u64) -> Result<(), MeshError> {
+        check_count(
+            "triangles",
+            count,
+            self.max_triangles,
+            "limits.mesh.max_triangles",
+        )
+    }
+}
+
+fn check_count(
+    what: &'static str,
+    count: u64,
+    limit: u64,
+    setting: &'static str,
+) -> Result<(), MeshError> {
+    if count <= limit {
+        return Ok(());
+    }
+    Err(MeshError::TooMany {
+        what,
+        count,
+        limit,
+        setting,
+    })
 }

@@ -1,28 +1,28 @@
-//! Which format some bytes are, by their content.
+//! Format detection by content.
 
 use super::{MeshError, stl, text};
 use crate::domain::FileKind;
 
-/// The formats that are read.
+/// The supported formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DetectedFormat {
     /// Wavefront OBJ.
     Obj,
-    /// Stanford polygon format, ascii or binary of either byte order.
+    /// Stanford polygon format, ASCII or binary of either byte order.
     Ply,
     /// Binary STL.
     StlBinary,
-    /// Ascii STL.
+    /// ASCII STL.
     StlAscii,
     /// Lines of numbers, the first three of each a position.
     Xyz,
 }
 
-/// Lines of a text looked at before it is given up.
+/// Lines of a text that are examined.
 const LINES_TRIED: usize = 1000;
 
 impl DetectedFormat {
-    /// Name in messages.
+    /// Returns the name in messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Obj => "OBJ",
@@ -33,10 +33,10 @@ impl DetectedFormat {
         }
     }
 
-    /// Format of a file with this content; its name decides only between truncated or odd files.
+    /// Detects the format of a file; its name decides only for truncated or ambiguous content.
     ///
     /// # Errors
-    /// When the content is of no format that is read.
+    /// Returns an error if the content is of no supported format.
     pub fn of(bytes: &[u8], name: &str) -> Result<Self, MeshError> {
         if bytes.is_empty() {
             return Err(MeshError::Empty);
@@ -49,7 +49,7 @@ impl DetectedFormat {
             }
             FileKind::Text => text_format(bytes, name).ok_or(MeshError::NotAMesh(kind)),
             FileKind::Binary if has_extension(name, "stl") => Ok(Self::StlBinary),
-            // Names in another encoding or a stray control character do not make a text binary.
+            // Names in another encoding or a stray control character do not make a text file binary.
             FileKind::Binary => first_words(bytes).ok_or(MeshError::NotAMesh(kind)),
             FileKind::Png
             | FileKind::Jpeg
@@ -77,7 +77,7 @@ fn text_format(bytes: &[u8], name: &str) -> Option<DetectedFormat> {
     if let Some(format) = first_words(bytes) {
         return Some(format);
     }
-    // The header of a binary STL may be text all through: count and triangles tell, here cut short.
+    // A truncated binary STL with a text header has no count to recognise it by.
     (has_extension(name, "stl") && bytes.contains(&0)).then_some(DetectedFormat::StlBinary)
 }
 
@@ -99,7 +99,7 @@ fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {
     None
 }
 
-/// `solid` begins an ascii STL, and the header of some binary ones.
+/// Tells an ASCII STL from a binary STL whose header begins with `solid`.
 fn stl_after_solid(bytes: &[u8]) -> DetectedFormat {
     let binary = bytes.iter().take(4096).any(|byte| *byte == 0);
     if binary {

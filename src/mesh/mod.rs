@@ -1,44 +1,47 @@
-//! Scanned surfaces in their own frame and unit, and the readers that bring them in.
+//! Triangle meshes and point sets in their own frame and unit, and their readers and writers.
 
 mod error;
 mod format;
-mod limits;
 mod obj;
 mod ply;
 mod stl;
 mod text;
-mod vertices;
+mod triangle_mesh;
+
 pub mod write;
 mod xyz;
 
-pub use error::{MeshError, MeshReadError};
+pub use error::{MeshError, MeshLimits, MeshReadError};
 pub use format::DetectedFormat;
-pub use limits::MeshLimits;
-pub use vertices::Vertices;
+pub use triangle_mesh::{Mesh, Vertices};
 
 use std::io::Read;
 
 use crate::domain::FileKind;
 use crate::page_vec::PageVec;
 
-/// Triangles over vertices, in the mesh's own frame and unit. A point set has no triangles.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Mesh {
-    /// Positions of corners and points.
-    pub vertices: Vertices,
-    /// Indices into `vertices`, wound as in the file.
-    pub triangles: PageVec<[u32; 3]>,
-}
-
-/// Reads a mesh or point set from a file's bytes.
+/// Reads a mesh or point set from the bytes of a file.
 ///
-/// The format is told by content; `name` serves only where the content leaves a doubt. Polygons become fans of
-/// triangles, those of fewer than three corners are left out. STL stays a soup: a vertex is repeated in each of its
-/// triangles. Nothing is reserved on a header's word alone: counts are held against the bytes that are there.
+/// The format is detected by content; `name` decides only for ambiguous content. Polygons are triangulated as fans;
+/// faces of fewer than three corners are ignored. The vertices of an STL are repeated in each of their triangles.
+/// Memory is reserved only as far as the file's size supports the counts in its header.
+///
+/// ```
+/// use mocban::mesh::{MeshLimits, read};
+///
+/// let obj = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
+/// let mesh = read(obj, "square.obj", &MeshLimits::SUGGESTED)?;
+/// assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+///
+/// let xyz = b"x,y,z\n0,0,1.5\n1,0,1.5\n";
+/// let points = read(xyz, "points.xyz", &MeshLimits::SUGGESTED)?;
+/// assert_eq!(points.vertices.at(1), [1.0, 0.0, 1.5]);
+/// # Ok::<(), mocban::mesh::MeshError>(())
+/// ```
 ///
 /// # Errors
-/// When the bytes are no whole mesh of a known format, hold a number that is not finite or an index out of range,
-/// or exceed the limits.
+/// Returns an error if the bytes are not a complete mesh of a supported format, contain a number that is not finite or
+/// an index out of range, or exceed the limits.
 pub fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh, MeshError> {
     limits.check_bytes(bytes.len() as u64)?;
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
@@ -55,13 +58,25 @@ pub fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh, MeshE
     Ok(mesh)
 }
 
-/// Some programs put it before text.
+/// Some programs write it before text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Reads a mesh or point set of about so many bytes as [`read`] does. The bytes of a whole binary STL are not kept.
+/// Reads a mesh or point set of about `about` bytes like [`read`]. The bytes of a binary STL are not kept in memory.
+///
+/// ```
+/// use mocban::mesh::{MeshLimits, read, read_from};
+///
+/// let ply = b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+///     property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n\
+///     0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+/// let limits = MeshLimits::SUGGESTED;
+/// let mesh = read_from(&mut ply.as_slice(), ply.len() as u64, "a.ply", &limits)?;
+/// assert_eq!(mesh, read(ply, "a.ply", &limits)?);
+/// # Ok::<(), mocban::mesh::MeshReadError>(())
+/// ```
 ///
 /// # Errors
-/// As those of [`read`], and when the source fails.
+/// Returns an error like [`read`], and if the source fails.
 pub fn read_from(
     source: &mut impl Read,
     about: u64,
@@ -95,7 +110,7 @@ mod tests {
         max_triangles: 1000,
     };
 
-    /// One whole file of each format and encoding.
+    /// One complete file of each format and encoding.
     fn samples() -> Vec<(&'static str, Vec<u8>)> {
         let obj = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nf 1//1 2//1 3//1\nf -3 -2 -1\n";
         let ascii =
@@ -128,7 +143,7 @@ mod tests {
         ]
     }
 
-    /// A source that gives a few bytes at a time.
+    /// A source that returns a few bytes at a time.
     struct Slow<'a>(&'a [u8]);
 
     impl std::io::Read for Slow<'_> {
@@ -138,7 +153,7 @@ mod tests {
         }
     }
 
-    /// As read from a file of so many bytes that is another one by now.
+    /// Reads from a file that had `about` bytes when it was opened.
     fn from_file(bytes: &[u8], about: usize, name: &str) -> Result<Mesh, String> {
         read_from(&mut Slow(bytes), about as u64, name, &LIMITS).map_err(|error| error.to_string())
     }
@@ -147,7 +162,7 @@ mod tests {
     fn a_file_gives_what_its_bytes_give() {
         let mut many = samples();
         let mut long = vec![b' '; 80];
-        // Three times as many as are read at a time, but for some.
+        // Almost three times as many facets as are read at a time.
         let count = 2 * 1280 + 7_u32;
         long.extend(count.to_le_bytes());
         long.extend((0..count * 50).map(|k| (k % 60) as u8));

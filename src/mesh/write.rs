@@ -1,10 +1,25 @@
-//! Meshes as files: STL, PLY and OBJ. Coordinates are written as 32-bit floats.
+//! Writers of STL, PLY and OBJ files. Coordinates are written as 32-bit floats.
 
 use std::fmt::Write as _;
 
 use super::Mesh;
 
-/// A mesh file format.
+/// A file format to write.
+///
+/// ```
+/// use mocban::mesh::write::MeshFormat;
+/// use mocban::mesh::{Mesh, MeshLimits, read};
+///
+/// let mesh = Mesh {
+///     vertices: vec![[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]].into(),
+///     triangles: vec![[0, 1, 2]].into(),
+/// };
+/// for format in [MeshFormat::StlBinary, MeshFormat::PlyLittleEndian, MeshFormat::Obj] {
+///     let bytes = format.encode(&mesh);
+///     assert_eq!(read(&bytes, "scan", &MeshLimits::SUGGESTED)?, mesh);
+/// }
+/// # Ok::<(), mocban::mesh::MeshError>(())
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MeshFormat {
     /// Binary STL: each triangle with its own three vertices.
@@ -13,9 +28,9 @@ pub enum MeshFormat {
     StlAscii,
     /// PLY as text.
     PlyAscii,
-    /// Binary PLY, little end first.
+    /// Binary PLY, little-endian.
     PlyLittleEndian,
-    /// Binary PLY, big end first.
+    /// Binary PLY, big-endian.
     PlyBigEndian,
     /// Wavefront OBJ.
     Obj,
@@ -32,7 +47,7 @@ impl MeshFormat {
         Self::Obj,
     ];
 
-    /// Ending of the file's name.
+    /// Returns the extension of the file's name.
     pub const fn extension(self) -> &'static str {
         match self {
             Self::StlBinary | Self::StlAscii => "stl",
@@ -41,7 +56,7 @@ impl MeshFormat {
         }
     }
 
-    /// The file's bytes.
+    /// Encodes a mesh as the bytes of a file.
     pub fn encode(self, mesh: &Mesh) -> Vec<u8> {
         match self {
             Self::StlBinary => stl_binary(mesh),
@@ -72,7 +87,7 @@ fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [[f32; 3]; 3] {
     triangle.map(|corner| single(mesh.vertices.at(corner as usize)))
 }
 
-/// Unit normal by winding; zero for a triangle without area, as STL writers do.
+/// Returns the unit normal by winding; zero for a triangle without area, as other STL writers do.
 fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
     let side = |p: [f32; 3]| [0, 1, 2].map(|i| f64::from(p[i]) - f64::from(a[i]));
     let (u, v) = (side(b), side(c));
@@ -196,7 +211,7 @@ mod tests {
         }
     }
 
-    /// Corners of all triangles, as singles.
+    /// Returns the corners of all triangles in single precision.
     fn soup(mesh: &Mesh) -> Vec<[f32; 3]> {
         let corner = |index: &u32| mesh.vertices.at(*index as usize).map(|c| c as f32);
         mesh.triangles.iter().flatten().map(corner).collect()

@@ -1,12 +1,12 @@
-//! XYZ point sets: lines of numbers, the first three of each a position.
+//! Reader of XYZ point sets: lines of numbers, the first three of each a position.
 
 use super::{Mesh, MeshError, MeshLimits, error, text};
 
-/// Bytes of the shortest line: three digits, two spaces, an end.
+/// Bytes of the shortest line: three digits, two spaces, a line end.
 const SHORTEST_LINE: usize = 6;
 
-/// Reads positions; further columns such as normals and colours are left out. Commas and semicolons may stand
-/// between numbers. The first line may be a count or the columns' names.
+/// Reads positions; further columns such as normals and colours are ignored. Commas and semicolons may separate
+/// numbers. The first line may be a count or the names of the columns.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let mut vertices = Vec::with_capacity((bytes.len() / SHORTEST_LINE).min(1 << 16));
     let mut first = true;
@@ -20,7 +20,7 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
         })?;
         let count = vertices.len() as u64 + 1;
         limits.check_vertices(count)?;
-        vertices.push(error::finite(position, count)?);
+        vertices.push(error::check_finite(position, count)?);
     }
     Ok(Mesh {
         vertices: vertices.into(),
@@ -28,7 +28,7 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     })
 }
 
-/// Whether a file that begins with this line may be a point set.
+/// Returns whether a file that begins with this line may be a point set.
 pub(super) fn is_data_or_title(line: &[u8]) -> bool {
     is_title(line) || text::position(cells(line)).is_ok()
 }
@@ -37,7 +37,7 @@ fn is_comment(line: &[u8]) -> bool {
     line.is_empty() || line.starts_with(b"#") || line.starts_with(b"//")
 }
 
-/// A count of points alone on its line, or columns named x, y, z.
+/// Returns whether a line is a count of points, or columns named x, y, z.
 fn is_title(line: &[u8]) -> bool {
     let mut words = cells(line);
     let first = words.next().unwrap_or_default();

@@ -1,20 +1,20 @@
-//! The depth map: heights over the fitted surface, seen as the print is read.
+//! The depth map: heights over the fitted surface, mirrored so that it reads like the print.
 
-use super::warp::warp_strokes;
+use super::warp_mask::warp_level_sets;
 use super::{Grid, Mask};
 use crate::domain::{Affine2, DepthScale};
 
-/// A 16-bit depth map. Level 0 holds no data; 1..=65535 are linear in height.
+/// A 16-bit depth map. Level 0 is no data; 1..=65535 are linear in height.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthMap {
-    /// Levels by pixel.
+    /// Level of each pixel.
     pub levels: Grid<u16>,
-    /// How levels and pixels are to be read.
+    /// Scale of levels and pixels.
     pub scale: DepthScale,
 }
 
 impl DepthMap {
-    /// Height over the fitted surface at a pixel, mesh units; `None` where there is no data.
+    /// Returns the height over the fitted surface at a pixel, mesh units; `None` without data.
     pub fn height(&self, x: usize, y: usize) -> Option<f64> {
         match self.levels.at(x, y) {
             0 => None,
@@ -22,18 +22,19 @@ impl DepthMap {
         }
     }
 
-    /// The levels of all pixels that hold data, row by row.
+    /// Returns the levels of all pixels with data, row by row.
     pub fn valid_levels(&self) -> Vec<u16> {
         let levels = self.levels.data().iter().copied();
         levels.filter(|level| *level > 0).collect()
     }
 
-    /// The strokes at a threshold: levels from `level` up. No data is no stroke.
+    /// Returns the stroke mask at a threshold: levels of at least `level`. Pixels without data are not set.
     pub fn stroke_mask(&self, level: u16) -> Mask {
         self.levels.map(|found| *found >= level.max(1))
     }
 
-    /// The strokes at some thresholds in another frame; `to_from` maps depth-map pixels to its pixels.
+    /// Returns the stroke masks at several thresholds, warped into another frame of `width` x `height` pixels.
+    /// `to_from` maps depth-map px to that frame's px.
     pub fn warped_stroke_masks(
         &self,
         to_from: &Affine2,
@@ -41,10 +42,10 @@ impl DepthMap {
         levels: &[u16],
     ) -> Vec<Mask> {
         let levels: Vec<u16> = levels.iter().map(|level| (*level).max(1)).collect();
-        warp_strokes(&self.levels, &levels, to_from, width, height)
+        warp_level_sets(&self.levels, &levels, to_from, width, height)
     }
 
-    /// A map from -1 to 0.3 mesh units of ten pixels each, for tests.
+    /// Returns a map from -1 to 0.3 mesh units with ten pixels a unit, for tests.
     #[cfg(test)]
     pub(crate) fn of_levels(levels: Grid<u16>) -> Self {
         Self {

@@ -1,9 +1,19 @@
-//! A rectangle of values. The pixel convention of the whole project is stated here.
+//! A two-dimensional grid of values, and the pixel convention of the whole project.
 //!
-//! x runs to the right, y down, and **(0, 0) is the centre of the top-left pixel**: a pixel covers
-//! `x - 0.5 .. x + 0.5`.
+//! x runs to the right, y down, and **(0, 0) is the centre of the top-left pixel**: a pixel covers `x - 0.5 .. x +
+//! 0.5`.
 
-/// Values in rows, top row first.
+/// Values in row-major order, top row first.
+///
+/// ```
+/// use mocban::raster::Grid;
+///
+/// let grid = Grid::from_fn(3, 2, |x, y| 10 * y + x);
+/// assert_eq!((grid.width(), grid.height()), (3, 2));
+/// assert_eq!(grid.row(1), [10, 11, 12]);
+/// assert_eq!(grid.get(-1, 0), None);
+/// assert_eq!(grid.transposed().row(2), [2, 12]);
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid<T> {
     width: usize,
@@ -11,11 +21,11 @@ pub struct Grid<T> {
     data: Vec<T>,
 }
 
-/// Side of the squares that are turned over one by one, so that rows of either side stay at hand.
+/// Side of the tiles that are transposed at a time, so that their rows stay in the cache.
 const TILE: usize = 8;
 
-/// Turns the square at the beginning of rows `from_width` long into that at the beginning of rows `to_width` long.
-fn turn_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usize) {
+/// Transposes the tile at the start of rows of `from_width` values into rows of `to_width` values.
+fn transpose_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usize) {
     let rows: [&[T]; TILE] = std::array::from_fn(|y| &from[y * from_width..][..TILE]);
     for x in 0..TILE {
         let column = &mut to[x * to_width..][..TILE];
@@ -26,9 +36,9 @@ fn turn_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usi
 }
 
 impl Grid<u16> {
-    /// How many values reach a level.
+    /// Counts the values that are at least `level`.
     pub fn count_at_least(&self, level: u16) -> usize {
-        // Few enough for a narrow sum, of which more fit side by side.
+        // Few enough for a 16-bit sum, which has more SIMD lanes.
         let runs = self.data.chunks(usize::from(u16::MAX));
         let set = |run: &[u16]| run.iter().map(|l| u16::from(*l >= level)).sum::<u16>();
         runs.map(|run| usize::from(set(run))).sum()
@@ -36,7 +46,7 @@ impl Grid<u16> {
 }
 
 impl<T: Copy> Grid<T> {
-    /// A grid of one value.
+    /// Creates a grid of one value.
     pub fn new(width: usize, height: usize, fill: T) -> Self {
         Self {
             width,
@@ -45,7 +55,7 @@ impl<T: Copy> Grid<T> {
         }
     }
 
-    /// A grid from rows laid end to end; `None` when their number does not fit.
+    /// Creates a grid from values in row-major order; `None` if their number does not match.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {
         (data.len() == width * height).then_some(Self {
             width,
@@ -54,7 +64,7 @@ impl<T: Copy> Grid<T> {
         })
     }
 
-    /// A grid computed from each pixel's x and y.
+    /// Creates a grid from a function of each pixel's x and y.
     pub fn from_fn(width: usize, height: usize, mut value: impl FnMut(usize, usize) -> T) -> Self {
         let mut data = Vec::with_capacity(width * height);
         for y in 0..height {
@@ -69,7 +79,7 @@ impl<T: Copy> Grid<T> {
         }
     }
 
-    /// Each value replaced.
+    /// Applies a function to each value.
     pub fn map<U: Copy>(&self, value: impl FnMut(&T) -> U) -> Grid<U> {
         Grid {
             width: self.width,
@@ -78,7 +88,7 @@ impl<T: Copy> Grid<T> {
         }
     }
 
-    /// Rows turned into columns.
+    /// Returns the transposed grid.
     #[must_use]
     pub fn transposed(&self) -> Self {
         let (width, height) = (self.width, self.height);
@@ -91,7 +101,7 @@ impl<T: Copy> Grid<T> {
             for left in (0..width).step_by(TILE) {
                 let columns = &mut data[left * height..];
                 if top + TILE <= height && left + TILE <= width {
-                    turn_tile(&rows[left..], width, &mut columns[top..], height);
+                    transpose_tile(&rows[left..], width, &mut columns[top..], height);
                     continue;
                 }
                 for y in 0..TILE.min(height - top) {
@@ -108,51 +118,51 @@ impl<T: Copy> Grid<T> {
         }
     }
 
-    /// Columns.
+    /// Returns the number of columns.
     pub const fn width(&self) -> usize {
         self.width
     }
 
-    /// Rows.
+    /// Returns the number of rows.
     pub const fn height(&self) -> usize {
         self.height
     }
 
-    /// The value at column x, row y.
+    /// Returns the value at column x, row y; panics outside the grid.
     #[inline]
     pub fn at(&self, x: usize, y: usize) -> T {
         self.data[y * self.width + x]
     }
 
-    /// The value there, or `None` outside the grid.
+    /// Returns the value at column x, row y; `None` outside the grid.
     #[inline]
     pub fn get(&self, x: i64, y: i64) -> Option<T> {
         (x >= 0 && y >= 0 && x < self.width as i64 && y < self.height as i64)
             .then(|| self.data[y as usize * self.width + x as usize])
     }
 
-    /// Sets the value at column x, row y.
+    /// Sets the value at column x, row y; panics outside the grid.
     #[inline]
     pub fn set(&mut self, x: usize, y: usize, value: T) {
         self.data[y * self.width + x] = value;
     }
 
-    /// One row.
+    /// Returns a row.
     pub fn row(&self, y: usize) -> &[T] {
         &self.data[y * self.width..(y + 1) * self.width]
     }
 
-    /// All values, row after row.
+    /// Returns all values in row-major order.
     pub fn data(&self) -> &[T] {
         &self.data
     }
 
-    /// All values, to change.
+    /// Returns all values for modification.
     pub fn data_mut(&mut self) -> &mut [T] {
         &mut self.data
     }
 
-    /// The values themselves.
+    /// Returns the values in row-major order.
     pub fn into_vec(self) -> Vec<T> {
         self.data
     }

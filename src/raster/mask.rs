@@ -1,8 +1,8 @@
-//! Masks: which pixels are stroke.
+//! Binary masks: which pixels are stroke.
 
 use super::Grid;
 
-/// A grid of yes and no.
+/// A grid of booleans.
 pub type Mask = Grid<bool>;
 
 /// A box of pixels, bounds included.
@@ -19,17 +19,17 @@ pub struct PixelBox {
 }
 
 impl PixelBox {
-    /// Columns covered.
+    /// Returns the number of columns.
     pub const fn width(&self) -> usize {
         self.x1 - self.x0 + 1
     }
 
-    /// Rows covered.
+    /// Returns the number of rows.
     pub const fn height(&self) -> usize {
         self.y1 - self.y0 + 1
     }
 
-    /// The box around two.
+    /// Returns the smallest box that contains both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
         Self {
@@ -41,28 +41,41 @@ impl PixelBox {
     }
 }
 
-/// Pixels that are counted in a narrow sum, of which more fit side by side.
-const RUN: usize = 255;
+/// Pixels that are counted in an 8-bit sum, which has more SIMD lanes.
+const CHUNK_PIXELS: usize = 255;
 
-/// How many of up to [`RUN`] pixels are set.
-fn set(pixels: impl Iterator<Item = bool>) -> usize {
+/// Counts the set pixels of up to [`CHUNK_PIXELS`].
+fn count_set(pixels: impl Iterator<Item = bool>) -> usize {
     usize::from(pixels.map(u8::from).sum::<u8>())
 }
 
-/// How far two masks of the same size cover each other.
+/// Overlap of two masks of the same size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaskOverlap {
-    /// Pixels set in both over pixels set in either, 0..=1; 0 where none is set.
+    /// Intersection over union, 0..=1; 0 if both masks are empty.
     pub iou: f64,
-    /// Twice the pixels set in both over the sum of both counts, 0..=1; 0 where none is set.
+    /// Dice coefficient, 0..=1: twice the intersection over the sum of both areas; 0 if both masks are empty.
     pub dice: f64,
 }
 
 impl Mask {
-    /// How far this mask and another of the same size cover each other.
+    /// Computes the overlap with another mask of the same size.
+    ///
+    /// ```
+    /// use mocban::raster::Mask;
+    ///
+    /// let left = Mask::from_fn(8, 3, |x, _| x < 4);
+    /// let middle = Mask::from_fn(8, 3, |x, _| (2..6).contains(&x));
+    /// let overlap = left.overlap(&middle);
+    /// assert_eq!(overlap.iou, 6.0 / 18.0);
+    /// assert_eq!(overlap.dice, 12.0 / 24.0);
+    /// ```
     pub fn overlap(&self, other: &Self) -> MaskOverlap {
-        let runs = self.data().chunks(RUN).zip(other.data().chunks(RUN));
-        let both = runs.map(|(one, other)| set(one.iter().zip(other).map(|(a, b)| *a & *b)));
+        let runs = self
+            .data()
+            .chunks(CHUNK_PIXELS)
+            .zip(other.data().chunks(CHUNK_PIXELS));
+        let both = runs.map(|(one, other)| count_set(one.iter().zip(other).map(|(a, b)| *a & *b)));
         let both = both.sum::<usize>() as f64;
         let sum = (self.count() + other.count()) as f64;
         let share = |part: f64, whole: f64| if whole > 0.0 { part / whole } else { 0.0 };
@@ -72,13 +85,13 @@ impl Mask {
         }
     }
 
-    /// Number of set pixels.
+    /// Counts the set pixels.
     pub fn count(&self) -> usize {
-        let runs = self.data().chunks(RUN);
-        runs.map(|run| set(run.iter().copied())).sum()
+        let runs = self.data().chunks(CHUNK_PIXELS);
+        runs.map(|run| count_set(run.iter().copied())).sum()
     }
 
-    /// Share of set pixels, 0..=1; 0 for an empty grid.
+    /// Returns the share of set pixels, 0..=1; 0 for an empty grid.
     pub fn density(&self) -> f64 {
         if self.data().is_empty() {
             return 0.0;
@@ -86,12 +99,21 @@ impl Mask {
         self.count() as f64 / self.data().len() as f64
     }
 
-    /// Smallest box that holds every set pixel; `None` when none is set.
+    /// Returns the smallest box that contains every set pixel; `None` if none is set.
+    ///
+    /// ```
+    /// use mocban::raster::Mask;
+    ///
+    /// let mask = Mask::from_fn(9, 7, |x, y| (2..5).contains(&x) && y == 3);
+    /// let bounds = mask.bounding_box().expect("set pixels");
+    /// assert_eq!([bounds.x0, bounds.y0, bounds.x1, bounds.y1], [2, 3, 4, 3]);
+    /// assert_eq!(mask.centroid(), Some([3.0, 3.0]));
+    /// ```
     pub fn bounding_box(&self) -> Option<PixelBox> {
         let mut found: Option<PixelBox> = None;
         for y in 0..self.height() {
             let row = self.row(y);
-            // Many at a time, where a search would ask one by one.
+            // Tests the whole row with SIMD first.
             if !row.iter().fold(false, |any, set| any | *set) {
                 continue;
             }
@@ -109,7 +131,14 @@ impl Mask {
         found
     }
 
-    /// The mask with every pixel that touches it, by a side or a corner.
+    /// Dilates the mask by a 3 x 3 square.
+    ///
+    /// ```
+    /// use mocban::raster::Mask;
+    ///
+    /// let dot = Mask::from_fn(5, 5, |x, y| (x, y) == (2, 2));
+    /// assert_eq!(dot.dilate().count(), 9);
+    /// ```
     #[must_use]
     pub fn dilate(&self) -> Self {
         let (width, height) = (self.width(), self.height());
@@ -134,7 +163,7 @@ impl Mask {
         grown
     }
 
-    /// Mean position of the set pixels; `None` when none is set.
+    /// Returns the mean position of the set pixels, pixels; `None` if none is set.
     pub fn centroid(&self) -> Option<[f64; 2]> {
         let (mut n, mut sum_x, mut sum_y) = (0_u64, 0_u64, 0_u64);
         for y in 0..self.height() {

@@ -1,52 +1,55 @@
-//! The lowest and the highest value in any box of a grid, to ask for many pixels at a time.
+//! Min-max pyramid: bounds of the values in any box of a grid in constant time.
 
 use super::Grid;
 
-/// Side of the finest cells, pixels; that of each further kind is twice as large.
-const FINEST_PX: usize = 4;
+/// Side of the finest cells, pixels; it doubles at each level.
+const FINEST_CELL_PX: usize = 4;
 
-/// Cells of several sizes with the extremes of what they hold.
-pub(super) struct Extremes<T> {
-    kinds: Vec<Grid<[T; 2]>>,
+/// Cells of several sizes with the lowest and highest value in each.
+pub(super) struct MinMaxPyramid<T> {
+    levels: Vec<Grid<[T; 2]>>,
     size: [usize; 2],
 }
 
-impl<T: Copy + Ord> Extremes<T> {
-    pub(super) fn of(values: &Grid<T>) -> Self {
+impl<T: Copy + Ord> MinMaxPyramid<T> {
+    pub(super) fn new(values: &Grid<T>) -> Self {
         let size = [values.width(), values.height()];
-        let [across, down] = size.map(|side| side.div_ceil(FINEST_PX));
+        let [across, down] = size.map(|side| side.div_ceil(FINEST_CELL_PX));
         let mut cells = Vec::with_capacity(across * down);
         for y in 0..down {
-            let last = ((y + 1) * FINEST_PX).min(size[1]);
-            let mut lowest = values.row(y * FINEST_PX).to_vec();
+            let last = ((y + 1) * FINEST_CELL_PX).min(size[1]);
+            let mut lowest = values.row(y * FINEST_CELL_PX).to_vec();
             let mut highest = lowest.clone();
-            for row in y * FINEST_PX + 1..last {
+            for row in y * FINEST_CELL_PX + 1..last {
                 let pairs = lowest.iter_mut().zip(&mut highest).zip(values.row(row));
                 for ((low, high), value) in pairs {
                     *low = (*low).min(*value);
                     *high = (*high).max(*value);
                 }
             }
-            let (lows, highs) = (lowest.chunks(FINEST_PX), highest.chunks(FINEST_PX));
+            let (lows, highs) = (
+                lowest.chunks(FINEST_CELL_PX),
+                highest.chunks(FINEST_CELL_PX),
+            );
             cells.extend(lows.zip(highs).map(|(low, high)| {
                 let low = low.iter().fold(low[0], |a, b| a.min(*b));
                 let high = high.iter().fold(high[0], |a, b| a.max(*b));
                 [low, high]
             }));
         }
-        let mut kinds: Vec<Grid<[T; 2]>> =
+        let mut levels: Vec<Grid<[T; 2]>> =
             Grid::from_vec(across, down, cells).into_iter().collect();
-        while let Some(finer) = kinds.last()
+        while let Some(finer) = levels.last()
             && finer.width().max(finer.height()) > 1
         {
-            kinds.push(halved(finer));
+            levels.push(halved(finer));
         }
-        Self { kinds, size }
+        Self { levels, size }
     }
 
-    /// The lowest and the highest value, or beyond those where cells reach over the box, from the first to the last
-    /// column and row; `outside` counts where the box reaches out of the grid.
-    pub(super) fn within(&self, [columns, rows]: [[i64; 2]; 2], outside: T) -> [T; 2] {
+    /// Returns bounds of the values in a box, given as first and last column and row. The bounds may be wider than the
+    /// values because cells extend beyond the box; `outside` is included where the box leaves the grid.
+    pub(super) fn range_in_box(&self, [columns, rows]: [[i64; 2]; 2], outside: T) -> [T; 2] {
         let sides = self.size.map(|side| side as i64);
         let is_cut = [columns, rows]
             .iter()
@@ -60,11 +63,11 @@ impl<T: Copy + Ord> Extremes<T> {
         if x0 > x1 || y0 > y1 {
             return found.unwrap_or([outside; 2]);
         }
-        // Cells so large that two or three lie along the box.
-        let longest = (x1 - x0).max(y1 - y0) as usize / (2 * FINEST_PX);
-        let kind = ((usize::BITS - longest.leading_zeros()) as usize).min(self.kinds.len() - 1);
-        let side = (FINEST_PX << kind) as i64;
-        let cells = &self.kinds[kind];
+        // Selects cells so large that two or three cover the longest side.
+        let longest = (x1 - x0).max(y1 - y0) as usize / (2 * FINEST_CELL_PX);
+        let level = ((usize::BITS - longest.leading_zeros()) as usize).min(self.levels.len() - 1);
+        let side = (FINEST_CELL_PX << level) as i64;
+        let cells = &self.levels[level];
         for y in y0 / side..=y1 / side {
             for [low, high] in &cells.row(y as usize)[(x0 / side) as usize..=(x1 / side) as usize] {
                 let so_far = found.get_or_insert([*low, *high]);
@@ -75,7 +78,7 @@ impl<T: Copy + Ord> Extremes<T> {
     }
 }
 
-/// Cells of twice the side.
+/// Merges two by two cells.
 fn halved<T: Copy + Ord>(finer: &Grid<[T; 2]>) -> Grid<[T; 2]> {
     let [width, height] = [finer.width(), finer.height()];
     Grid::from_fn(width.div_ceil(2), height.div_ceil(2), |x, y| {
@@ -91,7 +94,7 @@ fn halved<T: Copy + Ord>(finer: &Grid<[T; 2]>) -> Grid<[T; 2]> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::Extremes;
+    use super::MinMaxPyramid;
     use crate::raster::Grid;
 
     proptest! {
@@ -108,7 +111,7 @@ mod tests {
             };
             let grid = Grid::from_fn(width, height, value);
             let [x1, y1] = [x0 + across, y0 + down];
-            let [low, high] = Extremes::of(&grid).within([[x0, x1], [y0, y1]], 0);
+            let [low, high] = MinMaxPyramid::new(&grid).range_in_box([[x0, x1], [y0, y1]], 0);
             for y in y0..=y1 {
                 for x in x0..=x1 {
                     let value = grid.get(x, y).unwrap_or(0);
@@ -120,7 +123,7 @@ mod tests {
         #[test]
         fn are_exact_for_cells(x in 0_i64..8, y in 0_i64..8) {
             let grid = Grid::from_fn(32, 32, |x, y| (x * y) as u16);
-            let [low, high] = Extremes::of(&grid).within([[4 * x, 4 * x + 3], [4 * y, 4 * y + 3]], 0);
+            let [low, high] = MinMaxPyramid::new(&grid).range_in_box([[4 * x, 4 * x + 3], [4 * y, 4 * y + 3]], 0);
             prop_assert_eq!(i64::from(low), 16 * x * y);
             prop_assert_eq!(i64::from(high), (4 * x + 3) * (4 * y + 3));
         }

@@ -1,23 +1,33 @@
-//! Bringing values to another size along the axes: exact area means where the map shrinks, linear where it grows.
+//! Resampling to another size along the axes: box filter where the map shrinks, linear interpolation where it
+//! enlarges.
 
 use super::Grid;
 use crate::simd::dispatch;
 
-/// Values under an upright map `to = scale * from + shift` (pixels, per axis), of so many columns and rows.
+/// Resamples values under the map `to = scale * from + shift` (pixels, per axis) to a grid of `to` columns and rows.
 ///
-/// Each output pixel is the mean of the source over its own square, or over a source pixel's where that is larger.
-/// Beyond the source values are zero.
+/// Each output pixel is the mean of the source over its own square, or over a source pixel's square if that is larger.
+/// Values beyond the source are zero.
+///
+/// ```
+/// use mocban::raster::{Grid, resample};
+///
+/// // Half the size: output pixel 0 covers source pixels 0 and 1, whose centre is at 0.5.
+/// let ramp = Grid::from_fn(4, 2, |x, _| x as f32);
+/// let half = resample(&ramp, 0.5, [-0.25, -0.25], [2, 1]);
+/// assert_eq!(half.data(), [0.5, 2.5]);
+/// ```
 pub fn resample(values: &Grid<f32>, scale: f64, shift: [f64; 2], to: [usize; 2]) -> Grid<f32> {
     if scale <= 1.0 {
         return resample_transposed(values, scale, shift, to).transposed();
     }
-    // What grows is turned while it is small.
+    // What is enlarged is transposed while it is small.
     let from = [values.width(), values.height()];
-    let [columns, rows] = Reaches::both(from, to, scale, shift);
-    rows.mix(&columns.mix(&values.transposed()).transposed())
+    let [columns, rows] = BoxFilter::both(from, to, scale, shift);
+    rows.mix_rows(&columns.mix_rows(&values.transposed()).transposed())
 }
 
-/// The same with rows and columns changed for each other.
+/// Resamples like [`resample`] and returns the transposed grid.
 pub fn resample_transposed(
     values: &Grid<f32>,
     scale: f64,
@@ -25,37 +35,37 @@ pub fn resample_transposed(
     to: [usize; 2],
 ) -> Grid<f32> {
     let from = [values.width(), values.height()];
-    let [columns, rows] = Reaches::both(from, to, scale, shift);
-    // Whole rows are summed side by side, so columns are turned into rows for their turn.
-    columns.mix(&rows.mix(values).transposed())
+    let [columns, rows] = BoxFilter::both(from, to, scale, shift);
+    // Whole rows are summed in SIMD lanes, so columns are transposed into rows first.
+    columns.mix_rows(&rows.mix_rows(values).transposed())
 }
 
-/// The same of values that `make` writes, row by row as they are asked for; some rows more than once.
+/// Resamples like [`resample_transposed`], for source rows that `write_row` computes on demand, some of them more than once.
 pub fn resample_rows_transposed(
     from: [usize; 2],
-    make: impl FnMut(usize, &mut [f32]),
+    write_row: impl FnMut(usize, &mut [f32]),
     scale: f64,
     shift: [f64; 2],
     to: [usize; 2],
 ) -> Grid<f32> {
-    let [columns, rows] = Reaches::both(from, to, scale, shift);
-    columns.mix(&rows.mix_made(from[0], make).transposed())
+    let [columns, rows] = BoxFilter::both(from, to, scale, shift);
+    columns.mix_rows(&rows.mix_rows_with(from[0], write_row).transposed())
 }
 
-/// How far along one axis the output pixels reach in the source.
-struct Reaches {
-    /// First source pixel of each, and where its weights end among all.
+/// The filter along one axis: source pixels and weights of each output pixel.
+struct BoxFilter {
+    /// First source pixel of each output pixel, and the end of its weights.
     each: Vec<(usize, usize)>,
     weights: Vec<f32>,
 }
 
-impl Reaches {
-    /// Those of columns and of rows.
+impl BoxFilter {
+    /// Creates the filters along x and y.
     fn both(from: [usize; 2], to: [usize; 2], scale: f64, shift: [f64; 2]) -> [Self; 2] {
         [0, 1].map(|k: usize| Self::new(from[k], to[k], scale, shift[k]))
     }
 
-    /// The reach of each of `to` output pixels over `from` source pixels.
+    /// Creates the filter of `to` output pixels over `from` source pixels.
     fn new(from: usize, to: usize, scale: f64, shift: f64) -> Self {
         let length = (1.0 / scale).max(1.0);
         let mut weights = Vec::with_capacity(to * ((length as usize).min(from) + 2));
@@ -76,8 +86,8 @@ impl Reaches {
         }
     }
 
-    /// Rows mixed from those that each reaches.
-    fn mix(&self, values: &Grid<f32>) -> Grid<f32> {
+    /// Computes output rows as weighted sums of source rows.
+    fn mix_rows(&self, values: &Grid<f32>) -> Grid<f32> {
         let width = values.width();
         let mut out = Grid::new(width, self.each.len(), 0.0_f32);
         let mut rows = out.data_mut().chunks_exact_mut(width.max(1));
@@ -105,8 +115,12 @@ impl Reaches {
         out
     }
 
-    /// Rows mixed from those that each reaches, `width` pixels long, which `make` writes.
-    fn mix_made(&self, width: usize, mut make: impl FnMut(usize, &mut [f32])) -> Grid<f32> {
+    /// Computes output rows as weighted sums of source rows of `width` pixels that `write_row` computes.
+    fn mix_rows_with(
+        &self,
+        width: usize,
+        mut write_row: impl FnMut(usize, &mut [f32]),
+    ) -> Grid<f32> {
         let mut out = Grid::new(width, self.each.len(), 0.0_f32);
         let mut rows = out.data_mut().chunks_exact_mut(width.max(1));
         let mut made = vec![0.0_f32; width];
@@ -116,7 +130,7 @@ impl Reaches {
             || {
                 for ((first, end), row) in self.each.iter().zip(&mut rows) {
                     for (k, weight) in self.weights[start..*end].iter().enumerate() {
-                        make(first + k, &mut made);
+                        write_row(first + k, &mut made);
                         for (sum, value) in row.iter_mut().zip(&made) {
                             *sum += weight * value;
                         }
@@ -129,7 +143,7 @@ impl Reaches {
     }
 }
 
-/// Adds some weighed rows to a row, one after the other.
+/// Adds `N` weighted rows to a row, in order.
 #[inline(always)]
 fn add<const N: usize>(row: &mut [f32], values: &Grid<f32>, first: usize, weights: [f32; N]) {
     let width = row.len();

@@ -1,28 +1,29 @@
-//! Where the pixels of another frame look in a grid, and what is there: a look mixes the four pixels around it.
+//! Supersampling: positions in the source of the samples of an output pixel, and bilinear interpolation there.
 
 use std::ops::Range;
 
 use super::Grid;
 use crate::domain::Affine2;
 
-/// Most looks along one side of an output pixel; beyond this a shrinking map begins to alias.
-const MAX_LOOKS: usize = 8;
-/// A look mixes the pixels around it, so looks this far apart in the source miss nothing between them.
-const APART_PX: f64 = 1.5;
+/// Most samples along a side of an output pixel; maps that shrink further begin to alias.
+const MAX_SAMPLES_PER_SIDE: usize = 8;
+/// Spacing of samples in the source, pixels; each interpolates its neighbours, so nothing between them is missed.
+const SAMPLE_SPACING_PX: f64 = 1.5;
 
-/// Where an output pixel looks in the source.
-pub(super) struct Looks {
+/// The sample positions of output pixels in the source.
+pub(super) struct Supersampler {
     from_to: Affine2,
     per_side: usize,
-    /// Where the looks lie along a side, output pixels from the middle; the first `per_side` of them count.
-    offsets: [f64; MAX_LOOKS],
-    /// How far the outermost looks lie from the middle one, source pixels along x and y.
+    /// Offsets of the samples along a side from the pixel's centre, output pixels; the first `per_side` are used.
+    offsets: [f64; MAX_SAMPLES_PER_SIDE],
+    /// Offset of the outermost samples from the centre, source pixels along x and y.
     spread: [f64; 2],
 }
 
-impl Looks {
+impl Supersampler {
     pub(super) fn new(from_to: &Affine2) -> Self {
-        let per_side = ((from_to.scale() / APART_PX).ceil() as usize).clamp(1, MAX_LOOKS);
+        let per_side =
+            ((from_to.scale() / SAMPLE_SPACING_PX).ceil() as usize).clamp(1, MAX_SAMPLES_PER_SIDE);
         let outermost = 0.5 - 0.5 / per_side as f64;
         Self {
             from_to: *from_to,
@@ -34,31 +35,32 @@ impl Looks {
         }
     }
 
-    /// Calls `look` with where they fall for an output pixel, row by row, source pixels.
+    /// Calls `visit` with each sample position of an output pixel, source pixels, row by row.
     #[inline(always)]
-    fn each(&self, x: usize, y: usize, mut look: impl FnMut([f64; 2])) {
+    fn for_each_sample(&self, x: usize, y: usize, mut visit: impl FnMut([f64; 2])) {
         let offsets = &self.offsets[..self.per_side];
         for down in offsets {
             for across in offsets {
-                look(self.from_to.apply([x as f64 + across, y as f64 + down]));
+                visit(self.from_to.apply([x as f64 + across, y as f64 + down]));
             }
         }
     }
 
-    /// How much of the looks of an output pixel falls on what reaches each of some levels.
+    /// Returns the covered area of an output pixel, in samples, for each of some levels: the bilinear weight of values
+    /// of at least that level.
     #[inline(always)]
-    pub(super) fn covered<T: Copy + Default + Into<f64>, const LEVELS: usize>(
+    pub(super) fn coverage<T: Copy + Default + Into<f64>, const LEVELS: usize>(
         &self,
         x: usize,
         y: usize,
         values: &Grid<T>,
         least: &[f64; LEVELS],
-        look: impl Fn(&Grid<T>, [f64; 2]) -> ([T; 4], [f64; 2]),
+        cell: impl Fn(&Grid<T>, [f64; 2]) -> ([T; 4], [f64; 2]),
     ) -> [f64; LEVELS] {
         let mut covered = [0.0; LEVELS];
-        self.each(x, y, |place| {
-            let (near, within) = look(values, place);
-            let weights = weights(within);
+        self.for_each_sample(x, y, |place| {
+            let (near, within) = cell(values, place);
+            let weights = bilinear_weights(within);
             for i in 0..4 {
                 let value: f64 = near[i].into();
                 for k in 0..LEVELS {
@@ -69,11 +71,11 @@ impl Looks {
         covered
     }
 
-    pub(super) fn count(&self) -> usize {
+    pub(super) fn sample_count(&self) -> usize {
         self.per_side * self.per_side
     }
 
-    /// Mean of what the looks find; `None` when half of them or more find nothing.
+    /// Returns the mean over the samples where `value` exists; `None` unless it exists for more than half of them.
     pub(super) fn mean(
         &self,
         x: usize,
@@ -81,31 +83,35 @@ impl Looks {
         value: impl Fn([f64; 2]) -> Option<f64>,
     ) -> Option<f64> {
         let (mut sum, mut found) = (0.0, 0_usize);
-        self.each(x, y, |place| {
+        self.for_each_sample(x, y, |place| {
             if let Some(v) = value(place) {
                 sum += v;
                 found += 1;
             }
         });
-        let count = self.count();
+        let count = self.sample_count();
         (2 * found > count || (count == 1 && found == 1)).then(|| sum / found as f64)
     }
 
-    /// Mean level where all pixels around the looks are within the grid and hold data.
+    /// Returns the mean level if all pixels around the samples are within the grid and have data.
     pub(super) fn mean_inside(&self, x: usize, y: usize, levels: &Grid<u16>) -> f64 {
         let mut sum = 0.0;
-        self.each(x, y, |place| {
-            let (near, [fx, fy]) = look_inside(levels, place);
+        self.for_each_sample(x, y, |place| {
+            let (near, [fx, fy]) = bilinear_cell_inside(levels, place);
             let [a, b, c, d] = near.map(f64::from);
             let (above, below) = (a + (b - a) * fx, c + (d - c) * fx);
             sum += above + (below - above) * fy;
         });
-        sum / self.count() as f64
+        sum / self.sample_count() as f64
     }
 
-    /// Source pixels that the looks of a box of output pixels may touch: first and last column and row, rather more than
-    /// less.
-    pub(super) fn reach(&self, columns: &Range<usize>, rows: &Range<usize>) -> [[i64; 2]; 2] {
+    /// Returns bounds of the source pixels that the samples of a box of output pixels may read: first and last column
+    /// and row.
+    pub(super) fn source_bounds(
+        &self,
+        columns: &Range<usize>,
+        rows: &Range<usize>,
+    ) -> [[i64; 2]; 2] {
         const SLACK: f64 = 1e-6;
         let ends = |range: &Range<usize>| [range.start as f64, range.end as f64 - 1.0];
         let ([left, right], [top, bottom]) = (ends(columns), ends(rows));
@@ -120,24 +126,30 @@ impl Looks {
     }
 }
 
-/// The whole number below; a plain cast and a comparison, where `f64::floor` would be a call.
+/// Rounds down; a cast and a comparison, where `f64::floor` would be a call.
 pub(super) fn floor(value: f64) -> i64 {
     let cut = value as i64;
     cut - i64::from(cut as f64 > value)
 }
 
-/// The four pixels around a place, and where between them it lies; outside the grid there is the least of values.
+/// Returns the four pixels around a position and the offset between them, 0..1; the default value outside the grid.
 #[inline(always)]
-pub(super) fn look<T: Copy + Default>(values: &Grid<T>, [x, y]: [f64; 2]) -> ([T; 4], [f64; 2]) {
+pub(super) fn bilinear_cell<T: Copy + Default>(
+    values: &Grid<T>,
+    [x, y]: [f64; 2],
+) -> ([T; 4], [f64; 2]) {
     let (x0, y0) = (floor(x), floor(y));
-    let near = neighbours(values, x0, y0, T::default());
+    let near = cell_corners(values, x0, y0, T::default());
     (near, [x - x0 as f64, y - y0 as f64])
 }
 
-/// The same where all four pixels are within the grid.
+/// Does the same where all four pixels are within the grid.
 #[inline(always)]
-pub(super) fn look_inside<T: Copy>(values: &Grid<T>, [x, y]: [f64; 2]) -> ([T; 4], [f64; 2]) {
-    // Not below zero, so a cast rounds down.
+pub(super) fn bilinear_cell_inside<T: Copy>(
+    values: &Grid<T>,
+    [x, y]: [f64; 2],
+) -> ([T; 4], [f64; 2]) {
+    // The position is not negative, so a cast rounds down.
     let (column, row) = (x as i32, y as i32);
     let width = values.width();
     let from = row as usize * width + column as usize;
@@ -146,16 +158,16 @@ pub(super) fn look_inside<T: Copy>(values: &Grid<T>, [x, y]: [f64; 2]) -> ([T; 4
     (near, [x - f64::from(column), y - f64::from(row)])
 }
 
-/// How much a pixel, the next in its row and the two below have to say at a place between them.
+/// Returns the bilinear weights of a pixel, its right neighbour, and the two below.
 #[inline(always)]
-pub(super) fn weights([fx, fy]: [f64; 2]) -> [f64; 4] {
+pub(super) fn bilinear_weights([fx, fy]: [f64; 2]) -> [f64; 4] {
     let (left, above) = (1.0 - fx, 1.0 - fy);
     [left * above, fx * above, left * fy, fx * fy]
 }
 
-/// A pixel and those to its right and below, row after row; `outside` where there are none.
+/// Returns a pixel, its right neighbour, and the two below; `outside` beyond the grid.
 #[inline(always)]
-pub(super) fn neighbours<T: Copy>(grid: &Grid<T>, x: i64, y: i64, outside: T) -> [T; 4] {
+pub(super) fn cell_corners<T: Copy>(grid: &Grid<T>, x: i64, y: i64, outside: T) -> [T; 4] {
     let width = grid.width();
     let inside = |i: i64, side: usize| i >= 0 && i + 1 < side as i64;
     if inside(x, width) && inside(y, grid.height()) {

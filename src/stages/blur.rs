@@ -1,77 +1,76 @@
-//! Gaussian smoothing of values, by three box means (the classic approximation), zero beyond the rim.
+//! Gaussian blur by three box filters (Wells 1986, doi:10.1109/TPAMI.1986.4767776), zero beyond the border.
 
 use crate::raster::Grid;
 use crate::simd::dispatch;
 
-/// Less is not smoothed, pixels.
-const LEAST_SIGMA: f64 = 0.5;
+/// Smaller sigmas leave values unchanged, pixels.
+const MIN_SIGMA: f64 = 0.5;
 
-/// Values smoothed with a gaussian of `sigma` pixels; unchanged when `sigma` is below half a pixel.
+/// Blurs values with a Gaussian of `sigma` pixels; returns them unchanged if `sigma` is below half a pixel.
 ///
-/// Beyond the rim values are taken to be zero, so divide by the smoothed weight where that matters.
+/// Values beyond the border are zero; divide by the blurred weight where that matters.
 pub(super) fn gaussian_blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
-    if sigma < LEAST_SIGMA {
+    if sigma < MIN_SIGMA {
         return values.clone();
     }
     gaussian_blur_transposed(values.transposed(), sigma)
 }
 
-/// The same of values whose rows and columns were changed for each other, which they are changed back.
-pub(super) fn gaussian_blur_transposed(turned: Grid<f32>, sigma: f64) -> Grid<f32> {
-    if sigma < LEAST_SIGMA {
-        return turned.transposed();
+/// Blurs a transposed input like [`gaussian_blur`] and returns it untransposed.
+pub(super) fn gaussian_blur_transposed(transposed: Grid<f32>, sigma: f64) -> Grid<f32> {
+    if sigma < MIN_SIGMA {
+        return transposed.transposed();
     }
-    // Three boxes of half-width r have the variance r (r + 1) of one gaussian: three whole half-widths whose mean is
-    // as close to that as it can be.
+    // Three boxes of radius r have the variance r (r + 1) of one Gaussian; the mean of the three whole radii is as
+    // close to that as possible.
     let half = ((1.0 + 4.0 * sigma * sigma).sqrt() - 1.0) / 2.0;
-    let whole = |pass: u32| (half * f64::from(pass)).round() as usize;
-    let radii = [0, 1, 2].map(|pass| whole(pass + 1) - whole(pass));
-    // Columns are summed side by side.
-    down(down(turned, radii).transposed(), radii)
+    let rounded = |pass: u32| (half * f64::from(pass)).round() as usize;
+    let radii = [0, 1, 2].map(|pass| rounded(pass + 1) - rounded(pass));
+    // Columns are summed in parallel lanes.
+    box_blur_columns(box_blur_columns(transposed, radii).transposed(), radii)
 }
 
-/// Box means down the columns, one after the other.
-fn down(mut values: Grid<f32>, radii: [usize; 3]) -> Grid<f32> {
+/// Applies box filters down the columns, one after another.
+fn box_blur_columns(mut values: Grid<f32>, radii: [usize; 3]) -> Grid<f32> {
     let mut means = Grid::new(values.width(), values.height(), 0.0);
     for radius in radii.into_iter().filter(|radius| *radius > 0) {
-        box_columns(&values, radius, &mut means);
+        box_blur_all_columns(&values, radius, &mut means);
         std::mem::swap(&mut values, &mut means);
     }
     values
 }
 
-/// Columns that are summed side by side: many at a time, so that no sum waits for the last, and few at a time for the
-/// rest.
-const MANY: usize = 32;
-const FEW: usize = 8;
+/// Columns summed in parallel: many where possible, few for the rest.
+const WIDE_COLUMNS: usize = 32;
+const NARROW_COLUMNS: usize = 8;
 
-fn box_columns(values: &Grid<f32>, radius: usize, means: &mut Grid<f32>) {
+fn box_blur_all_columns(values: &Grid<f32>, radius: usize, means: &mut Grid<f32>) {
     let width = values.width();
     let (values, means) = (values.data(), means.data_mut());
     dispatch(
         #[inline(always)]
         || {
             let mut left = 0;
-            while left + MANY <= width {
-                columns::<MANY>(values, width, left, radius, means);
-                left += MANY;
+            while left + WIDE_COLUMNS <= width {
+                box_blur_run::<WIDE_COLUMNS>(values, width, left, radius, means);
+                left += WIDE_COLUMNS;
             }
-            // The last few may be summed twice.
-            while left < width && width >= FEW {
-                let from = left.min(width - FEW);
-                columns::<FEW>(values, width, from, radius, means);
-                left = from + FEW;
+            // The last few columns may be computed twice.
+            while left < width && width >= NARROW_COLUMNS {
+                let from = left.min(width - NARROW_COLUMNS);
+                box_blur_run::<NARROW_COLUMNS>(values, width, from, radius, means);
+                left = from + NARROW_COLUMNS;
             }
             for left in left..width {
-                columns::<1>(values, width, left, radius, means);
+                box_blur_run::<1>(values, width, left, radius, means);
             }
         },
     );
 }
 
-/// Means down `N` columns from `left` on.
+/// Computes box means down `N` columns from `left` on.
 #[inline(always)]
-fn columns<const N: usize>(
+fn box_blur_run<const N: usize>(
     values: &[f32],
     width: usize,
     left: usize,
@@ -80,29 +79,29 @@ fn columns<const N: usize>(
 ) {
     let height = values.len() / width;
     let row = |y: usize| values[y * width + left..].first_chunk::<N>();
-    let nothing = [0.0_f32; N];
+    let zeros = [0.0_f32; N];
     let scale = 1.0 / (2 * radius + 1) as f32;
-    let mut sums = nothing;
+    let mut sums = zeros;
     for y in 0..radius.min(height) {
-        let comes = row(y).unwrap_or(&nothing);
+        let entering = row(y).unwrap_or(&zeros);
         for k in 0..N {
-            sums[k] += comes[k];
+            sums[k] += entering[k];
         }
     }
     for y in 0..height {
         let last = y + radius;
-        let comes = if last < height { row(last) } else { None }.unwrap_or(&nothing);
-        let goes = if y > radius {
+        let entering = if last < height { row(last) } else { None }.unwrap_or(&zeros);
+        let leaving = if y > radius {
             row(y - radius - 1)
         } else {
             None
         }
-        .unwrap_or(&nothing);
+        .unwrap_or(&zeros);
         let Some(means) = means[y * width + left..].first_chunk_mut::<N>() else {
             return;
         };
         for k in 0..N {
-            sums[k] += comes[k] - goes[k];
+            sums[k] += entering[k] - leaving[k];
             means[k] = sums[k] * scale;
         }
     }
@@ -112,7 +111,7 @@ fn columns<const N: usize>(
 mod tests {
     use proptest::prelude::*;
 
-    use super::{down, gaussian_blur};
+    use super::{box_blur_columns, gaussian_blur};
     use crate::raster::Grid;
 
     proptest! {
@@ -122,7 +121,7 @@ mod tests {
             radius in 1_usize..30,
         ) {
             let grid = Grid::from_fn(width, height, |x, y| ((x * 7 + y * 13) % 17) as f32);
-            let means = down(grid.clone(), [0, radius, 0]);
+            let means = box_blur_columns(grid.clone(), [0, radius, 0]);
             for y in 0..height {
                 for x in 0..width {
                     let rows = y.saturating_sub(radius)..(y + radius + 1).min(height);

@@ -1,33 +1,33 @@
-//! Connected groups of set pixels.
+//! Connected components of a mask, labelled by runs with union-find (4-connectivity).
 
 use crate::raster::{Grid, Mask};
 
-/// Groups below this share of a picture are specks; the authors' code has it.
+/// Components below this share of an image are specks: the value of the authors' code.
 const SPECK_SHARE: f64 = 1.0 / 1200.0;
 
-/// Groups of set pixels that touch along an edge, each with its size.
+/// Components of pixels connected by edges, with their areas.
 #[derive(Debug)]
 pub(super) struct ConnectedComponents {
-    /// Group of each pixel; `u32::MAX` where the mask is not set.
+    /// Component of each pixel; `u32::MAX` where the mask is not set.
     labels: Grid<u32>,
     sizes: Vec<usize>,
 }
 
 impl ConnectedComponents {
-    /// Finds the groups of a mask, numbered in the order of their first pixels.
+    /// Labels the components of a mask in the order of their first pixels.
     pub(super) fn label(mask: &Mask) -> Self {
         let (width, height) = (mask.width(), mask.height());
         let mut runs = Vec::new();
-        // Where the runs of the row above begin and end among all.
+        // Runs of the row above, a range of `runs`.
         let mut above = 0..0;
         for y in 0..height {
-            let first = runs.len();
-            for (begin, end) in runs_of(mask.row(y)) {
+            let row_start = runs.len();
+            for (begin, end) in row_runs(mask.row(y)) {
                 let place = runs.len();
                 let run = Run {
                     begin: y * width + begin,
                     end: y * width + end,
-                    first: place,
+                    root: place,
                 };
                 runs.push(run);
                 let ends_before = |k: usize| runs[k].end + width <= run.begin;
@@ -36,21 +36,21 @@ impl ConnectedComponents {
                     if runs[k].begin + width >= run.end {
                         break;
                     }
-                    join(&mut runs, place, k);
+                    union(&mut runs, place, k);
                 }
             }
-            above = first..runs.len();
+            above = row_start..runs.len();
         }
         let mut labels = Grid::new(width, height, u32::MAX);
         let mut sizes: Vec<usize> = Vec::new();
         let mut numbers = Vec::with_capacity(runs.len());
         for k in 0..runs.len() {
-            let first = first_of(&mut runs, k);
-            if first == k {
+            let root = find_root(&mut runs, k);
+            if root == k {
                 numbers.push(sizes.len() as u32);
                 sizes.push(0);
             } else {
-                numbers.push(numbers[first]);
+                numbers.push(numbers[root]);
             }
             let Run { begin, end, .. } = runs[k];
             sizes[numbers[k] as usize] += end - begin;
@@ -59,14 +59,15 @@ impl ConnectedComponents {
         Self { labels, sizes }
     }
 
-    /// The pixels whose group has at least this size.
+    /// Returns the pixels of components of at least this area, pixels.
     pub(super) fn with_area_at_least(&self, size: usize) -> Mask {
         self.labels
             .map(|label| *label != u32::MAX && self.sizes[*label as usize] >= size)
     }
 
-    /// The pixels whose group comes within `reach` pixels, along either axis, of one of the other mask.
-    pub(super) fn touching(&self, other: &Mask, reach: i64) -> Mask {
+    /// Returns the pixels of components that come within `distance` pixels, along either axis, of a pixel of another
+    /// mask or of the border.
+    pub(super) fn touching(&self, other: &Mask, distance: i64) -> Mask {
         let mut touches = vec![false; self.sizes.len()];
         for y in 0..self.labels.height() {
             for x in 0..self.labels.width() {
@@ -75,7 +76,7 @@ impl ConnectedComponents {
                     continue;
                 }
                 let (x, y) = (x as i64, y as i64);
-                let around = [(reach, 0), (-reach, 0), (0, reach), (0, -reach)];
+                let around = [(distance, 0), (-distance, 0), (0, distance), (0, -distance)];
                 touches[label as usize] = around
                     .iter()
                     .any(|(dx, dy)| other.get(x + dx, y + dy).unwrap_or(true));
@@ -85,7 +86,7 @@ impl ConnectedComponents {
             .map(|label| *label != u32::MAX && touches[*label as usize])
     }
 
-    /// The pixels whose group reaches the border of the grid.
+    /// Returns the pixels of components that touch the border of the grid.
     pub(super) fn touching_border(&self) -> Mask {
         let (width, height) = (self.labels.width(), self.labels.height());
         let mut reaches = vec![false; self.sizes.len()];
@@ -103,18 +104,18 @@ impl ConnectedComponents {
     }
 }
 
-/// Set pixels side by side in a row.
+/// A run of set pixels of a row.
 #[derive(Debug, Clone, Copy)]
 struct Run {
-    /// Their first place in the mask, and the one after their last.
+    /// Index of the first pixel, and of the one after the last.
     begin: usize,
     end: usize,
-    /// An earlier run of the same group, or itself.
-    first: usize,
+    /// An earlier run of the same component, or itself.
+    root: usize,
 }
 
-/// Begin and end of each run of set pixels of a row.
-fn runs_of(row: &[bool]) -> impl Iterator<Item = (usize, usize)> {
+/// Returns begin and end of each run of set pixels of a row.
+fn row_runs(row: &[bool]) -> impl Iterator<Item = (usize, usize)> {
     let mut from = 0;
     std::iter::from_fn(move || {
         let begin = from + row[from..].iter().position(|set| *set)?;
@@ -124,22 +125,22 @@ fn runs_of(row: &[bool]) -> impl Iterator<Item = (usize, usize)> {
     })
 }
 
-/// The first run of a run's group; the way there is shortened.
-fn first_of(runs: &mut [Run], mut k: usize) -> usize {
-    while runs[k].first != k {
-        runs[k].first = runs[runs[k].first].first;
-        k = runs[k].first;
+/// Returns the first run of a run's component and shortens the path to it.
+fn find_root(runs: &mut [Run], mut k: usize) -> usize {
+    while runs[k].root != k {
+        runs[k].root = runs[runs[k].root].root;
+        k = runs[k].root;
     }
     k
 }
 
-/// Makes one group of those of two runs.
-fn join(runs: &mut [Run], one: usize, other: usize) {
-    let (one, other) = (first_of(runs, one), first_of(runs, other));
-    runs[one.max(other)].first = one.min(other);
+/// Merges the components of two runs.
+fn union(runs: &mut [Run], one: usize, other: usize) {
+    let (one, other) = (find_root(runs, one), find_root(runs, other));
+    runs[one.max(other)].root = one.min(other);
 }
 
-/// The mask without specks for a picture of so many pixels, neither set ones nor holes.
+/// Removes specks and pinholes whose area is below [`SPECK_SHARE`] of `area`, pixels.
 pub(super) fn remove_specks(mask: &Mask, area: usize) -> Mask {
     let size = (area as f64 * SPECK_SHARE).round() as usize;
     let kept = ConnectedComponents::label(mask).with_area_at_least(size);
@@ -154,7 +155,7 @@ mod tests {
     use super::{ConnectedComponents, remove_specks};
     use crate::raster::Mask;
 
-    /// The slow obvious twin: the least place that each set pixel can be reached from.
+    /// Reference implementation: the lowest index that each set pixel is connected to.
     fn flooded(mask: &Mask) -> Vec<Option<usize>> {
         let (width, places) = (mask.width(), 0..mask.data().len());
         let mut least: Vec<Option<usize>> = places
@@ -191,14 +192,14 @@ mod tests {
             firsts.sort_unstable();
             firsts.dedup();
             prop_assert_eq!(found.sizes.len(), firsts.len());
-            for (label, first) in found.labels.data().iter().zip(&flooded) {
-                let number = first.map_or(u32::MAX, |first| {
-                    firsts.binary_search(&first).expect("a first") as u32
+            for (label, root) in found.labels.data().iter().zip(&flooded) {
+                let number = root.map_or(u32::MAX, |root| {
+                    firsts.binary_search(&root).expect("a root") as u32
                 });
                 prop_assert_eq!(*label, number);
             }
-            for (number, first) in firsts.iter().enumerate() {
-                let size = flooded.iter().filter(|other| **other == Some(*first)).count();
+            for (number, root) in firsts.iter().enumerate() {
+                let size = flooded.iter().filter(|other| **other == Some(*root)).count();
                 prop_assert_eq!(found.sizes[number], size);
             }
         }

@@ -1,4 +1,4 @@
-//! Agreement of two masks on one canvas: SSIM, its structure part, IoU, Dice, bounding-box IoU.
+//! Scores of two masks on one canvas: SSIM, its structure part, IoU, Dice and bounding-box IoU.
 
 mod ssim;
 
@@ -7,9 +7,23 @@ pub use ssim::{SsimReference, SsimScores, SsimWindow};
 use crate::domain::Scores;
 use crate::raster::{Mask, PixelBox};
 
-/// Every score of a depth mask against a print mask of the same size.
+/// Computes every score of a depth mask against a print mask of the same size, each in 0..=1 (SSIM in -1..=1).
 ///
-/// `ssim` and `nl_ssim` use the print's window; masks count as 0 and 1 with data range 1.
+/// Masks count as 0 and 1 with data range 1. SSIM: Wang et al. 2004, doi:10.1109/TIP.2003.819861.
+///
+/// ```
+/// use mocban::raster::Mask;
+/// use mocban::stages::score::{SsimReference, SsimWindow, score_masks};
+///
+/// // Two bars of 4 x 12 pixels, shifted by 2: 24 pixels in both, 72 in either.
+/// let bar = |x0: usize| Mask::from_fn(12, 12, |x, _| (x0..x0 + 4).contains(&x));
+/// let print = SsimReference::new(&bar(3), SsimWindow::Gaussian);
+/// let scores = score_masks(&print, &bar(5));
+/// assert_eq!(scores.iou, 24.0 / 72.0);
+/// assert_eq!(scores.dice, 0.5);
+/// assert_eq!(scores.iou_box, 24.0 / 72.0);
+/// assert_eq!(score_masks(&print, &bar(3)).ssim, 1.0);
+/// ```
 pub fn score_masks(print: &SsimReference, depth: &Mask) -> Scores {
     let structure = print.compare(depth);
     let (print, print_bounds) = (print.mask(), print.bounds);
@@ -33,7 +47,7 @@ fn ratio(part: usize, whole: usize) -> f64 {
     }
 }
 
-/// Intersection over union of two boxes of pixels; 0 when one is missing.
+/// Returns the intersection over union of two pixel boxes; 0 if either is missing.
 fn box_iou(a: Option<PixelBox>, b: Option<PixelBox>) -> f64 {
     let (Some(a), Some(b)) = (a, b) else {
         return 0.0;

@@ -99,7 +99,7 @@ impl HostilePairs {
         let stl = |mesh: Mesh| BadFile::file("stl", MeshFormat::StlBinary.encode(&mesh));
         let relief = |change: fn([f64; 3]) -> [f64; 3]| {
             let mut mesh = sample_files::relief(20);
-            mesh.vertices.change(change);
+            mesh.vertices.map_in_place(change);
             mesh
         };
         match number % cases {

@@ -1,16 +1,17 @@
 //! The PLY header: encoding, elements and their properties.
 
-use super::super::{MeshError, text};
+use crate::mesh::error::MeshError;
+use crate::mesh::text;
 
-/// How the body is written.
+/// Encoding of the body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Encoding {
+pub(super) enum PlyEncoding {
     Ascii,
     LittleEndian,
     BigEndian,
 }
 
-impl Encoding {
+impl PlyEncoding {
     pub(super) const fn name(self) -> &'static str {
         match self {
             Self::Ascii => "ascii PLY",
@@ -28,9 +29,9 @@ impl Encoding {
     }
 }
 
-/// Type of a number in the body.
+/// Number type.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Scalar {
+pub(super) enum PlyScalar {
     I8,
     U8,
     I16,
@@ -41,7 +42,7 @@ pub(super) enum Scalar {
     F64,
 }
 
-impl Scalar {
+impl PlyScalar {
     pub(super) const fn size(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
@@ -51,7 +52,7 @@ impl Scalar {
         }
     }
 
-    /// Whether a 32-bit float holds every such number of a binary body.
+    /// Returns whether a 32-bit float represents every such number exactly.
     const fn is_single(self) -> bool {
         matches!(
             self,
@@ -78,70 +79,72 @@ impl Scalar {
     }
 }
 
-/// One value, or a counted list of them.
+/// Type of a property: a number, or a counted list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Shape {
-    One(Scalar),
-    List { count: Scalar, item: Scalar },
+pub(super) enum PlyType {
+    Scalar(PlyScalar),
+    List { count: PlyScalar, item: PlyScalar },
 }
 
-impl Shape {
-    /// Bytes of the shortest such value in a binary body.
-    const fn least_size(self) -> usize {
+impl PlyType {
+    /// Returns the bytes of the shortest value in a binary body.
+    const fn min_size(self) -> usize {
         match self {
-            Self::One(scalar) => scalar.size(),
+            Self::Scalar(scalar) => scalar.size(),
             Self::List { count, .. } => count.size(),
         }
     }
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Property {
+pub(super) struct PlyProperty {
     pub(super) name: String,
-    pub(super) shape: Shape,
+    pub(super) shape: PlyType,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Element {
+pub(super) struct PlyElement {
     pub(super) name: String,
     pub(super) rows: u64,
-    pub(super) properties: Vec<Property>,
+    pub(super) properties: Vec<PlyProperty>,
 }
 
-impl Element {
-    /// Bytes of the shortest row in a binary body.
-    pub(super) fn least_size(&self) -> usize {
-        self.properties.iter().map(|p| p.shape.least_size()).sum()
+impl PlyElement {
+    /// Returns the bytes of the shortest row in a binary body.
+    pub(super) fn min_size(&self) -> usize {
+        self.properties.iter().map(|p| p.shape.min_size()).sum()
     }
 
-    /// Bytes of every row, when no property is a list.
+    /// Returns the bytes of every row if no property is a list.
     pub(super) fn fixed_size(&self) -> Option<usize> {
-        let one = |p: &Property| matches!(p.shape, Shape::One(_));
-        self.properties.iter().all(one).then(|| self.least_size())
+        let one = |p: &PlyProperty| matches!(p.shape, PlyType::Scalar(_));
+        self.properties.iter().all(one).then(|| self.min_size())
     }
 
-    /// Whether a row is three 32-bit floats.
-    pub(super) fn is_plain_position(&self) -> bool {
+    /// Returns whether a row is three 32-bit floats.
+    pub(super) fn is_packed_position(&self) -> bool {
         let mut shapes = self.properties.iter().map(|property| property.shape);
-        self.properties.len() == 3 && shapes.all(|shape| shape == Shape::One(Scalar::F32))
+        self.properties.len() == 3 && shapes.all(|shape| shape == PlyType::Scalar(PlyScalar::F32))
     }
 
-    /// Whether 32-bit floats hold all of the position's coordinates.
+    /// Returns whether 32-bit floats represent all coordinates exactly.
     fn is_single_position(&self) -> bool {
         let is_single = |name: &str| {
-            let property = self.place(&[name]).map(|place| &self.properties[place]);
-            property.is_none_or(|p| matches!(p.shape, Shape::One(kind) if kind.is_single()))
+            let property = self
+                .position_of(&[name])
+                .map(|column| &self.properties[column]);
+            property.is_none_or(|p| matches!(p.shape, PlyType::Scalar(kind) if kind.is_single()))
         };
         ["x", "y", "z"].into_iter().all(is_single)
     }
 
-    /// Type of the corners where a row is a list of 32-bit indices that a byte counts.
-    pub(super) fn plain_corners(&self) -> Option<Scalar> {
+    /// Returns the index type if a row is a list of 32-bit indices with an 8-bit count.
+    pub(super) fn packed_corner_type(&self) -> Option<PlyScalar> {
         let [
-            Property {
+            PlyProperty {
                 shape:
-                    Shape::List {
-                        count: Scalar::U8,
+                    PlyType::List {
+                        count: PlyScalar::U8,
                         item,
                     },
                 ..
@@ -150,64 +153,69 @@ impl Element {
         else {
             return None;
         };
-        matches!(item, Scalar::I32 | Scalar::U32).then_some(item)
+        matches!(item, PlyScalar::I32 | PlyScalar::U32).then_some(item)
     }
 
-    /// Place of a property among the others.
-    pub(super) fn place(&self, names: &[&str]) -> Option<usize> {
+    /// Returns the position of a property among the others.
+    pub(super) fn position_of(&self, names: &[&str]) -> Option<usize> {
         self.properties
             .iter()
             .position(|p| names.contains(&p.name.as_str()))
     }
 }
 
-/// Longest header in bytes; it holds names and notes, and every line of it is kept.
-const LONGEST: usize = 1 << 20;
+/// Largest header, bytes; every line of it is parsed.
+const MAX_HEADER_BYTES: usize = 1 << 20;
 
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Header {
-    pub(super) encoding: Encoding,
-    pub(super) elements: Vec<Element>,
+pub(super) struct PlyHeader {
+    pub(super) encoding: PlyEncoding,
+    pub(super) elements: Vec<PlyElement>,
 }
 
-impl Header {
-    /// The header and the place of the first byte after it.
+impl PlyHeader {
+    /// Parses the header and returns it with the offset of the body.
     pub(super) fn parse(bytes: &[u8]) -> Result<(Self, usize), MeshError> {
         let mut encoding = None;
         let mut elements = Vec::new();
         let mut at = 0;
         while let Some((line, next)) = line_at(bytes, at) {
             at = next;
-            if at > LONGEST {
-                return Err(wrong("it is longer than 1 MiB"));
+            if at > MAX_HEADER_BYTES {
+                return Err(header_error("it is longer than 1 MiB"));
             }
             let words: Vec<&[u8]> = text::words(line).collect();
             match words.as_slice() {
                 [b"end_header"] => {
-                    let encoding = encoding.ok_or_else(|| wrong("no format line"))?;
+                    let encoding = encoding.ok_or_else(|| header_error("no format line"))?;
                     return Ok((Self { encoding, elements }, at));
                 }
                 [b"format", name, ..] => encoding = Some(parse_encoding(name)?),
                 [b"element", name, rows] => elements.push(parse_element(name, rows)?),
                 [b"property", rest @ ..] => elements
                     .last_mut()
-                    .ok_or_else(|| wrong("a property before the first element"))?
+                    .ok_or_else(|| header_error("a property before the first element"))?
                     .properties
                     .push(parse_property(rest)?),
                 [] | [b"ply" | b"comment" | b"obj_info", ..] => {}
-                _ => return Err(wrong(&format!("{} is not understood", text::shown(line)))),
+                _ => {
+                    return Err(header_error(&format!(
+                        "{} is not understood",
+                        text::quote(line)
+                    )));
+                }
             }
         }
-        Err(wrong("the file ends before end_header"))
+        Err(header_error("the file ends before end_header"))
     }
 
-    /// Whether 32-bit floats hold all vertices as the body has them.
+    /// Returns whether 32-bit floats represent all vertices of the body exactly.
     pub(super) fn has_single_vertices(&self) -> bool {
         let mut vertices = self.elements.iter().filter(|e| e.name == "vertex");
-        self.encoding != Encoding::Ascii && vertices.all(Element::is_single_position)
+        self.encoding != PlyEncoding::Ascii && vertices.all(PlyElement::is_single_position)
     }
 
-    /// Rows of the elements of this name.
+    /// Returns the number of rows of the elements with this name.
     pub(super) fn rows(&self, name: &str) -> u64 {
         self.elements
             .iter()
@@ -216,8 +224,8 @@ impl Header {
     }
 }
 
-/// The line at a place without its end, and the place after it; `None` when no line ends there. All three ends
-/// occur, and the byte after a lone carriage return may already belong to a binary body, so the first line decides.
+/// Returns the line at an offset and the offset of the next; `None` if no line ends there. All three line ends occur.
+/// The byte after a lone carriage return may belong to a binary body, so the first line decides.
 fn line_at(bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
     let old_mac = bytes.get(3) == Some(&b'\r') && bytes.get(4) != Some(&b'\n');
     let end = if old_mac { b'\r' } else { b'\n' };
@@ -226,56 +234,57 @@ fn line_at(bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
     Some((rest[..len].trim_ascii(), at + len + 1))
 }
 
-fn parse_encoding(name: &[u8]) -> Result<Encoding, MeshError> {
-    Encoding::parse(name).ok_or_else(|| {
-        wrong(&format!(
+fn parse_encoding(name: &[u8]) -> Result<PlyEncoding, MeshError> {
+    PlyEncoding::parse(name).ok_or_else(|| {
+        header_error(&format!(
             "{} is not a format (ascii, binary_little_endian, binary_big_endian)",
-            text::shown(name)
+            text::quote(name)
         ))
     })
 }
 
-fn parse_element(name: &[u8], rows: &[u8]) -> Result<Element, MeshError> {
+fn parse_element(name: &[u8], rows: &[u8]) -> Result<PlyElement, MeshError> {
     let count = std::str::from_utf8(rows)
         .ok()
         .and_then(|digits| digits.parse().ok());
     let name = String::from_utf8_lossy(name).into_owned();
     let Some(count) = count else {
-        return Err(wrong(&format!(
+        return Err(header_error(&format!(
             "element {} has the count {}",
-            text::shown(name.as_bytes()),
-            text::shown(rows)
+            text::quote(name.as_bytes()),
+            text::quote(rows)
         )));
     };
-    Ok(Element {
+    Ok(PlyElement {
         name,
         rows: count,
         properties: Vec::new(),
     })
 }
 
-fn parse_property(words: &[&[u8]]) -> Result<Property, MeshError> {
+fn parse_property(words: &[&[u8]]) -> Result<PlyProperty, MeshError> {
     let scalar = |word: &[u8]| {
-        Scalar::parse(word).ok_or_else(|| wrong(&format!("{} is not a type", text::shown(word))))
+        PlyScalar::parse(word)
+            .ok_or_else(|| header_error(&format!("{} is not a type", text::quote(word))))
     };
     let (shape, name) = match words {
         [b"list", count, item, name] => {
             let count = scalar(count)?;
             if count.is_float() {
-                return Err(wrong("a list is counted by a float"));
+                return Err(header_error("a list is counted by a float"));
             }
             let item = scalar(item)?;
-            (Shape::List { count, item }, name)
+            (PlyType::List { count, item }, name)
         }
-        [kind, name] => (Shape::One(scalar(kind)?), name),
-        _ => return Err(wrong("a property of neither two nor four words")),
+        [kind, name] => (PlyType::Scalar(scalar(kind)?), name),
+        _ => return Err(header_error("a property of neither two nor four words")),
     };
-    Ok(Property {
+    Ok(PlyProperty {
         name: String::from_utf8_lossy(name).into_owned(),
         shape,
     })
 }
 
-fn wrong(reason: &str) -> MeshError {
+fn header_error(reason: &str) -> MeshError {
     MeshError::Header(reason.to_owned())
 }

@@ -1,22 +1,23 @@
-//! The Stanford polygon format: ascii, binary little and big endian.
+//! Reader of the Stanford polygon format (PLY): ASCII, binary little-endian and big-endian.
 
 mod body;
 mod header;
 mod source;
 
-use header::{Encoding, Header};
-use source::{Ascii, Binary};
+use header::{PlyEncoding, PlyHeader};
+use source::{AsciiSource, BinarySource};
 
-use super::{Mesh, MeshError, MeshLimits};
+use crate::mesh::error::{MeshError, MeshLimits};
+use crate::mesh::triangle_mesh::Mesh;
 
-/// Reads vertices, faces and triangle strips; other elements and properties are stepped over.
+/// Reads vertices, faces and triangle strips; ignores other elements and properties.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
-    let (header, start) = Header::parse(bytes)?;
+    let (header, start) = PlyHeader::parse(bytes)?;
     let rest = &bytes[start..];
     match header.encoding {
-        Encoding::Ascii => body::read(&header, Ascii::new(rest), limits),
-        Encoding::LittleEndian => body::read(&header, Binary::<false>::new(rest), limits),
-        Encoding::BigEndian => body::read(&header, Binary::<true>::new(rest), limits),
+        PlyEncoding::Ascii => body::read(&header, AsciiSource::new(rest), limits),
+        PlyEncoding::LittleEndian => body::read(&header, BinarySource::<false>::new(rest), limits),
+        PlyEncoding::BigEndian => body::read(&header, BinarySource::<true>::new(rest), limits),
     }
 }
 
@@ -251,7 +252,7 @@ mod tests {
         }
     }
 
-    /// The slow way to write any encoding, twin of the reader.
+    /// Reference writer of any encoding.
     fn write(mesh: &Mesh, format: &str, wide: bool) -> Vec<u8> {
         let kind = if wide { "double" } else { "float" };
         let mut out = format!(
@@ -341,7 +342,7 @@ mod tests {
                     out.extend(&(face.len() as u32).to_le_bytes()[..count_bytes]);
                     out.extend(face.iter().flat_map(|index| index.to_le_bytes()));
                 }
-                // No more than the last face's corners may be missing, so that the rows' own sizes do not show.
+                // At most the last face's corners are removed, so that the size of a row does not matter.
                 let missing = cut.min(faces.last().map_or(0, |face| 4 * face.len()));
                 out.truncate(out.len() - missing);
                 read(&out).map_err(|error| error.to_string())

@@ -1,11 +1,11 @@
-//! Why a print image could not be decoded.
+//! Errors of the print image decoder.
 
-use crate::domain::{FailureClass, FileKind};
+use crate::domain::{FailureClass, FileKind, sanitize};
 
 /// Why a print image could not be decoded.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum DecodeError {
-    /// No bytes at all.
+    /// The file has no bytes.
     #[error("the file is empty (0 bytes)")]
     Empty,
     /// The content is of another kind than PNG, JPEG or TIFF.
@@ -19,40 +19,48 @@ pub enum DecodeError {
         /// The setting.
         limit: u64,
     },
-    /// More pixels than the settings allow, by the header.
+    /// More pixels than the settings allow, according to the header.
     #[error("the image is {width} x {height} pixels; limits.image.max_pixels is {limit}")]
     TooManyPixels {
-        /// Columns by the header.
+        /// Columns in the header.
         width: u32,
-        /// Rows by the header.
+        /// Rows in the header.
         height: u32,
         /// The setting.
         limit: u64,
     },
-    /// A side of no length.
+    /// A side of zero pixels.
     #[error("the image is {width} x {height} pixels: it has no pixels")]
     NoPixels {
-        /// Columns by the header.
+        /// Columns in the header.
         width: u32,
-        /// Rows by the header.
+        /// Rows in the header.
         height: u32,
     },
     /// The file ends before the image does.
     #[error("the {} is truncated: it ends before the image does", .0.name())]
     Truncated(FileKind),
-    /// The file breaks its own format, or uses a part of it that is not read.
+    /// The file violates its format, or uses an unsupported part of it.
     #[error("the {} cannot be decoded: {reason}", .kind.name())]
     Broken {
-        /// What the file claims to be.
+        /// The kind of file by its signature.
         kind: FileKind,
-        /// The decoder's words.
+        /// The decoder's message.
         reason: String,
     },
 }
 
 impl DecodeError {
-    /// Decides retry or quarantine: the file is at fault in every case.
+    /// Returns the failure class: the file is at fault in every case.
     pub const fn class(&self) -> FailureClass {
         FailureClass::BadInput
+    }
+}
+
+/// Wraps a decoder's message, sanitised and on one line.
+pub(super) fn broken(kind: FileKind, reason: &str) -> DecodeError {
+    DecodeError::Broken {
+        kind,
+        reason: sanitize(reason, 160),
     }
 }

@@ -1,26 +1,43 @@
-//! Print images into [`PrintImage`]s: PNG, JPEG and TIFF told apart by content, never by name.
+//! Decoder of print images: PNG, JPEG and TIFF, recognised by content, not by name.
 
 mod error;
+mod limits;
+mod print_image;
 mod tiff;
 
 use std::io::{BufRead, Cursor, Seek};
 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
-use super::{Grid, ImageLimits, PrintImage};
-use crate::domain::{FileKind, sanitize};
+use super::Grid;
+use crate::domain::FileKind;
+
+use error::broken;
+use print_image::colours_on_white;
 
 pub use error::DecodeError;
+pub use limits::ImageLimits;
+pub use print_image::PrintImage;
 
-/// Decodes a print image: grey, RGB or a palette, with or without transparency, which is laid on white paper.
+/// Decodes a print image: grey, RGB or palette; transparency is composited on white.
 ///
-/// The image is taken as given: an EXIF orientation is not applied, so that print pixels mean the same to every
-/// program. The header's size is checked before any pixel is decoded.
+/// An EXIF orientation is not applied, so that print pixels mean the same to every program. The size in the header is
+/// checked before any pixel is decoded.
+///
+/// ```
+/// use mocban::raster::{Grid, ImageLimits, decode, png_rgb8};
+///
+/// let png = png_rgb8(&Grid::new(2, 1, [255, 0, 51]));
+/// let image = decode(&png, &ImageLimits::SUGGESTED)?;
+/// assert_eq!(image.rgb.at(1, 0), [65535, 0, 51 * 257]);
+/// # Ok::<(), mocban::raster::DecodeError>(())
+/// ```
 ///
 /// # Errors
-/// When the bytes are no whole PNG, JPEG or TIFF image, or exceed the limits.
+/// Returns an error if the bytes are not a complete PNG, JPEG or TIFF image, or exceed the limits.
 pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeError> {
-    let kind = kind_within_limits(bytes, limits)?;
+    limits.check_bytes(bytes)?;
+    let kind = FileKind::of(bytes);
     let format = format_of(kind)?;
     if kind == FileKind::Png {
         check_png_header(bytes, limits)?;
@@ -29,7 +46,7 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
     Ok(PrintImage { rgb })
 }
 
-/// How many pixels the header of an image promises; `None` where it does not tell.
+/// Returns the number of pixels in an image's header; `None` if it cannot be read.
 pub fn header_pixel_count(file: impl BufRead + Seek) -> Option<u64> {
     let reader = ImageReader::new(file).with_guessed_format().ok()?;
     let (width, height) = reader.into_dimensions().ok()?;
@@ -43,26 +60,12 @@ fn colours(
     limits: &ImageLimits,
 ) -> Result<Grid<[u16; 3]>, DecodeError> {
     if kind == FileKind::Tiff
-        && let Some(colours) = tiff::rare(bytes, limits)?
+        && let Some(colours) = tiff::decode_uncommon(bytes, limits)?
     {
         return Ok(colours);
     }
     let image = decode_pixels(bytes, format, kind, limits)?;
     Ok(colours_on_white(&image))
-}
-
-fn kind_within_limits(bytes: &[u8], limits: &ImageLimits) -> Result<FileKind, DecodeError> {
-    let size = bytes.len() as u64;
-    if size == 0 {
-        return Err(DecodeError::Empty);
-    }
-    if size > limits.max_bytes {
-        return Err(DecodeError::TooManyBytes {
-            bytes: size,
-            limit: limits.max_bytes,
-        });
-    }
-    Ok(FileKind::of(bytes))
 }
 
 fn format_of(kind: FileKind) -> Result<ImageFormat, DecodeError> {
@@ -79,7 +82,7 @@ fn format_of(kind: FileKind) -> Result<ImageFormat, DecodeError> {
     }
 }
 
-/// A PNG's size stands at a fixed place, and is checked there: its decoder wants to see pixels first.
+/// Checks the size at its fixed place in a PNG; the decoder would read pixels first.
 fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeError> {
     let side = |at: usize| {
         let field = bytes.get(at..at + 4).and_then(|b| b.try_into().ok());
@@ -87,21 +90,7 @@ fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeErro
             .map(u32::from_be_bytes)
             .ok_or(DecodeError::Truncated(FileKind::Png))
     };
-    check_size(side(16)?, side(20)?, limits)
-}
-
-fn check_size(width: u32, height: u32, limits: &ImageLimits) -> Result<(), DecodeError> {
-    if width == 0 || height == 0 {
-        return Err(DecodeError::NoPixels { width, height });
-    }
-    if u64::from(width) * u64::from(height) > limits.max_pixels {
-        return Err(DecodeError::TooManyPixels {
-            width,
-            height,
-            limit: limits.max_pixels,
-        });
-    }
-    Ok(())
+    limits.check_size(side(16)?, side(20)?)
 }
 
 fn decode_pixels(
@@ -120,17 +109,11 @@ fn decode_pixels(
     };
     let mut reader = ImageReader::with_format(Cursor::new(bytes), format);
     let mut memory = image::Limits::no_limits();
-    // Sixteen bytes are the widest pixel a decoder hands over; the rest is for its own tables.
-    memory.max_alloc = Some(
-        limits
-            .max_pixels
-            .saturating_mul(16)
-            .saturating_add(64 << 20),
-    );
+    memory.max_alloc = Some(limits.max_decoder_bytes());
     reader.limits(memory);
     let decoder = reader.into_decoder().map_err(refused)?;
     let (width, height) = decoder.dimensions();
-    check_size(width, height, limits)?;
+    limits.check_size(width, height)?;
     if !whole {
         return Err(DecodeError::Truncated(kind));
     }
@@ -149,16 +132,8 @@ fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {
     broken(kind, &reason)
 }
 
-/// The decoder's words on one line; some list all they found.
-fn broken(kind: FileKind, reason: &str) -> DecodeError {
-    DecodeError::Broken {
-        kind,
-        reason: sanitize(reason, 160),
-    }
-}
-
-/// Whether a JPEG's own segments lead to its end marker. The decoder fills what a truncated file lacks with grey,
-/// and a thumbnail has an end marker of its own, so the segments are walked.
+/// Returns whether the segments of a JPEG lead to its end marker. The decoder fills a truncated image with grey, and a
+/// thumbnail has its own end marker, so the segments are followed.
 fn has_end_marker(bytes: &[u8]) -> bool {
     let mut at = 2;
     while let Some(marker) = bytes.get(at..at + 2) {
@@ -169,7 +144,7 @@ fn has_end_marker(bytes: &[u8]) -> bool {
                 Some(length) => at += 2 + usize::from(u16::from_be_bytes([length[0], length[1]])),
                 None => return false,
             },
-            // Coded pixels: on to the next byte that may begin a marker.
+            // Entropy-coded data: continue at the next byte that may begin a marker.
             _ => match bytes[at..].iter().position(|byte| *byte == 0xff) {
                 Some(step) => at += step,
                 None => return false,
@@ -179,39 +154,6 @@ fn has_end_marker(bytes: &[u8]) -> bool {
     false
 }
 
-/// Laid on white: `c a + 65535 (65535 - a)`, over 65535, rounded.
-fn on_white([c @ .., a]: [u16; 4]) -> [u16; 3] {
-    const FULL: u64 = u16::MAX as u64;
-    let a = u64::from(a);
-    c.map(|c| ((u64::from(c) * a + FULL * (FULL - a) + FULL / 2) / FULL) as u16)
-}
-
-const fn wide(value: u8) -> u16 {
-    value as u16 * 257
-}
-
-fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
-    let (width, height) = (image.width() as usize, image.height() as usize);
-    let colours = match image {
-        DynamicImage::ImageLuma8(i) => i.pixels().map(|p| [wide(p[0]); 3]).collect(),
-        DynamicImage::ImageRgb8(i) => i.pixels().map(|p| p.0.map(wide)).collect(),
-        DynamicImage::ImageLuma16(i) => i.pixels().map(|p| [p[0]; 3]).collect(),
-        DynamicImage::ImageRgb16(i) => i.pixels().map(|p| p.0).collect(),
-        DynamicImage::ImageLumaA8(i) => {
-            let grey = |p: &image::LumaA<u8>| {
-                let [l, a] = p.0.map(wide);
-                on_white([l, l, l, a])
-            };
-            i.pixels().map(grey).collect()
-        }
-        DynamicImage::ImageRgba8(i) => i.pixels().map(|p| on_white(p.0.map(wide))).collect(),
-        // The rest is rare enough for a copy: 16 bits with transparency, 32-bit floats in 0..=1.
-        other => other.to_rgba16().pixels().map(|p| on_white(p.0)).collect(),
-    };
-    // An image of w x h pixels yields as many colours.
-    Grid::from_vec(width, height, colours).expect("one colour for each pixel")
-}
-
 #[cfg(test)]
 mod tests {
     use std::io::Cursor;
@@ -219,7 +161,8 @@ mod tests {
     use image::{DynamicImage, ImageFormat};
     use proptest::prelude::*;
 
-    use super::{DecodeError, broken, decode};
+    use super::error::broken;
+    use super::{DecodeError, decode};
 
     #[test]
     fn words_of_a_decoder_come_plain_and_short() {
@@ -388,7 +331,7 @@ mod tests {
             assert!(decode(&whole, &LIMITS).is_ok(), "{format:?}");
             for len in 1..whole.len() {
                 let error = decode(&whole[..len], &LIMITS);
-                // A PNG is whole once its pixels are there, whatever its last chunk.
+                // A PNG is complete once its pixels are, even without its last chunk.
                 if kind == FileKind::Png && len + 16 >= whole.len() {
                     continue;
                 }

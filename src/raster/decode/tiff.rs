@@ -1,5 +1,5 @@
-//! TIFF images of the rarer kinds: palettes, few bits a pixel, grey with transparency, floats. The common kinds are
-//! left to the `image` crate.
+//! Uncommon TIFF images: palettes, fewer than 8 bits a sample, grey with transparency, floats. The `image` crate
+//! decodes the common ones.
 
 use std::io::Cursor;
 
@@ -7,23 +7,25 @@ use tiff::decoder::{Decoder, DecodingResult, Limits as Memory};
 use tiff::tags::Tag;
 use tiff::{TiffError, TiffResult};
 
-use super::super::{Grid, ImageLimits};
-use super::{DecodeError, broken, check_size, on_white};
+use super::error::broken;
+use super::print_image::on_white;
+use super::{DecodeError, ImageLimits};
 use crate::domain::FileKind;
+use crate::raster::Grid;
 
-type Reader<'a> = Decoder<Cursor<&'a [u8]>>;
+type TiffDecoder<'a> = Decoder<Cursor<&'a [u8]>>;
 
-/// What the samples of a pixel are (TIFF 6.0, section 8, `PhotometricInterpretation`).
+/// Meaning of a pixel's samples (TIFF 6.0, section 8, `PhotometricInterpretation`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Colours {
+enum Photometric {
     WhiteIsZero,
     BlackIsZero,
     Rgb,
     Palette,
 }
 
-impl Colours {
-    const fn of(tag: u16) -> Option<Self> {
+impl Photometric {
+    const fn from_tag(tag: u16) -> Option<Self> {
         match tag {
             0 => Some(Self::WhiteIsZero),
             1 => Some(Self::BlackIsZero),
@@ -41,45 +43,45 @@ impl Colours {
     }
 }
 
-/// What the sample after the colours says.
+/// Meaning of the first extra sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Alpha {
-    /// Nothing that is used.
+    /// Not transparency.
     None,
-    /// Transparency; the colours are multiplied by it already.
+    /// Transparency that the colours are already multiplied by.
     Premultiplied,
     /// Transparency.
     Plain,
 }
 
-/// How a sample is written.
+/// Number type of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Number {
+enum SampleType {
     Unsigned,
     Float,
     Other,
 }
 
-/// What the tags say of the pixels.
+/// Layout of the pixels according to the tags.
 #[derive(Debug)]
-struct Layout {
+struct TiffLayout {
     width: u32,
     height: u32,
-    colours: Colours,
+    photometric: Photometric,
     bits: u16,
     samples: usize,
-    number: Number,
+    sample_type: SampleType,
     alpha: Alpha,
-    /// Colours by number, all reds first; empty without a palette.
+    /// Palette: all reds, then greens, then blues; empty without one.
     palette: Vec<u16>,
 }
 
-impl Layout {
-    /// `None` when the tags tell of a kind that is not read here.
-    fn read(reader: &mut Reader<'_>) -> TiffResult<Option<Self>> {
+impl TiffLayout {
+    /// Reads the tags; returns `None` if the image is not one of the uncommon kinds.
+    fn read(reader: &mut TiffDecoder<'_>) -> TiffResult<Option<Self>> {
         let (width, height) = reader.dimensions()?;
-        let photometric = reader.find_tag_unsigned(Tag::PhotometricInterpretation)?;
-        let Some(colours) = photometric.and_then(Colours::of) else {
+        let tag = reader.find_tag_unsigned(Tag::PhotometricInterpretation)?;
+        let Some(photometric) = tag.and_then(Photometric::from_tag) else {
             return Ok(None);
         };
         let mut all = |tag| reader.find_tag_unsigned_vec::<u16>(tag);
@@ -87,74 +89,77 @@ impl Layout {
         let layout = Self {
             width,
             height,
-            colours,
+            photometric,
             bits: first(all(Tag::BitsPerSample)?).unwrap_or(1),
             samples: usize::from(first(all(Tag::SamplesPerPixel)?).unwrap_or(1)),
-            number: match first(all(Tag::SampleFormat)?).unwrap_or(1) {
-                1 => Number::Unsigned,
-                3 => Number::Float,
-                _ => Number::Other,
+            sample_type: match first(all(Tag::SampleFormat)?).unwrap_or(1) {
+                1 => SampleType::Unsigned,
+                3 => SampleType::Float,
+                _ => SampleType::Other,
             },
             alpha: match first(all(Tag::ExtraSamples)?) {
                 Some(1) => Alpha::Premultiplied,
                 Some(2) => Alpha::Plain,
                 _ => Alpha::None,
             },
-            palette: match colours {
-                Colours::Palette => all(Tag::ColorMap)?.unwrap_or_default(),
-                Colours::WhiteIsZero | Colours::BlackIsZero | Colours::Rgb => Vec::new(),
+            palette: match photometric {
+                Photometric::Palette => all(Tag::ColorMap)?.unwrap_or_default(),
+                Photometric::WhiteIsZero | Photometric::BlackIsZero | Photometric::Rgb => {
+                    Vec::new()
+                }
             },
         };
-        Ok(Some(layout).filter(Self::is_rare))
+        Ok(Some(layout).filter(Self::is_uncommon))
     }
 
-    /// Whether the `image` crate leaves it out, or takes floats for what they may not be.
-    fn is_rare(&self) -> bool {
+    /// Returns whether the `image` crate cannot decode the image, or assumes a range of floats that may be wrong.
+    fn is_uncommon(&self) -> bool {
         let grey = self.samples > 1 || !matches!(self.bits, 1 | 8 | 16);
-        self.samples >= self.colours.samples()
-            && match self.colours {
-                Colours::Palette => self.number == Number::Unsigned,
-                Colours::WhiteIsZero | Colours::BlackIsZero => {
-                    grey || self.number != Number::Unsigned
+        self.samples >= self.photometric.samples()
+            && match self.photometric {
+                Photometric::Palette => self.sample_type == SampleType::Unsigned,
+                Photometric::WhiteIsZero | Photometric::BlackIsZero => {
+                    grey || self.sample_type != SampleType::Unsigned
                 }
-                Colours::Rgb => self.number == Number::Float,
+                Photometric::Rgb => self.sample_type == SampleType::Float,
             }
     }
 }
 
-/// Decodes an image of a rare kind; `None` when it is of another.
+/// Decodes an image of an uncommon kind; returns `None` for other kinds.
 ///
-/// Floats are taken for 0 to 1 when they all are, and for 0 to 255 or 0 to 65535 when they are whole numbers of that
-/// range.
+/// Floats are scaled from 0..=1 if all are in that range, and from 0..=255 or 0..=65535 if they are whole numbers in
+/// that range.
 ///
 /// # Errors
-/// When the image is too large, not whole, or its numbers may mean anything.
-pub(super) fn rare(
+/// Returns an error if the image is too large or truncated, or its numbers are ambiguous.
+pub(super) fn decode_uncommon(
     bytes: &[u8],
     limits: &ImageLimits,
 ) -> Result<Option<Grid<[u16; 3]>>, DecodeError> {
-    // What is wrong with the tags is for the common decoder to tell.
-    let layout = Decoder::new(Cursor::new(bytes)).and_then(|mut reader| Layout::read(&mut reader));
+    // The common decoder reports faults of the tags.
+    let layout =
+        Decoder::new(Cursor::new(bytes)).and_then(|mut reader| TiffLayout::read(&mut reader));
     let Ok(Some(layout)) = layout else {
         return Ok(None);
     };
-    check_size(layout.width, layout.height, limits)?;
+    limits.check_size(layout.width, layout.height)?;
     let plain;
-    let bytes = match layout.colours {
-        Colours::Rgb => bytes,
-        Colours::WhiteIsZero | Colours::BlackIsZero | Colours::Palette => {
-            let Some(changed) = as_plain_grey(bytes) else {
+    let bytes = match layout.photometric {
+        Photometric::Rgb => bytes,
+        Photometric::WhiteIsZero | Photometric::BlackIsZero | Photometric::Palette => {
+            let Some(changed) = declared_black_is_zero(bytes) else {
                 return Ok(None);
             };
             plain = changed;
             &plain
         }
     };
-    let samples = Samples::read(bytes, &layout, limits).map_err(|error| refused(&error))?;
+    let samples = TiffSamples::read(bytes, &layout, limits).map_err(|error| tiff_error(&error))?;
     pixels(&layout, &samples?).map(Some)
 }
 
-fn refused(error: &TiffError) -> DecodeError {
+fn tiff_error(error: &TiffError) -> DecodeError {
     match error {
         TiffError::IoError(io) if io.kind() == std::io::ErrorKind::UnexpectedEof => {
             DecodeError::Truncated(FileKind::Tiff)
@@ -163,9 +168,9 @@ fn refused(error: &TiffError) -> DecodeError {
     }
 }
 
-/// The file with its samples declared as grey of which 0 is black, so that the decoder hands them over as they are:
-/// it refuses palettes, and white of 0 beside other samples.
-fn as_plain_grey(bytes: &[u8]) -> Option<Vec<u8>> {
+/// Returns the file with its samples declared as grey with black as 0, so that the decoder returns them unchanged: it
+/// rejects palettes, and white as 0 with extra samples.
+fn declared_black_is_zero(bytes: &[u8]) -> Option<Vec<u8>> {
     const PHOTOMETRIC: u64 = 262;
     const SHORT: u64 = 3;
     let big_end = bytes.starts_with(b"MM");
@@ -178,7 +183,7 @@ fn as_plain_grey(bytes: &[u8]) -> Option<Vec<u8>> {
             field.iter().rev().fold(0, add)
         })
     };
-    // In a BigTIFF places and counts are of eight bytes.
+    // Offsets and counts of a BigTIFF have eight bytes.
     let (place, count, entry, value) = match number(2, 2)? {
         43 => (number(8, 8)?, 8, 20, 12),
         _ => (number(4, 4)?, 2, 12, 8),
@@ -196,29 +201,26 @@ fn as_plain_grey(bytes: &[u8]) -> Option<Vec<u8>> {
     Some(changed)
 }
 
-/// All samples as the file has them.
-struct Samples {
+/// All samples as stored.
+struct TiffSamples {
     values: DecodingResult,
     bits: usize,
-    /// Bytes of a row of samples below 8 bits.
+    /// Bytes per row of samples below 8 bits.
     row_bytes: usize,
-    /// Samples of a row in one plane, and of a pixel in one plane.
+    /// Samples per row, and per pixel, of one plane.
     row: usize,
     pixel: usize,
-    /// Samples of a plane; none between planes when there is one.
+    /// Samples per plane; 0 if there is only one plane.
     plane: usize,
 }
 
-impl Samples {
+impl TiffSamples {
     fn read(
         bytes: &[u8],
-        layout: &Layout,
+        layout: &TiffLayout,
         limits: &ImageLimits,
     ) -> TiffResult<Result<Self, DecodeError>> {
-        let wanted = limits
-            .max_pixels
-            .saturating_mul(16)
-            .saturating_add(64 << 20);
+        let wanted = limits.max_decoder_bytes();
         let mut memory = Memory::default();
         memory.decoding_buffer_size = usize::try_from(wanted).unwrap_or(usize::MAX);
         memory.intermediate_buffer_size = memory.decoding_buffer_size;
@@ -250,7 +252,7 @@ impl Samples {
         Ok(Ok(samples))
     }
 
-    /// A sample of a pixel. Signed numbers are read nowhere, and come as 0.
+    /// Returns a sample of a pixel; 0 for signed numbers, which are rejected.
     fn at(&self, x: usize, y: usize, sample: usize) -> f64 {
         let in_row = x * self.pixel + if self.plane > 0 { 0 } else { sample };
         let at = y * self.row + in_row + sample * self.plane;
@@ -275,25 +277,25 @@ impl Samples {
     }
 }
 
-/// A number of fewer than 8 bits, the highest first.
+/// Returns a number of fewer than 8 bits, most significant bit first.
 fn bits_at(bytes: &[u8], from: usize, count: usize) -> u8 {
     (from..from + count).fold(0, |sum, at| sum << 1 | (bytes[at / 8] >> (7 - at % 8) & 1))
 }
 
-/// The number that is white, or opaque.
-fn full(layout: &Layout, samples: &Samples) -> Result<f64, DecodeError> {
-    match layout.number {
-        Number::Unsigned => Ok(2_f64.powi(i32::from(layout.bits)) - 1.0),
-        Number::Float => full_of_floats(layout, samples),
-        Number::Other => Err(broken(
+/// Returns the sample value of white or opaque.
+fn full_scale(layout: &TiffLayout, samples: &TiffSamples) -> Result<f64, DecodeError> {
+    match layout.sample_type {
+        SampleType::Unsigned => Ok(2_f64.powi(i32::from(layout.bits)) - 1.0),
+        SampleType::Float => float_full_scale(layout, samples),
+        SampleType::Other => Err(broken(
             FileKind::Tiff,
             "its samples are signed or of an unknown kind; unsigned numbers and floats are read",
         )),
     }
 }
 
-fn full_of_floats(layout: &Layout, samples: &Samples) -> Result<f64, DecodeError> {
-    let colours = layout.colours.samples();
+fn float_full_scale(layout: &TiffLayout, samples: &TiffSamples) -> Result<f64, DecodeError> {
+    let colours = layout.photometric.samples();
     let (mut least, mut most, mut whole) = (f64::INFINITY, f64::NEG_INFINITY, true);
     for y in 0..layout.height as usize {
         for x in 0..layout.width as usize {
@@ -324,8 +326,8 @@ fn full_of_floats(layout: &Layout, samples: &Samples) -> Result<f64, DecodeError
     ))
 }
 
-fn pixels(layout: &Layout, samples: &Samples) -> Result<Grid<[u16; 3]>, DecodeError> {
-    let full = full(layout, samples)?;
+fn pixels(layout: &TiffLayout, samples: &TiffSamples) -> Result<Grid<[u16; 3]>, DecodeError> {
+    let full = full_scale(layout, samples)?;
     let (width, height) = (layout.width as usize, layout.height as usize);
     let mut out = Grid::new(width, height, [0; 3]);
     for y in 0..height {
@@ -334,13 +336,13 @@ fn pixels(layout: &Layout, samples: &Samples) -> Result<Grid<[u16; 3]>, DecodeEr
                 let share = (samples.at(x, y, sample) / full).clamp(0.0, 1.0);
                 (share * f64::from(u16::MAX)).round() as u16
             };
-            let colour = match layout.colours {
-                Colours::BlackIsZero => [level(0); 3],
-                Colours::WhiteIsZero => [u16::MAX - level(0); 3],
-                Colours::Rgb => [level(0), level(1), level(2)],
-                Colours::Palette => palette_colour(&layout.palette, samples.at(x, y, 0))?,
+            let colour = match layout.photometric {
+                Photometric::BlackIsZero => [level(0); 3],
+                Photometric::WhiteIsZero => [u16::MAX - level(0); 3],
+                Photometric::Rgb => [level(0), level(1), level(2)],
+                Photometric::Palette => palette_colour(&layout.palette, samples.at(x, y, 0))?,
             };
-            let alpha = layout.colours.samples();
+            let alpha = layout.photometric.samples();
             let has_alpha = layout.samples > alpha;
             let seen = match layout.alpha {
                 Alpha::Plain if has_alpha => {

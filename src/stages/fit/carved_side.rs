@@ -181,10 +181,10 @@ fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
         return 0.0;
     };
     let found = search_coarse_to_fine(ink, &wood, LIMITS, &PASSES);
-    let print = ink.layer(JUDGED_PX, 1.0);
+    let print = ink.level(JUDGED_PX, 1.0);
     let tops = wood
-        .at(JUDGED_PX, 1.0)
-        .mapped(|near| ((near - PRINTS) / (1.0 - PRINTS)).max(0.0));
+        .level_builder(JUDGED_PX, 1.0)
+        .mapped_level(|near| ((near - PRINTS) / (1.0 - PRINTS)).max(0.0));
     let judge = Refiner::new(&print, &tops);
     let scores = found
         .iter()

@@ -1,95 +1,99 @@
-//! One Gauss-Newton step: what each pixel of the fixed layer meets, weighed, summed to normal equations.
+//! One Gauss-Newton step: correspondences between two levels, robust weights, normal equations.
+//!
+//! Unknowns: two of rotation and scale, two of shift, and gain and offset of the moving values.
 
 use nalgebra::{Matrix6, Vector6};
 
 use crate::simd::dispatch;
 
-/// Residuals beyond this many of their median count less: what stands on one side only must not decide.
-const ROBUST: f32 = 2.5;
-/// Residuals beyond this share of full ink belong to what is lost or was added: they do not count at all.
-const FAR: f32 = 0.5;
-/// Pixels whose sums are kept apart, so that they are added side by side.
+/// Huber's threshold in medians of the absolute residual (Huber 1964, doi:10.1214/aoms/1177703732).
+const HUBER_MEDIANS: f32 = 2.5;
+/// Tukey's cutoff in shares of full ink: larger residuals are lost or added strokes (Beaton and Tukey 1974).
+const TUKEY_CUTOFF: f32 = 0.5;
+/// Lanes of the sums, one SIMD vector.
 const LANES: usize = 8;
-/// Looks summed in single precision before their sums go to the others, in [`LANES`].
-const RUN: usize = 128;
-/// Products of a row of the normal equations with itself, lower triangle, then with the residual.
-const SUMS: usize = 21 + 6;
+/// Blocks that are summed in single precision before their sum is added in double precision.
+const BLOCKS_PER_SUM: usize = 128;
+/// Products of the normal equations: lower triangle of 6 x 6, then the right-hand side.
+const SUM_COUNT: usize = 21 + 6;
 
-/// What a residual costs.
+/// The loss of a residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::stages) enum Loss {
-    /// Large residuals count less: from afar.
+    /// Large residuals count less: for starts far from the optimum.
     Huber,
-    /// Large residuals do not count: once the pose is nearly right.
+    /// Large residuals do not count: near the optimum.
     Tukey,
 }
 
-/// A few looks side by side.
+/// A block of correspondences, one a lane.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Looks {
-    /// The fixed layer's value.
+pub(super) struct Correspondences {
+    /// Value in the fixed level.
     fixed: [f32; LANES],
-    /// The moving layer's value, slope in x and y, and weight.
-    met: [[f32; 4]; LANES],
-    /// Place in the fixed layer, relative to its middle: x of each, then y.
+    /// Value, gradient in x and y, and weight in the moving level.
+    moving: [[f32; 4]; LANES],
+    /// x and y in the fixed level relative to its centre, pixels.
     place: [[f32; LANES]; 2],
 }
 
-/// Buffers of one refinement.
+/// Buffers that are reused between steps.
 #[derive(Default)]
-pub(super) struct Room {
-    /// The last one may be filled only in part, with zeros after.
-    looks: Vec<Looks>,
+pub(super) struct Workspace {
+    /// The last block may be filled only in part, with zeros after.
+    blocks: Vec<Correspondences>,
     count: usize,
-    /// Sum of the products of all values that met.
+    /// Sum of products of corresponding values.
     explained: f64,
-    sizes: Vec<f32>,
+    residual_sizes: Vec<f32>,
 }
 
-impl Room {
-    /// Makes room for this many looks, and one that does not count.
-    pub(super) fn clear(&mut self, most: usize) {
-        self.looks.resize(most / LANES + 1, Looks::default());
+impl Workspace {
+    /// Makes room for `most` correspondences and one that is discarded.
+    pub(super) fn reset(&mut self, most: usize) {
+        self.blocks
+            .resize(most / LANES + 1, Correspondences::default());
         self.count = 0;
     }
 
-    /// Takes in a look if the moving layer is known there.
+    /// Appends a correspondence if the moving level is known there.
     #[inline(always)]
-    pub(super) fn put(&mut self, fixed: f32, met: [f32; 4], [x, y]: [f32; 2]) {
+    pub(super) fn push(&mut self, fixed: f32, moving: [f32; 4], [x, y]: [f32; 2]) {
         let lane = self.count % LANES;
-        let looks = &mut self.looks[self.count / LANES];
-        looks.fixed[lane] = fixed;
-        looks.met[lane] = met;
-        looks.place[0][lane] = x;
-        looks.place[1][lane] = y;
-        self.count += usize::from(met[3] >= 0.5);
+        let block = &mut self.blocks[self.count / LANES];
+        block.fixed[lane] = fixed;
+        block.moving[lane] = moving;
+        block.place[0][lane] = x;
+        block.place[1][lane] = y;
+        self.count += usize::from(moving[3] >= 0.5);
     }
 
-    /// Leaves only what was taken in; `explained` is the sum of the products of all values that met.
-    pub(super) fn close(&mut self, explained: f64) {
+    /// Truncates the buffer to the correspondences appended. `explained` is the sum of products of corresponding
+    /// values.
+    pub(super) fn finish(&mut self, explained: f64) {
         self.explained = explained;
-        self.looks.truncate(self.count.div_ceil(LANES));
-        let held = (self.count + LANES - 1) % LANES + 1;
-        if let Some(last) = self.looks.last_mut() {
-            for lane in held..LANES {
+        self.blocks.truncate(self.count.div_ceil(LANES));
+        let filled = (self.count + LANES - 1) % LANES + 1;
+        if let Some(last) = self.blocks.last_mut() {
+            for lane in filled..LANES {
                 last.fixed[lane] = 0.0;
-                last.met[lane] = [0.0; 4];
+                last.moving[lane] = [0.0; 4];
             }
         }
     }
 
-    /// Least-squares gain and offset of the fixed values over the moving ones; the gain never below a trifle.
+    /// Returns the least-squares gain (at least 0.05) and offset of the fixed values over the moving ones.
     fn gain_and_offset(&self) -> (f32, f32) {
-        let looks = &self.looks;
+        let blocks = &self.blocks;
         let totals = dispatch(
             #[inline(always)]
             || {
                 let mut totals = [0.0_f64; 4];
-                for looks in looks.chunks(RUN) {
+                for blocks in blocks.chunks(BLOCKS_PER_SUM) {
                     let mut sums = [[0.0_f32; LANES]; 4];
-                    for looks in looks {
+                    for block in blocks {
                         for k in 0..LANES {
-                            let (a, b) = (looks.fixed[k], looks.met[k][0]);
+                            let (a, b) = (block.fixed[k], block.moving[k][0]);
                             sums[0][k] += a;
                             sums[1][k] += b;
                             sums[2][k] += a * b;
@@ -109,48 +113,48 @@ impl Room {
         (gain as f32, (f - gain * m) as f32)
     }
 
-    /// Median size of the residuals at a gain and offset.
+    /// Returns the median of the absolute residuals.
     fn median_residual(&mut self, gain: f32, offset: f32) -> f32 {
-        self.sizes.clear();
-        for looks in &self.looks {
-            let residual = |k: usize| looks.fixed[k] - gain * looks.met[k][0] - offset;
-            let sizes: [f32; LANES] = std::array::from_fn(|k| residual(k).abs());
-            self.sizes.extend(sizes);
+        self.residual_sizes.clear();
+        for block in &self.blocks {
+            let residual = |k: usize| block.fixed[k] - gain * block.moving[k][0] - offset;
+            let residual_sizes: [f32; LANES] = std::array::from_fn(|k| residual(k).abs());
+            self.residual_sizes.extend(residual_sizes);
         }
-        self.sizes.truncate(self.count);
-        median(&mut self.sizes)
+        self.residual_sizes.truncate(self.count);
+        median(&mut self.residual_sizes)
     }
 }
 
-/// Normal equations at one pose: four of the pose, gain and offset of the values.
-pub(super) struct Step {
-    /// The last is the cost before it was shared out.
-    sums: [f64; SUMS + 1],
+/// Normal equations at one pose.
+pub(super) struct NormalEquations {
+    /// The last is the sum of the losses.
+    sums: [f64; SUM_COUNT + 1],
     pub(super) cost: f64,
-    /// Sum of the products of all values that met.
+    /// Sum of products of corresponding values.
     pub(super) explained: f64,
 }
 
-impl Step {
-    /// Sums up what was met.
-    pub(super) fn of(room: &mut Room, mirrored: bool, loss: Loss) -> Self {
-        let (gain, offset) = room.gain_and_offset();
-        let limit = match loss {
-            Loss::Huber => ROBUST * room.median_residual(gain, offset).max(1e-4),
-            Loss::Tukey => FAR,
+impl NormalEquations {
+    /// Accumulates the normal equations of all correspondences.
+    pub(super) fn new(workspace: &mut Workspace, mirrored: bool, loss: Loss) -> Self {
+        let (gain, offset) = workspace.gain_and_offset();
+        let cutoff = match loss {
+            Loss::Huber => HUBER_MEDIANS * workspace.median_residual(gain, offset).max(1e-4),
+            Loss::Tukey => TUKEY_CUTOFF,
         };
-        let (looks, count, fit) = (&room.looks, room.count, [gain, offset, limit]);
-        // Sums and looks of its own: what may lie in one place is not computed side by side.
+        let (blocks, count, fit) = (&workspace.blocks, workspace.count, [gain, offset, cutoff]);
+        // Local copies of sums and block: memory that may alias is not vectorised.
         let totals = dispatch(
             #[inline(always)]
             || {
-                let mut totals = [0.0_f64; SUMS + 1];
-                for (run, looks) in looks.chunks(RUN).enumerate() {
-                    let mut sums = [[0.0_f32; LANES]; SUMS + 1];
-                    for (k, looks) in looks.iter().enumerate() {
-                        let held = LANES.min(count - (run * RUN + k) * LANES);
-                        let looks = *looks;
-                        add(&mut sums, &looks, held, mirrored, fit, loss);
+                let mut totals = [0.0_f64; SUM_COUNT + 1];
+                for (run, blocks) in blocks.chunks(BLOCKS_PER_SUM).enumerate() {
+                    let mut sums = [[0.0_f32; LANES]; SUM_COUNT + 1];
+                    for (k, block) in blocks.iter().enumerate() {
+                        let filled = LANES.min(count - (run * BLOCKS_PER_SUM + k) * LANES);
+                        let block = *block;
+                        accumulate(&mut sums, &block, filled, mirrored, fit, loss);
                     }
                     for (lanes, total) in sums.iter().zip(&mut totals) {
                         *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
@@ -159,11 +163,15 @@ impl Step {
                 totals
             },
         );
-        let mean = totals[SUMS] / room.count as f64;
+        let mean = totals[SUM_COUNT] / workspace.count as f64;
         Self {
-            cost: if room.count == 0 { f64::INFINITY } else { mean },
+            cost: if workspace.count == 0 {
+                f64::INFINITY
+            } else {
+                mean
+            },
             sums: totals,
-            explained: room.explained,
+            explained: workspace.explained,
         }
     }
 
@@ -193,33 +201,33 @@ fn median(values: &mut [f32]) -> f32 {
     *values.select_nth_unstable_by(k, f32::total_cmp).1
 }
 
-/// Adds the products of a few looks, side by side, to the sums of the normal equations and of the cost.
+/// Adds a block's products to the sums of the normal equations and of the loss.
 #[inline(always)]
-fn add(
-    sums: &mut [[f32; LANES]; SUMS + 1],
-    looks: &Looks,
-    held: usize,
+fn accumulate(
+    sums: &mut [[f32; LANES]; SUM_COUNT + 1],
+    block: &Correspondences,
+    filled: usize,
     mirrored: bool,
-    [gain, offset, limit]: [f32; 3],
+    [gain, offset, cutoff]: [f32; 3],
     loss: Loss,
 ) {
     let s = if mirrored { -1.0 } else { 1.0 };
-    let [x, y] = &looks.place;
+    let [x, y] = &block.place;
     let (mut residual, mut weight, mut cost) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    // In the order of the unknowns: two of turn and scale, two of shift, gain and offset.
+    // Jacobian rows in the order of the unknowns.
     let mut row = [[1.0; LANES]; 6];
     for k in 0..LANES {
-        let [m, gx, gy, _] = looks.met[k];
-        residual[k] = looks.fixed[k] - gain * m - offset;
+        let [m, gx, gy, _] = block.moving[k];
+        residual[k] = block.fixed[k] - gain * m - offset;
         row[0][k] = gain * (gx * x[k] + gy * y[k] * s);
         row[1][k] = gain * (gy * x[k] - gx * y[k] * s);
         row[2][k] = gain * gx;
         row[3][k] = gain * gy;
         row[4][k] = m;
     }
-    loss.weigh(&residual, limit, &mut weight, &mut cost);
-    weight[held..].fill(0.0);
-    cost[held..].fill(0.0);
+    loss.weights_and_costs(&residual, cutoff, &mut weight, &mut cost);
+    weight[filled..].fill(0.0);
+    cost[filled..].fill(0.0);
     let mut at = 0;
     for i in 0..6 {
         let mut weighed = [0.0; LANES];
@@ -237,17 +245,17 @@ fn add(
         }
     }
     for k in 0..LANES {
-        sums[SUMS][k] += cost[k];
+        sums[SUM_COUNT][k] += cost[k];
     }
 }
 
 impl Loss {
-    /// Weights of residuals and their costs, so that steps are judged by what they minimise.
+    /// Computes weights and losses of residuals; steps are compared by the loss that they minimise.
     #[inline(always)]
-    fn weigh(
+    fn weights_and_costs(
         self,
         residual: &[f32; LANES],
-        limit: f32,
+        cutoff: f32,
         weight: &mut [f32; LANES],
         cost: &mut [f32; LANES],
     ) {
@@ -255,19 +263,19 @@ impl Loss {
             Self::Huber => {
                 for k in 0..LANES {
                     let size = residual[k].abs();
-                    let is_far = size > limit;
-                    weight[k] = if is_far { limit / size } else { 1.0 };
-                    let far = limit * (2.0 * size - limit);
+                    let is_far = size > cutoff;
+                    weight[k] = if is_far { cutoff / size } else { 1.0 };
+                    let far = cutoff * (2.0 * size - cutoff);
                     cost[k] = if is_far { far } else { size * size };
                 }
             }
             Self::Tukey => {
                 for k in 0..LANES {
-                    let share = residual[k].abs() / limit;
+                    let share = residual[k].abs() / cutoff;
                     let near = 1.0 - share * share;
                     let near = if near > 0.0 { near } else { 0.0 };
                     weight[k] = near * near;
-                    cost[k] = limit * limit / 3.0 * (1.0 - near * near * near);
+                    cost[k] = cutoff * cutoff / 3.0 * (1.0 - near * near * near);
                 }
             }
         }

@@ -1,10 +1,15 @@
-//! Laying relief on ink: a search over every angle and a band of scales, then refinement of the best few.
+//! Pose of a relief on a print: exhaustive search over rotation, scale and shift, then sub-pixel refinement.
 //!
-//! Neither boxes nor centroids are trusted: neighbours, specks and broken ends decide those. What is compared is
-//! soft relief with soft ink, each with its slow variation taken out, and only where it is known.
+//! Soft relief is compared with soft ink, both high-pass filtered, where both are known. Bounding boxes and centroids
+//! are not used: neighbours, specks and broken strokes change them.
+//!
+//! Frames: image px (of the depth map or the print), and working px of a pyramid level. The print is the fixed image,
+//! the relief the moving one.
 
 mod border_mask;
+mod candidate;
 mod coarse_to_fine;
+mod fft_correlation;
 mod gauss_newton;
 mod overlap;
 mod pyramid;
@@ -13,9 +18,9 @@ mod search;
 mod tiebreak;
 
 pub(super) use border_mask::BorderStrokes;
+pub(super) use candidate::{BeamWidth, PoseCandidate, SearchRange};
 pub(super) use coarse_to_fine::{RefinementPass, search_coarse_to_fine};
 pub(super) use gauss_newton::Loss;
 pub(super) use overlap::PoseOverlap;
 pub(super) use pyramid::{ImagePyramid, LevelBuilder, PyramidLevel, SoftMask};
 pub(super) use refine::Refiner;
-pub(super) use search::{BeamWidth, PoseCandidate, SearchRange};

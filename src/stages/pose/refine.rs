@@ -1,109 +1,114 @@
-//! Sub-pixel refinement of one pose: robust Gauss-Newton on what both layers know.
+//! Sub-pixel refinement of a pose by robust Gauss-Newton (Levenberg-Marquardt damping), and scores of poses.
 
 use std::cell::OnceCell;
 use std::rc::Rc;
 
-use super::border_mask::own_ground;
-use super::gauss_newton::{Loss, Room, Step};
-use super::search::PoseCandidate;
-use super::tiebreak::{Side, duel};
+use super::border_mask::valid_mask;
+use super::candidate::PoseCandidate;
+use super::gauss_newton::{Loss, NormalEquations, Workspace};
+use super::tiebreak::{TiebreakCandidate, tiebreak_scores};
 use super::{PoseOverlap, PyramidLevel};
 use crate::domain::Affine2;
 use crate::raster::Grid;
 use crate::simd::dispatch;
 
-/// A step that moves the layer's rim by less than this many pixels ends the refinement.
-const SETTLED_PX: f64 = 0.03;
-/// Products summed in single precision before their sum goes to the others.
-const RUN: usize = 256;
+/// Converged if the step moves the level's border by less than this, working pixels.
+const CONVERGED_PX: f64 = 0.03;
+/// Pixels that are summed in single precision before their sum is added in double precision.
+const PIXELS_PER_SUM: usize = 256;
 
-/// Two layers ready to be laid on each other many times.
+/// A fixed and a moving level prepared for the evaluation of many poses.
 pub(in crate::stages) struct Refiner<'a> {
     fixed: &'a PyramidLevel,
     moving: &'a PyramidLevel,
-    looked_at: Rc<LookedAt>,
-    /// The moving layer's value, slope in x and y, and weight, pixel by pixel.
+    samples: Rc<FixedSamples>,
+    /// Value, gradient in x and y, and weight of each pixel of the moving level.
     cells: Vec<[f32; 4]>,
     size: [usize; 2],
     centre: [f64; 2],
-    rim: f64,
+    radius: f64,
     energies: [f64; 2],
-    /// Where either layer can be judged, once somebody has asked.
-    grounds: [OnceCell<Grid<f32>>; 2],
+    /// Valid masks of the fixed and the moving level, computed when first used.
+    valid_masks: [OnceCell<Grid<f32>>; 2],
 }
 
 impl<'a> Refiner<'a> {
-    /// Prepares the two layers.
+    /// Prepares a pair of levels.
     pub(in crate::stages) fn new(fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> Self {
-        Self::with(Rc::new(LookedAt::of(fixed)), fixed, moving)
+        Self::with_samples(Rc::new(FixedSamples::new(fixed)), fixed, moving)
     }
 
-    /// Prepares several layers to be laid on one.
+    /// Prepares several moving levels against one fixed level.
     pub(in crate::stages) fn for_levels(
         fixed: &'a PyramidLevel,
         moving: &'a [PyramidLevel],
     ) -> Vec<Self> {
-        let looked_at = Rc::new(LookedAt::of(fixed));
-        let with = |moving| Self::with(Rc::clone(&looked_at), fixed, moving);
+        let samples = Rc::new(FixedSamples::new(fixed));
+        let with = |moving| Self::with_samples(Rc::clone(&samples), fixed, moving);
         moving.iter().map(with).collect()
     }
 
-    fn with(looked_at: Rc<LookedAt>, fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> Self {
+    fn with_samples(
+        samples: Rc<FixedSamples>,
+        fixed: &'a PyramidLevel,
+        moving: &'a PyramidLevel,
+    ) -> Self {
         let centre = fixed.centre();
         Self {
             cells: cells(moving),
             size: [moving.value.width(), moving.value.height()],
             centre,
-            rim: centre[0].max(centre[1]).max(1.0),
-            energies: [looked_at.energy, moving.energy()],
-            looked_at,
-            grounds: Default::default(),
+            radius: centre[0].max(centre[1]).max(1.0),
+            energies: [samples.energy, moving.energy()],
+            samples,
+            valid_masks: Default::default(),
             fixed,
             moving,
         }
     }
 
-    /// Refines a pose so that the moving layer explains the fixed one, and scores it.
+    /// Refines a pose so that the moving level predicts the fixed one, and scores it.
     ///
-    /// The moving values may be scaled and offset freely; residuals are weighed down where only one side has
-    /// something. A pose that has not settled after `most_steps` is judged where it is. The score is the correlation
-    /// over what both know, over what each holds.
+    /// Gain and offset of the moving values are estimated too; residuals are weighted by the loss. The refinement ends
+    /// at convergence or after `max_steps`. Returns `start` unchanged if it has no inverse.
     pub(in crate::stages) fn refine(
         &self,
         start: &PoseCandidate,
-        most_steps: usize,
+        max_steps: usize,
         loss: Loss,
     ) -> PoseCandidate {
         let Some(mut from_fixed) = self.moving_from_fixed(&start.fixed_from_moving) else {
             return *start;
         };
-        let mut room = Room::default();
+        let mut workspace = Workspace::default();
         let mut damping = 1e-3;
-        let mut best: Option<(Step, Affine2)> = None;
-        for _ in 0..most_steps {
-            let step = self.step(&from_fixed, start.mirrored, loss, &mut room);
-            let better = best.as_ref().is_none_or(|(kept, _)| step.cost < kept.cost);
+        let mut best: Option<(NormalEquations, Affine2)> = None;
+        for _ in 0..max_steps {
+            let step = self.normal_equations(&from_fixed, start.mirrored, loss, &mut workspace);
+            let better = best
+                .as_ref()
+                .is_none_or(|(equations, _)| step.cost < equations.cost);
             if better {
                 best = Some((step, from_fixed));
                 damping = (damping * 0.3_f64).max(1e-6);
             } else {
                 damping = (damping * 8.0).max(1e-2);
             }
-            let Some((kept, at)) = &best else { break };
-            let Some(change) = kept.solve(damping) else {
+            let Some((equations, at)) = &best else { break };
+            let Some(change) = equations.solve(damping) else {
                 break;
             };
-            let reach = change[0].hypot(change[1]) * self.rim + change[2].hypot(change[3]);
-            from_fixed = moved(at, &change, start.mirrored);
-            if reach < SETTLED_PX || damping > 1e3 {
+            let step_px = change[0].hypot(change[1]) * self.radius + change[2].hypot(change[3]);
+            from_fixed = apply_update(at, &change, start.mirrored);
+            if step_px < CONVERGED_PX || damping > 1e3 {
                 break;
             }
         }
-        let Some((kept, at)) = best else {
+        let Some((equations, at)) = best else {
             return *start;
         };
-        let score = self.share(kept.explained, &at);
-        match self.to_images(&at) {
+        let score = self.normalize_score(equations.explained, &at);
+        match self.fixed_from_moving(&at) {
             Some(fixed_from_moving) => PoseCandidate {
                 fixed_from_moving,
                 score,
@@ -113,7 +118,7 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// The score of a pose as it is.
+    /// Scores a pose without changing it.
     pub(in crate::stages) fn evaluate(&self, pose: &PoseCandidate) -> PoseCandidate {
         let score = self
             .moving_from_fixed(&pose.fixed_from_moving)
@@ -121,59 +126,60 @@ impl<'a> Refiner<'a> {
         PoseCandidate { score, ..*pose }
     }
 
-    /// How much of each layer the other explains at a pose.
+    /// Computes how much of each level is covered by the other at a pose.
     pub(in crate::stages) fn overlap(&self, pose: &PoseCandidate) -> PoseOverlap {
         self.moving_from_pixels(pose)
             .map(|into| {
-                PoseOverlap::of(
+                PoseOverlap::new(
                     [self.fixed, self.moving],
-                    [self.paper(), self.ground()],
+                    [self.fixed_valid(), self.moving_valid()],
                     &into,
                 )
             })
             .unwrap_or_default()
     }
 
-    /// The scores of a pose and of a rival, which may have other strokes, on the ground they share; zeros where a pose
-    /// cannot be turned round.
-    pub(in crate::stages) fn duel(
+    /// Scores a pose and a rival's pose, possibly of another moving level, on the pixels valid for both; zeros if a
+    /// pose has no inverse.
+    pub(in crate::stages) fn tiebreak_scores(
         &self,
         pose: &PoseCandidate,
         other: &Self,
         rival: &PoseCandidate,
     ) -> [f64; 2] {
-        match (self.side(pose), other.side(rival)) {
-            (Some(one), Some(two)) => duel(self.fixed, self.paper(), &[one, two]),
+        match (self.candidate(pose), other.candidate(rival)) {
+            (Some(one), Some(two)) => tiebreak_scores(self.fixed, self.fixed_valid(), &[one, two]),
             _ => [0.0; 2],
         }
     }
 
-    fn side(&self, pose: &PoseCandidate) -> Option<Side<'_>> {
-        Some(Side {
+    fn candidate(&self, pose: &PoseCandidate) -> Option<TiebreakCandidate<'_>> {
+        Some(TiebreakCandidate {
             moving: self.moving,
-            ground: self.ground(),
+            moving_valid: self.moving_valid(),
             moving_from_fixed: self.moving_from_pixels(pose)?,
         })
     }
 
-    /// Where the fixed layer can be judged.
-    fn paper(&self) -> &Grid<f32> {
-        self.grounds[0].get_or_init(|| own_ground(self.fixed))
+    /// Returns the valid mask of the fixed level.
+    fn fixed_valid(&self) -> &Grid<f32> {
+        self.valid_masks[0].get_or_init(|| valid_mask(self.fixed))
     }
 
-    /// Where the moving layer can be judged.
-    fn ground(&self) -> &Grid<f32> {
-        self.grounds[1].get_or_init(|| own_ground(self.moving))
+    /// Returns the valid mask of the moving level.
+    fn moving_valid(&self) -> &Grid<f32> {
+        self.valid_masks[1].get_or_init(|| valid_mask(self.moving))
     }
 
-    /// From the fixed layer's pixels into the moving one at a pose.
+    /// Returns the map from fixed to moving working pixels at a pose.
     fn moving_from_pixels(&self, pose: &PoseCandidate) -> Option<Affine2> {
         let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
         let into = self.moving_from_fixed(&pose.fixed_from_moving)?;
         Some(into.after(&to_middle))
     }
 
-    /// The pose between layers, from the fixed one's pixels relative to its middle into the moving one.
+    /// Returns the map from fixed working pixels relative to the centre to moving working pixels, given the map
+    /// between images.
     fn moving_from_fixed(&self, fixed_from_moving: &Affine2) -> Option<Affine2> {
         let image = fixed_from_moving.inverse()?;
         let from_work = self.fixed.work_from_image.inverse()?;
@@ -182,8 +188,8 @@ impl<'a> Refiner<'a> {
         Some(into.after(&from_middle))
     }
 
-    /// Back from layers to images.
-    fn to_images(&self, from_fixed: &Affine2) -> Option<Affine2> {
+    /// Returns the map between images, the inverse of `moving_from_fixed`.
+    fn fixed_from_moving(&self, from_fixed: &Affine2) -> Option<Affine2> {
         let to_image = self.moving.work_from_image.inverse()?;
         let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
         to_image
@@ -193,34 +199,36 @@ impl<'a> Refiner<'a> {
             .inverse()
     }
 
-    /// What each known pixel of the fixed layer meets in the moving one.
-    fn look(&self, from_fixed: &Affine2, room: &mut Room) {
-        room.clear(self.looked_at.places.len());
-        let explained = self.explained(
+    /// Collects the correspondence of each sampled fixed pixel.
+    fn gather_correspondences(&self, from_fixed: &Affine2, workspace: &mut Workspace) {
+        workspace.reset(self.samples.places.len());
+        let product = self.product(
             from_fixed,
             #[inline(always)]
             |[u, v], place, value| {
-                self.cell(u, v).map_or(0.0, |cell| {
-                    room.put(value, cell, place);
+                self.sample_cell(u, v).map_or(0.0, |cell| {
+                    workspace.push(value, cell, place);
                     cell[0]
                 })
             },
         );
-        room.close(explained);
+        workspace.finish(product);
     }
 
-    /// Sum of the products of the fixed values with those that `meet` finds, given where in the moving layer, the pixel's
-    /// place in the fixed one, and its value.
+    /// Returns the sum of products of fixed values with `moving_value`, which is called with the position in the
+    /// moving level, the position in the fixed one, and the fixed value.
     #[inline(always)]
-    fn explained(
+    fn product(
         &self,
         from_fixed: &Affine2,
-        mut meet: impl FnMut([f32; 2], [f32; 2], f32) -> f32,
+        mut moving_value: impl FnMut([f32; 2], [f32; 2], f32) -> f32,
     ) -> f64 {
-        let LookedAt { places, values, .. } = &*self.looked_at;
+        let FixedSamples { places, values, .. } = &*self.samples;
         let [a, b] = from_fixed.0.map(|row| row.map(|v| v as f32));
-        let runs = places.chunks(RUN).zip(values.chunks(RUN));
-        let mut explained = 0.0_f64;
+        let runs = places
+            .chunks(PIXELS_PER_SUM)
+            .zip(values.chunks(PIXELS_PER_SUM));
+        let mut product = 0.0_f64;
         dispatch(
             #[inline(always)]
             || {
@@ -229,31 +237,31 @@ impl<'a> Refiner<'a> {
                     for ([x, y], value) in places.iter().zip(values) {
                         let u = a[0] * x + a[1] * y + a[2];
                         let v = b[0] * x + b[1] * y + b[2];
-                        part += meet([u, v], [*x, *y], *value) * value;
+                        part += moving_value([u, v], [*x, *y], *value) * value;
                     }
-                    explained += f64::from(part);
+                    product += f64::from(part);
                 }
             },
         );
-        explained
+        product
     }
 
-    /// Bilinear look into the moving layer; `None` outside.
+    /// Interpolates value, gradient and weight of the moving level; `None` outside.
     #[inline(always)]
-    fn cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
-        let (from, [fx, fy]) = self.corner(u, v)?;
+    fn sample_cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
+        let (from, [fx, fy]) = self.cell_at(u, v)?;
         let (above, below) = (
             &self.cells[from..from + 2],
             &self.cells[from + self.size[0]..][..2],
         );
-        let (top, bottom) = (mix(above[0], above[1], fx), mix(below[0], below[1], fx));
-        Some(mix(top, bottom, fy))
+        let (top, bottom) = (lerp(above[0], above[1], fx), lerp(below[0], below[1], fx));
+        Some(lerp(top, bottom, fy))
     }
 
-    /// The value alone.
+    /// Interpolates the value alone; 0 outside.
     #[inline(always)]
-    fn value(&self, u: f32, v: f32) -> f32 {
-        let Some((from, [fx, fy])) = self.corner(u, v) else {
+    fn sample_value(&self, u: f32, v: f32) -> f32 {
+        let Some((from, [fx, fy])) = self.cell_at(u, v) else {
             return 0.0;
         };
         let width = self.size[0];
@@ -263,49 +271,55 @@ impl<'a> Refiner<'a> {
         top + (bottom - top) * fy
     }
 
-    /// The cell of the moving layer up and left of a place, and where beyond it the place lies; `None` outside.
+    /// Returns the index of the pixel above and left of a position and the offset from it; `None` outside.
     #[inline(always)]
-    fn corner(&self, u: f32, v: f32) -> Option<(usize, [f32; 2])> {
+    fn cell_at(&self, u: f32, v: f32) -> Option<(usize, [f32; 2])> {
         let [width, height] = self.size;
         if !(u >= 0.0 && v >= 0.0 && u < (width - 1) as f32 && v < (height - 1) as f32) {
             return None;
         }
-        // Narrow integers: casts between them and floats are single instructions.
+        // Casts between i32 and f32 are single instructions.
         let (column, row) = (u as i32, v as i32);
         let within = [u - column as f32, v - row as f32];
         Some((row as usize * width + column as usize, within))
     }
 
-    fn step(&self, from_fixed: &Affine2, mirrored: bool, loss: Loss, room: &mut Room) -> Step {
-        self.look(from_fixed, room);
-        Step::of(room, mirrored, loss)
+    fn normal_equations(
+        &self,
+        from_fixed: &Affine2,
+        mirrored: bool,
+        loss: Loss,
+        workspace: &mut Workspace,
+    ) -> NormalEquations {
+        self.gather_correspondences(from_fixed, workspace);
+        NormalEquations::new(workspace, mirrored, loss)
     }
 
-    /// Correlation over what both know, over the whole of what each holds.
+    /// Returns the correlation at a pose, normalised by the energy of both levels.
     fn score(&self, from_fixed: &Affine2) -> f64 {
-        let explained = self.explained(
+        let product = self.product(
             from_fixed,
             #[inline(always)]
-            |[u, v], _, _| self.value(u, v),
+            |[u, v], _, _| self.sample_value(u, v),
         );
-        self.share(explained, from_fixed)
+        self.normalize_score(product, from_fixed)
     }
 
-    /// That score, given the sum of the products of the values that meet.
-    fn share(&self, explained: f64, from_fixed: &Affine2) -> f64 {
-        // A moving pixel covers this many fixed ones.
+    /// Normalises a sum of products.
+    fn normalize_score(&self, product: f64, from_fixed: &Affine2) -> f64 {
+        // Fixed pixels per moving pixel, inverted.
         let area = from_fixed.determinant().abs().max(1e-12);
-        explained
-            / self.looked_at.share
+        product
+            / self.samples.known_share
             / (self.energies[0] * self.energies[1] / area)
                 .sqrt()
                 .max(1e-12)
     }
 }
 
-/// From one to the other by a share; a loop, since what is not inlined gains nothing by wide instructions.
+/// Interpolates linearly; a loop, because only inlined code is vectorised.
 #[inline(always)]
-fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
+fn lerp(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
     let mut mixed = a;
     for k in 0..4 {
         mixed[k] += (b[k] - a[k]) * share;
@@ -313,43 +327,43 @@ fn mix(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
     mixed
 }
 
-/// What is looked at of a fixed layer.
-struct LookedAt {
-    /// Known pixels: place relative to its middle, and value. One colour of a chessboard is enough: layers are smooth,
-    /// neighbours say nearly the same.
+/// The sampled pixels of a fixed level.
+struct FixedSamples {
+    /// Known pixels of one colour of a chessboard: position relative to the centre, and value. Levels are smooth, so
+    /// neighbours are nearly equal.
     places: Vec<[f32; 2]>,
     values: Vec<f32>,
-    /// Share of the known pixels that are in these lists.
-    share: f64,
-    /// That of the whole layer.
+    /// Sampled share of the known pixels.
+    known_share: f64,
+    /// Sum of squared values of the whole level.
     energy: f64,
 }
 
-impl LookedAt {
-    fn of(layer: &PyramidLevel) -> Self {
-        let centre = layer.centre().map(|c| c as f32);
-        let (width, height) = (layer.value.width(), layer.value.height());
+impl FixedSamples {
+    fn new(level: &PyramidLevel) -> Self {
+        let centre = level.centre().map(|c| c as f32);
+        let (width, height) = (level.value.width(), level.value.height());
         let (mut places, mut values) = (Vec::new(), Vec::new());
         for y in 0..height {
             for x in (y % 2..width).step_by(2) {
-                if layer.weight.at(x, y) > 0.0 {
+                if level.weight.at(x, y) > 0.0 {
                     places.push([x as f32 - centre[0], y as f32 - centre[1]]);
-                    values.push(layer.value.at(x, y));
+                    values.push(level.value.at(x, y));
                 }
             }
         }
-        let known = layer.weight.data().iter().filter(|w| **w > 0.0).count();
+        let known = level.weight.data().iter().filter(|w| **w > 0.0).count();
         Self {
-            share: places.len().max(1) as f64 / known.max(1) as f64,
+            known_share: places.len().max(1) as f64 / known.max(1) as f64,
             places,
             values,
-            energy: layer.energy(),
+            energy: level.energy(),
         }
     }
 }
 
-/// Changes the map by a small similarity about the fixed layer's middle.
-fn moved(map: &Affine2, change: &[f64; 6], mirrored: bool) -> Affine2 {
+/// Adds a small similarity about the fixed level's centre to a map.
+fn apply_update(map: &Affine2, change: &[f64; 6], mirrored: bool) -> Affine2 {
     let [a, b, tx, ty, _, _] = *change;
     let s = if mirrored { -1.0 } else { 1.0 };
     let [p, q] = map.0;
@@ -359,17 +373,17 @@ fn moved(map: &Affine2, change: &[f64; 6], mirrored: bool) -> Affine2 {
     ])
 }
 
-/// Value, central differences and weight of each pixel of a layer.
-fn cells(layer: &PyramidLevel) -> Vec<[f32; 4]> {
-    let (width, height) = (layer.value.width(), layer.value.height());
+/// Returns value, central differences and weight of each pixel.
+fn cells(level: &PyramidLevel) -> Vec<[f32; 4]> {
+    let (width, height) = (level.value.width(), level.value.height());
     let mut cells = Vec::with_capacity(width * height);
     for y in 0..height {
         let [above, row, below] =
-            [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| layer.value.row(y));
+            [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|y| level.value.row(y));
         let sides = (0..width).map(|x| {
             let slope_x = (row[(x + 1).min(width - 1)] - row[x.saturating_sub(1)]) * 0.5;
             let slope_y = (below[x] - above[x]) * 0.5;
-            [row[x], slope_x, slope_y, layer.weight.at(x, y)]
+            [row[x], slope_x, slope_y, level.weight.at(x, y)]
         });
         cells.extend(sides);
     }

@@ -1,41 +1,45 @@
-//! Two poses judged on the same ground.
+//! Tie-break between two poses on the pixels that are valid for both.
 //!
-//! What only one of them lays on known paper would decide between poses that are else alike, so it does not count.
+//! Where only one of them covers valid pixels, the other cannot be compared, so those pixels do not count.
 
 use super::PyramidLevel;
-use super::pyramid::Between;
+use super::pyramid::BilinearCell;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
-/// A moving picture with where the fixed one's pixels lie in it.
-pub(super) struct Side<'a> {
+/// A moving level with the map from fixed to moving working pixels.
+pub(super) struct TiebreakCandidate<'a> {
     pub(super) moving: &'a PyramidLevel,
-    pub(super) ground: &'a Grid<f32>,
+    pub(super) moving_valid: &'a Grid<f32>,
     pub(super) moving_from_fixed: Affine2,
 }
 
-/// The scores of two poses over the ground of all pictures: correlation times the share of the moving picture's amount that
-/// meets the fixed one's, 0..=1.
-pub(super) fn duel(fixed: &PyramidLevel, paper: &Grid<f32>, sides: &[Side<'_>; 2]) -> [f64; 2] {
-    let mut sums = [Sums::default(); 2];
-    for y in 0..paper.height() {
-        for x in 0..paper.width() {
-            if paper.at(x, y) == 0.0 {
+/// Scores two poses on the pixels valid in all levels: correlation times the share of the moving amount that the fixed
+/// one covers, 0..=1.
+pub(super) fn tiebreak_scores(
+    fixed: &PyramidLevel,
+    fixed_valid: &Grid<f32>,
+    candidates: &[TiebreakCandidate<'_>; 2],
+) -> [f64; 2] {
+    let mut sums = [TiebreakSums::default(); 2];
+    for y in 0..fixed_valid.height() {
+        for x in 0..fixed_valid.width() {
+            if fixed_valid.at(x, y) == 0.0 {
                 continue;
             }
             let place = [x as f64, y as f64];
-            let there = [0, 1].map(|k: usize| sides[k].moving_from_fixed.apply(place));
+            let there = [0, 1].map(|k: usize| candidates[k].moving_from_fixed.apply(place));
             let there = [0, 1].map(|k: usize| {
-                let ground = sides[k].ground;
-                Between::of([ground.width(), ground.height()], there[k])
-                    .filter(|at| at.value(ground) >= 0.5)
+                let moving_valid = candidates[k].moving_valid;
+                BilinearCell::at([moving_valid.width(), moving_valid.height()], there[k])
+                    .filter(|at| at.value(moving_valid) >= 0.5)
             });
             let [Some(one), Some(two)] = there else {
                 continue;
             };
             let ink = [fixed.value.at(x, y), fixed.amount.at(x, y)];
-            for ((at, side), sums) in [one, two].iter().zip(sides).zip(&mut sums) {
-                let PyramidLevel { value, amount, .. } = side.moving;
+            for ((at, candidate), sums) in [one, two].iter().zip(candidates).zip(&mut sums) {
+                let PyramidLevel { value, amount, .. } = candidate.moving;
                 sums.add(ink, [value, amount].map(|of| at.value(of)));
             }
         }
@@ -43,21 +47,21 @@ pub(super) fn duel(fixed: &PyramidLevel, paper: &Grid<f32>, sides: &[Side<'_>; 2
     sums.map(|sums| sums.score())
 }
 
-/// Sums over the pixels of two pictures.
+/// Sums over corresponding pixels.
 #[derive(Debug, Clone, Copy, Default)]
-struct Sums {
+struct TiebreakSums {
     n: f64,
-    /// Of the values, their squares and their products.
+    /// Sums of values, squares and products, fixed first.
     values: [f64; 2],
     squares: [f64; 2],
     products: f64,
-    /// Of the moving amount, and of what of it meets the fixed one's.
+    /// Sum of the moving amount, and of what the fixed one covers of it.
     amount: f64,
     met: f64,
 }
 
-impl Sums {
-    /// Takes in value and amount of the fixed and the moving picture.
+impl TiebreakSums {
+    /// Adds value and amount of the fixed and the moving level.
     fn add(&mut self, fixed: [f32; 2], moving: [f32; 2]) {
         let values = [fixed[0], moving[0]].map(f64::from);
         self.n += 1.0;
@@ -81,23 +85,27 @@ impl Sums {
 
 #[cfg(test)]
 mod tests {
-    use super::super::border_mask::own_ground;
-    use super::{Side, duel};
+    use super::super::border_mask::valid_mask;
+    use super::{TiebreakCandidate, tiebreak_scores};
     use crate::domain::Affine2;
     use crate::stages::pose::PyramidLevel;
-    use crate::stages::pose::border_mask::tests::{SIDE, layer};
+    use crate::stages::pose::border_mask::tests::{SIDE, level};
 
     fn scores(print: &PyramidLevel, relief: &PyramidLevel) -> [f64; 2] {
         let last = (relief.amount.width() - 1) as f64;
         let as_read = Affine2([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         let mirrored = Affine2([[-1.0, 0.0, last], [0.0, 1.0, 0.0]]);
-        let (paper, ground) = (own_ground(print), own_ground(relief));
-        let side = |moving_from_fixed| Side {
+        let (fixed_valid, moving_valid) = (valid_mask(print), valid_mask(relief));
+        let candidate = |moving_from_fixed| TiebreakCandidate {
             moving: relief,
-            ground: &ground,
+            moving_valid: &moving_valid,
             moving_from_fixed,
         };
-        duel(print, &paper, &[side(as_read), side(mirrored)])
+        tiebreak_scores(
+            print,
+            &fixed_valid,
+            &[candidate(as_read), candidate(mirrored)],
+        )
     }
 
     /// A beam that is heavier at its right end, on a stem.
@@ -105,16 +113,16 @@ mod tests {
 
     #[test]
     fn a_small_difference_within_the_character_tells_the_mirror() {
-        let [as_read, mirrored] = scores(&layer(&CHARACTER), &layer(&CHARACTER));
+        let [as_read, mirrored] = scores(&level(&CHARACTER), &level(&CHARACTER));
         assert!(as_read > 0.99, "{as_read}");
         assert!(mirrored < 0.95 * as_read, "{mirrored} of {as_read}");
     }
 
     #[test]
     fn a_wall_that_falls_on_a_frame_line_only_in_the_mirror_decides_nothing() {
-        let with = |bar| layer(&[&CHARACTER[..], &[bar]].concat());
+        let with = |bar| level(&[&CHARACTER[..], &[bar]].concat());
         let (left, right) = ([0, 0, 4, SIDE], [SIDE - 4, 0, SIDE, SIDE]);
-        let bare = scores(&layer(&CHARACTER), &layer(&CHARACTER));
+        let bare = scores(&level(&CHARACTER), &level(&CHARACTER));
         let walled = scores(&with(right), &with(left));
         for (k, score) in walled.into_iter().enumerate() {
             assert!((score - bare[k]).abs() < 0.06, "{walled:?} {bare:?}");

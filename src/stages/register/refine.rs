@@ -210,8 +210,8 @@ impl WorkingImages {
         let px = (self.px as f64 * share).round() as usize;
         let sigma = self.smoothing_px * share.sqrt();
         ScaledImages {
-            ink: self.ink.layer(px, sigma),
-            depths: self.depths.at(px, sigma),
+            ink: self.ink.level(px, sigma),
+            depths: self.depths.level_builder(px, sigma),
         }
     }
 
@@ -221,18 +221,18 @@ impl WorkingImages {
     fn refine_fully(&self, few: &ScaledImages, best: &RefinedPose) -> Option<(Affine2, f64)> {
         let strokes = few.stroke(best.cut);
         let both = [&few.ink, &strokes];
-        let around = BorderStrokes::of(both, &best.found.fixed_from_moving)?;
-        let [ink, strokes] = around.without();
+        let around = BorderStrokes::find(both, &best.found.fixed_from_moving)?;
+        let [ink, strokes] = around.levels_without();
         let (closer, spread) =
             self.refine_at_three_sizes(&Refiner::new(&ink, &strokes), &best.found);
-        let agree = BorderStrokes::of(both, &closer.fixed_from_moving)?.agree();
+        let agree = BorderStrokes::find(both, &closer.fixed_from_moving)?.agree();
         let full = self.at(1.0);
         let strokes = full.stroke(best.cut);
         let both = [&full.ink, &strokes];
         let alone = if agree {
             None
         } else {
-            Some(BorderStrokes::of(both, &closer.fixed_from_moving)?.without())
+            Some(BorderStrokes::find(both, &closer.fixed_from_moving)?.levels_without())
         };
         let [ink, strokes] = alone.as_ref().map_or(both, |[ink, strokes]| [ink, strokes]);
         let refiner = Refiner::new(ink, strokes);
@@ -296,7 +296,7 @@ struct ScaledImages<'a> {
 impl ScaledImages<'_> {
     /// Soft strokes of a threshold below the tops.
     fn stroke(&self, cut: f64) -> PyramidLevel {
-        self.depths.mapped(|d| soft_stroke(d, cut, SOFTNESS))
+        self.depths.mapped_level(|d| soft_stroke(d, cut, SOFTNESS))
     }
 
     fn strokes(&self, cuts: &[f64]) -> Vec<PyramidLevel> {

@@ -78,7 +78,7 @@ impl<'a> SoftThresholds<'a> {
         &self,
         [one, two]: [(usize, &PoseCandidate); 2],
     ) -> [f64; 2] {
-        self.refiners[one.0].duel(one.1, &self.refiners[two.0], two.1)
+        self.refiners[one.0].tiebreak_scores(one.1, &self.refiners[two.0], two.1)
     }
 }
 

@@ -1,4 +1,4 @@
-//! Structural similarity of masks: Wang, Bovik, Sheikh and Simoncelli 2004, doi:10.1109/TIP.2003.819861.
+//! Structural similarity (SSIM) of masks: Wang, Bovik, Sheikh and Simoncelli 2004, doi:10.1109/TIP.2003.819861.
 
 use std::ops::Range;
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::raster::{Grid, Mask, PixelBox};
 use crate::simd::dispatch;
 
-/// Stabilising constants for a data range of 1: `C1 = (0.01)^2`, `C2 = (0.03)^2`.
+/// Stabilising constants for a data range of 1.
 const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 
@@ -15,16 +15,16 @@ const C2: f64 = 0.03 * 0.03;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SsimWindow {
-    /// Gaussian of sigma 1.5 cut at 3.5 sigma (11 taps), population covariance: the paper of 2004, and
+    /// Gaussian of sigma 1.5 px truncated at 3.5 sigma (11 weights), population covariance: the paper of 2004, and
     /// scikit-image with `gaussian_weights=True, use_sample_covariance=False`.
     Gaussian,
-    /// Uniform 7 x 7, sample covariance: scikit-image's default.
+    /// Uniform 7 x 7 px, sample covariance: scikit-image's default.
     Uniform7,
 }
 
 impl SsimWindow {
-    /// Weights along one axis, summing to 1; their number is odd.
-    fn taps(self) -> Vec<f64> {
+    /// Returns the weights along one axis, which sum to 1; their number is odd.
+    fn weights(self) -> Vec<f64> {
         match self {
             Self::Gaussian => {
                 let raw: Vec<f64> = (-5..=5)
@@ -37,7 +37,7 @@ impl SsimWindow {
         }
     }
 
-    /// Factor on variances and covariance.
+    /// Returns the factor on variances and covariance.
     fn covariance_factor(self) -> f64 {
         match self {
             Self::Gaussian => 1.0,
@@ -46,23 +46,34 @@ impl SsimWindow {
     }
 }
 
-/// Means over the map, its rim of half a window left out.
+/// Means over the SSIM map without a border of half a window.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SsimScores {
-    /// Mean structural similarity.
+    /// Mean structural similarity, -1..=1.
     pub ssim: f64,
-    /// Mean of `(2 s_xy + C2) / (s_x^2 + s_y^2 + C2)`: without the luminance factor.
+    /// Mean of `(2 s_xy + C2) / (s_x^2 + s_y^2 + C2)`: SSIM without its luminance factor.
     pub nl_ssim: f64,
 }
 
-/// A mask with its windowed means, kept to compare many masks with one.
+/// A mask with its windowed means, to compare many masks with it.
+///
+/// ```
+/// use mocban::raster::Mask;
+/// use mocban::stages::score::{SsimReference, SsimWindow};
+///
+/// let disc = Mask::from_fn(40, 40, |x, y| (x as i64 - 20).pow(2) + (y as i64 - 20).pow(2) < 150);
+/// let reference = SsimReference::new(&disc, SsimWindow::Gaussian);
+/// assert_eq!(reference.compare(&disc).ssim, 1.0);
+/// let inverse = disc.map(|set| !set);
+/// assert!(reference.nl_ssim(&inverse) < 0.5);
+/// ```
 #[derive(Debug, Clone)]
 pub struct SsimReference {
     mask: Mask,
-    /// Where the mask is set.
+    /// Bounding box of the mask.
     pub(super) bounds: Option<PixelBox>,
-    taps: Taps,
-    /// Means over the windows that lie wholly in the mask: a rim of half a window is left out.
+    weights: WindowWeights,
+    /// Means over the windows that lie within the mask.
     means: Grid<f64>,
     covariance_factor: f64,
 }
@@ -70,84 +81,84 @@ pub struct SsimReference {
 impl SsimReference {
     /// Computes the windowed means of a mask.
     pub fn new(mask: &Mask, window: SsimWindow) -> Self {
-        let taps = Taps::new(window.taps());
+        let weights = WindowWeights::new(window.weights());
         Self {
-            means: taps.means(mask),
-            taps,
+            means: weights.means(mask),
+            weights,
             mask: mask.clone(),
             bounds: mask.bounding_box(),
             covariance_factor: window.covariance_factor(),
         }
     }
 
-    /// The mask itself.
+    /// Returns the mask.
     pub const fn mask(&self) -> &Mask {
         &self.mask
     }
 
-    /// Returns the SSIM scores of this mask against another of the same size.
+    /// Computes the scores of another mask of the same size.
     pub fn compare(&self, other: &Mask) -> SsimScores {
-        self.compared::<true>(other)
+        self.scores::<true>(other)
     }
 
-    /// Its part without luminance alone, which takes less time.
+    /// Computes the structure part alone, which is faster.
     pub fn nl_ssim(&self, other: &Mask) -> f64 {
-        self.compared::<false>(other).nl_ssim
+        self.scores::<false>(other).nl_ssim
     }
 
-    /// Without `LUMINANCE` the first of the two means is not computed.
-    fn compared<const LUMINANCE: bool>(&self, other: &Mask) -> SsimScores {
+    /// Skips `ssim` unless `LUMINANCE` is set.
+    fn scores<const LUMINANCE: bool>(&self, other: &Mask) -> SsimScores {
         let count = self.means.data().len();
         let mut both = other.clone();
         let pairs = self.mask.data().iter().zip(other.data());
         for (both, (a, b)) in both.data_mut().iter_mut().zip(pairs) {
             *both = *a && *b;
         }
-        let windows = self.touched(other);
-        let mut sums = Sums::default();
+        let windows = self.windows_touching(other);
+        let mut sums = SsimSums::default();
         let rows = |y: usize, [other, both]: [&[f64]; 2]| {
             let own = &self.means.row(y)[windows.columns.clone()];
             sums.add_row::<LUMINANCE>(own, other, both, self.covariance_factor);
         };
         dispatch(
             #[inline(always)]
-            || self.taps.each_row([other, &both], &windows, rows),
+            || self.weights.for_each_row([other, &both], &windows, rows),
         );
-        // Windows that see nothing in either mask agree wholly.
-        let alike = count - windows.columns.len() * windows.rows.len();
-        sums.mean(alike, count)
+        // Windows without a set pixel in either mask score 1.
+        let equal = count - windows.columns.len() * windows.rows.len();
+        sums.mean(equal, count)
     }
 
-    /// The windows that see something of this mask or of another.
-    fn touched(&self, other: &Mask) -> Windows {
+    /// Returns the windows that contain a set pixel of either mask.
+    fn windows_touching(&self, other: &Mask) -> WindowRange {
         let boxes = [self.bounds, other.bounding_box()];
         let Some(bounds) = boxes.into_iter().flatten().reduce(PixelBox::union) else {
-            return Windows::default();
+            return WindowRange::default();
         };
-        let lost = self.taps.lost();
+        let rim = self.weights.rim();
         let seeing = |first: usize, last: usize, count: usize| {
             let end = (last + 1).min(count);
-            first.saturating_sub(lost).min(end)..end
+            first.saturating_sub(rim).min(end)..end
         };
-        Windows {
+        WindowRange {
             columns: seeing(bounds.x0, bounds.x1, self.means.width()),
             rows: seeing(bounds.y0, bounds.y1, self.means.height()),
         }
     }
 }
 
-/// Sums kept apart, so that one addition need not wait for the last.
+/// Independent sums, so that additions overlap.
 const LANES: usize = 4;
 
-/// Sums over windows. Since a mask is its own square, `E[x^2] = E[x]`: three windowed means hold all there is.
+/// Sums over windows. A mask is its own square, so `E[x^2] = E[x]` and three windowed means suffice.
 #[derive(Default)]
-struct Sums {
+struct SsimSums {
     ssim: [f64; LANES],
     nl_ssim: [f64; LANES],
 }
 
-impl Sums {
-    /// Adds a row of windows: the means of one mask, of the other, and of what both have.
+impl SsimSums {
+    /// Adds a row of windows: the means of one mask, of the other, and of their intersection.
     #[inline(always)]
     fn add_row<const LUMINANCE: bool>(
         &mut self,
@@ -186,9 +197,9 @@ impl Sums {
         }
     }
 
-    /// Means over `count` windows, of which some that were not added agree wholly.
-    fn mean(&self, alike: usize, count: usize) -> SsimScores {
-        let mean = |sums: &[f64]| (sums.iter().sum::<f64>() + alike as f64) / count.max(1) as f64;
+    /// Returns the means over `count` windows, of which `equal` score 1 and were not added.
+    fn mean(&self, equal: usize, count: usize) -> SsimScores {
+        let mean = |sums: &[f64]| (sums.iter().sum::<f64>() + equal as f64) / count.max(1) as f64;
         SsimScores {
             ssim: mean(&self.ssim),
             nl_ssim: mean(&self.nl_ssim),
@@ -196,22 +207,22 @@ impl Sums {
     }
 }
 
-/// Windows by their first column and row in the mask.
+/// A range of windows by their first column and row in the mask.
 #[derive(Debug, Default)]
-struct Windows {
+struct WindowRange {
     columns: Range<usize>,
     rows: Range<usize>,
 }
 
 /// The weights of a window along one axis.
 #[derive(Debug, Clone)]
-struct Taps {
+struct WindowWeights {
     weights: Vec<f64>,
-    /// The weighted mean of every row of so many pixels of a mask, by its bits: the last pixel is the lowest bit.
-    of_bits: Vec<f64>,
+    /// Weighted mean of each pattern of window-width pixels, indexed by its bits: the last pixel is the lowest bit.
+    mean_of_bits: Vec<f64>,
 }
 
-impl Taps {
+impl WindowWeights {
     fn new(weights: Vec<f64>) -> Self {
         let mean = |bits: usize| {
             let set = weights
@@ -220,87 +231,96 @@ impl Taps {
                 .filter(|(k, _)| bits >> k & 1 == 1);
             set.map(|(_, weight)| weight).sum()
         };
-        let of_bits = (0..1 << weights.len()).map(mean).collect();
-        Self { weights, of_bits }
+        let mean_of_bits = (0..1 << weights.len()).map(mean).collect();
+        Self {
+            weights,
+            mean_of_bits,
+        }
     }
 
-    /// By how many a row or column of windows is shorter than that of the mask.
-    fn lost(&self) -> usize {
+    /// Returns how many windows fewer than pixels there are along an axis.
+    fn rim(&self) -> usize {
         self.weights.len() - 1
     }
 
-    /// Weighted means of a mask over the windows that lie wholly in it.
+    /// Returns the weighted means over the windows that lie within a mask.
     fn means(&self, mask: &Mask) -> Grid<f64> {
         let [width, height] =
-            [mask.width(), mask.height()].map(|side| side.saturating_sub(self.lost()));
+            [mask.width(), mask.height()].map(|side| side.saturating_sub(self.rim()));
         let mut means = Grid::new(width, height, 0.0);
-        let all = Windows {
+        let all = WindowRange {
             columns: 0..width,
             rows: 0..height,
         };
-        self.each_row([mask], &all, |y, [row]| {
+        self.for_each_row([mask], &all, |y, [row]| {
             means.data_mut()[y * width..(y + 1) * width].copy_from_slice(row);
         });
         means
     }
 
-    /// Hands `take` each row of windows with the weighted means of some masks of one size. Only as many rows of the
-    /// masks as a window sees are kept, so all stays in the cache.
+    /// Calls `visit` with each row of windows and the weighted means of some masks of one size. Only the rows that a
+    /// window needs are stored, so the buffers stay in the cache.
     #[inline(always)]
-    fn each_row<const MASKS: usize>(
+    fn for_each_row<const MASKS: usize>(
         &self,
         masks: [&Mask; MASKS],
-        windows: &Windows,
-        mut take: impl FnMut(usize, [&[f64]; MASKS]),
+        windows: &WindowRange,
+        mut visit: impl FnMut(usize, [&[f64]; MASKS]),
     ) {
         let width = windows.columns.len();
         if windows.rows.is_empty() || width == 0 {
             return;
         }
-        let (lost, seen) = (self.lost(), self.weights.len());
+        let (rim, seen) = (self.rim(), self.weights.len());
         let mut across = masks.map(|_| vec![0.0; seen * width]);
         let mut means = masks.map(|_| vec![0.0; width]);
-        for y in windows.rows.start..windows.rows.end + lost {
+        for y in windows.rows.start..windows.rows.end + rim {
             for (mask, across) in masks.iter().zip(&mut across) {
-                let pixels = &mask.row(y)[windows.columns.start..windows.columns.end + lost];
+                let pixels = &mask.row(y)[windows.columns.start..windows.columns.end + rim];
                 self.across(pixels, &mut across[y % seen * width..][..width]);
             }
-            if y >= windows.rows.start + lost {
+            if y >= windows.rows.start + rim {
                 for (across, means) in across.iter().zip(&mut means) {
-                    self.down(across, y - lost, means);
+                    self.down(across, y - rim, means);
                 }
-                take(y - lost, means.each_ref().map(Vec::as_slice));
+                visit(y - rim, means.each_ref().map(Vec::as_slice));
             }
         }
     }
 
-    /// Weighted means along a row of pixels.
+    /// Computes weighted means along a row of pixels.
     #[inline(always)]
     fn across(&self, pixels: &[bool], means: &mut [f64]) {
-        let (first, rest) = pixels.split_at(self.lost());
+        let (first, rest) = pixels.split_at(self.rim());
         let shift_in =
-            |bits: usize, set: bool| (bits << 1 | usize::from(set)) & (self.of_bits.len() - 1);
+            |bits: usize, set: bool| (bits << 1 | usize::from(set)) & (self.mean_of_bits.len() - 1);
         let mut bits = first.iter().fold(0, |bits, set| shift_in(bits, *set));
         for (mean, set) in means.iter_mut().zip(rest) {
             bits = shift_in(bits, *set);
-            *mean = self.of_bits[bits];
+            *mean = self.mean_of_bits[bits];
         }
     }
 
-    /// Weighted means down the columns, of the rows from `y` on: each lies at its number's remainder.
+    /// Computes weighted means down the columns from row `y` on. Row `y` is stored at `y` modulo the number of
+    /// weights.
     #[inline(always)]
     fn down(&self, across: &[f64], y: usize, means: &mut [f64]) {
         match *self.weights.as_slice() {
-            [a, b, c, d, _, _, _] => mixed([a, b, c, d], across, y, means),
-            [a, b, c, d, e, f, _, _, _, _, _] => mixed([a, b, c, d, e, f], across, y, means),
-            _ => unreachable!("windows have 7 or 11 taps"),
+            [a, b, c, d, _, _, _] => weighted_sum([a, b, c, d], across, y, means),
+            [a, b, c, d, e, f, _, _, _, _, _] => weighted_sum([a, b, c, d, e, f], across, y, means),
+            _ => unreachable!("windows have 7 or 11 weights"),
         }
     }
 }
 
-/// Rows mixed by the first half of their weights, the middle one included: those alike share a product.
+/// Sums rows weighted by the first half of the weights, including the middle; symmetric rows share a product.
 #[inline(always)]
-fn mixed<const HALF: usize>(weights: [f64; HALF], across: &[f64], y: usize, means: &mut [f64]) {
+fn weighted_sum<const HALF: usize>(
+    weights: [f64; HALF],
+    across: &[f64],
+    y: usize,
+    means: &mut [f64],
+) {
     let (last, width) = (2 * HALF - 2, means.len());
     let row = |k: usize| &across[(y + k) % (last + 1) * width..][..width];
     let above: [&[f64]; HALF] = std::array::from_fn(row);
@@ -319,7 +339,7 @@ mod tests {
     use super::{SsimReference, SsimWindow};
     use crate::raster::Mask;
 
-    /// Two masks that any language can rebuild: a disc and a turned, shifted box with holes.
+    /// Two masks that can be rebuilt in any language: a disc, and a rotated box with holes.
     fn reference_masks() -> (Mask, Mask) {
         let disc = Mask::from_fn(96, 80, |x, y| {
             let (dx, dy) = (x as i64 - 44, y as i64 - 37);
@@ -359,8 +379,8 @@ mod tests {
         assert_eq!(means.nl_ssim(&b), got);
     }
 
-    // scikit-image 0.26 structural_similarity(a, b, data_range=1.0, ...) on the masks above as float64, and the structure
-    // factor from scipy.ndimage.gaussian_filter(sigma=1.5, truncate=3.5) on the same crop.
+    // scikit-image 0.26 structural_similarity(a, b, data_range=1.0, ...) on the masks above as float64, and the
+    // structure factor from scipy.ndimage.gaussian_filter(sigma=1.5, truncate=3.5) on the same crop.
     const GAUSSIAN: f64 = 0.508_712_369_326_821_2;
     const UNIFORM: f64 = 0.583_304_742_506_446_5;
     const STRUCTURE: f64 = 0.517_618_603_199_105_7;

@@ -1,18 +1,18 @@
-//! Area, centre and spread of a surface, each triangle weighing its area: repeated vertices and uneven density change
-//! nothing.
+//! Centroid and covariance of a surface, weighted by area: independent of repeated vertices and of the triangulation.
 
 use nalgebra::{Matrix3, Vector3};
 
-use super::{Block, IndexedSurface, LANES, Lanes};
+use super::surface::IndexedSurface;
+use super::triangle_block::{LANES, LaneArray, TriangleBlock};
 use crate::simd::dispatch;
 use crate::stages::robust_bounds::Bounds;
 
-/// Products of two axes, each kept once.
+/// The distinct products of two axes.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-/// Blocks summed in single precision before their sums go to the others.
-const RUN: usize = 32;
+/// Blocks that are summed in single precision before their sum is added in double precision.
+const BLOCKS_PER_SUM: usize = 32;
 
-/// Centre and covariance of a surface, in the mesh's frame and unit.
+/// Centroid (mesh units) and covariance (mesh units squared) of a surface, in the mesh's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::stages) struct Moments {
     pub(in crate::stages) centre: Vector3<f64>,
@@ -20,21 +20,21 @@ pub(in crate::stages) struct Moments {
 }
 
 impl Moments {
-    /// Of the triangles that lie in the bulk; `None` where they have no area.
-    pub(in crate::stages) fn of(shell: &IndexedSurface) -> Option<Self> {
-        if !shell.has_faces {
+    /// Computes the moments of the triangles within the bulk; `None` if their area is zero.
+    pub(in crate::stages) fn of(surface: &IndexedSurface) -> Option<Self> {
+        if !surface.has_faces {
             return None;
         }
-        let around = Around::of(shell);
-        let mut sums = [0.0; SUMS];
+        let bulk = BulkBox::new(surface);
+        let mut sums = [0.0; SUM_COUNT];
         dispatch(
             #[inline(always)]
             || {
-                for (run, blocks) in shell.blocks.chunks(RUN).enumerate() {
-                    let mut part = [[0.0; LANES]; SUMS];
+                for (run, blocks) in surface.blocks.chunks(BLOCKS_PER_SUM).enumerate() {
+                    let mut part = [[0.0; LANES]; SUM_COUNT];
                     for (k, block) in blocks.iter().enumerate() {
-                        let first = (run * RUN + k) * LANES;
-                        around.add(block, shell.count - first, &mut part);
+                        let first = (run * BLOCKS_PER_SUM + k) * LANES;
+                        bulk.add(block, surface.triangle_count - first, &mut part);
                     }
                     for (sum, part) in sums.iter_mut().zip(part) {
                         *sum += part.iter().map(|v| f64::from(*v)).sum::<f64>();
@@ -47,29 +47,29 @@ impl Moments {
             return None;
         }
         let centre = Vector3::new(x, y, z) / (3.0 * total);
-        // Second moment of a triangle: (sum of corners' outer products + outer product of their sum) / 12.
+        // Second moment of a triangle: (sum of the corners' outer products + outer product of their sum) / 12.
         let second = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) / (12.0 * total);
-        let unit = around.extent;
+        let unit = bulk.extent;
         Some(Self {
-            centre: Vector3::from(shell.middle) + centre * unit,
+            centre: Vector3::from(surface.origin) + centre * unit,
             covariance: (second - centre * centre.transpose()) * (unit * unit),
         })
     }
 }
 
-/// Sums kept: area, three of first degree, six of second.
-const SUMS: usize = 10;
+/// Number of sums: area, three of first degree, six of second.
+const SUM_COUNT: usize = 10;
 
-/// The bulk, its middle at zero.
-struct Around {
+/// The bulk box about the origin.
+struct BulkBox {
     extent: f64,
-    /// Half its sides, a share of the extent.
+    /// Half sides, shares of the extent.
     half: [f32; 3],
 }
 
-impl Around {
-    fn of(shell: &IndexedSurface) -> Self {
-        let [low, high]: Bounds<3> = shell.room;
+impl BulkBox {
+    fn new(surface: &IndexedSurface) -> Self {
+        let [low, high]: Bounds<3> = surface.bulk;
         let sides = [0, 1, 2].map(|axis| high[axis] - low[axis]);
         let extent = sides.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b));
         Self {
@@ -78,11 +78,11 @@ impl Around {
         }
     }
 
-    /// Adds the first `count` triangles of a block that lie in the bulk.
+    /// Adds the first `count` triangles of a block, as far as they lie within the bulk.
     #[inline(always)]
-    fn add(&self, block: &Block, count: usize, sums: &mut [[f32; LANES]; SUMS]) {
+    fn add(&self, block: &TriangleBlock, count: usize, sums: &mut [[f32; LANES]; SUM_COUNT]) {
         let per_extent = (1.0 / self.extent) as f32;
-        let corner = |corner: &[Lanes; 3], lane: usize| {
+        let corner = |corner: &[LaneArray; 3], lane: usize| {
             [
                 corner[0][lane] * per_extent,
                 corner[1][lane] * per_extent,
@@ -133,10 +133,10 @@ mod tests {
     use crate::mesh::Mesh;
     use crate::stages::zbuffer::IndexedSurface;
 
-    /// Each triangle is cut into this many rows of small ones.
+    /// Rows of small triangles that each triangle is cut into.
     const ROWS: usize = 40;
 
-    /// The slow obvious twin: the middles of many small triangles, each with its area.
+    /// Reference implementation: centroids of many small triangles, weighted by area.
     fn of_small_triangles(mesh: &Mesh) -> ([f64; 3], [[f64; 3]; 3]) {
         let mut middles = Vec::new();
         for t in &mesh.triangles {

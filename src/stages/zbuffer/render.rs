@@ -1,44 +1,48 @@
-//! A shell seen along a direction: what the ray of each pixel meets, the highest first.
+//! Renders a surface: the height of the first hit of each pixel's ray.
 
-use super::triangle_block::{Block, LANES, Row, fill_block, holding};
-use super::triangle_fill::pixels;
-use super::{IndexedSurface, Viewport};
+use super::block_fill::{fill_block, may_cover_centre};
+use super::surface::IndexedSurface;
+use super::triangle_block::{AffineForm, LANES, TriangleBlock};
+use super::triangle_fill::pixel_range;
+use super::viewport::Viewport;
 use crate::domain::Rigid3;
 use crate::raster::Grid;
-use crate::simd::{dispatch, higher};
+use crate::simd::{dispatch, max_f32};
 use crate::stages::robust_bounds::bulk_along;
 
-/// Height of a pixel that no surface covers.
+/// Height of a pixel whose ray hits nothing.
 pub(in crate::stages) const NO_HIT: f32 = f32::NEG_INFINITY;
 
-/// Where so many triangles come to a pixel, few blocks hold one's centre.
-const MANY_A_PIXEL: usize = 16;
+/// With more triangles per pixel than this, few blocks contain a pixel centre.
+const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
 
-/// Points of a set without faces are grown to this many times half their mean spacing, so that no holes stay.
-const POINT_GROWTH: f64 = 1.5;
+/// Side of a splat of a point set, in mean point spacings: large enough that no holes remain.
+const SPLAT_GROWTH: f64 = 1.5;
 
 impl IndexedSurface {
-    /// The highest z of a frame under each pixel's centre; [`NO_HIT`] where the ray meets no surface.
+    /// Renders the highest z of a plane frame under each pixel centre, mesh units; [`NO_HIT`] where the ray hits
+    /// nothing.
     pub(in crate::stages) fn render(&self, plane_from_mesh: &Rigid3, view: &Viewport) -> Grid<f32> {
         let mut heights = Grid::new(view.width, view.height, NO_HIT);
-        self.raster(plane_from_mesh, view, |place, z| {
+        self.rasterize(plane_from_mesh, view, |place, z| {
             let height = &mut heights.data_mut()[place];
-            *height = higher(z, *height);
+            *height = max_f32(z, *height);
         });
         heights
     }
 
-    /// The highest z, and seen from the other side the highest of -z: of `plane_from_mesh` turned about its x axis.
+    /// Renders the highest z, and the highest -z as seen from the back, where `plane_from_mesh` is rotated by 180
+    /// degrees about its x axis.
     pub(in crate::stages) fn render_both_sides(
         &self,
         plane_from_mesh: &Rigid3,
         view: &Viewport,
     ) -> [Grid<f32>; 2] {
         let mut heights = Grid::new(view.width, view.height, [NO_HIT; 2]);
-        self.raster(plane_from_mesh, view, |place, z| {
+        self.rasterize(plane_from_mesh, view, |place, z| {
             let [front, back] = &mut heights.data_mut()[place];
-            *front = higher(z, *front);
-            *back = higher(-z, *back);
+            *front = max_f32(z, *front);
+            *back = max_f32(-z, *back);
         });
         let last = view.height.saturating_sub(1);
         [
@@ -47,42 +51,47 @@ impl IndexedSurface {
         ]
     }
 
-    /// Rows that give a column and a row of a view, and a height.
-    fn view_rows(&self, plane_from_mesh: &Rigid3, view: &Viewport) -> [Row; 3] {
-        let [x, y, z] = self.rows(plane_from_mesh);
+    /// Returns the affine forms of a vertex's column, row and height.
+    fn view_rows(&self, plane_from_mesh: &Rigid3, view: &Viewport) -> [AffineForm; 3] {
+        let [x, y, z] = self.frame_rows(plane_from_mesh);
         let [[a, b, c], [d, e, f]] = view.px_from_plane.0;
         let mixed = |p: f64, q: f64, r: f64| {
             std::array::from_fn(|k| p * x[k] + q * y[k] + if k == 3 { r } else { 0.0 })
         };
-        [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| Row(row.map(|v| v as f32)))
+        [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| AffineForm(row.map(|v| v as f32)))
     }
 
-    /// Calls `meet` with the place in the grid and the height of all that the pixels' rays meet, and with what is no
-    /// number.
-    fn raster(&self, plane_from_mesh: &Rigid3, view: &Viewport, meet: impl FnMut(usize, f32)) {
+    /// Calls `emit` with the pixel index and height of every hit. The height is NaN for tested pixels outside a
+    /// triangle.
+    fn rasterize(&self, plane_from_mesh: &Rigid3, view: &Viewport, emit: impl FnMut(usize, f32)) {
         let rows = self.view_rows(plane_from_mesh, view);
         let size = [view.width, view.height];
         if !self.has_faces {
-            self.splat(&rows, size, meet);
-        } else if self.count / MANY_A_PIXEL > size[0] * size[1] {
-            self.fill_few(&rows, size, meet);
+            self.splat_points(&rows, size, emit);
+        } else if self.triangle_count / SPARSE_TRIANGLES_PER_PIXEL > size[0] * size[1] {
+            self.fill_sparse_blocks(&rows, size, emit);
         } else {
-            self.fill_all(&rows, size, meet);
+            self.fill_every_block(&rows, size, emit);
         }
     }
 
-    /// Fills the triangles that hold a pixel's centre.
-    fn fill_all(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
+    /// Fills every block that may contain a pixel centre.
+    fn fill_every_block(
+        &self,
+        rows: &[AffineForm; 3],
+        size: [usize; 2],
+        mut emit: impl FnMut(usize, f32),
+    ) {
         let [u, v, _] = rows;
         dispatch(
             #[inline(always)]
             || {
-                for (boxes, blocks) in self.boxes.iter().zip(self.blocks.chunks(LANES)) {
-                    let (across, down) = (boxes.reach(u), boxes.reach(v));
-                    let held = holding([&across, &down], size);
-                    for (block, held) in blocks.iter().zip(held) {
-                        if held {
-                            fill_block(block, rows, size, &mut meet);
+                for (bounds, blocks) in self.bounds.iter().zip(self.blocks.chunks(LANES)) {
+                    let (across, down) = (bounds.range_along(u), bounds.range_along(v));
+                    let candidates = may_cover_centre([&across, &down], size);
+                    for (block, candidates) in blocks.iter().zip(candidates) {
+                        if candidates {
+                            fill_block(block, rows, size, &mut emit);
                         }
                     }
                 }
@@ -90,44 +99,58 @@ impl IndexedSurface {
         );
     }
 
-    /// The same where most blocks hold no pixel's centre. Those that do lie too far apart for the processor to fetch
-    /// them ahead by itself: a look at each of some brings them nearer while the others are on their way.
-    fn fill_few(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
+    /// Does the same where few blocks contain a pixel centre. They are too far apart for the hardware prefetcher, so a
+    /// group of them is read before it is filled.
+    fn fill_sparse_blocks(
+        &self,
+        rows: &[AffineForm; 3],
+        size: [usize; 2],
+        mut emit: impl FnMut(usize, f32),
+    ) {
         const GROUPS: usize = 16;
         let [u, v, _] = rows;
-        let mut few: Vec<&Block> = Vec::with_capacity(GROUPS * LANES);
+        let mut few: Vec<&TriangleBlock> = Vec::with_capacity(GROUPS * LANES);
         dispatch(
             #[inline(always)]
             || {
                 let blocks = self.blocks.chunks(GROUPS * LANES);
-                for (boxes, blocks) in self.boxes.chunks(GROUPS).zip(blocks) {
+                for (bounds, blocks) in self.bounds.chunks(GROUPS).zip(blocks) {
                     few.clear();
-                    for (boxes, blocks) in boxes.iter().zip(blocks.chunks(LANES)) {
-                        let (across, down) = (boxes.reach(u), boxes.reach(v));
-                        let held = holding([&across, &down], size);
-                        let pairs = blocks.iter().zip(held);
-                        few.extend(pairs.filter(|(_, held)| *held).map(|(block, _)| block));
+                    for (bounds, blocks) in bounds.iter().zip(blocks.chunks(LANES)) {
+                        let (across, down) = (bounds.range_along(u), bounds.range_along(v));
+                        let candidates = may_cover_centre([&across, &down], size);
+                        let pairs = blocks.iter().zip(candidates);
+                        few.extend(
+                            pairs
+                                .filter(|(_, candidates)| *candidates)
+                                .map(|(block, _)| block),
+                        );
                     }
                     let mut seen = 0.0;
                     for block in &few {
-                        // One number of each line of the cache.
+                        // One number per cache line.
                         let numbers = block.as_flattened().as_flattened();
                         seen += numbers.iter().step_by(16).sum::<f32>();
                     }
                     std::hint::black_box(seen);
                     for block in &few {
-                        fill_block(block, rows, size, &mut meet);
+                        fill_block(block, rows, size, &mut emit);
                     }
                 }
             },
         );
     }
 
-    /// Each point as a small square.
-    fn splat(&self, rows: &[Row; 3], size: [usize; 2], mut meet: impl FnMut(usize, f32)) {
-        let of_row = |row: &Row| -> Vec<f32> {
+    /// Fills a square for each point.
+    fn splat_points(
+        &self,
+        rows: &[AffineForm; 3],
+        size: [usize; 2],
+        mut emit: impl FnMut(usize, f32),
+    ) {
+        let of_row = |row: &AffineForm| -> Vec<f32> {
             let blocks = self.blocks.iter();
-            blocks.flat_map(|block| row.at(&block[0])).collect()
+            blocks.flat_map(|block| row.at_lanes(&block[0])).collect()
         };
         let [xs, ys, zs] = rows.each_ref().map(of_row);
         let length = |places: &[f32]| {
@@ -135,11 +158,11 @@ impl IndexedSurface {
             high - low
         };
         let spacing_px = (length(&xs) * length(&ys) / xs.len().max(1) as f64).sqrt();
-        let reach = (spacing_px * 0.5 * POINT_GROWTH).max(0.5) as f32;
+        let reach = (spacing_px * 0.5 * SPLAT_GROWTH).max(0.5) as f32;
         for ((x, y), z) in xs.iter().zip(&ys).zip(zs) {
-            for row in pixels(y - reach, y + reach, size[1]) {
-                for column in pixels(x - reach, x + reach, size[0]) {
-                    meet(row * size[0] + column, z);
+            for row in pixel_range(y - reach, y + reach, size[1]) {
+                for column in pixel_range(x - reach, x + reach, size[0]) {
+                    emit(row * size[0] + column, z);
                 }
             }
         }
@@ -161,8 +184,8 @@ mod tests {
         [0.0, 0.0, 0.0, 1.0],
     ]);
 
-    /// The slow obvious twin: one ray at a time against every triangle. Also says how true single precision can be
-    /// there, which is less on slivers, and whether the ray passes too near to an edge to tell.
+    /// Reference implementation: tests one ray against every triangle. Also returns the tolerance of single precision,
+    /// which is larger on slivers, and whether the ray is too close to an edge to decide.
     fn cast(mesh: &Mesh, view: &Viewport, x: usize, y: usize) -> (Option<f64>, f64, bool) {
         let mut best: Option<f64> = None;
         let (mut tolerance, mut near_edge) = (1e-5_f64, false);
@@ -230,7 +253,7 @@ mod tests {
     proptest! {
         #[test]
         fn few_blocks_fill_what_all_do(mesh in soup(), turn in 0.0..3.0_f64, more in 1..300_usize) {
-            // Many small copies side by side, so that most hold no pixel's centre.
+            // Many small copies side by side, most of which contain no pixel centre.
             let mut many = Mesh::default();
             for copy in 0..more {
                 let at = |[x, y, z]: [f64; 3]| {
@@ -244,13 +267,13 @@ mod tests {
                 [[turn.cos(), turn.sin(), 0.0], [-turn.sin(), turn.cos(), 0.0], [0.0, 0.0, 1.0]],
                 [0.0; 3],
             );
-            let shell = IndexedSurface::new(&many);
-            let view = Viewport::around(shell.bounds(&frame), 16, false);
-            let rows = shell.view_rows(&frame, &view);
+            let surface = IndexedSurface::new(&many);
+            let view = Viewport::around(surface.bounds(&frame), 16, false);
+            let rows = surface.view_rows(&frame, &view);
             let size = [view.width, view.height];
             let mut filled = [Vec::new(), Vec::new()];
-            shell.fill_all(&rows, size, |place, z| filled[0].push((place, z.to_bits())));
-            shell.fill_few(&rows, size, |place, z| filled[1].push((place, z.to_bits())));
+            surface.fill_every_block(&rows, size, |place, z| filled[0].push((place, z.to_bits())));
+            surface.fill_sparse_blocks(&rows, size, |place, z| filled[1].push((place, z.to_bits())));
             prop_assert_eq!(&filled[0], &filled[1]);
         }
     }
@@ -284,17 +307,6 @@ mod tests {
     }
 
     #[test]
-    fn mirrored_view_reflects_x_only() {
-        let plain = Viewport::around([[0.0, 0.0], [10.0, 6.0]], 64, false);
-        let mirrored = Viewport::around([[0.0, 0.0], [10.0, 6.0]], 64, true);
-        let [x, y] = plain.px_from_plane.apply([2.0, 1.0]);
-        let [u, v] = mirrored.px_from_plane.apply([8.0, 1.0]);
-        assert!((x - u).abs() < 1e-9 && (y - v).abs() < 1e-9);
-        assert!(plain.px_from_plane.determinant() < 0.0);
-        assert!(mirrored.px_from_plane.determinant() > 0.0);
-    }
-
-    #[test]
     fn points_without_faces_cover_their_area() {
         let vertices = (0..40 * 40)
             .map(|i| [f64::from(i % 40), f64::from(i / 40), 1.0])
@@ -303,9 +315,9 @@ mod tests {
             vertices,
             triangles: Vec::new().into(),
         };
-        let shell = IndexedSurface::new(&mesh);
-        let view = Viewport::around(shell.bounds(&UPRIGHT), 128, false);
-        let heights = shell.render(&UPRIGHT, &view);
+        let surface = IndexedSurface::new(&mesh);
+        let view = Viewport::around(surface.bounds(&UPRIGHT), 128, false);
+        let heights = surface.render(&UPRIGHT, &view);
         let covered = heights.data().iter().filter(|z| **z == 1.0).count();
         assert!(covered > 120 * 120, "{covered}");
     }

@@ -1,12 +1,12 @@
-//! Where the pixels of a rendering lie.
+//! The pixel grid of a rendering.
 
 use crate::domain::Affine2;
 use crate::stages::robust_bounds::Bounds;
 
-/// Where the pixels of a rendering lie in the plane.
+/// The position of a rendering's pixels in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::stages) struct Viewport {
-    /// Plane x, y to pixels.
+    /// Maps plane x, y (mesh units) to pixels.
     pub(in crate::stages) px_from_plane: Affine2,
     /// Columns.
     pub(in crate::stages) width: usize,
@@ -17,16 +17,16 @@ pub(in crate::stages) struct Viewport {
 }
 
 impl Viewport {
-    /// A view of the bounds whose longest side takes `longest_px` pixels, one of them free on each side.
+    /// Returns a viewport of bounds whose longest side takes `longest_px` pixels, with one free pixel on each side.
     ///
-    /// The bounds' middle is the view's, so a mesh turned by a right angle is seen by the same rays.
-    /// With `mirrored`, x is reflected: what is carved in mirror writing then reads right. y points down either way.
+    /// It is centred on the bounds, so a mesh rotated by a right angle is sampled by the same rays. `mirrored`
+    /// reflects x, so that mirror writing reads correctly. y points down in both cases.
     pub(in crate::stages) fn around(bounds: Bounds<2>, longest_px: usize, mirrored: bool) -> Self {
         let [low, high] = bounds;
         let size = [high[0] - low[0], high[1] - low[1]];
         let unit_per_px = size[0].max(size[1]) / (longest_px.max(4) as f64 - 3.0);
         let scale = 1.0 / unit_per_px;
-        // Rounding must not add a pixel to a side that takes a whole number of them.
+        // Rounding must not add a pixel to a side of a whole number of pixels.
         let side = |length: f64| (length * scale - 1e-6).ceil() as usize + 3;
         let [width, height] = size.map(side);
         let along = |axis: usize, side: usize, scale: f64| {
@@ -43,5 +43,21 @@ impl Viewport {
             height,
             unit_per_px,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Viewport;
+
+    #[test]
+    fn mirrored_view_reflects_x_only() {
+        let plain = Viewport::around([[0.0, 0.0], [10.0, 6.0]], 64, false);
+        let mirrored = Viewport::around([[0.0, 0.0], [10.0, 6.0]], 64, true);
+        let [x, y] = plain.px_from_plane.apply([2.0, 1.0]);
+        let [u, v] = mirrored.px_from_plane.apply([8.0, 1.0]);
+        assert!((x - u).abs() < 1e-9 && (y - v).abs() < 1e-9);
+        assert!(plain.px_from_plane.determinant() < 0.0);
+        assert!(mirrored.px_from_plane.determinant() > 0.0);
     }
 }

@@ -1,19 +1,41 @@
-//! Where the corners of a surface lie.
+//! Triangle meshes and their vertices.
 
 use crate::page_vec::PageVec;
 
-/// Positions in the mesh's own frame and unit, all finite, each kept as precisely as its file says it and no more: what
-/// lies in memory is what most of the time goes into.
+/// Triangles over vertices, in the mesh's own frame and unit. A point set has no triangles.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Mesh {
+    /// Positions of corners and points.
+    pub vertices: Vertices,
+    /// Indices into `vertices`, with the winding of the file.
+    pub triangles: PageVec<[u32; 3]>,
+}
+
+impl Mesh {
+    /// Creates a mesh of separate triangles: each three consecutive vertices are one.
+    pub(super) fn from_soup(vertices: Vertices) -> Self {
+        let triangles = (0..vertices.len() as u32)
+            .step_by(3)
+            .map(|first| [first, first + 1, first + 2])
+            .collect();
+        Self {
+            vertices,
+            triangles,
+        }
+    }
+}
+
+/// Finite positions in the mesh's own frame and unit, in the precision of the file: memory traffic dominates run time.
 #[derive(Debug, Clone)]
 pub enum Vertices {
-    /// Of files that hold 32-bit floats, as scanners' do.
+    /// From files of 32-bit floats, as scanners write.
     Single(PageVec<[f32; 3]>),
-    /// Of text and of 64-bit floats.
+    /// From text and 64-bit floats.
     Double(PageVec<[f64; 3]>),
 }
 
 impl Vertices {
-    /// How many there are.
+    /// Returns the number of vertices.
     pub fn len(&self) -> usize {
         match self {
             Self::Single(all) => all.len(),
@@ -21,12 +43,12 @@ impl Vertices {
         }
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no vertices.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// How many there is room for.
+    /// Returns the number of vertices that fit the reserved memory.
     pub fn capacity(&self) -> usize {
         match self {
             Self::Single(all) => all.capacity(),
@@ -34,7 +56,7 @@ impl Vertices {
         }
     }
 
-    /// One of them; panics past the last.
+    /// Returns a vertex; panics if it is out of range.
     #[inline]
     pub fn at(&self, place: usize) -> [f64; 3] {
         match self {
@@ -43,36 +65,36 @@ impl Vertices {
         }
     }
 
-    /// All in their order.
+    /// Iterates over the vertices in order.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = [f64; 3]> + Clone {
         (0..self.len()).map(|place| self.at(place))
     }
 
-    /// Adds one at the end.
+    /// Appends a vertex; converts all to double precision.
     pub fn push(&mut self, vertex: [f64; 3]) {
-        self.double().push(vertex);
+        self.make_double().push(vertex);
     }
 
-    /// Puts another in the place of one; panics past the last.
+    /// Replaces a vertex; panics if it is out of range.
     pub fn set(&mut self, place: usize, vertex: [f64; 3]) {
-        self.double()[place] = vertex;
+        self.make_double()[place] = vertex;
     }
 
-    /// Puts another in the place of each.
-    pub fn change(&mut self, other: impl Fn([f64; 3]) -> [f64; 3]) {
-        for vertex in self.double() {
+    /// Applies a function to each vertex.
+    pub fn map_in_place(&mut self, other: impl Fn([f64; 3]) -> [f64; 3]) {
+        for vertex in self.make_double() {
             *vertex = other(*vertex);
         }
     }
 
-    /// In double precision, so that any can be written.
-    fn double(&mut self) -> &mut PageVec<[f64; 3]> {
+    /// Converts to double precision, so that any position can be stored.
+    fn make_double(&mut self) -> &mut PageVec<[f64; 3]> {
         if let Self::Single(_) = self {
             *self = self.iter().collect();
         }
         match self {
             Self::Double(all) => all,
-            Self::Single(_) => unreachable!("made double above"),
+            Self::Single(_) => unreachable!("made make_double above"),
         }
     }
 }
@@ -83,7 +105,7 @@ impl Default for Vertices {
     }
 }
 
-/// Equal where they lie at the same places.
+/// Equal if the positions are, in either precision.
 impl PartialEq for Vertices {
     fn eq(&self, other: &Self) -> bool {
         self.iter().eq(other.iter())
@@ -104,7 +126,7 @@ impl FromIterator<[f64; 3]> for Vertices {
 
 impl Extend<[f64; 3]> for Vertices {
     fn extend<I: IntoIterator<Item = [f64; 3]>>(&mut self, more: I) {
-        self.double().extend(more);
+        self.make_double().extend(more);
     }
 }
 
@@ -115,17 +137,17 @@ mod tests {
     #[test]
     fn both_precisions_say_the_same_and_neither_loses_anything() {
         let single = Vertices::Single(vec![[0.1_f32, 2.0, -3.5], [4.0, 5.0, 6.25]].into());
-        let mut double: Vertices = single.iter().collect();
-        assert_eq!(single, double);
+        let mut make_double: Vertices = single.iter().collect();
+        assert_eq!(single, make_double);
         assert_eq!(single.at(0)[0], f64::from(0.1_f32));
         let mut more = single.clone();
-        for vertices in [&mut more, &mut double] {
+        for vertices in [&mut more, &mut make_double] {
             vertices.push([0.1, 0.2, 0.3]);
-            vertices.change(|[x, y, z]| [z, x, y]);
+            vertices.map_in_place(|[x, y, z]| [z, x, y]);
             vertices.extend([[7.0; 3]]);
             vertices.set(1, [0.7; 3]);
         }
-        assert_eq!(more, double);
+        assert_eq!(more, make_double);
         assert_eq!(more.at(2), [0.3, 0.1, 0.2]);
         assert_ne!(single, more);
         assert_eq!((single.len(), more.len()), (2, 4));

@@ -1,0 +1,128 @@
+//! Binary STL: an 80-byte header, a count, and 50 bytes a facet.
+
+use std::io::{self, Read};
+
+use crate::mesh::error::{self, MeshError, MeshLimits, MeshReadError};
+use crate::mesh::triangle_mesh::{Mesh, Vertices};
+use crate::page_vec::{PageVec, fill};
+
+/// Name in messages.
+const FORMAT: &str = "binary STL";
+/// Bytes of the header, including the count.
+pub(crate) const HEADER: usize = 84;
+const FACET: usize = 50;
+/// Facets that are checked at a time, and read from a file at a time.
+const CHECKED_FACETS: usize = 128;
+const READ_FACETS: usize = 1280;
+
+/// Returns the count in the header; `None` if the file ends before it.
+pub(crate) fn binary_count(bytes: &[u8]) -> Option<u32> {
+    bytes
+        .get(80..HEADER)
+        .and_then(|count| count.try_into().ok())
+        .map(u32::from_le_bytes)
+}
+
+/// Returns the number of triangles if a file of `len` bytes has exactly the size that its header gives: then it is a
+/// binary STL even if it begins with `solid`.
+pub(crate) fn whole_binary_count(bytes: &[u8], len: u64) -> Option<u32> {
+    let holds = |count: &u32| len == HEADER as u64 + FACET as u64 * u64::from(*count);
+    binary_count(bytes).filter(holds)
+}
+
+/// Reads the facets of a binary STL after its header, a buffer at a time.
+pub(crate) fn read_facets(
+    source: &mut impl Read,
+    count: u32,
+    limits: &MeshLimits,
+) -> Result<Mesh, MeshReadError> {
+    let mut facets = FacetBuffer::with_capacity(count, limits)?;
+    let mut bytes = vec![0; FACET * (count as usize).min(READ_FACETS)];
+    let mut left = count as usize;
+    while left > 0 {
+        let most = bytes.len().min(FACET * left);
+        let bytes = &mut bytes[..most];
+        let have = fill(source, bytes)?;
+        let (whole, _) = bytes[..have].as_chunks();
+        facets.push(whole)?;
+        left -= whole.len();
+        if have < bytes.len() {
+            return Err(truncated(u64::from(count) - left as u64, count).into());
+        }
+    }
+    if fill(source, &mut [0])? > 0 {
+        return Err(io::Error::other("it grew while it was read").into());
+    }
+    Ok(facets.into_mesh()?)
+}
+
+fn truncated(have: u64, count: u32) -> MeshError {
+    MeshError::Truncated {
+        format: FORMAT,
+        what: "triangles".into(),
+        have,
+        want: u64::from(count),
+    }
+}
+
+/// Reads a binary STL. Bytes after the last triangle are ignored, as are normals and attributes.
+pub(crate) fn read_binary(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
+    let count = binary_count(bytes).ok_or_else(|| MeshError::Truncated {
+        format: FORMAT,
+        what: "bytes of its header".into(),
+        have: bytes.len() as u64,
+        want: HEADER as u64,
+    })?;
+    let (rows, _) = bytes[HEADER..].as_chunks::<FACET>();
+    let have = rows.len() as u64;
+    if have < u64::from(count) {
+        return Err(truncated(have, count));
+    }
+    let mut facets = FacetBuffer::with_capacity(count, limits)?;
+    facets.push(&rows[..count as usize])?;
+    facets.into_mesh()
+}
+
+/// Vertices of the facets read so far.
+struct FacetBuffer {
+    vertices: PageVec<[f32; 3]>,
+    chunk: Vec<[f32; 3]>,
+}
+
+impl FacetBuffer {
+    /// Reserves memory for `count` facets if that is within the limits.
+    fn with_capacity(count: u32, limits: &MeshLimits) -> Result<Self, MeshError> {
+        limits.check_triangles(u64::from(count))?;
+        limits.check_vertices(3 * u64::from(count))?;
+        Ok(Self {
+            vertices: PageVec::with_capacity(3 * count as usize),
+            chunk: Vec::with_capacity(3 * CHECKED_FACETS),
+        })
+    }
+
+    fn push(&mut self, facets: &[[u8; FACET]]) -> Result<(), MeshError> {
+        for facets in facets.chunks(CHECKED_FACETS) {
+            self.chunk.clear();
+            for facet in facets {
+                self.chunk.extend(corners(facet));
+            }
+            error::check_all_finite(&self.chunk, self.vertices.len())?;
+            self.vertices.extend_from_slice(&self.chunk);
+        }
+        Ok(())
+    }
+
+    fn into_mesh(self) -> Result<Mesh, MeshError> {
+        if self.vertices.is_empty() {
+            return Err(MeshError::NoFaces);
+        }
+        Ok(Mesh::from_soup(Vertices::Single(self.vertices)))
+    }
+}
+
+/// Returns the corners of a facet: twelve little-endian 32-bit floats, of which the first three are the normal.
+fn corners(facet: &[u8; FACET]) -> [[f32; 3]; 3] {
+    let (floats, _) = facet[12..48].as_chunks::<4>();
+    let at = |i: usize| f32::from_le_bytes(floats[i]);
+    [0, 3, 6].map(|i| [at(i), at(i + 1), at(i + 2)])
+}

@@ -1,0 +1,134 @@
+//! Readers of STL, binary and ASCII: separate triangles, each with its own three vertices.
+
+mod ascii;
+mod binary;
+
+pub(super) use ascii::read_ascii;
+pub(super) use binary::{HEADER, read_binary, read_facets, whole_binary_count};
+
+#[cfg(test)]
+mod tests {
+    use crate::mesh::{Mesh, MeshError, MeshLimits, read};
+
+    fn binary(header: &[u8], corners: &[[f32; 3]]) -> Vec<u8> {
+        let mut bytes = header.to_vec();
+        bytes.resize(80, b' ');
+        bytes.extend((corners.len() as u32 / 3).to_le_bytes());
+        for facet in corners.chunks_exact(3) {
+            bytes.extend([0xff; 12]);
+            for value in facet.as_flattened() {
+                bytes.extend(value.to_le_bytes());
+            }
+            bytes.extend([0; 2]);
+        }
+        bytes
+    }
+
+    fn open(bytes: &[u8]) -> Result<Mesh, MeshError> {
+        read(bytes, "scan.stl", &MeshLimits::SUGGESTED)
+    }
+
+    const CORNERS: [[f32; 3]; 6] = [
+        [0., 0., 0.],
+        [1., 0., 0.],
+        [0., 1., 0.],
+        [0., 1., 0.],
+        [1., 0., 0.],
+        [1., 1., 0.25],
+    ];
+
+    #[test]
+    fn binary_is_known_even_when_its_header_begins_with_solid() {
+        for header in [b"solid made by a scanner".as_slice(), b"", b"COLOR=...."] {
+            let mesh = open(&binary(header, &CORNERS)).expect("reads");
+            assert_eq!(mesh.vertices.len(), 6);
+            assert_eq!(mesh.vertices.at(5), [1.0, 1.0, 0.25]);
+            assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
+        }
+    }
+
+    #[test]
+    fn bytes_after_the_last_triangle_are_left_out() {
+        let mut bytes = binary(b"", &CORNERS);
+        bytes.extend(b"trailer");
+        assert_eq!(open(&bytes).expect("reads").triangles.len(), 2);
+    }
+
+    #[test]
+    fn truncated_binary_says_how_many_of_how_many() {
+        for header in [b"solid a".as_slice(), b"\0", b"text header"] {
+            let bytes = binary(header, &CORNERS);
+            let error = open(&bytes[..bytes.len() - 1]).expect_err("truncated");
+            assert_eq!(
+                error.to_string(),
+                "the binary STL is truncated: it holds 1 of 2 triangles"
+            );
+        }
+        let error = open(&[0; 50]).expect_err("truncated");
+        assert_eq!(
+            error.to_string(),
+            "the binary STL is truncated: it holds 50 of 84 bytes of its header"
+        );
+    }
+
+    #[test]
+    fn lying_count_is_an_error_not_an_allocation() {
+        let mut bytes = binary(b"", &CORNERS);
+        bytes[80..84].fill(0xff);
+        let error = open(&bytes).expect_err("lies");
+        assert_eq!(
+            error.to_string(),
+            "the binary STL is truncated: it holds 2 of 4294967295 triangles"
+        );
+    }
+
+    #[test]
+    fn no_facets_and_nan_are_refused() {
+        assert_eq!(open(&binary(b"", &[])), Err(MeshError::NoFaces));
+        assert_eq!(
+            open(b"solid empty\nendsolid empty\n"),
+            Err(MeshError::NoFaces)
+        );
+        let mut corners = CORNERS;
+        corners[4][1] = f32::NAN;
+        let error = open(&binary(b"", &corners)).expect_err("NaN");
+        assert!(
+            error
+                .to_string()
+                .starts_with("vertex 5 has the coordinate NaN")
+        );
+    }
+
+    const ASCII: &str = "solid a b\n FACET NORMAL nan nan nan\n outer loop\n vertex 0 0 0\n vertex 1 0 0\n \
+        vertex 1 1 1e-1\n vertex 0 1 0\n endloop\n endfacet\nendsolid a b\n";
+
+    #[test]
+    fn ascii_loops_of_four_become_two_triangles() {
+        let mesh = open(ASCII.as_bytes()).expect("reads");
+        assert_eq!(mesh.triangles.len(), 2);
+        assert_eq!(mesh.vertices.at(2), [1.0, 1.0, 0.1]);
+        let two = open(ASCII.repeat(2).as_bytes()).expect("reads");
+        assert_eq!(two.triangles.len(), 4);
+    }
+
+    #[test]
+    fn truncated_ascii_says_where_it_ends() {
+        let cut = |word: &str| &ASCII[..ASCII.find(word).expect("is there")];
+        assert_eq!(
+            open(cut("endsolid").as_bytes())
+                .expect_err("cut")
+                .to_string(),
+            "the ascii STL is truncated: it ends after 1 facets without endsolid"
+        );
+        assert_eq!(
+            open(cut("endloop").as_bytes())
+                .expect_err("cut")
+                .to_string(),
+            "the ascii STL is truncated: it ends after 0 facets without endfacet"
+        );
+        assert_eq!(
+            open(cut(" 1e-1").as_bytes()).expect_err("cut").to_string(),
+            "line 6: 2 of 3 coordinates"
+        );
+    }
+}

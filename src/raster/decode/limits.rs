@@ -1,0 +1,65 @@
+//! Limits on print images.
+
+use serde::{Deserialize, Serialize};
+
+use super::DecodeError;
+
+/// Limits on print images, checked before anything is decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImageLimits {
+    /// Largest file in bytes; 256 MiB is generous for one character.
+    pub max_bytes: u64,
+    /// Largest width times height, pixels; 100 million decode to 600 MB.
+    pub max_pixels: u64,
+}
+
+impl ImageLimits {
+    /// 256 MiB and 30 million pixels.
+    pub const SUGGESTED: Self = Self {
+        max_bytes: 256 << 20,
+        max_pixels: 30_000_000,
+    };
+
+    /// Checks the size of a file.
+    ///
+    /// # Errors
+    /// Returns an error if it is empty or over `max_bytes`.
+    pub(super) fn check_bytes(&self, bytes: &[u8]) -> Result<(), DecodeError> {
+        let size = bytes.len() as u64;
+        if size == 0 {
+            return Err(DecodeError::Empty);
+        }
+        if size > self.max_bytes {
+            return Err(DecodeError::TooManyBytes {
+                bytes: size,
+                limit: self.max_bytes,
+            });
+        }
+        Ok(())
+    }
+
+    /// Checks the size of an image, pixels.
+    ///
+    /// # Errors
+    /// Returns an error if a side is zero or the area is over `max_pixels`.
+    pub(super) fn check_size(&self, width: u32, height: u32) -> Result<(), DecodeError> {
+        if width == 0 || height == 0 {
+            return Err(DecodeError::NoPixels { width, height });
+        }
+        if u64::from(width) * u64::from(height) > self.max_pixels {
+            return Err(DecodeError::TooManyPixels {
+                width,
+                height,
+                limit: self.max_pixels,
+            });
+        }
+        Ok(())
+    }
+
+    /// Returns the memory that a decoder may allocate, bytes: 16 a pixel, the widest that a decoder returns, and 64 MiB
+    /// for its tables.
+    pub(super) fn max_decoder_bytes(&self) -> u64 {
+        self.max_pixels.saturating_mul(16).saturating_add(64 << 20)
+    }
+}

@@ -1,0 +1,45 @@
+//! The decoded print image: 16-bit RGB on white.
+
+use image::DynamicImage;
+
+use crate::raster::Grid;
+
+/// Red, green and blue, 0..=65535 each. 8-bit sources are multiplied by 257, so white is 65535 in both.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PrintImage {
+    /// Colour of each pixel; a transparent pixel is white.
+    pub rgb: Grid<[u16; 3]>,
+}
+
+/// Composites a colour on white: `(c a + 65535 (65535 - a)) / 65535`, rounded.
+pub(super) fn on_white([c @ .., a]: [u16; 4]) -> [u16; 3] {
+    const FULL: u64 = u16::MAX as u64;
+    let a = u64::from(a);
+    c.map(|c| ((u64::from(c) * a + FULL * (FULL - a) + FULL / 2) / FULL) as u16)
+}
+
+const fn widen(value: u8) -> u16 {
+    value as u16 * 257
+}
+
+pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
+    let (width, height) = (image.width() as usize, image.height() as usize);
+    let colours = match image {
+        DynamicImage::ImageLuma8(i) => i.pixels().map(|p| [widen(p[0]); 3]).collect(),
+        DynamicImage::ImageRgb8(i) => i.pixels().map(|p| p.0.map(widen)).collect(),
+        DynamicImage::ImageLuma16(i) => i.pixels().map(|p| [p[0]; 3]).collect(),
+        DynamicImage::ImageRgb16(i) => i.pixels().map(|p| p.0).collect(),
+        DynamicImage::ImageLumaA8(i) => {
+            let grey = |p: &image::LumaA<u8>| {
+                let [l, a] = p.0.map(widen);
+                on_white([l, l, l, a])
+            };
+            i.pixels().map(grey).collect()
+        }
+        DynamicImage::ImageRgba8(i) => i.pixels().map(|p| on_white(p.0.map(widen))).collect(),
+        // The rest is rare enough for a copy: 16 bits with transparency, 32-bit floats in 0..=1.
+        other => other.to_rgba16().pixels().map(|p| on_white(p.0)).collect(),
+    };
+    // An image of w x h pixels has as many colours.
+    Grid::from_vec(width, height, colours).expect("one colour for each pixel")
+}

@@ -1,0 +1,65 @@
+//! Warps a depth map into another frame.
+
+use super::minmax_pyramid::MinMaxPyramid;
+use super::supersample::{Supersampler, cell_corners, floor};
+use super::{DepthMap, Grid};
+use crate::domain::Affine2;
+
+/// Side of the blocks of output pixels that are tested for missing data at a time.
+const BLOCK_PX: usize = 4;
+
+/// Warps the levels of a depth map into a frame of `width` x `height` pixels; 0 where less than half of a pixel's
+/// square has data. A map without inverse gives no data.
+///
+/// `to_from` maps depth-map px to output px. The levels keep their scale.
+pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usize) -> Grid<u16> {
+    let Some(from_to) = to_from.inverse() else {
+        return Grid::new(width, height, 0);
+    };
+    let levels = &depth.levels;
+    let (sampler, value_ranges) = (Supersampler::new(&from_to), MinMaxPyramid::new(levels));
+    let rounded = |level: f64| level.round().clamp(1.0, 65535.0) as u16;
+    let mut out = Grid::new(width, height, 0);
+    for top in (0..height).step_by(BLOCK_PX) {
+        for left in (0..width).step_by(BLOCK_PX) {
+            let columns = left..(left + BLOCK_PX).min(width);
+            let rows = top..(top + BLOCK_PX).min(height);
+            let [low, high] = value_ranges.range_in_box(sampler.source_bounds(&columns, &rows), 0);
+            if high == 0 {
+                continue;
+            }
+            for y in rows {
+                for x in columns.clone() {
+                    let mean = if low > 0 {
+                        Some(sampler.mean_inside(x, y, levels))
+                    } else {
+                        sampler.mean(x, y, |p| level_at(levels, p))
+                    };
+                    out.set(x, y, mean.map_or(0, rounded));
+                }
+            }
+        }
+    }
+    out
+}
+
+/// Interpolates the level bilinearly among the neighbours with data; `None` if their weight is below a half.
+fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
+    let (x0, y0) = (floor(x), floor(y));
+    let (fx, fy) = (x - x0 as f64, y - y0 as f64);
+    let near = cell_corners(levels, x0, y0, 0).map(f64::from);
+    if near == [0.0; 4] {
+        return None;
+    }
+    let above = near[0] + (near[1] - near[0]) * fx;
+    let below = near[2] + (near[3] - near[2]) * fx;
+    let level = above + (below - above) * fy;
+    if near.iter().all(|level| *level > 0.0) {
+        return Some(level);
+    }
+    let held = near.map(|level| if level > 0.0 { 1.0 } else { 0.0 });
+    let above = held[0] + (held[1] - held[0]) * fx;
+    let below = held[2] + (held[3] - held[2]) * fx;
+    let weight = above + (below - above) * fy;
+    (weight >= 0.5).then(|| level / weight)
+}

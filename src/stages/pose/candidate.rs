@@ -1,0 +1,80 @@
+//! Candidate poses, the range that is searched, and the beam width.
+
+use crate::domain::Affine2;
+
+/// Refined poses closer than this in rotation (degrees) and scale (natural logarithm) are the same.
+const NEAR_DEG: f64 = 3.0;
+const NEAR_RATIO: f64 = 0.04;
+
+/// How many candidates to keep, as is and mirrored. Zero skips that reading.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::stages) struct BeamWidth {
+    /// Without reflection.
+    pub(in crate::stages) upright: usize,
+    /// With the moving image mirrored.
+    pub(in crate::stages) mirrored: usize,
+}
+
+impl BeamWidth {
+    /// Returns the number to keep for one reading.
+    pub(super) const fn of_reading(self, mirrored: bool) -> usize {
+        if mirrored {
+            self.mirrored
+        } else {
+            self.upright
+        }
+    }
+}
+
+/// The range of poses to search.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::stages) struct SearchRange {
+    /// Largest ratio between the two sizes, up or down.
+    pub(in crate::stages) max_scale: f64,
+    /// Candidates to keep after the search.
+    pub(in crate::stages) beam_width: BeamWidth,
+}
+
+/// A candidate pose with its score.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::stages) struct PoseCandidate {
+    /// Maps moving image pixels to fixed image pixels; contains a reflection if `mirrored`.
+    pub(in crate::stages) fixed_from_moving: Affine2,
+    /// Correlation where both images are known, normalised by the energy of both; at most 1.
+    pub(in crate::stages) score: f64,
+    /// Whether the moving image is mirrored.
+    pub(in crate::stages) mirrored: bool,
+}
+
+impl PoseCandidate {
+    /// Returns the absolute rotation between two poses, degrees in 0..=180.
+    pub(in crate::stages) fn rotation_to(&self, other: &Self) -> f64 {
+        let angle = |pose: &Self| pose.fixed_from_moving.angle_deg();
+        let turn = (angle(self) - angle(other)).rem_euclid(360.0);
+        turn.min(360.0 - turn)
+    }
+
+    /// Returns whether two poses are the same up to a small rotation and scale; the shift is not compared.
+    pub(super) fn is_near(&self, other: &Self) -> bool {
+        let scale = |pose: &Self| pose.fixed_from_moving.scale();
+        let ratio = (scale(self) / scale(other)).ln().abs();
+        self.mirrored == other.mirrored && self.rotation_to(other) < NEAR_DEG && ratio < NEAR_RATIO
+    }
+}
+
+/// Returns the best candidates of each reading without duplicates, best first.
+pub(super) fn prune(mut found: Vec<PoseCandidate>, beam_width: BeamWidth) -> Vec<PoseCandidate> {
+    found.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut accepted: Vec<PoseCandidate> = Vec::new();
+    for pose in found {
+        let same_reading = accepted
+            .iter()
+            .filter(|k| k.mirrored == pose.mirrored)
+            .count();
+        let limit = beam_width.of_reading(pose.mirrored);
+        if same_reading < limit && !accepted.iter().any(|other| other.is_near(&pose)) {
+            accepted.push(pose);
+        }
+    }
+    accepted
+}

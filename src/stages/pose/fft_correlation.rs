@@ -1,0 +1,134 @@
+//! Cross-correlation of small squares by FFT (Lewis 1995, fast normalized cross-correlation).
+
+use std::sync::Arc;
+
+use rustfft::num_complex::Complex32;
+use rustfft::{Fft, FftPlanner};
+
+/// Side of the squares that are correlated, pixels.
+pub(super) const FFT_SIZE: usize = 32;
+
+/// Returns the shift (pixels) of the highest correlation within `max_shift_px` along each axis, and its value. `part`
+/// selects the real (0) or imaginary (1) part.
+///
+/// The surface is stored reversed: its value at -s belongs to shift s.
+pub(super) fn best_shift(surface: &[Complex32], part: usize, max_shift_px: i64) -> ([f64; 2], f32) {
+    let mut best = ([0.0; 2], f32::NEG_INFINITY);
+    for dy in -max_shift_px..=max_shift_px {
+        let from = (-dy).rem_euclid(FFT_SIZE as i64) as usize * FFT_SIZE;
+        let row = &surface[from..from + FFT_SIZE];
+        for dx in -max_shift_px..=max_shift_px {
+            let value = row[(-dx).rem_euclid(FFT_SIZE as i64) as usize];
+            let value = if part == 0 { value.re } else { value.im };
+            if value > best.1 {
+                best = ([dx as f64, dy as f64], value);
+            }
+        }
+    }
+    best
+}
+
+/// Two-dimensional FFTs of a square with their buffers.
+///
+/// Spectra are stored column by column, which saves a transposition each way.
+pub(super) struct FftCorrelator {
+    forward: Arc<dyn Fft<f32>>,
+    inverse: Arc<dyn Fft<f32>>,
+    scratch: Vec<Complex32>,
+    spectrum: Vec<Complex32>,
+    product: Vec<Complex32>,
+}
+
+impl FftCorrelator {
+    pub(super) fn new() -> Self {
+        // The last digits differ between processors; they can only change the order of equal peaks.
+        let mut planner = FftPlanner::new();
+        let forward = planner.plan_fft_forward(FFT_SIZE);
+        let inverse = planner.plan_fft_inverse(FFT_SIZE);
+        let scratch_len = forward
+            .get_inplace_scratch_len()
+            .max(inverse.get_inplace_scratch_len());
+        let empty = Complex32::new(0.0, 0.0);
+        Self {
+            forward,
+            inverse,
+            scratch: vec![empty; scratch_len],
+            spectrum: vec![empty; FFT_SIZE * FFT_SIZE],
+            product: vec![empty; FFT_SIZE * FFT_SIZE],
+        }
+    }
+
+    /// Returns the conjugated spectrum of a real square, scaled so that the inverse transform of a product is the
+    /// correlation.
+    pub(super) fn target_spectrum(&mut self, values: &[f32]) -> Vec<Complex32> {
+        for (out, value) in self.spectrum.iter_mut().zip(values) {
+            *out = Complex32::new(*value, 0.0);
+        }
+        fft_2d(&*self.forward, &mut self.spectrum, &mut self.scratch);
+        let scale = 1.0 / (FFT_SIZE * FFT_SIZE) as f32;
+        self.spectrum.iter().map(|v| v.conj() * scale).collect()
+    }
+
+    /// Loads a real square. The square rotated by 180 degrees is loaded as the imaginary part, so one transform serves
+    /// both.
+    pub(super) fn load(&mut self, values: &[f32]) {
+        for y in 0..FFT_SIZE {
+            let back = (FFT_SIZE - y) % FFT_SIZE * FFT_SIZE;
+            for x in 0..FFT_SIZE {
+                let opposite = values[back + (FFT_SIZE - x) % FFT_SIZE];
+                self.spectrum[y * FFT_SIZE + x] =
+                    Complex32::new(values[y * FFT_SIZE + x], opposite);
+            }
+        }
+        fft_2d(&*self.forward, &mut self.spectrum, &mut self.scratch);
+    }
+
+    /// Rotates the loaded square by 90 degrees, x to y: its spectrum rotates with it.
+    pub(super) fn rotate_quarter(&mut self) {
+        // Column-major: column u, row v is at u * FFT_SIZE + v.
+        for u in 0..FFT_SIZE {
+            for v in 0..FFT_SIZE {
+                self.product[u * FFT_SIZE + v] =
+                    self.spectrum[v * FFT_SIZE + (FFT_SIZE - u) % FFT_SIZE];
+            }
+        }
+        std::mem::swap(&mut self.spectrum, &mut self.product);
+    }
+
+    /// Returns the correlation of the loaded square with a target; `mirrored` reads the spectrum backwards along x.
+    ///
+    /// The square's middle is at `FFT_SIZE / 2`, so mirroring about column 0 of the transform keeps it. The result is
+    /// stored reversed: its value at -s belongs to shift s.
+    pub(super) fn correlate(&mut self, target: &[Complex32], mirrored: bool) -> &[Complex32] {
+        for x in 0..FFT_SIZE {
+            let from = if mirrored {
+                (FFT_SIZE - x) % FFT_SIZE
+            } else {
+                x
+            } * FFT_SIZE;
+            let column = &self.spectrum[from..from + FFT_SIZE];
+            let places = x * FFT_SIZE..(x + 1) * FFT_SIZE;
+            let out = &mut self.product[places.clone()];
+            for ((out, a), b) in out.iter_mut().zip(column).zip(&target[places]) {
+                *out = a * b;
+            }
+        }
+        fft_2d(&*self.inverse, &mut self.product, &mut self.scratch);
+        &self.product
+    }
+}
+
+/// Transforms along both axes; the result is transposed.
+fn fft_2d(fft: &dyn Fft<f32>, data: &mut [Complex32], scratch: &mut [Complex32]) {
+    fft.process_with_scratch(data, scratch);
+    transpose(data);
+    fft.process_with_scratch(data, scratch);
+}
+
+fn transpose(data: &mut [Complex32]) {
+    for y in 0..FFT_SIZE {
+        for x in 0..y {
+            data.swap(y * FFT_SIZE + x, x * FFT_SIZE + y);
+        }
+    }
+}
