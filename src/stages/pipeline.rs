@@ -7,11 +7,10 @@
 //! | normalize | ink of the print under every likely polarity, heights of tops and ground | fixed grey, wrap by box and centroid, density and structure thresholds (III-C) |
 //! | register | pose search on soft strokes, refinement, then thresholds in the aligned frame, scores, confidence | rotations at equal steps, shifts climbed on IoU, scores (III-D) |
 //!
-//! The side is decided in fit, although that makes fit depend on the print. An open sheet shows relief from both sides,
-//! and its winding and the sharpness of its layers mislead too often: both sides would stay in question for most scans.
-//! Then fit would refine two surfaces and depth render, encode and store two maps: about 2.5 and 4 ms more of about
-//! 33 ms a pair of 60,000 vertices (16 % or more; 25 % at 530,000), where 3 % was the limit. What fit decides by is a
-//! rendering of 96 pixels a side.
+//! The side is decided in fit, which therefore depends on the print. An open sheet shows relief from both sides, so its
+//! mesh alone often leaves both sides in question; then fit would refine two surfaces, and depth would render and store
+//! two maps. Estimated from stage times, not tried: 16 % more time for a pair of 60,000 vertices, 25 % at 530,000. The
+//! decision in fit takes two renderings of 96 pixels a side.
 
 use super::depth::{self, DepthError};
 use super::fit::{self, FitError};

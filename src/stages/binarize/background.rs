@@ -1,6 +1,5 @@
 //! Brightness of the background at each pixel, estimated by a grey-scale closing: what is dark and narrow is ink, what
-//! is
-//! dark and wide is a stain.
+//! is dark and wide is a stain.
 
 use crate::raster::{Grid, Mask, resample};
 use crate::stages::blur::gaussian_blur;
@@ -17,8 +16,7 @@ const LEAST_KNOWN: f32 = 0.3;
 const EMPTY: f32 = f32::NAN;
 
 /// Returns the brightness of the background under and around each pixel, 0..=1: the grey closed by a square of half
-/// width
-/// `narrow`, a share of the longest side.
+/// width `narrow`, a share of the longest side.
 pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let (width, height) = (grey.width(), grey.height());
     let Some(bounds) = known.bounding_box() else {

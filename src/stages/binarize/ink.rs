@@ -16,8 +16,7 @@ const LEAST_PAPER: f64 = 0.2;
 /// Least share of the image that the white outside the cut covers.
 const LEAST_WHITE: f64 = 0.004;
 /// Position between the darkest grey and the background below which a pixel is pale; least share of pale pixels among
-/// the
-/// dark ones where stains are possible.
+/// the dark ones where stains are possible.
 const PALE: f64 = 0.35;
 const LEAST_PALE: f64 = 0.15;
 /// Least difference between ink and background, as a share of the lighter one: scanners that fill only part of their 16

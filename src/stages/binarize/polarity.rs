@@ -11,8 +11,7 @@ const CLEAR_LIGHT: f64 = 1.6;
 const RIM: f64 = 0.06;
 
 /// Returns whether ink is probably lighter than the background, and whether that is clear. Stains and frame lines
-/// mislead:
-/// where the image and its version with the background divided out disagree, both polarities stay possible.
+/// mislead: where the image and its version with the background divided out disagree, both polarities stay possible.
 pub(super) fn polarity(
     even: &Grid<f32>,
     levelled: Option<Split>,
@@ -29,8 +28,8 @@ pub(super) fn polarity(
 }
 
 /// Returns the evidence that the dark class is the background; negative for ink. Ink is the smaller class, and
-/// background
-/// reaches the rim. Heavy ink breaks the first rule and border lines the second, so both count, the first twice.
+/// background reaches the rim. Heavy ink breaks the first rule and border lines the second, so both count, the first
+/// twice.
 fn paper_darkness(dark: &Mask, known: &Mask) -> f64 {
     let of_known = known.count().max(1) as f64;
     let pairs = dark.data().iter().zip(known.data());

@@ -3,8 +3,7 @@
 //! Four kinds of evidence are combined as log-odds. The winding of the faces is right in most files, but wrong
 //! everywhere in some. Stroke tops are planed wood, so their heights are concentrated at one level; ground is gouged.
 //! The manifest may say how the block was scanned. And the relief of the carved side agrees with the print, which
-//! weighs
-//! most: it is the only evidence that knows the character.
+//! weighs most: it is the only evidence that knows the character.
 
 use super::surface::{HeightSamples, Surface, quantile};
 use crate::domain::{Bow, Rigid3, SideEvidence};

@@ -40,8 +40,7 @@ impl Axes {
     }
 
     /// Computes the axes of a surface by area, or of the vertices where there is no area. Specks far from the bulk are
-    /// left
-    /// out.
+    /// left out.
     pub(in crate::stages) fn of_surface(mesh: &Mesh, shell: &IndexedSurface) -> Self {
         if let Some(moments) = Moments::of(shell) {
             return Self::from_moments(moments.centre, moments.covariance);

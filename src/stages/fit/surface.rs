@@ -1,8 +1,7 @@
 //! A one-sided robust surface over the highest parts of a height map.
 //!
 //! Stroke tops are the original face of the block: much lies below them, nothing above. So a point above the surface
-//! has
-//! a high cost and a point far below it none.
+//! has a high cost and a point far below it none.
 
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
 use crate::domain::Rigid3;
@@ -252,8 +251,7 @@ impl HeightSamples {
     }
 
     /// Returns priors from the ground where enough of it is visible: a block bends as a whole, so the tops bend as the
-    /// ground
-    /// does. Without them few strokes would leave the bend undetermined.
+    /// ground does. Without them few strokes would leave the bend undetermined.
     fn beliefs_along_ground(&self) -> Option<[Prior; 6]> {
         let [a, b, c, ..] = self.mean_plane;
         let [_, _, _, p, q, r] = self.ground()?;

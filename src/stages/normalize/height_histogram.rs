@@ -17,9 +17,8 @@ const WALLS: [f64; 2] = [0.10, 0.50];
 const FINE: usize = 3;
 const COARSE: usize = 16;
 /// Frequency at the end of the tops, as a multiple of the frequency on the walls: walls, as much of the tops, and a
-/// little
-/// for noise that widens the histogram. Measured on two independent kinds of generated reliefs; flat around 2.5. Where
-/// walls are frequent everywhere, the middle between walls and peak is used.
+/// little for noise that widens the histogram. Measured on two independent kinds of generated reliefs; flat around 2.5.
+/// Where walls are frequent everywhere, the middle between walls and peak is used.
 const EDGE: f64 = 2.5;
 /// Usual depth at which tops end, and the range to which a measured depth is clamped. One scan's histogram is noisy, so
 /// the result is the geometric mean of both: nearer to the truth on three kinds of generated reliefs.

@@ -76,8 +76,7 @@ pub(in crate::stages) fn normalize(
 }
 
 /// Chooses the density and the structure threshold on the wrapped images. The ensemble keeps the better of the two
-/// after
-/// registration.
+/// after registration.
 fn choose(
     depth: &DepthMap,
     print: &InkMask,

@@ -1,12 +1,9 @@
 //! The paper's registration (III-D) as its authors' program does it: the depth mask is rotated through a full circle
-//! and
-//! wrapped at each angle, then in finer steps about the best angle; at each angle the shift is climbed pixel by pixel
-//! on
-//! the masks' IoU.
+//! and wrapped at each angle, then in finer steps about the best angle; at each angle the shift is climbed pixel by
+//! pixel on the masks' IoU.
 //!
 //! The text judges six sectors at one angle each, which misses by up to half a sector; the program tries 60 angles and
-//! 60
-//! more about the best.
+//! 60 more about the best.
 
 use crate::domain::{Affine2, ThresholdMetric};
 use crate::raster::{DepthMap, Mask, warp_mask};

@@ -1,8 +1,7 @@
 //! Chooses each metric's depth threshold in the aligned frame.
 //!
 //! Candidates are equally spaced depths below the tops; each candidate's mask is compared with the print's ink where
-//! both
-//! print and depth map hold data. See [`ThresholdMetric`] for the formulas.
+//! both print and depth map hold data. See [`ThresholdMetric`] for the formulas.
 
 use super::params::{RegisterError, RegisterParams};
 use crate::domain::{Affine2, ReliefHeights, ThresholdChoice, ThresholdMetric};
@@ -74,8 +73,7 @@ struct Candidate {
 /// Chooses each metric's threshold, in the order of [`ThresholdMetric::ALL`].
 ///
 /// Structure and density alone reproduce the print's spread ink, and geometry alone ignores the print; `ensemble`
-/// therefore
-/// takes the best structure score among thresholds whose area is close to that of `relief`.
+/// therefore takes the best structure score among thresholds whose area is close to that of `relief`.
 ///
 /// # Errors
 /// When no threshold leaves strokes, or no ink lies where the depth map holds data.
