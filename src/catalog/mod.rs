@@ -32,7 +32,6 @@ pub use queue::selection::PairSelection;
 pub use queue::staleness::RerunPolicy;
 pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
-pub use records::look::Look;
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults,
@@ -41,4 +40,5 @@ pub use records::model::{
 pub use records::pair_results::ResultPages;
 pub use records::pair_work::{KnownInputs, PairWork};
 pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Shown};
+pub use records::review_context::ReviewContext;
 pub use records::verdicts::{NewVerdict, VerdictEvent};

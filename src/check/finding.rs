@@ -1,42 +1,42 @@
-//! One thing that is not as it should be.
+//! Findings of a check.
 
 use serde::Serialize;
 
 use crate::catalog::CounterDrift;
 use crate::domain::{PairName, Stage};
 
-/// What kind of damage it is.
+/// Kind of damage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
-    /// The file of the database is not what the database wrote.
+    /// The database file is damaged.
     Database,
-    /// A table, index or trigger is not as the program makes it.
+    /// A table, index or trigger differs from the schema.
     Schema,
-    /// A row names a row that is not there.
+    /// A row references a missing row.
     Reference,
-    /// A counter does not say how many jobs there are.
+    /// A counter differs from the number of jobs.
     Counter,
     /// A pair has no job.
     JobMissing,
-    /// A pair failed, and nothing says why.
+    /// A pair failed, but the reason is missing.
     ReasonMissing,
-    /// A pair is past a stage that has no result.
+    /// The result of a completed stage is missing.
     ResultMissing,
-    /// A stored result does not have its hash.
+    /// A stored result differs from its hash.
     ResultChanged,
-    /// A pair is done, and its metrics are not those of its result.
+    /// A pair is done, but its metrics differ from those of its result.
     Metrics,
-    /// A result names a file that is not there.
+    /// A file of a result is missing.
     FileMissing,
-    /// A result's file is not what it was.
+    /// The content of a result file has changed.
     FileChanged,
-    /// A result's file cannot be read.
+    /// A file of a result cannot be read.
     FileUnreadable,
 }
 
 impl Kind {
-    /// Every kind, in the order of a report.
+    /// All kinds, in the order of the summary.
     pub const ALL: [Self; 12] = [
         Self::Database,
         Self::Schema,
@@ -52,7 +52,7 @@ impl Kind {
         Self::FileUnreadable,
     ];
 
-    /// What a number of findings of it is called.
+    /// Returns the label of a number of findings of this kind.
     pub const fn heading(self) -> &'static str {
         match self {
             Self::Database => "faults of the database",
@@ -70,7 +70,7 @@ impl Kind {
         }
     }
 
-    /// Whether it is of a pair, which can be put back to be done.
+    /// Returns whether it concerns a pair, which can be sent back to run again.
     pub const fn is_of_pair(self) -> bool {
         match self {
             Self::Database | Self::Schema | Self::Reference | Self::Counter => false,
@@ -86,16 +86,16 @@ impl Kind {
     }
 }
 
-/// One piece of damage.
+/// One damaged file, row or counter.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// What kind it is.
+    /// Kind of damage.
     pub kind: Kind,
-    /// The pair, where it is of one.
+    /// The pair concerned, if any.
     pub pair: Option<PairName>,
-    /// The stage to be done again, where it is of a pair.
+    /// The stage to run again, if a pair is concerned.
     pub stage: Option<Stage>,
-    /// The file, counter or row, in words.
+    /// Description of the file, counter or row.
     pub what: String,
 }
 

@@ -1,7 +1,7 @@
-//! A project held against itself: the database's own checks, counters and states against rows, files against rows.
+//! Checks a project for damage: the database file, counters and job states against rows, and files against rows.
 //!
-//! Read in pages, so that memory stays the same whatever the number of pairs. What is damaged can be put back to be
-//! done; verdicts and the history of results are never touched.
+//! Pairs are read in pages, so that memory does not grow with their number. Damaged results can be sent back to be
+//! computed again; verdicts and the history of results are never changed.
 
 mod finding;
 mod pairs;
@@ -14,47 +14,47 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use crate::catalog::{AuditedPair, Catalog, CatalogError, CatalogErrorKind, Drift};
 use crate::store::{Project, ReferencedArtifacts, UnreferencedKind};
-use pairs::Look;
+use pairs::PairCheck;
 
-/// Pairs in memory at a time.
+/// Number of pairs in memory at a time.
 const PAGE: usize = 500;
 
-/// How to check.
+/// Options of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CheckOptions {
-    /// Compare lengths of files in place of their hashes, and leave out whether indexes agree with tables.
+    /// Compare the lengths of files instead of their hashes, and do not compare indexes with tables.
     pub quick: bool,
-    /// Mend what can be mended. The caller holds the lock of the run, alone.
+    /// Repair what can be repaired. The caller holds the exclusive run lock.
     pub repair: bool,
-    /// Whether a run may be writing artifacts; then files that no row names cannot be told.
+    /// Whether a run may be writing artifacts; then unreferenced files are not reported.
     pub in_use: bool,
 }
 
-/// Why a check could not be made. Damage is no error: it is in the summary.
+/// Why a check could not be completed. Damage is not an error: the summary lists it.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
-    /// The catalog refused.
+    /// The catalog returned an error.
     #[error(transparent)]
     Catalog(#[from] CatalogError),
-    /// The folder of artifacts refused.
+    /// The artifact folder cannot be read.
     #[error("{path}: {source}")]
     Artifacts {
         /// The folder.
         path: std::path::PathBuf,
-        /// Why.
+        /// The cause.
         source: std::io::Error,
     },
-    /// A thread was lost.
+    /// A worker thread panicked or was cancelled.
     #[error("the check stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
 
-/// Checks a project, and mends it when asked to.
+/// Checks a project and, with `repair`, repairs it.
 ///
-/// A damaged database is never written to, except that indexes are made anew where they alone are wrong.
+/// A damaged database is not written to, except that its indexes are rebuilt if nothing else is wrong.
 ///
 /// # Errors
-/// When catalog or disk refuse.
+/// When the catalog or the artifact folder cannot be read or written.
 pub async fn check(
     project: &Project,
     catalog: &Catalog,
@@ -69,7 +69,7 @@ pub async fn check(
     let rest = rows_and_files(project, catalog, options, &mut summary).await;
     match rest {
         Err(CheckError::Catalog(error)) if is_damage(&error) => {
-            // The database's own check may have passed over a value that is not what its column holds.
+            // The integrity check of SQLite can miss a value that does not fit its column.
             summary.add(Finding::database(format!("not read to its end: {error}")));
             Ok(summary)
         }
@@ -79,14 +79,15 @@ pub async fn check(
 }
 
 fn is_damage(error: &CatalogError) -> bool {
-    let told = matches!(error, CatalogError::Corrupt(_) | CatalogError::Json(_));
-    told || matches!(
-        error.kind(),
-        Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase)
-    )
+    let is_invalid_row = matches!(error, CatalogError::Corrupt(_) | CatalogError::Json(_));
+    is_invalid_row
+        || matches!(
+            error.kind(),
+            Some(CatalogErrorKind::Damaged | CatalogErrorKind::NotADatabase)
+        )
 }
 
-/// The database by itself; says whether it may be written to.
+/// Checks the database file; returns whether it may be written to.
 async fn database(
     catalog: &Catalog,
     options: CheckOptions,
@@ -108,7 +109,7 @@ async fn database(
     Ok(true)
 }
 
-/// Whether a line of SQLite's check speaks of an index that does not agree with its table.
+/// Returns whether a line of the integrity check of SQLite reports an index that does not match its table.
 fn is_of_index(line: &str) -> bool {
     line.contains("missing from index") || line.contains("wrong # of entries in index")
 }
@@ -130,13 +131,13 @@ async fn rows_and_files(
         let page = catalog.audit_page(after, PAGE).await?;
         let Some(last) = page.last() else { break };
         after = Some(last.inputs.pair);
-        let looks = look_at(project, page, options.quick).await?;
-        mend_pairs(catalog, options, &looks, summary).await?;
-        for look in looks {
-            for hash in &look.named {
+        let checks = check_page(project, page, options.quick).await?;
+        repair_pairs(catalog, options, &checks, summary).await?;
+        for check in checks {
+            for hash in &check.named {
                 named.add(hash);
             }
-            summary.count(look, options.repair);
+            summary.count(check, options.repair);
         }
     }
     if !options.in_use {
@@ -184,30 +185,30 @@ async fn counters(
     Ok(())
 }
 
-/// Looks at a page's rows and files on all cores.
-async fn look_at(
+/// Checks the rows and files of a page of pairs on all cores.
+async fn check_page(
     project: &Project,
     page: Vec<AuditedPair>,
     quick: bool,
-) -> Result<Vec<Look>, CheckError> {
+) -> Result<Vec<PairCheck>, CheckError> {
     let project = project.clone();
-    let look = move || {
+    let work = move || {
         page.into_par_iter()
-            .map(|pair| pairs::look(&project, &pair, quick))
+            .map(|pair| pairs::check_pair(&project, &pair, quick))
             .collect()
     };
-    Ok(tokio::task::spawn_blocking(look).await?)
+    Ok(tokio::task::spawn_blocking(work).await?)
 }
 
-async fn mend_pairs(
+async fn repair_pairs(
     catalog: &Catalog,
     options: CheckOptions,
-    looks: &[Look],
+    checks: &[PairCheck],
     summary: &mut CheckSummary,
 ) -> Result<(), CheckError> {
-    let back = looks
+    let back = checks
         .iter()
-        .filter_map(|look| Some((look.pair, look.back_to()?)));
+        .filter_map(|check| Some((check.pair, check.back_to()?)));
     let back: Vec<_> = back.collect();
     if options.repair && !back.is_empty() {
         summary.repaired.put_back += back.len() as u64;
@@ -216,7 +217,7 @@ async fn mend_pairs(
     Ok(())
 }
 
-/// Files that no row names; removes those that are ours.
+/// Counts unreferenced files and, with `remove`, deletes those that the program wrote.
 async fn spare_files(
     project: &Project,
     named: ReferencedArtifacts,
@@ -228,7 +229,7 @@ async fn spare_files(
         let mut spare = Spare::default();
         let walked = named.for_each_unreferenced(&folder, |unnamed| {
             let ours = unnamed.kind != UnreferencedKind::UnknownFile;
-            // One that cannot be removed is told again by the next check.
+            // The next check reports a file again that cannot be deleted.
             let removed = remove && ours && std::fs::remove_file(&unnamed.path).is_ok();
             spare.count(&unnamed, removed);
         });
@@ -251,7 +252,7 @@ mod tests {
     use super::is_of_index;
 
     #[test]
-    fn only_indexes_are_made_anew() {
+    fn only_index_faults_are_rebuilt() {
         assert!(is_of_index("row 3 missing from index job_ready"));
         assert!(is_of_index("wrong # of entries in index job_ready"));
         assert!(!is_of_index(

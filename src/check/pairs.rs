@@ -1,4 +1,4 @@
-//! One pair held against its rows and files.
+//! Checks one pair: its rows against each other and against its files.
 
 use std::collections::BTreeSet;
 
@@ -10,31 +10,31 @@ use crate::domain::{
 use crate::runner::result_hash;
 use crate::store::{ArtifactError, InputError, Project, hash_input, stat_input};
 
-/// What a look at a pair gave.
+/// Result of the check of one pair.
 #[derive(Debug)]
-pub(super) struct Look {
+pub(super) struct PairCheck {
     pub(super) pair: PairId,
     pub(super) damage: Vec<Finding>,
-    /// Hashes of all artifacts its rows name, those of stages to be done again too.
+    /// Hashes of all artifacts that its rows reference, including those of stages that will run again.
     pub(super) named: Vec<ContentHash>,
-    /// Files that were looked at.
+    /// Number of files checked.
     pub(super) files: u64,
     pub(super) inputs_missing: Vec<String>,
     pub(super) inputs_changed: Vec<String>,
 }
 
-impl Look {
-    /// The first stage to be done again.
+impl PairCheck {
+    /// Returns the first damaged stage, from which the pair must run again.
     pub(super) fn back_to(&self) -> Option<Stage> {
         self.damage.iter().filter_map(|finding| finding.stage).min()
     }
 }
 
-/// Looks at a pair. Results of stages that are still before it are what an earlier turn left: they name files that
-/// stay, and no more is asked of them.
-pub(super) fn look(project: &Project, pair: &AuditedPair, quick: bool) -> Look {
+/// Checks the rows and files of a pair; with `quick` only the length of each file. Results of stages at or after the
+/// job's cursor remain from an earlier run: their files stay referenced, but are not checked.
+pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> PairCheck {
     let state = state(pair);
-    let mut look = Look {
+    let mut check = PairCheck {
         pair: pair.inputs.pair,
         damage: state.into_iter().map(|fault| fault.of(pair)).collect(),
         named: Vec::new(),
@@ -45,23 +45,24 @@ pub(super) fn look(project: &Project, pair: &AuditedPair, quick: bool) -> Look {
     for (stage, result) in &pair.results {
         let files: Option<ArtifactSet> = serde_json::from_str(&result.files).ok();
         let files = files.unwrap_or_default();
-        look.named
+        check
+            .named
             .extend(files.values().map(|artifact| artifact.hash));
-        if !is_behind(pair, *stage) {
+        if !is_before_cursor(pair, *stage) {
             continue;
         }
-        look.files += files.len() as u64;
+        check.files += files.len() as u64;
         for artifact in files.values() {
             if let Err(error) = project.check_artifact(artifact, quick) {
-                look.damage.push(file(*stage, &error).of(pair));
+                check.damage.push(file(*stage, &error).of(pair));
             }
         }
     }
-    inputs(project, pair, &mut look);
-    look
+    inputs(project, pair, &mut check);
+    check
 }
 
-/// Damage before the pair's name is put to it.
+/// Damage, without the name of the pair.
 #[derive(Debug, PartialEq, Eq)]
 struct Fault {
     kind: Kind,
@@ -85,19 +86,19 @@ impl Fault {
     }
 }
 
-fn is_behind(pair: &AuditedPair, stage: Stage) -> bool {
+fn is_before_cursor(pair: &AuditedPair, stage: Stage) -> bool {
     pair.job
         .is_some_and(|(_, cursor)| (stage.index() as i64) < cursor)
 }
 
-/// The pair's state against its rows.
+/// Checks that the rows of the pair agree with the state of its job.
 fn state(pair: &AuditedPair) -> Vec<Fault> {
     let Some((status, cursor)) = pair.job else {
         return vec![Fault::new(Kind::JobMissing, Stage::Fit, "it has no job")];
     };
     let mut faults = Vec::new();
     for stage in Stage::ALL {
-        if !is_behind(pair, stage) {
+        if !is_before_cursor(pair, stage) {
             continue;
         }
         match pair.results.get(&stage) {
@@ -109,7 +110,7 @@ fn state(pair: &AuditedPair) -> Vec<Fault> {
             Some(result) if !has_its_hash(result) => faults.push(Fault::new(
                 Kind::ResultChanged,
                 stage,
-                "the result is not what it was",
+                "the result differs from its hash",
             )),
             Some(_) => {}
         }
@@ -118,19 +119,19 @@ fn state(pair: &AuditedPair) -> Vec<Fault> {
     if let (JobStatus::Done, Some(last)) = (status, last)
         && metrics_of(last).is_none_or(|metrics| metrics != pair.metrics)
     {
-        let what = "its metrics are not those of its result";
+        let what = "its metrics differ from those of its result";
         faults.push(Fault::new(Kind::Metrics, Stage::Register, what));
     }
     let failed = matches!(status, JobStatus::Backoff | JobStatus::Quarantined);
     let next = usize::try_from(cursor).ok().and_then(Stage::from_index);
     if let (true, false, Some(next)) = (failed, pair.has_failure, next) {
-        let what = "it failed, and nothing says why";
+        let what = "it failed, but the reason is missing";
         faults.push(Fault::new(Kind::ReasonMissing, next, what));
     }
     faults
 }
 
-/// Whether numbers and files of a result are those it was stored with.
+/// Returns whether the outcome and files of a result still have the stored result hash.
 fn has_its_hash(result: &AuditedResult) -> bool {
     serde_json::from_str(&result.files)
         .is_ok_and(|files| result_hash(&result.outcome, &files) == result.result_hash)
@@ -150,8 +151,8 @@ fn file(stage: Stage, error: &ArtifactError) -> Fault {
     Fault::new(kind, stage, error.to_string())
 }
 
-/// Input files that are gone or no longer what was read: no damage, a run takes care of them.
-fn inputs(project: &Project, pair: &AuditedPair, look: &mut Look) {
+/// Lists input files that are missing or have changed since they were read. This is no damage: a run handles it.
+fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
     let known = &pair.inputs;
     for (stored, seen) in [
         (&known.mesh_path, known.mesh.as_ref()),
@@ -160,15 +161,15 @@ fn inputs(project: &Project, pair: &AuditedPair, look: &mut Look) {
         let path = project.input_path(stored);
         let said = || format!("{} of {}", path.display(), pair.name);
         match stat_input(&path) {
-            Err(InputError::NotThere(_)) => look.inputs_missing.push(said()),
-            Err(_) => look.inputs_changed.push(said()),
+            Err(InputError::NotThere(_)) => check.inputs_missing.push(said()),
+            Err(_) => check.inputs_changed.push(said()),
             Ok(stat) => {
                 let moved = |seen: &&InputVersion| seen.stat != stat.as_str();
                 let changed = seen.filter(moved).is_some_and(|seen| {
                     hash_input(&path).map_or(true, |found| found.hash != seen.hash)
                 });
                 if changed {
-                    look.inputs_changed.push(said());
+                    check.inputs_changed.push(said());
                 }
             }
         }
@@ -184,7 +185,7 @@ mod tests {
     use crate::domain::{ArtifactSet, JobStatus, PairId, Stage};
 
     fn pair(status: JobStatus, cursor: i64) -> AuditedPair {
-        let outcome = r#"{"metrics":[]}"#.to_owned();
+        let outcome = r#"{"ink":0,"metrics":[]}"#.to_owned();
         let result = AuditedResult {
             result_hash: result_hash(&outcome, &ArtifactSet::new()),
             outcome,
@@ -214,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_that_has_what_it_should_is_sound_at_every_stage() {
+    fn a_complete_pair_is_sound_at_every_stage() {
         for cursor in 0..4 {
             assert_eq!(found(&pair(JobStatus::Ready, cursor)), []);
         }
@@ -225,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn only_results_behind_a_pair_are_asked_for() {
+    fn only_results_before_the_cursor_are_required() {
         let mut broken = pair(JobStatus::Ready, 2);
         broken.results.remove(&Stage::Depth);
         broken.results.remove(&Stage::Normalize);
@@ -237,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pair_without_job_reason_or_metrics_is_told() {
+    fn a_missing_job_reason_or_metric_is_reported() {
         let mut lost = pair(JobStatus::Ready, 0);
         lost.job = None;
         assert_eq!(found(&lost), [(Kind::JobMissing, Stage::Fit)]);

@@ -1,82 +1,82 @@
-//! What a check found, counted, with the first of each kind by name.
+//! Summary of a check: counts by kind, with the first findings of each.
 
 use std::collections::BTreeMap;
 
 use serde::Serialize;
 
 use super::finding::{Finding, Kind};
-use super::pairs::Look;
+use super::pairs::PairCheck;
 use crate::store::{UnreferencedFile, UnreferencedKind};
 
-/// Findings of a kind, and inputs, that are kept by name.
+/// Number of findings listed per kind, and of input files listed.
 const NAMED: usize = 20;
 
-/// What a check found; serialises to what `check --json` prints.
+/// Result of a check; serialized by `check --json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct CheckSummary {
-    /// Version of this form.
+    /// Version of this JSON schema.
     pub schema: u32,
-    /// Whether only lengths of files were compared.
+    /// Whether only the lengths of files were compared.
     pub quick: bool,
-    /// Pairs that were looked at.
+    /// Number of pairs checked.
     pub pairs: u64,
-    /// Files of results that were looked at.
+    /// Number of result files checked.
     pub files: u64,
-    /// Damage by kind; only what there is.
+    /// Damage by kind, without kinds that were not found.
     pub damage: BTreeMap<Kind, Found>,
-    /// Input files that are not there. No damage: results made from them stand.
+    /// Missing input files. No damage: results computed from them stay valid.
     pub inputs_missing: Notes,
-    /// Input files that are no longer what was read. No damage: the next run takes them up.
+    /// Input files that changed after they were read. No damage: the next run computes their pairs again.
     pub inputs_changed: Notes,
-    /// Files in the folder of artifacts that no row names; `None` where it cannot be told, because a run goes on.
+    /// Unreferenced files in the artifact folder; `None` while a run is writing there.
     pub spare: Option<Spare>,
-    /// What was mended.
+    /// Repairs made.
     pub repaired: Repaired,
 }
 
 /// Damage of one kind.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Found {
-    /// How often it was found.
+    /// Number of findings.
     pub found: u64,
-    /// How often it is still there.
+    /// Number of findings that remain after the repair.
     pub left: u64,
-    /// The first ones.
+    /// The first findings.
     pub first: Vec<Finding>,
 }
 
-/// Things to know, counted, the first by name.
+/// Notes about files: their number and the first of them.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct Notes {
-    /// How many.
+    /// Number of files.
     pub count: u64,
-    /// The first ones.
+    /// The first findings.
     pub first: Vec<String>,
 }
 
-/// Files that no row names.
+/// Unreferenced files.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Spare {
-    /// Files of results that no row names any more, or never did, with those half-written.
+    /// Result files that no row references, partly written ones included.
     pub files: u64,
-    /// Their length together.
+    /// Total length in bytes.
     pub bytes: u64,
-    /// How many of them were removed.
+    /// Number of files deleted.
     pub removed: u64,
-    /// Files that are not the program's; they are left alone.
+    /// Files that the program did not write; they are never deleted.
     pub strangers: u64,
 }
 
-/// What was mended.
+/// Repairs made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Repaired {
-    /// Pairs that were put back to be done.
+    /// Number of pairs sent back to run again.
     pub put_back: u64,
-    /// Whether counters were counted anew.
+    /// Whether the counters were rebuilt.
     pub counters: bool,
-    /// Whether indexes were made anew.
+    /// Whether the indexes were rebuilt.
     pub indexes: bool,
-    /// Whether indexes or triggers that were gone were made.
+    /// Whether missing indexes or triggers were created.
     pub schema: bool,
 }
 
@@ -95,12 +95,12 @@ impl CheckSummary {
         }
     }
 
-    /// Damage that is still there.
+    /// Returns the number of findings that remain.
     pub fn left(&self) -> u64 {
         self.damage.values().map(|found| found.left).sum()
     }
 
-    /// Damage that was found.
+    /// Returns the number of findings.
     pub fn found(&self) -> u64 {
         self.damage.values().map(|found| found.found).sum()
     }
@@ -114,31 +114,31 @@ impl CheckSummary {
         }
     }
 
-    /// All of a kind was mended.
+    /// Marks all findings of a kind as repaired.
     pub(super) fn mended(&mut self, kind: Kind) {
         self.mended_but(kind, 0);
     }
 
-    /// All of a kind was mended but a number.
+    /// Marks all findings of a kind as repaired, except `left` of them.
     pub(super) fn mended_but(&mut self, kind: Kind, left: u64) {
         if let Some(found) = self.damage.get_mut(&kind) {
             found.left = left;
         }
     }
 
-    /// Counts what a look at a pair gave; `put_back` when it is to be done again by now.
-    pub(super) fn count(&mut self, look: Look, put_back: bool) {
+    /// Adds the check of a pair; `put_back` when the pair was sent back to run again.
+    pub(super) fn count(&mut self, check: PairCheck, put_back: bool) {
         self.pairs += 1;
-        self.files += look.files;
-        for finding in look.damage {
+        self.files += check.files;
+        for finding in check.damage {
             let kind = finding.kind;
             self.add(finding);
             if let (true, Some(found)) = (put_back, self.damage.get_mut(&kind)) {
                 found.left -= 1;
             }
         }
-        self.inputs_missing.add(look.inputs_missing);
-        self.inputs_changed.add(look.inputs_changed);
+        self.inputs_missing.add(check.inputs_missing);
+        self.inputs_changed.add(check.inputs_changed);
     }
 }
 

@@ -13,7 +13,7 @@ use super::table::{Align, columns, count};
 use super::time_text::{duration, utc};
 use super::verdict_file::{self, VerdictRow};
 use super::{files, select};
-use crate::catalog::{Catalog, Look, NewVerdict, VerdictEvent};
+use crate::catalog::{Catalog, NewVerdict, ReviewContext, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 
 /// Commands on verdicts.
@@ -114,9 +114,9 @@ async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode
         reviewer: args.reviewer,
         reason: args.reason,
         note: args.note,
-        look: Look {
+        look: ReviewContext {
             angle_read_deg: args.angle,
-            ..Look::default()
+            ..ReviewContext::default()
         },
         at: None,
     };
@@ -264,7 +264,7 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
 }
 
 /// Formats how long the reviewer looked, and the remaining rotation that was read.
-fn view_text(look: &Look) -> String {
+fn view_text(look: &ReviewContext) -> String {
     let shown = look.shown_ms.map(duration);
     let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));
     let parts: Vec<String> = shown.into_iter().chain(angle).collect();

@@ -7,7 +7,7 @@ use csv::StringRecord;
 use serde::Deserialize;
 
 use super::time_text::parse_utc;
-use crate::catalog::{Look, NewVerdict};
+use crate::catalog::{NewVerdict, ReviewContext};
 use crate::config::hint;
 use crate::domain::{
     ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict, sanitize,
@@ -132,7 +132,7 @@ fn row(
         metric: cell(3).map(|text| value(text, line)).transpose()?,
         reason: cell(4).map(|text| value(text, line)).transpose()?,
         note: cell(5).map(ToOwned::to_owned),
-        look: Look::default(),
+        look: ReviewContext::default(),
         at: cell(6).map(|text| time(text, line)).transpose()?,
     };
     Ok(VerdictRow {
@@ -219,7 +219,7 @@ fn row_of_line(line: u64, parsed: VerdictLine) -> VerdictRow {
         reviewer: parsed.reviewer,
         reason: parsed.reason,
         note: parsed.note,
-        look: Look {
+        look: ReviewContext {
             event: parsed.event,
             seen: parsed.seen,
             shown_ms: parsed.shown_ms,

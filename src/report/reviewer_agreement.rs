@@ -246,7 +246,7 @@ fn independent_verdicts<'a>(group: &[&'a MetricRecord]) -> BTreeMap<&'a str, Ver
 #[cfg(test)]
 mod tests {
     use super::{AgreementCounts, MIN_RESULTS, OwnVerdicts, VerdictTable};
-    use crate::catalog::{AttentionCheckAnswer, Look, MetricRecord, ReviewerVerdict};
+    use crate::catalog::{AttentionCheckAnswer, MetricRecord, ReviewContext, ReviewerVerdict};
     use crate::domain::{
         AttentionCheck, ContentHash, PairName, ReviewOrder, ThresholdMetric, Verdict,
     };
@@ -262,7 +262,7 @@ mod tests {
             reviewer: "lan".to_owned(),
             reason: None,
             note: None,
-            look: Look::default(),
+            look: ReviewContext::default(),
             at: 0,
             undone_at: None,
         }

@@ -36,7 +36,7 @@ fn bootstrap_skipped(skipped: BootstrapSkipped) -> String {
             counted(MAX_UNITS as u64, "pair")
         ),
         BootstrapSkipped::TooFew { units, by } => format!(
-            "an interval needs at least {MIN_UNITS} {} and there are {units}",
+            "an interval needs at least {MIN_UNITS} {}; here: {units}",
             by.plural()
         ),
     };
@@ -127,7 +127,7 @@ mod tests {
             by: ResamplingUnit::Block,
         });
         assert!(
-            few.ends_with("because an interval needs at least 10 blocks and there are 5."),
+            few.ends_with("because an interval needs at least 10 blocks; here: 5."),
             "{few}"
         );
         let many = bootstrap_skipped(BootstrapSkipped::TooMany);

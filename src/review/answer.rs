@@ -4,7 +4,7 @@ use serde::Deserialize;
 
 use super::item::ReviewItem;
 use super::state::ServerState;
-use crate::catalog::{Look, NewVerdict};
+use crate::catalog::{NewVerdict, ReviewContext};
 use crate::domain::{Reason, Verdict};
 
 /// Maximum length of a note in characters.
@@ -86,7 +86,7 @@ impl AnswerBody {
             reviewer: state.queue_options.reviewer.clone(),
             reason: self.reason,
             note: check_note(self.note.as_deref())?,
-            look: Look {
+            look: ReviewContext {
                 event: Some(self.event.clone()),
                 seen: Some(item.view.hash()),
                 shown_ms: self.shown_ms,

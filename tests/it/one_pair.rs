@@ -133,10 +133,10 @@ fn paper_preset_has_only_its_three_metrics() {
     let warnings = report["warnings"].as_array().expect("a list");
     let is_of_one_pair = |warning: &Value| {
         let text = warning.as_str().expect("a sentence");
-        text.ends_with("that takes 10 blocks at least; here: 1.")
+        text.ends_with("needs at least 10 blocks; here: 1.")
     };
     assert!(warnings.iter().all(is_of_one_pair), "{warnings:?}");
-    assert_eq!(report["coverage"], serde_json::json!([]));
+    assert_eq!(report["risk_coverage"], serde_json::json!([]));
 
     at(&["export", "--to", "jsonl", "-o", "out"]).expect(0);
     let exported = Value::Array(lines(&dir.path().join("out/pairs.jsonl")));

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mocban::catalog::{Catalog, ImportRow, Look, NewVerdict};
+use mocban::catalog::{Catalog, ImportRow, NewVerdict, ReviewContext};
 use mocban::config::{self, Sources};
 use mocban::demo::{DemoOptions, Tier, write_dataset};
 use mocban::domain::{PairName, ThresholdMetric, Verdict};
@@ -345,7 +345,7 @@ async fn verdicts_make_acc(world: &World) {
         reviewer: "lan".to_owned(),
         reason: None,
         note: None,
-        look: Look::default(),
+        look: ReviewContext::default(),
         at: None,
     };
     let set = vec![

@@ -14,7 +14,7 @@ const REPEATED_TYPES: &[&str] = &[
     "Canvas",
     "Drawn",
     "Lanes",
-    "Look",
+    "ReviewContext",
     "Looks",
     "MetricRow",
     "Open",

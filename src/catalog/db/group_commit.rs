@@ -7,7 +7,7 @@ use sqlx::SqliteConnection;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::request::{Reply, Request};
 use crate::catalog::db::script::{Script, ScriptRows, Statement};
-use crate::catalog::queue::checkpoint::{self, StoredStages};
+use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints};
 use crate::catalog::queue::claim::{self, ClaimRequest, ClaimedRow, Heartbeat};
 use crate::catalog::queue::counters::Deltas;
 use crate::catalog::queue::fail::{self, FailedRow};
@@ -116,7 +116,7 @@ impl Batch {
             let claimed = rows.read(statement)?;
             claims.push(claim::leases(claimed, request.worker, &mut deltas)?);
         }
-        let stored: Vec<&StoredStages> = self
+        let stored: Vec<&LeasedCheckpoints> = self
             .checkpoints
             .iter()
             .map(|(item, _)| &**item)

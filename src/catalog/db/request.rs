@@ -6,7 +6,7 @@ use sqlx::SqliteConnection;
 use tokio::sync::oneshot;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::queue::checkpoint::StoredStages;
+use crate::catalog::queue::checkpoint::LeasedCheckpoints;
 use crate::catalog::queue::claim::{ClaimRequest, Heartbeat};
 use crate::catalog::queue::lease::{Lease, StageFailure};
 
@@ -16,7 +16,7 @@ pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;
 /// A request that may share a commit with others. A write under a lease is answered with whether the lease still held.
 pub(crate) enum Request {
     Heartbeat(Heartbeat, Reply<bool>),
-    Checkpoint(Box<StoredStages>, Reply<bool>),
+    Checkpoint(Box<LeasedCheckpoints>, Reply<bool>),
     Fail(Box<(Lease, StageFailure)>, Reply<bool>),
     Release(Lease, Reply<bool>),
     Claim(ClaimRequest, Reply<Vec<Lease>>),

@@ -13,7 +13,7 @@ use crate::domain::{ContentHash, JobStatus, MetricOutcome, PairId, Stage, UnixMi
 use crate::failpoint::{self, Point};
 
 /// A lease and the stages to be stored under it, in the order they were computed.
-pub(crate) type StoredStages = (Lease, Vec<StageCheckpoint>);
+pub(crate) type LeasedCheckpoints = (Lease, Vec<StageCheckpoint>);
 
 /// Advances jobs whose lease still holds and whose worker is alive. A stage that succeeds clears the suspicion that the
 /// pair kills workers. A result that does not follow on the one before marks the job dirty.
@@ -90,7 +90,7 @@ pub(crate) const ROWS: [&str; 6] = [
 /// Adds the advance of jobs to a script; it returns those whose lease still held.
 pub(crate) fn add_advance<'i>(
     script: &mut Script,
-    checkpoints: impl Iterator<Item = &'i StoredStages>,
+    checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,
 ) -> Result<Option<Statement<FencedRow>>> {
     script.add_over(ADVANCE, checkpoints.filter_map(advanced_job))
 }
@@ -98,7 +98,7 @@ pub(crate) fn add_advance<'i>(
 /// Adds the results of jobs that advanced to a script.
 pub(crate) fn add_results(
     script: &mut Script,
-    advanced: &[&StoredStages],
+    advanced: &[&LeasedCheckpoints],
     deltas: &mut Deltas,
 ) -> Result<()> {
     for (lease, stages) in advanced.iter().map(|stored| &**stored) {
@@ -127,7 +127,9 @@ pub(crate) fn add_results(
 }
 
 /// Pairs each stage with its lease.
-fn each_stage((lease, done): &StoredStages) -> impl Iterator<Item = (&Lease, &StageCheckpoint)> {
+fn each_stage(
+    (lease, done): &LeasedCheckpoints,
+) -> impl Iterator<Item = (&Lease, &StageCheckpoint)> {
     done.iter().map(move |one| (lease, one))
 }
 
@@ -160,7 +162,7 @@ struct AdvancedJob {
 }
 
 /// Combines all stages that are stored at once; `None` for no stage.
-fn advanced_job((lease, stages): &StoredStages) -> Option<AdvancedJob> {
+fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<AdvancedJob> {
     let last = stages.last()?;
     let after = key_after(last);
     let metrics = &mut last.metrics.iter();
@@ -237,7 +239,7 @@ const fn attempt_row((lease, done): (&Lease, &StageCheckpoint)) -> Attempt {
 
 /// One item of [`METRICS`].
 #[derive(Serialize)]
-struct MetricRow<'d> {
+struct MetricResultRow<'d> {
     pair: i64,
     row: &'d MetricOutcome,
     result_hash: ContentHash,
@@ -245,8 +247,8 @@ struct MetricRow<'d> {
 
 fn metric_rows<'d>(
     (lease, done): (&'d Lease, &'d StageCheckpoint),
-) -> impl Iterator<Item = MetricRow<'d>> {
-    done.metrics.iter().map(|metric| MetricRow {
+) -> impl Iterator<Item = MetricResultRow<'d>> {
+    done.metrics.iter().map(|metric| MetricResultRow {
         pair: lease.pair.0,
         row: &metric.outcome,
         result_hash: metric.result_hash,

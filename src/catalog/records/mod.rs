@@ -2,12 +2,12 @@
 
 pub(crate) mod ground_truth;
 pub(crate) mod import;
-pub(crate) mod look;
 pub(crate) mod manual_alignments;
 pub(crate) mod model;
 pub(crate) mod pair_results;
 pub(crate) mod pair_work;
 pub(crate) mod review_answers;
+pub(crate) mod review_context;
 pub(crate) mod stage_results;
 pub(crate) mod status;
 pub(crate) mod verdicts;

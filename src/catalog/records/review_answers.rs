@@ -8,7 +8,7 @@ use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::records::look::Look;
+use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::records::verdicts::{self, NewVerdict};
 use crate::domain::{
     AttentionCheck, ContentHash, PairName, Reason, ThresholdMetric, UnixMillis, Verdict,
@@ -79,7 +79,7 @@ pub struct AttentionCheckAnswer {
     pub note: Option<String>,
     /// How it came about.
     #[serde(flatten)]
-    pub look: Look,
+    pub look: ReviewContext,
     /// When.
     pub at: UnixMillis,
     /// When it was taken back, if it was.
@@ -308,7 +308,7 @@ fn check_answer(row: &SqliteRow) -> Result<AttentionCheckAnswer> {
         reviewer: row.try_get("reviewer")?,
         reason: reason(row)?,
         note: row.try_get("note")?,
-        look: Look::read(row)?,
+        look: ReviewContext::read(row)?,
         at: row.try_get("at")?,
         undone_at: row.try_get("undone_at")?,
     })

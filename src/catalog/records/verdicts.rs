@@ -11,7 +11,7 @@ use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::records::look::Look;
+use crate::catalog::records::review_context::ReviewContext;
 use crate::domain::{
     ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
 };
@@ -32,7 +32,7 @@ pub struct NewVerdict {
     /// In the reviewer's words.
     pub note: Option<String>,
     /// How it came about, as far as it is known.
-    pub look: Look,
+    pub look: ReviewContext,
     /// When it was given, where that was before it is stored.
     pub at: Option<UnixMillis>,
 }
@@ -60,7 +60,7 @@ pub struct VerdictEvent {
     pub note: Option<String>,
     /// How it came about, as far as it is known.
     #[serde(flatten)]
-    pub look: Look,
+    pub look: ReviewContext,
     /// When.
     pub at: UnixMillis,
     /// When it was taken back, if it was.
@@ -259,7 +259,7 @@ fn event(row: &SqliteRow) -> Result<VerdictEvent> {
         reviewer: row.try_get("reviewer")?,
         reason: reason.map(|reason| rows::name(&reason)).transpose()?,
         note: row.try_get("note")?,
-        look: Look::read(row)?,
+        look: ReviewContext::read(row)?,
         at: row.try_get("at")?,
         undone_at: row.try_get("undone_at")?,
         current: row.try_get("current")?,

@@ -2,7 +2,9 @@
 
 use super::{World, name};
 use crate::catalog::db::open;
-use crate::catalog::{AnsweredOn, Catalog, CatalogError, Look, ManualAlignment, NewVerdict, Shown};
+use crate::catalog::{
+    AnsweredOn, Catalog, CatalogError, ManualAlignment, NewVerdict, ReviewContext, Shown,
+};
 use crate::domain::{
     Affine2, AttentionCheck, ContentHash, PrintFromMesh, Reason, ReviewOrder, ThresholdMetric,
     Verdict,
@@ -16,7 +18,7 @@ fn given(event: &str, verdict: Verdict) -> NewVerdict {
         reviewer: "ana".to_owned(),
         reason: (verdict == Verdict::Fail).then_some(Reason::WrongPair),
         note: Some("torn".to_owned()),
-        look: Look {
+        look: ReviewContext {
             event: Some(event.to_owned()),
             seen: Some(ContentHash::of(b"seen")),
             shown_ms: Some(1_900),
@@ -152,7 +154,7 @@ async fn a_verdict_from_the_command_line_is_among_the_answers() {
     let world = World::new(1).await;
     world.finish_one().await;
     let typed = NewVerdict {
-        look: Look::default(),
+        look: ReviewContext::default(),
         at: Some(3),
         ..given("", Verdict::Pass)
     };

@@ -1,7 +1,7 @@
 //! Verdicts: bound to results, appended, taken back.
 
 use super::{World, name};
-use crate::catalog::{Catalog, CatalogError, CheckpointOutcome, Look, NewVerdict};
+use crate::catalog::{Catalog, CatalogError, CheckpointOutcome, NewVerdict, ReviewContext};
 use crate::domain::{ContentHash, Reason, Stage, ThresholdMetric, Verdict};
 
 /// Results of a pair that is done.
@@ -15,7 +15,7 @@ fn verdict(reviewer: &str, verdict: Verdict) -> NewVerdict {
         reviewer: reviewer.to_owned(),
         reason: (verdict == Verdict::Fail).then_some(Reason::Angle),
         note: None,
-        look: Look::default(),
+        look: ReviewContext::default(),
         at: None,
     }
 }

@@ -6,7 +6,7 @@ use super::super::model::LEASE;
 use super::super::state_machine::JobState;
 use super::super::{fingerprints, name, row};
 use super::{Game, LONGEST, MOST_PAIRS};
-use crate::catalog::{DeadWorker, Look, NewVerdict, RerunPolicy, RetrySelection};
+use crate::catalog::{DeadWorker, NewVerdict, RerunPolicy, RetrySelection, ReviewContext};
 use crate::domain::{JobStatus, Stage, ThresholdMetric, Verdict};
 
 impl Game {
@@ -153,7 +153,7 @@ impl Game {
             reviewer: "ana".to_owned(),
             reason: None,
             note: None,
-            look: Look::default(),
+            look: ReviewContext::default(),
             at: None,
         };
         let stored = self.world.catalog.verdict_set(vec![verdict], self.wall);

@@ -10,7 +10,7 @@ use crate::domain::{ContentHash, ReviewOrder};
 
 /// What is known of a verdict besides what it says; nothing of one that came from elsewhere.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
-pub struct Look {
+pub struct ReviewContext {
     /// The client's number of the act: sent twice, it is stored once.
     pub event: Option<String>,
     /// Hash of all that the picture on the screen was made from.
@@ -23,7 +23,7 @@ pub struct Look {
     pub review_order: Option<ReviewOrder>,
 }
 
-impl Look {
+impl ReviewContext {
     /// From the columns of its names.
     pub(crate) fn read(row: &SqliteRow) -> Result<Self> {
         let order: Option<String> = row.try_get("review_order")?;
