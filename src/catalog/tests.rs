@@ -30,7 +30,7 @@ use crate::domain::{
 };
 
 impl Catalog {
-    /// A new catalog whose writer lets what can wait do so for ever.
+    /// A new catalog whose writer never commits deferrable requests by itself.
     pub(crate) async fn create_patient(path: &Path) -> super::Result<Self> {
         Self::with_writer(path, true, CommitDelay::of(Duration::from_hours(1))).await
     }
@@ -126,7 +126,7 @@ impl World {
         self.catalog.claim(request).await.expect("a claim")
     }
 
-    /// Enters another worker that takes all others for dead, and so many pairs come back from them.
+    /// Registers another worker that treats all others as dead; `n` pairs must come back from them.
     async fn recovered_by_another(&self, pairs: u64) -> WorkerId {
         let other = register(&self.catalog).await;
         let recovered = self.catalog.recover(DeadWorker::AllExcept(other), 60).await;
@@ -159,7 +159,7 @@ impl World {
 }
 
 impl World {
-    /// What is told of all pairs at once is what a look at each of them tells, with the settings of now and others.
+    /// The plan of all pairs equals the sum of the plans of each pair, with the current and with other settings.
     async fn shortcuts_hold(&self) {
         let names = self.catalog.pair_names().await.expect("names");
         for revision in [[1; 4], [1, 1, 2, 1]] {

@@ -217,7 +217,7 @@ async fn repair_pairs(
     Ok(())
 }
 
-/// Counts unreferenced files and, with `remove`, deletes those that the program wrote.
+/// Counts unreferenced files and, with `remove`, deletes the ones written by the program.
 async fn spare_files(
     project: &Project,
     named: ReferencedArtifacts,

@@ -61,7 +61,7 @@ impl std::str::FromStr for FailureClass {
     }
 }
 
-/// A failure as it is stored and shown: its class and a message with the file and the reason.
+/// A failure, stored and shown in this form: its class and a message with the file and the reason.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{message}")]
 pub struct Failure {

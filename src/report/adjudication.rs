@@ -7,7 +7,7 @@ use super::stats::{IntervalMethod, Rate};
 use crate::catalog::MetricRecord;
 use crate::domain::Verdict;
 
-/// Acc of a metric under three rules: passed results of those that passed or failed under the rule.
+/// Acc of a metric under three rules: the share of passed results among results passed or failed under the rule.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AdjudicationRules {
     /// Results that at least two reviewers independently passed or failed; without any, all rules agree.

@@ -8,7 +8,7 @@ use super::stats::{IntervalMethod, Rate};
 use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
 use crate::domain::Verdict;
 
-/// Planted faults that reviewers failed, of those that they answered. An unsure answer does not detect the fault.
+/// Share of answered planted faults that reviewers failed. An unsure answer does not detect the fault.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct AttentionCheckRates {
     /// Of every kind.

@@ -36,7 +36,7 @@ pub struct ReviewerAgreement {
     pub reviewer_pairs: Vec<ReviewerPair>,
     /// Every reviewer, by name.
     pub reviewers: Vec<ReviewerRecord>,
-    /// Planted faults that all reviewers together failed, of those that they answered.
+    /// Share of planted faults failed, among the faults answered by all reviewers together.
     pub attention_checks: Rate,
 }
 
@@ -86,7 +86,7 @@ pub struct ReviewerRecord {
     pub judged: u64,
     /// Results shown a second time that got the same verdict again.
     pub duplicates: Rate,
-    /// Planted faults that they failed, of those that they answered.
+    /// Share of answered planted faults that they failed.
     pub attention_checks: AttentionCheckRates,
 }
 

@@ -8,22 +8,7 @@ use crate::source_text::{identifier, package_dir, rust_files, source_files};
 const MAX_LINES: usize = 450;
 
 /// Type names that are declared more than once. Remove a name here when it is unique; add none.
-const REPEATED_TYPES: &[&str] = &[
-    "Agreement",
-    "Ascii",
-    "Canvas",
-    "Drawn",
-    "Lanes",
-    "ReviewContext",
-    "Looks",
-    "MetricRow",
-    "Open",
-    "Pictures",
-    "Row",
-    "Samples",
-    "StoredStages",
-    "Sums",
-];
+const REPEATED_TYPES: &[&str] = &[];
 
 /// Names of associated types, which repeat by nature.
 const ASSOCIATED_TYPES: &[&str] = &[
@@ -48,7 +33,8 @@ const BANNED_PHRASES: &[&str] = &[
     " so many ",
     " those that ",
     " laid on ",
-    " for ever",
+    " for ever ",
+    " for ever.",
     " looked at once",
     " in hand",
     " as it is ",
@@ -57,10 +43,10 @@ const BANNED_PHRASES: &[&str] = &[
 ];
 
 /// Occurrences of banned phrases that are still in `src`. Lower the number when it drops; never raise it.
-const BANNED_PHRASES_LEFT: usize = 143;
+const BANNED_PHRASES_LEFT: usize = 0;
 
 /// Public functions of numeric rooms without a verb in front. Lower the number when it drops; never raise it.
-const MISSING_VERBS_LEFT: usize = 62;
+const MISSING_VERBS_LEFT: usize = 0;
 
 /// Files above the limit. Remove a file here when it is split; add none.
 const LONG_FILES: &[&str] = &[];

@@ -221,7 +221,7 @@ async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
     Ok(Value::from(items).to_string())
 }
 
-/// Marks the dead workers; returns those that may hold leases, as a JSON array.
+/// Marks the dead workers; returns the workers whose leases may still be open, as a JSON array.
 async fn mark_dead(conn: &mut SqliteConnection, dead: &DeadWorker) -> Result<String> {
     match dead {
         DeadWorker::Workers(workers) => {

@@ -63,7 +63,7 @@ struct RequeuedJob {
 }
 
 impl Catalog {
-    /// Requeues pairs whose settings or inputs changed, and those that the policy asks for; returns how many.
+    /// Requeues pairs whose settings or inputs changed and pairs selected by the policy; returns how many.
     ///
     /// # Errors
     /// When the database refuses.

@@ -1,4 +1,4 @@
-//! True alignments, where a dataset has them: stored as given, read by the report.
+//! Ground truth of a dataset, if it has any: stored as given and read by the report.
 
 use serde_json::{Value, json};
 use sqlx::SqliteConnection;
@@ -21,19 +21,19 @@ SELECT item.value ->> 'name' FROM json_each(?1) AS item
 WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.name = item.value ->> 'name') LIMIT 1";
 
 impl Catalog {
-    /// Stores true alignments as given, replacing earlier ones; says how many.
+    /// Stores true alignments as given and replaces earlier ones; returns how many.
     ///
     /// # Errors
-    /// When a pair is not there; then nothing is stored.
+    /// When a pair does not exist; then nothing is stored.
     pub async fn set_truth(&self, truths: Vec<(PairName, Value)>) -> Result<u64> {
         self.in_transaction(move |conn| Box::pin(async move { set(conn, &truths).await }))
             .await
     }
 
-    /// Whether any pair has a true alignment.
+    /// Returns whether any pair has a true alignment.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn has_truth(&self) -> Result<bool> {
         let mut conn = self.read_conn().await?;
         Ok(sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM truth)")
@@ -42,7 +42,7 @@ impl Catalog {
     }
 }
 
-/// Stores true alignments in the transaction that is open; says how many.
+/// Stores true alignments in the open transaction; returns how many.
 pub(crate) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)]) -> Result<u64> {
     let mut stored = 0;
     for chunk in truths.chunks(500) {

@@ -1,4 +1,4 @@
-//! Pairs as imported: their names, paths and what is known of them.
+//! Import of pairs: names, paths and attributes.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,26 +20,26 @@ use crate::domain::{PairName, UnixMillis};
 /// A row to import.
 pub type ImportRow = PairAttributes;
 
-/// Rows in one statement.
+/// Number of rows in one statement.
 const CHUNK: usize = 2_000;
 
-/// A part of what is imported.
+/// A message of a streamed import.
 #[derive(Debug)]
 pub enum ImportChunk {
     /// The next rows.
     Rows(Vec<ImportRow>),
-    /// That was all of them.
+    /// The end of the rows.
     End,
 }
 
-/// What an import changed.
+/// Counts of an import.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct ImportSummary {
-    /// Pairs that were not there.
+    /// Number of new pairs.
     pub added: u64,
-    /// Pairs that were there with other values, and which fields differ, by name.
+    /// Existing pairs with other values and the fields that differ, by name.
     pub changed: Vec<PairChange>,
-    /// Pairs that were there just so.
+    /// Number of existing pairs with the same values.
     pub unchanged: u64,
 }
 
@@ -57,7 +57,7 @@ const SELECT: &str = "
 SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta
 FROM pair WHERE name IN (SELECT value FROM json_each(?1))";
 
-/// A path that changed forgets what the file looked like, so that the next run reads it.
+/// Updates changed rows. A changed path clears the stored file state, so that the next run reads the file.
 const UPSERT: &str = "
 INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, attributes, imported)
 SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', value ->> 'face_down',
@@ -75,11 +75,11 @@ SELECT id, 0, 0 FROM pair WHERE name IN (SELECT value FROM json_each(?1))
     AND NOT EXISTS (SELECT 1 FROM job WHERE job.pair = pair.id)";
 
 impl Catalog {
-    /// Imports rows in one transaction: new ones are added, others take the new values. Of two rows with the
-    /// same name the later one counts.
+    /// Imports rows in one transaction: new pairs are added, existing pairs are updated. Of two rows with the same
+    /// name the later one counts.
     ///
     /// # Errors
-    /// When the database refuses; then nothing is imported.
+    /// When the database returns an error; then nothing is imported.
     pub async fn import(&self, rows: Vec<ImportRow>, now: UnixMillis) -> Result<ImportSummary> {
         let (sender, chunks) = mpsc::channel(2);
         for chunk in [ImportChunk::Rows(rows), ImportChunk::End] {
@@ -90,10 +90,10 @@ impl Catalog {
         Ok(summary)
     }
 
-    /// Imports rows as they come, and true alignments, in one transaction; also says how many of those were stored.
+    /// Imports streamed rows and true alignments in one transaction; also returns the number of true alignments.
     ///
     /// # Errors
-    /// When the rows stop without an end, a pair of a true alignment is not there even now, or the database refuses;
+    /// When the rows stop without an end, a true alignment names an unknown pair, or the database returns an error;
     /// then nothing is imported.
     pub async fn import_all(
         &self,
@@ -126,10 +126,10 @@ impl Catalog {
         .await
     }
 
-    /// Names of all pairs, sorted.
+    /// Returns the names of all pairs, sorted.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let names: Vec<String> = sqlx::query_scalar("SELECT name FROM pair ORDER BY name")
@@ -138,10 +138,10 @@ impl Catalog {
         names.iter().map(|name| rows::pair_name(name)).collect()
     }
 
-    /// Those of the names that are no pairs, in the order given.
+    /// Returns the names that are not pairs, in the order given.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let found: Vec<String> = sqlx::query_scalar(
@@ -155,10 +155,10 @@ impl Catalog {
         Ok(unknown.cloned().collect())
     }
 
-    /// Pairs by their names; unknown names are left out.
+    /// Returns pairs by their names; unknown names are left out.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
         let mut conn = self.read_conn().await?;
         select(&mut conn, names).await
@@ -208,7 +208,7 @@ fn item(row: &ImportRow) -> Value {
     })
 }
 
-/// What the manifest says that results depend on, as the catalog compares it.
+/// Returns the manifest attributes that results depend on, in the form in which the catalog compares them.
 fn result_attributes(row: &ImportRow) -> String {
     json!({ "scanned_face_down": row.scanned_face_down, "unit": row.unit }).to_string()
 }
@@ -231,7 +231,7 @@ fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
     .collect()
 }
 
-/// A pair's attributes from a row that has the columns of [`SELECT`] by name.
+/// Reads a pair's attributes from a row with the columns of [`SELECT`].
 pub(crate) fn attributes(row: &SqliteRow) -> Result<PairAttributes> {
     let unit: Option<String> = row.try_get("unit")?;
     let meta: String = row.try_get("meta")?;

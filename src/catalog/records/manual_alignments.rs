@@ -1,4 +1,4 @@
-//! Alignments that people made by hand: append-only, beside the automatic ones, bound to what they were made on.
+//! Manual alignments: append-only, stored beside the automatic results and bound to the files they were made on.
 
 use std::collections::BTreeMap;
 
@@ -12,10 +12,10 @@ use crate::catalog::handle::Catalog;
 use crate::catalog::records::review_answers::pair_id;
 use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
 
-/// An alignment by hand.
+/// A manual alignment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ManualAlignment {
-    /// The client's number of the act: sent twice, it is stored once.
+    /// Idempotency key of the client: an alignment sent twice is stored once.
     pub event: String,
     /// The pair.
     pub pair: PairName,
@@ -23,7 +23,7 @@ pub struct ManualAlignment {
     pub reviewer: String,
     /// Depth-map pixels to print pixels, for the depth map of `depth_hash`.
     pub print_from_depth: Affine2,
-    /// Mesh points to print pixels and height: true whatever becomes of the depth map.
+    /// Mesh points to print pixels and height; stays valid when the depth map changes.
     pub print_from_mesh: PrintFromMesh,
     /// Content of the mesh.
     pub mesh_hash: ContentHash,
@@ -33,27 +33,27 @@ pub struct ManualAlignment {
     pub depth_hash: ContentHash,
     /// Hash of what was shown when the correction began.
     pub seen: ContentHash,
-    /// Intersection over union of the two masks as laid by hand, on the canvas of the pair's scores.
+    /// Intersection over union of the two masks at the manual pose, on the canvas of the pair's scores.
     pub iou: f64,
-    /// Dice coefficient of the same.
+    /// Dice coefficient of the same masks.
     pub dice: f64,
-    /// In the reviewer's words.
+    /// Note of the reviewer.
     pub note: Option<String>,
 }
 
-/// An alignment by hand as stored.
+/// A stored manual alignment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StoredAlignment {
-    /// What was made.
+    /// The alignment.
     #[serde(flatten)]
     pub made: ManualAlignment,
     /// When.
     pub at: UnixMillis,
-    /// When it was taken back, if it was.
+    /// When it was undone, if it was.
     pub undone_at: Option<UnixMillis>,
-    /// Whether mesh and print are still those it was made for, so that `print_from_mesh` holds.
+    /// Whether mesh and print are unchanged, so that `print_from_mesh` is valid.
     pub holds: bool,
-    /// Whether the depth map is still that one too, so that `print_from_depth` holds.
+    /// Whether the depth map is unchanged too, so that `print_from_depth` is valid.
     pub on_current_depth: bool,
 }
 
@@ -74,11 +74,10 @@ FROM manual_alignment AS a JOIN pair AS p ON p.id = a.pair
 ORDER BY a.id";
 
 impl Catalog {
-    /// Appends an alignment by hand. It is on the disk when this returns; sent again, it is left alone. Says whether
-    /// it is new.
+    /// Appends a manual alignment, durable on return, and returns whether it is new; one sent again is not stored twice.
     ///
     /// # Errors
-    /// When there is no such pair or the database refuses.
+    /// When there is no such pair or the database returns an error.
     pub async fn store_manual_alignment(
         &self,
         made: ManualAlignment,
@@ -109,20 +108,20 @@ impl Catalog {
         .await
     }
 
-    /// Every alignment by hand, oldest first, those taken back too.
+    /// Returns every manual alignment, oldest first, including undone ones.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
         let found = sqlx::query(LOG).fetch_all(&mut *conn).await?;
         found.iter().map(stored).collect()
     }
 
-    /// The newest alignment by hand of each pair, of those that hold and were not taken back.
+    /// Returns the newest manual alignment of each pair that is valid and not undone.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn newest_hand_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
         let stored = self.manual_alignments().await?.into_iter();
         let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());

@@ -1,4 +1,4 @@
-//! What is stored of pairs: imports, results, verdicts, answers, counts.
+//! Records of pairs: imports, results, verdicts, review answers and counts.
 
 pub(crate) mod ground_truth;
 pub(crate) mod import;

@@ -1,4 +1,4 @@
-//! What the catalog tells its readers: plain values, pairs always in the order of their names.
+//! Read models of the catalog: plain values, pairs in the order of their names.
 
 use std::collections::BTreeMap;
 
@@ -12,40 +12,40 @@ use crate::domain::{
     PairName, Reason, ReviewOrder, Stage, ThresholdMetric, UnixMillis, Verdict,
 };
 
-/// Counts of the whole project; `status --json` prints them with whether a process is at work.
+/// Counts of the whole project, as in `status --json`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct StatusCounts {
-    /// Version of this form.
+    /// Version of this JSON schema.
     pub schema: u32,
-    /// Pairs in the project.
+    /// Number of pairs.
     pub pairs: u64,
-    /// Pairs by the state of their job; every status is there.
+    /// Number of pairs by job status, all statuses included.
     pub jobs: BTreeMap<JobStatus, u64>,
-    /// Pairs by stage; every stage is there.
+    /// Number of pairs by stage, all stages included.
     pub stages: BTreeMap<Stage, StageCounts>,
-    /// Pairs whose results were made with other settings or inputs than the current ones.
+    /// Number of pairs whose results are stale: computed with other settings or inputs than the current ones.
     pub stale: u64,
-    /// Pairs that are done with a result less confident than [`MetricOutcome::LOW_CONFIDENCE`].
+    /// Number of completed pairs with a confidence below [`MetricOutcome::LOW_CONFIDENCE`].
     pub low_confidence: u64,
-    /// Verdicts on current results, the newest of each reviewer.
+    /// Number of verdicts on current results, the newest of each reviewer.
     pub verdicts: BTreeMap<Verdict, u64>,
 }
 
-/// Pairs at one stage.
+/// Counts of one stage.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct StageCounts {
-    /// Have this stage behind them.
+    /// Pairs that completed the stage.
     pub done: u64,
-    /// Have it before them.
+    /// Pairs that have not reached or completed it.
     pub pending: u64,
-    /// Failed at it.
+    /// Pairs that failed at it.
     pub failed: u64,
 }
 
-/// A failure as stored, with the stage it happened at.
+/// A stored failure with its stage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct StoredFailure {
-    /// Where it failed.
+    /// The stage that failed.
     pub stage: Stage,
     /// Class and message.
     #[serde(flatten)]
@@ -59,9 +59,9 @@ pub struct StoredFailure {
 pub struct FailedPair {
     /// The pair.
     pub name: PairName,
-    /// Quarantined or backing off.
+    /// Whether it is quarantined or backing off.
     pub status: JobStatus,
-    /// What happened.
+    /// The failure.
     #[serde(flatten)]
     pub failure: StoredFailure,
 }
@@ -69,9 +69,9 @@ pub struct FailedPair {
 /// The current result of one stage of one pair.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StageRecord {
-    /// Which stage.
+    /// The stage.
     pub stage: Stage,
-    /// The stage's numbers as JSON; read them with [`StageRecord::parse`].
+    /// Outcome of the stage as JSON; parse it with [`StageRecord::parse`].
     pub outcome: Value,
     /// Its artifacts by role.
     pub files: ArtifactSet,
@@ -79,11 +79,11 @@ pub struct StageRecord {
     pub result_hash: ContentHash,
     /// Hash of the settings it was computed with, earlier stages' included.
     pub fingerprint_hash: ContentHash,
-    /// Those settings: revision and settings of this stage.
+    /// These settings: revision and settings of this stage.
     pub fingerprint_fields: Value,
     /// Content of the mesh it was computed from.
     pub mesh_hash: ContentHash,
-    /// Content of the print it was computed from; `None` for stages that do not see the print.
+    /// Content of the print it was computed from; `None` for stages that do not read the print.
     pub print_hash: Option<ContentHash>,
     /// Time it took to compute, milliseconds.
     pub ms: u64,
@@ -92,10 +92,10 @@ pub struct StageRecord {
 }
 
 impl StageRecord {
-    /// The outcome as its type in `domain`, such as `FitOutcome`.
+    /// Parses the outcome into its type in `domain`, such as `FitOutcome`.
     ///
     /// # Errors
-    /// When the stored JSON is not of that type, as after an upgrade that changed it.
+    /// When the stored JSON does not match the type, for example after an upgrade.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, serde_json::Error> {
         T::deserialize(&self.outcome)
     }
@@ -104,13 +104,13 @@ impl StageRecord {
 /// One reviewer's newest verdict on a current result.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct ReviewerVerdict {
-    /// Who read it.
+    /// Name of the reviewer.
     pub reviewer: String,
     /// The judgement.
     pub verdict: Verdict,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// The order in which results came to the reviewer; [`ReviewOrder::Adjudicate`] marks a word on a conflict.
+    /// The order in which results came to the reviewer; [`ReviewOrder::Adjudicate`] marks the decision on a conflict.
     pub review_order: Option<ReviewOrder>,
 }
 
@@ -120,15 +120,15 @@ pub struct MetricRecord {
     /// The numbers.
     #[serde(flatten)]
     pub outcome: MetricOutcome,
-    /// Hash over the numbers and the pictures a reviewer sees; verdicts are bound to it.
+    /// Hash over the numbers and the images that reviewers see; verdicts are bound to it.
     pub result_hash: ContentHash,
-    /// Verdicts on this very result, by reviewer.
+    /// Verdicts on this result, by reviewer.
     pub verdicts: Vec<ReviewerVerdict>,
-    /// Verdicts on an older result of this pair and metric, not counted any more.
+    /// Verdicts on older results of this pair and metric; not counted.
     pub older_verdicts: u64,
 }
 
-/// What was said of a pair when it was imported.
+/// Attributes of a pair as imported.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairAttributes {
     /// The user's id.
@@ -141,41 +141,41 @@ pub struct PairAttributes {
     pub unit: Option<LengthUnit>,
     /// Whether the block lay face down when scanned.
     pub scanned_face_down: Option<bool>,
-    /// The character, where it is told.
+    /// The character, if given.
     pub character: Option<String>,
-    /// The block, where it is told.
+    /// The block, if given.
     pub block: Option<String>,
-    /// Every other column.
+    /// All other columns of the manifest.
     pub meta: Map<String, Value>,
 }
 
 /// One pair with its current results, for report and export.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairResults {
-    /// What was said of it at import.
+    /// Attributes as imported.
     #[serde(flatten)]
     pub attributes: PairAttributes,
-    /// Where its job stands.
+    /// Status of its job.
     pub status: JobStatus,
     /// Next stage; `None` when done.
     pub next_stage: Option<Stage>,
-    /// Why it failed, when it is quarantined or backing off.
+    /// The failure, if it is quarantined or backing off.
     pub failure: Option<StoredFailure>,
-    /// Results of the stages behind it, in order.
+    /// Results of the completed stages, in order.
     pub stages: Vec<StageRecord>,
-    /// Results of the metrics that the method gave, in the order of [`ThresholdMetric::ALL`]; empty unless done.
+    /// Results of the metrics that the method computes, in the order of [`ThresholdMetric::ALL`]; empty unless done.
     pub metrics: Vec<MetricRecord>,
-    /// The true alignment as given, where there is one.
+    /// The true alignment as given, if any.
     pub truth: Option<Value>,
 }
 
 impl PairResults {
-    /// The current result of a stage.
+    /// Returns the current result of a stage.
     pub fn stage(&self, stage: Stage) -> Option<&StageRecord> {
         self.stages.iter().find(|record| record.stage == stage)
     }
 
-    /// The current result of a metric.
+    /// Returns the current result of a metric.
     pub fn metric(&self, metric: ThresholdMetric) -> Option<&MetricRecord> {
         self.metrics
             .iter()
@@ -187,20 +187,20 @@ impl PairResults {
         self.failure.as_ref().map(|stored| stored.failure.class)
     }
 
-    /// Computing time of its current results in seconds.
+    /// Returns the computing time of its current results in seconds.
     pub fn seconds(&self) -> f64 {
         self.stages.iter().map(|record| record.ms).sum::<u64>() as f64 / 1000.0
     }
 }
 
-/// One try of one stage.
+/// One attempt at one stage.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct AttemptRecord {
-    /// Which stage.
+    /// The stage.
     pub stage: Stage,
-    /// `None` when it went well.
+    /// The failure; `None` if it succeeded.
     pub failure: Option<Failure>,
-    /// Computing time in milliseconds, where it is known.
+    /// Computing time in milliseconds, if known.
     pub ms: Option<u64>,
     /// When it ended.
     pub at: UnixMillis,
@@ -209,20 +209,20 @@ pub struct AttemptRecord {
 /// Everything about one pair, for `show`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairDetail {
-    /// Facts, state, results, failure, metrics with the verdicts that count.
+    /// Attributes, status, results, failure, and metrics with the verdicts that count.
     #[serde(flatten)]
     pub results: PairResults,
     /// Content of the mesh as last read.
     pub mesh_hash: Option<ContentHash>,
     /// Content of the print as last read.
     pub print_hash: Option<ContentHash>,
-    /// Tries of the stage in hand.
+    /// Number of attempts at the current stage.
     pub attempt: u32,
-    /// Workers that died over it since its last finished stage.
+    /// Number of workers that died while processing it since its last completed stage.
     pub crashes: u32,
-    /// When a pair that backs off is tried again.
+    /// When the back-off ends.
     pub run_at: Option<UnixMillis>,
-    /// Tries, oldest first.
+    /// Attempts, oldest first.
     pub attempts: Vec<AttemptRecord>,
     /// Every verdict event of the pair, oldest first.
     pub verdict_log: Vec<VerdictEvent>,

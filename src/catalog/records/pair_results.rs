@@ -1,4 +1,4 @@
-//! Read models put together from their tables: pages of results, one pair, failures.
+//! Builds read models from several tables: pages of results, one pair, failures.
 
 use std::collections::BTreeMap;
 
@@ -48,10 +48,10 @@ SELECT f.class, count(*) FROM job AS j JOIN failure AS f ON f.pair = j.pair
 WHERE j.status = 4 GROUP BY f.class";
 
 impl Catalog {
-    /// The next pairs after a name, in the order of names, at most `limit`; empty at the end.
+    /// Returns up to `limit` pairs after a name, in the order of names; empty at the end.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub(crate) async fn results_page(
         &self,
         after: Option<&PairName>,
@@ -67,10 +67,10 @@ impl Catalog {
         assemble(&mut conn, &found).await
     }
 
-    /// Everything about one pair; `None` when there is no such pair.
+    /// Returns everything about one pair; `None` if it does not exist.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn pair(&self, name: &PairName) -> Result<Option<PairDetail>> {
         let mut conn = self.snapshot().await?;
         let found = sqlx::query(ONE)
@@ -97,10 +97,10 @@ impl Catalog {
         }))
     }
 
-    /// Pairs that failed for good, in the order of names, at most `limit`.
+    /// Returns up to `limit` quarantined pairs, in the order of names.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
         let mut conn = self.read_conn().await?;
         let found = sqlx::query(FAILED)
@@ -121,10 +121,10 @@ impl Catalog {
             .collect()
     }
 
-    /// Pairs that failed for good by class, every class with at least one.
+    /// Returns the number of quarantined pairs by class, without empty classes.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
         let mut conn = self.read_conn().await?;
         let found = sqlx::query(FAILED_BY_CLASS).fetch_all(&mut *conn).await?;
@@ -194,7 +194,7 @@ fn stored_failure(row: &SqliteRow) -> Result<Option<StoredFailure>> {
     }))
 }
 
-/// The metrics of a pair that is through, with the verdicts on exactly these results.
+/// Returns the metrics of a completed pair with the verdicts on exactly these results.
 fn metrics(
     pair: i64,
     stages: &[StageRecord],
@@ -269,7 +269,7 @@ async fn attempts(conn: &mut SqliteConnection, pair: i64) -> Result<Vec<AttemptR
         .collect()
 }
 
-/// Pairs in the order of names, a page at a time, so that memory does not grow with their number.
+/// Reads pairs in the order of names, one page at a time, so that memory does not grow with their number.
 #[derive(Debug)]
 pub struct ResultPages<'a> {
     catalog: &'a Catalog,
@@ -278,7 +278,7 @@ pub struct ResultPages<'a> {
 }
 
 impl Catalog {
-    /// Results of all pairs in pages of at most `size`.
+    /// Returns the results of all pairs in pages of at most `size`.
     pub const fn result_pages(&self, size: usize) -> ResultPages<'_> {
         ResultPages {
             catalog: self,
@@ -289,10 +289,10 @@ impl Catalog {
 }
 
 impl ResultPages<'_> {
-    /// The next page, which is never empty; `None` at the end.
+    /// Returns the next page, which is never empty; `None` at the end.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn next(&mut self) -> Result<Option<Vec<PairResults>>> {
         let page = self.catalog.results_page(self.after.as_ref(), self.size);
         let page = page.await?;

@@ -1,4 +1,4 @@
-//! What a worker needs to know of the pair it leased, and of its inputs.
+//! Data that a worker needs of a leased pair and its inputs.
 
 use std::collections::BTreeMap;
 
@@ -18,18 +18,18 @@ use crate::catalog::records::model::{PairAttributes, StageRecord};
 use crate::catalog::records::stage_results;
 use crate::domain::{ContentHash, PairId, Stage};
 
-/// A leased pair with what is known of it.
+/// A leased pair with its attributes and results.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PairWork {
-    /// As imported.
+    /// Attributes as imported.
     pub attributes: PairAttributes,
-    /// What the manifest says that results depend on; stored with each result.
+    /// Manifest attributes that results depend on; stored with each result.
     pub attributes_json: String,
-    /// Results of the stages behind it, in order; none missing.
+    /// Results of all completed stages, in order.
     pub results: Vec<StageRecord>,
 }
 
-/// An input file as last read, to tell whether it changed since.
+/// Input files of a pair as last read, to detect changes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KnownInputs {
     /// The pair.
@@ -48,7 +48,7 @@ pub(crate) const LEASED: &str = "
 SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.attributes
 FROM json_each(?1) AS wanted CROSS JOIN pair AS p ON p.id = wanted.value";
 
-/// Pairs of which at least one file has been read, in pages by number.
+/// Selects pairs with at least one file read, in pages by number.
 pub(crate) const INPUTS: &str = "
 SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat FROM pair
 WHERE id > ?1 ORDER BY id LIMIT ?2";
@@ -58,10 +58,10 @@ SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat
 FROM pair WHERE id > ?1 AND id IN (SELECT value FROM json_each(?3)) ORDER BY id LIMIT ?2";
 
 impl Catalog {
-    /// The leased pairs with the results they have, in the order of their leases.
+    /// Returns the leased pairs with their results, in the order of the leases.
     ///
     /// # Errors
-    /// When the database refuses or holds what it must not.
+    /// When the database returns an error or holds invalid values.
     pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
         let mut conn = self.read_conn().await?;
         let wanted = rows::array(leases.iter().map(|lease| lease.pair.0));
@@ -88,10 +88,10 @@ impl Catalog {
         each.collect()
     }
 
-    /// Input files as last read, in pages by the pair's number; empty at the end.
+    /// Returns input files as last read, in pages by pair number; empty at the end.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn known_inputs(
         &self,
         after: Option<PairId>,
@@ -111,10 +111,10 @@ impl Catalog {
         found.iter().map(known_inputs).collect()
     }
 
-    /// Stores what input files look like now.
+    /// Stores the current state of input files.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn store_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {

@@ -1,4 +1,4 @@
-//! What a reviewer answers on the review page: verdicts on what was shown, and answers to what only tests the reviewer.
+//! Answers of the review page: verdicts on results, and answers to attention checks.
 
 use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
@@ -14,14 +14,14 @@ use crate::domain::{
     AttentionCheck, ContentHash, PairName, Reason, ThresholdMetric, UnixMillis, Verdict,
 };
 
-/// What was shown to a reviewer.
+/// Item shown to a reviewer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shown {
-    /// The result of one metric, or of several that came to the same; each with its hash.
+    /// The result of one metric, or of several with equal results, each with its hash.
     Results(Vec<(ThresholdMetric, ContentHash)>),
-    /// Something that tests the reviewer, made from a metric's result.
+    /// An attention check made from a metric's result.
     Check {
-        /// What it is.
+        /// The kind of check.
         check: AttentionCheck,
         /// The metric it was made from.
         metric: ThresholdMetric,
@@ -30,26 +30,26 @@ pub enum Shown {
     },
 }
 
-/// An answer that counts: not taken back.
+/// An answer that was not undone.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answer {
-    /// By which it is taken back.
+    /// Number by which it is undone.
     pub event: String,
     /// The pair.
     pub pair: PairName,
-    /// Hash of what was shown, or of the result where only that is known.
+    /// Hash of the shown item, or of the result if only that is known.
     pub on: AnsweredOn,
     /// The judgement.
     pub verdict: Verdict,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// In the reviewer's words.
+    /// Note of the reviewer.
     pub note: Option<String>,
     /// When.
     pub at: UnixMillis,
 }
 
-/// What an answer was given to.
+/// Item that an answer belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum AnsweredOn {
     /// A result, by its hash.
@@ -75,7 +75,7 @@ pub struct AttentionCheckAnswer {
     pub reviewer: String,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// In the reviewer's words.
+    /// Note of the reviewer.
     pub note: Option<String>,
     /// How it came about.
     #[serde(flatten)]
@@ -134,7 +134,7 @@ impl Catalog {
     /// whether it is new.
     ///
     /// # Errors
-    /// When there is no such pair, nothing was shown, or the database refuses.
+    /// When there is no such pair, nothing was shown, or the database returns an error.
     pub async fn answer(&self, given: NewVerdict, shown: Shown, now: UnixMillis) -> Result<bool> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -206,7 +206,7 @@ impl Catalog {
     /// A reviewer's answers that were not taken back, oldest first; one on several results is there once a result.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
         let found = sqlx::query(ANSWERS)
@@ -219,7 +219,7 @@ impl Catalog {
     /// Every answer to planted faults and repeats, oldest first. No verdict is among them.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.read_conn().await?;
         let found = sqlx::query(CONTROLS).fetch_all(&mut *conn).await?;
@@ -229,7 +229,7 @@ impl Catalog {
     /// What the names of pictures are made with: the same at every start.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn review_key(&self) -> Result<ContentHash> {
         let mut conn = self.read_conn().await?;
         let key: Vec<u8> = sqlx::query_scalar("SELECT key FROM review_key")

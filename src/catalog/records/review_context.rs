@@ -1,4 +1,4 @@
-//! How a verdict came about.
+//! Context in which a verdict was given.
 
 use serde::Serialize;
 use sqlx::Row as _;
@@ -8,23 +8,23 @@ use crate::catalog::db::error::Result;
 use crate::catalog::db::rows;
 use crate::domain::{ContentHash, ReviewOrder};
 
-/// What is known of a verdict besides what it says; nothing of one that came from elsewhere.
+/// Context of a verdict; empty for verdicts that were not given on the review page.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ReviewContext {
-    /// The client's number of the act: sent twice, it is stored once.
+    /// Idempotency key of the client: a verdict sent twice is stored once.
     pub event: Option<String>,
-    /// Hash of all that the picture on the screen was made from.
+    /// Hash of everything that the shown image was made from.
     pub seen: Option<ContentHash>,
-    /// How long the picture was there, milliseconds.
+    /// How long the image was shown, milliseconds.
     pub shown_ms: Option<u64>,
-    /// How far the reviewer had to turn the relief until it lay on the print, degrees clockwise.
+    /// Rotation that the reviewer found missing between relief and print, degrees clockwise.
     pub angle_read_deg: Option<f64>,
-    /// The order in which results came.
+    /// Order of the review queue.
     pub review_order: Option<ReviewOrder>,
 }
 
 impl ReviewContext {
-    /// From the columns of its names.
+    /// Reads it from the columns of the same names.
     pub(crate) fn read(row: &SqliteRow) -> Result<Self> {
         let order: Option<String> = row.try_get("review_order")?;
         Ok(Self {

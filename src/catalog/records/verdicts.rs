@@ -31,7 +31,7 @@ pub struct NewVerdict {
     pub reason: Option<Reason>,
     /// In the reviewer's words.
     pub note: Option<String>,
-    /// How it came about, as far as it is known.
+    /// Context in which it was given, if known.
     pub look: ReviewContext,
     /// When it was given, where that was before it is stored.
     pub at: Option<UnixMillis>,
@@ -58,7 +58,7 @@ pub struct VerdictEvent {
     pub reason: Option<Reason>,
     /// In the reviewer's words.
     pub note: Option<String>,
-    /// How it came about, as far as it is known.
+    /// Context in which it was given, if known.
     #[serde(flatten)]
     pub look: ReviewContext,
     /// When.
@@ -168,7 +168,7 @@ impl Catalog {
     /// The log, oldest first, of one pair or of all.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// When the database returns an error.
     pub async fn verdict_log(&self, pair: Option<&PairName>) -> Result<Vec<VerdictEvent>> {
         let mut conn = self.read_conn().await?;
         log(&mut conn, pair).await
@@ -205,7 +205,7 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
     }
 }
 
-/// Appends one row on a result of a pair; its act is the number of the act's first row, which is told. A row with the
+/// Appends one row on a result of a pair; its act is the number of the act's first row, which is returned. A row with the
 /// client's number of one that is there already is left out.
 pub(crate) async fn insert(
     conn: &mut SqliteConnection,

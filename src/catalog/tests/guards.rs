@@ -82,7 +82,7 @@ async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothi
     world.counters_hold().await;
 }
 
-/// Both are in one commit: what is told of the one must not be taken for the other. A third lease keeps the counters
+/// Both share one commit: the reply to one must not be taken for the reply to the other. A third lease keeps the counters
 /// from refusing the commit, after which each would be tried alone.
 #[tokio::test]
 async fn a_late_completion_beside_the_right_one_changes_nothing() {
@@ -266,7 +266,7 @@ async fn a_failure_that_may_pass_is_not_stranded_by_a_death() {
     assert_eq!((again[0].attempt(), again[0].crashes()), (3, 1));
 }
 
-/// One worker's clock is years behind, another's years ahead: nobody living loses a lease, nothing waits for ever.
+/// One worker's clock is years behind, another's years ahead: no live worker loses a lease, nothing waits indefinitely.
 #[tokio::test]
 async fn a_clock_that_jumps_strands_nothing_and_robs_nobody() {
     const YEARS: i64 = 100_000_000_000;

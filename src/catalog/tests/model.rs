@@ -29,7 +29,7 @@ pub(super) struct Job {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Process {
     pub(super) worker: WorkerId,
-    /// Its own clock, which tells nobody else's time.
+    /// Its own clock, independent of all others.
     pub(super) clock: UnixMillis,
     pub(super) heartbeat: UnixMillis,
     pub(super) ended: bool,

@@ -12,7 +12,7 @@ pub(super) enum JobState {
     },
     /// A worker runs it from `stage` on.
     Leased {
-        /// Stage in hand.
+        /// Current stage.
         stage: Stage,
         /// Whose lease it is.
         worker: WorkerId,
@@ -73,7 +73,7 @@ pub(super) enum Event {
     Checkpoint {
         /// Who did it.
         worker: WorkerId,
-        /// The stage that is done: the one in hand, or an earlier one that had to be computed again.
+        /// The completed stage: the current one, or an earlier one that had to be computed again.
         stage: Stage,
         /// When the next stage should be over.
         deadline: UnixMillis,
