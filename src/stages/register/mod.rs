@@ -1,7 +1,7 @@
 //! Finds the pose, chooses each metric's depth threshold in the aligned frame, and scores the masks.
 //!
 //! The pose is found from soft strokes, without a threshold: coarse to fine over all rotations and a band of scales
-//! ([`pose_search`]), then refined at full size against its competitors ([`refine`]). The paper's order is in
+//! (`pose_search`), then refined at full size against its competitors (`refine`). The paper's order is in
 //! `paper_method::register`.
 
 mod anisotropic_scale;
