@@ -99,7 +99,7 @@ fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {
     None
 }
 
-/// Tells an ASCII STL from a binary STL whose header begins with `solid`.
+/// Distinguishes an ASCII STL from a binary STL whose header begins with `solid`.
 fn stl_after_solid(bytes: &[u8]) -> DetectedFormat {
     let binary = bytes.iter().take(4096).any(|byte| *byte == 0);
     if binary {

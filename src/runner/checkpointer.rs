@@ -87,7 +87,7 @@ impl Checkpointer {
     }
 
     /// Sends a computed stage to be stored. Returns `false` when no more stages can be stored: the lease is lost, the
-    /// disk or the catalog returned an error, or the run was told to stop at once.
+    /// disk or the catalog returned an error, or an immediate stop was requested.
     pub(super) fn store(&self, stage: ComputedStage) -> bool {
         self.stages.send(stage).is_ok()
     }
@@ -164,7 +164,7 @@ async fn store_stages(
 }
 
 /// Writes the files of a stage and of all stages that have arrived since. The second value is `false` when the run was
-/// told to stop before all were written.
+/// stopped before all were written.
 async fn write_batch(
     context: &RunContext,
     pair: &PairName,

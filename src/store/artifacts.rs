@@ -124,7 +124,7 @@ impl Project {
     /// its temporary name, before it gets its own.
     ///
     /// # Errors
-    /// When one cannot be written. Those that were written stay; as no row names them, `check --repair` removes them.
+    /// When one cannot be written. Files already written stay unreferenced until `check --repair` removes them.
     pub fn write_artifacts(
         &self,
         files: &[NewArtifact],

@@ -1,4 +1,4 @@
-//! Several processes on one catalog, and processes that are suspended, held at a failpoint, or told to stop.
+//! Several processes on one catalog, and processes that are suspended, held at a failpoint, or asked to stop.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};

@@ -27,7 +27,7 @@ impl fmt::Display for LockOwner {
     }
 }
 
-/// Returns the process that holds the write lock; `None` where there is none or the system does not tell. Opens no file
+/// Returns the process that holds the write lock; `None` if there is none or it is unknown. Opens no file
 /// of the catalog, because closing it would drop the locks of this process's own connections.
 pub fn lock_owner(catalog: &Path) -> Option<LockOwner> {
     let index = std::fs::metadata(sidecar(catalog, "-shm")).ok()?;

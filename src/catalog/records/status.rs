@@ -28,7 +28,7 @@ pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
 
 impl Catalog {
-    /// Counts for `status`; `fingerprints` are the current ones, to tell what is stale.
+    /// Counts for `status`; results that differ from the current `fingerprints` count as stale.
     ///
     /// # Errors
     /// When the database refuses.

@@ -50,7 +50,7 @@ async fn a_reused_worker_identity_cannot_complete() {
 }
 
 /// The older and the newer lease of a pair that hung under a worker, was taken back by others, and came to the same
-/// worker again, which lives: pair, worker, status and sign of life are what they were, and only the token tells.
+/// worker again, which lives: pair, worker, status and heartbeat are unchanged; only the token differs.
 async fn taken_twice(world: &World) -> [Lease; 2] {
     let late = world.claim(1).await.remove(0);
     let heartbeat = world.catalog.heartbeat(world.worker, 5_000, 0).await;
