@@ -91,7 +91,7 @@ fn axe_finds_nothing_serious_in_a_report() {
         let tab = browser.tab(size[0], size[1]);
         tab.dark(dark);
         tab.open(&format!("file://{}", file.display()));
-        tab.wait("document.querySelector('.shots')");
+        tab.wait("document.querySelector('figure.item')");
         tab.eval(&format!("{axe}; null"));
         nothing_serious(&tab, &format!("{size:?}"));
     }
