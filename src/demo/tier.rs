@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use crate::domain::enum_names;
+
 /// Number of pairs of the `real` tier.
 pub(super) const REAL_PAIRS: u64 = 20;
 
@@ -22,26 +24,14 @@ pub enum Tier {
     Real,
 }
 
+enum_names! { pub Tier, "a tier":
+    Upright = "upright", Pose = "pose", Hard = "hard", Real = "real",
+}
+
 impl Tier {
-    /// All tiers, easiest first.
-    pub const ALL: [Self; 4] = [Self::Upright, Self::Pose, Self::Hard, Self::Real];
-
-    /// Returns the name used on the command line and in file names.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Upright => "upright",
-            Self::Pose => "pose",
-            Self::Hard => "hard",
-            Self::Real => "real",
-        }
-    }
-
     /// Returns the number of distinct pairs, or `None` when it is unlimited.
-    pub const fn max_pairs(self) -> Option<u64> {
-        match self {
-            Self::Upright | Self::Pose | Self::Hard => None,
-            Self::Real => Some(REAL_PAIRS),
-        }
+    pub fn max_pairs(self) -> Option<u64> {
+        (self == Self::Real).then_some(REAL_PAIRS)
     }
 
     /// Returns the range of the bend's sagitta over the character, mm.
@@ -54,35 +44,12 @@ impl Tier {
     }
 
     /// Returns whether the block was damaged after printing.
-    pub(super) const fn is_damaged(self) -> bool {
-        match self {
-            Self::Upright | Self::Pose | Self::Real => false,
-            Self::Hard => true,
-        }
+    pub(super) fn is_damaged(self) -> bool {
+        self == Self::Hard
     }
 
     /// Returns whether the scan has an arbitrary orientation and unit.
-    pub(super) const fn is_any_pose(self) -> bool {
-        match self {
-            Self::Upright => false,
-            Self::Pose | Self::Hard | Self::Real => true,
-        }
-    }
-}
-
-impl std::fmt::Display for Tier {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for Tier {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|tier| tier.name() == text)
-            .ok_or_else(|| format!("{text:?} is not a tier (upright, pose, hard, real)"))
+    pub(super) fn is_any_pose(self) -> bool {
+        self != Self::Upright
     }
 }

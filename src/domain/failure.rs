@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::enum_names;
+
 /// Class of a failure. It decides between retry and quarantine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -18,47 +20,8 @@ pub enum FailureClass {
     Bug,
 }
 
-impl FailureClass {
-    /// All classes.
-    pub const ALL: [Self; 5] = [
-        Self::BadInput,
-        Self::NoSolution,
-        Self::Io,
-        Self::Resource,
-        Self::Bug,
-    ];
-
-    /// Returns the name in JSON, in the catalog and on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::BadInput => "bad_input",
-            Self::NoSolution => "no_solution",
-            Self::Io => "io",
-            Self::Resource => "resource",
-            Self::Bug => "bug",
-        }
-    }
-}
-
-impl std::fmt::Display for FailureClass {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for FailureClass {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|class| class.name() == text)
-            .ok_or_else(|| {
-                format!(
-                    "{text:?} is not a failure class (bad_input, no_solution, io, resource, bug)"
-                )
-            })
-    }
+enum_names! { pub FailureClass, "a failure class":
+    BadInput = "bad_input", NoSolution = "no_solution", Io = "io", Resource = "resource", Bug = "bug",
 }
 
 /// A failure, stored and shown in this form: its class and a message with the file and the reason.

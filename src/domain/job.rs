@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::enum_names;
+
 /// The status of a pair's job in the queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -18,47 +20,19 @@ pub enum JobStatus {
     Quarantined,
 }
 
-impl JobStatus {
-    /// Every status, in the order of `status --json`.
-    pub const ALL: [Self; 5] = [
-        Self::Ready,
-        Self::Leased,
-        Self::Backoff,
-        Self::Done,
-        Self::Quarantined,
-    ];
+enum_names! { pub JobStatus, "a job status":
+    Ready = "ready", Leased = "leased", Backoff = "backoff", Done = "done", Quarantined = "quarantined",
+}
 
+impl JobStatus {
     /// Returns the code in the catalog.
     pub const fn code(self) -> i64 {
-        match self {
-            Self::Ready => 0,
-            Self::Leased => 1,
-            Self::Backoff => 2,
-            Self::Done => 3,
-            Self::Quarantined => 4,
-        }
+        self as i64
     }
 
     /// Returns the status of a code in the catalog.
     pub fn from_code(code: i64) -> Option<Self> {
         Self::ALL.into_iter().find(|status| status.code() == code)
-    }
-
-    /// Returns the name in JSON and on the screen.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Ready => "ready",
-            Self::Leased => "leased",
-            Self::Backoff => "backoff",
-            Self::Done => "done",
-            Self::Quarantined => "quarantined",
-        }
-    }
-}
-
-impl std::fmt::Display for JobStatus {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
     }
 }
 

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::enum_names;
+
 /// How the height at which a depth map becomes a mask is chosen (paper III-C).
 ///
 /// `P` is the ink mask of the print and `D(t)` the depth mask of the heights from threshold `t` up, both on one canvas.
@@ -32,29 +34,13 @@ pub enum ThresholdMetric {
     Relief,
 }
 
+enum_names! { pub ThresholdMetric, "a metric":
+    NlSsim = "nl_ssim", Density = "density", Ensemble = "ensemble", Relief = "relief",
+}
+
 impl ThresholdMetric {
-    /// Every metric: the paper's in the order of its table, then ours.
-    pub const ALL: [Self; 4] = [Self::NlSsim, Self::Density, Self::Ensemble, Self::Relief];
     /// The paper's three, which both methods give.
     pub const PAPER: [Self; 3] = [Self::NlSsim, Self::Density, Self::Ensemble];
-
-    /// Returns the name in JSON, in the catalog and on the command line.
-    ///
-    /// # Examples
-    /// ```
-    /// use mocban::domain::ThresholdMetric;
-    ///
-    /// assert_eq!(ThresholdMetric::NlSsim.name(), "nl_ssim");
-    /// assert_eq!("relief".parse(), Ok(ThresholdMetric::Relief));
-    /// ```
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::NlSsim => "nl_ssim",
-            Self::Density => "density",
-            Self::Ensemble => "ensemble",
-            Self::Relief => "relief",
-        }
-    }
 
     /// Returns the name in the printed table; the paper's metrics as the paper names them.
     pub const fn title(self) -> &'static str {
@@ -64,22 +50,5 @@ impl ThresholdMetric {
             Self::Ensemble => "Ensemble",
             Self::Relief => "Relief",
         }
-    }
-}
-
-impl std::fmt::Display for ThresholdMetric {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for ThresholdMetric {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|metric| metric.name() == text)
-            .ok_or_else(|| format!("{text:?} is not a metric (nl_ssim, density, ensemble, relief)"))
     }
 }

@@ -3,6 +3,7 @@
 mod artifact;
 pub mod artifact_role;
 mod attention_check;
+mod enum_names;
 mod failure;
 mod file_kind;
 mod hash;
@@ -20,6 +21,7 @@ mod verdict;
 
 pub use artifact::{ArtifactRef, ArtifactSet};
 pub use attention_check::AttentionCheck;
+pub(crate) use enum_names::enum_names;
 pub use failure::{Failure, FailureClass};
 pub use file_kind::FileKind;
 pub use hash::{ContentHash, ContentHashError};

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::enum_names;
+
 /// A stage of the pipeline. Variants are in processing order.
 ///
 /// ```
@@ -9,6 +11,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// assert_eq!(Stage::Fit.next(), Some(Stage::Depth));
 /// assert_eq!(Stage::Register.next(), None);
+/// assert_eq!("register".parse(), Ok(Stage::Register));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -23,10 +26,11 @@ pub enum Stage {
     Register,
 }
 
-impl Stage {
-    /// All stages in order.
-    pub const ALL: [Self; 4] = [Self::Fit, Self::Depth, Self::Normalize, Self::Register];
+enum_names! { pub Stage, "a stage":
+    Fit = "fit", Depth = "depth", Normalize = "normalize", Register = "register",
+}
 
+impl Stage {
     /// Returns the position in the order, 0 to 3: the cursor of a job whose next stage this is.
     pub const fn index(self) -> usize {
         self as usize
@@ -40,33 +44,6 @@ impl Stage {
     /// Returns the next stage, or `None` after the last.
     pub fn next(self) -> Option<Self> {
         Self::from_index(self.index() + 1)
-    }
-
-    /// Returns the lower-case name used on the command line and in JSON.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Fit => "fit",
-            Self::Depth => "depth",
-            Self::Normalize => "normalize",
-            Self::Register => "register",
-        }
-    }
-}
-
-impl std::fmt::Display for Stage {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for Stage {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|stage| stage.name() == text)
-            .ok_or_else(|| format!("{text:?} is not a stage (fit, depth, normalize, register)"))
     }
 }
 

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::enum_names;
+
 /// Unit of a mesh's coordinates. Without a unit, no lengths in mm are reported.
 ///
 /// ```
@@ -24,10 +26,11 @@ pub enum LengthUnit {
     In,
 }
 
-impl LengthUnit {
-    /// All units.
-    pub const ALL: [Self; 4] = [Self::Mm, Self::Cm, Self::M, Self::In];
+enum_names! { pub LengthUnit, "a unit":
+    Mm = "mm", Cm = "cm", M = "m", In = "in",
+}
 
+impl LengthUnit {
     /// Returns the length of one unit in millimetres.
     pub const fn mm(self) -> f64 {
         match self {
@@ -36,32 +39,5 @@ impl LengthUnit {
             Self::M => 1000.0,
             Self::In => 25.4,
         }
-    }
-
-    /// Returns the name in manifests and sidecar files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Mm => "mm",
-            Self::Cm => "cm",
-            Self::M => "m",
-            Self::In => "in",
-        }
-    }
-}
-
-impl std::fmt::Display for LengthUnit {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for LengthUnit {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|unit| unit.name() == text)
-            .ok_or_else(|| format!("{text:?} is not a unit (mm, cm, m, in)"))
     }
 }

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::enum_names;
+
 /// Pass, fail or unsure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -14,35 +16,8 @@ pub enum Verdict {
     Unsure,
 }
 
-impl Verdict {
-    /// All verdicts.
-    pub const ALL: [Self; 3] = [Self::Pass, Self::Fail, Self::Unsure];
-
-    /// Returns the name in JSON, in the catalog and on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Pass => "pass",
-            Self::Fail => "fail",
-            Self::Unsure => "unsure",
-        }
-    }
-}
-
-impl std::fmt::Display for Verdict {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for Verdict {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|verdict| verdict.name() == text)
-            .ok_or_else(|| format!("{text:?} is not a verdict (pass, fail, unsure)"))
-    }
+enum_names! { pub Verdict, "a verdict":
+    Pass = "pass", Fail = "fail", Unsure = "unsure",
 }
 
 /// Why a result failed.
@@ -63,29 +38,12 @@ pub enum Reason {
     WrongPair,
 }
 
+enum_names! { pub Reason, "a reason":
+    Angle = "angle", StrokesLost = "strokes_lost", BackgroundIn = "background_in", ShiftOrScale = "shift_or_scale",
+    Mirrored = "mirrored", WrongPair = "wrong_pair",
+}
+
 impl Reason {
-    /// All reasons, in the order of the keys 1 to 6.
-    pub const ALL: [Self; 6] = [
-        Self::Angle,
-        Self::StrokesLost,
-        Self::BackgroundIn,
-        Self::ShiftOrScale,
-        Self::Mirrored,
-        Self::WrongPair,
-    ];
-
-    /// Returns the name in JSON, in the catalog and on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Angle => "angle",
-            Self::StrokesLost => "strokes_lost",
-            Self::BackgroundIn => "background_in",
-            Self::ShiftOrScale => "shift_or_scale",
-            Self::Mirrored => "mirrored",
-            Self::WrongPair => "wrong_pair",
-        }
-    }
-
     /// Returns the name for tables and messages.
     pub const fn title(self) -> &'static str {
         match self {
@@ -96,25 +54,5 @@ impl Reason {
             Self::Mirrored => "mirrored",
             Self::WrongPair => "wrong pair",
         }
-    }
-}
-
-impl std::fmt::Display for Reason {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for Reason {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|reason| reason.name() == text)
-            .ok_or_else(|| {
-                let known: Vec<_> = Self::ALL.iter().map(|reason| reason.name()).collect();
-                format!("{text:?} is not a reason ({})", known.join(", "))
-            })
     }
 }

@@ -1,0 +1,39 @@
+//! Names of enums without fields, in one table per enum.
+
+/// Defines `ALL`, `name`, `Display` and `FromStr` of an enum from a table of its variants and their names.
+///
+/// The noun completes the message of `FromStr`: `"fitt" is not a stage (fit, depth, normalize, register)`.
+macro_rules! enum_names {
+    ($vis:vis $type:ident, $noun:literal: $($variant:ident = $name:literal),+ $(,)?) => {
+        impl $type {
+            /// Every variant, in order.
+            $vis const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];
+
+            /// Returns the name in JSON, in the catalog and on the command line.
+            $vis const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name),+
+                }
+            }
+        }
+
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = String;
+
+            fn from_str(text: &str) -> Result<Self, Self::Err> {
+                match text {
+                    $($name => Ok(Self::$variant),)+
+                    _ => Err(format!("{text:?} is not {} ({})", $noun, [$($name),+].join(", "))),
+                }
+            }
+        }
+    };
+}
+
+pub(crate) use enum_names;
