@@ -10,10 +10,13 @@ use rand::RngExt;
 
 use super::artwork::Artwork;
 use super::damage::Damage;
-use super::pair::{DemoPair, Printed, Scene, pair_id, pair_rng};
+use super::pair::{DemoPair, Printed, finish_pair};
 use super::rendered_print::PrintFrame;
+use super::scalar_field::bilinear;
+use super::scene::{Scene, pair_id, pair_rng};
 use super::tier::{REAL_PAIRS, Tier};
 use crate::domain::Affine2;
+use crate::raster::Mask;
 
 /// Maps pixels of the clean mask to pixels of the crop.
 const CROP_FROM_CLEAN: Affine2 = Affine2([[1.0, 0.0, 0.0], [0.0, 1.0, 1.0]]);
@@ -25,38 +28,20 @@ struct PhotographedCharacter {
     clean: &'static [u8],
 }
 
-macro_rules! cell {
-    ($character:literal, $number:literal) => {
-        PhotographedCharacter {
+macro_rules! cells {
+    ($($number:literal $character:literal),+) => {
+        [$(PhotographedCharacter {
             character: $character,
             photograph: include_bytes!(concat!("../../assets/calligraphy/", $number, "_real.png")),
             clean: include_bytes!(concat!("../../assets/calligraphy/", $number, "_clean.png")),
-        }
+        }),+]
     };
 }
 
-static CELLS: [PhotographedCharacter; REAL_PAIRS as usize] = [
-    cell!('後', "00"),
-    cell!('二', "01"),
-    cell!('成', "02"),
-    cell!('而', "03"),
-    cell!('有', "04"),
-    cell!('文', "05"),
-    cell!('非', "06"),
-    cell!('并', "07"),
-    cell!('則', "08"),
-    cell!('訓', "09"),
-    cell!('尺', "10"),
-    cell!('不', "11"),
-    cell!('善', "12"),
-    cell!('迴', "13"),
-    cell!('用', "14"),
-    cell!('造', "15"),
-    cell!('王', "16"),
-    cell!('庫', "17"),
-    cell!('普', "18"),
-    cell!('同', "19"),
-];
+static CELLS: [PhotographedCharacter; REAL_PAIRS as usize] = cells! {
+    "00" '後', "01" '二', "02" '成', "03" '而', "04" '有', "05" '文', "06" '非', "07" '并', "08" '則', "09" '訓',
+    "10" '尺', "11" '不', "12" '善', "13" '迴', "14" '用', "15" '造', "16" '王', "17" '庫', "18" '普', "19" '同'
+};
 
 /// Makes a pair from the unchanged photograph and a relief of its clean mask in a random pose.
 ///
@@ -88,15 +73,14 @@ pub(super) fn pair(seed: u64, index: u64, vertices: Option<u32>) -> Result<DemoP
         print_neighbours: no_neighbours,
         damage: Damage::default(),
     };
-    Ok(scene.into_pair(printed, vertices, &mut rng))
+    Ok(finish_pair(&scene, printed, vertices, &mut rng))
 }
 
 /// Returns the map from mm to mask pixels that centres the ink and scales its longest side to `size_mm`.
 fn clean_from_mm(clean: &GrayImage, size_mm: f64) -> Affine2 {
-    let ink =
-        crate::raster::Mask::from_fn(clean.width() as usize, clean.height() as usize, |x, y| {
-            clean.get_pixel(x as u32, y as u32).0[0] < 128
-        });
+    let ink = Mask::from_fn(clean.width() as usize, clean.height() as usize, |x, y| {
+        clean.get_pixel(x as u32, y as u32).0[0] < 128
+    });
     let Some(found) = ink.bounding_box() else {
         return Affine2::IDENTITY;
     };
@@ -108,18 +92,11 @@ fn clean_from_mm(clean: &GrayImage, size_mm: f64) -> Affine2 {
 /// Returns the ink coverage, 0..=1, at a pixel position by bilinear interpolation; 0 outside the image.
 fn ink_coverage(clean: &GrayImage, [x, y]: [f64; 2]) -> f64 {
     let at = |x: f64, y: f64| {
-        let (x, y) = (x as i64, y as i64);
-        let inside =
-            x >= 0 && y >= 0 && x < i64::from(clean.width()) && y < i64::from(clean.height());
-        if inside {
-            f64::from(255 - clean.get_pixel(x as u32, y as u32).0[0]) / 255.0
-        } else {
-            0.0
-        }
+        let pixel = (x >= 0.0 && y >= 0.0).then(|| clean.get_pixel_checked(x as u32, y as u32));
+        let grey = pixel.flatten().map_or(255, |pixel| pixel.0[0]);
+        f64::from(255 - grey) / 255.0
     };
     let (x0, y0) = (x.floor(), y.floor());
-    let (fx, fy) = (x - x0, y - y0);
-    let top = at(x0, y0) * (1.0 - fx) + at(x0 + 1.0, y0) * fx;
-    let bottom = at(x0, y0 + 1.0) * (1.0 - fx) + at(x0 + 1.0, y0 + 1.0) * fx;
-    top * (1.0 - fy) + bottom * fy
+    let corners = [y0, y0 + 1.0].map(|y| [x0, x0 + 1.0].map(|x| at(x, y)));
+    bilinear(corners, x - x0, y - y0)
 }

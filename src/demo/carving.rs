@@ -6,28 +6,19 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::damage::Damage;
+use super::ellipse::Axis;
 use super::noise::{Noise, smoothstep};
 use super::scalar_field::{SampleFrame, ScalarField};
+use super::scene::Scene;
 
-/// Inputs of the carved surface.
-pub(super) struct Carving<'a> {
-    /// Signed distance to the strokes left on the block, mm.
-    pub strokes: &'a ScalarField,
-    /// Signed distance to neighbours and column rules, mm.
-    pub neighbours: &'a ScalarField,
-    /// Damage; only the cracks are used.
-    pub damage: &'a Damage,
-    /// Range of the bend, mm.
-    pub bend_mm: Range<f64>,
-}
-
-/// Computes the surface of a carved, worn and bent block. Height zero is the least-squares plane of the stroke tops.
-pub(super) fn carve(carving: &Carving, rng: &mut ChaCha8Rng) -> ScalarField {
-    let knife = Knife::draw(carving.strokes.frame, rng);
+/// Computes the surface of a carved, worn and bent block from the signed distance to the strokes left on it, mm. Height
+/// zero is the least-squares plane of the stroke tops.
+pub(super) fn carve(scene: &Scene, strokes: &ScalarField, rng: &mut ChaCha8Rng) -> ScalarField {
+    let frame = strokes.frame;
+    let knife = Knife::draw(frame, rng);
     let wear = Wear::draw(rng);
-    let frame = carving.strokes.frame;
     let cut = ScalarField::from_fn(frame, |point, x, y| {
-        let inside = carving.strokes.at(x, y).max(carving.neighbours.at(x, y));
+        let inside = strokes.at(x, y).max(scene.block_neighbours.at(x, y));
         if inside > 0.0 {
             -wear.at(point, inside)
         } else {
@@ -35,11 +26,11 @@ pub(super) fn carve(carving: &Carving, rng: &mut ChaCha8Rng) -> ScalarField {
         }
     });
     let rounded = cut.blurred(rng.random_range(0.03..0.05));
-    let bend = Bend::draw(carving, rng);
+    let bend = Bend::draw(scene.tier.bend_mm(), strokes, rng);
     let bent = ScalarField::from_fn(frame, |point, x, y| {
-        rounded.at(x, y) + bend.at(point) - crack_depth(carving.damage, point)
+        rounded.at(x, y) + bend.at(point) - crack_depth(&scene.damage, point)
     });
-    subtract_fitted_plane(&bent, carving.strokes)
+    subtract_fitted_plane(&bent, strokes)
 }
 
 /// Shape of the carved background.
@@ -86,19 +77,16 @@ impl Knife {
 /// Draws gouge marks in the floor, as depths in mm.
 fn gouges(frame: SampleFrame, rng: &mut ChaCha8Rng) -> ScalarField {
     let mut field = ScalarField::from_fn(frame, |_, _, _| 0.0);
-    let half = frame.half_mm();
     let main = rng.random_range(0.0..std::f64::consts::PI);
     for _ in 0..rng.random_range(60..120_u32) {
-        let angle = main + rng.random_range(-0.5..0.5);
-        let (sin, cos) = angle.sin_cos();
-        let centre = [0; 2].map(|_: i32| rng.random_range(-half..half));
+        let axis = Axis::at(main + rng.random_range(-0.5..0.5));
+        let centre = frame.random_position(rng);
         let (length, width) = (rng.random_range(0.5..1.6), rng.random_range(0.12..0.35));
         let depth = rng.random_range(0.05..0.22);
         for (x, y) in frame.box_around(centre, length) {
             let [u, v] = frame.position(x, y);
-            let (du, dv) = (u - centre[0], v - centre[1]);
-            let along = (du * cos + dv * sin) / length;
-            let across = (dv * cos - du * sin) / width;
+            let [along, across] = axis.along_across([u - centre[0], v - centre[1]]);
+            let (along, across) = (along / length, across / width);
             let hollow = depth * (1.0 - along * along - across * across).max(0.0);
             let value = field.at(x, y).max(hollow);
             field.values.set(x, y, value as f32);
@@ -112,19 +100,19 @@ struct Wear {
     patches: Noise,
     patch_mm: f64,
     grain: Noise,
-    grain_axis: [f64; 2],
+    grain_axis: Axis,
     pits: Noise,
     rim_mm: f64,
 }
 
 impl Wear {
     fn draw(rng: &mut ChaCha8Rng) -> Self {
-        let angle = rng.random_range(-0.2..0.2);
+        let grain_axis = Axis::at(rng.random_range(-0.2..0.2));
         Self {
             patches: Noise::draw(rng),
             patch_mm: rng.random_range(0.02..0.07),
             grain: Noise::draw(rng),
-            grain_axis: [f64::cos(angle), f64::sin(angle)],
+            grain_axis,
             pits: Noise::draw(rng),
             rim_mm: rng.random_range(0.02..0.06),
         }
@@ -132,8 +120,7 @@ impl Wear {
 
     /// Returns the height lost in mm at `inside` mm from the stroke edge: patches, open grain, small pits, rounded edges.
     fn at(&self, [u, v]: [f64; 2], inside: f64) -> f64 {
-        let along = u * self.grain_axis[0] + v * self.grain_axis[1];
-        let across = v * self.grain_axis[0] - u * self.grain_axis[1];
+        let [along, across] = self.grain_axis.along_across([u, v]);
         let patches = self.patch_mm * (1.0 + self.patches.two_octaves(u / 2.2, v / 2.2));
         let grain = 0.008 * (1.0 + self.grain.at(along / 2.5, across / 0.12));
         let pits = 0.06 * smoothstep(0.72, 0.95, self.pits.at(u / 0.25, v / 0.25));
@@ -144,47 +131,38 @@ impl Wear {
 
 /// A quadratic bend.
 struct Bend {
-    axis: [f64; 2],
+    axis: Axis,
     along: f64,
     across: f64,
 }
 
 impl Bend {
-    /// Draws a bend whose sagitta over the character lies in `carving.bend_mm`.
-    fn draw(carving: &Carving, rng: &mut ChaCha8Rng) -> Self {
-        let range = carving.bend_mm.clone();
-        let sagitta = if range.is_empty() {
-            0.0
-        } else {
-            rng.random_range(range)
-        };
+    /// Draws a bend whose sagitta over the strokes lies in the range, mm.
+    fn draw(sagitta_mm: Range<f64>, strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Self {
+        let sagitta = rng.random_range(sagitta_mm);
         let sign = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-        let angle = rng.random_range(0.0..std::f64::consts::PI);
-        let half_extent_mm = super::artwork::half_extent_mm(carving.strokes);
+        let axis = Axis::draw_any(rng);
+        let half_extent_mm = super::artwork::half_extent_mm(strokes);
         let along = sign * sagitta / (half_extent_mm * half_extent_mm);
         Self {
-            axis: [angle.cos(), angle.sin()],
+            axis,
             along,
             across: along * rng.random_range(-0.2..0.3),
         }
     }
 
-    fn at(&self, [u, v]: [f64; 2]) -> f64 {
-        let along = u * self.axis[0] + v * self.axis[1];
-        let across = v * self.axis[0] - u * self.axis[1];
+    fn at(&self, point: [f64; 2]) -> f64 {
+        let [along, across] = self.axis.along_across(point);
         self.along * along * along + self.across * across * across
     }
 }
 
 fn crack_depth(damage: &Damage, point: [f64; 2]) -> f64 {
-    damage
-        .cracks
-        .iter()
-        .map(|crack| {
-            let share = crack.distance_mm(point) / crack.half_width_mm;
-            crack.depth_mm * (1.0 - share).max(0.0)
-        })
-        .fold(0.0, f64::max)
+    let depths = damage.cracks.iter().map(|crack| {
+        let share = crack.distance_mm(point) / crack.half_width_mm;
+        crack.depth_mm * (1.0 - share).max(0.0)
+    });
+    depths.fold(0.0, f64::max)
 }
 
 /// Subtracts the least-squares plane of the stroke tops.

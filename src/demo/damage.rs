@@ -4,6 +4,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::artwork::Artwork;
+use super::ellipse::{Axis, Ellipse};
 use super::noise::Noise;
 use super::scalar_field::ScalarField;
 
@@ -22,7 +23,7 @@ pub(super) struct Damage {
 /// A nearly straight crack across the whole sample frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Crack {
-    normal: [f64; 2],
+    normal: Axis,
     offset_mm: f64,
     path_noise: Noise,
     /// Half the width at the top, mm.
@@ -62,9 +63,8 @@ impl Damage {
 
 impl Crack {
     fn draw(rng: &mut ChaCha8Rng) -> Self {
-        let angle = rng.random_range(0.0..std::f64::consts::PI);
         Self {
-            normal: [angle.cos(), angle.sin()],
+            normal: Axis::draw_any(rng),
             offset_mm: rng.random_range(-4.0..4.0),
             path_noise: Noise::draw(rng),
             half_width_mm: rng.random_range(0.03..0.09),
@@ -73,11 +73,10 @@ impl Crack {
     }
 
     /// Returns the distance of a point to the centre line of the crack, mm.
-    pub(super) fn distance_mm(&self, [u, v]: [f64; 2]) -> f64 {
-        let [nu, nv] = self.normal;
-        let along = u * nv - v * nu;
-        let offset = 0.35 * self.path_noise.two_octaves(along / 1.7, 0.0);
-        (u * nu + v * nv - self.offset_mm - offset).abs()
+    pub(super) fn distance_mm(&self, point: [f64; 2]) -> f64 {
+        let [out, across] = self.normal.along_across(point);
+        let offset = 0.35 * self.path_noise.two_octaves(-across / 1.7, 0.0);
+        (out - self.offset_mm - offset).abs()
     }
 }
 
@@ -97,9 +96,10 @@ fn draw_lost_regions(artwork: &Artwork, rng: &mut ChaCha8Rng) -> ScalarField {
             break;
         }
         let (x, y) = ink[rng.random_range(0..ink.len())];
-        let blob = Blob::draw(frame.position(x, y), rng);
-        let with_blob = ScalarField::from_fn(frame, |point, x, y| {
-            lost.at(x, y).max(blob.inside_mm(point, edge_noise))
+        let blob = draw_blob(frame.position(x, y), rng);
+        let with_blob = ScalarField::from_fn(frame, |[u, v], x, y| {
+            let ragged_mm = 0.15 * edge_noise.two_octaves(u / 0.5, v / 0.5);
+            lost.at(x, y).max(blob.inside_mm([u, v]) + ragged_mm)
         });
         if lost_share(&with_blob, &ink) <= LOST_SHARE[1] {
             lost = with_blob;
@@ -113,32 +113,14 @@ fn lost_share(lost: &ScalarField, ink: &[(usize, usize)]) -> f64 {
     lost_count as f64 / ink.len().max(1) as f64
 }
 
-/// An elliptical lost region.
-struct Blob {
-    centre: [f64; 2],
-    axis: [f64; 2],
-    long_mm: f64,
-    short_mm: f64,
-}
-
-impl Blob {
-    fn draw(centre: [f64; 2], rng: &mut ChaCha8Rng) -> Self {
-        let angle = rng.random_range(0.0..std::f64::consts::PI);
-        let long_mm = rng.random_range(0.5..1.5);
-        Self {
-            centre,
-            axis: [angle.cos(), angle.sin()],
-            long_mm,
-            short_mm: long_mm * rng.random_range(0.4..0.9),
-        }
-    }
-
-    fn inside_mm(&self, [u, v]: [f64; 2], edge_noise: Noise) -> f64 {
-        let (du, dv) = (u - self.centre[0], v - self.centre[1]);
-        let along = (du * self.axis[0] + dv * self.axis[1]) / self.long_mm;
-        let across = (dv * self.axis[0] - du * self.axis[1]) / self.short_mm;
-        self.short_mm * (1.0 - along.hypot(across))
-            + 0.15 * edge_noise.two_octaves(u / 0.5, v / 0.5)
+fn draw_blob(centre: [f64; 2], rng: &mut ChaCha8Rng) -> Ellipse {
+    let axis = Axis::draw_any(rng);
+    let long_mm = rng.random_range(0.5..1.5);
+    Ellipse {
+        centre,
+        axis,
+        long_mm,
+        short_mm: long_mm * rng.random_range(0.4..0.9),
     }
 }
 

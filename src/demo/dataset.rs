@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::generator::PairGenerator;
 use super::pair::DemoPair;
+use super::scene::pair_id;
 use super::tier::Tier;
 use crate::raster::png_grey8;
 
@@ -64,14 +65,6 @@ pub enum DatasetError {
     /// Stopped before the dataset was complete.
     #[error("stopped while the demo files were written")]
     Stopped,
-    /// A record could not be serialized.
-    #[error("{}: {reason}", path.display())]
-    Text {
-        /// The file.
-        path: PathBuf,
-        /// The serializer's message.
-        reason: String,
-    },
 }
 
 /// Content of `dataset.json`.
@@ -109,10 +102,9 @@ pub fn write_dataset(
     options: &DemoOptions,
     is_stopped: &(dyn Fn() -> bool + Sync),
 ) -> Result<DatasetFiles, DatasetError> {
+    let max_pairs = options.tier.max_pairs().unwrap_or(u64::MAX);
     let options = DemoOptions {
-        pairs: options
-            .pairs
-            .min(options.tier.max_pairs().unwrap_or(u64::MAX)),
+        pairs: options.pairs.min(max_pairs),
         ..*options
     };
     let stamp = DatasetStamp {
@@ -123,10 +115,8 @@ pub fn write_dataset(
     let already_existed = is_complete(dir, &stamp);
     if !already_existed {
         write_all(dir, &options, is_stopped)?;
-        write(
-            &dir.join(STAMP_FILE),
-            &json_line(&dir.join(STAMP_FILE), &stamp)?,
-        )?;
+        let file = dir.join(STAMP_FILE);
+        write(&file, &json_line(&file, &stamp)?)?;
     }
     Ok(DatasetFiles {
         manifest: dir.join("manifest.csv"),
@@ -150,8 +140,7 @@ fn write_all(
 ) -> Result<(), DatasetError> {
     for folder in ["meshes", "prints", "tops"] {
         // Files of an earlier dataset would not be listed in the new manifest.
-        remove_folder(&dir.join(folder))?;
-        create_folder(&dir.join(folder))?;
+        clear_folder(&dir.join(folder))?;
     }
     let pairs = PairGenerator::new(options.tier, options.seed);
     let lines = (0..options.pairs)
@@ -176,7 +165,7 @@ fn write_pair(
 ) -> Result<(ManifestLine, Vec<u8>), DatasetError> {
     let tier = pairs.tier();
     let pair = pairs.pair(index).map_err(|source| DatasetError::Image {
-        id: super::pair::pair_id(tier, index),
+        id: pair_id(tier, index),
         source,
     })?;
     let manifest_line = manifest_line(&pair, tier, index);
@@ -205,50 +194,35 @@ fn manifest_line(pair: &DemoPair, tier: Tier, index: u64) -> ManifestLine {
 }
 
 fn write_manifest(path: &Path, rows: &[ManifestLine]) -> Result<(), DatasetError> {
-    let text_error = |error: csv::Error| DatasetError::Text {
-        path: path.to_owned(),
-        reason: error.to_string(),
-    };
-    let mut writer = csv::Writer::from_writer(Vec::new());
+    let mut writer = csv::Writer::from_path(path).map_err(at(path))?;
     for manifest_line in rows {
-        writer.serialize(manifest_line).map_err(text_error)?;
+        writer.serialize(manifest_line).map_err(at(path))?;
     }
-    let bytes = writer.into_inner().map_err(|error| DatasetError::Text {
-        path: path.to_owned(),
-        reason: error.to_string(),
-    })?;
-    write(path, &bytes)
+    writer.flush().map_err(at(path))
 }
 
 fn json_line(path: &Path, value: &impl Serialize) -> Result<Vec<u8>, DatasetError> {
-    let mut line = serde_json::to_vec(value).map_err(|error| DatasetError::Text {
-        path: path.to_owned(),
-        reason: error.to_string(),
-    })?;
+    let mut line = serde_json::to_vec(value).map_err(at(path))?;
     line.push(b'\n');
     Ok(line)
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<(), DatasetError> {
-    fs::write(path, bytes).map_err(|source| DatasetError::Io {
-        path: path.to_owned(),
-        source,
-    })
+    fs::write(path, bytes).map_err(at(path))
 }
 
-fn create_folder(path: &Path) -> Result<(), DatasetError> {
-    fs::create_dir_all(path).map_err(|source| DatasetError::Io {
-        path: path.to_owned(),
-        source,
-    })
-}
-
-fn remove_folder(path: &Path) -> Result<(), DatasetError> {
+/// Empties a folder, or creates it.
+fn clear_folder(path: &Path) -> Result<(), DatasetError> {
     match fs::remove_dir_all(path) {
-        Err(source) if source.kind() != std::io::ErrorKind::NotFound => Err(DatasetError::Io {
-            path: path.to_owned(),
-            source,
-        }),
-        Ok(()) | Err(_) => Ok(()),
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(at(path)(error)),
+        Ok(()) | Err(_) => fs::create_dir_all(path).map_err(at(path)),
+    }
+}
+
+/// Adds a path to an error.
+fn at<E: Into<std::io::Error>>(path: &Path) -> impl FnOnce(E) -> DatasetError {
+    |error| DatasetError::Io {
+        path: path.to_owned(),
+        source: error.into(),
     }
 }

@@ -3,8 +3,10 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
+use super::ellipse::{Axis, Ellipse};
 use super::noise::{Noise, lerp, smoothstep};
 use super::scalar_field::ScalarField;
+use super::scene::Scene;
 use super::tier::Tier;
 
 /// Amount of ink on the block.
@@ -27,38 +29,24 @@ pub(super) struct Inking {
     dryness: f64,
     dry_patches: Noise,
     bristles: Noise,
-    gaps: Vec<InkSpot>,
-    specks: Vec<InkSpot>,
-}
-
-/// A small ellipse with or without ink.
-struct InkSpot {
-    centre: [f64; 2],
-    axis: [f64; 2],
-    long_mm: f64,
-    short_mm: f64,
+    gaps: Vec<Ellipse>,
+    specks: Vec<Ellipse>,
 }
 
 impl Inking {
     /// Inks the strokes and their neighbours.
-    pub(super) fn draw(
-        strokes: &ScalarField,
-        neighbours: &ScalarField,
-        tier: Tier,
-        rng: &mut ChaCha8Rng,
-    ) -> Self {
+    pub(super) fn draw(scene: &Scene, rng: &mut ChaCha8Rng) -> Self {
+        let (tier, strokes) = (scene.tier, &scene.artwork.strokes);
         let load = draw_ink_load(tier, rng);
         let union = ScalarField::from_fn(strokes.frame, |_, x, y| {
-            strokes.at(x, y).max(neighbours.at(x, y))
+            strokes.at(x, y).max(scene.print_neighbours.at(x, y))
         });
         let gap_count = rng.random_range(0..if tier.is_damaged() { 9 } else { 5 });
         let gaps = (0..gap_count)
-            .filter_map(|_| InkSpot::gap(strokes, rng))
+            .filter_map(|_| draw_gap(strokes, rng))
             .collect();
         let speck_count = rng.random_range(4..if tier.is_damaged() { 45 } else { 22 });
-        let specks = (0..speck_count)
-            .map(|_| InkSpot::speck(strokes, rng))
-            .collect();
+        let specks = (0..speck_count).map(|_| draw_speck(strokes, rng)).collect();
         Self {
             printed: fill_corners(&union),
             spread_mm: match load {
@@ -95,7 +83,10 @@ impl Inking {
         let cover = |inside_mm: f64| (0.5 + inside_mm / (1.4 * px_mm)).clamp(0.0, 1.0);
         let stroke =
             cover(self.printed.value(point) + spread) * (1.0 - self.missing_share(point, px_mm));
-        let speck = self.specks.iter().map(|spot| cover(spot.inside_mm(point)));
+        let speck = self
+            .specks
+            .iter()
+            .map(|spot| cover(inside_spot_mm(spot, point)));
         let blotch = 1.0 - 0.12 * (1.0 + self.blotches.two_octaves(u / 0.7, v / 0.7)).max(0.0);
         self.strength * (stroke * blotch.min(1.0)).max(0.8 * speck.fold(0.0, f64::max))
     }
@@ -109,7 +100,7 @@ impl Inking {
         let patchy = 0.85 * smoothstep(edge, edge + 0.45, bristle);
         let ragged_mm = 0.05 * bristle;
         let broken = self.gaps.iter().map(|spot| {
-            (0.5 + (spot.inside_mm(point) + ragged_mm) / (1.4 * px_mm)).clamp(0.0, 0.9)
+            (0.5 + (inside_spot_mm(spot, point) + ragged_mm) / (1.4 * px_mm)).clamp(0.0, 0.9)
         });
         broken.fold(patchy, f64::max)
     }
@@ -118,14 +109,10 @@ impl Inking {
 /// Draws the amount of ink; only the `hard` tier has too much or too little.
 fn draw_ink_load(tier: Tier, rng: &mut ChaCha8Rng) -> InkLoad {
     let share: f64 = rng.random();
-    if !tier.is_damaged() {
-        InkLoad::Normal
-    } else if share < 0.35 {
-        InkLoad::Heavy
-    } else if share < 0.7 {
-        InkLoad::Faint
-    } else {
-        InkLoad::Normal
+    match share {
+        ..0.35 if tier.is_damaged() => InkLoad::Heavy,
+        ..0.7 if tier.is_damaged() => InkLoad::Faint,
+        _ => InkLoad::Normal,
     }
 }
 
@@ -141,55 +128,37 @@ fn fill_corners(printed: &ScalarField) -> ScalarField {
     })
 }
 
-impl InkSpot {
-    fn gap(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Option<Self> {
-        let centre = (0..200).find_map(|_| {
-            let point = random_point(strokes, rng);
-            (strokes.value(point) > 0.05).then_some(point)
-        })?;
-        let short_mm = rng.random_range(0.04..0.14);
-        Some(Self::with_random_axis(
-            centre,
-            rng.random_range(0.3..0.8),
-            short_mm,
-            rng,
-        ))
-    }
+/// Draws a gap inside a stroke.
+fn draw_gap(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Option<Ellipse> {
+    let centre = (0..200).find_map(|_| {
+        let point = strokes.frame.random_position(rng);
+        (strokes.value(point) > 0.05).then_some(point)
+    })?;
+    let short_mm = rng.random_range(0.04..0.14);
+    Some(Ellipse {
+        centre,
+        short_mm,
+        long_mm: rng.random_range(0.3..0.8),
+        axis: Axis::draw_any(rng),
+    })
+}
 
-    fn speck(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Self {
-        let long_mm = 0.02 * 9.0_f64.powf(rng.random());
-        let short_mm = long_mm * rng.random_range(0.5..1.0);
-        Self::with_random_axis(random_point(strokes, rng), long_mm, short_mm, rng)
-    }
-
-    fn with_random_axis(
-        centre: [f64; 2],
-        long_mm: f64,
-        short_mm: f64,
-        rng: &mut ChaCha8Rng,
-    ) -> Self {
-        let angle = rng.random_range(0.0..std::f64::consts::PI);
-        Self {
-            centre,
-            axis: [angle.cos(), angle.sin()],
-            long_mm,
-            short_mm,
-        }
-    }
-
-    /// Returns the approximate signed distance to the edge in mm, positive inside.
-    fn inside_mm(&self, [u, v]: [f64; 2]) -> f64 {
-        let (du, dv) = (u - self.centre[0], v - self.centre[1]);
-        if du * du + dv * dv > (self.long_mm + 1.0).powi(2) {
-            return -1.0;
-        }
-        let along = (du * self.axis[0] + dv * self.axis[1]) / self.long_mm;
-        let across = (dv * self.axis[0] - du * self.axis[1]) / self.short_mm;
-        self.short_mm * (1.0 - along.hypot(across))
+/// Draws a speck of ink anywhere.
+fn draw_speck(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Ellipse {
+    let long_mm = 0.02 * 9.0_f64.powf(rng.random());
+    Ellipse {
+        long_mm,
+        short_mm: long_mm * rng.random_range(0.5..1.0),
+        centre: strokes.frame.random_position(rng),
+        axis: Axis::draw_any(rng),
     }
 }
 
-fn random_point(field: &ScalarField, rng: &mut ChaCha8Rng) -> [f64; 2] {
-    let half = field.frame.half_mm();
-    [0; 2].map(|_: i32| rng.random_range(-half..half))
+/// Returns the approximate signed distance to the edge of a spot in mm, positive inside; -1 far outside.
+fn inside_spot_mm(spot: &Ellipse, [u, v]: [f64; 2]) -> f64 {
+    let (du, dv) = (u - spot.centre[0], v - spot.centre[1]);
+    if du * du + dv * dv > (spot.long_mm + 1.0).powi(2) {
+        return -1.0;
+    }
+    spot.inside_mm([u, v])
 }

@@ -1,15 +1,16 @@
 //! The built-in dataset: glyphs carved into meshes and printed, with known truth, from one seed.
 //!
-//! A pair is a pure function of seed, tier and index. `artwork` draws the strokes and `damage` removes parts of them.
-//! `carving` computes the carved surface; `scanner` and `scan_pose` turn it into a mesh. `inking`, `print_sheet`,
-//! `rendered_print` and `print_format` make the print. `truth_line` records the true alignment, `generator` makes pairs in
-//! memory and `dataset` writes them to disk.
+//! A pair is a pure function of seed, tier and index. `scene` draws the strokes (`artwork`) and `damage` removes parts
+//! of them. `carving` computes the carved surface; `scanner` and `scan_pose` turn it into a mesh. `inking`,
+//! `print_sheet`, `rendered_print` and `print_format` make the print. `truth_line` records the true alignment,
+//! `generator` makes pairs in memory and `dataset` writes them to disk.
 
 mod artwork;
 mod calligraphy;
 mod carving;
 mod damage;
 mod dataset;
+mod ellipse;
 mod generator;
 mod glyph;
 mod inking;
@@ -22,6 +23,7 @@ mod rendered_print;
 mod scalar_field;
 mod scan_pose;
 mod scanner;
+mod scene;
 mod tier;
 mod truth_line;
 

@@ -18,21 +18,9 @@ impl Noise {
     /// Returns the value at a point, -1..1.
     pub(super) fn at(self, x: f64, y: f64) -> f64 {
         let (ix, iy) = (floor(x), floor(y));
-        let (fx, fy) = (
-            smoothstep_unit(x - ix as f64),
-            smoothstep_unit(y - iy as f64),
-        );
-        let top = lerp(
-            self.lattice_value(ix, iy),
-            self.lattice_value(ix + 1, iy),
-            fx,
-        );
-        let bottom = lerp(
-            self.lattice_value(ix, iy + 1),
-            self.lattice_value(ix + 1, iy + 1),
-            fx,
-        );
-        lerp(top, bottom, fy)
+        let [fx, fy] = [x - ix as f64, y - iy as f64].map(smoothstep_unit);
+        let row = |y| lerp(self.lattice_value(ix, y), self.lattice_value(ix + 1, y), fx);
+        lerp(row(iy), row(iy + 1), fy)
     }
 
     /// Returns the sum of two octaves, the second at half amplitude, -1.5..1.5.

@@ -1,23 +1,21 @@
 //! Makes one pair of the dataset: carves, scans and prints a character and records the ground truth.
 
 use image::ImageError;
-use rand::{RngExt, SeedableRng};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 use super::artwork::Artwork;
-use super::carving::{Carving, carve};
-use super::damage::Damage;
+use super::carving::carve;
 use super::glyph::Glyphs;
-use super::inking::Inking;
 use super::polygon::Polygon;
-use super::print_format::PrintFormat;
-use super::rendered_print::{Impression, PrintFrame, render_print};
-use super::scalar_field::ScalarField;
+use super::print_format::encode_print;
+use super::rendered_print::{PrintFrame, render_print};
 use super::scan_pose::ScanPose;
 use super::scanner::{ScanStyle, scan};
+use super::scene::{Scene, pair_rng};
 use super::tier::Tier;
 use super::truth_line::{TruthLine, TruthSource};
-use crate::domain::{ContentHash, LengthUnit};
+use crate::domain::LengthUnit;
 use crate::mesh::Mesh;
 use crate::mesh::write::MeshFormat;
 use crate::raster::Grid;
@@ -48,35 +46,6 @@ pub struct DemoPair {
     pub truth: TruthLine,
 }
 
-/// Creates the random generator of one pair from seed, tier and index.
-pub(super) fn pair_rng(seed: u64, tier: Tier, index: u64) -> ChaCha8Rng {
-    let name = format!("mocban demo {tier} {seed} {index}");
-    ChaCha8Rng::from_seed(*ContentHash::of(name.as_bytes()).as_bytes())
-}
-
-/// Returns the id of a pair, which is also its file stem.
-pub(super) fn pair_id(tier: Tier, index: u64) -> String {
-    format!("{tier}-{index:04}")
-}
-
-/// The inputs of a pair: a character, its neighbours and the damage of the block.
-pub(super) struct Scene {
-    /// Manifest id and file stem.
-    pub id: String,
-    /// Difficulty.
-    pub tier: Tier,
-    /// The character.
-    pub character: char,
-    /// Strokes of the character.
-    pub artwork: Artwork,
-    /// Neighbours and column rules on the block.
-    pub block_neighbours: ScalarField,
-    /// Neighbours and column rules on the print.
-    pub print_neighbours: ScalarField,
-    /// Damage of the block after printing.
-    pub damage: Damage,
-}
-
 /// An encoded print and its frame.
 pub(super) struct Printed {
     /// Size and true map of the image.
@@ -99,100 +68,56 @@ pub(super) fn drawn_pair(
     vertices: Option<u32>,
 ) -> Result<DemoPair, ImageError> {
     let mut rng = pair_rng(seed, tier, index);
-    let scene = Scene::draw(glyphs, tier, pair_id(tier, index), &mut rng);
-    let printed = scene.printed(&mut rng)?;
-    Ok(scene.into_pair(printed, vertices, &mut rng))
+    let scene = Scene::draw(glyphs, tier, index, &mut rng);
+    let printed = print(&scene, &mut rng)?;
+    Ok(finish_pair(&scene, printed, vertices, &mut rng))
 }
 
-impl Scene {
-    fn draw(glyphs: &Glyphs, tier: Tier, id: String, rng: &mut ChaCha8Rng) -> Self {
-        let characters = glyphs.characters();
-        let character = characters[rng.random_range(0..characters.len())];
-        let artwork = Artwork::of_glyph(glyphs, character, rng);
-        let block_neighbours = artwork.draw_neighbours(glyphs, rng);
-        let (print_neighbours, damage) = if tier.is_damaged() {
-            let other = artwork.draw_neighbours(glyphs, rng);
-            (other, Damage::draw(&artwork, rng))
-        } else {
-            (block_neighbours.clone(), Damage::default())
-        };
-        Self {
-            id,
-            tier,
-            character,
-            artwork,
-            block_neighbours,
-            print_neighbours,
-            damage,
-        }
-    }
+/// Prints the block and cuts the character out of the print.
+fn print(scene: &Scene, rng: &mut ChaCha8Rng) -> Result<Printed, ImageError> {
+    let outline = cut_outline(&scene.artwork, rng);
+    let frame = PrintFrame::draw(&outline, rng);
+    let picture = render_print(scene, &outline, &frame, rng);
+    let (bytes, extension) = encode_print(&picture, rng)?;
+    Ok(Printed {
+        frame,
+        bytes,
+        extension,
+    })
+}
 
-    /// Prints the block and cuts the character out of the print.
-    fn printed(&self, rng: &mut ChaCha8Rng) -> Result<Printed, ImageError> {
-        let outline = cut_outline(&self.artwork, rng);
-        let frame = PrintFrame::draw(&outline, rng);
-        let strokes = &self.artwork.strokes;
-        let impression = Impression {
-            inking: &Inking::draw(strokes, &self.print_neighbours, self.tier, rng),
-            damage: &self.damage,
-            outline: &outline,
-            tier: self.tier,
-        };
-        let picture = render_print(&impression, &frame, rng);
-        let format = PrintFormat::draw(rng);
-        Ok(Printed {
-            frame,
-            bytes: format.encode(&picture)?,
-            extension: format.extension(),
-        })
-    }
-
-    /// Carves and scans the damaged block and records the ground truth.
-    pub(super) fn into_pair(
-        self,
-        printed: Printed,
-        vertices: Option<u32>,
-        rng: &mut ChaCha8Rng,
-    ) -> DemoPair {
-        let remaining = self.damage.remaining(&self.artwork.strokes);
-        let surface = self.surface(&remaining, rng);
-        let style = ScanStyle::draw(self.tier.is_damaged(), vertices, rng);
-        let mut mesh = scan(&surface, &cut_outline(&self.artwork, rng), &style, rng);
-        let pose = ScanPose::draw(self.tier, rng);
-        mesh.vertices
-            .map_in_place(|vertex| pose.mesh_from_block(vertex));
-        let truth_source = TruthSource {
-            strokes: &self.artwork.strokes,
-            remaining: &remaining,
-            neighbours: [&self.block_neighbours, &self.print_neighbours],
-            damage: &self.damage,
-            surface: &surface,
-        };
-        let frame = &printed.frame;
-        DemoPair {
-            truth: TruthLine::new(&self.id, &truth_source, &pose, frame, rng),
-            tops: truth_source.tops_mask(frame),
-            scanned_face_down: rng.random_bool(0.3).then(|| pose.is_face_down()),
-            mesh_format: draw_mesh_format(mesh.vertices.len(), rng),
-            id: self.id,
-            character: self.character.to_string(),
-            unit: pose.unit.map(LengthUnit::name),
-            is_closed: style.is_closed,
-            mesh,
-            print: printed.bytes,
-            print_extension: printed.extension,
-        }
-    }
-
-    /// Computes the carved surface with the remaining strokes.
-    fn surface(&self, remaining: &ScalarField, rng: &mut ChaCha8Rng) -> ScalarField {
-        let carving = Carving {
-            strokes: remaining,
-            neighbours: &self.block_neighbours,
-            damage: &self.damage,
-            bend_mm: self.tier.bend_mm(),
-        };
-        carve(&carving, rng)
+/// Carves and scans the damaged block and records the ground truth.
+pub(super) fn finish_pair(
+    scene: &Scene,
+    printed: Printed,
+    vertices: Option<u32>,
+    rng: &mut ChaCha8Rng,
+) -> DemoPair {
+    let remaining = scene.damage.remaining(&scene.artwork.strokes);
+    let surface = carve(scene, &remaining, rng);
+    let style = ScanStyle::draw(scene.tier.is_damaged(), vertices, rng);
+    let mut mesh = scan(&surface, &cut_outline(&scene.artwork, rng), &style, rng);
+    let pose = ScanPose::draw(scene.tier, rng);
+    mesh.vertices
+        .map_in_place(|vertex| pose.mesh_from_block(vertex));
+    let truth_source = TruthSource {
+        scene,
+        remaining: &remaining,
+        surface: &surface,
+    };
+    let frame = &printed.frame;
+    DemoPair {
+        truth: truth_source.line(&pose, frame, rng),
+        tops: truth_source.tops_mask(frame),
+        scanned_face_down: rng.random_bool(0.3).then(|| pose.is_face_down()),
+        mesh_format: draw_mesh_format(mesh.vertices.len(), rng),
+        id: scene.id.clone(),
+        character: scene.character.to_string(),
+        unit: pose.unit.map(LengthUnit::name),
+        is_closed: style.is_closed,
+        mesh,
+        print: printed.bytes,
+        print_extension: printed.extension,
     }
 }
 

@@ -54,11 +54,9 @@ impl Polygon {
     /// Returns the bounding box.
     pub(super) fn bounds(&self) -> BoundsMm {
         let extreme = |start: f64, pick: fn(f64, f64) -> f64| {
-            [0, 1].map(|i| {
-                self.corners
-                    .iter()
-                    .map(|corner| corner[i])
-                    .fold(start, pick)
+            let corners = self.corners.iter();
+            corners.fold([start; 2], |found, corner| {
+                [0, 1].map(|i| pick(found[i], corner[i]))
             })
         };
         BoundsMm {

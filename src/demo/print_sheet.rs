@@ -55,14 +55,8 @@ impl PrintSheet {
             .map(|stain| stain.transmittance([u, v]))
             .product();
         // Stains are brown: they absorb blue most.
-        [1.0, 0.94, 0.82]
-            .map(|hue| lerp(hue, 1.0, smoothstep(0.6, 1.0, stained)))
-            .iter()
-            .zip(self.colour)
-            .map(|(hue, colour)| (colour + shade) * hue * stained)
-            .collect::<Vec<_>>()
-            .try_into()
-            .unwrap_or(self.colour)
+        let hues = [1.0, 0.94, 0.82].map(|hue| lerp(hue, 1.0, smoothstep(0.6, 1.0, stained)));
+        [0, 1, 2].map(|i| (self.colour[i] + shade) * hues[i] * stained)
     }
 }
 

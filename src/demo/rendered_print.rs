@@ -3,12 +3,11 @@
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
-use super::damage::Damage;
 use super::inking::Inking;
 use super::noise::{Noise, lerp};
 use super::polygon::Polygon;
 use super::print_sheet::PrintSheet;
-use super::tier::Tier;
+use super::scene::Scene;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
@@ -76,18 +75,6 @@ impl PrintFrame {
     }
 }
 
-/// Inputs of the rendered print.
-pub(super) struct Impression<'a> {
-    /// The ink.
-    pub inking: &'a Inking,
-    /// Damage of the block; the cracks may predate the print.
-    pub damage: &'a Damage,
-    /// Outline along which the print is cut.
-    pub outline: &'a Polygon,
-    /// Difficulty.
-    pub tier: Tier,
-}
-
 /// A rendered print.
 pub(super) struct RenderedPrint {
     /// Red, green and blue, 0..=255.
@@ -96,13 +83,15 @@ pub(super) struct RenderedPrint {
     pub inside_cut: Grid<bool>,
 }
 
-/// Renders the print.
+/// Prints the scene and cuts the print along an outline.
 pub(super) fn render_print(
-    impression: &Impression,
+    scene: &Scene,
+    outline: &Polygon,
     frame: &PrintFrame,
     rng: &mut ChaCha8Rng,
 ) -> RenderedPrint {
-    let stains = if impression.tier.is_damaged() {
+    let inking = Inking::draw(scene, rng);
+    let stains = if scene.tier.is_damaged() {
         rng.random_range(0..4)
     } else {
         0
@@ -110,10 +99,11 @@ pub(super) fn render_print(
     let sheet = PrintSheet::draw(stains, 6.0, rng);
     let ink_grey = rng.random_range(20.0..44.0);
     let ink_colour = [0; 3].map(|_: i32| ink_grey + rng.random_range(-4.0..4.0));
+    // Cracks may be older than the print.
     let cracks_print = rng.random_bool(0.5);
     let stretch = [Noise::draw(rng), Noise::draw(rng)];
     let inside_cut = Grid::from_fn(frame.width, frame.height, |x, y| {
-        impression.outline.contains(frame.uv(x, y))
+        outline.contains(frame.uv(x, y))
     });
     let rgb = Grid::from_fn(frame.width, frame.height, |x, y| {
         let [u, v] = frame.uv(x, y);
@@ -123,8 +113,8 @@ pub(super) fn render_print(
         // Damp paper stretches unevenly by a few hundredths of a millimetre.
         let [su, sv] = stretch.map(|noise| 0.035 * noise.at(u / 4.0, v / 4.0));
         let point = [u + su, v + sv];
-        let mut ink = impression.inking.at(point, frame.px_mm());
-        if cracks_print && impression.damage.is_cracked(point, 0.0) {
+        let mut ink = inking.at(point, frame.px_mm());
+        if cracks_print && scene.damage.is_cracked(point, 0.0) {
             ink *= 0.15;
         }
         let sheet_colour = sheet.at([u, v]);

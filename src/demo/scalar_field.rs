@@ -1,5 +1,8 @@
 //! Scalar fields over the character's square, in mm: signed distances and heights.
 
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+
 use crate::raster::{Grid, Mask};
 
 /// A square grid of samples around the character's centre. u points right and v down **as the print reads**, in mm.
@@ -47,6 +50,12 @@ impl SampleFrame {
         };
         let ([x0, y0], [x1, y1]) = (bound(-half_size_mm), bound(half_size_mm));
         (y0..=y1).flat_map(move |y| (x0..=x1).map(move |x| (x, y)))
+    }
+
+    /// Draws a uniformly distributed position, mm.
+    pub(super) fn random_position(self, rng: &mut ChaCha8Rng) -> [f64; 2] {
+        let half = self.half_mm();
+        [0; 2].map(|_: i32| rng.random_range(-half..half))
     }
 
     /// Converts a point in mm to fractional sample coordinates.
@@ -104,14 +113,9 @@ impl ScalarField {
     pub(super) fn value(&self, point: [f64; 2]) -> f64 {
         let last = (self.frame.side - 1) as f64;
         let [x, y] = self.frame.sample(point).map(|c| c.clamp(0.0, last));
-        let (x0, y0) = (
-            (x as usize).min(self.frame.side - 2),
-            (y as usize).min(self.frame.side - 2),
-        );
-        let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-        let top = self.at(x0, y0) * (1.0 - fx) + self.at(x0 + 1, y0) * fx;
-        let bottom = self.at(x0, y0 + 1) * (1.0 - fx) + self.at(x0 + 1, y0 + 1) * fx;
-        top * (1.0 - fy) + bottom * fy
+        let [x0, y0] = [x, y].map(|c| (c as usize).min(self.frame.side - 2));
+        let corners = [y0, y0 + 1].map(|y| [x0, x0 + 1].map(|x| self.at(x, y)));
+        bilinear(corners, x - x0 as f64, y - y0 as f64)
     }
 
     /// Returns the field smoothed by a Gaussian of `sigma_mm`.
@@ -125,6 +129,12 @@ impl ScalarField {
             values,
         }
     }
+}
+
+/// Interpolates between the corners of a unit square, given row by row, at a point of the square.
+pub(super) fn bilinear([top, bottom]: [[f64; 2]; 2], x: f64, y: f64) -> f64 {
+    let [top, bottom] = [top, bottom].map(|[left, right]| left * (1.0 - x) + right * x);
+    top * (1.0 - y) + bottom * y
 }
 
 /// Returns the weights of a Gaussian of `sigma` samples, truncated at three sigma and normalized to sum one.

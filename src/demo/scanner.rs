@@ -41,11 +41,7 @@ impl ScanStyle {
             is_closed,
             vertices: vertices.map_or_else(|| 22_000.0 * 6.0_f64.powf(share * share), f64::from),
             noise_mm: rng.random_range(0.005..0.010),
-            spikes: if is_damaged_scan {
-                rng.random_range(0..40)
-            } else {
-                rng.random_range(0..6)
-            },
+            spikes: rng.random_range(0..if is_damaged_scan { 40 } else { 6 }),
             holes: if is_closed { 0 } else { rng.random_range(0..5) },
             is_inside_out: rng.random_bool(0.15),
         }
@@ -121,7 +117,7 @@ impl SampledSurface {
                 outline.contains(point) && !holes.iter().any(|hole| hole.contains(point))
             })
             .collect();
-        let mut builder = MeshBuilder::new(&self.points);
+        let mut kept = Vec::new();
         for row in 0..self.points.len() / self.columns - 1 {
             for column in 0..self.columns - 1 {
                 let a = row * self.columns + column;
@@ -131,43 +127,29 @@ impl SampledSurface {
                 } else {
                     [[a, b, d], [b, c, d]]
                 };
-                for triangle in halves {
-                    if triangle.iter().all(|corner| is_visible[*corner]) {
-                        builder.add(triangle);
-                    }
-                }
+                let visible = |half: &[usize; 3]| half.iter().all(|corner| is_visible[*corner]);
+                kept.extend(halves.into_iter().filter(visible));
             }
         }
-        builder.mesh
+        mesh_of(&self.points, &kept)
     }
 }
 
-/// Collects triangles and the points that they use.
-struct MeshBuilder<'a> {
-    points: &'a [[f64; 3]],
-    index: Vec<u32>,
-    mesh: Mesh,
-}
-
-impl<'a> MeshBuilder<'a> {
-    fn new(points: &'a [[f64; 3]]) -> Self {
-        Self {
-            points,
-            index: vec![u32::MAX; points.len()],
-            mesh: Mesh::default(),
-        }
-    }
-
-    fn add(&mut self, triangle: [usize; 3]) {
+/// Returns the mesh of these triangles; its vertices are the points that they use, in the order of first use.
+fn mesh_of(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> Mesh {
+    let mut index = vec![u32::MAX; points.len()];
+    let mut mesh = Mesh::default();
+    for triangle in triangles {
         let corners = triangle.map(|corner| {
-            if self.index[corner] == u32::MAX {
-                self.index[corner] = self.mesh.vertices.len() as u32;
-                self.mesh.vertices.push(self.points[corner]);
+            if index[corner] == u32::MAX {
+                index[corner] = mesh.vertices.len() as u32;
+                mesh.vertices.push(points[corner]);
             }
-            self.index[corner]
+            index[corner]
         });
-        self.mesh.triangles.push(corners);
+        mesh.triangles.push(corners);
     }
+    mesh
 }
 
 /// A circular region without data.
@@ -184,11 +166,10 @@ impl ScanHole {
 
 /// Draws holes in deep regions, which scanners see badly.
 fn holes(surface: &ScalarField, style: &ScanStyle, rng: &mut ChaCha8Rng) -> Vec<ScanHole> {
-    let half = surface.frame.half_mm();
     (0..style.holes)
         .filter_map(|_| {
             (0..100).find_map(|_| {
-                let centre = [0; 2].map(|_: i32| rng.random_range(-half..half));
+                let centre = surface.frame.random_position(rng);
                 let radius_mm = rng.random_range(0.05..0.2);
                 (surface.value(centre) < -0.6).then_some(ScanHole { centre, radius_mm })
             })
@@ -223,10 +204,13 @@ fn close_body(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
         .iter()
         .map(|[a, b, c]| [a, c, b].map(|corner| corner + base_start));
     mesh.triangles.extend(under);
-    let mut columns = BTreeMap::new();
+    let mut columns: BTreeMap<u32, Vec<u32>> = BTreeMap::new();
     for (a, b) in boundary {
-        let from = wall_column(a, base_start, mesh, &mut columns, noise_mm, rng);
-        let to = wall_column(b, base_start, mesh, &mut columns, noise_mm, rng);
+        let [from, to] = [a, b].map(|corner| {
+            let column = columns.entry(corner);
+            let make = || wall_column(corner, base_start, mesh, noise_mm, rng);
+            column.or_insert_with(make).clone()
+        });
         for row in 0..from.len() - 1 {
             let (p, q, r, s) = (from[row], to[row], to[row + 1], from[row + 1]);
             mesh.triangles.extend([[q, p, s], [q, s, r]]);
@@ -247,18 +231,14 @@ fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
         .collect()
 }
 
-/// Returns the wall vertices below a boundary vertex, from the face down to the base.
+/// Adds the wall vertices below a boundary vertex; returns them from the face down to the base.
 fn wall_column(
     boundary: u32,
     base_start: u32,
     mesh: &mut Mesh,
-    columns: &mut BTreeMap<u32, Vec<u32>>,
     noise_mm: f64,
     rng: &mut ChaCha8Rng,
 ) -> Vec<u32> {
-    if let Some(existing) = columns.get(&boundary) {
-        return existing.clone();
-    }
     let [x, y, z] = mesh.vertices.at(boundary as usize);
     let mut column = vec![boundary];
     for row in 1..WALL_ROWS {
@@ -271,7 +251,6 @@ fn wall_column(
         ]);
     }
     column.push(boundary + base_start);
-    columns.insert(boundary, column.clone());
     column
 }
 
