@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use super::draft::{DraftRow, RowCollector};
-use super::error::{ManifestError, Problem};
-use super::row::{COLUMNS, ManifestRow, REQUIRED, RowIds};
+use super::error::{ManifestError, at_line, of_list};
+use super::row::{ManifestRow, REQUIRED, RowIds, known_column};
 use super::text::{LineCounter, as_utf8, delimiter};
 
 /// Parses a CSV list with a header line. Columns may be in any order, their names in any case; blank lines are ignored.
@@ -22,8 +22,7 @@ pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
 /// # Errors
 /// All problems, by the line where each row starts.
 pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError> {
-    let text = as_utf8(bytes).map_err(|error| Problem::of_list(error.to_string()))?;
-    let bytes = &*text;
+    let bytes = &*as_utf8(bytes).map_err(|error| error.to_string())?;
     let mut reader = ::csv::ReaderBuilder::new()
         .delimiter(delimiter(bytes))
         .trim(::csv::Trim::All)
@@ -32,37 +31,24 @@ pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowId
         .from_reader(bytes);
     let mut lines = LineCounter::new(bytes);
     let mut records = reader.byte_records().map(|record| {
-        let record = record.map_err(|error| Problem::of_list(error.to_string()))?;
+        let record = record.map_err(|error| of_list(&error.to_string()))?;
         let line = lines.at(record.position());
-        Ok::<_, Problem>((line, record))
+        Ok::<_, ManifestError>((line, record))
     });
     let header = match records.next() {
         Some(header) => CsvHeader::parse(&header?)?,
-        None => return Err(Problem::of_list("the list is empty").into()),
+        None => return Err(of_list("the list is empty").into()),
     };
     let mut rows = RowCollector::new(each);
     for record in records {
         let (line, record) = record?;
-        match header.draft(line, &record) {
-            Ok(Some(draft)) => rows.push(draft),
-            Ok(None) => {}
-            Err(problem) => rows.problems.push(problem),
-        }
+        rows.push(line, header.draft(line, &record));
     }
     rows.finish()
 }
 
-/// The meaning of a column.
-#[derive(Debug, Clone)]
-enum CsvColumn {
-    Known(&'static str),
-    Meta(String),
-}
-
-#[derive(Debug)]
-struct CsvHeader {
-    columns: Vec<CsvColumn>,
-}
+/// The columns in order: the known name, if it has a meaning, and the name as written.
+struct CsvHeader(Vec<(Option<&'static str>, String)>);
 
 impl CsvHeader {
     fn parse((line, record): &(usize, ::csv::ByteRecord)) -> Result<Self, ManifestError> {
@@ -71,88 +57,54 @@ impl CsvHeader {
         let mut columns = Vec::new();
         for (number, field) in (1..).zip(record) {
             let Ok(name) = std::str::from_utf8(field) else {
-                problems.push(Problem::at_line(
-                    *line,
-                    format!("the name of column {number} is not UTF-8"),
-                ));
+                let reason = format!("the name of column {number} is not UTF-8");
+                problems.push(at_line(*line, &reason));
                 continue;
             };
-            let column = column(name);
+            let known = known_column(name);
             if !name.is_empty()
-                && let Some(first) = seen.insert(column_name(&column).to_owned(), number)
+                && let Some(first) = seen.insert(known.unwrap_or(name), number)
             {
                 let reason = format!("columns {first} and {number} are both named {name:?}");
-                problems.push(Problem::at_line(*line, reason));
+                problems.push(at_line(*line, &reason));
             }
-            columns.push(column);
+            columns.push((known, name.to_owned()));
         }
         let missing = REQUIRED.iter().filter(|name| !seen.contains_key(**name));
-        problems.extend(missing.map(|name| Problem::at_line(*line, missing_column(name, record))));
+        problems.extend(missing.map(|name| at_line(*line, &missing_column(name, record))));
         if problems.is_empty() {
-            Ok(Self { columns })
+            Ok(Self(columns))
         } else {
             Err(ManifestError { problems })
         }
     }
 
     /// Returns a row's cells; `None` for a row of empty cells, as spreadsheets write them at the end.
-    fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<DraftRow>, Problem> {
+    ///
+    /// # Errors
+    /// What is wrong with the row, without its line.
+    fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<DraftRow>, String> {
+        let Self(columns) = self;
         if record.iter().all(<[u8]>::is_empty) {
             return Ok(None);
         }
-        if record.len() != self.columns.len() {
-            return Err(Problem::at_line(
-                line,
-                format!(
-                    "the row has {} cells, the header has {}",
-                    record.len(),
-                    self.columns.len()
-                ),
-            ));
+        if record.len() != columns.len() {
+            let (cells, names) = (record.len(), columns.len());
+            return Err(format!("the row has {cells} cells, the header has {names}"));
         }
-        let mut draft = DraftRow {
-            line,
-            ..DraftRow::default()
-        };
-        for (column, cell) in self.columns.iter().zip(record) {
+        let mut draft = DraftRow::new(line);
+        for ((known, name), cell) in columns.iter().zip(record) {
             let Ok(cell) = std::str::from_utf8(cell) else {
-                let name = column_name(column);
-                return Err(Problem::at_line(
-                    line,
-                    format!("the cell of column {name:?} is not UTF-8"),
-                ));
+                let name = known.unwrap_or(name);
+                return Err(format!("the cell of column {name:?} is not UTF-8"));
             };
-            draft.put(column, cell);
+            if let Some(known) = known {
+                draft.cells.insert(known, cell.to_owned());
+            } else if !cell.is_empty() && !name.is_empty() {
+                draft.meta.insert(name.clone(), cell.into());
+            }
         }
         Ok(Some(draft))
-    }
-}
-
-impl DraftRow {
-    fn put(&mut self, column: &CsvColumn, cell: &str) {
-        match column {
-            CsvColumn::Known(name) => {
-                self.cells.insert(name, cell.to_owned());
-            }
-            CsvColumn::Meta(name) if !cell.is_empty() && !name.is_empty() => {
-                self.meta.insert(name.clone(), cell.into());
-            }
-            CsvColumn::Meta(_) => {}
-        }
-    }
-}
-
-fn column(name: &str) -> CsvColumn {
-    COLUMNS
-        .into_iter()
-        .find(|known| known.eq_ignore_ascii_case(name))
-        .map_or_else(|| CsvColumn::Meta(name.to_owned()), CsvColumn::Known)
-}
-
-fn column_name(column: &CsvColumn) -> &str {
-    match column {
-        CsvColumn::Known(name) => name,
-        CsvColumn::Meta(name) => name,
     }
 }
 

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use super::error::{ManifestError, Problem};
+use super::error::{ManifestError, at_line};
 use super::row::{ManifestRow, REQUIRED, RowIds};
-use crate::domain::{LengthUnit, PairName};
+use crate::domain::PairName;
 
 /// The cells of one row by lower-case column name, and its other columns.
 #[derive(Debug, Default)]
@@ -15,9 +15,19 @@ pub(super) struct DraftRow {
     pub(super) meta: BTreeMap<String, serde_json::Value>,
 }
 
+impl DraftRow {
+    /// Starts a row without cells.
+    pub(super) fn new(line: usize) -> Self {
+        Self {
+            line,
+            ..Self::default()
+        }
+    }
+}
+
 /// Passes valid rows on; collects problems and ids.
 pub(super) struct RowCollector<'e> {
-    pub(super) problems: Vec<Problem>,
+    problems: Vec<String>,
     ids: RowIds,
     each: &'e mut dyn FnMut(ManifestRow),
 }
@@ -38,30 +48,34 @@ impl<'e> RowCollector<'e> {
         Ok(self.ids)
     }
 
-    /// Checks a row and records its problems.
-    pub(super) fn push(&mut self, draft: DraftRow) {
-        let line = draft.line;
+    /// Checks a row, if it was read and is not blank, and records its problems.
+    pub(super) fn push(&mut self, line: usize, draft: Result<Option<DraftRow>, String>) {
         let mut reasons = Vec::new();
-        let name = self.name(&draft, &mut reasons);
-        let row = complete(draft, name, &mut reasons);
-        let problems = reasons.into_iter().map(|why| Problem::at_line(line, why));
-        let before = self.problems.len();
-        self.problems.extend(problems);
-        if before == self.problems.len() {
+        let row = match draft {
+            Ok(Some(draft)) => {
+                let name = self.name(&draft, &mut reasons);
+                complete(draft, name, &mut reasons)
+            }
+            Ok(None) => None,
+            Err(reason) => {
+                reasons.push(reason);
+                None
+            }
+        };
+        if reasons.is_empty() {
             row.into_iter().for_each(&mut self.each);
         }
+        let problems = reasons.iter().map(|reason| at_line(line, reason));
+        self.problems.extend(problems);
     }
 
     /// Returns the row's id if it is valid and new.
     fn name(&mut self, draft: &DraftRow, reasons: &mut Vec<String>) -> Option<PairName> {
         let text = draft.cells.get("id").map_or("", String::as_str);
-        let name = match PairName::new(text) {
-            Ok(name) => name,
-            Err(error) => {
-                reasons.push(error.to_string());
-                return None;
-            }
-        };
+        let name = record(
+            PairName::new(text).map_err(|error| error.to_string()),
+            reasons,
+        )?;
         if let Some(first) = self.ids.insert(&name, draft.line) {
             reasons.push(format!("id {text:?} is already on line {first}"));
             return None;
@@ -81,8 +95,16 @@ fn complete(
             reasons.push(format!("{column} is empty"));
         }
     }
-    let unit = checked(draft.cells.remove("unit"), parse_unit, reasons);
-    let face_down = checked(draft.cells.remove("scanned_face_down"), parse_flag, reasons);
+    let unit = draft
+        .cells
+        .remove("unit")
+        .map(|cell| cell.to_ascii_lowercase().parse());
+    let face_down = draft
+        .cells
+        .remove("scanned_face_down")
+        .map(|cell| parse_flag(&cell));
+    let unit = unit.and_then(|unit| record(unit, reasons));
+    let face_down = face_down.and_then(|face_down| record(face_down, reasons));
     Some(ManifestRow {
         line: draft.line,
         name: name?,
@@ -96,23 +118,9 @@ fn complete(
     })
 }
 
-/// Parses an optional cell; records an invalid value.
-fn checked<T>(
-    cell: Option<String>,
-    parse: impl Fn(&str) -> Result<T, String>,
-    reasons: &mut Vec<String>,
-) -> Option<T> {
-    match parse(&cell?) {
-        Ok(value) => Some(value),
-        Err(reason) => {
-            reasons.push(reason);
-            None
-        }
-    }
-}
-
-fn parse_unit(cell: &str) -> Result<LengthUnit, String> {
-    cell.to_ascii_lowercase().parse()
+/// Returns a value, or records why it is not valid.
+fn record<T>(value: Result<T, String>, reasons: &mut Vec<String>) -> Option<T> {
+    value.map_err(|reason| reasons.push(reason)).ok()
 }
 
 fn parse_flag(cell: &str) -> Result<bool, String> {

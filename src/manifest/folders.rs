@@ -1,9 +1,10 @@
 //! Pairs from two directories: files with the same stem form a pair, such as `stl/12.stl` and `print/12.png`.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::{Path, PathBuf};
 
-use super::error::{ManifestError, Problem, ProblemLocation};
+use super::error::{ManifestError, at_file};
 use super::row::ManifestRow;
 use crate::domain::PairName;
 
@@ -44,7 +45,7 @@ pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPair
         };
         match PairName::new(&stem.text) {
             Ok(name) => rows.push(row(rows.len() + 1, name, mesh, print)),
-            Err(error) => problems.push(at_file(&mesh, error.to_string())),
+            Err(error) => problems.push(at_file(&mesh, &error.to_string())),
         }
     }
     ManifestError::check(rows.is_empty(), problems)?;
@@ -93,21 +94,25 @@ fn by_stem(
     listing: &[PathBuf],
     extensions: &[&str],
     kind: &str,
-    problems: &mut Vec<Problem>,
+    problems: &mut Vec<String>,
 ) -> (BTreeMap<Stem, PathBuf>, Vec<PathBuf>) {
     let mut sorted = listing.to_vec();
     sorted.sort();
     let mut found: BTreeMap<Stem, PathBuf> = BTreeMap::new();
     let mut ignored = Vec::new();
     for path in sorted.into_iter().filter(|path| !is_hidden(path)) {
-        match Stem::of(&path).filter(|_| has_extension(&path, extensions)) {
-            None => ignored.push(path),
-            Some(stem) => {
-                if let Some(first) = found.get(&stem) {
-                    problems.push(same_stem(first, &path, kind));
-                } else {
-                    found.insert(stem, path);
-                }
+        let Some(stem) = Stem::of(&path).filter(|_| has_extension(&path, extensions)) else {
+            ignored.push(path);
+            continue;
+        };
+        match found.entry(stem) {
+            Entry::Vacant(free) => {
+                free.insert(path);
+            }
+            Entry::Occupied(first) => {
+                let first = first.get().display();
+                let reason = format!("{first} has the same stem; {kind} are paired by stem");
+                problems.push(at_file(&path, &reason));
             }
         }
     }
@@ -123,21 +128,6 @@ fn has_extension(path: &Path, extensions: &[&str]) -> bool {
     path.extension()
         .and_then(|extension| extension.to_str())
         .is_some_and(|extension| extensions.iter().any(|e| e.eq_ignore_ascii_case(extension)))
-}
-
-fn same_stem(first: &Path, second: &Path, kind: &str) -> Problem {
-    let reason = format!(
-        "{} has the same stem; {kind} are paired by stem",
-        first.display()
-    );
-    at_file(second, reason)
-}
-
-fn at_file(path: &Path, reason: String) -> Problem {
-    Problem {
-        location: ProblemLocation::File(path.to_owned()),
-        reason,
-    }
 }
 
 #[cfg(test)]

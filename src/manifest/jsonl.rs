@@ -3,8 +3,8 @@
 use serde_json::{Map, Value};
 
 use super::draft::{DraftRow, RowCollector};
-use super::error::{ManifestError, Problem};
-use super::row::{COLUMNS, ManifestRow, RowIds};
+use super::error::ManifestError;
+use super::row::{ManifestRow, RowIds, known_column};
 use super::text::as_utf8;
 
 /// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` means no value; blank lines are ignored.
@@ -25,18 +25,14 @@ pub fn read_jsonl(
     bytes: &[u8],
     each: &mut dyn FnMut(ManifestRow),
 ) -> Result<RowIds, ManifestError> {
-    let text = as_utf8(bytes).map_err(|error| Problem::of_list(error.to_string()))?;
-    let bytes = &*text;
+    let bytes = &*as_utf8(bytes).map_err(|error| error.to_string())?;
     let mut rows = RowCollector::new(each);
     for (line, content) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
         let content = content.trim_ascii();
         if content.is_empty() {
             continue;
         }
-        match draft(line, content) {
-            Ok(draft) => rows.push(draft),
-            Err(reason) => rows.problems.push(Problem::at_line(line, reason)),
-        }
+        rows.push(line, draft(line, content).map(Some));
     }
     rows.finish()
 }
@@ -46,15 +42,9 @@ fn draft(line: usize, content: &[u8]) -> Result<DraftRow, String> {
         .map_err(|error| format!("byte {} is not UTF-8", error.valid_up_to() + 1))?;
     let object: Map<String, Value> =
         serde_json::from_str(text).map_err(|error| not_an_object(&error))?;
-    let mut draft = DraftRow {
-        line,
-        ..DraftRow::default()
-    };
+    let mut draft = DraftRow::new(line);
     for (key, value) in object {
-        let known = COLUMNS
-            .into_iter()
-            .find(|name| name.eq_ignore_ascii_case(key.trim()));
-        match (known, value) {
+        match (known_column(key.trim()), value) {
             (_, Value::Null) => {}
             (Some(name), value) => {
                 draft.cells.insert(name, cell(name, value)?);

@@ -12,8 +12,8 @@ mod row;
 mod text;
 
 pub use self::csv::{parse_csv, read_csv};
-pub use error::{ManifestError, Problem, ProblemLocation};
+pub use error::ManifestError;
 pub use folders::{FolderPairs, pair_folders};
 pub use jsonl::{parse_jsonl, read_jsonl};
-pub use row::{COLUMNS, ManifestRow, REQUIRED, RowIds};
+pub use row::{ManifestRow, RowIds};
 pub use text::{LineCounter, NotText, as_utf8, delimiter};

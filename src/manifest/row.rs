@@ -30,7 +30,7 @@ pub struct ManifestRow {
 }
 
 /// Names of the columns with a meaning.
-pub const COLUMNS: [&str; 7] = [
+const COLUMNS: [&str; 7] = [
     "id",
     "mesh",
     "print",
@@ -41,7 +41,13 @@ pub const COLUMNS: [&str; 7] = [
 ];
 
 /// Columns that every list needs.
-pub const REQUIRED: [&str; 3] = ["id", "mesh", "print"];
+pub(super) const REQUIRED: [&str; 3] = ["id", "mesh", "print"];
+
+/// Returns the column with a meaning that a name stands for, in any case.
+pub(super) fn known_column(name: &str) -> Option<&'static str> {
+    let mut columns = COLUMNS.into_iter();
+    columns.find(|known| known.eq_ignore_ascii_case(name))
+}
 
 /// Hash bytes stored per id: two ids of a list collide once in 10^24 lists of ten million rows.
 const HASH_BYTES: usize = 16;

@@ -22,7 +22,7 @@ fn check(parsed: Result<Vec<ManifestRow>, ManifestError>) {
         Err(refused) => {
             assert!(!refused.problems.is_empty());
             for problem in &refused.problems {
-                mocban_fuzz::one_sentence(&problem.to_string());
+                mocban_fuzz::one_sentence(problem);
             }
         }
     }
