@@ -31,7 +31,7 @@ pub(super) struct Options {
     #[arg(long, value_delimiter = ',', default_value = "1")]
     seeds: Vec<u64>,
     /// Presets to compare: default, paper
-    #[arg(long, value_delimiter = ',', default_value = "default", value_parser = preset)]
+    #[arg(long, value_delimiter = ',', default_value = "default")]
     presets: Vec<Preset>,
     /// A setting that overrides each preset; repeatable
     #[arg(long = "set", value_name = "SECTION.KEY=VALUE")]
@@ -99,10 +99,6 @@ impl Options {
         }
         cases
     }
-}
-
-fn preset(name: &str) -> Result<Preset, String> {
-    Preset::named(name).ok_or_else(|| format!("{name:?} is not a preset (default, paper)"))
 }
 
 fn cores() -> NonZeroUsize {

@@ -9,7 +9,7 @@ use super::output::Output;
 use super::screen::Screen;
 use super::table::count;
 use crate::catalog::Catalog;
-use crate::config::{BaseLayer, Loaded, Preset, Sources, load};
+use crate::config::{BaseLayer, Loaded, Sources, load};
 use crate::domain::UnixMillis;
 use crate::runner;
 use crate::store::{Project, SETTINGS_FILE, StoreError};
@@ -77,7 +77,7 @@ impl Context {
     /// Loads the settings in effect for this project.
     pub(super) fn settings(&self) -> anyhow::Result<Loaded> {
         let base = match &self.global.config {
-            Some(name) => match Preset::named(name) {
+            Some(name) => match name.parse().ok() {
                 Some(preset) => BaseLayer::Preset(preset),
                 None => BaseLayer::File(PathBuf::from(name)),
             },

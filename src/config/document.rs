@@ -1,25 +1,26 @@
-//! The settings as typed values, and the sections of a settings file.
+//! The settings as typed values, one field per section of a settings file.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 use toml::Value;
 
-use super::error::{ConfigError, Origin};
+use super::error::ConfigError;
 use super::sources::Preset;
-use super::tree::{Change, Tree};
+use super::tree::{Setting, Tree};
 use crate::mesh;
 use crate::raster;
-use crate::stages::{PipelineParams, Settings, depth, fit, normalize, register};
+use crate::stages::Settings;
 
-/// Every setting, checked.
-#[derive(Debug, Clone, PartialEq)]
+/// Every setting, checked. [`Tree`] refuses unknown sections and keys before.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Size limits of input files.
     pub limits: InputLimits,
     /// Resources of a run; they change no result.
     pub run: RunSettings,
     /// The stages.
+    #[serde(flatten)]
     pub stages: Settings,
     /// The review page.
     pub review: ReviewSettings,
@@ -55,54 +56,20 @@ pub struct ReviewSettings {
     pub keys: BTreeMap<String, String>,
 }
 
-/// The sections of a settings file.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Document {
-    limits: InputLimits,
-    run: RunSettings,
-    pipeline: PipelineParams,
-    fit: fit::FitParams,
-    depth: depth::DepthParams,
-    normalize: normalize::NormalizeParams,
-    register: register::RegisterParams,
-    review: ReviewSettings,
-}
-
-impl From<Document> for Config {
-    fn from(document: Document) -> Self {
-        Self {
-            limits: document.limits,
-            run: document.run,
-            stages: Settings {
-                pipeline: document.pipeline,
-                fit: document.fit,
-                depth: document.depth,
-                normalize: document.normalize,
-                register: document.register,
-            },
-            review: document.review,
-        }
-    }
-}
-
 /// Converts the merged tree to typed settings.
 ///
 /// # Errors
 /// When a value has the wrong type or is unknown; the message names the first change to blame.
-pub(super) fn typed(tree: &Tree, changes: &[Change]) -> Result<Config, ConfigError> {
-    match read(tree) {
-        Ok(document) => Ok(document.into()),
-        Err(error) => Err(blame(changes, &error)),
-    }
+pub(super) fn typed(tree: &Tree, changes: &[Setting]) -> Result<Config, ConfigError> {
+    read(tree).map_err(|error| blame(changes, &error))
 }
 
-fn read(tree: &Tree) -> Result<Document, toml::de::Error> {
+fn read(tree: &Tree) -> Result<Config, toml::de::Error> {
     Value::Table(tree.table().clone()).try_into()
 }
 
 /// Applies the changes to the defaults one by one and blames the first after which the settings are invalid.
-fn blame(changes: &[Change], error: &toml::de::Error) -> ConfigError {
+fn blame(changes: &[Setting], error: &toml::de::Error) -> ConfigError {
     let Ok(defaults) = Preset::Default.table() else {
         return ConfigError::BuiltIn(error.message().to_owned());
     };
@@ -110,29 +77,18 @@ fn blame(changes: &[Change], error: &toml::de::Error) -> ConfigError {
     for change in changes {
         tree.apply(change);
         if let Err(error) = read(&tree) {
-            return bad_value(change, &error);
+            return change.invalid(error.message().trim_end());
         }
     }
     ConfigError::BuiltIn(error.message().to_owned())
-}
-
-fn bad_value(change: &Change, error: &toml::de::Error) -> ConfigError {
-    match change.origin {
-        Origin::Default => ConfigError::BuiltIn(error.message().to_owned()),
-        Origin::Preset(_) | Origin::File(_) | Origin::Env(_) | Origin::Flag => ConfigError::Value {
-            origin: change.origin.clone(),
-            key: change.key.clone(),
-            value: change.value.to_string(),
-            reason: error.message().trim_end().to_owned(),
-        },
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use toml::{Table, Value};
 
-    use super::{Document, Preset, Tree, read};
+    use super::{Config, Preset, Tree, read};
+    use crate::config::Origin;
 
     fn keys(table: &Table, prefix: &str, into: &mut Vec<String>) {
         for (key, value) in table {
@@ -147,7 +103,7 @@ mod tests {
     #[test]
     fn default_file_holds_exactly_the_existing_settings() {
         let file = Preset::Default.table().expect("valid TOML");
-        let document: Document = read(&Tree::new(file.clone())).expect("every key and no other");
+        let document: Config = read(&Tree::new(file.clone())).expect("every key and no other");
         let typed = Table::try_from(&document).expect("plain values");
         let (mut written, mut expected) = (Vec::new(), Vec::new());
         keys(&file, "", &mut written);
@@ -162,7 +118,7 @@ mod tests {
         let mut tree = Tree::new(Preset::Default.table().expect("valid TOML"));
         let paper = Preset::Paper.table().expect("valid TOML");
         let changes = tree
-            .changes(&paper, &super::Origin::Preset("paper"))
+            .changes(&paper, &Origin::Preset("paper"))
             .expect("known keys");
         for change in &changes {
             tree.apply(change);

@@ -28,7 +28,7 @@ impl std::fmt::Display for Origin {
             Self::Default => f.write_str("default"),
             Self::Preset(name) => write!(f, "preset {name}"),
             Self::File(path) => write!(f, "{}", path.display()),
-            Self::Env(name) => f.write_str(&sanitize(name, MAX_QUOTE)),
+            Self::Env(name) => f.write_str(&quote(name)),
             Self::Flag => f.write_str("--set"),
         }
     }
@@ -45,95 +45,25 @@ pub enum ConfigError {
         /// The system's error.
         source: std::io::Error,
     },
-    /// The text is not TOML.
-    #[error("{origin}: line {line}: {}", sanitize(reason, MAX_QUOTE))]
-    Syntax {
+    /// A layer is not TOML, or has an unknown key or an invalid value.
+    #[error("{origin}: {problem}")]
+    Layer {
         /// The layer.
         origin: Origin,
-        /// Line, from 1.
-        line: usize,
-        /// The parser's message.
-        reason: String,
-    },
-    /// A section or key that does not exist.
-    #[error("{origin}: there is no setting {}{hint}", sanitize(key, MAX_QUOTE))]
-    Unknown {
-        /// The layer.
-        origin: Origin,
-        /// Dotted key.
-        key: String,
-        /// A suggestion, or empty.
-        hint: String,
-    },
-    /// A value in place of a section.
-    #[error(
-        "{origin}: {} is a section; set its keys one by one",
-        sanitize(key, MAX_QUOTE)
-    )]
-    NotASection {
-        /// The layer.
-        origin: Origin,
-        /// Dotted key.
-        key: String,
-    },
-    /// A value of the wrong type, or one that the setting does not accept.
-    #[error(
-        "{origin}: {} = {}: {}",
-        sanitize(key, MAX_QUOTE),
-        sanitize(value, MAX_QUOTE),
-        sanitize(reason, MAX_QUOTE)
-    )]
-    Value {
-        /// The layer.
-        origin: Origin,
-        /// Dotted key.
-        key: String,
-        /// The value as TOML.
-        value: String,
-        /// What is wrong with it.
-        reason: String,
-    },
-    /// A number outside its range.
-    #[error(
-        "{origin}: {} = {} is outside the range {range}",
-        sanitize(key, MAX_QUOTE),
-        sanitize(value, MAX_QUOTE)
-    )]
-    Range {
-        /// The layer.
-        origin: Origin,
-        /// Dotted key.
-        key: String,
-        /// The value as TOML.
-        value: String,
-        /// The allowed values.
-        range: String,
-    },
-    /// A preset that does not exist.
-    #[error(
-        "{origin}: there is no preset \"{}\", only default and paper{hint}",
-        sanitize(name, MAX_QUOTE)
-    )]
-    UnknownPreset {
-        /// The layer.
-        origin: Origin,
-        /// As written.
-        name: String,
-        /// A suggestion, or empty.
-        hint: String,
+        /// The key, the value and what is wrong, sanitized.
+        problem: String,
     },
     /// `--set` without `=`, or without a section.
-    #[error(
-        "--set \"{}\" is not of the form section.key=value",
-        sanitize(text, MAX_QUOTE)
-    )]
-    SetForm {
-        /// As typed.
-        text: String,
-    },
+    #[error("--set \"{}\" is not of the form section.key=value", quote(.0))]
+    SetForm(String),
     /// The embedded texts and the structs disagree: a defect of this program.
     #[error("the built-in settings are inconsistent: {0}")]
     BuiltIn(String),
+}
+
+/// Returns text from outside as messages quote it: sanitized and shortened.
+pub(super) fn quote(text: &str) -> String {
+    sanitize(text, MAX_QUOTE)
 }
 
 /// Returns up to `limit` of the known names that are similar to a mistyped one, most similar first.
@@ -172,7 +102,7 @@ fn distance_if_similar(typed: &str, name: &str) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use super::{ConfigError, MAX_QUOTE, Origin, hint, nearest};
+    use super::{hint, nearest};
 
     #[test]
     fn similar_names_come_in_order_and_others_not_at_all() {
@@ -186,64 +116,5 @@ mod tests {
             "; did you mean \"workers\"?",
             "a swap of neighbours is one edit"
         );
-    }
-
-    /// Text from outside is shown without control characters, and shortened.
-    #[test]
-    fn quoted_text_is_sanitized_and_short() {
-        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(MAX_QUOTE + 1)] {
-            for error in errors(&rude) {
-                let text = error.to_string();
-                assert!(!text.contains(&rude), "{error:?}: {text:?}");
-            }
-        }
-    }
-
-    /// Returns errors that each quote one text from outside.
-    fn errors(rude: &str) -> Vec<ConfigError> {
-        let (origin, quote) = (|| Origin::Flag, || rude.to_owned());
-        let value = |key: &str, value: &str, reason: &str| ConfigError::Value {
-            origin: origin(),
-            key: key.to_owned(),
-            value: value.to_owned(),
-            reason: reason.to_owned(),
-        };
-        let range = |key: &str, value: &str| ConfigError::Range {
-            origin: origin(),
-            key: key.to_owned(),
-            value: value.to_owned(),
-            range: "0 to 1".to_owned(),
-        };
-        vec![
-            ConfigError::Syntax {
-                origin: origin(),
-                line: 1,
-                reason: quote(),
-            },
-            ConfigError::Unknown {
-                origin: origin(),
-                key: quote(),
-                hint: String::new(),
-            },
-            ConfigError::NotASection {
-                origin: origin(),
-                key: quote(),
-            },
-            value(rude, "1", "no"),
-            value("key", rude, "no"),
-            value("key", "1", rude),
-            range(rude, "1"),
-            range("key", rude),
-            ConfigError::UnknownPreset {
-                origin: origin(),
-                name: quote(),
-                hint: String::new(),
-            },
-            ConfigError::SetForm { text: quote() },
-            ConfigError::NotASection {
-                origin: Origin::Env(quote()),
-                key: String::new(),
-            },
-        ]
     }
 }

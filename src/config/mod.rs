@@ -12,7 +12,7 @@ mod tree;
 pub use document::{Config, InputLimits, ReviewSettings, RunSettings};
 pub use error::{ConfigError, Origin, hint, nearest};
 pub use sources::{BaseLayer, Preset, Sources, explanation};
-pub use tree::{Change, Setting, Tree};
+pub use tree::{Setting, Tree};
 
 /// Settings ready for use, with the values they were made from.
 #[derive(Debug, Clone)]
@@ -186,7 +186,35 @@ mod tests {
             "MOCBAN_RUNS__WORKERS: there is no setting runs; did you mean \"run\"?"
         );
         let error = with(&["workers=1"]).expect_err("no section");
-        assert!(matches!(error, ConfigError::SetForm { .. }), "{error}");
+        assert!(matches!(error, ConfigError::SetForm(_)), "{error}");
+    }
+
+    /// Text from outside is shown without control characters, and shortened.
+    #[test]
+    fn quoted_text_is_sanitized_and_short() {
+        for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(200)] {
+            let (_dir, file) = project(&format!("preset = {}", toml::Value::from(rude.clone())));
+            let file = load(&Sources {
+                base: BaseLayer::Project(file),
+                ..Sources::default()
+            });
+            let env = load(&Sources {
+                env: vec![(format!("MOCBAN_RUN__{}", rude.to_uppercase()), "1".into())],
+                ..Sources::default()
+            });
+            let errors = [
+                file,
+                env,
+                with(&[&rude]),
+                with(&[&format!("run.{rude}=1")]),
+                with(&[&format!("run.workers={rude}")]),
+                with(&[&format!("{rude}.workers=1")]),
+            ];
+            for error in errors.map(|result| result.expect_err("refused").to_string()) {
+                let is_whole = error.to_lowercase().contains(&rude.to_lowercase());
+                assert!(!is_whole, "{error:?}");
+            }
+        }
     }
 
     #[test]

@@ -1,65 +1,44 @@
 //! The ranges of numeric settings, and settings that depend on each other.
 
-use std::fmt;
+use std::ops::RangeInclusive;
 
 use toml::Value;
 
 use super::error::{ConfigError, Origin};
 use super::tree::{Setting, Tree};
 
-/// The values that a numeric setting, or each number of a list, may have.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Range {
-    min: f64,
-    max: f64,
-}
-
-impl fmt::Display for Range {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.max.is_infinite() {
-            write!(f, "{} or more", self.min)
-        } else {
-            write!(f, "{} to {}", self.min, self.max)
-        }
-    }
-}
-
-const fn range(min: f64, max: f64) -> Range {
-    Range { min, max }
-}
-
 /// The range of every numeric setting. The comments in `config/default.toml` repeat them, which a test checks.
-const RANGES: &[(&str, Range)] = &[
-    ("limits.mesh.max_bytes", range(1.0, 1e15)),
-    ("limits.mesh.max_vertices", range(3.0, 4_294_967_295.0)),
-    ("limits.mesh.max_triangles", range(1.0, 4_294_967_295.0)),
-    ("limits.image.max_bytes", range(1.0, 1e15)),
-    ("limits.image.max_pixels", range(1.0, 1e10)),
-    ("run.workers", range(0.0, 1024.0)),
-    ("run.memory_mib", range(0.0, 1e9)),
-    ("run.stage_timeout_s", range(1.0, 86_400.0)),
-    ("fit.seed", range(0.0, f64::INFINITY)),
-    ("fit.spaced_points", range(3.0, 100_000.0)),
-    ("fit.spacing", range(1e-6, 1.0)),
-    ("fit.ransac_draws", range(1.0, 100_000.0)),
-    ("fit.ransac_distance", range(1e-6, 1.0)),
-    ("fit.min_relief", range(0.0, 1.0)),
-    ("depth.longest_px", range(32.0, 16_384.0)),
-    ("depth.px_per_mm", range(1e-3, 1e4)),
-    ("normalize.print_grey", range(0.0, 255.0)),
-    ("normalize.canvas_px", range(64.0, 2048.0)),
-    ("normalize.character_px", range(32.0, 2048.0)),
-    ("register.scale_band", range(1.0, 2.0)),
-    ("register.threshold_min", range(0.0, 1.0)),
-    ("register.threshold_max", range(0.0, 1.0)),
-    ("register.ink_spread", range(1.0, 3.0)),
-    ("normalize.density_greys", range(0.0, 255.0)),
-    ("normalize.structure_greys", range(0.0, 255.0)),
-    ("register.working_px", range(32.0, 1024.0)),
-    ("register.smoothing_px", range(0.0, 10.0)),
-    ("register.min_confidence", range(0.0, 1.0)),
-    ("register.coarse_angles", range(4.0, 3600.0)),
-    ("register.fine_angles", range(2.0, 3600.0)),
+const RANGES: &[(&str, RangeInclusive<f64>)] = &[
+    ("limits.mesh.max_bytes", 1.0..=1e15),
+    ("limits.mesh.max_vertices", 3.0..=4_294_967_295.0),
+    ("limits.mesh.max_triangles", 1.0..=4_294_967_295.0),
+    ("limits.image.max_bytes", 1.0..=1e15),
+    ("limits.image.max_pixels", 1.0..=1e10),
+    ("run.workers", 0.0..=1024.0),
+    ("run.memory_mib", 0.0..=1e9),
+    ("run.stage_timeout_s", 1.0..=86_400.0),
+    ("fit.seed", 0.0..=f64::INFINITY),
+    ("fit.spaced_points", 3.0..=100_000.0),
+    ("fit.spacing", 1e-6..=1.0),
+    ("fit.ransac_draws", 1.0..=100_000.0),
+    ("fit.ransac_distance", 1e-6..=1.0),
+    ("fit.min_relief", 0.0..=1.0),
+    ("depth.longest_px", 32.0..=16_384.0),
+    ("depth.px_per_mm", 1e-3..=1e4),
+    ("normalize.print_grey", 0.0..=255.0),
+    ("normalize.canvas_px", 64.0..=2048.0),
+    ("normalize.character_px", 32.0..=2048.0),
+    ("register.scale_band", 1.0..=2.0),
+    ("register.threshold_min", 0.0..=1.0),
+    ("register.threshold_max", 0.0..=1.0),
+    ("register.ink_spread", 1.0..=3.0),
+    ("normalize.density_greys", 0.0..=255.0),
+    ("normalize.structure_greys", 0.0..=255.0),
+    ("register.working_px", 32.0..=1024.0),
+    ("register.smoothing_px", 0.0..=10.0),
+    ("register.min_confidence", 0.0..=1.0),
+    ("register.coarse_angles", 4.0..=3600.0),
+    ("register.fine_angles", 2.0..=3600.0),
 ];
 
 /// Pairs of settings of which the first must be below the second.
@@ -90,20 +69,21 @@ fn check_range(setting: &Setting) -> Result<(), ConfigError> {
         return Ok(());
     };
     let numbers = numbers(&setting.value);
-    let is_inside = |number: &f64| (range.min..=range.max).contains(number);
-    if !numbers.iter().all(is_inside) {
-        return Err(ConfigError::Range {
-            origin: setting.origin.clone(),
-            key: setting.key.clone(),
-            value: setting.value.to_string(),
-            range: range.to_string(),
-        });
+    if !numbers.iter().all(|number| range.contains(number)) {
+        return Err(setting.refused(&format!(" is outside the range {}", range_text(range))));
     }
     match numbers[..] {
-        [first, last] if first > last => {
-            Err(invalid(setting, "the first is above the last".to_owned()))
-        }
+        [first, last] if first > last => Err(setting.invalid("the first is above the last")),
         _ => Ok(()),
+    }
+}
+
+/// Formats a range as messages and the comments of the default file state it.
+fn range_text(range: &RangeInclusive<f64>) -> String {
+    if range.end().is_infinite() {
+        format!("{} or more", range.start())
+    } else {
+        format!("{} to {}", range.start(), range.end())
     }
 }
 
@@ -117,18 +97,9 @@ fn check_ascending(low: &Setting, high: &Setting) -> Result<(), ConfigError> {
                     (low, format!("must be below {} = {}", high.key, high.value))
                 }
             };
-            Err(invalid(blamed, reason))
+            Err(blamed.invalid(&reason))
         }
         _ => Ok(()),
-    }
-}
-
-fn invalid(setting: &Setting, reason: String) -> ConfigError {
-    ConfigError::Value {
-        origin: setting.origin.clone(),
-        key: setting.key.clone(),
-        value: setting.value.to_string(),
-        reason,
     }
 }
 
@@ -144,7 +115,7 @@ fn numbers(value: &Value) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::{ASCENDING, Origin, RANGES, Range, Tree, check, numbers, range};
+    use super::{ASCENDING, Origin, RANGES, RangeInclusive, Tree, check, numbers, range_text};
     use crate::config::{Preset, explanation};
 
     fn tree() -> Tree {
@@ -190,18 +161,16 @@ mod tests {
         for key in ascending {
             assert!(keys.contains(key), "{key}");
         }
-        assert!(RANGES.iter().all(|(_, range)| range.min < range.max));
+        assert!(RANGES.iter().all(|(_, range)| range.start() < range.end()));
     }
 
     /// Finds `A to B` or `A or more` at the end of a clause.
-    fn stated_ranges(comment: &str) -> Vec<Range> {
+    fn stated_ranges(comment: &str) -> Vec<RangeInclusive<f64>> {
         let clauses = comment.split([' ', '\n']).collect::<Vec<_>>();
         let number = |text: &str| text.trim_end_matches(['.', ';', ',']).parse::<f64>().ok();
         let stated = clauses.windows(3).filter_map(|words| match words {
-            [min, "to", max] => Some(range(number(min)?, number(max)?)),
-            [min, "or", more] if more.starts_with("more") => {
-                Some(range(number(min)?, f64::INFINITY))
-            }
+            [min, "to", max] => Some(number(min)?..=number(max)?),
+            [min, "or", more] if more.starts_with("more") => Some(number(min)?..=f64::INFINITY),
             _ => None,
         });
         stated.collect()
@@ -213,7 +182,8 @@ mod tests {
             let comment = explanation(key).join(" ");
             assert!(
                 stated_ranges(&comment).contains(range),
-                "{key}: the comment must state \"{range}\": {comment}"
+                "{key}: the comment must state \"{}\": {comment}",
+                range_text(range)
             );
         }
     }

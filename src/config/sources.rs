@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::error::{ConfigError, Origin, hint};
+use super::error::{ConfigError, Origin, hint, quote};
 use super::tree::Tree;
+use crate::domain::enum_names;
 
 /// Settings that come with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -17,23 +18,11 @@ pub enum Preset {
     Paper,
 }
 
+enum_names! { pub Preset, "a preset":
+    Default = "default", Paper = "paper",
+}
+
 impl Preset {
-    /// Every preset.
-    pub const ALL: [Self; 2] = [Self::Default, Self::Paper];
-
-    /// Returns the name in files and on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Default => "default",
-            Self::Paper => "paper",
-        }
-    }
-
-    /// Returns the preset of a name.
-    pub fn named(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|preset| preset.name() == name)
-    }
-
     /// Returns the TOML text, with a comment for each setting.
     pub const fn text(self) -> &'static str {
         match self {
@@ -114,7 +103,7 @@ impl Sources {
     /// Returns the layers that are tables, lowest first.
     pub(super) fn tables(&self) -> Result<Vec<(Table, Origin)>, ConfigError> {
         match &self.base {
-            BaseLayer::Preset(preset) => Ok(preset_layer(*preset)?.into_iter().collect()),
+            BaseLayer::Preset(preset) => preset_layer(*preset),
             BaseLayer::File(path) => file_layers(path),
             BaseLayer::Project(path) if path.exists() => file_layers(path),
             BaseLayer::Project(_) => Ok(Vec::new()),
@@ -161,20 +150,10 @@ fn env_key(name: &str, defaults: &Tree) -> Option<String> {
 }
 
 fn split_set(text: &str) -> Result<(String, Value), ConfigError> {
+    let parts = |key: &str| key.split('.').filter(|part| !part.is_empty()).count();
     match text.split_once('=') {
-        Some((key, new))
-            if key
-                .trim()
-                .split('.')
-                .filter(|part| !part.is_empty())
-                .count()
-                > 1 =>
-        {
-            Ok((key.trim().to_owned(), value(new.trim())))
-        }
-        Some(_) | None => Err(ConfigError::SetForm {
-            text: text.to_owned(),
-        }),
+        Some((key, new)) if parts(key.trim()) > 1 => Ok((key.trim().to_owned(), value(new.trim()))),
+        Some(_) | None => Err(ConfigError::SetForm(text.to_owned())),
     }
 }
 
@@ -188,10 +167,10 @@ fn value(text: &str) -> Value {
         .unwrap_or_else(|| Value::String(text.to_owned()))
 }
 
-fn preset_layer(preset: Preset) -> Result<Option<(Table, Origin)>, ConfigError> {
+fn preset_layer(preset: Preset) -> Result<Vec<(Table, Origin)>, ConfigError> {
     match preset {
-        Preset::Default => Ok(None),
-        Preset::Paper => Ok(Some((preset.table()?, preset.origin()))),
+        Preset::Default => Ok(Vec::new()),
+        Preset::Paper => Ok(vec![(preset.table()?, preset.origin())]),
     }
 }
 
@@ -202,11 +181,10 @@ fn file_layers(path: &Path) -> Result<Vec<(Table, Origin)>, ConfigError> {
     })?;
     let origin = Origin::File(path.to_owned());
     let mut table = parse(&text, &origin)?;
-    let preset = match table.remove("preset") {
-        Some(name) => find_preset(&name, &origin)?,
-        None => Preset::Default,
+    let mut layers = match table.remove("preset") {
+        Some(name) => preset_layer(find_preset(&name, &origin)?)?,
+        None => Vec::new(),
     };
-    let mut layers: Vec<_> = preset_layer(preset)?.into_iter().collect();
     layers.push((table, origin));
     Ok(layers)
 }
@@ -215,10 +193,14 @@ fn find_preset(name: &Value, origin: &Origin) -> Result<Preset, ConfigError> {
     let name = name
         .as_str()
         .map_or_else(|| name.to_string(), ToOwned::to_owned);
-    Preset::named(&name).ok_or_else(|| ConfigError::UnknownPreset {
-        origin: origin.clone(),
-        hint: hint(&name, Preset::ALL.map(Preset::name)),
-        name,
+    let mut presets = Preset::ALL.into_iter();
+    presets.find(|preset| preset.name() == name).ok_or_else(|| {
+        let hint = hint(&name, Preset::ALL.map(Preset::name));
+        let name = quote(&name);
+        ConfigError::Layer {
+            origin: origin.clone(),
+            problem: format!("there is no preset \"{name}\", only default and paper{hint}"),
+        }
     })
 }
 
@@ -227,10 +209,10 @@ fn parse(text: &str, origin: &Origin) -> Result<Table, ConfigError> {
         let before = error
             .span()
             .map_or(0, |span| text.floor_char_boundary(span.start));
-        ConfigError::Syntax {
+        let line = 1 + text[..before].matches('\n').count();
+        ConfigError::Layer {
             origin: origin.clone(),
-            line: 1 + text[..before].matches('\n').count(),
-            reason: error.message().to_owned(),
+            problem: format!("line {line}: {}", quote(error.message())),
         }
     })
 }

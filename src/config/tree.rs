@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use toml::{Table, Value};
 
-use super::error::{ConfigError, Origin, hint};
+use super::error::{ConfigError, Origin, hint, quote};
 
 /// The merged settings and, for each changed dotted key, the layer that changed it.
 #[derive(Debug, Clone)]
@@ -13,26 +13,34 @@ pub struct Tree {
     changed: BTreeMap<String, Origin>,
 }
 
-/// One value of one layer, by its dotted key.
+/// The value of one setting in one layer.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Change {
+pub struct Setting {
     /// Dotted key, such as `run.workers`.
     pub key: String,
-    /// The new value.
+    /// The value.
     pub value: Value,
     /// The layer.
     pub origin: Origin,
 }
 
-/// One setting as `config show` prints it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Setting {
-    /// Dotted key.
-    pub key: String,
-    /// The current value.
-    pub value: Value,
-    /// Where the value came from.
-    pub origin: Origin,
+impl Setting {
+    /// Refuses the value.
+    pub(super) fn invalid(&self, reason: &str) -> ConfigError {
+        self.refused(&format!(": {}", quote(reason)))
+    }
+
+    /// Refuses the value with a text that follows `key = value`.
+    pub(super) fn refused(&self, why: &str) -> ConfigError {
+        ConfigError::Layer {
+            origin: self.origin.clone(),
+            problem: format!(
+                "{} = {}{why}",
+                quote(&self.key),
+                quote(&self.value.to_string())
+            ),
+        }
+    }
 }
 
 impl Tree {
@@ -56,7 +64,7 @@ impl Tree {
     ///
     /// # Errors
     /// When the layer names a section or key that does not exist.
-    pub fn changes(&self, layer: &Table, origin: &Origin) -> Result<Vec<Change>, ConfigError> {
+    pub fn changes(&self, layer: &Table, origin: &Origin) -> Result<Vec<Setting>, ConfigError> {
         let mut changes = Vec::new();
         collect(&self.root, layer, "", origin, &mut changes)?;
         Ok(changes)
@@ -71,7 +79,7 @@ impl Tree {
         key: &str,
         value: Value,
         origin: &Origin,
-    ) -> Result<Vec<Change>, ConfigError> {
+    ) -> Result<Vec<Setting>, ConfigError> {
         let mut layer = value;
         for part in key.rsplit('.') {
             layer = Value::Table(Table::from_iter([(part.to_owned(), layer)]));
@@ -83,7 +91,7 @@ impl Tree {
     }
 
     /// Applies one change.
-    pub fn apply(&mut self, change: &Change) {
+    pub fn apply(&mut self, change: &Setting) {
         let mut parts: Vec<&str> = change.key.split('.').collect();
         let Some(last) = parts.pop() else { return };
         let mut table = &mut self.root;
@@ -150,15 +158,15 @@ fn collect(
     layer: &Table,
     prefix: &str,
     origin: &Origin,
-    changes: &mut Vec<Change>,
+    changes: &mut Vec<Setting>,
 ) -> Result<(), ConfigError> {
     for (key, value) in layer {
         let path = dotted(prefix, key);
         let Some(default) = known.get(key) else {
-            return Err(ConfigError::Unknown {
+            let hint = hint(key, known.keys().map(String::as_str));
+            return Err(ConfigError::Layer {
                 origin: origin.clone(),
-                hint: hint(key, known.keys().map(String::as_str)),
-                key: path,
+                problem: format!("there is no setting {}{hint}", quote(&path)),
             });
         };
         match (default, value) {
@@ -166,12 +174,12 @@ fn collect(
                 collect(section, inner, &path, origin, changes)?;
             }
             (Value::Table(_), _) if prefix.is_empty() => {
-                return Err(ConfigError::NotASection {
+                return Err(ConfigError::Layer {
                     origin: origin.clone(),
-                    key: path,
+                    problem: format!("{} is a section; set its keys one by one", quote(&path)),
                 });
             }
-            _ => changes.push(Change {
+            _ => changes.push(Setting {
                 key: path,
                 value: value.clone(),
                 origin: origin.clone(),
