@@ -34,7 +34,7 @@ pub struct CheckOptions {
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
     /// The catalog returned an error.
-    #[error(transparent)]
+    #[error("{0}")]
     Catalog(#[from] CatalogError),
     /// The artifact folder cannot be read.
     #[error("{path}: {source}")]

@@ -8,8 +8,8 @@ use clap::{ColorChoice, CommandFactory as _, FromArgMatches as _, Parser, Subcom
 use super::exit::ExitCode;
 use super::global::Global;
 use super::{
-    agreement, backup, check, completions, config, contact_sheet, demo, export, import, man,
-    report, retry, review, run, show, status, verdict,
+    backup, check, completions, config, contact_sheet, demo, export, import, man, report, retry,
+    review, run, show, status, verdict,
 };
 
 /// Aligns 3D scans of carved woodblock characters with images of their prints.
@@ -53,7 +53,7 @@ pub(super) enum Command {
     /// Judge results in the browser with the keyboard, and align pairs manually
     Review(review::ReviewArgs),
     /// Measure how far reviewers agree with each other and with themselves, and which planted errors they catch
-    Agreement(agreement::AgreementArgs),
+    Agreement,
     /// Print the table of all results
     Report(report::ReportArgs),
     /// Write the aligned pairs for other tools
@@ -126,11 +126,7 @@ fn count_verbose(args: &[OsString]) -> u8 {
 /// Finds `--color` before clap parses: help and usage errors are printed before the flags are known.
 fn help_color(args: &[OsString]) -> ColorChoice {
     let values = values_of("--color", args);
-    let choice = values.iter().find_map(|value| match value.as_str() {
-        "never" => Some(ColorChoice::Never),
-        "always" => Some(ColorChoice::Always),
-        _ => None,
-    });
+    let choice = values.iter().find_map(|value| value.parse().ok());
     choice.unwrap_or(ColorChoice::Auto)
 }
 

@@ -8,7 +8,7 @@ use serde_json::json;
 
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
-use super::output;
+use super::files::remove_database;
 use super::table::count;
 use crate::catalog::{Catalog, VerdictEvent};
 use crate::export::json_lines;
@@ -58,13 +58,11 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
     }
     renamed?;
     let bytes = std::fs::metadata(file)?.len();
-    if context.global.json {
-        output::print_json(&json!({
-            "schema": 1, "file": file, "bytes": bytes, "pairs": pairs, "verdicts": verdicts,
-            "verdicts_file": verdicts_file(file),
-        }))?;
-    }
-    context.output.info(&format!(
+    context.print_json(&json!({
+        "schema": 1, "file": file, "bytes": bytes, "pairs": pairs, "verdicts": verdicts,
+        "verdicts_file": verdicts_file(file),
+    }))?;
+    context.info(&format!(
         "{} and {} saved to {shown}, {:.1} MB; images are not included, `run` computes them again",
         count(pairs, "pair"),
         count(verdicts, "verdict"),
@@ -85,12 +83,8 @@ impl PartialFile {
     }
 
     fn clear(&self) {
-        for ending in ["", "-wal", "-shm", "-journal"] {
-            let mut name = self.0.as_os_str().to_owned();
-            name.push(ending);
-            // Usually there is no such file; one that cannot be removed makes writing the copy fail.
-            let _ = std::fs::remove_file(PathBuf::from(name));
-        }
+        // Usually there is no such file; one that cannot be removed makes writing the copy fail.
+        remove_database(&self.0);
     }
 }
 
@@ -193,14 +187,8 @@ fn check_target(file: &Path, project: &Project) -> Result<(), Refusal> {
 
 /// Returns whether two paths name the same file.
 fn is_same(one: Option<&Path>, other: &Path) -> bool {
-    let one = one.map(|path| {
-        if path == Path::new("") {
-            Path::new(".")
-        } else {
-            path
-        }
-    });
-    let canonical = one.and_then(|path| path.canonicalize().ok());
+    // The parent of a bare file name is empty.
+    let canonical = one.and_then(|path| Path::new(".").join(path).canonicalize().ok());
     canonical.is_some() && canonical == other.canonicalize().ok()
 }
 

@@ -10,9 +10,8 @@ use clap::Args;
 use super::context::Context;
 use super::error_text;
 use super::exit::ExitCode;
-use super::output;
 use super::screen::{Palette, Tone};
-use super::table::{Align, columns, count};
+use super::table::{columns, count};
 use crate::catalog::CatalogError;
 use crate::check::{
     CheckOptions, CheckSummary, Finding, Kind, Notes, Spare, check as check_project,
@@ -48,13 +47,9 @@ pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
         Ok(summary) => summary,
         Err(error) => return report_unreadable(error, context),
     };
-    if context.global.json {
-        output::print_json(&summary)?;
-    } else {
-        output::print(&text(&summary, args.repair, context.output.stdout))?;
-    }
+    context.print(&summary, || text(&summary, args.repair, context.stdout))?;
     for command in next_steps(&summary, args.repair) {
-        context.output.next(&context.command(command));
+        context.next(command);
     }
     Ok(if summary.left() > 0 {
         ExitCode::Damaged
@@ -63,22 +58,30 @@ pub(super) async fn check(args: CheckArgs, context: &Context) -> anyhow::Result<
     })
 }
 
+/// Checks without changing anything, also during a run; or repairs while no run can start.
 async fn once(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummary> {
-    if args.repair {
-        repair(args, context).await
+    let (project, catalog) = if args.repair {
+        context.open().await?
     } else {
-        read(args, context).await
-    }
+        context.open_read_only().await?
+    };
+    let lock = args.repair.then(|| exclusive_lock(&project)).transpose();
+    let lock = lock.context("nothing was repaired")?;
+    let options = CheckOptions {
+        quick: args.quick,
+        repair: args.repair,
+        in_use: lock.is_none() && RunLock::is_held(&project),
+    };
+    let summary = check_project(&project, &catalog, options).await;
+    catalog.close().await;
+    Ok(summary?)
 }
 
 /// Returns whether the database itself is reported as damaged.
 fn is_database_damage(checked: &anyhow::Result<CheckSummary>) -> bool {
     match checked {
         Ok(summary) => summary.damage.contains_key(&Kind::Database) && summary.left() > 0,
-        Err(error) => {
-            let error = error.chain().find_map(error_text::catalog_error);
-            error.is_some_and(error_text::is_damaged_file)
-        }
+        Err(error) => error_text::catalog_error(error).is_some_and(error_text::is_damaged_file),
     }
 }
 
@@ -86,33 +89,6 @@ fn is_database_damage(checked: &anyhow::Result<CheckSummary>) -> bool {
 fn is_readable(path: &Path) -> bool {
     let read = File::open(path).and_then(|mut file| io::copy(&mut file, &mut io::sink()));
     read.is_ok()
-}
-
-/// Checks without changing anything, also during a run.
-async fn read(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummary> {
-    let (project, catalog) = context.open_read_only().await?;
-    let options = CheckOptions {
-        quick: args.quick,
-        repair: false,
-        in_use: RunLock::is_held(&project),
-    };
-    let summary = check_project(&project, &catalog, options).await;
-    catalog.close().await;
-    Ok(summary?)
-}
-
-/// Repairs while no run can start.
-async fn repair(args: &CheckArgs, context: &Context) -> anyhow::Result<CheckSummary> {
-    let (project, catalog) = context.open().await?;
-    let _lock = exclusive_lock(&project).context("nothing was repaired")?;
-    let options = CheckOptions {
-        quick: args.quick,
-        repair: true,
-        in_use: false,
-    };
-    let summary = check_project(&project, &catalog, options).await;
-    catalog.close().await;
-    Ok(summary?)
 }
 
 /// Takes the run's lock if no other process works on the project.
@@ -127,7 +103,7 @@ fn exclusive_lock(project: &Project) -> Result<RunLock, RunError> {
 
 /// Reports a catalog that cannot be opened as damage.
 fn report_unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<ExitCode> {
-    let of_catalog = error.chain().find_map(error_text::catalog_error);
+    let of_catalog = error_text::catalog_error(&error);
     let Some(found) = of_catalog.filter(|error| error_text::is_damage(error)) else {
         return Err(error);
     };
@@ -140,7 +116,7 @@ fn report_unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<
             error_text::catalog_path(&dir)
         ),
     };
-    context.output.error(&text, ExitCode::Damaged);
+    context.error(&text, ExitCode::Damaged);
     Ok(ExitCode::Damaged)
 }
 
@@ -199,19 +175,16 @@ fn headline(summary: &CheckSummary, palette: Palette) -> String {
         count(summary.pairs, "pair"),
         count(summary.files, "result file")
     );
-    let verdict = match (summary.found(), summary.left()) {
-        (0, _) => palette.paint(Tone::Good, "no problems found"),
-        (found, 0) => {
-            let problems = count(found, "problem");
-            palette.paint(Tone::Good, format!("{problems} found, all repaired"))
-        }
+    let problems = count(summary.found(), "problem");
+    let (tone, verdict) = match (summary.found(), summary.left()) {
+        (0, _) => (Tone::Good, "no problems found".to_owned()),
+        (_, 0) => (Tone::Good, format!("{problems} found, all repaired")),
         (found, left) if left < found => {
-            let problems = count(found, "problem");
-            palette.paint(Tone::Bad, format!("{problems} found, {left} not repaired"))
+            (Tone::Bad, format!("{problems} found, {left} not repaired"))
         }
-        (found, _) => palette.paint(Tone::Bad, format!("{} found", count(found, "problem"))),
+        _ => (Tone::Bad, format!("{problems} found")),
     };
-    format!("{checked}: {verdict}")
+    format!("{checked}: {}", palette.paint(tone, verdict))
 }
 
 /// Formats the first findings of a kind, one line each.
@@ -227,24 +200,19 @@ fn listed(first: &[Finding], found: u64) -> String {
     if more > 0 {
         rows.push(vec![format!("  and {more} more")]);
     }
-    columns(&rows, &[Align::Left; 3])
+    columns(rows, "<<<")
 }
 
 fn repairs(summary: &CheckSummary, repaired: bool) -> Vec<String> {
     let done = &summary.repaired;
-    let mut lines = Vec::new();
-    for (is_done, what) in [
+    let schema = "the missing parts of the schema were created again";
+    let parts = [
         (done.indexes, "the indexes were rebuilt"),
-        (
-            done.schema,
-            "the missing parts of the schema were created again",
-        ),
+        (done.schema, schema),
         (done.counters, "the counters were recounted"),
-    ] {
-        if is_done {
-            lines.push(what.to_owned());
-        }
-    }
+    ];
+    let parts = parts.iter().filter(|(is_done, _)| *is_done);
+    let mut lines: Vec<String> = parts.map(|(_, what)| (*what).to_owned()).collect();
     if repaired && done.put_back > 0 {
         let pairs = count(done.put_back, "pair");
         lines.push(format!(
@@ -256,12 +224,7 @@ fn repairs(summary: &CheckSummary, repaired: bool) -> Vec<String> {
 
 fn notes(notes: &Notes, problem: &str) -> Option<String> {
     (notes.count > 0).then(|| {
-        let mut names = notes
-            .first
-            .iter()
-            .take(MAX_LISTED)
-            .cloned()
-            .collect::<Vec<_>>();
+        let mut names: Vec<_> = notes.first.iter().take(MAX_LISTED).cloned().collect();
         let more = notes.count.saturating_sub(names.len() as u64);
         if more > 0 {
             names.push(format!("and {more} more"));
@@ -277,18 +240,15 @@ fn unreferenced(spare: Option<&Spare>, repaired: bool) -> Option<String> {
         let text = "unreferenced files were not searched for, because a run may be writing";
         return Some(text.to_owned());
     };
-    let megabytes = spare.bytes as f64 / 1e6;
-    let files = count(spare.files, "file");
-    let artifacts = match (spare.files, repaired) {
-        (0, _) => None,
-        (_, false) => Some(format!(
-            "{files} of {megabytes:.1} MB not referenced by any result; `check --repair` removes them"
-        )),
-        (_, true) => Some(format!(
-            "removed {} of {files} not referenced by any result, {megabytes:.1} MB",
-            spare.removed
-        )),
-    };
+    let artifacts = (spare.files > 0).then(|| {
+        let (removed, megabytes) = (spare.removed, spare.bytes as f64 / 1e6);
+        let files = count(spare.files, "file");
+        if repaired {
+            format!("removed {removed} of {files} not referenced by any result, {megabytes:.1} MB")
+        } else {
+            format!("{files} of {megabytes:.1} MB not referenced by any result; `check --repair` removes them")
+        }
+    });
     let unknown = (spare.strangers > 0).then(|| {
         let files = count(spare.strangers, "file");
         format!("{files} in the artifacts directory not written by this program, left untouched")

@@ -1,6 +1,6 @@
 //! `report --compare`: the tables of two projects side by side.
 
-use super::table::{Align, columns};
+use super::table::columns;
 use crate::report::{MetricRow, Report};
 
 /// Formats the means of both projects and their differences, one line per metric and number.
@@ -14,36 +14,20 @@ pub(super) fn side_by_side(here: &Report, there: &Report, names: [&str; 2]) -> S
             rows.extend(lines(row, other));
         }
     }
-    let aligns = [
-        Align::Left,
-        Align::Left,
-        Align::Right,
-        Align::Right,
-        Align::Right,
-    ];
-    columns(&rows, &aligns)
+    columns(rows, "<<>>>")
 }
 
 fn lines(here: &MetricRow, there: &MetricRow) -> Vec<Vec<String>> {
-    let truth = |row: &MetricRow, number: fn(&crate::report::TruthSummary) -> Option<f64>| {
-        row.truth.as_ref().and_then(number)
-    };
+    let acc_by_truth = |row: &MetricRow| row.truth.as_ref()?.acc;
+    let within_5deg = |row: &MetricRow| row.truth.as_ref()?.angle_le_5deg;
     let numbers = [
         ("Acc", here.acc, there.acc),
         ("SSIM", here.ssim, there.ssim),
         ("IoU", here.iou, there.iou),
         ("IoU box", here.iou_box, there.iou_box),
         ("Dice", here.dice, there.dice),
-        (
-            "Acc by truth",
-            truth(here, |block| block.acc),
-            truth(there, |block| block.acc),
-        ),
-        (
-            "in 5° by truth",
-            truth(here, |block| block.angle_le_5deg),
-            truth(there, |block| block.angle_le_5deg),
-        ),
+        ("Acc by truth", acc_by_truth(here), acc_by_truth(there)),
+        ("in 5° by truth", within_5deg(here), within_5deg(there)),
     ];
     let counts = vec!["n".to_owned(), here.n.to_string(), there.n.to_string()];
     let lines = numbers

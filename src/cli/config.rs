@@ -5,7 +5,6 @@ use serde_json::{Map, json};
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::output;
 use super::screen::{Palette, Tone};
 use crate::config::{Origin, Setting, explanation};
 
@@ -30,11 +29,9 @@ pub(super) struct ConfigShowArgs {
 pub(super) fn config(command: &ConfigCommand, context: &Context) -> anyhow::Result<ExitCode> {
     let ConfigCommand::Show(args) = command;
     let settings = context.settings()?.tree.settings();
-    if context.global.json {
-        output::print_json(&as_json(&settings))?;
-    } else {
-        output::print(&as_toml(&settings, args, context.output.stdout))?;
-    }
+    context.print(&as_json(&settings), || {
+        as_toml(&settings, args, context.stdout)
+    })?;
     Ok(ExitCode::Done)
 }
 
@@ -65,11 +62,8 @@ pub(super) fn as_toml(settings: &[Setting], args: &ConfigShowArgs, palette: Pale
         }
         let explained = explanation(&setting.key);
         if args.explain && explained != comment {
-            lines.extend(
-                explained
-                    .iter()
-                    .map(|text| palette.paint(Tone::Faint, format!("# {text}"))),
-            );
+            let paint = |text: &&str| palette.paint(Tone::Faint, format!("# {text}"));
+            lines.extend(explained.iter().map(paint));
             comment = explained;
         }
         let line = line(setting);

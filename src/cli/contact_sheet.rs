@@ -1,6 +1,6 @@
 //! `contact-sheet`: draws many pairs on one PNG, worst first.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Context as _;
 use clap::Args;
@@ -8,7 +8,6 @@ use serde_json::json;
 
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
-use super::output;
 use super::select;
 use super::table::count;
 use crate::domain::ThresholdMetric;
@@ -38,30 +37,14 @@ pub(super) struct ContactSheetArgs {
     pub(super) columns: u16,
 }
 
-impl Default for ContactSheetArgs {
-    fn default() -> Self {
-        Self {
-            pairs: Vec::new(),
-            output: None,
-            metric: ThresholdMetric::Ensemble,
-            order: ContactSheetOrder::Worst,
-            limit: 60,
-            columns: 5,
-        }
-    }
-}
-
 pub(super) async fn contact_sheet(
     args: ContactSheetArgs,
     context: &Context,
 ) -> anyhow::Result<ExitCode> {
     let (path, sheet) = write(&args, context).await?;
-    if context.global.json {
-        output::print_json(
-            &json!({"schema": 1, "file": path, "shown": sheet.shown, "of": sheet.of}),
-        )?;
-    }
-    context.output.info(&format!(
+    context
+        .print_json(&json!({"schema": 1, "file": path, "shown": sheet.shown, "of": sheet.of}))?;
+    context.info(&format!(
         "{} of {} on {}",
         count(sheet.shown as u64, "pair"),
         sheet.of,
@@ -79,13 +62,9 @@ pub(super) async fn write(
     context: &Context,
 ) -> anyhow::Result<(PathBuf, ContactSheet)> {
     let (project, catalog) = context.open_read_only().await?;
-    let pairs = match args.pairs.as_slice() {
-        [] => None,
-        typed => Some(select::pairs(&catalog, typed).await?),
-    };
     let options = ContactSheetOptions {
         metric: args.metric,
-        pairs,
+        pairs: select::some_or_all(&catalog, &args.pairs).await?,
         order: args.order,
         limit: usize::from(args.limit),
         columns: usize::from(args.columns),
@@ -94,21 +73,15 @@ pub(super) async fn write(
     let sheet = draw_contact_sheet(&catalog, &project, options).await?;
     catalog.close().await;
     if sheet.shown == 0 {
-        let text = format!(
-            "no pair has a result of {} yet, so there is nothing to draw",
-            args.metric
-        );
+        let metric = args.metric;
+        let text = format!("no pair has a result of {metric} yet, so there is nothing to draw");
         return Err(Refusal::NothingSelected(text).into());
     }
     let path = match &args.output {
         Some(path) => path.clone(),
         None => project.dir().join("sheet.png"),
     };
-    save(&path, &sheet)?;
+    write_atomic(&path, &png_rgb8(&sheet.picture))
+        .with_context(|| format!("cannot write {}", path.display()))?;
     Ok((path, sheet))
-}
-
-fn save(path: &Path, sheet: &ContactSheet) -> anyhow::Result<()> {
-    let bytes = png_rgb8(&sheet.picture);
-    write_atomic(path, &bytes).with_context(|| format!("cannot write {}", path.display()))
 }

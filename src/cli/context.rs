@@ -1,12 +1,17 @@
 //! The context of a command: the project, its settings and the output streams.
 
 use std::ffi::OsString;
+use std::io::IsTerminal as _;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
+use serde::Serialize;
+use serde_json::json;
+
+use super::exit::ExitCode;
 use super::global::Global;
-use super::output::Output;
-use super::screen::Screen;
+use super::output;
+use super::screen::{Palette, Screen, Tone};
 use super::table::count;
 use crate::catalog::Catalog;
 use crate::config::{BaseLayer, Loaded, Sources, load};
@@ -19,17 +24,20 @@ use crate::store::{Project, SETTINGS_FILE, StoreError};
 pub(super) struct Context {
     pub(super) global: Global,
     pub(super) screen: Screen,
-    pub(super) output: Output,
+    /// Colours of stdout.
+    pub(super) stdout: Palette,
+    /// Colours of stderr.
+    pub(super) stderr: Palette,
     program: String,
 }
 
 impl Context {
     /// Builds the context from the flags and the name by which the program was called.
     pub(super) fn new(global: Global, program: Option<&OsString>) -> Self {
-        let screen = Screen::new();
         Self {
-            output: Output::new(&global, screen.clone()),
-            screen,
+            screen: Screen::new(),
+            stdout: Palette::choose(global.color, std::io::stdout().is_terminal()),
+            stderr: Palette::choose(global.color, std::io::stderr().is_terminal()),
             program: program_name(program),
             global,
         }
@@ -56,6 +64,64 @@ impl Context {
         dir.unwrap_or_else(|| PathBuf::from("."))
     }
 
+    /// Writes a line to stderr, unless `-q` is given.
+    pub(super) fn info(&self, text: &str) {
+        if !self.global.quiet {
+            self.screen.line(text);
+        }
+    }
+
+    /// Writes a warning to stderr, also with `-q`.
+    pub(super) fn warn(&self, text: &str) {
+        let label = self.stderr.paint(Tone::Warn, "warning:");
+        self.screen.line(&format!("{label} {text}"));
+    }
+
+    /// Writes why the command failed to stderr: a sentence, or an object with `--json`.
+    pub(super) fn error(&self, text: &str, code: ExitCode) {
+        if self.global.json {
+            let object = json!({"message_type": "exit_error", "code": code as u8, "message": text});
+            self.screen.line(&object.to_string());
+        } else {
+            let label = self.stderr.paint(Tone::Bad, "error:");
+            self.screen.line(&format!("{label} {text}"));
+        }
+    }
+
+    /// Suggests the next command on stderr, for this project and ready to be copied.
+    pub(super) fn next(&self, tail: &str) {
+        self.next_command(&self.command(tail));
+    }
+
+    /// Suggests the next command as given.
+    pub(super) fn next_command(&self, command: &str) {
+        if !self.global.json {
+            let label = self.stderr.paint(Tone::Faint, "next:");
+            self.info(&format!("{label} {command}"));
+        }
+    }
+
+    /// Writes a result to stdout: as text, or as a JSON document with `--json`.
+    pub(super) fn print(
+        &self,
+        value: &impl Serialize,
+        text: impl FnOnce() -> String,
+    ) -> anyhow::Result<()> {
+        if self.global.json {
+            output::print_json(value)
+        } else {
+            Ok(output::print(&text())?)
+        }
+    }
+
+    /// Writes a JSON document to stdout with `--json`.
+    pub(super) fn print_json(&self, value: &impl Serialize) -> anyhow::Result<()> {
+        if self.global.json {
+            output::print_json(value)?;
+        }
+        Ok(())
+    }
+
     /// Opens the project and its catalog for reading; works during a run.
     pub(super) async fn open_read_only(&self) -> anyhow::Result<(Project, Catalog)> {
         let project = self.project()?;
@@ -77,10 +143,9 @@ impl Context {
     /// Loads the settings in effect for this project.
     pub(super) fn settings(&self) -> anyhow::Result<Loaded> {
         let base = match &self.global.config {
-            Some(name) => match name.parse().ok() {
-                Some(preset) => BaseLayer::Preset(preset),
-                None => BaseLayer::File(PathBuf::from(name)),
-            },
+            Some(name) => name
+                .parse()
+                .map_or_else(|_: String| BaseLayer::File(name.into()), BaseLayer::Preset),
             None => BaseLayer::Project(self.dir().join(SETTINGS_FILE)),
         };
         let env = std::env::vars_os()
@@ -101,7 +166,7 @@ impl Context {
         if stale > 0 {
             let pairs = count(stale, "pair");
             let verb = if stale == 1 { "is" } else { "are" };
-            self.output.warn(&format!(
+            self.warn(&format!(
                 "{pairs} {verb} stale: computed with other settings or files than the current ones; `run` updates them"
             ));
         }

@@ -14,9 +14,11 @@ use super::report;
 use super::run::{self, drive};
 use super::screen::Palette;
 use super::signals;
+use super::table::count;
 use crate::config::{Origin, Tree};
 use crate::demo::{DatasetError, DatasetFiles, DemoOptions, Tier, write_dataset};
-use crate::domain::JobStatus;
+use crate::domain::{JobStatus, ThresholdMetric};
+use crate::export::ContactSheetOrder;
 use crate::runner::{Stop, StopLevel};
 use crate::store::{CATALOG_FILE, SETTINGS_FILE};
 
@@ -39,21 +41,16 @@ pub(super) struct DemoArgs {
     pub(super) no_run: bool,
 }
 
-impl DemoArgs {
-    const fn options(&self) -> DemoOptions {
-        DemoOptions {
-            pairs: self.pairs,
-            seed: self.seed,
-            tier: self.tier,
-        }
-    }
-}
-
 pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let dir = demo_dir(&args, context);
     let context = &save_settings(&dir, &context.at(&dir))?;
-    let Some(files) = create_dataset(&dir, args.options(), context).await? else {
-        context.output.info(
+    let options = DemoOptions {
+        pairs: args.pairs,
+        seed: args.seed,
+        tier: args.tier,
+    };
+    let Some(files) = create_dataset(&dir, options, context).await? else {
+        context.info(
             "stopped while the files were being written; nothing was imported, and the same command starts again",
         );
         return Ok(ExitCode::Stopped);
@@ -66,7 +63,7 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
     let outcome = import::import_pairs(&manifest, context).await?;
     import::print_outcome(&outcome, context);
     if args.no_run {
-        context.output.next(&context.command("run"));
+        context.next("run");
         return Ok(ExitCode::Done);
     }
     align(&dir, context).await
@@ -82,24 +79,25 @@ async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
     let done = summary.status.jobs.get(&JobStatus::Done).copied();
     if summary.stopped || done.unwrap_or(0) == 0 {
         for command in run::next_steps(&summary, &failures) {
-            context.output.next(&context.command(&command));
+            context.next(&command);
         }
         return Ok(run::code(&summary));
     }
     report::print(context).await?;
-    let (picture, _) = contact_sheet::write(&ContactSheetArgs::default(), context).await?;
-    let output = &context.output;
-    output.info(&format!(
-        "meshes, prints and truth: {}",
-        dir.join("data").display()
-    ));
-    output.info(&format!(
-        "contact sheet of all pairs: {}",
-        picture.display()
-    ));
-    for command in ["status", "export -o export"] {
-        output.next(&context.command(command));
-    }
+    let sheet = ContactSheetArgs {
+        pairs: Vec::new(),
+        output: None,
+        metric: ThresholdMetric::Ensemble,
+        order: ContactSheetOrder::Worst,
+        limit: 60,
+        columns: 5,
+    };
+    let (picture, _) = contact_sheet::write(&sheet, context).await?;
+    let (data, picture) = (dir.join("data"), picture.display());
+    context.info(&format!("meshes, prints and truth: {}", data.display()));
+    context.info(&format!("contact sheet of all pairs: {picture}"));
+    context.next("status");
+    context.next("export -o export");
     Ok(run::code(&summary))
 }
 
@@ -124,17 +122,12 @@ async fn create_dataset(
     let Some(files) = write_or_stop(data.clone(), options).await? else {
         return Ok(None);
     };
-    let action = if files.already_existed {
-        "found"
-    } else {
-        "created"
-    };
-    context.output.info(&format!(
-        "{action} {} of tier {}, seed {}, in {}",
-        super::table::count(files.pairs, "pair"),
-        options.tier,
-        options.seed,
-        data.display()
+    let pairs = count(files.pairs, "pair");
+    let DemoOptions { tier, seed, .. } = options;
+    let action = ["created", "found"][usize::from(files.already_existed)];
+    let data = data.display();
+    context.info(&format!(
+        "{action} {pairs} of tier {tier}, seed {seed}, in {data}"
     ));
     Ok(Some(files))
 }
@@ -175,22 +168,20 @@ fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> Result<(),
         let dir = shell_quoted(&dir.to_string_lossy());
         format!("; `mocban -C {dir} run` continues it")
     };
-    let seal = std::fs::read(data.join("dataset.json")).ok();
-    let found = seal.and_then(|bytes| serde_json::from_slice::<DemoOptions>(&bytes).ok());
+    let stamp = std::fs::read(data.join("dataset.json")).ok();
+    let found = stamp.and_then(|bytes| serde_json::from_slice::<DemoOptions>(&bytes).ok());
     match found {
         Some(found) if found.tier != options.tier || found.seed != options.seed => {
+            let DemoOptions { tier, seed, .. } = found;
+            let hint = continue_hint();
             refuse(&format!(
-                "holds the demo of tier {} and seed {}{}",
-                found.tier,
-                found.seed,
-                continue_hint()
+                "holds the demo of tier {tier} and seed {seed}{hint}"
             ))
         }
-        Some(found) if found.pairs > options.pairs => refuse(&format!(
-            "already holds a demo of {} pairs{}",
-            found.pairs,
-            continue_hint()
-        )),
+        Some(DemoOptions { pairs, .. }) if pairs > options.pairs => {
+            let hint = continue_hint();
+            refuse(&format!("already holds a demo of {pairs} pairs{hint}"))
+        }
         None if data.exists() && !data.join(NOTE).is_file() => {
             refuse("has a data directory that no demo created")
         }
@@ -213,7 +204,7 @@ fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
     match std::fs::read_to_string(&file) {
         Ok(there) if there == text => {}
         Ok(_) => {
-            context.output.warn(&format!(
+            context.warn(&format!(
                 "{shown} exists and was not changed; the flags apply to this call only"
             ));
             return Ok(context.clone());
@@ -222,9 +213,7 @@ fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
             std::fs::create_dir_all(dir)
                 .with_context(|| format!("cannot create {}", dir.display()))?;
             std::fs::write(&file, text).with_context(|| format!("cannot write {shown}"))?;
-            context
-                .output
-                .info(&format!("settings are saved in {shown}"));
+            context.info(&format!("settings are saved in {shown}"));
         }
     }
     Ok(context.without_setting_flags())
@@ -268,8 +257,8 @@ mod tests {
         assert!(!check(&OPTIONS));
         std::fs::write(data.join(NOTE), "").expect("a small file");
         assert!(check(&OPTIONS));
-        let seal = serde_json::to_vec(&OPTIONS).expect("plain values");
-        std::fs::write(data.join("dataset.json"), seal).expect("a small file");
+        let stamp = serde_json::to_vec(&OPTIONS).expect("plain values");
+        std::fs::write(data.join("dataset.json"), stamp).expect("a small file");
         assert!(check(&OPTIONS));
         assert!(check(&DemoOptions {
             pairs: 9,

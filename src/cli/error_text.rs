@@ -4,14 +4,8 @@ use std::error::Error;
 use std::path::Path;
 
 use super::exit::{ExitCode, Refusal};
-use super::manifest_file::RefusedManifest;
-use super::truth_file::TruthFileError;
-use super::verdict_file::VerdictFileError;
 use crate::catalog::{CatalogError, CatalogErrorKind, LockOwner, lock_owner};
-use crate::check::CheckError;
 use crate::config::ConfigError;
-use crate::export::{DrawError, ExportError};
-use crate::report::ReportError;
 use crate::runner::RunError;
 use crate::store::{CATALOG_FILE, StoreError};
 
@@ -25,11 +19,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     if let Some(refusal) = cause.downcast_ref::<Refusal>() {
         return Some(refusal.code());
     }
-    let is_refused_text = cause.is::<ConfigError>()
-        || cause.is::<RefusedManifest>()
-        || cause.is::<TruthFileError>()
-        || cause.is::<VerdictFileError>();
-    if is_refused_text {
+    if cause.is::<ConfigError>() {
         return Some(ExitCode::Usage);
     }
     match cause.downcast_ref() {
@@ -43,7 +33,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
         Some(StoreError::NotUtf8(_)) => return Some(ExitCode::Usage),
         Some(_) | None => {}
     }
-    match catalog_error(cause)? {
+    match cause.downcast_ref()? {
         CatalogError::Missing(_) => Some(ExitCode::NoProject),
         CatalogError::NetworkFileSystem { .. } => Some(ExitCode::Usage),
         CatalogError::UnknownPair(_)
@@ -56,8 +46,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
 
 /// Returns the sentence for an error: an explanation where the catalog is to blame, otherwise the chain of causes.
 pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
-    let found = error.chain().find_map(catalog_error);
-    let explained = found.and_then(|found| explain_catalog(found, project));
+    let explained = catalog_error(error).and_then(|found| explain_catalog(found, project));
     explained.unwrap_or_else(|| join_causes(error))
 }
 
@@ -84,36 +73,15 @@ pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
     })
 }
 
-/// Returns the catalog's error at the root of a cause, whatever it is wrapped in.
-pub(super) fn catalog_error<'a>(cause: &'a (dyn Error + 'static)) -> Option<&'a CatalogError> {
-    if let Some(RunError::Catalog(error)) = cause.downcast_ref() {
-        return Some(error);
-    }
-    if let Some(ExportError::Catalog(error)) = cause.downcast_ref() {
-        return Some(error);
-    }
-    if let Some(DrawError::Catalog(error)) = cause.downcast_ref() {
-        return Some(error);
-    }
-    if let Some(ReportError::Catalog(error)) = cause.downcast_ref() {
-        return Some(error);
-    }
-    if let Some(CheckError::Catalog(error)) = cause.downcast_ref() {
-        return Some(error);
-    }
-    cause.downcast_ref()
+/// Returns the first error of the catalog in a chain of causes.
+pub(super) fn catalog_error(error: &anyhow::Error) -> Option<&CatalogError> {
+    error.chain().find_map(|cause| cause.downcast_ref())
 }
 
 /// Returns whether the catalog's content is damaged, empty or not a catalog.
 pub(super) fn is_damage(error: &CatalogError) -> bool {
-    let is_wrong_content = matches!(
-        error,
-        CatalogError::Empty(_)
-            | CatalogError::Foreign { .. }
-            | CatalogError::Corrupt(_)
-            | CatalogError::Json(_)
-    );
-    is_wrong_content || is_damaged_file(error)
+    use CatalogError::{Corrupt, Empty, Foreign, Json};
+    matches!(error, Empty(_) | Foreign { .. } | Corrupt(_) | Json(_)) || is_damaged_file(error)
 }
 
 /// Returns whether the pages of the catalog's file are inconsistent.
@@ -204,8 +172,10 @@ mod tests {
 
     #[test]
     fn wrapped_catalog_error_is_found_and_explained() {
-        let error = ExportError::Catalog(CatalogError::Corrupt("stage 9 is unknown".into()));
+        let error = CatalogError::Corrupt("stage 9 is unknown".into());
+        let error = anyhow::Error::new(ExportError::Catalog(error));
         let found = catalog_error(&error).expect("the catalog's error");
+        assert_eq!(join_causes(&error), found.to_string());
         assert!(is_damage(found));
         let text = explain_catalog(found, Path::new("nowhere")).expect("a sentence");
         assert!(

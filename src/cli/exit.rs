@@ -28,46 +28,26 @@ pub enum ExitCode {
     Stopped = 130,
 }
 
+/// Every code with its explanation in `--help`.
+const MEANINGS: [(ExitCode, &str); 11] = [
+    (ExitCode::Done, "done, or nothing left to do"),
+    (ExitCode::Error, "unexpected error"),
+    (ExitCode::Usage, "wrong command line, setting or manifest"),
+    (ExitCode::SomeFailed, "finished, some pairs failed"),
+    (ExitCode::NothingSelected, "the selection matched no pair"),
+    (ExitCode::NoProject, "no project here"),
+    (ExitCode::InUse, "project in use by another process"),
+    (ExitCode::Damaged, "check found damage"),
+    (ExitCode::BelowFailUnder, "--fail-under not met"),
+    (ExitCode::Incomplete, "--require-complete not met"),
+    (ExitCode::Stopped, "stopped by Ctrl-C, state safe"),
+];
+
 impl ExitCode {
-    /// Every code.
-    pub const ALL: [Self; 11] = [
-        Self::Done,
-        Self::Error,
-        Self::Usage,
-        Self::SomeFailed,
-        Self::NothingSelected,
-        Self::NoProject,
-        Self::InUse,
-        Self::Damaged,
-        Self::BelowFailUnder,
-        Self::Incomplete,
-        Self::Stopped,
-    ];
-
-    /// Returns the explanation that `--help` prints.
-    pub const fn meaning(self) -> &'static str {
-        match self {
-            Self::Done => "done, or nothing left to do",
-            Self::Error => "unexpected error",
-            Self::Usage => "wrong command line, setting or manifest",
-            Self::SomeFailed => "finished, some pairs failed",
-            Self::NothingSelected => "the selection matched no pair",
-            Self::NoProject => "no project here",
-            Self::InUse => "project in use by another process",
-            Self::Damaged => "check found damage",
-            Self::BelowFailUnder => "--fail-under not met",
-            Self::Incomplete => "--require-complete not met",
-            Self::Stopped => "stopped by Ctrl-C, state safe",
-        }
-    }
-
     /// Returns the table of codes for `--help`.
-    pub fn table() -> String {
-        let lines: Vec<String> = Self::ALL
-            .iter()
-            .map(|code| format!("  {:>3}  {}", *code as u8, code.meaning()))
-            .collect();
-        format!("Exit codes:\n{}", lines.join("\n"))
+    pub(super) fn table() -> String {
+        let line = |(code, meaning): (Self, &str)| format!("\n  {:>3}  {meaning}", code as u8);
+        format!("Exit codes:{}", MEANINGS.map(line).concat())
     }
 }
 

@@ -7,7 +7,6 @@ use serde_json::json;
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::output;
 use super::table::count;
 use crate::export::{ExportSummary, JsonlOptions, to_jsonl};
 
@@ -58,29 +57,22 @@ fn print_summary(
     args: &ExportArgs,
     context: &Context,
 ) -> anyhow::Result<()> {
-    if context.global.json {
-        let unreadable: Vec<_> = summary
-            .unreadable
-            .iter()
-            .map(|(pair, why)| json!({"id": pair, "error": why}))
-            .collect();
-        output::print_json(&json!({
-            "schema": 1,
-            "done": summary.done,
-            "without_result": summary.without_result,
-            "unreadable": unreadable,
-            "kept_earlier": summary.kept_earlier,
-        }))?;
-    }
+    let unreadable = summary.unreadable.iter();
+    let unreadable = unreadable.map(|(pair, why)| json!({"id": pair, "error": why}));
+    context.print_json(&json!({
+        "schema": 1,
+        "done": summary.done,
+        "without_result": summary.without_result,
+        "unreadable": unreadable.collect::<Vec<_>>(),
+        "kept_earlier": summary.kept_earlier,
+    }))?;
     for (pair, why) in &summary.unreadable {
-        context
-            .output
-            .warn(&format!("the export has no files of {pair}: {why}"));
+        context.warn(&format!("the export has no files of {pair}: {why}"));
     }
     let shown = args.output.display();
     if summary.kept_earlier {
         let lost = count(summary.unreadable.len() as u64, "pair");
-        context.output.info(&format!(
+        context.info(&format!(
             "the earlier export in {shown} was kept, because the new one would lack the files of {lost}; repair them, or export to a new directory"
         ));
     } else {
@@ -88,8 +80,8 @@ fn print_summary(
     }
     if !summary.unreadable.is_empty() {
         // A run trusts the catalog, so the check must come first.
-        context.output.next(&context.command("check --repair"));
-        context.output.next(&context.command("run"));
+        context.next("check --repair");
+        context.next("run");
     }
     Ok(())
 }
@@ -99,7 +91,7 @@ fn print_done(summary: &ExportSummary, args: &ExportArgs, context: &Context) {
         0 => String::new(),
         lost => format!(", {lost} with missing or changed files"),
     };
-    context.output.info(&format!(
+    context.info(&format!(
         "{} exported to {}, {} without a result{unreadable}",
         count(summary.done, "pair"),
         args.output.display(),

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-use super::table::{Align, columns};
+use super::table::columns;
 use crate::catalog::{Catalog, FailedPair, StoredFailure};
 use crate::domain::FailureClass;
 
@@ -20,21 +20,13 @@ pub(super) struct Failures {
 }
 
 impl Failures {
-    /// Reads the failures, to name a few of each class.
-    pub(super) async fn read(catalog: &Catalog) -> anyhow::Result<Self> {
-        Self::read_some(catalog, READ_LIMIT, NAME_LIMIT).await
-    }
-
-    /// Reads the failures, to name all of them.
-    pub(super) async fn read_all(catalog: &Catalog) -> anyhow::Result<Self> {
-        Self::read_some(catalog, NO_LIMIT, NO_LIMIT).await
-    }
-
-    async fn read_some(
-        catalog: &Catalog,
-        limit: usize,
-        names_per_class: usize,
-    ) -> anyhow::Result<Self> {
+    /// Reads the failures, to name all of them or a few of each class.
+    pub(super) async fn read(catalog: &Catalog, all: bool) -> anyhow::Result<Self> {
+        let (limit, names_per_class) = if all {
+            (NO_LIMIT, NO_LIMIT)
+        } else {
+            (READ_LIMIT, NAME_LIMIT)
+        };
         let mut counts = catalog.failure_counts().await?;
         counts.sort_by_key(|(class, number)| (std::cmp::Reverse(*number), *class));
         let pairs = match counts.as_slice() {
@@ -64,24 +56,17 @@ impl Failures {
 
     /// Formats one line per named pair, the most frequent class first.
     pub(super) fn text(&self) -> String {
-        let rows: Vec<Vec<String>> = self
-            .counts
-            .iter()
-            .flat_map(|(class, number)| self.class_rows(*class, *number))
-            .collect();
-        columns(&rows, &[Align::Left; 4])
+        let counts = self.counts.iter();
+        let rows = counts.flat_map(|(class, number)| self.class_rows(*class, *number));
+        columns(rows, "<<<<")
     }
 
     fn class_rows(&self, class: FailureClass, number: u64) -> Vec<Vec<String>> {
         let mut head = format!("  {class} {number}");
         let mut rows = Vec::new();
-        let of_class = |pair: &&FailedPair| pair.failure.failure.class == class;
-        for pair in self
-            .pairs
-            .iter()
-            .filter(of_class)
-            .take(self.names_per_class)
-        {
+        let pairs = self.pairs.iter();
+        let of_class = pairs.filter(|pair| pair.failure.failure.class == class);
+        for pair in of_class.take(self.names_per_class) {
             rows.push(vec![
                 std::mem::take(&mut head),
                 pair.name.to_string(),

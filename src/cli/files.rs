@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::exit::Refusal;
+use crate::domain::sanitize;
 
 /// Reads a file.
 pub(super) fn read(path: &Path) -> Result<Vec<u8>, Refusal> {
@@ -28,6 +29,37 @@ pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
             let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
             text.trim_ascii_start().starts_with(b"{")
         }
+    }
+}
+
+/// Removes a database and the files that SQLite keeps beside it, as far as they exist and can be removed.
+pub(super) fn remove_database(path: &Path) {
+    for ending in ["", "-wal", "-shm", "-journal"] {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        let _ = std::fs::remove_file(name);
+    }
+}
+
+/// What is wrong with a line of a file that is refused as a whole.
+#[derive(Debug, thiserror::Error)]
+#[error("line {line}: {reason}")]
+pub(super) struct LineError {
+    line: usize,
+    reason: String,
+}
+
+impl LineError {
+    pub(super) fn new(line: usize, reason: &str) -> Self {
+        Self {
+            line,
+            reason: sanitize(reason, 300),
+        }
+    }
+
+    /// Refuses the file; `outcome` says that nothing was changed.
+    pub(super) fn in_file(&self, file: &Path, outcome: &str) -> Refusal {
+        Refusal::Usage(format!("{}: {self}; {outcome}", file.display()))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{ArgAction, Args, ValueEnum};
+use clap::{ArgAction, Args, ColorChoice, ValueEnum};
 
 /// Flags of every command.
 #[derive(Debug, Clone, Args)]
@@ -29,19 +29,19 @@ pub(super) struct Global {
     /// When to use colour: auto, always or never
     #[arg(
         long,
-        hide_possible_values = true,
-        value_name = "WHEN",
         global = true,
-        default_value = "auto"
+        value_name = "WHEN",
+        default_value = "auto",
+        hide_possible_values = true
     )]
-    pub(super) color: ColorWhen,
+    pub(super) color: ColorChoice,
     /// Format of the log: text or json
     #[arg(
         long,
-        hide_possible_values = true,
-        value_name = "FORMAT",
         global = true,
-        default_value = "text"
+        value_name = "FORMAT",
+        default_value = "text",
+        hide_possible_values = true
     )]
     pub(super) log_format: LogFormat,
     /// Append the log to this file instead of printing it on stderr
@@ -50,23 +50,12 @@ pub(super) struct Global {
     /// How a run shows its progress on stderr: auto, bar, plain, json or none
     #[arg(
         long,
-        hide_possible_values = true,
-        value_name = "MODE",
         global = true,
-        default_value = "auto"
+        value_name = "MODE",
+        default_value = "auto",
+        hide_possible_values = true
     )]
     pub(super) progress: ProgressMode,
-}
-
-/// When to use colour.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum ColorWhen {
-    /// On a terminal, unless `NO_COLOR` is set.
-    Auto,
-    /// Always.
-    Always,
-    /// Never.
-    Never,
 }
 
 /// Format of the log.

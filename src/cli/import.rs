@@ -9,11 +9,10 @@ use tokio::sync::mpsc;
 
 use super::context::{Context, now};
 use super::exit::{ExitCode, Refusal};
-use super::files;
+use super::files::{self, remove_database};
 use super::manifest_file::Listing;
-use super::output;
 use super::table::count;
-use super::truth_file::{self, TruthRow, refusal};
+use super::truth_file::{self, TruthRow};
 use crate::catalog::{Catalog, ImportChunk, ImportRow, ImportSummary};
 use crate::domain::{LengthUnit, PairName};
 use crate::manifest::{ManifestRow, RowIds};
@@ -22,6 +21,9 @@ use crate::store::Project;
 /// Rows per chunk sent to the catalog, and chunks that may wait there.
 const CHUNK: usize = 2_000;
 const WAITING_CHUNKS: usize = 2;
+
+/// End of the message when the file of true alignments is refused.
+const NOT_IMPORTED: &str = "nothing was imported";
 
 /// Arguments of `import`.
 #[derive(Debug, Default, Args)]
@@ -46,11 +48,9 @@ pub(super) struct ImportArgs {
 
 pub(super) async fn import(args: ImportArgs, context: &Context) -> anyhow::Result<ExitCode> {
     let outcome = import_pairs(&args, context).await?;
-    if context.global.json {
-        output::print_json(&as_json(&outcome))?;
-    }
+    context.print_json(&as_json(&outcome))?;
     print_outcome(&outcome, context);
-    context.output.next(&context.command("run"));
+    context.next("run");
     Ok(ExitCode::Done)
 }
 
@@ -159,11 +159,7 @@ impl StateBefore {
     /// Removes what did not exist before. What cannot be removed is a harmless empty project.
     fn restore(&self, project: &Project) {
         if !self.catalog {
-            for ending in ["", "-wal", "-shm", "-journal"] {
-                let mut name = project.catalog_path().into_os_string();
-                name.push(ending);
-                let _ = std::fs::remove_file(name);
-            }
+            remove_database(&project.catalog_path());
         }
         if !self.dir {
             // Fails unless the directory is empty.
@@ -184,12 +180,10 @@ fn listing(args: &ImportArgs) -> anyhow::Result<Listing> {
 async fn read_truths(file: &Path, listed: &RowIds, dir: &Path) -> anyhow::Result<Vec<TruthRow>> {
     let text = String::from_utf8(files::read(file)?)
         .map_err(|error| Refusal::Usage(format!("{}: {error}", file.display())))?;
-    let truths = truth_file::parse(file, &text)?;
-    let others: Vec<PairName> = truths
-        .iter()
-        .map(|truth| truth.name.clone())
-        .filter(|name| !listed.contains(name))
-        .collect();
+    let truths =
+        truth_file::parse(file, &text).map_err(|error| error.in_file(file, NOT_IMPORTED))?;
+    let names = truths.iter().map(|truth| truth.name.clone());
+    let others: Vec<PairName> = names.filter(|name| !listed.contains(name)).collect();
     if others.is_empty() {
         return Ok(truths);
     }
@@ -203,10 +197,9 @@ async fn read_truths(file: &Path, listed: &RowIds, dir: &Path) -> anyhow::Result
         Err(_) => others,
     };
     match truths.iter().find(|truth| unknown.contains(&truth.name)) {
-        Some(truth) => {
-            let reason = format!("there is no pair {}", truth.name);
-            Err(refusal(file, truth.line, &reason).into())
-        }
+        Some(truth) => Err(truth_file::unknown_pair(truth)
+            .in_file(file, NOT_IMPORTED)
+            .into()),
         None => Ok(truths),
     }
 }
@@ -245,51 +238,44 @@ fn stored_row(row: &ManifestRow, project: &Project) -> anyhow::Result<ImportRow>
 pub(super) fn print_outcome(outcome: &ImportOutcome, context: &Context) {
     const MAX_WARNINGS: usize = 20;
     const MAX_CHANGES: usize = 10;
-    let output = &context.output;
     for line in outcome.missing.iter().take(MAX_WARNINGS) {
-        output.warn(line);
+        context.warn(line);
     }
     if let Some(more) = outcome.missing.len().checked_sub(MAX_WARNINGS + 1) {
-        output.warn(&format!("{} more files do not exist", more + 1));
+        context.warn(&format!("{} more files do not exist", more + 1));
     }
     for line in &outcome.warnings {
-        output.warn(line);
+        context.warn(line);
     }
     let summary = &outcome.summary;
-    output.info(&format!(
-        "{} added, {} changed, {} unchanged{}",
+    let truths = match outcome.truths {
+        0 => String::new(),
+        truths => format!("; {} stored", count(truths, "true alignment")),
+    };
+    context.info(&format!(
+        "{} added, {} changed, {} unchanged{truths}",
         count(summary.added, "pair"),
         summary.changed.len(),
-        summary.unchanged,
-        match outcome.truths {
-            0 => String::new(),
-            truths => format!("; {} stored", count(truths, "true alignment")),
-        }
+        summary.unchanged
     ));
     for change in summary.changed.iter().take(MAX_CHANGES) {
-        output.info(&format!(
-            "  {}: {} changed",
-            change.name,
-            change.fields.join(", ")
-        ));
+        let fields = change.fields.join(", ");
+        context.info(&format!("  {}: {fields} changed", change.name));
     }
     if let Some(more) = summary.changed.len().checked_sub(MAX_CHANGES + 1) {
-        output.info(&format!("  and {} more", more + 1));
+        context.info(&format!("  and {} more", more + 1));
     }
 }
 
 fn as_json(outcome: &ImportOutcome) -> Value {
-    let changed: Vec<Value> = outcome
-        .summary
-        .changed
-        .iter()
-        .map(|change| json!({"id": change.name, "fields": change.fields}))
-        .collect();
+    let summary = &outcome.summary;
+    let changed = summary.changed.iter();
+    let changed = changed.map(|change| json!({"id": change.name, "fields": change.fields}));
     json!({
         "schema": 1,
-        "added": outcome.summary.added,
-        "changed": changed,
-        "unchanged": outcome.summary.unchanged,
+        "added": summary.added,
+        "changed": changed.collect::<Value>(),
+        "unchanged": summary.unchanged,
         "truths": outcome.truths,
         "missing_files": outcome.missing,
         "warnings": outcome.warnings,

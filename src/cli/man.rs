@@ -20,11 +20,9 @@ pub(super) fn man(args: &ManArgs, command: Command, context: &Context) -> anyhow
     std::fs::create_dir_all(&args.dir).with_context(|| format!("cannot create {dir}"))?;
     clap_mangen::generate_to(command, &args.dir)
         .with_context(|| format!("cannot write manual pages to {dir}"))?;
-    context
-        .output
-        .info(&format!("the manual pages are in {dir}"));
+    context.info(&format!("the manual pages are in {dir}"));
     let page = args.dir.join("mocban.1");
     let page = shell_quoted(&page.to_string_lossy());
-    context.output.next(&format!("man -l {page}"));
+    context.next_command(&format!("man -l {page}"));
     Ok(ExitCode::Done)
 }

@@ -36,18 +36,13 @@ enum ListingSource {
 /// Calls a function for each row; returns the ids of all rows.
 type RowParser = fn(&[u8], &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError>;
 
-/// A manifest that is refused as a whole.
-#[derive(Debug, thiserror::Error)]
-#[error("{} is refused, nothing was imported:\n{}", from.display(), indented(problems))]
-pub(super) struct RefusedManifest {
-    from: PathBuf,
-    problems: ManifestError,
-}
-
-fn indented(problems: &ManifestError) -> String {
-    let text = problems.to_string();
-    let lines: Vec<String> = text.lines().map(|line| format!("  {line}")).collect();
-    lines.join("\n")
+/// Refuses a manifest as a whole.
+fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
+    let problems = problems.to_string().replace('\n', "\n  ");
+    let from = from.display();
+    Refusal::Usage(format!(
+        "{from} is refused, nothing was imported:\n  {problems}"
+    ))
 }
 
 impl Listing {
@@ -66,12 +61,8 @@ impl Listing {
             read_csv
         };
         let mut similar = SimilarIds::default();
-        let ids = parse(&bytes, &mut |row| similar.add(&row.name)).map_err(|problems| {
-            RefusedManifest {
-                from: file.to_owned(),
-                problems,
-            }
-        })?;
+        let ids = parse(&bytes, &mut |row| similar.add(&row.name))
+            .map_err(|problems| refuse(file, &problems))?;
         let folder = file.parent().unwrap_or(Path::new("")).to_owned();
         Ok(Self {
             source: ListingSource::List {
@@ -94,13 +85,8 @@ impl Listing {
         prints: &Path,
         unit: Option<LengthUnit>,
     ) -> anyhow::Result<Self> {
-        let found =
-            pair_folders(&plain_files(meshes)?, &plain_files(prints)?).map_err(|problems| {
-                RefusedManifest {
-                    from: meshes.to_owned(),
-                    problems,
-                }
-            })?;
+        let found = pair_folders(&plain_files(meshes)?, &plain_files(prints)?)
+            .map_err(|problems| refuse(meshes, &problems))?;
         let mut rows = found.rows;
         let mut similar = SimilarIds::default();
         for row in &mut rows {

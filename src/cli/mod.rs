@@ -68,7 +68,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
         Ok(code) => code,
         Err(error) => report_error(&error, &context),
     };
-    panics::catch(work, |text| context.output.error(text, ExitCode::Error))
+    panics::catch(work, |text| context.error(text, ExitCode::Error))
 }
 
 fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
@@ -101,7 +101,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
         Command::Backup(args) => backup::backup(args, context).await,
         Command::Verdict(command) => verdict::verdict(command, context).await,
         Command::Review(args) => review::review(args, context).await,
-        Command::Agreement(args) => agreement::agreement(args, context).await,
+        Command::Agreement => agreement::agreement(context).await,
         Command::Report(args) => report::report(args, context).await,
         Command::Export(args) => export::export(args, context).await,
         Command::ContactSheet(args) => contact_sheet::contact_sheet(args, context).await,
@@ -118,22 +118,12 @@ fn report_error(error: &anyhow::Error, context: &Context) -> ExitCode {
     }
     let code = error_text::exit_code(error);
     let text = error_text::describe(error, &context.dir());
-    context.output.error(&text, code);
-    match code {
-        ExitCode::NoProject => {
-            context.output.next(&context.command("import pairs.csv"));
-            context.output.next(&context.program_with("demo"));
-        }
-        ExitCode::InUse => context.output.next(&context.command("status --watch")),
-        ExitCode::Done
-        | ExitCode::Error
-        | ExitCode::Usage
-        | ExitCode::SomeFailed
-        | ExitCode::NothingSelected
-        | ExitCode::Damaged
-        | ExitCode::BelowFailUnder
-        | ExitCode::Incomplete
-        | ExitCode::Stopped => {}
+    context.error(&text, code);
+    if code == ExitCode::NoProject {
+        context.next("import pairs.csv");
+        context.next_command(&context.program_with("demo"));
+    } else if code == ExitCode::InUse {
+        context.next("status --watch");
     }
     code
 }

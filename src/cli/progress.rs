@@ -9,8 +9,8 @@ use serde_json::json;
 use super::global::ProgressMode;
 use super::run_progress::RunProgress;
 use super::screen::{Palette, Screen, Tone, is_dumb_terminal};
+use super::table::count;
 use super::time_text::duration;
-use crate::domain::{Failure, PairName, Stage};
 use crate::runner::{RunEvent, StopLevel};
 
 /// Shows one run.
@@ -132,7 +132,13 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
             stage,
             failure,
             ..
-        } => Some(failed_line(pair, *stage, failure, palette)),
+        } => Some(format!(
+            "{} {} at {stage}: {} ({})",
+            palette.paint(Tone::Bad, "failed"),
+            palette.paint(Tone::Strong, pair),
+            failure.message,
+            failure.class
+        )),
         RunEvent::PairBackingOff {
             pair,
             stage,
@@ -145,10 +151,10 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
             failure.class,
             duration(*wait_ms)
         )),
-        RunEvent::Recovered { pairs } => Some(format!(
-            "{} recovered from a worker that died",
-            super::table::count(*pairs, "pair")
-        )),
+        RunEvent::Recovered { pairs } => {
+            let pairs = count(*pairs, "pair");
+            Some(format!("{pairs} recovered from a worker that died"))
+        }
         RunEvent::Stopping { level, reason } => {
             Some(palette.paint(Tone::Warn, stopping_line(*level, reason)))
         }
@@ -157,17 +163,6 @@ fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
         | RunEvent::StageFinished { .. }
         | RunEvent::PairDone { .. } => None,
     }
-}
-
-/// Returns `failed 0003 at fit: mesh has no faces (bad_input)`.
-fn failed_line(pair: &PairName, stage: Stage, failure: &Failure, palette: Palette) -> String {
-    format!(
-        "{} {} at {stage}: {} ({})",
-        palette.paint(Tone::Bad, "failed"),
-        palette.paint(Tone::Strong, pair),
-        failure.message,
-        failure.class
-    )
 }
 
 fn stopping_line(level: StopLevel, reason: &str) -> String {
@@ -182,8 +177,8 @@ fn stopping_line(level: StopLevel, reason: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Failure, PairName, Palette, RunEvent, Stage, StopLevel, event_line, json};
-    use crate::domain::FailureClass;
+    use super::{Palette, RunEvent, StopLevel, event_line, json};
+    use crate::domain::{Failure, FailureClass, PairName, Stage};
 
     #[test]
     fn lines_of_events() {

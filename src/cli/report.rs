@@ -69,26 +69,19 @@ pub(super) async fn report(args: ReportArgs, context: &Context) -> anyhow::Resul
     if !args.with_times && format != ReportFormat::Html {
         report = report.without_times();
     }
-    let text = match (&args.compare, format) {
-        (Some(other), _) => compared(&report, other, format, context).await?,
-        (None, ReportFormat::Html) => {
-            pictured(&report, pictures, (&project, &catalog), context).await?
-        }
-        (
-            None,
-            ReportFormat::Text
-            | ReportFormat::Json
-            | ReportFormat::Csv
-            | ReportFormat::Markdown
-            | ReportFormat::Latex,
-        ) => render(&report, format),
+    let text = if let Some(other) = &args.compare {
+        compared(&report, other, format, context).await?
+    } else if format == ReportFormat::Html {
+        pictured(&report, pictures, (&project, &catalog), context).await?
+    } else {
+        render(&report, format)
     };
     catalog.close().await;
     match &args.output {
         Some(path) => {
             let shown = path.display();
             write_atomic(path, text.as_bytes()).with_context(|| format!("cannot write {shown}"))?;
-            context.output.info(&format!("the report is in {shown}"));
+            context.info(&format!("the report is in {shown}"));
         }
         None => output::print(&text)?,
     }
@@ -105,10 +98,9 @@ async fn pictured(
     let limits = context.settings()?.config.limits.image;
     let gallery = draw_gallery(pictures, catalog, project, limits).await?;
     let name = std::path::absolute(project.dir()).unwrap_or_else(|_| project.dir().to_owned());
+    let name = name.file_name().map(|name| name.to_string_lossy());
     let cover = Cover {
-        project: name
-            .file_name()
-            .map(|name| name.to_string_lossy().into_owned()),
+        project: name.map(Into::into),
         date: Some(day(now())),
     };
     Ok(page(report, &gallery, &cover))
@@ -124,17 +116,16 @@ async fn compared(
     let there = read(&context.at(other)).await?.with_interval(here.interval);
     let names = [context.dir(), other.to_owned()].map(|dir| dir.display().to_string());
     match format {
-        ReportFormat::Text => Ok(format!(
-            "{}\n{}",
-            render(here, format),
-            side_by_side(here, &there, [&names[0], &names[1]])
-        )),
+        ReportFormat::Text => {
+            let tables = side_by_side(here, &there, [&names[0], &names[1]]);
+            Ok(format!("{}\n{tables}", render(here, format)))
+        }
         ReportFormat::Json => {
             let mut value = serde_json::to_value(here)?;
             value["compared_with"] = json!({"project": names[1], "report": there});
             Ok(serde_json::to_string_pretty(&value)?)
         }
-        ReportFormat::Csv | ReportFormat::Markdown | ReportFormat::Latex | ReportFormat::Html => {
+        _ => {
             let text = format!("--compare needs the format text or json, not {format}");
             Err(Refusal::Usage(text).into())
         }
@@ -166,22 +157,19 @@ async fn read(context: &Context) -> anyhow::Result<Report> {
 
 /// Warns about unmet requirements and returns the exit code; an incomplete report comes before a low Acc.
 fn check_requirements(report: &Report, args: &ReportArgs, context: &Context) -> ExitCode {
-    let missing = if args.require_complete {
-        quality_gate::missing(report)
-    } else {
-        Vec::new()
-    };
-    let below = match args.fail_under {
-        Some(least) => quality_gate::below(report, least),
-        None => Vec::new(),
-    };
-    let code = match (missing.is_empty(), below.is_empty()) {
-        (false, _) => ExitCode::Incomplete,
-        (true, false) => ExitCode::BelowFailUnder,
-        (true, true) => ExitCode::Done,
-    };
+    let missing = args.require_complete.then(|| quality_gate::missing(report));
+    let below = args
+        .fail_under
+        .map(|least| quality_gate::below(report, least));
+    let (missing, below) = (missing.unwrap_or_default(), below.unwrap_or_default());
     for reason in missing.iter().chain(&below) {
-        context.output.warn(reason);
+        context.warn(reason);
     }
-    code
+    if !missing.is_empty() {
+        ExitCode::Incomplete
+    } else if !below.is_empty() {
+        ExitCode::BelowFailUnder
+    } else {
+        ExitCode::Done
+    }
 }

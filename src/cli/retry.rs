@@ -5,7 +5,6 @@ use serde_json::json;
 
 use super::context::Context;
 use super::exit::{ExitCode, Refusal};
-use super::output;
 use super::select;
 use super::table::count;
 use crate::catalog::{Catalog, RetrySelection};
@@ -30,22 +29,18 @@ pub(super) async fn retry(args: RetryArgs, context: &Context) -> anyhow::Result<
     if retried == 0 {
         return Err(Refusal::NothingSelected(no_match(&selection)).into());
     }
-    if context.global.json {
-        output::print_json(&json!({"schema": 1, "retried": retried}))?;
-    }
-    context
-        .output
-        .info(&format!("{} will run again", count(retried, "pair")));
-    context.output.next(&context.command("run"));
+    context.print_json(&json!({"schema": 1, "retried": retried}))?;
+    context.info(&format!("{} will run again", count(retried, "pair")));
+    context.next("run");
     Ok(ExitCode::Done)
 }
 
 async fn selection(args: &RetryArgs, catalog: &Catalog) -> anyhow::Result<RetrySelection> {
-    Ok(match (args.class, args.pairs.as_slice()) {
-        (Some(class), _) => RetrySelection::Class(class),
-        (None, []) => RetrySelection::All,
-        (None, typed) => RetrySelection::Names(select::pairs(catalog, typed).await?),
-    })
+    if let Some(class) = args.class {
+        return Ok(RetrySelection::Class(class));
+    }
+    let names = select::some_or_all(catalog, &args.pairs).await?;
+    Ok(names.map_or(RetrySelection::All, RetrySelection::Names))
 }
 
 fn no_match(selection: &RetrySelection) -> String {

@@ -2,7 +2,6 @@
 
 use std::io::Write as _;
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
-use std::path::Path;
 use std::process::{Command, Stdio};
 
 use clap::Args;
@@ -123,10 +122,8 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     }
     signals.abort();
     catalog.close().await;
-    context
-        .output
-        .info("the page is closed; every answer is stored");
-    context.output.next(&context.command("report"));
+    context.info("the page is closed; every answer is stored");
+    context.next("report");
     Ok(ExitCode::Done)
 }
 
@@ -154,30 +151,21 @@ fn no_conflict(args: &ReviewArgs, context: &Context) -> anyhow::Result<ExitCode>
         output::print(&json!({"schema": 1, "url": null}).to_string())?;
     }
     let reviewer = &args.reviewer;
-    context.output.info(&format!(
+    context.info(&format!(
         "there is nothing to adjudicate for {reviewer}: no two other reviewers disagree on an open result"
     ));
-    context.output.next(&context.command("agreement"));
+    context.next("agreement");
     Ok(ExitCode::Done)
 }
 
 /// Returns a reviewer's progress: `lan has answered 0 of 54 images: 50 results and 4 attention checks or duplicates`.
 fn progress(reviewer: &str, counts: QueueCounts) -> String {
-    let QueueCounts {
-        items,
-        results,
-        answered,
-    } = counts;
-    let text = format!(
-        "{reviewer} has answered {answered} of {}",
-        count(items as u64, "image")
-    );
-    match items - results {
+    let images = count(counts.items as u64, "image");
+    let results = count(counts.results as u64, "result");
+    let text = format!("{reviewer} has answered {} of {images}", counts.answered);
+    match counts.items - counts.results {
         0 => text,
-        checks => format!(
-            "{text}: {} and {checks} attention checks or duplicates",
-            count(results as u64, "result")
-        ),
+        checks => format!("{text}: {results} and {checks} attention checks or duplicates"),
     }
 }
 
@@ -194,17 +182,17 @@ fn announce(
     } else {
         output::print(&url)?;
     }
-    context.output.info(&format!(
+    context.info(&format!(
         "{}; the address works once, in one browser; press Ctrl-C to end",
         progress(&args.reviewer, page.counts())
     ));
     if address.ip().is_loopback() {
         let port = address.port();
-        context.output.info(&format!(
+        context.info(&format!(
             "if this machine is remote, first run: ssh -L {port}:127.0.0.1:{port} MACHINE"
         ));
     } else {
-        context.output.warn(&format!(
+        context.warn(&format!(
             "the page listens on {address}, which other machines can reach, and its traffic is not encrypted"
         ));
     }
@@ -223,18 +211,10 @@ fn open(url: &str) -> Option<tempfile::NamedTempFile> {
         "xdg-open"
     };
     let mut file = tempfile::Builder::new().suffix(".html").tempfile().ok()?;
-    write!(
-        file,
-        "<meta http-equiv=\"refresh\" content=\"0;url={url}\">"
-    )
-    .ok()?;
-    start_browser(program, file.path());
-    Some(file)
-}
-
-fn start_browser(program: &str, path: &Path) {
+    let page = format!("<meta http-equiv=\"refresh\" content=\"0;url={url}\">");
+    file.write_all(page.as_bytes()).ok()?;
     let started = Command::new(program)
-        .arg(path)
+        .arg(file.path())
         .stdin(Stdio::null())
         .stdout(Stdio::null())
         .stderr(Stdio::null())
@@ -242,6 +222,7 @@ fn start_browser(program: &str, path: &Path) {
     if let Err(error) = started {
         tracing::debug!(%error, "no browser was opened");
     }
+    Some(file)
 }
 
 /// Returns Vietnamese if the locale is Vietnamese, otherwise English.

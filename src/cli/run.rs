@@ -8,9 +8,8 @@ use serde_json::{Value, json};
 use super::context::Context;
 use super::exit::ExitCode;
 use super::failures::Failures;
-use super::output;
 use super::progress::ProgressReporter;
-use super::table::{Align, columns, count};
+use super::table::{columns, count};
 use super::time_text::duration;
 use super::{select, signals};
 use crate::catalog::{Catalog, Plan, RerunPolicy};
@@ -68,12 +67,10 @@ pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<Exit
         return print_plan(&plan, RunLock::is_held(&project), context);
     }
     let (summary, failures) = drive(&project, catalog, &config, &options, context).await?;
-    if context.global.json {
-        output::print_json(&as_json(&summary))?;
-    }
+    context.print_json(&as_json(&summary))?;
     print_outcome(&summary, &failures, context);
     for command in next_steps(&summary, &failures) {
-        context.output.next(&context.command(&command));
+        context.next(&command);
     }
     Ok(code(&summary))
 }
@@ -81,13 +78,12 @@ pub(super) async fn run(args: RunArgs, context: &Context) -> anyhow::Result<Exit
 /// Parses a number of bytes with an optional unit: 4G, 512M, 900K.
 fn bytes(text: &str) -> Result<u64, String> {
     let text = text.trim();
-    let (number, shift) = match text.chars().last().map(|c| c.to_ascii_uppercase()) {
-        Some('K') => (&text[..text.len() - 1], 10),
-        Some('M') => (&text[..text.len() - 1], 20),
-        Some('G') => (&text[..text.len() - 1], 30),
-        Some('T') => (&text[..text.len() - 1], 40),
-        Some(_) | None => (text, 0),
+    let units = [('K', 10), ('M', 20), ('G', 30), ('T', 40)];
+    let split = |(unit, shift): (char, u32)| {
+        let number = text.strip_suffix([unit, unit.to_ascii_lowercase()])?;
+        Some((number, shift))
     };
+    let (number, shift) = units.into_iter().find_map(split).unwrap_or((text, 0));
     let number: Option<u64> = number.parse().ok();
     number
         .and_then(|number| number.checked_mul(1 << shift))
@@ -96,10 +92,7 @@ fn bytes(text: &str) -> Result<u64, String> {
 }
 
 async fn options(args: &RunArgs, config: &Config, catalog: &Catalog) -> anyhow::Result<RunOptions> {
-    let pairs = match args.pairs.as_slice() {
-        [] => None,
-        typed => Some(select::pairs(catalog, typed).await?),
-    };
+    let pairs = select::some_or_all(catalog, &args.pairs).await?;
     let plain = from_config(config);
     Ok(RunOptions {
         workers: args.jobs.map_or(plain.workers, usize::from),
@@ -146,19 +139,15 @@ pub(super) async fn drive(
     let stop = Stop::new();
     let watch = signals::watch(&stop)?;
     let global = &context.global;
-    let mut progress = ProgressReporter::new(
-        global.progress,
-        global.quiet,
-        &context.screen,
-        context.output.stderr,
-    );
+    let (screen, palette) = (&context.screen, context.stderr);
+    let mut progress = ProgressReporter::new(global.progress, global.quiet, screen, palette);
     let ended = runner::run(project, &catalog, &config.stages, options, &stop, |event| {
         progress.event(&event);
     })
     .await;
     progress.end();
     watch.abort();
-    let failures = Failures::read(&catalog).await;
+    let failures = Failures::read(&catalog, false).await;
     catalog.close().await;
     Ok((ended?, failures?))
 }
@@ -176,29 +165,23 @@ pub(super) const fn code(summary: &RunSummary) -> ExitCode {
 
 /// Prints how a run ended and which pairs failed.
 pub(super) fn print_outcome(summary: &RunSummary, failures: &Failures, context: &Context) {
-    let output = &context.output;
-    output.info(&headline(summary));
+    context.info(&headline(summary));
     if summary.failed_in_all > 0 {
         let number = count(summary.failed_in_all, "pair");
-        output.info(&format!("{number} failed:\n{}", failures.text().trim_end()));
+        context.info(&format!("{number} failed:\n{}", failures.text().trim_end()));
     }
 }
 
 fn headline(summary: &RunSummary) -> String {
-    let took = duration(summary.elapsed_ms);
+    let (took, left) = (duration(summary.elapsed_ms), summary.left);
+    let done = count(summary.done, "pair");
     if summary.stopped {
-        return format!(
-            "stopped after {took}: {} done, {} left; the state is safe",
-            count(summary.done, "pair"),
-            summary.left
-        );
+        return format!("stopped after {took}: {done} done, {left} left; the state is safe");
     }
     if summary.too_many_failures {
+        let failed = count(summary.failed, "pair");
         return format!(
-            "stopped after {took} because {} failed in this run: {} done, {} left",
-            count(summary.failed, "pair"),
-            count(summary.done, "pair"),
-            summary.left
+            "stopped after {took} because {failed} failed in this run: {done} done, {left} left"
         );
     }
     if summary.stages == 0 && summary.failed == 0 {
@@ -211,10 +194,8 @@ fn headline(summary: &RunSummary) -> String {
         };
     }
     format!(
-        "{} done, {} failed, {} left in {took}",
-        count(summary.done, "pair"),
-        summary.failed,
-        summary.left
+        "{done} done, {} failed, {left} left in {took}",
+        summary.failed
     )
 }
 
@@ -254,13 +235,10 @@ fn as_json(summary: &RunSummary) -> Value {
 }
 
 fn print_plan(plan: &Plan, running: bool, context: &Context) -> anyhow::Result<ExitCode> {
-    if context.global.json {
-        output::print_json(&json!({"schema": 1, "pairs": plan.pairs(), "plan": plan}))?;
-        return Ok(ExitCode::Done);
-    }
-    output::print(&plan_text(plan, running))?;
+    let json = json!({"schema": 1, "pairs": plan.pairs(), "plan": plan});
+    context.print(&json, || plan_text(plan, running))?;
     if plan.pairs() > 0 || plan.leased > 0 && !running {
-        context.output.next(&context.command("run"));
+        context.next("run");
     }
     Ok(ExitCode::Done)
 }
@@ -281,22 +259,11 @@ fn plan_text(plan: &Plan, running: bool) -> String {
             parts.push(format!("{number} {what}"));
         }
     }
-    let rows: Vec<Vec<String>> = plan
-        .entries
-        .iter()
-        .map(|entry| {
-            vec![
-                format!("  {}", entry.pairs),
-                format!("from {}", entry.from),
-                entry.why.to_string(),
-            ]
-        })
-        .collect();
-    format!(
-        "{}\n{}",
-        parts.join(", "),
-        columns(&rows, &[Align::Right, Align::Left, Align::Left])
-    )
+    let rows = plan.entries.iter().map(|entry| {
+        let (pairs, from) = (format!("  {}", entry.pairs), format!("from {}", entry.from));
+        vec![pairs, from, entry.why.to_string()]
+    });
+    format!("{}\n{}", parts.join(", "), columns(rows, "><<"))
 }
 
 #[cfg(test)]

@@ -2,9 +2,8 @@
 
 use std::io::Write;
 
+use clap::ColorChoice;
 use indicatif::{MultiProgress, ProgressBar};
-
-use super::global::ColorWhen;
 
 /// stderr, shared by messages, log and progress bar so that no line overwrites the bar.
 #[derive(Debug, Clone)]
@@ -58,18 +57,6 @@ pub(super) enum Tone {
     Faint,
 }
 
-impl Tone {
-    const fn code(self) -> &'static str {
-        match self {
-            Self::Good => "32",
-            Self::Warn => "33",
-            Self::Bad => "31",
-            Self::Strong => "1",
-            Self::Faint => "2",
-        }
-    }
-}
-
 /// Colours text for one stream, or leaves it plain.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Palette {
@@ -81,11 +68,11 @@ impl Palette {
     pub(super) const PLAIN: Self = Self { on: false };
 
     /// Decides for one stream: `--color` first, then `NO_COLOR`, then whether it is a terminal.
-    pub(super) fn choose(when: ColorWhen, is_terminal: bool) -> Self {
+    pub(super) fn choose(when: ColorChoice, is_terminal: bool) -> Self {
         let on = match when {
-            ColorWhen::Always => true,
-            ColorWhen::Never => false,
-            ColorWhen::Auto => is_terminal && !is_no_color() && !is_dumb_terminal(),
+            ColorChoice::Always => true,
+            ColorChoice::Never => false,
+            ColorChoice::Auto => is_terminal && !is_no_color() && !is_dumb_terminal(),
         };
         Self { on }
     }
@@ -97,8 +84,15 @@ impl Palette {
 
     /// Returns the text in the colour of its tone.
     pub(super) fn paint(self, tone: Tone, text: impl std::fmt::Display) -> String {
+        let code = match tone {
+            Tone::Good => "32",
+            Tone::Warn => "33",
+            Tone::Bad => "31",
+            Tone::Strong => "1",
+            Tone::Faint => "2",
+        };
         if self.on {
-            format!("\u{1b}[{}m{text}\u{1b}[0m", tone.code())
+            format!("\u{1b}[{code}m{text}\u{1b}[0m")
         } else {
             text.to_string()
         }
@@ -116,14 +110,14 @@ fn is_no_color() -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::{ColorWhen, Palette, Tone};
+    use super::{ColorChoice, Palette, Tone};
 
     #[test]
     fn colour_is_used_only_where_it_is_wanted() {
-        let always = Palette::choose(ColorWhen::Always, false);
+        let always = Palette::choose(ColorChoice::Always, false);
         assert_eq!(always.paint(Tone::Bad, "x"), "\u{1b}[31mx\u{1b}[0m");
-        let piped = Palette::choose(ColorWhen::Auto, false);
+        let piped = Palette::choose(ColorChoice::Auto, false);
         assert_eq!(piped.paint(Tone::Bad, "x"), "x");
-        assert_eq!(Palette::choose(ColorWhen::Never, true), Palette::PLAIN);
+        assert_eq!(Palette::choose(ColorChoice::Never, true), Palette::PLAIN);
     }
 }

@@ -25,6 +25,20 @@ pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result
     }
 }
 
+/// Looks up pairs by their ids; returns `None` for all pairs if none is named.
+///
+/// # Errors
+/// Like [`pairs`].
+pub(super) async fn some_or_all(
+    catalog: &Catalog,
+    typed: &[String],
+) -> anyhow::Result<Option<Vec<PairName>>> {
+    match typed {
+        [] => Ok(None),
+        typed => Ok(Some(pairs(catalog, typed).await?)),
+    }
+}
+
 /// Looks up one pair.
 pub(super) async fn pair(catalog: &Catalog, typed: &str) -> anyhow::Result<PairName> {
     let names = pairs(catalog, &[typed.to_owned()]).await?;

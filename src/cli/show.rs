@@ -5,7 +5,6 @@ use serde_json::{Value, json};
 
 use super::context::Context;
 use super::exit::ExitCode;
-use super::output;
 use super::screen::{Palette, Tone};
 use super::select;
 use super::show_text::{Adjustment, ManualResult, PairPage, manual_text};
@@ -34,23 +33,18 @@ pub(super) async fn show(args: ShowArgs, context: &Context) -> anyhow::Result<Ex
     };
     let manual = manual_results(&catalog, &detail.results).await?;
     catalog.close().await;
-    if context.global.json {
-        output::print_json(&as_json(&detail, &manual, why.as_ref(), &project)?)?;
-        return Ok(ExitCode::Done);
-    }
+    let (detail, palette) = (&detail, context.stdout);
     let page = PairPage {
-        detail: &detail,
+        detail,
         project: &project,
-        palette: context.output.stdout,
+        palette,
     };
-    output::print(&format!(
-        "{}{}{}",
-        page.text(),
-        manual_text(&manual, context.output.stdout),
-        tail(&detail, why.as_ref(), context.output.stdout)
-    ))?;
-    for command in next_steps(&detail, why.is_some()) {
-        context.output.next(&context.command(&command));
+    context.print(&as_json(detail, &manual, why.as_ref(), &project)?, || {
+        let tail = tail(detail, why.as_ref(), palette);
+        [page.text(), manual_text(&manual, palette), tail].concat()
+    })?;
+    for command in next_steps(detail, why.is_some()) {
+        context.next(&command);
     }
     Ok(ExitCode::Done)
 }
@@ -95,22 +89,19 @@ fn as_json(
     project: &Project,
 ) -> anyhow::Result<Value> {
     let mut value = serde_json::to_value(detail)?;
-    if let Value::Object(fields) = &mut value {
-        let mut paths = serde_json::Map::new();
-        for record in &detail.results.stages {
-            for (role, artifact) in &record.files {
-                let path = project.artifact_path(artifact);
-                paths.insert(role.clone(), json!(path.to_string_lossy()));
-            }
-        }
-        fields.insert("files".to_owned(), Value::Object(paths));
-        fields.insert(
-            "manual_alignments".to_owned(),
-            serde_json::to_value(manual)?,
-        );
-        fields.insert("next_run".to_owned(), serde_json::to_value(why)?);
-        fields.insert("schema".to_owned(), json!(1));
-    }
+    let files = detail
+        .results
+        .stages
+        .iter()
+        .flat_map(|record| &record.files);
+    let paths = files.map(|(role, artifact)| {
+        let path = project.artifact_path(artifact);
+        (role.clone(), json!(path.to_string_lossy()))
+    });
+    value["files"] = paths.collect::<serde_json::Map<_, _>>().into();
+    value["manual_alignments"] = serde_json::to_value(manual)?;
+    value["next_run"] = serde_json::to_value(why)?;
+    value["schema"] = json!(1);
     Ok(value)
 }
 
@@ -120,28 +111,22 @@ async fn manual_results(
     results: &PairResults,
 ) -> Result<Vec<ManualResult>, CatalogError> {
     let all = catalog.manual_alignments().await?.into_iter();
-    let of_pair = all
-        .filter(|stored| stored.made.pair == results.attributes.name && stored.undone_at.is_none());
-    Ok(of_pair
-        .map(|stored| ManualResult {
-            adjustment: adjustment(&stored, results),
-            stored,
-        })
-        .collect())
+    let name = &results.attributes.name;
+    let of_pair = all.filter(|stored| stored.made.pair == *name && stored.undone_at.is_none());
+    let with_adjustment = of_pair.map(|stored| ManualResult {
+        adjustment: adjustment(&stored, results),
+        stored,
+    });
+    Ok(with_adjustment.collect())
 }
 
 fn adjustment(manual: &StoredAlignment, results: &PairResults) -> Option<Adjustment> {
     let automatic = automatic_result(results).filter(|_| manual.on_current_depth)?;
     let depth: DepthOutcome = results.stage(Stage::Depth)?.parse().ok()?;
-    let size = [depth.width, depth.height];
-    let by = ManualCorrection::between(
-        &automatic.print_from_depth,
-        &manual.made.print_from_depth,
-        size,
-    )?;
+    let (from, to) = (&automatic.print_from_depth, &manual.made.print_from_depth);
     Some(Adjustment {
         from: automatic.metric,
-        by,
+        by: ManualCorrection::between(from, to, [depth.width, depth.height])?,
         from_iou: automatic.scores.iou,
     })
 }

@@ -3,12 +3,12 @@
 use serde::Serialize;
 
 use super::screen::{Palette, Tone};
-use super::table::{Align, columns};
+use super::table::columns;
 use super::time_text::{duration, utc};
 use crate::catalog::{AttemptRecord, MetricRecord, PairDetail, StageRecord, StoredAlignment};
 use crate::domain::{
-    DepthOutcome, FitOutcome, InkHypothesis, JobStatus, NormalizeOutcome, Stage, ThresholdMetric,
-    Verdict,
+    DepthOutcome, FitOutcome, InkHypothesis, JobStatus, LengthUnit, NormalizeOutcome, Stage,
+    ThresholdMetric, Verdict,
 };
 use crate::report::ManualCorrection;
 use crate::store::Project;
@@ -21,12 +21,17 @@ pub(super) struct PairPage<'a> {
 }
 
 /// Formats a heading and the rows below it; returns nothing if there are no rows.
-fn section(name: &str, rows: &[Vec<String>], aligns: &[Align], palette: Palette) -> String {
+fn section(
+    name: &str,
+    rows: impl IntoIterator<Item = Vec<String>>,
+    aligns: &str,
+    palette: Palette,
+) -> String {
+    let rows = columns(rows, aligns);
     if rows.is_empty() {
-        return String::new();
+        return rows;
     }
-    let heading = palette.paint(Tone::Strong, name);
-    format!("{heading}\n{}", columns(rows, aligns))
+    format!("{}\n{rows}", palette.paint(Tone::Strong, name))
 }
 
 impl PairPage<'_> {
@@ -46,35 +51,28 @@ impl PairPage<'_> {
     fn attributes(&self) -> String {
         let attributes = &self.detail.results.attributes;
         let mut names = vec![self.palette.paint(Tone::Strong, &attributes.name)];
-        names.extend(
-            [&attributes.character, &attributes.block]
-                .into_iter()
-                .flatten()
-                .cloned(),
-        );
-        let unit = attributes.unit.map_or("unit unknown", |unit| unit.name());
+        names.extend(attributes.character.clone());
+        names.extend(attributes.block.clone());
+        let unit = attributes.unit.map_or("unit unknown", LengthUnit::name);
         let side = match attributes.scanned_face_down {
             Some(true) => ", scanned face down",
             Some(false) => ", scanned face up",
             None => "",
         };
-        let mut rows = vec![
-            ["pair".to_owned(), names.join("  ")],
-            ["state".to_owned(), self.state()],
-            [
-                "mesh".to_owned(),
-                self.input(&attributes.mesh_path, &format!(" ({unit}{side})")),
-            ],
-            ["print".to_owned(), self.input(&attributes.print_path, "")],
+        let mesh = self.input(&attributes.mesh_path, &format!(" ({unit}{side})"));
+        let print = self.input(&attributes.print_path, "");
+        let rows = [
+            ("pair", names.join("  ")),
+            ("state", self.state()),
+            ("mesh", mesh),
+            ("print", print),
         ];
-        for (key, value) in &attributes.meta {
-            let text = value
-                .as_str()
-                .map_or_else(|| value.to_string(), ToOwned::to_owned);
-            rows.push([key.clone(), text]);
-        }
-        let rows: Vec<Vec<String>> = rows.into_iter().map(Vec::from).collect();
-        columns(&rows, &[Align::Left; 2])
+        let rows = rows.map(|(key, text)| vec![key.to_owned(), text]);
+        let meta = attributes.meta.iter().map(|(key, value)| {
+            let text = value.as_str().map(ToOwned::to_owned);
+            vec![key.clone(), text.unwrap_or_else(|| value.to_string())]
+        });
+        columns(rows.into_iter().chain(meta), "<<")
     }
 
     fn input(&self, stored: &str, note: &str) -> String {
@@ -118,20 +116,11 @@ impl PairPage<'_> {
     }
 
     fn stages(&self) -> String {
-        let records = &self.detail.results.stages;
-        let rows: Vec<Vec<String>> = records
-            .iter()
-            .map(|record| {
-                vec![
-                    format!("  {}", record.stage),
-                    duration(record.ms),
-                    record.result_hash.short(),
-                    numbers(record),
-                ]
-            })
-            .collect();
-        let aligns = [Align::Left, Align::Right, Align::Left, Align::Left];
-        section("stages", &rows, &aligns, self.palette)
+        let rows = self.detail.results.stages.iter().map(|record| {
+            let (stage, took) = (format!("  {}", record.stage), duration(record.ms));
+            vec![stage, took, record.result_hash.short(), numbers(record)]
+        });
+        section("stages", rows, "<><<", self.palette)
     }
 
     fn metrics(&self) -> String {
@@ -140,34 +129,26 @@ impl PairPage<'_> {
             return String::new();
         }
         let head = "  metric,angle °,scale,shift px,threshold,ssim,iou,iou box,dice,margin,confidence,verdicts";
-        let mut rows = vec![head.split(',').map(ToOwned::to_owned).collect()];
-        rows.extend(metrics.iter().map(metric_row));
-        let mut aligns = [Align::Right; 12];
-        aligns[0] = Align::Left;
-        aligns[11] = Align::Left;
-        section("result", &rows, &aligns, self.palette)
+        let head = head.split(',').map(ToOwned::to_owned).collect();
+        let rows = std::iter::once(head).chain(metrics.iter().map(metric_row));
+        section("result", rows, "<>>>>>>>>>><", self.palette)
     }
 
     fn files(&self) -> String {
-        let rows: Vec<Vec<String>> = self
-            .detail
-            .results
-            .stages
-            .iter()
+        let stages = self.detail.results.stages.iter();
+        let rows = stages
             .flat_map(|record| &record.files)
             .map(|(role, artifact)| {
                 let path = self.project.artifact_path(artifact);
                 vec![format!("  {role}"), path.display().to_string()]
-            })
-            .collect();
-        section("files", &rows, &[Align::Left; 2], self.palette)
+            });
+        section("files", rows, "<<", self.palette)
     }
 
     fn history(&self) -> String {
         let attempts = self.detail.attempts.iter();
-        let rows: Vec<Vec<String>> = attempts.map(|attempt| self.attempt_row(attempt)).collect();
-        let aligns = [Align::Left, Align::Left, Align::Right, Align::Left];
-        section("history", &rows, &aligns, self.palette)
+        let rows = attempts.map(|attempt| self.attempt_row(attempt));
+        section("history", rows, "<<><", self.palette)
     }
 
     fn attempt_row(&self, attempt: &AttemptRecord) -> Vec<String> {
@@ -190,23 +171,9 @@ impl PairPage<'_> {
 /// Returns the few numbers of a stage that show whether it succeeded.
 fn numbers(record: &StageRecord) -> String {
     let text = match record.stage {
-        Stage::Fit => record.parse::<FitOutcome>().map(|fit| fit_numbers(&fit)),
-        Stage::Depth => record
-            .parse::<DepthOutcome>()
-            .map(|depth| depth_numbers(&depth)),
-        Stage::Normalize => record.parse::<NormalizeOutcome>().map(|found| {
-            let text = |ink: &InkHypothesis| {
-                let polarity = if ink.light_on_dark {
-                    "light on dark"
-                } else {
-                    "dark on light"
-                };
-                let threshold = ink.threshold_print;
-                format!("print threshold {threshold:.0} of 65535, {polarity}")
-            };
-            let texts: Vec<String> = found.inks.iter().map(text).collect();
-            texts.join("; or ")
-        }),
+        Stage::Fit => record.parse().map(|fit| fit_numbers(&fit)),
+        Stage::Depth => record.parse().map(|depth| depth_numbers(&depth)),
+        Stage::Normalize => record.parse().map(|found| ink_numbers(&found)),
         Stage::Register => Ok(String::new()),
     };
     text.unwrap_or_else(|_| "written by another version of this program".to_owned())
@@ -224,13 +191,19 @@ fn fit_numbers(fit: &FitOutcome) -> String {
 }
 
 fn depth_numbers(depth: &DepthOutcome) -> String {
-    format!(
-        "{} x {} px, {:.4} a pixel, {:.0} % covered",
-        depth.width,
-        depth.height,
-        depth.scale.mesh_unit_per_px,
-        depth.coverage * 100.0
-    )
+    let DepthOutcome { width, height, .. } = depth;
+    let (side, covered) = (depth.scale.mesh_unit_per_px, depth.coverage * 100.0);
+    format!("{width} x {height} px, {side:.4} a pixel, {covered:.0} % covered")
+}
+
+fn ink_numbers(found: &NormalizeOutcome) -> String {
+    let text = |ink: &InkHypothesis| {
+        let polarity = ["dark on light", "light on dark"][usize::from(ink.light_on_dark)];
+        let threshold = ink.threshold_print;
+        format!("print threshold {threshold:.0} of 65535, {polarity}")
+    };
+    let texts: Vec<String> = found.inks.iter().map(text).collect();
+    texts.join("; or ")
 }
 
 fn metric_row(record: &MetricRecord) -> Vec<String> {
@@ -255,16 +228,17 @@ fn metric_row(record: &MetricRecord) -> Vec<String> {
 }
 
 fn verdicts(record: &MetricRecord) -> String {
-    let mut parts: Vec<String> = Verdict::ALL
-        .into_iter()
-        .filter_map(|verdict| {
-            let number = record
-                .verdicts
-                .iter()
-                .filter(|read| read.verdict == verdict)
-                .count();
-            (number > 0).then(|| format!("{number} {verdict}"))
-        })
+    let number = |verdict| {
+        let equal = record
+            .verdicts
+            .iter()
+            .filter(|read| read.verdict == verdict);
+        equal.count()
+    };
+    let counts = Verdict::ALL.map(|verdict| (number(verdict), verdict));
+    let given = counts.iter().filter(|(number, _)| *number > 0);
+    let mut parts: Vec<String> = given
+        .map(|(number, verdict)| format!("{number} {verdict}"))
         .collect();
     if record.older_verdicts > 0 {
         parts.push(format!("{} for an older result", record.older_verdicts));
@@ -293,8 +267,8 @@ pub(super) struct Adjustment {
 
 /// Formats manual alignments, one line each; returns nothing if there are none.
 pub(super) fn manual_text(manual: &[ManualResult], palette: Palette) -> String {
-    let rows: Vec<Vec<String>> = manual.iter().map(|one| vec![manual_line(one)]).collect();
-    section("manual alignments", &rows, &[Align::Left], palette)
+    let rows = manual.iter().map(|one| vec![manual_line(one)]);
+    section("manual alignments", rows, "<", palette)
 }
 
 /// Returns `  2026-11-22 02:10:00  lan: rotated 5.0°, shifted 12.1 px, scaled 1.000 from ensemble; IoU 0.616, before

@@ -11,12 +11,12 @@ use super::exit::ExitCode;
 use super::failures::Failures;
 use super::output;
 use super::screen::{CLEAR, Palette, Tone};
-use super::table::{Align, columns, count};
+use super::table::{columns, count};
 use super::verdict::reviewer_name;
-use crate::catalog::{Catalog, Fingerprints, StageCounts, StatusCounts};
+use crate::catalog::{StageCounts, StatusCounts};
 use crate::domain::{JobStatus, MetricOutcome, Stage, Verdict};
 use crate::runner;
-use crate::store::{Project, RunLock};
+use crate::store::RunLock;
 
 /// Arguments of `status`.
 #[derive(Debug, Args)]
@@ -35,12 +35,12 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
     let (project, catalog) = context.open_read_only().await?;
     loop {
         let fingerprints = runner::fingerprints(&context.settings()?.config.stages);
-        let failures = if args.failed {
-            Failures::read_all(&catalog).await?
-        } else {
-            Failures::read(&catalog).await?
+        let status = ProjectStatus {
+            // Read before the counts: a run that ends in between leaves no leases.
+            running: RunLock::is_held(&project),
+            failures: Failures::read(&catalog, args.failed).await?,
+            counts: catalog.status(&fingerprints).await?,
         };
-        let status = ProjectStatus::read(&project, &catalog, &fingerprints, failures).await?;
         print_status(&status, &args, context)?;
         if !args.watch {
             break;
@@ -63,22 +63,6 @@ struct ProjectStatus {
 }
 
 impl ProjectStatus {
-    async fn read(
-        project: &Project,
-        catalog: &Catalog,
-        fingerprints: &Fingerprints,
-        failures: Failures,
-    ) -> anyhow::Result<Self> {
-        // Read before the counts: a run that ends in between leaves no leases.
-        let running = RunLock::is_held(project);
-        let counts = catalog.status(fingerprints).await?;
-        Ok(Self {
-            counts,
-            running,
-            failures,
-        })
-    }
-
     fn jobs(&self, status: JobStatus) -> u64 {
         self.counts.jobs.get(&status).copied().unwrap_or(0)
     }
@@ -87,13 +71,14 @@ impl ProjectStatus {
         self.jobs(JobStatus::Ready) + self.jobs(JobStatus::Backoff)
     }
 
+    /// Returns the number of pairs that a process is working on.
+    fn in_process(&self) -> u64 {
+        self.jobs(JobStatus::Leased) - self.interrupted()
+    }
+
     /// Returns the number of pairs whose process died; the next run continues them.
     fn interrupted(&self) -> u64 {
-        if self.running {
-            0
-        } else {
-            self.jobs(JobStatus::Leased)
-        }
+        u64::from(!self.running) * self.jobs(JobStatus::Leased)
     }
 
     fn json(&self, with_failures: bool) -> anyhow::Result<Value> {
@@ -123,16 +108,14 @@ fn print_status(
             output::print_json(&json)?;
         }
     } else {
-        let clear = if args.watch && std::io::stdout().is_terminal() {
-            CLEAR
-        } else {
-            ""
-        };
         let dir = context.dir().display().to_string();
-        let text = screen(status, &dir, context.output.stdout);
-        output::print(&format!("{clear}{text}"))?;
+        let mut text = screen(status, &dir, context.stdout);
+        if args.watch && std::io::stdout().is_terminal() {
+            text.insert_str(0, CLEAR);
+        }
+        output::print(&text)?;
         for command in next_steps(status) {
-            context.output.next(&context.command(&command));
+            context.next(&command);
         }
     }
     Ok(())
@@ -177,11 +160,7 @@ fn headline(status: &ProjectStatus, dir: &str, palette: Palette) -> String {
     ];
     for (number, word, tone) in [
         (status.failed(), "failed", Tone::Bad),
-        (
-            status.jobs(JobStatus::Leased) - status.interrupted(),
-            "running",
-            Tone::Strong,
-        ),
+        (status.in_process(), "running", Tone::Strong),
         (status.interrupted(), "interrupted", Tone::Warn),
         (status.waiting(), "waiting", Tone::Warn),
     ] {
@@ -202,29 +181,21 @@ fn stage_table(counts: &StatusCounts, palette: Palette) -> String {
         let cells = Stage::ALL.map(|stage| cell(of(stage)));
         [vec![label(name, palette)], cells.to_vec()].concat()
     };
+    let failed = |stage: StageCounts| {
+        let tone = if stage.failed == 0 {
+            Tone::Faint
+        } else {
+            Tone::Bad
+        };
+        palette.paint(tone, stage.failed)
+    };
     let rows = [
         [vec![label("stages", palette)], head.to_vec()].concat(),
         row("  done", &|stage| stage.done.to_string()),
         row("  pending", &|stage| stage.pending.to_string()),
-        row("  failed", &|stage| {
-            let tone = if stage.failed == 0 {
-                Tone::Faint
-            } else {
-                Tone::Bad
-            };
-            palette.paint(tone, stage.failed)
-        }),
+        row("  failed", &failed),
     ];
-    columns(
-        &rows,
-        &[
-            Align::Left,
-            Align::Right,
-            Align::Right,
-            Align::Right,
-            Align::Right,
-        ],
-    )
+    columns(rows, "<>>>>")
 }
 
 fn low_confidence_line(counts: &StatusCounts) -> Option<String> {
@@ -237,11 +208,8 @@ fn low_confidence_line(counts: &StatusCounts) -> Option<String> {
 fn verdict_line(counts: &StatusCounts) -> Option<String> {
     let of = |verdict: Verdict| counts.verdicts.get(&verdict).copied().unwrap_or(0);
     let total: u64 = Verdict::ALL.into_iter().map(of).sum();
-    (total > 0).then(|| {
-        Verdict::ALL
-            .map(|verdict| format!("{} {verdict}", of(verdict)))
-            .join(" · ")
-    })
+    let parts = Verdict::ALL.map(|verdict| format!("{} {verdict}", of(verdict)));
+    (total > 0).then(|| parts.join(" · "))
 }
 
 fn next_steps(status: &ProjectStatus) -> Vec<String> {
@@ -249,7 +217,7 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     if status.counts.pairs == 0 {
         steps.push("import pairs.csv".to_owned());
     }
-    let running = status.jobs(JobStatus::Leased) > status.interrupted();
+    let running = status.in_process() > 0;
     if !running && status.waiting() + status.interrupted() + status.counts.stale > 0 {
         steps.push("run".to_owned());
     }

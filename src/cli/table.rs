@@ -2,42 +2,36 @@
 
 use unicode_width::UnicodeWidthStr;
 
-/// Alignment of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Align {
-    /// For words.
-    Left,
-    /// For numbers.
-    Right,
-}
-
-/// Formats rows as columns two spaces apart, without trailing blanks.
-pub(super) fn columns(rows: &[Vec<String>], aligns: &[Align]) -> String {
+/// Formats rows as columns two spaces apart, without trailing blanks. `aligns` has a character per column, as in format
+/// strings: `<` left for words, `>` right for numbers.
+pub(super) fn columns(rows: impl IntoIterator<Item = Vec<String>>, aligns: &str) -> String {
+    let rows: Vec<Vec<String>> = rows.into_iter().collect();
     let width_of_column = |column: usize| {
         let cells = rows.iter().filter_map(|row| row.get(column));
         cells.map(|cell| width(cell)).max().unwrap_or(0)
     };
-    let widths: Vec<usize> = (0..aligns.len()).map(width_of_column).collect();
+    let aligns: Vec<(char, usize)> = (aligns.chars().zip(0..))
+        .map(|(align, column)| (align, width_of_column(column)))
+        .collect();
     rows.iter()
-        .flat_map(|row| [line(row, aligns, &widths), "\n".to_owned()])
+        .flat_map(|row| [line(row, &aligns), "\n".to_owned()])
         .collect()
 }
 
-fn line(row: &[String], aligns: &[Align], widths: &[usize]) -> String {
+fn line(row: &[String], aligns: &[(char, usize)]) -> String {
     let cells: Vec<String> = row
         .iter()
-        .zip(aligns.iter().zip(widths))
-        .map(|(cell, (align, width))| pad(cell, *align, *width))
+        .zip(aligns)
+        .map(|(cell, (align, column_width))| {
+            let blanks = " ".repeat(column_width.saturating_sub(width(cell)));
+            if *align == '>' {
+                blanks + cell
+            } else {
+                cell.clone() + &blanks
+            }
+        })
         .collect();
     cells.join("  ").trim_end().to_owned()
-}
-
-fn pad(cell: &str, align: Align, to_width: usize) -> String {
-    let blanks = " ".repeat(to_width.saturating_sub(width(cell)));
-    match align {
-        Align::Left => format!("{cell}{blanks}"),
-        Align::Right => format!("{blanks}{cell}"),
-    }
 }
 
 /// Returns the number of terminal columns of a text; colour codes take none, East Asian wide characters two.
@@ -56,7 +50,7 @@ pub(super) fn count(number: u64, noun: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{Align, columns, count, width};
+    use super::{columns, count, width};
 
     #[test]
     fn columns_line_up_whatever_the_colours_and_scripts() {
@@ -74,7 +68,7 @@ mod tests {
                 "5".to_owned(),
             ],
         ];
-        let text = columns(&rows, &[Align::Left, Align::Left, Align::Right]);
+        let text = columns(rows, "<<>");
         let ends: Vec<usize> = text.lines().map(width).collect();
         assert_eq!(ends, [12, 12, 12]);
     }

@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::domain::{PairName, sanitize};
+use super::files::LineError;
+use crate::domain::PairName;
 use crate::report::ground_truth::TruthRecord;
 
 /// One true alignment and its line number.
@@ -19,20 +20,11 @@ pub(super) struct TruthRow {
     pub(super) tops_mask: Option<PathBuf>,
 }
 
-/// Why the file is refused.
-#[derive(Debug, thiserror::Error)]
-#[error("{}: line {line}: {reason}; nothing was imported", file.display())]
-pub(super) struct TruthFileError {
-    file: PathBuf,
-    line: usize,
-    reason: String,
-}
-
 /// Parses all lines; `tops_mask` is relative to the file.
 ///
 /// # Errors
 /// At the first line that is not a true alignment, or repeats a pair.
-pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, TruthFileError> {
+pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, LineError> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut lines: BTreeMap<PairName, usize> = BTreeMap::new();
     let mut rows = Vec::new();
@@ -40,15 +32,13 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, TruthFileE
         if text.trim().is_empty() {
             continue;
         }
-        let refuse = |reason: String| refusal(file, line, &reason);
+        let refuse = |reason: String| LineError::new(line, &reason);
         let value: Value =
             serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
         let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
         if let Some(first) = lines.insert(record.id.clone(), line) {
-            return Err(refuse(format!(
-                "pair {} is already on line {first}",
-                record.id
-            )));
+            let name = record.id;
+            return Err(refuse(format!("pair {name} is already on line {first}")));
         }
         rows.push(TruthRow {
             line,
@@ -60,31 +50,28 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, TruthFileE
     Ok(rows)
 }
 
-/// Refuses a line.
-pub(super) fn refusal(file: &Path, line: usize, reason: &str) -> TruthFileError {
-    TruthFileError {
-        file: file.to_owned(),
-        line,
-        reason: sanitize(reason, 300),
-    }
+/// Refuses a row whose pair does not exist.
+pub(super) fn unknown_pair(row: &TruthRow) -> LineError {
+    LineError::new(row.line, &format!("there is no pair {}", row.name))
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
-    use super::{TruthRow, parse, refusal};
+    use super::{LineError, TruthRow, parse};
 
     const LINE: &str = r#"{"id":"a","print_from_mesh":[[1,0,0,0],[0,-1,0,0],[0,0,1,0]],"plane":{"n":[0,0,1],"d":0},"landmarks":[[0,0,0]],"char_height_px":10,"tops_mask":"tops/a.png"}"#;
 
     fn read(text: &str) -> Result<Vec<TruthRow>, String> {
-        parse(Path::new("data/truth.jsonl"), text).map_err(|error| error.to_string())
+        let file = Path::new("data/truth.jsonl");
+        parse(file, text).map_err(|error| error.in_file(file, "nothing was imported").to_string())
     }
 
     #[test]
     fn quoted_text_is_sanitized_and_short() {
         for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(301)] {
-            let text = refusal(Path::new("truth.jsonl"), 1, &rude).to_string();
+            let text = LineError::new(1, &rude).to_string();
             assert!(!text.contains(&rude), "{text:?}");
         }
     }

@@ -7,12 +7,13 @@ use serde_json::json;
 
 use super::context::{Context, now};
 use super::exit::ExitCode;
+use super::files::{self, LineError};
 use super::output;
 use super::screen::{Palette, Tone};
-use super::table::{Align, columns, count};
+use super::select;
+use super::table::{columns, count};
 use super::time_text::{duration, utc};
 use super::verdict_file::{self, VerdictRow};
-use super::{files, select};
 use crate::catalog::{Catalog, NewVerdict, ReviewContext, VerdictEvent};
 use crate::domain::{Reason, ThresholdMetric, Verdict};
 
@@ -124,7 +125,7 @@ async fn set(args: VerdictSetArgs, context: &Context) -> anyhow::Result<ExitCode
     let text = format!("{}, {metric}: {}", new.pair, new.verdict);
     catalog.verdict_set(vec![new], now()).await?;
     catalog.close().await;
-    context.output.info(&text);
+    context.info(&text);
     Ok(ExitCode::Done)
 }
 
@@ -136,36 +137,32 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     } else {
         verdict_file::parse_csv
     };
-    let rows = parse(&bytes).map_err(|error| error.in_file(&args.file))?;
+    let refused = |error: LineError| error.in_file(&args.file, "no verdict was recorded");
+    let rows = parse(&bytes).map_err(refused)?;
     let names: Vec<_> = rows.iter().map(|row| row.verdict.pair.clone()).collect();
     let unknown = catalog.unknown_names(&names).await?;
-    verdict_file::refuse_unknown(&rows, &unknown).map_err(|error| error.in_file(&args.file))?;
+    verdict_file::refuse_unknown(&rows, &unknown).map_err(refused)?;
     let all = rows.len() as u64;
     let rows = on_current_results(&catalog, rows).await?;
     let current = rows.len() as u64;
     let verdicts = rows.into_iter().map(|row| row.verdict).collect();
     let number = catalog.verdict_set(verdicts, now()).await?;
     catalog.close().await;
-    if context.global.json {
-        output::print_json(
-            &json!({"schema": 1, "recorded": number, "left_out": all - current, "known": current - number}),
-        )?;
+    let (left_out, known) = (all - current, current - number);
+    context.print_json(
+        &json!({"schema": 1, "recorded": number, "left_out": left_out, "known": known}),
+    )?;
+    if left_out > 0 {
+        let left_out = count(left_out, "verdict");
+        context.warn(&format!(
+            "{left_out} left out: the judged result is not the current one of the pair"
+        ));
     }
-    if all > current {
-        let left_out = count(all - current, "verdict");
-        let reason = "the judged result is not the current one of the pair";
-        context
-            .output
-            .warn(&format!("{left_out} left out: {reason}"));
+    if known > 0 {
+        context.info(&format!("{} already recorded", count(known, "verdict")));
     }
-    if current > number {
-        let known = count(current - number, "verdict");
-        context.output.info(&format!("{known} already recorded"));
-    }
-    context
-        .output
-        .info(&format!("{} recorded", count(number, "verdict")));
-    context.output.next(&context.command("report"));
+    context.info(&format!("{} recorded", count(number, "verdict")));
+    context.next("report");
     Ok(ExitCode::Done)
 }
 
@@ -206,9 +203,9 @@ async fn log(args: VerdictLogArgs, context: &Context) -> anyhow::Result<ExitCode
             output::print(&serde_json::to_string(event)?)?;
         }
     } else if events.is_empty() {
-        context.output.info("no verdicts yet");
+        context.info("no verdicts yet");
     } else {
-        output::print(&log_text(&events, context.output.stdout))?;
+        output::print(&log_text(&events, context.stdout))?;
     }
     Ok(ExitCode::Done)
 }
@@ -219,11 +216,9 @@ async fn undo(args: VerdictUndoArgs, context: &Context) -> anyhow::Result<ExitCo
         .verdict_undo(args.reviewer.as_deref(), now())
         .await?;
     catalog.close().await;
-    if context.global.json {
-        output::print_json(&json!({"schema": 1, "undone": undone}))?;
-    }
+    context.print_json(&json!({"schema": 1, "undone": undone}))?;
     for event in &undone {
-        context.output.info(&format!(
+        context.info(&format!(
             "undone: {} for {} {} by {}",
             event.verdict, event.pair, event.metric, event.reviewer
         ));
@@ -233,8 +228,8 @@ async fn undo(args: VerdictUndoArgs, context: &Context) -> anyhow::Result<ExitCo
 
 /// Formats the log, one line per event.
 pub(super) fn log_text(events: &[VerdictEvent], palette: Palette) -> String {
-    let rows: Vec<Vec<String>> = events.iter().map(|event| log_row(event, palette)).collect();
-    columns(&rows, &[Align::Left; 9])
+    let rows = events.iter().map(|event| log_row(event, palette));
+    columns(rows, "<<<<<<<<<")
 }
 
 fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
@@ -254,9 +249,7 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
         event.metric.to_string(),
         palette.paint(tone, event.verdict),
         event.reviewer.clone(),
-        event
-            .reason
-            .map_or_else(String::new, |reason| reason.to_string()),
+        event.reason.map_or("", Reason::name).to_owned(),
         view_text(&event.look),
         event.note.clone().unwrap_or_default(),
         state,

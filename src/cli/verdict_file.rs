@@ -1,17 +1,15 @@
 //! Files of verdicts, CSV or JSON Lines: accepted as a whole, or refused by line number.
 
-use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use csv::StringRecord;
 use serde::Deserialize;
 
+use super::files::LineError;
 use super::time_text::parse_utc;
 use crate::catalog::{NewVerdict, ReviewContext};
 use crate::config::hint;
-use crate::domain::{
-    ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict, sanitize,
-};
+use crate::domain::{ContentHash, PairName, UnixMillis};
 use crate::manifest::{LineCounter, as_utf8, delimiter};
 
 const COLUMNS: [&str; 7] = [
@@ -23,43 +21,18 @@ const REQUIRED: usize = 3;
 /// One verdict and its line number.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct VerdictRow {
-    pub(super) line: u64,
+    pub(super) line: usize,
     pub(super) verdict: NewVerdict,
     /// The judged result, if the file names it.
     pub(super) judged: Option<ContentHash>,
-}
-
-/// Why the file is refused.
-#[derive(Debug, thiserror::Error)]
-#[error("{}line {line}: {reason}; no verdict was recorded", .file.as_ref().map(|file| format!("{}: ", file.display())).unwrap_or_default())]
-pub(super) struct VerdictFileError {
-    file: Option<PathBuf>,
-    line: u64,
-    reason: String,
-}
-
-impl VerdictFileError {
-    pub(super) fn new(line: u64, reason: &str) -> Self {
-        Self {
-            file: None,
-            line,
-            reason: sanitize(reason, 300),
-        }
-    }
-
-    /// Adds the name of the file.
-    pub(super) fn in_file(mut self, file: &Path) -> Self {
-        self.file = Some(file.to_owned());
-        self
-    }
 }
 
 /// Parses a CSV file; separator and encoding are detected.
 ///
 /// # Errors
 /// At the first invalid line.
-pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, VerdictFileError> {
-    let text = as_utf8(bytes).map_err(|error| VerdictFileError::new(1, &error.to_string()))?;
+pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, LineError> {
+    let text = as_utf8(bytes).map_err(|error| LineError::new(1, &error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter(&text))
         .trim(csv::Trim::All)
@@ -70,7 +43,7 @@ pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, VerdictFileErro
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| refused(&error))?;
-        let line = lines.at(record.position()) as u64;
+        let line = lines.at(record.position());
         rows.push(row(&record, line, &positions)?);
     }
     Ok(rows)
@@ -80,50 +53,44 @@ pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, VerdictFileErro
 ///
 /// # Errors
 /// At the first such row.
-pub(super) fn refuse_unknown(
-    rows: &[VerdictRow],
-    unknown: &[PairName],
-) -> Result<(), VerdictFileError> {
+pub(super) fn refuse_unknown(rows: &[VerdictRow], unknown: &[PairName]) -> Result<(), LineError> {
     match rows.iter().find(|row| unknown.contains(&row.verdict.pair)) {
-        Some(row) => {
-            let reason = format!("there is no pair {}", row.verdict.pair);
-            Err(VerdictFileError::new(row.line, &reason))
-        }
+        Some(row) => Err(LineError::new(
+            row.line,
+            &format!("there is no pair {}", row.verdict.pair),
+        )),
         None => Ok(()),
     }
 }
 
 /// Returns the position of each of [`COLUMNS`] in the file.
-fn positions(headers: &StringRecord) -> Result<[Option<usize>; 7], VerdictFileError> {
+fn positions(headers: &StringRecord) -> Result<[Option<usize>; 7], LineError> {
     if let Some(unknown) = headers.iter().find(|name| !COLUMNS.contains(name)) {
         let reason = format!("there is no column {unknown}{}", hint(unknown, COLUMNS));
-        return Err(VerdictFileError::new(1, &reason));
+        return Err(LineError::new(1, &reason));
     }
     let positions = COLUMNS.map(|name| headers.iter().position(|header| header == name));
-    for (name, position) in COLUMNS.iter().zip(positions).take(REQUIRED) {
-        if position.is_none() {
-            return Err(VerdictFileError::new(
-                1,
-                &format!("column {name} is missing"),
-            ));
-        }
+    match positions[..REQUIRED].iter().position(Option::is_none) {
+        Some(at) => Err(LineError::new(
+            1,
+            &format!("column {} is missing", COLUMNS[at]),
+        )),
+        None => Ok(positions),
     }
-    Ok(positions)
 }
 
 fn row(
     record: &StringRecord,
-    line: u64,
+    line: usize,
     positions: &[Option<usize>; 7],
-) -> Result<VerdictRow, VerdictFileError> {
+) -> Result<VerdictRow, LineError> {
     let cell = |column: usize| {
         positions[column]
             .and_then(|position| record.get(position))
             .filter(|text| !text.is_empty())
     };
     let required = |column: usize| {
-        cell(column)
-            .ok_or_else(|| VerdictFileError::new(line, &format!("{} is empty", COLUMNS[column])))
+        cell(column).ok_or_else(|| LineError::new(line, &format!("{} is empty", COLUMNS[column])))
     };
     let verdict = NewVerdict {
         pair: value(required(0)?, line)?,
@@ -142,24 +109,24 @@ fn row(
     })
 }
 
-fn time(text: &str, line: u64) -> Result<UnixMillis, VerdictFileError> {
+fn time(text: &str, line: usize) -> Result<UnixMillis, LineError> {
     parse_utc(text).ok_or_else(|| {
         let reason =
             format!("at is {text:?}, not a time such as 2026-11-21 or 2026-11-21 04:10:03");
-        VerdictFileError::new(line, &reason)
+        LineError::new(line, &reason)
     })
 }
 
-fn value<T>(text: &str, line: u64) -> Result<T, VerdictFileError>
+fn value<T>(text: &str, line: usize) -> Result<T, LineError>
 where
     T: FromStr<Err: std::fmt::Display>,
 {
     text.parse()
-        .map_err(|error: T::Err| VerdictFileError::new(line, &error.to_string()))
+        .map_err(|error: T::Err| LineError::new(line, &error.to_string()))
 }
 
-fn csv_error(error: &csv::Error, text: &[u8]) -> VerdictFileError {
-    let line = LineCounter::new(text).at(error.position()) as u64;
+fn csv_error(error: &csv::Error, text: &[u8]) -> LineError {
+    let line = LineCounter::new(text).at(error.position());
     let reason = match error.kind() {
         csv::ErrorKind::UnequalLengths {
             expected_len, len, ..
@@ -167,25 +134,15 @@ fn csv_error(error: &csv::Error, text: &[u8]) -> VerdictFileError {
         csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8; save it as \"CSV UTF-8\"".to_owned(),
         _ => error.to_string(),
     };
-    VerdictFileError::new(line, &reason)
+    LineError::new(line, &reason)
 }
 
 /// A line as `verdict log --json`, exports and backups write it; other fields are ignored.
 #[derive(Debug, Deserialize)]
 struct VerdictLine {
-    pair: PairName,
-    verdict: Verdict,
-    reviewer: String,
-    metric: Option<ThresholdMetric>,
+    #[serde(flatten)]
+    verdict: NewVerdict,
     result_hash: Option<ContentHash>,
-    reason: Option<Reason>,
-    note: Option<String>,
-    event: Option<String>,
-    seen: Option<ContentHash>,
-    shown_ms: Option<u64>,
-    angle_read_deg: Option<f64>,
-    review_order: Option<ReviewOrder>,
-    at: Option<UnixMillis>,
     undone_at: Option<UnixMillis>,
 }
 
@@ -193,46 +150,23 @@ struct VerdictLine {
 ///
 /// # Errors
 /// At the first invalid line.
-pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, VerdictFileError> {
-    let text = as_utf8(bytes).map_err(|error| VerdictFileError::new(1, &error.to_string()))?;
+pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, LineError> {
+    let text = as_utf8(bytes).map_err(|error| LineError::new(1, &error.to_string()))?;
     let lines = (1..).zip(text.split(|byte| *byte == b'\n'));
     let lines = lines.filter(|(_, content)| !content.trim_ascii().is_empty());
     let rows = lines.map(|(line, content)| {
         let parsed: VerdictLine = serde_json::from_slice(content)
-            .map_err(|error| VerdictFileError::new(line, &json_error(&error)))?;
-        if parsed.reviewer.trim().is_empty() {
-            return Err(VerdictFileError::new(line, "reviewer is empty"));
+            .map_err(|error| LineError::new(line, &json_error(&error)))?;
+        if parsed.verdict.reviewer.trim().is_empty() {
+            return Err(LineError::new(line, "reviewer is empty"));
         }
-        Ok(parsed
-            .undone_at
-            .is_none()
-            .then(|| row_of_line(line, parsed)))
+        Ok(parsed.undone_at.is_none().then_some(VerdictRow {
+            line,
+            verdict: parsed.verdict,
+            judged: parsed.result_hash,
+        }))
     });
     rows.filter_map(Result::transpose).collect()
-}
-
-fn row_of_line(line: u64, parsed: VerdictLine) -> VerdictRow {
-    let verdict = NewVerdict {
-        pair: parsed.pair,
-        metric: parsed.metric,
-        verdict: parsed.verdict,
-        reviewer: parsed.reviewer,
-        reason: parsed.reason,
-        note: parsed.note,
-        look: ReviewContext {
-            event: parsed.event,
-            seen: parsed.seen,
-            shown_ms: parsed.shown_ms,
-            angle_read_deg: parsed.angle_read_deg,
-            review_order: parsed.review_order,
-        },
-        at: parsed.at,
-    };
-    VerdictRow {
-        line,
-        verdict,
-        judged: parsed.result_hash,
-    }
 }
 
 /// Returns the parser's message without its line number, because each line is parsed separately.
@@ -303,7 +237,7 @@ mod tests {
     fn invalid_line_is_reported_by_number() {
         assert_eq!(
             error("pair,verdict,reviewer\n1,pass,lan\n2,maybe,lan\n"),
-            "line 3: \"maybe\" is not a verdict (pass, fail, unsure); no verdict was recorded"
+            "line 3: \"maybe\" is not a verdict (pass, fail, unsure)"
         );
         assert!(error("pair,verdict,reviewer\n1,pass,\n").starts_with("line 2: reviewer is empty"));
         let rude = error("pair,ver\u{1b}[2J\n");

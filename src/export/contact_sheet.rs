@@ -102,7 +102,7 @@ pub struct ContactSheet {
 #[derive(Debug, thiserror::Error)]
 pub enum DrawError {
     /// The catalog cannot be read.
-    #[error(transparent)]
+    #[error("{0}")]
     Catalog(#[from] CatalogError),
     /// A thread was lost.
     #[error("drawing stopped: {0}")]

@@ -16,7 +16,7 @@ pub(super) const PAIRS_PER_PAGE: usize = 256;
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The catalog cannot be read.
-    #[error(transparent)]
+    #[error("{0}")]
     Catalog(#[from] CatalogError),
     /// The result of a pair with a manual alignment cannot be read.
     #[error(transparent)]

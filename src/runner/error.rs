@@ -23,7 +23,7 @@ pub enum RunError {
     #[error("there is no pair {}", .0.iter().map(PairName::as_str).collect::<Vec<_>>().join(", "))]
     NoSuchPair(Vec<PairName>),
     /// The catalog returned an error.
-    #[error(transparent)]
+    #[error("{0}")]
     Catalog(#[from] CatalogError),
     /// The project's directory cannot be used.
     #[error(transparent)]

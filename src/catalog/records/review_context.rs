@@ -1,6 +1,6 @@
 //! Context in which a verdict was given.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
 
@@ -9,7 +9,7 @@ use crate::catalog::db::rows;
 use crate::domain::{ContentHash, ReviewOrder};
 
 /// Context of a verdict; empty for verdicts that were not given on the review page.
-#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct ReviewContext {
     /// Idempotency key of the client: a verdict sent twice is stored once.
     pub event: Option<String>,

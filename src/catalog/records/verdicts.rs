@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{Row as _, SqliteConnection};
@@ -17,7 +17,7 @@ use crate::domain::{
 };
 
 /// A verdict to store.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct NewVerdict {
     /// The pair.
     pub pair: PairName,
@@ -32,6 +32,7 @@ pub struct NewVerdict {
     /// In the reviewer's words.
     pub note: Option<String>,
     /// Context in which it was given, if known.
+    #[serde(flatten)]
     pub look: ReviewContext,
     /// When it was given, where that was before it is stored.
     pub at: Option<UnixMillis>,
