@@ -58,7 +58,7 @@ impl Kind {
             Self::Database => "faults of the database",
             Self::Schema => "tables, indexes or triggers not as they were made",
             Self::Reference => "rows that name a row that is not there",
-            Self::Counter => "counters that are off",
+            Self::Counter => "wrong counters",
             Self::JobMissing => "pairs without a job",
             Self::ReasonMissing => "failed pairs without a reason",
             Self::ResultMissing => "results that are missing",
