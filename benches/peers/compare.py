@@ -1,12 +1,12 @@
-"""Times the same work on the same files in mocban and in what people use today, and prints the ratios.
+"""Times the same work on the same files in mocban and in other tools, and prints the ratios.
 
     python3 -m venv peers && peers/bin/pip install -r benches/peers/requirements.txt
     taskset -c 0 peers/bin/python benches/peers/compare.py
 
 Open3D needs the system's libusb-1.0 and libGL (Debian: libusb-1.0-0, libgl1, libgomp1).
 
-Rounds of one and of the other take turns, so that what else the machine does meets both. One core: `taskset` holds
-every thread of both to it. The files are those of `cargo bench --bench speed`, which makes them at the first round.
+Measurements of both alternate, so that other load on the machine affects both alike. `taskset` limits both to one
+core. The files come from `cargo bench --bench speed`, which generates them in the first round.
 """
 
 import argparse
@@ -49,7 +49,7 @@ def timed(work, least=3, seconds=1.5):
 
 
 def rings(side, moved):
-    """The masks of the bench: rings about as wide as strokes."""
+    """The masks of `benches/speed/scores.rs`: rings about as wide as strokes."""
     width, middle = side / 14, side / 2
     y, x = np.mgrid[:side, :side]
     radius = np.hypot(x - middle - moved * width, y - middle)
@@ -101,9 +101,9 @@ def scores():
         yield f"png_grey16/{side}", "OpenCV", lambda h=heights: cv2.imencode(".png", h)
 
 
-def registration(side, size="60k"):
-    """From a start near the answer: what is left once somebody has found the angle. Ours has up to four angles to tell
-    from each other, and the mirror."""
+def registration(side, size):
+    """Registration of two masks of `side` pixels that are 3 degrees apart, against the whole register stage, which
+    searches all rotations, both readings and a range of scales, chooses thresholds and scores them."""
     print_mask = rings(side, 0.0).astype(np.float32)
     turn = cv2.getRotationMatrix2D((side / 2, side / 2), 3.0, 1.03)
     depth_mask = cv2.warpAffine(print_mask, turn, (side, side))
@@ -121,8 +121,8 @@ def registration(side, size="60k"):
         method.SetGlobalDefaultNumberOfThreads(1)
         method.Execute(sitk.GetImageFromArray(print_mask), sitk.GetImageFromArray(depth_mask))
 
-    yield f"stages/register_one_{side}/{size}", "OpenCV ECC, started 3 degrees off", ecc
-    yield f"stages/register_one_{side}/{size}", "SimpleITK, started 3 degrees off", itk
+    yield f"stages/register/{size}", f"OpenCV ECC, {side} px, started 3 degrees off", ecc
+    yield f"stages/register/{size}", f"SimpleITK, {side} px, started 3 degrees off", itk
 
 
 def main():
@@ -136,13 +136,13 @@ def main():
     for size in sizes:
         rust(f"read/raw_stl/{size}")
     cases = [case for size in sizes for make in (readers, stages) for case in make(size)]
-    cases += [*scores(), *registration(256), *registration(512)]
+    cases += [*scores(), *registration(256, sizes[0]), *registration(512, sizes[0])]
     cases = [case for case in cases if options.only in case[0]]
     times = {}
     for _ in range(options.rounds):
         for bench, peer, work in cases:
             ours = times.setdefault((bench, "mocban"), [])
-            # Several peers share one measurement of ours a round.
+            # Several peers share one measurement of mocban per round.
             if len(ours) <= len(times.get((bench, peer), [])):
                 ours.append(rust(bench))
             times.setdefault((bench, peer), []).append(rust(work) if isinstance(work, str) else timed(work))

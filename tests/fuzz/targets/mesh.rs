@@ -3,7 +3,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use mocban::mesh::{MeshLimits, read};
+use mocban::mesh::{MeshLimits, Vertices, read};
 
 /// Limits that small files can exceed.
 const LIMITS: MeshLimits = MeshLimits {
@@ -16,7 +16,11 @@ fuzz_target!(|bytes: &[u8]| {
     for name in ["scan", "scan.stl"] {
         match read(bytes, name, &LIMITS) {
             Ok(mesh) => {
-                assert!(mesh.vertices.capacity() <= 2 * bytes.len() + 64);
+                let capacity = match &mesh.vertices {
+                    Vertices::Single(all) => all.capacity(),
+                    Vertices::Double(all) => all.capacity(),
+                };
+                assert!(capacity <= 2 * bytes.len() + 64);
                 assert!(mesh.vertices.len() as u64 <= LIMITS.max_vertices);
                 assert!(mesh.triangles.len() as u64 <= LIMITS.max_triangles);
                 assert!(mesh.vertices.iter().flatten().all(f64::is_finite));
