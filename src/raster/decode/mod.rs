@@ -9,7 +9,6 @@ use std::io::{BufRead, Cursor, Seek};
 
 use image::{DynamicImage, ImageDecoder, ImageError, ImageFormat, ImageReader};
 
-use super::Grid;
 use crate::domain::FileKind;
 
 use error::broken;
@@ -42,7 +41,12 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
     if kind == FileKind::Png {
         check_png_header(bytes, limits)?;
     }
-    let rgb = colours(bytes, format, kind, limits)?;
+    if kind == FileKind::Tiff
+        && let Some(rgb) = tiff::decode_uncommon(bytes, limits)?
+    {
+        return Ok(PrintImage { rgb });
+    }
+    let rgb = colours_on_white(&decode_pixels(bytes, format, kind, limits)?);
     Ok(PrintImage { rgb })
 }
 
@@ -53,42 +57,21 @@ pub fn header_pixel_count(file: impl BufRead + Seek) -> Option<u64> {
     Some(u64::from(width) * u64::from(height))
 }
 
-fn colours(
-    bytes: &[u8],
-    format: ImageFormat,
-    kind: FileKind,
-    limits: &ImageLimits,
-) -> Result<Grid<[u16; 3]>, DecodeError> {
-    if kind == FileKind::Tiff
-        && let Some(colours) = tiff::decode_uncommon(bytes, limits)?
-    {
-        return Ok(colours);
-    }
-    let image = decode_pixels(bytes, format, kind, limits)?;
-    Ok(colours_on_white(&image))
-}
-
 fn format_of(kind: FileKind) -> Result<ImageFormat, DecodeError> {
     match kind {
         FileKind::Png => Ok(ImageFormat::Png),
         FileKind::Jpeg => Ok(ImageFormat::Jpeg),
         FileKind::Tiff => Ok(ImageFormat::Tiff),
-        FileKind::OtherImage(_)
-        | FileKind::Ply
-        | FileKind::OtherMesh(_)
-        | FileKind::Other(_)
-        | FileKind::Text
-        | FileKind::Binary => Err(DecodeError::NotAnImage(kind)),
+        _ => Err(DecodeError::NotAnImage(kind)),
     }
 }
 
 /// Checks the size at its fixed place in a PNG; the decoder would read pixels first.
 fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeError> {
     let side = |at: usize| {
-        let field = bytes.get(at..at + 4).and_then(|b| b.try_into().ok());
-        field
-            .map(u32::from_be_bytes)
-            .ok_or(DecodeError::Truncated(FileKind::Png))
+        let field = bytes.get(at..).and_then(|rest| rest.first_chunk());
+        let side = field.map(|field| u32::from_be_bytes(*field));
+        side.ok_or(DecodeError::Truncated(FileKind::Png))
     };
     limits.check_size(side(16)?, side(20)?)
 }
@@ -165,7 +148,7 @@ mod tests {
     use super::{DecodeError, decode};
 
     #[test]
-    fn words_of_a_decoder_come_plain_and_short() {
+    fn decoder_messages_are_sanitized_and_short() {
         for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(161)] {
             let said = broken(FileKind::of(b""), &rude).to_string();
             assert!(!said.contains(&rude), "{said:?}");
@@ -232,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn transparency_is_paper() {
+    fn transparency_is_white() {
         let at = |a| image::RgbaImage::from_pixel(2, 2, image::Rgba([0, 255, 0, a]));
         let read = |a| {
             let bytes = file(&DynamicImage::ImageRgba8(at(a)), ImageFormat::Png);
@@ -307,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_image_is_named() {
+    fn error_names_the_type_of_other_files() {
         assert_eq!(decode(b"", &LIMITS), Err(DecodeError::Empty));
         assert_eq!(
             decode(b"id,mesh,print\n", &LIMITS),
@@ -321,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn truncated_images_say_so() {
+    fn truncated_images_are_reported_as_such() {
         for (format, kind) in [
             (ImageFormat::Png, FileKind::Png),
             (ImageFormat::Jpeg, FileKind::Jpeg),

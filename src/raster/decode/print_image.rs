@@ -27,17 +27,7 @@ pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
     let colours = match image {
         DynamicImage::ImageLuma8(i) => i.pixels().map(|p| [widen(p[0]); 3]).collect(),
         DynamicImage::ImageRgb8(i) => i.pixels().map(|p| p.0.map(widen)).collect(),
-        DynamicImage::ImageLuma16(i) => i.pixels().map(|p| [p[0]; 3]).collect(),
-        DynamicImage::ImageRgb16(i) => i.pixels().map(|p| p.0).collect(),
-        DynamicImage::ImageLumaA8(i) => {
-            let grey = |p: &image::LumaA<u8>| {
-                let [l, a] = p.0.map(widen);
-                on_white([l, l, l, a])
-            };
-            i.pixels().map(grey).collect()
-        }
-        DynamicImage::ImageRgba8(i) => i.pixels().map(|p| on_white(p.0.map(widen))).collect(),
-        // The rest is rare enough for a copy: 16 bits with transparency, 32-bit floats in 0..=1.
+        // Other kinds are rare enough for a copy: 16 bits, transparency, 32-bit floats in 0..=1.
         other => other.to_rgba16().pixels().map(|p| on_white(p.0)).collect(),
     };
     // An image of w x h pixels has as many colours.

@@ -4,7 +4,7 @@
 use std::io::Cursor;
 
 use tiff::decoder::{Decoder, DecodingResult, Limits as Memory};
-use tiff::tags::Tag;
+use tiff::tags::{ExtraSamples, PhotometricInterpretation as Photometric, SampleFormat, Tag};
 use tiff::{TiffError, TiffResult};
 
 use super::error::broken;
@@ -13,55 +13,6 @@ use super::{DecodeError, ImageLimits};
 use crate::domain::FileKind;
 use crate::raster::Grid;
 
-type TiffDecoder<'a> = Decoder<Cursor<&'a [u8]>>;
-
-/// Meaning of a pixel's samples (TIFF 6.0, section 8, `PhotometricInterpretation`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Photometric {
-    WhiteIsZero,
-    BlackIsZero,
-    Rgb,
-    Palette,
-}
-
-impl Photometric {
-    const fn from_tag(tag: u16) -> Option<Self> {
-        match tag {
-            0 => Some(Self::WhiteIsZero),
-            1 => Some(Self::BlackIsZero),
-            2 => Some(Self::Rgb),
-            3 => Some(Self::Palette),
-            _ => None,
-        }
-    }
-
-    const fn samples(self) -> usize {
-        match self {
-            Self::WhiteIsZero | Self::BlackIsZero | Self::Palette => 1,
-            Self::Rgb => 3,
-        }
-    }
-}
-
-/// Meaning of the first extra sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Alpha {
-    /// Not transparency.
-    None,
-    /// Transparency that the colours are already multiplied by.
-    Premultiplied,
-    /// Transparency.
-    Plain,
-}
-
-/// Number type of a sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum SampleType {
-    Unsigned,
-    Float,
-    Other,
-}
-
 /// Layout of the pixels according to the tags.
 #[derive(Debug)]
 struct TiffLayout {
@@ -69,44 +20,45 @@ struct TiffLayout {
     height: u32,
     photometric: Photometric,
     bits: u16,
+    /// Samples per pixel, and how many of them are its colour.
     samples: usize,
-    sample_type: SampleType,
-    alpha: Alpha,
+    colours: usize,
+    format: SampleFormat,
+    /// Meaning of the first sample after the colour.
+    extra: Option<ExtraSamples>,
     /// Palette: all reds, then greens, then blues; empty without one.
     palette: Vec<u16>,
 }
 
 impl TiffLayout {
     /// Reads the tags; returns `None` if the image is not one of the uncommon kinds.
-    fn read(reader: &mut TiffDecoder<'_>) -> TiffResult<Option<Self>> {
+    fn read(reader: &mut Decoder<Cursor<&[u8]>>) -> TiffResult<Option<Self>> {
         let (width, height) = reader.dimensions()?;
         let tag = reader.find_tag_unsigned(Tag::PhotometricInterpretation)?;
-        let Some(photometric) = tag.and_then(Photometric::from_tag) else {
+        let Some(photometric) = tag.and_then(Photometric::from_u16) else {
             return Ok(None);
+        };
+        let colours = match photometric {
+            Photometric::WhiteIsZero | Photometric::BlackIsZero | Photometric::RGBPalette => 1,
+            Photometric::RGB => 3,
+            _ => return Ok(None),
         };
         let mut all = |tag| reader.find_tag_unsigned_vec::<u16>(tag);
         let first = |values: Option<Vec<u16>>| values.and_then(|values| values.first().copied());
+        let extra = first(all(Tag::ExtraSamples)?).and_then(ExtraSamples::from_u16);
+        let samples = usize::from(first(all(Tag::SamplesPerPixel)?).unwrap_or(1));
         let layout = Self {
             width,
             height,
             photometric,
             bits: first(all(Tag::BitsPerSample)?).unwrap_or(1),
-            samples: usize::from(first(all(Tag::SamplesPerPixel)?).unwrap_or(1)),
-            sample_type: match first(all(Tag::SampleFormat)?).unwrap_or(1) {
-                1 => SampleType::Unsigned,
-                3 => SampleType::Float,
-                _ => SampleType::Other,
-            },
-            alpha: match first(all(Tag::ExtraSamples)?) {
-                Some(1) => Alpha::Premultiplied,
-                Some(2) => Alpha::Plain,
-                _ => Alpha::None,
-            },
+            samples,
+            colours,
+            format: SampleFormat::from_u16_exhaustive(first(all(Tag::SampleFormat)?).unwrap_or(1)),
+            extra: extra.filter(|_| samples > colours),
             palette: match photometric {
-                Photometric::Palette => all(Tag::ColorMap)?.unwrap_or_default(),
-                Photometric::WhiteIsZero | Photometric::BlackIsZero | Photometric::Rgb => {
-                    Vec::new()
-                }
+                Photometric::RGBPalette => all(Tag::ColorMap)?.unwrap_or_default(),
+                _ => Vec::new(),
             },
         };
         Ok(Some(layout).filter(Self::is_uncommon))
@@ -114,14 +66,12 @@ impl TiffLayout {
 
     /// Returns whether the `image` crate cannot decode the image, or assumes a range of floats that may be wrong.
     fn is_uncommon(&self) -> bool {
-        let grey = self.samples > 1 || !matches!(self.bits, 1 | 8 | 16);
-        self.samples >= self.photometric.samples()
+        let is_grey_common = self.samples == 1 && matches!(self.bits, 1 | 8 | 16);
+        self.samples >= self.colours
             && match self.photometric {
-                Photometric::Palette => self.sample_type == SampleType::Unsigned,
-                Photometric::WhiteIsZero | Photometric::BlackIsZero => {
-                    grey || self.sample_type != SampleType::Unsigned
-                }
-                Photometric::Rgb => self.sample_type == SampleType::Float,
+                Photometric::RGBPalette => self.format == SampleFormat::Uint,
+                Photometric::RGB => self.format == SampleFormat::IEEEFP,
+                _ => !is_grey_common || self.format != SampleFormat::Uint,
             }
     }
 }
@@ -144,19 +94,15 @@ pub(super) fn decode_uncommon(
         return Ok(None);
     };
     limits.check_size(layout.width, layout.height)?;
-    let plain;
-    let bytes = match layout.photometric {
-        Photometric::Rgb => bytes,
-        Photometric::WhiteIsZero | Photometric::BlackIsZero | Photometric::Palette => {
-            let Some(changed) = declared_black_is_zero(bytes) else {
-                return Ok(None);
-            };
-            plain = changed;
-            &plain
-        }
+    let samples = if layout.photometric == Photometric::RGB {
+        TiffSamples::read(bytes, &layout, limits)?
+    } else {
+        let Some(changed) = declared_black_is_zero(bytes) else {
+            return Ok(None);
+        };
+        TiffSamples::read(&changed, &layout, limits)?
     };
-    let samples = TiffSamples::read(bytes, &layout, limits).map_err(|error| tiff_error(&error))?;
-    pixels(&layout, &samples?).map(Some)
+    pixels(&layout, &samples).map(Some)
 }
 
 fn tiff_error(error: &TiffError) -> DecodeError {
@@ -215,18 +161,15 @@ struct TiffSamples {
 }
 
 impl TiffSamples {
-    fn read(
-        bytes: &[u8],
-        layout: &TiffLayout,
-        limits: &ImageLimits,
-    ) -> TiffResult<Result<Self, DecodeError>> {
-        let wanted = limits.max_decoder_bytes();
+    fn read(bytes: &[u8], layout: &TiffLayout, limits: &ImageLimits) -> Result<Self, DecodeError> {
         let mut memory = Memory::default();
-        memory.decoding_buffer_size = usize::try_from(wanted).unwrap_or(usize::MAX);
+        memory.decoding_buffer_size =
+            usize::try_from(limits.max_decoder_bytes()).unwrap_or(usize::MAX);
         memory.intermediate_buffer_size = memory.decoding_buffer_size;
-        let mut reader = Decoder::new(Cursor::new(bytes))?.with_limits(memory);
         let mut values = DecodingResult::U8(Vec::new());
-        let read = reader.read_image_to_buffer(&mut values)?;
+        let read = Decoder::new(Cursor::new(bytes))
+            .and_then(|reader| reader.with_limits(memory).read_image_to_buffer(&mut values))
+            .map_err(|error| tiff_error(&error))?;
         let pixel = if read.planes > 1 { 1 } else { layout.samples };
         let row = layout.width as usize * pixel;
         let bits = usize::from(layout.bits);
@@ -244,12 +187,10 @@ impl TiffSamples {
         };
         let wanted = layout.height as usize * samples.row_bytes * (layout.samples / pixel);
         if samples.values.as_buffer(0).as_bytes().len() < wanted {
-            return Ok(Err(broken(
-                FileKind::Tiff,
-                "it holds fewer samples than its tags say",
-            )));
+            let reason = "it holds fewer samples than its tags say";
+            return Err(broken(FileKind::Tiff, reason));
         }
-        Ok(Ok(samples))
+        Ok(samples)
     }
 
     /// Returns a sample of a pixel; 0 for signed numbers, which are rejected.
@@ -269,10 +210,7 @@ impl TiffSamples {
             DecodingResult::F16(values) => f64::from(values[at].to_f32()),
             DecodingResult::F32(values) => f64::from(values[at]),
             DecodingResult::F64(values) => values[at],
-            DecodingResult::I8(_)
-            | DecodingResult::I16(_)
-            | DecodingResult::I32(_)
-            | DecodingResult::I64(_) => 0.0,
+            _ => 0.0,
         }
     }
 }
@@ -284,10 +222,10 @@ fn bits_at(bytes: &[u8], from: usize, count: usize) -> u8 {
 
 /// Returns the sample value of white or opaque.
 fn full_scale(layout: &TiffLayout, samples: &TiffSamples) -> Result<f64, DecodeError> {
-    match layout.sample_type {
-        SampleType::Unsigned => Ok(2_f64.powi(i32::from(layout.bits)) - 1.0),
-        SampleType::Float => float_full_scale(layout, samples),
-        SampleType::Other => Err(broken(
+    match layout.format {
+        SampleFormat::Uint => Ok(2_f64.powi(i32::from(layout.bits)) - 1.0),
+        SampleFormat::IEEEFP => float_full_scale(layout, samples),
+        _ => Err(broken(
             FileKind::Tiff,
             "its samples are signed or of an unknown kind; unsigned numbers and floats are read",
         )),
@@ -295,16 +233,13 @@ fn full_scale(layout: &TiffLayout, samples: &TiffSamples) -> Result<f64, DecodeE
 }
 
 fn float_full_scale(layout: &TiffLayout, samples: &TiffSamples) -> Result<f64, DecodeError> {
-    let colours = layout.photometric.samples();
     let (mut least, mut most, mut whole) = (f64::INFINITY, f64::NEG_INFINITY, true);
     for y in 0..layout.height as usize {
         for x in 0..layout.width as usize {
-            for value in (0..colours).map(|sample| samples.at(x, y, sample)) {
+            for value in (0..layout.colours).map(|sample| samples.at(x, y, sample)) {
                 if !value.is_finite() {
-                    return Err(broken(
-                        FileKind::Tiff,
-                        &format!("it holds the sample {value}"),
-                    ));
+                    let reason = format!("it holds the sample {value}");
+                    return Err(broken(FileKind::Tiff, &reason));
                 }
                 (least, most) = (least.min(value), most.max(value));
                 whole &= value.fract() == 0.0;
@@ -318,42 +253,37 @@ fn float_full_scale(layout: &TiffLayout, samples: &TiffSamples) -> Result<f64, D
         ..=65535.0 if whole => return Ok(65535.0),
         _ => {}
     }
-    Err(broken(
-        FileKind::Tiff,
-        &format!(
-            "its floats go from {least} to {most}; 0 to 1 and whole numbers to 255 or 65535 are read"
-        ),
-    ))
+    let reason = format!(
+        "its floats go from {least} to {most}; 0 to 1 and whole numbers to 255 or 65535 are read"
+    );
+    Err(broken(FileKind::Tiff, &reason))
 }
 
 fn pixels(layout: &TiffLayout, samples: &TiffSamples) -> Result<Grid<[u16; 3]>, DecodeError> {
     let full = full_scale(layout, samples)?;
-    let (width, height) = (layout.width as usize, layout.height as usize);
-    let mut out = Grid::new(width, height, [0; 3]);
-    for y in 0..height {
-        for x in 0..width {
+    let mut out = Grid::new(layout.width as usize, layout.height as usize, [0; 3]);
+    for y in 0..out.height() {
+        for x in 0..out.width() {
             let level = |sample| {
                 let share = (samples.at(x, y, sample) / full).clamp(0.0, 1.0);
                 (share * f64::from(u16::MAX)).round() as u16
             };
             let colour = match layout.photometric {
-                Photometric::BlackIsZero => [level(0); 3],
                 Photometric::WhiteIsZero => [u16::MAX - level(0); 3],
-                Photometric::Rgb => [level(0), level(1), level(2)],
-                Photometric::Palette => palette_colour(&layout.palette, samples.at(x, y, 0))?,
+                Photometric::RGB => [level(0), level(1), level(2)],
+                Photometric::RGBPalette => palette_colour(&layout.palette, samples.at(x, y, 0))?,
+                _ => [level(0); 3],
             };
-            let alpha = layout.photometric.samples();
-            let has_alpha = layout.samples > alpha;
-            let seen = match layout.alpha {
-                Alpha::Plain if has_alpha => {
-                    on_white([colour[0], colour[1], colour[2], level(alpha)])
+            let alpha = || level(layout.colours);
+            let [r, g, b] = colour;
+            let on_white = match layout.extra {
+                Some(ExtraSamples::UnassociatedAlpha) => on_white([r, g, b, alpha()]),
+                Some(ExtraSamples::AssociatedAlpha) => {
+                    colour.map(|c| c.saturating_add(u16::MAX - alpha()))
                 }
-                Alpha::Premultiplied if has_alpha => {
-                    colour.map(|c| c.saturating_add(u16::MAX - level(alpha)))
-                }
-                Alpha::Plain | Alpha::Premultiplied | Alpha::None => colour,
+                _ => colour,
             };
-            out.set(x, y, seen);
+            out.set(x, y, on_white);
         }
     }
     Ok(out)
