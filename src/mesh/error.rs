@@ -25,7 +25,7 @@ pub enum MeshError {
     #[error("the file is {0}; OBJ, PLY and STL meshes and XYZ points are read")]
     NotAMesh(FileKind),
     /// More than the settings allow.
-    #[error("the file has {count} {what}; {setting} is {limit}")]
+    #[error("the file has {count} {what}; limits.mesh.max_{what} is {limit}")]
     TooMany {
         /// Bytes, vertices or triangles.
         what: &'static str,
@@ -33,8 +33,6 @@ pub enum MeshError {
         count: u64,
         /// The setting's value.
         limit: u64,
-        /// The setting's name.
-        setting: &'static str,
     },
     /// The file ends early.
     #[error("the {format} is truncated: it holds {have} of {want} {what}")]
@@ -157,38 +155,23 @@ impl MeshLimits {
     };
 
     pub(super) fn check_bytes(&self, count: u64) -> Result<(), MeshError> {
-        check_count("bytes", count, self.max_bytes, "limits.mesh.max_bytes")
+        check_count("bytes", count, self.max_bytes)
     }
 
     /// Checks a number of vertices; never allows more than a 32-bit index can address.
     pub(super) fn check_vertices(&self, count: u64) -> Result<(), MeshError> {
         let limit = self.max_vertices.min(u64::from(u32::MAX));
-        check_count("vertices", count, limit, "limits.mesh.max_vertices")
+        check_count("vertices", count, limit)
     }
 
     pub(super) fn check_triangles(&self, count: u64) -> Result<(), MeshError> {
-        check_count(
-            "triangles",
-            count,
-            self.max_triangles,
-            "limits.mesh.max_triangles",
-        )
+        check_count("triangles", count, self.max_triangles)
     }
 }
 
-fn check_count(
-    what: &'static str,
-    count: u64,
-    limit: u64,
-    setting: &'static str,
-) -> Result<(), MeshError> {
+fn check_count(what: &'static str, count: u64, limit: u64) -> Result<(), MeshError> {
     if count <= limit {
         return Ok(());
     }
-    Err(MeshError::TooMany {
-        what,
-        count,
-        limit,
-        setting,
-    })
+    Err(MeshError::TooMany { what, count, limit })
 }

@@ -5,7 +5,7 @@ use crate::domain::FileKind;
 
 /// The supported formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DetectedFormat {
+pub(super) enum DetectedFormat {
     /// Wavefront OBJ.
     Obj,
     /// Stanford polygon format, ASCII or binary of either byte order.
@@ -22,22 +22,11 @@ pub enum DetectedFormat {
 const LINES_TRIED: usize = 1000;
 
 impl DetectedFormat {
-    /// Returns the name in messages.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Obj => "OBJ",
-            Self::Ply => "PLY",
-            Self::StlBinary => "binary STL",
-            Self::StlAscii => "ascii STL",
-            Self::Xyz => "XYZ",
-        }
-    }
-
     /// Detects the format of a file; its name decides only for truncated or ambiguous content.
     ///
     /// # Errors
     /// Returns an error if the content is of no supported format.
-    pub fn of(bytes: &[u8], name: &str) -> Result<Self, MeshError> {
+    pub(super) fn of(bytes: &[u8], name: &str) -> Result<Self, MeshError> {
         if bytes.is_empty() {
             return Err(MeshError::Empty);
         }
@@ -51,19 +40,8 @@ impl DetectedFormat {
             FileKind::Binary if has_extension(name, "stl") => Ok(Self::StlBinary),
             // Names in another encoding or a stray control character do not make a text file binary.
             FileKind::Binary => first_words(bytes).ok_or(MeshError::NotAMesh(kind)),
-            FileKind::Png
-            | FileKind::Jpeg
-            | FileKind::Tiff
-            | FileKind::OtherImage(_)
-            | FileKind::OtherMesh(_)
-            | FileKind::Other(_) => Err(MeshError::NotAMesh(kind)),
+            _ => Err(MeshError::NotAMesh(kind)),
         }
-    }
-}
-
-impl std::fmt::Display for DetectedFormat {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
     }
 }
 
@@ -101,8 +79,7 @@ fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {
 
 /// Distinguishes an ASCII STL from a binary STL whose header begins with `solid`.
 fn stl_after_solid(bytes: &[u8]) -> DetectedFormat {
-    let binary = bytes.iter().take(4096).any(|byte| *byte == 0);
-    if binary {
+    if bytes.iter().take(4096).any(|byte| *byte == 0) {
         DetectedFormat::StlBinary
     } else {
         DetectedFormat::StlAscii

@@ -33,9 +33,9 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     }
     let joined = join_continued_lines(bytes);
     let bytes = joined.as_deref().unwrap_or(bytes);
-    let counts = count(bytes);
-    limits.check_vertices(counts.vertices)?;
-    limits.check_triangles(counts.triangles)?;
+    let [vertices, triangles] = count(bytes);
+    limits.check_vertices(vertices)?;
+    limits.check_triangles(triangles)?;
     parser::parse(&plain_lines(bytes))
         .and_then(parser::ParsedObj::into_mesh)
         .ok_or_else(|| find_fault(bytes))
@@ -67,21 +67,12 @@ fn record(line: &[u8]) -> Option<Record<'_>> {
     }
 }
 
-#[derive(Default)]
-struct ObjCounts {
-    vertices: u64,
-    triangles: u64,
-}
-
-fn count(bytes: &[u8]) -> ObjCounts {
-    let mut counts = ObjCounts::default();
-    for (_, record) in records(bytes) {
-        match record {
-            Record::Vertex(_) => counts.vertices += 1,
-            Record::Face(rest) => counts.triangles += text::words(rest).count() as u64 - 2,
-        }
-    }
-    counts
+/// Counts the vertices and triangles of a file.
+fn count(bytes: &[u8]) -> [u64; 2] {
+    records(bytes).fold([0; 2], |[vertices, triangles], (_, record)| match record {
+        Record::Vertex(_) => [vertices + 1, triangles],
+        Record::Face(rest) => [vertices, triangles + text::words(rest).count() as u64 - 2],
+    })
 }
 
 /// Joins lines that end in a backslash with the next; returns `None` if there are none.
@@ -121,7 +112,7 @@ fn plain_lines(bytes: &[u8]) -> Vec<u8> {
 
 /// Returns the first fault of a file that the parser rejected.
 fn find_fault(bytes: &[u8]) -> MeshError {
-    let vertices = count(bytes).vertices;
+    let [vertices, _] = count(bytes);
     let (mut vertex, mut face) = (0, 0);
     for (line, record) in records(bytes) {
         let fault = match record {
@@ -157,7 +148,7 @@ fn face_fault(rest: &[u8], line: u64, face: u64, (before, all): (u64, u64)) -> O
     for corner in text::words(rest) {
         let parts = || corner.split(|byte| *byte == b'/');
         for part in parts().filter(|p| !p.is_empty()) {
-            if text::integer(part).is_none() {
+            if text::parse::<i64>(part).is_none() {
                 let reason = text::not_a_number(part);
                 return Some(MeshError::Line { line, reason });
             }
@@ -166,7 +157,7 @@ fn face_fault(rest: &[u8], line: u64, face: u64, (before, all): (u64, u64)) -> O
             let reason = format!("corner {} has more than three indices", text::quote(corner));
             return Some(MeshError::Line { line, reason });
         }
-        let Some(index) = parts().next().and_then(text::integer) else {
+        let Some(index) = parts().next().and_then(text::parse::<i64>) else {
             let reason = format!("corner {} names no vertex", text::quote(corner));
             return Some(MeshError::Line { line, reason });
         };

@@ -17,13 +17,8 @@ pub(super) fn words(line: &[u8]) -> impl Iterator<Item = &[u8]> {
         .filter(|word| !word.is_empty())
 }
 
-/// Parses a number in the syntax of Rust and C; NaN and infinities are accepted and rejected later by vertex.
-pub(super) fn number(word: &[u8]) -> Option<f64> {
-    std::str::from_utf8(word).ok()?.parse().ok()
-}
-
-/// Parses an integer.
-pub(super) fn integer(word: &[u8]) -> Option<i64> {
+/// Parses a number. Floats may be NaN or infinite; such vertices are rejected later.
+pub(super) fn parse<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
@@ -31,10 +26,9 @@ pub(super) fn integer(word: &[u8]) -> Option<i64> {
 pub(super) fn position<'a>(mut words: impl Iterator<Item = &'a [u8]>) -> Result<[f64; 3], String> {
     let mut out = [0.0; 3];
     for (have, value) in out.iter_mut().enumerate() {
-        let word = words
-            .next()
-            .ok_or_else(|| format!("{have} of 3 coordinates"))?;
-        *value = number(word).ok_or_else(|| not_a_number(word))?;
+        let missing = || format!("{have} of 3 coordinates");
+        let word = words.next().ok_or_else(missing)?;
+        *value = parse(word).ok_or_else(|| not_a_number(word))?;
     }
     Ok(out)
 }
@@ -60,7 +54,7 @@ mod tests {
     use super::{quote, sanitize};
 
     #[test]
-    fn words_of_a_mesh_come_plain_and_short() {
+    fn quoted_words_are_sanitized_and_short() {
         for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(49)] {
             for said in [quote(rude.as_bytes()), sanitize(&rude)] {
                 assert!(!said.contains(&rude), "{said:?}");

@@ -48,14 +48,6 @@ impl Vertices {
         self.len() == 0
     }
 
-    /// Returns the number of vertices that fit the reserved memory.
-    pub fn capacity(&self) -> usize {
-        match self {
-            Self::Single(all) => all.capacity(),
-            Self::Double(all) => all.capacity(),
-        }
-    }
-
     /// Returns a vertex; panics if it is out of range.
     #[inline]
     pub fn at(&self, place: usize) -> [f64; 3] {
@@ -94,7 +86,7 @@ impl Vertices {
         }
         match self {
             Self::Double(all) => all,
-            Self::Single(_) => unreachable!("made make_double above"),
+            Self::Single(_) => unreachable!("converted above"),
         }
     }
 }
@@ -135,19 +127,19 @@ mod tests {
     use super::Vertices;
 
     #[test]
-    fn both_precisions_say_the_same_and_neither_loses_anything() {
+    fn both_precisions_hold_the_same_positions() {
         let single = Vertices::Single(vec![[0.1_f32, 2.0, -3.5], [4.0, 5.0, 6.25]].into());
-        let mut make_double: Vertices = single.iter().collect();
-        assert_eq!(single, make_double);
+        let mut double: Vertices = single.iter().collect();
+        assert_eq!(single, double);
         assert_eq!(single.at(0)[0], f64::from(0.1_f32));
         let mut more = single.clone();
-        for vertices in [&mut more, &mut make_double] {
+        for vertices in [&mut more, &mut double] {
             vertices.push([0.1, 0.2, 0.3]);
             vertices.map_in_place(|[x, y, z]| [z, x, y]);
             vertices.extend([[7.0; 3]]);
             vertices.set(1, [0.7; 3]);
         }
-        assert_eq!(more, make_double);
+        assert_eq!(more, double);
         assert_eq!(more.at(2), [0.3, 0.1, 0.2]);
         assert_ne!(single, more);
         assert_eq!((single.len(), more.len()), (2, 4));

@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use nalgebra::Vector3;
+
 use super::Mesh;
 
 /// A file format to write.
@@ -62,18 +64,8 @@ impl MeshFormat {
             Self::StlBinary => stl_binary(mesh),
             Self::StlAscii => stl_ascii(mesh),
             Self::PlyAscii => ply_ascii(mesh),
-            Self::PlyLittleEndian => ply_binary(
-                mesh,
-                "binary_little_endian",
-                f32::to_le_bytes,
-                u32::to_le_bytes,
-            ),
-            Self::PlyBigEndian => ply_binary(
-                mesh,
-                "binary_big_endian",
-                f32::to_be_bytes,
-                u32::to_be_bytes,
-            ),
+            Self::PlyLittleEndian => ply_binary(mesh, "binary_little_endian", u32::to_le_bytes),
+            Self::PlyBigEndian => ply_binary(mesh, "binary_big_endian", u32::to_be_bytes),
             Self::Obj => obj(mesh),
         }
     }
@@ -88,20 +80,10 @@ fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [[f32; 3]; 3] {
 }
 
 /// Returns the unit normal by winding; zero for a triangle without area, as other STL writers do.
-fn normal([a, b, c]: [[f32; 3]; 3]) -> [f32; 3] {
-    let side = |p: [f32; 3]| [0, 1, 2].map(|i| f64::from(p[i]) - f64::from(a[i]));
-    let (u, v) = (side(b), side(c));
-    let cross = [
-        u[1] * v[2] - u[2] * v[1],
-        u[2] * v[0] - u[0] * v[2],
-        u[0] * v[1] - u[1] * v[0],
-    ];
-    let length = cross.iter().map(|c| c * c).sum::<f64>().sqrt();
-    if length > 0.0 {
-        cross.map(|c| (c / length) as f32)
-    } else {
-        [0.0; 3]
-    }
+fn normal(corners: [[f32; 3]; 3]) -> [f32; 3] {
+    let [a, b, c] = corners.map(|corner| Vector3::from(corner.map(f64::from)));
+    let unit = (b - a).cross(&(c - a)).try_normalize(0.0);
+    unit.map_or([0.0; 3], |unit| unit.map(|c| c as f32).into())
 }
 
 fn stl_binary(mesh: &Mesh) -> Vec<u8> {
@@ -125,10 +107,8 @@ fn stl_ascii(mesh: &Mesh) -> Vec<u8> {
     for triangle in &mesh.triangles {
         let points = corners(mesh, *triangle);
         let [x, y, z] = normal(points);
-        push(
-            &mut out,
-            format_args!("facet normal {x} {y} {z}\n outer loop\n"),
-        );
+        push(&mut out, format_args!("facet normal {x} {y} {z}\n"));
+        out.push_str(" outer loop\n");
         for [x, y, z] in points {
             push(&mut out, format_args!("  vertex {x} {y} {z}\n"));
         }
@@ -157,21 +137,16 @@ fn ply_ascii(mesh: &Mesh) -> Vec<u8> {
     out.into_bytes()
 }
 
-fn ply_binary(
-    mesh: &Mesh,
-    format: &str,
-    float: fn(f32) -> [u8; 4],
-    index: fn(u32) -> [u8; 4],
-) -> Vec<u8> {
+fn ply_binary(mesh: &Mesh, format: &str, word: fn(u32) -> [u8; 4]) -> Vec<u8> {
     let mut out = ply_header(mesh, format).into_bytes();
     out.reserve(12 * mesh.vertices.len() + 13 * mesh.triangles.len());
     for value in mesh.vertices.iter().flat_map(single) {
-        out.extend(float(value));
+        out.extend(word(value.to_bits()));
     }
     for triangle in &mesh.triangles {
         out.push(3);
         for corner in triangle {
-            out.extend(index(*corner));
+            out.extend(word(*corner));
         }
     }
     out

@@ -39,16 +39,14 @@ fn is_comment(line: &[u8]) -> bool {
 
 /// Returns whether a line is a count of points, or columns named x, y, z.
 fn is_title(line: &[u8]) -> bool {
-    let mut words = cells(line);
-    let first = words.next().unwrap_or_default();
-    match (words.next(), words.next()) {
-        (None, _) => !first.is_empty() && first.iter().all(u8::is_ascii_digit),
-        (Some(second), Some(third)) => {
-            first.eq_ignore_ascii_case(b"x")
-                && second.eq_ignore_ascii_case(b"y")
-                && third.eq_ignore_ascii_case(b"z")
-        }
-        (Some(_), None) => false,
+    let words: Vec<Vec<u8>> = cells(line)
+        .take(3)
+        .map(<[u8]>::to_ascii_lowercase)
+        .collect();
+    match words.as_slice() {
+        [count] => count.iter().all(u8::is_ascii_digit),
+        [x, y, z] => [x, y, z] == [b"x", b"y", b"z"],
+        _ => false,
     }
 }
 
@@ -66,7 +64,7 @@ mod tests {
     }
 
     #[test]
-    fn titles_counts_comments_and_further_columns_are_left_out() {
+    fn titles_counts_comments_and_further_columns_are_ignored() {
         let plain = open("1 2 3\n4 5 6\n").expect("reads");
         assert_eq!(
             plain.vertices,

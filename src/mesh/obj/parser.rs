@@ -76,13 +76,8 @@ impl ParsedObj {
         if !triangles.is_empty() {
             vertices = in_order_of_use(&vertices, &mut triangles)?;
         }
-        let all_finite = || {
-            vertices
-                .as_flattened()
-                .iter()
-                .all(|value| value.is_finite())
-        };
-        (is_finite || all_finite()).then_some(Mesh {
+        let is_kept_finite = || vertices.as_flattened().iter().all(|v| v.is_finite());
+        (is_finite || is_kept_finite()).then_some(Mesh {
             vertices: Vertices::Double(vertices),
             triangles,
         })
@@ -143,7 +138,7 @@ impl LineCursor<'_> {
         let len = word.iter().position(|byte| is_end_of_word(*byte));
         let (word, rest) = word.split_at(len.unwrap_or(word.len()));
         self.rest = rest;
-        let value = text::number(word)?;
+        let value: f64 = text::parse(word)?;
         self.is_finite &= value.is_finite();
         Some(value)
     }
@@ -216,7 +211,7 @@ impl LineCursor<'_> {
             0 => None,
             1..=MAX_INDEX_DIGITS if word[0] == b'-' => Some(-(index as i64)),
             1..=MAX_INDEX_DIGITS => Some(index as i64),
-            digits => text::integer(&word[..sign + digits]),
+            digits => text::parse(&word[..sign + digits]),
         }
     }
 }

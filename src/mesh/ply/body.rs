@@ -1,13 +1,13 @@
 //! Reads the rows of a PLY body into a mesh.
 
 use super::header::{PlyElement, PlyHeader, PlyScalar, PlyType};
-use super::source::{NumberError, NumberSource};
+use super::source::{BodyFault, NumberSource};
 use crate::mesh::error::{self, MeshError, MeshLimits};
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
 
-/// Property names in use for a face's corners.
+/// Names of the property with a face's corners.
 const CORNERS: [&str; 2] = ["vertex_indices", "vertex_index"];
 
 /// Rows that are read at a time.
@@ -19,14 +19,14 @@ pub(super) fn read(
     source: impl NumberSource,
     limits: &MeshLimits,
 ) -> Result<Mesh, MeshError> {
-    let vertices = header.rows("vertex");
     let mut body = BodyReader {
         header,
         source,
         limits,
-        declared_vertices: vertices,
+        declared_vertices: header.rows("vertex"),
         mesh: Mesh::default(),
-        row: Vec::new(),
+        row: 0,
+        values: Vec::new(),
     };
     for element in &header.elements {
         body.element(element)?;
@@ -40,24 +40,35 @@ struct BodyReader<'a, S> {
     limits: &'a MeshLimits,
     declared_vertices: u64,
     mesh: Mesh,
+    /// Complete rows of the current element.
+    row: u64,
     /// Values of the current row.
-    row: Vec<f64>,
+    values: Vec<f64>,
 }
 
 impl<S: NumberSource> BodyReader<'_, S> {
     fn element(&mut self, element: &PlyElement) -> Result<(), MeshError> {
         // Rows without properties have no bytes, however many are declared; a vertex without properties is an error.
-        let is_vertex = element.name == "vertex";
-        if element.rows == 0 || (element.properties.is_empty() && !is_vertex) {
+        if element.rows == 0 || (element.properties.is_empty() && element.name != "vertex") {
             return Ok(());
         }
         self.check_rows(element)?;
-        match element.name.as_str() {
+        self.row = 0;
+        let read = match element.name.as_str() {
             "vertex" => self.vertices(element),
             "face" => self.faces(element, FaceKind::Polygon),
             "tristrips" => self.faces(element, FaceKind::Strips),
             _ => self.skip_rows(element),
-        }
+        };
+        read.map_err(|fault| match fault {
+            BodyFault::End => self.truncated(element, self.row),
+            BodyFault::Invalid(reason) => MeshError::Row {
+                element: text::sanitize(&element.name),
+                row: self.row + 1,
+                reason,
+            },
+            BodyFault::Mesh(error) => error,
+        })
     }
 
     /// Checks that the remaining bytes can hold the rows, before memory is reserved for them.
@@ -87,15 +98,7 @@ impl<S: NumberSource> BodyReader<'_, S> {
         }
     }
 
-    /// Returns the error of a row, counted from 0.
-    fn number_error(&self, element: &PlyElement, row: u64, reason: NumberError) -> MeshError {
-        match reason {
-            NumberError::End => self.truncated(element, row),
-            NumberError::Invalid(reason) => row_error(element, row, reason),
-        }
-    }
-
-    fn vertices(&mut self, element: &PlyElement) -> Result<(), MeshError> {
+    fn vertices(&mut self, element: &PlyElement) -> Result<(), BodyFault> {
         let mut columns = [0; 3];
         for (column, name) in columns.iter_mut().zip(["x", "y", "z"]) {
             *column = element.position_of(&[name]).ok_or_else(|| {
@@ -110,34 +113,31 @@ impl<S: NumberSource> BodyReader<'_, S> {
                 Vertices::Double(PageVec::with_capacity(most))
             };
         }
-        let plain = if element.is_packed_position() && columns == [0, 1, 2] {
-            self.packed_vertices(element.rows)?
-        } else {
-            0
-        };
-        for row in plain..element.rows {
-            self.values(element)
-                .map_err(|reason| self.number_error(element, row, reason))?;
+        if element.is_packed_position() && columns == [0, 1, 2] {
+            self.packed_vertices(element.rows)?;
+        }
+        while self.row < element.rows {
+            self.read_values(element)?;
             let count = self.mesh.vertices.len() as u64 + 1;
-            let position = error::check_finite(columns.map(|column| self.row[column]), count)?;
+            let position = error::check_finite(columns.map(|column| self.values[column]), count)?;
             match &mut self.mesh.vertices {
                 Vertices::Single(vertices) => vertices.push(position.map(|v| v as f32)),
                 Vertices::Double(vertices) => vertices.push(position),
             }
+            self.row += 1;
         }
         Ok(())
     }
 
-    /// Reads up to `rows` positions in the packed layout of most programs and returns how many were read.
-    fn packed_vertices(&mut self, rows: u64) -> Result<u64, MeshError> {
+    /// Reads positions in the packed layout of most programs, as far as the source supports it.
+    fn packed_vertices(&mut self, rows: u64) -> Result<(), MeshError> {
         let mut chunk = Vec::with_capacity(CHUNK_ROWS);
-        let mut row = 0;
-        while row < rows {
+        while self.row < rows {
             chunk.clear();
-            let most = (rows - row).min(CHUNK_ROWS as u64) as usize;
+            let most = (rows - self.row).min(CHUNK_ROWS as u64) as usize;
             self.source.packed_positions(most, &mut chunk);
             if chunk.is_empty() {
-                return Ok(row);
+                break;
             }
             error::check_all_finite(&chunk, self.mesh.vertices.len())?;
             match &mut self.mesh.vertices {
@@ -146,14 +146,14 @@ impl<S: NumberSource> BodyReader<'_, S> {
                     vertices.extend(chunk.iter().map(|v| v.map(f64::from)));
                 }
             }
-            row += chunk.len() as u64;
+            self.row += chunk.len() as u64;
         }
-        Ok(rows)
+        Ok(())
     }
 
-    /// Reads a row into `self.row`, one value per property; 0 for a list.
-    fn values(&mut self, element: &PlyElement) -> Result<(), NumberError> {
-        self.row.clear();
+    /// Reads a row into `self.values`, one value per property; 0 for a list.
+    fn read_values(&mut self, element: &PlyElement) -> Result<(), BodyFault> {
+        self.values.clear();
         for property in &element.properties {
             let value = match property.shape {
                 PlyType::Scalar(kind) => self.source.next(kind)?,
@@ -162,109 +162,99 @@ impl<S: NumberSource> BodyReader<'_, S> {
                     0.0
                 }
             };
-            self.row.push(value);
+            self.values.push(value);
         }
         Ok(())
     }
 
-    fn skip(&mut self, shape: PlyType) -> Result<(), NumberError> {
+    fn skip(&mut self, shape: PlyType) -> Result<(), BodyFault> {
         match shape {
             PlyType::Scalar(kind) => self.source.skip(kind, 1),
             PlyType::List { count, item } => {
-                let length = length(self.source.next(count)?)?;
+                let length = self.list_length(count)?;
                 self.source.skip(item, length)
             }
         }
     }
 
-    fn skip_rows(&mut self, element: &PlyElement) -> Result<(), MeshError> {
-        for row in 0..element.rows {
+    /// Reads the length of a list; a negative or fractional one means a damaged body.
+    fn list_length(&mut self, kind: PlyScalar) -> Result<u64, BodyFault> {
+        let length = self.source.next(kind)?;
+        if length >= 0.0 && length.fract() == 0.0 {
+            return Ok(length as u64);
+        }
+        let reason = format!("{length} is not the length of a list");
+        Err(BodyFault::Invalid(reason))
+    }
+
+    fn skip_rows(&mut self, element: &PlyElement) -> Result<(), BodyFault> {
+        while self.row < element.rows {
             for property in &element.properties {
-                self.skip(property.shape)
-                    .map_err(|reason| self.number_error(element, row, reason))?;
+                self.skip(property.shape)?;
             }
+            self.row += 1;
         }
         Ok(())
     }
 
-    fn faces(&mut self, element: &PlyElement, joining: FaceKind) -> Result<(), MeshError> {
+    fn faces(&mut self, element: &PlyElement, kind: FaceKind) -> Result<(), BodyFault> {
         let corners = element.position_of(&CORNERS).ok_or_else(|| {
+            let name = &element.name;
             MeshError::Header(format!(
-                "element {:?} has no property \"vertex_indices\"",
-                element.name
+                "element {name:?} has no property \"vertex_indices\""
             ))
         })?;
-        let plain = element
+        let packed = element
             .packed_corner_type()
-            .filter(|_| joining == FaceKind::Polygon);
+            .filter(|_| kind == FaceKind::Polygon);
         let most = self.source.max_rows(element).min(element.rows);
-        if plain.is_some() && self.mesh.triangles.is_empty() {
+        if packed.is_some() && self.mesh.triangles.is_empty() {
             self.mesh.triangles = PageVec::with_capacity(most as usize);
         }
         let mut chunk = Vec::with_capacity(CHUNK_ROWS);
-        let mut row = 0;
-        while row < element.rows {
+        while self.row < element.rows {
             chunk.clear();
-            if plain.is_some() {
-                let most = (element.rows - row).min(CHUNK_ROWS as u64) as usize;
+            if packed.is_some() {
+                let most = (element.rows - self.row).min(CHUNK_ROWS as u64) as usize;
                 self.source.packed_triangles(most, &mut chunk);
             }
-            if let Some(item) = plain
+            if let Some(item) = packed
                 && !chunk.is_empty()
             {
-                self.packed_triangles(element, row, item, &chunk)?;
-                row += chunk.len() as u64;
+                self.packed_triangles(item, &chunk)?;
             } else {
-                self.face(element, row, corners, joining)?;
-                row += 1;
+                self.face(element, corners, kind)?;
+                self.row += 1;
             }
         }
         Ok(())
     }
 
     /// Appends triangles that were read in the packed layout.
-    fn packed_triangles(
-        &mut self,
-        element: &PlyElement,
-        first_row: u64,
-        item: PlyScalar,
-        chunk: &[[u32; 3]],
-    ) -> Result<(), MeshError> {
+    fn packed_triangles(&mut self, item: PlyScalar, chunk: &[[u32; 3]]) -> Result<(), BodyFault> {
         let declared = self.declared_vertices;
         let corners = chunk.as_flattened().iter();
         let is_sound = corners.fold(true, |sound, index| sound & (u64::from(*index) < declared));
         let count = (self.mesh.triangles.len() + chunk.len()) as u64;
         if is_sound && self.limits.check_triangles(count).is_ok() {
             self.mesh.triangles.extend_from_slice(chunk);
+            self.row += chunk.len() as u64;
             return Ok(());
         }
         // Checked separately to report the faulty one.
-        for (row, triangle) in (first_row..).zip(chunk) {
-            self.packed_triangle(element, row, item, *triangle)?;
+        let is_signed = item == PlyScalar::I32;
+        for triangle in chunk {
+            for index in triangle {
+                self.check_index(if is_signed {
+                    f64::from(index.cast_signed())
+                } else {
+                    f64::from(*index)
+                })?;
+            }
+            self.push(*triangle)?;
+            self.row += 1;
         }
         Ok(())
-    }
-
-    /// Appends a triangle that was read in the packed layout.
-    fn packed_triangle(
-        &mut self,
-        element: &PlyElement,
-        row: u64,
-        item: PlyScalar,
-        triangle: [u32; 3],
-    ) -> Result<(), MeshError> {
-        for index in triangle {
-            if u64::from(index) >= self.declared_vertices {
-                let negative = f64::from(index.cast_signed());
-                let index = if item == PlyScalar::I32 {
-                    negative
-                } else {
-                    f64::from(index)
-                };
-                self.check_index(element, row, index)?;
-            }
-        }
-        self.push(triangle)
     }
 
     fn push(&mut self, triangle: [u32; 3]) -> Result<(), MeshError> {
@@ -274,22 +264,19 @@ impl<S: NumberSource> BodyReader<'_, S> {
         Ok(())
     }
 
-    /// Reads one row of faces.
+    /// Reads one row of faces; `corners` is the column with the corners.
     fn face(
         &mut self,
         element: &PlyElement,
-        row: u64,
         corners: usize,
-        joining: FaceKind,
-    ) -> Result<(), MeshError> {
+        kind: FaceKind,
+    ) -> Result<(), BodyFault> {
         for (column, property) in element.properties.iter().enumerate() {
             match property.shape {
                 PlyType::List { count, item } if column == corners => {
-                    self.corners(element, row, (count, item), joining)?;
+                    self.corners(count, item, kind)?;
                 }
-                other => self
-                    .skip(other)
-                    .map_err(|reason| self.number_error(element, row, reason))?,
+                other => self.skip(other)?,
             }
         }
         Ok(())
@@ -298,45 +285,38 @@ impl<S: NumberSource> BodyReader<'_, S> {
     /// Reads a list of corners into triangles without storing the list, so that the limit bounds memory.
     fn corners(
         &mut self,
-        element: &PlyElement,
-        row: u64,
-        (count, item): (PlyScalar, PlyScalar),
-        joining: FaceKind,
-    ) -> Result<(), MeshError> {
-        let length = self.source.next(count).and_then(length);
-        let length = length.map_err(|reason| self.number_error(element, row, reason))?;
+        count: PlyScalar,
+        item: PlyScalar,
+        kind: FaceKind,
+    ) -> Result<(), BodyFault> {
         let mut joined = CornerJoiner::default();
-        for _ in 0..length {
-            let index = self.source.next(item);
-            let index = index.map_err(|reason| self.number_error(element, row, reason))?;
-            if joining == FaceKind::Strips && index == -1.0 {
+        for _ in 0..self.list_length(count)? {
+            let index = self.source.next(item)?;
+            if kind == FaceKind::Strips && index == -1.0 {
                 joined = CornerJoiner::default();
                 continue;
             }
-            self.check_index(element, row, index)?;
-            if let Some(triangle) = joined.corner(index as u32, joining) {
+            self.check_index(index)?;
+            if let Some(triangle) = joined.corner(index as u32, kind) {
                 self.push(triangle)?;
             }
         }
         Ok(())
     }
 
-    fn check_index(&self, element: &PlyElement, row: u64, index: f64) -> Result<(), MeshError> {
-        if index >= 0.0 && index < self.declared_vertices as f64 && index.fract() == 0.0 {
+    fn check_index(&self, index: f64) -> Result<(), BodyFault> {
+        if index.fract() != 0.0 {
+            let reason = format!("{index} is not a vertex index");
+            return Err(BodyFault::Invalid(reason));
+        }
+        if index >= 0.0 && index < self.declared_vertices as f64 {
             return Ok(());
         }
-        if index.fract() != 0.0 {
-            return Err(row_error(
-                element,
-                row,
-                format!("{index} is not a vertex index"),
-            ));
-        }
-        Err(MeshError::IndexOutOfRange {
-            face: row + 1,
+        Err(BodyFault::Mesh(MeshError::IndexOutOfRange {
+            face: self.row + 1,
             index: index as i64,
             vertices: self.declared_vertices,
-        })
+        }))
     }
 }
 
@@ -358,40 +338,16 @@ struct CornerJoiner {
 
 impl CornerJoiner {
     /// Adds a corner and returns the triangle that it completes.
-    fn corner(&mut self, corner: u32, joining: FaceKind) -> Option<[u32; 3]> {
-        let [a, b] = self.kept;
-        let before = self.seen;
+    fn corner(&mut self, corner: u32, kind: FaceKind) -> Option<[u32; 3]> {
+        let ([a, b], before) = (self.kept, self.seen);
         self.seen += 1;
-        self.kept = match joining {
+        self.kept = match kind {
             _ if before == 0 => [corner; 2],
-            _ if before == 1 => [a, corner],
-            FaceKind::Polygon => [a, corner],
-            FaceKind::Strips => [b, corner],
+            FaceKind::Strips if before >= 2 => [b, corner],
+            FaceKind::Polygon | FaceKind::Strips => [a, corner],
         };
-        let turned = joining == FaceKind::Strips && before % 2 == 1;
-        (before >= 2).then_some(if turned {
-            [b, a, corner]
-        } else {
-            [a, b, corner]
-        })
-    }
-}
-
-/// Converts the length of a list; a negative or fractional one means a damaged body.
-fn length(count: f64) -> Result<u64, NumberError> {
-    if count >= 0.0 && count.fract() == 0.0 {
-        Ok(count as u64)
-    } else {
-        Err(NumberError::Invalid(format!(
-            "{count} is not the length of a list"
-        )))
-    }
-}
-
-fn row_error(element: &PlyElement, row: u64, reason: String) -> MeshError {
-    MeshError::Row {
-        element: text::sanitize(&element.name),
-        row: row + 1,
-        reason,
+        let is_reversed = kind == FaceKind::Strips && before % 2 == 1;
+        let [a, b] = if is_reversed { [b, a] } else { [a, b] };
+        (before >= 2).then_some([a, b, corner])
     }
 }

@@ -18,15 +18,6 @@ impl PlyEncoding {
             Self::LittleEndian | Self::BigEndian => "binary PLY",
         }
     }
-
-    fn parse(word: &[u8]) -> Option<Self> {
-        match word {
-            b"ascii" => Some(Self::Ascii),
-            b"binary_little_endian" => Some(Self::LittleEndian),
-            b"binary_big_endian" => Some(Self::BigEndian),
-            _ => None,
-        }
-    }
 }
 
 /// Number type.
@@ -140,20 +131,14 @@ impl PlyElement {
 
     /// Returns the index type if a row is a list of 32-bit indices with an 8-bit count.
     pub(super) fn packed_corner_type(&self) -> Option<PlyScalar> {
-        let [
-            PlyProperty {
-                shape:
-                    PlyType::List {
-                        count: PlyScalar::U8,
-                        item,
-                    },
-                ..
-            },
-        ] = self.properties[..]
-        else {
+        let [property] = self.properties.as_slice() else {
             return None;
         };
-        matches!(item, PlyScalar::I32 | PlyScalar::U32).then_some(item)
+        let PlyType::List { count, item } = property.shape else {
+            return None;
+        };
+        let is_packed = count == PlyScalar::U8 && matches!(item, PlyScalar::I32 | PlyScalar::U32);
+        is_packed.then_some(item)
     }
 
     /// Returns the position of a property among the others.
@@ -217,10 +202,8 @@ impl PlyHeader {
 
     /// Returns the number of rows of the elements with this name.
     pub(super) fn rows(&self, name: &str) -> u64 {
-        self.elements
-            .iter()
-            .filter(|element| element.name == name)
-            .fold(0, |sum: u64, element| sum.saturating_add(element.rows))
+        let named = self.elements.iter().filter(|element| element.name == name);
+        named.fold(0, |sum: u64, element| sum.saturating_add(element.rows))
     }
 }
 
@@ -235,38 +218,32 @@ fn line_at(bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
 }
 
 fn parse_encoding(name: &[u8]) -> Result<PlyEncoding, MeshError> {
-    PlyEncoding::parse(name).ok_or_else(|| {
-        header_error(&format!(
+    match name {
+        b"ascii" => Ok(PlyEncoding::Ascii),
+        b"binary_little_endian" => Ok(PlyEncoding::LittleEndian),
+        b"binary_big_endian" => Ok(PlyEncoding::BigEndian),
+        _ => Err(header_error(&format!(
             "{} is not a format (ascii, binary_little_endian, binary_big_endian)",
             text::quote(name)
-        ))
-    })
+        ))),
+    }
 }
 
 fn parse_element(name: &[u8], rows: &[u8]) -> Result<PlyElement, MeshError> {
-    let count = std::str::from_utf8(rows)
-        .ok()
-        .and_then(|digits| digits.parse().ok());
-    let name = String::from_utf8_lossy(name).into_owned();
-    let Some(count) = count else {
-        return Err(header_error(&format!(
-            "element {} has the count {}",
-            text::quote(name.as_bytes()),
-            text::quote(rows)
-        )));
+    let fault = || {
+        let (name, rows) = (text::quote(name), text::quote(rows));
+        header_error(&format!("element {name} has the count {rows}"))
     };
     Ok(PlyElement {
-        name,
-        rows: count,
+        name: String::from_utf8_lossy(name).into_owned(),
+        rows: text::parse(rows).ok_or_else(fault)?,
         properties: Vec::new(),
     })
 }
 
 fn parse_property(words: &[&[u8]]) -> Result<PlyProperty, MeshError> {
-    let scalar = |word: &[u8]| {
-        PlyScalar::parse(word)
-            .ok_or_else(|| header_error(&format!("{} is not a type", text::quote(word))))
-    };
+    let unknown = |word: &[u8]| header_error(&format!("{} is not a type", text::quote(word)));
+    let scalar = |word| PlyScalar::parse(word).ok_or_else(|| unknown(word));
     let (shape, name) = match words {
         [b"list", count, item, name] => {
             let count = scalar(count)?;

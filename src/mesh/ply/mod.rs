@@ -15,9 +15,9 @@ pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError>
     let (header, start) = PlyHeader::parse(bytes)?;
     let rest = &bytes[start..];
     match header.encoding {
-        PlyEncoding::Ascii => body::read(&header, AsciiSource::new(rest), limits),
-        PlyEncoding::LittleEndian => body::read(&header, BinarySource::<false>::new(rest), limits),
-        PlyEncoding::BigEndian => body::read(&header, BinarySource::<true>::new(rest), limits),
+        PlyEncoding::Ascii => body::read(&header, AsciiSource { rest }, limits),
+        PlyEncoding::LittleEndian => body::read(&header, BinarySource::<false> { rest }, limits),
+        PlyEncoding::BigEndian => body::read(&header, BinarySource::<true> { rest }, limits),
     }
 }
 
@@ -39,7 +39,7 @@ mod tests {
     const CORNERS: &str = "property list uchar int vertex_indices\n";
 
     #[test]
-    fn unknown_elements_and_properties_are_stepped_over() {
+    fn unknown_elements_and_properties_are_skipped() {
         let bytes = ascii(
             "comment made by hand\nobj_info num_cols 2\nelement camera 1\nproperty float f\n\
              property list uchar float k\nelement vertex 4\nproperty uchar red\nproperty double z\n\
@@ -136,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn a_long_list_of_corners_meets_the_limit_before_it_is_read() {
+    fn a_long_list_of_corners_is_rejected_before_it_is_read() {
         let limits = MeshLimits {
             max_triangles: 10,
             ..MeshLimits::SUGGESTED
@@ -154,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn vertices_declared_twice_or_without_coordinates_name_no_corners() {
+    fn vertices_may_be_declared_twice_but_not_without_coordinates() {
         let bare = ascii(
             &format!("element vertex 2\nelement vertex 1\n{XYZ}element face 1\n{CORNERS}"),
             "1 2 3\n3 0 1 2\n",
@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_header_without_end_is_not_kept_line_by_line() {
+    fn a_header_without_end_is_rejected_after_a_mebibyte() {
         let bytes = ascii(
             &"property char a\n"
                 .repeat(80_000)
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn faults_are_told_by_their_place() {
+    fn faults_are_reported_with_their_place() {
         let elements = format!("element vertex 2\n{XYZ}element face 1\n{CORNERS}");
         let fault = |body: &str| read(&ascii(&elements, body)).expect_err(body).to_string();
         assert_eq!(
@@ -292,7 +292,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_encoding_comes_back_exactly(
+        fn every_encoding_is_read_back_exactly(
             vertices in prop::collection::vec(prop::array::uniform3(-1e6_f32..1e6), 1..40),
             corners in prop::collection::vec(prop::array::uniform3(any::<prop::sample::Index>()), 0..40),
             wide in any::<bool>(),
@@ -316,7 +316,7 @@ mod tests {
         }
 
         #[test]
-        fn rows_as_most_programs_write_them_are_read_as_others(
+        fn packed_rows_are_read_like_others(
             vertices in prop::collection::vec(prop::array::uniform3(prop_oneof![20 => -9.0..9.0_f32, 1 => Just(f32::NAN)]), 1..6),
             faces in prop::collection::vec(prop_oneof![
                 6 => prop::collection::vec(0..6_i32, 3),

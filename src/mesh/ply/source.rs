@@ -1,23 +1,32 @@
 //! Sources of the numbers of a PLY body: words of text, or bytes of either order.
 
 use super::header::{PlyElement, PlyScalar};
+use crate::mesh::error::MeshError;
 use crate::mesh::text;
 
-/// Why there is no next number.
-pub(super) enum NumberError {
+/// Why a row cannot be read.
+pub(super) enum BodyFault {
     /// The body has ended.
     End,
-    /// A word is not a number.
+    /// A word is not a number, or a number has no meaning there.
     Invalid(String),
+    /// A fault that is reported without the row.
+    Mesh(MeshError),
+}
+
+impl From<MeshError> for BodyFault {
+    fn from(error: MeshError) -> Self {
+        Self::Mesh(error)
+    }
 }
 
 /// A sequence of numbers.
 pub(super) trait NumberSource {
     /// Returns the next number. Every type fits a 64-bit float exactly.
-    fn next(&mut self, kind: PlyScalar) -> Result<f64, NumberError>;
+    fn next(&mut self, kind: PlyScalar) -> Result<f64, BodyFault>;
 
     /// Skips numbers of one type.
-    fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), NumberError>;
+    fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), BodyFault>;
 
     /// Returns an upper bound on the rows of an element in the rest of the body.
     fn max_rows(&self, element: &PlyElement) -> u64;
@@ -32,17 +41,11 @@ pub(super) trait NumberSource {
 
 /// Words between white space; rows need not be lines.
 pub(super) struct AsciiSource<'a> {
-    rest: &'a [u8],
-}
-
-impl<'a> AsciiSource<'a> {
-    pub(super) const fn new(rest: &'a [u8]) -> Self {
-        Self { rest }
-    }
+    pub(super) rest: &'a [u8],
 }
 
 impl NumberSource for AsciiSource<'_> {
-    fn next(&mut self, _: PlyScalar) -> Result<f64, NumberError> {
+    fn next(&mut self, _: PlyScalar) -> Result<f64, BodyFault> {
         let rest = self.rest.trim_ascii_start();
         let len = rest
             .iter()
@@ -51,12 +54,12 @@ impl NumberSource for AsciiSource<'_> {
         let (word, rest) = rest.split_at(len);
         self.rest = rest;
         if word.is_empty() {
-            return Err(NumberError::End);
+            return Err(BodyFault::End);
         }
-        text::number(word).ok_or_else(|| NumberError::Invalid(text::not_a_number(word)))
+        text::parse(word).ok_or_else(|| BodyFault::Invalid(text::not_a_number(word)))
     }
 
-    fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), NumberError> {
+    fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), BodyFault> {
         for _ in 0..count {
             self.next(kind)?;
         }
@@ -71,14 +74,10 @@ impl NumberSource for AsciiSource<'_> {
 
 /// Bytes of one order.
 pub(super) struct BinarySource<'a, const BIG_ENDIAN: bool> {
-    rest: &'a [u8],
+    pub(super) rest: &'a [u8],
 }
 
 impl<'a, const BIG_ENDIAN: bool> BinarySource<'a, BIG_ENDIAN> {
-    pub(super) const fn new(rest: &'a [u8]) -> Self {
-        Self { rest }
-    }
-
     /// Returns up to `most` of the next rows without consuming them.
     fn rows<const SIZE: usize>(&self, most: usize) -> &'a [[u8; SIZE]] {
         let (rows, _) = self.rest.as_chunks();
@@ -97,8 +96,8 @@ impl<'a, const BIG_ENDIAN: bool> BinarySource<'a, BIG_ENDIAN> {
 
     /// Returns the next bytes, least significant first.
     #[inline]
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], NumberError> {
-        let (bytes, rest) = self.rest.split_first_chunk::<N>().ok_or(NumberError::End)?;
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], BodyFault> {
+        let (bytes, rest) = self.rest.split_first_chunk::<N>().ok_or(BodyFault::End)?;
         self.rest = rest;
         let mut bytes = *bytes;
         if BIG_ENDIAN {
@@ -110,7 +109,7 @@ impl<'a, const BIG_ENDIAN: bool> BinarySource<'a, BIG_ENDIAN> {
 
 impl<const BIG_ENDIAN: bool> NumberSource for BinarySource<'_, BIG_ENDIAN> {
     #[inline]
-    fn next(&mut self, kind: PlyScalar) -> Result<f64, NumberError> {
+    fn next(&mut self, kind: PlyScalar) -> Result<f64, BodyFault> {
         Ok(match kind {
             PlyScalar::I8 => f64::from(i8::from_le_bytes(self.take()?)),
             PlyScalar::U8 => f64::from(u8::from_le_bytes(self.take()?)),
@@ -123,10 +122,10 @@ impl<const BIG_ENDIAN: bool> NumberSource for BinarySource<'_, BIG_ENDIAN> {
         })
     }
 
-    fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), NumberError> {
+    fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), BodyFault> {
         let bytes = count.saturating_mul(kind.size() as u64);
         if bytes > self.rest.len() as u64 {
-            return Err(NumberError::End);
+            return Err(BodyFault::End);
         }
         self.rest = &self.rest[bytes as usize..];
         Ok(())
@@ -139,10 +138,8 @@ impl<const BIG_ENDIAN: bool> NumberSource for BinarySource<'_, BIG_ENDIAN> {
     fn packed_positions(&mut self, most: usize, into: &mut Vec<[f32; 3]>) {
         let rows = self.rows::<12>(most);
         self.rest = &self.rest[rows.as_flattened().len()..];
-        into.extend(
-            rows.iter()
-                .map(|row| [0, 4, 8].map(|offset| f32::from_bits(Self::word(row, offset)))),
-        );
+        let position = |row| [0, 4, 8].map(|offset| f32::from_bits(Self::word(row, offset)));
+        into.extend(rows.iter().map(|row| position(row)));
     }
 
     fn packed_triangles(&mut self, most: usize, into: &mut Vec<[u32; 3]>) {
@@ -150,9 +147,7 @@ impl<const BIG_ENDIAN: bool> NumberSource for BinarySource<'_, BIG_ENDIAN> {
         let count = rows.iter().take_while(|row| row[0] == 3).count();
         let rows = &rows[..count];
         self.rest = &self.rest[rows.as_flattened().len()..];
-        into.extend(
-            rows.iter()
-                .map(|row| [1, 5, 9].map(|offset| Self::word(row, offset))),
-        );
+        let corners = |row| [1, 5, 9].map(|offset| Self::word(row, offset));
+        into.extend(rows.iter().map(|row| corners(row)));
     }
 }

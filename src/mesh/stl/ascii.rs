@@ -4,22 +4,23 @@ use crate::mesh::error::{self, MeshError, MeshLimits};
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::Mesh;
 
-/// Name in messages.
-const FORMAT: &str = "ascii STL";
-
 /// Reads an ASCII STL of one or more solids; loops of more than three corners become fans.
 pub(crate) fn read_ascii(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let mut parser = AsciiParser::default();
     for (line, content) in text::lines(bytes) {
-        parser
-            .line(content, limits)
-            .map_err(|reason| reason.into_mesh_error(line))?;
+        parser.line = line;
+        parser.parse(content, limits)?;
     }
-    if parser.scope != Scope::File {
+    let missing = match parser.scope {
+        Scope::File => None,
+        Scope::Solid => Some("endsolid"),
+        Scope::Facet => Some("endfacet"),
+    };
+    if let Some(missing) = missing {
         return Err(MeshError::EndMissing {
-            format: FORMAT,
+            format: "ascii STL",
             have: parser.facets,
-            missing: parser.scope.end_keyword(),
+            missing,
         });
     }
     if parser.vertices.is_empty() {
@@ -37,33 +38,10 @@ enum Scope {
     Facet,
 }
 
-impl Scope {
-    const fn end_keyword(self) -> &'static str {
-        match self {
-            Self::File => "an end",
-            Self::Solid => "endsolid",
-            Self::Facet => "endfacet",
-        }
-    }
-}
-
-/// An error of a line whose number is not known yet, or a complete error.
-enum LineError {
-    Syntax(String),
-    Mesh(MeshError),
-}
-
-impl LineError {
-    fn into_mesh_error(self, line: u64) -> MeshError {
-        match self {
-            Self::Syntax(reason) => MeshError::Line { line, reason },
-            Self::Mesh(error) => error,
-        }
-    }
-}
-
 #[derive(Default)]
 struct AsciiParser {
+    /// Number of the current line, counted from 1.
+    line: u64,
     scope: Scope,
     facets: u64,
     /// Vertices parsed, including those of incomplete loops.
@@ -73,46 +51,49 @@ struct AsciiParser {
 }
 
 impl AsciiParser {
-    fn line(&mut self, line: &[u8], limits: &MeshLimits) -> Result<(), LineError> {
+    fn parse(&mut self, line: &[u8], limits: &MeshLimits) -> Result<(), MeshError> {
         let mut words = text::words(line);
         let Some(keyword) = words.next() else {
             return Ok(());
         };
         match keyword.to_ascii_lowercase().as_slice() {
-            b"vertex" => self.vertex(text::position(words).map_err(LineError::Syntax)?),
+            b"vertex" => self.vertex(text::position(words).map_err(|reason| self.fault(reason))?),
             b"solid" => self.transition(Scope::File, Scope::Solid, keyword),
             b"facet" => self.transition(Scope::Solid, Scope::Facet, keyword),
             b"outer" | b"endloop" => Ok(()),
             b"endfacet" => {
                 self.transition(Scope::Facet, Scope::Solid, keyword)?;
-                self.end_facet(limits).map_err(LineError::Mesh)
+                self.end_facet(limits)
             }
             b"endsolid" => self.transition(Scope::Solid, Scope::File, keyword),
-            _ => Err(LineError::Syntax(format!(
-                "{} is not a word of ascii STL",
-                text::quote(keyword)
-            ))),
+            _ => {
+                let word = text::quote(keyword);
+                Err(self.fault(format!("{word} is not a word of ascii STL")))
+            }
         }
     }
 
-    fn transition(&mut self, from: Scope, to: Scope, keyword: &[u8]) -> Result<(), LineError> {
+    fn fault(&self, reason: String) -> MeshError {
+        let line = self.line;
+        MeshError::Line { line, reason }
+    }
+
+    fn transition(&mut self, from: Scope, to: Scope, keyword: &[u8]) -> Result<(), MeshError> {
         if self.scope != from {
-            return Err(LineError::Syntax(format!(
-                "{} stands where it must not",
-                text::quote(keyword)
-            )));
+            let word = text::quote(keyword);
+            return Err(self.fault(format!("{word} stands where it must not")));
         }
         self.scope = to;
         Ok(())
     }
 
-    fn vertex(&mut self, position: [f64; 3]) -> Result<(), LineError> {
+    fn vertex(&mut self, position: [f64; 3]) -> Result<(), MeshError> {
         if self.scope != Scope::Facet {
-            return Err(LineError::Syntax("a vertex outside of a facet".into()));
+            return Err(self.fault("a vertex outside of a facet".into()));
         }
         self.corners += 1;
-        let corner = error::check_finite(position, self.corners).map_err(LineError::Mesh)?;
-        self.loop_corners.push(corner);
+        self.loop_corners
+            .push(error::check_finite(position, self.corners)?);
         Ok(())
     }
 

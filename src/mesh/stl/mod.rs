@@ -38,7 +38,7 @@ mod tests {
     ];
 
     #[test]
-    fn binary_is_known_even_when_its_header_begins_with_solid() {
+    fn binary_is_detected_even_when_its_header_begins_with_solid() {
         for header in [b"solid made by a scanner".as_slice(), b"", b"COLOR=...."] {
             let mesh = open(&binary(header, &CORNERS)).expect("reads");
             assert_eq!(mesh.vertices.len(), 6);
@@ -48,14 +48,14 @@ mod tests {
     }
 
     #[test]
-    fn bytes_after_the_last_triangle_are_left_out() {
+    fn bytes_after_the_last_triangle_are_ignored() {
         let mut bytes = binary(b"", &CORNERS);
         bytes.extend(b"trailer");
         assert_eq!(open(&bytes).expect("reads").triangles.len(), 2);
     }
 
     #[test]
-    fn truncated_binary_says_how_many_of_how_many() {
+    fn truncated_binary_reports_both_counts() {
         for header in [b"solid a".as_slice(), b"\0", b"text header"] {
             let bytes = binary(header, &CORNERS);
             let error = open(&bytes[..bytes.len() - 1]).expect_err("truncated");
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn lying_count_is_an_error_not_an_allocation() {
+    fn excessive_count_is_an_error_not_an_allocation() {
         let mut bytes = binary(b"", &CORNERS);
         bytes[80..84].fill(0xff);
         let error = open(&bytes).expect_err("lies");
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn truncated_ascii_says_where_it_ends() {
+    fn truncated_ascii_reports_where_it_ends() {
         let cut = |word: &str| &ASCII[..ASCII.find(word).expect("is there")];
         assert_eq!(
             open(cut("endsolid").as_bytes())
