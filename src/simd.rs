@@ -3,12 +3,17 @@
 //! The program is compiled for the baseline of its architecture. Dispatched code is compiled again for newer
 //! instruction sets and selected at run time. All variants compute the same bits: nothing is fused or reordered.
 
-/// Runs `work` with the widest instruction set of the processor. Only inlined code gains: mark it and the functions
+/// Runs an expression with the widest instruction set of the processor. Only inlined code gains: mark the functions
 /// that it calls `#[inline(always)]`.
-#[inline(always)]
-pub(crate) fn dispatch<R>(work: impl FnOnce() -> R) -> R {
-    pulp::Arch::new().dispatch(work)
+macro_rules! dispatch {
+    ($work:expr) => {
+        pulp::Arch::new().dispatch(
+            #[inline(always)]
+            || $work,
+        )
+    };
 }
+pub(crate) use dispatch;
 
 /// Returns the smaller number by a plain comparison, one instruction for many lanes; `f32::min` treats NaN specially.
 #[inline(always)]
@@ -46,7 +51,6 @@ pub(crate) fn index_from_f32(whole: f32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use super::dispatch;
 
     #[inline(always)]
     fn sums(values: &[f32]) -> [u32; 8] {
@@ -62,17 +66,14 @@ mod tests {
     #[test]
     fn wide_and_narrow_give_the_same_bits() {
         let values: Vec<f32> = (0..4096).map(|k| (k as f32 * 0.7).sin()).collect();
-        let wide = dispatch(
-            #[inline(always)]
-            || sums(&values),
-        );
+        let wide = dispatch!(sums(&values));
         assert_eq!(wide, sums(&values));
     }
 
     #[test]
     fn a_panic_comes_through() {
         let none: Vec<f32> = Vec::new();
-        let caught = std::panic::catch_unwind(|| dispatch(|| none[3]));
+        let caught = std::panic::catch_unwind(|| dispatch!(none[3]));
         assert!(caught.is_err());
     }
 }

@@ -3,7 +3,7 @@
 use mocban::domain::FitOutcome;
 use mocban::mesh;
 use mocban::raster;
-use mocban::stages::{AlignedPair, Print, Scan, Settings, StageError, pipeline};
+use mocban::stages::{AlignedPair, Print, Scan, Settings, StageError, depth, pipeline};
 
 use super::times::{Part, Times};
 
@@ -69,7 +69,7 @@ fn align(
     let plane = &*fit.insert(plane);
     let depth = times
         .book(Part::Depth, || {
-            pipeline::depth(&scan, plane, None, settings)
+            depth::depth(&scan, plane, None, &settings.depth)
         })
         .map_err(StageError::from)?;
     let normalized = times

@@ -44,20 +44,26 @@ impl DepthMap {
         let levels: Vec<u16> = levels.iter().map(|level| (*level).max(1)).collect();
         warp_level_sets(&self.levels, &levels, to_from, width, height)
     }
+}
 
-    /// Returns a map from -1 to 0.3 mesh units with ten pixels a unit, for tests.
-    #[cfg(test)]
-    pub(crate) fn of_levels(levels: Grid<u16>) -> Self {
-        Self {
-            levels,
-            scale: DepthScale {
-                height_min: -1.0,
-                height_per_level: 2e-5,
-                mesh_unit_per_px: 0.1,
-                depth_from_plane: crate::domain::Affine2::IDENTITY,
-                bow: None,
-                unit: None,
-            },
+#[cfg(test)]
+mod testing {
+    use super::{Affine2, DepthMap, DepthScale, Grid};
+
+    impl DepthMap {
+        /// Returns a map from -1 to 0.3 mesh units with ten pixels per unit.
+        pub(crate) fn of_levels(levels: Grid<u16>) -> Self {
+            Self {
+                levels,
+                scale: DepthScale {
+                    height_min: -1.0,
+                    height_per_level: 2e-5,
+                    mesh_unit_per_px: 0.1,
+                    depth_from_plane: Affine2::IDENTITY,
+                    bow: None,
+                    unit: None,
+                },
+            }
         }
     }
 }

@@ -1,7 +1,6 @@
 //! A two-dimensional grid of values, and the pixel convention of the whole project.
 //!
-//! x runs to the right, y down, and **(0, 0) is the centre of the top-left pixel**: a pixel covers `x - 0.5 .. x +
-//! 0.5`.
+//! x runs to the right, y down, and **(0, 0) is the centre of the top-left pixel**: a pixel covers x - 0.5..x + 0.5.
 
 /// Values in row-major order, top row first.
 ///
@@ -9,7 +8,6 @@
 /// use mocban::raster::Grid;
 ///
 /// let grid = Grid::from_fn(3, 2, |x, y| 10 * y + x);
-/// assert_eq!((grid.width(), grid.height()), (3, 2));
 /// assert_eq!(grid.row(1), [10, 11, 12]);
 /// assert_eq!(grid.get(-1, 0), None);
 /// assert_eq!(grid.transposed().row(2), [2, 12]);
@@ -46,56 +44,55 @@ impl Grid<u16> {
 }
 
 impl<T: Copy> Grid<T> {
-    /// Creates a grid of one value.
-    pub fn new(width: usize, height: usize, fill: T) -> Self {
+    const fn of(width: usize, height: usize, data: Vec<T>) -> Self {
         Self {
             width,
             height,
-            data: vec![fill; width * height],
+            data,
         }
+    }
+
+    /// Creates a grid of one value.
+    pub fn new(width: usize, height: usize, fill: T) -> Self {
+        Self::of(width, height, vec![fill; width * height])
     }
 
     /// Creates a grid from values in row-major order; `None` if their number does not match.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {
-        (data.len() == width * height).then_some(Self {
-            width,
-            height,
-            data,
-        })
+        (data.len() == width * height).then_some(Self::of(width, height, data))
     }
 
     /// Creates a grid from a function of each pixel's x and y.
     pub fn from_fn(width: usize, height: usize, mut value: impl FnMut(usize, usize) -> T) -> Self {
         let mut data = Vec::with_capacity(width * height);
         for y in 0..height {
-            for x in 0..width {
-                data.push(value(x, y));
-            }
+            data.extend((0..width).map(|x| value(x, y)));
         }
-        Self {
-            width,
-            height,
-            data,
-        }
+        Self::of(width, height, data)
     }
 
     /// Applies a function to each value.
     pub fn map<U: Copy>(&self, value: impl FnMut(&T) -> U) -> Grid<U> {
-        Grid {
-            width: self.width,
-            height: self.height,
-            data: self.data.iter().map(value).collect(),
-        }
+        let data = self.data.iter().map(value).collect();
+        Grid::of(self.width, self.height, data)
+    }
+
+    /// Combines each value with the value at the same place of another grid of the same size.
+    pub fn zip_map<U: Copy, V: Copy>(
+        &self,
+        other: &Grid<U>,
+        mut value: impl FnMut(T, U) -> V,
+    ) -> Grid<V> {
+        let pairs = self.data.iter().zip(&other.data);
+        let data = pairs.map(|(one, other)| value(*one, *other)).collect();
+        Grid::of(self.width, self.height, data)
     }
 
     /// Returns the transposed grid.
     #[must_use]
     pub fn transposed(&self) -> Self {
         let (width, height) = (self.width, self.height);
-        let mut data: Vec<T> = match self.data.first() {
-            Some(any) => vec![*any; self.data.len()],
-            None => Vec::new(),
-        };
+        let mut data = self.data.clone();
         for top in (0..height).step_by(TILE) {
             let rows = &self.data[top * width..];
             for left in (0..width).step_by(TILE) {
@@ -111,11 +108,7 @@ impl<T: Copy> Grid<T> {
                 }
             }
         }
-        Self {
-            width: height,
-            height: width,
-            data,
-        }
+        Self::of(height, width, data)
     }
 
     /// Returns the number of columns.
@@ -161,11 +154,6 @@ impl<T: Copy> Grid<T> {
     pub fn data_mut(&mut self) -> &mut [T] {
         &mut self.data
     }
-
-    /// Returns the values in row-major order.
-    pub fn into_vec(self) -> Vec<T> {
-        self.data
-    }
 }
 
 #[cfg(test)]
@@ -173,7 +161,7 @@ mod tests {
     use super::Grid;
 
     #[test]
-    fn more_values_than_a_narrow_sum_holds_are_counted() {
+    fn more_values_than_fit_16_bits_are_counted() {
         let grid = Grid::from_fn(400, 300, |x, _| x as u16);
         assert_eq!(grid.count_at_least(0), 120_000);
         assert_eq!(grid.count_at_least(100), 300 * 300);

@@ -29,6 +29,11 @@ impl PixelBox {
         self.y1 - self.y0 + 1
     }
 
+    /// Returns the larger of width and height.
+    pub fn longest_side(&self) -> usize {
+        self.width().max(self.height())
+    }
+
     /// Returns the smallest box that contains both.
     #[must_use]
     pub fn union(self, other: Self) -> Self {
@@ -83,6 +88,11 @@ impl Mask {
             iou: share(both, sum - both),
             dice: share(2.0 * both, sum),
         }
+    }
+
+    /// Returns 1 for set pixels and 0 for others.
+    pub fn to_weights(&self) -> Grid<f32> {
+        self.map(|set| f32::from(u8::from(*set)))
     }
 
     /// Counts the set pixels.
@@ -187,7 +197,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn counts_are_those_of_one_by_one(bits in prop::collection::vec(any::<[bool; 2]>(), 1..900)) {
+        fn counts_and_boxes_equal_those_of_single_pixels(bits in prop::collection::vec(any::<[bool; 2]>(), 1..900)) {
             let mask = |k: usize| {
                 let set = bits.iter().map(|pair| pair[k]).collect();
                 Mask::from_vec(bits.len(), 1, set).expect("a row")
@@ -212,7 +222,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn grown_by_what_touches_it(
+        fn dilation_adds_neighbours(
             width in 1_usize..20,
             bits in prop::collection::vec(prop::bool::weighted(0.1), 1..200),
         ) {

@@ -99,7 +99,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn hold_all_that_a_box_holds(
+        fn range_contains_all_values_of_the_box(
             [width, height] in [1_usize..70, 1_usize..70],
             seed in any::<u64>(),
             [x0, y0] in [-9_i64..80, -9_i64..80],
@@ -121,7 +121,7 @@ mod tests {
         }
 
         #[test]
-        fn are_exact_for_cells(x in 0_i64..8, y in 0_i64..8) {
+        fn range_is_exact_for_single_cells(x in 0_i64..8, y in 0_i64..8) {
             let grid = Grid::from_fn(32, 32, |x, y| (x * y) as u16);
             let [low, high] = MinMaxPyramid::new(&grid).range_in_box([[4 * x, 4 * x + 3], [4 * y, 4 * y + 3]], 0);
             prop_assert_eq!(i64::from(low), 16 * x * y);

@@ -19,6 +19,6 @@ pub use encode::{
 };
 pub use grid::Grid;
 pub use mask::{Mask, MaskOverlap, PixelBox};
-pub use resample::{resample, resample_rows_transposed, resample_transposed};
+pub use resample::{resample, resample_transposed};
 pub use warp_depth::warp_depth;
 pub use warp_mask::warp_mask;

@@ -40,18 +40,6 @@ pub fn resample_transposed(
     columns.mix_rows(&rows.mix_rows(values).transposed())
 }
 
-/// Resamples like [`resample_transposed`], for source rows that `write_row` computes on demand, some of them more than once.
-pub fn resample_rows_transposed(
-    from: [usize; 2],
-    write_row: impl FnMut(usize, &mut [f32]),
-    scale: f64,
-    shift: [f64; 2],
-    to: [usize; 2],
-) -> Grid<f32> {
-    let [columns, rows] = BoxFilter::both(from, to, scale, shift);
-    columns.mix_rows(&rows.mix_rows_with(from[0], write_row).transposed())
-}
-
 /// The filter along one axis: source pixels and weights of each output pixel.
 struct BoxFilter {
     /// First source pixel of each output pixel, and the end of its weights.
@@ -92,53 +80,23 @@ impl BoxFilter {
         let mut out = Grid::new(width, self.each.len(), 0.0_f32);
         let mut rows = out.data_mut().chunks_exact_mut(width.max(1));
         let mut start = 0;
-        dispatch(
-            #[inline(always)]
-            || {
-                for ((first, end), row) in self.each.iter().zip(&mut rows) {
-                    let weights = &self.weights[start..*end];
-                    start = *end;
-                    let (fours, rest) = weights.as_chunks::<4>();
-                    for (k, weights) in fours.iter().enumerate() {
-                        add(row, values, first + 4 * k, *weights);
-                    }
-                    let first = first + 4 * fours.len();
-                    match *rest {
-                        [a, b, c] => add(row, values, first, [a, b, c]),
-                        [a, b] => add(row, values, first, [a, b]),
-                        [a] => add(row, values, first, [a]),
-                        _ => {}
-                    }
+        dispatch!({
+            for ((first, end), row) in self.each.iter().zip(&mut rows) {
+                let weights = &self.weights[start..*end];
+                start = *end;
+                let (fours, rest) = weights.as_chunks::<4>();
+                for (k, weights) in fours.iter().enumerate() {
+                    add(row, values, first + 4 * k, *weights);
                 }
-            },
-        );
-        out
-    }
-
-    /// Computes output rows as weighted sums of source rows of `width` pixels that `write_row` computes.
-    fn mix_rows_with(
-        &self,
-        width: usize,
-        mut write_row: impl FnMut(usize, &mut [f32]),
-    ) -> Grid<f32> {
-        let mut out = Grid::new(width, self.each.len(), 0.0_f32);
-        let mut rows = out.data_mut().chunks_exact_mut(width.max(1));
-        let mut made = vec![0.0_f32; width];
-        let mut start = 0;
-        dispatch(
-            #[inline(always)]
-            || {
-                for ((first, end), row) in self.each.iter().zip(&mut rows) {
-                    for (k, weight) in self.weights[start..*end].iter().enumerate() {
-                        write_row(first + k, &mut made);
-                        for (sum, value) in row.iter_mut().zip(&made) {
-                            *sum += weight * value;
-                        }
-                    }
-                    start = *end;
+                let first = first + 4 * fours.len();
+                match *rest {
+                    [a, b, c] => add(row, values, first, [a, b, c]),
+                    [a, b] => add(row, values, first, [a, b]),
+                    [a] => add(row, values, first, [a]),
+                    _ => {}
                 }
-            },
-        );
+            }
+        });
         out
     }
 }
@@ -162,7 +120,7 @@ fn add<const N: usize>(row: &mut [f32], values: &Grid<f32>, first: usize, weight
 mod tests {
     use proptest::prelude::*;
 
-    use super::{resample, resample_rows_transposed, resample_transposed};
+    use super::{resample, resample_transposed};
     use crate::raster::Grid;
 
     #[test]
@@ -173,11 +131,6 @@ mod tests {
         assert!((half.at(5, 3) - (70.0 + 71.0 + 80.0 + 81.0) / 4.0).abs() < 1e-4);
         let turned = resample_transposed(&ramp, 0.5, [-0.25, -0.25], [6, 4]);
         assert_eq!(turned.transposed(), half);
-        let row = |y: usize, row: &mut [f32]| row.copy_from_slice(ramp.row(y));
-        assert_eq!(
-            resample_rows_transposed([12, 8], row, 0.5, [-0.25, -0.25], [6, 4]),
-            turned
-        );
         let double = resample(&ramp, 2.0, [0.5, 0.5], [24, 16]);
         assert!((double.at(6, 4) - (2.75 + 17.5)).abs() < 1e-5);
     }

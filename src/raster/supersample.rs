@@ -97,10 +97,8 @@ impl Supersampler {
     pub(super) fn mean_inside(&self, x: usize, y: usize, levels: &Grid<u16>) -> f64 {
         let mut sum = 0.0;
         self.for_each_sample(x, y, |place| {
-            let (near, [fx, fy]) = bilinear_cell_inside(levels, place);
-            let [a, b, c, d] = near.map(f64::from);
-            let (above, below) = (a + (b - a) * fx, c + (d - c) * fx);
-            sum += above + (below - above) * fy;
+            let (near, within) = bilinear_cell_inside(levels, place);
+            sum += interpolate(near.map(f64::from), within);
         });
         sum / self.sample_count() as f64
     }
@@ -127,7 +125,7 @@ impl Supersampler {
 }
 
 /// Rounds down; a cast and a comparison, where `f64::floor` would be a call.
-pub(super) fn floor(value: f64) -> i64 {
+fn floor(value: f64) -> i64 {
     let cut = value as i64;
     cut - i64::from(cut as f64 > value)
 }
@@ -139,7 +137,15 @@ pub(super) fn bilinear_cell<T: Copy + Default>(
     [x, y]: [f64; 2],
 ) -> ([T; 4], [f64; 2]) {
     let (x0, y0) = (floor(x), floor(y));
-    let near = cell_corners(values, x0, y0, T::default());
+    let width = values.width();
+    let is_inside = |i: i64, side: usize| i >= 0 && i + 1 < side as i64;
+    let near = if is_inside(x0, width) && is_inside(y0, values.height()) {
+        let from = &values.data()[y0 as usize * width + x0 as usize..][..width + 2];
+        [from[0], from[1], from[width], from[width + 1]]
+    } else {
+        [(0, 0), (1, 0), (0, 1), (1, 1)]
+            .map(|(dx, dy)| values.get(x0 + dx, y0 + dy).unwrap_or_default())
+    };
     (near, [x - x0 as f64, y - y0 as f64])
 }
 
@@ -158,22 +164,16 @@ pub(super) fn bilinear_cell_inside<T: Copy>(
     (near, [x - f64::from(column), y - f64::from(row)])
 }
 
+/// Interpolates between a pixel, its right neighbour, and the two below.
+#[inline(always)]
+pub(super) fn interpolate([a, b, c, d]: [f64; 4], [fx, fy]: [f64; 2]) -> f64 {
+    let (above, below) = (a + (b - a) * fx, c + (d - c) * fx);
+    above + (below - above) * fy
+}
+
 /// Returns the bilinear weights of a pixel, its right neighbour, and the two below.
 #[inline(always)]
 pub(super) fn bilinear_weights([fx, fy]: [f64; 2]) -> [f64; 4] {
     let (left, above) = (1.0 - fx, 1.0 - fy);
     [left * above, fx * above, left * fy, fx * fy]
-}
-
-/// Returns a pixel, its right neighbour, and the two below; `outside` beyond the grid.
-#[inline(always)]
-pub(super) fn cell_corners<T: Copy>(grid: &Grid<T>, x: i64, y: i64, outside: T) -> [T; 4] {
-    let width = grid.width();
-    let inside = |i: i64, side: usize| i >= 0 && i + 1 < side as i64;
-    if inside(x, width) && inside(y, grid.height()) {
-        let from = &grid.data()[y as usize * width + x as usize..][..width + 2];
-        [from[0], from[1], from[width], from[width + 1]]
-    } else {
-        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(dx, dy)| grid.get(x + dx, y + dy).unwrap_or(outside))
-    }
 }

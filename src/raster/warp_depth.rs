@@ -1,7 +1,7 @@
 //! Warps a depth map into another frame.
 
 use super::minmax_pyramid::MinMaxPyramid;
-use super::supersample::{Supersampler, cell_corners, floor};
+use super::supersample::{Supersampler, bilinear_cell, interpolate};
 use super::{DepthMap, Grid};
 use crate::domain::Affine2;
 
@@ -44,22 +44,16 @@ pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usi
 }
 
 /// Interpolates the level bilinearly among the neighbours with data; `None` if their weight is below a half.
-fn level_at(levels: &Grid<u16>, [x, y]: [f64; 2]) -> Option<f64> {
-    let (x0, y0) = (floor(x), floor(y));
-    let (fx, fy) = (x - x0 as f64, y - y0 as f64);
-    let near = cell_corners(levels, x0, y0, 0).map(f64::from);
-    if near == [0.0; 4] {
+fn level_at(levels: &Grid<u16>, place: [f64; 2]) -> Option<f64> {
+    let (near, within) = bilinear_cell(levels, place);
+    if near == [0; 4] {
         return None;
     }
-    let above = near[0] + (near[1] - near[0]) * fx;
-    let below = near[2] + (near[3] - near[2]) * fx;
-    let level = above + (below - above) * fy;
-    if near.iter().all(|level| *level > 0.0) {
+    let level = interpolate(near.map(f64::from), within);
+    if !near.contains(&0) {
         return Some(level);
     }
-    let held = near.map(|level| if level > 0.0 { 1.0 } else { 0.0 });
-    let above = held[0] + (held[1] - held[0]) * fx;
-    let below = held[2] + (held[3] - held[2]) * fx;
-    let weight = above + (below - above) * fy;
+    let weights = near.map(|level| if level > 0 { 1.0 } else { 0.0 });
+    let weight = interpolate(weights, within);
     (weight >= 0.5).then(|| level / weight)
 }

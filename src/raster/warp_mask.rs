@@ -17,6 +17,9 @@ const HALF_COVERED: f64 = 0.5 - 1e-9;
 /// Sides of the largest and the smallest blocks, output pixels.
 const MAX_BLOCK_PX: usize = 32;
 const MIN_BLOCK_PX: usize = 2;
+/// Levels per SIMD vector.
+const LANES: usize = 4;
+
 /// Warps a mask into a frame of `width` x `height` pixels: a pixel is set if at least half of its square is covered.
 ///
 /// `to_from` maps source px to output px. A map without inverse gives an empty mask.
@@ -90,9 +93,6 @@ struct PendingBlock {
     is_inside: bool,
 }
 
-/// Levels per SIMD vector.
-const LANES: usize = 4;
-
 impl<T: Copy + Ord + Default + Into<f64>> MaskWarp<'_, T> {
     /// Fills a block for the undecided levels, or divides it.
     fn fill_block(&mut self, x: usize, y: usize, side: usize, levels_left: Range<usize>) {
@@ -138,14 +138,11 @@ impl<T: Copy + Ord + Default + Into<f64>> MaskWarp<'_, T> {
         let (sampler, values, levels) = (&self.sampler, self.values, self.levels);
         let masks = &mut self.masks;
         let pending = self.pending.drain(..);
-        dispatch(
-            #[inline(always)]
-            || {
-                for block in pending {
-                    block.fill(sampler, values, levels, masks);
-                }
-            },
-        );
+        dispatch!({
+            for block in pending {
+                block.fill(sampler, values, levels, masks);
+            }
+        });
     }
 }
 
@@ -203,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn four_quarter_turns_lead_back() {
+    fn four_quarter_turns_are_the_identity() {
         let mask = blob();
         let turn = |m: &Mask| {
             let quarter = Affine2([[0.0, -1.0, (m.height() - 1) as f64], [1.0, 0.0, 0.0]]);
@@ -229,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_alike_all_over_equals_look_by_look() {
+    fn blocks_filled_at_once_equal_single_samples() {
         let levels = Grid::from_fn(90, 70, |x, y| {
             ((x / 9 + y / 14) % 4 * 1000 + x * y % 31) as u16
         });

@@ -11,7 +11,7 @@ use super::stage_output::{self, ExecutionError, StageOutput};
 use crate::domain::{FailureClass, Stage};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{NormalizeError, Normalized};
-use crate::stages::{Settings, StageError, pipeline};
+use crate::stages::{Settings, StageError, depth, pipeline};
 use crate::store::Project;
 
 /// Runs stages on a pair's thread. Tests replace it by stages that fail or hang.
@@ -68,7 +68,7 @@ impl PipelineExecutor {
         let fit = StageInputs::fit(pair)?;
         // No later stage needs the scan: it is dropped here, so that another pair can use its memory.
         let scan = self.inputs.fitted_scan(pair)?;
-        let map = pipeline::depth(&scan, &fit, pair.attributes.unit, &self.settings)
+        let map = depth::depth(&scan, &fit, pair.attributes.unit, &self.settings.depth)
             .map_err(|error| in_file(&pair.attributes.mesh_path, &error.into()))?;
         let (outcome, json) = round_trip(&stage_output::depth_outcome(&map))?;
         let output = StageOutput::depth(json, &map);

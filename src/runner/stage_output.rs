@@ -89,9 +89,8 @@ impl StageOutput {
         registered: &Registered,
     ) -> Self {
         let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
-        for canvas in &registered.canvases {
-            let role = canvas_depth_mask(canvas.metric);
-            files.push(png(&role, png_mask(&canvas.depth)));
+        for (metric, mask) in metrics.iter().zip(&registered.canvas_depths) {
+            files.push(png(&canvas_depth_mask(metric.metric), png_mask(mask)));
         }
         Self {
             outcome,

@@ -47,25 +47,22 @@ const NARROW_COLUMNS: usize = 8;
 fn box_blur_all_columns(values: &Grid<f32>, radius: usize, means: &mut Grid<f32>) {
     let width = values.width();
     let (values, means) = (values.data(), means.data_mut());
-    dispatch(
-        #[inline(always)]
-        || {
-            let mut left = 0;
-            while left + WIDE_COLUMNS <= width {
-                box_blur_run::<WIDE_COLUMNS>(values, width, left, radius, means);
-                left += WIDE_COLUMNS;
-            }
-            // The last few columns may be computed twice.
-            while left < width && width >= NARROW_COLUMNS {
-                let from = left.min(width - NARROW_COLUMNS);
-                box_blur_run::<NARROW_COLUMNS>(values, width, from, radius, means);
-                left = from + NARROW_COLUMNS;
-            }
-            for left in left..width {
-                box_blur_run::<1>(values, width, left, radius, means);
-            }
-        },
-    );
+    dispatch!({
+        let mut left = 0;
+        while left + WIDE_COLUMNS <= width {
+            box_blur_run::<WIDE_COLUMNS>(values, width, left, radius, means);
+            left += WIDE_COLUMNS;
+        }
+        // The last few columns may be computed twice.
+        while left < width && width >= NARROW_COLUMNS {
+            let from = left.min(width - NARROW_COLUMNS);
+            box_blur_run::<NARROW_COLUMNS>(values, width, from, radius, means);
+            left = from + NARROW_COLUMNS;
+        }
+        for left in left..width {
+            box_blur_run::<1>(values, width, left, radius, means);
+        }
+    });
 }
 
 /// Computes box means down `N` columns from `left` on.
@@ -91,12 +88,7 @@ fn box_blur_run<const N: usize>(
     for y in 0..height {
         let last = y + radius;
         let entering = if last < height { row(last) } else { None }.unwrap_or(&zeros);
-        let leaving = if y > radius {
-            row(y - radius - 1)
-        } else {
-            None
-        }
-        .unwrap_or(&zeros);
+        let leaving = y.checked_sub(radius + 1).and_then(row).unwrap_or(&zeros);
         let Some(means) = means[y * width + left..].first_chunk_mut::<N>() else {
             return;
         };
@@ -116,7 +108,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn means_are_those_of_one_by_one(
+        fn columns_in_lanes_equal_single_columns(
             [width, height] in [1_usize..90, 1_usize..24],
             radius in 1_usize..30,
         ) {
@@ -134,7 +126,7 @@ mod tests {
     }
 
     #[test]
-    fn keeps_the_sum_and_has_the_variance() {
+    fn blur_keeps_the_sum_and_has_the_requested_variance() {
         let mut dot = Grid::new(61, 61, 0.0_f32);
         dot.set(30, 30, 1.0);
         for sigma in [1.0, 2.0, 4.0] {

@@ -61,8 +61,13 @@ impl ConnectedComponents {
 
     /// Returns the pixels of components of at least this area, pixels.
     pub(super) fn with_area_at_least(&self, size: usize) -> Mask {
+        self.select(|label| self.sizes[label] >= size)
+    }
+
+    /// Returns the pixels of the components for which `wanted` is true.
+    fn select(&self, wanted: impl Fn(usize) -> bool) -> Mask {
         self.labels
-            .map(|label| *label != u32::MAX && self.sizes[*label as usize] >= size)
+            .map(|label| *label != u32::MAX && wanted(*label as usize))
     }
 
     /// Returns the pixels of components that come within `distance` pixels, along either axis, of a pixel of another
@@ -82,25 +87,13 @@ impl ConnectedComponents {
                     .any(|(dx, dy)| other.get(x + dx, y + dy).unwrap_or(true));
             }
         }
-        self.labels
-            .map(|label| *label != u32::MAX && touches[*label as usize])
+        self.select(|label| touches[label])
     }
 
     /// Returns the pixels of components that touch the border of the grid.
     pub(super) fn touching_border(&self) -> Mask {
-        let (width, height) = (self.labels.width(), self.labels.height());
-        let mut reaches = vec![false; self.sizes.len()];
-        for y in 0..height {
-            for x in 0..width {
-                let on_border = x == 0 || y == 0 || x + 1 == width || y + 1 == height;
-                let label = self.labels.at(x, y);
-                if on_border && label != u32::MAX {
-                    reaches[label as usize] = true;
-                }
-            }
-        }
-        self.labels
-            .map(|label| *label != u32::MAX && reaches[*label as usize])
+        let none = Mask::new(self.labels.width(), self.labels.height(), false);
+        self.touching(&none, 1)
     }
 }
 
@@ -180,7 +173,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn groups_are_those_that_flooding_finds(
+        fn components_equal_those_of_flood_fill(
             width in 1_usize..24,
             bits in prop::collection::vec(prop::bool::weighted(0.6), 1..400),
         ) {
@@ -210,14 +203,14 @@ mod tests {
     }
 
     #[test]
-    fn specks_and_pinholes_go() {
+    fn specks_and_pinholes_are_removed() {
         let mask = drawn(["#.....", ".####.", ".#.##.", ".####.", ".....#"]);
         let clean = drawn(["......", ".####.", ".####.", ".####.", "......"]);
         assert_eq!(remove_specks(&mask, 2400), clean);
     }
 
     #[test]
-    fn groups_at_the_border_are_told() {
+    fn components_at_the_border_are_found() {
         let mask = drawn(["##....", "#.....", "..##..", "..##..", "......"]);
         assert_eq!(
             ConnectedComponents::label(&mask).touching_border().count(),

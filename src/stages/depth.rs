@@ -6,6 +6,7 @@ use super::Scan;
 use super::zbuffer::{NO_HIT, Viewport};
 use crate::domain::{DepthScale, FailureClass, FitOutcome, LengthUnit};
 use crate::raster::{DepthMap, Grid};
+use crate::simd::{max_f32, min_f32};
 
 /// Raised whenever the same inputs and settings may give another result than before.
 pub const REVISION: u32 = 5;
@@ -68,41 +69,25 @@ impl DepthError {
 
 /// Renders the heights over the fitted surface, mirrored so that the map reads like the print.
 ///
-/// Each pixel whose centre ray meets the mesh is set, exactly once, to the highest surface. Level 0 is "no data";
-/// levels
+/// Each pixel whose centre ray meets the mesh gets the level of the highest surface. Level 0 is "no data"; levels
 /// 1..=65535 are linear in height, see [`DepthScale`]. `unit` is the mesh's unit, where it is known.
 ///
 /// # Errors
 /// When the resolution cannot be reached, or no ray meets the mesh.
-///
-/// # Examples
-/// ```
-/// # use mocban::{config, demo, raster};
-/// # let settings = config::load(&config::Sources::default())?.config.stages;
-/// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
-/// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
-/// use mocban::stages::{Print, Scan, depth, fit};
-///
-/// let (scan, print) = (Scan::from(pair.mesh), Print::from(image));
-/// let plane = fit::fit(&scan, Some(&print), None, &settings.fit)?;
-/// let map = depth::depth(&scan, &plane, None, &settings.depth)?;
-/// assert_eq!(map.levels.width().max(map.levels.height()), 512);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn depth(
     scan: &Scan,
     fit: &FitOutcome,
     unit: Option<LengthUnit>,
     params: &DepthParams,
 ) -> Result<DepthMap, DepthError> {
-    let shell = scan.shell();
-    let bounds = shell.bounds(&fit.plane_from_mesh);
+    let indexed = scan.indexed();
+    let bounds = indexed.bounds(&fit.plane_from_mesh);
     let view = Viewport::around(bounds, longest_px(bounds, unit, params)?, true);
     let plane_from_px = view
         .px_from_plane
         .inverse()
         .ok_or(DepthError::NothingSeen)?;
-    let mut heights = shell.render(&fit.plane_from_mesh, &view);
+    let mut heights = indexed.render(&fit.plane_from_mesh, &view);
     if let Some(bow) = &fit.bow {
         let rows = heights.data_mut().chunks_exact_mut(view.width);
         for (y, row) in rows.enumerate() {
@@ -114,7 +99,7 @@ pub fn depth(
         }
     }
     let (levels, height_min, height_per_level) =
-        quantise(&heights).ok_or(DepthError::NothingSeen)?;
+        quantize(&heights).ok_or(DepthError::NothingSeen)?;
     Ok(DepthMap {
         levels,
         scale: DepthScale {
@@ -148,8 +133,8 @@ fn longest_px(
 }
 
 /// Quantizes heights to levels 1..=65535 over their range; `None` when no pixel holds data.
-fn quantise(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
-    let [low, high] = range(heights.data())?.map(f64::from);
+fn quantize(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
+    let [low, high] = range(heights)?.map(f64::from);
     let step = ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE));
     let levels = heights.map(|z| {
         let steps = ((f64::from(*z) - low) / step).clamp(0.0, 65_534.0);
@@ -162,23 +147,15 @@ fn quantise(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
 }
 
 /// Returns the lowest and the highest height; `None` when no pixel holds data.
-fn range(heights: &[f32]) -> Option<[f32; 2]> {
-    // In lanes: a sequential minimum is not vectorized.
-    const LANES: usize = 16;
-    let (mut lows, mut highs) = ([f32::INFINITY; LANES], [NO_HIT; LANES]);
-    let mut take = |lane: usize, z: f32| {
-        let low = if z == NO_HIT { f32::INFINITY } else { z };
-        lows[lane] = if low < lows[lane] { low } else { lows[lane] };
-        highs[lane] = if z > highs[lane] { z } else { highs[lane] };
-    };
-    let (chunks, rest) = heights.as_chunks::<LANES>();
-    for chunk in chunks {
-        for (lane, z) in chunk.iter().enumerate() {
-            take(lane, *z);
+fn range(heights: &Grid<f32>) -> Option<[f32; 2]> {
+    // Column by column first, which is vectorized; one minimum over all is not.
+    let width = heights.width();
+    let (mut lows, mut highs) = (vec![f32::INFINITY; width], vec![NO_HIT; width]);
+    for row in heights.data().chunks_exact(width) {
+        for ((low, high), z) in lows.iter_mut().zip(&mut highs).zip(row) {
+            *low = min_f32(if *z == NO_HIT { f32::INFINITY } else { *z }, *low);
+            *high = max_f32(*z, *high);
         }
-    }
-    for (lane, z) in rest.iter().enumerate() {
-        take(lane, *z);
     }
     let low = lows.into_iter().fold(f32::INFINITY, f32::min);
     let high = highs.into_iter().fold(NO_HIT, f32::max);
@@ -189,7 +166,7 @@ fn range(heights: &[f32]) -> Option<[f32; 2]> {
 mod tests {
     use proptest::prelude::*;
 
-    use super::{DepthError, DepthParams, NO_HIT, ResolutionBy, depth, quantise};
+    use super::{DepthError, DepthParams, NO_HIT, ResolutionBy, depth, quantize};
     use crate::domain::{Bow, FitOutcome, LengthUnit, Rigid3, SideEvidence};
     use crate::mesh::Mesh;
     use crate::raster::Grid;
@@ -248,7 +225,7 @@ mod tests {
         ) {
             let seen: Vec<f64> = heights.iter().filter(|z| **z != NO_HIT).map(|z| f64::from(*z)).collect();
             let grid = Grid::from_vec(heights.len(), 1, heights.clone()).expect("a row");
-            let Some((levels, low, step)) = quantise(&grid) else {
+            let Some((levels, low, step)) = quantize(&grid) else {
                 prop_assert!(seen.is_empty());
                 return Ok(());
             };

@@ -47,8 +47,6 @@ fn depth_map_and_mask_are_as_they_were() {
     hold("depth.png", &levels.map(|level| (level >> 8) as u8));
     hold(
         "mask.png",
-        &aligned.registered.canvases[2]
-            .depth
-            .map(|set| if *set { 255 } else { 0 }),
+        &aligned.registered.canvas_depths[2].map(|set| if *set { 255 } else { 0 }),
     );
 }

@@ -20,9 +20,7 @@ use super::print::Print;
 use super::register::{self, RegisterError, Registered};
 use super::scan::Scan;
 use super::settings::{AlignmentMethod, Settings};
-use crate::domain::{
-    FailureClass, FitOutcome, LengthUnit, MetricOutcome, PrintFromMesh, ThresholdMetric,
-};
+use crate::domain::{FailureClass, FitOutcome, MetricOutcome, PrintFromMesh, ThresholdMetric};
 use crate::raster::DepthMap;
 
 /// Why a stage found no result.
@@ -57,10 +55,7 @@ impl StageError {
 impl Settings {
     /// Returns whether the fit stage reads the print. Where it does not, a changed print leaves its results valid.
     pub const fn fit_reads_print(&self) -> bool {
-        match self.pipeline.method {
-            AlignmentMethod::Default => true,
-            AlignmentMethod::Paper => false,
-        }
+        matches!(self.pipeline.method, AlignmentMethod::Default)
     }
 }
 
@@ -78,19 +73,6 @@ pub fn fit(
         AlignmentMethod::Default => fit::fit(scan, print, scanned_face_down, &settings.fit),
         AlignmentMethod::Paper => paper_method::fit::fit(scan, &settings.fit),
     }
-}
-
-/// Renders the depth map, which reads like the print. `unit` is the mesh's, where it is known.
-///
-/// # Errors
-/// When the resolution cannot be reached or no ray meets the mesh.
-pub fn depth(
-    scan: &Scan,
-    fit: &FitOutcome,
-    unit: Option<LengthUnit>,
-    settings: &Settings,
-) -> Result<DepthMap, DepthError> {
-    depth::depth(scan, fit, unit, &settings.depth)
 }
 
 /// Prepares print and depth map for registration.
@@ -155,9 +137,13 @@ impl AlignedPair {
     /// use mocban::domain::ThresholdMetric;
     /// use mocban::stages::{AlignedPair, AlignmentMethod, Print};
     ///
+    /// let vertex = pair.mesh.vertices.at(0);
     /// let (scan, print) = (pair.mesh.into(), Print::from(image));
     /// let ours = AlignedPair::new(&scan, &print, &settings)?;
-    /// assert!(ours.metric(ThresholdMetric::Relief).is_some());
+    /// let relief = ours.metric(ThresholdMetric::Relief).ok_or("no result")?;
+    /// // Print pixel of a mesh vertex, and its height over the plane in mesh units.
+    /// let [x, y, height] = ours.print_from_mesh(relief).apply(vertex);
+    /// assert!(x.is_finite() && y.is_finite() && height.is_finite());
     ///
     /// let mut paper = settings.clone();
     /// paper.pipeline.method = AlignmentMethod::Paper;
@@ -167,7 +153,7 @@ impl AlignedPair {
     /// ```
     pub fn new(scan: &Scan, print: &Print, settings: &Settings) -> Result<Self, StageError> {
         let fit = fit(scan, Some(print), None, settings)?;
-        let depth = depth(scan, &fit, None, settings)?;
+        let depth = depth::depth(scan, &fit, None, &settings.depth)?;
         let normalized = normalize(&depth, print, settings)?;
         let registered = register(&depth, &normalized, settings)?;
         Ok(Self {
@@ -189,24 +175,6 @@ impl AlignedPair {
     }
 
     /// Returns the map from mesh points to print pixels under a metric's alignment.
-    ///
-    /// # Examples
-    /// ```
-    /// # use mocban::{config, demo, raster};
-    /// # let settings = config::load(&config::Sources::default())?.config.stages;
-    /// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
-    /// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
-    /// use mocban::domain::ThresholdMetric;
-    /// use mocban::stages::{AlignedPair, Print};
-    ///
-    /// let vertex = pair.mesh.vertices.at(0);
-    /// let aligned = AlignedPair::new(&pair.mesh.into(), &Print::from(image), &settings)?;
-    /// let metric = aligned.metric(ThresholdMetric::Relief).ok_or("no result")?;
-    /// // Print pixel of a mesh vertex, and its height over the plane in mesh units.
-    /// let [x, y, height] = aligned.print_from_mesh(metric).apply(vertex);
-    /// assert!(x.is_finite() && y.is_finite() && height.is_finite());
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
     pub fn print_from_mesh(&self, metric: &MetricOutcome) -> PrintFromMesh {
         PrintFromMesh::new(
             &metric.print_from_depth,

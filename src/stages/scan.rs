@@ -9,7 +9,7 @@ use crate::mesh::Mesh;
 #[derive(Debug)]
 pub struct Scan {
     mesh: Mesh,
-    shell: OnceLock<IndexedSurface>,
+    indexed: OnceLock<IndexedSurface>,
 }
 
 impl Scan {
@@ -19,8 +19,8 @@ impl Scan {
     }
 
     /// Returns the surface, ready to be rendered along any direction.
-    pub(super) fn shell(&self) -> &IndexedSurface {
-        self.shell.get_or_init(|| IndexedSurface::new(&self.mesh))
+    pub(super) fn indexed(&self) -> &IndexedSurface {
+        self.indexed.get_or_init(|| IndexedSurface::new(&self.mesh))
     }
 }
 
@@ -28,7 +28,7 @@ impl From<Mesh> for Scan {
     fn from(mesh: Mesh) -> Self {
         Self {
             mesh,
-            shell: OnceLock::new(),
+            indexed: OnceLock::new(),
         }
     }
 }

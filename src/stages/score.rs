@@ -39,14 +39,6 @@ pub fn score_masks(print: &SsimReference, depth: &Mask) -> Scores {
     }
 }
 
-fn ratio(part: usize, whole: usize) -> f64 {
-    if whole == 0 {
-        0.0
-    } else {
-        part as f64 / whole as f64
-    }
-}
-
 /// Returns the intersection over union of two pixel boxes; 0 if either is missing.
 fn box_iou(a: Option<PixelBox>, b: Option<PixelBox>) -> f64 {
     let (Some(a), Some(b)) = (a, b) else {
@@ -55,7 +47,8 @@ fn box_iou(a: Option<PixelBox>, b: Option<PixelBox>) -> f64 {
     let along =
         |a0: usize, a1: usize, b0: usize, b1: usize| (a1.min(b1) + 1).saturating_sub(a0.max(b0));
     let both = along(a.x0, a.x1, b.x0, b.x1) * along(a.y0, a.y1, b.y0, b.y1);
-    ratio(both, a.width() * a.height() + b.width() * b.height() - both)
+    let either = a.width() * a.height() + b.width() * b.height() - both;
+    both as f64 / either as f64
 }
 
 #[cfg(test)]
@@ -76,7 +69,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn scores_do_not_care_which_mask_is_first((a, b) in masks()) {
+        fn scores_are_symmetric((a, b) in masks()) {
             let means = |mask| SsimReference::new(mask, SsimWindow::Gaussian);
             let (p, q) = (score_masks(&means(&a), &b), score_masks(&means(&b), &a));
             prop_assert!((p.ssim - q.ssim).abs() < 1e-12);
@@ -85,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mask_agrees_wholly_with_itself() {
+    fn a_mask_scores_one_against_itself() {
         let mask = Mask::from_fn(40, 40, |x, y| (10..30).contains(&x) && (5..20).contains(&y));
         let scores = score_masks(&SsimReference::new(&mask, SsimWindow::Gaussian), &mask);
         for one in [
@@ -100,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_side_by_side_share_nothing() {
+    fn adjacent_boxes_do_not_overlap() {
         let left = Mask::from_fn(10, 4, |x, _| x < 5).bounding_box();
         let right = Mask::from_fn(10, 4, |x, _| x >= 5).bounding_box();
         let three = Mask::from_fn(10, 4, |x, _| (2..5).contains(&x)).bounding_box();

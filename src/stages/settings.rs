@@ -1,6 +1,7 @@
 //! Settings of all four stages.
 
 use serde::{Deserialize, Serialize};
+use serde_json::json;
 
 use super::depth::{self, DepthParams};
 use super::fit::{self, FitParams};
@@ -77,20 +78,12 @@ impl Settings {
     /// # Ok::<(), mocban::config::ConfigError>(())
     /// ```
     pub fn fingerprint_fields(&self, stage: Stage) -> serde_json::Value {
-        let method = self.pipeline.method;
-        match stage {
-            Stage::Fit => serde_json::json!({
-                "revision": fit::REVISION, "method": method, "settings": self.fit,
-            }),
-            Stage::Depth => serde_json::json!({
-                "revision": depth::REVISION, "settings": self.depth,
-            }),
-            Stage::Normalize => serde_json::json!({
-                "revision": normalize::REVISION, "method": method, "settings": self.normalize,
-            }),
-            Stage::Register => serde_json::json!({
-                "revision": register::REVISION, "method": method, "settings": self.register,
-            }),
-        }
+        let (revision, settings) = match stage {
+            Stage::Fit => (fit::REVISION, json!(self.fit)),
+            Stage::Depth => return json!({"revision": depth::REVISION, "settings": self.depth}),
+            Stage::Normalize => (normalize::REVISION, json!(self.normalize)),
+            Stage::Register => (register::REVISION, json!(self.register)),
+        };
+        json!({"revision": revision, "method": self.pipeline.method, "settings": settings})
     }
 }

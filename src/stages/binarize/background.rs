@@ -6,8 +6,7 @@ use crate::stages::blur::gaussian_blur;
 
 /// Number of cells along the longest side: the background changes slowly.
 const CELLS: f64 = 96.0;
-/// Half the width of what counts as narrow, as a share of the longest side: wider than every stroke, and wider than
-/// most.
+/// Half widths of the closing, as shares of the longest side: wider than every stroke, and wider than most strokes.
 pub(super) const NARROW: f64 = 0.12;
 pub(super) const STROKE: f64 = 0.05;
 /// Least share of a cell that must be known for it to count.
@@ -18,7 +17,6 @@ const EMPTY: f32 = f32::NAN;
 /// Returns the brightness of the background under and around each pixel, 0..=1: the grey closed by a square of half
 /// width `narrow`, a share of the longest side.
 pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
-    let (width, height) = (grey.width(), grey.height());
     let Some(bounds) = known.bounding_box() else {
         return grey.clone();
     };
@@ -30,50 +28,35 @@ pub(super) fn level(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let sides = lengths.map(|length| (length as f64 * scale).ceil() as usize);
     let middle = [bounds.x0 + bounds.x1, bounds.y0 + bounds.y1].map(|sum| sum as f64 / 2.0);
     let shift = [0, 1].map(|k| (sides[k] - 1) as f64 / 2.0 - scale * middle[k]);
-    let weight = known.map(|k| f32::from(u8::from(*k)));
-    let pairs = grey.data().iter().zip(weight.data());
-    let present: Vec<f32> = pairs.map(|(g, w)| g * w).collect();
-    let Some(present) = Grid::from_vec(width, height, present) else {
-        return grey.clone();
-    };
-    let sums = resample(&present, scale, shift, sides);
-    let weights = resample(&weight, scale, shift, sides);
-    let cells = Grid::from_fn(sides[0], sides[1], |x, y| {
-        let weight = weights.at(x, y);
+    let weight = known.to_weights();
+    let present = grey.zip_map(&weight, |grey, weight| grey * weight);
+    let [sums, weights] = [&present, &weight].map(|of| resample(of, scale, shift, sides));
+    let mean_of_known = |sum, weight| {
         if weight > LEAST_KNOWN {
-            sums.at(x, y) / weight
+            sum / weight
         } else {
             EMPTY
         }
-    });
+    };
+    let cells = sums.zip_map(&weights, mean_of_known);
     let reach = ((narrow * longest * scale).round() as usize).max(1);
     let closed = extreme(&extreme(&cells, reach, f32::max), reach, f32::min);
-    let seen: Vec<f32> = closed
-        .data()
-        .iter()
-        .copied()
-        .filter(|v| !v.is_nan())
-        .collect();
-    let mean = seen.iter().sum::<f32>() / seen.len().max(1) as f32;
+    let known_values = || closed.data().iter().filter(|value| !value.is_nan());
+    let mean = known_values().sum::<f32>() / known_values().count().max(1) as f32;
     let filled = closed.map(|value| if value.is_nan() { 0.0 } else { value - mean });
     let smooth = gaussian_blur(&filled, reach as f64 / 3.0);
     let back = shift.map(|shift| -shift / scale);
-    resample(&smooth, 1.0 / scale, back, [width, height]).map(|value| value + mean)
+    let size = [grey.width(), grey.height()];
+    resample(&smooth, 1.0 / scale, back, size).map(|value| value + mean)
 }
 
 /// Returns the extreme value of the square around each cell; `pick` ignores cells without data.
 fn extreme(cells: &Grid<f32>, reach: usize, pick: impl Fn(f32, f32) -> f32) -> Grid<f32> {
+    // Transposes the result, so that two calls cover both axes.
     let along_rows = |cells: &Grid<f32>| {
-        let (width, height) = (cells.width(), cells.height());
-        // Transposes on the way, so that two calls cover both axes.
-        let mut turned = Grid::new(height, width, EMPTY);
-        for y in 0..height {
-            let spans = doubled(cells.row(y), reach, &pick);
-            for (x, value) in spans.into_iter().enumerate() {
-                turned.set(y, x, value);
-            }
-        }
-        turned
+        let rows = (0..cells.height()).flat_map(|y| doubled(cells.row(y), reach, &pick));
+        let extremes = Grid::from_vec(cells.width(), cells.height(), rows.collect());
+        extremes.expect("one value for each cell").transposed()
     };
     along_rows(&along_rows(cells))
 }
@@ -103,10 +86,10 @@ mod tests {
     use crate::raster::{Grid, Mask};
 
     #[test]
-    fn strokes_are_seen_past_and_stains_are_not() {
+    fn background_ignores_strokes_and_follows_stains() {
         let grey = Grid::from_fn(200, 200, |x, y| {
-            let paper = if x > 110 && y > 110 { 0.6 } else { 0.9 };
-            if x % 40 < 12 { paper - 0.4 } else { paper }
+            let sheet = if x > 110 && y > 110 { 0.6 } else { 0.9 };
+            if x % 40 < 12 { sheet - 0.4 } else { sheet }
         });
         let level = level(&grey, &Mask::new(200, 200, true), NARROW);
         assert!(

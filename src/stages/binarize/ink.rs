@@ -10,9 +10,9 @@ use crate::stages::pose::SoftMask;
 /// A pixel is white outside the cut when its darkest channel is above this share of full white.
 const WHITE: f32 = 0.965;
 /// Background darker than this can be distinguished from the white outside the cut.
-const PAPER_TELLABLE: f64 = 0.945;
-/// Least share of the image that coloured background covers; less is only the soft edge of ink on white paper.
-const LEAST_PAPER: f64 = 0.2;
+const DISTINCT_BACKGROUND: f64 = 0.945;
+/// Least share of the image that coloured background covers; less is only the soft edge of ink on a white sheet.
+const LEAST_BACKGROUND: f64 = 0.2;
 /// Least share of the image that the white outside the cut covers.
 const LEAST_WHITE: f64 = 0.004;
 /// Position between the darkest grey and the background below which a pixel is pale; least share of pale pixels among
@@ -35,12 +35,7 @@ const LEAST_PRINT_PX: usize = 16;
 pub enum BinarizeError {
     /// The image is too small.
     #[error("print of {width} x {height} px is too small, needs {LEAST_PRINT_PX} px each way")]
-    TooSmall {
-        /// Columns.
-        width: usize,
-        /// Rows.
-        height: usize,
-    },
+    TooSmall { width: usize, height: usize },
     /// The image has one grey only.
     #[error(
         "print has no ink to tell from paper: their greys differ by {contrast:.3} of full white"
@@ -67,15 +62,15 @@ pub enum BinarizeError {
 
 /// One interpretation of a print as ink and background.
 #[derive(Debug, Clone)]
-pub(in crate::stages) struct InkMask {
+pub(crate) struct InkMask {
     /// Pixels that are ink.
-    pub(in crate::stages) mask: Mask,
+    pub(crate) mask: Mask,
     /// Amount of ink, 0..=1, and where the image is ink or background at all.
-    pub(in crate::stages) soft: SoftMask,
+    pub(crate) soft: SoftMask,
     /// Grey between ink and background, 0..=1.
-    pub(in crate::stages) threshold: f64,
+    pub(crate) threshold: f64,
     /// Whether ink is lighter than the background, as in a rubbing.
-    pub(in crate::stages) light_on_dark: bool,
+    pub(crate) light_on_dark: bool,
 }
 
 fn grey_of(picture: &PrintImage) -> Result<Grid<f32>, BinarizeError> {
@@ -92,7 +87,7 @@ fn luminance(c: [u16; 3]) -> f32 {
 }
 
 /// Binarizes as the paper does: pixels darker than a fixed grey are ink, the whole image is known.
-pub(in crate::stages) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeError> {
+pub(crate) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask, BinarizeError> {
     let threshold = f64::from(grey) / 255.0;
     let grey = &grey_of(picture)?;
     let raw = grey.map(|g| f64::from(*g) < threshold);
@@ -100,7 +95,7 @@ pub(in crate::stages) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask
     require_ink(&ink, ink.data().len(), grey, threshold)?;
     Ok(InkMask {
         soft: SoftMask {
-            amount: ink.map(|set| f32::from(u8::from(*set))),
+            amount: ink.to_weights(),
             known: Mask::new(ink.width(), ink.height(), true),
         },
         mask: ink,
@@ -112,7 +107,7 @@ pub(in crate::stages) fn fixed(picture: &PrintImage, grey: u8) -> Result<InkMask
 /// Binarizes adaptively: white outside the cut is left out, the background is divided out, and Otsu's method finds the
 /// threshold. Returns one interpretation for each polarity that the image leaves possible, the likelier first, and one
 /// that ignores small stains where there may be some.
-pub(in crate::stages) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeError> {
+pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeError> {
     let grey = &grey_of(picture)?;
     let known = known(picture, grey);
     let mut values = held(grey, &known);
@@ -129,11 +124,9 @@ pub(in crate::stages) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>
     let (likelier, clear) = polarity(&even, levelled, &dark, &known);
     let of = |light_on_dark| {
         if light_on_dark {
-            let turned = evened(&grey.map(|g| 1.0 - *g), &known, NARROW);
-            let split = otsu::split(&mut held(&turned, &known));
-            read(grey, &turned, split, &known, light_on_dark)
+            binarize_narrow(grey, &grey.map(|g| 1.0 - *g), &known, NARROW, true)
         } else {
-            read(grey, &even, levelled, &known, light_on_dark)
+            binarize_even(grey, &even, levelled, &known, false)
         }
     };
     let polarities: &[bool] = if clear {
@@ -144,7 +137,8 @@ pub(in crate::stages) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>
     let mut inks: Vec<Result<InkMask, BinarizeError>> =
         polarities.iter().map(|light| of(*light)).collect();
     if polarities.contains(&false) && may_be_stained(&values, levelled) {
-        inks.push(past_stains(grey, &known));
+        // Takes what is wider than most strokes as a stain.
+        inks.push(binarize_narrow(grey, grey, &known, STROKE, false));
     }
     // If none has ink, the error of the likeliest is reported.
     if inks.iter().all(Result::is_err) {
@@ -164,15 +158,21 @@ fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
     pale as f64 > LEAST_PALE * dark as f64
 }
 
-/// Binarizes with what is wider than most strokes taken as a stain.
-fn past_stains(grey: &Grid<f32>, known: &Mask) -> Result<InkMask, BinarizeError> {
-    let even = evened(grey, known, STROKE);
+/// Binarizes `dark_ink`, the grey or its inverse: what is dark and at most twice `narrow` wide is ink.
+fn binarize_narrow(
+    grey: &Grid<f32>,
+    dark_ink: &Grid<f32>,
+    known: &Mask,
+    narrow: f64,
+    light_on_dark: bool,
+) -> Result<InkMask, BinarizeError> {
+    let even = evened(dark_ink, known, narrow);
     let split = otsu::split(&mut held(&even, known));
-    read(grey, &even, split, known, false)
+    binarize_even(grey, &even, split, known, light_on_dark)
 }
 
 /// Binarizes one polarity from the grey divided by the background.
-fn read(
+fn binarize_even(
     grey: &Grid<f32>,
     even: &Grid<f32>,
     split: Option<Split>,
@@ -180,14 +180,11 @@ fn read(
     light_on_dark: bool,
 ) -> Result<InkMask, BinarizeError> {
     let split = split.ok_or(BinarizeError::NoContrast { contrast: 0.0 })?;
-    let raw = Mask::from_fn(grey.width(), grey.height(), |x, y| {
-        known.at(x, y) && f64::from(even.at(x, y)) < split.threshold
+    let raw = even.zip_map(known, |even, known| {
+        known && f64::from(even) < split.threshold
     });
     let area = known.count();
-    let ink = remove_specks(&raw, area);
-    let ink = Mask::from_fn(ink.width(), ink.height(), |x, y| {
-        ink.at(x, y) && known.at(x, y)
-    });
+    let ink = remove_specks(&raw, area).zip_map(known, |ink, known| ink && known);
     require_ink(&ink, area, grey, split.threshold)?;
     Ok(InkMask {
         soft: SoftMask {
@@ -200,6 +197,7 @@ fn read(
     })
 }
 
+/// Returns the values of the known pixels.
 fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
     let pairs = grey.data().iter().zip(known.data());
     pairs.filter(|(_, k)| **k).map(|(g, _)| *g).collect()
@@ -208,10 +206,9 @@ fn held(grey: &Grid<f32>, known: &Mask) -> Vec<f32> {
 /// Returns where the image is ink or background: everything but the white at the border, unless the background is as
 /// white.
 fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
-    let white = picture.rgb.map(|c| {
-        let darkest = c[0].min(c[1]).min(c[2]);
-        f32::from(darkest) / 65_535.0 > WHITE
-    });
+    let white = picture
+        .rgb
+        .map(|[r, g, b]| f32::from(*r.min(g).min(b)) / 65_535.0 > WHITE);
     let beyond = ConnectedComponents::label(&white).touching_border();
     let all = Mask::new(grey.width(), grey.height(), true);
     if beyond.density() < LEAST_WHITE {
@@ -223,12 +220,10 @@ fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
     let Some(split) = otsu::split(&mut values) else {
         return all;
     };
-    let paper = values
-        .iter()
-        .filter(|v| f64::from(**v) > split.threshold)
-        .count();
-    let enough = paper as f64 >= LEAST_PAPER * all.data().len() as f64;
-    if enough && split.high < PAPER_TELLABLE {
+    let is_light = |value: &&f32| f64::from(**value) > split.threshold;
+    let background = values.iter().filter(is_light).count() as f64;
+    let is_enough = background >= LEAST_BACKGROUND * all.data().len() as f64;
+    if is_enough && split.high < DISTINCT_BACKGROUND {
         inside
     } else {
         all
@@ -238,22 +233,18 @@ fn known(picture: &PrintImage, grey: &Grid<f32>) -> Mask {
 /// Divides the grey by the background.
 fn evened(grey: &Grid<f32>, known: &Mask, narrow: f64) -> Grid<f32> {
     let level = background::level(grey, known, narrow);
-    Grid::from_fn(grey.width(), grey.height(), |x, y| {
-        (grey.at(x, y) / level.at(x, y).max(0.01)).min(1.5)
-    })
+    grey.zip_map(&level, |grey, level| (grey / level.max(0.01)).min(1.5))
 }
 
-/// Returns 0 at the background and 1 at ink, by the medians of the classes; 0 away from the cleaned mask and its rim.
+/// Returns the amount of ink, from 0 at the median of the background to 1 at the median of the ink; 0 away from the
+/// cleaned mask and its rim.
 fn amount(even: &Grid<f32>, ink: &Mask, split: Split) -> Grid<f32> {
-    let near = ink.dilate();
     let span = (split.high - split.low).max(1e-6);
-    Grid::from_fn(even.width(), even.height(), |x, y| {
-        if near.at(x, y) {
-            ((split.high - f64::from(even.at(x, y))) / span).clamp(0.0, 1.0) as f32
-        } else {
-            0.0
-        }
-    })
+    let share = |even: f32| ((split.high - f64::from(even)) / span).clamp(0.0, 1.0) as f32;
+    even.zip_map(
+        &ink.dilate(),
+        |even, is_near| if is_near { share(even) } else { 0.0 },
+    )
 }
 
 fn require_ink(
@@ -313,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn border_lines_do_not_turn_the_print_over() {
+    fn border_lines_do_not_invert_the_polarity() {
         let framed = picture(|x, y| {
             let at_rim = !(4..56).contains(&x) || y < 3;
             if cross(x, y) || (at_rim && (x + y) % 9 != 0) {
@@ -326,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn one_reading_sees_past_a_stain() {
+    fn one_interpretation_ignores_a_stain() {
         let near = |at: usize, middle: i64| (at as i64 - middle).abs() < 6;
         let thin = |x, y| near(x, 100) || near(y, 90);
         let stain = |x: usize, y: usize| (x as f64 - 130.0).hypot(y as f64 - 120.0) < 22.0;
@@ -356,7 +347,7 @@ mod tests {
     }
 
     #[test]
-    fn white_beyond_the_cut_is_unknown() {
+    fn white_outside_the_cut_is_unknown() {
         let cut = picture(|x, y| match (x + y < 30, cross(x, y)) {
             (true, _) => 255,
             (_, true) => 50,

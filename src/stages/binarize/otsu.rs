@@ -2,23 +2,23 @@
 
 /// Two classes of values and the threshold between them.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stages) struct Split {
+pub(crate) struct Split {
     /// Middle of the classes' nearest members.
-    pub(in crate::stages) threshold: f64,
+    pub(crate) threshold: f64,
     /// Median of the lower class.
-    pub(in crate::stages) low: f64,
+    pub(crate) low: f64,
     /// Median of the upper class.
-    pub(in crate::stages) high: f64,
+    pub(crate) high: f64,
 }
 
 /// Splits values where the variance between the classes is largest; `None` for fewer than two values. Sorts the values.
-pub(in crate::stages) fn split(values: &mut [f32]) -> Option<Split> {
+pub(crate) fn split(values: &mut [f32]) -> Option<Split> {
     sort(values);
     split_sorted(values)
 }
 
 /// Splits values without the lowest and the highest one in `one_in` of them. Sorts the values.
-pub(in crate::stages) fn split_inner(values: &mut [f32], one_in: usize) -> Option<Split> {
+pub(crate) fn split_inner(values: &mut [f32], one_in: usize) -> Option<Split> {
     sort(values);
     let cut = values.len() / one_in;
     split_sorted(&values[cut..values.len() - cut])
@@ -60,37 +60,27 @@ fn sort(values: &mut [f32]) {
         return;
     }
     let mut keys: Vec<u32> = values.iter().map(|v| key(*v)).collect();
-    let mut counts = vec![[0_u32; DIGIT_VALUES]; DIGITS.len()];
-    for key in &keys {
-        for (counts, shift) in counts.iter_mut().zip(DIGITS) {
-            counts[digit(*key, shift)] += 1;
-        }
-    }
     let mut sorted = vec![0; keys.len()];
-    for (counts, shift) in counts.iter().zip(DIGITS) {
-        by_digit(&keys, &mut sorted, counts, shift);
+    for shift in DIGITS {
+        let digit = |key: u32| (key >> shift) as usize % DIGIT_VALUES;
+        // Counts of the digit's values, then the place of the next key with each value.
+        let mut places = [0_u32; DIGIT_VALUES];
+        for key in &keys {
+            places[digit(*key)] += 1;
+        }
+        let mut next = 0;
+        for place in &mut places {
+            next += std::mem::replace(place, next);
+        }
+        for key in &keys {
+            let place = &mut places[digit(*key)];
+            sorted[*place as usize] = *key;
+            *place += 1;
+        }
         std::mem::swap(&mut keys, &mut sorted);
     }
     for (value, key) in values.iter_mut().zip(keys) {
         *value = of_key(key);
-    }
-}
-
-const fn digit(key: u32, shift: u32) -> usize {
-    (key >> shift) as usize % DIGIT_VALUES
-}
-
-/// Sorts keys by one digit, stably. `counts` holds how often each digit value occurs.
-fn by_digit(keys: &[u32], sorted: &mut [u32], counts: &[u32; DIGIT_VALUES], shift: u32) {
-    let mut places = *counts;
-    let mut next = 0;
-    for place in &mut places {
-        next += std::mem::replace(place, next);
-    }
-    for key in keys {
-        let place = &mut places[digit(*key, shift)];
-        sorted[*place as usize] = *key;
-        *place += 1;
     }
 }
 
@@ -115,7 +105,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20))]
         #[test]
-        fn sorts_as_the_library_does(
+        fn sorts_like_the_standard_library(
             mut values in prop::collection::vec(any::<f32>(), DIGIT_VALUES..DIGIT_VALUES + 500),
         ) {
             let mut wanted = values.clone();
@@ -127,17 +117,17 @@ mod tests {
     }
 
     #[test]
-    fn two_heaps_part_between_them() {
+    fn threshold_lies_between_two_clusters() {
         let mut values: Vec<f32> = (0..30).map(|i| i as f32 * 0.1).collect();
         values.extend((0..90).map(|i| 10.0 + i as f32 * 0.01));
-        let parted = split(&mut values).expect("two heaps");
+        let parted = split(&mut values).expect("two clusters");
         assert!((2.9..10.0).contains(&parted.threshold));
         assert!((parted.low - 1.5).abs() < 0.1 && (parted.high - 10.45).abs() < 0.1);
         assert!(split(&mut [1.0]).is_none());
     }
 
     #[test]
-    fn farthest_values_can_be_left_out() {
+    fn extreme_values_can_be_left_out() {
         let mut values: Vec<f32> = (0..100).map(|i| if i < 60 { 1.0 } else { 2.0 }).collect();
         values[0] = -5000.0;
         values[99] = 9000.0;

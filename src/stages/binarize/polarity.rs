@@ -18,19 +18,19 @@ pub(super) fn polarity(
     dark: &Mask,
     known: &Mask,
 ) -> (bool, bool) {
-    let plain = paper_darkness(dark, known);
+    let plain = background_darkness(dark, known);
     let levelled = levelled.map_or(plain, |split| {
-        paper_darkness(&even.map(|g| f64::from(*g) < split.threshold), known)
+        background_darkness(&even.map(|g| f64::from(*g) < split.threshold), known)
     });
     let sum = plain + levelled;
     let clear = if sum > 0.0 { CLEAR_LIGHT } else { CLEAR };
     (sum > 0.0, plain * levelled > 0.0 && sum.abs() > clear)
 }
 
-/// Returns the evidence that the dark class is the background; negative for ink. Ink is the smaller class, and
+/// Returns the evidence that the dark class is the background; negative for ink. Ink is usually the smaller class, and
 /// background reaches the rim. Heavy ink breaks the first rule and border lines the second, so both count, the first
 /// twice.
-fn paper_darkness(dark: &Mask, known: &Mask) -> f64 {
+fn background_darkness(dark: &Mask, known: &Mask) -> f64 {
     let of_known = known.count().max(1) as f64;
     let pairs = dark.data().iter().zip(known.data());
     let share = pairs.filter(|(d, k)| **d && **k).count() as f64 / of_known;
@@ -74,7 +74,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn the_rim_is_what_has_something_unknown_at_its_reach(
+        fn rim_pixels_have_an_unknown_pixel_within_reach(
             [width, height] in [1_usize..60, 1_usize..60],
             cut in 0_usize..50,
             seed in 1_u64..99,

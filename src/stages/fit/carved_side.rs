@@ -65,7 +65,7 @@ const PRINTS: f32 = 0.7;
 const BASE_PX: usize = 72;
 
 /// Surface and measurements of one side.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub(super) struct FittedSide {
     pub(super) plane_from_mesh: Rigid3,
     pub(super) bow: Option<Bow>,
@@ -73,53 +73,47 @@ pub(super) struct FittedSide {
     pub(super) relief: f64,
     pub(super) extent: f64,
     pub(super) surface: Surface,
-    /// Width of the layer of heights at the tops, as a share of the relief.
-    pub(super) layer_width: f64,
-    /// Nearness to the tops seen from outside, so in mirror writing.
-    pub(super) tops: SoftMask,
+    pub(super) samples: HeightSamples,
 }
 
 /// Further evidence for the side.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SideInputs<'a> {
-    pub(super) shell: &'a IndexedSurface,
+    pub(super) indexed: &'a IndexedSurface,
     pub(super) print: Option<&'a Print>,
     pub(super) scanned_face_down: Option<bool>,
 }
 
 /// Returns the carved one of two sides with the evidence for it; `None` when neither shows a surface.
 pub(super) fn choose(
-    faces: [Option<FittedSide>; 2],
+    sides: [Option<FittedSide>; 2],
     inputs: SideInputs<'_>,
 ) -> Option<(FittedSide, SideEvidence)> {
-    let (first, second) = match faces {
-        [Some(a), Some(b)] => (a, b),
+    let winding = |side: &FittedSide| inputs.indexed.upward_facing_share(&side.plane_from_mesh);
+    let (side, confidence, winding) = match sides {
+        [Some(first), Some(second)] => {
+            let winding = winding(&first);
+            let odds = log_odds(&first, &second, winding, inputs);
+            let confidence = (odds.abs() / 2.0).tanh();
+            // Faces that point outward on one side point inward on the other.
+            if odds >= 0.0 {
+                (first, confidence, winding)
+            } else {
+                (second, confidence, winding.map(|out| 1.0 - out))
+            }
+        }
         [Some(only), None] | [None, Some(only)] => {
-            let winding = inputs.shell.upward_facing_share(&only.plane_from_mesh);
-            let evidence = evidence(&only, 1.0, winding);
-            return Some((only, evidence));
+            let winding = winding(&only);
+            (only, 1.0, winding)
         }
         [None, None] => return None,
     };
-    let winding = inputs.shell.upward_facing_share(&first.plane_from_mesh);
-    let odds = log_odds(&first, &second, winding, inputs);
-    let confidence = (odds.abs() / 2.0).tanh();
-    // Faces that point outward on one side point inward on the other.
-    let (face, winding) = if odds >= 0.0 {
-        (first, winding)
-    } else {
-        (second, winding.map(|out| 1.0 - out))
-    };
-    let evidence = evidence(&face, confidence, winding);
-    Some((face, evidence))
-}
-
-fn evidence(face: &FittedSide, confidence: f64, winding: Option<f64>) -> SideEvidence {
-    SideEvidence {
+    let evidence = SideEvidence {
         winding,
-        flatness: face.surface.tops,
+        flatness: side.surface.tops,
         confidence,
-    }
+    };
+    Some((side, evidence))
 }
 
 /// Returns the log-odds that the first side is the carved one.
@@ -136,14 +130,12 @@ fn log_odds(
         return 10.0;
     }
     let winding = winding.map_or(0.0, |out| 2.0 * out - 1.0);
-    let sharpness = (second.layer_width / first.layer_width)
-        .ln()
-        .clamp(-1.5, 1.5);
+    let sharpness = (layer_width(second) / layer_width(first)).ln();
     let up = first.plane_from_mesh.0[2][2];
     let manifest = inputs
         .scanned_face_down
         .map_or(0.0, |down| if down { -up } else { up });
-    let unseen = WINDING * winding + SHARPNESS * sharpness + MANIFEST * manifest;
+    let unseen = WINDING * winding + SHARPNESS * sharpness.clamp(-1.5, 1.5) + MANIFEST * manifest;
     let agreement = inputs.print.map_or(0.0, |print| {
         if unseen >= 0.0 {
             agreement(first, second, print)
@@ -164,8 +156,10 @@ fn agreement(likelier: &FittedSide, other: &FittedSide, print: &Print) -> f64 {
         .iter()
         .filter_map(|ink| ImagePyramid::new(&ink.soft, BASE_PX))
         .collect();
-    let score = |face: &FittedSide| {
-        let scores = inks.iter().map(|ink| best_score(ink, &face.tops));
+    let score = |side: &FittedSide| {
+        // Seen from outside, so in mirror writing.
+        let tops = side.samples.soft_tops(&side.surface, side.relief);
+        let scores = inks.iter().map(|ink| best_score(ink, &tops));
         scores.fold(LEAST_AGREEMENT, f64::max)
     };
     let first = score(likelier);
@@ -193,15 +187,12 @@ fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
 
 /// Returns the width of the layer of heights at the tops: the interquartile range of the upper part of the relief, as a
 /// share of the relief.
-pub(super) fn layer_width(samples: &HeightSamples, surface: &Surface, relief: f64) -> f64 {
-    let mut upper: Vec<f64> = samples
-        .residuals(surface)
-        .into_iter()
-        .filter(|r| *r > -0.4 * relief)
-        .collect();
+fn layer_width(side: &FittedSide) -> f64 {
+    let mut upper = side.samples.residuals(&side.surface);
+    upper.retain(|r| *r > -0.4 * side.relief);
     if upper.len() < 8 {
         return 1.0;
     }
     let (low, high) = (quantile(&mut upper, 0.25), quantile(&mut upper, 0.75));
-    ((high - low) / relief.max(f64::MIN_POSITIVE)).max(0.005)
+    ((high - low) / side.relief.max(f64::MIN_POSITIVE)).max(0.005)
 }

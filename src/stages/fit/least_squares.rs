@@ -61,9 +61,8 @@ impl Points {
         residuals
     }
 
-    /// Solves the weighted least squares for the first `TERMS` (3 or 6) coefficients. `weight` gives the weight of a
-    /// point by
-    /// its height over the surface `from`.
+    /// Solves the weighted least squares for the first `TERMS` (3 or 6) coefficients. `weight` returns the weight of a
+    /// point, given its height over the surface `from`.
     pub(super) fn solve<const TERMS: usize>(
         &self,
         from: &Coefficients,
@@ -72,21 +71,18 @@ impl Points {
     ) -> Coefficients {
         let (blocks, whole) = (&self.blocks, self.count / LANES);
         // Local sums and copied points: possible aliasing would prevent vectorization.
-        let mut sums = dispatch(
-            #[inline(always)]
-            || {
-                let mut sums = MomentSums::default();
-                for block in &blocks[..whole] {
-                    let block = *block;
-                    let mut weights = over::<TERMS>(&block, from);
-                    for over in &mut weights {
-                        *over = weight(*over);
-                    }
-                    sums.add::<TERMS>(&block, weights);
+        let mut sums = dispatch!({
+            let mut sums = MomentSums::default();
+            for block in &blocks[..whole] {
+                let block = *block;
+                let mut weights = over::<TERMS>(&block, from);
+                for over in &mut weights {
+                    *over = weight(*over);
                 }
-                sums
-            },
-        );
+                sums.add::<TERMS>(&block, weights);
+            }
+            sums
+        });
         if let Some(block) = self.blocks.get(whole) {
             let mut weights = over::<TERMS>(block, from).map(&weight);
             weights[self.count % LANES..].fill(0.0);
@@ -153,37 +149,19 @@ impl MomentSums {
                 }
             }
         };
-        // Each degree from the one before: all times u, then the last one times v.
-        let (one, first) = (weights, [times(&weights, u), times(&weights, v)]);
-        let second = [
-            times(&first[0], u),
-            times(&first[1], u),
-            times(&first[1], v),
-        ];
-        put(0, &one);
-        put(1, &first[0]);
-        put(2, &first[1]);
-        for (k, product) in second.iter().enumerate() {
-            put(3 + k, product);
-        }
-        if TERMS < SECOND {
-            return;
-        }
-        let [uu, uv, vv] = second;
-        let third = [times(&uu, u), times(&uv, u), times(&vv, u), times(&vv, v)];
-        for (k, product) in third.iter().enumerate() {
-            put(6 + k, product);
-        }
-        let [uuu, uuv, uvv, vvv] = third;
-        let fourth = [
-            times(&uuu, u),
-            times(&uuv, u),
-            times(&uvv, u),
-            times(&vvv, u),
-            times(&vvv, v),
-        ];
-        for (k, product) in fourth.iter().enumerate() {
-            put(10 + k, product);
+        let degrees = if TERMS < SECOND { 2 } else { 4 };
+        let mut products = [weights; 6];
+        let mut place = 0;
+        for degree in 0..=degrees {
+            for product in &products[..=degree] {
+                put(place, product);
+                place += 1;
+            }
+            // The next degree: the last product times v, and all times u.
+            products[degree + 1] = times(&products[degree], v);
+            for product in &mut products[..=degree] {
+                *product = times(product, u);
+            }
         }
     }
 
@@ -249,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_weigh_nothing_count_for_nothing() {
+    fn points_of_weight_zero_have_no_effect() {
         let plane = [0.3, -0.1, 0.2, 0.0, 0.0, 0.0];
         let spiked = |at: [f64; 2]| value(&plane, at) + if at[0] > 0.3 { 5.0 } else { 0.0 };
         let weight = |r: f64| f64::from(u8::from(r < 1.0));
@@ -260,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_belief_holds_where_points_say_nothing() {
+    fn a_prior_decides_where_points_do_not() {
         let mut points = Points::default();
         (0..20).for_each(|k| points.push([f64::from(k) / 20.0, 0.0, 1.0]));
         let mut priors = OPEN;

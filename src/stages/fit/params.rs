@@ -70,12 +70,8 @@ impl FitError {
     /// Returns what the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
         match self {
-            Self::TooFewPoints(_)
-            | Self::OnePoint(_)
-            | Self::OneLine(_)
-            | Self::NoFaces(_)
-            | Self::NoSurface(_) => FailureClass::BadInput,
             Self::NoRelief { .. } | Self::TooFewInliers { .. } => FailureClass::NoSolution,
+            _ => FailureClass::BadInput,
         }
     }
 }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 use super::params::FitError;
 use crate::domain::Rigid3;
 use crate::mesh::Mesh;
-use crate::stages::robust_bounds::{Bounds, holds};
+use crate::stages::robust_bounds::is_in_box;
 use crate::stages::zbuffer::{IndexedSurface, Moments};
 
 /// Least number of points of a surface without faces: 25 along a side show one or two strokes.
@@ -13,17 +13,15 @@ const LEAST_POINTS: usize = 600;
 
 /// Centre and principal axes, longest first, with the variance along each.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::stages) struct Axes {
-    pub(in crate::stages) centre: Vector3<f64>,
-    pub(in crate::stages) directions: [Vector3<f64>; 3],
-    pub(in crate::stages) variances: [f64; 3],
+pub(crate) struct Axes {
+    pub(crate) centre: Vector3<f64>,
+    pub(crate) directions: [Vector3<f64>; 3],
+    pub(crate) variances: [f64; 3],
 }
 
 impl Axes {
     /// Computes the axes of weighted points.
-    pub(in crate::stages) fn of_points(
-        points: impl Iterator<Item = ([f64; 3], f64)> + Clone,
-    ) -> Self {
+    pub(crate) fn of_points(points: impl Iterator<Item = ([f64; 3], f64)> + Clone) -> Self {
         let mut total = 0.0;
         let mut sum = Vector3::zeros();
         for (p, w) in points.clone() {
@@ -41,12 +39,11 @@ impl Axes {
 
     /// Computes the axes of a surface by area, or of the vertices where there is no area. Specks far from the bulk are
     /// left out.
-    pub(in crate::stages) fn of_surface(mesh: &Mesh, shell: &IndexedSurface) -> Self {
-        if let Some(moments) = Moments::of(shell) {
+    pub(crate) fn of_surface(mesh: &Mesh, indexed: &IndexedSurface) -> Self {
+        if let Some(moments) = Moments::of(indexed) {
             return Self::from_moments(moments.centre, moments.covariance);
         }
-        let bounds: Bounds<3> = shell.bulk_bounds();
-        let kept = mesh.vertices.iter().filter(|v| holds(&bounds, v));
+        let kept = mesh.vertices.iter().filter(|v| is_in_box(&indexed.bulk, v));
         Self::of_points(kept.map(|v| (v, 1.0)))
     }
 
@@ -62,7 +59,7 @@ impl Axes {
     }
 
     /// Returns an error for points that span no surface.
-    pub(in crate::stages) fn require_surface(&self, mesh: &Mesh) -> Result<(), FitError> {
+    pub(crate) fn require_surface(&self, mesh: &Mesh) -> Result<(), FitError> {
         let count = mesh.vertices.len();
         let scale = self.centre.norm_squared().max(1e-300);
         let [first, second, _] = self.variances;
@@ -79,14 +76,14 @@ impl Axes {
     }
 
     /// Returns the normal of the plane through the centre with the least variance.
-    pub(in crate::stages) fn normal(&self) -> Vector3<f64> {
+    pub(crate) fn normal(&self) -> Vector3<f64> {
         self.directions[2]
     }
 }
 
 /// Returns a right-handed plane frame with this normal whose x axis is as close as possible to the mesh's x, so that an
 /// upright scan stays upright; to the mesh's y where the normal runs along x.
-pub(in crate::stages) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
+pub(crate) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Rigid3 {
     let along = if normal.normalize().x.abs() < 0.9 {
         Vector3::x()
     } else {
@@ -96,7 +93,7 @@ pub(in crate::stages) fn frame(normal: Vector3<f64>, origin: Vector3<f64>) -> Ri
 }
 
 /// Returns a right-handed plane frame with this normal whose x axis is as close as possible to `along`.
-pub(in crate::stages) fn frame_along(
+pub(crate) fn frame_along(
     normal: Vector3<f64>,
     along: Vector3<f64>,
     origin: Vector3<f64>,
@@ -116,7 +113,7 @@ mod tests {
     use crate::stages::zbuffer::IndexedSurface;
 
     #[test]
-    fn repeated_vertices_and_split_faces_change_nothing() {
+    fn axes_do_not_depend_on_shared_vertices() {
         let corners = vec![
             [0.0, 0.0, 0.0],
             [4.0, 0.0, 0.0],
@@ -127,8 +124,7 @@ mod tests {
             vertices: corners.clone().into(),
             triangles: vec![[0, 1, 2], [0, 2, 3]].into(),
         };
-        let mut vertices: Vec<[f64; 3]> = [0, 1, 2, 0, 2, 3].iter().map(|i| corners[*i]).collect();
-        vertices.extend([[9.0, 9.0, 9.0]; 0]);
+        let vertices: Vec<[f64; 3]> = [0, 1, 2, 0, 2, 3].iter().map(|i| corners[*i]).collect();
         let soup = Mesh {
             vertices: vertices.into(),
             triangles: vec![[0, 1, 2], [3, 4, 5]].into(),

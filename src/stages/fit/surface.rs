@@ -20,7 +20,7 @@ const WINDOWS: [f64; 5] = [0.35, 0.22, 0.14, 0.10, 0.08];
 const ENVELOPE_PASSES: usize = 8;
 const NARROW_PASSES: usize = 2;
 /// Number of wide windows, for which a quarter of the points is enough.
-const AFAR: usize = 3;
+const WIDE_WINDOWS: usize = 3;
 /// Tops this close to the cut of the mesh, in pixels of the rendering, belong to neighbours.
 const CUT_PX: i64 = 2;
 /// Weight of a point that is not on a top of the character.
@@ -64,13 +64,14 @@ pub(super) struct HeightSamples {
     size: [usize; 2],
     centre: [f64; 2],
     extent: f64,
+    /// Range of heights over the mean plane without the extreme 3 % at either end.
     range: f64,
 }
 
 /// A surface `z = c0 + c1 u + c2 v + c3 u^2 + c4 u v + c5 v^2` in scaled units, and how well it fits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Surface {
-    coefficients: Coefficients,
+    pub(super) coefficients: Coefficients,
     /// Share of the visible area that supports it, minus a penalty for what lies above it.
     pub(super) support: f64,
     /// Share of the visible area within the last window.
@@ -83,23 +84,17 @@ impl HeightSamples {
     /// Collects the visible pixels of a rendering; `None` when fewer than 16 are visible.
     pub(super) fn new(heights: &Grid<f32>, view: &Viewport) -> Option<Self> {
         let back = view.px_from_plane.inverse()?;
-        let extent = view.unit_per_px * heights.width().max(heights.height()) as f64;
-        let centre = back.apply([
-            (heights.width() - 1) as f64 / 2.0,
-            (heights.height() - 1) as f64 / 2.0,
-        ]);
         let size = [heights.width(), heights.height()];
+        let extent = view.unit_per_px * size[0].max(size[1]) as f64;
+        let centre = back.apply(size.map(|side| (side - 1) as f64 / 2.0));
         let (mut points, mut places) = (Points::default(), Vec::new());
         for y in 0..size[1] {
             for (x, z) in heights.row(y).iter().enumerate() {
                 if *z != NO_HIT {
                     let [u, v] = back.apply([x as f64, y as f64]);
                     places.push(y * size[0] + x);
-                    points.push([
-                        (u - centre[0]) / extent,
-                        (v - centre[1]) / extent,
-                        f64::from(*z) / extent,
-                    ]);
+                    let offset = [u - centre[0], v - centre[1], f64::from(*z)];
+                    points.push(offset.map(|length| length / extent));
                 }
             }
         }
@@ -120,8 +115,10 @@ impl HeightSamples {
             }
         }
         let mean_plane = points.solve::<3>(&[0.0; 6], |_| 1.0, &OPEN);
+        let mut residuals = points.residuals(&mean_plane);
+        let mut bound = |share| quantile(&mut residuals, share);
         Self {
-            range: height_range(points.residuals(&mean_plane)),
+            range: (bound(0.97) - bound(0.03)).max(1e-9),
             points,
             few,
             mean_plane,
@@ -135,43 +132,35 @@ impl HeightSamples {
     /// Transforms the points to another frame with a small rotation from this one.
     pub(super) fn turned(&self, other_from_this: &Rigid3) -> Self {
         let at = |[u, v, z]: [f64; 3]| {
-            let [x, y] = [
-                self.centre[0] + u * self.extent,
-                self.centre[1] + v * self.extent,
-            ];
-            other_from_this.apply([x, y, z * self.extent])
+            let [u, v, z] = [u, v, z].map(|share| share * self.extent);
+            other_from_this.apply([self.centre[0] + u, self.centre[1] + v, z])
         };
         let [x, y, _] = at([0.0; 3]);
         let mut points = Points::default();
         for point in self.points.iter() {
-            let there = at(point);
-            points.push([
-                (there[0] - x) / self.extent,
-                (there[1] - y) / self.extent,
-                there[2] / self.extent,
-            ]);
+            let [u, v, z] = at(point);
+            points.push([u - x, v - y, z].map(|length| length / self.extent));
         }
         Self::of(points, self.places.clone(), self.size, [x, y], self.extent)
     }
 
     /// Fits the surface over the tops; second-degree only when allowed and when it fits better.
     pub(super) fn fit(&self, allow_bow: bool) -> Surface {
-        let ground = self.mean_plane;
         let envelope = |r: f64| if r > 0.0 { ENVELOPE } else { 1.0 - ENVELOPE };
-        let priors = self.priors(ground, BOW_SIGMA);
-        let (few, few_beliefs) = self.seen_from_afar(&priors);
-        let mut start = ground;
+        let priors = self.priors(self.mean_plane, BOW_SIGMA);
+        let few_priors = self.priors_of_few(&priors);
+        let mut start = self.mean_plane;
         for _ in 0..ENVELOPE_PASSES {
-            start = few.solve::<3>(&start, envelope, &few_beliefs);
+            start = self.few.solve::<3>(&start, envelope, &few_priors);
         }
         let plane = self.narrow::<3>(start, &priors);
         if !allow_bow {
             return plane;
         }
         let free = self.narrow::<6>(start, &priors);
-        let sparse = free.support < SPARSE;
-        let along = sparse.then(|| self.beliefs_along_ground()).flatten();
-        let bent = along
+        let is_sparse = free.support < SPARSE;
+        let along_ground = is_sparse.then(|| self.priors_along_ground()).flatten();
+        let bent = along_ground
             .map(|priors| self.narrow::<6>(start, &priors))
             .filter(|along| along.support > free.support)
             .unwrap_or(free);
@@ -184,13 +173,13 @@ impl HeightSamples {
 
     /// Refines a surface with a shrinking window below it.
     fn narrow<const TERMS: usize>(&self, start: Coefficients, priors: &[Prior; 6]) -> Surface {
-        let few = self.seen_from_afar(priors);
+        let few_priors = self.priors_of_few(priors);
         let mut c = start;
         for (k, window) in WINDOWS.map(|w| w * self.range).into_iter().enumerate() {
             let weight = |r| one_sided_weight(r, window);
             for _ in 0..NARROW_PASSES {
-                c = if k < AFAR {
-                    few.0.solve::<TERMS>(&c, weight, &few.1)
+                c = if k < WIDE_WINDOWS {
+                    self.few.solve::<TERMS>(&c, weight, &few_priors)
                 } else {
                     self.points.solve::<TERMS>(&c, weight, priors)
                 };
@@ -199,14 +188,13 @@ impl HeightSamples {
         self.judge(c)
     }
 
-    /// Returns the subsampled points with priors of the same relative weight.
-    fn seen_from_afar(&self, priors: &[Prior; 6]) -> (&Points, [Prior; 6]) {
+    /// Returns priors of the same weight relative to the subsampled points as the given ones to all points.
+    fn priors_of_few(&self, priors: &[Prior; 6]) -> [Prior; 6] {
         let share = self.few.len() as f64 / self.points.len() as f64;
-        let lighter = |prior: Prior| Prior {
+        priors.map(|prior| Prior {
             precision: prior.precision * share,
             ..prior
-        };
-        (&self.few, priors.map(lighter))
+        })
     }
 
     /// Measures how well a surface fits at the narrowest window.
@@ -227,17 +215,12 @@ impl HeightSamples {
             coefficients,
             support: support / n,
             tops: tops / n,
-            rms: if tops > 0.0 {
-                (squares / tops).sqrt() * self.extent
-            } else {
-                0.0
-            },
+            rms: (squares / tops.max(1.0)).sqrt() * self.extent,
         }
     }
 
-    /// Returns priors for the coefficients, which decide where the tops say little: tilt and bend of `mean`, the
-    /// second degree
-    /// within `bow_sigma`.
+    /// Returns priors for the coefficients, which decide where few tops are visible: tilt and bend of `mean`, the second
+    /// degree within `bow_sigma`.
     fn priors(&self, mean: Coefficients, bow_sigma: f64) -> [Prior; 6] {
         let noise = CORRELATED_PX * (TOP_SIGMA * self.range).powi(2);
         std::array::from_fn(|k| {
@@ -252,7 +235,7 @@ impl HeightSamples {
 
     /// Returns priors from the ground where enough of it is visible: a block bends as a whole, so the tops bend as the
     /// ground does. Without them few strokes would leave the bend undetermined.
-    fn beliefs_along_ground(&self) -> Option<[Prior; 6]> {
+    fn priors_along_ground(&self) -> Option<[Prior; 6]> {
         let [a, b, c, ..] = self.mean_plane;
         let [_, _, _, p, q, r] = self.ground()?;
         Some(self.priors([a, b, c, p, q, r], GROUND_BOW_SIGMA))
@@ -293,8 +276,8 @@ impl HeightSamples {
             (cut..side - cut).contains(&i)
         };
         let residuals = self.residuals(surface);
-        let seen = residuals.iter().zip(&self.places);
-        let inner: Vec<f64> = seen
+        let pixels = residuals.iter().zip(&self.places);
+        let inner: Vec<f64> = pixels
             .filter(|(_, place)| inside(*place % width, width) && inside(*place / width, height))
             .map(|(residual, _)| *residual)
             .collect();
@@ -323,9 +306,7 @@ impl HeightSamples {
     pub(super) fn plane_of_tops(&self, surface: &Surface) -> [f64; 3] {
         let c = surface.coefficients;
         let is_bent = c[3..].iter().any(|c| *c != 0.0);
-        let plane = if is_bent { self.plane_in(&c) } else { c };
-        let (b, c) = (plane[1], plane[2]);
-        let a = plane[0] * self.extent - b * self.centre[0] - c * self.centre[1];
+        let [a, b, c, ..] = self.in_plane_units(if is_bent { self.plane_in(&c) } else { c });
         [a, b, c]
     }
 
@@ -350,16 +331,14 @@ impl HeightSamples {
     fn own_tops(&self, c: &Coefficients) -> Mask {
         let window = WINDOWS[WINDOWS.len() - 1] * self.range;
         let [width, height] = self.size;
-        let (mut tops, mut unknown) = (
-            Mask::new(width, height, false),
-            Mask::new(width, height, true),
-        );
+        let mut tops = Mask::new(width, height, false);
+        let mut unknown = Mask::new(width, height, true);
         for (r, place) in self.points.residuals(c).into_iter().zip(&self.places) {
             tops.data_mut()[*place] = r.abs() < window;
             unknown.data_mut()[*place] = false;
         }
         let cut_off = ConnectedComponents::label(&tops).touching(&unknown, CUT_PX);
-        let own = Mask::from_fn(width, height, |x, y| tops.at(x, y) && !cut_off.at(x, y));
+        let own = tops.zip_map(&cut_off, |top, cut_off| top && !cut_off);
         if own.count() as f64 >= LEAST_OWN * tops.count() as f64 {
             own
         } else {
@@ -367,9 +346,8 @@ impl HeightSamples {
         }
     }
 
-    /// Returns the surface in plane coordinates and mesh units: coefficients of 1, x, y, x^2, xy, y^2.
-    pub(super) fn in_plane_units(&self, surface: &Surface) -> [f64; 6] {
-        let c = surface.coefficients;
+    /// Returns a surface in plane coordinates and mesh units: coefficients of 1, x, y, x^2, xy, y^2.
+    pub(super) fn in_plane_units(&self, c: Coefficients) -> [f64; 6] {
         let e = self.extent;
         let [p, q] = self.centre;
         // u = (x - p) / e, z = e * f(u, v).
@@ -385,13 +363,8 @@ impl HeightSamples {
     }
 }
 
-/// Returns the range of heights over their mean plane without the extreme 3 % at either end.
-fn height_range(mut residuals: Vec<f64>) -> f64 {
-    (quantile(&mut residuals, 0.97) - quantile(&mut residuals, 0.03)).max(1e-9)
-}
-
 /// Returns the value below which a share of the values lies; reorders them.
-pub(in crate::stages) fn quantile(values: &mut [f64], share: f64) -> f64 {
+pub(crate) fn quantile(values: &mut [f64], share: f64) -> f64 {
     let k = ((values.len() - 1) as f64 * share) as usize;
     *values.select_nth_unstable_by(k, f64::total_cmp).1
 }

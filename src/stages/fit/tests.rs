@@ -14,7 +14,7 @@ fn normal_error_deg(world: &SyntheticSheet, found: &FitOutcome) -> f64 {
 }
 
 #[test]
-fn plane_and_side_of_any_pose() {
+fn plane_and_side_are_found_in_any_pose() {
     for k in 0..6 {
         let world = SyntheticSheet {
             turn: some_turn(k),
@@ -85,7 +85,7 @@ fn the_papers_plane_is_close_on_an_open_mesh() {
 type FitPoints<'a> = &'a dyn Fn(Vec<[f64; 3]>) -> Result<FitOutcome, FitError>;
 
 #[test]
-fn points_that_span_no_surface_are_refused() {
+fn points_that_span_no_surface_are_rejected() {
     let mesh = |vertices: Vec<[f64; 3]>| Mesh {
         vertices: vertices.into(),
         triangles: Vec::new().into(),

@@ -3,7 +3,7 @@
 
 use nalgebra::Vector3;
 
-use super::carved_side::{self, FittedSide, SideInputs, layer_width};
+use super::carved_side::{self, FittedSide, SideInputs};
 use super::params::{FitError, FitParams};
 use super::pca::{Axes, frame, frame_along};
 use super::surface::{HeightSamples, Surface};
@@ -14,20 +14,8 @@ use crate::stages::print::Print;
 use crate::stages::scan::Scan;
 use crate::stages::zbuffer::{IndexedSurface, Viewport};
 
-/// Longest side in pixels of the rendering that decides the side, and of the one that the surface is fitted to.
-const COARSE_PX: usize = 96;
-const FINE_PX: usize = 144;
-/// The view is aligned with the plane of the tops until the plane's slope in the view is below this.
-const COARSE_SLOPE: f64 = 0.05;
-const FINE_SLOPE: f64 = 0.01;
-/// Up to this slope the rendered heights are rotated; beyond it walls hide too much, and the mesh is rendered again.
-const COARSE_ROTATION: f64 = 0.15;
-const FINE_ROTATION: f64 = 0.05;
 /// Maximum number of rotations of one rendering.
 const MAX_ROTATIONS: usize = 3;
-/// Maximum number of renderings of each kind.
-const MAX_COARSE_RENDERINGS: usize = 4;
-const MAX_FINE_RENDERINGS: usize = 3;
 /// Where more than this share of the visible area is one smooth surface, nothing is carved: strokes never cover so
 /// much.
 const MAX_TOPS: f64 = 0.85;
@@ -36,7 +24,16 @@ const MIN_TOPS: f64 = 0.05;
 /// One in this many pixels is left out at either end when the depth of the carving is measured.
 const TRIMMED_ONE_IN: usize = 100;
 
-pub(super) fn fit(
+/// Fits the surface on which the tops of the strokes lie and finds the carved side.
+///
+/// `scan` is in its own frame and unit. `scanned_face_down` gives the direction of the carved face along the mesh's z
+/// where it is known; it decides only when nothing else does. `print` helps to separate the carved side from the back
+/// of an open sheet, whose winding is not reliable; the plane does not depend on it. The frame of the outcome keeps the
+/// mesh's x direction as far as possible, so an upright scan stays upright; lengths are in mesh units.
+///
+/// # Errors
+/// When the vertices span no surface, nothing is carved, or no plane is found.
+pub fn fit(
     scan: &Scan,
     print: Option<&Print>,
     scanned_face_down: Option<bool>,
@@ -46,37 +43,34 @@ pub(super) fn fit(
     if mesh.vertices.len() < 3 {
         return Err(FitError::TooFewPoints(mesh.vertices.len()));
     }
-    let shell = scan.shell();
-    let axes = Axes::of_surface(mesh, shell);
+    let indexed = scan.indexed();
+    let axes = Axes::of_surface(mesh, indexed);
     axes.require_surface(mesh)?;
-    let faces = coarse_sides(
-        shell,
-        &frame(axes.normal(), axes.centre),
-        params.curved_blocks,
-    );
+    let start = frame(axes.normal(), axes.centre);
     let inputs = SideInputs {
-        shell,
+        indexed,
         print,
         scanned_face_down,
     };
     let no_surface = || FitError::NoSurface(mesh.vertices.len());
-    let (face, side) = carved_side::choose(faces, inputs).ok_or_else(no_surface)?;
-    let face =
-        fit_view(shell, face.plane_from_mesh, params.curved_blocks, FINE).ok_or_else(no_surface)?;
-    if face.relief < params.min_relief * face.extent {
+    let sides = coarse_sides(indexed, &start, params.curved_blocks);
+    let (coarse, side) = carved_side::choose(sides, inputs).ok_or_else(no_surface)?;
+    let fine = fit_view(indexed, &coarse.plane_from_mesh, params.curved_blocks, FINE)
+        .ok_or_else(no_surface)?;
+    if fine.relief < params.min_relief * fine.extent {
         return Err(FitError::NoRelief {
-            relief: face.relief,
-            extent: face.extent,
+            relief: fine.relief,
+            extent: fine.extent,
             min_relief: params.min_relief,
         });
     }
     Ok(FitOutcome {
-        plane_from_mesh: face.plane_from_mesh,
-        bow: face.bow,
-        bow_height: face.bow_height,
-        inlier_ratio: face.surface.tops,
-        rms: face.surface.rms,
-        relief: face.relief,
+        plane_from_mesh: fine.plane_from_mesh,
+        bow: fine.bow,
+        bow_height: fine.bow_height,
+        inlier_ratio: fine.surface.tops,
+        rms: fine.surface.rms,
+        relief: fine.relief,
         side,
         vertices: mesh.vertices.len() as u64,
         triangles: mesh.triangles.len() as u64,
@@ -86,43 +80,37 @@ pub(super) fn fit(
 /// Resolution and limits of one search for the upper surface.
 #[derive(Debug, Clone, Copy)]
 struct FitEffort {
+    /// Longest side of a rendering, pixels.
     px: usize,
+    /// The view is aligned with the plane of the tops until the plane's slope in the view is below this.
     slope: f64,
+    /// Up to this angle (radians) the rendered heights are rotated; beyond it walls hide too much, and the mesh is
+    /// rendered again.
     max_rotation: f64,
     max_renderings: usize,
 }
 
+/// For the renderings that decide the side.
 const COARSE: FitEffort = FitEffort {
-    px: COARSE_PX,
-    slope: COARSE_SLOPE,
-    max_rotation: COARSE_ROTATION,
-    max_renderings: MAX_COARSE_RENDERINGS,
+    px: 96,
+    slope: 0.05,
+    max_rotation: 0.15,
+    max_renderings: 4,
 };
+/// For the renderings of the carved side that the surface is fitted to.
 const FINE: FitEffort = FitEffort {
-    px: FINE_PX,
-    slope: FINE_SLOPE,
-    max_rotation: FINE_ROTATION,
-    max_renderings: MAX_FINE_RENDERINGS,
+    px: 144,
+    slope: 0.01,
+    max_rotation: 0.05,
+    max_renderings: 3,
 };
 
 /// Fits a coarse surface to both sides of a frame's plane.
-fn coarse_sides(shell: &IndexedSurface, front: &Rigid3, bow: bool) -> [Option<FittedSide>; 2] {
-    let view = Viewport::around(shell.bounds(front), COARSE.px, false);
-    let frames = [*front, opposite_side(front)];
-    let [front, back] = shell.render_both_sides(front, &view);
-    let refined = FitEffort {
-        max_renderings: COARSE.max_renderings - 1,
-        ..COARSE
-    };
-    let fit_side = |heights: Grid<f32>, frame: &Rigid3| {
-        let seen = FittedView::new(frame, &heights, view, bow)?.leveled(bow, COARSE);
-        if seen.slope() < COARSE.slope {
-            Some(seen.face())
-        } else {
-            fit_view(shell, seen.plane_from_mesh(), bow, refined)
-        }
-    };
-    [fit_side(front, &frames[0]), fit_side(back, &frames[1])]
+fn coarse_sides(indexed: &IndexedSurface, front: &Rigid3, bow: bool) -> [Option<FittedSide>; 2] {
+    let view = Viewport::around(indexed.bounds(front), COARSE.px, false);
+    let [seen, seen_from_back] = indexed.render_both_sides(front, &view);
+    [(seen, *front), (seen_from_back, opposite_side(front))]
+        .map(|(heights, frame)| fit_heights(indexed, &frame, &heights, view, bow, COARSE))
 }
 
 /// Returns the frame of the other side: x stays, y and z are reversed.
@@ -131,24 +119,43 @@ fn opposite_side(frame: &Rigid3) -> Rigid3 {
     Rigid3([x, y.map(|v| -v), z.map(|v| -v), last])
 }
 
-/// Fits the tops seen along a frame's z, and rotates the view until it is perpendicular to them.
+/// Renders the mesh along a frame's z and fits the tops.
 fn fit_view(
-    shell: &IndexedSurface,
-    start: Rigid3,
+    indexed: &IndexedSurface,
+    frame: &Rigid3,
     bow: bool,
     effort: FitEffort,
 ) -> Option<FittedSide> {
-    let mut frame = start;
-    for round in 1.. {
-        let view = Viewport::around(shell.bounds(&frame), effort.px, false);
-        let seen = FittedView::new(&frame, &shell.render(&frame, &view), view, bow)?;
-        let seen = seen.leveled(bow, effort);
-        if seen.slope() < effort.slope || round >= effort.max_renderings {
-            return Some(seen.face());
-        }
-        frame = seen.plane_from_mesh();
+    let view = Viewport::around(indexed.bounds(frame), effort.px, false);
+    fit_heights(
+        indexed,
+        frame,
+        &indexed.render(frame, &view),
+        view,
+        bow,
+        effort,
+    )
+}
+
+/// Fits the tops of a rendering and rotates the view until it is perpendicular to them.
+fn fit_heights(
+    indexed: &IndexedSurface,
+    frame: &Rigid3,
+    heights: &Grid<f32>,
+    view: Viewport,
+    bow: bool,
+    effort: FitEffort,
+) -> Option<FittedSide> {
+    let samples = HeightSamples::new(heights, &view)?;
+    let seen = FittedView::of(*frame, samples, view, bow).leveled(bow, effort);
+    if seen.slope() < effort.slope || effort.max_renderings <= 1 {
+        return Some(seen.into_side());
     }
-    None
+    let fewer = FitEffort {
+        max_renderings: effort.max_renderings - 1,
+        ..effort
+    };
+    fit_view(indexed, &seen.plane_from_mesh(), bow, fewer)
 }
 
 /// A rendering with the surface fitted to it.
@@ -162,15 +169,6 @@ struct FittedView {
 }
 
 impl FittedView {
-    fn new(frame: &Rigid3, heights: &Grid<f32>, view: Viewport, bow: bool) -> Option<Self> {
-        Some(Self::of(
-            *frame,
-            HeightSamples::new(heights, &view)?,
-            view,
-            bow,
-        ))
-    }
-
     fn of(frame: Rigid3, samples: HeightSamples, view: Viewport, bow: bool) -> Self {
         let surface = samples.fit(bow);
         Self {
@@ -209,29 +207,34 @@ impl FittedView {
     }
 
     /// Returns the surface of this side with its measurements.
-    fn face(&self) -> FittedSide {
-        let (samples, surface) = (&self.samples, &self.surface);
-        let mut over_plane = samples.in_plane_units(surface);
-        for (coefficient, flat) in over_plane.iter_mut().zip(self.plane) {
+    fn into_side(self) -> FittedSide {
+        let plane_from_mesh = self.plane_from_mesh();
+        let Self {
+            view,
+            samples,
+            surface,
+            plane,
+            ..
+        } = self;
+        let mut over_plane = samples.in_plane_units(surface.coefficients);
+        for (coefficient, flat) in over_plane.iter_mut().zip(plane) {
             *coefficient -= flat;
         }
-        let bent = over_plane[3..].iter().any(|c| *c != 0.0);
-        let bow = bent.then_some(Bow(over_plane));
+        let is_bent = over_plane[3..].iter().any(|c| *c != 0.0);
+        let bow = is_bent.then_some(Bow(over_plane));
         let relief = if (MIN_TOPS..=MAX_TOPS).contains(&surface.tops) {
-            relief(&samples.inner_residuals(surface))
+            relief(&samples.inner_residuals(&surface))
         } else {
             0.0
         };
-        let view = &self.view;
         FittedSide {
-            plane_from_mesh: self.plane_from_mesh(),
+            plane_from_mesh,
             bow,
-            bow_height: bow.map_or(0.0, |b| bow_height(&b, view)),
+            bow_height: bow.map_or(0.0, |bow| bow_height(&bow, &view)),
             relief,
-            layer_width: layer_width(samples, surface, relief),
-            tops: samples.soft_tops(surface, relief),
             extent: view.unit_per_px * view.width.max(view.height) as f64,
-            surface: *surface,
+            surface,
+            samples,
         }
     }
 }
@@ -252,17 +255,14 @@ fn bow_height(bow: &Bow, view: &Viewport) -> f64 {
     let Some(back) = view.px_from_plane.inverse() else {
         return 0.0;
     };
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for j in 0..=8 {
-        for i in 0..=8 {
-            let px = (view.width - 1) as f64 * f64::from(i) / 8.0;
-            let py = (view.height - 1) as f64 * f64::from(j) / 8.0;
-            let [x, y] = back.apply([px, py]);
-            let z = bow.height(x, y);
-            low = low.min(z);
-            high = high.max(z);
-        }
-    }
+    let along = |side: usize, step: i32| (side - 1) as f64 * f64::from(step) / 8.0;
+    let heights = (0..81).map(|k| {
+        let [x, y] = back.apply([along(view.width, k % 9), along(view.height, k / 9)]);
+        bow.height(x, y)
+    });
+    let [low, high] = heights.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], z| {
+        [low.min(z), high.max(z)]
+    });
     high - low
 }
 

@@ -27,24 +27,6 @@ pub const REVISION: u32 = 10;
 ///
 /// # Errors
 /// When the print shows no ink or the depth map only one height.
-///
-/// # Examples
-/// ```
-/// # use mocban::{config, demo, raster};
-/// # let settings = config::load(&config::Sources::default())?.config.stages;
-/// # let pair = demo::PairGenerator::new(demo::Tier::Pose, 7).with_vertices(Some(20_000)).pair(0)?;
-/// # let image = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED)?;
-/// use mocban::stages::{Print, Scan, depth, fit, normalize};
-///
-/// let (scan, print) = (Scan::from(pair.mesh), Print::from(image));
-/// let plane = fit::fit(&scan, Some(&print), None, &settings.fit)?;
-/// let map = depth::depth(&scan, &plane, None, &settings.depth)?;
-/// let normalized = normalize::normalize(&map, &print, &settings.normalize)?;
-/// // One mask for each interpretation of the print, the likeliest first.
-/// assert_eq!(normalized.prints.len(), normalized.outcome.inks.len());
-/// assert!(normalized.outcome.relief.is_some_and(|relief| relief.depth() > 0.0));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
 pub fn normalize(
     depth: &DepthMap,
     print: &Print,

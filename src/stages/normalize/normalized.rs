@@ -1,7 +1,7 @@
 //! Result of the normalize stage and the canvas on which a pair's masks are compared.
 
 use super::params::{NormalizeError, NormalizeParams};
-use crate::domain::{Affine2, InkHypothesis, NormalizeOutcome, ReliefHeights, ThresholdChoice};
+use crate::domain::{Affine2, InkHypothesis, NormalizeOutcome, ReliefHeights};
 use crate::raster::Mask;
 use crate::stages::binarize::InkMask;
 use crate::stages::pose::SoftMask;
@@ -17,9 +17,9 @@ pub struct PrintMasks {
 
 impl PrintMasks {
     /// Returns the ink mask as a soft mask of zeros and ones.
-    pub(in crate::stages) fn soft_ink(&self) -> SoftMask {
+    pub(crate) fn soft_ink(&self) -> SoftMask {
         SoftMask {
-            amount: self.ink.map(|set| f32::from(u8::from(*set))),
+            amount: self.ink.to_weights(),
             known: self.known.clone(),
         }
     }
@@ -39,19 +39,14 @@ impl Normalized {
     ///
     /// # Errors
     /// When no interpretation has ink.
-    pub(in crate::stages) fn new(
+    pub(crate) fn new(
         inks: &[InkMask],
         relief: Option<ReliefHeights>,
         params: &NormalizeParams,
     ) -> Result<Self, NormalizeError> {
         let (mut hypotheses, mut prints) = (Vec::new(), Vec::new());
         for ink in inks {
-            let wrap = box_wrap(
-                &ink.mask,
-                params.canvas_px as usize,
-                f64::from(params.character_px),
-            );
-            let Some(canvas_from_print) = wrap else {
+            let Some(canvas_from_print) = box_wrap(&ink.mask, params) else {
                 continue;
             };
             hypotheses.push(InkHypothesis {
@@ -77,25 +72,15 @@ impl Normalized {
             prints,
         })
     }
-
-    /// Adds thresholds that are chosen before registration.
-    pub(in crate::stages) fn with_thresholds(mut self, thresholds: Vec<ThresholdChoice>) -> Self {
-        self.outcome.thresholds = thresholds;
-        self
-    }
 }
 
 /// Returns the paper's wrap W(I) (III-C), image pixels to canvas pixels: the longest side of the mask's bounding box
 /// becomes `character_px` and its centroid the middle of a canvas of `canvas_px` pixels; `None` for an empty mask.
-pub(in crate::stages) fn box_wrap(
-    mask: &Mask,
-    canvas_px: usize,
-    character_px: f64,
-) -> Option<Affine2> {
+pub(crate) fn box_wrap(mask: &Mask, params: &NormalizeParams) -> Option<Affine2> {
     let bounds = mask.bounding_box()?;
     let [x, y] = mask.centroid()?;
-    let scale = character_px / bounds.width().max(bounds.height()) as f64;
-    let middle = (canvas_px - 1) as f64 / 2.0;
+    let scale = f64::from(params.character_px) / bounds.longest_side() as f64;
+    let middle = f64::from(params.canvas_px - 1) / 2.0;
     Some(Affine2::scale_shift(
         scale,
         [middle - scale * x, middle - scale * y],

@@ -54,11 +54,7 @@ pub(super) fn relief_heights(depth: &DepthMap) -> Option<ReliefHeights> {
 /// logarithm of the ratio of their areas.
 ///
 /// Walls are steep, so strong growth means that the threshold cuts through worn or tilted tops.
-pub(in crate::stages) fn stroke_growth(
-    depth: &DepthMap,
-    relief: &ReliefHeights,
-    level: u16,
-) -> f64 {
+pub(crate) fn stroke_growth(depth: &DepthMap, relief: &ReliefHeights, level: u16) -> f64 {
     let step = LOWERED_BY * relief.depth() / depth.scale.height_per_level;
     let lower = (f64::from(level) - step).clamp(1.0, 65_535.0) as u16;
     let area = |least: u16| depth.levels.count_at_least(least);
@@ -66,24 +62,21 @@ pub(in crate::stages) fn stroke_growth(
 }
 
 /// Returns the depth of every pixel below the tops as a share of the relief, clamped to -1..=2.
-pub(in crate::stages) fn relative_depths(depth: &DepthMap, relief: &ReliefHeights) -> SoftMask {
+pub(crate) fn relative_depths(depth: &DepthMap, relief: &ReliefHeights) -> SoftMask {
     let scale = &depth.scale;
     let per_level = (scale.height_per_level / relief.depth()) as f32;
     let none = ((relief.top - scale.height(1)) / relief.depth()) as f32 + per_level;
     let of_level = |level: u16| (none - per_level * f32::from(level)).clamp(-1.0, 2.0);
-    dispatch(
-        #[inline(always)]
-        || SoftMask {
-            amount: depth.levels.map(|level| of_level(*level)),
-            known: depth.levels.map(|level| *level != 0),
-        },
-    )
+    dispatch!(SoftMask {
+        amount: depth.levels.map(|level| of_level(*level)),
+        known: depth.levels.map(|level| *level != 0),
+    })
 }
 
 /// Returns the soft stroke value of a depth below the tops: 1 well above the threshold `cut`, 0 well below, linear over
 /// `softness` in between. All are shares of the relief.
 #[inline(always)]
-pub(in crate::stages) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
+pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
     (0.5 + (cut as f32 - depth) / softness as f32).clamp(0.0, 1.0)
 }
 

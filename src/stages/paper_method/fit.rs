@@ -15,7 +15,7 @@ use crate::stages::scan::Scan;
 ///
 /// # Errors
 /// When the vertices span no surface, nothing is carved, or RANSAC finds no plane.
-pub(in crate::stages) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitError> {
+pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitError> {
     let mesh = scan.mesh();
     if mesh.vertices.len() < 3 {
         return Err(FitError::TooFewPoints(mesh.vertices.len()));
@@ -67,11 +67,8 @@ pub(in crate::stages) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutco
 fn distinct(vertices: &Vertices) -> Vec<[f64; 3]> {
     let mut points: Vec<[f64; 3]> = vertices.iter().collect();
     points.sort_by(|a, b| {
-        a.iter()
-            .zip(b)
-            .map(|(p, q)| p.total_cmp(q))
-            .find(|o| o.is_ne())
-            .unwrap_or(std::cmp::Ordering::Equal)
+        let along = |axis: usize| a[axis].total_cmp(&b[axis]);
+        along(0).then(along(1)).then(along(2))
     });
     points.dedup();
     points
@@ -96,16 +93,9 @@ fn upper_set(points: &[[f64; 3]], all: &Axes) -> (Vec<[f64; 3]>, Vector3<f64>, f
 /// Returns the mean distance of points to their own centroid.
 fn mean_distance(points: &[[f64; 3]]) -> f64 {
     let n = points.len().max(1) as f64;
-    let centroid = points
-        .iter()
-        .map(|p| Vector3::from(*p))
-        .sum::<Vector3<f64>>()
-        / n;
-    points
-        .iter()
-        .map(|p| (Vector3::from(*p) - centroid).norm())
-        .sum::<f64>()
-        / n
+    let vectors = || points.iter().map(|p| Vector3::from(*p));
+    let centroid = vectors().sum::<Vector3<f64>>() / n;
+    vectors().map(|p| (p - centroid).norm()).sum::<f64>() / n
 }
 
 /// Selects points from the farthest from the plane down, each farther than `spacing` from all selected ones.
@@ -141,40 +131,34 @@ fn ransac(
     distance: f64,
     params: &FitParams,
 ) -> Result<Vec<[f64; 3]>, FitError> {
+    let too_few = |inliers| FitError::TooFewInliers {
+        inliers,
+        taken: taken.len(),
+        needs: 3,
+    };
     if taken.len() < 3 {
-        return Err(FitError::TooFewInliers {
-            inliers: taken.len(),
-            taken: taken.len(),
-            needs: 3,
-        });
+        return Err(too_few(taken.len()));
     }
     let mut rng = ChaCha8Rng::seed_from_u64(params.seed);
     let point = |i: usize| Vector3::from(taken[i]);
+    let near = |a: Vector3<f64>, normal: Vector3<f64>| {
+        let is_near = move |p: &&[f64; 3]| (Vector3::from(**p) - a).dot(&normal).abs() < distance;
+        taken.iter().filter(is_near)
+    };
     let mut best: (usize, Vector3<f64>, Vector3<f64>) = (0, point(0), Vector3::zeros());
     for _ in 0..params.ransac_draws {
         let [a, b, c] = [0; 3].map(|_: i32| point(rng.random_range(0..taken.len())));
         let Some(normal) = (b - a).cross(&(c - a)).try_normalize(1e-300) else {
             continue;
         };
-        let near = taken
-            .iter()
-            .filter(|p| (Vector3::from(**p) - a).dot(&normal).abs() < distance)
-            .count();
-        if near > best.0 {
-            best = (near, a, normal);
+        let count = near(a, normal).count();
+        if count > best.0 {
+            best = (count, a, normal);
         }
     }
     let (count, a, normal) = best;
     if count < 3 {
-        return Err(FitError::TooFewInliers {
-            inliers: count,
-            taken: taken.len(),
-            needs: 3,
-        });
+        return Err(too_few(count));
     }
-    Ok(taken
-        .iter()
-        .copied()
-        .filter(|p| (Vector3::from(*p) - a).dot(&normal).abs() < distance)
-        .collect())
+    Ok(near(a, normal).copied().collect())
 }

@@ -63,16 +63,16 @@ struct Tried {
 ///
 /// # Errors
 /// When the print shows no ink or no threshold leaves strokes.
-pub(in crate::stages) fn normalize(
+pub(crate) fn normalize(
     depth: &DepthMap,
     print: &Print,
     params: &NormalizeParams,
 ) -> Result<Normalized, NormalizeError> {
     let ink = binarize::fixed(print.image(), params.print_grey)?;
-    let normalized = Normalized::new(std::slice::from_ref(&ink), None, params)?;
+    let mut normalized = Normalized::new(std::slice::from_ref(&ink), None, params)?;
     let canvas_from_print = normalized.outcome.inks[0].canvas_from_print;
-    let thresholds = choose(depth, &ink, &canvas_from_print, params)?;
-    Ok(normalized.with_thresholds(thresholds))
+    normalized.outcome.thresholds = choose(depth, &ink, &canvas_from_print, params)?;
+    Ok(normalized)
 }
 
 /// Chooses the density and the structure threshold on the wrapped images. The ensemble keeps the better of the two
@@ -101,23 +101,25 @@ fn choose(
     let structure = within(params.structure_greys)
         .max_by(|a, b| a.structure.total_cmp(&b.structure))
         .ok_or(NormalizeError::NoStrokes)?;
-    let choice = |metric, t: &Tried, score, [from, to]: [u8; 2]| ThresholdChoice {
+    let choice = |metric, t: &Tried, score, greys: [u8; 2]| ThresholdChoice {
         metric,
         level: t.level,
         score,
-        at_bound: t.grey == from || t.grey == to,
+        at_bound: greys.contains(&t.grey),
     };
+    let structure_score = structure.structure;
+    let density_score = -density.density_gap.abs();
     Ok(vec![
         choice(
             ThresholdMetric::NlSsim,
             structure,
-            structure.structure,
+            structure_score,
             params.structure_greys,
         ),
         choice(
             ThresholdMetric::Density,
             density,
-            -density.density_gap.abs(),
+            density_score,
             params.density_greys,
         ),
     ])
@@ -133,7 +135,7 @@ fn attempt(
 ) -> Option<Tried> {
     let side = params.canvas_px as usize;
     let mask = mask_above(depth, level);
-    let wrap = box_wrap(&mask, side, f64::from(params.character_px))?;
+    let wrap = box_wrap(&mask, params)?;
     let wrapped = warp_mask(&mask, &wrap, side, side);
     let mut turned = wrapped.clone();
     let mut best: Option<(f64, Mask)> = None;
@@ -155,7 +157,7 @@ fn attempt(
 
 /// Returns the stroke mask of a level without specks.
 fn mask_above(depth: &DepthMap, level: u16) -> Mask {
-    let raw = depth.levels.map(|l| *l >= level && *l > 0);
+    let raw = depth.stroke_mask(level);
     remove_specks(&raw, raw.data().len())
 }
 

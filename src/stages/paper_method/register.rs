@@ -33,7 +33,7 @@ struct Turn {
 ///
 /// # Errors
 /// When normalization chose no threshold or a mask is empty.
-pub(in crate::stages) fn register(
+pub(crate) fn register(
     depth: &DepthMap,
     normalized: &Normalized,
     params: &RegisterParams,
@@ -106,8 +106,7 @@ fn align(
 }
 
 fn longest_side(mask: &Mask) -> Option<f64> {
-    mask.bounding_box()
-        .map(|b| b.width().max(b.height()) as f64)
+    Some(mask.bounding_box()?.longest_side() as f64)
 }
 
 /// A mask that is rotated first and wrapped afterwards: rotation changes the bounding box.
@@ -125,19 +124,15 @@ impl Turner {
     fn new(mask: &Mask, side: usize, character_px: f64) -> Option<Self> {
         let scale = character_px / longest_side(mask)?;
         let small_from_depth = Affine2::scale_shift(scale, [0.0, 0.0]);
-        let shrunk = |length: usize| (length as f64 * scale).ceil() as usize + 1;
+        let [width, height] =
+            [mask.width(), mask.height()].map(|length| (length as f64 * scale).ceil() as usize + 1);
         let set = |i: usize| [(i % mask.width()) as f64, (i / mask.width()) as f64];
         Some(Self {
             points: (0..mask.data().len())
                 .filter(|i| mask.data()[*i])
                 .map(set)
                 .collect(),
-            small: warp_mask(
-                mask,
-                &small_from_depth,
-                shrunk(mask.width()),
-                shrunk(mask.height()),
-            ),
+            small: warp_mask(mask, &small_from_depth, width, height),
             small_from_depth,
             side,
             character_px,
@@ -273,11 +268,8 @@ fn shifted(row: &[u64], k: usize, dx: i64) -> u64 {
     let first = k as i64 * 64 - dx;
     let (word, bit) = (first.div_euclid(64), first.rem_euclid(64));
     let at = |i: i64| {
-        if i < 0 {
-            0
-        } else {
-            row.get(i as usize).copied().unwrap_or(0)
-        }
+        let word = usize::try_from(i).ok().and_then(|i| row.get(i));
+        word.copied().unwrap_or(0)
     };
     if bit == 0 {
         at(word)

@@ -4,7 +4,8 @@
 //! a pose says nothing about the character, yet it would decide between the poses of a symmetric one.
 
 use super::PyramidLevel;
-use super::pyramid::{BilinearCell, bilinear};
+use super::overlap::PlacedLevel;
+use super::pyramid::BilinearCell;
 use crate::domain::Affine2;
 use crate::raster::{Grid, Mask};
 use crate::stages::components::ConnectedComponents;
@@ -30,7 +31,7 @@ pub(super) fn valid_mask(level: &PyramidLevel) -> Grid<f32> {
 
 /// Two levels at a pose with their border strokes. A stroke that lies on an inner stroke of the other level is not a
 /// border stroke: there the character is connected to its surroundings.
-pub(in crate::stages) struct BorderStrokes<'a> {
+pub(crate) struct BorderStrokes<'a> {
     levels: [&'a PyramidLevel; 2],
     strokes: [StrokeMasks; 2],
     moving_from_fixed: Affine2,
@@ -39,10 +40,7 @@ pub(in crate::stages) struct BorderStrokes<'a> {
 impl<'a> BorderStrokes<'a> {
     /// Finds the border strokes of a fixed and a moving level. `fixed_from_moving` maps image pixels; returns `None`
     /// if it has no inverse.
-    pub(in crate::stages) fn find(
-        levels: [&'a PyramidLevel; 2],
-        fixed_from_moving: &Affine2,
-    ) -> Option<Self> {
+    pub(crate) fn find(levels: [&'a PyramidLevel; 2], fixed_from_moving: &Affine2) -> Option<Self> {
         let onto = |a: &PyramidLevel, b: &PyramidLevel, b_from_a: &Affine2| {
             let from_work = a.work_from_image.inverse()?;
             Some(b.work_from_image.after(b_from_a).after(&from_work))
@@ -61,7 +59,7 @@ impl<'a> BorderStrokes<'a> {
     }
 
     /// Returns the fixed and the moving level with the border strokes masked.
-    pub(in crate::stages) fn levels_without(&self) -> [PyramidLevel; 2] {
+    pub(crate) fn levels_without(&self) -> [PyramidLevel; 2] {
         [0, 1].map(|k: usize| {
             self.levels[k].restricted_to(self.strokes[k].valid_mask(self.levels[k]))
         })
@@ -69,27 +67,21 @@ impl<'a> BorderStrokes<'a> {
 
     /// Returns whether the border strokes of both levels overlap about as well as the rest. If so, both show the same
     /// state of the block, and the border strokes are evidence for the pose too.
-    pub(in crate::stages) fn agree(&self) -> bool {
+    pub(crate) fn agree(&self) -> bool {
         let [fixed, moving] = self.levels;
-        let border = self.strokes[1]
-            .border
-            .map(|stray| f32::from(u8::from(*stray)));
+        let placed = PlacedLevel {
+            moving,
+            valid: &moving.weight,
+            moving_from_fixed: self.moving_from_fixed,
+        };
+        let moving_border = self.strokes[1].border.to_weights();
         let mut sums = [[0.0_f64; 2]; 2];
-        let size = [moving.weight.width(), moving.weight.height()];
-        for y in 0..fixed.weight.height() {
-            for x in (0..fixed.weight.width()).filter(|x| fixed.weight.at(*x, y) > 0.0) {
-                let there = self.moving_from_fixed.apply([x as f64, y as f64]);
-                let there =
-                    BilinearCell::at(size, there).filter(|at| at.value(&moving.weight) >= 0.5);
-                let Some(there) = there else {
-                    continue;
-                };
-                let stray = self.strokes[0].border.at(x, y) || there.value(&border) > 0.5;
-                let (ink, relief) = (fixed.amount.at(x, y), there.value(&moving.amount));
-                let [met, all] = &mut sums[usize::from(stray)];
-                *met += f64::from(ink.min(relief));
-                *all += f64::from(ink.max(relief));
-            }
+        for (x, y, cell) in placed.common_pixels(&fixed.weight) {
+            let is_border = self.strokes[0].border.at(x, y) || cell.value(&moving_border) > 0.5;
+            let (ink, relief) = (fixed.amount.at(x, y), cell.value(&moving.amount));
+            let [met, all] = &mut sums[usize::from(is_border)];
+            *met += f64::from(ink.min(relief));
+            *all += f64::from(ink.max(relief));
         }
         let [own, around] = sums.map(|[met, all]| met / all.max(1e-9));
         around >= MIN_RELATIVE_OVERLAP * own
@@ -112,20 +104,19 @@ impl StrokeMasks {
 
     /// Returns 1 for strokes that are not connected to the border, 0 elsewhere.
     fn interior(&self) -> Grid<f32> {
-        let own = |x, y| f32::from(u8::from(self.all.at(x, y) && !self.border.at(x, y)));
-        Grid::from_fn(self.all.width(), self.all.height(), own)
+        let inner = self
+            .all
+            .zip_map(&self.border, |stroke, border| stroke && !border);
+        inner.to_weights()
     }
 
     /// Removes from the border strokes what lies on a stroke of the other level's mask.
     fn unmark_matched(&mut self, others: &Grid<f32>, other_from_this: &Affine2) {
-        for y in 0..self.border.height() {
-            for x in 0..self.border.width() {
-                if self.border.at(x, y) {
-                    let there = other_from_this.apply([x as f64, y as f64]);
-                    self.border.set(x, y, bilinear(others, there) == 0.0);
-                }
-            }
-        }
+        let size = [others.width(), others.height()];
+        self.border = Mask::from_fn(self.border.width(), self.border.height(), |x, y| {
+            let there = || BilinearCell::at(size, other_from_this.apply([x as f64, y as f64]));
+            self.border.at(x, y) && there().is_none_or(|cell| cell.value(others) == 0.0)
+        });
     }
 
     /// Returns 1 where the level is known and free of border strokes, 0 elsewhere.
@@ -175,7 +166,7 @@ pub(super) mod tests {
     use crate::raster::{Grid, Mask};
     use crate::stages::pose::{ImagePyramid, PyramidLevel, SoftMask};
 
-    pub(in crate::stages::pose) const SIDE: usize = 64;
+    pub(crate) const SIDE: usize = 64;
     /// A cross in the middle, and bars at the left and the right border.
     const CROSS: [[usize; 4]; 2] = [[16, 30, 48, 35], [30, 16, 35, 48]];
     const LEFT: [usize; 4] = [0, 0, 6, SIDE];
@@ -184,7 +175,7 @@ pub(super) mod tests {
     const BRIDGE: [usize; 4] = [4, 30, 20, 35];
 
     /// Draws bars given as left, top, right (exclusive) and bottom (exclusive), pixels.
-    pub(in crate::stages::pose) fn level(bars: &[[usize; 4]]) -> PyramidLevel {
+    pub(crate) fn level(bars: &[[usize; 4]]) -> PyramidLevel {
         let on = |x, y| {
             let mut bars = bars.iter();
             bars.any(|[l, t, r, b]| (*l..*r).contains(&x) && (*t..*b).contains(&y))
@@ -197,9 +188,9 @@ pub(super) mod tests {
         base.level(SIDE, 0.8)
     }
 
-    fn as_they_lie<'a>(fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> BorderStrokes<'a> {
+    fn at_identity<'a>(fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> BorderStrokes<'a> {
         let around = BorderStrokes::find([fixed, moving], &Affine2::IDENTITY);
-        around.expect("the map can be turned round")
+        around.expect("the identity has an inverse")
     }
 
     fn amount(level: &PyramidLevel, x: usize, y: usize) -> f32 {
@@ -208,9 +199,9 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn what_runs_into_the_border_is_left_out_of_both() {
+    fn strokes_at_the_border_are_masked_in_both_levels() {
         let with = |bar| level(&[CROSS[0], CROSS[1], bar]);
-        let [ink, relief] = as_they_lie(&with(LEFT), &with(RIGHT)).levels_without();
+        let [ink, relief] = at_identity(&with(LEFT), &with(RIGHT)).levels_without();
         for level in [&ink, &relief] {
             assert!(amount(level, 32, 32) > 0.9);
             assert_eq!(amount(level, 2, 10) + amount(level, SIDE - 3, 10), 0.0);
@@ -218,17 +209,17 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn surroundings_agree_where_they_stand_alike_only() {
+    fn border_strokes_agree_only_where_they_overlap() {
         let with = |bar| level(&[CROSS[0], CROSS[1], bar]);
-        assert!(as_they_lie(&with(LEFT), &with(LEFT)).agree());
-        assert!(!as_they_lie(&with(LEFT), &with(RIGHT)).agree());
+        assert!(at_identity(&with(LEFT), &with(LEFT)).agree());
+        assert!(!at_identity(&with(LEFT), &with(RIGHT)).agree());
     }
 
     #[test]
-    fn a_character_that_hangs_on_a_frame_line_in_one_picture_stays() {
+    fn a_character_connected_to_a_frame_line_in_one_level_is_kept() {
         let bridged = level(&[CROSS[0], CROSS[1], BRIDGE, LEFT]);
         let free = level(&[CROSS[0], CROSS[1]]);
-        let [ink, relief] = as_they_lie(&bridged, &free).levels_without();
+        let [ink, relief] = at_identity(&bridged, &free).levels_without();
         assert!(amount(&ink, 32, 32) > 0.9 && amount(&ink, 32, 44) > 0.9);
         assert!(amount(&relief, 32, 32) > 0.9);
         assert_eq!(amount(&ink, 2, 10), 0.0);

@@ -8,11 +8,11 @@ const NEAR_RATIO: f64 = 0.04;
 
 /// How many candidates to keep, as is and mirrored. Zero skips that reading.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::stages) struct BeamWidth {
+pub(crate) struct BeamWidth {
     /// Without reflection.
-    pub(in crate::stages) upright: usize,
+    pub(crate) upright: usize,
     /// With the moving image mirrored.
-    pub(in crate::stages) mirrored: usize,
+    pub(crate) mirrored: usize,
 }
 
 impl BeamWidth {
@@ -28,27 +28,27 @@ impl BeamWidth {
 
 /// The range of poses to search.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stages) struct SearchRange {
+pub(crate) struct SearchRange {
     /// Largest ratio between the two sizes, up or down.
-    pub(in crate::stages) max_scale: f64,
+    pub(crate) max_scale: f64,
     /// Candidates to keep after the search.
-    pub(in crate::stages) beam_width: BeamWidth,
+    pub(crate) beam_width: BeamWidth,
 }
 
 /// A candidate pose with its score.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stages) struct PoseCandidate {
+pub(crate) struct PoseCandidate {
     /// Maps moving image pixels to fixed image pixels; contains a reflection if `mirrored`.
-    pub(in crate::stages) fixed_from_moving: Affine2,
+    pub(crate) fixed_from_moving: Affine2,
     /// Correlation where both images are known, normalised by the energy of both; at most 1.
-    pub(in crate::stages) score: f64,
+    pub(crate) score: f64,
     /// Whether the moving image is mirrored.
-    pub(in crate::stages) mirrored: bool,
+    pub(crate) mirrored: bool,
 }
 
 impl PoseCandidate {
     /// Returns the absolute rotation between two poses, degrees in 0..=180.
-    pub(in crate::stages) fn rotation_to(&self, other: &Self) -> f64 {
+    pub(crate) fn rotation_to(&self, other: &Self) -> f64 {
         let angle = |pose: &Self| pose.fixed_from_moving.angle_deg();
         let turn = (angle(self) - angle(other)).rem_euclid(360.0);
         turn.min(360.0 - turn)
@@ -62,17 +62,22 @@ impl PoseCandidate {
     }
 }
 
-/// Returns the best candidates of each reading without duplicates, best first.
-pub(super) fn prune(mut found: Vec<PoseCandidate>, beam_width: BeamWidth) -> Vec<PoseCandidate> {
-    found.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let mut accepted: Vec<PoseCandidate> = Vec::new();
+/// Returns the best poses of each reading without duplicates, best first. `rank` returns a pose's score and whether it
+/// is mirrored.
+pub(super) fn prune<T: Copy>(
+    mut found: Vec<T>,
+    beam_width: BeamWidth,
+    rank: impl Fn(&T) -> (f64, bool),
+    is_duplicate: impl Fn(&T, &T) -> bool,
+) -> Vec<T> {
+    found.sort_by(|a, b| rank(b).0.total_cmp(&rank(a).0));
+    let mut accepted: Vec<T> = Vec::new();
     for pose in found {
-        let same_reading = accepted
-            .iter()
-            .filter(|k| k.mirrored == pose.mirrored)
-            .count();
-        let limit = beam_width.of_reading(pose.mirrored);
-        if same_reading < limit && !accepted.iter().any(|other| other.is_near(&pose)) {
+        let (_, mirrored) = rank(&pose);
+        let same_reading = accepted.iter().filter(|other| rank(other).1 == mirrored);
+        if same_reading.count() < beam_width.of_reading(mirrored)
+            && !accepted.iter().any(|other| is_duplicate(&pose, other))
+        {
             accepted.push(pose);
         }
     }

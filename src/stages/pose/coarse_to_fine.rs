@@ -10,15 +10,15 @@ const SEARCH_SIGMA: f64 = 0.5;
 
 /// One refinement pass: level size and smoothing in working pixels, Gauss-Newton steps, candidates kept.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::stages) struct RefinementPass {
-    pub(in crate::stages) size_px: usize,
-    pub(in crate::stages) sigma_px: f64,
-    pub(in crate::stages) max_steps: usize,
-    pub(in crate::stages) beam_width: BeamWidth,
+pub(crate) struct RefinementPass {
+    pub(crate) size_px: usize,
+    pub(crate) sigma_px: f64,
+    pub(crate) max_steps: usize,
+    pub(crate) beam_width: BeamWidth,
 }
 
 /// Searches for the pose of the moving image on the fixed one and returns candidates of both readings, best first.
-pub(in crate::stages) fn search_coarse_to_fine(
+pub(crate) fn search_coarse_to_fine(
     fixed: &ImagePyramid,
     moving: &ImagePyramid,
     range: SearchRange,
@@ -33,7 +33,8 @@ pub(in crate::stages) fn search_coarse_to_fine(
         for pose in &mut found {
             *pose = refiner.refine(pose, pass.max_steps, Loss::Huber);
         }
-        found = prune(found, pass.beam_width);
+        let rank = |pose: &PoseCandidate| (pose.score, pose.mirrored);
+        found = prune(found, pass.beam_width, rank, PoseCandidate::is_near);
     }
     found
 }

@@ -19,7 +19,7 @@ const SUM_COUNT: usize = 21 + 6;
 
 /// The loss of a residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::stages) enum Loss {
+pub(crate) enum Loss {
     /// Large residuals count less: for starts far from the optimum.
     Huber,
     /// Large residuals do not count: near the optimum.
@@ -84,27 +84,17 @@ impl Workspace {
 
     /// Returns the least-squares gain (at least 0.05) and offset of the fixed values over the moving ones.
     fn gain_and_offset(&self) -> (f32, f32) {
-        let blocks = &self.blocks;
-        let totals = dispatch(
+        let totals = sum_blocks::<4>(
+            &self.blocks,
             #[inline(always)]
-            || {
-                let mut totals = [0.0_f64; 4];
-                for blocks in blocks.chunks(BLOCKS_PER_SUM) {
-                    let mut sums = [[0.0_f32; LANES]; 4];
-                    for block in blocks {
-                        for k in 0..LANES {
-                            let (a, b) = (block.fixed[k], block.moving[k][0]);
-                            sums[0][k] += a;
-                            sums[1][k] += b;
-                            sums[2][k] += a * b;
-                            sums[3][k] += b * b;
-                        }
-                    }
-                    for (lanes, total) in sums.iter().zip(&mut totals) {
-                        *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
-                    }
+            |sums, block, _| {
+                for k in 0..LANES {
+                    let (a, b) = (block.fixed[k], block.moving[k][0]);
+                    sums[0][k] += a;
+                    sums[1][k] += b;
+                    sums[2][k] += a * b;
+                    sums[3][k] += b * b;
                 }
-                totals
             },
         );
         let n = self.count.max(1) as f64;
@@ -143,24 +133,13 @@ impl NormalEquations {
             Loss::Huber => HUBER_MEDIANS * workspace.median_residual(gain, offset).max(1e-4),
             Loss::Tukey => TUKEY_CUTOFF,
         };
-        let (blocks, count, fit) = (&workspace.blocks, workspace.count, [gain, offset, cutoff]);
-        // Local copies of sums and block: memory that may alias is not vectorised.
-        let totals = dispatch(
+        let (count, fit) = (workspace.count, [gain, offset, cutoff]);
+        let totals = sum_blocks(
+            &workspace.blocks,
             #[inline(always)]
-            || {
-                let mut totals = [0.0_f64; SUM_COUNT + 1];
-                for (run, blocks) in blocks.chunks(BLOCKS_PER_SUM).enumerate() {
-                    let mut sums = [[0.0_f32; LANES]; SUM_COUNT + 1];
-                    for (k, block) in blocks.iter().enumerate() {
-                        let filled = LANES.min(count - (run * BLOCKS_PER_SUM + k) * LANES);
-                        let block = *block;
-                        accumulate(&mut sums, &block, filled, mirrored, fit, loss);
-                    }
-                    for (lanes, total) in sums.iter().zip(&mut totals) {
-                        *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
-                    }
-                }
-                totals
+            |sums, block, place| {
+                let filled = LANES.min(count - place * LANES);
+                accumulate(sums, block, filled, mirrored, fit, loss);
             },
         );
         let mean = totals[SUM_COUNT] / workspace.count as f64;
@@ -191,6 +170,30 @@ impl NormalEquations {
         let right = Vector6::from_fn(|i, _| self.sums[21 + i]);
         Some(normal.cholesky()?.solve(&right).into())
     }
+}
+
+/// Sums over blocks, in single precision over a run of them and then in double precision. `add` adds one block, given
+/// with its index.
+#[inline(always)]
+fn sum_blocks<const N: usize>(
+    blocks: &[Correspondences],
+    add: impl Fn(&mut [[f32; LANES]; N], &Correspondences, usize),
+) -> [f64; N] {
+    dispatch!({
+        let mut totals = [0.0_f64; N];
+        for (run, blocks) in blocks.chunks(BLOCKS_PER_SUM).enumerate() {
+            let mut sums = [[0.0_f32; LANES]; N];
+            for (k, block) in blocks.iter().enumerate() {
+                // A local copy: memory that may alias the sums would prevent vectorization.
+                let block = *block;
+                add(&mut sums, &block, run * BLOCKS_PER_SUM + k);
+            }
+            for (lanes, total) in sums.iter().zip(&mut totals) {
+                *total += lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+            }
+        }
+        totals
+    })
 }
 
 fn median(values: &mut [f32]) -> f32 {

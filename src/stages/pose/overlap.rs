@@ -1,52 +1,65 @@
-//! Shares of two levels that overlap at a pose.
+//! Pixels that two levels have in common at a pose, and the shares of their amounts that overlap there.
 
 use super::PyramidLevel;
 use super::pyramid::BilinearCell;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
+/// A moving level with its valid mask and the map from fixed to moving working pixels.
+pub(super) struct PlacedLevel<'a> {
+    pub(super) moving: &'a PyramidLevel,
+    pub(super) valid: &'a Grid<f32>,
+    pub(super) moving_from_fixed: Affine2,
+}
+
+impl PlacedLevel<'_> {
+    /// Returns the position in the moving level of a pixel of the fixed one; `None` where it is not valid.
+    pub(super) fn cell(&self, x: usize, y: usize) -> Option<BilinearCell> {
+        let there = self.moving_from_fixed.apply([x as f64, y as f64]);
+        let size = [self.valid.width(), self.valid.height()];
+        BilinearCell::at(size, there).filter(|cell| cell.value(self.valid) >= 0.5)
+    }
+
+    /// Returns column, row and position in the moving level of each pixel of the fixed level that is valid in both.
+    pub(super) fn common_pixels(
+        &self,
+        fixed_valid: &Grid<f32>,
+    ) -> impl Iterator<Item = (usize, usize, BilinearCell)> {
+        let rows = 0..fixed_valid.height();
+        let pixels = rows.flat_map(|y| (0..fixed_valid.width()).map(move |x| (x, y)));
+        pixels
+            .filter(|(x, y)| fixed_valid.at(*x, *y) != 0.0)
+            .filter_map(|(x, y)| Some((x, y, self.cell(x, y)?)))
+    }
+}
+
 /// How much of each level's amount is covered by the other, 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(in crate::stages) struct PoseOverlap {
+pub(crate) struct PoseOverlap {
     /// Share of the moving amount covered by the fixed one: of the stroke tops, what has printed.
-    pub(in crate::stages) moving_covered: f64,
+    pub(crate) moving_covered: f64,
     /// Share of the fixed amount covered by the moving one: of the ink, what has stroke tops under it.
-    pub(in crate::stages) fixed_covered: f64,
+    pub(crate) fixed_covered: f64,
 }
 
 impl PoseOverlap {
-    /// Computes the shares on the valid pixels of the fixed and the moving level; zeros if there are none.
-    /// `moving_from_fixed` maps working pixels.
+    /// Computes the shares on the pixels that are valid in both levels; zeros if there are none.
     pub(super) fn new(
-        [fixed, moving]: [&PyramidLevel; 2],
-        [fixed_valid, moving_valid]: [&Grid<f32>; 2],
-        moving_from_fixed: &Affine2,
+        fixed: &PyramidLevel,
+        fixed_valid: &Grid<f32>,
+        placed: &PlacedLevel<'_>,
     ) -> Self {
         let (mut both, mut ink, mut relief) = (0.0, 0.0, 0.0);
-        let size = [moving_valid.width(), moving_valid.height()];
-        for y in 0..fixed.amount.height() {
-            let row = fixed_valid
-                .row(y)
-                .iter()
-                .zip(fixed.amount.row(y))
-                .enumerate();
-            for (x, (_, a)) in row.filter(|(_, (fixed_valid, _))| **fixed_valid != 0.0) {
-                let there = moving_from_fixed.apply([x as f64, y as f64]);
-                let there =
-                    BilinearCell::at(size, there).filter(|at| at.value(moving_valid) >= 0.5);
-                let Some(there) = there else {
-                    continue;
-                };
-                let (a, b) = (*a, there.value(&moving.amount));
-                both += f64::from(a.min(b));
-                ink += f64::from(a);
-                relief += f64::from(b);
-            }
+        for (x, y, cell) in placed.common_pixels(fixed_valid) {
+            let (a, b) = (fixed.amount.at(x, y), cell.value(&placed.moving.amount));
+            both += f64::from(a.min(b));
+            ink += f64::from(a);
+            relief += f64::from(b);
         }
-        let share = |part: f64, of: f64| if of > 0.0 { part / of } else { 0.0 };
+        let share = |of: f64| if of > 0.0 { both / of } else { 0.0 };
         Self {
-            moving_covered: share(both, relief),
-            fixed_covered: share(both, ink),
+            moving_covered: share(relief),
+            fixed_covered: share(ink),
         }
     }
 }

@@ -1,24 +1,22 @@
 //! Image pyramid of a soft mask: levels at working size, smoothed and high-pass filtered.
 
 use crate::domain::Affine2;
-use crate::raster::{
-    Grid, Mask, PixelBox, resample, resample_rows_transposed, resample_transposed,
-};
+use crate::raster::{Grid, Mask, resample, resample_transposed};
 use crate::simd::dispatch;
 use crate::stages::blur::{gaussian_blur, gaussian_blur_transposed};
 
 /// Soft mask: an amount of 0..=1 for each pixel, and where it is known.
 #[derive(Debug, Clone)]
-pub(in crate::stages) struct SoftMask {
+pub(crate) struct SoftMask {
     /// Ink of a print, or nearness to the stroke tops of a relief.
-    pub(in crate::stages) amount: Grid<f32>,
+    pub(crate) amount: Grid<f32>,
     /// Where the image has data.
-    pub(in crate::stages) known: Mask,
+    pub(crate) known: Mask,
 }
 
-/// A soft mask at the largest working size, from which levels are computed. Stored transposed.
+/// A soft mask at the largest working size, from which levels are computed.
 #[derive(Debug, Clone)]
-pub(in crate::stages) struct ImagePyramid {
+pub(crate) struct ImagePyramid {
     /// Amount times `known`.
     present: Grid<f32>,
     known: Grid<f32>,
@@ -29,7 +27,7 @@ pub(in crate::stages) struct ImagePyramid {
 
 /// One level of the pyramid. All grids have the same size; they are zero where nothing is known.
 #[derive(Debug, Clone)]
-pub(in crate::stages) struct PyramidLevel {
+pub(crate) struct PyramidLevel {
     pub(super) value: Grid<f32>,
     /// Smoothed amount, 0..=1.
     pub(super) amount: Grid<f32>,
@@ -45,82 +43,76 @@ const LOW_PASS_PX: usize = 48;
 /// A working pixel is known if at least this share of it is.
 const MIN_KNOWN: f32 = 0.5;
 
-impl SoftMask {
-    /// Returns the bounding box of the known pixels; `None` if there are none.
-    pub(in crate::stages) fn bounds(&self) -> Option<PixelBox> {
-        self.known.bounding_box()
-    }
-}
-
 impl ImagePyramid {
     /// Resamples a soft mask to `size` working pixels along the longest side of its known box; `None` if nothing is
     /// known.
-    pub(in crate::stages) fn new(soft: &SoftMask, size: usize) -> Option<Self> {
-        let bounds = soft.bounds()?;
-        let longest = bounds.width().max(bounds.height()) as f64;
+    pub(crate) fn new(soft: &SoftMask, size: usize) -> Option<Self> {
+        let bounds = soft.known.bounding_box()?;
+        let longest = bounds.longest_side() as f64;
         let scale = size as f64 / longest;
-        let middle = [
-            (bounds.x0 + bounds.x1) as f64 / 2.0,
-            (bounds.y0 + bounds.y1) as f64 / 2.0,
-        ];
+        let middle = [bounds.x0 + bounds.x1, bounds.y0 + bounds.y1].map(|sum| sum as f64 / 2.0);
         let (sides, shift) = fit_grid([bounds.width(), bounds.height()], middle, scale);
-        let from = [soft.known.width(), soft.known.height()];
-        let present = resample_rows_transposed(
-            from,
-            #[inline(always)]
-            |y, row| {
-                let pairs = soft.amount.row(y).iter().zip(soft.known.row(y));
-                for (present, (amount, known)) in row.iter_mut().zip(pairs) {
-                    *present = amount * f32::from(u8::from(*known));
-                }
-            },
-            scale,
-            shift,
-            sides,
-        );
-        let known = resample_rows_transposed(
-            from,
-            #[inline(always)]
-            |y, row| {
-                for (known, is_known) in row.iter_mut().zip(soft.known.row(y)) {
-                    *known = f32::from(u8::from(*is_known));
-                }
-            },
-            scale,
-            shift,
-            sides,
-        );
+        let known = soft.known.to_weights();
+        let present = soft.amount.zip_map(&known, |amount, known| amount * known);
+        let resampled = |values| resample_transposed(values, scale, shift, sides).transposed();
         Some(Self {
-            present: present.transposed(),
-            known: known.transposed(),
+            present: resampled(&present),
+            known: resampled(&known),
             from_image: Affine2::scale_shift(scale, shift),
             size: size as f64,
         })
     }
 
     /// Replaces each known pixel's amount.
-    pub(in crate::stages) fn map(mut self, amount: impl Fn(f32) -> f32) -> Self {
-        let pairs = self.present.data_mut().iter_mut().zip(self.known.data());
-        for (present, known) in pairs {
-            *present = map_amount(*present, *known, &amount);
+    pub(crate) fn map(self, amount: impl Fn(f32) -> f32) -> Self {
+        Self {
+            present: self.mapped(amount),
+            ..self
         }
-        self
+    }
+
+    /// Returns `present` with each known pixel's amount replaced.
+    fn mapped(&self, amount: impl Fn(f32) -> f32) -> Grid<f32> {
+        dispatch!(self.present.zip_map(
+            &self.known,
+            #[inline(always)]
+            |present, known| {
+                let is_known = known > 0.0;
+                let share = if is_known { known } else { 1.0 };
+                let replaced = share * amount(present / share);
+                if is_known { replaced } else { 0.0 }
+            },
+        ))
     }
 
     /// Computes the level of `size` working pixels along the longest side, smoothed by a Gaussian of `sigma` working
     /// pixels.
-    pub(in crate::stages) fn level(&self, size: usize, sigma: f64) -> PyramidLevel {
-        self.level_builder(size, sigma).build()
+    pub(crate) fn level(&self, size: usize, sigma: f64) -> PyramidLevel {
+        self.level_builder(size, sigma).level(&self.present)
     }
 
     /// Prepares levels of one size and smoothing.
-    pub(in crate::stages) fn level_builder(&self, size: usize, sigma: f64) -> LevelBuilder<'_> {
-        LevelBuilder::new(self, size, sigma)
+    pub(crate) fn level_builder(&self, size: usize, sigma: f64) -> LevelBuilder<'_> {
+        let scale = size as f64 / self.size;
+        let sides = [self.known.width(), self.known.height()];
+        let (sides, shift) = fit_grid(sides, sides.map(middle), scale);
+        let transposed = resample_transposed(&self.known, scale, shift, sides);
+        let weight = gaussian_blur_transposed(transposed, sigma);
+        LevelBuilder {
+            base: self,
+            size,
+            sigma,
+            scale,
+            shift,
+            sides,
+            low_pass_weight: low_pass(&weight, size),
+            weight,
+        }
     }
 }
 
 /// What all levels of one size and smoothing share.
-pub(in crate::stages) struct LevelBuilder<'a> {
+pub(crate) struct LevelBuilder<'a> {
     base: &'a ImagePyramid,
     size: usize,
     sigma: f64,
@@ -132,79 +124,38 @@ pub(in crate::stages) struct LevelBuilder<'a> {
     low_pass_weight: Grid<f32>,
 }
 
-impl<'a> LevelBuilder<'a> {
-    fn new(base: &'a ImagePyramid, size: usize, sigma: f64) -> Self {
-        let scale = size as f64 / base.size;
-        let sides = [base.known.width(), base.known.height()];
-        let middle = sides.map(|side| (side - 1) as f64 / 2.0);
-        let (sides, shift) = fit_grid(sides, middle, scale);
-        let weight =
-            gaussian_blur_transposed(resample_transposed(&base.known, scale, shift, sides), sigma);
-        Self {
-            low_pass_weight: low_pass(&weight, size),
-            base,
-            size,
-            sigma,
-            scale,
-            shift,
-            sides,
-            weight,
-        }
-    }
-
+impl LevelBuilder<'_> {
     /// Computes the level with each known pixel's amount replaced.
-    pub(in crate::stages) fn mapped_level(&self, amount: impl Fn(f32) -> f32) -> PyramidLevel {
-        let ImagePyramid { present, known, .. } = self.base;
-        self.level(resample_rows_transposed(
-            [present.width(), present.height()],
-            #[inline(always)]
-            |y, row| {
-                let pairs = present.row(y).iter().zip(known.row(y));
-                for (made, (present, known)) in row.iter_mut().zip(pairs) {
-                    *made = map_amount(*present, *known, &amount);
-                }
-            },
-            self.scale,
-            self.shift,
-            self.sides,
-        ))
+    pub(crate) fn mapped_level(&self, amount: impl Fn(f32) -> f32) -> PyramidLevel {
+        self.level(&self.base.mapped(amount))
     }
 
-    fn build(&self) -> PyramidLevel {
-        let present = &self.base.present;
-        self.level(resample_transposed(
-            present, self.scale, self.shift, self.sides,
-        ))
-    }
-
-    /// Computes the level of transposed amounts at its size.
-    fn level(&self, transposed: Grid<f32>) -> PyramidLevel {
+    /// Computes the level of amounts that are zero where nothing is known.
+    fn level(&self, present: &Grid<f32>) -> PyramidLevel {
+        let transposed = resample_transposed(present, self.scale, self.shift, self.sides);
         let mut amount = gaussian_blur_transposed(transposed, self.sigma);
         // Becomes the high-pass value below.
         let mut value = low_pass(&amount, self.size);
         let mut known_share = self.weight.clone();
         let [width, height] = self.sides;
-        dispatch(
-            #[inline(always)]
-            || {
-                let count = width * height;
-                let low_pass_weight = &self.low_pass_weight.data()[..count];
-                let amount = &mut amount.data_mut()[..count];
-                let value = &mut value.data_mut()[..count];
-                let known_share = &mut known_share.data_mut()[..count];
-                for k in 0..count {
-                    let known = if known_share[k] >= MIN_KNOWN {
-                        1.0
-                    } else {
-                        0.0
-                    };
-                    let whole = amount[k] * (known / at_least_epsilon(known_share[k]));
-                    amount[k] = whole;
-                    value[k] = whole - known * value[k] / at_least_epsilon(low_pass_weight[k]);
-                    known_share[k] = known;
-                }
-            },
-        );
+        dispatch!({
+            let count = width * height;
+            let low_pass_weight = &self.low_pass_weight.data()[..count];
+            let amount = &mut amount.data_mut()[..count];
+            let value = &mut value.data_mut()[..count];
+            let known_share = &mut known_share.data_mut()[..count];
+            for k in 0..count {
+                let known = if known_share[k] >= MIN_KNOWN {
+                    1.0
+                } else {
+                    0.0
+                };
+                let whole = amount[k] * (known / at_least_epsilon(known_share[k]));
+                amount[k] = whole;
+                value[k] = whole - known * value[k] / at_least_epsilon(low_pass_weight[k]);
+                known_share[k] = known;
+            }
+        });
         PyramidLevel {
             value,
             amount,
@@ -213,15 +164,6 @@ impl<'a> LevelBuilder<'a> {
                 .after(&self.base.from_image),
         }
     }
-}
-
-/// Returns `present` with the amount of its known share replaced.
-#[inline(always)]
-fn map_amount(present: f32, known: f32, amount: impl Fn(f32) -> f32) -> f32 {
-    let is_known = known > 0.0;
-    let share = if is_known { known } else { 1.0 };
-    let replaced = share * amount(present / share);
-    if is_known { replaced } else { 0.0 }
 }
 
 /// Returns the weight, at least 1e-6, as a divisor.
@@ -236,12 +178,16 @@ fn low_pass(values: &Grid<f32>, size: usize) -> Grid<f32> {
         return gaussian_blur(values, LOW_PASS_SHARE * size as f64);
     }
     let sides = [values.width(), values.height()];
-    let middle = sides.map(|side| (side - 1) as f64 / 2.0);
     let scale = LOW_PASS_PX as f64 / size as f64;
-    let (few, shift) = fit_grid(sides, middle, scale);
+    let (few, shift) = fit_grid(sides, sides.map(middle), scale);
     let small = resample_transposed(values, scale, shift, few);
     let small = gaussian_blur_transposed(small, LOW_PASS_SHARE * LOW_PASS_PX as f64);
     resample(&small, 1.0 / scale, shift.map(|s| -s / scale), sides)
+}
+
+/// Returns the middle of a side of a grid, pixels.
+fn middle(side: usize) -> f64 {
+    (side - 1) as f64 / 2.0
 }
 
 /// Returns the size of a grid that holds a scaled box, and the shift that centres the box in it, pixels.
@@ -254,12 +200,7 @@ fn fit_grid(sides: [usize; 2], middle: [f64; 2], scale: f64) -> ([usize; 2], [f6
 impl PyramidLevel {
     /// Returns the level masked by `valid` (1 or 0 a pixel).
     pub(super) fn restricted_to(&self, valid: Grid<f32>) -> Self {
-        let over = |values: &Grid<f32>| {
-            let mut kept = values.clone();
-            let pairs = kept.data_mut().iter_mut().zip(valid.data());
-            pairs.for_each(|(value, valid)| *value *= valid);
-            kept
-        };
+        let over = |values: &Grid<f32>| values.zip_map(&valid, |value, valid| value * valid);
         Self {
             value: over(&self.value),
             amount: over(&self.amount),
@@ -270,31 +211,25 @@ impl PyramidLevel {
 
     /// Returns the centre of the level, working pixels.
     pub(super) fn centre(&self) -> [f64; 2] {
-        [
-            (self.value.width() - 1) as f64 / 2.0,
-            (self.value.height() - 1) as f64 / 2.0,
-        ]
+        [self.value.width(), self.value.height()].map(middle)
     }
 
     /// Returns the sum of squared values.
     pub(super) fn energy(&self) -> f64 {
-        let squares = self.value.data().iter().map(|v| f64::from(*v).powi(2));
-        squares.sum()
+        self.value
+            .data()
+            .iter()
+            .map(|v| f64::from(*v).powi(2))
+            .sum()
     }
-}
-
-/// Interpolates bilinearly; 0 outside.
-#[inline]
-pub(super) fn bilinear(values: &Grid<f32>, place: [f64; 2]) -> f32 {
-    BilinearCell::at([values.width(), values.height()], place).map_or(0.0, |at| at.value(values))
 }
 
 /// A position between four pixels, for interpolation in grids of one size.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BilinearCell {
     /// Index of the pixel above and left, and the offset from it, 0..1.
-    from: usize,
-    fraction: [f32; 2],
+    pub(super) from: usize,
+    pub(super) fraction: [f32; 2],
     width: usize,
 }
 
@@ -314,8 +249,22 @@ impl BilinearCell {
         })
     }
 
+    /// Locates a position in single precision; `None` outside the grid.
+    #[inline(always)]
+    pub(super) fn at_single([width, height]: [usize; 2], [x, y]: [f32; 2]) -> Option<Self> {
+        if !(x >= 0.0 && y >= 0.0 && x < (width - 1) as f32 && y < (height - 1) as f32) {
+            return None;
+        }
+        let (column, row) = (x as i32, y as i32);
+        Some(Self {
+            from: row as usize * width + column as usize,
+            fraction: [x - column as f32, y - row as f32],
+            width,
+        })
+    }
+
     /// Interpolates bilinearly.
-    #[inline]
+    #[inline(always)]
     pub(super) fn value(&self, values: &Grid<f32>) -> f32 {
         let (width, [fx, fy]) = (self.width, self.fraction);
         let near = &values.data()[self.from..self.from + width + 2];

@@ -6,8 +6,9 @@ use std::rc::Rc;
 use super::border_mask::valid_mask;
 use super::candidate::PoseCandidate;
 use super::gauss_newton::{Loss, NormalEquations, Workspace};
-use super::tiebreak::{TiebreakCandidate, tiebreak_scores};
-use super::{PoseOverlap, PyramidLevel};
+use super::overlap::{PlacedLevel, PoseOverlap};
+use super::pyramid::{BilinearCell, PyramidLevel};
+use super::tiebreak::tiebreak_scores;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 use crate::simd::dispatch;
@@ -18,7 +19,7 @@ const CONVERGED_PX: f64 = 0.03;
 const PIXELS_PER_SUM: usize = 256;
 
 /// A fixed and a moving level prepared for the evaluation of many poses.
-pub(in crate::stages) struct Refiner<'a> {
+pub(crate) struct Refiner<'a> {
     fixed: &'a PyramidLevel,
     moving: &'a PyramidLevel,
     samples: Rc<FixedSamples>,
@@ -34,15 +35,12 @@ pub(in crate::stages) struct Refiner<'a> {
 
 impl<'a> Refiner<'a> {
     /// Prepares a pair of levels.
-    pub(in crate::stages) fn new(fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> Self {
+    pub(crate) fn new(fixed: &'a PyramidLevel, moving: &'a PyramidLevel) -> Self {
         Self::with_samples(Rc::new(FixedSamples::new(fixed)), fixed, moving)
     }
 
     /// Prepares several moving levels against one fixed level.
-    pub(in crate::stages) fn for_levels(
-        fixed: &'a PyramidLevel,
-        moving: &'a [PyramidLevel],
-    ) -> Vec<Self> {
+    pub(crate) fn for_levels(fixed: &'a PyramidLevel, moving: &'a [PyramidLevel]) -> Vec<Self> {
         let samples = Rc::new(FixedSamples::new(fixed));
         let with = |moving| Self::with_samples(Rc::clone(&samples), fixed, moving);
         moving.iter().map(with).collect()
@@ -71,7 +69,7 @@ impl<'a> Refiner<'a> {
     ///
     /// Gain and offset of the moving values are estimated too; residuals are weighted by the loss. The refinement ends
     /// at convergence or after `max_steps`. Returns `start` unchanged if it has no inverse.
-    pub(in crate::stages) fn refine(
+    pub(crate) fn refine(
         &self,
         start: &PoseCandidate,
         max_steps: usize,
@@ -84,11 +82,9 @@ impl<'a> Refiner<'a> {
         let mut damping = 1e-3;
         let mut best: Option<(NormalEquations, Affine2)> = None;
         for _ in 0..max_steps {
-            let step = self.normal_equations(&from_fixed, start.mirrored, loss, &mut workspace);
-            let better = best
-                .as_ref()
-                .is_none_or(|(equations, _)| step.cost < equations.cost);
-            if better {
+            self.gather_correspondences(&from_fixed, &mut workspace);
+            let step = NormalEquations::new(&mut workspace, start.mirrored, loss);
+            if best.as_ref().is_none_or(|(best, _)| step.cost < best.cost) {
                 best = Some((step, from_fixed));
                 damping = (damping * 0.3_f64).max(1e-6);
             } else {
@@ -107,75 +103,65 @@ impl<'a> Refiner<'a> {
         let Some((equations, at)) = best else {
             return *start;
         };
-        let score = self.normalize_score(equations.explained, &at);
-        match self.fixed_from_moving(&at) {
-            Some(fixed_from_moving) => PoseCandidate {
-                fixed_from_moving,
-                score,
-                mirrored: start.mirrored,
-            },
-            None => *start,
-        }
+        let refined = |fixed_from_moving| PoseCandidate {
+            fixed_from_moving,
+            score: self.normalize_score(equations.explained, &at),
+            mirrored: start.mirrored,
+        };
+        self.fixed_from_moving(&at).map_or(*start, refined)
     }
 
     /// Scores a pose without changing it.
-    pub(in crate::stages) fn evaluate(&self, pose: &PoseCandidate) -> PoseCandidate {
-        let score = self
-            .moving_from_fixed(&pose.fixed_from_moving)
-            .map_or(0.0, |at| self.score(&at));
-        PoseCandidate { score, ..*pose }
+    pub(crate) fn evaluate(&self, pose: &PoseCandidate) -> PoseCandidate {
+        let score = |from_fixed: Affine2| {
+            let product = self.product(
+                &from_fixed,
+                #[inline(always)]
+                |[u, v], _, _| self.sample_value(u, v),
+            );
+            self.normalize_score(product, &from_fixed)
+        };
+        let from_fixed = self.moving_from_fixed(&pose.fixed_from_moving);
+        PoseCandidate {
+            score: from_fixed.map_or(0.0, score),
+            ..*pose
+        }
     }
 
     /// Computes how much of each level is covered by the other at a pose.
-    pub(in crate::stages) fn overlap(&self, pose: &PoseCandidate) -> PoseOverlap {
-        self.moving_from_pixels(pose)
-            .map(|into| {
-                PoseOverlap::new(
-                    [self.fixed, self.moving],
-                    [self.fixed_valid(), self.moving_valid()],
-                    &into,
-                )
-            })
-            .unwrap_or_default()
+    pub(crate) fn overlap(&self, pose: &PoseCandidate) -> PoseOverlap {
+        let placed = self.placed(pose);
+        let overlap = |placed| PoseOverlap::new(self.fixed, self.fixed_valid(), &placed);
+        placed.map_or_else(PoseOverlap::default, overlap)
     }
 
     /// Scores a pose and a rival's pose, possibly of another moving level, on the pixels valid for both; zeros if a
     /// pose has no inverse.
-    pub(in crate::stages) fn tiebreak_scores(
+    pub(crate) fn tiebreak_scores(
         &self,
         pose: &PoseCandidate,
         other: &Self,
         rival: &PoseCandidate,
     ) -> [f64; 2] {
-        match (self.candidate(pose), other.candidate(rival)) {
+        match (self.placed(pose), other.placed(rival)) {
             (Some(one), Some(two)) => tiebreak_scores(self.fixed, self.fixed_valid(), &[one, two]),
             _ => [0.0; 2],
         }
     }
 
-    fn candidate(&self, pose: &PoseCandidate) -> Option<TiebreakCandidate<'_>> {
-        Some(TiebreakCandidate {
+    /// Returns the moving level at a pose; `None` if the pose has no inverse.
+    fn placed(&self, pose: &PoseCandidate) -> Option<PlacedLevel<'_>> {
+        let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
+        let into = self.moving_from_fixed(&pose.fixed_from_moving)?;
+        Some(PlacedLevel {
             moving: self.moving,
-            moving_valid: self.moving_valid(),
-            moving_from_fixed: self.moving_from_pixels(pose)?,
+            valid: self.valid_masks[1].get_or_init(|| valid_mask(self.moving)),
+            moving_from_fixed: into.after(&to_middle),
         })
     }
 
-    /// Returns the valid mask of the fixed level.
     fn fixed_valid(&self) -> &Grid<f32> {
         self.valid_masks[0].get_or_init(|| valid_mask(self.fixed))
-    }
-
-    /// Returns the valid mask of the moving level.
-    fn moving_valid(&self) -> &Grid<f32> {
-        self.valid_masks[1].get_or_init(|| valid_mask(self.moving))
-    }
-
-    /// Returns the map from fixed to moving working pixels at a pose.
-    fn moving_from_pixels(&self, pose: &PoseCandidate) -> Option<Affine2> {
-        let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
-        let into = self.moving_from_fixed(&pose.fixed_from_moving)?;
-        Some(into.after(&to_middle))
     }
 
     /// Returns the map from fixed working pixels relative to the centre to moving working pixels, given the map
@@ -229,27 +215,25 @@ impl<'a> Refiner<'a> {
             .chunks(PIXELS_PER_SUM)
             .zip(values.chunks(PIXELS_PER_SUM));
         let mut product = 0.0_f64;
-        dispatch(
-            #[inline(always)]
-            || {
-                for (places, values) in runs {
-                    let mut part = 0.0_f32;
-                    for ([x, y], value) in places.iter().zip(values) {
-                        let u = a[0] * x + a[1] * y + a[2];
-                        let v = b[0] * x + b[1] * y + b[2];
-                        part += moving_value([u, v], [*x, *y], *value) * value;
-                    }
-                    product += f64::from(part);
+        dispatch!({
+            for (places, values) in runs {
+                let mut part = 0.0_f32;
+                for ([x, y], value) in places.iter().zip(values) {
+                    let u = a[0] * x + a[1] * y + a[2];
+                    let v = b[0] * x + b[1] * y + b[2];
+                    part += moving_value([u, v], [*x, *y], *value) * value;
                 }
-            },
-        );
+                product += f64::from(part);
+            }
+        });
         product
     }
 
     /// Interpolates value, gradient and weight of the moving level; `None` outside.
     #[inline(always)]
     fn sample_cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
-        let (from, [fx, fy]) = self.cell_at(u, v)?;
+        let cell = BilinearCell::at_single(self.size, [u, v])?;
+        let (from, [fx, fy]) = (cell.from, cell.fraction);
         let (above, below) = (
             &self.cells[from..from + 2],
             &self.cells[from + self.size[0]..][..2],
@@ -261,59 +245,16 @@ impl<'a> Refiner<'a> {
     /// Interpolates the value alone; 0 outside.
     #[inline(always)]
     fn sample_value(&self, u: f32, v: f32) -> f32 {
-        let Some((from, [fx, fy])) = self.cell_at(u, v) else {
-            return 0.0;
-        };
-        let width = self.size[0];
-        let near = &self.moving.value.data()[from..from + width + 2];
-        let top = near[0] + (near[1] - near[0]) * fx;
-        let bottom = near[width] + (near[width + 1] - near[width]) * fx;
-        top + (bottom - top) * fy
+        let cell = BilinearCell::at_single(self.size, [u, v]);
+        cell.map_or(0.0, |cell| cell.value(&self.moving.value))
     }
 
-    /// Returns the index of the pixel above and left of a position and the offset from it; `None` outside.
-    #[inline(always)]
-    fn cell_at(&self, u: f32, v: f32) -> Option<(usize, [f32; 2])> {
-        let [width, height] = self.size;
-        if !(u >= 0.0 && v >= 0.0 && u < (width - 1) as f32 && v < (height - 1) as f32) {
-            return None;
-        }
-        // Casts between i32 and f32 are single instructions.
-        let (column, row) = (u as i32, v as i32);
-        let within = [u - column as f32, v - row as f32];
-        Some((row as usize * width + column as usize, within))
-    }
-
-    fn normal_equations(
-        &self,
-        from_fixed: &Affine2,
-        mirrored: bool,
-        loss: Loss,
-        workspace: &mut Workspace,
-    ) -> NormalEquations {
-        self.gather_correspondences(from_fixed, workspace);
-        NormalEquations::new(workspace, mirrored, loss)
-    }
-
-    /// Returns the correlation at a pose, normalised by the energy of both levels.
-    fn score(&self, from_fixed: &Affine2) -> f64 {
-        let product = self.product(
-            from_fixed,
-            #[inline(always)]
-            |[u, v], _, _| self.sample_value(u, v),
-        );
-        self.normalize_score(product, from_fixed)
-    }
-
-    /// Normalises a sum of products.
+    /// Divides a sum of products by the energy of both levels, which gives the correlation.
     fn normalize_score(&self, product: f64, from_fixed: &Affine2) -> f64 {
-        // Fixed pixels per moving pixel, inverted.
+        // Moving pixels per fixed pixel.
         let area = from_fixed.determinant().abs().max(1e-12);
-        product
-            / self.samples.known_share
-            / (self.energies[0] * self.energies[1] / area)
-                .sqrt()
-                .max(1e-12)
+        let energy = (self.energies[0] * self.energies[1] / area).sqrt();
+        product / self.samples.known_share / energy.max(1e-12)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::PyramidLevel;
-use super::candidate::{BeamWidth, PoseCandidate, SearchRange};
+use super::candidate::{PoseCandidate, SearchRange, prune};
 use super::fft_correlation::{FFT_SIZE, FftCorrelator, best_shift};
 use crate::domain::Affine2;
 use crate::simd::{dispatch, floor_f32, index_from_f32};
@@ -76,13 +76,21 @@ pub(super) fn search(
             }
         }
     }
-    suppress_duplicates(peaks, range.beam_width)
-        .into_iter()
-        .map(|peak| peak.candidate(fixed, moving))
-        .collect()
+    let rank = |peak: &Peak| (peak.score, peak.mirrored);
+    let best = prune(peaks, range.beam_width, rank, Peak::is_duplicate_of);
+    let candidate = |peak: Peak| peak.candidate(fixed, moving);
+    best.into_iter().map(candidate).collect()
 }
 
 impl Peak {
+    fn is_duplicate_of(&self, other: &Self) -> bool {
+        let turn = (self.angle - other.angle).to_degrees().rem_euclid(360.0);
+        let ratio = (self.scale / other.scale).max(other.scale / self.scale);
+        self.mirrored == other.mirrored
+            && turn.min(360.0 - turn) < DUPLICATE_ANGLE_DEG
+            && ratio < DUPLICATE_SCALE
+    }
+
     /// Converts working pixels to image pixels: moving image to its level, similarity about the centre, fixed level to
     /// its image.
     fn candidate(&self, fixed: &PyramidLevel, moving: &PyramidLevel) -> PoseCandidate {
@@ -107,30 +115,6 @@ impl Peak {
     }
 }
 
-/// Returns the best peaks without duplicates; each reading is ranked separately.
-fn suppress_duplicates(mut peaks: Vec<Peak>, beam_width: BeamWidth) -> Vec<Peak> {
-    peaks.sort_by(|a, b| b.score.total_cmp(&a.score));
-    let mut accepted: Vec<Peak> = Vec::new();
-    for peak in peaks {
-        let same = |other: &Peak| {
-            let turn = (peak.angle - other.angle).to_degrees().rem_euclid(360.0);
-            let apart = turn.min(360.0 - turn);
-            let ratio = (peak.scale / other.scale).max(other.scale / peak.scale);
-            peak.mirrored == other.mirrored
-                && apart < DUPLICATE_ANGLE_DEG
-                && ratio < DUPLICATE_SCALE
-        };
-        let same_reading = accepted
-            .iter()
-            .filter(|other| other.mirrored == peak.mirrored)
-            .count();
-        if same_reading < beam_width.of_reading(peak.mirrored) && !accepted.iter().any(same) {
-            accepted.push(peak);
-        }
-    }
-    accepted
-}
-
 /// Warps a level's values into the square, rotated (radians) and scaled about its centre.
 fn warp_to_square(level: &PyramidLevel, turn: Option<(f64, f64)>) -> Vec<f32> {
     let middle = (FFT_SIZE / 2) as f64;
@@ -142,49 +126,45 @@ fn warp_to_square(level: &PyramidLevel, turn: Option<(f64, f64)>) -> Vec<f32> {
     let Some(back) = place.inverse() else {
         return vec![0.0; FFT_SIZE * FFT_SIZE];
     };
-    let (width, height) = (level.value.width(), level.value.height());
-    let data = level.value.data();
-    let [to_right, to_end] = [width - 1, height - 1].map(|last| last as f32);
+    let (width, data) = (level.value.width(), level.value.data());
+    let [to_right, to_end] = [width - 1, level.value.height() - 1].map(|last| last as f32);
     let [x_of, y_of] = back.0.map(|row| row.map(|v| v as f32));
     let mut values = vec![0.0; FFT_SIZE * FFT_SIZE];
     let (runs, _) = values.as_chunks_mut::<LANES>();
     // Levels are smooth at this size, so one sample a pixel suffices even where the scale shrinks them.
-    dispatch(
-        #[inline(always)]
-        || {
-            for (run, values) in runs.iter_mut().enumerate() {
-                let (row, column) = (run * LANES / FFT_SIZE, run * LANES % FFT_SIZE);
-                let (mut from, mut beyond) = ([0; LANES], [[0.0; LANES]; 2]);
-                let mut inside = [0.0; LANES];
-                for k in 0..LANES {
-                    let (column, row) = ((column + k) as f32, row as f32);
-                    let x = x_of[0] * column + x_of[1] * row + x_of[2];
-                    let y = y_of[0] * column + y_of[1] * row + y_of[2];
-                    let is_inside = (x >= 0.0) & (y >= 0.0) & (x < to_right) & (y < to_end);
-                    inside[k] = if is_inside { 1.0 } else { 0.0 };
-                    let (x, y) = if is_inside { (x, y) } else { (0.0, 0.0) };
-                    let (left, top) = (floor_f32(x), floor_f32(y));
-                    beyond[0][k] = x - left;
-                    beyond[1][k] = y - top;
-                    from[k] = index_from_f32(top) * width as u32 + index_from_f32(left);
-                }
-                let mut near = [[0.0; LANES]; 4];
-                for k in 0..LANES {
-                    let from = from[k] as usize;
-                    let above = &data[from..from + width + 2];
-                    near[0][k] = above[0];
-                    near[1][k] = above[1];
-                    near[2][k] = above[width];
-                    near[3][k] = above[width + 1];
-                }
-                for k in 0..LANES {
-                    let a = near[0][k] + (near[1][k] - near[0][k]) * beyond[0][k];
-                    let b = near[2][k] + (near[3][k] - near[2][k]) * beyond[0][k];
-                    values[k] = inside[k] * (a + (b - a) * beyond[1][k]);
-                }
+    dispatch!({
+        for (run, values) in runs.iter_mut().enumerate() {
+            let (row, column) = (run * LANES / FFT_SIZE, run * LANES % FFT_SIZE);
+            let (mut from, mut beyond) = ([0; LANES], [[0.0; LANES]; 2]);
+            let mut inside = [0.0; LANES];
+            for k in 0..LANES {
+                let (column, row) = ((column + k) as f32, row as f32);
+                let x = x_of[0] * column + x_of[1] * row + x_of[2];
+                let y = y_of[0] * column + y_of[1] * row + y_of[2];
+                let is_inside = (x >= 0.0) & (y >= 0.0) & (x < to_right) & (y < to_end);
+                inside[k] = if is_inside { 1.0 } else { 0.0 };
+                let (x, y) = if is_inside { (x, y) } else { (0.0, 0.0) };
+                let (left, top) = (floor_f32(x), floor_f32(y));
+                beyond[0][k] = x - left;
+                beyond[1][k] = y - top;
+                from[k] = index_from_f32(top) * width as u32 + index_from_f32(left);
             }
-        },
-    );
+            let mut near = [[0.0; LANES]; 4];
+            for k in 0..LANES {
+                let from = from[k] as usize;
+                let above = &data[from..from + width + 2];
+                near[0][k] = above[0];
+                near[1][k] = above[1];
+                near[2][k] = above[width];
+                near[3][k] = above[width + 1];
+            }
+            for k in 0..LANES {
+                let a = near[0][k] + (near[1][k] - near[0][k]) * beyond[0][k];
+                let b = near[2][k] + (near[3][k] - near[2][k]) * beyond[0][k];
+                values[k] = inside[k] * (a + (b - a) * beyond[1][k]);
+            }
+        }
+    });
     values
 }
 

@@ -3,45 +3,25 @@
 //! Where only one of them covers valid pixels, the other cannot be compared, so those pixels do not count.
 
 use super::PyramidLevel;
-use super::pyramid::BilinearCell;
-use crate::domain::Affine2;
+use super::overlap::PlacedLevel;
 use crate::raster::Grid;
-
-/// A moving level with the map from fixed to moving working pixels.
-pub(super) struct TiebreakCandidate<'a> {
-    pub(super) moving: &'a PyramidLevel,
-    pub(super) moving_valid: &'a Grid<f32>,
-    pub(super) moving_from_fixed: Affine2,
-}
 
 /// Scores two poses on the pixels valid in all levels: correlation times the share of the moving amount that the fixed
 /// one covers, 0..=1.
 pub(super) fn tiebreak_scores(
     fixed: &PyramidLevel,
     fixed_valid: &Grid<f32>,
-    candidates: &[TiebreakCandidate<'_>; 2],
+    candidates: &[PlacedLevel<'_>; 2],
 ) -> [f64; 2] {
     let mut sums = [TiebreakSums::default(); 2];
-    for y in 0..fixed_valid.height() {
-        for x in 0..fixed_valid.width() {
-            if fixed_valid.at(x, y) == 0.0 {
-                continue;
-            }
-            let place = [x as f64, y as f64];
-            let there = [0, 1].map(|k: usize| candidates[k].moving_from_fixed.apply(place));
-            let there = [0, 1].map(|k: usize| {
-                let moving_valid = candidates[k].moving_valid;
-                BilinearCell::at([moving_valid.width(), moving_valid.height()], there[k])
-                    .filter(|at| at.value(moving_valid) >= 0.5)
-            });
-            let [Some(one), Some(two)] = there else {
-                continue;
-            };
-            let ink = [fixed.value.at(x, y), fixed.amount.at(x, y)];
-            for ((at, candidate), sums) in [one, two].iter().zip(candidates).zip(&mut sums) {
-                let PyramidLevel { value, amount, .. } = candidate.moving;
-                sums.add(ink, [value, amount].map(|of| at.value(of)));
-            }
+    for (x, y, one) in candidates[0].common_pixels(fixed_valid) {
+        let Some(two) = candidates[1].cell(x, y) else {
+            continue;
+        };
+        let ink = [fixed.value.at(x, y), fixed.amount.at(x, y)];
+        for ((cell, candidate), sums) in [one, two].iter().zip(candidates).zip(&mut sums) {
+            let PyramidLevel { value, amount, .. } = candidate.moving;
+            sums.add(ink, [value, amount].map(|of| cell.value(of)));
         }
     }
     sums.map(|sums| sums.score())
@@ -86,7 +66,7 @@ impl TiebreakSums {
 #[cfg(test)]
 mod tests {
     use super::super::border_mask::valid_mask;
-    use super::{TiebreakCandidate, tiebreak_scores};
+    use super::{PlacedLevel, tiebreak_scores};
     use crate::domain::Affine2;
     use crate::stages::pose::PyramidLevel;
     use crate::stages::pose::border_mask::tests::{SIDE, level};
@@ -96,9 +76,9 @@ mod tests {
         let as_read = Affine2([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
         let mirrored = Affine2([[-1.0, 0.0, last], [0.0, 1.0, 0.0]]);
         let (fixed_valid, moving_valid) = (valid_mask(print), valid_mask(relief));
-        let candidate = |moving_from_fixed| TiebreakCandidate {
+        let candidate = |moving_from_fixed| PlacedLevel {
             moving: relief,
-            moving_valid: &moving_valid,
+            valid: &moving_valid,
             moving_from_fixed,
         };
         tiebreak_scores(
@@ -112,14 +92,14 @@ mod tests {
     const CHARACTER: [[usize; 4]; 3] = [[14, 20, 50, 26], [42, 12, 50, 26], [29, 20, 35, 50]];
 
     #[test]
-    fn a_small_difference_within_the_character_tells_the_mirror() {
+    fn a_small_asymmetry_of_the_character_decides_against_the_mirrored_pose() {
         let [as_read, mirrored] = scores(&level(&CHARACTER), &level(&CHARACTER));
         assert!(as_read > 0.99, "{as_read}");
         assert!(mirrored < 0.95 * as_read, "{mirrored} of {as_read}");
     }
 
     #[test]
-    fn a_wall_that_falls_on_a_frame_line_only_in_the_mirror_decides_nothing() {
+    fn a_wall_that_overlaps_a_frame_line_only_when_mirrored_has_no_effect() {
         let with = |bar| level(&[&CHARACTER[..], &[bar]].concat());
         let (left, right) = ([0, 0, 4, SIDE], [SIDE - 4, 0, SIDE, SIDE]);
         let bare = scores(&level(&CHARACTER), &level(&CHARACTER));

@@ -140,12 +140,11 @@ pub(super) fn set_confidence(
 #[cfg(test)]
 mod tests {
     use super::{Areas, MASK, logistic, mask_inputs, of_pose};
+    use crate::domain::PoseFeatures;
 
     fn of_mask(features: &PoseFeatures, areas: Areas) -> f64 {
         logistic(&MASK, &mask_inputs(features, areas))
     }
-
-    use crate::domain::PoseFeatures;
 
     const PLAIN: PoseFeatures = PoseFeatures {
         correlation: 0.88,

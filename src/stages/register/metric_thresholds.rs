@@ -89,7 +89,7 @@ pub(super) fn choose(
         return Err(RegisterError::NoStrokes);
     }
     let mut structure = Structure::new(canvas, &candidates, params.window);
-    let best = structure.best_of_all();
+    let best = structure.best_of_all().unwrap_or(0);
     let gap = |c: &Candidate| (c.area / ink * params.ink_spread - 1.0).abs();
     let density = nearest(&candidates, gap);
     let edge = relief.level_at(&depth.scale, relief.tops_end);
@@ -99,7 +99,7 @@ pub(super) fn choose(
         .clamp(ink / MOST_SPREAD, ink * LEAST_INKED);
     let close = |c: &Candidate| (c.area / own_area.max(1.0)).ln().abs() <= CLOSE_AREA.ln();
     let both = structure
-        .best_among(&close)
+        .best((0..candidates.len()).filter(|k| close(&candidates[*k])))
         .unwrap_or_else(|| nearest(&candidates, |c| f64::from(c.level.abs_diff(edge))));
     let choice = |metric, k: usize, score| ThresholdChoice {
         metric,
@@ -171,41 +171,25 @@ impl<'a> Structure<'a> {
     }
 
     fn at(&mut self, k: usize) -> f64 {
-        if let Some(score) = self.known[k] {
-            return score;
-        }
-        let mask = self.canvas.mask(self.candidates[k].level);
-        let score = self.means.nl_ssim(&mask);
-        self.known[k] = Some(score);
-        score
+        *self.known[k].get_or_insert_with(|| {
+            let mask = self.canvas.mask(self.candidates[k].level);
+            self.means.nl_ssim(&mask)
+        })
     }
 
     /// Returns the best candidate: the score changes slowly with depth, so every fourth is tried, then those around
     /// the best.
-    fn best_of_all(&mut self) -> usize {
+    fn best_of_all(&mut self) -> Option<usize> {
         let count = self.candidates.len();
-        let coarse = self.best((0..count).step_by(COARSE));
-        let near = coarse.saturating_sub(COARSE - 1)..(coarse + COARSE).min(count);
-        self.best(near)
-    }
-
-    fn best_among(&mut self, allowed: &impl Fn(&Candidate) -> bool) -> Option<usize> {
-        let among: Vec<usize> = (0..self.candidates.len())
-            .filter(|k| allowed(&self.candidates[*k]))
-            .collect();
-        (!among.is_empty()).then(|| self.best(among.into_iter()))
+        let coarse = self.best((0..count).step_by(COARSE))?;
+        self.best(coarse.saturating_sub(COARSE - 1)..(coarse + COARSE).min(count))
     }
 
     /// Returns the first candidate with the highest score.
-    fn best(&mut self, among: impl Iterator<Item = usize>) -> usize {
-        let mut best = (0, f64::NEG_INFINITY);
-        for k in among {
-            let score = self.at(k);
-            if score > best.1 {
-                best = (k, score);
-            }
-        }
-        best.0
+    fn best(&mut self, among: impl Iterator<Item = usize>) -> Option<usize> {
+        let scored = among.map(|k| (k, self.at(k)));
+        let best = scored.reduce(|best, other| if other.1 > best.1 { other } else { best });
+        best.map(|(k, _)| k)
     }
 }
 

@@ -15,8 +15,8 @@ mod soft_thresholds;
 
 pub use confidence::ConfidenceInputs;
 pub use params::{RegisterError, RegisterParams};
+pub use scoring::Registered;
 pub(super) use scoring::{Alignment, canvas_print, score_alignments};
-pub use scoring::{CanvasMasks, Registered};
 
 use super::normalize::{Normalized, relative_depths, stroke_growth};
 use crate::domain::PoseFeatures;
@@ -49,7 +49,10 @@ const MIRROR_WINS: f64 = 1.06;
 /// let (scan, print) = (Scan::from(pair.mesh), Print::from(image));
 /// let plane = fit::fit(&scan, Some(&print), None, &settings.fit)?;
 /// let map = depth::depth(&scan, &plane, None, &settings.depth)?;
+/// assert_eq!(map.levels.width().max(map.levels.height()), 512);
 /// let normalized = normalize::normalize(&map, &print, &settings.normalize)?;
+/// // One mask for each interpretation of the print, the likeliest first.
+/// assert_eq!(normalized.prints.len(), normalized.outcome.inks.len());
 /// let registered = register::register(&map, &normalized, &settings.register)?;
 /// for metric in &registered.outcome.metrics {
 ///     assert!(metric.confidence.is_some_and(|confidence| confidence > 0.5));

@@ -82,27 +82,11 @@ pub enum RegisterError {
 impl RegisterError {
     /// Returns what the failure means for the pair.
     pub const fn class(&self) -> FailureClass {
-        match self {
-            Self::NoPose
-            | Self::NoStrokes
-            | Self::NoThreshold(_)
-            | Self::EmptyMask(_)
-            | Self::Mirrored { .. }
-            | Self::NoCorrelation { .. }
-            | Self::NoMatch { .. } => FailureClass::NoSolution,
-        }
+        FailureClass::NoSolution
     }
 
     /// Returns whether the mesh is the likelier cause, not the print.
     pub const fn is_of_the_mesh(&self) -> bool {
-        match self {
-            Self::NoPose
-            | Self::NoStrokes
-            | Self::NoThreshold(_)
-            | Self::EmptyMask(_)
-            | Self::Mirrored { .. }
-            | Self::NoCorrelation { .. } => true,
-            Self::NoMatch { .. } => false,
-        }
+        !matches!(self, Self::NoMatch { .. })
     }
 }

@@ -126,7 +126,7 @@ fn find_poses(
 fn longest(known: &Mask) -> f64 {
     known
         .bounding_box()
-        .map_or(1.0, |b| b.width().max(b.height()) as f64)
+        .map_or(1.0, |bounds| bounds.longest_side() as f64)
 }
 
 /// Refuses mirror writing and relief that correlates with nothing.

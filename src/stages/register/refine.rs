@@ -95,11 +95,15 @@ struct CompetingPoses {
 }
 
 impl CompetingPoses {
-    /// Refines the poses of the search and ranks them.
+    /// Refines the first few poses as read and the best mirrored one, and ranks them.
     fn compare(images: &ScaledImages, search: &PoseSearch) -> Option<Self> {
         let strokes = images.strokes(&FEW_CUTS);
         let thresholds = SoftThresholds::new(&FEW_CUTS, &images.ink, &strokes);
-        let tried = refine_all(&thresholds, search)?;
+        let starts = search.poses.iter().take(TRIED).chain(&search.mirrored);
+        let tried: Option<Vec<RefinedPose>> = starts
+            .map(|start| refined_twice(&thresholds, start))
+            .collect();
+        let tried = tried?;
         let best = *best_of(&tried, |pose| !pose.found.mirrored)?;
         let elsewhere = |pose: &RefinedPose| {
             !pose.found.mirrored && pose.found.rotation_to(&best.found) > SAME_POSE_DEG
@@ -121,10 +125,8 @@ impl CompetingPoses {
         if !is_close {
             return Some(());
         }
-        for rival in [&mut self.other_angle, &mut self.mirrored]
-            .into_iter()
-            .flatten()
-        {
+        let rivals = [&mut self.other_angle, &mut self.mirrored];
+        for rival in rivals.into_iter().flatten() {
             *rival = sharpened(thresholds, &rival.found)?;
         }
         self.shares = self.fair_shares(thresholds);
@@ -143,13 +145,13 @@ impl CompetingPoses {
             .map(|rival| rival.map_or(0.0, |rival| fair_share(thresholds, &rival, &self.best)))
     }
 
-    /// Score of the best pose minus the score of its best competitor.
+    /// Returns the score of the best pose minus the score of its best competitor.
     fn margin(&self) -> f64 {
         let [other_angle, mirrored] = self.shares;
         self.best.score() * (1.0 - other_angle.max(mirrored))
     }
 
-    /// Evidence for and against the best pose.
+    /// Returns the evidence for and against the best pose.
     fn features(&self, spread: f64) -> PoseFeatures {
         let [other_angle, mirrored] = self.shares;
         PoseFeatures {
@@ -163,13 +165,13 @@ impl CompetingPoses {
     }
 }
 
-/// Score of a competitor divided by the score of the best pose; 0 without a competitor.
+/// Returns the score of a competitor divided by the score of the best pose; 0 without a competitor.
 fn share(rival: Option<RefinedPose>, best: &RefinedPose) -> f64 {
     rival.map_or(0.0, |rival| rival.score() / best.score().max(1e-6))
 }
 
-/// The same on the area that both have in common. A small common area may favour the best pose by chance, so the plain
-/// share, up to the share of a symmetric character, is the lower bound.
+/// Returns the share of a competitor on the area that both have in common. A small common area may favour the best pose
+/// by chance, so the plain share, up to the share of a symmetric character, is the lower bound.
 fn fair_share(thresholds: &SoftThresholds, rival: &RefinedPose, best: &RefinedPose) -> f64 {
     let [score, fair] =
         thresholds.compare_on_common_area([best, rival].map(|pose| (pose.nearest, &pose.found)));
@@ -182,33 +184,29 @@ fn best_of(tried: &[RefinedPose], of_kind: impl Fn(&RefinedPose) -> bool) -> Opt
 }
 
 /// Print and relief at working size.
-struct WorkingImages {
+struct WorkingImages<'a> {
     ink: ImagePyramid,
     depths: ImagePyramid,
-    px: usize,
-    smoothing_px: f64,
-    anisotropic_scale: bool,
+    params: &'a RegisterParams,
     /// Middle of the depth map, pixels.
     middle: [f64; 2],
 }
 
-impl WorkingImages {
-    fn new(depths: &SoftMask, print: &PrintMasks, params: &RegisterParams) -> Option<Self> {
+impl<'a> WorkingImages<'a> {
+    fn new(depths: &SoftMask, print: &PrintMasks, params: &'a RegisterParams) -> Option<Self> {
         let px = params.working_px as usize;
         Some(Self {
             ink: ImagePyramid::new(&print.soft_ink(), px)?,
             depths: ImagePyramid::new(depths, px)?,
-            px,
-            smoothing_px: params.smoothing_px,
-            anisotropic_scale: params.anisotropic_scale,
+            params,
             middle: [depths.known.width(), depths.known.height()].map(|side| side as f64 / 2.0),
         })
     }
 
     /// Scales both to a share of the working size.
     fn at(&self, share: f64) -> ScaledImages<'_> {
-        let px = (self.px as f64 * share).round() as usize;
-        let sigma = self.smoothing_px * share.sqrt();
+        let px = (f64::from(self.params.working_px) * share).round() as usize;
+        let sigma = self.params.smoothing_px * share.sqrt();
         ScaledImages {
             ink: self.ink.level(px, sigma),
             depths: self.depths.level_builder(px, sigma),
@@ -216,8 +214,8 @@ impl WorkingImages {
     }
 
     /// Refines a pose with the strokes of its threshold, first on the character alone: walls, frame lines and neighbours
-    /// may be cut differently around print and relief. Where they agree they are used too. Also returns the spread of
-    /// the answers, see [`Self::refine_at_three_sizes`].
+    /// may be cut off differently in print and relief. If they agree, they are used too. Also returns the spread of the
+    /// answers, see [`Self::refine_at_three_sizes`].
     fn refine_fully(&self, few: &ScaledImages, best: &RefinedPose) -> Option<(Affine2, f64)> {
         let strokes = few.stroke(best.cut);
         let both = [&few.ink, &strokes];
@@ -237,7 +235,7 @@ impl WorkingImages {
         let [ink, strokes] = alone.as_ref().map_or(both, |[ink, strokes]| [ink, strokes]);
         let refiner = Refiner::new(ink, strokes);
         let refined = refiner.refine(&closer, MOST_STEPS, Loss::Tukey);
-        let last = if self.anisotropic_scale {
+        let last = if self.params.anisotropic_scale {
             with_anisotropic_scale(&refiner, &refined, self.middle)
         } else {
             refined
@@ -263,18 +261,13 @@ impl WorkingImages {
             refiner.refine(&start, MOST_STEPS, Loss::Tukey)
         };
         let answers = [1.0, 1.0 / OTHER_SIZE, OTHER_SIZE].map(answer);
-        let best = answers.iter().fold(answers[0], |best, other| {
-            if other.score > best.score {
-                *other
-            } else {
-                best
-            }
-        });
+        let better = |a: PoseCandidate, b: PoseCandidate| if b.score > a.score { b } else { a };
+        let best = answers.into_iter().fold(answers[0], better);
         let apart = answers.iter().map(|other| self.apart(&best, other));
         (best, apart.fold(0.0, f64::max))
     }
 
-    /// Mean distance between the depth map's corners under two poses, as a share of its longest side.
+    /// Returns the mean distance between the depth map's corners under two poses, as a share of its longest side.
     fn apart(&self, one: &PoseCandidate, other: &PoseCandidate) -> f64 {
         let [width, height] = self.middle.map(|middle| 2.0 * middle);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
@@ -294,7 +287,7 @@ struct ScaledImages<'a> {
 }
 
 impl ScaledImages<'_> {
-    /// Soft strokes of a threshold below the tops.
+    /// Computes the soft strokes of a threshold below the tops.
     fn stroke(&self, cut: f64) -> PyramidLevel {
         self.depths.mapped_level(|d| soft_stroke(d, cut, SOFTNESS))
     }
@@ -304,21 +297,10 @@ impl ScaledImages<'_> {
     }
 }
 
-/// Refines the first few poses as read, and the best mirrored one.
-fn refine_all(thresholds: &SoftThresholds, search: &PoseSearch) -> Option<Vec<RefinedPose>> {
-    let starts = search.poses.iter().take(TRIED).chain(&search.mirrored);
-    starts
-        .map(|start| refined_twice(thresholds, start))
-        .collect()
-}
-
 /// Refines a pose with the threshold that fits best, first with a loss for distant starts, then for close ones.
 fn refined_twice(thresholds: &SoftThresholds, start: &PoseCandidate) -> Option<RefinedPose> {
-    let close = thresholds
-        .best_at(start)?
-        .strokes
-        .refine(start, FEW_STEPS, Loss::Huber);
-    sharpened(thresholds, &close)
+    let strokes = thresholds.best_at(start)?.strokes;
+    sharpened(thresholds, &strokes.refine(start, FEW_STEPS, Loss::Huber))
 }
 
 /// Refines a pose that is nearly right with the threshold that fits best.

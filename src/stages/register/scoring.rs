@@ -9,33 +9,17 @@ use crate::stages::score::{self, SsimReference, SsimWindow};
 
 /// A metric's threshold and pose before they are scored.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::stages) struct Alignment {
+pub(crate) struct Alignment {
     /// Which metric.
-    pub(in crate::stages) metric: ThresholdMetric,
+    pub(crate) metric: ThresholdMetric,
     /// Depth-map levels from this one up are stroke.
-    pub(in crate::stages) level: u16,
+    pub(crate) level: u16,
     /// Depth-map pixels to print-image pixels.
-    pub(in crate::stages) print_from_depth: Affine2,
+    pub(crate) print_from_depth: Affine2,
     /// Score of the pose minus the score of the best other pose.
-    pub(in crate::stages) margin: f64,
+    pub(crate) margin: f64,
     /// Whether the threshold or the scale lies at the end of the range that was searched.
-    pub(in crate::stages) at_bound: bool,
-}
-
-impl Alignment {
-    /// Returns whether the other alignment puts the same strokes at the same place.
-    fn has_mask_of(&self, other: &Self) -> bool {
-        self.level == other.level && self.print_from_depth == other.print_from_depth
-    }
-}
-
-/// The depth mask of one metric on the pair's canvas.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CanvasMasks {
-    /// Which metric.
-    pub metric: ThresholdMetric,
-    /// The depth mask transformed by the alignment.
-    pub depth: Mask,
+    pub(crate) at_bound: bool,
 }
 
 /// Result of the register stage.
@@ -45,15 +29,15 @@ pub struct Registered {
     pub outcome: RegisterOutcome,
     /// The print mask on the canvas, one for all metrics.
     pub canvas_print: Mask,
-    /// One canvas a metric, in the order of the outcome.
-    pub canvases: Vec<CanvasMasks>,
+    /// The depth mask of each metric on the canvas, in the order of the outcome.
+    pub canvas_depths: Vec<Mask>,
     /// Inputs of the confidence model, one a metric in the order of the outcome; empty under the paper's method. Its
     /// weights are fitted on them by `cargo bench --bench accuracy -- --fit-confidence`.
     pub confidence_inputs: Vec<ConfidenceInputs>,
 }
 
 /// Warps one interpretation of the print's ink to the pair's canvas.
-pub(in crate::stages) fn canvas_print(normalized: &Normalized, ink: usize) -> Mask {
+pub(crate) fn canvas_print(normalized: &Normalized, ink: usize) -> Mask {
     let side = normalized.outcome.canvas_px as usize;
     let canvas_from_print = normalized.outcome.inks[ink].canvas_from_print;
     warp_mask(&normalized.prints[ink].ink, &canvas_from_print, side, side)
@@ -63,7 +47,7 @@ pub(in crate::stages) fn canvas_print(normalized: &Normalized, ink: usize) -> Ma
 ///
 /// # Errors
 /// When a threshold leaves no strokes.
-pub(in crate::stages) fn score_alignments(
+pub(crate) fn score_alignments(
     depth: &DepthMap,
     normalized: &Normalized,
     ink: usize,
@@ -76,9 +60,13 @@ pub(in crate::stages) fn score_alignments(
     let print_size = [print.width(), print.height()];
     let side = normalized.outcome.canvas_px as usize;
     let print_means = SsimReference::new(&canvas_print, window);
-    let masks = masks(alignments, |pose, levels| {
-        depth.warped_stroke_masks(&canvas_from_print.after(pose), [side; 2], levels)
-    });
+    let mut masks = Vec::new();
+    // Masks of one pose share their sampling.
+    for alike in alignments.chunk_by(|one, other| one.print_from_depth == other.print_from_depth) {
+        let levels: Vec<u16> = alike.iter().map(|alignment| alignment.level).collect();
+        let canvas_from_depth = canvas_from_print.after(&alike[0].print_from_depth);
+        masks.extend(depth.warped_stroke_masks(&canvas_from_depth, [side; 2], &levels));
+    }
     let mut metrics: Vec<MetricOutcome> = Vec::new();
     for (k, (alignment, mask)) in alignments.iter().zip(&masks).enumerate() {
         if mask.count() == 0 {
@@ -86,7 +74,9 @@ pub(in crate::stages) fn score_alignments(
         }
         // Metrics often choose the same threshold.
         let mut before = alignments[..k].iter();
-        let twin = before.position(|other| other.has_mask_of(alignment));
+        let twin = before.position(|other| {
+            (other.level, other.print_from_depth) == (alignment.level, alignment.print_from_depth)
+        });
         let scores = twin.map_or_else(
             || score::score_masks(&print_means, mask),
             |twin| metrics[twin].scores,
@@ -101,25 +91,8 @@ pub(in crate::stages) fn score_alignments(
         },
         confidence_inputs: Vec::new(),
         canvas_print,
-        canvases: alignments
-            .iter()
-            .zip(masks)
-            .map(|(alignment, depth)| CanvasMasks {
-                metric: alignment.metric,
-                depth,
-            })
-            .collect(),
+        canvas_depths: masks,
     })
-}
-
-/// Computes the mask of each alignment; `strokes` computes the masks of several levels at one pose.
-fn masks(alignments: &[Alignment], strokes: impl Fn(&Affine2, &[u16]) -> Vec<Mask>) -> Vec<Mask> {
-    let mut masks = Vec::new();
-    for alike in alignments.chunk_by(|one, other| one.print_from_depth == other.print_from_depth) {
-        let levels: Vec<u16> = alike.iter().map(|alignment| alignment.level).collect();
-        masks.extend(strokes(&alike[0].print_from_depth, &levels));
-    }
-    masks
 }
 
 fn outcome(

@@ -13,11 +13,8 @@ pub(super) const FEW_CUTS: [f64; NEAR] = [0.08, 0.2, 0.4];
 
 /// Returns the thresholds around one that is known roughly.
 pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
-    let far = |at: usize| {
-        (CUTS[at + NEAR / 2] / cut.max(f64::MIN_POSITIVE))
-            .ln()
-            .abs()
-    };
+    let cut = cut.max(f64::MIN_POSITIVE);
+    let far = |at: usize| (CUTS[at + NEAR / 2] / cut).ln().abs();
     let nearest = |a: &usize, b: &usize| far(*a).total_cmp(&far(*b));
     let first = (0..=CUTS.len() - NEAR).min_by(nearest).unwrap_or(0);
     &CUTS[first..first + NEAR]
@@ -35,8 +32,8 @@ pub(super) struct BestThreshold<'a, 'b> {
     pub(super) strokes: &'b Refiner<'a>,
     /// The pose with its score.
     pub(super) found: PoseCandidate,
-    /// The threshold that fits best, interpolated between the tried ones: a choice among equally good ones
-    /// would make the answer discontinuous.
+    /// The threshold that fits best, interpolated between the tried ones: choosing one of them would make the answer
+    /// discontinuous.
     pub(super) cut: f64,
     /// Index of the tried threshold that came nearest.
     pub(super) nearest: usize,
@@ -53,11 +50,8 @@ impl<'a> SoftThresholds<'a> {
 
     /// Finds the threshold that fits best at a pose.
     pub(super) fn best_at<'b>(&'b self, pose: &PoseCandidate) -> Option<BestThreshold<'a, 'b>> {
-        let scores: Vec<f64> = self
-            .refiners
-            .iter()
-            .map(|strokes| strokes.evaluate(pose).score)
-            .collect();
+        let score = |strokes: &Refiner| strokes.evaluate(pose).score;
+        let scores: Vec<f64> = self.refiners.iter().map(score).collect();
         let best = highest(&scores);
         let at = summit(&scores);
         let cut = |k: usize| self.cuts[k.min(self.cuts.len() - 1)];

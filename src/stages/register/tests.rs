@@ -1,4 +1,4 @@
-//! Known alignments come back through all four stages.
+//! The four stages recover known alignments.
 
 use super::RegisterError;
 use crate::domain::{MetricOutcome, PrintFromMesh, ThresholdMetric};
@@ -9,7 +9,7 @@ use crate::stages::testing::{
 };
 
 #[test]
-fn any_pose_unit_and_winding_comes_out_right() {
+fn any_pose_unit_and_winding_is_aligned() {
     let (picture, truth) = print(14.0, 3.0);
     for k in 0..4 {
         let world = SyntheticSheet {
@@ -81,7 +81,7 @@ fn the_papers_method_gives_the_papers_metrics_and_ours_one_more() {
 }
 
 #[test]
-fn the_print_has_no_say_in_the_cut_of_relief() {
+fn threshold_of_relief_does_not_depend_on_the_print() {
     let ((picture, _), mesh) = (print(14.0, 3.0), SyntheticSheet::default().mesh());
     let mut spread = settings();
     spread.register.ink_spread = 0.8;
@@ -96,7 +96,7 @@ fn the_print_has_no_say_in_the_cut_of_relief() {
 }
 
 #[test]
-fn a_fleck_far_away_changes_nothing() {
+fn distant_specks_change_nothing() {
     let (picture, truth) = print(14.0, 3.0);
     let world = SyntheticSheet {
         turn: some_turn(5),
@@ -162,7 +162,7 @@ fn order_and_repetition_of_vertices_and_the_depth_resolution_change_nothing() {
 }
 
 #[test]
-fn a_turned_and_moved_print_turns_and_moves_the_alignment() {
+fn a_rotated_and_shifted_print_rotates_and_shifts_the_alignment() {
     let world = SyntheticSheet {
         turn: some_turn(9),
         ..SyntheticSheet::default()

@@ -109,41 +109,34 @@ impl SsimReference {
     /// Skips `ssim` unless `LUMINANCE` is set.
     fn scores<const LUMINANCE: bool>(&self, other: &Mask) -> SsimScores {
         let count = self.means.data().len();
-        let mut both = other.clone();
-        let pairs = self.mask.data().iter().zip(other.data());
-        for (both, (a, b)) in both.data_mut().iter_mut().zip(pairs) {
-            *both = *a && *b;
-        }
-        let windows = self.windows_touching(other);
+        let both = self.mask.zip_map(other, |a, b| a & b);
+        let windows @ [columns, rows] = &self.windows_touching(other);
         let mut sums = SsimSums::default();
-        let rows = |y: usize, [other, both]: [&[f64]; 2]| {
-            let own = &self.means.row(y)[windows.columns.clone()];
+        let add_row = |y: usize, [other, both]: [&[f64]; 2]| {
+            let own = &self.means.row(y)[columns.clone()];
             sums.add_row::<LUMINANCE>(own, other, both, self.covariance_factor);
         };
-        dispatch(
-            #[inline(always)]
-            || self.weights.for_each_row([other, &both], &windows, rows),
-        );
+        dispatch!(self.weights.for_each_row([other, &both], windows, add_row));
         // Windows without a set pixel in either mask score 1.
-        let equal = count - windows.columns.len() * windows.rows.len();
+        let equal = count - columns.len() * rows.len();
         sums.mean(equal, count)
     }
 
-    /// Returns the windows that contain a set pixel of either mask.
-    fn windows_touching(&self, other: &Mask) -> WindowRange {
+    /// Returns the windows that may contain a set pixel of either mask.
+    fn windows_touching(&self, other: &Mask) -> Windows {
         let boxes = [self.bounds, other.bounding_box()];
         let Some(bounds) = boxes.into_iter().flatten().reduce(PixelBox::union) else {
-            return WindowRange::default();
+            return [0..0, 0..0];
         };
         let rim = self.weights.rim();
         let seeing = |first: usize, last: usize, count: usize| {
             let end = (last + 1).min(count);
             first.saturating_sub(rim).min(end)..end
         };
-        WindowRange {
-            columns: seeing(bounds.x0, bounds.x1, self.means.width()),
-            rows: seeing(bounds.y0, bounds.y1, self.means.height()),
-        }
+        [
+            seeing(bounds.x0, bounds.x1, self.means.width()),
+            seeing(bounds.y0, bounds.y1, self.means.height()),
+        ]
     }
 }
 
@@ -207,12 +200,8 @@ impl SsimSums {
     }
 }
 
-/// A range of windows by their first column and row in the mask.
-#[derive(Debug, Default)]
-struct WindowRange {
-    columns: Range<usize>,
-    rows: Range<usize>,
-}
+/// First columns and first rows of windows in the mask.
+type Windows = [Range<usize>; 2];
 
 /// The weights of a window along one axis.
 #[derive(Debug, Clone)]
@@ -225,11 +214,8 @@ struct WindowWeights {
 impl WindowWeights {
     fn new(weights: Vec<f64>) -> Self {
         let mean = |bits: usize| {
-            let set = weights
-                .iter()
-                .enumerate()
-                .filter(|(k, _)| bits >> k & 1 == 1);
-            set.map(|(_, weight)| weight).sum()
+            let weight = |k: usize| if bits >> k & 1 == 1 { weights[k] } else { 0.0 };
+            (0..weights.len()).map(weight).sum()
         };
         let mean_of_bits = (0..1 << weights.len()).map(mean).collect();
         Self {
@@ -248,11 +234,7 @@ impl WindowWeights {
         let [width, height] =
             [mask.width(), mask.height()].map(|side| side.saturating_sub(self.rim()));
         let mut means = Grid::new(width, height, 0.0);
-        let all = WindowRange {
-            columns: 0..width,
-            rows: 0..height,
-        };
-        self.for_each_row([mask], &all, |y, [row]| {
+        self.for_each_row([mask], &[0..width, 0..height], |y, [row]| {
             means.data_mut()[y * width..(y + 1) * width].copy_from_slice(row);
         });
         means
@@ -264,22 +246,22 @@ impl WindowWeights {
     fn for_each_row<const MASKS: usize>(
         &self,
         masks: [&Mask; MASKS],
-        windows: &WindowRange,
+        [columns, rows]: &Windows,
         mut visit: impl FnMut(usize, [&[f64]; MASKS]),
     ) {
-        let width = windows.columns.len();
-        if windows.rows.is_empty() || width == 0 {
+        let width = columns.len();
+        if rows.is_empty() || width == 0 {
             return;
         }
         let (rim, seen) = (self.rim(), self.weights.len());
         let mut across = masks.map(|_| vec![0.0; seen * width]);
         let mut means = masks.map(|_| vec![0.0; width]);
-        for y in windows.rows.start..windows.rows.end + rim {
+        for y in rows.start..rows.end + rim {
             for (mask, across) in masks.iter().zip(&mut across) {
-                let pixels = &mask.row(y)[windows.columns.start..windows.columns.end + rim];
+                let pixels = &mask.row(y)[columns.start..columns.end + rim];
                 self.across(pixels, &mut across[y % seen * width..][..width]);
             }
-            if y >= windows.rows.start + rim {
+            if y >= rows.start + rim {
                 for (across, means) in across.iter().zip(&mut means) {
                     self.down(across, y - rim, means);
                 }

@@ -14,34 +14,31 @@ const BLOCKS_PER_SUM: usize = 32;
 
 /// Centroid (mesh units) and covariance (mesh units squared) of a surface, in the mesh's frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stages) struct Moments {
-    pub(in crate::stages) centre: Vector3<f64>,
-    pub(in crate::stages) covariance: Matrix3<f64>,
+pub(crate) struct Moments {
+    pub(crate) centre: Vector3<f64>,
+    pub(crate) covariance: Matrix3<f64>,
 }
 
 impl Moments {
     /// Computes the moments of the triangles within the bulk; `None` if their area is zero.
-    pub(in crate::stages) fn of(surface: &IndexedSurface) -> Option<Self> {
+    pub(crate) fn of(surface: &IndexedSurface) -> Option<Self> {
         if !surface.has_faces {
             return None;
         }
         let bulk = BulkBox::new(surface);
         let mut sums = [0.0; SUM_COUNT];
-        dispatch(
-            #[inline(always)]
-            || {
-                for (run, blocks) in surface.blocks.chunks(BLOCKS_PER_SUM).enumerate() {
-                    let mut part = [[0.0; LANES]; SUM_COUNT];
-                    for (k, block) in blocks.iter().enumerate() {
-                        let first = (run * BLOCKS_PER_SUM + k) * LANES;
-                        bulk.add(block, surface.triangle_count - first, &mut part);
-                    }
-                    for (sum, part) in sums.iter_mut().zip(part) {
-                        *sum += part.iter().map(|v| f64::from(*v)).sum::<f64>();
-                    }
+        dispatch!({
+            for (run, blocks) in surface.blocks.chunks(BLOCKS_PER_SUM).enumerate() {
+                let mut part = [[0.0; LANES]; SUM_COUNT];
+                for (k, block) in blocks.iter().enumerate() {
+                    let first = (run * BLOCKS_PER_SUM + k) * LANES;
+                    bulk.add(block, surface.triangle_count - first, &mut part);
                 }
-            },
-        );
+                for (sum, part) in sums.iter_mut().zip(part) {
+                    *sum += part.iter().map(|v| f64::from(*v)).sum::<f64>();
+                }
+            }
+        });
         let [total, x, y, z, xx, xy, xz, yy, yz, zz] = sums;
         if total <= 0.0 || !total.is_finite() {
             return None;
@@ -173,7 +170,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(12))]
         #[test]
-        fn equal_those_of_many_small_triangles(
+        fn moments_equal_sums_over_many_small_triangles(
             places in prop::collection::vec(prop::array::uniform3(-3.0..5.0_f64), 9..40),
         ) {
             let triangles = (0..places.len() as u32 - 2).map(|i| [i, i + 1, i + 2]).collect();
@@ -191,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fleck_far_away_does_not_count() {
+    fn distant_specks_are_excluded() {
         let grid = |i: u32| [f64::from(i % 60), f64::from(i / 60), 0.0];
         let mut vertices: Vec<[f64; 3]> = (0..3600).map(grid).collect();
         let mut triangles: Vec<[u32; 3]> = (0..3500)

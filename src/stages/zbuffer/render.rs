@@ -11,7 +11,7 @@ use crate::simd::{dispatch, max_f32};
 use crate::stages::robust_bounds::bulk_along;
 
 /// Height of a pixel whose ray hits nothing.
-pub(in crate::stages) const NO_HIT: f32 = f32::NEG_INFINITY;
+pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;
 
 /// With more triangles per pixel than this, few blocks contain a pixel centre.
 const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
@@ -22,7 +22,7 @@ const SPLAT_GROWTH: f64 = 1.5;
 impl IndexedSurface {
     /// Renders the highest z of a plane frame under each pixel centre, mesh units; [`NO_HIT`] where the ray hits
     /// nothing.
-    pub(in crate::stages) fn render(&self, plane_from_mesh: &Rigid3, view: &Viewport) -> Grid<f32> {
+    pub(crate) fn render(&self, plane_from_mesh: &Rigid3, view: &Viewport) -> Grid<f32> {
         let mut heights = Grid::new(view.width, view.height, NO_HIT);
         self.rasterize(plane_from_mesh, view, |place, z| {
             let height = &mut heights.data_mut()[place];
@@ -33,7 +33,7 @@ impl IndexedSurface {
 
     /// Renders the highest z, and the highest -z as seen from the back, where `plane_from_mesh` is rotated by 180
     /// degrees about its x axis.
-    pub(in crate::stages) fn render_both_sides(
+    pub(crate) fn render_both_sides(
         &self,
         plane_from_mesh: &Rigid3,
         view: &Viewport,
@@ -83,20 +83,17 @@ impl IndexedSurface {
         mut emit: impl FnMut(usize, f32),
     ) {
         let [u, v, _] = rows;
-        dispatch(
-            #[inline(always)]
-            || {
-                for (bounds, blocks) in self.bounds.iter().zip(self.blocks.chunks(LANES)) {
-                    let (across, down) = (bounds.range_along(u), bounds.range_along(v));
-                    let candidates = may_cover_centre([&across, &down], size);
-                    for (block, candidates) in blocks.iter().zip(candidates) {
-                        if candidates {
-                            fill_block(block, rows, size, &mut emit);
-                        }
+        dispatch!({
+            for (bounds, blocks) in self.bounds.iter().zip(self.blocks.chunks(LANES)) {
+                let (across, down) = (bounds.range_along(u), bounds.range_along(v));
+                let candidates = may_cover_centre([&across, &down], size);
+                for (block, candidates) in blocks.iter().zip(candidates) {
+                    if candidates {
+                        fill_block(block, rows, size, &mut emit);
                     }
                 }
-            },
-        );
+            }
+        });
     }
 
     /// Does the same where few blocks contain a pixel centre. They are too far apart for the hardware prefetcher, so a
@@ -110,35 +107,32 @@ impl IndexedSurface {
         const GROUPS: usize = 16;
         let [u, v, _] = rows;
         let mut few: Vec<&TriangleBlock> = Vec::with_capacity(GROUPS * LANES);
-        dispatch(
-            #[inline(always)]
-            || {
-                let blocks = self.blocks.chunks(GROUPS * LANES);
-                for (bounds, blocks) in self.bounds.chunks(GROUPS).zip(blocks) {
-                    few.clear();
-                    for (bounds, blocks) in bounds.iter().zip(blocks.chunks(LANES)) {
-                        let (across, down) = (bounds.range_along(u), bounds.range_along(v));
-                        let candidates = may_cover_centre([&across, &down], size);
-                        let pairs = blocks.iter().zip(candidates);
-                        few.extend(
-                            pairs
-                                .filter(|(_, candidates)| *candidates)
-                                .map(|(block, _)| block),
-                        );
-                    }
-                    let mut seen = 0.0;
-                    for block in &few {
-                        // One number per cache line.
-                        let numbers = block.as_flattened().as_flattened();
-                        seen += numbers.iter().step_by(16).sum::<f32>();
-                    }
-                    std::hint::black_box(seen);
-                    for block in &few {
-                        fill_block(block, rows, size, &mut emit);
-                    }
+        dispatch!({
+            let blocks = self.blocks.chunks(GROUPS * LANES);
+            for (bounds, blocks) in self.bounds.chunks(GROUPS).zip(blocks) {
+                few.clear();
+                for (bounds, blocks) in bounds.iter().zip(blocks.chunks(LANES)) {
+                    let (across, down) = (bounds.range_along(u), bounds.range_along(v));
+                    let candidates = may_cover_centre([&across, &down], size);
+                    let pairs = blocks.iter().zip(candidates);
+                    few.extend(
+                        pairs
+                            .filter(|(_, candidates)| *candidates)
+                            .map(|(block, _)| block),
+                    );
                 }
-            },
-        );
+                let mut seen = 0.0;
+                for block in &few {
+                    // One number per cache line.
+                    let numbers = block.as_flattened().as_flattened();
+                    seen += numbers.iter().step_by(16).sum::<f32>();
+                }
+                std::hint::black_box(seen);
+                for block in &few {
+                    fill_block(block, rows, size, &mut emit);
+                }
+            }
+        });
     }
 
     /// Fills a square for each point.
@@ -252,7 +246,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn few_blocks_fill_what_all_do(mesh in soup(), turn in 0.0..3.0_f64, more in 1..300_usize) {
+        fn sparse_blocks_are_filled_like_all_blocks(mesh in soup(), turn in 0.0..3.0_f64, more in 1..300_usize) {
             // Many small copies side by side, most of which contain no pixel centre.
             let mut many = Mesh::default();
             for copy in 0..more {
@@ -279,7 +273,7 @@ mod tests {
     }
 
     #[test]
-    fn a_fan_without_gaps_leaves_no_hole() {
+    fn a_closed_fan_is_rendered_without_holes() {
         let mut mesh = Mesh {
             vertices: vec![[0.03, -0.07, 0.0]].into(),
             triangles: Vec::new().into(),

@@ -212,7 +212,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn side_by_side_is_one_by_one(triangles in triangles()) {
+        fn lanes_equal_single_triangles(triangles in triangles()) {
             let block: TriangleBlock = std::array::from_fn(|corner| {
                 std::array::from_fn(|axis| std::array::from_fn(|k| triangles[k][corner][axis]))
             });

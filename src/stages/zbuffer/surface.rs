@@ -6,7 +6,7 @@ use crate::domain::Rigid3;
 use crate::mesh::{Mesh, Vertices};
 use crate::page_vec::PageVec;
 use crate::simd::dispatch;
-use crate::stages::robust_bounds::{Bounds, Bulk, room};
+use crate::stages::robust_bounds::{Bounds, BulkRange, bulk_box};
 
 /// Blocks sampled for the winding: tens of thousands of triangles determine the share well enough.
 const WINDING_SAMPLE_BLOCKS: usize = 8_192;
@@ -15,10 +15,10 @@ const WINDING_SAMPLE_BLOCKS: usize = 8_192;
 ///
 /// Corners are stored relative to the centre of the bulk in single precision, 1e-7 of its extent.
 #[derive(Debug)]
-pub(in crate::stages) struct IndexedSurface {
+pub(crate) struct IndexedSurface {
     pub(super) origin: [f64; 3],
-    /// Bounding box of the bulk.
-    pub(super) bulk: Bounds<3>,
+    /// Bounding box of the bulk, mesh frame.
+    pub(crate) bulk: Bounds<3>,
     pub(super) blocks: PageVec<TriangleBlock>,
     /// Boxes of each [`LANES`] blocks.
     pub(super) bounds: Vec<BlockBounds>,
@@ -29,7 +29,7 @@ pub(in crate::stages) struct IndexedSurface {
 
 impl IndexedSurface {
     /// Packs the triangles of a mesh, or its points if it has none.
-    pub(in crate::stages) fn new(mesh: &Mesh) -> Self {
+    pub(crate) fn new(mesh: &Mesh) -> Self {
         match &mesh.vertices {
             Vertices::Single(vertices) => Self::of(mesh, vertices),
             Vertices::Double(vertices) => Self::of(mesh, vertices),
@@ -37,9 +37,8 @@ impl IndexedSurface {
     }
 
     fn of<T: Coordinate>(mesh: &Mesh, vertices: &[[T; 3]]) -> Self {
-        let bulk_bounds @ [low, high]: Bounds<3> = room(vertices);
-        let origin: [f64; 3] =
-            std::array::from_fn(|k| T::reference(f64::midpoint(low[k], high[k])));
+        let bulk @ [low, high]: Bounds<3> = bulk_box(vertices);
+        let origin = [0, 1, 2].map(|k| T::reference(f64::midpoint(low[k], high[k])));
         let points: PageVec<[u32; 3]>;
         let triangles = if mesh.triangles.is_empty() {
             points = (0..vertices.len() as u32).map(|i| [i; 3]).collect();
@@ -51,31 +50,23 @@ impl IndexedSurface {
         let extent = sides.into_iter().fold(0.0, f64::max) as f32;
         let mut blocks = PageVec::with_capacity(triangles.len().div_ceil(LANES));
         let mut bounds = Vec::with_capacity(triangles.len().div_ceil(LANES * LANES));
-        dispatch(
-            #[inline(always)]
-            || {
-                for group in triangles.chunks(LANES * LANES) {
-                    let first = blocks.len();
-                    for triangles in group.chunks(LANES) {
-                        blocks.push(pack_block(triangles, vertices, origin));
-                    }
-                    bounds.push(BlockBounds::new(&blocks[first..], extent));
+        dispatch!({
+            for group in triangles.chunks(LANES * LANES) {
+                let first = blocks.len();
+                for triangles in group.chunks(LANES) {
+                    blocks.push(pack_block(triangles, vertices, origin));
                 }
-            },
-        );
+                bounds.push(BlockBounds::new(&blocks[first..], extent));
+            }
+        });
         Self {
             origin,
-            bulk: bulk_bounds,
+            bulk,
             triangle_count: triangles.len(),
             bounds,
             blocks,
             has_faces: !mesh.triangles.is_empty(),
         }
-    }
-
-    /// Returns the bounding box of the bulk, mesh frame.
-    pub(in crate::stages) const fn bulk_bounds(&self) -> Bounds<3> {
-        self.bulk
     }
 
     /// Returns the rows that give a vertex's x, y and z in a frame, relative to the origin.
@@ -88,7 +79,7 @@ impl IndexedSurface {
     }
 
     /// Returns the bounds of the bulk in x and y of a plane frame, mesh units.
-    pub(in crate::stages) fn bounds(&self, plane_from_mesh: &Rigid3) -> Bounds<2> {
+    pub(crate) fn bounds(&self, plane_from_mesh: &Rigid3) -> Bounds<2> {
         let [x, y, _] = self.frame_rows(plane_from_mesh);
         let [x, y] = [x, y].map(|row| self.bulk_range_along(&AffineForm(row.map(|v| v as f32))));
         [[x[0], y[0]], [x[1], y[1]]]
@@ -96,61 +87,55 @@ impl IndexedSurface {
 
     /// Returns the lowest and highest value of the bulk along an affine form.
     fn bulk_range_along(&self, row: &AffineForm) -> [f64; 2] {
-        let mut bulk = Bulk::of(self.blocks.len() * 3 * LANES, |k| {
+        let mut bulk = BulkRange::new(self.blocks.len() * 3 * LANES, |k| {
             let corner = &self.blocks[k / (3 * LANES)][k / LANES % 3];
             row.at([0, 1, 2].map(|axis| corner[axis][k % LANES]))
         });
-        let take = |bulk: &mut Bulk, block: &TriangleBlock| {
+        let add = |bulk: &mut BulkRange, block: &TriangleBlock| {
             for corner in block {
-                bulk.take(row.at_lanes(corner));
+                bulk.add(row.at_lanes(corner));
             }
         };
         // Extreme blocks come first, so that few of the others change the range.
         for place in self.extreme_blocks(row, &bulk) {
-            take(&mut bulk, &self.blocks[place]);
+            add(&mut bulk, &self.blocks[place]);
         }
-        let [mut low, mut high] = bulk.taken();
-        dispatch(
-            #[inline(always)]
-            || {
-                for (bounds, blocks) in self.bounds.iter().zip(self.blocks.chunks(LANES)) {
-                    let [lows, highs] = bounds.range_along(row);
-                    for (k, block) in blocks.iter().enumerate() {
-                        if lows[k] < low || highs[k] > high {
-                            take(&mut bulk, block);
-                            [low, high] = bulk.taken();
-                        }
+        let [mut low, mut high] = bulk.range();
+        dispatch!({
+            for (bounds, blocks) in self.bounds.iter().zip(self.blocks.chunks(LANES)) {
+                let [lows, highs] = bounds.range_along(row);
+                for (k, block) in blocks.iter().enumerate() {
+                    if lows[k] < low || highs[k] > high {
+                        add(&mut bulk, block);
+                        [low, high] = bulk.range();
                     }
                 }
-            },
-        );
+            }
+        });
         [low, high].map(f64::from)
     }
 
     /// Returns the blocks whose boxes reach lowest and highest, ignoring boxes that leave the bulk.
-    fn extreme_blocks(&self, row: &AffineForm, bulk: &Bulk) -> [usize; 2] {
+    fn extreme_blocks(&self, row: &AffineForm, bulk: &BulkRange) -> [usize; 2] {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
-        dispatch(
-            #[inline(always)]
-            || {
-                for (group, bounds) in self.bounds.iter().enumerate() {
-                    let [lows, highs] = bounds.range_along(row);
-                    for k in 0..LANES {
-                        if lows[k] < low && bulk.holds(lows[k]) {
-                            (low, places[0]) = (lows[k], group * LANES + k);
-                        }
-                        if highs[k] > high && bulk.holds(highs[k]) {
-                            (high, places[1]) = (highs[k], group * LANES + k);
-                        }
+        dispatch!({
+            for (group, bounds) in self.bounds.iter().enumerate() {
+                let [lows, highs] = bounds.range_along(row);
+                for k in 0..LANES {
+                    if lows[k] < low && bulk.contains(lows[k]) {
+                        (low, places[0]) = (lows[k], group * LANES + k);
+                    }
+                    if highs[k] > high && bulk.contains(highs[k]) {
+                        (high, places[1]) = (highs[k], group * LANES + k);
                     }
                 }
-            },
-        );
+            }
+        });
         places.map(|place| place.min(self.blocks.len() - 1))
     }
 
     /// Returns the share of the projected area along z of a frame whose winding faces up, 0..=1; `None` without faces.
-    pub(in crate::stages) fn upward_facing_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
+    pub(crate) fn upward_facing_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
         if !self.has_faces {
             return None;
         }

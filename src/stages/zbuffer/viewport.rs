@@ -5,15 +5,15 @@ use crate::stages::robust_bounds::Bounds;
 
 /// The position of a rendering's pixels in the plane.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::stages) struct Viewport {
+pub(crate) struct Viewport {
     /// Maps plane x, y (mesh units) to pixels.
-    pub(in crate::stages) px_from_plane: Affine2,
+    pub(crate) px_from_plane: Affine2,
     /// Columns.
-    pub(in crate::stages) width: usize,
+    pub(crate) width: usize,
     /// Rows.
-    pub(in crate::stages) height: usize,
+    pub(crate) height: usize,
     /// Side of a pixel, mesh units.
-    pub(in crate::stages) unit_per_px: f64,
+    pub(crate) unit_per_px: f64,
 }
 
 impl Viewport {
@@ -21,7 +21,7 @@ impl Viewport {
     ///
     /// It is centred on the bounds, so a mesh rotated by a right angle is sampled by the same rays. `mirrored`
     /// reflects x, so that mirror writing reads correctly. y points down in both cases.
-    pub(in crate::stages) fn around(bounds: Bounds<2>, longest_px: usize, mirrored: bool) -> Self {
+    pub(crate) fn around(bounds: Bounds<2>, longest_px: usize, mirrored: bool) -> Self {
         let [low, high] = bounds;
         let size = [high[0] - low[0], high[1] - low[1]];
         let unit_per_px = size[0].max(size[1]) / (longest_px.max(4) as f64 - 3.0);
