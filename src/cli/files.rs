@@ -44,12 +44,12 @@ pub(super) fn remove_database(path: &Path) {
 /// What is wrong with a line of a file that is refused as a whole.
 #[derive(Debug, thiserror::Error)]
 #[error("line {line}: {reason}")]
-pub(super) struct LineError {
+pub(super) struct RefusedLine {
     line: usize,
     reason: String,
 }
 
-impl LineError {
+impl RefusedLine {
     pub(super) fn new(line: usize, reason: &str) -> Self {
         Self {
             line,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::files::LineError;
+use super::files::RefusedLine;
 use crate::domain::PairName;
 use crate::report::ground_truth::TruthRecord;
 
@@ -24,7 +24,7 @@ pub(super) struct TruthRow {
 ///
 /// # Errors
 /// At the first line that is not a true alignment, or repeats a pair.
-pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, LineError> {
+pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLine> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut lines: BTreeMap<PairName, usize> = BTreeMap::new();
     let mut rows = Vec::new();
@@ -32,7 +32,7 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, LineError>
         if text.trim().is_empty() {
             continue;
         }
-        let refuse = |reason: String| LineError::new(line, &reason);
+        let refuse = |reason: String| RefusedLine::new(line, &reason);
         let value: Value =
             serde_json::from_str(text).map_err(|error| refuse(format!("not JSON: {error}")))?;
         let record = TruthRecord::read(&value).map_err(|error| refuse(error.to_string()))?;
@@ -51,15 +51,15 @@ pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, LineError>
 }
 
 /// Refuses a row whose pair does not exist.
-pub(super) fn unknown_pair(row: &TruthRow) -> LineError {
-    LineError::new(row.line, &format!("there is no pair {}", row.name))
+pub(super) fn unknown_pair(row: &TruthRow) -> RefusedLine {
+    RefusedLine::new(row.line, &format!("there is no pair {}", row.name))
 }
 
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
-    use super::{LineError, TruthRow, parse};
+    use super::{RefusedLine, TruthRow, parse};
 
     const LINE: &str = r#"{"id":"a","print_from_mesh":[[1,0,0,0],[0,-1,0,0],[0,0,1,0]],"plane":{"n":[0,0,1],"d":0},"landmarks":[[0,0,0]],"char_height_px":10,"tops_mask":"tops/a.png"}"#;
 
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn quoted_text_is_sanitized_and_short() {
         for rude in ["a\u{1b}[2J".to_owned(), "a".repeat(301)] {
-            let text = LineError::new(1, &rude).to_string();
+            let text = RefusedLine::new(1, &rude).to_string();
             assert!(!text.contains(&rude), "{text:?}");
         }
     }

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::context::{Context, now};
 use super::exit::ExitCode;
-use super::files::{self, LineError};
+use super::files::{self, RefusedLine};
 use super::output;
 use super::screen::{Palette, Tone};
 use super::select;
@@ -137,7 +137,7 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     } else {
         verdict_file::parse_csv
     };
-    let refused = |error: LineError| error.in_file(&args.file, "no verdict was recorded");
+    let refused = |error: RefusedLine| error.in_file(&args.file, "no verdict was recorded");
     let rows = parse(&bytes).map_err(refused)?;
     let names: Vec<_> = rows.iter().map(|row| row.verdict.pair.clone()).collect();
     let unknown = catalog.unknown_names(&names).await?;

@@ -5,7 +5,7 @@ use std::str::FromStr;
 use csv::StringRecord;
 use serde::Deserialize;
 
-use super::files::LineError;
+use super::files::RefusedLine;
 use super::time_text::parse_utc;
 use crate::catalog::{NewVerdict, ReviewContext};
 use crate::config::hint;
@@ -31,8 +31,8 @@ pub(super) struct VerdictRow {
 ///
 /// # Errors
 /// At the first invalid line.
-pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, LineError> {
-    let text = as_utf8(bytes).map_err(|error| LineError::new(1, &error.to_string()))?;
+pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
+    let text = as_utf8(bytes).map_err(|error| RefusedLine::new(1, &error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
         .delimiter(delimiter(&text))
         .trim(csv::Trim::All)
@@ -53,9 +53,9 @@ pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, LineError> {
 ///
 /// # Errors
 /// At the first such row.
-pub(super) fn refuse_unknown(rows: &[VerdictRow], unknown: &[PairName]) -> Result<(), LineError> {
+pub(super) fn refuse_unknown(rows: &[VerdictRow], unknown: &[PairName]) -> Result<(), RefusedLine> {
     match rows.iter().find(|row| unknown.contains(&row.verdict.pair)) {
-        Some(row) => Err(LineError::new(
+        Some(row) => Err(RefusedLine::new(
             row.line,
             &format!("there is no pair {}", row.verdict.pair),
         )),
@@ -64,14 +64,14 @@ pub(super) fn refuse_unknown(rows: &[VerdictRow], unknown: &[PairName]) -> Resul
 }
 
 /// Returns the position of each of [`COLUMNS`] in the file.
-fn positions(headers: &StringRecord) -> Result<[Option<usize>; 7], LineError> {
+fn positions(headers: &StringRecord) -> Result<[Option<usize>; 7], RefusedLine> {
     if let Some(unknown) = headers.iter().find(|name| !COLUMNS.contains(name)) {
         let reason = format!("there is no column {unknown}{}", hint(unknown, COLUMNS));
-        return Err(LineError::new(1, &reason));
+        return Err(RefusedLine::new(1, &reason));
     }
     let positions = COLUMNS.map(|name| headers.iter().position(|header| header == name));
     match positions[..REQUIRED].iter().position(Option::is_none) {
-        Some(at) => Err(LineError::new(
+        Some(at) => Err(RefusedLine::new(
             1,
             &format!("column {} is missing", COLUMNS[at]),
         )),
@@ -83,14 +83,14 @@ fn row(
     record: &StringRecord,
     line: usize,
     positions: &[Option<usize>; 7],
-) -> Result<VerdictRow, LineError> {
+) -> Result<VerdictRow, RefusedLine> {
     let cell = |column: usize| {
         positions[column]
             .and_then(|position| record.get(position))
             .filter(|text| !text.is_empty())
     };
     let required = |column: usize| {
-        cell(column).ok_or_else(|| LineError::new(line, &format!("{} is empty", COLUMNS[column])))
+        cell(column).ok_or_else(|| RefusedLine::new(line, &format!("{} is empty", COLUMNS[column])))
     };
     let verdict = NewVerdict {
         pair: value(required(0)?, line)?,
@@ -109,23 +109,23 @@ fn row(
     })
 }
 
-fn time(text: &str, line: usize) -> Result<UnixMillis, LineError> {
+fn time(text: &str, line: usize) -> Result<UnixMillis, RefusedLine> {
     parse_utc(text).ok_or_else(|| {
         let reason =
             format!("at is {text:?}, not a time such as 2026-11-21 or 2026-11-21 04:10:03");
-        LineError::new(line, &reason)
+        RefusedLine::new(line, &reason)
     })
 }
 
-fn value<T>(text: &str, line: usize) -> Result<T, LineError>
+fn value<T>(text: &str, line: usize) -> Result<T, RefusedLine>
 where
     T: FromStr<Err: std::fmt::Display>,
 {
     text.parse()
-        .map_err(|error: T::Err| LineError::new(line, &error.to_string()))
+        .map_err(|error: T::Err| RefusedLine::new(line, &error.to_string()))
 }
 
-fn csv_error(error: &csv::Error, text: &[u8]) -> LineError {
+fn csv_error(error: &csv::Error, text: &[u8]) -> RefusedLine {
     let line = LineCounter::new(text).at(error.position());
     let reason = match error.kind() {
         csv::ErrorKind::UnequalLengths {
@@ -134,7 +134,7 @@ fn csv_error(error: &csv::Error, text: &[u8]) -> LineError {
         csv::ErrorKind::Utf8 { .. } => "the text is not UTF-8; save it as \"CSV UTF-8\"".to_owned(),
         _ => error.to_string(),
     };
-    LineError::new(line, &reason)
+    RefusedLine::new(line, &reason)
 }
 
 /// A line as `verdict log --json`, exports and backups write it; other fields are ignored.
@@ -150,15 +150,15 @@ struct VerdictLine {
 ///
 /// # Errors
 /// At the first invalid line.
-pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, LineError> {
-    let text = as_utf8(bytes).map_err(|error| LineError::new(1, &error.to_string()))?;
+pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
+    let text = as_utf8(bytes).map_err(|error| RefusedLine::new(1, &error.to_string()))?;
     let lines = (1..).zip(text.split(|byte| *byte == b'\n'));
     let lines = lines.filter(|(_, content)| !content.trim_ascii().is_empty());
     let rows = lines.map(|(line, content)| {
         let parsed: VerdictLine = serde_json::from_slice(content)
-            .map_err(|error| LineError::new(line, &json_error(&error)))?;
+            .map_err(|error| RefusedLine::new(line, &json_error(&error)))?;
         if parsed.verdict.reviewer.trim().is_empty() {
-            return Err(LineError::new(line, "reviewer is empty"));
+            return Err(RefusedLine::new(line, "reviewer is empty"));
         }
         Ok(parsed.undone_at.is_none().then_some(VerdictRow {
             line,
