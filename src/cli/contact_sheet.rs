@@ -37,6 +37,19 @@ pub(super) struct ContactSheetArgs {
     pub(super) columns: u16,
 }
 
+impl Default for ContactSheetArgs {
+    fn default() -> Self {
+        Self {
+            pairs: Vec::new(),
+            output: None,
+            metric: ThresholdMetric::Ensemble,
+            order: ContactSheetOrder::Worst,
+            limit: 60,
+            columns: 5,
+        }
+    }
+}
+
 pub(super) async fn contact_sheet(
     args: ContactSheetArgs,
     context: &Context,

@@ -17,8 +17,7 @@ use super::signals;
 use super::table::count;
 use crate::config::{Origin, Tree};
 use crate::demo::{DatasetError, DatasetFiles, DemoOptions, Tier, write_dataset};
-use crate::domain::{JobStatus, ThresholdMetric};
-use crate::export::ContactSheetOrder;
+use crate::domain::JobStatus;
 use crate::runner::{Stop, StopLevel};
 use crate::store::{CATALOG_FILE, SETTINGS_FILE};
 
@@ -84,15 +83,7 @@ async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
         return Ok(run::code(&summary));
     }
     report::print(context).await?;
-    let sheet = ContactSheetArgs {
-        pairs: Vec::new(),
-        output: None,
-        metric: ThresholdMetric::Ensemble,
-        order: ContactSheetOrder::Worst,
-        limit: 60,
-        columns: 5,
-    };
-    let (picture, _) = contact_sheet::write(&sheet, context).await?;
+    let (picture, _) = contact_sheet::write(&ContactSheetArgs::default(), context).await?;
     let (data, picture) = (dir.join("data"), picture.display());
     context.info(&format!("meshes, prints and truth: {}", data.display()));
     context.info(&format!("contact sheet of all pairs: {picture}"));
