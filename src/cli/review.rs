@@ -86,7 +86,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let keys = review::key_map(&settings.config.review.keys);
     let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
     if args.listen.is_some_and(|address| address.is_unspecified()) {
-        // The page accepts only requests for its own address, which an unspecified address is not.
+        // The page accepts only requests for its own address, but 0.0.0.0 stands for all addresses of the machine.
         let text = "--listen needs the address of this machine at which the page will be opened";
         return Err(Refusal::Usage(text.to_owned()).into());
     }

@@ -164,7 +164,7 @@ impl ScanHole {
     }
 }
 
-/// Draws holes in deep regions, which scanners see badly.
+/// Draws holes in deep regions, which scanners often miss.
 fn holes(surface: &ScalarField, style: &ScanStyle, rng: &mut ChaCha8Rng) -> Vec<ScanHole> {
     (0..style.holes)
         .filter_map(|_| {

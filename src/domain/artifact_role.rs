@@ -7,8 +7,8 @@ pub const DEPTH: &str = "depth.png";
 /// Ink mask on the canvas: 255 ink; from register.
 pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
 
-/// One interpretation of the print's ink, counted from 0, in the print image's frame: 255 ink, 0 background, 128 where
-/// nothing is known; from normalize. `RegisterOutcome::ink` says which one was used.
+/// Returns the role of one interpretation of the print's ink, counted from 0, in the frame of the print: 255 ink,
+/// 0 background, 128 unknown; from normalize. `RegisterOutcome::ink` is the selected interpretation.
 pub fn print_mask(ink: usize) -> String {
     match ink {
         0 => "print_mask.png".to_owned(),

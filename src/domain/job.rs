@@ -16,7 +16,7 @@ pub enum JobStatus {
     Backoff,
     /// All four stages are done.
     Done,
-    /// Failed permanently, until somebody retries it.
+    /// Failed permanently; only `retry` or a changed input runs it again.
     Quarantined,
 }
 
@@ -39,12 +39,11 @@ impl JobStatus {
 /// Number of workers that may die over a pair before it is quarantined.
 pub const CRASH_LIMIT: u32 = 3;
 
-/// Returns whether a pair is to blame for its dead workers.
+/// Returns whether a pair is the likely cause of worker deaths, so that it must be quarantined.
 ///
 /// `crashes` counts workers that died with only this pair leased since its last finished stage, `deaths` all recent
-/// deaths. If a pair kills workers, nearly all deaths are its own, except perhaps a first one that it shared with
-/// others. Each further death of another worker suggests an external cause, such as somebody who kills processes, and
-/// raises the pair's limit by one.
+/// deaths. If a pair kills workers, nearly all deaths are its own; one may have happened while the worker also leased
+/// other pairs. Each further death suggests an external cause, such as killed processes, and raises the limit by one.
 pub const fn is_poisoned(crashes: u32, deaths: u32) -> bool {
     crashes >= CRASH_LIMIT + deaths.saturating_sub(crashes + 1)
 }

@@ -7,11 +7,11 @@ use super::enum_names;
 /// How the height at which a depth map becomes a mask is chosen (paper III-C).
 ///
 /// `P` is the ink mask of the print and `D(t)` the depth mask of the heights from threshold `t` up, both on one canvas.
-/// Under the default method they are compared after alignment, where both images hold data, over 40 equal steps of `t`
+/// Under the default method they are compared after alignment, where both images have data, over 40 equal steps of `t`
 /// from `register.threshold_min` to `register.threshold_max` of the relief below the tops. Under the paper's method they
 /// are compared before alignment, wrapped by box and centroid, over the authors' ranges of grey.
 ///
-/// The paper's three match the print and so reproduce its ink spread; [`Self::Relief`] is true to the wood.
+/// The paper's three match the print and so reproduce its ink spread; [`Self::Relief`] follows the wood.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ThresholdMetric {

@@ -48,7 +48,7 @@ pub fn delimiter(bytes: &[u8]) -> u8 {
 }
 
 /// Counts the line where a record of a CSV list starts. The parser's own count stops at the end of the previous record,
-/// after which half a line end or blank lines may follow.
+/// before the second half of its line end and before blank lines.
 #[derive(Debug)]
 pub struct LineCounter<'a> {
     bytes: &'a [u8],
