@@ -16,7 +16,7 @@
 //! 2. `src/catalog/records/import.rs`: stores pairs and their jobs
 //! 3. `src/runner/scheduler.rs`: starts a task for each pair that `prefetch.rs` claims
 //! 4. `src/catalog/queue/claim.rs`: leases a job in one statement, with a fencing token
-//! 5. `src/runner/pair_task.rs`: follows one leased pair through its stages, on a thread of its own
+//! 5. `src/runner/pair_task.rs`: follows the thread that computes the stages of one leased pair
 //! 6. `src/runner/stage_executor.rs`: calls the stages
 //! 7. `src/stages/fit/mod.rs`: plane, curvature and carved side
 //! 8. `src/stages/depth.rs`: depth map
@@ -31,13 +31,13 @@
 //! 17. `src/report/accumulate.rs`: sums results per metric
 //! 18. `src/report/render/table.rs`: formats the cells
 //!
-//! A **lost lease** is noticed when something is stored. The statements of `src/catalog/queue/checkpoint.rs` and `fail.rs`
-//! update a job only where worker and fencing token are still those of the lease. When no row was updated,
+//! A **lost lease** is noticed when a stage or a failure is stored. The statements in `src/catalog/queue/checkpoint.rs`
+//! and `fail.rs` update a job only if its worker and fencing token equal those of the lease. If no row was updated,
 //! `src/catalog/queue/api.rs` returns [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome); the checkpointer then
 //! stores nothing more, and `src/runner/pair_task.rs` drops the pair with `PairEnd::LeaseLost`.
 //!
 //! The carved side is decided in `fit`, which therefore reads the print; [`stages::pipeline`] shows both methods side by
-//! side and says what it would cost to decide the side later.
+//! side and explains the cost of deciding the side later.
 //!
 //! ## A new threshold metric
 //!
@@ -45,12 +45,12 @@
 //!
 //! - `src/cli/contact_sheet.rs`: the default metric of contact sheets; no change needed
 //! - `src/cli/show.rs`: the metric of the summary; no change needed
-//! - `src/domain/metric.rs`: the variant with its definition; its `match`es fail to compile until they cover it
+//! - `src/domain/metric.rs`: the variant with its definition, name and title; the compiler reports missing ones
 //! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
 //! - `src/export/pair_files.rs`: the metric whose files are shared; no change needed
 //! - `src/stages/paper_method/normalize.rs`: computes the thresholds
 //! - `src/stages/paper_method/register.rs`: computes the thresholds
-//! - `src/stages/register/confidence.rs`: compares every mask with the one by relief; no change needed
+//! - `src/stages/register/confidence.rs`: compares every mask with the mask of the relief metric; no change needed
 //! - `src/stages/register/metric_thresholds.rs`: computes the thresholds
 //! - `migrations/`: the `CHECK` lists of the metric columns
 //! - `README.md` and `docs/report.md`: the description

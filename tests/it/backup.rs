@@ -161,7 +161,7 @@ fn failed_backup_leaves_the_previous_one_and_no_partial_files() {
     assert!(refused.err.contains("is damaged"), "{}", refused.err);
     assert!(std::fs::read(&file).expect("read") == good);
     assert_eq!(files(dir.path()), names);
-    // A partial copy that a killed process left does not matter.
+    // A partial copy left by a killed process is replaced.
     std::fs::write(project.catalog_path(), intact).expect("restored");
     sql(&project, "UPDATE pair SET block = 'b1'");
     std::fs::write(dir.path().join(".b.sqlite.mocban-partial"), "half").expect("written");

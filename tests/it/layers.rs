@@ -72,7 +72,7 @@ fn names_after(code: &str, prefix: &str) -> BTreeSet<String> {
     paths.filter_map(|path| path.into_iter().next()).collect()
 }
 
-/// Returns the rooms that a piece of code of this file names.
+/// Returns the rooms that a part of the code of a file names.
 fn imported_rooms(file: &SourceFile, code: &str) -> BTreeSet<String> {
     let mut used = names_after(code, "crate::");
     if file.module().len() == 1 {

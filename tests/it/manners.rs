@@ -57,7 +57,7 @@ fn status_lists_every_failed_pair_on_request() {
 }
 
 #[test]
-fn demo_in_the_directory_of_another_explains_how_to_continue_that() {
+fn demo_in_the_directory_of_another_demo_suggests_how_to_continue_it() {
     let dir = empty();
     let demo = |tier: &str| {
         mocban(

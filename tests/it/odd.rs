@@ -22,7 +22,7 @@ pub(crate) fn corrupt_catalog(project: &Project, from: usize, to: usize) -> Vec<
     intact
 }
 
-/// Words of the database that no user should see.
+/// Terms of SQLite and sqlx that no message may contain.
 const RAW: [&str; 4] = ["code:", "returned from database", "SQLITE_", "malformed"];
 
 #[track_caller]

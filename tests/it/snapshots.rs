@@ -8,7 +8,7 @@ use mocban::store::Project;
 use crate::check::{done, sql};
 use crate::cli::{binary, call, empty, mocban};
 
-/// What differs from call to call, and what stands for it in a snapshot.
+/// Patterns of text that differs between calls, each with its replacement in snapshots.
 const VARYING: [(&str, &str); 7] = [
     (r"\S*/debug/mocban|\S*/release/mocban", "mocban"),
     (r"/\S*/\.tmp[A-Za-z0-9]+", "[DIR]"),
@@ -19,7 +19,7 @@ const VARYING: [(&str, &str); 7] = [
     (r"\b[0-9a-f]{12,64}\b", "[HASH]"),
 ];
 
-/// Measured numbers, whose width may differ too.
+/// Patterns of measured numbers, whose width may differ too.
 const NUMBERS: [(&str, &str); 6] = [
     (r"-?\d+\.\d, -?\d+\.\d", "[X, Y]"),
     (r"-?\d+\.\d{2,}", "[N]"),
