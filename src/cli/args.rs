@@ -130,7 +130,7 @@ fn help_color(args: &[OsString]) -> ColorChoice {
     choice.unwrap_or(ColorChoice::Auto)
 }
 
-/// Returns every value of a flag, wherever it stands on the command line.
+/// Returns every value of a flag, before and after the name of the command.
 fn values_of(flag: &str, args: &[OsString]) -> Vec<String> {
     let words = args.iter().skip(1).filter_map(|arg| arg.to_str());
     let mut words = words.take_while(|word| *word != "--");

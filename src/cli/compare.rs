@@ -5,7 +5,7 @@ use crate::report::{MetricRow, Report};
 
 /// Formats the means of both projects and their differences, one line per metric and number.
 ///
-/// The projects may hold different pairs: tables are compared, not pairs.
+/// The projects may have different pairs: the tables are compared, not the pairs.
 pub(super) fn side_by_side(here: &Report, there: &Report, names: [&str; 2]) -> String {
     let head = ["", "", names[0], names[1], "difference"];
     let mut rows = vec![head.map(ToOwned::to_owned).to_vec()];

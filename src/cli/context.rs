@@ -19,7 +19,7 @@ use crate::domain::UnixMillis;
 use crate::runner;
 use crate::store::{Project, SETTINGS_FILE, StoreError};
 
-/// The global flags and what follows from them.
+/// The global flags and the state derived from them.
 #[derive(Debug, Clone)]
 pub(super) struct Context {
     pub(super) global: Global,

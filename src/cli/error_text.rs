@@ -44,7 +44,7 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
 }
 
-/// Returns the sentence for an error: an explanation where the catalog is to blame, otherwise the chain of causes.
+/// Returns the sentence for an error: an explanation for errors of the catalog, otherwise the chain of causes.
 pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
     let explained = catalog_error(error).and_then(|found| explain_catalog(found, project));
     explained.unwrap_or_else(|| join_causes(error))

@@ -6,7 +6,7 @@ use super::table::columns;
 use crate::catalog::{Catalog, FailedPair, StoredFailure};
 use crate::domain::FailureClass;
 
-/// Failed pairs that are read, and failed pairs per class that are named, unless all are asked for.
+/// Maximum numbers of failed pairs that are read, and that are named per class, unless all are requested.
 const READ_LIMIT: usize = 200;
 const NAME_LIMIT: usize = 3;
 const NO_LIMIT: usize = i64::MAX as usize;

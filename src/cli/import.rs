@@ -176,7 +176,7 @@ fn listing(args: &ImportArgs) -> anyhow::Result<Listing> {
     }
 }
 
-/// Reads true alignments. Refuses those of pairs that are neither in the list nor in the project.
+/// Reads true alignments. Refuses pairs that are neither in the list nor in the project.
 async fn read_truths(file: &Path, listed: &RowIds, dir: &Path) -> anyhow::Result<Vec<TruthRow>> {
     let text = String::from_utf8(files::read(file)?)
         .map_err(|error| Refusal::Usage(format!("{}: {error}", file.display())))?;
@@ -204,8 +204,8 @@ async fn read_truths(file: &Path, listed: &RowIds, dir: &Path) -> anyhow::Result
     }
 }
 
-/// Converts true alignments to their stored form; like inputs, `tops_mask` is stored relative to the project if it lies
-/// below it.
+/// Converts true alignments to their stored form. Like the paths of inputs, `tops_mask` is stored relative to the
+/// project if the file is below it.
 fn stored_truths(
     truths: Vec<TruthRow>,
     project: &Project,

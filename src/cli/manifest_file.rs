@@ -16,7 +16,7 @@ pub(super) struct Listing {
     pub(super) ids: RowIds,
     /// Warnings, one line each.
     pub(super) warnings: Vec<String>,
-    /// What the number of a row counts: `pairs.csv: line`, or `pair` for directories.
+    /// Label of row numbers in messages: `pairs.csv: line`, or `pair` for directories.
     row_label: String,
 }
 

@@ -15,7 +15,7 @@ pub(super) fn log_only() {
     }));
 }
 
-/// Does some work; turns a panic into a sentence for `show_error` and an exit code.
+/// Calls a function; turns a panic into a sentence for `show_error` and an exit code.
 pub(super) fn catch(work: impl FnOnce() -> ExitCode, show_error: impl FnOnce(&str)) -> ExitCode {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
         show_error(

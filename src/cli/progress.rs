@@ -38,7 +38,7 @@ const PLAIN_PERCENT: u64 = 5;
 const PLAIN_MIN_INTERVAL: Duration = Duration::from_secs(1);
 
 impl ProgressReporter {
-    /// Starts the display that was asked for; `-q` turns the automatic one off.
+    /// Starts the requested display; `-q` turns the automatic one off.
     pub(super) fn new(mode: ProgressMode, quiet: bool, screen: &Screen, palette: Palette) -> Self {
         let now = Instant::now();
         Self {
@@ -98,7 +98,7 @@ fn display(mode: ProgressMode, quiet: bool, screen: &Screen, now: Instant) -> Di
 }
 
 fn bar(screen: &Screen) -> Display {
-    // Narrower than the terminal, which writes "^C" at the end of the line and must not wrap there.
+    // The bar is narrower than the terminal, so that the "^C" printed after it does not wrap.
     let style = ProgressStyle::with_template(
         "{msg}\n{bar:40} {percent:>3} %  {pos}/{len} stages  {per_sec}  {eta} left",
     )
@@ -124,7 +124,7 @@ fn update_bar(bar: &ProgressBar, progress: &RunProgress) {
     bar.set_message(progress.by_stage_line());
 }
 
-/// Returns the line of an event that deserves one.
+/// Returns the line that is printed for an event, if any.
 fn event_line(event: &RunEvent, palette: Palette) -> Option<String> {
     match event {
         RunEvent::PairFailed {

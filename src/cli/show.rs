@@ -131,7 +131,7 @@ fn adjustment(manual: &StoredAlignment, results: &PairResults) -> Option<Adjustm
     })
 }
 
-/// Returns the result that manual alignments are compared with: that of the ensemble, otherwise the first.
+/// Returns the result that manual alignments are compared with: the ensemble's, otherwise the first.
 fn automatic_result(results: &PairResults) -> Option<&MetricOutcome> {
     let ensemble = results.metric(ThresholdMetric::Ensemble);
     ensemble

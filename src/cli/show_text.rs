@@ -251,7 +251,7 @@ fn verdicts(record: &MetricRecord) -> String {
 pub(super) struct ManualResult {
     #[serde(flatten)]
     pub(super) stored: StoredAlignment,
-    /// The difference to the automatic result; `None` if that belongs to another depth map.
+    /// The difference to the automatic result; `None` if the two belong to different depth maps.
     pub(super) adjustment: Option<Adjustment>,
 }
 

@@ -1,4 +1,4 @@
-//! Errors of settings: the layer that set the value, the key, what is wrong, and what was probably meant.
+//! Errors of settings: the layer that set the value, the key, the problem and a suggestion.
 
 use std::path::PathBuf;
 
@@ -50,7 +50,7 @@ pub enum ConfigError {
     Layer {
         /// The layer.
         origin: Origin,
-        /// The key, the value and what is wrong, sanitized.
+        /// The key, the value and the problem, sanitized.
         problem: String,
     },
     /// `--set` without `=`, or without a section.

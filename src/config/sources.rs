@@ -11,10 +11,10 @@ use crate::domain::enum_names;
 /// Settings that come with the program.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Preset {
-    /// The best known method; holds every setting.
+    /// The best known method; contains every setting.
     #[default]
     Default,
-    /// The paper's method; holds only what differs from the default.
+    /// The paper's method; contains only the settings that differ from the default.
     Paper,
 }
 

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::enum_names;
 
-/// How the height at which a depth map becomes a mask is chosen (paper III-C).
+/// How the threshold between strokes and background of a depth map is selected (paper III-C).
 ///
 /// `P` is the ink mask of the print and `D(t)` the depth mask of the heights from threshold `t` up, both on one canvas.
 /// Under the default method they are compared after alignment, where both images have data, over 40 equal steps of `t`

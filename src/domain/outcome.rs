@@ -236,7 +236,7 @@ pub struct MetricOutcome {
     pub shift_px: [f64; 2],
     /// Similarity of the masks on the canvas.
     pub scores: Scores,
-    /// Score of the best pose minus that of the best competing pose (at another angle, or mirrored).
+    /// Score of the best pose minus the score of the best competing pose (at another angle, or mirrored).
     pub margin: f64,
     /// Calibrated probability, 0..=1, that this alignment is right: angle within 5 degrees and landmarks within 5 % of
     /// the character's height. `None` under the paper's method.

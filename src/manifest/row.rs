@@ -43,7 +43,7 @@ const COLUMNS: [&str; 7] = [
 /// Columns that every list needs.
 pub(super) const REQUIRED: [&str; 3] = ["id", "mesh", "print"];
 
-/// Returns the column with a meaning that a name stands for, in any case.
+/// Returns the column with a meaning of this name, ignoring case.
 pub(super) fn known_column(name: &str) -> Option<&'static str> {
     let mut columns = COLUMNS.into_iter();
     columns.find(|known| known.eq_ignore_ascii_case(name))
