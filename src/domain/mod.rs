@@ -15,6 +15,8 @@ mod review_order;
 mod sanitize;
 mod seeded_random;
 mod stage;
+#[cfg(test)]
+pub(crate) mod test_values;
 mod transform;
 mod unit;
 mod verdict;

@@ -1,106 +1,43 @@
 //! A built-in font of 5 x 7 dots, for ids and numbers on images.
 
+use std::collections::BTreeMap;
+use std::sync::LazyLock;
+
 /// Width of a glyph, dots.
 pub(super) const WIDTH: usize = 5;
 /// Height of a glyph, dots.
 pub(super) const HEIGHT: usize = 7;
 
+/// The rows of each glyph, top first; bit 4 is the leftmost dot.
+///
+/// In the file, a line with the letter in quotes precedes the rows of its glyph, in which `#` is a dot.
+static GLYPHS: LazyLock<BTreeMap<char, [u8; HEIGHT]>> = LazyLock::new(|| {
+    let lines: Vec<&str> = include_str!("../../../assets/export/font.txt")
+        .lines()
+        .collect();
+    let bits = |row: &str| {
+        row.bytes()
+            .fold(0, |bits, dot| bits << 1 | u8::from(dot == b'#'))
+    };
+    let glyphs = lines.chunks(HEIGHT + 1);
+    glyphs
+        .filter_map(|glyph| {
+            let rows = glyph[1..].iter().map(|row| bits(row)).collect::<Vec<_>>();
+            Some((glyph[0].chars().nth(1)?, rows.try_into().ok()?))
+        })
+        .collect()
+});
+
 /// Returns the rows of a glyph, top first; bit 4 is the leftmost dot. An unknown letter is an empty box.
 pub(super) fn glyph(letter: char) -> [u8; HEIGHT] {
-    GLYPHS
-        .iter()
-        .find(|(known, _)| *known == letter)
-        .map_or([31, 17, 17, 17, 17, 17, 31], |(_, rows)| *rows)
+    let known = GLYPHS.get(&letter);
+    known.copied().unwrap_or([31, 17, 17, 17, 17, 17, 31])
 }
-
-const GLYPHS: [(char, [u8; HEIGHT]); 83] = [
-    (' ', [0, 0, 0, 0, 0, 0, 0]),
-    ('0', [14, 17, 19, 21, 25, 17, 14]),
-    ('1', [4, 12, 4, 4, 4, 4, 14]),
-    ('2', [14, 17, 1, 6, 8, 16, 31]),
-    ('3', [14, 17, 1, 6, 1, 17, 14]),
-    ('4', [2, 6, 10, 18, 31, 2, 2]),
-    ('5', [31, 16, 30, 1, 1, 17, 14]),
-    ('6', [6, 8, 16, 30, 17, 17, 14]),
-    ('7', [31, 1, 2, 4, 8, 8, 8]),
-    ('8', [14, 17, 17, 14, 17, 17, 14]),
-    ('9', [14, 17, 17, 15, 1, 2, 12]),
-    ('A', [14, 17, 17, 31, 17, 17, 17]),
-    ('B', [30, 17, 17, 30, 17, 17, 30]),
-    ('C', [14, 17, 16, 16, 16, 17, 14]),
-    ('D', [30, 17, 17, 17, 17, 17, 30]),
-    ('E', [31, 16, 16, 30, 16, 16, 31]),
-    ('F', [31, 16, 16, 30, 16, 16, 16]),
-    ('G', [14, 17, 16, 23, 17, 17, 15]),
-    ('H', [17, 17, 17, 31, 17, 17, 17]),
-    ('I', [14, 4, 4, 4, 4, 4, 14]),
-    ('J', [7, 2, 2, 2, 2, 18, 12]),
-    ('K', [17, 18, 20, 24, 20, 18, 17]),
-    ('L', [16, 16, 16, 16, 16, 16, 31]),
-    ('M', [17, 27, 21, 21, 17, 17, 17]),
-    ('N', [17, 25, 21, 21, 19, 17, 17]),
-    ('O', [14, 17, 17, 17, 17, 17, 14]),
-    ('P', [30, 17, 17, 30, 16, 16, 16]),
-    ('Q', [14, 17, 17, 17, 21, 18, 13]),
-    ('R', [30, 17, 17, 30, 20, 18, 17]),
-    ('S', [15, 16, 16, 14, 1, 1, 30]),
-    ('T', [31, 4, 4, 4, 4, 4, 4]),
-    ('U', [17, 17, 17, 17, 17, 17, 14]),
-    ('V', [17, 17, 17, 17, 17, 10, 4]),
-    ('W', [17, 17, 17, 21, 21, 27, 17]),
-    ('X', [17, 17, 10, 4, 10, 17, 17]),
-    ('Y', [17, 17, 10, 4, 4, 4, 4]),
-    ('Z', [31, 1, 2, 4, 8, 16, 31]),
-    ('a', [0, 0, 14, 1, 15, 17, 15]),
-    ('b', [16, 16, 30, 17, 17, 17, 30]),
-    ('c', [0, 0, 14, 16, 16, 16, 14]),
-    ('d', [1, 1, 15, 17, 17, 17, 15]),
-    ('e', [0, 0, 14, 17, 31, 16, 14]),
-    ('f', [6, 8, 28, 8, 8, 8, 8]),
-    ('g', [0, 0, 15, 17, 15, 1, 14]),
-    ('h', [16, 16, 30, 17, 17, 17, 17]),
-    ('i', [4, 0, 12, 4, 4, 4, 14]),
-    ('j', [2, 0, 6, 2, 2, 18, 12]),
-    ('k', [16, 16, 18, 20, 24, 20, 18]),
-    ('l', [12, 4, 4, 4, 4, 4, 14]),
-    ('m', [0, 0, 26, 21, 21, 21, 21]),
-    ('n', [0, 0, 30, 17, 17, 17, 17]),
-    ('o', [0, 0, 14, 17, 17, 17, 14]),
-    ('p', [0, 0, 30, 17, 30, 16, 16]),
-    ('q', [0, 0, 15, 17, 15, 1, 1]),
-    ('r', [0, 0, 22, 24, 16, 16, 16]),
-    ('s', [0, 0, 15, 16, 14, 1, 30]),
-    ('t', [8, 8, 28, 8, 8, 8, 6]),
-    ('u', [0, 0, 17, 17, 17, 19, 13]),
-    ('v', [0, 0, 17, 17, 17, 10, 4]),
-    ('w', [0, 0, 17, 17, 21, 21, 10]),
-    ('x', [0, 0, 17, 10, 4, 10, 17]),
-    ('y', [0, 0, 17, 17, 15, 1, 14]),
-    ('z', [0, 0, 31, 2, 4, 8, 31]),
-    ('.', [0, 0, 0, 0, 0, 12, 12]),
-    (',', [0, 0, 0, 0, 12, 4, 8]),
-    (':', [0, 12, 12, 0, 12, 12, 0]),
-    (';', [0, 12, 12, 0, 12, 4, 8]),
-    ('-', [0, 0, 0, 31, 0, 0, 0]),
-    ('+', [0, 4, 4, 31, 4, 4, 0]),
-    ('_', [0, 0, 0, 0, 0, 0, 31]),
-    ('=', [0, 0, 31, 0, 31, 0, 0]),
-    ('%', [24, 25, 2, 4, 8, 19, 3]),
-    ('/', [1, 1, 2, 4, 8, 16, 16]),
-    ('(', [2, 4, 8, 8, 8, 4, 2]),
-    (')', [8, 4, 2, 2, 2, 4, 8]),
-    ('<', [2, 4, 8, 16, 8, 4, 2]),
-    ('>', [8, 4, 2, 1, 2, 4, 8]),
-    ('\'', [4, 4, 8, 0, 0, 0, 0]),
-    ('"', [10, 10, 10, 0, 0, 0, 0]),
-    ('!', [4, 4, 4, 4, 4, 0, 4]),
-    ('?', [14, 17, 1, 2, 4, 0, 4]),
-    ('#', [10, 10, 31, 10, 31, 10, 10]),
-    ('\u{b0}', [6, 9, 9, 6, 0, 0, 0]),
-];
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::{GLYPHS, WIDTH, glyph};
 
     #[test]
@@ -110,15 +47,13 @@ mod tests {
             .chain('a'..='z')
             .chain(['_', '-']);
         for letter in letters {
-            assert!(GLYPHS.iter().any(|(known, _)| *known == letter), "{letter}");
+            assert!(GLYPHS.contains_key(&letter), "{letter}");
         }
-        for (i, (a, rows)) in GLYPHS.iter().enumerate() {
-            assert!(rows.iter().all(|row| *row < 1 << WIDTH), "{a:?}");
-            assert!(
-                GLYPHS[..i].iter().all(|(b, other)| a != b && rows != other),
-                "{a:?}"
-            );
-        }
+        assert_eq!(GLYPHS.len(), 83);
+        assert!(GLYPHS.values().flatten().all(|row| *row < 1 << WIDTH));
+        let distinct: BTreeSet<_> = GLYPHS.values().collect();
+        assert_eq!(distinct.len(), GLYPHS.len());
+        assert_eq!(glyph('F'), [31, 16, 16, 30, 16, 16, 16]);
     }
 
     #[test]
