@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::pictures::{ContactSheetCell, Rgb, contact_sheet, tile_side};
 use super::source_print::result_images;
 use crate::catalog::{Catalog, CatalogError, PairResults};
-use crate::domain::{JobStatus, PairName, ThresholdMetric};
+use crate::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
 use crate::raster::ImageLimits;
 use crate::report::ground_truth::TruthErrors;
 use crate::report::{Consensus, TruthEvaluation, evaluate_pairs};
@@ -29,45 +29,9 @@ pub enum ContactSheetOrder {
     Name,
 }
 
-impl ContactSheetOrder {
-    /// Every order.
-    pub const ALL: [Self; 5] = [
-        Self::Worst,
-        Self::Score,
-        Self::Margin,
-        Self::Confidence,
-        Self::Name,
-    ];
-
-    /// Returns the name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Worst => "worst",
-            Self::Score => "score",
-            Self::Margin => "margin",
-            Self::Confidence => "confidence",
-            Self::Name => "name",
-        }
-    }
-}
-
-impl std::fmt::Display for ContactSheetOrder {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for ContactSheetOrder {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|order| order.name() == text)
-            .ok_or_else(|| {
-                format!("{text:?} is not an order (worst, score, margin, confidence, name)")
-            })
-    }
+enum_names! {
+    pub ContactSheetOrder, "an order":
+    Worst = "worst", Score = "score", Margin = "margin", Confidence = "confidence", Name = "name",
 }
 
 /// What to draw.
@@ -154,7 +118,9 @@ async fn choose(
         let wanted = page.into_iter().filter(|pair| is_shown(options, pair));
         for (pair, truth) in evaluate_pairs(project, wanted.collect()).await? {
             of += 1;
-            chosen.push(SheetCandidate::new(pair, &truth, options));
+            let truth = truth.errors.get(&options.metric).copied();
+            let rank = rank(&pair, truth.as_ref(), options);
+            chosen.push(SheetCandidate { rank, pair, truth });
         }
         // The sort is stable and pairs come by name, so pairs of equal rank are sorted by name.
         chosen.sort_by(|a, b| a.rank.total_cmp(&b.rank));
@@ -170,29 +136,18 @@ fn is_shown(options: &ContactSheetOptions, pair: &PairResults) -> bool {
         && (pair.status == JobStatus::Quarantined || pair.metric(options.metric).is_some())
 }
 
-impl SheetCandidate {
-    fn new(pair: PairResults, truth: &TruthEvaluation, options: &ContactSheetOptions) -> Self {
-        let truth = truth.errors.get(&options.metric).copied();
-        let rank = rank(&pair, truth.as_ref(), options);
-        Self { rank, pair, truth }
-    }
-}
-
 /// Returns the sort key of a pair, lowest first.
 fn rank(pair: &PairResults, truth: Option<&TruthErrors>, options: &ContactSheetOptions) -> f64 {
-    if options.order == ContactSheetOrder::Name {
-        return 0.0;
-    }
-    let Some(record) = pair.metric(options.metric) else {
-        return f64::NEG_INFINITY;
-    };
-    let score = record.outcome.scores.iou;
-    match options.order {
-        ContactSheetOrder::Worst => truth.map_or(score, |errors| -errors.severity()),
-        ContactSheetOrder::Score => score,
-        ContactSheetOrder::Margin => record.outcome.margin,
-        ContactSheetOrder::Confidence => record.outcome.confidence.unwrap_or(f64::INFINITY),
-        ContactSheetOrder::Name => 0.0,
+    let outcome = pair.metric(options.metric).map(|record| record.outcome);
+    match (options.order, outcome) {
+        (ContactSheetOrder::Name, _) => 0.0,
+        (_, None) => f64::NEG_INFINITY,
+        (ContactSheetOrder::Worst, Some(found)) => {
+            truth.map_or(found.scores.iou, |errors| -errors.severity())
+        }
+        (ContactSheetOrder::Score, Some(found)) => found.scores.iou,
+        (ContactSheetOrder::Margin, Some(found)) => found.margin,
+        (ContactSheetOrder::Confidence, Some(found)) => found.confidence.unwrap_or(f64::INFINITY),
     }
 }
 
@@ -202,16 +157,14 @@ fn cell(
     options: &ContactSheetOptions,
 ) -> ContactSheetCell {
     let pair = &candidate.pair;
-    let standing = pair.metric(options.metric).map(Consensus::of);
+    let consensus = pair.metric(options.metric).map(Consensus::of);
     let off_truth = candidate.truth.is_some_and(|errors| !errors.pass());
     let side = tile_side(options.columns);
     let (tiles, problem) = result_images(project, pair, options.metric, side, &options.limits);
     ContactSheetCell {
         id: title(pair, options.metric),
         note: problem.unwrap_or_else(|| note(candidate, options.metric)),
-        wrong: pair.metric(options.metric).is_none()
-            || off_truth
-            || standing == Some(Consensus::Failed),
+        wrong: off_truth || consensus.is_none_or(|consensus| consensus == Consensus::Failed),
         tiles,
     }
 }
@@ -235,8 +188,7 @@ fn note(candidate: &SheetCandidate, metric: ThresholdMetric) -> String {
         (Some(record), Some(errors), _) => {
             let (iou, tops) = (record.outcome.scores.iou, errors.mask_iou);
             let tops = tops.map_or(String::new(), |tops| format!(" tops {tops:.2}"));
-            let (angle, landmarks) = (errors.angle_deg, errors.tre_pct);
-            let (angle, landmarks) = (short(angle), short(landmarks));
+            let [angle, landmarks] = [errors.angle_deg, errors.tre_pct].map(short);
             format!("IoU {iou:.2}  {angle}\u{b0} {landmarks}%{tops}")
         }
         (Some(record), None, _) => format!(

@@ -15,6 +15,7 @@ mod text;
 
 use super::gallery::Gallery;
 use super::model::Report;
+use crate::domain::enum_names;
 
 pub use agreement_text::agreement_text;
 pub use html::{Cover, MAX_PAGE_BYTES, page};
@@ -26,7 +27,7 @@ pub enum ReportFormat {
     Text,
     /// The whole report, numbers with all digits.
     Json,
-    /// One line a metric, numbers with all digits (RFC 4180).
+    /// One line per metric, numbers with all digits (RFC 4180).
     Csv,
     /// Tables of GitHub's dialect.
     Markdown,
@@ -36,47 +37,9 @@ pub enum ReportFormat {
     Html,
 }
 
-impl ReportFormat {
-    /// Every format.
-    pub const ALL: [Self; 6] = [
-        Self::Text,
-        Self::Json,
-        Self::Csv,
-        Self::Markdown,
-        Self::Latex,
-        Self::Html,
-    ];
-
-    /// Returns the name on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Text => "text",
-            Self::Json => "json",
-            Self::Csv => "csv",
-            Self::Markdown => "markdown",
-            Self::Latex => "latex",
-            Self::Html => "html",
-        }
-    }
-}
-
-impl std::fmt::Display for ReportFormat {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for ReportFormat {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|format| format.name() == text)
-            .ok_or_else(|| {
-                format!("{text:?} is not a report format (text, json, csv, markdown, latex, html)")
-            })
-    }
+enum_names! {
+    pub ReportFormat, "a report format":
+    Text = "text", Json = "json", Csv = "csv", Markdown = "markdown", Latex = "latex", Html = "html",
 }
 
 /// Returns the report in a format; ends with a line end. [`page`] returns the HTML page with images.

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::binomial::binomial_cdf;
+use crate::domain::enum_names;
 
 /// The 97.5 % point of the standard normal distribution.
 pub(super) const Z_975: f64 = 1.959_963_984_540_054;
@@ -19,17 +20,6 @@ pub enum IntervalMethod {
 }
 
 impl IntervalMethod {
-    /// Every method.
-    pub const ALL: [Self; 2] = [Self::Wilson, Self::Exact];
-
-    /// Returns the name in JSON, CSV and on the command line.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Wilson => "wilson",
-            Self::Exact => "exact",
-        }
-    }
-
     /// Returns the header of a column of intervals.
     pub const fn title(self) -> &'static str {
         match self {
@@ -47,16 +37,7 @@ impl IntervalMethod {
     }
 }
 
-impl std::str::FromStr for IntervalMethod {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        Self::ALL
-            .into_iter()
-            .find(|method| method.name() == text)
-            .ok_or_else(|| format!("{text:?} is not an interval (wilson, exact)"))
-    }
-}
+enum_names! { pub IntervalMethod, "an interval": Wilson = "wilson", Exact = "exact" }
 
 /// Returns Wilson's 95 % score interval of `count / n`, both bounds in 0..=1; `None` when `n` is 0.
 ///
