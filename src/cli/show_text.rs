@@ -291,16 +291,16 @@ fn manual_line(manual: &ManualResult) -> String {
 
 fn adjustment_text(adjustment: &Adjustment, iou: f64) -> String {
     let ManualCorrection {
-        turned_deg,
-        shifted_px: [x, y],
-        scaled,
+        rotation_deg,
+        shift_px: [x, y],
+        scale,
         mirrored,
     } = adjustment.by;
     // Adding zero turns -0.0 into 0.0.
-    let turned_deg = (turned_deg * 10.0).round() / 10.0 + 0.0;
+    let rotation_deg = (rotation_deg * 10.0).round() / 10.0 + 0.0;
     let mirrored = if mirrored { ", mirrored" } else { "" };
     format!(
-        "rotated {turned_deg:.1}\u{b0}, shifted {:.1} px, scaled {scaled:.3}{mirrored} from {}; IoU {iou:.3}, before {:.3}",
+        "rotated {rotation_deg:.1}\u{b0}, shifted {:.1} px, scaled {scale:.3}{mirrored} from {}; IoU {iou:.3}, before {:.3}",
         x.hypot(y),
         adjustment.from,
         adjustment.from_iou
@@ -317,9 +317,9 @@ mod tests {
         let adjustment = Adjustment {
             from: ThresholdMetric::Ensemble,
             by: ManualCorrection {
-                turned_deg: -5.04,
-                shifted_px: [3.0, 4.0],
-                scaled: 1.0,
+                rotation_deg: -5.04,
+                shift_px: [3.0, 4.0],
+                scale: 1.0,
                 mirrored: true,
             },
             from_iou: 0.7021,

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::ground_truth::MAX_ANGLE_DEG;
 use super::pair_artifacts::{PairArtifacts, PairArtifactsError};
-use super::stats::{median, quantile, ratio};
+use super::stats::{Rate, median, quantile};
 use crate::catalog::{PairResults, StoredAlignment};
 use crate::domain::{Affine2, DepthOutcome, Stage, ThresholdMetric};
 use crate::store::Project;
@@ -30,19 +30,19 @@ pub struct ManualAlignmentErrors {
     pub scale_median_pct: Option<f64>,
     /// 95th percentile of the difference in scale, percent.
     pub scale_p95_pct: Option<f64>,
-    /// Results that are mirrored against the manual alignment; their angle error counts as 180 degrees.
+    /// Results that are mirrored relative to the manual alignment; their angle error counts as 180 degrees.
     pub mirrored: u64,
 }
 
-/// What a manual alignment changed of a result.
+/// How a manual alignment differs from a result.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ManualCorrection {
     /// Rotation, degrees in (-180, 180], clockwise on the screen.
-    pub turned_deg: f64,
+    pub rotation_deg: f64,
     /// Shift of the relief's centre, print pixels, x right and y down.
-    pub shifted_px: [f64; 2],
+    pub shift_px: [f64; 2],
     /// Factor of the scale.
-    pub scaled: f64,
+    pub scale: f64,
     /// Whether the relief was also mirrored left to right, before the rotation.
     pub mirrored: bool,
 }
@@ -64,9 +64,9 @@ impl ManualCorrection {
         let centre = depth_px.map(|side| (f64::from(side) - 1.0) / 2.0);
         let ([x, y], [u, v]) = (found.apply(centre), manual.apply(centre));
         Some(Self {
-            turned_deg: change.angle_deg(),
-            shifted_px: [u - x, v - y],
-            scaled: change.scale(),
+            rotation_deg: change.angle_deg(),
+            shift_px: [u - x, v - y],
+            scale: change.scale(),
             mirrored,
         })
     }
@@ -89,16 +89,16 @@ impl ManualErrors {
     /// Returns the errors of one `print_from_depth` against another; `None` when one is singular.
     fn between(found: &Affine2, manual: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
         let correction = ManualCorrection::between(found, manual, depth_px)?;
-        let [x, y] = correction.shifted_px;
+        let [x, y] = correction.shift_px;
         let longer = f64::from(depth_px[0].max(depth_px[1]));
         Some(Self {
             angle_deg: if correction.mirrored {
                 180.0
             } else {
-                correction.turned_deg.abs()
+                correction.rotation_deg.abs()
             },
             shift_pct: 100.0 * x.hypot(y) / (manual.scale() * longer),
-            scale_pct: 100.0 * (correction.scaled - 1.0).abs(),
+            scale_pct: 100.0 * (correction.scale - 1.0).abs(),
             mirrored: correction.mirrored,
         })
     }
@@ -144,45 +144,35 @@ pub(super) fn errors(
         .collect())
 }
 
-/// The errors of one metric's results.
-#[derive(Debug, Clone, Default)]
-pub(super) struct ManualErrorSums(Vec<ManualErrors>);
-
-impl ManualErrorSums {
-    /// Counts one result.
-    pub(super) fn add(&mut self, errors: ManualErrors) {
-        self.0.push(errors);
-    }
-
-    /// Returns the summary; `None` without any result.
-    pub(super) fn finish(self) -> Option<ManualAlignmentErrors> {
-        let n = self.0.len() as u64;
+impl ManualAlignmentErrors {
+    /// Returns the summary of one metric's errors; `None` without any.
+    pub(super) fn of(found: &[ManualErrors]) -> Option<Self> {
         let median_and_p95 = |read: fn(&ManualErrors) -> f64| -> [Option<f64>; 2] {
-            let mut values: Vec<f64> = self.0.iter().map(read).collect();
+            let mut values: Vec<f64> = found.iter().map(read).collect();
             [median(&mut values), quantile(&mut values, 0.95)]
         };
-        let count = |is: fn(&ManualErrors) -> bool| self.0.iter().filter(|one| is(one)).count();
-        let right = count(|errors| errors.angle_deg <= MAX_ANGLE_DEG);
+        let rate = |is: fn(&ManualErrors) -> bool| Rate::of(found.iter().map(is));
+        let right = rate(|errors| errors.angle_deg <= MAX_ANGLE_DEG);
         let [angle_median_deg, angle_p95_deg] = median_and_p95(|errors| errors.angle_deg);
         let [shift_median_pct, shift_p95_pct] = median_and_p95(|errors| errors.shift_pct);
         let [scale_median_pct, scale_p95_pct] = median_and_p95(|errors| errors.scale_pct);
-        (n > 0).then(|| ManualAlignmentErrors {
-            n,
-            angle_le_5deg: ratio(right as f64, n),
+        (right.n > 0).then_some(Self {
+            n: right.n,
+            angle_le_5deg: right.share,
             angle_median_deg,
             angle_p95_deg,
             shift_median_pct,
             shift_p95_pct,
             scale_median_pct,
             scale_p95_pct,
-            mirrored: count(|errors| errors.mirrored) as u64,
+            mirrored: rate(|errors| errors.mirrored).count,
         })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ManualCorrection, ManualErrorSums, ManualErrors};
+    use super::{ManualAlignmentErrors, ManualCorrection, ManualErrors};
     use crate::domain::Affine2;
 
     /// Places a relief of 101 x 51 px with its centre at (200, 100) + `shift`.
@@ -228,10 +218,10 @@ mod tests {
         ] {
             let moved = correction(&manual);
             assert_eq!(moved.mirrored, mirrored);
-            assert!((moved.turned_deg - 12.5).abs() < 1e-9, "{moved:?}");
-            assert!((moved.shifted_px[0] - 3.0).abs() < 1e-9, "{moved:?}");
-            assert!((moved.shifted_px[1] + 4.0).abs() < 1e-9, "{moved:?}");
-            assert!((moved.scaled - 1.0).abs() < 1e-9, "{moved:?}");
+            assert!((moved.rotation_deg - 12.5).abs() < 1e-9, "{moved:?}");
+            assert!((moved.shift_px[0] - 3.0).abs() < 1e-9, "{moved:?}");
+            assert!((moved.shift_px[1] + 4.0).abs() < 1e-9, "{moved:?}");
+            assert!((moved.scale - 1.0).abs() < 1e-9, "{moved:?}");
         }
     }
 
@@ -246,11 +236,9 @@ mod tests {
 
     #[test]
     fn shares_and_percentiles_are_over_the_corrected_pairs() {
-        let mut sums = ManualErrorSums::default();
-        for angle_deg in [30.0, 31.0, 34.0, 40.0, 10.0] {
-            sums.add(errors(&placed(2.0, angle_deg, [0.0, 0.0])));
-        }
-        let found = sums.finish().expect("five");
+        let results = [30.0, 31.0, 34.0, 40.0, 10.0]
+            .map(|angle_deg| errors(&placed(2.0, angle_deg, [0.0, 0.0])));
+        let found = ManualAlignmentErrors::of(&results).expect("five");
         assert_eq!(
             (found.n, found.angle_le_5deg, found.mirrored),
             (5, Some(0.6), 0)
@@ -261,6 +249,6 @@ mod tests {
         near(found.angle_median_deg, 4.0);
         // NumPy 2 `quantile([0, 1, 4, 10, 20], 0.95)`.
         near(found.angle_p95_deg, 18.0);
-        assert_eq!(ManualErrorSums::default().finish(), None);
+        assert_eq!(ManualAlignmentErrors::of(&[]), None);
     }
 }

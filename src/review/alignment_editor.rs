@@ -3,14 +3,12 @@
 use serde::{Deserialize, Serialize};
 
 use super::answer::{InvalidInput, check_event, check_note};
-use super::item::{ItemView, ReviewItem};
+use super::item::ReviewItem;
 use super::item_images::{IMAGE_SIDE, ItemImages, ItemInputs};
-use crate::catalog::{ManualAlignment, PairResults};
-use crate::domain::{Affine2, Stage};
+use crate::catalog::ManualAlignment;
+use crate::domain::Affine2;
 use crate::raster::{MaskOverlap, warp_mask};
 use crate::report::ManualCorrection;
-use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
-use crate::store::Project;
 
 /// Accepted scale of the relief relative to the image.
 const SCALES: std::ops::RangeInclusive<f64> = 0.01..=100.0;
@@ -39,24 +37,6 @@ pub(super) struct AlignmentBody {
     note: Option<String>,
 }
 
-/// How well the two masks overlap on the canvas.
-#[derive(Debug, Serialize)]
-pub(super) struct MaskScores {
-    /// Intersection over union, 0 to 1.
-    pub(super) iou: f64,
-    /// Dice coefficient, 0 to 1.
-    pub(super) dice: f64,
-}
-
-impl From<MaskOverlap> for MaskScores {
-    fn from(found: MaskOverlap) -> Self {
-        Self {
-            iou: found.iou,
-            dice: found.dice,
-        }
-    }
-}
-
 /// Returns where the editor starts: at the result, and where the reviewer left it before.
 pub(super) fn start(
     item: &ReviewItem,
@@ -74,27 +54,22 @@ pub(super) fn start(
 }
 
 /// Computes the overlap of an item's masks under a map, in the same way as the scores of results.
-pub(super) fn mask_scores(images: &ItemImages, print_from_depth: &Affine2) -> MaskScores {
+pub(super) fn mask_overlap(images: &ItemImages, print_from_depth: &Affine2) -> MaskOverlap {
     let ItemInputs {
         canvas, strokes, ..
     } = &images.inputs;
     let map = canvas.from_print.after(print_from_depth);
     let (width, height) = (canvas.print_mask.width(), canvas.print_mask.height());
-    let warped = warp_mask(strokes, &map, width, height);
-    warped.overlap(&canvas.print_mask).into()
+    warp_mask(strokes, &map, width, height).overlap(&canvas.print_mask)
 }
 
 /// A manual alignment as the page shows it.
 #[derive(Debug, Serialize)]
 pub(super) struct AlignmentSummary {
     reviewer: String,
-    /// Rotation against the result, degrees clockwise on the screen.
-    rotation_deg: f64,
-    /// Shift of the relief's centre against the result, print pixels.
-    shift_px: [f64; 2],
-    /// Scale relative to the result.
-    scale: f64,
-    mirrored: bool,
+    /// Against the result.
+    #[serde(flatten)]
+    correction: ManualCorrection,
     iou: f64,
     dice: f64,
 }
@@ -102,19 +77,12 @@ pub(super) struct AlignmentSummary {
 impl AlignmentSummary {
     /// Compares a manual alignment with what the item shows; `None` if one of the two maps is singular.
     pub(super) fn of(item: &ReviewItem, made: &ManualAlignment) -> Option<Self> {
-        let ItemView {
-            print_from_depth,
-            depth_px,
-            ..
-        } = &item.view;
-        let change =
-            ManualCorrection::between(print_from_depth, &made.print_from_depth, *depth_px)?;
+        let found = &item.view.print_from_depth;
+        let correction =
+            ManualCorrection::between(found, &made.print_from_depth, item.view.depth_px)?;
         Some(Self {
             reviewer: made.reviewer.clone(),
-            rotation_deg: change.turned_deg,
-            shift_px: change.shifted_px,
-            scale: change.scaled,
-            mirrored: change.mirrored,
+            correction,
             iou: made.iou,
             dice: made.dice,
         })
@@ -128,13 +96,9 @@ impl AlignmentBody {
     /// When the map is singular, not finite, or places the relief far outside the print.
     pub(super) fn print_from_depth(&self, images: &ItemImages) -> Result<Affine2, InvalidInput> {
         check_event(&self.event)?;
-        let is_finite = self
-            .view_from_depth
-            .0
-            .as_flattened()
-            .iter()
-            .all(|n| n.is_finite());
-        let [x, y] = [self.view_from_depth.0[0][2], self.view_from_depth.0[1][2]];
+        let rows = self.view_from_depth.0;
+        let is_finite = rows.as_flattened().iter().all(|n| n.is_finite());
+        let [x, y] = rows.map(|row| row[2]);
         let is_near = x.abs().max(y.abs()) <= 1000.0 * IMAGE_SIDE as f64;
         let print_from_view = images.inputs.view().from_print().inverse();
         let map = print_from_view.map(|map| map.after(&self.view_from_depth));
@@ -151,33 +115,4 @@ impl AlignmentBody {
     pub(super) fn note(&self) -> Result<Option<String>, InvalidInput> {
         check_note(self.note.as_deref())
     }
-}
-
-/// Builds the record of a manual alignment, without its event and note.
-///
-/// # Errors
-/// When the pair's results cannot be read.
-pub(super) fn to_record(
-    project: &Project,
-    pair: &PairResults,
-    item: &ReviewItem,
-    reviewer: &str,
-    print_from_depth: Affine2,
-    scores: &MaskScores,
-) -> Result<ManualAlignment, PairArtifactsError> {
-    let aligned = PairArtifacts::new(project, pair);
-    Ok(ManualAlignment {
-        event: String::new(),
-        pair: item.pair.clone(),
-        reviewer: reviewer.to_owned(),
-        print_from_depth,
-        print_from_mesh: aligned.print_from_mesh(&print_from_depth)?,
-        mesh_hash: aligned.stage(Stage::Fit)?.mesh_hash,
-        print_hash: item.view.print_hash,
-        depth_hash: item.view.depth_hash,
-        seen: item.view.hash(),
-        iou: scores.iou,
-        dice: scores.dice,
-        note: None,
-    })
 }
