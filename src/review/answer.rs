@@ -36,22 +36,16 @@ pub(super) struct UndoBody {
 /// Why a request from the page is not valid.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub(super) enum InvalidInput {
-    /// The event id has another form.
     #[error("an event is 1 to 64 letters, digits and hyphens")]
     Event,
-    /// A reason is given without a fail.
     #[error("only a fail has a reason")]
     Reason,
-    /// The note is too long.
     #[error("a note has at most {NOTE_CHARS} characters")]
     Note,
-    /// The angle is out of range.
     #[error("an angle is from -180 to 180 degrees")]
     Angle,
-    /// The display time is out of range.
     #[error("the display time is too long")]
     ShownMs,
-    /// The map is singular, or scales or shifts too far.
     #[error("the map is singular, or its scale or shift is out of range")]
     Map,
 }
@@ -70,10 +64,8 @@ impl AnswerBody {
         if self.reason.is_some() && self.verdict != Verdict::Fail {
             return Err(InvalidInput::Reason);
         }
-        if self
-            .angle_read_deg
-            .is_some_and(|angle| angle.is_nan() || angle.abs() > 180.0)
-        {
+        let is_angle = |angle: f64| angle.abs() <= 180.0;
+        if !self.angle_read_deg.is_none_or(is_angle) {
             return Err(InvalidInput::Angle);
         }
         if self.shown_ms.is_some_and(|ms| i64::try_from(ms).is_err()) {
@@ -83,7 +75,7 @@ impl AnswerBody {
             pair: item.pair.clone(),
             metric: None,
             verdict: self.verdict,
-            reviewer: state.queue_options.reviewer.clone(),
+            reviewer: state.options.queue.reviewer.clone(),
             reason: self.reason,
             note: check_note(self.note.as_deref())?,
             look: ReviewContext {
@@ -91,7 +83,7 @@ impl AnswerBody {
                 seen: Some(item.view.hash()),
                 shown_ms: self.shown_ms,
                 angle_read_deg: self.angle_read_deg,
-                review_order: Some(state.queue_options.order),
+                review_order: Some(state.options.queue.order),
             },
             at: None,
         })

@@ -47,20 +47,18 @@ pub(super) fn plant_fault(
 ) -> ReviewItem {
     let draw = |purpose| random.draw(&item.view.hash(), purpose);
     let strokes = depth.stroke_mask(item.view.level);
-    let (check, view) = match draw("kind") {
-        ..0.2 if !is_symmetric(&strokes) => (AttentionCheck::Mirrored, item.view.mirrored()),
-        0.2..0.5 => match faulty_threshold(depth, item.view.level, draw("cut") < 0.5) {
-            Some(level) => (
+    let changed = match draw("kind") {
+        ..0.2 if !is_symmetric(&strokes) => Some((AttentionCheck::Mirrored, item.view.mirrored())),
+        0.2..0.5 => faulty_threshold(depth, item.view.level, draw("cut") < 0.5).map(|level| {
+            let view = item.view.clone();
+            (
                 AttentionCheck::Threshold { level },
-                ItemView {
-                    level,
-                    ..item.view.clone()
-                },
-            ),
-            None => rotated(item, draw("turn")),
-        },
-        _ => rotated(item, draw("turn")),
+                ItemView { level, ..view },
+            )
+        }),
+        _ => None,
     };
+    let (check, view) = changed.unwrap_or_else(|| rotated(item, draw("turn")));
     ReviewItem {
         check: Some(check),
         view,
@@ -74,10 +72,8 @@ fn rotated(item: &ReviewItem, number: f64) -> (AttentionCheck, ItemView) {
     let sign = if number < 0.5 { -1.0 } else { 1.0 };
     let share = (2.0 * number).fract();
     let angle_deg = sign * (min + share * (max - min));
-    (
-        AttentionCheck::Turned { angle_deg },
-        item.view.rotated(angle_deg),
-    )
+    let view = item.view.rotated(angle_deg);
+    (AttentionCheck::Turned { angle_deg }, view)
 }
 
 /// Returns whether the strokes nearly cover their mirror image, mirrored about the centre of their bounding box.
@@ -98,20 +94,15 @@ fn faulty_threshold(depth: &DepthMap, level: u16, loses_strokes: bool) -> Option
     let mut levels = depth.valid_levels();
     levels.sort_unstable_by(|a, b| b.cmp(a));
     let area = levels.partition_point(|found| *found >= level);
-    let share = if loses_strokes {
-        REDUCED_STROKES
+    let (share, accepted) = if loses_strokes {
+        (REDUCED_STROKES, 0.1..0.7)
     } else {
-        ENLARGED_STROKES
+        (ENLARGED_STROKES, 1.5..3.0)
     };
     let wanted = (area as f64 * share) as usize;
     let faulty = *levels.get(wanted)?;
     let ratio = levels.partition_point(|found| *found >= faulty) as f64 / area.max(1) as f64;
-    let is_fault = if loses_strokes {
-        (0.1..0.7).contains(&ratio)
-    } else {
-        (1.5..3.0).contains(&ratio)
-    };
-    is_fault.then_some(faulty)
+    accepted.contains(&ratio).then_some(faulty)
 }
 
 /// Inserts faults and duplicates among the results, so that the position of an item does not reveal its kind.

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use axum::extract::{Request, State};
+use axum::http::header::AsHeaderName;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse as _, Response};
@@ -38,41 +39,31 @@ const HEADERS: [(HeaderName, &str); 7] = [
     ),
 ];
 
-/// Why a request is rejected.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Rejection {
-    /// `Host` is not ours, as after DNS rebinding.
-    Host,
-    /// The session cookie is missing or of an earlier start.
-    Cookie,
-    /// `Origin` is missing or of another site.
-    Origin,
-    /// The body is not JSON; a form on another site could send it.
-    ContentType,
-    /// The CSRF token is missing or wrong.
-    CsrfToken,
-}
+/// Why a request is rejected: the status and the body of the response.
+type Rejection = (StatusCode, &'static str);
 
-impl Rejection {
-    const fn status(self) -> StatusCode {
-        match self {
-            Self::Host => StatusCode::MISDIRECTED_REQUEST,
-            Self::Cookie => StatusCode::UNAUTHORIZED,
-            Self::Origin | Self::CsrfToken => StatusCode::FORBIDDEN,
-            Self::ContentType => StatusCode::UNSUPPORTED_MEDIA_TYPE,
-        }
-    }
-
-    const fn message(self) -> &'static str {
-        match self {
-            Self::Host => "this host name is not served; open the address that the command printed",
-            Self::Cookie => "open the address that the command printed; it works once",
-            Self::Origin => "only the review page may write here",
-            Self::ContentType => "only application/json is accepted",
-            Self::CsrfToken => "the server was restarted; reload the page",
-        }
-    }
-}
+/// `Host` is not ours, as after DNS rebinding.
+const WRONG_HOST: Rejection = (
+    StatusCode::MISDIRECTED_REQUEST,
+    "this host name is not served; open the address that the command printed",
+);
+/// The session cookie is missing or of an earlier start.
+const NO_COOKIE: Rejection = (
+    StatusCode::UNAUTHORIZED,
+    "open the address that the command printed; it works once",
+);
+/// `Origin` is missing or of another site.
+const WRONG_ORIGIN: Rejection = (StatusCode::FORBIDDEN, "only the review page may write here");
+/// The body is not JSON; a form on another site could send it.
+const NO_JSON: Rejection = (
+    StatusCode::UNSUPPORTED_MEDIA_TYPE,
+    "only application/json is accepted",
+);
+/// The CSRF token is missing or wrong.
+const WRONG_TOKEN: Rejection = (
+    StatusCode::FORBIDDEN,
+    "the server was restarted; reload the page",
+);
 
 /// Rejects unauthorised requests and adds the security headers to every response.
 pub(super) async fn guard(
@@ -82,7 +73,7 @@ pub(super) async fn guard(
 ) -> Response {
     let mut response = match check(&state, &request) {
         Ok(()) => next.run(request).await,
-        Err(rejection) => (rejection.status(), rejection.message()).into_response(),
+        Err(rejection) => rejection.into_response(),
     };
     let headers = response.headers_mut();
     for (name, value) in HEADERS {
@@ -93,37 +84,35 @@ pub(super) async fn guard(
 
 fn check(state: &ServerState, request: &Request) -> Result<(), Rejection> {
     let headers = request.headers();
-    let host = text(headers, &header::HOST).ok_or(Rejection::Host)?;
+    let host = text(headers, header::HOST).ok_or(WRONG_HOST)?;
     if !state.hosts.iter().any(|allowed| allowed == host) {
-        return Err(Rejection::Host);
+        return Err(WRONG_HOST);
     }
     let is_read = matches!(*request.method(), Method::GET | Method::HEAD);
     if is_read && request.uri().path() == START {
         return Ok(());
     }
-    if !text(headers, &header::COOKIE).is_some_and(|cookie| state.session.has_cookie(cookie)) {
-        return Err(Rejection::Cookie);
+    if !text(headers, header::COOKIE).is_some_and(|cookie| state.session.has_cookie(cookie)) {
+        return Err(NO_COOKIE);
     }
     if is_read {
         return Ok(());
     }
-    let origin = text(headers, &header::ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
+    let origin = text(headers, header::ORIGIN).and_then(|origin| origin.strip_prefix("http://"));
     if origin != Some(host) {
-        return Err(Rejection::Origin);
+        return Err(WRONG_ORIGIN);
     }
-    let kind = text(headers, &header::CONTENT_TYPE).and_then(|kind| kind.split(';').next());
+    let kind = text(headers, header::CONTENT_TYPE).and_then(|kind| kind.split(';').next());
     if kind.map(str::trim) != Some("application/json") {
-        return Err(Rejection::ContentType);
+        return Err(NO_JSON);
     }
-    let token = headers
-        .get(CSRF_HEADER)
-        .and_then(|token| token.to_str().ok());
+    let token = text(headers, CSRF_HEADER);
     if !token.is_some_and(|token| state.session.is_csrf_token(token)) {
-        return Err(Rejection::CsrfToken);
+        return Err(WRONG_TOKEN);
     }
     Ok(())
 }
 
-fn text<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
+fn text(headers: &HeaderMap, name: impl AsHeaderName) -> Option<&str> {
     headers.get(name)?.to_str().ok()
 }

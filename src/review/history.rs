@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::item::ReviewItem;
-use super::queue_options::QueueOptions;
+use super::options::QueueOptions;
 use crate::catalog::{Answer, AnsweredOn, Catalog, CatalogError, ManualAlignment};
 use crate::domain::ContentHash;
 

@@ -1,9 +1,7 @@
-//! An item of the queue: one image that a reviewer judges, and what only the server knows of it.
+//! An item of the queue: one image that a reviewer judges, with data that stay on the server.
 
 use crate::catalog::Shown;
-use crate::domain::{
-    Affine2, AttentionCheck, ContentHash, DepthOutcome, PairName, ThresholdMetric,
-};
+use crate::domain::{Affine2, AttentionCheck, ContentHash, PairName, ThresholdMetric};
 
 /// What the images of an item are rendered from.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,29 +31,14 @@ impl ItemView {
         ContentHash::of(&bytes)
     }
 
-    /// Returns width and height of the depth map that the depth stage produced, in pixels.
-    pub(super) const fn size(outcome: &DepthOutcome) -> [u32; 2] {
-        [outcome.width, outcome.height]
-    }
-
-    /// Returns the print pixel on which the centre of the depth map lies.
-    fn centre(&self) -> [f64; 2] {
-        let [width, height] = self.depth_px.map(f64::from);
-        let middle = [(width - 1.0) / 2.0, (height - 1.0) / 2.0];
-        self.print_from_depth.apply(middle)
-    }
-
     /// Returns this view with the relief rotated about its centre, in degrees clockwise.
     pub(super) fn rotated(&self, angle_deg: f64) -> Self {
-        let [x, y] = self.centre();
-        let to_centre = Affine2::scale_shift(1.0, [x, y]);
+        let centre = self.depth_px.map(|side| (f64::from(side) - 1.0) / 2.0);
+        let [x, y] = self.print_from_depth.apply(centre);
         let from_centre = Affine2::scale_shift(1.0, [-x, -y]);
-        let rotation = Affine2::similarity(1.0, angle_deg.to_radians(), [0.0; 2]);
+        let rotation = Affine2::similarity(1.0, angle_deg.to_radians(), [x, y]).after(&from_centre);
         Self {
-            print_from_depth: to_centre
-                .after(&rotation)
-                .after(&from_centre)
-                .after(&self.print_from_depth),
+            print_from_depth: rotation.after(&self.print_from_depth),
             ..self.clone()
         }
     }
@@ -90,7 +73,7 @@ pub(super) struct ReviewItem {
 }
 
 impl ReviewItem {
-    /// Returns what an answer to this item is stored for.
+    /// Returns the results or the attention check for which an answer to this item is stored.
     pub(super) fn shown(&self) -> Shown {
         match (self.check, self.results.first()) {
             (Some(check), Some((metric, result_hash))) => Shown::Check {

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
+use serde::Deserialize;
 use tokio::sync::{Mutex, OnceCell};
 
 use super::item::ReviewItem;
@@ -19,8 +20,9 @@ pub(super) const IMAGE_SIDE: usize = 640;
 /// Number of items whose images are cached.
 const CACHED_ITEMS: usize = 48;
 
-/// One of the images of an item.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// One of the images of an item, by its name in URLs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub(super) enum ImageLayer {
     /// The print.
     Print,
@@ -38,53 +40,18 @@ pub(super) enum ImageLayer {
     CanvasMask,
 }
 
-impl ImageLayer {
-    /// All layers.
-    pub(super) const ALL: [Self; 7] = [
-        Self::Print,
-        Self::PrintMask,
-        Self::Relief,
-        Self::DepthMask,
-        Self::DepthFrameRelief,
-        Self::DepthFrameMask,
-        Self::CanvasMask,
-    ];
-
-    /// Returns the name in the image's URL.
-    pub(super) const fn name(self) -> &'static str {
-        match self {
-            Self::Print => "print",
-            Self::PrintMask => "print-mask",
-            Self::Relief => "relief",
-            Self::DepthMask => "depth-mask",
-            Self::DepthFrameRelief => "depth-frame-relief",
-            Self::DepthFrameMask => "depth-frame-mask",
-            Self::CanvasMask => "canvas-mask",
-        }
-    }
-
-    /// Returns the layer of a name.
-    pub(super) fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|layer| layer.name() == name)
-    }
-}
-
 /// Why the images of an item cannot be rendered.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum ImageError {
-    /// The catalog cannot be read.
     #[error(transparent)]
     Catalog(#[from] CatalogError),
-    /// A result or artifact cannot be read.
     #[error(transparent)]
     PairArtifacts(#[from] PairArtifactsError),
-    /// The print cannot be read.
     #[error(transparent)]
     Print(#[from] SourcePrintError),
     /// The pair has a new result.
     #[error("this pair has a new result; reload the page")]
     Gone,
-    /// A blocking task panicked.
     #[error("rendering stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
@@ -94,15 +61,6 @@ pub(super) enum ImageError {
 pub(super) struct ScoreCanvas {
     pub(super) print_mask: Mask,
     pub(super) from_print: Affine2,
-}
-
-impl ScoreCanvas {
-    fn read(aligned: &PairArtifacts<'_>) -> Result<Self, ImageError> {
-        Ok(Self {
-            print_mask: aligned.canvas_print_mask()?,
-            from_print: aligned.canvas_from_print()?,
-        })
-    }
 }
 
 /// Everything an item shows, read from the project.
@@ -134,7 +92,10 @@ impl ItemInputs {
         Ok(Self {
             print: SourcePrint::read(project, pair, limits)?,
             print_mask: aligned.print_mask()?,
-            canvas: ScoreCanvas::read(&aligned)?,
+            canvas: ScoreCanvas {
+                print_mask: aligned.canvas_print_mask()?,
+                from_print: aligned.canvas_from_print()?,
+            },
             strokes: depth.stroke_mask(item.view.level),
             depth,
         })
@@ -257,11 +218,14 @@ mod tests {
 
     #[test]
     fn layers_are_found_by_name_and_nothing_else_is() {
-        for layer in ImageLayer::ALL {
-            assert_eq!(ImageLayer::from_name(layer.name()), Some(layer));
-        }
+        let layer = |name: &str| serde_json::from_value::<ImageLayer>(name.into()).ok();
+        assert_eq!(layer("print-mask"), Some(ImageLayer::PrintMask));
+        assert_eq!(
+            layer("depth-frame-relief"),
+            Some(ImageLayer::DepthFrameRelief)
+        );
         for name in ["", "PRINT", "../print", "print.png"] {
-            assert_eq!(ImageLayer::from_name(name), None, "{name}");
+            assert_eq!(layer(name), None, "{name}");
         }
     }
 

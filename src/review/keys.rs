@@ -3,62 +3,32 @@
 
 use std::collections::BTreeMap;
 
-/// Actions that judge an item.
-pub(super) const VERDICT_ACTIONS: [&str; 11] = [
-    "pass",
-    "fail",
-    "angle",
-    "strokes_lost",
-    "background_in",
-    "shift_or_scale",
-    "mirrored",
-    "wrong_pair",
-    "unsure",
-    "note",
-    "undo",
+/// The actions in the order of the help, by group: those that judge an item, change how it is displayed, move through the
+/// queue or open a dialog, and align manually.
+pub(super) const ACTIONS: [(&str, &str); 4] = [
+    (
+        "verdicts",
+        "pass fail angle strokes_lost background_in shift_or_scale mirrored wrong_pair unsure note undo",
+    ),
+    (
+        "modes",
+        "two_up overlay edges onion checker difference reveal flicker auto_flicker angle_guides stroke_map zoom \
+         rotate_left rotate_right less more reset",
+    ),
+    (
+        "navigation",
+        "next previous jump details help other_language",
+    ),
+    (
+        "manual_alignment",
+        "align mirror larger smaller save cancel",
+    ),
 ];
-/// Actions that change how an item is displayed.
-pub(super) const VIEW_ACTIONS: [&str; 17] = [
-    "two_up",
-    "overlay",
-    "edges",
-    "onion",
-    "checker",
-    "difference",
-    "reveal",
-    "flicker",
-    "auto_flicker",
-    "angle_guides",
-    "stroke_map",
-    "zoom",
-    "rotate_left",
-    "rotate_right",
-    "less",
-    "more",
-    "reset",
-];
-/// Actions that move through the queue, or open a dialog.
-pub(super) const NAVIGATION_ACTIONS: [&str; 6] = [
-    "next",
-    "previous",
-    "jump",
-    "details",
-    "help",
-    "other_language",
-];
-/// Actions of the manual alignment.
-pub(super) const ALIGNMENT_ACTIONS: [&str; 6] =
-    ["align", "mirror", "larger", "smaller", "save", "cancel"];
 
 /// Returns every action, in the order of the help.
 pub(super) fn actions() -> impl Iterator<Item = &'static str> {
-    let groups: [&[&str]; 4] = [
-        &VERDICT_ACTIONS,
-        &VIEW_ACTIONS,
-        &NAVIGATION_ACTIONS,
-        &ALIGNMENT_ACTIONS,
-    ];
-    groups.into_iter().flatten().copied()
+    let groups = ACTIONS.into_iter();
+    groups.flat_map(|(_, actions)| actions.split_whitespace())
 }
 
 /// Why key bindings are not valid.

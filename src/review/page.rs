@@ -3,28 +3,14 @@
 use maud::{DOCTYPE, Markup, html};
 
 use super::i18n::Language;
-use super::keys::{ALIGNMENT_ACTIONS, NAVIGATION_ACTIONS, VERDICT_ACTIONS, VIEW_ACTIONS};
-use super::queue_options::QueueOptions;
+use super::keys::ACTIONS;
+use super::options::QueueOptions;
 use crate::domain::{Reason, ReviewOrder};
 
 /// Display modes with a button, in the order of their keys.
-const MODES: [&str; 7] = [
-    "two_up",
-    "overlay",
-    "edges",
-    "onion",
-    "checker",
-    "difference",
-    "reveal",
-];
+const MODES: &str = "two_up overlay edges onion checker difference reveal";
 /// Switches that work in every display mode.
-const SWITCHES: [&str; 5] = [
-    "auto_flicker",
-    "angle_guides",
-    "stroke_map",
-    "zoom",
-    "align",
-];
+const SWITCHES: &str = "auto_flicker angle_guides stroke_map zoom align";
 
 /// Returns a whole document.
 fn document(language: Language, title: &str, head: &Markup, body: &Markup) -> Markup {
@@ -47,23 +33,14 @@ fn document(language: Language, title: &str, head: &Markup, body: &Markup) -> Ma
 pub(super) fn forward(language: Language) -> Markup {
     let title = language.translate("forward");
     let head = html! { meta http-equiv="refresh" content="0;url=/"; };
-    document(
-        language,
-        title,
-        &head,
-        &html! { p { a href="/" { (title) } } },
-    )
+    let body = html! { p { a href="/" { (title) } } };
+    document(language, title, &head, &body)
 }
 
 /// Returns the page for a one-time token that was used before.
 pub(super) fn token_used(language: Language) -> Markup {
-    let text = language.translate("token_used");
-    document(
-        language,
-        language.translate("title"),
-        &html! {},
-        &html! { h1 { (text) } },
-    )
+    let body = html! { h1 { (language.translate("token_used")) } };
+    document(language, language.translate("title"), &html! {}, &body)
 }
 
 /// Returns the review page.
@@ -156,9 +133,9 @@ fn viewer(language: Language) -> Markup {
 fn modes(language: Language) -> Markup {
     html! {
         div.modes role="group" aria-label=(language.translate("modes")) {
-            @for mode in MODES { (toggle(mode, language)) }
+            @for mode in MODES.split_whitespace() { (toggle(mode, language)) }
             span.divider {}
-            @for switch in SWITCHES { (toggle(switch, language)) }
+            @for switch in SWITCHES.split_whitespace() { (toggle(switch, language)) }
         }
     }
 }
@@ -212,21 +189,6 @@ fn verdict(action: &'static str, sign: &str, language: Language) -> Markup {
 }
 
 fn help(language: Language, has_attention_checks: bool) -> Markup {
-    let list = |actions: &[&'static str]| {
-        html! {
-            dl {
-                @for action in actions {
-                    div { dt { kbd data-key=(action) {} } dd { (language.translate(action)) } }
-                }
-            }
-        }
-    };
-    let groups: [(&'static str, &[&'static str]); 4] = [
-        ("verdicts", &VERDICT_ACTIONS),
-        ("modes", &VIEW_ACTIONS),
-        ("navigation", &NAVIGATION_ACTIONS),
-        ("manual_alignment", &ALIGNMENT_ACTIONS),
-    ];
     html! {
         dialog #help aria-labelledby="help-title" {
             form.title method="dialog" {
@@ -234,8 +196,15 @@ fn help(language: Language, has_attention_checks: bool) -> Markup {
                 button { (language.translate("close")) }
             }
             div.groups {
-                @for (name, actions) in groups {
-                    section { h3 { (language.translate(name)) } (list(actions)) }
+                @for (name, actions) in ACTIONS {
+                    section {
+                        h3 { (language.translate(name)) }
+                        dl {
+                            @for action in actions.split_whitespace() {
+                                div { dt { kbd data-key=(action) {} } dd { (language.translate(action)) } }
+                            }
+                        }
+                    }
                 }
             }
             p { (language.translate("manual_alignment")) ": " (language.translate("alignment_hint")) }
@@ -280,7 +249,7 @@ mod tests {
         }
     }
 
-    /// The text of a document, one element a line, so that a snapshot reads like the page.
+    /// The text of a document, one element per line, so that a snapshot reads like the page.
     fn lines(html: &str) -> String {
         html.replace("><", ">\n<")
     }

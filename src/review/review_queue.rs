@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::check_items;
 use super::history::ReviewerHistory;
 use super::item::{ItemView, ReviewItem};
+use super::options::QueueOptions;
 use super::order;
-use super::queue_options::QueueOptions;
 use crate::catalog::{Catalog, CatalogError, MetricRecord, PairResults};
 use crate::domain::{DepthOutcome, ReviewOrder, SeededRandom, Stage, Verdict};
 use crate::report::consensus::{is_disputed, partition_verdicts};
@@ -47,10 +47,9 @@ impl ReviewQueue {
             let faults = faults(catalog, project, selected, &random).await?;
             items = check_items::interleave(items, faults, &options.rates, &random);
         }
-        let items = items.into_iter();
-        let items = items.map(|item| Arc::new(item.with_id(&key, &options.reviewer)));
+        let item = |item: ReviewItem| Arc::new(item.with_id(&key, &options.reviewer));
         Ok(Self {
-            items: items.collect(),
+            items: items.into_iter().map(item).collect(),
             history: ReviewerHistory::read(catalog, options).await?,
         })
     }
@@ -59,10 +58,8 @@ impl ReviewQueue {
 /// Why the queue cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum QueueError {
-    /// The catalog cannot be read.
     #[error(transparent)]
     Catalog(#[from] CatalogError),
-    /// A blocking task panicked.
     #[error("planting faults stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
@@ -112,7 +109,7 @@ fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> 
             view: ItemView {
                 print_hash,
                 depth_hash: depth.result_hash,
-                depth_px: ItemView::size(&outcome),
+                depth_px: [outcome.width, outcome.height],
                 level: first.threshold_level,
                 print_from_depth: first.print_from_depth,
             },

@@ -22,9 +22,9 @@ use super::item_images::{ImageError, ImageLayer};
 use super::page;
 use super::review_queue::QueueError;
 use super::state::ServerState;
-use crate::catalog::CatalogError;
-use crate::domain::{PairName, ReviewOrder};
-use crate::report::pair_artifacts::PairArtifactsError;
+use crate::catalog::{CatalogError, ManualAlignment};
+use crate::domain::{PairName, ReviewOrder, Stage};
+use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 
 /// Returns the router with all routes behind the guard.
 pub(super) fn router(state: &Arc<ServerState>) -> Router {
@@ -102,24 +102,25 @@ async fn start(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery)
     let token = query.strip_prefix("token=").unwrap_or_default();
     if state.session.open(token) {
         let cookie = [(header::SET_COOKIE, state.session.set_cookie())];
-        return (cookie, Html(page::forward(state.language).into_string())).into_response();
+        return (
+            cookie,
+            Html(page::forward(state.options.language).into_string()),
+        )
+            .into_response();
     }
     // A browser that already has the cookie may reopen the address from its history.
     if token.is_empty() {
         return Redirect::to("/").into_response();
     }
-    let refused = page::token_used(state.language).into_string();
+    let refused = page::token_used(state.options.language).into_string();
     (StatusCode::FORBIDDEN, Html(refused)).into_response()
 }
 
 async fn index(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Html<String> {
-    let requested = query
-        .as_deref()
-        .and_then(|query| query.strip_prefix("lang="));
-    let language = requested
-        .and_then(|name| name.parse().ok())
-        .unwrap_or(state.language);
-    Html(page::review(&state.queue_options, language).into_string())
+    let query = query.as_deref();
+    let requested = query.and_then(|query| query.strip_prefix("lang=")?.parse().ok());
+    let language = requested.unwrap_or(state.options.language);
+    Html(page::review(&state.options.queue, language).into_string())
 }
 
 async fn asset(Path(name): Path<String>) -> Response {
@@ -133,17 +134,17 @@ async fn asset(Path(name): Path<String>) -> Response {
 async fn config(State(state): State<Arc<ServerState>>) -> Json<Value> {
     let messages = Language::ALL.map(|language| (language.name(), language.messages()));
     Json(json!({
-        "csrf_token": state.session.csrf_token(),
-        "keys": state.keys,
-        "review_order": state.queue_options.order,
-        "min_view_ms": state.min_view_ms,
+        "csrf_token": state.session.csrf_token,
+        "keys": state.options.keys,
+        "review_order": state.options.queue.order,
+        "min_view_ms": state.options.min_view_ms,
         "messages": BTreeMap::from(messages),
     }))
 }
 
 async fn queue(State(state): State<Arc<ServerState>>) -> ApiResult {
     let queue = state.load_queue().await?;
-    let hides_pairs = state.queue_options.has_attention_checks();
+    let hides_pairs = state.options.queue.has_attention_checks();
     let items = queue.items.iter().map(|item| {
         let answer = queue.history.answer(item).map(|answer| {
             json!({
@@ -178,8 +179,9 @@ async fn image(
     Path((id, layer)): Path<(String, String)>,
 ) -> ApiResult<Response> {
     let item = served_item(&state, &id)?;
-    let layer = ImageLayer::from_name(&layer).ok_or(ApiError::NoItem)?;
-    let images = state.images(&item).await?;
+    let layer: Option<ImageLayer> = serde_json::from_value(layer.into()).ok();
+    let layer = layer.ok_or(ApiError::NoItem)?;
+    let images = state.images.of(&item).await?;
     let kind = [(header::CONTENT_TYPE, "image/png")];
     Ok((kind, images.layer(layer)).into_response())
 }
@@ -187,14 +189,14 @@ async fn image(
 /// Returns pair, metrics and scores of an answered item, for attention checks as for results.
 async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) -> ApiResult {
     let item = served_item(&state, &id)?;
-    let history = ReviewerHistory::read(&state.catalog, &state.queue_options).await?;
+    let history = ReviewerHistory::read(&state.catalog, &state.options.queue).await?;
     if history.answer(&item).is_none() {
         return Err(ApiError::NotAnswered);
     }
-    let images = state.images(&item).await?;
-    let scores = alignment_editor::mask_scores(&images, &item.view.print_from_depth);
+    let images = state.images.of(&item).await?;
+    let scores = alignment_editor::mask_overlap(&images, &item.view.print_from_depth);
     let metrics = item.results.iter().map(|(metric, _)| metric.title());
-    let others = match state.queue_options.order {
+    let others = match state.options.queue.order {
         ReviewOrder::Adjudicate => other_verdicts(&state, &item).await?,
         // Planted faults have no verdicts of others, so showing any would reveal the faults.
         ReviewOrder::Random | ReviewOrder::LeastConfident => Vec::new(),
@@ -213,7 +215,7 @@ async fn other_verdicts(
     let is_on_item = |hash| item.results.iter().any(|(_, of_item)| *of_item == hash);
     let mut verdicts: Vec<Value> = Vec::new();
     for event in log {
-        let is_other = event.reviewer != state.queue_options.reviewer && event.undone_at.is_none();
+        let is_other = event.reviewer != state.options.queue.reviewer && event.undone_at.is_none();
         let verdict = json!({
             "reviewer": event.reviewer, "verdict": event.verdict, "reason": event.reason, "note": event.note,
         });
@@ -227,12 +229,10 @@ async fn other_verdicts(
 /// Returns the initial state of the alignment editor.
 async fn alignment(State(state): State<Arc<ServerState>>, Path(id): Path<String>) -> ApiResult {
     let item = served_item(&state, &id)?;
-    let images = state.images(&item).await?;
-    let history = ReviewerHistory::read(&state.catalog, &state.queue_options).await?;
-    let previous = history.alignment(&item);
-    Ok(Json(json!(alignment_editor::start(
-        &item, &images, previous
-    ))))
+    let images = state.images.of(&item).await?;
+    let history = ReviewerHistory::read(&state.catalog, &state.options.queue).await?;
+    let start = alignment_editor::start(&item, &images, history.alignment(&item));
+    Ok(Json(json!(start)))
 }
 
 async fn answer(
@@ -242,7 +242,9 @@ async fn answer(
     let Json(body) = body?;
     let item = served_item(&state, &body.item)?;
     let verdict = body.verdict(&item, &state)?;
-    let stored = state.catalog.answer(verdict, item.shown(), (state.now)());
+    let stored = state
+        .catalog
+        .answer(verdict, item.shown(), (state.options.now)());
     let is_new = stored.await?;
     Ok(Json(json!({ "stored": body.event, "new": is_new })))
 }
@@ -252,11 +254,9 @@ async fn undo(
     body: Result<Json<UndoBody>, JsonRejection>,
 ) -> ApiResult {
     let Json(body) = body?;
-    let reviewer = &state.queue_options.reviewer;
-    let undone = state
-        .catalog
-        .take_back(&body.event, reviewer, (state.now)());
-    undone.await?;
+    let reviewer = &state.options.queue.reviewer;
+    let now = (state.options.now)();
+    state.catalog.take_back(&body.event, reviewer, now).await?;
     Ok(Json(json!({ "undone": body.event })))
 }
 
@@ -266,30 +266,32 @@ async fn align(
 ) -> ApiResult {
     let Json(body) = body?;
     let item = served_item(&state, &body.item)?;
-    let images = state.images(&item).await?;
-    let map = body.print_from_depth(&images)?;
-    let scores = alignment_editor::mask_scores(&images, &map);
-    let found = state
+    let images = state.images.of(&item).await?;
+    let print_from_depth = body.print_from_depth(&images)?;
+    let scores = alignment_editor::mask_overlap(&images, &print_from_depth);
+    let pair = state
         .catalog
         .pair(&item.pair)
         .await?
         .ok_or(ApiError::NoItem)?;
-    let reviewer = &state.queue_options.reviewer;
-    let mut record = alignment_editor::to_record(
-        &state.project,
-        &found.results,
-        &item,
-        reviewer,
-        map,
-        &scores,
-    )?;
-    record.note = body.note()?;
-    record.event = body.event;
+    let artifacts = PairArtifacts::new(&state.project, &pair.results);
+    let record = ManualAlignment {
+        note: body.note()?,
+        event: body.event,
+        pair: item.pair.clone(),
+        reviewer: state.options.queue.reviewer.clone(),
+        print_from_depth,
+        print_from_mesh: artifacts.print_from_mesh(&print_from_depth)?,
+        mesh_hash: artifacts.stage(Stage::Fit)?.mesh_hash,
+        print_hash: item.view.print_hash,
+        depth_hash: item.view.depth_hash,
+        seen: item.view.hash(),
+        iou: scores.iou,
+        dice: scores.dice,
+    };
     let summary = json!(AlignmentSummary::of(&item, &record));
-    state
-        .catalog
-        .store_manual_alignment(record, (state.now)())
-        .await?;
+    let now = (state.options.now)();
+    state.catalog.store_manual_alignment(record, now).await?;
     Ok(Json(summary))
 }
 

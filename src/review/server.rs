@@ -1,43 +1,20 @@
 //! Starts the server: binds the port, reads the queue, serves until it is stopped.
 
-use std::collections::BTreeMap;
 use std::net::SocketAddr;
 use std::sync::Arc;
 
 use tokio::net::TcpListener;
 
 use super::guard::START;
-use super::i18n::Language;
 use super::item::ReviewItem;
 use super::item_images::ImageCache;
-use super::queue_options::QueueOptions;
+use super::options::ReviewOptions;
 use super::routes;
 use super::session::Session;
 use super::state::ServerState;
 use crate::catalog::{Catalog, CatalogError};
-use crate::domain::{ContentHash, UnixMillis};
-use crate::raster;
+use crate::domain::ContentHash;
 use crate::store::Project;
-
-/// Options of the server.
-#[derive(Debug, Clone)]
-pub struct ReviewOptions {
-    /// Whose queue is served, and what it contains.
-    pub queue: QueueOptions,
-    /// Language of the page.
-    pub language: Language,
-    /// Physical keys to actions; from [`key_map`](super::key_map).
-    pub keys: BTreeMap<String, String>,
-    /// Minimum time an image is shown before a verdict is accepted, milliseconds.
-    pub min_view_ms: u64,
-    /// Address to listen on. Port 0 selects a fixed port for the project and reviewer, or any free port if that one is
-    /// taken.
-    pub listen: SocketAddr,
-    /// Limits on the print images.
-    pub limits: raster::ImageLimits,
-    /// Clock.
-    pub now: fn() -> UnixMillis,
-}
 
 /// Why the server cannot start or run.
 #[derive(Debug, thiserror::Error)]
@@ -93,12 +70,10 @@ pub async fn bind(
     project: Project,
     options: ReviewOptions,
 ) -> Result<ReviewServer, ReviewError> {
-    let failed = |source| ReviewError::Listen {
-        address: options.listen,
-        source,
-    };
+    let address = options.listen;
+    let failed = |source| ReviewError::Listen { address, source };
     let preferred = preferred_port(&project, &options.queue.reviewer);
-    let listener = listen(options.listen, preferred).await.map_err(failed)?;
+    let listener = listen(address, preferred).await.map_err(failed)?;
     let address = listener.local_addr().map_err(failed)?;
     let state = ServerState {
         images: ImageCache::new(catalog.clone(), project.clone(), options.limits),
@@ -106,11 +81,7 @@ pub async fn bind(
         hosts: hosts(address),
         catalog,
         project,
-        queue_options: options.queue,
-        language: options.language,
-        keys: options.keys,
-        min_view_ms: options.min_view_ms,
-        now: options.now,
+        options,
         served_items: std::sync::Mutex::default(),
     };
     // After a restart, a page may resend an answer before it requests the queue.
@@ -133,11 +104,8 @@ pub async fn bind(
 impl ReviewServer {
     /// Returns the start URL with the one-time token.
     pub fn url(&self) -> String {
-        format!(
-            "http://{}{START}?token={}",
-            self.address,
-            self.state.session.token()
-        )
+        let token = &self.state.session.token;
+        format!("http://{}{START}?token={token}", self.address)
     }
 
     /// Returns the bound address.

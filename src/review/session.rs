@@ -10,9 +10,10 @@ use crate::domain::ContentHash;
 /// Secrets of one start of the server.
 #[derive(Debug)]
 pub(super) struct Session {
-    token: String,
+    /// The one-time token of the start address.
+    pub(super) token: String,
     cookie: String,
-    csrf_token: String,
+    pub(super) csrf_token: String,
     cookie_name: String,
     is_opened: AtomicBool,
 }
@@ -31,16 +32,6 @@ impl Session {
             cookie_name: format!("mocban_review_{port}"),
             is_opened: AtomicBool::new(false),
         })
-    }
-
-    /// Returns the one-time token of the start address.
-    pub(super) fn token(&self) -> &str {
-        &self.token
-    }
-
-    /// Returns the CSRF token.
-    pub(super) fn csrf_token(&self) -> &str {
-        &self.csrf_token
     }
 
     /// Accepts the one-time token; returns false if it is wrong or already used.
@@ -90,7 +81,7 @@ mod tests {
     fn token_opens_once_and_only_itself() {
         let session = Session::new(8000).expect("secrets");
         assert!(!session.open("") && !session.open("guess"));
-        let token = session.token().to_owned();
+        let token = session.token.clone();
         assert_eq!(token.len(), 64);
         assert!(session.open(&token));
         assert!(!session.open(&token));

@@ -1,16 +1,14 @@
 //! Server state shared by the request handlers: the catalog, the reviewer's options, the items served so far.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::i18n::Language;
 use super::item::ReviewItem;
-use super::item_images::{ImageCache, ImageError, ItemImages};
-use super::queue_options::QueueOptions;
+use super::item_images::ImageCache;
+use super::options::ReviewOptions;
 use super::review_queue::{QueueError, ReviewQueue};
 use super::session::Session;
 use crate::catalog::Catalog;
-use crate::domain::UnixMillis;
 use crate::store::Project;
 
 /// State of one reviewer's server.
@@ -18,11 +16,7 @@ use crate::store::Project;
 pub(super) struct ServerState {
     pub(super) catalog: Catalog,
     pub(super) project: Project,
-    pub(super) queue_options: QueueOptions,
-    pub(super) language: Language,
-    pub(super) keys: BTreeMap<String, String>,
-    pub(super) min_view_ms: u64,
-    pub(super) now: fn() -> UnixMillis,
+    pub(super) options: ReviewOptions,
     pub(super) session: Session,
     /// Accepted values of the `Host` header, with port.
     pub(super) hosts: Vec<String>,
@@ -37,12 +31,8 @@ impl ServerState {
     /// # Errors
     /// When the catalog cannot be read.
     pub(super) async fn load_queue(&self) -> Result<ReviewQueue, QueueError> {
-        let queue = ReviewQueue::read(&self.catalog, &self.project, &self.queue_options).await?;
-        // A poisoned lock still holds a consistent map: each insertion is complete.
-        let mut served = self
-            .served_items
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let queue = ReviewQueue::read(&self.catalog, &self.project, &self.options.queue).await?;
+        let mut served = self.lock_served();
         for item in &queue.items {
             served.insert(item.id.clone(), Arc::clone(item));
         }
@@ -51,21 +41,12 @@ impl ServerState {
 
     /// Returns a served item by its id.
     pub(super) fn item(&self, id: &str) -> Option<Arc<ReviewItem>> {
-        let served = self
-            .served_items
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        served.get(id).cloned()
+        self.lock_served().get(id).cloned()
     }
 
-    /// Returns the images of an item.
-    ///
-    /// # Errors
-    /// When files of the pair cannot be read.
-    pub(super) async fn images(
-        &self,
-        item: &Arc<ReviewItem>,
-    ) -> Result<Arc<ItemImages>, ImageError> {
-        self.images.of(item).await
+    /// Locks the served items. A poisoned lock still holds a consistent map: each insertion is complete.
+    fn lock_served(&self) -> MutexGuard<'_, BTreeMap<String, Arc<ReviewItem>>> {
+        let locked = self.served_items.lock();
+        locked.unwrap_or_else(PoisonError::into_inner)
     }
 }

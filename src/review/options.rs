@@ -1,7 +1,12 @@
-//! What a reviewer is shown: whose queue, which results, in which order, with how many attention checks.
+//! Options of the review page: whose queue it shows, in which order, with how many attention checks, and where.
+
+use std::collections::BTreeMap;
+use std::net::SocketAddr;
 
 use super::check_items::CheckRates;
-use crate::domain::{ReviewOrder, ThresholdMetric};
+use super::i18n::Language;
+use crate::domain::{ReviewOrder, ThresholdMetric, UnixMillis};
+use crate::raster::ImageLimits;
 
 /// Options of a review queue.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,4 +33,24 @@ impl QueueOptions {
         let CheckRates { faults, duplicates } = self.rates;
         self.order != ReviewOrder::Adjudicate && (faults > 0.0 || duplicates > 0.0)
     }
+}
+
+/// Options of the server.
+#[derive(Debug, Clone)]
+pub struct ReviewOptions {
+    /// Whose queue is served, and what it contains.
+    pub queue: QueueOptions,
+    /// Language of the page.
+    pub language: Language,
+    /// Physical keys to actions; from [`key_map`](super::key_map).
+    pub keys: BTreeMap<String, String>,
+    /// Minimum time an image is shown before a verdict is accepted, milliseconds.
+    pub min_view_ms: u64,
+    /// Address to listen on. Port 0 selects a fixed port for the project and reviewer, or any free port if that one is
+    /// taken.
+    pub listen: SocketAddr,
+    /// Limits on the print images.
+    pub limits: ImageLimits,
+    /// Clock.
+    pub now: fn() -> UnixMillis,
 }
