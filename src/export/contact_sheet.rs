@@ -8,7 +8,7 @@ use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{JobStatus, PairName, ThresholdMetric, enum_names};
 use crate::raster::ImageLimits;
 use crate::report::ground_truth::TruthErrors;
-use crate::report::{Consensus, TruthEvaluation, evaluate_pairs};
+use crate::report::{Consensus, evaluate_pairs};
 use crate::store::Project;
 
 /// Pairs in memory at a time while the worst are selected.

@@ -5,11 +5,10 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-use super::pair_files::PAIRS;
-
 /// The file of lines; a folder with it is an export.
 pub(super) const LINES: &str = "pairs.jsonl";
-
+/// The folder with the files of the pairs.
+pub(super) const PAIRS: &str = "pairs";
 /// The log of verdicts.
 pub(super) const VERDICTS: &str = "verdicts.jsonl";
 /// The log of answers to attention checks.
@@ -197,7 +196,8 @@ fn not_an_export(target: &Path, entry: &OsStr) -> FolderError {
     }
 }
 
-fn at(path: &Path) -> impl Fn(io::Error) -> FolderError {
+/// Returns a conversion of errors of operations on a file or folder.
+pub(super) fn at(path: &Path) -> impl Fn(io::Error) -> FolderError {
     let path = path.to_owned();
     move |source| FolderError::Io {
         path: path.clone(),

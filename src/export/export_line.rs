@@ -85,7 +85,7 @@ pub struct Numbers {
     pub density_print: Option<f64>,
     /// Share of the canvas that is stroke.
     pub density_depth: Option<f64>,
-    /// Calibrated probability that the alignment is right, 0..=1; null under a method that gives none.
+    /// Calibrated probability that the alignment is right, 0..=1; null for methods without a confidence.
     pub confidence: Option<f64>,
 }
 
@@ -137,14 +137,12 @@ pub struct LineManualAlignment {
 impl LineManualAlignment {
     fn of(stored: StoredAlignment) -> Self {
         let made = stored.made;
-        let Affine2([first, second]) = made.print_from_depth;
+        let print_from_depth = homogeneous(&made.print_from_depth);
         Self {
             reviewer: made.reviewer,
             at: stored.at,
             print_from_mesh: made.print_from_mesh,
-            print_from_depth: stored
-                .on_current_depth
-                .then_some([first, second, [0.0, 0.0, 1.0]]),
+            print_from_depth: stored.on_current_depth.then_some(print_from_depth),
             iou: made.iou,
             dice: made.dice,
             note: made.note,
@@ -200,10 +198,7 @@ impl ExportLine {
             numbers: Numbers::default(),
             maps: Maps::default(),
             files: None,
-            hashes: Hashes {
-                result_hash: None,
-                ..hashes(pair)
-            },
+            hashes: hashes(pair),
             verdict: None,
             manual_alignment: None,
             seconds: None,
@@ -264,35 +259,35 @@ impl Numbers {
 
 impl Maps {
     fn of(outcome: &MetricOutcome, outcomes: &Outcomes) -> Self {
-        let (plane_from_mesh, depth_from_plane) = (
-            outcomes.fit.plane_from_mesh,
-            outcomes.depth.scale.depth_from_plane,
-        );
-        let [first, second] = outcome.print_from_depth.0;
+        let plane_from_mesh = outcomes.fit.plane_from_mesh;
+        let depth_from_plane = outcomes.depth.scale.depth_from_plane;
+        let print_from_depth = &outcome.print_from_depth;
+        let print_from_mesh =
+            PrintFromMesh::new(print_from_depth, &depth_from_plane, &plane_from_mesh);
         Self {
-            print_from_mesh: Some(PrintFromMesh::new(
-                &outcome.print_from_depth,
-                &depth_from_plane,
-                &plane_from_mesh,
-            )),
+            print_from_mesh: Some(print_from_mesh),
             plane_from_mesh: Some(plane_from_mesh),
             depth_from_plane: Some(depth_from_plane),
-            print_from_depth: Some([first, second, [0.0, 0.0, 1.0]]),
+            print_from_depth: Some(homogeneous(print_from_depth)),
         }
     }
 }
 
+/// Returns an affine map as a 3x3 matrix.
+const fn homogeneous(map: &Affine2) -> [[f64; 3]; 3] {
+    let [first, second] = map.0;
+    [first, second, [0.0, 0.0, 1.0]]
+}
+
 /// Returns the hashes that all lines of a pair share.
 fn hashes(pair: &PairResults) -> Hashes {
+    let [fit, normalize, register] =
+        [Stage::Fit, Stage::Normalize, Stage::Register].map(|stage| pair.stage(stage));
     Hashes {
-        mesh_hash: pair.stage(Stage::Fit).map(|record| record.mesh_hash),
-        print_hash: pair
-            .stage(Stage::Normalize)
-            .and_then(|record| record.print_hash),
+        mesh_hash: fit.map(|record| record.mesh_hash),
+        print_hash: normalize.and_then(|record| record.print_hash),
         result_hash: None,
-        config_hash: pair
-            .stage(Stage::Register)
-            .map(|record| record.fingerprint_hash),
+        config_hash: register.map(|record| record.fingerprint_hash),
     }
 }
 

@@ -42,19 +42,18 @@ struct GallerySubject {
 pub struct GallerySelection {
     seed: u64,
     random: SeededRandom,
-    /// For each of [`FOUND`], the number of results in the project and those to draw.
-    found: [(u64, Vec<GallerySubject>); 3],
-    /// The pairs with the smallest random numbers, sorted by these.
-    sample: Vec<(f64, GallerySubject)>,
-    pairs: u64,
+    /// For each of [`GalleryReason::ALL`].
+    groups: [SelectedResults; GalleryReason::ALL.len()],
 }
 
-/// The reasons that select a result by its verdicts or errors.
-const FOUND: [GalleryReason; 3] = [
-    GalleryReason::Failed,
-    GalleryReason::Conflict,
-    GalleryReason::OffTruth,
-];
+/// The results that are shown for one reason.
+#[derive(Debug, Default)]
+struct SelectedResults {
+    /// Number of such results in the project.
+    total: u64,
+    /// Those to draw, each with a number: the smallest numbers of a random sample, otherwise all 0.
+    subjects: Vec<(f64, GallerySubject)>,
+}
 
 /// Draws the images of a project's report. An image that cannot be drawn is left out, with the reason.
 ///
@@ -78,85 +77,68 @@ impl GallerySelection {
         Self {
             seed,
             random: SeededRandom::new(seed, "report"),
-            found: Default::default(),
-            sample: Vec::new(),
-            pairs: 0,
+            groups: Default::default(),
         }
     }
 
-    /// Adds a pair's results, as far as they are to be drawn. Pairs are added in the order of their names.
+    /// Adds those results of a pair that are to be drawn. Pairs are added in the order of their names.
     pub fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
         for records in group_identical(&pair.metrics) {
-            for ((total, subjects), reason) in self.found.iter_mut().zip(FOUND) {
+            for (group, reason) in self.groups.iter_mut().zip(GalleryReason::ALL) {
                 let applies = |record: &&MetricRecord| reason_applies(reason, record, truth);
-                let matching: Vec<_> = records.iter().copied().filter(applies).collect();
-                *total += u64::from(!matching.is_empty());
-                if !matching.is_empty() && subjects.len() < MAX_PER_REASON {
-                    subjects.push(GallerySubject::new(pair, &matching, truth));
+                let mut shown: Vec<_> = records.iter().copied().filter(applies).collect();
+                if shown.is_empty() {
+                    continue;
+                }
+                group.total += 1;
+                let (number, limit) = if reason == GalleryReason::Random {
+                    shown.clone_from(&records);
+                    let name = ContentHash::of(pair.attributes.name.as_str().as_bytes());
+                    (self.random.draw(&name, "picture"), SAMPLE_SIZE)
+                } else {
+                    (0.0, MAX_PER_REASON)
+                };
+                let subjects = &mut group.subjects;
+                let place = subjects.partition_point(|(other, _)| *other <= number);
+                if place < limit {
+                    subjects.insert(place, (number, GallerySubject::new(pair, &shown, truth)));
+                    subjects.truncate(limit);
                 }
             }
-            let is_sampled = |record: &&MetricRecord| record.outcome.metric == SAMPLE_METRIC;
-            if records.iter().any(is_sampled) {
-                self.add_to_sample(pair, &records, truth);
-            }
-        }
-    }
-
-    /// Adds a pair to the sample if its random number is among the smallest.
-    fn add_to_sample(
-        &mut self,
-        pair: &PairResults,
-        records: &[&MetricRecord],
-        truth: &TruthEvaluation,
-    ) {
-        self.pairs += 1;
-        let name = ContentHash::of(pair.attributes.name.as_str().as_bytes());
-        let number = self.random.draw(&name, "picture");
-        let place = self.sample.partition_point(|(other, _)| *other <= number);
-        if place < SAMPLE_SIZE {
-            let subject = GallerySubject::new(pair, records, truth);
-            self.sample.insert(place, (number, subject));
-            self.sample.truncate(SAMPLE_SIZE);
         }
     }
 
     /// Reads the verdicts on what is shown.
     async fn read_log(&mut self, catalog: &Catalog) -> Result<(), CatalogError> {
-        let found = self.found.iter_mut().flat_map(|(_, subjects)| subjects);
-        let sample = self.sample.iter_mut().map(|(_, subject)| subject);
-        for subject in found.chain(sample) {
+        let groups = self.groups.iter_mut();
+        for (_, subject) in groups.flat_map(|group| &mut group.subjects) {
             if subject.is_judged() {
-                subject.log = catalog
-                    .verdict_log(Some(&subject.pair.attributes.name))
-                    .await?;
+                let name = &subject.pair.attributes.name;
+                subject.log = catalog.verdict_log(Some(name)).await?;
             }
         }
         Ok(())
     }
 
     fn draw(self, project: &Project, limits: &ImageLimits) -> Gallery {
-        let mut sample: Vec<GallerySubject> = self
-            .sample
-            .into_iter()
-            .map(|(_, subject)| subject)
-            .collect();
-        sample.sort_by(|a, b| a.pair.attributes.name.cmp(&b.pair.attributes.name));
-        let found = FOUND.into_iter().zip(self.found);
-        let groups = found
-            .map(|(reason, (total, subjects))| (reason, total, subjects))
-            .chain([(GalleryReason::Random, self.pairs, sample)])
-            .filter(|(_, total, _)| *total > 0);
+        let draw = |(reason, mut group): (GalleryReason, SelectedResults)| {
+            let names = |(_, subject): &(f64, GallerySubject)| subject.pair.attributes.name.clone();
+            group.subjects.sort_by_cached_key(names);
+            let subjects = group.subjects.par_iter();
+            GalleryGroup {
+                reason,
+                total: group.total,
+                items: subjects
+                    .map(|(_, subject)| subject.item(project, limits))
+                    .collect(),
+            }
+        };
+        let groups = GalleryReason::ALL.into_iter().zip(self.groups);
         Gallery {
             seed: self.seed,
             groups: groups
-                .map(|(reason, total, subjects)| GalleryGroup {
-                    reason,
-                    total,
-                    items: subjects
-                        .par_iter()
-                        .map(|subject| subject.item(project, limits))
-                        .collect(),
-                })
+                .filter(|(_, group)| group.total > 0)
+                .map(draw)
                 .collect(),
         }
     }
@@ -171,7 +153,7 @@ fn reason_applies(reason: GalleryReason, record: &MetricRecord, truth: &TruthEva
             .errors
             .get(&record.outcome.metric)
             .is_some_and(|errors| !errors.pass()),
-        GalleryReason::Random => false,
+        GalleryReason::Random => record.outcome.metric == SAMPLE_METRIC,
     }
 }
 
@@ -211,7 +193,7 @@ impl GallerySubject {
         }
     }
 
-    /// Returns scores, confidence and errors against ground truth, as far as there are any.
+    /// Returns scores, confidence and errors against ground truth, where they exist.
     fn numbers(&self) -> String {
         let Some(record) = self.record() else {
             return String::new();
@@ -280,33 +262,27 @@ mod tests {
     #[test]
     fn results_that_look_the_same_are_selected_once() {
         let selection = selection(1, 30);
-        let counts = selection
-            .found
-            .each_ref()
-            .map(|(total, subjects)| (*total, subjects.len()));
-        assert_eq!(counts, [(10, 10), (10, 10), (1, 1)]);
-        assert_eq!(
-            selection.found[0].1[0].metrics.len(),
-            4,
-            "all look the same"
-        );
+        let groups = selection.groups.each_ref();
+        let counts = groups.map(|group| (group.total, group.subjects.len()));
+        assert_eq!(counts, [(10, 10), (10, 10), (1, 1), (30, SAMPLE_SIZE)]);
+        let (_, first) = &selection.groups[0].subjects[0];
+        assert_eq!(first.metrics.len(), 4, "all look the same");
     }
 
     #[test]
     fn failures_beyond_the_limit_are_still_counted() {
         let selection = selection(1, 3 * MAX_PER_REASON + 3);
-        let (total, subjects) = &selection.found[0];
-        assert_eq!(
-            (*total, subjects.len()),
-            (MAX_PER_REASON as u64 + 1, MAX_PER_REASON)
-        );
+        let failed = &selection.groups[0];
+        let counts = (failed.total, failed.subjects.len());
+        assert_eq!(counts, (MAX_PER_REASON as u64 + 1, MAX_PER_REASON));
     }
 
     #[test]
     fn the_sample_depends_on_seed_and_names_only() {
         let names = |seed, pairs| -> Vec<String> {
-            let sample = selection(seed, pairs).sample;
+            let [.., sample] = selection(seed, pairs).groups;
             let names = sample
+                .subjects
                 .iter()
                 .map(|(_, subject)| subject.pair.attributes.name.to_string());
             names.collect()

@@ -4,16 +4,16 @@
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use rayon::prelude::*;
 use serde::Serialize;
 
 use super::export_folder::{
-    ATTENTION_CHECKS, Folder, FolderError, LINES, MANUAL_ALIGNMENTS, VERDICTS,
+    ATTENTION_CHECKS, Folder, FolderError, LINES, MANUAL_ALIGNMENTS, PAIRS, VERDICTS, at,
 };
 use super::export_line::{ExportLine, LineStatus, Outcomes, newest_manual_alignments};
-use super::pair_files::{EncodedAlignment, FilesError, PAIRS, PairFiles};
+use super::pair_files::{EncodedImages, FilesError, PairFiles};
 use crate::catalog::{Catalog, CatalogError, PairResults};
 use crate::domain::{Failure, FailureClass, MetricOutcome, PairName, ThresholdMetric};
 use crate::raster;
@@ -53,17 +53,9 @@ pub enum ExportError {
     /// The catalog cannot be read.
     #[error("{0}")]
     Catalog(#[from] CatalogError),
-    /// The folder cannot be used.
+    /// The folder cannot be used, or a file in it not written.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A file cannot be written.
-    #[error("{path}: {source}")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
     /// A thread was lost.
     #[error("the export stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
@@ -83,7 +75,8 @@ pub async fn to_jsonl(
     options: JsonlOptions,
 ) -> Result<ExportSummary, ExportError> {
     let folder = Folder::begin(dir)?;
-    let mut lines = ExportLineWriter::create(folder.path())?;
+    let path = folder.path().join(LINES);
+    let mut lines = BufWriter::new(File::create(&path).map_err(at(&path))?);
     let mut summary = ExportSummary::default();
     let manual_alignments = newest_manual_alignments(catalog).await?;
     let mut pages = catalog.result_pages(PAGE);
@@ -92,11 +85,12 @@ pub async fn to_jsonl(
             for line in &mut pair.lines {
                 line.manual_alignment = manual_alignments.get(&line.id).cloned();
             }
-            lines.write(&pair.lines)?;
+            let text = json_lines(&pair.lines);
+            lines.write_all(text.as_bytes()).map_err(at(&path))?;
             summary.count(pair);
         }
     }
-    lines.finish()?;
+    lines.flush().map_err(at(&path))?;
     write_logs(catalog, folder.path()).await?;
     summary.kept_earlier = !summary.unreadable.is_empty() && folder.replaces();
     if !summary.kept_earlier {
@@ -105,13 +99,13 @@ pub async fn to_jsonl(
     Ok(summary)
 }
 
-/// Returns a log as JSON lines.
-pub fn json_lines<T: Serialize>(log: &[T]) -> String {
-    let line = |event| {
-        let text = serde_json::to_string(event);
-        text.expect("an event holds only numbers, names and text") + "\n"
+/// Returns values as JSON lines.
+pub fn json_lines<T: Serialize>(values: &[T]) -> String {
+    let line = |value| {
+        let text = serde_json::to_string(value);
+        text.expect("lines hold only strings, finite numbers, lists and fields") + "\n"
     };
-    log.iter().map(line).collect()
+    values.iter().map(line).collect()
 }
 
 /// Writes the logs of verdicts, attention checks and manual alignments, oldest first, with undone entries. The last two
@@ -129,9 +123,9 @@ async fn write_logs(catalog: &Catalog, root: &Path) -> Result<(), ExportError> {
     Ok(())
 }
 
-fn write_log<T: Serialize>(root: &Path, name: &str, log: &[T]) -> Result<(), ExportError> {
+fn write_log<T: Serialize>(root: &Path, name: &str, log: &[T]) -> Result<(), FolderError> {
     let path = root.join(name);
-    std::fs::write(&path, json_lines(log)).map_err(|source| ExportError::Write { path, source })
+    std::fs::write(&path, json_lines(log)).map_err(at(&path))
 }
 
 /// A pair's lines, and why its files are missing although it is finished.
@@ -181,54 +175,47 @@ fn pair_lines(
     options: JsonlOptions,
 ) -> Result<PairLines, ExportError> {
     let name = pair.attributes.name.clone();
-    if pair.metrics.is_empty() {
-        let metrics = options.metrics.iter();
-        let lines = metrics.map(|metric| ExportLine::without_result(pair, *metric));
-        return Ok(PairLines {
-            name,
-            lines: lines.collect(),
-            unreadable: None,
-        });
-    }
-    match finished_lines(project, root, pair, options) {
-        Ok(lines) => Ok(PairLines {
-            name,
-            lines,
-            unreadable: None,
-        }),
-        Err(FilesError::Write { path, source }) => Err(ExportError::Write { path, source }),
+    let (lines, unreadable) = match written_lines(project, root, pair, options) {
+        Ok(lines) => (lines, None),
+        Err(FilesError::Folder(error)) => return Err(error.into()),
         Err(error) => {
             // An incomplete folder would look like a complete one.
             let _ = std::fs::remove_dir_all(root.join(PAIRS).join(name.as_str()));
             let failure = Failure::new(FailureClass::Io, error.to_string());
             let metrics = pair.metrics.iter().map(|record| record.outcome.metric);
             let lines = metrics.map(|metric| ExportLine::unreadable(pair, metric, &failure));
-            Ok(PairLines {
-                name,
-                lines: lines.collect(),
-                unreadable: Some(failure.message),
-            })
+            (lines.collect(), Some(failure.message))
         }
-    }
+    };
+    Ok(PairLines {
+        name,
+        lines,
+        unreadable,
+    })
 }
 
-fn finished_lines(
+/// Writes the files of a pair and returns its lines.
+fn written_lines(
     project: &Project,
     root: &Path,
     pair: &PairResults,
     options: JsonlOptions,
 ) -> Result<Vec<ExportLine>, FilesError> {
+    if pair.metrics.is_empty() {
+        let metrics = options.metrics.iter();
+        let lines = metrics.map(|metric| ExportLine::without_result(pair, *metric));
+        return Ok(lines.collect());
+    }
     let files = PairFiles::read(project, pair, &options.limits)?;
-    let outcomes = Outcomes::read(files.artifacts())?;
+    let outcomes = Outcomes::read(&files.artifacts)?;
     files.write_shared(root)?;
-    let mut drawn: Vec<(&MetricOutcome, EncodedAlignment)> = Vec::new();
+    let mut drawn: Vec<(&MetricOutcome, EncodedImages)> = Vec::new();
     let mut lines = Vec::new();
     for record in &pair.metrics {
         let outcome = &record.outcome;
         // Metrics often have the same alignment, which is drawn once.
-        let same = drawn
-            .iter()
-            .position(|(other, _)| same_alignment(other, outcome));
+        let mut known = drawn.iter();
+        let same = known.position(|(other, _)| same_alignment(other, outcome));
         let index = same.unwrap_or(drawn.len());
         if same.is_none() {
             drawn.push((outcome, files.draw(outcome)));
@@ -240,43 +227,4 @@ fn finished_lines(
         });
     }
     Ok(lines)
-}
-
-/// Writes `pairs.jsonl`.
-struct ExportLineWriter {
-    path: PathBuf,
-    file: BufWriter<File>,
-}
-
-impl ExportLineWriter {
-    fn create(root: &Path) -> Result<Self, ExportError> {
-        let path = root.join(LINES);
-        match File::create(&path) {
-            Ok(file) => Ok(Self {
-                path,
-                file: BufWriter::new(file),
-            }),
-            Err(source) => Err(ExportError::Write { path, source }),
-        }
-    }
-
-    fn write(&mut self, lines: &[ExportLine]) -> Result<(), ExportError> {
-        for line in lines {
-            let text = serde_json::to_string(line)
-                .expect("a line holds only strings, finite numbers, lists and fields");
-            writeln!(self.file, "{text}").map_err(|source| self.refused(source))?;
-        }
-        Ok(())
-    }
-
-    fn finish(mut self) -> Result<(), ExportError> {
-        self.file.flush().map_err(|source| self.refused(source))
-    }
-
-    fn refused(&self, source: std::io::Error) -> ExportError {
-        ExportError::Write {
-            path: self.path.clone(),
-            source,
-        }
-    }
 }

@@ -1,9 +1,10 @@
 //! The files of one exported pair.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde::Serialize;
 
+use super::export_folder::{FolderError, PAIRS, at};
 use super::pictures::PrintView;
 use super::source_print::{SourcePrint, SourcePrintError};
 use crate::catalog::PairResults;
@@ -14,9 +15,6 @@ use crate::raster::{
 };
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::Project;
-
-/// Folder of the pairs below the export folder.
-pub(super) const PAIRS: &str = "pairs";
 
 /// Paths of one line's files below the export folder. Masks are 8-bit PNG, 255 = stroke.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -69,13 +67,8 @@ pub enum FilesError {
     #[error(transparent)]
     Print(#[from] SourcePrintError),
     /// The export folder cannot be written to; the export stops.
-    #[error("{path}: {source}")]
-    Write {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: std::io::Error,
-    },
+    #[error(transparent)]
+    Folder(#[from] FolderError),
 }
 
 /// The meaning of a depth PNG's levels; written next to it.
@@ -91,20 +84,15 @@ struct Sidecar<'a> {
 
 /// The inputs and artifacts of a pair from which its files are made.
 pub(super) struct PairFiles<'a> {
-    artifacts: PairArtifacts<'a>,
+    pub(super) artifacts: PairArtifacts<'a>,
     name: &'a str,
     print: SourcePrint,
     print_mask: Mask,
     depth: DepthMap,
 }
 
-/// The images of one alignment, encoded.
-pub(super) struct EncodedAlignment {
-    depth_mask: Vec<u8>,
-    aligned_depth: Vec<u8>,
-    aligned_mask: Vec<u8>,
-    overlay: Vec<u8>,
-}
+/// The images that depend on the alignment only, as PNG: depth mask, aligned depth, aligned mask and overlay.
+pub(super) type EncodedImages = [Vec<u8>; 4];
 
 impl<'a> PairFiles<'a> {
     /// Reads the inputs and artifacts.
@@ -123,11 +111,6 @@ impl<'a> PairFiles<'a> {
         })
     }
 
-    /// Returns the stored results.
-    pub(super) const fn artifacts(&self) -> &PairArtifacts<'a> {
-        &self.artifacts
-    }
-
     /// Writes the files shared by all metrics.
     pub(super) fn write_shared(&self, root: &Path) -> Result<(), FilesError> {
         let files = self.files(ThresholdMetric::NlSsim);
@@ -136,28 +119,25 @@ impl<'a> PairFiles<'a> {
         write(root, &files.print, &self.print.bytes)?;
         write(root, &files.print_mask, &png_mask(&self.print_mask))?;
         write(root, &files.depth, &depth)?;
-        write(
-            root,
-            &format!("{PAIRS}/{}/depth.json", self.name),
-            self.sidecar().as_bytes(),
-        )?;
+        let sidecar = format!("{PAIRS}/{}/depth.json", self.name);
+        write(root, &sidecar, self.sidecar().as_bytes())?;
         write(root, &files.canvas_print_mask, &canvas)
     }
 
-    /// Draws the images that depend on the alignment only.
-    pub(super) fn draw(&self, outcome: &MetricOutcome) -> EncodedAlignment {
+    /// Draws the images of an alignment.
+    pub(super) fn draw(&self, outcome: &MetricOutcome) -> EncodedImages {
         let (width, height) = (self.print_mask.width(), self.print_mask.height());
         let print_from_depth = &outcome.print_from_depth;
         let strokes = self.depth.stroke_mask(outcome.threshold_level);
         let aligned = warp_mask(&strokes, print_from_depth, width, height);
         let heights = warp_depth(&self.depth, print_from_depth, width, height);
-        let view = PrintView::to_judge_by(&self.print.picture);
-        EncodedAlignment {
-            depth_mask: png_mask(&strokes),
-            aligned_depth: png_grey16(&heights),
-            aligned_mask: png_mask(&aligned),
-            overlay: png_rgb8(&view.overlay(&self.print.picture, &self.depth, outcome)),
-        }
+        let view = PrintView::enlarged(&self.print.picture);
+        [
+            png_mask(&strokes),
+            png_grey16(&heights),
+            png_mask(&aligned),
+            png_rgb8(&view.overlay(&self.print.picture, &self.depth, outcome)),
+        ]
     }
 
     /// Writes the files of one metric; returns the paths of all files of its line.
@@ -165,16 +145,21 @@ impl<'a> PairFiles<'a> {
         &self,
         root: &Path,
         metric: ThresholdMetric,
-        drawn: &EncodedAlignment,
+        drawn: &EncodedImages,
     ) -> Result<Files, FilesError> {
         let files = self.files(metric);
         let role = canvas_depth_mask(metric);
         let canvas = self.artifacts.bytes(Stage::Register, &role)?;
-        write(root, &files.depth_mask, &drawn.depth_mask)?;
-        write(root, &files.aligned_depth, &drawn.aligned_depth)?;
-        write(root, &files.aligned_mask, &drawn.aligned_mask)?;
         write(root, &files.canvas_depth_mask, &canvas)?;
-        write(root, &files.overlay, &drawn.overlay)?;
+        let paths = [
+            &files.depth_mask,
+            &files.aligned_depth,
+            &files.aligned_mask,
+            &files.overlay,
+        ];
+        for (path, image) in paths.into_iter().zip(drawn) {
+            write(root, path, image)?;
+        }
         Ok(files)
     }
 
@@ -199,9 +184,8 @@ impl<'a> PairFiles<'a> {
 fn write(root: &Path, below: &str, bytes: &[u8]) -> Result<(), FilesError> {
     let path = root.join(below);
     let created = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-    created
-        .and_then(|()| std::fs::write(&path, bytes))
-        .map_err(|source| FilesError::Write { path, source })
+    let written = created.and_then(|()| std::fs::write(&path, bytes));
+    Ok(written.map_err(at(&path))?)
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The print image of a pair, and the three images of a result that people look at.
+//! Reads the print image of a pair, and draws the three images of a result.
 
 use std::path::PathBuf;
 
@@ -56,9 +56,8 @@ impl SourcePrint {
             Ok(bytes) => bytes,
             Err(source) => return Err(SourcePrintError::Read { path, source }),
         };
-        let aligned = pair
-            .stage(Stage::Normalize)
-            .and_then(|record| record.print_hash);
+        let normalized = pair.stage(Stage::Normalize);
+        let aligned = normalized.and_then(|record| record.print_hash);
         if aligned.is_some_and(|hash| hash != ContentHash::of(&bytes)) {
             return Err(SourcePrintError::Changed(path));
         }
@@ -74,12 +73,7 @@ impl SourcePrint {
             FileKind::Png => "png",
             FileKind::Jpeg => "jpg",
             FileKind::Tiff => "tif",
-            FileKind::OtherImage(_)
-            | FileKind::Ply
-            | FileKind::OtherMesh(_)
-            | FileKind::Other(_)
-            | FileKind::Text
-            | FileKind::Binary => "img",
+            _ => "img",
         }
     }
 }

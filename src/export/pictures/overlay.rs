@@ -32,7 +32,7 @@ impl PrintView {
     }
 
     /// Returns the view enlarged by the smallest integer that makes it large enough to judge.
-    pub fn to_judge_by(print: &PrintImage) -> Self {
+    pub fn enlarged(print: &PrintImage) -> Self {
         let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
         let factor = OVERLAY_SIDE.div_ceil(size[0].max(size[1]));
         Self::new(factor as f64, size[0] * factor, size[1] * factor)
@@ -160,7 +160,7 @@ mod tests {
     fn an_enlarged_view_keeps_positions() {
         let mut outcome = test_fixtures::metric(ThresholdMetric::Density, 0.8, &[]).outcome;
         outcome.print_from_depth = Affine2::IDENTITY;
-        let view = PrintView::to_judge_by(&blank_print());
+        let view = PrintView::enlarged(&blank_print());
         let picture = view.overlay(&blank_print(), &depth(), &outcome);
         assert_eq!((picture.width(), picture.height()), (480, 480));
         let row: Vec<_> = (0..480).filter(|x| picture.at(*x, 240) == EDGE).collect();

@@ -98,17 +98,13 @@ pub(super) fn truncated(text: &str, width: usize, dot: usize) -> String {
 }
 
 /// Draws a text with its top left corner at (x, y) and dots of `dot` pixels.
-pub(super) fn write(onto: &mut Rgb, text: &str, x: usize, y: usize, dot: usize, colour: [u8; 3]) {
+pub(super) fn write(onto: &mut Rgb, text: &str, x: usize, y: usize, dot: usize) {
     for (i, letter) in text.chars().enumerate() {
         let left = x + text_width(i, dot);
         for (row, bits) in font::glyph(letter).into_iter().enumerate() {
             for column in (0..font::WIDTH).filter(|c| bits >> (font::WIDTH - 1 - c) & 1 == 1) {
-                fill(
-                    onto,
-                    [left + column * dot, y + row * dot],
-                    [dot, dot],
-                    colour,
-                );
+                let corner = [left + column * dot, y + row * dot];
+                fill(onto, corner, [dot, dot], TEXT);
             }
         }
     }
@@ -116,7 +112,7 @@ pub(super) fn write(onto: &mut Rgb, text: &str, x: usize, y: usize, dot: usize, 
 
 #[cfg(test)]
 mod tests {
-    use super::{Rgb, copy, eight_bits, resized, truncated, write};
+    use super::{Rgb, TEXT, copy, eight_bits, resized, truncated, write};
     use crate::raster::{Grid, PrintImage};
 
     #[test]
@@ -141,9 +137,9 @@ mod tests {
     #[test]
     fn drawing_is_clipped() {
         let mut sheet = Rgb::new(8, 8, [255; 3]);
-        write(&mut sheet, "W", 6, 3, 2, [0; 3]);
+        write(&mut sheet, "W", 6, 3, 2);
         copy(&mut sheet, &Rgb::new(5, 5, [9; 3]), 7, 7);
-        assert_eq!(sheet.at(6, 3), [0; 3]);
+        assert_eq!(sheet.at(6, 3), TEXT);
         assert_eq!(sheet.at(7, 7), [9; 3]);
     }
 

@@ -1,7 +1,7 @@
 //! Layout and drawing of contact sheets: many pairs on one image.
 
 use super::paint::{
-    BACKGROUND, Rgb, TEXT, copy, fill, resized, text_height, text_width, truncated, write,
+    BACKGROUND, Rgb, copy, fill, resized, text_height, text_width, truncated, write,
 };
 
 /// Width of a contact sheet, pixels.
@@ -83,24 +83,20 @@ pub fn contact_sheet(cells: &[ContactSheetCell], columns: usize) -> Rgb {
 
 fn paint(sheet: &mut Rgb, [x, y]: [usize; 2], cell: &ContactSheetCell, layout: &SheetLayout) {
     let colour = if cell.wrong { WRONG } else { FRAME };
-    frame(
+    fill(
         sheet,
         [x + 2, y + 2],
         layout.cell.map(|side| side - 4),
         colour,
     );
+    let inside = layout.cell.map(|side| side - 8);
+    fill(sheet, [x + 4, y + 4], inside, BACKGROUND);
     let (left, width) = (x + 2 * GAP, layout.cell[0] - 4 * GAP);
     let line = text_height(layout.dot);
     let texts = [(&cell.id, y + 2 * GAP), (&cell.note, y + 2 * GAP + line)];
     for (text, top) in texts {
-        write(
-            sheet,
-            &truncated(text, width, layout.dot),
-            left,
-            top,
-            layout.dot,
-            TEXT,
-        );
+        let text = truncated(text, width, layout.dot);
+        write(sheet, &text, left, top, layout.dot);
     }
     for (i, tile) in cell.tiles.iter().enumerate() {
         let corner = [left + i * (layout.tile + GAP), y + 2 * GAP + 2 * line];
@@ -119,7 +115,7 @@ fn paint_note(sheet: &mut Rgb, [x, y]: [usize; 2], note: &str, layout: &SheetLay
     let note: Vec<char> = note.chars().collect();
     for (i, line) in note.chunks(letters.max(1)).take(lines).enumerate() {
         let text: String = line.iter().collect();
-        write(sheet, &text, x, y + i * text_height(SMALL), SMALL, TEXT);
+        write(sheet, &text, x, y + i * text_height(SMALL), SMALL);
     }
 }
 
@@ -132,30 +128,8 @@ fn paint_tile(sheet: &mut Rgb, [x, y]: [usize; 2], tile: Option<&Rgb>, side: usi
     let longest = tile.width().max(tile.height()).max(side);
     let [width, height] = [tile.width(), tile.height()].map(|n| (n * side / longest).max(1));
     let fitted = resized(tile, width, height);
-    copy(
-        sheet,
-        &fitted,
-        x + (side - width) / 2,
-        y + (side - height) / 2,
-    );
-}
-
-fn frame(sheet: &mut Rgb, at: [usize; 2], size: [usize; 2], colour: [u8; 3]) {
-    let line = 2;
-    fill(sheet, at, [size[0], line], colour);
-    fill(sheet, at, [line, size[1]], colour);
-    fill(
-        sheet,
-        [at[0], at[1] + size[1] - line],
-        [size[0], line],
-        colour,
-    );
-    fill(
-        sheet,
-        [at[0] + size[0] - line, at[1]],
-        [line, size[1]],
-        colour,
-    );
+    let [x, y] = [x + (side - width) / 2, y + (side - height) / 2];
+    copy(sheet, &fitted, x, y);
 }
 
 #[cfg(test)]
@@ -197,7 +171,9 @@ mod tests {
         let ink = |cell: &ContactSheetCell| {
             let sheet = contact_sheet(std::slice::from_ref(cell), 5);
             let below = (70..sheet.height()).flat_map(|y| sheet.row(y)[150..390].to_vec());
-            below.filter(|colour| *colour == super::TEXT).count()
+            below
+                .filter(|colour| *colour == super::super::paint::TEXT)
+                .count()
         };
         assert!(ink(&long) > 5 * ink(&short).max(1));
     }
