@@ -1,4 +1,4 @@
-//! The report as plain data: what `report --format json` prints, and what every other format is made from.
+//! The report as plain data, which `report --format json` prints and all other formats are rendered from.
 
 use serde::Serialize;
 
@@ -7,6 +7,7 @@ use super::attention_checks::AttentionCheckRates;
 use super::comparison::{Basis, Comparison};
 use super::fail_reasons::FailReasonCount;
 use super::manual_alignment::ManualAlignmentErrors;
+use super::number_format::count_list;
 use super::risk_coverage::RiskCoverageCurve;
 use super::score_bootstrap::{BootstrapSettings, MeanIntervals};
 use super::score_comparison::ScoreComparison;
@@ -22,7 +23,7 @@ pub const SCHEMA: u32 = 1;
 /// The report on a project.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Report {
-    /// Version of this form.
+    /// Version of the JSON form.
     pub schema: u32,
     /// Pairs in the project, in every state.
     pub pairs: u64,
@@ -30,7 +31,7 @@ pub struct Report {
     pub interval: IntervalMethod,
     /// How many pairs are finished.
     pub progress: PairProgress,
-    /// One row a metric, in the order of the paper's table; `relief` last, and only where it has results.
+    /// One row per metric, in the order of the paper's table; `relief` last, and only where it has results.
     pub rows: Vec<MetricRow>,
     /// Metrics compared by which results are right.
     pub comparisons: Vec<Comparison>,
@@ -47,10 +48,10 @@ pub struct Report {
     /// Computing times of the stages. All other fields are equal whenever the results are equal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub times: Vec<StageTimes>,
-    /// Planted faults that reviewers detected, where any were answered.
+    /// Planted faults that reviewers detected; `None` where none were answered.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attention_checks: Option<AttentionCheckRates>,
-    /// What qualifies the numbers, in whole sentences.
+    /// Caveats on the numbers, in whole sentences.
     pub warnings: Vec<String>,
 }
 
@@ -65,6 +66,13 @@ pub struct PairProgress {
     pub pending: u64,
 }
 
+impl PairProgress {
+    /// Returns the numbers of pairs without results, such as `2 failed, 1 not finished`; `None` when all are done.
+    pub(super) fn without_results(self) -> Option<String> {
+        count_list([(self.failed, "failed"), (self.pending, "not finished")])
+    }
+}
+
 /// One metric's row. A mean over no pairs is `None`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MetricRow {
@@ -74,11 +82,11 @@ pub struct MetricRow {
     pub n: u64,
     /// Results with a verdict: passed, failed and unsure.
     pub judged: u64,
-    /// Results that every reviewer who decided passed, or that were adjudicated so.
+    /// Results that an adjudicator passed, or every reviewer who was not unsure.
     pub passed: u64,
-    /// Results that every reviewer who decided failed, or that were adjudicated so.
+    /// Results that an adjudicator failed, or every reviewer who was not unsure.
     pub failed: u64,
-    /// Results on which nobody decided, or on which reviewers disagree.
+    /// Results about which all reviewers were unsure, or on which they disagree.
     pub unsure: u64,
     /// The unsure results on which reviewers disagree.
     pub conflicts: u64,
@@ -156,11 +164,14 @@ impl Report {
     #[must_use]
     pub fn with_interval(mut self, method: IntervalMethod) -> Self {
         self.interval = method;
-        let checks = self.attention_checks;
-        self.attention_checks = checks.map(|rates| rates.with_interval(method));
+        if let Some(rates) = &mut self.attention_checks {
+            rates.set_interval(method);
+        }
         for row in &mut self.rows {
             row.acc_ci95 = method.interval_95(row.passed, row.passed + row.failed);
-            row.rules = row.rules.map(|rules| rules.with_interval(method));
+            if let Some(rules) = &mut row.rules {
+                rules.set_interval(method);
+            }
             if let Some(truth) = &mut row.truth {
                 truth.acc_ci95 = method.interval_95(truth.passed, truth.n);
             }

@@ -1,6 +1,6 @@
-//! How numbers are written in reports.
+//! Formats of numbers in reports.
 
-/// What a number is, which decides how it is written.
+/// The kind of a number, which determines its format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum NumberStyle {
     /// A whole number.
@@ -31,7 +31,7 @@ impl NumberStyle {
     }
 }
 
-/// Returns a number as every report writes it, except JSON and CSV, which hold all digits.
+/// Formats a number for reports other than JSON and CSV, which hold all digits.
 ///
 /// Shares and p-values have three decimals, angles two, percentages and seconds one, counts and milliseconds none. A
 /// comma separates thousands. A p-value that would round to 0 is `<0.001`.
@@ -39,7 +39,11 @@ pub fn format_number(value: f64, style: NumberStyle) -> String {
     if style == NumberStyle::PValue && value < 0.0005 {
         return "<0.001".to_owned();
     }
-    let text = format!("{value:.*}", style.decimals());
+    let mut text = format!("{value:.*}", style.decimals());
+    // A negative number that rounds to zero has no sign.
+    if !text.contains(|c| matches!(c, '1'..='9')) {
+        text = text.replace('-', "");
+    }
     let digits_end = text.find('.').unwrap_or(text.len());
     let digits_start = usize::from(text.starts_with('-'));
     let mut grouped = String::with_capacity(text.len() + 3);
@@ -64,6 +68,15 @@ pub fn counted(n: u64, noun: &str) -> String {
     format!("{} {noun}{plural}", format_count(n))
 }
 
+/// Returns the counts that are not 0, such as `2 failed, 1 not finished`; `None` when all are.
+pub fn count_list<const N: usize>(counts: [(u64, &str); N]) -> Option<String> {
+    let known = counts.into_iter().filter(|(n, _)| *n > 0);
+    let parts: Vec<String> = known
+        .map(|(n, what)| format!("{} {what}", format_count(n)))
+        .collect();
+    (!parts.is_empty()).then(|| parts.join(", "))
+}
+
 #[cfg(test)]
 mod tests {
     use super::NumberStyle::{Count, Degrees, PValue, Percent, Seconds, Share};
@@ -77,6 +90,9 @@ mod tests {
             (1_234_567.0, Count, "1,234,567"),
             (0.9949, Share, "0.995"),
             (-0.05, Share, "-0.050"),
+            (-0.0004, Share, "0.000"),
+            (-0.0006, Share, "-0.001"),
+            (-0.4, Count, "0"),
             (12.34, Percent, "12.3"),
             (-179.996, Degrees, "-180.00"),
             (-123_456.78, Seconds, "-123,456.8"),

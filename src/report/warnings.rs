@@ -1,8 +1,8 @@
-//! What qualifies the numbers of a report, in whole sentences.
+//! Caveats on the numbers of a report, in whole sentences.
 
 use super::model::{MetricRow, PairProgress};
 use super::number_format::NumberStyle::Share;
-use super::number_format::{counted, format_count, format_number};
+use super::number_format::{count_list, counted, format_count, format_number};
 use super::score_bootstrap::BootstrapSkipped;
 use super::stats::{MAX_UNITS, MIN_UNITS};
 use super::truth_evaluation::TruthProblems;
@@ -10,7 +10,7 @@ use super::truth_evaluation::TruthProblems;
 /// Tolerance for rounding in sums before a mean is called impossible.
 const ROUNDING: f64 = 1e-9;
 
-/// Returns every warning that the numbers call for.
+/// Returns the warnings that apply to the numbers of a report.
 pub(super) fn warnings(
     progress: PairProgress,
     rows: &[MetricRow],
@@ -21,8 +21,7 @@ pub(super) fn warnings(
     warnings.extend(missing_pairs(progress));
     for row in rows {
         warnings.extend(impossible_dice(row));
-        warnings.extend(uncounted_verdicts(row));
-        warnings.extend(mirrored(row));
+        warnings.extend(qualified_results(row));
     }
     warnings.extend(unusable_truth(truth));
     warnings.extend(skipped.map(bootstrap_skipped));
@@ -45,25 +44,11 @@ fn bootstrap_skipped(skipped: BootstrapSkipped) -> String {
 
 fn missing_pairs(progress: PairProgress) -> Option<String> {
     let missing = progress.failed + progress.pending;
-    let counts = [
-        (progress.failed, "failed"),
-        (progress.pending, "not finished"),
-    ];
-    let counts = list(counts)?;
+    let counts = progress.without_results()?;
     let verb = if missing == 1 { "is" } else { "are" };
     let pairs = counted(progress.done + missing, "pair");
     let missing = format_count(missing);
     Some(format!("{missing} of {pairs} {verb} in no row: {counts}."))
-}
-
-/// Returns the counts that are not 0, such as `2 failed, 1 not finished`; `None` when all are.
-fn list<const N: usize>(counts: [(u64, &str); N]) -> Option<String> {
-    let parts: Vec<String> = counts
-        .into_iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, what)| format!("{} {what}", format_count(n)))
-        .collect();
-    (!parts.is_empty()).then(|| parts.join(", "))
 }
 
 /// Compares the mean Dice with the largest one that the mean `IoU` allows.
@@ -84,24 +69,19 @@ fn impossible_dice(row: &MetricRow) -> Option<String> {
     })
 }
 
-/// Names verdicts that say nothing about the current results.
-fn uncounted_verdicts(row: &MetricRow) -> Option<String> {
-    let counts = list([
+/// Counts results whose verdicts say nothing about them, and mirrored results.
+fn qualified_results(row: &MetricRow) -> Vec<String> {
+    let mirrored = row.truth.as_ref().map_or(0, |truth| truth.mirrored);
+    let verdicts = count_list([
         (row.stale, "have a verdict on an earlier result only"),
         (row.conflicts, "are unsure because reviewers disagree"),
-    ])?;
-    Some(of_results(row, &counts))
-}
-
-fn mirrored(row: &MetricRow) -> Option<String> {
-    let mirrored = row.truth.as_ref()?.mirrored;
-    let counts = list([(mirrored, "are mirrored (angle error 180 degrees)")])?;
-    Some(of_results(row, &counts))
-}
-
-fn of_results(row: &MetricRow, counts: &str) -> String {
-    let results = counted(row.n, "result");
-    format!("{}: of {results}, {counts}.", row.metric.title())
+    ]);
+    let mirrored = count_list([(mirrored, "are mirrored (angle error 180 degrees)")]);
+    let (title, results) = (row.metric.title(), counted(row.n, "result"));
+    let counts = [verdicts, mirrored].into_iter().flatten();
+    counts
+        .map(|counts| format!("{title}: of {results}, {counts}."))
+        .collect()
 }
 
 fn unusable_truth(truth: &TruthProblems) -> Option<String> {

@@ -10,7 +10,7 @@ use crate::report::number_format::{counted, format_count};
 use crate::report::stats::Rate;
 use crate::report::truth_summary::TruthSummary;
 
-/// Returns the tables a report calls for: scores always, others where there is something to show.
+/// Returns the tables of a report: scores always, others where they have content.
 pub(super) fn tables(report: &Report) -> Vec<Table> {
     let tables = [
         Some(scores(report)),
@@ -94,7 +94,7 @@ pub(super) fn rules(report: &Report) -> Option<Table> {
     })
 }
 
-/// Returns failed results by reason, a column a metric; `None` where reviewers failed nothing.
+/// Returns failed results by reason, with a column for each metric; `None` without failed results.
 pub(super) fn fail_reasons(report: &Report) -> Option<Table> {
     let reasons = Reason::ALL.into_iter().map(Some).chain([None]);
     let is_given = |reason: &Option<Reason>| {
@@ -218,15 +218,17 @@ pub(super) fn times(report: &Report) -> Option<Table> {
 
 /// Returns the state of the pairs in one line, such as `24 pairs: 22 done, 2 failed`.
 pub(super) fn headline(report: &Report) -> String {
-    let progress = report.progress;
-    let rest = [
-        (progress.failed, "failed"),
-        (progress.pending, "not finished"),
-    ];
-    let rest = rest.into_iter().filter(|(n, _)| *n > 0);
-    let pairs = counted(report.pairs, "pair");
-    let mut line = format!("{pairs}: {} done", format_count(progress.done));
-    line.extend(rest.map(|(n, what)| format!(", {} {what}", format_count(n))));
+    let (pairs, done) = (
+        counted(report.pairs, "pair"),
+        format_count(report.progress.done),
+    );
+    let mut line = format!("{pairs}: {done} done");
+    line.extend(
+        report
+            .progress
+            .without_results()
+            .map(|rest| format!(", {rest}")),
+    );
     line
 }
 

@@ -1,17 +1,17 @@
-//! Risk-coverage curves as tables: short ones for a terminal, and with every number for a document.
+//! Risk-coverage curves as tables: short tables for a terminal, full tables for documents.
 
 use super::table::Table;
 use crate::report::comparison::Basis;
 use crate::report::model::Report;
 use crate::report::number_format::NumberStyle::Percent;
-use crate::report::number_format::{counted, format_count};
+use crate::report::number_format::{counted, format_count, format_number};
 use crate::report::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT, RiskCoverageCurve};
 
 /// Headers of the columns of [`short_tables`], one for each of [`COVERAGE_PERCENT`].
 const HEADERS: [&str; COVERAGE_PERCENT.len()] =
     ["100 %", "99 %", "97 %", "95 %", "90 %", "80 %", "50 %"];
 
-/// Returns a table for each basis, with a row a metric.
+/// Returns a table for each basis, with a row for each metric.
 pub(super) fn short_tables(report: &Report) -> Vec<Table> {
     by_basis(report, |basis, curves| {
         let mut table = Table::of(curves.iter().copied())
@@ -24,7 +24,7 @@ pub(super) fn short_tables(report: &Report) -> Vec<Table> {
     })
 }
 
-/// Returns a table for each basis, with a row a metric and coverage.
+/// Returns a table for each basis, with a row for each metric and coverage.
 pub(super) fn full_tables(report: &Report) -> Vec<Table> {
     by_basis(report, |basis, curves| {
         let points = curves.iter().flat_map(|curve| {
@@ -61,25 +61,31 @@ const fn title(basis: Basis) -> &'static str {
 }
 
 fn caption(basis: Basis, curves: &[&RiskCoverageCurve]) -> String {
-    let with_failures = curves.iter().filter(|curve| curve.failures > 0);
     let mut sentences = vec![format!(
         "Acc by {} of the most confident results, at the share of results that is kept (coverage).",
         basis.name()
     )];
-    sentences.extend(with_failures.map(|curve| failures(curve)));
+    sentences.extend(curves.iter().filter_map(|curve| failures(curve)));
     sentences.join(" ")
 }
 
-/// Returns how many of a metric's failures its confidence reveals.
-fn failures(curve: &RiskCoverageCurve) -> String {
-    format!(
-        "{}: the least confident {LEAST_CONFIDENT_PERCENT} % ({} of {}) hold {} of {}.",
-        curve.metric.title(),
-        format_count(curve.least_n),
-        counted(curve.n, "result"),
-        format_count(curve.failures_in_least),
-        counted(curve.failures, "failure")
-    )
+/// Returns how many of a metric's failures its confidence reveals; `None` without failures, and where the least
+/// confident 3 % are less than one result.
+fn failures(curve: &RiskCoverageCurve) -> Option<String> {
+    let is_enough = curve.n * LEAST_CONFIDENT_PERCENT >= 100;
+    // The number is rounded up, so its share is above 3 %.
+    let percent = 100.0 * curve.least_n as f64 / curve.n as f64;
+    (is_enough && curve.failures > 0).then(|| {
+        format!(
+            "{}: the least confident {} of {} ({} %) hold {} of {}.",
+            curve.metric.title(),
+            format_count(curve.least_n),
+            counted(curve.n, "result"),
+            format_number(percent, Percent),
+            format_count(curve.failures_in_least),
+            counted(curve.failures, "failure")
+        )
+    })
 }
 
 #[cfg(test)]
@@ -97,19 +103,23 @@ mod tests {
     #[test]
     fn failures_among_the_least_confident_are_counted_in_the_caption() {
         let mut report = ReportAccumulator::default();
-        let results = [(0.9, 1.0), (0.2, 170.0), (0.8, 1.0)];
-        for (i, (confidence, angle_deg)) in results.into_iter().enumerate() {
-            let pair = test_fixtures::with_confidence(&format!("p{i}"), confidence);
+        for i in 0..34_u32 {
+            let (confidence, angle_deg) = match i {
+                7 => (0.2, 170.0),
+                9 => (0.9, 170.0),
+                _ => (0.8, 1.0),
+            };
+            let pair = test_fixtures::with_confidence(&format!("p{i:02}"), confidence);
             report.add(&pair, &test_fixtures::truth(angle_deg, 1.0, 0.9));
         }
         let report = report.finish();
         let [table] = &short_tables(&report)[..] else {
             panic!("one basis: there are no verdicts");
         };
-        let wanted = "Ensemble: the least confident 3 % (1 of 3 results) hold 1 of 1 failure.";
+        let wanted = "Ensemble: the least confident 2 of 34 results (5.9 %) hold 1 of 2 failures.";
         assert!(table.caption.contains(wanted), "{}", table.caption);
         let row: Vec<_> = table.rows[3].iter().flatten().map(String::as_str).collect();
-        assert_eq!(row[..4], ["Relief", "3", "0.667", "1.000"]);
+        assert_eq!(row[..4], ["Relief", "34", "0.941", "0.970"]);
         let [table] = &full_tables(&report)[..] else {
             panic!("one basis: there are no verdicts");
         };
@@ -118,12 +128,32 @@ mod tests {
         let wanted = [
             "Non-luminous SSIM",
             "99.0",
-            "2",
-            "1.000",
-            "0.342-1.000",
+            "33",
+            "0.970",
+            "0.847-0.995",
             "0.800",
         ];
         assert_eq!(row, wanted);
+    }
+
+    #[test]
+    fn three_percent_of_few_results_are_not_one_result() {
+        let caption = |n: u32| {
+            let mut report = ReportAccumulator::default();
+            for i in 0..n {
+                let pair = test_fixtures::with_confidence(&format!("p{i:02}"), f64::from(i) / 50.0);
+                report.add(&pair, &test_fixtures::truth(170.0, 1.0, 0.9));
+            }
+            short_tables(&report.finish())[0].caption.clone()
+        };
+        for few in [2, 33] {
+            assert!(!caption(few).contains("hold"), "{}", caption(few));
+        }
+        assert!(
+            caption(34).contains("hold 2 of 34 failures"),
+            "{}",
+            caption(34)
+        );
     }
 
     #[test]
