@@ -1,84 +1,65 @@
 //! Adds pairs up to a report, one at a time.
 //!
-//! Kept in memory a pair, for medians and percentiles: the time of each stage, the threshold of each metric, the errors
-//! where there is ground truth, its confidence where it is judged, and sums of scores for the bootstrap of up to a
-//! hundred thousand units.
+//! Kept in memory for each pair, for medians and percentiles: the time of each stage, the threshold of each metric, the
+//! errors where there is ground truth, its confidence where it is judged, and sums of scores for the bootstrap of up to
+//! 100,000 units.
 
 use std::collections::BTreeMap;
 
-use super::adjudication::AdjudicationSums;
+use super::adjudication::AdjudicationRules;
 use super::attention_checks::AttentionCheckRates;
 use super::comparison::{Basis, ComparisonSums};
 use super::consensus::Consensus;
 use super::fail_reasons::FailReasonSums;
 use super::ground_truth::TruthErrors;
-use super::manual_alignment::{ManualErrorSums, ManualErrors};
+use super::manual_alignment::{ManualAlignmentErrors, ManualErrors};
 use super::model::{FailureExample, FailureGroup, MetricRow, PairProgress, Report, SCHEMA};
-use super::risk_coverage::ConfidenceSamples;
-use super::score_bootstrap::{BootstrapResults, ScoreSample};
-use super::stage_times::StageTimeSamples;
-use super::stats::{IntervalMethod, ratio};
-use super::thresholds::ThresholdSamples;
+use super::risk_coverage::RiskCoverageCurve;
+use super::score_bootstrap::{MeanIntervals, ScoreSample};
+use super::stage_times::StageTimes;
+use super::stats::{IntervalMethod, Rate, ratio};
+use super::thresholds::{ThresholdDistribution, relative_height};
 use super::truth_evaluation::{TruthEvaluation, TruthProblems};
-use super::truth_summary::TruthSums;
+use super::truth_summary::TruthSummary;
 use super::warnings::warnings;
 use crate::catalog::{MetricRecord, PairResults};
-use crate::domain::{FailureClass, JobStatus, Scores, ThresholdMetric};
+use crate::domain::{FailureClass, JobStatus, Stage, ThresholdMetric};
 
-/// A report while pairs are counted.
-#[derive(Debug, Clone)]
+/// The sums from which a report is made.
+#[derive(Debug, Clone, Default)]
 pub struct ReportAccumulator {
     pairs: u64,
     progress: PairProgress,
     metrics: [MetricSums; ThresholdMetric::ALL.len()],
     scores: ScoreSample,
-    verdict_comparisons: ComparisonSums,
-    truth_comparisons: ComparisonSums,
-    verdict_confidences: ConfidenceSamples,
-    truth_confidences: ConfidenceSamples,
+    /// For each [`Basis`].
+    comparisons: [ComparisonSums; Basis::ALL.len()],
     failures: BTreeMap<FailureClass, FailureGroup>,
-    thresholds: ThresholdSamples,
-    times: StageTimeSamples,
+    /// Computing times of each stage, milliseconds.
+    times_ms: [Vec<f64>; Stage::ALL.len()],
     attention_checks: Option<AttentionCheckRates>,
     truth_problems: TruthProblems,
 }
 
 /// The sums of one metric.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct MetricSums {
-    metric: ThresholdMetric,
     n: u64,
     passed: u64,
     failed: u64,
     unsure: u64,
     conflicts: u64,
     stale: u64,
-    rules: AdjudicationSums,
+    rules: AdjudicationRules,
     reasons: FailReasonSums,
     /// Of SSIM, NL-SSIM, `IoU`, `IoU` of boxes, Dice.
     scores: [f64; 5],
-    truth: TruthSums,
-    manual: ManualErrorSums,
-}
-
-impl Default for ReportAccumulator {
-    fn default() -> Self {
-        Self {
-            pairs: 0,
-            progress: PairProgress::default(),
-            metrics: ThresholdMetric::ALL.map(MetricSums::new),
-            scores: ScoreSample::default(),
-            verdict_comparisons: ComparisonSums::default(),
-            truth_comparisons: ComparisonSums::default(),
-            verdict_confidences: ConfidenceSamples::default(),
-            truth_confidences: ConfidenceSamples::default(),
-            failures: BTreeMap::new(),
-            thresholds: ThresholdSamples::default(),
-            times: StageTimeSamples::default(),
-            attention_checks: None,
-            truth_problems: TruthProblems::default(),
-        }
-    }
+    truth: Vec<TruthErrors>,
+    manual: Vec<ManualErrors>,
+    /// Relative heights of the thresholds.
+    thresholds: Vec<f64>,
+    /// For each [`Basis`], the confidence of each result that is known to be right or wrong, and whether it is right.
+    confidences: [Vec<(f64, bool)>; Basis::ALL.len()],
 }
 
 impl ReportAccumulator {
@@ -87,31 +68,25 @@ impl ReportAccumulator {
         self.pairs += 1;
         self.count_status(pair);
         self.truth_problems.add(pair, truth);
-        self.thresholds.add(pair);
-        self.times.add(&pair.stages);
-        for sums in &mut self.metrics {
-            if let Some(record) = pair.metric(sums.metric) {
-                sums.add(record, truth.errors.get(&sums.metric));
+        for record in &pair.stages {
+            self.times_ms[record.stage.index()].push(record.ms as f64);
+        }
+        for (sums, metric) in self.metrics.iter_mut().zip(ThresholdMetric::ALL) {
+            if let Some(record) = pair.metric(metric) {
+                sums.add(record, truth.errors.get(&metric));
             }
         }
         let passed = |metric| Consensus::of(pair.metric(metric)?).passed();
         let right = |metric| truth.errors.get(&metric).map(TruthErrors::pass);
-        let confidence = |metric| pair.metric(metric)?.outcome.confidence;
         self.scores.add(pair, passed);
-        self.verdict_comparisons.add(passed);
-        self.truth_comparisons.add(right);
-        self.verdict_confidences
-            .add(|metric| confidence(metric).zip(passed(metric)));
-        self.truth_confidences
-            .add(|metric| confidence(metric).zip(right(metric)));
+        self.comparisons[Basis::Verdicts as usize].add(passed);
+        self.comparisons[Basis::Truth as usize].add(right);
     }
 
     /// Counts a pair's errors against its manual alignment.
     pub fn add_manual_errors(&mut self, errors: &BTreeMap<ThresholdMetric, ManualErrors>) {
-        for sums in &mut self.metrics {
-            if let Some(errors) = errors.get(&sums.metric) {
-                sums.manual.add(*errors);
-            }
+        for (metric, errors) in errors {
+            self.metrics[*metric as usize].manual.push(*errors);
         }
     }
 
@@ -154,14 +129,24 @@ impl ReportAccumulator {
     }
 
     /// Returns the report on all pairs added.
-    pub fn finish(self) -> Report {
-        let metrics = self.metrics.into_iter().filter(MetricSums::has_row);
+    pub fn finish(mut self) -> Report {
         let bootstrap = self.scores.finish();
-        let rows: Vec<MetricRow> = metrics.map(|sums| sums.finish(&bootstrap)).collect();
-        let mut comparisons = self.verdict_comparisons.finish(Basis::Verdicts);
-        comparisons.extend(self.truth_comparisons.finish(Basis::Truth));
-        let mut risk_coverage = self.verdict_confidences.finish(Basis::Verdicts);
-        risk_coverage.extend(self.truth_confidences.finish(Basis::Truth));
+        let (mut rows, mut thresholds) = (Vec::new(), Vec::new());
+        let mut curves = Basis::ALL.map(|_| Vec::new());
+        for (metric, mut sums) in ThresholdMetric::ALL.into_iter().zip(self.metrics) {
+            thresholds.extend(ThresholdDistribution::of(metric, &mut sums.thresholds));
+            for ((curves, samples), basis) in
+                curves.iter_mut().zip(&mut sums.confidences).zip(Basis::ALL)
+            {
+                curves.extend(RiskCoverageCurve::of(basis, metric, samples));
+            }
+            // The paper's metrics always have a row, others where they have results.
+            if sums.n > 0 || ThresholdMetric::PAPER.contains(&metric) {
+                rows.push(sums.finish(metric, bootstrap.means[metric as usize]));
+            }
+        }
+        let comparisons = self.comparisons.into_iter().zip(Basis::ALL);
+        let times = Stage::ALL.into_iter().zip(&mut self.times_ms);
         Report {
             schema: SCHEMA,
             pairs: self.pairs,
@@ -174,60 +159,46 @@ impl ReportAccumulator {
                 bootstrap.skipped,
             ),
             rows,
-            comparisons,
+            comparisons: comparisons
+                .flat_map(|(sums, basis)| sums.finish(basis))
+                .collect(),
             score_comparisons: bootstrap.comparisons,
             bootstrap: bootstrap.settings,
-            risk_coverage,
+            risk_coverage: curves.into_iter().flatten().collect(),
             failures: self.failures.into_values().collect(),
-            thresholds: self.thresholds.finish(),
-            times: self.times.finish(),
+            thresholds,
+            times: times
+                .filter_map(|(stage, ms)| StageTimes::of(stage, ms))
+                .collect(),
             attention_checks: self.attention_checks,
         }
     }
 }
 
 impl MetricSums {
-    fn new(metric: ThresholdMetric) -> Self {
-        Self {
-            metric,
-            n: 0,
-            passed: 0,
-            failed: 0,
-            unsure: 0,
-            conflicts: 0,
-            stale: 0,
-            rules: AdjudicationSums::default(),
-            reasons: FailReasonSums::default(),
-            scores: [0.0; 5],
-            truth: TruthSums::default(),
-            manual: ManualErrorSums::default(),
-        }
-    }
-
-    /// Returns whether the report has a row for the metric: the paper's always, others where they have results.
-    fn has_row(&self) -> bool {
-        self.n > 0 || ThresholdMetric::PAPER.contains(&self.metric)
-    }
-
     fn add(&mut self, record: &MetricRecord, truth: Option<&TruthErrors>) {
-        self.n += 1;
-        let Scores {
-            ssim,
-            nl_ssim,
-            iou,
-            iou_box,
-            dice,
-            ..
-        } = record.outcome.scores;
-        let scores = [ssim, nl_ssim, iou, iou_box, dice];
+        let (outcome, consensus) = (&record.outcome, Consensus::of(record));
+        let scores = &outcome.scores;
+        let scores = [
+            scores.ssim,
+            scores.nl_ssim,
+            scores.iou,
+            scores.iou_box,
+            scores.dice,
+        ];
         for (sum, score) in self.scores.iter_mut().zip(scores) {
             *sum += score;
         }
+        self.n += 1;
         self.rules.add(record);
         self.reasons.add(record);
-        self.count_consensus(Consensus::of(record));
-        if let Some(errors) = truth {
-            self.truth.add(errors);
+        self.count_consensus(consensus);
+        self.truth.extend(truth);
+        self.thresholds
+            .push(relative_height(outcome.threshold_level));
+        let right = [consensus.passed(), truth.map(TruthErrors::pass)];
+        for (samples, right) in self.confidences.iter_mut().zip(right) {
+            samples.extend(outcome.confidence.zip(right));
         }
     }
 
@@ -245,12 +216,12 @@ impl MetricSums {
         }
     }
 
-    fn finish(self, bootstrap: &BootstrapResults) -> MetricRow {
+    fn finish(self, metric: ThresholdMetric, means_ci95: MeanIntervals) -> MetricRow {
         let [ssim, nl_ssim, iou, iou_box, dice] = self.scores.map(|sum| ratio(sum, self.n));
-        let decided = self.passed + self.failed;
-        let judged = decided + self.unsure;
+        let acc = Rate::new(self.passed, self.passed + self.failed);
+        let judged = acc.n + self.unsure;
         MetricRow {
-            metric: self.metric,
+            metric,
             n: self.n,
             judged,
             passed: self.passed,
@@ -258,18 +229,18 @@ impl MetricSums {
             unsure: self.unsure,
             conflicts: self.conflicts,
             stale: self.stale,
-            acc: ratio(self.passed as f64, decided),
-            acc_ci95: IntervalMethod::Wilson.interval_95(self.passed, decided),
-            rules: (judged > 0).then(|| self.rules.finish()),
+            acc: acc.share,
+            acc_ci95: acc.ci95,
+            rules: (judged > 0).then_some(self.rules),
             failed_reasons: self.reasons.finish(),
             ssim,
             nl_ssim,
             iou,
             iou_box,
             dice,
-            means_ci95: bootstrap.means[self.metric as usize],
-            truth: self.truth.finish(),
-            manual_alignment: self.manual.finish(),
+            means_ci95,
+            truth: TruthSummary::of(&self.truth),
+            manual_alignment: ManualAlignmentErrors::of(&self.manual),
         }
     }
 }

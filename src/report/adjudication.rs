@@ -1,4 +1,4 @@
-//! How Acc depends on the rule for results on which reviewers disagree.
+//! Acc under different rules for results on which reviewers disagree.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use crate::catalog::MetricRecord;
 use crate::domain::Verdict;
 
 /// Acc of a metric under three rules: the share of passed results among results passed or failed under the rule.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct AdjudicationRules {
     /// Results that at least two reviewers independently passed or failed; without any, all rules agree.
     pub double_read: u64,
@@ -26,27 +26,6 @@ impl AdjudicationRules {
         [self.either_fails, self.adjudicated, self.both_fail]
     }
 
-    /// Returns the same rates with intervals computed by `method`.
-    pub(super) fn with_interval(self, method: IntervalMethod) -> Self {
-        Self {
-            double_read: self.double_read,
-            either_fails: self.either_fails.with_interval(method),
-            adjudicated: self.adjudicated.with_interval(method),
-            both_fail: self.both_fail.with_interval(method),
-        }
-    }
-}
-
-/// Counts under each rule: passed, and passed or failed.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct AdjudicationSums {
-    double_read: u64,
-    either_fails: [u64; 2],
-    adjudicated: [u64; 2],
-    both_fail: [u64; 2],
-}
-
-impl AdjudicationSums {
     /// Counts one result.
     pub(super) fn add(&mut self, record: &MetricRecord) {
         let independent = partition_verdicts(record).1;
@@ -57,49 +36,44 @@ impl AdjudicationSums {
         let (passes, fails) = (count_of(Verdict::Pass), count_of(Verdict::Fail));
         self.double_read += u64::from(passes + fails > 1);
         if passes + fails > 0 {
-            count(&mut self.either_fails, fails == 0);
-            count(&mut self.both_fail, passes > 0);
+            self.either_fails.add(fails == 0);
+            self.both_fail.add(passes > 0);
         }
         if let Some(passed) = Consensus::of(record).passed() {
-            count(&mut self.adjudicated, passed);
+            self.adjudicated.add(passed);
         }
     }
 
-    /// Returns the rates.
-    pub(super) fn finish(self) -> AdjudicationRules {
-        let rate = |[passed, decided]: [u64; 2]| Rate::new(passed, decided);
-        AdjudicationRules {
-            double_read: self.double_read,
-            either_fails: rate(self.either_fails),
-            adjudicated: rate(self.adjudicated),
-            both_fail: rate(self.both_fail),
+    /// Computes the intervals by `method`.
+    pub(super) fn set_interval(&mut self, method: IntervalMethod) {
+        for rate in [
+            &mut self.either_fails,
+            &mut self.adjudicated,
+            &mut self.both_fail,
+        ] {
+            rate.set_interval(method);
         }
     }
-}
-
-fn count([passed, decided]: &mut [u64; 2], is_passed: bool) {
-    *passed += u64::from(is_passed);
-    *decided += 1;
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{AdjudicationRules, AdjudicationSums};
+    use super::AdjudicationRules;
     use crate::domain::Verdict::{self, Fail, Pass, Unsure};
     use crate::domain::{ReviewOrder, ThresholdMetric};
     use crate::report::test_fixtures;
 
     fn of(results: &[(&[Verdict], Option<Verdict>)]) -> AdjudicationRules {
-        let mut sums = AdjudicationSums::default();
+        let mut rules = AdjudicationRules::default();
         for (own, adjudication) in results {
             let verdicts: Vec<Verdict> = own.iter().copied().chain(*adjudication).collect();
             let mut record = test_fixtures::metric(ThresholdMetric::Density, 0.8, &verdicts);
             for settled in &mut record.verdicts[own.len()..] {
                 settled.review_order = Some(ReviewOrder::Adjudicate);
             }
-            sums.add(&record);
+            rules.add(&record);
         }
-        sums.finish()
+        rules
     }
 
     #[test]

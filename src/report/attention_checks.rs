@@ -1,4 +1,4 @@
-//! Reviewers' answers to attention checks: planted faults, and results shown a second time.
+//! Reviewers' answers to attention checks: planted faults, and results shown twice.
 
 use std::collections::BTreeMap;
 
@@ -19,44 +19,22 @@ pub struct AttentionCheckRates {
 }
 
 impl AttentionCheckRates {
-    /// Returns the rates of one reviewer; answers to duplicates are left out.
+    /// Returns the rates over answers of one or several reviewers; answers to duplicates are left out.
     pub(super) fn of<'a>(answers: impl IntoIterator<Item = &'a AttentionCheckAnswer>) -> Self {
-        let mut outcomes: BTreeMap<_, Vec<bool>> = BTreeMap::new();
+        let mut rates = Self::default();
         for answer in answers.into_iter().filter(|answer| answer.check.is_fault()) {
-            let of_kind = outcomes.entry(answer.check.name()).or_default();
-            of_kind.push(answer.verdict == Verdict::Fail);
+            let is_detected = answer.verdict == Verdict::Fail;
+            let of_kind = rates.by_kind.entry(answer.check.name()).or_default();
+            of_kind.add(is_detected);
+            rates.all.add(is_detected);
         }
-        let by_kind = outcomes.into_iter();
-        Self::from_kinds(by_kind.map(|(kind, outcomes)| (kind, Rate::of(outcomes))))
+        rates
     }
 
-    /// Returns the rates of several reviewers together.
-    pub(super) fn total(reviewers: impl IntoIterator<Item = Self>) -> Self {
-        let mut by_kind: BTreeMap<_, Vec<Rate>> = BTreeMap::new();
-        for (kind, rate) in reviewers.into_iter().flat_map(|rates| rates.by_kind) {
-            by_kind.entry(kind).or_default().push(rate);
-        }
-        let by_kind = by_kind.into_iter();
-        Self::from_kinds(by_kind.map(|(kind, rates)| (kind, Rate::total(rates))))
-    }
-
-    fn from_kinds(by_kind: impl Iterator<Item = (&'static str, Rate)>) -> Self {
-        let by_kind: BTreeMap<_, _> = by_kind.collect();
-        Self {
-            all: Rate::total(by_kind.values().copied()),
-            by_kind,
-        }
-    }
-
-    /// Returns the same rates with intervals computed by `method`.
-    #[must_use]
-    pub fn with_interval(self, method: IntervalMethod) -> Self {
-        let by_kind = self.by_kind.into_iter();
-        Self {
-            all: self.all.with_interval(method),
-            by_kind: by_kind
-                .map(|(kind, rate)| (kind, rate.with_interval(method)))
-                .collect(),
+    /// Computes the intervals by `method`.
+    pub(super) fn set_interval(&mut self, method: IntervalMethod) {
+        for rate in self.by_kind.values_mut().chain([&mut self.all]) {
+            rate.set_interval(method);
         }
     }
 }
@@ -67,8 +45,8 @@ impl AttentionCheckRates {
 /// When the catalog cannot be read.
 pub(super) async fn project_rates(catalog: &Catalog) -> Result<AttentionCheckRates, CatalogError> {
     let answers = answers_by_reviewer(catalog).await?;
-    let rates = |answers: &Vec<_>| AttentionCheckRates::of(newest(answers));
-    Ok(AttentionCheckRates::total(answers.values().map(rates)))
+    let newest = answers.values().flat_map(|answers| newest(answers));
+    Ok(AttentionCheckRates::of(newest))
 }
 
 /// Returns each reviewer's answers that were not undone, oldest first.
@@ -88,7 +66,7 @@ pub(super) async fn answers_by_reviewer(
     Ok(by_reviewer)
 }
 
-/// Returns the newest of a reviewer's answers to each thing that was shown; `answers` are sorted oldest first.
+/// Returns a reviewer's newest answer to each shown item; `answers` are sorted oldest first.
 pub(super) fn newest(answers: &[AttentionCheckAnswer]) -> Vec<&AttentionCheckAnswer> {
     let shown = |answer: &AttentionCheckAnswer| {
         let hashes = (answer.result_hash, answer.look.seen);

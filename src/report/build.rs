@@ -28,7 +28,7 @@ pub enum ReportError {
 
 /// Builds the report of a project from the current state of its catalog.
 ///
-/// Memory does not grow with the number of pairs, except by a few numbers a pair and metric.
+/// Memory grows by a few numbers per pair and metric.
 ///
 /// # Errors
 /// When the catalog cannot be read.

@@ -5,12 +5,12 @@ use serde::Serialize;
 use super::number_format::format_count;
 use super::stats::{McNemarTest, SIGNIFICANCE_LEVEL, holm_of_known};
 use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
+use crate::domain::enum_names;
 
-/// Above this number of pairs the sample size is not spelled out.
+/// Largest sample size that is stated; above it, texts say "more than".
 const MAX_SAMPLE_SIZE: f64 = 100_000.0;
 
-/// The metrics that are compared: every two of the paper's, and the mask true to the block with the one matched to the
-/// print.
+/// The pairs of metrics that are compared: all pairs of the paper's metrics, and `relief` with `ensemble`.
 pub const COMPARED_METRICS: [(ThresholdMetric, ThresholdMetric); 4] = [
     (Ensemble, NlSsim),
     (Ensemble, Density),
@@ -29,17 +29,6 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// Both, in the order of reports.
-    pub const ALL: [Self; 2] = [Self::Verdicts, Self::Truth];
-
-    /// Returns the name in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Verdicts => "verdicts",
-            Self::Truth => "truth",
-        }
-    }
-
     /// Returns the noun for the pairs whose results are known to be right or wrong.
     const fn pairs(self) -> &'static str {
         match self {
@@ -48,6 +37,8 @@ impl Basis {
         }
     }
 }
+
+enum_names! { pub Basis, "a basis": Verdicts = "verdicts", Truth = "truth" }
 
 /// Two metrics on the same pairs.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -70,7 +61,7 @@ pub struct Comparison {
     pub p: Option<f64>,
     /// `p` after Holm's correction over the comparisons of this basis.
     pub p_holm: Option<f64>,
-    /// What follows, in whole sentences.
+    /// The conclusion, in whole sentences.
     pub conclusion: String,
 }
 
@@ -93,36 +84,30 @@ impl ComparisonSums {
         let compared = self.0.into_iter().zip(COMPARED_METRICS);
         let compared: Vec<_> = compared.filter(|(test, _)| test.n > 0).collect();
         let p_values: Vec<Option<f64>> = compared.iter().map(|(test, _)| test.p()).collect();
-        let adjusted = holm_of_known(&p_values);
-        compared
-            .into_iter()
-            .zip(adjusted)
-            .map(|((test, metrics), p_holm)| comparison(basis, metrics, test, p_holm))
+        let adjusted = compared.into_iter().zip(holm_of_known(&p_values));
+        adjusted
+            .map(|((test, (a, b)), p_holm)| Comparison {
+                basis,
+                a,
+                b,
+                n: test.n,
+                a_only: test.a_only,
+                b_only: test.b_only,
+                test: McNemarTest::NAME,
+                p: test.p(),
+                p_holm,
+                conclusion: conclusion(basis, (a, b), test, p_holm),
+            })
             .collect()
     }
 }
 
-fn comparison(
-    basis: Basis,
-    (a, b): (ThresholdMetric, ThresholdMetric),
-    test: McNemarTest,
-    p_holm: Option<f64>,
-) -> Comparison {
-    Comparison {
-        basis,
-        a,
-        b,
-        n: test.n,
-        a_only: test.a_only,
-        b_only: test.b_only,
-        test: McNemarTest::NAME,
-        p: test.p(),
-        p_holm,
-        conclusion: conclusion(basis, (a, b), test, p_holm),
-    }
+/// Returns the titles of two metrics that are compared.
+pub(super) fn versus(a: ThresholdMetric, b: ThresholdMetric) -> String {
+    format!("{} v. {}", a.title(), b.title())
 }
 
-/// Returns what follows from a test, before and after the correction.
+/// Returns the conclusion of a test, from its p-value before and after the correction.
 fn conclusion(
     basis: Basis,
     (a, b): (ThresholdMetric, ThresholdMetric),
@@ -141,17 +126,14 @@ fn conclusion(
             "{better} is right more often, but not significantly after correction for several comparisons."
         );
     }
-    match test.sample_size() {
-        None => "No significant difference: each alone is right on as many pairs.".to_owned(),
-        Some(pairs) => format!(
-            "No significant difference. At this rate, {} {} would be needed to show a difference between {} and {} \
-             (80 % power, 5 % level).",
-            about(pairs),
-            basis.pairs(),
-            a.title(),
-            b.title()
-        ),
-    }
+    let Some(pairs) = test.sample_size() else {
+        return "No significant difference: each alone is right on as many pairs.".to_owned();
+    };
+    let (pairs, known, a, b) = (about(pairs), basis.pairs(), a.title(), b.title());
+    format!(
+        "No significant difference. At this rate, {pairs} {known} would be needed to show a difference between {a} and \
+         {b} (80 % power, 5 % level)."
+    )
 }
 
 /// Returns a sample size to two significant digits, as the estimate is no better.
@@ -160,10 +142,8 @@ fn about(pairs: f64) -> String {
         return format!("more than {}", format_count(MAX_SAMPLE_SIZE as u64));
     }
     let unit = 10.0_f64.powf((pairs.log10().floor() - 1.0).max(0.0));
-    format!(
-        "about {}",
-        format_count(((pairs / unit).ceil() * unit) as u64)
-    )
+    let rounded = (pairs / unit).ceil() * unit;
+    format!("about {}", format_count(rounded as u64))
 }
 
 #[cfg(test)]
@@ -203,7 +183,7 @@ mod tests {
         assert!(found[1].conclusion.contains("not significantly after"));
     }
 
-    /// 3, 9 and 1 failures of 587, where the ensemble's is one of structure's, and structure's are of density's.
+    /// Nested failures of 587 pairs: `nl_ssim` fails on 3, density on these and 6 others, the ensemble on one of the 3.
     #[test]
     fn nested_failures_of_the_paper_equal_statsmodels() {
         let found = compare(&[

@@ -1,4 +1,4 @@
-//! What all reviewers together say of one result.
+//! The joint verdict of all reviewers on one result.
 
 use crate::catalog::{MetricRecord, ReviewerVerdict};
 use crate::domain::{ReviewOrder, Verdict};
@@ -42,7 +42,7 @@ impl Consensus {
         }
     }
 
-    /// Returns the verdict it amounts to; `None` where nobody judged the current result.
+    /// Returns the equivalent verdict; `None` where nobody judged the current result.
     pub const fn verdict(self) -> Option<Verdict> {
         match self {
             Self::Passed => Some(Verdict::Pass),

@@ -1,4 +1,4 @@
-//! The images of the HTML report with what is known of each; plain data, drawn elsewhere.
+//! The images of the HTML report with the texts next to them; plain data, drawn by `export`.
 
 use crate::catalog::VerdictEvent;
 use crate::domain::{PairName, ThresholdMetric, Verdict};
@@ -15,11 +15,11 @@ pub struct Gallery {
 /// Results that are shown for the same reason.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GalleryGroup {
-    /// Why they are shown.
+    /// The reason.
     pub reason: GalleryReason,
     /// Number of such results in the project.
     pub total: u64,
-    /// The results that were drawn.
+    /// The results whose images are shown.
     pub items: Vec<GalleryItem>,
 }
 
@@ -50,7 +50,7 @@ pub struct GalleryItem {
     pub character: Option<String>,
     /// Paths of mesh and print.
     pub files: [String; 2],
-    /// The metrics with this result.
+    /// The metrics whose results look like this.
     pub metrics: Vec<ThresholdMetric>,
     /// Scores and errors as text.
     pub numbers: String,
@@ -62,7 +62,7 @@ pub struct GalleryItem {
     pub problem: Option<String>,
 }
 
-/// Returns a verdict as text, such as `lan: fail, angle (“upper half”)`.
+/// Formats a verdict, such as `lan: fail, angle (“upper half”)`.
 pub fn verdict_text(event: &VerdictEvent) -> String {
     let mut text = format!("{}: {}", event.reviewer, event.verdict);
     let reason = event.reason.filter(|_| event.verdict == Verdict::Fail);

@@ -1,8 +1,9 @@
 //! The error of an alignment against ground truth.
 
+use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use crate::domain::{PairName, PrintFromMesh, Rigid3};
+use crate::domain::{Affine2, PairName, PrintFromMesh, Rigid3};
 
 /// Largest angle error of a right alignment, degrees (the paper's rule).
 pub const MAX_ANGLE_DEG: f64 = 5.0;
@@ -109,20 +110,15 @@ impl TruthRecord {
     pub fn read(value: &serde_json::Value) -> Result<Self, TruthError> {
         let record =
             Self::deserialize(value).map_err(|error| TruthError::Form(error.to_string()))?;
-        record.tangents()?;
+        let tangents = record.tangents()?;
         if record.landmarks.is_empty() {
             return Err(TruthError::NoLandmarks);
         }
         if !(record.char_height_px > 0.0 && record.char_height_px.is_finite()) {
             return Err(TruthError::Height(record.char_height_px));
         }
-        if in_plane(&record.print_from_mesh, record.tangents()?)
-            .inverse()
-            .is_none()
-        {
-            return Err(TruthError::Flat);
-        }
-        Ok(record)
+        let truth = in_plane(&record.print_from_mesh, tangents).inverse();
+        truth.map(|_| record).ok_or(TruthError::Flat)
     }
 
     /// Measures the error of a found map; `mask_iou` is passed through.
@@ -142,7 +138,7 @@ impl TruthRecord {
             angle_deg: if mirrored {
                 180.0
             } else {
-                relative.angle_deg()
+                rotation_deg(&relative)
             },
             mirrored,
             tre_pct: 100.0 * self.landmark_distance_px(found) / self.char_height_px,
@@ -157,90 +153,49 @@ impl TruthRecord {
     pub fn normal_error_deg(&self, plane_from_mesh: &Rigid3) -> Result<f64, TruthError> {
         let [across, down] = self.tangents()?;
         let [x, y, z, _] = plane_from_mesh.0[2];
-        let along = |axis: [f64; 3]| x * axis[0] + y * axis[1] + z * axis[2];
+        let (found, truth) = (Vector3::new(x, y, z), Vector3::from(self.plane.n));
         // The sine resolves small angles, which the cosine does not.
-        let sin = along(across).hypot(along(down));
-        let cos = along(self.plane.n);
-        Ok(sin.atan2(cos / length(self.plane.n)).to_degrees())
+        let sin = found.dot(&across).hypot(found.dot(&down));
+        Ok(sin.atan2(found.dot(&truth) / truth.norm()).to_degrees())
     }
 
     /// Returns the mean distance between the true and the found image of the landmarks, print pixels.
     fn landmark_distance_px(&self, found: &PrintFromMesh) -> f64 {
-        let sum: f64 = self
-            .landmarks
-            .iter()
-            .map(|point| {
-                let ([u, v, _], [p, q, _]) =
-                    (self.print_from_mesh.apply(*point), found.apply(*point));
-                (u - p).hypot(v - q)
-            })
-            .sum();
-        sum / self.landmarks.len() as f64
+        let distances = self.landmarks.iter().map(|point| {
+            let ([u, v, _], [p, q, _]) = (self.print_from_mesh.apply(*point), found.apply(*point));
+            (u - p).hypot(v - q)
+        });
+        distances.sum::<f64>() / self.landmarks.len() as f64
     }
 
     /// Returns two orthonormal directions that span the true plane.
-    fn tangents(&self) -> Result<[[f64; 3]; 2], TruthError> {
-        let n = self.plane.n;
-        let unit = |v: [f64; 3]| {
-            let length = length(v);
-            (length > 0.0 && length.is_finite()).then(|| v.map(|c| c / length))
-        };
-        let cross = |a: [f64; 3], b: [f64; 3]| {
-            [
-                a[1] * b[2] - a[2] * b[1],
-                a[2] * b[0] - a[0] * b[2],
-                a[0] * b[1] - a[1] * b[0],
-            ]
-        };
-        let normal = unit(n).ok_or(TruthError::Normal(n))?;
-        let least = (0..3)
-            .min_by(|i, j| normal[*i].abs().total_cmp(&normal[*j].abs()))
-            .unwrap_or(0);
-        let mut axis = [0.0; 3];
-        axis[least] = 1.0;
-        let first = unit(cross(normal, axis)).ok_or(TruthError::Normal(n))?;
-        Ok([first, cross(normal, first)])
+    fn tangents(&self) -> Result<[Vector3<f64>; 2], TruthError> {
+        let normal = Vector3::from(self.plane.n);
+        let length = normal.norm();
+        if !(length > 0.0 && length.is_finite()) {
+            return Err(TruthError::Normal(self.plane.n));
+        }
+        let normal = normal / length;
+        let mut axis = Vector3::zeros();
+        axis[normal.iamin()] = 1.0;
+        let first = normal.cross(&axis).normalize();
+        Ok([first, normal.cross(&first)])
     }
 }
 
-fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|c| c * c).sum::<f64>().sqrt()
+/// Returns the linear part of a map of space, restricted to two directions of a plane, as a map to print pixels.
+fn in_plane(map: &PrintFromMesh, tangents: [Vector3<f64>; 2]) -> Affine2 {
+    let row = |r: [f64; 4]| {
+        let [a, b] = tangents.map(|t| r[0] * t[0] + r[1] * t[1] + r[2] * t[2]);
+        [a, b, 0.0]
+    };
+    Affine2([row(map.0[0]), row(map.0[1])])
 }
 
-/// The linear part of a map restricted to two directions of a plane, print pixels.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Linear2([[f64; 2]; 2]);
-
-/// Restricts a map of space to two directions.
-fn in_plane(map: &PrintFromMesh, tangents: [[f64; 3]; 2]) -> Linear2 {
-    let row = |r: [f64; 4]| tangents.map(|t| r[0] * t[0] + r[1] * t[1] + r[2] * t[2]);
-    Linear2([row(map.0[0]), row(map.0[1])])
-}
-
-impl Linear2 {
-    fn determinant(&self) -> f64 {
-        let [[a, b], [c, d]] = self.0;
-        a * d - b * c
-    }
-
-    fn inverse(&self) -> Option<Self> {
-        let ([[a, b], [c, d]], det) = (self.0, self.determinant());
-        (det != 0.0 && det.is_finite()).then(|| Self([[d / det, -b / det], [-c / det, a / det]]))
-    }
-
-    fn after(&self, first: &Self) -> Self {
-        let [p, q] = first.0;
-        Self(
-            self.0
-                .map(|[a, b]| [a * p[0] + b * q[0], a * p[1] + b * q[1]]),
-        )
-    }
-
-    /// Size of the turn in the rotation closest to this map, degrees in 0..=180.
-    fn angle_deg(&self) -> f64 {
-        let [[a, b], [c, d]] = self.0;
-        (c - b).atan2(a + d).to_degrees().abs()
-    }
+/// Returns the angle of the rotation that is closest to a map, degrees in 0..=180.
+fn rotation_deg(map: &Affine2) -> f64 {
+    let [[a, b, _], [c, d, _]] = map.0;
+    (c - b).atan2(a + d).to_degrees().abs()
 }
 
 #[cfg(test)]

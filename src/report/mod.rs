@@ -1,4 +1,4 @@
-//! From the catalog to a report as plain data, and from there to text, JSON, CSV, Markdown, LaTeX and HTML.
+//! Builds reports from the catalog as plain data, and renders them as text, JSON, CSV, Markdown, LaTeX and HTML.
 //!
 //! [`build()`] streams the pairs through a [`ReportAccumulator`], [`agreement()`] through counts of verdicts. The numbers
 //! come from [`stats`]; the renderers only read the finished [`Report`].

@@ -8,7 +8,7 @@ use crate::domain::{
     Affine2, ArtifactRef, DepthOutcome, FitOutcome, MetricOutcome, NormalizeOutcome, PrintFromMesh,
     RegisterOutcome, Stage,
 };
-use crate::raster::{DepthMap, Grid, Mask, PngError, decode_grey8, decode_grey16};
+use crate::raster::{DepthMap, Mask, PngError, decode_grey8, decode_grey16};
 use crate::store::{self, Project};
 
 /// Ink in a stored print mask; the background is 0, unknown pixels are 128.
@@ -67,9 +67,8 @@ impl<'a> PairArtifacts<'a> {
     /// # Errors
     /// When there is none.
     pub fn stage(&self, stage: Stage) -> Result<&'a StageRecord, PairArtifactsError> {
-        self.pair
-            .stage(stage)
-            .ok_or(PairArtifactsError::NoResult(stage))
+        let found = self.pair.stage(stage);
+        found.ok_or(PairArtifactsError::NoResult(stage))
     }
 
     /// Parses the outcome of a stage, such as [`FitOutcome`].
@@ -114,23 +113,19 @@ impl<'a> PairArtifacts<'a> {
         let outcome: DepthOutcome = self.outcome(Stage::Depth)?;
         let levels = decode_grey16(&self.bytes(Stage::Depth, DEPTH)?);
         Ok(DepthMap {
-            levels: levels.map_err(|source| PairArtifactsError::Image {
-                role: DEPTH.to_owned(),
-                source,
-            })?,
+            levels: levels.map_err(undecodable(DEPTH))?,
             scale: outcome.scale,
         })
     }
 
-    /// The ink of the print, in the print image's frame and size.
+    /// Reads the ink mask of the print, in the frame and size of the print image.
     ///
     /// # Errors
     /// When the result or its picture cannot be read.
     pub fn print_mask(&self) -> Result<Mask, PairArtifactsError> {
         let register = self.outcome::<RegisterOutcome>(Stage::Register);
         let ink = register.map_or(0, |outcome| outcome.ink);
-        let grey = self.grey(Stage::Normalize, &print_mask(ink))?;
-        Ok(grey.map(|value| *value == INK))
+        self.mask(Stage::Normalize, &print_mask(ink))
     }
 
     /// Returns the map from print pixels to the canvas of the scores.
@@ -153,19 +148,16 @@ impl<'a> PairArtifacts<'a> {
     /// # Errors
     /// When the result or its picture cannot be read.
     pub fn canvas_print_mask(&self) -> Result<Mask, PairArtifactsError> {
-        let grey = self.grey(Stage::Register, CANVAS_PRINT_MASK)?;
+        self.mask(Stage::Register, CANVAS_PRINT_MASK)
+    }
+
+    fn mask(&self, stage: Stage, role: &str) -> Result<Mask, PairArtifactsError> {
+        let grey = decode_grey8(&self.bytes(stage, role)?).map_err(undecodable(role))?;
         Ok(grey.map(|value| *value == INK))
     }
 
-    fn grey(&self, stage: Stage, role: &str) -> Result<Grid<u8>, PairArtifactsError> {
-        decode_grey8(&self.bytes(stage, role)?).map_err(|source| PairArtifactsError::Image {
-            role: role.to_owned(),
-            source,
-        })
-    }
-
-    /// Depth-map pixels to print pixels under a map from the mesh, on the fitted plane; `None` where the depth map
-    /// flattens the plane.
+    /// Returns the map from depth-map pixels to print pixels that a map from the mesh gives on the fitted plane; `None` if
+    /// `depth_from_plane` is singular.
     ///
     /// # Errors
     /// When the results of fit or depth cannot be read.
@@ -189,7 +181,7 @@ impl<'a> PairArtifacts<'a> {
         }))
     }
 
-    /// The three maps of the pipeline put together, for a metric's `print_from_depth`.
+    /// Composes the three maps of the pipeline for a metric's `print_from_depth`.
     ///
     /// # Errors
     /// When the results of fit or depth cannot be read.
@@ -204,6 +196,14 @@ impl<'a> PairArtifacts<'a> {
             &depth.scale.depth_from_plane,
             &fit.plane_from_mesh,
         ))
+    }
+}
+
+/// Returns a conversion of decoding errors of an artifact.
+fn undecodable(role: &str) -> impl Fn(PngError) -> PairArtifactsError {
+    move |source| PairArtifactsError::Image {
+        role: role.to_owned(),
+        source,
     }
 }
 

@@ -22,7 +22,7 @@ pub fn below(report: &Report, least: f64) -> Vec<String> {
         .collect()
 }
 
-/// Returns what keeps a report from being complete; empty when nothing does.
+/// Returns the reasons why a report is incomplete; empty for a complete one.
 ///
 /// Complete means that every pair is done, and every result of every metric was passed or failed.
 pub fn missing(report: &Report) -> Vec<String> {

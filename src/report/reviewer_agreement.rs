@@ -8,7 +8,7 @@ use super::attention_checks::{self, AttentionCheckRates};
 use super::build::PAIRS_PER_PAGE;
 use super::consensus::{Consensus, partition_verdicts};
 use super::pair_artifacts::group_identical;
-use super::stats::{AgreementTable, IntervalMethod, Rate, ratio};
+use super::stats::{AgreementTable, Rate};
 use crate::catalog::{
     AnsweredOn, AttentionCheckAnswer, Catalog, CatalogError, MetricRecord, PairResults,
 };
@@ -28,7 +28,7 @@ pub const MIN_RESULTS: u64 = 30;
 /// adjudications are not compared.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReviewerAgreement {
-    /// Version of this form.
+    /// Version of the JSON form.
     pub schema: u32,
     /// Results on which reviewers disagree and that nobody adjudicated.
     pub conflicts: u64,
@@ -84,7 +84,7 @@ pub struct ReviewerRecord {
     pub reviewer: String,
     /// Current results that they judged.
     pub judged: u64,
-    /// Results shown a second time that got the same verdict again.
+    /// Share of results shown twice that got the same verdict both times.
     pub duplicates: Rate,
     /// Share of answered planted faults that they failed.
     pub attention_checks: AttentionCheckRates,
@@ -113,14 +113,14 @@ pub async fn agreement(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogEr
 type OwnVerdicts = BTreeMap<(PairName, ContentHash), Verdict>;
 
 async fn own_verdicts(catalog: &Catalog, reviewer: &str) -> Result<OwnVerdicts, CatalogError> {
-    let answers = catalog.answers(reviewer).await?.into_iter();
+    let mut verdicts = OwnVerdicts::new();
     // Answers come oldest first, so the newest of each result is kept.
-    Ok(answers
-        .filter_map(|answer| match answer.on {
-            AnsweredOn::Result(hash) => Some(((answer.pair, hash), answer.verdict)),
-            AnsweredOn::Check(_) => None,
-        })
-        .collect())
+    for answer in catalog.answers(reviewer).await? {
+        if let AnsweredOn::Result(hash) = answer.on {
+            verdicts.insert((answer.pair, hash), answer.verdict);
+        }
+    }
+    Ok(verdicts)
 }
 
 /// Two reviewers' verdicts on the same results, counted.
@@ -143,18 +143,18 @@ impl VerdictTable {
 
     /// Returns the agreement.
     pub(super) fn finish(self) -> VerdictAgreement {
-        let (n, agreed) = (self.decided.n(), self.decided.agreed());
+        let agreed = Rate::new(self.decided.agreed(), self.decided.n());
         VerdictAgreement {
-            n,
+            n: agreed.n,
             unsure: self.unsure,
-            agreed,
-            agreement: ratio(agreed as f64, n),
-            agreement_ci95: IntervalMethod::Wilson.interval_95(agreed, n),
+            agreed: agreed.count,
+            agreement: agreed.share,
+            agreement_ci95: agreed.ci95,
             kappa: self.decided.cohen_kappa(),
             ac1: self.decided.gwet_ac1(),
             failed_by_any: self.decided.failed_by_any(),
             failed_by_both: self.decided.both_fail,
-            sufficient: n >= MIN_RESULTS,
+            sufficient: agreed.n >= MIN_RESULTS,
         }
     }
 }

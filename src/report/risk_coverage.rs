@@ -3,12 +3,12 @@
 use serde::Serialize;
 
 use super::comparison::Basis;
-use super::stats::{IntervalMethod, ratio};
+use super::stats::Rate;
 use crate::domain::ThresholdMetric;
 
 /// Coverages of a curve: percent of the results that are kept, the most confident ones.
 pub const COVERAGE_PERCENT: [u64; 7] = [100, 99, 97, 95, 90, 80, 50];
-/// Percent of the results, the least confident ones, among which failures are counted.
+/// Percent of the results, the least confident ones, in which failures are counted.
 pub const LEAST_CONFIDENT_PERCENT: u64 = 3;
 
 /// The risk-coverage curve of one metric.
@@ -20,11 +20,11 @@ pub struct RiskCoverageCurve {
     pub metric: ThresholdMetric,
     /// Results that have a confidence and are known to be right or wrong.
     pub n: u64,
-    /// The wrong ones of these.
+    /// Number of wrong results.
     pub failures: u64,
     /// Number of the least confident 3 %, rounded up.
     pub least_n: u64,
-    /// The wrong ones among the least confident 3 %.
+    /// Number of wrong results among the least confident 3 %.
     pub failures_in_least: u64,
     /// From full coverage down to half.
     pub points: Vec<RiskCoveragePoint>,
@@ -37,7 +37,7 @@ pub struct RiskCoveragePoint {
     pub coverage: f64,
     /// Number of results kept, rounded down.
     pub n: u64,
-    /// The right ones of these.
+    /// Number of right results among those kept.
     pub passed: u64,
     /// `passed / n`; `None` where nothing is kept.
     pub acc: Option<f64>,
@@ -47,83 +47,60 @@ pub struct RiskCoveragePoint {
     pub least_confidence: Option<f64>,
 }
 
-/// Confidence and outcome of every metric's results, in the order of [`ThresholdMetric::ALL`].
-#[derive(Debug, Clone, Default)]
-pub(super) struct ConfidenceSamples([Vec<(f64, bool)>; ThresholdMetric::ALL.len()]);
-
-impl ConfidenceSamples {
-    /// Counts one pair; `outcome` returns a metric's confidence and whether its result is right, where both are known.
-    pub(super) fn add(&mut self, outcome: impl Fn(ThresholdMetric) -> Option<(f64, bool)>) {
-        for (samples, metric) in self.0.iter_mut().zip(ThresholdMetric::ALL) {
-            samples.extend(outcome(metric));
-        }
-    }
-
-    /// Returns the curve of every metric that has results with a confidence.
-    pub(super) fn finish(self, basis: Basis) -> Vec<RiskCoverageCurve> {
-        let by_metric = self.0.into_iter().zip(ThresholdMetric::ALL);
-        by_metric
-            .filter(|(samples, _)| !samples.is_empty())
-            .map(|(samples, metric)| curve(samples, basis, metric))
-            .collect()
-    }
-}
-
-fn curve(
-    mut samples: Vec<(f64, bool)>,
-    basis: Basis,
-    metric: ThresholdMetric,
-) -> RiskCoverageCurve {
-    // The sort is stable: among equal confidences the first pair by name is kept longest.
-    samples.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let kept = |percent| samples.len() * percent as usize / 100;
-    let failures =
-        |samples: &[(f64, bool)]| samples.iter().filter(|(_, right)| !right).count() as u64;
-    let least = &samples[kept(100 - LEAST_CONFIDENT_PERCENT)..];
-    RiskCoverageCurve {
-        basis,
-        metric,
-        n: samples.len() as u64,
-        failures: failures(&samples),
-        least_n: least.len() as u64,
-        failures_in_least: failures(least),
-        points: COVERAGE_PERCENT
-            .iter()
-            .map(|percent| point(*percent, &samples[..kept(*percent)]))
-            .collect(),
+impl RiskCoverageCurve {
+    /// Returns the curve of a metric from the confidence of each result and whether it is right, in the order of the
+    /// pairs' names; `None` without results.
+    pub(super) fn of(
+        basis: Basis,
+        metric: ThresholdMetric,
+        samples: &mut [(f64, bool)],
+    ) -> Option<Self> {
+        // The sort is stable: among equal confidences the first pair by name is kept longest.
+        samples.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let kept = |percent| samples.len() * percent as usize / 100;
+        let failures =
+            |samples: &[(f64, bool)]| samples.iter().filter(|(_, right)| !right).count() as u64;
+        let least = &samples[kept(100 - LEAST_CONFIDENT_PERCENT)..];
+        let points = COVERAGE_PERCENT.iter();
+        (!samples.is_empty()).then(|| Self {
+            basis,
+            metric,
+            n: samples.len() as u64,
+            failures: failures(samples),
+            least_n: least.len() as u64,
+            failures_in_least: failures(least),
+            points: points
+                .map(|percent| point(*percent, &samples[..kept(*percent)]))
+                .collect(),
+        })
     }
 }
 
 /// Returns one point of a curve from the results that are kept, the most confident first.
 fn point(percent: u64, kept: &[(f64, bool)]) -> RiskCoveragePoint {
-    let n = kept.len() as u64;
-    let passed = kept.iter().filter(|(_, right)| *right).count() as u64;
+    let acc = Rate::of(kept.iter().map(|(_, right)| *right));
     RiskCoveragePoint {
         coverage: percent as f64 / 100.0,
-        n,
-        passed,
-        acc: ratio(passed as f64, n),
-        acc_ci95: IntervalMethod::Wilson.interval_95(passed, n),
+        n: acc.n,
+        passed: acc.count,
+        acc: acc.share,
+        acc_ci95: acc.ci95,
         least_confidence: kept.last().map(|(confidence, _)| *confidence),
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{COVERAGE_PERCENT, ConfidenceSamples, RiskCoverageCurve};
+    use super::{COVERAGE_PERCENT, RiskCoverageCurve};
     use crate::domain::ThresholdMetric;
     use crate::report::comparison::Basis;
     use crate::report::stats::wilson_95;
 
     /// The curve of density over results in the order given.
     fn curve(judged: &[(f64, bool)]) -> RiskCoverageCurve {
-        let mut confidences = ConfidenceSamples::default();
-        for one in judged {
-            confidences.add(|metric| (metric == ThresholdMetric::Density).then_some(*one));
-        }
-        let mut curves = confidences.finish(Basis::Truth);
-        assert_eq!(curves.len(), 1);
-        curves.remove(0)
+        let found =
+            RiskCoverageCurve::of(Basis::Truth, ThresholdMetric::Density, &mut judged.to_vec());
+        found.expect("there are results")
     }
 
     #[test]

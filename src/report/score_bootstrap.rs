@@ -5,7 +5,7 @@
 use serde::Serialize;
 
 use super::comparison::COMPARED_METRICS;
-use super::score_comparison::{Score, ScoreComparison, ScoreDifference, compare_scores};
+use super::score_comparison::{Score, ScoreComparison, conclude};
 use super::stats::{
     BOOTSTRAP_SEED, ClusterSample, MIN_UNITS, ResampledMeans, ResamplingUnit, resample_count,
 };
@@ -47,8 +47,8 @@ pub struct MeanIntervals {
     pub acc_by_block: Option<[f64; 2]>,
 }
 
-/// What the bootstrap gave.
-#[derive(Debug, Clone, PartialEq)]
+/// Results of the bootstrap.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct BootstrapResults {
     /// How it was done; `None` where nothing was resampled.
     pub(super) settings: Option<BootstrapSettings>,
@@ -56,7 +56,7 @@ pub(super) struct BootstrapResults {
     pub(super) means: [MeanIntervals; METRICS],
     /// Metrics compared by their scores.
     pub(super) comparisons: Vec<ScoreComparison>,
-    /// Why there are no intervals and comparisons.
+    /// Why there are no intervals or comparisons.
     pub(super) skipped: Option<BootstrapSkipped>,
 }
 
@@ -126,10 +126,8 @@ impl ScoreSample {
         let (units, by) = (self.0.units(), self.0.unit_kind());
         if self.0.is_full() || units == 0 {
             return BootstrapResults {
-                settings: None,
-                means: Default::default(),
-                comparisons: Vec::new(),
                 skipped: self.0.is_full().then_some(BootstrapSkipped::TooMany),
+                ..BootstrapResults::default()
             };
         }
         let mut resampled = self.0.resample();
@@ -142,7 +140,7 @@ impl ScoreSample {
                 seed: BOOTSTRAP_SEED,
             }),
             means: std::array::from_fn(|metric| mean_intervals(&mut resampled, metric, by)),
-            comparisons: compare_scores(&differences(&mut resampled), by),
+            comparisons: comparisons(&mut resampled, by),
             skipped: (units < MIN_UNITS).then_some(BootstrapSkipped::TooFew { units, by }),
         }
     }
@@ -182,25 +180,29 @@ fn mean_intervals(
     }
 }
 
-/// Returns the differences by which metrics are compared, score by score.
-fn differences(resampled: &mut ResampledMeans) -> Vec<ScoreDifference> {
+/// Returns the comparisons of metrics, score by score.
+fn comparisons(resampled: &mut ResampledMeans, by: ResamplingUnit) -> Vec<ScoreComparison> {
     let mut found = Vec::new();
     for score in Score::COMPARED {
         for (i, (a, b)) in COMPARED_METRICS.into_iter().enumerate() {
             let quantity = difference_index(i, score as usize);
             let [sum, n] = resampled.total(quantity);
             let (ci95, p) = (resampled.ci95(quantity), resampled.p(quantity));
-            found.extend((n > 0.0).then(|| ScoreDifference {
+            found.extend((n > 0.0).then(|| ScoreComparison {
                 score,
                 a,
                 b,
                 n: n as u64,
-                mean: sum / n,
+                difference: sum / n,
                 ci95,
+                test: ScoreComparison::TEST,
                 p,
+                p_holm: None,
+                conclusion: String::new(),
             }));
         }
     }
+    conclude(&mut found, by);
     found
 }
 

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::comparison::versus;
 use super::stats::{ResamplingUnit, SIGNIFICANCE_LEVEL, holm_of_known};
 use crate::domain::{Scores, ThresholdMetric};
 
@@ -67,61 +68,33 @@ pub struct ScoreComparison {
     pub p: Option<f64>,
     /// `p` after Holm's correction over the comparisons by this score.
     pub p_holm: Option<f64>,
-    /// What follows, as a sentence without its full stop.
+    /// The conclusion, a sentence without its full stop.
     pub conclusion: String,
 }
 
-/// The mean difference of a score between two metrics, before the correction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct ScoreDifference {
-    pub(super) score: Score,
-    pub(super) a: ThresholdMetric,
-    pub(super) b: ThresholdMetric,
-    pub(super) n: u64,
-    pub(super) mean: f64,
-    pub(super) ci95: Option<[f64; 2]>,
-    pub(super) p: Option<f64>,
-}
-
-/// Name of the test.
-const TEST: &str = "paired bootstrap, percentile, two-sided";
-
-/// Returns the comparisons of differences that are sorted by score, with Holm's correction within each score.
-pub(super) fn compare_scores(
-    differences: &[ScoreDifference],
-    unit: ResamplingUnit,
-) -> Vec<ScoreComparison> {
-    let families = differences.chunk_by(|a, b| a.score == b.score);
-    families
-        .flat_map(|family| {
-            let p_values: Vec<Option<f64>> = family.iter().map(|one| one.p).collect();
-            let adjusted = holm_of_known(&p_values);
-            let both = family.iter().zip(adjusted);
-            both.map(|(one, p_holm)| one.finish(p_holm, unit))
-                .collect::<Vec<_>>()
-        })
-        .collect()
-}
-
-impl ScoreDifference {
-    fn finish(&self, p_holm: Option<f64>, unit: ResamplingUnit) -> ScoreComparison {
-        ScoreComparison {
-            score: self.score,
-            a: self.a,
-            b: self.b,
-            n: self.n,
-            difference: self.mean,
-            ci95: self.ci95,
-            test: TEST,
-            p: self.p,
-            p_holm,
-            conclusion: self.conclusion(self.p.zip(p_holm), unit),
+/// Adds Holm's correction within each score, and the conclusions, to comparisons that are sorted by score.
+pub(super) fn conclude(comparisons: &mut [ScoreComparison], unit: ResamplingUnit) {
+    for family in comparisons.chunk_by_mut(|a, b| a.score == b.score) {
+        let p_values: Vec<Option<f64>> = family.iter().map(|one| one.p).collect();
+        for (one, p_holm) in family.iter_mut().zip(holm_of_known(&p_values)) {
+            one.p_holm = p_holm;
+            one.conclusion = one.conclusion(unit);
         }
     }
+}
 
-    fn conclusion(&self, p: Option<(f64, f64)>, unit: ResamplingUnit) -> String {
-        let higher = if self.mean > 0.0 { self.a } else { self.b }.title();
-        match p {
+impl ScoreComparison {
+    /// Name of the test.
+    pub(super) const TEST: &str = "paired bootstrap, percentile, two-sided";
+
+    fn conclusion(&self, unit: ResamplingUnit) -> String {
+        let higher = if self.difference > 0.0 {
+            self.a
+        } else {
+            self.b
+        }
+        .title();
+        match self.p.zip(self.p_holm) {
             None => format!("too few {} for a test", unit.plural()),
             Some(_) if self.ci95 == Some([0.0; 2]) => "equal on all pairs".to_owned(),
             Some((_, p_holm)) if p_holm < SIGNIFICANCE_LEVEL => {
@@ -159,26 +132,29 @@ pub(super) fn conclusions(found: &[ScoreComparison]) -> Vec<String> {
             .iter()
             .map(|(conclusion, scores)| format!("{conclusion} ({})", scores.join(", ")))
             .collect();
-        format!("{} v. {}: {}.", a.title(), b.title(), parts.join("; "))
+        format!("{}: {}.", versus(a, b), parts.join("; "))
     };
     compared.into_iter().map(sentence).collect()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Score, ScoreDifference, compare_scores, conclusions};
+    use super::{Score, ScoreComparison, conclude, conclusions};
     use crate::domain::ThresholdMetric::{Density, Ensemble, NlSsim, Relief};
     use crate::report::stats::ResamplingUnit;
 
-    fn difference(score: Score, difference: f64, p: Option<f64>) -> ScoreDifference {
-        ScoreDifference {
+    fn difference(score: Score, difference: f64, p: Option<f64>) -> ScoreComparison {
+        ScoreComparison {
             score,
             a: Ensemble,
             b: Density,
             n: 587,
-            mean: difference,
+            difference,
             ci95: p.map(|_| [difference - 0.01, difference + 0.01]),
+            test: ScoreComparison::TEST,
             p,
+            p_holm: None,
+            conclusion: String::new(),
         }
     }
 
@@ -191,7 +167,7 @@ mod tests {
             difference(Score::Iou, -0.1, Some(0.04)),
         ];
         (found[1].b, found[2].a) = (NlSsim, Relief);
-        let found = compare_scores(&found, ResamplingUnit::Pair);
+        conclude(&mut found, ResamplingUnit::Pair);
         // statsmodels 0.15.0 `multipletests([0.01, 0.03, 0.5], method="holm")`.
         let wanted = [0.03, 0.06, 0.5, 0.04];
         for (one, wanted) in found.iter().zip(wanted) {
@@ -209,29 +185,30 @@ mod tests {
 
     #[test]
     fn scores_with_the_same_conclusion_share_a_sentence() {
-        let found = [
+        let mut found = [
             difference(Score::Ssim, 0.1, Some(0.001)),
             difference(Score::Iou, 0.01, Some(0.3)),
             difference(Score::Dice, 0.1, Some(0.001)),
         ];
+        conclude(&mut found, ResamplingUnit::Pair);
         assert_eq!(
-            conclusions(&compare_scores(&found, ResamplingUnit::Pair)),
+            conclusions(&found),
             [
                 "Ensemble v. Pixel density: Ensemble is significantly higher (SSIM, Dice); no significant difference \
                  (IoU)."
             ]
         );
-        let few = difference(Score::Iou, 0.1, None);
-        let few = compare_scores(&[few], ResamplingUnit::Block);
+        let mut few = [difference(Score::Iou, 0.1, None)];
+        conclude(&mut few, ResamplingUnit::Block);
         assert_eq!(few[0].p_holm, None);
         assert_eq!(few[0].conclusion, "too few blocks for a test");
     }
 
     #[test]
     fn equal_scores_are_called_equal() {
-        let mut same = difference(Score::Dice, 0.0, Some(1.0));
-        same.ci95 = Some([0.0; 2]);
-        let found = compare_scores(&[same], ResamplingUnit::Pair);
-        assert_eq!(found[0].conclusion, "equal on all pairs");
+        let mut same = [difference(Score::Dice, 0.0, Some(1.0))];
+        same[0].ci95 = Some([0.0; 2]);
+        conclude(&mut same, ResamplingUnit::Pair);
+        assert_eq!(same[0].conclusion, "equal on all pairs");
     }
 }

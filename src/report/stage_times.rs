@@ -1,9 +1,8 @@
-//! Computing times of the stages, over the pairs whose current results they made.
+//! Computing times of the stages, over the current results.
 
 use serde::Serialize;
 
 use super::stats::{median, quantile};
-use crate::catalog::StageRecord;
 use crate::domain::Stage;
 
 /// Computing times of one stage.
@@ -21,53 +20,32 @@ pub struct StageTimes {
     pub total_s: f64,
 }
 
-/// Computing times by stage, milliseconds.
-#[derive(Debug, Clone, Default)]
-pub(super) struct StageTimeSamples([Vec<f64>; Stage::ALL.len()]);
-
-impl StageTimeSamples {
-    /// Counts the stages of one pair.
-    pub(super) fn add(&mut self, stages: &[StageRecord]) {
-        for record in stages {
-            self.0[record.stage.index()].push(record.ms as f64);
-        }
-    }
-
-    /// Returns the times of every stage that has results, in order.
-    pub(super) fn finish(self) -> Vec<StageTimes> {
-        let by_stage = Stage::ALL.into_iter().zip(self.0);
-        by_stage
-            .filter_map(|(stage, mut ms)| {
-                Some(StageTimes {
-                    stage,
-                    n: ms.len() as u64,
-                    median_ms: median(&mut ms)?,
-                    p95_ms: quantile(&mut ms, 0.95)?,
-                    total_s: ms.iter().sum::<f64>() / 1000.0,
-                })
-            })
-            .collect()
+impl StageTimes {
+    /// Returns the times of a stage from those of its results, milliseconds; `None` without results.
+    pub(super) fn of(stage: Stage, ms: &mut [f64]) -> Option<Self> {
+        Some(Self {
+            stage,
+            n: ms.len() as u64,
+            median_ms: median(ms)?,
+            p95_ms: quantile(ms, 0.95)?,
+            total_s: ms.iter().sum::<f64>() / 1000.0,
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::StageTimeSamples;
+    use super::StageTimes;
     use crate::domain::Stage;
-    use crate::report::test_fixtures;
 
     #[test]
     fn a_stage_has_its_median_its_tail_and_its_sum() {
-        let mut times = StageTimeSamples::default();
-        for ms in [10, 20, 30, 40, 100] {
-            times.add(&[test_fixtures::stage(Stage::Depth, ms)]);
-        }
-        times.add(&[]);
-        let found = times.finish();
-        assert_eq!(found.len(), 1);
-        assert_eq!((found[0].stage, found[0].n), (Stage::Depth, 5));
-        assert_eq!((found[0].median_ms, found[0].total_s), (30.0, 0.2));
+        let mut ms = [100.0, 10.0, 20.0, 30.0, 40.0];
+        let found = StageTimes::of(Stage::Depth, &mut ms).expect("five results");
+        assert_eq!((found.stage, found.n), (Stage::Depth, 5));
+        assert_eq!((found.median_ms, found.total_s), (30.0, 0.2));
         // NumPy 2 `quantile([10, 20, 30, 40, 100], 0.95)`.
-        assert!((found[0].p95_ms - 88.0).abs() < 1e-9, "{}", found[0].p95_ms);
+        assert!((found.p95_ms - 88.0).abs() < 1e-9, "{}", found.p95_ms);
+        assert_eq!(StageTimes::of(Stage::Depth, &mut []), None);
     }
 }

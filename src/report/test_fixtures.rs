@@ -14,35 +14,16 @@ use super::truth_evaluation::TruthEvaluation;
 use crate::catalog::{
     MetricRecord, PairAttributes, PairResults, ReviewerVerdict, StageRecord, StoredFailure,
 };
+use crate::domain::test_values::metric_outcome;
 use crate::domain::{
-    Affine2, ContentHash, Failure, FailureClass, JobStatus, MetricOutcome, PairName, Reason,
-    Scores, Stage, ThresholdMetric, Verdict,
+    ContentHash, Failure, FailureClass, JobStatus, PairName, Reason, Stage, ThresholdMetric,
+    Verdict,
 };
 
 /// Returns a result with an IoU and the matching Dice; the verdicts are of reviewers `r0`, `r1`, ...
 pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) -> MetricRecord {
     MetricRecord {
-        outcome: MetricOutcome {
-            metric,
-            threshold_level: 30_000,
-            threshold_depth: -0.25,
-            print_from_depth: Affine2::similarity(0.5, 0.1, [3.0, 4.0]),
-            angle_deg: 0.1_f64.to_degrees(),
-            scale: 0.5,
-            shift_px: [1.5, -2.5],
-            scores: Scores {
-                ssim: 0.81,
-                nl_ssim: 0.82,
-                iou,
-                iou_box: 0.9,
-                dice: 2.0 * iou / (1.0 + iou),
-                density_print: 0.2,
-                density_depth: 0.21,
-            },
-            margin: 0.3,
-            confidence: None,
-            at_bound: false,
-        },
+        outcome: metric_outcome(metric, iou),
         result_hash: ContentHash::of(metric.name().as_bytes()),
         verdicts: verdicts
             .iter()

@@ -3,7 +3,6 @@
 use serde::Serialize;
 
 use super::stats::{median, quantile};
-use crate::catalog::PairResults;
 use crate::domain::ThresholdMetric;
 
 /// Equal bins of a distribution.
@@ -28,75 +27,47 @@ pub struct ThresholdDistribution {
     pub bins: Vec<u64>,
 }
 
-/// Relative heights of the thresholds, by metric.
-#[derive(Debug, Clone, Default)]
-pub(super) struct ThresholdSamples([Vec<f64>; ThresholdMetric::ALL.len()]);
-
-impl ThresholdSamples {
-    /// Counts the results of one pair.
-    pub(super) fn add(&mut self, pair: &PairResults) {
-        for (heights, metric) in self.0.iter_mut().zip(ThresholdMetric::ALL) {
-            let found = pair.metric(metric);
-            heights.extend(found.map(|record| height(record.outcome.threshold_level)));
+impl ThresholdDistribution {
+    /// Returns the distribution of a metric's thresholds, given as relative heights; `None` without any.
+    pub(super) fn of(metric: ThresholdMetric, heights: &mut [f64]) -> Option<Self> {
+        let mut bins = vec![0; BINS];
+        for height in heights.iter() {
+            bins[((height * BINS as f64) as usize).min(BINS - 1)] += 1;
         }
-    }
-
-    /// Returns the distribution of every metric that has results.
-    pub(super) fn finish(self) -> Vec<ThresholdDistribution> {
-        let by_metric = ThresholdMetric::ALL.into_iter().zip(self.0);
-        by_metric
-            .filter_map(|(metric, mut heights)| {
-                Some(ThresholdDistribution {
-                    metric,
-                    n: heights.len() as u64,
-                    p5: quantile(&mut heights, 0.05)?,
-                    median: median(&mut heights)?,
-                    p95: quantile(&mut heights, 0.95)?,
-                    bins: histogram(&heights),
-                })
-            })
-            .collect()
+        Some(Self {
+            metric,
+            n: heights.len() as u64,
+            p5: quantile(heights, 0.05)?,
+            median: median(heights)?,
+            p95: quantile(heights, 0.95)?,
+            bins,
+        })
     }
 }
 
 /// Returns the relative height of a depth-map level; level 1 is the lowest, 0 holds no data.
-fn height(level: u16) -> f64 {
+pub(super) fn relative_height(level: u16) -> f64 {
     f64::from(level.saturating_sub(1)) / LEVELS
-}
-
-fn histogram(heights: &[f64]) -> Vec<u64> {
-    let mut bins = vec![0; BINS];
-    for height in heights {
-        bins[((height * BINS as f64) as usize).min(BINS - 1)] += 1;
-    }
-    bins
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{ThresholdSamples, height};
+    use super::{ThresholdDistribution, relative_height};
     use crate::domain::ThresholdMetric;
-    use crate::report::test_fixtures;
 
     #[test]
     fn levels_span_the_heights_of_a_map() {
-        assert_eq!([1, 65_535].map(height), [0.0, 1.0]);
+        assert_eq!([1, 65_535].map(relative_height), [0.0, 1.0]);
     }
 
     #[test]
     fn every_threshold_is_in_one_bin_even_at_the_ends() {
-        let mut samples = ThresholdSamples::default();
-        for (name, level) in [("a", 1), ("b", 32_768), ("c", 65_535)] {
-            let mut pair = test_fixtures::done(name, 0.8, &[]);
-            pair.metrics.truncate(1);
-            pair.metrics[0].outcome.threshold_level = level;
-            samples.add(&pair);
-        }
-        let found = samples.finish();
-        assert_eq!(found.len(), 1, "only one metric has results");
-        assert_eq!((found[0].metric, found[0].n), (ThresholdMetric::NlSsim, 3));
-        assert_eq!(found[0].median, 0.5);
-        let filled = found[0].bins.iter().enumerate().filter(|(_, n)| **n > 0);
+        let mut heights = [32_768, 1, 65_535].map(relative_height);
+        let found = ThresholdDistribution::of(ThresholdMetric::NlSsim, &mut heights);
+        let found = found.expect("three thresholds");
+        assert_eq!((found.metric, found.n), (ThresholdMetric::NlSsim, 3));
+        assert_eq!(found.median, 0.5);
+        let filled = found.bins.iter().enumerate().filter(|(_, n)| **n > 0);
         assert_eq!(filled.collect::<Vec<_>>(), [(0, &1), (20, &1), (39, &1)]);
     }
 }

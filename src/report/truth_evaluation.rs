@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 
 use super::ground_truth::{TruthError, TruthErrors, TruthRecord};
-use super::pair_artifacts::{PairArtifacts, PairArtifactsError, same_alignment};
-use crate::catalog::{MetricRecord, PairResults};
+use super::pair_artifacts::{PairArtifacts, PairArtifactsError, group_identical};
+use crate::catalog::PairResults;
 use crate::domain::{MetricOutcome, ThresholdMetric};
 use crate::raster::{self, DepthMap, Grid, ImageLimits, Mask, warp_mask};
 use crate::store::Project;
@@ -101,56 +101,33 @@ fn errors_by_metric(
 ) -> Result<BTreeMap<ThresholdMetric, TruthErrors>, EvaluationError> {
     let (record, artifacts) = (TruthRecord::read(truth)?, PairArtifacts::new(project, pair));
     let tops = match &record.tops_mask {
-        Some(path) => Some(TrueTops::read(project, path, &artifacts)?),
+        Some(path) => Some(read_tops_and_depth(project, path, &artifacts)?),
         None => None,
     };
     let mut by_metric = BTreeMap::new();
-    let mut measured: Vec<&MetricRecord> = Vec::new();
-    for found in &pair.metrics {
-        let outcome = &found.outcome;
-        // Metrics with the same alignment have the same errors, so the mask is warped once.
-        let mut same = measured.iter();
-        let same = same.find(|other| same_alignment(&other.outcome, outcome));
-        let known = same.and_then(|same| by_metric.get(&same.outcome.metric));
-        let errors = match known {
-            Some(errors) => *errors,
-            None => measure(&record, &artifacts, tops.as_ref(), outcome)?,
-        };
-        by_metric.insert(outcome.metric, errors);
-        measured.push(found);
+    // Metrics with the same alignment have the same errors, so the mask is warped once.
+    for group in group_identical(&pair.metrics) {
+        let outcome = &group[0].outcome;
+        let found = artifacts.print_from_mesh(&outcome.print_from_depth)?;
+        let iou = tops
+            .as_ref()
+            .map(|(tops, depth)| tops_iou(depth, outcome, tops));
+        let errors = record.measure(&found, iou)?;
+        by_metric.extend(group.iter().map(|same| (same.outcome.metric, errors)));
     }
     Ok(by_metric)
 }
 
-fn measure(
-    record: &TruthRecord,
+/// Reads the true stroke tops of a pair, and the depth map to compare with them.
+fn read_tops_and_depth(
+    project: &Project,
+    path: &str,
     artifacts: &PairArtifacts<'_>,
-    tops: Option<&TrueTops>,
-    outcome: &MetricOutcome,
-) -> Result<TruthErrors, EvaluationError> {
-    let found = artifacts.print_from_mesh(&outcome.print_from_depth)?;
-    let iou = tops.map(|tops| tops_iou(&tops.depth, outcome, &tops.tops));
-    Ok(record.measure(&found, iou)?)
-}
-
-/// The true stroke tops of a pair, and the depth map to compare with them.
-struct TrueTops {
-    tops: Grid<u8>,
-    depth: DepthMap,
-}
-
-impl TrueTops {
-    fn read(
-        project: &Project,
-        path: &str,
-        artifacts: &PairArtifacts<'_>,
-    ) -> Result<Self, EvaluationError> {
-        let print = artifacts.print_mask()?;
-        let tops = read_tops(project, path)?;
-        check_size(&tops, [print.width(), print.height()])?;
-        let depth = artifacts.depth()?;
-        Ok(Self { tops, depth })
-    }
+) -> Result<(Grid<u8>, DepthMap), EvaluationError> {
+    let print = artifacts.print_mask()?;
+    let tops = read_tops(project, path)?;
+    check_size(&tops, [print.width(), print.height()])?;
+    Ok((tops, artifacts.depth()?))
 }
 
 /// Reads the grey values of a tops mask, whatever its image format.

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::ground_truth::{MAX_ANGLE_DEG, TruthErrors};
-use super::stats::{IntervalMethod, median, ratio};
+use super::stats::{Rate, median};
 
 /// A metric's errors against ground truth; never mixed with verdicts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,45 +28,31 @@ pub struct TruthSummary {
     pub mirrored: u64,
 }
 
-/// The errors of one metric's results.
-#[derive(Debug, Clone, Default)]
-pub(super) struct TruthSums(Vec<TruthErrors>);
-
-impl TruthSums {
-    /// Counts one result.
-    pub(super) fn add(&mut self, errors: &TruthErrors) {
-        self.0.push(*errors);
-    }
-
-    /// Returns the summary; `None` without any result.
-    pub(super) fn finish(self) -> Option<TruthSummary> {
-        let n = self.0.len() as u64;
-        let count = |is: fn(&TruthErrors) -> bool| {
-            let found = self.0.iter().filter(|errors| is(errors));
-            found.count() as u64
-        };
+impl TruthSummary {
+    /// Returns the summary of one metric's errors; `None` without any.
+    pub(super) fn of(found: &[TruthErrors]) -> Option<Self> {
+        let rate = |is: fn(&TruthErrors) -> bool| Rate::of(found.iter().map(is));
         let median_of = |value: fn(&TruthErrors) -> Option<f64>| {
-            median(&mut self.0.iter().filter_map(value).collect::<Vec<_>>())
+            median(&mut found.iter().filter_map(value).collect::<Vec<_>>())
         };
-        let passed = count(TruthErrors::pass);
-        let angle_right = count(|errors| errors.angle_deg <= MAX_ANGLE_DEG);
-        (n > 0).then(|| TruthSummary {
-            n,
-            passed,
-            acc: ratio(passed as f64, n),
-            acc_ci95: IntervalMethod::Wilson.interval_95(passed, n),
-            angle_le_5deg: ratio(angle_right as f64, n),
+        let acc = rate(TruthErrors::pass);
+        (acc.n > 0).then(|| Self {
+            n: acc.n,
+            passed: acc.count,
+            acc: acc.share,
+            acc_ci95: acc.ci95,
+            angle_le_5deg: rate(|errors| errors.angle_deg <= MAX_ANGLE_DEG).share,
             angle_median_deg: median_of(|errors| Some(errors.angle_deg)),
             tre_median_pct: median_of(|errors| Some(errors.tre_pct)),
             mask_iou_median: median_of(|errors| errors.mask_iou),
-            mirrored: count(|errors| errors.mirrored),
+            mirrored: rate(|errors| errors.mirrored).count,
         })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{TruthErrors, TruthSums};
+    use super::{TruthErrors, TruthSummary};
 
     #[test]
     fn summary_has_shares_and_medians() {
@@ -76,20 +62,17 @@ mod tests {
             tre_pct,
             mask_iou: Some(mask_iou),
         };
-        let mut sums = TruthSums::default();
-        for result in [
+        let results = [
             errors(1.0, 2.0, 0.9),
             errors(9.0, 2.0, 0.9),
             errors(3.0, 4.0, 0.6),
-        ] {
-            sums.add(&result);
-        }
-        let found = sums.finish().expect("three results");
+        ];
+        let found = TruthSummary::of(&results).expect("three results");
         assert_eq!((found.n, found.passed, found.mirrored), (3, 1, 0));
         assert_eq!(found.angle_le_5deg, Some(2.0 / 3.0));
         assert_eq!(found.angle_median_deg, Some(3.0));
         assert_eq!(found.tre_median_pct, Some(2.0));
         assert_eq!(found.mask_iou_median, Some(0.9));
-        assert_eq!(TruthSums::default().finish(), None);
+        assert_eq!(TruthSummary::of(&[]), None);
     }
 }

@@ -1,7 +1,7 @@
 //! Tables of metrics compared with each other, and of bootstrap intervals.
 
 use super::table::Table;
-use crate::report::comparison::Comparison;
+use crate::report::comparison::{Comparison, versus};
 use crate::report::model::Report;
 use crate::report::number_format::NumberStyle::Share;
 use crate::report::number_format::{format_count, format_number};
@@ -14,7 +14,7 @@ type MeanIntervalField = fn(&MeanIntervals) -> Option<[f64; 2]>;
 pub(super) fn comparisons(report: &Report) -> Option<Table> {
     let test = report.comparisons.first()?.test;
     let table = Table::of(&report.comparisons)
-        .text("Comparison", |found| title(found))
+        .text("Comparison", |found| versus(found.a, found.b))
         .text("by", |found| found.basis.name())
         .count("n", |found| found.n)
         .count("first only", |found| found.a_only)
@@ -29,15 +29,10 @@ pub(super) fn comparisons(report: &Report) -> Option<Table> {
 /// Returns a sentence or two on each comparison.
 pub(super) fn comparison_sentences(report: &Report) -> Vec<String> {
     let sentence = |found: &Comparison| {
-        let (title, basis) = (title(found), found.basis.name());
-        format!("{title}, by {basis}: {}", found.conclusion)
+        let (metrics, basis) = (versus(found.a, found.b), found.basis.name());
+        format!("{metrics}, by {basis}: {}", found.conclusion)
     };
     report.comparisons.iter().map(sentence).collect()
-}
-
-/// Returns the two metrics of a comparison.
-fn title(comparison: &Comparison) -> String {
-    format!("{} v. {}", comparison.a.title(), comparison.b.title())
 }
 
 /// Returns the bootstrap intervals of the means, and of Acc where whole blocks are resampled; `None` without any.
@@ -80,16 +75,12 @@ fn method(settings: &BootstrapSettings) -> String {
 /// Returns the comparisons by score; `None` without any interval, where a warning replaces a table of dashes.
 pub(super) fn score_comparisons(report: &Report) -> Option<Table> {
     let settings = report.bootstrap.as_ref()?;
-    let has_interval = report
-        .score_comparisons
-        .iter()
-        .any(|found| found.ci95.is_some());
+    let mut compared = report.score_comparisons.iter();
+    let has_interval = compared.any(|found| found.ci95.is_some());
     let bounds = |bounds: [f64; 2]| bounds.map(|bound| format_number(bound, Share)).join(", ");
     has_interval.then(|| {
         Table::of(&report.score_comparisons)
-            .text("Scores compared", |found| {
-                format!("{} v. {}", found.a.title(), found.b.title())
-            })
+            .text("Scores compared", |found| versus(found.a, found.b))
             .text("by", |found| found.score.title())
             .share("diff.", |found| Some(found.difference))
             .optional_text("95% bootstrap", |found| found.ci95.map(bounds))

@@ -1,4 +1,4 @@
-//! The report as CSV (RFC 4180): one line a metric, numbers with all digits.
+//! The report as CSV (RFC 4180): one line per metric, numbers with all digits.
 
 use serde_json::{Value, json};
 
@@ -7,24 +7,26 @@ use crate::report::comparison::Basis;
 use crate::report::model::{MetricRow, Report};
 use crate::report::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT};
 
-/// A column: its name, and the JSON pointer of its value in [`document`].
-struct CsvField {
-    name: String,
-    pointer: String,
-}
+/// The columns: the name of each, and the JSON pointer of its value in [`document`].
+#[derive(Default)]
+struct CsvColumns(Vec<[String; 2]>);
 
 /// Returns the report as CSV. A value that does not exist is an empty field.
 pub(super) fn render(report: &Report) -> String {
-    let columns = columns();
-    let mut text = line(columns.iter().map(|column| escape(&column.name)));
+    let CsvColumns(columns) = columns();
+    let mut text = line(columns.iter().map(|[name, _]| escape(name)));
     for row in &report.rows {
         let document = document(report, row);
-        text += &line(columns.iter().map(|column| field(&document, column)));
+        text += &line(
+            columns
+                .iter()
+                .map(|[_, pointer]| field(document.pointer(pointer))),
+        );
     }
     text
 }
 
-/// Returns a row's JSON with what the report holds elsewhere of its metric.
+/// Returns a row as JSON, with the values of its metric from other parts of the report.
 fn document(report: &Report, row: &MetricRow) -> Value {
     let mut value = serde_json::to_value(row).expect("a row is JSON");
     let truth_ci95 = row.truth.as_ref().and_then(|truth| truth.acc_ci95);
@@ -35,177 +37,97 @@ fn document(report: &Report, row: &MetricRow) -> Value {
     value["bootstrap_by"] = json!(bootstrap.map(|settings| settings.by.plural()));
     let mut thresholds = report.thresholds.iter();
     value["thresholds"] = json!(thresholds.find(|found| found.metric == row.metric));
-    for (key, basis) in [
-        ("verdict_curve", Basis::Verdicts),
-        ("truth_curve", Basis::Truth),
-    ] {
-        value[key] = json!(report.risk_coverage(basis, row.metric));
-    }
+    value["verdict_curve"] = json!(report.risk_coverage(Basis::Verdicts, row.metric));
+    value["truth_curve"] = json!(report.risk_coverage(Basis::Truth, row.metric));
     if row.judged > 0 {
-        for reason in reasons() {
-            value["reasons"][reason_name(reason)] = json!(row.failed_for(reason));
+        for (reason, name) in reasons() {
+            value["reasons"][name] = json!(row.failed_for(reason));
         }
     }
     value
 }
 
-fn reasons() -> impl Iterator<Item = Option<Reason>> {
-    Reason::ALL.into_iter().map(Some).chain([None])
-}
-
-fn reason_name(reason: Option<Reason>) -> &'static str {
-    reason.map_or("no_reason", Reason::name)
+/// Returns every reason with its name, and `no_reason` last.
+fn reasons() -> impl Iterator<Item = (Option<Reason>, &'static str)> {
+    let named = Reason::ALL.map(|reason| (Some(reason), reason.name()));
+    named.into_iter().chain([(None, "no_reason")])
 }
 
 /// Returns the columns in their order.
-fn columns() -> Vec<CsvField> {
-    let mut columns = Vec::new();
-    let fields = [
-        "metric",
-        "n",
-        "judged",
-        "passed",
-        "failed",
-        "unsure",
-        "conflicts",
-        "stale",
-        "acc",
-        "acc_ci95",
-        "ssim",
-        "nl_ssim",
-        "iou",
-        "iou_box",
-        "dice",
-    ];
-    push_all(&mut columns, "", "", &fields);
-    let fields = [
-        "n",
-        "passed",
-        "acc",
-        "acc_ci95",
-        "angle_le_5deg",
-        "angle_median_deg",
-        "tre_median_pct",
-        "mask_iou_median",
-        "mirrored",
-    ];
-    push_all(&mut columns, "truth_", "/truth", &fields);
-    push_all(&mut columns, "", "", &["interval"]);
-    push_risk_coverage(&mut columns, "", "/verdict_curve");
-    push_risk_coverage(&mut columns, "truth_", "/truth_curve");
-    push_all(&mut columns, "rules_", "/rules", &["double_read"]);
-    for rule in ["either_fails", "adjudicated", "both_fail"] {
-        let pointer = |field: &str| format!("/rules/{rule}/{field}");
-        push(&mut columns, format!("{rule}_n"), pointer("n"));
-        push(&mut columns, format!("{rule}_acc"), pointer("share"));
-        push(&mut columns, format!("{rule}_acc_ci95"), pointer("ci95"));
-    }
-    for reason in reasons().map(reason_name) {
-        push(
-            &mut columns,
-            format!("failed_{reason}"),
-            format!("/reasons/{reason}"),
-        );
-    }
-    push_all(
-        &mut columns,
-        "threshold_",
-        "/thresholds",
-        &["p5", "median", "p95"],
+fn columns() -> CsvColumns {
+    let mut columns = CsvColumns::default();
+    columns.add(
+        "",
+        "",
+        "metric n judged passed failed unsure conflicts stale acc acc_ci95 ssim nl_ssim iou iou_box dice",
     );
-    for mean in ["ssim", "iou", "iou_box", "dice", "acc_by_block"] {
-        push(
-            &mut columns,
-            format!("{mean}_ci95"),
-            format!("/means_ci95/{mean}"),
-        );
+    columns.add(
+        "truth_",
+        "/truth",
+        "n passed acc acc_ci95 angle_le_5deg angle_median_deg tre_median_pct mask_iou_median mirrored",
+    );
+    columns.add("", "", "interval");
+    columns.add_risk_coverage("", "/verdict_curve");
+    columns.add_risk_coverage("truth_", "/truth_curve");
+    columns.add("rules_", "/rules", "double_read");
+    for rule in ["either_fails", "adjudicated", "both_fail"] {
+        let fields = "n acc=share acc_ci95=ci95";
+        columns.add(&format!("{rule}_"), &format!("/rules/{rule}"), fields);
     }
-    push_all(&mut columns, "", "", &["bootstrap_by"]);
-    let fields = [
-        "n",
-        "angle_le_5deg",
-        "angle_median_deg",
-        "angle_p95_deg",
-        "shift_median_pct",
-        "shift_p95_pct",
-        "scale_median_pct",
-        "scale_p95_pct",
-        "mirrored",
-    ];
-    push_all(
-        &mut columns,
+    for (_, reason) in reasons() {
+        columns.add("failed_", "/reasons", reason);
+    }
+    columns.add("threshold_", "/thresholds", "p5 median p95");
+    for mean in ["ssim", "iou", "iou_box", "dice", "acc_by_block"] {
+        columns.add("", "/means_ci95", &format!("{mean}_ci95={mean}"));
+    }
+    columns.add("", "", "bootstrap_by");
+    columns.add(
         "manual_alignment_",
         "/manual_alignment",
-        &fields,
+        "n angle_le_5deg angle_median_deg angle_p95_deg shift_median_pct shift_p95_pct scale_median_pct scale_p95_pct \
+         mirrored",
     );
     columns
 }
 
-/// Adds the columns of a risk-coverage curve; `acc_at_97` is the Acc of the 97 % most confident results.
-fn push_risk_coverage(columns: &mut Vec<CsvField>, prefix: &str, parent: &str) {
-    let counts = [
-        ("n".to_owned(), "n"),
-        ("failures".to_owned(), "failures"),
-        (
-            format!("failures_in_least_{LEAST_CONFIDENT_PERCENT}"),
-            "failures_in_least",
-        ),
-    ];
-    for (name, field) in counts {
-        push(
-            columns,
-            format!("{prefix}confidence_{name}"),
-            format!("{parent}/{field}"),
-        );
+impl CsvColumns {
+    /// Adds the fields of the JSON object at `parent`, each as `field` or `name=field`. A name that ends with `ci95` has
+    /// two columns for its bounds.
+    fn add(&mut self, prefix: &str, parent: &str, fields: &str) {
+        for field in fields.split_whitespace() {
+            let (name, field) = field.split_once('=').unwrap_or((field, field));
+            let (name, pointer) = (format!("{prefix}{name}"), format!("{parent}/{field}"));
+            if name.ends_with("ci95") {
+                self.0.push([format!("{name}_low"), format!("{pointer}/0")]);
+                self.0
+                    .push([format!("{name}_high"), format!("{pointer}/1")]);
+            } else {
+                self.0.push([name, pointer]);
+            }
+        }
     }
-    for (i, percent) in COVERAGE_PERCENT.into_iter().enumerate() {
-        let pointer = |field: &str| format!("{parent}/points/{i}/{field}");
-        push(columns, format!("{prefix}acc_at_{percent}"), pointer("acc"));
-        push(
-            columns,
-            format!("{prefix}acc_at_{percent}_ci95"),
-            pointer("acc_ci95"),
-        );
-        push(
-            columns,
-            format!("{prefix}least_confidence_at_{percent}"),
-            pointer("least_confidence"),
-        );
+
+    /// Adds the columns of a risk-coverage curve; `acc_at_97` is the Acc of the 97 % most confident results.
+    fn add_risk_coverage(&mut self, prefix: &str, parent: &str) {
+        let least = format!("failures_in_least_{LEAST_CONFIDENT_PERCENT}=failures_in_least");
+        let fields = format!("n failures {least}");
+        self.add(&format!("{prefix}confidence_"), parent, &fields);
+        for (i, at) in COVERAGE_PERCENT.into_iter().enumerate() {
+            let acc = format!("acc_at_{at}=acc acc_at_{at}_ci95=acc_ci95");
+            let fields = format!("{acc} least_confidence_at_{at}=least_confidence");
+            self.add(prefix, &format!("{parent}/points/{i}"), &fields);
+        }
     }
 }
 
-/// Adds the fields of one JSON object.
-fn push_all(columns: &mut Vec<CsvField>, prefix: &str, parent: &str, fields: &[&str]) {
-    for field in fields {
-        push(
-            columns,
-            format!("{prefix}{field}"),
-            format!("{parent}/{field}"),
-        );
-    }
-}
-
-/// Adds a column, or two for the bounds of an interval.
-fn push(columns: &mut Vec<CsvField>, name: String, pointer: String) {
-    if !name.ends_with("ci95") {
-        columns.push(CsvField { name, pointer });
-        return;
-    }
-    for (i, bound) in ["low", "high"].into_iter().enumerate() {
-        columns.push(CsvField {
-            name: format!("{name}_{bound}"),
-            pointer: format!("{pointer}/{i}"),
-        });
-    }
-}
-
-fn field(document: &Value, column: &CsvField) -> String {
-    match document.pointer(&column.pointer) {
+fn field(value: Option<&Value>) -> String {
+    match value {
         Some(Value::String(text)) => escape(text),
+        // Display of f64 has no exponent, unlike JSON.
         Some(Value::Number(number)) => match (number.as_u64(), number.as_f64()) {
-            (Some(count), _) => count.to_string(),
             (None, Some(number)) => number.to_string(),
-            (None, None) => number.to_string(),
+            (Some(_), _) | (None, None) => number.to_string(),
         },
         Some(Value::Null | Value::Bool(_) | Value::Array(_) | Value::Object(_)) | None => {
             String::new()
@@ -215,11 +137,8 @@ fn field(document: &Value, column: &CsvField) -> String {
 
 /// Returns a text field: quoted where needed, with `'` before what a spreadsheet would take for a formula.
 fn escape(text: &str) -> String {
-    let guarded = if text.starts_with(['=', '+', '-', '@', '\t', '\r']) {
-        format!("'{text}")
-    } else {
-        text.to_owned()
-    };
+    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    let guarded = if is_formula { "'" } else { "" }.to_owned() + text;
     if guarded.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", guarded.replace('"', "\"\""))
     } else {

@@ -3,7 +3,7 @@
 use super::comparison_tables::{comparison_sentences, comparisons, score_comparisons};
 use super::report_tables::{headline, tables};
 use super::risk_coverage_tables::full_tables;
-use super::table::{ColumnFormat, Table, TableColumn};
+use super::table::{ColumnFormat, Table};
 use crate::report::model::{FailureGroup, Report};
 use crate::report::number_format::format_count;
 use crate::report::score_comparison::conclusions;
@@ -31,29 +31,22 @@ pub(super) fn render(report: &Report) -> String {
 
 fn list(sentences: &[String]) -> String {
     let items = sentences.iter();
-    let items: Vec<String> = items.map(|text| format!("- {}\n", escape(text))).collect();
-    items.concat()
+    let items = items.map(|text| format!("- {}\n", escape(text)));
+    items.collect::<Vec<_>>().concat()
 }
 
 fn with_caption(table: &Table) -> [String; 2] {
     let headers = table.columns.iter().map(|column| escape(column.header));
-    let delimiters = table
-        .columns
-        .iter()
-        .map(|column| delimiter(column).to_owned());
+    let delimiters = table.columns.iter().map(|column| match column.format {
+        ColumnFormat::Text | ColumnFormat::Interval => "---".to_owned(),
+        ColumnFormat::Number(_) => "---:".to_owned(),
+    });
     let mut text = line(headers) + &line(delimiters);
     for row in &table.rows {
         let cells = row.iter().map(Option::as_deref);
         text += &line(cells.map(|cell| cell.map_or("–".to_owned(), escape)));
     }
     [text, format!("{}\n", escape(&table.caption))]
-}
-
-const fn delimiter(column: &TableColumn) -> &'static str {
-    match column.format {
-        ColumnFormat::Text | ColumnFormat::Interval => "---",
-        ColumnFormat::Number(_) => "---:",
-    }
 }
 
 fn line(cells: impl Iterator<Item = String>) -> String {
@@ -75,18 +68,12 @@ fn failures(group: &FailureGroup) -> String {
 
 /// Escapes text so that Markdown shows it unchanged, on one line.
 fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '\\' | '`' | '*' | '_' | '|' | '<' | '>' | '[' | ']' | '#' | '~' => {
-                escaped.push('\\');
-                escaped.push(c);
-            }
-            '\n' | '\r' => escaped.push(' '),
-            other => escaped.push(other),
-        }
-    }
-    escaped
+    let escape = |c| match c {
+        '\\' | '`' | '*' | '_' | '|' | '<' | '>' | '[' | ']' | '#' | '~' => format!("\\{c}"),
+        '\n' | '\r' => " ".to_owned(),
+        other => other.to_string(),
+    };
+    text.chars().map(escape).collect()
 }
 
 #[cfg(test)]

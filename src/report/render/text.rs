@@ -11,7 +11,7 @@ use crate::report::score_comparison::conclusions;
 
 /// Columns of the terminal.
 const WIDTH: usize = 80;
-/// Failed pairs listed a class.
+/// Most failed pairs that are listed per class.
 const MAX_LISTED: usize = 5;
 
 /// Returns the report as aligned text.
@@ -108,23 +108,17 @@ fn failures(group: &FailureGroup) -> String {
 
 /// Breaks a text into lines; the first begins with `mark`, the others are indented as far.
 pub(super) fn wrapped(mark: &str, text: &str) -> String {
-    let indent = " ".repeat(mark.chars().count());
-    let (mut lines, mut line) = (String::new(), mark.to_owned());
-    let mut is_empty = true;
+    let indent = mark.chars().count();
+    let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
-        let width = line.chars().count() + usize::from(!is_empty) + word.chars().count();
-        if !is_empty && width > WIDTH {
-            lines = lines + &line + "\n";
-            line.clone_from(&indent);
-            is_empty = true;
+        let width = |line: &String| indent + line.chars().count() + 1 + word.chars().count();
+        match lines.last_mut() {
+            Some(line) if width(line) <= WIDTH => *line = format!("{line} {word}"),
+            Some(_) | None => lines.push(word.to_owned()),
         }
-        if !is_empty {
-            line.push(' ');
-        }
-        line.push_str(word);
-        is_empty = false;
     }
-    lines + &line + "\n"
+    let break_and_indent = format!("\n{}", " ".repeat(indent));
+    format!("{mark}{}\n", lines.join(&break_and_indent))
 }
 
 #[cfg(test)]

@@ -2,8 +2,8 @@
 
 /// Returns P(X <= `count`) for X binomial with `n` trials of success probability `p`, in 0..=1.
 ///
-/// `p` lies strictly between 0 and 1, and `count` is at most `n`. The relative error is that of rounding in the lower
-/// tail; above the mean the upper tail is subtracted from 1.
+/// `p` lies strictly between 0 and 1, and `count` is at most `n`. Up to the mean, terms of the lower tail are added, so
+/// the relative error is at rounding level; above the mean the upper tail is subtracted from 1.
 ///
 /// ```
 /// use mocban::report::stats::binomial_cdf;

@@ -14,7 +14,7 @@ pub const BOOTSTRAP_SEED: u64 = 1;
 const MAX_RESAMPLES: usize = 10_000;
 /// Fewest resamples, however many units there are.
 const MIN_RESAMPLES: usize = 1000;
-/// Draws of units in all that limit the resamples of large samples to seconds of computing.
+/// Most draws in all resamples together, so that large samples take seconds.
 const MAX_DRAWS: usize = 50_000_000;
 /// Resamples that one thread adds up in one pass over the units.
 const STREAMS_PER_PASS: usize = 8;

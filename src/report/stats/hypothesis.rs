@@ -5,7 +5,7 @@ pub const SIGNIFICANCE_LEVEL: f64 = 0.05;
 
 /// Returns the p-values adjusted by Holm's step-down method, in the order given, each in 0..=1.
 ///
-/// The i-th smallest of m values is multiplied by m - i + 1; no adjusted value is below that of a smaller p.
+/// The i-th smallest of m values is multiplied by m - i + 1; adjusted values never decrease as p grows.
 /// Source: Holm 1979, <https://www.jstor.org/stable/4615733>.
 ///
 /// ```

@@ -1,6 +1,6 @@
 //! Statistics on plain numbers: intervals of proportions, paired tests, chance-corrected agreement, the bootstrap.
 //!
-//! Nothing here knows of the catalog, of metrics or verdicts. Intervals have a coverage of 95 %, tests are two-sided.
+//! Independent of the catalog, of metrics and of verdicts. Intervals have a coverage of 95 %, tests are two-sided.
 
 mod binomial;
 mod bootstrap;

@@ -15,7 +15,7 @@ pub fn ratio(sum: f64, n: u64) -> Option<f64> {
     (n > 0).then(|| sum / n as f64)
 }
 
-/// A count out of a total, with its proportion and the 95 % interval of that.
+/// A count out of a total, with its proportion and 95 % interval.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Rate {
     /// The total.
@@ -47,23 +47,21 @@ impl Rate {
         }
     }
 
-    /// Returns the same rate with its interval computed by `method`.
-    #[must_use]
-    pub fn with_interval(self, method: IntervalMethod) -> Self {
-        Self {
-            ci95: method.interval_95(self.count, self.n),
-            ..self
-        }
+    /// Computes the interval by `method`.
+    pub fn set_interval(&mut self, method: IntervalMethod) {
+        self.ci95 = method.interval_95(self.count, self.n);
+    }
+
+    /// Counts one outcome; the interval is Wilson's again.
+    pub fn add(&mut self, outcome: bool) {
+        *self = Self::new(self.count + u64::from(outcome), self.n + 1);
     }
 
     /// Returns the rate of `true` among the outcomes.
     pub fn of(outcomes: impl IntoIterator<Item = bool>) -> Self {
-        let (mut count, mut n) = (0, 0);
-        for outcome in outcomes {
-            n += 1;
-            count += u64::from(outcome);
-        }
-        Self::new(count, n)
+        let mut rate = Self::default();
+        outcomes.into_iter().for_each(|outcome| rate.add(outcome));
+        rate
     }
 
     /// Returns the rate over all of several samples.

@@ -53,7 +53,7 @@ impl ClusterSample {
         }
     }
 
-    /// Returns the sums of the unit an observation belongs to, to be added to: that of its cluster, or a new one.
+    /// Returns the sums to which an observation is added: those of its cluster, or of a new unit.
     ///
     /// Returns `None`, and marks the sample as full, when there would be more than [`MAX_UNITS`].
     pub fn unit(&mut self, cluster: Option<&str>) -> Option<&mut QuantitySums> {

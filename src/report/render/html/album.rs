@@ -1,9 +1,9 @@
-//! The images of the page, as many as there is room for.
+//! The images of the page, as many as fit.
 
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use maud::{Markup, PreEscaped, html};
 
-use crate::report::gallery::{Gallery, GalleryItem, GalleryReason};
+use crate::report::gallery::{Gallery, GalleryGroup, GalleryItem, GalleryReason};
 use crate::report::number_format::format_count;
 
 /// Descriptions of the three images of a result.
@@ -13,75 +13,54 @@ const LAYERS: [&str; 3] = [
     "edges of the relief's strokes over the print",
 ];
 
-/// The groups of images on the page.
-pub(super) struct Album {
-    seed: u64,
-    groups: Vec<AlbumGroup>,
+/// The images on the page.
+pub(super) struct Album<'a> {
+    gallery: &'a Gallery,
+    /// For each group of the gallery, the figures that fit.
+    figures: Vec<Vec<String>>,
 }
 
-struct AlbumGroup {
-    reason: GalleryReason,
-    total: u64,
-    figures: Vec<String>,
-}
-
-impl Album {
-    /// Returns as many images as fit into `room` bytes, taking one of each group in turn.
-    pub(super) fn new(gallery: &Gallery, room: usize) -> Self {
-        let empty = |reason, total| AlbumGroup {
-            reason,
-            total,
-            figures: Vec::new(),
-        };
-        let mut groups: Vec<AlbumGroup> = gallery
-            .groups
-            .iter()
-            .map(|group| empty(group.reason, group.total))
-            .collect();
-        let mut left = room;
+impl<'a> Album<'a> {
+    /// Returns as many images as fit into `max_bytes`, taking one of each group in turn.
+    pub(super) fn new(gallery: &'a Gallery, max_bytes: usize) -> Self {
+        let mut figures = vec![Vec::new(); gallery.groups.len()];
+        let mut left = max_bytes;
         let longest = gallery.groups.iter().map(|group| group.items.len()).max();
         for round in 0..longest.unwrap_or(0) {
-            for (shown, group) in groups.iter_mut().zip(&gallery.groups) {
+            for (shown, group) in figures.iter_mut().zip(&gallery.groups) {
                 let Some(item) = group.items.get(round).filter(|item| size(item) <= left) else {
                     continue;
                 };
                 let figure = figure(item).into_string();
                 if let Some(rest) = left.checked_sub(figure.len()) {
                     left = rest;
-                    shown.figures.push(figure);
+                    shown.push(figure);
                 }
             }
         }
-        Self {
-            seed: gallery.seed,
-            groups,
-        }
+        Self { gallery, figures }
     }
 
-    /// Returns whether there are no groups.
-    pub(super) const fn is_empty(&self) -> bool {
-        self.groups.is_empty()
-    }
-
-    /// Returns all groups with their introductions.
-    pub(super) fn body(&self) -> Markup {
-        html! {
+    /// Returns all groups with their introductions; `None` without groups.
+    pub(super) fn body(&self) -> Option<Markup> {
+        let groups = self.gallery.groups.iter().zip(&self.figures);
+        (!self.figures.is_empty()).then(|| html! {
             p { "Each result has three images: the print, the aligned relief lit from the side, and the print with the \
                 edges of the relief's strokes in orange. Results that look the same for several methods are shown once." }
-            @for group in &self.groups { (self.group(group)) }
-        }
+            @for (group, figures) in groups { (self.group(group, figures)) }
+        })
     }
 
-    fn group(&self, group: &AlbumGroup) -> Markup {
+    fn group(&self, group: &GalleryGroup, figures: &[String]) -> Markup {
         let (id, title, introduction) = texts(group.reason);
         html! {
             h3 id={ "images-" (id) } { (title) }
             p {
-                (introduction) " " (group.figures.len()) " of " (format_count(group.total)) " are shown"
-                @if group.reason == GalleryReason::Random { ", chosen at random with seed " (self.seed) }
+                (introduction) " " (figures.len()) " of " (format_count(group.total)) " are shown"
+                @if group.reason == GalleryReason::Random { ", chosen at random with seed " (self.gallery.seed) }
                 "."
             }
-            ul.items { @for figure in &group.figures { li { (PreEscaped(figure)) } } }
+            ul.items { @for figure in figures { li { (PreEscaped(figure)) } } }
         }
     }
 }
@@ -112,7 +91,7 @@ const fn texts(reason: GalleryReason) -> (&'static str, &'static str, &'static s
     }
 }
 
-/// Returns the least number of bytes that the images of a result take as base64.
+/// Returns the size of a result's images as base64, bytes.
 fn size(item: &GalleryItem) -> usize {
     let images = item.images.iter().flatten();
     images.map(|image| image.len().div_ceil(3) * 4).sum()

@@ -20,7 +20,7 @@ const STYLE: &str = include_str!("../../../../assets/report/report.css");
 /// Forbids the page to load or run anything.
 const POLICY: &str = "default-src 'none'; img-src data:; style-src 'unsafe-inline'";
 
-/// What the page shows besides the report.
+/// Texts of the page besides the report.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Cover {
     /// Name of the project.
@@ -29,16 +29,16 @@ pub struct Cover {
     pub date: Option<String>,
 }
 
-/// Returns the page, at most [`MAX_PAGE_BYTES`] long: with too many images it shows fewer and says of how many.
+/// Returns the page, at most [`MAX_PAGE_BYTES`] long; images that do not fit are left out and counted.
 pub fn page(report: &Report, gallery: &Gallery, cover: &Cover) -> String {
-    let bare = document(report, &Album::new(gallery, 0), cover).into_string();
-    let room = MAX_PAGE_BYTES.saturating_sub(bare.len() + RESERVED_BYTES);
-    let mut page = document(report, &Album::new(gallery, room), cover).into_string();
+    let without_images = document(report, &Album::new(gallery, 0), cover).into_string();
+    let max_image_bytes = MAX_PAGE_BYTES.saturating_sub(without_images.len() + RESERVED_BYTES);
+    let mut page = document(report, &Album::new(gallery, max_image_bytes), cover).into_string();
     page.push('\n');
     page
 }
 
-fn document(report: &Report, album: &Album, cover: &Cover) -> Markup {
+fn document(report: &Report, album: &Album<'_>, cover: &Cover) -> Markup {
     let title = cover.project.as_deref().unwrap_or("mocban");
     let sections = sections::all(report, album);
     html! {
@@ -125,21 +125,21 @@ mod tests {
 
     #[test]
     fn a_page_never_exceeds_its_limit_and_says_how_many_images_it_shows() {
-        for (shots, bytes) in [(0, 0), (20, 20_000), (80, 60_000), (3, 4_000_000)] {
-            let text = page(&report(), &gallery(shots, bytes), &Cover::default());
+        for (items, bytes) in [(0, 0), (20, 20_000), (80, 60_000), (3, 4_000_000)] {
+            let text = page(&report(), &gallery(items, bytes), &Cover::default());
             assert!(text.len() <= MAX_PAGE_BYTES, "{}", text.len());
             let shown = text.matches("<figure class=\"item\"").count();
-            let all_fit = shots * bytes * 4 < 6_000_000;
-            assert_eq!(shown == 4 * shots, all_fit, "{shown} of {shots} x {bytes}");
-            let said: usize = (0..=shots)
+            let all_fit = items * bytes * 4 < 6_000_000;
+            assert_eq!(shown == 4 * items, all_fit, "{shown} of {items} x {bytes}");
+            let said: usize = (0..=items)
                 .map(|n| n * text.matches(&format!(" {n} of 400 are shown")).count())
                 .sum();
-            assert_eq!(said, shown, "{shots} x {bytes}");
+            assert_eq!(said, shown, "{items} x {bytes}");
         }
     }
 
     #[test]
-    fn with_little_room_each_group_has_its_share() {
+    fn each_group_has_its_share_of_a_full_page() {
         let text = page(&report(), &gallery(80, 60_000), &Cover::default());
         for kind in ["failed", "conflict", "off-truth", "random"] {
             let group = text.split(&format!("id=\"images-{kind}\"")).nth(1);

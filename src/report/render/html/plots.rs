@@ -34,13 +34,9 @@ struct PlotRow {
 /// Returns Acc of every metric with its interval; empty without any.
 pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
     let found = report.rows.iter().filter_map(|row| {
-        let truth = row.truth.as_ref();
-        let (acc, ends) = match basis {
-            Basis::Verdicts => (row.acc, row.acc_ci95),
-            Basis::Truth => (
-                truth.and_then(|truth| truth.acc),
-                truth.and_then(|truth| truth.acc_ci95),
-            ),
+        let (acc, ends) = match (basis, &row.truth) {
+            (Basis::Verdicts, _) => (row.acc, row.acc_ci95),
+            (Basis::Truth, truth) => truth.as_ref().map(|truth| (truth.acc, truth.acc_ci95))?,
         };
         let value = acc?;
         Some(PlotRow {
@@ -83,11 +79,8 @@ fn round_up(number: f64) -> f64 {
 fn dot_plot(rows: &[PlotRow], [from, to]: [f64; 2], style: NumberStyle, caption: &str) -> Markup {
     let place = |value: f64| LEFT + (RIGHT - LEFT) * (value - from) / (to - from);
     let below = ROW * rows.len() as f64;
-    let labels: Vec<String> = rows
-        .iter()
-        .map(|row| format!("{} {}", row.name, row.label))
-        .collect();
-    let alt = format!("{caption}: {}", labels.join(", "));
+    let labels = rows.iter().map(|row| format!("{} {}", row.name, row.label));
+    let alt = alt_text(caption, labels);
     let drawing = html! {
         @for i in 0..=TICKS {
             @let value = from + (to - from) * i as f64 / TICKS as f64;
@@ -111,14 +104,11 @@ pub(super) fn thresholds(report: &Report) -> Markup {
     let below = (BARS + 14.0) * found.len() as f64;
     let caption =
         "Results by relative threshold height, from the lowest point of a depth map to its highest";
-    let labels: Vec<String> = found
-        .iter()
-        .map(|found| {
-            let median = format_number(found.median, Share);
-            format!("{} median {median}", found.metric.title())
-        })
-        .collect();
-    let alt = format!("{caption}: {}", labels.join(", "));
+    let labels = found.iter().map(|found| {
+        let median = format_number(found.median, Share);
+        format!("{} median {median}", found.metric.title())
+    });
+    let alt = alt_text(caption, labels);
     let drawing = html! {
         @for (i, found) in found.iter().enumerate() { (bars(found, (BARS + 14.0) * i as f64)) }
         @for i in 0..=TICKS {
@@ -146,7 +136,7 @@ fn bars(found: &ThresholdDistribution, top: f64) -> Markup {
     }
 }
 
-/// Returns a plot with its caption, and its numbers for screen readers.
+/// Returns a plot with its caption.
 fn figure(height: f64, alt: &str, caption: &str, drawing: &Markup) -> Markup {
     let frame = format!("0 0 {WIDTH} {height}");
     html! {
@@ -155,6 +145,11 @@ fn figure(height: f64, alt: &str, caption: &str, drawing: &Markup) -> Markup {
             figcaption { (caption) "." }
         }
     }
+}
+
+/// Returns the text of a plot for screen readers.
+fn alt_text(caption: &str, labels: impl Iterator<Item = String>) -> String {
+    format!("{caption}: {}", labels.collect::<Vec<_>>().join(", "))
 }
 
 /// Formats a coordinate.

@@ -31,53 +31,55 @@ pub(super) struct Section {
 }
 
 /// Returns the sections that have content, in order.
-pub(super) fn all(report: &Report, album: &Album) -> Vec<Section> {
-    let section = |id, title, body| Section { id, title, body };
-    let optional = |id, title, body: Option<Markup>| body.map(|body| section(id, title, body));
-    let has_verdicts = report.has_verdicts();
+pub(super) fn all(report: &Report, album: &Album<'_>) -> Vec<Section> {
+    let manual_alignments = tables::manual_alignments(report);
+    let thresholds = tables::thresholds(report);
+    let times = tables::times(report);
     let sections = [
-        Some(section("result", "Result", result(report))),
-        optional("notes", "Notes", notes(report)),
-        optional(
+        ("result", "Result", Some(result(report))),
+        ("notes", "Notes", notes(report)),
+        (
             "verdicts",
             "Verdicts",
-            has_verdicts.then(|| verdicts(report)),
+            report.has_verdicts().then(|| verdicts(report)),
         ),
-        optional("tests", "Methods compared", tests(report)),
-        optional(
+        ("tests", "Methods compared", tests(report)),
+        (
             "truth",
             "Against ground truth",
             report.has_truth().then(|| truth(report)),
         ),
-        optional(
+        (
             "manual",
             "Against manual alignments",
-            tables::manual_alignments(report).map(|found| table(&found)),
+            manual_alignments.map(|found| table(&found)),
         ),
-        optional(
+        (
             "coverage",
             "What the confidence is worth",
             confidence(report),
         ),
-        optional(
+        (
             "thresholds",
             "Thresholds",
-            tables::thresholds(report)
-                .map(|found| html! { (plots::thresholds(report)) (table(&found)) }),
+            thresholds.map(|found| html! { (plots::thresholds(report)) (table(&found)) }),
         ),
-        optional(
+        (
             "times",
             "Computing times",
-            tables::times(report).map(|found| html! { (plots::times(report)) (table(&found)) }),
+            times.map(|found| html! { (plots::times(report)) (table(&found)) }),
         ),
-        optional("failures", "Failed pairs", failures(report)),
-        optional(
-            "images",
-            "Images",
-            (!album.is_empty()).then(|| album.body()),
-        ),
+        ("failures", "Failed pairs", failures(report)),
+        ("images", "Images", album.body()),
     ];
-    sections.into_iter().flatten().collect()
+    let section = |(id, title, body): (_, _, Option<Markup>)| {
+        Some(Section {
+            id,
+            title,
+            body: body?,
+        })
+    };
+    sections.into_iter().filter_map(section).collect()
 }
 
 fn tables_of(found: impl IntoIterator<Item = Table>) -> Markup {
@@ -103,12 +105,12 @@ fn notes(report: &Report) -> Option<Markup> {
 }
 
 fn verdicts(report: &Report) -> Markup {
-    let more = [
-        tables::rules(report),
-        tables::fail_reasons(report),
-        tables::attention_checks(report),
-    ];
-    html! { (table(&tables::verdicts(report))) (tables_of(more.into_iter().flatten())) }
+    html! {
+        (table(&tables::verdicts(report)))
+        (tables_of(tables::rules(report)))
+        (tables_of(tables::fail_reasons(report)))
+        (tables_of(tables::attention_checks(report)))
+    }
 }
 
 fn truth(report: &Report) -> Markup {
@@ -138,7 +140,7 @@ fn p_values(found: &Comparison) -> Markup {
     }
 }
 
-/// Returns the risk-coverage curves, a row a metric, with every number behind a fold; `None` without confidences.
+/// Returns the risk-coverage curves, with the full tables in a collapsed element; `None` without confidences.
 fn confidence(report: &Report) -> Option<Markup> {
     let short = short_tables(report);
     (!short.is_empty()).then(|| {
@@ -169,10 +171,8 @@ fn failure(group: &FailureGroup) -> Markup {
 
 /// Returns an error message, shortened if it is very long.
 fn shortened(error: &str) -> String {
-    let mut chars = error.chars();
-    let mut text: String = chars.by_ref().take(MAX_ERROR_CHARS).collect();
-    if chars.next().is_some() {
-        text.push('\u{2026}');
+    match error.char_indices().nth(MAX_ERROR_CHARS) {
+        Some((end, _)) => format!("{}\u{2026}", &error[..end]),
+        None => error.to_owned(),
     }
-    text
 }
