@@ -27,7 +27,7 @@ fn nothing_serious(tab: &Tab<'_>, what: &str) {
                 ({ id, nodes }) => `${id}: ${nodes.map(({ target }) => target).join(' ')}`),
         }))",
     );
-    tab.shot(&what.replace([',', ' '], "_"));
+    tab.screenshot(&what.replace([',', ' '], "_"));
     assert!(found["passes"].as_u64() > Some(10), "{found}");
     assert_eq!(found["serious"], serde_json::json!([]), "{what}");
 }

@@ -295,7 +295,7 @@ impl Tab<'_> {
     }
 
     /// Saves a screenshot to the folder `MOCBAN_SCREENSHOTS`, if set.
-    pub(crate) fn shot(&self, name: &str) {
+    pub(crate) fn screenshot(&self, name: &str) {
         let Some(folder) = std::env::var_os("MOCBAN_SCREENSHOTS") else {
             return;
         };

@@ -1,7 +1,7 @@
 //! Integration tests in one binary.
 
 mod accessible;
-mod agree;
+mod agreement;
 mod backup;
 mod browser;
 mod check;
@@ -34,15 +34,16 @@ mod memory;
 mod odd;
 mod one_pair;
 mod page;
+mod parsers;
 #[cfg(target_os = "linux")]
 mod power;
 mod processes;
 mod queue;
-mod readers;
 mod report;
 mod resume;
 mod review_alignment;
 mod review_browser;
+mod review_data;
 mod review_guard;
 mod review_kill;
 mod review_page;

@@ -26,6 +26,17 @@ pub(crate) fn read_project(dir: &tempfile::TempDir) -> Project {
     copy(made, &dir.path().join("p"))
 }
 
+/// Options for a queue without planted faults and duplicates.
+pub(crate) const NO_CHECKS: [&str; 4] = ["--attention-checks", "0", "--duplicates", "0"];
+
+/// Opens the page of the reviewer `lan` on a copy of the shared project.
+pub(crate) fn open_review(args: &[&str]) -> (tempfile::TempDir, Project, Page) {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let project = read_project(&dir);
+    let page = Page::open(&project, "lan", args);
+    (dir, project, page)
+}
+
 /// An HTTP response.
 #[derive(Debug)]
 pub(crate) struct Reply {

@@ -1,4 +1,4 @@
-//! The report's and the export's numbers on a real run, computed again from what was exported.
+//! Numbers of report and export after a real run, recomputed from the exported files.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,37 +18,37 @@ use mocban::runner::{self, RunOptions, Stop};
 use mocban::store::Project;
 use serde_json::Value;
 
-/// Any time will do.
+/// An arbitrary time.
 const NOW: i64 = 1_700_000_000_000;
 
 /// A run of two demo pairs and one whose mesh is empty, with its report and export.
-struct World {
+struct FinishedRun {
     dir: tempfile::TempDir,
     project: Project,
     catalog: Catalog,
 }
 
-impl World {
-    async fn run() -> Self {
+impl FinishedRun {
+    async fn new() -> Self {
         let dir = tempfile::tempdir().expect("a temporary folder");
         let project = Project::create(&dir.path().join("project")).expect("a new project");
         let catalog = Catalog::create(&project.catalog_path())
             .await
             .expect("a new catalog");
-        let world = Self {
+        let run = Self {
             dir,
             project,
             catalog,
         };
-        world.import().await;
+        run.import().await;
         let settings = config::load(&Sources::default())
             .expect("the defaults are sound")
             .config
             .stages;
         let (options, stop) = (RunOptions::default(), Stop::new());
         runner::run(
-            &world.project,
-            &world.catalog,
+            &run.project,
+            &run.catalog,
             &settings,
             &options,
             &stop,
@@ -56,7 +56,7 @@ impl World {
         )
         .await
         .expect("the run ends by itself");
-        world
+        run
     }
 
     async fn import(&self) {
@@ -119,7 +119,7 @@ impl World {
         };
         let summary = to_jsonl(&self.catalog, &self.project, &target, options)
             .await
-            .expect("the folder is free");
+            .expect("the folder is new");
         assert_eq!(
             (summary.done, summary.without_result),
             (2, 1),
@@ -145,7 +145,7 @@ fn grey8(export: &Path, line: &Value, role: &str) -> Grid<u8> {
     decode_grey8(&std::fs::read(path).expect(role)).expect(role)
 }
 
-/// Every file below a folder with its bytes.
+/// Returns every file below a folder with its bytes.
 fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut folders = vec![root.to_owned()];
@@ -163,7 +163,7 @@ fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// `IoU`, Dice and box `IoU` of two masks where 255 is set, by counting.
+/// Computes `IoU`, Dice and box `IoU` of two masks by counting; 255 is set.
 fn agreement(a: &Grid<u8>, b: &Grid<u8>) -> [f64; 3] {
     let set = |grid: &Grid<u8>, x, y| grid.at(x, y) == 255;
     let (mut both, mut either, mut sum) = (0.0, 0.0, 0.0);
@@ -206,21 +206,21 @@ fn agreement(a: &Grid<u8>, b: &Grid<u8>) -> [f64; 3] {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn report_and_export_say_the_same_and_can_be_computed_again() {
-    let world = World::run().await;
-    let (report, export) = (world.report().await, world.export("first").await);
-    scores_follow_from_the_exported_masks(&report, &export);
+async fn report_and_export_agree_with_the_exported_files() {
+    let run = FinishedRun::new().await;
+    let (report, export) = (run.report().await, run.export("first").await);
+    scores_equal_those_of_the_exported_masks(&report, &export);
     maps_compose_to_the_product(&export);
     aligned_files_are_in_the_prints_frame(&export);
-    failed_pair_is_told_in_both(&report, &export);
-    truth_is_there_and_apart(&report);
-    let again = world.export("second").await;
+    failed_pair_is_in_both(&report, &export);
+    truth_is_separate_from_verdicts(&report);
+    let again = run.export("second").await;
     assert!(contents(&export) == contents(&again), "two exports differ");
-    verdicts_make_acc(&world).await;
-    sheet_shows_every_pair(&world).await;
+    verdicts_make_acc(&run).await;
+    sheet_shows_every_pair(&run).await;
 }
 
-fn scores_follow_from_the_exported_masks(report: &Report, export: &Path) {
+fn scores_equal_those_of_the_exported_masks(report: &Report, export: &Path) {
     let mut sums: BTreeMap<String, [f64; 3]> = BTreeMap::new();
     for line in lines(export).iter().filter(|line| line["status"] == "done") {
         let print = grey8(export, line, "canvas_print_mask");
@@ -312,7 +312,7 @@ fn aligned_files_are_in_the_prints_frame(export: &Path) {
     }
 }
 
-fn failed_pair_is_told_in_both(report: &Report, export: &Path) {
+fn failed_pair_is_in_both(report: &Report, export: &Path) {
     assert_eq!(report.progress.failed, 1);
     assert_eq!(report.failures[0].class.name(), "bad_input");
     let list = lines(export);
@@ -328,7 +328,7 @@ fn failed_pair_is_told_in_both(report: &Report, export: &Path) {
     }
 }
 
-fn truth_is_there_and_apart(report: &Report) {
+fn truth_is_separate_from_verdicts(report: &Report) {
     for row in &report.rows {
         let truth = row.truth.as_ref().expect("the demo has truth");
         assert_eq!((truth.n, row.acc, row.judged), (2, None, 0));
@@ -336,8 +336,8 @@ fn truth_is_there_and_apart(report: &Report) {
     }
 }
 
-async fn verdicts_make_acc(world: &World) {
-    let names = world.catalog.pair_names().await.expect("names");
+async fn verdicts_make_acc(run: &FinishedRun) {
+    let names = run.catalog.pair_names().await.expect("names");
     let verdict = |pair: &PairName, verdict| NewVerdict {
         pair: pair.clone(),
         metric: None,
@@ -352,18 +352,17 @@ async fn verdicts_make_acc(world: &World) {
         verdict(&names[0], Verdict::Pass),
         verdict(&names[1], Verdict::Fail),
     ];
-    world
-        .catalog
+    run.catalog
         .verdict_set(set, NOW)
         .await
         .expect("both have results");
-    let report = world.report().await;
+    let report = run.report().await;
     for row in &report.rows {
         assert_eq!((row.judged, row.passed, row.failed), (2, 1, 1));
         assert_eq!(row.acc, Some(0.5));
     }
     assert_eq!(report.comparisons.len(), 8);
-    let verdicts: Vec<Value> = lines(&world.export("judged").await)
+    let verdicts: Vec<Value> = lines(&run.export("judged").await)
         .into_iter()
         .map(|line| line["verdict"].clone())
         .collect();
@@ -371,7 +370,7 @@ async fn verdicts_make_acc(world: &World) {
     assert!(verdicts[8].is_null());
 }
 
-async fn sheet_shows_every_pair(world: &World) {
+async fn sheet_shows_every_pair(run: &FinishedRun) {
     let options = ContactSheetOptions {
         metric: ThresholdMetric::Ensemble,
         pairs: None,
@@ -380,7 +379,7 @@ async fn sheet_shows_every_pair(world: &World) {
         columns: 5,
         limits: raster::ImageLimits::SUGGESTED,
     };
-    let sheet = draw_contact_sheet(&world.catalog, &world.project, options)
+    let sheet = draw_contact_sheet(&run.catalog, &run.project, options)
         .await
         .expect("a sheet");
     assert_eq!((sheet.shown, sheet.of), (3, 3));

@@ -5,7 +5,7 @@ use mocban::store::Project;
 use serde_json::{Value, json};
 
 use crate::cli::mocban;
-use crate::page::{Page, answer, read_project};
+use crate::page::{NO_CHECKS, Page, answer, open_review};
 use crate::review_page::ask;
 
 fn alignments(project: &Project) -> Vec<StoredAlignment> {
@@ -16,13 +16,7 @@ fn alignments(project: &Project) -> Vec<StoredAlignment> {
 
 #[test]
 fn a_manual_alignment_is_stored_with_the_result_and_exported() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::open(
-        &project,
-        "lan",
-        &["--attention-checks", "0", "--duplicates", "0"],
-    );
+    let (_dir, project, page) = open_review(&NO_CHECKS);
     let item = page.queue().remove(0);
     let id = item["id"].as_str().expect("an id");
     let start_of_editor = || page.get(&format!("/api/alignment/{id}")).json();
@@ -85,10 +79,10 @@ fn a_manual_alignment_is_stored_with_the_result_and_exported() {
             assert_eq!(line["manual_alignment"], Value::Null);
             continue;
         }
-        let by_hand = &line["manual_alignment"];
-        assert_eq!(by_hand["reviewer"], "lan");
-        assert_eq!(by_hand["print_from_mesh"], json!(second.print_from_mesh));
-        assert_ne!(by_hand["print_from_mesh"], line["print_from_mesh"]);
+        let manual = &line["manual_alignment"];
+        assert_eq!(manual["reviewer"], "lan");
+        assert_eq!(manual["print_from_mesh"], json!(second.print_from_mesh));
+        assert_ne!(manual["print_from_mesh"], line["print_from_mesh"]);
     }
     // The page and `show` report the alignment, and the editor starts from it.
     let near = |a: &Value, b: f64| (a.as_f64().expect("a number") - b).abs() < 1e-6;
@@ -119,13 +113,7 @@ fn a_manual_alignment_is_stored_with_the_result_and_exported() {
 
 #[test]
 fn an_alignment_is_hidden_on_a_duplicate_until_it_is_answered() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::open(
-        &project,
-        "lan",
-        &["--attention-checks", "0", "--duplicates", "100"],
-    );
+    let (_dir, _, page) = open_review(&["--attention-checks", "0", "--duplicates", "100"]);
     let queue = page.queue();
     let start = |item: &Value| {
         let id = item["id"].as_str().expect("an id");
@@ -153,17 +141,7 @@ fn an_alignment_is_hidden_on_a_duplicate_until_it_is_answered() {
 
 #[test]
 fn page_editor_and_show_report_equal_scores() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let plain = [
-        "--attention-checks",
-        "0",
-        "--duplicates",
-        "0",
-        "--metric",
-        "density",
-    ];
-    let page = Page::open(&project, "lan", &plain);
+    let (_dir, project, page) = open_review(&[&NO_CHECKS[..], &["--metric", "density"]].concat());
     let item = page.queue().remove(0);
     let id = item["id"].as_str().expect("an id");
     page.post("/api/answer", &answer("e1", &item, "pass"))

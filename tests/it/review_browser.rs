@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
-use crate::page::{Page, read_project};
+use crate::page::{NO_CHECKS, Page, read_project};
 
 /// No attention checks, so that the log holds exactly what was pressed; no minimum view time, so that tests do not wait.
 pub(crate) const PLAIN: [&str; 6] = [
@@ -152,7 +152,7 @@ fn every_display_mode_draws_a_different_image() {
             .to_string()
     };
     let mut seen = BTreeSet::from([canvas(&tab)]);
-    tab.shot("edges");
+    tab.screenshot("edges");
     for mode in [
         "two_up",
         "overlay",
@@ -169,14 +169,14 @@ fn every_display_mode_draws_a_different_image() {
             )),
             "true"
         );
-        tab.shot(mode);
+        tab.screenshot(mode);
     }
     tab.key("KeyE");
     assert!(!seen.insert(canvas(&tab)), "edges again");
     for key in ["KeyD", "KeyS", "BracketRight", "KeyZ"] {
         tab.key(key);
         assert!(seen.insert(canvas(&tab)), "{key}");
-        tab.shot(key);
+        tab.screenshot(key);
     }
     tab.key("KeyZ");
     tab.key("KeyZ");
@@ -330,7 +330,7 @@ fn a_relief_is_aligned_by_keys_and_mouse() {
         let at = [0, 1].map(|i| middle[i].as_f64().expect("a number"));
         tab.drag(at, [at[0] + 60.0, at[1]]);
         assert!(iou() < rotated);
-        tab.shot("alignment");
+        tab.screenshot("alignment");
         tab.key("Digit0");
         assert!((iou() - before).abs() < 1e-9);
         for _ in 0..5 {
@@ -407,7 +407,7 @@ fn typing_a_note_with_verdict_keys_stores_no_verdict() {
     let project = read_project(&dir);
     let page = Page::start(&project, "lan", &[&PLAIN[..], &["--lang", "vi"]].concat());
     let tab = enter(&browser, &page, [1024, 768]);
-    tab.shot("vietnamese");
+    tab.screenshot("vietnamese");
     tab.key("KeyN");
     tab.wait("document.activeElement.id === 'note'");
     tab.key("KeyP");
@@ -423,14 +423,7 @@ fn typing_a_note_with_verdict_keys_stores_no_verdict() {
         output.out
     );
     // A verdict before the minimum view time is not accepted.
-    let slow = [
-        "--attention-checks",
-        "0",
-        "--duplicates",
-        "0",
-        "--min-view-ms",
-        "60000",
-    ];
+    let slow = [&NO_CHECKS[..], &["--min-view-ms", "60000"]].concat();
     let page = Page::start(&project, "minh", &slow);
     let tab = enter(&browser, &page, [1024, 768]);
     tab.key("KeyP");

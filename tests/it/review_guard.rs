@@ -4,24 +4,19 @@ use mocban::store::Project;
 use serde_json::{Value, json};
 
 use crate::cli::mocban;
-use crate::page::{Page, Reply, answer, read_project, send};
+use crate::page::{NO_CHECKS, Page, Reply, answer, open_review, read_project, send};
 
-struct World {
+/// A review page under attack, and its first item.
+struct Target {
     page: Page,
     item: Value,
     project: Project,
     _dir: tempfile::TempDir,
 }
 
-impl World {
-    fn new() -> Self {
-        let dir = tempfile::tempdir().expect("a temporary directory");
-        let project = read_project(&dir);
-        let page = Page::open(
-            &project,
-            "lan",
-            &["--attention-checks", "0", "--duplicates", "0"],
-        );
+impl Target {
+    fn open() -> Self {
+        let (dir, project, page) = open_review(&NO_CHECKS);
         let item = page.queue().remove(0);
         Self {
             page,
@@ -60,8 +55,8 @@ impl World {
 
 #[test]
 fn a_foreign_host_is_rejected_first() {
-    let world = World::new();
-    let port = world.page.address().port();
+    let target = Target::open();
+    let port = target.page.address().port();
     for host in [
         Some("evil.example"),
         Some("127.0.0.1"),
@@ -70,7 +65,7 @@ fn a_foreign_host_is_rejected_first() {
         Some(""),
         None,
     ] {
-        let status = world.with("host", host).status;
+        let status = target.with("host", host).status;
         assert!([400, 421].contains(&status), "{host:?}: {status}");
     }
     let rebound = format!("evil.example:{port}");
@@ -85,25 +80,25 @@ fn a_foreign_host_is_rejected_first() {
         "/assets/main.js",
         "/image/a/print",
     ] {
-        let reply = send(world.page.address(), "GET", path, &same, b"").expect("a reply");
+        let reply = send(target.page.address(), "GET", path, &same, b"").expect("a reply");
         assert_eq!(reply.status, 421, "{path}");
     }
-    world.nothing_is_stored();
+    target.nothing_is_stored();
 }
 
 #[test]
 fn localhost_is_an_accepted_host() {
-    let world = World::new();
-    let named = format!("localhost:{}", world.page.address().port());
-    let headers = [("host", named), ("cookie", world.page.cookie.clone())];
-    let reply = send(world.page.address(), "GET", "/", &headers, b"").expect("a reply");
+    let target = Target::open();
+    let named = format!("localhost:{}", target.page.address().port());
+    let headers = [("host", named), ("cookie", target.page.cookie.clone())];
+    let reply = send(target.page.address(), "GET", "/", &headers, b"").expect("a reply");
     assert_eq!(reply.status, 200);
 }
 
 #[test]
 fn a_foreign_or_missing_origin_is_refused() {
-    let world = World::new();
-    let port = world.page.address().port();
+    let target = Target::open();
+    let port = target.page.address().port();
     let near = format!("http://127.0.0.1:{}", port.wrapping_add(1));
     let secure = format!("https://127.0.0.1:{port}");
     for origin in [
@@ -113,19 +108,22 @@ fn a_foreign_or_missing_origin_is_refused() {
         Some(&*near),
         Some(&*secure),
     ] {
-        assert_eq!(world.with("origin", origin).status, 403, "{origin:?}");
+        assert_eq!(target.with("origin", origin).status, 403, "{origin:?}");
     }
-    world.nothing_is_stored();
+    target.nothing_is_stored();
 }
 
 #[test]
 fn nothing_is_served_without_the_cookie() {
-    let world = World::new();
+    let target = Target::open();
     for cookie in [None, Some("mocban_review=x"), Some("")] {
-        assert_eq!(world.with("cookie", cookie).status, 401, "{cookie:?}");
+        assert_eq!(target.with("cookie", cookie).status, 401, "{cookie:?}");
     }
-    let headers = [("host", world.page.host.clone())];
-    let image = format!("/image/{}/print", world.item["id"].as_str().expect("an id"));
+    let headers = [("host", target.page.host.clone())];
+    let image = format!(
+        "/image/{}/print",
+        target.item["id"].as_str().expect("an id")
+    );
     for path in [
         "/",
         "/api/queue",
@@ -134,10 +132,10 @@ fn nothing_is_served_without_the_cookie() {
         &image,
         "/nowhere",
     ] {
-        let reply = send(world.page.address(), "GET", path, &headers, b"").expect("a reply");
+        let reply = send(target.page.address(), "GET", path, &headers, b"").expect("a reply");
         assert_eq!(reply.status, 401, "{path}");
     }
-    world.nothing_is_stored();
+    target.nothing_is_stored();
 }
 
 #[test]
@@ -159,16 +157,16 @@ fn the_token_opens_once() {
 
 #[test]
 fn a_write_without_the_csrf_token_is_refused() {
-    let world = World::new();
+    let target = Target::open();
     for token in [None, Some(""), Some("guess")] {
-        assert_eq!(world.with("x-csrf-token", token).status, 403, "{token:?}");
+        assert_eq!(target.with("x-csrf-token", token).status, 403, "{token:?}");
     }
-    world.nothing_is_stored();
+    target.nothing_is_stored();
 }
 
 #[test]
 fn a_content_type_that_a_form_can_send_is_refused() {
-    let world = World::new();
+    let target = Target::open();
     for kind in [
         None,
         Some("text/plain"),
@@ -176,27 +174,27 @@ fn a_content_type_that_a_form_can_send_is_refused() {
         Some("text/plain; application/json"),
         Some("application/ld+json"),
     ] {
-        assert_eq!(world.with("content-type", kind).status, 415, "{kind:?}");
+        assert_eq!(target.with("content-type", kind).status, 415, "{kind:?}");
     }
-    world.nothing_is_stored();
+    target.nothing_is_stored();
 }
 
 #[test]
 fn a_large_body_is_refused() {
-    let world = World::new();
-    let mut body = answer("e1", &world.item, "pass");
+    let target = Target::open();
+    let mut body = answer("e1", &target.item, "pass");
     body["note"] = Value::String("x".repeat(1 << 20));
-    let reply = world.page.post("/api/answer", &body).expect("a reply");
+    let reply = target.page.post("/api/answer", &body).expect("a reply");
     assert_eq!(reply.status, 413);
-    world.nothing_is_stored();
+    target.nothing_is_stored();
 }
 
 #[test]
 fn paths_reach_only_named_resources() {
-    let world = World::new();
-    let id = world.item["id"].as_str().expect("an id");
-    let pair = world.item["pair"].as_str().expect("a name");
-    assert_eq!(world.page.get(&format!("/image/{id}/print")).status, 200);
+    let target = Target::open();
+    let id = target.item["id"].as_str().expect("an id");
+    let pair = target.item["pair"].as_str().expect("a name");
+    assert_eq!(target.page.get(&format!("/image/{id}/print")).status, 200);
     for path in [
         "/assets/../Cargo.toml",
         "/assets/..%2f..%2fcatalog.sqlite",
@@ -210,20 +208,20 @@ fn paths_reach_only_named_resources() {
         "/image/..%2f..%2fetc/passwd",
         "/image/%00/print",
     ] {
-        let status = world.page.get(path).status;
+        let status = target.page.get(path).status;
         assert!([400, 404].contains(&status), "{path}: {status}");
     }
 }
 
 #[test]
 fn other_methods_and_invalid_answers_are_refused() {
-    let world = World::new();
-    let headers = world.page.headers();
+    let target = Target::open();
+    let headers = target.page.headers();
     for method in ["PUT", "DELETE", "PATCH"] {
-        let reply = send(world.page.address(), method, "/api/answer", &headers, b"");
+        let reply = send(target.page.address(), method, "/api/answer", &headers, b"");
         assert_eq!(reply.expect("a reply").status, 405, "{method}");
     }
-    let good = answer("e1", &world.item, "pass");
+    let good = answer("e1", &target.item, "pass");
     for (field, value, status) in [
         ("item", json!("nothing"), 404),
         ("verdict", json!("maybe"), 422),
@@ -236,19 +234,19 @@ fn other_methods_and_invalid_answers_are_refused() {
     ] {
         let mut body = good.clone();
         body[field] = value;
-        let reply = world.page.post("/api/answer", &body).expect("a reply");
+        let reply = target.page.post("/api/answer", &body).expect("a reply");
         assert_eq!(reply.status, status, "{field}");
     }
-    let others = world.page.post("/api/undo", &json!({ "event": "never" }));
+    let others = target.page.post("/api/undo", &json!({ "event": "never" }));
     assert_eq!(others.expect("a reply").status, 404);
-    world.nothing_is_stored();
+    target.nothing_is_stored();
 }
 
 #[test]
 fn every_response_has_the_security_headers() {
-    let world = World::new();
-    let refused = world.with("host", Some("evil.example"));
-    for reply in [world.page.get("/"), world.page.get("/api/queue"), refused] {
+    let target = Target::open();
+    let refused = target.with("host", Some("evil.example"));
+    for reply in [target.page.get("/"), target.page.get("/api/queue"), refused] {
         let policy = reply.header("content-security-policy").expect("a policy");
         assert!(policy.starts_with("default-src 'none';"), "{policy}");
         assert!(!policy.contains("unsafe"), "{policy}");

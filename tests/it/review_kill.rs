@@ -11,12 +11,12 @@ use rand_chacha::ChaCha8Rng;
 use serde_json::{Value, json};
 
 use crate::cli::mocban;
-use crate::page::{Page, Site, answer, read_project};
+use crate::page::{NO_CHECKS, Page, Site, answer, read_project};
 use crate::test_size::size_from_env;
 
-/// The requests of a reviewer and their outcome.
+/// The requests of a reviewer and their outcomes.
 #[derive(Default)]
-struct Diary {
+struct RequestLog {
     /// Acknowledged events by id: the verdict, or `None` if it was undone.
     acknowledged: BTreeMap<String, Option<&'static str>>,
     /// The request that was in flight when the server died; it is sent again.
@@ -24,9 +24,9 @@ struct Diary {
     acts: u32,
 }
 
-impl Diary {
+impl RequestLog {
     /// Answers random items until the server is gone; sometimes undoes the last answer.
-    fn review(&mut self, site: &Site, queue: &[Value], dice: &mut ChaCha8Rng) {
+    fn review(&mut self, site: &Site, queue: &[Value], rng: &mut ChaCha8Rng) {
         if let Some((path, body)) = self.open.take()
             && !self.send(site, path, body)
         {
@@ -35,16 +35,12 @@ impl Diary {
         loop {
             self.acts += 1;
             let event = format!("e{}", self.acts);
-            let item = &queue[dice.random_range(0..queue.len())];
-            let verdict = if dice.random_bool(0.2) {
-                "fail"
-            } else {
-                "pass"
-            };
+            let item = &queue[rng.random_range(0..queue.len())];
+            let verdict = if rng.random_bool(0.2) { "fail" } else { "pass" };
             if !self.send(site, "/api/answer", answer(&event, item, verdict)) {
                 return;
             }
-            if dice.random_bool(0.1) && !self.send(site, "/api/undo", json!({ "event": event })) {
+            if rng.random_bool(0.1) && !self.send(site, "/api/undo", json!({ "event": event })) {
                 return;
             }
         }
@@ -90,42 +86,38 @@ fn no_acknowledged_verdict_is_lost_or_doubled() {
     let kills = size_from_env("MOCBAN_REVIEW_KILLS", 15);
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
-    let mut dice = ChaCha8Rng::seed_from_u64(7);
-    let mut diary = Diary::default();
+    let mut rng = ChaCha8Rng::seed_from_u64(7);
+    let mut log = RequestLog::default();
     for _ in 0..kills {
-        let mut page = Page::open(
-            &project,
-            "lan",
-            &["--attention-checks", "0", "--duplicates", "0"],
-        );
+        let mut page = Page::open(&project, "lan", &NO_CHECKS);
         let queue = page.queue();
-        let moment = Duration::from_micros(dice.random_range(0..60_000));
-        let (shot, died) = mpsc::channel::<()>();
+        let moment = Duration::from_micros(rng.random_range(0..60_000));
+        let (killed, gone) = mpsc::channel::<()>();
         std::thread::scope(|scope| {
-            let reading = scope.spawn({
-                let (site, queue, diary) = (Site::clone(&page), &queue, &mut diary);
-                let mut dice = ChaCha8Rng::seed_from_u64(dice.random());
-                move || diary.review(&site, queue, &mut dice)
+            let reviewing = scope.spawn({
+                let (site, queue, log) = (Site::clone(&page), &queue, &mut log);
+                let mut rng = ChaCha8Rng::seed_from_u64(rng.random());
+                move || log.review(&site, queue, &mut rng)
             });
             // The kill comes at a random time, so there is no event to wait for.
-            let _ = died.recv_timeout(moment);
+            let _ = gone.recv_timeout(moment);
             page.kill();
-            drop(shot);
-            reading.join().expect("the reviewer");
+            drop(killed);
+            reviewing.join().expect("the reviewer");
         });
     }
     // The request in flight at the last kill is sent again.
     let page = Page::open(&project, "lan", &[]);
-    if let Some((path, body)) = diary.open.take() {
-        assert!(diary.send(&page, path, body));
+    if let Some((path, body)) = log.open.take() {
+        assert!(log.send(&page, path, body));
     }
     let found = stored(&project);
-    for (event, verdict) in &diary.acknowledged {
+    for (event, verdict) in &log.acknowledged {
         assert_eq!(found[event].as_deref(), *verdict, "{event}");
     }
-    assert_eq!(found.len(), diary.acknowledged.len());
+    assert_eq!(found.len(), log.acknowledged.len());
     let acts = found.len();
-    assert!(acts > kills, "{acts} acts under {kills} kills are no test");
+    assert!(acts > kills, "{acts} acts with {kills} kills are too few");
     mocban(project.dir(), &["check"]).expect(0);
-    eprintln!("{acts} acts under {kills} kills");
+    eprintln!("{acts} acts with {kills} kills");
 }

@@ -8,7 +8,7 @@ use mocban::store::Project;
 use serde_json::{Value, json};
 
 use crate::cli::{Call, mocban};
-use crate::page::{Page, answer, read_project};
+use crate::page::{NO_CHECKS, Page, answer, open_review};
 
 /// Opens a project's catalog and reads from it.
 pub(crate) fn ask<T>(project: &Project, read: impl AsyncFnOnce(&Catalog) -> T) -> T {
@@ -40,13 +40,7 @@ fn set(project: &Project, args: &[&str]) -> Call {
 
 #[test]
 fn page_and_command_line_write_the_same_events() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::open(
-        &project,
-        "lan",
-        &["--attention-checks", "0", "--duplicates", "0"],
-    );
+    let (_dir, project, page) = open_review(&NO_CHECKS);
     let item = page.queue().remove(0);
     let mut body = answer("e1", &item, "fail");
     body["reason"] = json!("strokes_lost");
@@ -85,12 +79,9 @@ fn page_and_command_line_write_the_same_events() {
 
 #[test]
 fn order_and_ids_survive_a_restart_and_differ_between_reviewers() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let unchecked = ["--attention-checks", "0", "--duplicates", "0"];
-    let first = Page::open(&project, "lan", &unchecked);
-    let again = Page::open(&project, "lan", &unchecked);
-    let other = Page::open(&project, "minh", &unchecked);
+    let (_dir, project, first) = open_review(&NO_CHECKS);
+    let again = Page::open(&project, "lan", &NO_CHECKS);
+    let other = Page::open(&project, "minh", &NO_CHECKS);
     assert_eq!(first.queue(), again.queue());
     let ids = |page: &Page| -> BTreeSet<String> {
         let queue = page.queue();
@@ -108,13 +99,7 @@ fn order_and_ids_survive_a_restart_and_differ_between_reviewers() {
 
 #[test]
 fn results_that_look_the_same_are_one_item() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::open(
-        &project,
-        "lan",
-        &["--attention-checks", "0", "--duplicates", "0"],
-    );
+    let (_dir, project, page) = open_review(&NO_CHECKS);
     let queue = page.queue();
     for (i, item) in queue.iter().enumerate() {
         let reply = page.post("/api/answer", &answer(&format!("e{i}"), item, "pass"));
@@ -133,13 +118,7 @@ fn results_that_look_the_same_are_one_item() {
 
 #[test]
 fn attention_checks_are_stored_apart_and_not_revealed_by_the_page() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::open(
-        &project,
-        "lan",
-        &["--attention-checks", "50", "--duplicates", "20"],
-    );
+    let (_dir, project, page) = open_review(&["--attention-checks", "50", "--duplicates", "20"]);
     let queue = page.queue();
     let mut shapes: BTreeMap<bool, BTreeSet<String>> = BTreeMap::new();
     for (i, item) in queue.iter().enumerate() {
@@ -216,13 +195,7 @@ fn attention_checks_are_stored_apart_and_not_revealed_by_the_page() {
 
 #[test]
 fn verdicts_of_others_are_shown_to_an_adjudicator_after_the_answer() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let first = Page::open(
-        &project,
-        "lan",
-        &["--attention-checks", "0", "--duplicates", "0"],
-    );
+    let (_dir, project, first) = open_review(&NO_CHECKS);
     let item = first.queue().remove(0);
     first
         .post("/api/answer", &answer("e1", &item, "pass"))
@@ -267,9 +240,9 @@ fn verdicts_of_others_are_shown_to_an_adjudicator_after_the_answer() {
     // The conflict is settled.
     idle("dung");
     let log = log(&project);
-    let rulings = log.iter().filter(|event| event["reviewer"] == "hoa");
-    assert!(rulings.clone().count() > 0);
-    for event in rulings {
+    let adjudications = log.iter().filter(|event| event["reviewer"] == "hoa");
+    assert!(adjudications.clone().count() > 0);
+    for event in adjudications {
         assert_eq!(event["review_order"], "adjudicate");
     }
     assert!(
@@ -280,17 +253,8 @@ fn verdicts_of_others_are_shown_to_an_adjudicator_after_the_answer() {
 
 #[test]
 fn a_jump_finds_only_the_first_item_of_a_pair() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let many = [
-        "--attention-checks",
-        "50",
-        "--duplicates",
-        "50",
-        "--metric",
-        "density",
-    ];
-    let page = Page::open(&project, "lan", &many);
+    let many = "--attention-checks 50 --duplicates 50 --metric density";
+    let (_dir, _, page) = open_review(&many.split(' ').collect::<Vec<_>>());
     let output = page.get("/api/queue").json();
     let pairs = output["pairs"].as_array().expect("names");
     assert_eq!(pairs.len(), 15);
@@ -317,9 +281,7 @@ fn a_jump_finds_only_the_first_item_of_a_pair() {
 
 #[test]
 fn a_changed_result_is_not_shown_but_the_answer_is_stored() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let page = Page::open(&project, "lan", &["--attention-checks", "0"]);
+    let (_dir, project, page) = open_review(&["--attention-checks", "0"]);
     let item = page.queue().remove(0);
     let smaller = ["--set", "depth.longest_px=80", "run", "--rerun", "stale"];
     mocban(project.dir(), &smaller).expect(0);
@@ -342,70 +304,4 @@ fn a_changed_result_is_not_shown_but_the_answer_is_stored() {
     });
     assert_eq!(detail, Some((Verdict::Fail, Some(Reason::WrongPair))));
     assert_ne!(page.queue()[0]["id"], item["id"]);
-}
-
-/// Replaces what differs between runs.
-fn redacted(mut value: Value, fields: &[&str]) -> Value {
-    match &mut value {
-        Value::Object(object) => {
-            for (name, value) in object {
-                *value = if fields.contains(&name.as_str()) && !value.is_null() {
-                    json!(format!("[{name}]"))
-                } else {
-                    redacted(value.take(), fields)
-                };
-            }
-        }
-        Value::Array(values) => {
-            for value in values {
-                *value = redacted(value.take(), fields);
-            }
-        }
-        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
-    }
-    value
-}
-
-#[test]
-fn the_api_of_a_small_queue() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
-    let small = [
-        "--attention-checks",
-        "0",
-        "--duplicates",
-        "0",
-        "--metric",
-        "density",
-        "--sample",
-        "2",
-    ];
-    let page = Page::open(&project, "lan", &small);
-    let config = page.get("/api/config").json();
-    let mut body = answer("e1", &page.queue()[0], "fail");
-    body["reason"] = json!("strokes_lost");
-    body["note"] = json!("nét mờ");
-    let stored = page.post("/api/answer", &body).expect("a reply").json();
-    let id = page.queue()[0]["id"].as_str().expect("an id").to_owned();
-    let fields = [
-        "csrf_token",
-        "messages",
-        "id",
-        "pair",
-        "pairs",
-        "at",
-        "iou",
-        "dice",
-    ];
-    let queue = page.get("/api/queue").json();
-    let details = page.get(&format!("/api/details/{id}")).json();
-    let missing = page.get("/api/details/none").json();
-    let undone = page.post("/api/undo", &json!({ "event": "e1" }));
-    insta::assert_json_snapshot!(redacted(
-        json!({
-            "config": config, "answer": stored, "queue": queue, "details": details, "missing": missing,
-            "undo": undone.expect("a reply").json(),
-        }),
-        &fields
-    ));
 }

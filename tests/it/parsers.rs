@@ -1,4 +1,4 @@
-//! Hostile bytes to every reader: an answer or a sentence, never a panic, and no mesh or picture that breaks a promise.
+//! Every parser on valid and on corrupted files: an error in one sentence, never a panic, never an invalid mesh or image.
 
 use std::path::Path;
 
@@ -56,7 +56,7 @@ fn read_list(name: &str, bytes: &[u8]) -> Result<(), String> {
     })
 }
 
-/// As a file where it is TOML, and line by line as flags.
+/// Loads TOML as a settings file, and other text line by line as `--set` flags.
 fn read_settings(name: &str, bytes: &[u8]) -> Result<(), String> {
     let dir = crate::cli::empty();
     let file = dir.path().join("mocban.toml");
@@ -76,9 +76,9 @@ fn read_settings(name: &str, bytes: &[u8]) -> Result<(), String> {
     load(&sources).map(drop).map_err(|error| error.to_string())
 }
 
-type Reader = fn(&str, &[u8]) -> Result<(), String>;
+type Parser = fn(&str, &[u8]) -> Result<(), String>;
 
-fn readers() -> [(&'static str, Vec<NamedFile>, Reader); 4] {
+fn parsers() -> [(&'static str, Vec<NamedFile>, Parser); 4] {
     [
         ("mesh", sample_files::meshes(), read_mesh),
         ("image", sample_files::images(), read_image),
@@ -87,12 +87,12 @@ fn readers() -> [(&'static str, Vec<NamedFile>, Reader); 4] {
     ]
 }
 
-/// Signed samples may mean anything; all other whole files are read.
+/// Valid files that are rejected: the range of signed samples is not defined.
 const REFUSED: [&str; 1] = ["grey_signed16.tif"];
 
 #[test]
-fn every_whole_file_is_read() {
-    for (kind, files, read) in readers() {
+fn every_valid_file_is_parsed() {
+    for (kind, files, read) in parsers() {
         for (name, bytes) in files {
             let outcome = read(&name, &bytes);
             assert_eq!(
@@ -105,14 +105,14 @@ fn every_whole_file_is_read() {
 }
 
 #[test]
-fn spoilt_files_of_every_kind_are_read_or_told_in_a_sentence() {
+fn corrupted_files_are_parsed_or_rejected_in_one_sentence() {
     let each = size_from_env("MOCBAN_SPOILT", 120);
-    for (kind, files, read) in readers() {
+    for (kind, files, read) in parsers() {
         let mut corruptor = Corruptor::new(2026);
         let mut refused = 0;
-        for (name, whole) in &files {
+        for (name, valid) in &files {
             for _ in 0..each {
-                if let Err(sentence) = read(name, &corruptor.corrupt(whole)) {
+                if let Err(sentence) = read(name, &corruptor.corrupt(valid)) {
                     assert_one_sentence(&sentence);
                     refused += 1;
                 }
@@ -126,9 +126,9 @@ fn spoilt_files_of_every_kind_are_read_or_told_in_a_sentence() {
     }
 }
 
-/// Lays the whole files out for the fuzzer where it is told to.
+/// Writes the valid files as a fuzzing corpus if `MOCBAN_CORPUS` names a folder.
 #[test]
-fn the_fuzzer_starts_from_whole_files() {
+fn the_fuzzing_corpus_holds_valid_files() {
     let dir = std::env::var_os("MOCBAN_CORPUS").map(std::path::PathBuf::from);
     let meshes = sample_files::meshes()
         .into_iter()
@@ -137,7 +137,7 @@ fn the_fuzzer_starts_from_whole_files() {
         ("pair", meshes.collect()),
         ("verdicts", sample_files::verdicts()),
     ];
-    all.extend(readers().map(|(kind, files, _)| (kind, files)));
+    all.extend(parsers().map(|(kind, files, _)| (kind, files)));
     for (kind, files) in all {
         assert!(!files.is_empty(), "{kind}");
         let Some(dir) = &dir else { continue };
@@ -148,12 +148,12 @@ fn the_fuzzer_starts_from_whole_files() {
     }
 }
 
-/// What the fuzzer found: words of a file went to the screen as they were, commands to the terminal among them.
+/// Regression test for a finding of the fuzzer: text of a file reached the terminal with its control sequences.
 #[test]
-fn words_with_commands_to_a_screen_come_out_as_escapes() {
+fn control_sequences_in_files_are_escaped_in_messages() {
     for (read, name, bytes) in [
         (
-            read_mesh as Reader,
+            read_mesh as Parser,
             "a.ply",
             &b"ply\nformat ascii 1.0\nelement \x1b[2J 9\nproperty char a\nend_header\n1\n"[..],
         ),

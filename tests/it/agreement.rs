@@ -1,12 +1,12 @@
-//! `agree` and what `report` says of reviewers, on verdicts that came through the page and the command line.
+//! `agreement`, and the statistics of reviewers in `report`, on verdicts from the page and from the command line.
 
 use mocban::store::Project;
 use serde_json::{Value, json};
 
 use crate::cli::mocban;
-use crate::page::{Page, answer, read_project};
+use crate::page::{Page, answer, open_review, read_project};
 
-fn told(project: &Project, args: &[&str]) -> Value {
+fn json_output(project: &Project, args: &[&str]) -> Value {
     mocban(project.dir(), args).expect(0).json()
 }
 
@@ -33,8 +33,8 @@ fn reviewer_pairs(project: &Project) -> Vec<Value> {
     );
     let queue = page.queue();
     judge_all(&page, &queue, "fail");
-    let told = page.get("/api/queue").json();
-    let pairs = told["pairs"].as_array().expect("names").clone();
+    let queue = page.get("/api/queue").json();
+    let pairs = queue["pairs"].as_array().expect("names").clone();
     for (i, pair) in pairs.iter().enumerate() {
         set(project, pair, if i == 0 { "fail" } else { "pass" }, "minh");
     }
@@ -42,15 +42,15 @@ fn reviewer_pairs(project: &Project) -> Vec<Value> {
 }
 
 #[test]
-fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
+fn two_reviewers_are_compared_and_a_third_settles_a_conflict() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let project = read_project(&dir);
     assert_eq!(
-        told(&project, &["agreement", "--json"])["reviewers"],
+        json_output(&project, &["agreement", "--json"])["reviewers"],
         json!([])
     );
     let pairs = reviewer_pairs(&project);
-    let found = told(&project, &["agreement", "--json"]);
+    let found = json_output(&project, &["agreement", "--json"]);
     let two = &found["reviewer_pairs"][0];
     assert_eq!((&two["a"], &two["b"]), (&json!("lan"), &json!("minh")));
     let count = |value: &Value| value.as_u64().expect("a count");
@@ -60,8 +60,14 @@ fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
         (count(&two["failed_by_any"]), count(&two["failed_by_both"])),
         (n, agreed)
     );
-    // One who always says the same agrees as often as chance would.
-    assert!(two["kappa"].as_f64().expect("chance is not sure").abs() < 1e-12);
+    // A reviewer who always gives the same verdict agrees no more often than by chance.
+    assert!(
+        two["kappa"]
+            .as_f64()
+            .expect("chance agreement is below 1")
+            .abs()
+            < 1e-12
+    );
     assert_eq!(two["sufficient"], json!(n >= 30));
     assert_eq!(count(&found["conflicts"]), n - agreed);
     let [lan, minh] = [0, 1].map(|i| &found["reviewers"][i]);
@@ -76,14 +82,14 @@ fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
         (&json!(1.0), &json!(1.0))
     );
     assert_eq!(minh["attention_checks"]["n"], 0);
-    report_agrees(&project, checks);
+    report_has_the_same_rates(&project, checks);
 
     let page = Page::open(&project, "ba", &["--adjudicate"]);
     let settled = page.queue().remove(0);
     let reply = page.post("/api/answer", &answer("s1", &settled, "pass"));
     assert_eq!(reply.expect("a reply").status, 200);
     assert_ne!(settled["pair"], pairs[0], "on which they agree");
-    let after = told(&project, &["agreement", "--json"]);
+    let after = json_output(&project, &["agreement", "--json"]);
     assert_eq!(count(&after["conflicts"]), n - agreed - 1);
     assert_eq!(after["reviewer_pairs"], found["reviewer_pairs"]);
     let text = mocban(project.dir(), &["agreement"]).expect(0).out;
@@ -94,8 +100,8 @@ fn two_reviewers_are_compared_and_tested_and_a_third_settles() {
     );
 }
 
-fn report_agrees(project: &Project, checks: &Value) {
-    let report = told(project, &["report", "-f", "json"]);
+fn report_has_the_same_rates(project: &Project, checks: &Value) {
+    let report = json_output(project, &["report", "-f", "json"]);
     for name in ["n", "count", "share", "ci95"] {
         assert_eq!(report["attention_checks"][name], checks[name], "{name}");
     }
@@ -109,15 +115,15 @@ fn report_agrees(project: &Project, checks: &Value) {
         );
         assert_eq!(rules["both_fail"]["count"], 14);
     }
-    let exact = told(project, &["report", "-f", "json", "--ci", "exact"]);
+    let exact = json_output(project, &["report", "-f", "json", "--ci", "exact"]);
     assert_ne!(exact["attention_checks"]["ci95"], checks["ci95"]);
     let csv = mocban(project.dir(), &["report", "-f", "csv"])
         .expect(0)
         .out;
-    let heads = csv.lines().next().expect("a line of heads");
+    let headers = csv.lines().next().expect("a header line");
     assert!(
-        heads.contains(",both_fail_acc,") && heads.contains(",manual_alignment_n,"),
-        "{heads}"
+        headers.contains(",both_fail_acc,") && headers.contains(",manual_alignment_n,"),
+        "{headers}"
     );
     let page = mocban(project.dir(), &["report", "-f", "html"])
         .expect(0)
@@ -135,56 +141,51 @@ fn report_agrees(project: &Project, checks: &Value) {
 
 #[test]
 fn results_are_measured_against_the_newest_manual_alignment() {
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let project = read_project(&dir);
+    let ensemble = ["--attention-checks", "0", "--metric", "ensemble"];
+    let (_dir, project, page) = open_review(&ensemble);
     let manual =
-        || told(&project, &["report", "-f", "json"])["rows"][2]["manual_alignment"].clone();
+        || json_output(&project, &["report", "-f", "json"])["rows"][2]["manual_alignment"].clone();
     assert_eq!(manual(), Value::Null);
-    let page = Page::open(
-        &project,
-        "lan",
-        &["--attention-checks", "0", "--metric", "ensemble"],
-    );
     let item = page.queue().remove(0);
     let id = item["id"].as_str().expect("an id");
     let start = page.get(&format!("/api/alignment/{id}")).json();
     let number = |value: &Value| value.as_f64().expect("a number");
     let [[a, b, c], [d, e, f]] =
         [0, 1].map(|i| [0, 1, 2].map(|j| number(&start["view_from_depth"][i][j])));
-    let laid = |event: &str, map: &Value| {
+    let align = |event: &str, map: &Value| {
         let body = json!({ "event": event, "item": id, "view_from_depth": map, "note": null });
         let reply = page.post("/api/align", &body).expect("a reply");
         assert_eq!(reply.status, 200, "{event}");
     };
-    let is = |found: &Value, name: &str, wanted: f64| {
+    let assert_near = |found: &Value, name: &str, wanted: f64| {
         assert!(
             (number(&found[name]) - wanted).abs() < 1e-6,
             "{name}: {found}"
         );
     };
-    laid("h1", &start["view_from_depth"]);
+    align("h1", &start["view_from_depth"]);
     let same = manual();
     assert_eq!(
         (&same["n"], &same["angle_le_5deg"]),
         (&json!(1), &json!(1.0))
     );
     for name in ["angle_median_deg", "shift_median_pct", "scale_p95_pct"] {
-        is(&same, name, 0.0);
+        assert_near(&same, name, 0.0);
     }
-    // Turned by 12 degrees about the corner of the picture, and a quarter larger.
+    // Rotated by 12 degrees about the corner of the image, and enlarged by a quarter.
     let (sin, cos) = 12.0_f64.to_radians().sin_cos();
-    let turn = |x: f64, y: f64| [1.25 * (cos * x - sin * y), 1.25 * (sin * x + cos * y)];
-    let columns = [turn(a, d), turn(b, e), turn(c, f)];
+    let rotate = |x: f64, y: f64| [1.25 * (cos * x - sin * y), 1.25 * (sin * x + cos * y)];
+    let columns = [rotate(a, d), rotate(b, e), rotate(c, f)];
     let rows = [0, 1].map(|i| columns.map(|column| column[i]));
-    laid("h2", &json!(rows));
-    let turned = manual();
+    align("h2", &json!(rows));
+    let rotated = manual();
     assert_eq!(
-        (&turned["n"], &turned["angle_le_5deg"]),
+        (&rotated["n"], &rotated["angle_le_5deg"]),
         (&json!(1), &json!(0.0))
     );
-    is(&turned, "angle_median_deg", 12.0);
-    is(&turned, "scale_median_pct", 25.0);
-    assert!(number(&turned["shift_p95_pct"]) > 1.0, "{turned}");
+    assert_near(&rotated, "angle_median_deg", 12.0);
+    assert_near(&rotated, "scale_median_pct", 25.0);
+    assert!(number(&rotated["shift_p95_pct"]) > 1.0, "{rotated}");
     let text = mocban(project.dir(), &["report"]).expect(0).out;
     assert!(
         text.contains("\nManual ") && text.contains("  12.00  12.00  "),
