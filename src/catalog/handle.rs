@@ -10,7 +10,7 @@ use tokio::sync::{mpsc, oneshot};
 use crate::catalog::db::commit_delay::CommitDelay;
 use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::open;
-use crate::catalog::db::request::{Message, Work};
+use crate::catalog::db::request::{Message, Reply, Work};
 use crate::catalog::db::writer;
 
 /// Capacity of the writer's channel.
@@ -65,8 +65,8 @@ impl Catalog {
         let reader_pool = open::reader_pool(path).await?;
         let (sender, inbox) = mpsc::channel(INBOX);
         let path: Arc<Path> = path.into();
-        let commits_with = Arc::clone(&delay);
-        tokio::spawn(writer::run(conn, Arc::clone(&path), inbox, commits_with));
+        let writer = writer::run(conn, Arc::clone(&path), inbox, Arc::clone(&delay));
+        tokio::spawn(writer);
         Ok(Self {
             reader_pool,
             inbox: Some(sender),
@@ -88,14 +88,18 @@ impl Catalog {
         }
     }
 
-    pub(crate) fn writer(&self) -> Result<&mpsc::Sender<Message>> {
-        self.inbox.as_ref().ok_or(CatalogError::ReadOnly)
-    }
-
     /// Sends the writer a message.
     pub(crate) async fn send(&self, message: Message) -> Result<()> {
-        let sent = self.writer()?.send(message).await;
+        let inbox = self.inbox.as_ref().ok_or(CatalogError::ReadOnly)?;
+        let sent = inbox.send(message).await;
         sent.or(Err(CatalogError::Closed))
+    }
+
+    /// Sends the writer a message and waits for the reply.
+    pub(crate) async fn reply_to<T>(&self, message: impl FnOnce(Reply<T>) -> Message) -> Result<T> {
+        let (sender, receiver) = oneshot::channel();
+        self.send(message(sender)).await?;
+        receiver.await.unwrap_or(Err(CatalogError::Closed))
     }
 
     pub(crate) async fn read_conn(&self) -> Result<PoolConnection<Sqlite>> {
@@ -112,6 +116,14 @@ impl Catalog {
         &self,
         work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
     ) -> Result<T> {
-        writer::in_transaction(self.writer()?, &self.path, work).await
+        let path = Arc::clone(&self.path);
+        self.reply_to(|reply| {
+            Message::Transaction(Box::new(move |conn| {
+                Box::pin(async move {
+                    let _ = reply.send(writer::run_transaction(conn, &path, work).await);
+                })
+            }))
+        })
+        .await
     }
 }

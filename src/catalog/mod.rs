@@ -34,11 +34,11 @@ pub use queue::workers::{Outstanding, WorkLeft, WorkerInfo};
 pub use records::import::{ImportChunk, ImportRow, ImportSummary, PairChange};
 pub use records::manual_alignments::{ManualAlignment, StoredAlignment};
 pub use records::model::{
-    AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults,
-    ReviewerVerdict, StageCounts, StageRecord, StatusCounts, StoredFailure,
+    AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageCounts,
+    StageRecord, StatusCounts, StoredFailure,
 };
 pub use records::pair_results::ResultPages;
 pub use records::pair_work::{KnownInputs, PairWork};
 pub use records::review_answers::{Answer, AnsweredOn, AttentionCheckAnswer, Shown};
 pub use records::review_context::ReviewContext;
-pub use records::verdicts::{NewVerdict, VerdictEvent};
+pub use records::verdicts::{NewVerdict, ReviewerVerdict, VerdictEvent};

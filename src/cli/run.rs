@@ -261,7 +261,7 @@ fn plan_text(plan: &Plan, running: bool) -> String {
     }
     let rows = plan.entries.iter().map(|entry| {
         let (pairs, from) = (format!("  {}", entry.pairs), format!("from {}", entry.from));
-        vec![pairs, from, entry.why.to_string()]
+        vec![pairs, from, entry.to_string()]
     });
     format!("{}\n{}", parts.join(", "), columns(rows, "><<"))
 }
@@ -287,14 +287,12 @@ mod tests {
         let plan = Plan {
             entries: vec![PlanEntry {
                 from: Stage::Register,
-                why: StaleReason::Settings {
-                    stage: Stage::Register,
-                    changes: vec![FieldChange {
-                        field: "register.max_scale".into(),
-                        old: Some(1.2.into()),
-                        new: Some(1.3.into()),
-                    }],
-                },
+                why: StaleReason::Requested,
+                changes: Some(vec![FieldChange {
+                    field: "register.max_scale".into(),
+                    old: Some(1.2.into()),
+                    new: Some(1.3.into()),
+                }]),
                 pairs: 24,
             }],
             done: 2,

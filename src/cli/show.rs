@@ -59,7 +59,7 @@ fn tail(detail: &PairDetail, why: Option<&PlanEntry>, palette: Palette) -> Strin
     }
     lines.push(palette.paint(Tone::Strong, "next run"));
     lines.push(match (why, detail.results.status) {
-        (Some(entry), _) => format!("  from {}: {}", entry.from, entry.why),
+        (Some(entry), _) => format!("  from {}: {entry}", entry.from),
         (None, JobStatus::Quarantined) => "  nothing until `retry`".to_owned(),
         (None, JobStatus::Leased) => "  running now".to_owned(),
         (None, JobStatus::Done | JobStatus::Ready | JobStatus::Backoff) => {

@@ -157,7 +157,7 @@ impl LineManualAlignment {
 pub(super) async fn newest_manual_alignments(
     catalog: &Catalog,
 ) -> Result<BTreeMap<PairName, LineManualAlignment>, CatalogError> {
-    let newest = catalog.newest_hand_alignments().await?.into_iter();
+    let newest = catalog.newest_manual_alignments().await?.into_iter();
     Ok(newest
         .map(|(pair, stored)| (pair, LineManualAlignment::of(stored)))
         .collect())

@@ -47,7 +47,7 @@ pub async fn build_with(
 ) -> Result<Report, ReportError> {
     let mut report = ReportAccumulator::default();
     report.set_attention_checks(attention_checks::project_rates(catalog).await?);
-    let manual_alignments = catalog.newest_hand_alignments().await?;
+    let manual_alignments = catalog.newest_manual_alignments().await?;
     let mut pages = catalog.result_pages(PAIRS_PER_PAGE);
     while let Some(page) = pages.next().await? {
         for (pair, truth) in evaluate_pairs(project, page).await? {

@@ -256,7 +256,7 @@ async fn undo(
     let Json(body) = body?;
     let reviewer = &state.options.queue.reviewer;
     let now = (state.options.now)();
-    state.catalog.take_back(&body.event, reviewer, now).await?;
+    state.catalog.undo_event(&body.event, reviewer, now).await?;
     Ok(Json(json!({ "undone": body.event })))
 }
 

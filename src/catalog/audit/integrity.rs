@@ -2,17 +2,15 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde_json::Value;
 use sqlx::sqlite::{SqliteConnectOptions, SqliteRow};
-use sqlx::{ConnectOptions as _, Row as _, SqliteConnection};
+use sqlx::{ConnectOptions as _, FromRow as _, Row as _, SqliteConnection};
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
+use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open;
-use crate::catalog::db::rows;
+use crate::catalog::db::rows::json_array;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::counters::CounterKey;
+use crate::catalog::queue::counters::{CounterKey, JobGroup};
 use crate::catalog::queue::fragments::inconsistent;
 use crate::catalog::queue::job_counts::count_jobs;
 use crate::catalog::records::pair_work::{self, KnownInputs};
@@ -39,7 +37,7 @@ pub struct CounterDrift {
     /// The status.
     pub status: JobStatus,
     /// The counter's value; `None` when its row is missing.
-    pub kept: Option<i64>,
+    pub kept: Option<u64>,
     /// The number of jobs.
     pub counted: u64,
 }
@@ -61,8 +59,8 @@ pub struct AuditedPair {
     pub metrics: BTreeSet<ThresholdMetric>,
 }
 
-/// A stored result, unparsed.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A stored result, unparsed, because a check must read damaged ones too.
+#[derive(Debug, Clone, PartialEq, Eq, sqlx::FromRow)]
 pub struct AuditedResult {
     /// The outcome as JSON text.
     pub outcome: String,
@@ -147,12 +145,14 @@ impl Catalog {
         let found = objects(&mut conn).await?;
         let wanted = wanted_objects().await?;
         let gone = wanted.keys().filter(|name| !found.contains_key(*name));
-        let gone = gone.map(|name| format!("{name} is gone"));
+        let gone = gone.map(|name| format!("{name} is missing"));
         let other = found
             .iter()
             .filter_map(|(name, sql)| match wanted.get(name) {
-                None => Some(format!("{name} is not of this program")),
-                Some(wanted) if wanted != sql => Some(format!("{name} is not as it was made")),
+                None => Some(format!("{name} does not belong to this program")),
+                Some(wanted) if wanted != sql => {
+                    Some(format!("{name} differs from its definition"))
+                }
                 Some(_) => None,
             });
         Ok(gone.chain(other).collect())
@@ -170,11 +170,11 @@ impl Catalog {
         let checks = [
             (
                 WRONG_FINGERPRINTS,
-                "have another fingerprint than that of their last result",
+                "have another fingerprint than their last result",
             ),
             (
                 UNMARKED,
-                "are not marked dirty, though their inputs or settings changed since",
+                "are not marked dirty, although their inputs or settings changed",
             ),
         ];
         for (sql, what) in checks.into_iter().filter(|_| !quick) {
@@ -196,11 +196,8 @@ impl Catalog {
         limit: usize,
     ) -> Result<Vec<AuditedPair>> {
         let mut conn = self.snapshot().await?;
-        let found = sqlx::query(PAGE)
-            .bind(after.map_or(0, |pair| pair.0))
-            .bind(limit as i64)
-            .fetch_all(&mut *conn)
-            .await?;
+        let query = sqlx::query(PAGE).bind(after.map_or(0, |pair| pair.0));
+        let found = query.bind(limit as i64).fetch_all(&mut *conn).await?;
         let mut pairs = found.iter().map(pair).collect::<Result<Vec<_>>>()?;
         let ids: Vec<i64> = pairs.iter().map(|pair| pair.inputs.pair.0).collect();
         let mut results = stored(&mut conn, &ids).await?;
@@ -217,11 +214,8 @@ impl Catalog {
 
 /// Compares the counters with the jobs.
 async fn counter_drift(conn: &mut SqliteConnection) -> Result<Vec<CounterDrift>> {
-    let stored: Vec<(i64, i64, i64, i64)> = sqlx::query_as(COUNTERS).fetch_all(&mut *conn).await?;
-    let stored = stored.into_iter();
-    let stored: BTreeMap<_, _> = stored
-        .map(|(cursor, status, fingerprint, n)| ((cursor, status, fingerprint), n))
-        .collect();
+    let stored: Vec<JobGroup> = sqlx::query_as(COUNTERS).fetch_all(&mut *conn).await?;
+    let stored: BTreeMap<_, _> = stored.iter().map(|group| (group.key, group.n)).collect();
     let counted = count_jobs(conn).await?;
     let fingerprints: Vec<(i64, i64)> = sqlx::query_as(FINGERPRINTS).fetch_all(conn).await?;
     let needed = fingerprints.into_iter().flat_map(|(cursor, fingerprint)| {
@@ -230,12 +224,11 @@ async fn counter_drift(conn: &mut SqliteConnection) -> Result<Vec<CounterDrift>>
     let keys: BTreeSet<_> = needed.chain(counted.keys().copied()).collect();
     let drift = keys.into_iter().filter_map(|key| {
         let counted = counted.get(&key).copied().unwrap_or(0);
-        let stored = stored.get(&(key.cursor, key.status.code(), key.fingerprint));
-        let is_right = stored.is_some_and(|n| u64::try_from(*n) == Ok(counted));
-        (!is_right).then_some(CounterDrift {
+        let kept = stored.get(&key).copied();
+        (kept != Some(counted)).then_some(CounterDrift {
             cursor: key.cursor,
             status: key.status,
-            kept: stored.copied(),
+            kept,
             counted,
         })
     });
@@ -276,12 +269,11 @@ pub(crate) async fn wanted_objects() -> Result<BTreeMap<String, String>> {
 }
 
 fn pair(row: &SqliteRow) -> Result<AuditedPair> {
-    let status: Option<i64> = row.try_get("status")?;
-    let cursor: Option<i64> = row.try_get("stage")?;
+    let status: Option<JobStatus> = row.try_get("status")?;
     Ok(AuditedPair {
-        name: rows::pair_name(&row.try_get::<String, _>("name")?)?,
+        name: row.try_get("name")?,
         inputs: pair_work::known_inputs(row)?,
-        job: status.map(rows::status).transpose()?.zip(cursor),
+        job: status.zip(row.try_get("stage")?),
         has_failure: row.try_get("has_failure")?,
         results: BTreeMap::new(),
         metrics: BTreeSet::new(),
@@ -292,20 +284,11 @@ async fn stored(
     conn: &mut SqliteConnection,
     pairs: &[i64],
 ) -> Result<BTreeMap<i64, BTreeMap<Stage, AuditedResult>>> {
-    let found = sqlx::query(RESULTS)
-        .bind(Value::from(pairs).to_string())
-        .fetch_all(conn)
-        .await?;
+    let query = sqlx::query(RESULTS).bind(json_array(pairs.iter().copied()));
     let mut results: BTreeMap<i64, BTreeMap<_, _>> = BTreeMap::new();
-    for row in &found {
-        let stage = rows::stage(row.try_get("stage")?)?;
-        let result = AuditedResult {
-            outcome: row.try_get("outcome")?,
-            files: row.try_get("files")?,
-            result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
-        };
+    for row in &query.fetch_all(conn).await? {
         let of_pair = results.entry(row.try_get("pair")?).or_default();
-        of_pair.insert(stage, result);
+        of_pair.insert(row.try_get("stage")?, AuditedResult::from_row(row)?);
     }
     Ok(results)
 }

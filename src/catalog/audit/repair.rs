@@ -1,20 +1,19 @@
 //! Repairs what a check found. Only without an active run; verdicts and the history of results are never changed.
 
 use serde_json::json;
-use sqlx::{AssertSqlSafe, Row as _, SqliteConnection};
+use sqlx::{AssertSqlSafe, SqliteConnection};
 
 use crate::catalog::audit::integrity::{integrity, objects, wanted_objects};
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
-use crate::catalog::db::rows::array;
+use crate::catalog::db::rows::json_array;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::fragments::{fingerprint_before, inconsistent};
 use crate::catalog::queue::job_counts::count_jobs;
-use crate::domain::{JobStatus, PairId, Stage};
+use crate::domain::{PairId, Stage};
 
 const POSITIONS: &str = "
-SELECT j.stage, j.status, j.fingerprint
+SELECT j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
 FROM json_each(?1) AS item CROSS JOIN job AS j ON j.pair = item.value ->> 0";
 
 const NEW_JOBS: &str = "
@@ -31,7 +30,7 @@ UPDATE job SET stage = min(stage, item.value ->> 1), status = 0, run_at = NULL, 
     fingerprint_before!("min(job.stage, item.value ->> 1)"),
     "
 FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0
-RETURNING pair, stage, fingerprint"
+RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
 const CLEAR_FAILURES: &str =
@@ -127,28 +126,25 @@ impl Catalog {
 }
 
 async fn restore(conn: &mut SqliteConnection, pairs: &[(PairId, Stage)]) -> Result<()> {
-    let items = pairs.iter();
-    let items = array(items.map(|(pair, stage)| json!([pair.0, stage.index()]))).to_string();
+    let items = json_array(
+        pairs
+            .iter()
+            .map(|(pair, stage)| json!([pair.0, stage.index()])),
+    );
     let mut deltas = Deltas::default();
-    let before = sqlx::query(POSITIONS)
-        .bind(&items)
-        .fetch_all(&mut *conn)
-        .await?;
-    for row in &before {
-        let (cursor, status): (i64, i64) = (row.try_get("stage")?, row.try_get("status")?);
-        let key = CounterKey::new(cursor, rows::status(status)?, row.try_get("fingerprint")?);
+    let before = sqlx::query_as(POSITIONS).bind(&items);
+    let before: Vec<CounterKey> = before.fetch_all(&mut *conn).await?;
+    for key in before {
         deltas.add(key, -1);
     }
     sqlx::query(NEW_JOBS)
         .bind(&items)
         .execute(&mut *conn)
         .await?;
-    let after: Vec<(i64, i64, Option<i64>)> = sqlx::query_as(RESTORE)
-        .bind(&items)
-        .fetch_all(&mut *conn)
-        .await?;
-    for (_, cursor, fingerprint) in after {
-        deltas.add(CounterKey::new(cursor, JobStatus::Ready, fingerprint), 1);
+    let after = sqlx::query_as(RESTORE).bind(&items);
+    let after: Vec<CounterKey> = after.fetch_all(&mut *conn).await?;
+    for key in after {
+        deltas.add(key, 1);
     }
     sqlx::query(CLEAR_FAILURES)
         .bind(&items)

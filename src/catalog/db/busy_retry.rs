@@ -20,7 +20,7 @@ const RETRY_EVERY: Duration = Duration::from_millis(5);
 pub(crate) struct BusyRetry<'p> {
     catalog: &'p Path,
     begun: Instant,
-    is_told: bool,
+    is_logged: bool,
 }
 
 impl<'p> BusyRetry<'p> {
@@ -29,7 +29,7 @@ impl<'p> BusyRetry<'p> {
         Self {
             catalog,
             begun: Instant::now(),
-            is_told: false,
+            is_logged: false,
         }
     }
 
@@ -41,20 +41,31 @@ impl<'p> BusyRetry<'p> {
             return None;
         }
         tracing::debug!(%error, "the catalog is busy, waiting");
-        if waited >= QUIET_WAIT && !self.is_told {
-            self.is_told = true;
-            self.tell();
+        if waited >= QUIET_WAIT && !self.is_logged {
+            self.is_logged = true;
+            let owner = lock_owner(self.catalog);
+            let owner =
+                owner.map_or_else(|| "another process".to_owned(), |owner| owner.to_string());
+            tracing::warn!("{} is locked by {owner}; waiting", self.catalog.display());
         }
         Some(sleep(RETRY_EVERY))
     }
-
-    fn tell(&self) {
-        let catalog = self.catalog.display();
-        let by = lock_owner(self.catalog)
-            .map_or_else(|| "another process".to_owned(), |holder| holder.to_string());
-        tracing::warn!("{catalog} is kept locked by {by}; waiting");
-    }
 }
+
+/// Evaluates a fallible expression until the catalog is not locked or the longest wait is over.
+macro_rules! retry_while_busy {
+    ($catalog:expr, $attempt:expr) => {{
+        let mut retry = $crate::catalog::db::busy_retry::BusyRetry::begin($catalog);
+        loop {
+            let outcome = $attempt;
+            match retry.wait(&outcome) {
+                Some(moment) => moment.await,
+                None => break outcome,
+            }
+        }
+    }};
+}
+pub(crate) use retry_while_busy;
 
 #[cfg(test)]
 mod tests {
@@ -123,23 +134,23 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn who_is_waited_for_is_told_after_a_while_and_the_wait_ends() {
+    async fn lock_owner_is_logged_once_and_the_wait_ends() {
         let busy = busy().await;
         let warnings = Warnings::default();
-        let told = Arc::clone(&warnings.0);
+        let logged = Arc::clone(&warnings.0);
         let _log = subscriber::set_default(warnings);
         assert!(after(Duration::ZERO).wait(&busy).is_some());
-        assert_eq!(told.load(Ordering::SeqCst), 0);
+        assert_eq!(logged.load(Ordering::SeqCst), 0);
         let mut retry = after(QUIET_WAIT);
         for _ in 0..3 {
             assert!(retry.wait(&busy).is_some());
-            assert_eq!(told.load(Ordering::SeqCst), 1);
+            assert_eq!(logged.load(Ordering::SeqCst), 1);
         }
         assert!(after(LONGEST_WAIT).wait(&busy).is_none());
     }
 
     #[tokio::test]
-    async fn what_is_done_or_refused_for_good_is_not_waited_for() {
+    async fn success_and_other_errors_are_not_retried() {
         assert!(after(Duration::ZERO).wait(&Ok(())).is_none());
         let closed: Result<()> = Err(CatalogError::Closed);
         assert!(after(Duration::ZERO).wait(&closed).is_none());

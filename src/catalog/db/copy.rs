@@ -6,8 +6,7 @@ use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions as _, Connection as _};
 
 use crate::catalog::audit::integrity;
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
+use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::{Identity, identity};
 use crate::catalog::handle::Catalog;
@@ -54,15 +53,7 @@ fn not_copied(file: &Path, error: sqlx::Error) -> CatalogError {
         Some(CatalogErrorKind::Full) => "the disk is full",
         Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen) => "it cannot be written",
         Some(CatalogErrorKind::Disk) => "the disk refused",
-        Some(
-            CatalogErrorKind::Damaged
-            | CatalogErrorKind::NotADatabase
-            | CatalogErrorKind::Busy
-            | CatalogErrorKind::Contradiction,
-        )
-        | None => {
-            return error.into();
-        }
+        _ => return error.into(),
     };
     CatalogError::Io {
         path: file.to_owned(),

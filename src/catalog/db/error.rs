@@ -11,16 +11,16 @@ pub enum CatalogError {
     #[error("no catalog at {0}")]
     Missing(PathBuf),
     /// The path is a directory.
-    #[error("{0} is a directory where the catalog should be a file; move it away")]
+    #[error("{0} is a directory where the catalog should be a file; rename it")]
     IsDirectory(PathBuf),
     /// The file is empty.
     #[error(
-        "{0} is empty (0 bytes), so nothing is known of this project; put a backup in its place, or import its pairs again"
+        "{0} is empty (0 bytes), so it holds no pairs; replace it with a backup, or import the pairs again"
     )]
     Empty(PathBuf),
     /// The file is not a catalog.
     #[error(
-        "{path} is not a catalog but {reason}; move it away, and put a backup in its place if there is one"
+        "{path} is not a catalog but {reason}; rename it, and restore a backup if there is one"
     )]
     Foreign {
         /// The file.
@@ -42,27 +42,27 @@ pub enum CatalogError {
     },
     /// The file is corrupt.
     #[error(
-        "{0} is damaged: some of it is not what the database wrote, or the disk cannot read it; `check` tells how far it can be read, and a backup can take its place"
+        "{0} is damaged: part of it was overwritten or cannot be read; `check` reports how much can be read, and a backup can replace it"
     )]
     Damaged(PathBuf),
     /// The disk failed to read part of the file.
     #[error(
-        "{0}: the disk refused to read some of it, so it is not known whether it is whole; look after the disk and call again"
+        "{0}: the disk reported an error for part of it, so it cannot be checked; check the disk and try again"
     )]
     Unread(PathBuf),
     /// The file cannot be created.
-    #[error("{0} cannot be made: its folder takes no new file, or the disk refuses")]
-    NotMade(PathBuf),
+    #[error("{0} cannot be created: its folder is not writable, or the disk reported an error")]
+    NotCreated(PathBuf),
     /// The file or its directory is read-only.
     #[error(
-        "{0} cannot be written to; status, show, report and export work here, all else needs a copy that can be written"
+        "{0} cannot be written to; status, show, report and export still work, other commands need a writable copy"
     )]
     NotWritable(PathBuf),
     /// The write-ahead log was not checkpointed, and cannot be here.
     #[error(
-        "{0} holds changes that are not in the catalog yet, and nothing can be written here; copy the project to where it can be written"
+        "{0} holds changes that are not in the catalog yet, and the folder is read-only; copy the project to a writable folder"
     )]
-    UnfoldedLog(PathBuf),
+    NotCheckpointed(PathBuf),
     /// The directory is on a network file system.
     #[error(
         "{path} is on a network file system ({kind}), where the catalog could be damaged: its write-ahead log is shared through memory; put the project on a local disk, its meshes and prints may stay where they are"
@@ -77,7 +77,7 @@ pub enum CatalogError {
     #[error("path {0:?} is not UTF-8")]
     NotUtf8(PathBuf),
     /// The rows of an import ended early.
-    #[error("the list was not read to its end, nothing was imported")]
+    #[error("the list was not read to its end, so nothing was imported")]
     CutShort,
     /// A pragma did not take effect.
     #[error("the database set {name} to {found}, not {wanted}")]
@@ -98,9 +98,9 @@ pub enum CatalogError {
     /// A verdict on a metric that has no result.
     #[error("pair {0} has no result of {1} to judge yet")]
     NoMetricResult(PairName, ThresholdMetric),
-    /// The reviewer has no verdict left to undo.
-    #[error("there is no verdict of {0} to take back")]
-    NothingToUndo(String),
+    /// No verdict is left to undo, of a reviewer or of anyone.
+    #[error("there is no verdict{} to undo", .0.as_ref().map_or_else(String::new, |reviewer| format!(" by {reviewer}")))]
+    NothingToUndo(Option<String>),
     /// The counters do not add up to the number of jobs.
     #[error("the counters add up to {counted} jobs, but there are {jobs}")]
     WrongCounters {
@@ -109,11 +109,11 @@ pub enum CatalogError {
         /// Number of jobs.
         jobs: u64,
     },
-    /// A row that violates the schema's rules.
-    #[error("the catalog holds a row it must not: {0}")]
+    /// A stored value that is not allowed.
+    #[error("invalid value in the catalog: {0}")]
     Corrupt(String),
     /// A write through a read-only catalog.
-    #[error("the catalog was opened to read only")]
+    #[error("the catalog was opened read-only")]
     ReadOnly,
     /// An error shared by the callers of one commit.
     #[error("{0}")]
@@ -123,7 +123,7 @@ pub enum CatalogError {
     Closed,
     /// An error of SQLite.
     #[error("catalog: {0}")]
-    Database(#[from] sqlx::Error),
+    Database(sqlx::Error),
     /// The schema could not be created.
     #[error("catalog schema: {0}")]
     Migrate(#[from] sqlx::migrate::MigrateError),
@@ -138,6 +138,15 @@ pub enum CatalogError {
         /// Why.
         source: std::io::Error,
     },
+}
+
+impl From<sqlx::Error> for CatalogError {
+    fn from(error: sqlx::Error) -> Self {
+        match error {
+            sqlx::Error::ColumnDecode { source, .. } => Self::Corrupt(source.to_string()),
+            error => Self::Database(error),
+        }
+    }
 }
 
 /// Result of a catalog call.

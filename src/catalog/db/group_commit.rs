@@ -8,22 +8,47 @@ use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::request::{Reply, Request};
 use crate::catalog::db::script::{Script, ScriptRows, Statement};
 use crate::catalog::queue::checkpoint::{self, LeasedCheckpoints};
-use crate::catalog::queue::claim::{self, ClaimRequest, ClaimedRow, Heartbeat};
+use crate::catalog::queue::claim::{self, ClaimRequest, Heartbeat};
 use crate::catalog::queue::counters::Deltas;
 use crate::catalog::queue::fail::{self, FailedRow};
-use crate::catalog::queue::lease::{FencedRow, Lease, StageCheckpoint, StageFailure};
+use crate::catalog::queue::lease::{FencedRow, Lease, StageFailure};
 
-/// Something to store under a lease, and where to reply whether the lease held.
-type Leased<T> = (Box<(Lease, T)>, Reply<bool>);
+/// Requests of one kind, and where the reply to each goes.
+struct Pending<I, R>(Vec<(I, Reply<R>)>);
+
+impl<I, R> Pending<I, R> {
+    fn items(&self) -> impl Iterator<Item = &I> {
+        self.0.iter().map(|(item, _)| item)
+    }
+
+    fn answer(self, replies: Vec<R>) {
+        for ((_, reply), answer) in self.0.into_iter().zip(replies) {
+            // The sender may no longer wait.
+            let _ = reply.send(Ok(answer));
+        }
+    }
+
+    fn refuse(self, error: &Arc<CatalogError>) {
+        for (_, reply) in self.0 {
+            let _ = reply.send(Err(CatalogError::Shared(Arc::clone(error))));
+        }
+    }
+}
+
+impl<I, R> Default for Pending<I, R> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
 
 /// The requests of one commit by kind.
 #[derive(Default)]
 pub(crate) struct Batch {
-    heartbeats: Vec<(Heartbeat, Reply<bool>)>,
-    checkpoints: Vec<Leased<Vec<StageCheckpoint>>>,
-    failures: Vec<Leased<StageFailure>>,
-    releases: Vec<(Lease, Reply<bool>)>,
-    claims: Vec<(ClaimRequest, Reply<Vec<Lease>>)>,
+    heartbeats: Pending<Heartbeat, bool>,
+    checkpoints: Pending<Box<LeasedCheckpoints>, bool>,
+    failures: Pending<Box<(Lease, StageFailure)>, bool>,
+    releases: Pending<Lease, bool>,
+    claims: Pending<ClaimRequest, Vec<Lease>>,
 }
 
 /// Replies to the requests of a batch, in their order.
@@ -41,26 +66,26 @@ struct JobStatements {
     advanced: Option<Statement<FencedRow>>,
     failed: Option<Statement<FailedRow>>,
     released: Option<Statement<FencedRow>>,
-    claims: Vec<Statement<ClaimedRow>>,
+    claims: Vec<Statement<Lease>>,
 }
 
 impl Batch {
     pub(crate) fn push(&mut self, request: Request) {
         match request {
-            Request::Heartbeat(heartbeat, reply) => self.heartbeats.push((heartbeat, reply)),
-            Request::Checkpoint(done, reply) => self.checkpoints.push((done, reply)),
-            Request::Fail(failed, reply) => self.failures.push((failed, reply)),
-            Request::Release(lease, reply) => self.releases.push((lease, reply)),
-            Request::Claim(claim, reply) => self.claims.push((claim, reply)),
+            Request::Heartbeat(heartbeat, reply) => self.heartbeats.0.push((heartbeat, reply)),
+            Request::Checkpoint(done, reply) => self.checkpoints.0.push((done, reply)),
+            Request::Fail(failed, reply) => self.failures.0.push((failed, reply)),
+            Request::Release(lease, reply) => self.releases.0.push((lease, reply)),
+            Request::Claim(claim, reply) => self.claims.0.push((claim, reply)),
         }
     }
 
     pub(crate) fn len(&self) -> usize {
-        self.heartbeats.len()
-            + self.checkpoints.len()
-            + self.failures.len()
-            + self.releases.len()
-            + self.claims.len()
+        self.heartbeats.0.len()
+            + self.checkpoints.0.len()
+            + self.failures.0.len()
+            + self.releases.0.len()
+            + self.claims.0.len()
     }
 
     /// Runs the requests in one transaction: heartbeats, checkpoints, failures, releases, claims. After an error that
@@ -79,21 +104,20 @@ impl Batch {
 
     /// Adds the statements that change workers and jobs.
     fn add_jobs(&self, script: &mut Script) -> Result<JobStatements> {
-        let heartbeats = self.heartbeats.iter();
-        let heartbeats = heartbeats.map(|(heartbeat, _)| claim::add_heartbeat(script, *heartbeat));
-        let heartbeats = heartbeats.collect::<Result<_>>()?;
-        let checkpoints = self.checkpoints.iter().map(|(item, _)| &**item);
-        let failures = self.failures.iter().map(|(item, _)| &**item);
-        let releases = self.releases.iter().map(|(lease, _)| lease);
+        let heartbeats = self.heartbeats.items();
+        let heartbeats = heartbeats.map(|heartbeat| claim::add_heartbeat(script, *heartbeat));
         Ok(JobStatements {
-            heartbeats,
-            advanced: checkpoint::add_advance(script, checkpoints)?,
-            failed: fail::add_failures(script, failures)?,
-            released: claim::add_release(script, releases)?,
+            heartbeats: heartbeats.collect::<Result<_>>()?,
+            advanced: checkpoint::add_advance(
+                script,
+                self.checkpoints.items().map(|item| &**item),
+            )?,
+            failed: fail::add_failures(script, self.failures.items().map(|item| &**item))?,
+            released: claim::add_release(script, self.releases.items())?,
             claims: self
                 .claims
-                .iter()
-                .map(|(request, _)| claim::add_claim(script, request))
+                .items()
+                .map(|request| claim::add_claim(script, request))
                 .collect::<Result<_>>()?,
         })
     }
@@ -111,96 +135,83 @@ impl Batch {
         let released = rows.read_if_any(statements.released.as_ref())?;
         let heartbeats = statements.heartbeats.iter();
         let heartbeats = heartbeats.map(|statement| Ok(!rows.read(statement)?.is_empty()));
-        let mut claims = Vec::with_capacity(self.claims.len());
-        for ((request, _), statement) in self.claims.iter().zip(&statements.claims) {
-            let claimed = rows.read(statement)?;
-            claims.push(claim::leases(claimed, request.worker, &mut deltas)?);
+        let mut claims = Vec::with_capacity(statements.claims.len());
+        for statement in &statements.claims {
+            claims.push(claim::count_claimed(rows.read(statement)?, &mut deltas));
         }
-        let stored: Vec<&LeasedCheckpoints> = self
-            .checkpoints
-            .iter()
-            .map(|(item, _)| &**item)
-            .filter(|(lease, _)| lease.is_in(&advanced))
-            .collect();
+        let stored = self.checkpoints.items().map(|item| &**item);
+        let stored: Vec<_> = stored.filter(|(lease, _)| lease.is_in(&advanced)).collect();
         checkpoint::add_results(script, &stored, &mut deltas)?;
-        let failures = self.failures.iter().filter_map(|(item, _)| {
-            let row = fail::row_of(&item.0, &failed)?;
-            Some((&**item, row))
-        });
+        let failures = self.failures.items();
+        let failures = failures.filter_map(|item| Some((&**item, fail::row_of(&item.0, &failed)?)));
         fail::add_failure_records(script, &failures.collect::<Vec<_>>(), &mut deltas)?;
-        let releases = self.releases.iter().map(|(lease, _)| lease);
+        let releases = self.releases.items();
         claim::count_released(releases.filter(|lease| lease.is_in(&released)), &mut deltas);
         deltas.add_to(script)?;
-        let checkpoints = self.checkpoints.iter();
-        let failures = self.failures.iter();
-        let releases = self.releases.iter();
+        let (checkpoints, failures) = (self.checkpoints.items(), self.failures.items());
+        let releases = self.releases.items();
         Ok(BatchReply {
             heartbeats: heartbeats.collect::<Result<_>>()?,
-            checkpoints: checkpoints
-                .map(|(item, _)| item.0.is_in(&advanced))
-                .collect(),
+            checkpoints: checkpoints.map(|item| item.0.is_in(&advanced)).collect(),
             failures: failures
-                .map(|(item, _)| fail::row_of(&item.0, &failed).is_some())
+                .map(|item| fail::row_of(&item.0, &failed).is_some())
                 .collect(),
-            releases: releases.map(|(lease, _)| lease.is_in(&released)).collect(),
+            releases: releases.map(|lease| lease.is_in(&released)).collect(),
             claims,
         })
     }
 
-    /// Sends the replies. Senders that no longer wait get none.
+    /// Sends the replies.
     pub(crate) fn answer(self, replies: BatchReply) {
-        for ((_, reply), alive) in self.heartbeats.into_iter().zip(replies.heartbeats) {
-            let _ = reply.send(Ok(alive));
-        }
-        for ((_, reply), kept) in self.checkpoints.into_iter().zip(replies.checkpoints) {
-            let _ = reply.send(Ok(kept));
-        }
-        for ((_, reply), kept) in self.failures.into_iter().zip(replies.failures) {
-            let _ = reply.send(Ok(kept));
-        }
-        for ((_, reply), kept) in self.releases.into_iter().zip(replies.releases) {
-            let _ = reply.send(Ok(kept));
-        }
-        for ((_, reply), leases) in self.claims.into_iter().zip(replies.claims) {
-            let _ = reply.send(Ok(leases));
-        }
+        self.heartbeats.answer(replies.heartbeats);
+        self.checkpoints.answer(replies.checkpoints);
+        self.failures.answer(replies.failures);
+        self.releases.answer(replies.releases);
+        self.claims.answer(replies.claims);
     }
 
     /// Replies to all requests that nothing was stored.
     pub(crate) fn refuse(self, error: &Arc<CatalogError>) {
-        let shared = || CatalogError::Shared(Arc::clone(error));
-        let replies = self.heartbeats.into_iter().map(|(_, reply)| reply);
-        let replies = replies.chain(self.checkpoints.into_iter().map(|(_, reply)| reply));
-        let replies = replies.chain(self.failures.into_iter().map(|(_, reply)| reply));
-        for reply in replies.chain(self.releases.into_iter().map(|(_, reply)| reply)) {
-            let _ = reply.send(Err(shared()));
-        }
-        for (_, reply) in self.claims {
-            let _ = reply.send(Err(shared()));
-        }
+        self.heartbeats.refuse(error);
+        self.checkpoints.refuse(error);
+        self.failures.refuse(error);
+        self.releases.refuse(error);
+        self.claims.refuse(error);
     }
 
     /// Splits the batch into one batch per request, in the order of execution.
     pub(crate) fn split(self) -> Vec<Self> {
         let heartbeats = self
             .heartbeats
+            .0
             .into_iter()
             .map(|(a, b)| Request::Heartbeat(a, b));
-        let checkpoints = self.checkpoints.into_iter();
-        let checkpoints = checkpoints.map(|(a, b)| Request::Checkpoint(a, b));
-        let failures = self.failures.into_iter();
-        let failures = failures.map(|(a, b)| Request::Fail(a, b));
-        let releases = self.releases.into_iter();
-        let releases = releases.map(|(a, b)| Request::Release(a, b));
-        let claims = self.claims.into_iter().map(|(a, b)| Request::Claim(a, b));
-        let all = heartbeats.chain(checkpoints).chain(failures);
-        all.chain(releases)
-            .chain(claims)
-            .map(|request| {
-                let mut single = Self::default();
-                single.push(request);
-                single
-            })
-            .collect()
+        let checkpoints = self
+            .checkpoints
+            .0
+            .into_iter()
+            .map(|(a, b)| Request::Checkpoint(a, b));
+        let failures = self
+            .failures
+            .0
+            .into_iter()
+            .map(|(a, b)| Request::Fail(a, b));
+        let releases = self
+            .releases
+            .0
+            .into_iter()
+            .map(|(a, b)| Request::Release(a, b));
+        let claims = self.claims.0.into_iter().map(|(a, b)| Request::Claim(a, b));
+        let requests = heartbeats
+            .chain(checkpoints)
+            .chain(failures)
+            .chain(releases)
+            .chain(claims);
+        let single = |request| {
+            let mut batch = Self::default();
+            batch.push(request);
+            batch
+        };
+        requests.map(single).collect()
     }
 }

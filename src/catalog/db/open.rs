@@ -7,11 +7,10 @@ use std::time::Duration;
 use sqlx::sqlite::{
     SqliteConnectOptions, SqliteJournalMode, SqlitePool, SqlitePoolOptions, SqliteSynchronous,
 };
-use sqlx::{ConnectOptions, Connection as _, SqliteConnection};
+use sqlx::{AssertSqlSafe, ConnectOptions, Connection as _, Row as _, SqliteConnection};
 
-use crate::catalog::db::busy_retry::BusyRetry;
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
+use crate::catalog::db::busy_retry::retry_while_busy;
+use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::lock_owner::sidecar;
 use crate::catalog::db::network_fs;
@@ -42,53 +41,35 @@ fn options(path: &Path) -> SqliteConnectOptions {
 /// Opens the write connection. Creates file and schema when `create` is set.
 pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnection> {
     network_fs::refuse(path)?;
-    look(path, create)?;
+    check_file(path, create)?;
     let is_new = create && !path.exists();
-    let mut conn = connect(path, create)
-        .await
-        .map_err(|error| match error.kind() {
-            Some(CatalogErrorKind::CannotOpen) if is_new => CatalogError::NotMade(path.to_owned()),
-            _ => not_writable(path, error),
-        })?;
-    for (name, sql, wanted) in [
-        (
-            "journal_mode",
-            "SELECT CAST(journal_mode AS TEXT) FROM pragma_journal_mode",
-            "wal",
-        ),
-        (
-            "synchronous",
-            "SELECT CAST(synchronous AS TEXT) FROM pragma_synchronous",
-            "2",
-        ),
-        (
-            "foreign_keys",
-            "SELECT CAST(foreign_keys AS TEXT) FROM pragma_foreign_keys",
-            "1",
-        ),
-        (
-            "busy_timeout",
-            "SELECT CAST(timeout AS TEXT) FROM pragma_busy_timeout",
-            "10000",
-        ),
+    let connected = retry_while_busy!(path, connect(path, create).await);
+    let mut conn = connected.map_err(|error| match error.kind() {
+        Some(CatalogErrorKind::CannotOpen) if is_new => CatalogError::NotCreated(path.to_owned()),
+        _ if is_read_only(&error) => CatalogError::NotWritable(path.to_owned()),
+        _ => unreadable(path, error),
+    })?;
+    for (name, wanted) in [
+        ("journal_mode", "wal"),
+        ("synchronous", "2"),
+        ("foreign_keys", "1"),
+        ("busy_timeout", "10000"),
     ] {
-        assert_pragma(&mut conn, name, sql, wanted).await?;
+        let query = sqlx::query(AssertSqlSafe(format!("PRAGMA {name}")));
+        // SQLite converts numbers to text.
+        let found: String = query.fetch_one(&mut conn).await?.try_get_unchecked(0)?;
+        if found != wanted {
+            return Err(CatalogError::Pragma {
+                name,
+                wanted,
+                found,
+            });
+        }
     }
     Ok(conn)
 }
 
 async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
-    let mut retry = BusyRetry::begin(path);
-    loop {
-        let outcome = try_connect(path, create).await;
-        match retry.wait(&outcome) {
-            Some(moment) => moment.await,
-            None => return outcome,
-        }
-    }
-}
-
-async fn try_connect(path: &Path, create: bool) -> Result<SqliteConnection> {
     // The writer task checkpoints the log itself, so that no commit waits for it.
     let mut conn = options(path)
         .create_if_missing(create)
@@ -104,9 +85,9 @@ async fn try_connect(path: &Path, create: bool) -> Result<SqliteConnection> {
 /// Opens read connections. In WAL mode they never wait for the writer, nor the writer for them. Where nothing can be
 /// written, not even the shared-memory file, the catalog is opened as an immutable file.
 pub(crate) async fn reader_pool(path: &Path) -> Result<SqlitePool> {
-    look(path, false)?;
+    check_file(path, false)?;
     let (pool, found) = match shared(path).await {
-        Err(error) if is_kept_out(&error) => frozen(path, error).await?,
+        Err(error) if is_read_only(&error) => frozen(path, error).await?,
         outcome => outcome.map_err(|error| unreadable(path, error))?,
     };
     match found {
@@ -122,21 +103,14 @@ pub(crate) async fn reader_pool(path: &Path) -> Result<SqlitePool> {
 
 /// Opens read connections to a catalog that may be written to.
 async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
-    let mut retry = BusyRetry::begin(path);
-    loop {
-        let outcome = pool(options(path).pragma("query_only", "1")).await;
-        match retry.wait(&outcome) {
-            Some(moment) => moment.await,
-            None => return outcome,
-        }
-    }
+    retry_while_busy!(path, pool(options(path).pragma("query_only", "1")).await)
 }
 
 /// Opens a file that cannot change. Only a log that was checkpointed may be ignored.
 async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identity)> {
     let log = sidecar(path, "-wal");
     match std::fs::metadata(&log) {
-        Ok(meta) if meta.len() > 0 => Err(CatalogError::UnfoldedLog(log)),
+        Ok(meta) if meta.len() > 0 => Err(CatalogError::NotCheckpointed(log)),
         Ok(_) | Err(_) if std::fs::File::open(path).is_err() => Err(error),
         Ok(_) | Err(_) => pool(options(path).read_only(true).immutable(true))
             .await
@@ -157,7 +131,7 @@ async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
 
 /// Checks the file before SQLite opens it, because SQLite takes an empty file for a new database. Does not open the
 /// file, because closing it would drop the locks of this process's connections.
-fn look(path: &Path, create: bool) -> Result<()> {
+fn check_file(path: &Path, create: bool) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(meta) if meta.is_dir() => Err(CatalogError::IsDirectory(path.to_owned())),
         Ok(meta) if meta.len() == 0 && !create => Err(CatalogError::Empty(path.to_owned())),
@@ -231,20 +205,12 @@ fn wrong_identity(path: &Path, (id, version): (i64, i64)) -> CatalogError {
     }
 }
 
-/// Returns whether the file or its directory is read-only.
-fn is_kept_out(error: &CatalogError) -> bool {
+/// Returns whether the file or its directory seems to be read-only.
+fn is_read_only(error: &CatalogError) -> bool {
     matches!(
         error.kind(),
         Some(CatalogErrorKind::ReadOnly | CatalogErrorKind::CannotOpen)
     )
-}
-
-fn not_writable(path: &Path, error: CatalogError) -> CatalogError {
-    if is_kept_out(&error) {
-        CatalogError::NotWritable(path.to_owned())
-    } else {
-        unreadable(path, error)
-    }
 }
 
 /// Replaces the error when the file is not a database, or is corrupt.
@@ -269,23 +235,6 @@ fn kind(path: &Path) -> &'static str {
         FileKind::Other("an SQLite database") => "a database cut short or encrypted",
         kind => kind.description(),
     }
-}
-
-async fn assert_pragma(
-    conn: &mut SqliteConnection,
-    name: &'static str,
-    sql: &'static str,
-    wanted: &'static str,
-) -> Result<()> {
-    let found: String = sqlx::query_scalar(sql).fetch_one(conn).await?;
-    if found == wanted {
-        return Ok(());
-    }
-    Err(CatalogError::Pragma {
-        name,
-        wanted,
-        found,
-    })
 }
 
 #[cfg(test)]

@@ -1,66 +1,105 @@
-//! Converts columns to domain types; a value that is not allowed is an error.
+//! Reads domain types from columns; a value that is not allowed is an error.
 
-use serde_json::Value;
+use serde_json::{Map, Value};
+use sqlx::error::BoxDynError;
+use sqlx::sqlite::{SqliteTypeInfo, SqliteValueRef};
+use sqlx::{Decode, Sqlite, Type};
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
-use crate::domain::{ContentHash, JobStatus, PairName, Stage};
+use crate::domain::{
+    Affine2, ArtifactSet, AttentionCheck, ContentHash, FailureClass, JobStatus, LengthUnit, PairId,
+    PairName, PrintFromMesh, Reason, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
+};
 
-/// Converts a status code.
-pub(crate) fn status(code: i64) -> Result<JobStatus> {
-    JobStatus::from_code(code)
-        .ok_or_else(|| CatalogError::Corrupt(format!("job status {code} is unknown")))
+/// Implements `Decode` for each type from the type of its column and a function that converts it.
+macro_rules! decode {
+    ($($type:ty: $column:ty = $convert:expr;)+) => {$(
+        impl Type<Sqlite> for $type {
+            fn type_info() -> SqliteTypeInfo {
+                <$column as Type<Sqlite>>::type_info()
+            }
+
+            fn compatible(ty: &SqliteTypeInfo) -> bool {
+                <$column as Type<Sqlite>>::compatible(ty)
+            }
+        }
+
+        impl<'r> Decode<'r, Sqlite> for $type {
+            fn decode(value: SqliteValueRef<'r>) -> Result<Self, BoxDynError> {
+                let column = <$column as Decode<Sqlite>>::decode(value)?;
+                Ok($convert(column)?)
+            }
+        }
+    )+};
 }
 
-/// Converts a cursor to its next stage; `None` at the end.
-pub(crate) fn next_stage(cursor: i64) -> Result<Option<Stage>> {
-    let index = usize::try_from(cursor)
-        .ok()
-        .filter(|index| *index <= Stage::ALL.len());
-    match index {
-        Some(index) => Ok(Stage::from_index(index)),
-        None => Err(CatalogError::Corrupt(format!("stage {cursor} is unknown"))),
+decode! {
+    PairId: i64 = |id| Ok::<_, String>(Self(id));
+    WorkerId: i64 = |id| Ok::<_, String>(Self(id));
+    JobStatus: i64 = status;
+    Stage: i64 = stage;
+    ContentHash: &[u8] = hash;
+    PairName: &str = str::parse;
+    FailureClass: &str = str::parse;
+    LengthUnit: &str = str::parse;
+    Reason: &str = str::parse;
+    ReviewOrder: &str = str::parse;
+    ThresholdMetric: &str = str::parse;
+    Verdict: &str = str::parse;
+    Affine2: &str = serde_json::from_str;
+    AttentionCheck: &str = serde_json::from_str;
+    PrintFromMesh: &str = serde_json::from_str;
+    Json<ArtifactSet>: &str = json;
+    Json<Map<String, Value>>: &str = json;
+    Json<Value>: &str = json;
+}
+
+/// The value of a column with JSON text, for types of other crates.
+pub(crate) struct Json<T>(pub(crate) T);
+
+fn json<T: serde::de::DeserializeOwned>(text: &str) -> serde_json::Result<Json<T>> {
+    serde_json::from_str(text).map(Json)
+}
+
+impl From<Json<Self>> for ArtifactSet {
+    fn from(Json(files): Json<Self>) -> Self {
+        files
     }
 }
 
-/// Converts the number of a stage.
-pub(crate) fn stage(index: i64) -> Result<Stage> {
-    next_stage(index)?
-        .ok_or_else(|| CatalogError::Corrupt(format!("stage {index} is past the last")))
+impl From<Json<Self>> for Map<String, Value> {
+    fn from(Json(fields): Json<Self>) -> Self {
+        fields
+    }
 }
 
-/// Converts a hash.
-pub(crate) fn hash(bytes: &[u8]) -> Result<ContentHash> {
-    match <[u8; 32]>::try_from(bytes) {
+impl From<Json<Self>> for Value {
+    fn from(Json(value): Json<Self>) -> Self {
+        value
+    }
+}
+
+fn status(code: i64) -> Result<JobStatus, String> {
+    JobStatus::from_code(code).ok_or_else(|| format!("job status {code} is unknown"))
+}
+
+fn stage(index: i64) -> Result<Stage, String> {
+    let stage = usize::try_from(index).ok().and_then(Stage::from_index);
+    stage.ok_or_else(|| format!("stage {index} is unknown"))
+}
+
+fn hash(bytes: &[u8]) -> Result<ContentHash, String> {
+    match bytes.try_into() {
         Ok(bytes) => Ok(ContentHash::from_bytes(bytes)),
-        Err(_) => Err(CatalogError::Corrupt(format!(
-            "a hash of {} bytes",
-            bytes.len()
-        ))),
+        Err(_) => Err(format!("a hash of {} bytes", bytes.len())),
     }
-}
-
-/// Converts a nullable hash.
-pub(crate) fn hash_option(bytes: Option<&[u8]>) -> Result<Option<ContentHash>> {
-    bytes.map(hash).transpose()
-}
-
-/// Converts the name of an enum value.
-pub(crate) fn name<T: std::str::FromStr<Err = String>>(text: &str) -> Result<T> {
-    text.parse().map_err(CatalogError::Corrupt)
-}
-
-/// Converts a pair's name.
-pub(crate) fn pair_name(text: &str) -> Result<PairName> {
-    PairName::new(text).map_err(|error| CatalogError::Corrupt(error.to_string()))
 }
 
 /// Builds a JSON array of names for `json_each`.
 pub(crate) fn names_json(names: &[PairName]) -> String {
-    array(names.iter().map(PairName::as_str)).to_string()
+    json_array(names.iter().map(PairName::as_str))
 }
 
 /// Builds a JSON array for `json_each`.
-pub(crate) fn array<T: Into<Value>>(items: impl IntoIterator<Item = T>) -> Value {
-    Value::Array(items.into_iter().map(Into::into).collect())
+pub(crate) fn json_array<T: Into<Value>>(items: impl IntoIterator<Item = T>) -> String {
+    items.into_iter().collect::<Value>().to_string()
 }

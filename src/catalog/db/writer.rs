@@ -5,16 +5,15 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use sqlx::{Connection as _, SqliteConnection};
-use tokio::sync::{mpsc, oneshot};
+use tokio::sync::mpsc;
 
 use crate::catalog::db::batch_collector::collect;
-use crate::catalog::db::busy_retry::BusyRetry;
+use crate::catalog::db::busy_retry::retry_while_busy;
 use crate::catalog::db::commit_delay::CommitDelay;
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
+use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::group_commit::{Batch, BatchReply};
-use crate::catalog::db::request::{Message, TransactionTask, Work};
+use crate::catalog::db::request::{Message, Work};
 
 /// Commits after which the write-ahead log is checkpointed even under load; about 4 MiB of log.
 const COMMITS_PER_CHECKPOINT: u32 = 128;
@@ -72,17 +71,17 @@ pub(crate) async fn run(
     }
 }
 
-/// Commits a batch and replies. When it fails, each request is tried alone, so that one that cannot be stored does not
-/// fail the others; errors of lock or disk fail them all.
+/// Commits a batch and replies. After a failure each request is tried alone, so that one that cannot be stored does not
+/// fail the others; an error of the lock or the disk fails all of them.
 async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
-    match attempt(conn, path, &batch).await {
+    match apply(conn, path, &batch).await {
         Ok(answers) => batch.answer(answers),
         Err(error) if batch.len() == 1 || is_of_the_file(&error) => {
             batch.refuse(&Arc::new(error));
         }
         Err(_) => {
             for single in batch.split() {
-                match attempt(conn, path, &single).await {
+                match apply(conn, path, &single).await {
                     Ok(answers) => single.answer(answers),
                     Err(error) => single.refuse(&Arc::new(error)),
                 }
@@ -93,90 +92,55 @@ async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
 
 /// Returns whether an error concerns the file rather than a request.
 fn is_of_the_file(error: &CatalogError) -> bool {
-    let trouble = error.kind();
-    trouble.is_some_and(|trouble| trouble != CatalogErrorKind::Contradiction)
+    let kind = error.kind();
+    kind.is_some_and(|kind| kind != CatalogErrorKind::Contradiction)
 }
 
-async fn attempt(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Result<BatchReply> {
-    let mut retry = BusyRetry::begin(path);
-    loop {
+async fn apply(conn: &mut SqliteConnection, path: &Path, batch: &Batch) -> Result<BatchReply> {
+    retry_while_busy!(path, {
         let outcome = batch.apply(conn).await;
         if outcome.is_err() {
             rollback(conn).await;
         }
-        match retry.wait(&outcome) {
-            Some(moment) => moment.await,
-            None => return outcome,
-        }
-    }
-}
-
-/// Begins a write transaction, as soon as no other process has one.
-async fn begin(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
-    let mut retry = BusyRetry::begin(path);
-    loop {
-        let begun = sqlx::query("BEGIN IMMEDIATE").execute(&mut *conn).await;
-        let outcome = begun.map(|_| ()).map_err(CatalogError::from);
-        match retry.wait(&outcome) {
-            Some(moment) => moment.await,
-            None => return outcome,
-        }
-    }
-}
-
-/// Commits after success and rolls back after an error.
-async fn end<T>(conn: &mut SqliteConnection, outcome: Result<T>) -> Result<T> {
-    let outcome = match outcome {
-        Ok(value) => match sqlx::query("COMMIT").execute(&mut *conn).await {
-            Ok(_) => return Ok(value),
-            Err(error) => Err(error.into()),
-        },
-        failed => failed,
-    };
-    rollback(conn).await;
-    outcome
+        outcome
+    })
 }
 
 /// Rolls the current transaction back.
 async fn rollback(conn: &mut SqliteConnection) {
     // SQLite has already rolled back after some errors, such as a full disk.
-    if let Err(error) = sqlx::query("ROLLBACK").execute(conn).await {
+    if let Err(error) = execute(conn, "ROLLBACK").await {
         tracing::debug!(%error, "nothing to roll back");
     }
 }
 
 async fn wal_checkpoint(conn: &mut SqliteConnection, pragma: &'static str) {
     // A reader may block it; the next checkpoint tries again.
-    if let Err(error) = sqlx::query(pragma).execute(conn).await {
-        tracing::debug!(%error, "the write-ahead log was not folded back");
+    if let Err(error) = execute(conn, pragma).await {
+        tracing::debug!(%error, "the write-ahead log was not checkpointed");
     }
 }
 
-/// Runs `work` in its own transaction on the writer task.
-pub(crate) async fn in_transaction<T: Send + 'static>(
-    inbox: &mpsc::Sender<Message>,
-    path: &Arc<Path>,
-    work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>> + Send + 'static,
-) -> Result<T> {
-    let (sender, receiver) = oneshot::channel();
-    let path = Arc::clone(path);
-    let task: TransactionTask = Box::new(move |conn| {
-        Box::pin(async move {
-            let _ = sender.send(run_transaction(conn, &path, work).await);
-        })
-    });
-    if inbox.send(Message::Transaction(task)).await.is_err() {
-        return Err(CatalogError::Closed);
-    }
-    receiver.await.unwrap_or(Err(CatalogError::Closed))
-}
-
-async fn run_transaction<T>(
+/// Runs `work` in its own transaction: commits after success, rolls back after an error.
+pub(crate) async fn run_transaction<T>(
     conn: &mut SqliteConnection,
     path: &Path,
     work: impl for<'c> FnOnce(&'c mut SqliteConnection) -> Work<'c, Result<T>>,
 ) -> Result<T> {
-    begin(conn, path).await?;
-    let outcome = work(&mut *conn).await;
-    end(conn, outcome).await
+    retry_while_busy!(path, execute(conn, "BEGIN IMMEDIATE").await)?;
+    let mut outcome = work(&mut *conn).await;
+    if outcome.is_ok()
+        && let Err(error) = execute(conn, "COMMIT").await
+    {
+        outcome = Err(error);
+    }
+    if outcome.is_err() {
+        rollback(conn).await;
+    }
+    outcome
+}
+
+async fn execute(conn: &mut SqliteConnection, sql: &'static str) -> Result<()> {
+    sqlx::query(sql).execute(conn).await?;
+    Ok(())
 }

@@ -1,9 +1,7 @@
 //! The queue's requests to the writer task, and its counters.
 
-use tokio::sync::oneshot;
-
 use crate::catalog::db::commit_delay::Waiting;
-use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::error::Result;
 use crate::catalog::db::request::{Message, Reply, Request};
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::claim::{ClaimRequest, Heartbeat};
@@ -89,7 +87,7 @@ impl Catalog {
             attempt: 1,
             crashes: 0,
             cleared: true,
-            ..duplicate(&lease)
+            ..lease
         });
         let stored = self
             .reply_to(|reply| message(Request::Checkpoint(Box::new((lease, stages)), reply)))
@@ -143,16 +141,4 @@ impl Catalog {
         self.reply_to(|reply| Message::Grouped(request(reply)))
             .await
     }
-
-    /// Sends the writer a message and waits for the reply.
-    async fn reply_to<T>(&self, message: impl FnOnce(Reply<T>) -> Message) -> Result<T> {
-        let (sender, receiver) = oneshot::channel();
-        self.send(message(sender)).await?;
-        receiver.await.unwrap_or(Err(CatalogError::Closed))
-    }
-}
-
-/// Copies a lease that the request consumes; the copy is handed out only when the request succeeds.
-const fn duplicate(lease: &Lease) -> Lease {
-    Lease { ..*lease }
 }

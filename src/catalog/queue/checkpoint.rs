@@ -1,15 +1,14 @@
 //! Statements that store finished stages, fenced by the lease.
 
-use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::catalog::db::error::Result;
 use crate::catalog::db::script::{Script, Statement};
-use crate::catalog::queue::counters::{CounterKey, Cursor, DONE, Deltas, cursor};
+use crate::catalog::queue::counters::{CounterKey, DONE, Deltas, cursor};
 use crate::catalog::queue::lease::{
     FencedRow, FingerprintId, InputVersions, Lease, StageCheckpoint,
 };
-use crate::domain::{ContentHash, JobStatus, MetricOutcome, PairId, Stage, UnixMillis};
+use crate::domain::{JobStatus, PairId, Stage};
 use crate::failpoint::{self, Point};
 
 /// A lease and the stages to be stored under it, in the order they were computed.
@@ -31,12 +30,13 @@ WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
         WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.value ->> 'alive_since')
 RETURNING pair, token";
 
+/// Items: pair, index of the stage, worker, [`StageCheckpoint`].
 const RESULT: &str = "
 INSERT INTO stage_result
-    (pair, stage, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, worker, at)
-SELECT value ->> 'pair', value ->> 'stage', value ->> 'fingerprint', unhex(value ->> 'mesh_hash'),
-    unhex(value ->> 'print_hash'), value ->> 'attributes', value ->> 'outcome', value ->> 'files',
-    unhex(value ->> 'result_hash'), value ->> 'ms', value ->> 'worker', value ->> 'at'
+    (pair, stage, worker, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, at)
+SELECT value ->> 0, value ->> 1, value ->> 2, value ->> '$[3].fingerprint', unhex(value ->> '$[3].mesh_hash'),
+    unhex(value ->> '$[3].print_hash'), value ->> '$[3].attributes', value ->> '$[3].outcome', value -> '$[3].files',
+    unhex(value ->> '$[3].result_hash'), value ->> '$[3].ms', value ->> '$[3].at'
 FROM jsonb_each(?) WHERE true
 ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh_hash = excluded.mesh_hash,
     print_hash = excluded.print_hash, attributes = excluded.attributes, outcome = excluded.outcome, files = excluded.files,
@@ -46,32 +46,34 @@ ON CONFLICT (pair, stage) DO UPDATE SET fingerprint = excluded.fingerprint, mesh
 const CLEAR_METRICS: &str = "
 DELETE FROM metric_result WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
 
+/// Items: pair, outcome of the metric, hash of its result.
 const METRICS: &str = "
 INSERT INTO metric_result
     (pair, metric, threshold_level, threshold_depth, print_from_depth, angle_deg, scale, shift_x_px, shift_y_px,
      ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, confidence, at_bound, result_hash)
-SELECT value ->> 'pair', value ->> '$.row.metric', value ->> '$.row.threshold_level',
-    value ->> '$.row.threshold_depth', value -> '$.row.print_from_depth', value ->> '$.row.angle_deg',
-    value ->> '$.row.scale', value ->> '$.row.shift_px[0]', value ->> '$.row.shift_px[1]',
-    value ->> '$.row.scores.ssim', value ->> '$.row.scores.nl_ssim', value ->> '$.row.scores.iou',
-    value ->> '$.row.scores.iou_box', value ->> '$.row.scores.dice', value ->> '$.row.scores.density_print',
-    value ->> '$.row.scores.density_depth', value ->> '$.row.margin', value ->> '$.row.confidence',
-    value ->> '$.row.at_bound', unhex(value ->> 'result_hash')
+SELECT value ->> 0, value ->> '$[1].metric', value ->> '$[1].threshold_level',
+    value ->> '$[1].threshold_depth', value -> '$[1].print_from_depth', value ->> '$[1].angle_deg',
+    value ->> '$[1].scale', value ->> '$[1].shift_px[0]', value ->> '$[1].shift_px[1]',
+    value ->> '$[1].scores.ssim', value ->> '$[1].scores.nl_ssim', value ->> '$[1].scores.iou',
+    value ->> '$[1].scores.iou_box', value ->> '$[1].scores.dice', value ->> '$[1].scores.density_print',
+    value ->> '$[1].scores.density_depth', value ->> '$[1].margin', value ->> '$[1].confidence',
+    value ->> '$[1].at_bound', unhex(value ->> 2)
 FROM jsonb_each(?)";
 
+/// Items: pair, index of the stage, worker, milliseconds, time.
 const ATTEMPT: &str = "
 INSERT INTO attempt (pair, stage, worker, ms, at)
 SELECT value ->> 0, value ->> 1, value ->> 2, value ->> 3, value ->> 4 FROM jsonb_each(?)";
 
-/// Updates the input files of pairs.
+/// Updates the input files of pairs. Items: pair, [`InputVersions`].
 pub(crate) const UPDATE_INPUTS: &str = "
-UPDATE pair SET mesh_hash = coalesce(unhex(item.value ->> 'mesh_hash'), mesh_hash),
-    mesh_stat = coalesce(item.value ->> 'mesh_stat', mesh_stat),
-    print_hash = coalesce(unhex(item.value ->> 'print_hash'), print_hash),
-    print_stat = coalesce(item.value ->> 'print_stat', print_stat)
-FROM jsonb_each(?) AS item WHERE pair.id = item.value ->> 'pair' AND (
-    pair.mesh_hash IS NOT unhex(item.value ->> 'mesh_hash') OR pair.mesh_stat IS NOT item.value ->> 'mesh_stat'
-    OR pair.print_hash IS NOT unhex(item.value ->> 'print_hash') OR pair.print_stat IS NOT item.value ->> 'print_stat')";
+UPDATE pair SET mesh_hash = coalesce(new.mesh_hash, pair.mesh_hash), mesh_stat = coalesce(new.mesh_stat, pair.mesh_stat),
+    print_hash = coalesce(new.print_hash, pair.print_hash), print_stat = coalesce(new.print_stat, pair.print_stat)
+FROM (
+    SELECT value ->> 0 AS id, unhex(value ->> '$[1].mesh.hash') AS mesh_hash, value ->> '$[1].mesh.stat' AS mesh_stat,
+        unhex(value ->> '$[1].print.hash') AS print_hash, value ->> '$[1].print.stat' AS print_stat FROM jsonb_each(?)) AS new
+WHERE pair.id = new.id AND (pair.mesh_hash IS NOT new.mesh_hash OR pair.mesh_stat IS NOT new.mesh_stat
+    OR pair.print_hash IS NOT new.print_hash OR pair.print_stat IS NOT new.print_stat)";
 
 const CLEAR_FAILURE: &str =
     "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM jsonb_each(?))";
@@ -96,9 +98,9 @@ pub(crate) fn add_advance<'i>(
 }
 
 /// Adds the results of jobs that advanced to a script.
-pub(crate) fn add_results(
+pub(crate) fn add_results<'i>(
     script: &mut Script,
-    advanced: &[&LeasedCheckpoints],
+    advanced: &[&'i LeasedCheckpoints],
     deltas: &mut Deltas,
 ) -> Result<()> {
     for (lease, stages) in advanced.iter().map(|stored| &**stored) {
@@ -109,14 +111,26 @@ pub(crate) fn add_results(
             deltas.move_job(lease.counter_key(), key_after(last));
         }
     }
-    let each = || advanced.iter().flat_map(|stored| each_stage(stored));
-    script.execute_over(RESULT, each().map(result_row))?;
-    script.execute_over(ATTEMPT, each().map(attempt_row))?;
+    let each = || {
+        let stored = advanced.iter();
+        stored.flat_map(|(lease, stages)| stages.iter().map(move |one| (lease, one)))
+    };
+    let rows = |(lease, one): (&Lease, &'i StageCheckpoint)| {
+        (lease.pair, one.stage.index(), lease.worker, one)
+    };
+    script.execute_over(RESULT, each().map(rows))?;
+    let attempts = each().map(rows);
+    let attempts = attempts.map(|(pair, stage, worker, one)| (pair, stage, worker, one.ms, one.at));
+    script.execute_over(ATTEMPT, attempts)?;
     let uncleared = advanced.iter().filter(|(lease, _)| !lease.cleared);
-    let uncleared = uncleared.map(|(lease, _)| [lease.pair.0]);
-    script.execute_over(CLEAR_FAILURE, uncleared)?;
-    let metrics = || each().flat_map(metric_rows);
-    script.execute_over(CLEAR_METRICS, metrics().map(|row| [row.pair]))?;
+    script.execute_over(CLEAR_FAILURE, uncleared.map(|(lease, _)| [lease.pair]))?;
+    let metrics = || {
+        each().flat_map(|(lease, one)| {
+            let metrics = one.metrics.iter();
+            metrics.map(|metric| (lease.pair, &metric.outcome, metric.result_hash))
+        })
+    };
+    script.execute_over(CLEAR_METRICS, metrics().map(|(pair, ..)| [pair]))?;
     script.execute_over(METRICS, metrics())?;
     let inputs = advanced.iter().filter_map(|(lease, stages)| {
         // The last stage that names inputs names all that earlier ones did.
@@ -124,13 +138,6 @@ pub(crate) fn add_results(
         Some((lease.pair, inputs.find(|inputs| !inputs.is_empty())?))
     });
     add_inputs(script, inputs)
-}
-
-/// Pairs each stage with its lease.
-fn each_stage(
-    (lease, done): &LeasedCheckpoints,
-) -> impl Iterator<Item = (&Lease, &StageCheckpoint)> {
-    done.iter().map(move |one| (lease, one))
 }
 
 /// Returns where a job is counted when a stage is stored.
@@ -142,44 +149,21 @@ fn key_after(stage: &StageCheckpoint) -> CounterKey {
     CounterKey::new(cursor, status, Some(stage.fingerprint.0))
 }
 
-/// One item of [`ADVANCE`].
-#[derive(Serialize)]
-struct AdvancedJob {
-    pair: i64,
-    worker: i64,
-    token: i64,
-    next: Cursor,
-    status: i64,
-    /// Fingerprint of the last result.
-    fingerprint: i64,
-    /// The fingerprint whose upstream must be that of the result before; `None` where there is no result before.
-    first: Option<i64>,
-    /// Whether the stages do not follow on each other.
-    mixed: i64,
-    low_confidence: i64,
-    deadline: Option<UnixMillis>,
-    alive_since: UnixMillis,
-}
-
-/// Combines all stages that are stored at once; `None` for no stage.
-fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<AdvancedJob> {
+/// Builds the item of [`ADVANCE`] for all stages that are stored at once; `None` for no stage. `first` is the fingerprint
+/// whose upstream must be the fingerprint of the result before, and `mixed` whether the stages do not follow on each other.
+fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<Value> {
     let last = stages.last()?;
     let after = key_after(last);
-    let metrics = &mut last.metrics.iter();
+    let deadline = (after.status == JobStatus::Leased).then_some(last.next_deadline);
+    let mut metrics = last.metrics.iter();
+    let low_confidence = metrics.any(|metric| metric.outcome.is_low_confidence());
     let (first, follow) = chain(stages);
-    Some(AdvancedJob {
-        pair: lease.pair.0,
-        worker: lease.worker.0,
-        token: lease.token,
-        next: after.cursor,
-        status: after.status.code(),
-        fingerprint: after.fingerprint,
-        first: first.map(|FingerprintId(id)| id),
-        mixed: i64::from(!follow),
-        low_confidence: i64::from(metrics.any(|metric| metric.outcome.is_low_confidence())),
-        deadline: (after.status == JobStatus::Leased).then_some(last.next_deadline),
-        alive_since: last.alive_since,
-    })
+    Some(json!({
+        "pair": lease.pair, "worker": lease.worker, "token": lease.token, "next": after.cursor,
+        "status": after.status.code(), "fingerprint": after.fingerprint, "first": first,
+        "mixed": i64::from(!follow), "low_confidence": i64::from(low_confidence), "deadline": deadline,
+        "alive_since": last.alive_since,
+    }))
 }
 
 /// Returns the fingerprint of the first stage, `None` if that is the first stage of all, and whether the stages follow
@@ -195,95 +179,13 @@ fn chain(stages: &[StageCheckpoint]) -> (Option<FingerprintId>, bool) {
     )
 }
 
-/// One item of [`RESULT`].
-#[derive(Serialize)]
-struct ResultRow<'d> {
-    pair: i64,
-    stage: usize,
-    fingerprint: i64,
-    mesh_hash: ContentHash,
-    print_hash: Option<ContentHash>,
-    attributes: &'d str,
-    outcome: &'d str,
-    files: String,
-    result_hash: ContentHash,
-    ms: u64,
-    worker: i64,
-    at: UnixMillis,
-}
-
-fn result_row<'d>((lease, done): (&Lease, &'d StageCheckpoint)) -> ResultRow<'d> {
-    ResultRow {
-        pair: lease.pair.0,
-        stage: done.stage.index(),
-        fingerprint: done.fingerprint.0,
-        mesh_hash: done.mesh_hash,
-        print_hash: done.print_hash,
-        attributes: &done.attributes,
-        outcome: &done.outcome,
-        files: json!(done.files).to_string(),
-        result_hash: done.result_hash,
-        ms: done.ms,
-        worker: lease.worker.0,
-        at: done.at,
-    }
-}
-
-/// One item of [`ATTEMPT`]: pair, stage, worker, milliseconds, time.
-type Attempt = (i64, usize, i64, u64, UnixMillis);
-
-const fn attempt_row((lease, done): (&Lease, &StageCheckpoint)) -> Attempt {
-    let stage = done.stage.index();
-    (lease.pair.0, stage, lease.worker.0, done.ms, done.at)
-}
-
-/// One item of [`METRICS`].
-#[derive(Serialize)]
-struct MetricResultRow<'d> {
-    pair: i64,
-    row: &'d MetricOutcome,
-    result_hash: ContentHash,
-}
-
-fn metric_rows<'d>(
-    (lease, done): (&'d Lease, &'d StageCheckpoint),
-) -> impl Iterator<Item = MetricResultRow<'d>> {
-    done.metrics.iter().map(|metric| MetricResultRow {
-        pair: lease.pair.0,
-        row: &metric.outcome,
-        result_hash: metric.result_hash,
-    })
-}
-
 /// Adds the input files of pairs as they were read to a script.
 pub(crate) fn add_inputs<'a>(
     script: &mut Script,
     inputs: impl Iterator<Item = (PairId, &'a InputVersions)>,
 ) -> Result<()> {
-    let items = inputs.filter(|(_, inputs)| !inputs.is_empty());
     script.execute_over(
         UPDATE_INPUTS,
-        items.map(|(pair, inputs)| input_row(pair, inputs)),
+        inputs.filter(|(_, inputs)| !inputs.is_empty()),
     )
-}
-
-/// One item of [`UPDATE_INPUTS`].
-#[derive(Serialize)]
-pub(crate) struct InputRow<'s> {
-    pair: i64,
-    mesh_hash: Option<ContentHash>,
-    mesh_stat: Option<&'s str>,
-    print_hash: Option<ContentHash>,
-    print_stat: Option<&'s str>,
-}
-
-pub(crate) fn input_row(PairId(pair): PairId, seen: &InputVersions) -> InputRow<'_> {
-    let (mesh, print) = (seen.mesh.as_ref(), seen.print.as_ref());
-    InputRow {
-        pair,
-        mesh_hash: mesh.map(|seen| seen.hash),
-        mesh_stat: mesh.map(|seen| seen.stat.as_str()),
-        print_hash: print.map(|seen| seen.hash),
-        print_stat: print.map(|seen| seen.stat.as_str()),
-    }
 }

@@ -1,14 +1,13 @@
 //! Statements that take leases, keep them alive and give them back.
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
 use crate::catalog::db::script::{Script, Statement};
-use crate::catalog::queue::counters::{CounterKey, Deltas, cursor};
-use crate::catalog::queue::lease::{FencedRow, FingerprintId, Lease};
+use crate::catalog::queue::counters::{Deltas, cursor};
+use crate::catalog::queue::lease::{FencedRow, Lease};
 use crate::catalog::queue::selection::PairSelection;
-use crate::domain::{JobStatus, PairId, Stage, UnixMillis, WorkerId};
+use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 use crate::failpoint::{self, Point};
 
 /// Which pairs a worker wants to lease.
@@ -61,7 +60,7 @@ WHERE pair IN (
     SELECT pair FROM job WHERE status = 0 AND stage <= ? AND exclusive = ?
     ORDER BY prio, stage DESC, pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
-RETURNING pair, stage, attempt, token, crashes, exclusive, fingerprint";
+RETURNING pair, worker, token, stage, fingerprint, attempt, crashes, exclusive";
 
 /// Like [`CLAIM`], among some pairs.
 pub(crate) const CLAIM_AMONG: &str = "
@@ -71,7 +70,7 @@ WHERE pair IN (
     WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
     ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
-RETURNING pair, stage, attempt, token, crashes, exclusive, fingerprint";
+RETURNING pair, worker, token, stage, fingerprint, attempt, crashes, exclusive";
 
 /// Gives leases back as if they had never been taken.
 pub(crate) const RELEASE: &str = "
@@ -84,18 +83,6 @@ RETURNING pair, token";
 /// Stores a heartbeat, unless the worker has ended or its last heartbeat is too old: others may have taken it for dead.
 pub(crate) const HEARTBEAT: &str = "
 UPDATE worker SET heartbeat = ? WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
-
-/// A row of [`CLAIM`].
-#[derive(sqlx::FromRow)]
-pub(crate) struct ClaimedRow {
-    pair: i64,
-    stage: i64,
-    attempt: u32,
-    token: i64,
-    crashes: u32,
-    exclusive: bool,
-    fingerprint: Option<i64>,
-}
 
 /// Adds a heartbeat to a script; it returns the worker's id when it was stored.
 pub(crate) fn add_heartbeat(
@@ -110,10 +97,7 @@ pub(crate) fn add_heartbeat(
 }
 
 /// Adds a claim to a script.
-pub(crate) fn add_claim(
-    script: &mut Script,
-    request: &ClaimRequest,
-) -> Result<Statement<ClaimedRow>> {
+pub(crate) fn add_claim(script: &mut Script, request: &ClaimRequest) -> Result<Statement<Lease>> {
     let statement = match request.among {
         Some(_) => script.add(CLAIM_AMONG),
         None => script.add(CLAIM),
@@ -131,14 +115,8 @@ pub(crate) fn add_claim(
     Ok(statement)
 }
 
-/// Turns the rows of a claim into leases, in the order of the claim.
-pub(crate) fn leases(
-    rows: Vec<ClaimedRow>,
-    worker: WorkerId,
-    deltas: &mut Deltas,
-) -> Result<Vec<Lease>> {
-    let leases = rows.into_iter().map(|row| lease(&row, worker));
-    let mut leases = leases.collect::<Result<Vec<_>>>()?;
+/// Counts claimed leases; returns them in the order of the claim.
+pub(crate) fn count_claimed(mut leases: Vec<Lease>, deltas: &mut Deltas) -> Vec<Lease> {
     // RETURNING promises no order.
     leases.sort_by_key(|lease| (std::cmp::Reverse(lease.cursor), lease.pair));
     for lease in &leases {
@@ -146,21 +124,7 @@ pub(crate) fn leases(
         deltas.move_job(from, lease.counter_key());
         failpoint::hit(lease.cursor, Point::Claiming, None);
     }
-    Ok(leases)
-}
-
-fn lease(row: &ClaimedRow, worker: WorkerId) -> Result<Lease> {
-    Ok(Lease {
-        pair: PairId(row.pair),
-        worker,
-        token: row.token,
-        cursor: rows::stage(row.stage)?,
-        fingerprint: row.fingerprint.map(FingerprintId),
-        attempt: row.attempt,
-        crashes: row.crashes,
-        exclusive: row.exclusive,
-        cleared: false,
-    })
+    leases
 }
 
 /// Adds the release of leases to a script.
@@ -168,18 +132,14 @@ pub(crate) fn add_release<'l>(
     script: &mut Script,
     leases: impl Iterator<Item = &'l Lease>,
 ) -> Result<Option<Statement<FencedRow>>> {
-    script.add_over(RELEASE, leases.map(fence))
+    let fences = leases.map(|lease| json!([lease.pair, lease.worker, lease.token]));
+    script.add_over(RELEASE, fences)
 }
 
 /// Counts released leases.
 pub(crate) fn count_released<'l>(leases: impl Iterator<Item = &'l Lease>, deltas: &mut Deltas) {
     for lease in leases {
-        let to: CounterKey = lease.counter_key().with_status(JobStatus::Ready);
+        let to = lease.counter_key().with_status(JobStatus::Ready);
         deltas.move_job(lease.counter_key(), to);
     }
-}
-
-/// Returns what a write under a lease must match: pair, worker, token.
-fn fence(lease: &Lease) -> Value {
-    json!([lease.pair.0, lease.worker.0, lease.token])
 }

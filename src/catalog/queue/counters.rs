@@ -6,7 +6,6 @@ use serde_json::json;
 use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
 use crate::catalog::db::script::Script;
 use crate::domain::{JobStatus, Stage};
 
@@ -14,6 +13,7 @@ const CHANGE: &str = "
 UPDATE counter SET n = n + (d.value ->> 3) FROM jsonb_each(?) AS d
 WHERE counter.stage = d.value ->> 0 AND counter.status = d.value ->> 1 AND counter.fingerprint = d.value ->> 2";
 
+/// Counters that are not 0.
 const COUNTERS: &str = "SELECT stage, status, fingerprint, n FROM counter WHERE n <> 0";
 
 /// Position of a job: the index of its next stage, or 4 when it is done.
@@ -28,8 +28,9 @@ pub(crate) const fn cursor(stage: Stage) -> Cursor {
 }
 
 /// What jobs are counted by.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, sqlx::FromRow)]
 pub(crate) struct CounterKey {
+    #[sqlx(rename = "stage")]
     pub(crate) cursor: Cursor,
     pub(crate) status: JobStatus,
     /// Fingerprint of the result before the cursor; 0 where there is none.
@@ -53,10 +54,33 @@ impl CounterKey {
         }
     }
 
+    /// Returns the next stage; `None` at the end.
+    pub(crate) fn stage(self) -> Option<Stage> {
+        usize::try_from(self.cursor)
+            .ok()
+            .and_then(Stage::from_index)
+    }
+
     /// Returns the key of the same job with another status.
     pub(crate) const fn with_status(self, status: JobStatus) -> Self {
         Self { status, ..self }
     }
+}
+
+/// A job with what it is counted by.
+#[derive(Debug, Clone, Copy, sqlx::FromRow)]
+pub(crate) struct KeyedJob {
+    pub(crate) pair: i64,
+    #[sqlx(flatten)]
+    pub(crate) key: CounterKey,
+}
+
+/// A number of jobs that are counted together.
+#[derive(Debug, Clone, Copy, sqlx::FromRow)]
+pub(crate) struct JobGroup {
+    #[sqlx(flatten)]
+    pub(crate) key: CounterKey,
+    pub(crate) n: u64,
 }
 
 /// Changes of the counters, collected over a transaction.
@@ -97,12 +121,11 @@ pub type JobCounts = BTreeMap<(i64, JobStatus), u64>;
 
 /// Reads the counters that are not 0.
 pub(crate) async fn counters(conn: &mut SqliteConnection) -> Result<BTreeMap<CounterKey, u64>> {
-    let found: Vec<(i64, i64, i64, i64)> = sqlx::query_as(COUNTERS).fetch_all(conn).await?;
-    let found = found.into_iter().map(|(cursor, status, fingerprint, n)| {
-        let key = CounterKey::new(cursor, rows::status(status)?, Some(fingerprint));
-        Ok((key, n.unsigned_abs()))
-    });
-    found.collect()
+    let found: Vec<JobGroup> = sqlx::query_as(COUNTERS).fetch_all(conn).await?;
+    Ok(found
+        .into_iter()
+        .map(|group| (group.key, group.n))
+        .collect())
 }
 
 /// Adds up numbers of jobs by cursor and status.

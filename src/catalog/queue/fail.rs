@@ -26,7 +26,7 @@ WHERE job.pair = item.value ->> 'pair' AND job.worker = item.value ->> 'worker'
     AND job.token = item.value ->> 'token' AND job.status = 1 AND EXISTS (
         SELECT 1 FROM worker AS w
         WHERE w.id = job.worker AND w.ended IS NULL AND w.heartbeat >= item.value ->> 'alive_since')
-RETURNING pair, token, stage, fingerprint"
+RETURNING pair, token, stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
 
 const FAILURE: &str = "
@@ -54,8 +54,8 @@ DELETE FROM attempt WHERE id IN (
 pub(crate) struct FailedRow {
     pub(crate) pair: i64,
     pub(crate) token: i64,
-    stage: i64,
-    fingerprint: Option<i64>,
+    #[sqlx(flatten)]
+    key: CounterKey,
 }
 
 /// Returns the row of the job under a lease; `None` when the lease was lost.
@@ -88,9 +88,8 @@ pub(crate) fn add_failure_records(
     script.bind(ATTEMPTS_KEPT)?;
     let inputs = failed.iter().map(|(item, _)| (item.0.pair, &item.1.inputs));
     add_inputs(script, inputs)?;
-    for ((lease, failure), row) in failed.iter().map(|(item, row)| (&**item, row)) {
-        let to = CounterKey::new(row.stage, status(failure.action), row.fingerprint);
-        deltas.move_job(lease.counter_key(), to);
+    for ((lease, _), row) in failed {
+        deltas.move_job(lease.counter_key(), row.key);
     }
     Ok(())
 }

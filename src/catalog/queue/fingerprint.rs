@@ -5,9 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Map, Value, json};
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::CatalogError;
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
+use crate::catalog::db::rows::{Json, json_array};
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
@@ -46,11 +45,9 @@ impl Fingerprints {
     }
 
     /// Returns the hashes on one line, for processes to compare; [`Catalog::changes_from`] reads it.
-    pub fn terms(&self) -> String {
-        self.0
-            .each_ref()
-            .map(|fingerprint| fingerprint.hash.to_hex())
-            .join(" ")
+    pub fn hash_line(&self) -> String {
+        let hashes = self.0.each_ref().map(|fingerprint| fingerprint.hash);
+        hashes.map(ContentHash::to_hex).join(" ")
     }
 }
 
@@ -66,11 +63,11 @@ impl FingerprintIds {
 
     /// Returns the ids as a JSON array by stage.
     pub(crate) fn json(self) -> String {
-        rows::array(self.0.map(|FingerprintId(id)| id)).to_string()
+        json_array(self.0.map(|FingerprintId(id)| id))
     }
 }
 
-const ENTER: &str = "
+const INSERT: &str = "
 INSERT INTO fingerprint (stage, hash, fields, upstream) VALUES (?1, ?2, ?3, ?4)
 ON CONFLICT (hash) DO UPDATE SET upstream = excluded.upstream RETURNING id";
 
@@ -91,57 +88,43 @@ impl Catalog {
         let fingerprints = fingerprints.clone();
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let mut upstream: Option<i64> = None;
+                let mut upstream: Option<FingerprintId> = None;
+                let mut ids = [FingerprintId(0); 4];
                 for stage in Stage::ALL {
                     let fingerprint = fingerprints.of(stage);
-                    let id = sqlx::query_scalar(ENTER)
+                    let id = sqlx::query_scalar(INSERT)
                         .bind(stage.index() as i64)
                         .bind(&fingerprint.hash.as_bytes()[..])
                         .bind(fingerprint.fields.to_string())
                         .bind(upstream)
                         .fetch_one(&mut *conn)
                         .await?;
-                    sqlx::query(ADD_COUNTERS)
-                        .bind(stage.index() as i64 + 1)
-                        .bind(id)
-                        .execute(&mut *conn)
-                        .await?;
+                    let counters = sqlx::query(ADD_COUNTERS).bind(stage.index() as i64 + 1);
+                    counters.bind(id).execute(&mut *conn).await?;
+                    ids[stage.index()] = id;
                     upstream = Some(id);
-                }
-                let mut ids = [FingerprintId(0); 4];
-                for (id, found) in ids.iter_mut().zip(known(conn, &fingerprints).await?) {
-                    *id = found.ok_or_else(|| {
-                        CatalogError::Corrupt("a fingerprint just written is not there".to_owned())
-                    })?;
                 }
                 Ok(FingerprintIds(ids))
             })
         })
         .await
     }
-}
 
-impl Catalog {
-    /// Compares the line of another process's [`Fingerprints::terms`] with these fingerprints; unknown hashes are
-    /// skipped.
+    /// Compares the [`Fingerprints::hash_line`] of another process with these fingerprints; unknown hashes are skipped.
     ///
     /// # Errors
     /// When the database refuses.
     pub async fn changes_from(
         &self,
-        terms: &str,
+        hash_line: &str,
         fingerprints: &Fingerprints,
     ) -> Result<Vec<FieldChange>> {
         let mut conn = self.read_conn().await?;
         let mut changes = Vec::new();
-        for (stage, hash) in Stage::ALL.into_iter().zip(terms.split_whitespace()) {
-            let fields: Option<String> =
-                sqlx::query_scalar("SELECT fields FROM fingerprint WHERE hash = unhex(?1)")
-                    .bind(hash)
-                    .fetch_optional(&mut *conn)
-                    .await?;
-            if let Some(fields) = fields {
-                let old = serde_json::from_str(&fields)?;
+        for (stage, hash) in Stage::ALL.into_iter().zip(hash_line.split_whitespace()) {
+            let sql = "SELECT fields FROM fingerprint WHERE hash = unhex(?1)";
+            let fields = sqlx::query_scalar(sql).bind(hash);
+            if let Some(Json(old)) = fields.fetch_optional(&mut *conn).await? {
                 changes.extend(differences(stage, &old, &fingerprints.of(stage).fields));
             }
         }
@@ -156,11 +139,9 @@ pub(crate) async fn known(
 ) -> Result<[Option<FingerprintId>; 4]> {
     let mut ids = [None; 4];
     for (id, stage) in ids.iter_mut().zip(Stage::ALL) {
-        *id = sqlx::query_scalar("SELECT id FROM fingerprint WHERE hash = ?1")
-            .bind(&fingerprints.of(stage).hash.as_bytes()[..])
-            .fetch_optional(&mut *conn)
-            .await?
-            .map(FingerprintId);
+        let query = sqlx::query_scalar("SELECT id FROM fingerprint WHERE hash = ?1");
+        let query = query.bind(&fingerprints.of(stage).hash.as_bytes()[..]);
+        *id = query.fetch_optional(&mut *conn).await?;
     }
     Ok(ids)
 }
@@ -172,22 +153,20 @@ pub(crate) async fn current_json(
 ) -> Result<String> {
     let ids = known(conn, fingerprints).await?;
     let ids = ids.iter().map(|id| id.map_or(-1, |FingerprintId(id)| id));
-    Ok(rows::array(ids).to_string())
+    Ok(json_array(ids))
 }
 
 /// Reads the settings of a fingerprint.
-pub(crate) async fn fields_of(conn: &mut SqliteConnection, fingerprint: i64) -> Result<Value> {
-    let fields: String = sqlx::query_scalar("SELECT fields FROM fingerprint WHERE id = ?1")
-        .bind(fingerprint)
-        .fetch_one(conn)
-        .await?;
-    Ok(serde_json::from_str(&fields)?)
+pub(crate) async fn fields_of(conn: &mut SqliteConnection, id: FingerprintId) -> Result<Value> {
+    let query = sqlx::query_scalar("SELECT fields FROM fingerprint WHERE id = ?1").bind(id);
+    let Json(fields) = query.fetch_one(conn).await?;
+    Ok(fields)
 }
 
 /// Every stored fingerprint with its stage and upstream, compared with the current ones.
 pub(crate) struct FingerprintChains {
     /// Stage and upstream by id.
-    stored: BTreeMap<i64, (Stage, Option<i64>)>,
+    stored: BTreeMap<FingerprintId, (Stage, Option<FingerprintId>)>,
     current: [Option<FingerprintId>; 4],
 }
 
@@ -198,25 +177,24 @@ impl FingerprintChains {
         fingerprints: &Fingerprints,
     ) -> Result<Self> {
         let current = known(conn, fingerprints).await?;
-        let found: Vec<(i64, i64, Option<i64>)> =
-            sqlx::query_as("SELECT id, stage, upstream FROM fingerprint")
-                .fetch_all(conn)
-                .await?;
-        let found = found.into_iter();
-        let stored = found.map(|(id, stage, upstream)| Ok((id, (rows::stage(stage)?, upstream))));
+        let query = sqlx::query_as("SELECT id, stage, upstream FROM fingerprint");
+        let found: Vec<(_, _, _)> = query.fetch_all(conn).await?;
+        let stored = found.into_iter();
         Ok(Self {
-            stored: stored.collect::<Result<_>>()?,
+            stored: stored
+                .map(|(id, stage, upstream)| (id, (stage, upstream)))
+                .collect(),
             current,
         })
     }
 
     /// Returns the earliest stage in the chain of a fingerprint that is not the current one, with its fingerprint.
-    pub(crate) fn first_change(&self, fingerprint: i64) -> Option<(Stage, i64)> {
+    pub(crate) fn first_change(&self, id: i64) -> Option<(Stage, FingerprintId)> {
         let mut change = None;
-        let mut next = Some(fingerprint);
+        let mut next = Some(FingerprintId(id));
         while let Some(id) = next {
             let (stage, upstream) = *self.stored.get(&id)?;
-            if self.current[stage.index()] != Some(FingerprintId(id)) {
+            if self.current[stage.index()] != Some(id) {
                 change = Some((stage, id));
             }
             next = upstream;
@@ -228,17 +206,16 @@ impl FingerprintChains {
 /// Returns the settings that differ, by name: `register.max_scale`.
 pub(crate) fn differences(stage: Stage, old: &Value, new: &Value) -> Vec<FieldChange> {
     let (old, new) = (leaves(stage, old), leaves(stage, new));
-    let names = old.keys().chain(new.keys());
-    let names: BTreeSet<_> = names.collect();
-    names
+    let names: BTreeSet<_> = old.keys().chain(new.keys()).collect();
+    let changed = names
         .into_iter()
-        .filter(|name| old.get(*name) != new.get(*name))
-        .map(|name| FieldChange {
-            field: name.clone(),
-            old: old.get(name).cloned(),
-            new: new.get(name).cloned(),
-        })
-        .collect()
+        .filter(|name| old.get(*name) != new.get(*name));
+    let changes = changed.map(|name| FieldChange {
+        field: name.clone(),
+        old: old.get(name).cloned(),
+        new: new.get(name).cloned(),
+    });
+    changes.collect()
 }
 
 /// Flattens nested objects; names leave out the key `settings`.
@@ -246,24 +223,16 @@ fn leaves(stage: Stage, fields: &Value) -> Map<String, Value> {
     let mut found = Map::new();
     let mut open = vec![(stage.name().to_owned(), fields)];
     while let Some((path, value)) = open.pop() {
-        match value {
-            Value::Object(inner) => {
-                for (key, value) in inner {
-                    let path = if key == "settings" {
-                        path.clone()
-                    } else {
-                        format!("{path}.{key}")
-                    };
-                    open.push((path, value));
-                }
-            }
-            Value::Null
-            | Value::Bool(_)
-            | Value::Number(_)
-            | Value::String(_)
-            | Value::Array(_) => {
-                found.insert(path, value.clone());
-            }
+        let Some(inner) = value.as_object() else {
+            found.insert(path, value.clone());
+            continue;
+        };
+        for (key, value) in inner {
+            let path = match key.as_str() {
+                "settings" => path.clone(),
+                key => format!("{path}.{key}"),
+            };
+            open.push((path, value));
         }
     }
     found

@@ -6,15 +6,14 @@ use std::collections::BTreeMap;
 use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
-use crate::catalog::queue::counters::CounterKey;
+use crate::catalog::queue::counters::{CounterKey, JobGroup};
 
 /// Pairs counted in one statement.
 const RANGE: i64 = 100_000;
 
 pub(crate) const COUNT_RANGE: &str = "
-SELECT stage, status, coalesce(fingerprint, 0), count(*) FROM job WHERE pair BETWEEN ?1 AND ?2
-GROUP BY stage, status, fingerprint";
+SELECT stage, status, coalesce(fingerprint, 0) AS fingerprint, count(*) AS n FROM job WHERE pair BETWEEN ?1 AND ?2
+GROUP BY stage, status, job.fingerprint";
 
 pub(crate) const NEXT_PAIR: &str = "SELECT min(pair) FROM job WHERE pair > ?1";
 
@@ -35,14 +34,10 @@ async fn count_in_ranges(
             return Ok(counts);
         };
         let to = i64::saturating_add(from, range - 1);
-        let found: Vec<(i64, i64, i64, i64)> = sqlx::query_as(COUNT_RANGE)
-            .bind(from)
-            .bind(to)
-            .fetch_all(&mut *conn)
-            .await?;
-        for (cursor, status, fingerprint, n) in found {
-            let key = CounterKey::new(cursor, rows::status(status)?, Some(fingerprint));
-            *counts.entry(key).or_default() += n.unsigned_abs();
+        let query = sqlx::query_as(COUNT_RANGE).bind(from).bind(to);
+        let found: Vec<JobGroup> = query.fetch_all(&mut *conn).await?;
+        for group in found {
+            *counts.entry(group.key).or_default() += group.n;
         }
         after = to;
     }

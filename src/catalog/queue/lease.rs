@@ -1,5 +1,7 @@
 //! Leases, and what is stored under them.
 
+use serde::Serialize;
+
 use crate::catalog::queue::counters::{CounterKey, cursor};
 use crate::domain::{
     ArtifactSet, ContentHash, Failure, JobStatus, MetricOutcome, PairId, Stage, UnixMillis,
@@ -10,11 +12,12 @@ use crate::domain::{
 ///
 /// `token` is the fencing token: each claim and each recovery raises the job's token, so that writes under an older
 /// lease change nothing.
-#[derive(Debug)]
+#[derive(Debug, sqlx::FromRow)]
 pub struct Lease {
     pub(crate) pair: PairId,
     pub(crate) worker: WorkerId,
     pub(crate) token: i64,
+    #[sqlx(rename = "stage")]
     pub(crate) cursor: Stage,
     /// Fingerprint of the result before the cursor.
     pub(crate) fingerprint: Option<FingerprintId>,
@@ -22,6 +25,7 @@ pub struct Lease {
     pub(crate) crashes: u32,
     pub(crate) exclusive: bool,
     /// Whether a stage was stored under it, which removed the pair's failure.
+    #[sqlx(skip)]
     pub(crate) cleared: bool,
 }
 
@@ -88,7 +92,7 @@ pub enum CheckpointOutcome {
 }
 
 /// The content of an input file as a stage read it.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct InputVersion {
     /// Hash of its bytes.
     pub hash: ContentHash,
@@ -97,7 +101,7 @@ pub struct InputVersion {
 }
 
 /// The input files of a pair as its worker read them; `None` for a file that was not read.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct InputVersions {
     /// The mesh.
     pub mesh: Option<InputVersion>,
@@ -122,7 +126,7 @@ pub struct MetricResult {
 }
 
 /// A finished stage: everything that its checkpoint stores.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StageCheckpoint {
     /// Which stage.
     pub stage: Stage,
@@ -141,8 +145,10 @@ pub struct StageCheckpoint {
     /// Hash over outcome and files.
     pub result_hash: ContentHash,
     /// Results of the metrics, for the last stage.
+    #[serde(skip)]
     pub metrics: Vec<MetricResult>,
     /// Input files that this pair's stages read.
+    #[serde(skip)]
     pub inputs: InputVersions,
     /// Computing time in milliseconds.
     pub ms: u64,
@@ -192,5 +198,6 @@ pub struct StageFailure {
 }
 
 /// Row id of a fingerprint.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, sqlx::Type)]
+#[sqlx(transparent)]
 pub struct FingerprintId(pub(crate) i64);

@@ -1,12 +1,15 @@
-//! The plan of a run, and the reasons as text.
+//! The plan of a run, and its reasons as text.
+
+use std::fmt;
 
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::catalog::queue::lease::FingerprintId;
 use crate::domain::{JobStatus, Stage};
 
 /// Why a pair has work to do.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case", tag = "reason")]
 pub enum StaleReason {
     /// It has never run.
@@ -21,8 +24,9 @@ pub enum StaleReason {
     Settings {
         /// First stage with other settings.
         stage: Stage,
-        /// What changed.
-        changes: Vec<FieldChange>,
+        /// Fingerprint of the old settings.
+        #[serde(skip)]
+        old: FingerprintId,
     },
     /// The mesh file's bytes changed.
     Mesh,
@@ -31,7 +35,7 @@ pub enum StaleReason {
     /// An import changed the unit or the scanned side.
     Manifest,
     /// It was requested (`--rerun`).
-    Asked,
+    Requested,
 }
 
 /// A changed setting.
@@ -53,6 +57,9 @@ pub struct PlanEntry {
     /// Why.
     #[serde(flatten)]
     pub why: StaleReason,
+    /// Which settings changed, for [`StaleReason::Settings`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub changes: Option<Vec<FieldChange>>,
     /// Number of pairs.
     pub pairs: u64,
 }
@@ -88,59 +95,41 @@ impl Plan {
     }
 }
 
-impl std::fmt::Display for FieldChange {
+impl fmt::Display for FieldChange {
     /// Writes `register.max_scale: 1.2 -> 1.3`.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let show = |value: &Option<Value>| match value {
-            Some(value) => value.to_string(),
-            None => "none".to_owned(),
-        };
-        write!(
-            f,
-            "{}: {} -> {}",
-            self.field,
-            show(&self.old),
-            show(&self.new)
-        )
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let none = || "none".to_owned();
+        let [old, new] =
+            [&self.old, &self.new].map(|value| value.as_ref().map_or_else(none, Value::to_string));
+        write!(f, "{}: {old} -> {new}", self.field)
     }
 }
 
-impl std::fmt::Display for StaleReason {
-    /// Writes a fragment such as `the print changed`.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let text = match self {
-            Self::New => "not run yet",
-            Self::Unfinished => "not finished yet",
-            Self::BackingOff => "waits to be tried again",
-            Self::FailedBefore => "failed before with other settings or inputs",
-            Self::Mesh => "the mesh changed",
-            Self::Print => "the print changed",
-            Self::Manifest => "the manifest tells another unit or side",
-            Self::Asked => "asked for",
-            Self::Settings { stage, changes } => return settings(f, *stage, changes),
-        };
-        f.write_str(text)
-    }
-}
-
-/// Writes the first few changes.
-fn settings(
-    f: &mut std::fmt::Formatter<'_>,
-    stage: Stage,
-    changes: &[FieldChange],
-) -> std::fmt::Result {
-    const SHOWN: usize = 4;
-    if changes.is_empty() {
-        return write!(f, "{stage} follows a stage that was computed otherwise");
-    }
-    let shown: Vec<_> = changes
-        .iter()
-        .take(SHOWN)
-        .map(ToString::to_string)
-        .collect();
-    f.write_str(&shown.join(", "))?;
-    match changes.len().saturating_sub(SHOWN) {
-        0 => Ok(()),
-        more => write!(f, " and {more} more"),
+impl fmt::Display for PlanEntry {
+    /// Writes the reason, such as `the print changed`, or the first changed settings.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const SHOWN: usize = 4;
+        let changes = self.changes.as_deref().unwrap_or_default();
+        f.write_str(match self.why {
+            StaleReason::New => "not run yet",
+            StaleReason::Unfinished => "not finished yet",
+            StaleReason::BackingOff => "waits to be tried again",
+            StaleReason::FailedBefore => "failed before with other settings or inputs",
+            StaleReason::Mesh => "the mesh changed",
+            StaleReason::Print => "the print changed",
+            StaleReason::Manifest => "the manifest has another unit or side",
+            StaleReason::Requested => "requested",
+            StaleReason::Settings { stage, .. } if changes.is_empty() => {
+                return write!(f, "{stage} follows a stage with other settings");
+            }
+            StaleReason::Settings { .. } => {
+                let shown = changes.iter().take(SHOWN).map(ToString::to_string);
+                f.write_str(&shown.collect::<Vec<_>>().join(", "))?;
+                return match changes.len().saturating_sub(SHOWN) {
+                    0 => Ok(()),
+                    more => write!(f, " and {more} more"),
+                };
+            }
+        })
     }
 }

@@ -2,22 +2,23 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::{Value, json};
-use sqlx::{Row as _, SqliteConnection};
+use serde_json::json;
+use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
+use crate::catalog::db::rows::json_array;
 use crate::catalog::db::script::Script;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::checkpoint::{UPDATE_INPUTS, input_row};
-use crate::catalog::queue::counters::{CounterKey, Deltas};
+use crate::catalog::queue::checkpoint::UPDATE_INPUTS;
+use crate::catalog::queue::counters::{Deltas, KeyedJob};
 use crate::catalog::queue::lease::InputVersions;
 use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
 /// A worker that holds leases.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, sqlx::FromRow)]
 pub struct LeaseHolder {
     /// The worker.
+    #[sqlx(rename = "id")]
     pub worker: WorkerId,
     /// Its last heartbeat, by its own clock. Compare it with an earlier one, never with this machine's clock.
     pub heartbeat: UnixMillis,
@@ -62,7 +63,7 @@ UPDATE job SET
     worker = NULL, deadline = NULL, token = token + 1, crashes = crashes + (item.value ->> 2),
     attempt = max(attempt - 1, 0), exclusive = max(exclusive, item.value ->> 1)
 FROM json_each(?1) AS item WHERE job.status = 1 AND job.worker = item.value ->> 0
-RETURNING pair, stage, status, crashes, fingerprint";
+RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint";
 
 /// Marks workers as dead, unless they ended properly.
 const DIED: &str =
@@ -86,7 +87,7 @@ UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = 
     token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), exclusive = 1
 WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))
     AND deadline + ?3 < (SELECT w.heartbeat FROM worker AS w WHERE w.id = job.worker)
-RETURNING pair, stage, status, crashes, fingerprint";
+RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint";
 
 /// Stores the failure with the settings of the dead worker and the inputs as last read.
 const CRASHED: &str = "
@@ -105,9 +106,17 @@ INSERT INTO attempt (pair, stage, worker, class, message, at)
 SELECT value ->> 'pair', value ->> 'stage', value ->> 'worker', value ->> 'class', value ->> 'message', value ->> 'at' FROM json_each(?1)";
 
 const FATAL_INPUTS: &str = "
-UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> 'mesh_hash')),
-    print_hash = coalesce(failure.print_hash, unhex(item.value ->> 'print_hash'))
-FROM json_each(?) AS item WHERE failure.pair = item.value ->> 'pair'";
+UPDATE failure SET mesh_hash = coalesce(failure.mesh_hash, unhex(item.value ->> '$[1].mesh.hash')),
+    print_hash = coalesce(failure.print_hash, unhex(item.value ->> '$[1].print.hash'))
+FROM json_each(?) AS item WHERE failure.pair = item.value ->> 0";
+
+/// A row of [`RECOVER`] or [`OVERDUE`].
+#[derive(sqlx::FromRow)]
+struct RecoveredJob {
+    #[sqlx(flatten)]
+    job: KeyedJob,
+    crashes: i64,
+}
 
 impl Catalog {
     /// Returns the workers that hold leases.
@@ -116,16 +125,7 @@ impl Catalog {
     /// When the database refuses.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
         let mut conn = self.read_conn().await?;
-        let found = sqlx::query(HOLDERS).fetch_all(&mut *conn).await?;
-        found
-            .iter()
-            .map(|row| {
-                Ok(LeaseHolder {
-                    worker: WorkerId(row.try_get(0)?),
-                    heartbeat: row.try_get(1)?,
-                })
-            })
-            .collect()
+        Ok(sqlx::query_as(HOLDERS).fetch_all(&mut *conn).await?)
     }
 
     /// Recovers the leases of dead workers: pairs become ready again, or are quarantined when too many workers died
@@ -144,13 +144,9 @@ impl Catalog {
                 let affected = affected_pairs(conn, &workers).await?;
                 let items = left_by(conn, &workers).await?;
                 let deaths: i64 = sqlx::query_scalar(DEATHS).fetch_one(&mut *conn).await?;
-                let found = sqlx::query(RECOVER)
-                    .bind(items)
-                    .bind(CRASH_LIMIT)
-                    .bind(deaths)
-                    .fetch_all(&mut *conn)
-                    .await?;
-                brought_back(conn, &found, &affected, now).await
+                let query = sqlx::query_as(RECOVER).bind(items).bind(CRASH_LIMIT);
+                let found = query.bind(deaths).fetch_all(&mut *conn).await?;
+                count_recovered(conn, found, &affected, now).await
             })
         })
         .await
@@ -165,9 +161,8 @@ impl Catalog {
         self.in_transaction(move |conn| {
             Box::pin(async move {
                 let mut script = Script::default();
-                let items = || seen.iter().map(|(pair, seen)| input_row(*pair, seen));
-                script.execute_over(UPDATE_INPUTS, items())?;
-                script.execute_over(FATAL_INPUTS, items())?;
+                script.execute_over(UPDATE_INPUTS, seen.iter())?;
+                script.execute_over(FATAL_INPUTS, seen.iter())?;
                 script.run(conn).await?;
                 Ok(())
             })
@@ -199,33 +194,27 @@ async fn overdue(
 ) -> Result<Recovered> {
     let others = holders_but(conn, me).await?;
     let affected = affected_pairs(conn, &others).await?;
-    let found = sqlx::query(OVERDUE)
-        .bind(others)
-        .bind(CRASH_LIMIT)
-        .bind(margin_ms)
-        .fetch_all(&mut *conn)
-        .await?;
-    brought_back(conn, &found, &affected, now).await
+    let query = sqlx::query_as(OVERDUE).bind(others).bind(CRASH_LIMIT);
+    let found = query.bind(margin_ms).fetch_all(&mut *conn).await?;
+    count_recovered(conn, found, &affected, now).await
 }
 
 /// Builds the items of [`RECOVER`] for some workers.
 async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
-    let found = sqlx::query(LEFT_BY).bind(workers).fetch_all(conn).await?;
-    let mut items = Vec::with_capacity(found.len());
-    for row in &found {
-        let (worker, died, leases): (i64, bool, i64) =
-            (row.try_get(0)?, row.try_get(1)?, row.try_get(2)?);
+    let query = sqlx::query_as(LEFT_BY).bind(workers);
+    let found: Vec<(i64, bool, i64)> = query.fetch_all(conn).await?;
+    let items = found.into_iter().map(|(worker, died, leases)| {
         let blamed = died && leases == 1;
-        items.push(json!([worker, i64::from(died), i64::from(blamed)]));
-    }
-    Ok(Value::from(items).to_string())
+        json!([worker, i64::from(died), i64::from(blamed)])
+    });
+    Ok(json_array(items))
 }
 
 /// Marks the dead workers; returns the workers whose leases may still be open, as a JSON array.
 async fn mark_dead(conn: &mut SqliteConnection, dead: &DeadWorker) -> Result<String> {
     match dead {
         DeadWorker::Workers(workers) => {
-            let workers = rows::array(workers.iter().map(|worker| worker.0)).to_string();
+            let workers = json_array(workers.iter().map(|worker| worker.0));
             sqlx::query(DIED).bind(&workers).execute(conn).await?;
             Ok(workers)
         }
@@ -238,47 +227,45 @@ async fn mark_dead(conn: &mut SqliteConnection, dead: &DeadWorker) -> Result<Str
 
 /// Returns the workers with leases except one, as a JSON array.
 async fn holders_but(conn: &mut SqliteConnection, me: WorkerId) -> Result<String> {
-    let holders: Vec<i64> = sqlx::query_scalar(HOLDERS).fetch_all(conn).await?;
-    let others = holders.into_iter().filter(|worker| *worker != me.0);
-    Ok(rows::array(others).to_string())
+    let holders: Vec<LeaseHolder> = sqlx::query_as(HOLDERS).fetch_all(conn).await?;
+    let others = holders.iter().map(|holder| holder.worker);
+    let others = others.filter(|worker| *worker != me);
+    Ok(json_array(others.map(|worker| worker.0)))
 }
 
 /// Returns the leased pairs of some workers, each with its worker.
 async fn affected_pairs(conn: &mut SqliteConnection, workers: &str) -> Result<BTreeMap<i64, i64>> {
-    let found: Vec<(i64, i64)> = sqlx::query_as(AFFECTED_PAIRS)
-        .bind(workers)
-        .fetch_all(conn)
-        .await?;
+    let query = sqlx::query_as(AFFECTED_PAIRS).bind(workers);
+    let found: Vec<(i64, i64)> = query.fetch_all(conn).await?;
     Ok(found.into_iter().collect())
 }
 
 /// Counts the recovered pairs, and stores why the quarantined ones failed.
-async fn brought_back(
+async fn count_recovered(
     conn: &mut SqliteConnection,
-    found: &[sqlx::sqlite::SqliteRow],
+    found: Vec<RecoveredJob>,
     affected: &BTreeMap<i64, i64>,
     now: UnixMillis,
 ) -> Result<Recovered> {
     let mut recovered = Recovered::default();
     let mut deltas = Deltas::default();
     let mut crashed = Vec::new();
-    for row in found {
-        let (pair, stage): (i64, i64) = (row.try_get(0)?, row.try_get(1)?);
-        let (status, crashes): (_, i64) = (rows::status(row.try_get(2)?)?, row.try_get(3)?);
-        let to = CounterKey::new(stage, status, row.try_get("fingerprint")?);
-        deltas.move_job(to.with_status(JobStatus::Leased), to);
-        if status == JobStatus::Quarantined {
-            recovered.poisoned.push(PairId(pair));
-            crashed.push(json!({
-                "pair": pair, "worker": affected.get(&pair), "stage": stage, "class": FailureClass::Resource, "at": now,
-                "message": format!("{crashes} workers died or hung over it at {}", rows::stage(stage)?),
-            }));
-        } else {
-            recovered.ready += 1;
+    for RecoveredJob { job, crashes } in found {
+        let KeyedJob { pair, key } = job;
+        deltas.move_job(key.with_status(JobStatus::Leased), key);
+        match key.stage() {
+            Some(stage) if key.status == JobStatus::Quarantined => {
+                recovered.poisoned.push(PairId(pair));
+                crashed.push(json!({
+                    "pair": pair, "worker": affected.get(&pair), "stage": key.cursor, "class": FailureClass::Resource,
+                    "message": format!("{crashes} workers died or hung over it at {stage}"), "at": now,
+                }));
+            }
+            _ => recovered.ready += 1,
         }
     }
     if !crashed.is_empty() {
-        let items = Value::from(crashed).to_string();
+        let items = json_array(crashed);
         for sql in [CRASHED, CRASH_ATTEMPT] {
             sqlx::query(sql).bind(&items).execute(&mut *conn).await?;
         }

@@ -12,7 +12,7 @@ use crate::catalog::queue::fingerprint::{
 use crate::catalog::queue::plan::{Plan, PlanEntry, StaleReason};
 use crate::catalog::queue::selection::{PairSelection, select};
 use crate::catalog::queue::staleness::{
-    RerunPolicy, StaleCause, StaleJob, count_stale, decide, inspect, inspect_all,
+    RerunPolicy, StaleJob, count_stale, decide, inspect, inspect_all,
 };
 use crate::domain::{PairName, Stage};
 
@@ -72,7 +72,7 @@ async fn plan(
 ) -> Result<Plan> {
     let current = current_json(conn, fingerprints).await?;
     let mut plan = Plan::default();
-    let mut entries: BTreeMap<(Stage, StaleCause), u64> = BTreeMap::new();
+    let mut entries: BTreeMap<(Stage, StaleReason), u64> = BTreeMap::new();
     let mut add = |job: &StaleJob, pairs: u64| match decide(job, policy) {
         Some(key) => *entries.entry(key).or_default() += pairs,
         None => plan.add_unchanged(job.key.status, pairs),
@@ -83,9 +83,20 @@ async fn plan(
         let chains = FingerprintChains::load(conn, fingerprints).await?;
         inspect_all(conn, &current, &chains, &mut add).await?;
     }
-    for ((from, cause), pairs) in entries {
-        let why = reason(conn, fingerprints, cause).await?;
-        plan.entries.push(PlanEntry { from, why, pairs });
+    for ((from, why), pairs) in entries {
+        let changes = match why {
+            StaleReason::Settings { stage, old } => {
+                let old = fields_of(conn, old).await?;
+                Some(differences(stage, &old, &fingerprints.of(stage).fields))
+            }
+            _ => None,
+        };
+        plan.entries.push(PlanEntry {
+            from,
+            why,
+            changes,
+            pairs,
+        });
     }
     Ok(plan)
 }
@@ -97,37 +108,13 @@ async fn inspect_selection(
     among: &PairSelection,
     mut each: impl FnMut(&StaleJob, u64),
 ) -> Result<()> {
-    let mut after = 0;
-    loop {
-        let page = inspect(conn, current, after, among).await?;
-        let Some((last, _)) = page.last() else {
-            return Ok(());
-        };
-        after = *last;
+    let mut after = Some(0);
+    while let Some(from) = after {
+        let page = inspect(conn, current, from, among).await?;
+        after = page.last().map(|(pair, _)| *pair);
         for (_, job) in &page {
             each(job, 1);
         }
     }
-}
-
-async fn reason(
-    conn: &mut SqliteConnection,
-    fingerprints: &Fingerprints,
-    cause: StaleCause,
-) -> Result<StaleReason> {
-    Ok(match cause {
-        StaleCause::New => StaleReason::New,
-        StaleCause::Unfinished => StaleReason::Unfinished,
-        StaleCause::BackingOff => StaleReason::BackingOff,
-        StaleCause::FailedBefore => StaleReason::FailedBefore,
-        StaleCause::Mesh => StaleReason::Mesh,
-        StaleCause::Print => StaleReason::Print,
-        StaleCause::Manifest => StaleReason::Manifest,
-        StaleCause::Requested => StaleReason::Asked,
-        StaleCause::Settings(stage, old) => {
-            let old = fields_of(conn, old).await?;
-            let changes = differences(stage, &old, &fingerprints.of(stage).fields);
-            StaleReason::Settings { stage, changes }
-        }
-    })
+    Ok(())
 }

@@ -1,10 +1,9 @@
 //! Selections of pairs.
 
-use serde_json::Value;
 use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
+use crate::catalog::db::rows::{json_array, names_json};
 use crate::domain::{PairId, PairName};
 
 /// Some pairs of the catalog.
@@ -18,15 +17,9 @@ pub struct PairSelection {
 impl PairSelection {
     /// Selects pairs.
     pub fn of(pairs: &[PairId]) -> Self {
-        let ids: Vec<i64> = pairs.iter().map(|pair| pair.0).collect();
-        Self::of_ids(&ids)
-    }
-
-    /// Selects pairs by their row ids.
-    pub(crate) fn of_ids(ids: &[i64]) -> Self {
         Self {
-            len: ids.len(),
-            json: Value::from(ids).to_string(),
+            len: pairs.len(),
+            json: json_array(pairs.iter().map(|pair| pair.0)),
         }
     }
 
@@ -46,11 +39,19 @@ pub(crate) async fn select(
     conn: &mut SqliteConnection,
     names: &[PairName],
 ) -> Result<PairSelection> {
-    let ids: Vec<i64> = sqlx::query_scalar(
-        "SELECT id FROM pair WHERE name IN (SELECT value FROM json_each(?1)) ORDER BY id",
-    )
-    .bind(rows::names_json(names))
-    .fetch_all(conn)
-    .await?;
-    Ok(PairSelection::of_ids(&ids))
+    let sql = "SELECT id FROM pair WHERE name IN (SELECT value FROM json_each(?1)) ORDER BY id";
+    let query = sqlx::query_scalar(sql).bind(names_json(names));
+    let pairs: Vec<PairId> = query.fetch_all(conn).await?;
+    Ok(PairSelection::of(&pairs))
+}
+
+/// Returns the names that are not pairs, in the order given.
+pub(crate) async fn unknown_names(
+    conn: &mut SqliteConnection,
+    names: &[PairName],
+) -> Result<Vec<PairName>> {
+    let sql = "SELECT value FROM json_each(?1) AS given
+        WHERE NOT EXISTS (SELECT 1 FROM pair WHERE name = given.value) ORDER BY given.id";
+    let query = sqlx::query_scalar(sql).bind(names_json(names));
+    Ok(query.fetch_all(conn).await?)
 }

@@ -8,15 +8,15 @@
 use std::collections::BTreeMap;
 
 use sqlx::sqlite::SqliteRow;
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::{FromRow as _, Row as _, SqliteConnection};
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
 use crate::catalog::queue::counters::{CounterKey, Cursor, counters};
 use crate::catalog::queue::fingerprint::FingerprintChains;
 use crate::catalog::queue::fragments::inconsistent;
+use crate::catalog::queue::plan::StaleReason;
 use crate::catalog::queue::selection::PairSelection;
-use crate::domain::{JobStatus, Stage};
+use crate::domain::{JobStatus, PairId, Stage};
 
 /// Jobs inspected in one statement.
 pub(crate) const PAGE: usize = 10_000;
@@ -41,7 +41,7 @@ WITH found AS (
             OR r.attributes <> p.attributes)) AS first
     FROM (SELECT value FROM json_each(?4)) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value
         JOIN pair AS p ON p.id = j.pair WHERE j.pair > ?2 ORDER BY j.pair LIMIT ?3)
-SELECT found.pair, found.stage, found.status, coalesce(found.fingerprint, 0) AS job_fingerprint, found.first, r.fingerprint,
+SELECT found.pair, found.stage, found.status, coalesce(found.fingerprint, 0) AS fingerprint, found.first, r.fingerprint AS old,
     coalesce(r.mesh_hash <> found.mesh_hash, 0) AS mesh, coalesce(r.print_hash <> found.print_hash, 0) AS print,
     coalesce(r.attributes <> found.attributes, 0) AS attributes,
     coalesce(f.fingerprint <> (?1 ->> f.stage), 0) OR coalesce(f.mesh_hash <> found.mesh_hash, 0)
@@ -79,39 +79,25 @@ UPDATE job SET dirty = 0 WHERE dirty = 1 AND pair > ?1 AND pair <= ?2 AND status
 pub(crate) struct StaleJob {
     pub(crate) key: CounterKey,
     /// First stage whose result has other settings or inputs than the current ones, and what changed.
-    pub(crate) change: Option<(Stage, StaleCause)>,
+    pub(crate) change: Option<(Stage, StaleReason)>,
     /// Whether its failure had other settings or inputs than the current ones.
     pub(crate) failure_is_outdated: bool,
 }
 
-/// Why a job has work to do, before the changed fields of its settings are looked up.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum StaleCause {
-    New,
-    Unfinished,
-    BackingOff,
-    FailedBefore,
-    Settings(Stage, i64),
-    Mesh,
-    Print,
-    Manifest,
-    Requested,
-}
-
 /// Returns where a job starts and why; `None` when it stays as it is.
-pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, StaleCause)> {
+pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, StaleReason)> {
     let CounterKey { cursor, status, .. } = job.key;
-    let next = usize::try_from(cursor).ok().and_then(Stage::from_index);
+    let next = job.key.stage();
     if status == JobStatus::Leased {
         return None;
     }
     let requested = match policy {
         RerunPolicy::All(from) => {
             let start = next.map_or(from, |next| next.min(from));
-            Some((start, StaleCause::Requested))
+            Some((start, StaleReason::Requested))
         }
         RerunPolicy::Failed if status == JobStatus::Quarantined => {
-            next.map(|at| (at, StaleCause::Requested))
+            next.map(|at| (at, StaleReason::Requested))
         }
         RerunPolicy::Failed | RerunPolicy::Changed => None,
     };
@@ -123,10 +109,10 @@ pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, Stal
         (None, None) => {}
     }
     let cause = match status {
-        JobStatus::Ready if cursor == 0 => StaleCause::New,
-        JobStatus::Ready => StaleCause::Unfinished,
-        JobStatus::Backoff => StaleCause::BackingOff,
-        JobStatus::Quarantined if job.failure_is_outdated => StaleCause::FailedBefore,
+        JobStatus::Ready if cursor == 0 => StaleReason::New,
+        JobStatus::Ready => StaleReason::Unfinished,
+        JobStatus::Backoff => StaleReason::BackingOff,
+        JobStatus::Quarantined if job.failure_is_outdated => StaleReason::FailedBefore,
         JobStatus::Quarantined | JobStatus::Done | JobStatus::Leased => return None,
     };
     next.map(|at| (at, cause))
@@ -145,17 +131,12 @@ pub(crate) async fn inspect(
 }
 
 fn stale_job(row: &SqliteRow) -> Result<(i64, StaleJob)> {
-    let first: Option<i64> = row.try_get("first")?;
-    let change = match first.map(rows::stage).transpose()? {
-        Some(stage) => Some((stage, changed(row, stage)?)),
+    let change = match row.try_get("first")? {
+        Some(stage) => Some((stage, change(row, stage)?)),
         None => None,
     };
     let job = StaleJob {
-        key: CounterKey {
-            cursor: row.try_get("stage")?,
-            status: rows::status(row.try_get("status")?)?,
-            fingerprint: row.try_get("job_fingerprint")?,
-        },
+        key: CounterKey::from_row(row)?,
         change,
         failure_is_outdated: row.try_get("failure_is_outdated")?,
     };
@@ -163,15 +144,16 @@ fn stale_job(row: &SqliteRow) -> Result<(i64, StaleJob)> {
 }
 
 /// Returns what differs in the first outdated result. Inputs go before settings, because they explain more.
-fn changed(row: &SqliteRow, stage: Stage) -> Result<StaleCause> {
+fn change(row: &SqliteRow, stage: Stage) -> Result<StaleReason> {
     Ok(if row.try_get("mesh")? {
-        StaleCause::Mesh
+        StaleReason::Mesh
     } else if row.try_get("print")? {
-        StaleCause::Print
+        StaleReason::Print
     } else if row.try_get("attributes")? {
-        StaleCause::Manifest
+        StaleReason::Manifest
     } else {
-        StaleCause::Settings(stage, row.try_get("fingerprint")?)
+        let old = row.try_get("old")?;
+        StaleReason::Settings { stage, old }
     })
 }
 
@@ -180,17 +162,14 @@ pub(crate) async fn inspect_marked(
     conn: &mut SqliteConnection,
     current: &str,
     after: i64,
-) -> Result<Option<(Vec<(i64, StaleJob)>, i64)>> {
-    let page: Vec<i64> = sqlx::query_scalar(MARKED)
-        .bind(after)
-        .bind(PAGE as i64)
-        .fetch_all(&mut *conn)
-        .await?;
-    let Some(last) = page.last().copied() else {
-        return Ok(None);
+) -> Result<(Vec<(i64, StaleJob)>, Option<i64>)> {
+    let query = sqlx::query_scalar(MARKED).bind(after).bind(PAGE as i64);
+    let page: Vec<PairId> = query.fetch_all(&mut *conn).await?;
+    let Some(last) = page.last() else {
+        return Ok((Vec::new(), None));
     };
-    let jobs = inspect(conn, current, after, &PairSelection::of_ids(&page)).await?;
-    Ok(Some((jobs, last)))
+    let jobs = inspect(conn, current, after, &PairSelection::of(&page)).await?;
+    Ok((jobs, Some(last.0)))
 }
 
 /// Returns the groups of unmarked jobs by the counters, those with earlier cursors first.
@@ -213,10 +192,10 @@ pub(crate) async fn groups(
 }
 
 /// Returns the first stage before the cursor with other settings than the current ones.
-fn changed_settings(key: CounterKey, chains: &FingerprintChains) -> Option<(Stage, StaleCause)> {
+fn changed_settings(key: CounterKey, chains: &FingerprintChains) -> Option<(Stage, StaleReason)> {
     let (stage, old) = chains.first_change(key.fingerprint)?;
     let is_before = (stage.index() as Cursor) < key.cursor;
-    is_before.then_some((stage, StaleCause::Settings(stage, old)))
+    is_before.then_some((stage, StaleReason::Settings { stage, old }))
 }
 
 /// Passes every job's state to `each`, with the number of jobs in that state.
@@ -227,8 +206,9 @@ pub(crate) async fn inspect_all(
     mut each: impl FnMut(&StaleJob, u64),
 ) -> Result<()> {
     let mut marked: BTreeMap<CounterKey, u64> = BTreeMap::new();
-    let mut after = 0;
-    while let Some((page, last)) = inspect_marked(conn, current, after).await? {
+    let mut after = Some(0);
+    while let Some(from) = after {
+        let (page, last) = inspect_marked(conn, current, from).await?;
         for (_, job) in &page {
             *marked.entry(job.key).or_default() += 1;
             each(job, 1);
@@ -247,11 +227,8 @@ pub(crate) async fn inspect_all(
 
 /// Counts the pairs with a result that has other settings or inputs than the current ones.
 pub(crate) async fn count_stale(conn: &mut SqliteConnection, current: &str) -> Result<u64> {
-    let n: i64 = sqlx::query_scalar(COUNT_STALE)
-        .bind(current)
-        .fetch_one(conn)
-        .await?;
-    Ok(n.unsigned_abs())
+    let query = sqlx::query_scalar(COUNT_STALE).bind(current);
+    Ok(query.fetch_one(conn).await?)
 }
 
 /// Unmarks the jobs in a range of pairs whose results agree again.
@@ -263,7 +240,7 @@ pub(crate) async fn clear_dirty(conn: &mut SqliteConnection, after: i64, last: i
 
 #[cfg(test)]
 mod tests {
-    use super::{CounterKey, RerunPolicy, StaleCause, StaleJob, decide};
+    use super::{CounterKey, RerunPolicy, StaleJob, StaleReason, decide};
     use crate::domain::{JobStatus, Stage};
 
     fn job(cursor: i64, status: JobStatus) -> StaleJob {
@@ -284,15 +261,15 @@ mod tests {
         assert_eq!(decide(&done, RerunPolicy::Changed), None);
         assert_eq!(decide(&done, RerunPolicy::Failed), None);
         let all = decide(&done, RerunPolicy::All(Stage::Depth));
-        assert_eq!(all, Some((Stage::Depth, StaleCause::Requested)));
+        assert_eq!(all, Some((Stage::Depth, StaleReason::Requested)));
     }
 
     #[test]
     fn the_first_changed_stage_is_where_it_starts() {
         let mut print_changed = job(4, JobStatus::Done);
-        print_changed.change = Some((Stage::Normalize, StaleCause::Print));
+        print_changed.change = Some((Stage::Normalize, StaleReason::Print));
         let found = decide(&print_changed, RerunPolicy::All(Stage::Register));
-        assert_eq!(found, Some((Stage::Normalize, StaleCause::Print)));
+        assert_eq!(found, Some((Stage::Normalize, StaleReason::Print)));
     }
 
     #[test]
@@ -301,6 +278,6 @@ mod tests {
         assert_eq!(decide(&failed, RerunPolicy::Changed), None);
         failed.failure_is_outdated = true;
         let found = decide(&failed, RerunPolicy::Changed);
-        assert_eq!(found, Some((Stage::Depth, StaleCause::FailedBefore)));
+        assert_eq!(found, Some((Stage::Depth, StaleReason::FailedBefore)));
     }
 }

@@ -1,11 +1,10 @@
 //! Worker registration, due back-offs and open work.
 
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
-use crate::catalog::queue::counters::{CounterKey, Deltas, cursor};
+use crate::catalog::queue::counters::{CounterKey, Cursor, Deltas, cursor};
 use crate::catalog::queue::fingerprint::FingerprintIds;
 use crate::catalog::queue::selection::PairSelection;
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
@@ -22,7 +21,7 @@ pub struct WorkerInfo {
 }
 
 /// Open work among some pairs or all.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, sqlx::FromRow)]
 pub struct Outstanding {
     /// Ready pairs with a stage to run.
     pub ready: u64,
@@ -48,18 +47,18 @@ pub struct WorkLeft {
 /// Due back-offs, including those implausibly far in the future (clock jump).
 pub(crate) const DUE: &str = "
 UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
-RETURNING stage, fingerprint";
+RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint";
 
 pub(crate) const LEFT_ALL: &str = "
 SELECT
-    (SELECT count(*) FROM (SELECT 1 FROM job WHERE status = 0 AND stage <= ?1 LIMIT 1000)),
-    (SELECT count(*) FROM job WHERE status = 1 AND stage <= ?1),
-    (SELECT count(*) FROM job WHERE status = 2 AND stage <= ?1),
-    (SELECT min(run_at) FROM job WHERE status = 2 AND stage <= ?1)";
+    (SELECT count(*) FROM (SELECT 1 FROM job WHERE status = 0 AND stage <= ?1 LIMIT 1000)) AS ready,
+    (SELECT count(*) FROM job WHERE status = 1 AND stage <= ?1) AS leased,
+    (SELECT count(*) FROM job WHERE status = 2 AND stage <= ?1) AS backoff,
+    (SELECT min(run_at) FROM job WHERE status = 2 AND stage <= ?1) AS next_due";
 
 const LEFT_AMONG: &str = "
-SELECT count(*) FILTER (WHERE j.status = 0), count(*) FILTER (WHERE j.status = 1),
-    count(*) FILTER (WHERE j.status = 2), min(j.run_at)
+SELECT count(*) FILTER (WHERE j.status = 0) AS ready, count(*) FILTER (WHERE j.status = 1) AS leased,
+    count(*) FILTER (WHERE j.status = 2) AS backoff, min(j.run_at) AS next_due
 FROM json_each(?2) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value WHERE j.stage <= ?1";
 
 const COUNT_ALL: &str = "SELECT stage, status, sum(n) FROM counter GROUP BY stage, status";
@@ -109,15 +108,11 @@ impl Catalog {
     pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let due: Vec<(i64, Option<i64>)> = sqlx::query_as(DUE)
-                    .bind(now)
-                    .bind(now + longest)
-                    .fetch_all(&mut *conn)
-                    .await?;
+                let query = sqlx::query_as(DUE).bind(now).bind(now + longest);
+                let due: Vec<CounterKey> = query.fetch_all(&mut *conn).await?;
                 let mut deltas = Deltas::default();
-                for (cursor, fingerprint) in &due {
-                    let to = CounterKey::new(*cursor, JobStatus::Ready, *fingerprint);
-                    deltas.move_job(to.with_status(JobStatus::Backoff), to);
+                for key in &due {
+                    deltas.move_job(key.with_status(JobStatus::Backoff), *key);
                 }
                 deltas.apply(conn).await?;
                 Ok(due.len() as u64)
@@ -137,19 +132,37 @@ impl Catalog {
     ) -> Result<Outstanding> {
         let mut conn = self.read_conn().await?;
         let query = match among {
-            None => sqlx::query(LEFT_ALL).bind(cursor(until)),
-            Some(among) => sqlx::query(LEFT_AMONG)
+            None => sqlx::query_as(LEFT_ALL).bind(cursor(until)),
+            Some(among) => sqlx::query_as(LEFT_AMONG)
                 .bind(cursor(until))
                 .bind(&among.json),
         };
-        let row = query.fetch_one(&mut *conn).await?;
-        let count = |index: usize| row.try_get::<i64, _>(index).map(i64::unsigned_abs);
-        Ok(Outstanding {
-            ready: count(0)?,
-            leased: count(1)?,
-            backoff: count(2)?,
-            next_due: row.try_get(3)?,
-        })
+        Ok(query.fetch_one(&mut *conn).await?)
+    }
+
+    /// Returns the open stages up to a stage, from the counters, or counted among some pairs.
+    ///
+    /// # Errors
+    /// When the database refuses.
+    pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
+        let mut conn = self.read_conn().await?;
+        let query = match among {
+            None => sqlx::query_as(COUNT_ALL),
+            Some(among) => sqlx::query_as(COUNT_AMONG).bind(&among.json),
+        };
+        let counted: Vec<(Cursor, JobStatus, u64)> = query.fetch_all(&mut *conn).await?;
+        let mut left = WorkLeft::default();
+        for (at, status, n) in counted {
+            if status == JobStatus::Quarantined {
+                left.quarantined += n;
+            } else if at <= cursor(until) {
+                left.pairs += n;
+                for open in &mut left.by_stage[at as usize..=until.index()] {
+                    *open += n;
+                }
+            }
+        }
+        Ok(left)
     }
 }
 
@@ -171,38 +184,4 @@ async fn insert_worker(
     .fetch_one(conn)
     .await?;
     Ok(WorkerId(id))
-}
-
-impl Catalog {
-    /// Returns the open stages up to a stage, from the counters, or counted among some pairs.
-    ///
-    /// # Errors
-    /// When the database refuses.
-    pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
-        let mut conn = self.read_conn().await?;
-        let query = match among {
-            None => sqlx::query(COUNT_ALL),
-            Some(among) => sqlx::query(COUNT_AMONG).bind(&among.json),
-        };
-        let mut left = WorkLeft::default();
-        for row in query.fetch_all(&mut *conn).await? {
-            let (at, n): (i64, i64) = (row.try_get(0)?, row.try_get(2)?);
-            let n = n.unsigned_abs();
-            match rows::status(row.try_get(1)?)? {
-                JobStatus::Quarantined => left.quarantined += n,
-                JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff
-                    if at <= cursor(until) =>
-                {
-                    left.pairs += n;
-                    for stage in Stage::ALL {
-                        if (at..=cursor(until)).contains(&cursor(stage)) {
-                            left.by_stage[stage.index()] += n;
-                        }
-                    }
-                }
-                JobStatus::Ready | JobStatus::Leased | JobStatus::Backoff | JobStatus::Done => {}
-            }
-        }
-        Ok(left)
-    }
 }

@@ -3,9 +3,8 @@
 use serde_json::{Value, json};
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::rows::json_array;
 use crate::catalog::handle::Catalog;
 use crate::domain::PairName;
 
@@ -36,9 +35,8 @@ impl Catalog {
     /// When the database returns an error.
     pub async fn has_truth(&self) -> Result<bool> {
         let mut conn = self.read_conn().await?;
-        Ok(sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM truth)")
-            .fetch_one(&mut *conn)
-            .await?)
+        let exists = sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM truth)");
+        Ok(exists.fetch_one(&mut *conn).await?)
     }
 }
 
@@ -46,22 +44,15 @@ impl Catalog {
 pub(crate) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)]) -> Result<u64> {
     let mut stored = 0;
     for chunk in truths.chunks(500) {
-        let items = chunk
-            .iter()
-            .map(|(name, body)| json!({ "name": name, "body": body.to_string() }));
-        let items = rows::array(items).to_string();
-        let unknown: Option<String> = sqlx::query_scalar(UNKNOWN)
-            .bind(&items)
-            .fetch_optional(&mut *conn)
-            .await?;
-        if let Some(name) = unknown {
-            return Err(CatalogError::UnknownPair(rows::pair_name(&name)?));
+        let items = chunk.iter();
+        let items = items.map(|(name, body)| json!({ "name": name, "body": body.to_string() }));
+        let items = json_array(items);
+        let unknown = sqlx::query_scalar(UNKNOWN).bind(&items);
+        if let Some(name) = unknown.fetch_optional(&mut *conn).await? {
+            return Err(CatalogError::UnknownPair(name));
         }
-        stored += sqlx::query(SET)
-            .bind(items)
-            .fetch_all(&mut *conn)
-            .await?
-            .len() as u64;
+        let set = sqlx::query(SET).bind(items);
+        stored += set.fetch_all(&mut *conn).await?.len() as u64;
     }
     Ok(stored)
 }

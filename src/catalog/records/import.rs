@@ -1,18 +1,16 @@
 //! Import of pairs: names, paths and attributes.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use serde_json::{Value, json};
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::SqliteConnection;
 use tokio::sync::mpsc;
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::rows::json_array;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
-use crate::catalog::queue::selection::{PairSelection, select};
+use crate::catalog::queue::selection::{PairSelection, select, unknown_names};
 use crate::catalog::records::ground_truth;
 use crate::catalog::records::model::PairAttributes;
 use crate::domain::{PairName, UnixMillis};
@@ -52,7 +50,6 @@ pub struct PairChange {
     pub fields: Vec<&'static str>,
 }
 
-/// Columns of a pair's attributes, in the order of [`attributes`].
 const SELECT: &str = "
 SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta
 FROM pair WHERE name IN (SELECT value FROM json_each(?1))";
@@ -132,10 +129,8 @@ impl Catalog {
     /// When the database returns an error.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
-        let names: Vec<String> = sqlx::query_scalar("SELECT name FROM pair ORDER BY name")
-            .fetch_all(&mut *conn)
-            .await?;
-        names.iter().map(|name| rows::pair_name(name)).collect()
+        let names = sqlx::query_scalar("SELECT name FROM pair ORDER BY name");
+        Ok(names.fetch_all(&mut *conn).await?)
     }
 
     /// Returns the names that are not pairs, in the order given.
@@ -144,15 +139,7 @@ impl Catalog {
     /// When the database returns an error.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
-        let found: Vec<String> = sqlx::query_scalar(
-            "SELECT name FROM pair WHERE name IN (SELECT value FROM json_each(?1))",
-        )
-        .bind(rows::names_json(names))
-        .fetch_all(&mut *conn)
-        .await?;
-        let found: BTreeSet<_> = found.into_iter().collect();
-        let unknown = names.iter().filter(|name| !found.contains(name.as_str()));
-        Ok(unknown.cloned().collect())
+        unknown_names(&mut conn, names).await
     }
 
     /// Returns pairs by their names; unknown names are left out.
@@ -171,15 +158,11 @@ async fn import_chunk(
     now: UnixMillis,
     summary: &mut ImportSummary,
 ) -> Result<()> {
-    let names = rows::array(chunk.iter().map(|row| row.name.as_str())).to_string();
-    let known = sqlx::query(SELECT)
-        .bind(&names)
-        .fetch_all(&mut *conn)
-        .await?;
-    let mut known = known
-        .iter()
-        .map(|row| attributes(row).map(|attributes| (attributes.name.clone(), attributes)))
-        .collect::<Result<BTreeMap<_, _>>>()?;
+    let names = json_array(chunk.iter().map(|row| row.name.as_str()));
+    let known = sqlx::query_as(SELECT).bind(&names);
+    let known: Vec<PairAttributes> = known.fetch_all(&mut *conn).await?;
+    let known = known.into_iter().map(|old| (old.name.clone(), old));
+    let mut known: BTreeMap<_, _> = known.collect();
     for row in chunk {
         match known.insert(row.name.clone(), row.clone()) {
             None => summary.added += 1,
@@ -190,12 +173,9 @@ async fn import_chunk(
             }),
         }
     }
-    let items = rows::array(chunk.iter().map(item)).to_string();
-    sqlx::query(UPSERT)
-        .bind(items)
-        .bind(now)
-        .execute(&mut *conn)
-        .await?;
+    let items = json_array(chunk.iter().map(item));
+    let upsert = sqlx::query(UPSERT).bind(items).bind(now);
+    upsert.execute(&mut *conn).await?;
     sqlx::query(NEW_JOBS).bind(names).execute(conn).await?;
     Ok(())
 }
@@ -229,20 +209,4 @@ fn differing(old: &ImportRow, new: &ImportRow) -> Vec<&'static str> {
     .into_iter()
     .filter_map(|(name, differs)| differs.then_some(name))
     .collect()
-}
-
-/// Reads a pair's attributes from a row with the columns of [`SELECT`].
-pub(crate) fn attributes(row: &SqliteRow) -> Result<PairAttributes> {
-    let unit: Option<String> = row.try_get("unit")?;
-    let meta: String = row.try_get("meta")?;
-    Ok(PairAttributes {
-        name: rows::pair_name(&row.try_get::<String, _>("name")?)?,
-        mesh_path: row.try_get("mesh_path")?,
-        print_path: row.try_get("print_path")?,
-        unit: unit.map(|unit| rows::name(&unit)).transpose()?,
-        scanned_face_down: row.try_get("scanned_face_down")?,
-        character: row.try_get("character")?,
-        block: row.try_get("block")?,
-        meta: serde_json::from_str(&meta)?,
-    })
 }

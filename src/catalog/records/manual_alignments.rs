@@ -3,17 +3,14 @@
 use std::collections::BTreeMap;
 
 use serde::Serialize;
-use sqlx::Row as _;
-use sqlx::sqlite::SqliteRow;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
 use crate::catalog::records::review_answers::pair_id;
 use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
 
 /// A manual alignment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
 pub struct ManualAlignment {
     /// Idempotency key of the client: an alignment sent twice is stored once.
     pub event: String,
@@ -42,10 +39,11 @@ pub struct ManualAlignment {
 }
 
 /// A stored manual alignment.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
 pub struct StoredAlignment {
     /// The alignment.
     #[serde(flatten)]
+    #[sqlx(flatten)]
     pub made: ManualAlignment,
     /// When.
     pub at: UnixMillis,
@@ -63,8 +61,8 @@ INSERT INTO manual_alignment (event, pair, mesh_hash, print_hash, depth_hash, se
 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13) ON CONFLICT (event) DO NOTHING";
 
 const LOG: &str = "
-SELECT a.event, p.name, a.reviewer, a.print_from_depth, a.print_from_mesh, a.mesh_hash, a.print_hash, a.depth_hash, a.seen,
-    a.iou, a.dice, a.note, a.at, u.at AS undone_at,
+SELECT a.event, p.name AS pair, a.reviewer, a.print_from_depth, a.print_from_mesh, a.mesh_hash, a.print_hash,
+    a.depth_hash, a.seen, a.iou, a.dice, a.note, a.at, u.at AS undone_at,
     coalesce(d.mesh_hash = a.mesh_hash AND n.print_hash = a.print_hash, 0) AS holds,
     coalesce(d.result_hash = a.depth_hash, 0) AS on_current_depth
 FROM manual_alignment AS a JOIN pair AS p ON p.id = a.pair
@@ -114,15 +112,14 @@ impl Catalog {
     /// When the database returns an error.
     pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
-        let found = sqlx::query(LOG).fetch_all(&mut *conn).await?;
-        found.iter().map(stored).collect()
+        Ok(sqlx::query_as(LOG).fetch_all(&mut *conn).await?)
     }
 
     /// Returns the newest manual alignment of each pair that is valid and not undone.
     ///
     /// # Errors
     /// When the database returns an error.
-    pub async fn newest_hand_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
+    pub async fn newest_manual_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
         let stored = self.manual_alignments().await?.into_iter();
         let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());
         // Oldest first, so that the newest stays.
@@ -130,29 +127,4 @@ impl Catalog {
             .map(|stored| (stored.made.pair.clone(), stored))
             .collect())
     }
-}
-
-fn stored(row: &SqliteRow) -> Result<StoredAlignment> {
-    let hash =
-        |column: &str| -> Result<ContentHash> { rows::hash(&row.try_get::<Vec<u8>, _>(column)?) };
-    Ok(StoredAlignment {
-        made: ManualAlignment {
-            event: row.try_get("event")?,
-            pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
-            reviewer: row.try_get("reviewer")?,
-            print_from_depth: serde_json::from_str(&row.try_get::<String, _>("print_from_depth")?)?,
-            print_from_mesh: serde_json::from_str(&row.try_get::<String, _>("print_from_mesh")?)?,
-            mesh_hash: hash("mesh_hash")?,
-            print_hash: hash("print_hash")?,
-            depth_hash: hash("depth_hash")?,
-            seen: hash("seen")?,
-            iou: row.try_get("iou")?,
-            dice: row.try_get("dice")?,
-            note: row.try_get("note")?,
-        },
-        at: row.try_get("at")?,
-        undone_at: row.try_get("undone_at")?,
-        holds: row.try_get("holds")?,
-        on_current_depth: row.try_get("on_current_depth")?,
-    })
 }

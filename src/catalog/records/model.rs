@@ -6,10 +6,11 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-use crate::catalog::records::verdicts::VerdictEvent;
+use crate::catalog::db::rows::Json;
+use crate::catalog::records::verdicts::{ReviewerVerdict, VerdictEvent};
 use crate::domain::{
-    ArtifactSet, ContentHash, Failure, FailureClass, JobStatus, LengthUnit, MetricOutcome,
-    PairName, Reason, ReviewOrder, Stage, ThresholdMetric, UnixMillis, Verdict,
+    ArtifactSet, ContentHash, Failure, JobStatus, LengthUnit, MetricOutcome, PairName, Stage,
+    ThresholdMetric, UnixMillis, Verdict,
 };
 
 /// Counts of the whole project, as in `status --json`.
@@ -54,7 +55,7 @@ pub struct StoredFailure {
     pub at: UnixMillis,
 }
 
-/// A failed pair in a list of failures.
+/// A quarantined pair in a list of failures.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct FailedPair {
     /// The pair.
@@ -67,19 +68,22 @@ pub struct FailedPair {
 }
 
 /// The current result of one stage of one pair.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
 pub struct StageRecord {
     /// The stage.
     pub stage: Stage,
     /// Outcome of the stage as JSON; parse it with [`StageRecord::parse`].
+    #[sqlx(try_from = "Json<Value>")]
     pub outcome: Value,
     /// Its artifacts by role.
+    #[sqlx(try_from = "Json<ArtifactSet>")]
     pub files: ArtifactSet,
     /// Hash over outcome and files; the same bytes give the same hash.
     pub result_hash: ContentHash,
     /// Hash of the settings it was computed with, earlier stages' included.
     pub fingerprint_hash: ContentHash,
     /// These settings: revision and settings of this stage.
+    #[sqlx(try_from = "Json<Value>")]
     pub fingerprint_fields: Value,
     /// Content of the mesh it was computed from.
     pub mesh_hash: ContentHash,
@@ -101,19 +105,6 @@ impl StageRecord {
     }
 }
 
-/// One reviewer's newest verdict on a current result.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct ReviewerVerdict {
-    /// Name of the reviewer.
-    pub reviewer: String,
-    /// The judgement.
-    pub verdict: Verdict,
-    /// Why, for a fail.
-    pub reason: Option<Reason>,
-    /// The order in which results came to the reviewer; [`ReviewOrder::Adjudicate`] marks the decision on a conflict.
-    pub review_order: Option<ReviewOrder>,
-}
-
 /// One metric's current result of one pair.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct MetricRecord {
@@ -129,7 +120,7 @@ pub struct MetricRecord {
 }
 
 /// Attributes of a pair as imported.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
 pub struct PairAttributes {
     /// The user's id.
     pub name: PairName,
@@ -146,6 +137,7 @@ pub struct PairAttributes {
     /// The block, if given.
     pub block: Option<String>,
     /// All other columns of the manifest.
+    #[sqlx(try_from = "Json<Map<String, Value>>")]
     pub meta: Map<String, Value>,
 }
 
@@ -180,11 +172,6 @@ impl PairResults {
         self.metrics
             .iter()
             .find(|record| record.outcome.metric == metric)
-    }
-
-    /// Class of the failure.
-    pub fn failure_class(&self) -> Option<FailureClass> {
-        self.failure.as_ref().map(|stored| stored.failure.class)
     }
 
     /// Returns the computing time of its current results in seconds.

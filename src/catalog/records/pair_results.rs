@@ -2,41 +2,42 @@
 
 use std::collections::BTreeMap;
 
-use serde_json::Value;
 use sqlx::sqlite::SqliteRow;
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::{FromRow as _, Row as _, SqliteConnection};
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::rows::Json;
 use crate::catalog::handle::Catalog;
-use crate::catalog::records::import;
+use crate::catalog::queue::counters::Cursor;
 use crate::catalog::records::model::{
-    AttemptRecord, FailedPair, MetricRecord, PairDetail, PairResults, ReviewerVerdict, StageRecord,
+    AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord,
     StoredFailure,
 };
-use crate::catalog::records::stage_results;
-use crate::catalog::records::verdicts;
+use crate::catalog::records::{stage_results, verdicts};
 use crate::domain::{
     ContentHash, Failure, FailureClass, PairName, RegisterOutcome, Stage, ThresholdMetric,
+    UnixMillis,
 };
 
-pub(crate) const PAGE: &str = "
+/// Selects pairs with their attributes, job, failure and true alignment.
+macro_rules! select_pairs {
+    ($condition:literal) => {
+        concat!(
+            "
 SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta,
-    j.stage, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at, t.body AS truth
+    p.mesh_hash, p.print_hash, j.stage, j.status, j.attempt, j.crashes, j.run_at, f.stage AS failed_stage, f.class,
+    f.message, f.at AS failed_at, t.body AS truth
 FROM pair AS p JOIN job AS j ON j.pair = p.id
     LEFT JOIN failure AS f ON f.pair = p.id AND j.status IN (2, 4)
     LEFT JOIN truth AS t ON t.pair = p.id
-WHERE p.name > ?1 ORDER BY p.name LIMIT ?2";
+WHERE ",
+            $condition
+        )
+    };
+}
 
-const ONE: &str = "
-SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta,
-    j.stage, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at, t.body AS truth,
-    p.mesh_hash, p.print_hash, j.attempt, j.crashes, j.run_at
-FROM pair AS p JOIN job AS j ON j.pair = p.id
-    LEFT JOIN failure AS f ON f.pair = p.id AND j.status IN (2, 4)
-    LEFT JOIN truth AS t ON t.pair = p.id
-WHERE p.name = ?1";
+pub(crate) const PAGE: &str = select_pairs!("p.name > ?1 ORDER BY p.name LIMIT ?2");
+const ONE: &str = select_pairs!("p.name = ?1");
 
 pub(crate) const FAILED: &str = "
 SELECT p.name, j.status, f.stage AS failed_stage, f.class, f.message, f.at AS failed_at
@@ -46,6 +47,9 @@ WHERE j.status = 4 ORDER BY p.name LIMIT ?1";
 pub(crate) const FAILED_BY_CLASS: &str = "
 SELECT f.class, count(*) FROM job AS j JOIN failure AS f ON f.pair = j.pair
 WHERE j.status = 4 GROUP BY f.class";
+
+const ATTEMPTS: &str =
+    "SELECT stage, class, message, ms, at FROM attempt WHERE pair = ?1 ORDER BY id";
 
 impl Catalog {
     /// Returns up to `limit` pairs after a name, in the order of names; empty at the end.
@@ -81,18 +85,14 @@ impl Catalog {
             return Ok(None);
         };
         let row = &found[0];
-        let pair: i64 = row.try_get("id")?;
-        let hash = |column: &str| -> Result<Option<ContentHash>> {
-            rows::hash_option(row.try_get::<Option<Vec<u8>>, _>(column)?.as_deref())
-        };
         Ok(Some(PairDetail {
             results,
-            mesh_hash: hash("mesh_hash")?,
-            print_hash: hash("print_hash")?,
+            mesh_hash: row.try_get("mesh_hash")?,
+            print_hash: row.try_get("print_hash")?,
             attempt: row.try_get("attempt")?,
             crashes: row.try_get("crashes")?,
             run_at: row.try_get("run_at")?,
-            attempts: attempts(&mut conn, pair).await?,
+            attempts: attempts(&mut conn, row.try_get("id")?).await?,
             verdict_log: verdicts::log(&mut conn, Some(name)).await?,
         }))
     }
@@ -103,22 +103,17 @@ impl Catalog {
     /// When the database returns an error.
     pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
         let mut conn = self.read_conn().await?;
-        let found = sqlx::query(FAILED)
-            .bind(limit as i64)
-            .fetch_all(&mut *conn)
-            .await?;
-        found
-            .iter()
-            .map(|row| {
-                Ok(FailedPair {
-                    name: rows::pair_name(&row.try_get::<String, _>("name")?)?,
-                    status: rows::status(row.try_get("status")?)?,
-                    failure: stored_failure(row)?.ok_or_else(|| {
-                        CatalogError::Corrupt("a failure without a stage".to_owned())
-                    })?,
-                })
+        let query = sqlx::query(FAILED).bind(limit as i64);
+        let found = query.fetch_all(&mut *conn).await?;
+        let failed = found.iter().map(|row| {
+            Ok(FailedPair {
+                name: row.try_get("name")?,
+                status: row.try_get("status")?,
+                failure: stored_failure(row)?
+                    .ok_or_else(|| CatalogError::Corrupt("a failure without a stage".to_owned()))?,
             })
-            .collect()
+        });
+        failed.collect()
     }
 
     /// Returns the number of quarantined pairs by class, without empty classes.
@@ -127,14 +122,8 @@ impl Catalog {
     /// When the database returns an error.
     pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
         let mut conn = self.read_conn().await?;
-        let found = sqlx::query(FAILED_BY_CLASS).fetch_all(&mut *conn).await?;
-        let mut counts = found
-            .iter()
-            .map(|row| {
-                let class = rows::name(&row.try_get::<String, _>(0)?)?;
-                Ok((class, row.try_get::<i64, _>(1)?.unsigned_abs()))
-            })
-            .collect::<Result<Vec<_>>>()?;
+        let query = sqlx::query_as(FAILED_BY_CLASS);
+        let mut counts: Vec<(FailureClass, u64)> = query.fetch_all(&mut *conn).await?;
         counts.sort_unstable();
         Ok(counts)
     }
@@ -142,54 +131,37 @@ impl Catalog {
 
 /// Adds results, metrics and verdicts to rows of pairs.
 async fn assemble(conn: &mut SqliteConnection, found: &[SqliteRow]) -> Result<Vec<PairResults>> {
-    let ids = found
-        .iter()
-        .map(|row| row.try_get("id"))
-        .collect::<Result<Vec<i64>, _>>()?;
+    let ids = found.iter().map(|row| row.try_get("id"));
+    let ids = ids.collect::<Result<Vec<i64>, _>>()?;
     let mut stages = stage_results::of_pairs(conn, &ids).await?;
     let hashes = stage_results::metric_hashes(conn, &ids).await?;
     let verdicts = verdicts::of_pairs(conn, &ids).await?;
-    found
-        .iter()
-        .zip(ids)
-        .map(|(row, id)| {
-            let cursor: i64 = row.try_get("stage")?;
-            let mut records = stages.remove(&id).unwrap_or_default();
-            records.retain(|record| (record.stage.index() as i64) < cursor);
-            let metrics = metrics(id, &records, &hashes, &verdicts)?;
-            pair_results(row, cursor, records, metrics)
+    let pairs = found.iter().zip(ids).map(|(row, id)| {
+        let cursor: Cursor = row.try_get("stage")?;
+        let mut records = stages.remove(&id).unwrap_or_default();
+        records.retain(|record| (record.stage.index() as Cursor) < cursor);
+        let truth: Option<Json<_>> = row.try_get("truth")?;
+        Ok(PairResults {
+            attributes: PairAttributes::from_row(row)?,
+            status: row.try_get("status")?,
+            next_stage: usize::try_from(cursor).ok().and_then(Stage::from_index),
+            failure: stored_failure(row)?,
+            metrics: metrics(id, &records, &hashes, &verdicts)?,
+            stages: records,
+            truth: truth.map(|Json(body)| body),
         })
-        .collect()
-}
-
-fn pair_results(
-    row: &SqliteRow,
-    cursor: i64,
-    stages: Vec<StageRecord>,
-    metrics: Vec<MetricRecord>,
-) -> Result<PairResults> {
-    let truth: Option<String> = row.try_get("truth")?;
-    Ok(PairResults {
-        attributes: import::attributes(row)?,
-        status: rows::status(row.try_get("status")?)?,
-        next_stage: rows::next_stage(cursor)?,
-        failure: stored_failure(row)?,
-        stages,
-        metrics,
-        truth: truth
-            .map(|body| serde_json::from_str::<Value>(&body))
-            .transpose()?,
-    })
+    });
+    pairs.collect()
 }
 
 fn stored_failure(row: &SqliteRow) -> Result<Option<StoredFailure>> {
-    let Some(stage) = row.try_get::<Option<i64>, _>("failed_stage")? else {
+    let Some(stage) = row.try_get("failed_stage")? else {
         return Ok(None);
     };
-    let class = rows::name(&row.try_get::<String, _>("class")?)?;
+    let message: String = row.try_get("message")?;
     Ok(Some(StoredFailure {
-        stage: rows::stage(stage)?,
-        failure: Failure::new(class, row.try_get::<String, _>("message")?),
+        stage,
+        failure: Failure::new(row.try_get("class")?, message),
         at: row.try_get("failed_at")?,
     }))
 }
@@ -199,7 +171,7 @@ fn metrics(
     pair: i64,
     stages: &[StageRecord],
     hashes: &BTreeMap<(i64, ThresholdMetric), ContentHash>,
-    verdicts: &BTreeMap<(i64, ThresholdMetric), Vec<verdicts::Counted>>,
+    verdicts: &BTreeMap<(i64, ThresholdMetric), Vec<verdicts::ResultVerdict>>,
 ) -> Result<Vec<MetricRecord>> {
     let Some(record) = stages.iter().find(|record| record.stage == Stage::Register) else {
         return Ok(Vec::new());
@@ -220,7 +192,10 @@ fn metrics(
         found.push(MetricRecord {
             outcome,
             result_hash,
-            verdicts: current.into_iter().map(reviewer_verdict).collect(),
+            verdicts: current
+                .iter()
+                .map(|counted| counted.verdict.clone())
+                .collect(),
             older_verdicts: older.len() as u64,
         });
     }
@@ -232,41 +207,26 @@ fn metrics(
     Ok(found)
 }
 
-fn reviewer_verdict(counted: &verdicts::Counted) -> ReviewerVerdict {
-    ReviewerVerdict {
-        reviewer: counted.reviewer.clone(),
-        verdict: counted.verdict,
-        reason: counted.reason,
-        review_order: counted.review_order,
-    }
-}
-
 async fn attempts(conn: &mut SqliteConnection, pair: i64) -> Result<Vec<AttemptRecord>> {
-    let found = sqlx::query(
-        "SELECT stage, class, message, ms, at FROM attempt WHERE pair = ?1 ORDER BY id",
-    )
-    .bind(pair)
-    .fetch_all(conn)
-    .await?;
-    found
-        .iter()
-        .map(|row| {
-            let class: Option<String> = row.try_get("class")?;
-            let message: Option<String> = row.try_get("message")?;
-            let failure = class
-                .zip(message)
-                .map(|(class, message)| {
-                    Ok::<_, CatalogError>(Failure::new(rows::name(&class)?, message))
-                })
-                .transpose()?;
-            Ok(AttemptRecord {
-                stage: rows::stage(row.try_get("stage")?)?,
-                failure,
-                ms: row.try_get::<Option<i64>, _>("ms")?.map(i64::unsigned_abs),
-                at: row.try_get("at")?,
-            })
-        })
-        .collect()
+    type Attempt = (
+        Stage,
+        Option<FailureClass>,
+        Option<String>,
+        Option<u64>,
+        UnixMillis,
+    );
+    let query = sqlx::query_as(ATTEMPTS).bind(pair);
+    let found: Vec<Attempt> = query.fetch_all(conn).await?;
+    let records = found.into_iter().map(|(stage, class, message, ms, at)| {
+        let failure = class.zip(message);
+        AttemptRecord {
+            stage,
+            failure: failure.map(|(class, message)| Failure::new(class, message)),
+            ms,
+            at,
+        }
+    });
+    Ok(records.collect())
 }
 
 /// Reads pairs in the order of names, one page at a time, so that memory does not grow with their number.

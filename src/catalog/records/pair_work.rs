@@ -2,30 +2,31 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::Row as _;
 use sqlx::sqlite::SqliteRow;
+use sqlx::{FromRow as _, Row as _};
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::rows::json_array;
 use crate::catalog::db::script::Script;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::checkpoint;
 use crate::catalog::queue::lease::{InputVersion, InputVersions, Lease};
 use crate::catalog::queue::selection::PairSelection;
-use crate::catalog::records::import;
 use crate::catalog::records::model::{PairAttributes, StageRecord};
 use crate::catalog::records::stage_results;
-use crate::domain::{ContentHash, PairId, Stage};
+use crate::domain::{PairId, Stage};
 
 /// A leased pair with its attributes and results.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, sqlx::FromRow)]
 pub struct PairWork {
     /// Attributes as imported.
+    #[sqlx(flatten)]
     pub attributes: PairAttributes,
     /// Manifest attributes that results depend on; stored with each result.
+    #[sqlx(rename = "attributes")]
     pub attributes_json: String,
     /// Results of all completed stages, in order.
+    #[sqlx(skip)]
     pub results: Vec<StageRecord>,
 }
 
@@ -64,25 +65,26 @@ impl Catalog {
     /// When the database returns an error or holds invalid values.
     pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
         let mut conn = self.read_conn().await?;
-        let wanted = rows::array(leases.iter().map(|lease| lease.pair.0));
-        let leased = sqlx::query(LEASED).bind(wanted.to_string());
-        let leased = leased.fetch_all(&mut *conn).await?;
+        let wanted = json_array(leases.iter().map(|lease| lease.pair.0));
+        let leased = sqlx::query(LEASED)
+            .bind(wanted)
+            .fetch_all(&mut *conn)
+            .await?;
         let begun = leases.iter().filter(|lease| lease.cursor > Stage::Fit);
         let begun: Vec<_> = begun.map(|lease| lease.pair.0).collect();
-        let mut found = BTreeMap::new();
+        let mut results = BTreeMap::new();
         if !begun.is_empty() {
-            found = stage_results::of_pairs(&mut conn, &begun).await?;
+            results = stage_results::of_pairs(&mut conn, &begun).await?;
         }
         let mut works = BTreeMap::new();
         for row in &leased {
-            let pair = row.try_get("id")?;
-            works.insert(pair, work_of(row, found.remove(&pair).unwrap_or_default())?);
+            works.insert(row.try_get::<PairId, _>("id")?, PairWork::from_row(row)?);
         }
-        let each = leases.iter().map(|lease| {
-            let mut work = works
-                .remove(&lease.pair.0)
-                .ok_or_else(|| gone(lease.pair))?;
-            work.results.retain(|record| record.stage < lease.cursor);
+        let each = leases.iter().map(|Lease { pair, cursor, .. }| {
+            let gone = || CatalogError::Corrupt(format!("a job has no pair {}", pair.0));
+            let mut work = works.remove(pair).ok_or_else(gone)?;
+            work.results = results.remove(&pair.0).unwrap_or_default();
+            work.results.retain(|record| record.stage < *cursor);
             Ok(work)
         });
         each.collect()
@@ -129,32 +131,18 @@ impl Catalog {
     }
 }
 
-fn gone(pair: PairId) -> CatalogError {
-    CatalogError::Corrupt(format!("a job has no pair {}", pair.0))
-}
-
-fn work_of(row: &SqliteRow, results: Vec<StageRecord>) -> Result<PairWork> {
-    Ok(PairWork {
-        attributes: import::attributes(row)?,
-        attributes_json: row.try_get("attributes")?,
-        results,
-    })
-}
-
+/// Reads the input files from a row with the columns of [`INPUTS`].
 pub(crate) fn known_inputs(row: &SqliteRow) -> Result<KnownInputs> {
-    let seen = |hash: &str, stat: &str| -> Result<Option<InputVersion>> {
-        let hash: Option<Vec<u8>> = row.try_get(hash)?;
-        let hash: Option<ContentHash> = rows::hash_option(hash.as_deref())?;
-        let stat: Option<String> = row.try_get(stat)?;
-        Ok(hash
-            .zip(stat)
-            .map(|(hash, stat)| InputVersion { hash, stat }))
+    let version = |hash: &str, stat: &str| -> Result<Option<InputVersion>> {
+        let (hash, stat): (Option<_>, Option<_>) = (row.try_get(hash)?, row.try_get(stat)?);
+        let both = hash.zip(stat);
+        Ok(both.map(|(hash, stat)| InputVersion { hash, stat }))
     };
     Ok(KnownInputs {
-        pair: PairId(row.try_get("id")?),
+        pair: row.try_get("id")?,
         mesh_path: row.try_get("mesh_path")?,
-        mesh: seen("mesh_hash", "mesh_stat")?,
+        mesh: version("mesh_hash", "mesh_stat")?,
         print_path: row.try_get("print_path")?,
-        print: seen("print_hash", "print_stat")?,
+        print: version("print_hash", "print_stat")?,
     })
 }

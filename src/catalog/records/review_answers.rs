@@ -2,11 +2,9 @@
 
 use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::{FromRow, Row as _, SqliteConnection};
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
+use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::handle::Catalog;
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::records::verdicts::{self, NewVerdict};
@@ -31,13 +29,14 @@ pub enum Shown {
 }
 
 /// An answer that was not undone.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, FromRow)]
 pub struct Answer {
-    /// Number by which it is undone.
+    /// Id by which it is undone.
     pub event: String,
     /// The pair.
     pub pair: PairName,
-    /// Hash of the shown item, or of the result if only that is known.
+    /// The item that it belongs to.
+    #[sqlx(flatten)]
     pub on: AnsweredOn,
     /// The judgement.
     pub verdict: Verdict,
@@ -54,12 +53,24 @@ pub struct Answer {
 pub enum AnsweredOn {
     /// A result, by its hash.
     Result(ContentHash),
-    /// What tests a reviewer, by the hash of what was shown.
+    /// An attention check, by the hash of what was shown.
     Check(ContentHash),
 }
 
-/// An answer to something that tests the reviewer, taken back or not.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+impl FromRow<'_, SqliteRow> for AnsweredOn {
+    fn from_row(row: &SqliteRow) -> sqlx::Result<Self> {
+        let hash = row.try_get("hash")?;
+        let is_check = row.try_get("is_check")?;
+        Ok(if is_check {
+            Self::Check(hash)
+        } else {
+            Self::Result(hash)
+        })
+    }
+}
+
+/// An answer to an attention check, undone or not.
+#[derive(Debug, Clone, PartialEq, Serialize, FromRow)]
 pub struct AttentionCheckAnswer {
     /// The pair.
     pub pair: PairName,
@@ -67,36 +78,37 @@ pub struct AttentionCheckAnswer {
     pub metric: ThresholdMetric,
     /// That result.
     pub result_hash: ContentHash,
-    /// What was shown.
+    /// The kind of check.
     pub check: AttentionCheck,
     /// The judgement.
     pub verdict: Verdict,
-    /// Who read it.
+    /// Name of the reviewer.
     pub reviewer: String,
     /// Why, for a fail.
     pub reason: Option<Reason>,
     /// Note of the reviewer.
     pub note: Option<String>,
-    /// How it came about.
+    /// Context in which it was given.
     #[serde(flatten)]
+    #[sqlx(flatten)]
     pub look: ReviewContext,
     /// When.
     pub at: UnixMillis,
-    /// When it was taken back, if it was.
+    /// When it was undone, if it was.
     pub undone_at: Option<UnixMillis>,
 }
 
-const INSERT_CONTROL: &str = "
+const INSERT_CHECK: &str = "
 INSERT INTO attention_check_answer (event, pair, metric, result_hash, kind, attention_check, seen, shown_ms, angle_read_deg,
     verdict, reviewer, reason, note, at)
 VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14)";
 
-/// Whether this number of the client is taken.
+/// Whether an answer with this event is stored.
 const KNOWN: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict WHERE event = ?1) OR EXISTS (SELECT 1 FROM attention_check_answer WHERE event = ?1)";
 
 const ANSWERS: &str = "
-SELECT coalesce(v.event, 'act-' || v.act) AS event, p.name, v.result_hash AS hash, 0 AS is_check,
+SELECT coalesce(v.event, 'act-' || v.act) AS event, p.name AS pair, v.result_hash AS hash, 0 AS is_check,
     v.verdict, v.reason, v.note, v.at, v.id
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair
 WHERE v.reviewer = ?1 AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
@@ -106,13 +118,13 @@ FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair
 WHERE c.reviewer = ?1 AND NOT EXISTS (SELECT 1 FROM attention_check_undo AS u WHERE u.answer = c.id)
 ORDER BY v.at, is_check, v.id";
 
-const CONTROLS: &str = "
-SELECT c.event, p.name, c.metric, c.result_hash, c.attention_check, c.seen, c.shown_ms, c.angle_read_deg, NULL AS review_order,
-    c.verdict, c.reviewer, c.reason, c.note, c.at, u.at AS undone_at
+const CHECK_ANSWERS: &str = r#"
+SELECT c.event, p.name AS pair, c.metric, c.result_hash, c.attention_check AS "check", c.seen, c.shown_ms, c.angle_read_deg,
+    NULL AS review_order, c.verdict, c.reviewer, c.reason, c.note, c.at, u.at AS undone_at
 FROM attention_check_answer AS c JOIN pair AS p ON p.id = c.pair LEFT JOIN attention_check_undo AS u ON u.answer = c.id
-ORDER BY c.id";
+ORDER BY c.id"#;
 
-/// Takes back the answer of a number, by its reviewer only; once.
+/// Undo what a reviewer did with an event, once.
 const UNDO: [&str; 3] = [
     "INSERT INTO verdict_undo (act, at) SELECT DISTINCT act, ?3 FROM verdict
         WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
@@ -122,24 +134,23 @@ const UNDO: [&str; 3] = [
         WHERE event = ?1 AND reviewer = ?2 ON CONFLICT DO NOTHING",
 ];
 
-/// Whether there is something of this number and reviewer to take back, taken back already or not.
-const IS_THERE: &str = "
+/// Whether a reviewer did anything with an event, undone or not.
+const EXISTS: &str = "
 SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 AND reviewer = ?2)
     OR EXISTS (SELECT 1 FROM attention_check_answer WHERE event = ?1 AND reviewer = ?2)
     OR EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1 AND reviewer = ?2)";
 
 impl Catalog {
-    /// Appends an answer to what was shown, which may be no current result any more. It is on the disk when this
-    /// returns. An answer whose `look.event` is stored already is left alone, so that it may be sent again; says
-    /// whether it is new.
+    /// Appends an answer to what was shown, durable on return; the shown result need not be current any more. Returns
+    /// whether the answer is new: one whose `look.event` is stored already is skipped, so that it may be sent again.
     ///
     /// # Errors
     /// When there is no such pair, nothing was shown, or the database returns an error.
     pub async fn answer(&self, given: NewVerdict, shown: Shown, now: UnixMillis) -> Result<bool> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let event = given.look.event.as_deref();
-                if is_known(conn, event).await? {
+                let known = sqlx::query_scalar(KNOWN).bind(&given.look.event);
+                if known.fetch_one(&mut *conn).await? {
                     return Ok(false);
                 }
                 let pair = pair_id(conn, &given.pair).await?;
@@ -172,22 +183,22 @@ impl Catalog {
         .await
     }
 
-    /// Takes back what a reviewer did under this number: an answer or an alignment by hand. A second time changes
-    /// nothing. The log keeps both.
+    /// Undoes what a reviewer did with an event: a verdict, an answer to an attention check or a manual alignment. A
+    /// second call changes nothing. The log keeps both.
     ///
     /// # Errors
-    /// When the reviewer did nothing under this number.
-    pub async fn take_back(&self, event: &str, reviewer: &str, now: UnixMillis) -> Result<()> {
+    /// When the reviewer did nothing with this event.
+    pub async fn undo_event(&self, event: &str, reviewer: &str, now: UnixMillis) -> Result<()> {
         let (event, reviewer) = (event.to_owned(), reviewer.to_owned());
         self.in_transaction(move |conn| {
             Box::pin(async move {
-                let is_there: bool = sqlx::query_scalar(IS_THERE)
+                let exists: bool = sqlx::query_scalar(EXISTS)
                     .bind(&event)
                     .bind(&reviewer)
                     .fetch_one(&mut *conn)
                     .await?;
-                if !is_there {
-                    return Err(CatalogError::NothingToUndo(reviewer));
+                if !exists {
+                    return Err(CatalogError::NothingToUndo(Some(reviewer)));
                 }
                 for undo in UNDO {
                     sqlx::query(undo)
@@ -203,48 +214,38 @@ impl Catalog {
         .await
     }
 
-    /// A reviewer's answers that were not taken back, oldest first; one on several results is there once a result.
+    /// Returns a reviewer's answers that were not undone, oldest first; one on several results appears once per result.
     ///
     /// # Errors
     /// When the database returns an error.
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
-        let found = sqlx::query(ANSWERS)
-            .bind(reviewer)
-            .fetch_all(&mut *conn)
-            .await?;
-        found.iter().map(answer).collect()
+        let query = sqlx::query_as(ANSWERS).bind(reviewer);
+        Ok(query.fetch_all(&mut *conn).await?)
     }
 
-    /// Every answer to planted faults and repeats, oldest first. No verdict is among them.
+    /// Returns every answer to an attention check, oldest first. Verdicts are not among them.
     ///
     /// # Errors
     /// When the database returns an error.
     pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.read_conn().await?;
-        let found = sqlx::query(CONTROLS).fetch_all(&mut *conn).await?;
-        found.iter().map(check_answer).collect()
+        let query = sqlx::query_as(CHECK_ANSWERS);
+        Ok(query.fetch_all(&mut *conn).await?)
     }
 
-    /// What the names of pictures are made with: the same at every start.
+    /// Returns the key for the names of pictures, which stays the same after a restart.
     ///
     /// # Errors
     /// When the database returns an error.
     pub async fn review_key(&self) -> Result<ContentHash> {
         let mut conn = self.read_conn().await?;
-        let key: Vec<u8> = sqlx::query_scalar("SELECT key FROM review_key")
-            .fetch_one(&mut *conn)
-            .await?;
-        rows::hash(&key)
+        let query = sqlx::query_scalar("SELECT key FROM review_key");
+        Ok(query.fetch_one(&mut *conn).await?)
     }
 }
 
-async fn is_known(conn: &mut SqliteConnection, event: Option<&str>) -> Result<bool> {
-    let known = sqlx::query_scalar(KNOWN).bind(event).fetch_one(conn).await;
-    Ok(known?)
-}
-
-/// The row of a pair.
+/// Returns the row id of a pair.
 pub(crate) async fn pair_id(conn: &mut SqliteConnection, name: &PairName) -> Result<i64> {
     let id = sqlx::query_scalar("SELECT id FROM pair WHERE name = ?1")
         .bind(name.as_str())
@@ -261,7 +262,7 @@ async fn insert_check(
     now: UnixMillis,
 ) -> Result<()> {
     let look = &given.look;
-    sqlx::query(INSERT_CONTROL)
+    sqlx::query(INSERT_CHECK)
         .bind(&look.event)
         .bind(pair)
         .bind(metric.name())
@@ -279,42 +280,4 @@ async fn insert_check(
         .execute(conn)
         .await?;
     Ok(())
-}
-
-fn answer(row: &SqliteRow) -> Result<Answer> {
-    let hash = rows::hash(&row.try_get::<Vec<u8>, _>("hash")?)?;
-    Ok(Answer {
-        event: row.try_get("event")?,
-        pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
-        on: if row.try_get("is_check")? {
-            AnsweredOn::Check(hash)
-        } else {
-            AnsweredOn::Result(hash)
-        },
-        verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-        reason: reason(row)?,
-        note: row.try_get("note")?,
-        at: row.try_get("at")?,
-    })
-}
-
-fn check_answer(row: &SqliteRow) -> Result<AttentionCheckAnswer> {
-    Ok(AttentionCheckAnswer {
-        pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
-        metric: rows::name(&row.try_get::<String, _>("metric")?)?,
-        result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
-        check: serde_json::from_str(&row.try_get::<String, _>("attention_check")?)?,
-        verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-        reviewer: row.try_get("reviewer")?,
-        reason: reason(row)?,
-        note: row.try_get("note")?,
-        look: ReviewContext::read(row)?,
-        at: row.try_get("at")?,
-        undone_at: row.try_get("undone_at")?,
-    })
-}
-
-fn reason(row: &SqliteRow) -> Result<Option<Reason>> {
-    let reason: Option<String> = row.try_get("reason")?;
-    reason.map(|reason| rows::name(&reason)).transpose()
 }

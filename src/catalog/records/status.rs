@@ -2,10 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::SqliteConnection;
 
 use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
 use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{JobCounts, by_status, counters};
 use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
@@ -23,7 +22,7 @@ WHERE v.id = (
         AND NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = n.act))
 GROUP BY v.verdict";
 
-/// Finished pairs with a metric that is unsure of itself.
+/// Completed pairs with a metric of low confidence.
 pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
 
@@ -42,10 +41,9 @@ impl Catalog {
             jobs: jobs_by_status(&counted),
             stages: by_stage(&counted),
             stale: count_stale(&mut conn, &current).await?,
-            low_confidence: sqlx::query_scalar::<_, i64>(LOW_CONFIDENCE)
+            low_confidence: sqlx::query_scalar(LOW_CONFIDENCE)
                 .fetch_one(&mut *conn)
-                .await?
-                .unsigned_abs(),
+                .await?,
             verdicts: verdicts(&mut conn).await?,
         })
     }
@@ -53,33 +51,27 @@ impl Catalog {
 
 /// Adds up numbers of jobs by status; every status is there.
 fn jobs_by_status(counts: &JobCounts) -> BTreeMap<JobStatus, u64> {
-    let mut jobs: BTreeMap<_, _> = JobStatus::ALL
-        .into_iter()
-        .map(|status| (status, 0))
-        .collect();
+    let mut jobs: BTreeMap<_, _> = JobStatus::ALL.map(|status| (status, 0)).into();
     for ((_, status), n) in counts {
         *jobs.entry(*status).or_default() += n;
     }
     jobs
 }
 
-/// Pairs by stage from the counters. A pair that failed at a stage is still pending at the later ones.
+/// Returns the numbers of pairs by stage. A pair that failed at a stage is still pending at the later ones.
 fn by_stage(counted: &JobCounts) -> BTreeMap<Stage, StageCounts> {
     let mut stages: BTreeMap<_, _> = Stage::ALL
-        .into_iter()
         .map(|stage| (stage, StageCounts::default()))
-        .collect();
+        .into();
     for ((cursor, status), n) in counted {
         for (stage, count) in &mut stages {
             let index = stage.index() as i64;
-            match status {
-                _ if *cursor > index => count.done += n,
-                JobStatus::Quarantined if *cursor == index => count.failed += n,
-                JobStatus::Ready
-                | JobStatus::Leased
-                | JobStatus::Backoff
-                | JobStatus::Done
-                | JobStatus::Quarantined => count.pending += n,
+            if *cursor > index {
+                count.done += n;
+            } else if *cursor == index && *status == JobStatus::Quarantined {
+                count.failed += n;
+            } else {
+                count.pending += n;
             }
         }
     }
@@ -87,15 +79,10 @@ fn by_stage(counted: &JobCounts) -> BTreeMap<Stage, StageCounts> {
 }
 
 async fn verdicts(conn: &mut SqliteConnection) -> Result<BTreeMap<Verdict, u64>> {
-    let mut found: BTreeMap<_, _> = Verdict::ALL
-        .into_iter()
-        .map(|verdict| (verdict, 0))
-        .collect();
-    for row in sqlx::query(VERDICTS).fetch_all(conn).await? {
-        let verdict: Verdict = rows::name(&row.try_get::<String, _>(0)?)?;
-        found.insert(verdict, row.try_get::<i64, _>(1)?.unsigned_abs());
-    }
-    Ok(found)
+    let mut counts: BTreeMap<_, _> = Verdict::ALL.map(|verdict| (verdict, 0)).into();
+    let found: Vec<(Verdict, u64)> = sqlx::query_as(VERDICTS).fetch_all(conn).await?;
+    counts.extend(found);
+    Ok(counts)
 }
 
 #[cfg(test)]

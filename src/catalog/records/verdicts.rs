@@ -1,15 +1,12 @@
-//! Verdicts: an append-only log; the newest of each reviewer on a result counts.
+//! Verdicts: an append-only log, of which the newest verdict of each reviewer on a result counts.
 
 use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
-use sqlx::sqlite::SqliteRow;
-use sqlx::{Row as _, SqliteConnection};
+use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::CatalogError;
-use crate::catalog::db::error::Result;
-use crate::catalog::db::rows;
+use crate::catalog::db::error::{CatalogError, Result};
+use crate::catalog::db::rows::json_array;
 use crate::catalog::handle::Catalog;
 use crate::catalog::records::review_context::ReviewContext;
 use crate::domain::{
@@ -21,25 +18,25 @@ use crate::domain::{
 pub struct NewVerdict {
     /// The pair.
     pub pair: PairName,
-    /// One metric's result, or those of all metrics.
+    /// The metric that is judged; `None` for all metrics.
     pub metric: Option<ThresholdMetric>,
     /// The judgement.
     pub verdict: Verdict,
-    /// Who read it.
+    /// Name of the reviewer.
     pub reviewer: String,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// In the reviewer's words.
+    /// Note of the reviewer.
     pub note: Option<String>,
     /// Context in which it was given, if known.
     #[serde(flatten)]
     pub look: ReviewContext,
-    /// When it was given, where that was before it is stored.
+    /// When it was given, if that was before it is stored.
     pub at: Option<UnixMillis>,
 }
 
 /// One line of the verdict log.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, sqlx::FromRow)]
 pub struct VerdictEvent {
     /// Number in the log.
     pub id: i64,
@@ -53,34 +50,48 @@ pub struct VerdictEvent {
     pub result_hash: ContentHash,
     /// The judgement.
     pub verdict: Verdict,
-    /// Who read it.
+    /// Name of the reviewer.
     pub reviewer: String,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// In the reviewer's words.
+    /// Note of the reviewer.
     pub note: Option<String>,
     /// Context in which it was given, if known.
     #[serde(flatten)]
+    #[sqlx(flatten)]
     pub look: ReviewContext,
     /// When.
     pub at: UnixMillis,
-    /// When it was taken back, if it was.
+    /// When it was undone, if it was.
     pub undone_at: Option<UnixMillis>,
-    /// Whether the pair's current result is still the one that was judged.
+    /// Whether the judged result is still the current one.
     pub current: bool,
 }
 
-/// A verdict that counts: the newest of its reviewer on its result, not taken back.
-#[derive(Debug)]
-pub(crate) struct Counted {
-    pub(crate) result_hash: ContentHash,
-    pub(crate) verdict: Verdict,
-    pub(crate) reviewer: String,
-    pub(crate) reason: Option<Reason>,
-    pub(crate) review_order: Option<ReviewOrder>,
+/// A reviewer's newest verdict on a result.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, sqlx::FromRow)]
+pub struct ReviewerVerdict {
+    /// Name of the reviewer.
+    pub reviewer: String,
+    /// The judgement.
+    pub verdict: Verdict,
+    /// Why, for a fail.
+    pub reason: Option<Reason>,
+    /// The order in which results came to the reviewer; [`ReviewOrder::Adjudicate`] marks the decision on a conflict.
+    pub review_order: Option<ReviewOrder>,
 }
 
-/// Results that a verdict on a pair judges: those of a job that is done.
+/// A verdict that was not undone, with the result that it judges.
+#[derive(Debug, sqlx::FromRow)]
+pub(crate) struct ResultVerdict {
+    pair: i64,
+    metric: ThresholdMetric,
+    pub(crate) result_hash: ContentHash,
+    #[sqlx(flatten)]
+    pub(crate) verdict: ReviewerVerdict,
+}
+
+/// Current results of a pair that is done; the metric is NULL for another pair.
 const JUDGED: &str = "
 SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
     JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
@@ -95,7 +106,7 @@ RETURNING act";
 
 /// Lines of the log of one act, or of one pair, or all.
 const LOG: &str = "
-SELECT v.id, v.act, p.name, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
+SELECT v.id, v.act, p.name AS pair, v.metric, v.result_hash, v.verdict, v.reviewer, v.reason, v.note, v.at,
     v.event, v.seen, v.shown_ms, v.angle_read_deg, v.review_order, u.at AS undone_at, coalesce(m.result_hash = v.result_hash, 0) AS current
 FROM verdict AS v JOIN pair AS p ON p.id = v.pair LEFT JOIN verdict_undo AS u ON u.act = v.act
     LEFT JOIN metric_result AS m ON m.pair = v.pair AND m.metric = v.metric
@@ -108,11 +119,11 @@ WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 ORDER BY v.pair, v.metric, v.reviewer, v.id";
 
 impl Catalog {
-    /// Appends verdicts on the current results, all or none. Those that are there already by the client's number are
-    /// left alone; says how many were not.
+    /// Appends verdicts on the current results, all or none; returns how many are new. A verdict whose `event` is stored
+    /// already is skipped.
     ///
     /// # Errors
-    /// When a pair is not there or has no result; then nothing is stored.
+    /// When a pair does not exist or has no result; then nothing is stored.
     pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -126,8 +137,8 @@ impl Catalog {
         .await
     }
 
-    /// Takes back the newest act that is not taken back yet, of one reviewer or of anybody; says which.
-    /// The log keeps both.
+    /// Undoes the newest act that is not undone yet, of one reviewer or of anyone; returns its verdicts. The log keeps
+    /// the act and the undo.
     ///
     /// # Errors
     /// When there is none.
@@ -147,26 +158,21 @@ impl Catalog {
                 .fetch_one(&mut *conn)
                 .await?;
                 let Some(act) = act else {
-                    let who = reviewer.unwrap_or_else(|| "anybody".to_owned());
-                    return Err(CatalogError::NothingToUndo(who));
+                    return Err(CatalogError::NothingToUndo(reviewer));
                 };
                 sqlx::query("INSERT INTO verdict_undo (act, at) VALUES (?1, ?2)")
                     .bind(act)
                     .bind(now)
                     .execute(&mut *conn)
                     .await?;
-                let found = sqlx::query(LOG)
-                    .bind(act)
-                    .bind(None::<&str>)
-                    .fetch_all(conn)
-                    .await?;
-                found.iter().map(event).collect()
+                let query = sqlx::query_as(LOG).bind(act).bind(None::<&str>);
+                Ok(query.fetch_all(conn).await?)
             })
         })
         .await
     }
 
-    /// The log, oldest first, of one pair or of all.
+    /// Returns the log of one pair or all, oldest first.
     ///
     /// # Errors
     /// When the database returns an error.
@@ -176,9 +182,9 @@ impl Catalog {
     }
 }
 
-/// Says whether anything of it is new.
+/// Appends a verdict; returns `false` when all its rows were stored before.
 async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) -> Result<bool> {
-    let judged = sqlx::query(JUDGED)
+    let judged: Vec<(i64, Option<ThresholdMetric>, Option<ContentHash>)> = sqlx::query_as(JUDGED)
         .bind(new.pair.as_str())
         .fetch_all(&mut *conn)
         .await?;
@@ -187,18 +193,15 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
     }
     let mut act: Option<i64> = None;
     let mut found = false;
-    for row in &judged {
-        let Some(metric) = row.try_get::<Option<String>, _>("metric")? else {
+    for (pair, metric, hash) in judged {
+        let Some((metric, hash)) = metric.zip(hash) else {
             return Err(CatalogError::NoResult(new.pair.clone()));
         };
-        let metric = rows::name(&metric)?;
-        if new.metric.is_some_and(|wanted| wanted != metric) {
-            continue;
+        if new.metric.is_none_or(|wanted| wanted == metric) {
+            found = true;
+            let judged = (pair, metric, hash);
+            act = insert(conn, new, judged, act, now).await?.or(act);
         }
-        found = true;
-        let hash = rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?;
-        let judged = (row.try_get("pair")?, metric, hash);
-        act = insert(conn, new, judged, act, now).await?.or(act);
     }
     match new.metric {
         Some(metric) if !found => Err(CatalogError::NoMetricResult(new.pair.clone(), metric)),
@@ -206,8 +209,8 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
     }
 }
 
-/// Appends one row on a result of a pair; its act is the number of the act's first row, which is returned. A row with the
-/// client's number of one that is there already is left out.
+/// Appends one row on a result of a pair; returns its act, which is the id of the act's first row. Returns `None` when a
+/// row with the same event and metric exists.
 pub(crate) async fn insert(
     conn: &mut SqliteConnection,
     new: &NewVerdict,
@@ -236,62 +239,30 @@ pub(crate) async fn insert(
     Ok(act)
 }
 
+/// Reads the log of one pair or all.
 pub(crate) async fn log(
     conn: &mut SqliteConnection,
     pair: Option<&PairName>,
 ) -> Result<Vec<VerdictEvent>> {
-    let found = sqlx::query(LOG)
-        .bind(None::<i64>)
-        .bind(pair.map(PairName::as_str))
-        .fetch_all(conn)
-        .await?;
-    found.iter().map(event).collect()
+    let query = sqlx::query_as(LOG).bind(None::<i64>);
+    let query = query.bind(pair.map(PairName::as_str));
+    Ok(query.fetch_all(conn).await?)
 }
 
-fn event(row: &SqliteRow) -> Result<VerdictEvent> {
-    let reason: Option<String> = row.try_get("reason")?;
-    Ok(VerdictEvent {
-        id: row.try_get("id")?,
-        act: row.try_get("act")?,
-        pair: rows::pair_name(&row.try_get::<String, _>("name")?)?,
-        metric: rows::name(&row.try_get::<String, _>("metric")?)?,
-        result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
-        verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-        reviewer: row.try_get("reviewer")?,
-        reason: reason.map(|reason| rows::name(&reason)).transpose()?,
-        note: row.try_get("note")?,
-        look: ReviewContext::read(row)?,
-        at: row.try_get("at")?,
-        undone_at: row.try_get("undone_at")?,
-        current: row.try_get("current")?,
-    })
-}
-
-/// The verdicts that count, of some pairs, in the order of reviewers.
+/// Returns the verdicts on results of some pairs that were not undone, in the order of reviewers: the newest of each
+/// reviewer on each result.
 pub(crate) async fn of_pairs(
     conn: &mut SqliteConnection,
     pairs: &[i64],
-) -> Result<BTreeMap<(i64, ThresholdMetric), Vec<Counted>>> {
-    let found = sqlx::query(COUNTED)
-        .bind(Value::from(pairs).to_string())
-        .fetch_all(conn)
-        .await?;
-    let mut counted: BTreeMap<_, Vec<Counted>> = BTreeMap::new();
-    for row in &found {
-        let metric = rows::name(&row.try_get::<String, _>("metric")?)?;
-        let reason: Option<String> = row.try_get("reason")?;
-        let order: Option<String> = row.try_get("review_order")?;
-        let newest = Counted {
-            result_hash: rows::hash(&row.try_get::<Vec<u8>, _>("result_hash")?)?,
-            verdict: rows::name(&row.try_get::<String, _>("verdict")?)?,
-            reviewer: row.try_get("reviewer")?,
-            reason: reason.map(|reason| rows::name(&reason)).transpose()?,
-            review_order: order.map(|order| rows::name(&order)).transpose()?,
-        };
-        let of_metric = counted.entry((row.try_get("pair")?, metric)).or_default();
-        // Rows come oldest first, so a later one of the same reviewer on the same result takes its place.
+) -> Result<BTreeMap<(i64, ThresholdMetric), Vec<ResultVerdict>>> {
+    let pairs = json_array(pairs.iter().copied());
+    let found: Vec<ResultVerdict> = sqlx::query_as(COUNTED).bind(pairs).fetch_all(conn).await?;
+    let mut counted: BTreeMap<_, Vec<ResultVerdict>> = BTreeMap::new();
+    for newest in found {
+        let of_metric = counted.entry((newest.pair, newest.metric)).or_default();
+        // Rows come oldest first, so that a later one of the same reviewer on the same result replaces it.
         of_metric.retain(|old| {
-            (&old.reviewer, old.result_hash) != (&newest.reviewer, newest.result_hash)
+            old.verdict.reviewer != newest.verdict.reviewer || old.result_hash != newest.result_hash
         });
         of_metric.push(newest);
     }

@@ -125,10 +125,10 @@ async fn answers_are_taken_back_by_number_and_by_their_reviewer_only() {
         answers.into_iter().map(|a| a.event).collect()
     };
     assert_eq!(left().await, ["e1", "e1", "c1", "e2", "e2"]);
-    let other = world.catalog.take_back("e2", "bo", 8).await;
+    let other = world.catalog.undo_event("e2", "bo", 8).await;
     assert!(matches!(other, Err(CatalogError::NothingToUndo(_))));
     for event in ["e2", "e2", "c1"] {
-        let taken = world.catalog.take_back(event, "ana", 8).await;
+        let taken = world.catalog.undo_event(event, "ana", 8).await;
         taken.expect("taken back");
     }
     assert_eq!(left().await, ["e1", "e1"]);
@@ -167,7 +167,7 @@ async fn a_verdict_from_the_command_line_is_among_the_answers() {
     assert_eq!(answers.len(), ThresholdMetric::ALL.len());
     assert_eq!((answers[0].event.as_str(), answers[0].at), ("act-1", 3));
     assert!(matches!(answers[0].on, AnsweredOn::Result(_)));
-    let taken = world.catalog.take_back("act-1", "ana", 10).await;
+    let taken = world.catalog.undo_event("act-1", "ana", 10).await;
     taken.expect("taken back");
     assert!(
         world
@@ -253,7 +253,7 @@ async fn an_alignment_by_hand_is_stored_once_beside_the_result() {
     assert!(!stored[1].holds);
     world
         .catalog
-        .take_back("a1", "ana", 7)
+        .undo_event("a1", "ana", 7)
         .await
         .expect("taken back");
     let stored = world.catalog.manual_alignments().await.expect("a read");
@@ -278,7 +278,7 @@ async fn the_database_itself_refuses_to_change_answers_and_alignments() {
     for event in ["c1", "a1"] {
         world
             .catalog
-            .take_back(event, "ana", 6)
+            .undo_event(event, "ana", 6)
             .await
             .expect("taken back");
     }

@@ -27,7 +27,7 @@ async fn a_changed_register_setting_re_runs_register_only() {
     let why = world.catalog.why(&name("p0"), &changed).await;
     let why = why.expect("a read").expect("a reason");
     assert_eq!(why.from, Stage::Register);
-    assert_eq!(why.why.to_string(), "register.revision: 1 -> 2");
+    assert_eq!(why.to_string(), "register.revision: 1 -> 2");
     let status = world.catalog.status(&changed).await.expect("a read");
     assert_eq!(status.stale, 1);
     assert_eq!(requeue_stale(&world, &changed).await, 1);
