@@ -25,7 +25,7 @@ pub enum Kind {
     ResultMissing,
     /// A stored result differs from its hash.
     ResultChanged,
-    /// A pair is done, but its metrics differ from those of its result.
+    /// The metrics of a completed pair differ from its result.
     Metrics,
     /// A file of a result is missing.
     FileMissing,
@@ -36,52 +36,21 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// All kinds, in the order of the summary.
-    pub const ALL: [Self; 12] = [
-        Self::Database,
-        Self::Schema,
-        Self::Reference,
-        Self::Counter,
-        Self::JobMissing,
-        Self::ReasonMissing,
-        Self::ResultMissing,
-        Self::ResultChanged,
-        Self::Metrics,
-        Self::FileMissing,
-        Self::FileChanged,
-        Self::FileUnreadable,
-    ];
-
     /// Returns the label of a number of findings of this kind.
     pub const fn heading(self) -> &'static str {
         match self {
             Self::Database => "faults of the database",
-            Self::Schema => "tables, indexes or triggers not as they were made",
-            Self::Reference => "rows that name a row that is not there",
+            Self::Schema => "tables, indexes or triggers that differ from the schema",
+            Self::Reference => "rows that reference a missing row",
             Self::Counter => "wrong counters",
             Self::JobMissing => "pairs without a job",
             Self::ReasonMissing => "failed pairs without a reason",
-            Self::ResultMissing => "results that are missing",
-            Self::ResultChanged => "results that were changed",
-            Self::Metrics => "pairs with other metrics than their result's",
-            Self::FileMissing => "files that are missing",
-            Self::FileChanged => "files that were changed",
-            Self::FileUnreadable => "files that cannot be read",
-        }
-    }
-
-    /// Returns whether it concerns a pair, which can be sent back to run again.
-    pub const fn is_of_pair(self) -> bool {
-        match self {
-            Self::Database | Self::Schema | Self::Reference | Self::Counter => false,
-            Self::JobMissing
-            | Self::ReasonMissing
-            | Self::ResultMissing
-            | Self::ResultChanged
-            | Self::Metrics
-            | Self::FileMissing
-            | Self::FileChanged
-            | Self::FileUnreadable => true,
+            Self::ResultMissing => "missing results",
+            Self::ResultChanged => "changed results",
+            Self::Metrics => "pairs whose metrics differ from their result",
+            Self::FileMissing => "missing files",
+            Self::FileChanged => "changed files",
+            Self::FileUnreadable => "unreadable files",
         }
     }
 }
@@ -100,45 +69,30 @@ pub struct Finding {
 }
 
 impl Finding {
-    pub(super) const fn database(what: String) -> Self {
-        Self::bare(Kind::Database, what)
-    }
-
-    pub(super) const fn schema(what: String) -> Self {
-        Self::bare(Kind::Schema, what)
-    }
-
-    pub(super) const fn reference(what: String) -> Self {
-        Self::bare(Kind::Reference, what)
-    }
-
-    pub(super) fn counter(drift: &CounterDrift) -> Self {
-        let kept = match drift.kept {
-            Some(kept) => format!("says {kept}"),
-            None => "is gone".to_owned(),
-        };
-        let at = usize::try_from(drift.cursor)
-            .ok()
-            .and_then(Stage::from_index)
-            .map_or("the end", Stage::name);
-        let what = format!(
-            "the counter of {} pairs at {at} {kept}, there are {}",
-            drift.status, drift.counted
-        );
-        Self::bare(Kind::Counter, what)
-    }
-
-    /// Jobs whose fingerprint or dirty mark is wrong.
-    pub(super) const fn mark(line: String) -> Self {
-        Self::bare(Kind::Counter, line)
-    }
-
-    const fn bare(kind: Kind, what: String) -> Self {
+    /// Returns a finding that concerns no single pair.
+    pub(super) const fn new(kind: Kind, what: String) -> Self {
         Self {
             kind,
             pair: None,
             stage: None,
             what,
         }
+    }
+
+    /// Describes a wrong counter.
+    pub(super) fn counter(drift: &CounterDrift) -> Self {
+        let kept = match drift.kept {
+            Some(kept) => format!("is {kept}"),
+            None => "is missing".to_owned(),
+        };
+        let stage = usize::try_from(drift.cursor)
+            .ok()
+            .and_then(Stage::from_index);
+        let at = stage.map_or("the end", Stage::name);
+        let what = format!(
+            "the counter of {} pairs at {at} {kept}, there are {}",
+            drift.status, drift.counted
+        );
+        Self::new(Kind::Counter, what)
     }
 }

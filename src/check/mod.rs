@@ -8,7 +8,7 @@ mod pairs;
 mod summary;
 
 pub use finding::{Finding, Kind};
-pub use summary::{CheckSummary, Found, Notes, Repaired, Spare};
+pub use summary::{CheckSummary, Found, Notes, Repaired, Unreferenced};
 
 use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
@@ -70,7 +70,10 @@ pub async fn check(
     match rest {
         Err(CheckError::Catalog(error)) if is_damage(&error) => {
             // The integrity check of SQLite can miss a value that does not fit its column.
-            summary.add(Finding::database(format!("not read to its end: {error}")));
+            summary.add(Finding::new(
+                Kind::Database,
+                format!("not read to its end: {error}"),
+            ));
             Ok(summary)
         }
         Err(error) => Err(error),
@@ -96,7 +99,7 @@ async fn database(
     let faults = catalog.integrity(options.quick).await?;
     let indexes_alone = !faults.is_empty() && faults.iter().all(|line| is_of_index(line));
     for line in &faults {
-        summary.add(Finding::database(line.clone()));
+        summary.add(Finding::new(Kind::Database, line.clone()));
     }
     if faults.is_empty() {
         return Ok(true);
@@ -104,7 +107,7 @@ async fn database(
     if !(options.repair && indexes_alone && catalog.rebuild_indexes().await?.is_empty()) {
         return Ok(false);
     }
-    summary.mended(Kind::Database);
+    summary.mark_repaired(Kind::Database, 0);
     summary.repaired.indexes = true;
     Ok(true)
 }
@@ -122,7 +125,7 @@ async fn rows_and_files(
 ) -> Result<(), CheckError> {
     schema(catalog, options, summary).await?;
     for line in catalog.broken_references().await? {
-        summary.add(Finding::reference(line));
+        summary.add(Finding::new(Kind::Reference, line));
     }
     counters(catalog, options, summary).await?;
     let mut named = ReferencedArtifacts::default();
@@ -141,7 +144,7 @@ async fn rows_and_files(
         }
     }
     if !options.in_use {
-        spare_files(project, named, options.repair, summary).await?;
+        unreferenced_files(project, named, options.repair, summary).await?;
     }
     Ok(())
 }
@@ -153,12 +156,12 @@ async fn schema(
 ) -> Result<(), CheckError> {
     let found = catalog.schema_differences().await?;
     for line in &found {
-        summary.add(Finding::schema(line.clone()));
+        summary.add(Finding::new(Kind::Schema, line.clone()));
     }
     if options.repair && !found.is_empty() {
         catalog.restore_schema().await?;
         let left = catalog.schema_differences().await?;
-        summary.mended_but(Kind::Schema, left.len() as u64);
+        summary.mark_repaired(Kind::Schema, left.len() as u64);
         summary.repaired.schema = left.len() < found.len();
     }
     Ok(())
@@ -175,11 +178,11 @@ async fn counters(
         summary.add(Finding::counter(drift));
     }
     for line in drift.marks {
-        summary.add(Finding::mark(line));
+        summary.add(Finding::new(Kind::Counter, line));
     }
     if options.repair && is_off {
         catalog.rebuild_counters().await?;
-        summary.mended(Kind::Counter);
+        summary.mark_repaired(Kind::Counter, 0);
         summary.repaired.counters = true;
     }
     Ok(())
@@ -206,19 +209,18 @@ async fn repair_pairs(
     checks: &[PairCheck],
     summary: &mut CheckSummary,
 ) -> Result<(), CheckError> {
-    let back = checks
-        .iter()
-        .filter_map(|check| Some((check.pair, check.back_to()?)));
+    let back = checks.iter();
+    let back = back.filter_map(|check| Some((check.pair, check.back_to()?)));
     let back: Vec<_> = back.collect();
     if options.repair && !back.is_empty() {
-        summary.repaired.put_back += back.len() as u64;
+        summary.repaired.requeued += back.len() as u64;
         catalog.restore(back).await?;
     }
     Ok(())
 }
 
-/// Counts unreferenced files and, with `remove`, deletes the ones written by the program.
-async fn spare_files(
+/// Counts unreferenced files and, with `remove`, deletes those that this program wrote.
+async fn unreferenced_files(
     project: &Project,
     named: ReferencedArtifacts,
     remove: bool,
@@ -226,18 +228,18 @@ async fn spare_files(
 ) -> Result<(), CheckError> {
     let folder = project.clone();
     let walk = move || {
-        let mut spare = Spare::default();
-        let walked = named.for_each_unreferenced(&folder, |unnamed| {
-            let ours = unnamed.kind != UnreferencedKind::UnknownFile;
+        let mut found = Unreferenced::default();
+        let walked = named.for_each_unreferenced(&folder, |file| {
+            let ours = file.kind != UnreferencedKind::UnknownFile;
             // The next check reports a file again that cannot be deleted.
-            let removed = remove && ours && std::fs::remove_file(&unnamed.path).is_ok();
-            spare.count(&unnamed, removed);
+            let removed = remove && ours && std::fs::remove_file(&file.path).is_ok();
+            found.count(&file, removed);
         });
-        walked.map(|()| spare)
+        walked.map(|()| found)
     };
     match tokio::task::spawn_blocking(walk).await? {
-        Ok(spare) => {
-            summary.spare = Some(spare);
+        Ok(found) => {
+            summary.unreferenced = Some(found);
             Ok(())
         }
         Err(source) => Err(CheckError::Artifacts {

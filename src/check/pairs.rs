@@ -33,10 +33,9 @@ impl PairCheck {
 /// Checks the rows and files of a pair; with `quick` only the length of each file. Results of stages at or after the
 /// job's cursor remain from an earlier run: their files stay referenced, but are not checked.
 pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> PairCheck {
-    let state = state(pair);
     let mut check = PairCheck {
         pair: pair.inputs.pair,
-        damage: state.into_iter().map(|fault| fault.of(pair)).collect(),
+        damage: state(pair),
         named: Vec::new(),
         files: 0,
         inputs_missing: Vec::new(),
@@ -54,7 +53,13 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
         check.files += files.len() as u64;
         for artifact in files.values() {
             if let Err(error) = project.check_artifact(artifact, quick) {
-                check.damage.push(file(*stage, &error).of(pair));
+                let kind = match error {
+                    ArtifactError::Missing(_) => Kind::FileMissing,
+                    ArtifactError::Changed(_) => Kind::FileChanged,
+                    ArtifactError::Io { .. } => Kind::FileUnreadable,
+                };
+                let finding = damage(pair, kind, *stage, error.to_string());
+                check.damage.push(finding);
             }
         }
     }
@@ -62,56 +67,39 @@ pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> 
     check
 }
 
-/// Damage, without the name of the pair.
-#[derive(Debug, PartialEq, Eq)]
-struct Fault {
-    kind: Kind,
-    stage: Stage,
-    what: String,
-}
-
-impl Fault {
-    fn new(kind: Kind, stage: Stage, what: impl Into<String>) -> Self {
-        let what = what.into();
-        Self { kind, stage, what }
-    }
-
-    fn of(self, pair: &AuditedPair) -> Finding {
-        Finding {
-            kind: self.kind,
-            pair: Some(pair.name.clone()),
-            stage: Some(self.stage),
-            what: self.what,
-        }
-    }
-}
-
 fn is_before_cursor(pair: &AuditedPair, stage: Stage) -> bool {
     pair.job
         .is_some_and(|(_, cursor)| (stage.index() as i64) < cursor)
 }
 
+/// Describes damage of a pair that a run from `stage` on repairs.
+fn damage(pair: &AuditedPair, kind: Kind, stage: Stage, what: impl Into<String>) -> Finding {
+    Finding {
+        kind,
+        pair: Some(pair.name.clone()),
+        stage: Some(stage),
+        what: what.into(),
+    }
+}
+
 /// Checks that the rows of the pair agree with the state of its job.
-fn state(pair: &AuditedPair) -> Vec<Fault> {
+fn state(pair: &AuditedPair) -> Vec<Finding> {
     let Some((status, cursor)) = pair.job else {
-        return vec![Fault::new(Kind::JobMissing, Stage::Fit, "it has no job")];
+        return vec![damage(pair, Kind::JobMissing, Stage::Fit, "it has no job")];
     };
-    let mut faults = Vec::new();
+    let mut found = Vec::new();
+    let mut add = |kind, stage, what| found.push(damage(pair, kind, stage, what));
     for stage in Stage::ALL {
-        if !is_before_cursor(pair, stage) {
-            continue;
-        }
         match pair.results.get(&stage) {
-            None => faults.push(Fault::new(
-                Kind::ResultMissing,
-                stage,
-                "the result is missing",
-            )),
-            Some(result) if !has_its_hash(result) => faults.push(Fault::new(
-                Kind::ResultChanged,
-                stage,
-                "the result differs from its hash",
-            )),
+            _ if !is_before_cursor(pair, stage) => {}
+            None => add(Kind::ResultMissing, stage, "the result is missing"),
+            Some(result) if !has_its_hash(result) => {
+                add(
+                    Kind::ResultChanged,
+                    stage,
+                    "the result differs from its hash",
+                );
+            }
             Some(_) => {}
         }
     }
@@ -119,16 +107,22 @@ fn state(pair: &AuditedPair) -> Vec<Fault> {
     if let (JobStatus::Done, Some(last)) = (status, last)
         && metrics_of(last).is_none_or(|metrics| metrics != pair.metrics)
     {
-        let what = "its metrics differ from those of its result";
-        faults.push(Fault::new(Kind::Metrics, Stage::Register, what));
+        add(
+            Kind::Metrics,
+            Stage::Register,
+            "its metrics differ from its result",
+        );
     }
     let failed = matches!(status, JobStatus::Backoff | JobStatus::Quarantined);
     let next = usize::try_from(cursor).ok().and_then(Stage::from_index);
     if let (true, false, Some(next)) = (failed, pair.has_failure, next) {
-        let what = "it failed, but the reason is missing";
-        faults.push(Fault::new(Kind::ReasonMissing, next, what));
+        add(
+            Kind::ReasonMissing,
+            next,
+            "it failed, but the reason is missing",
+        );
     }
-    faults
+    found
 }
 
 /// Returns whether the outcome and files of a result still have the stored result hash.
@@ -142,15 +136,6 @@ fn metrics_of(result: &AuditedResult) -> Option<BTreeSet<ThresholdMetric>> {
     Some(outcome.metrics.iter().map(|metric| metric.metric).collect())
 }
 
-fn file(stage: Stage, error: &ArtifactError) -> Fault {
-    let kind = match error {
-        ArtifactError::Missing(_) => Kind::FileMissing,
-        ArtifactError::Changed(_) => Kind::FileChanged,
-        ArtifactError::Io { .. } => Kind::FileUnreadable,
-    };
-    Fault::new(kind, stage, error.to_string())
-}
-
 /// Lists input files that are missing or have changed since they were read. This is no damage: a run handles it.
 fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
     let known = &pair.inputs;
@@ -159,17 +144,17 @@ fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
         (&known.print_path, known.print.as_ref()),
     ] {
         let path = project.input_path(stored);
-        let said = || format!("{} of {}", path.display(), pair.name);
+        let note = || format!("{} of {}", path.display(), pair.name);
         match stat_input(&path) {
-            Err(InputError::NotThere(_)) => check.inputs_missing.push(said()),
-            Err(_) => check.inputs_changed.push(said()),
+            Err(InputError::NotThere(_)) => check.inputs_missing.push(note()),
+            Err(_) => check.inputs_changed.push(note()),
             Ok(stat) => {
                 let moved = |seen: &&InputVersion| seen.stat != stat.as_str();
                 let changed = seen.filter(moved).is_some_and(|seen| {
                     hash_input(&path).map_or(true, |found| found.hash != seen.hash)
                 });
                 if changed {
-                    check.inputs_changed.push(said());
+                    check.inputs_changed.push(note());
                 }
             }
         }
@@ -208,10 +193,9 @@ mod tests {
     }
 
     fn found(pair: &AuditedPair) -> Vec<(Kind, Stage)> {
-        state(pair)
-            .iter()
-            .map(|fault| (fault.kind, fault.stage))
-            .collect()
+        let found = state(pair).into_iter();
+        let found = found.map(|finding| (finding.kind, finding.stage.expect("a stage")));
+        found.collect()
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub struct CheckSummary {
     /// Input files that changed after they were read. No damage: the next run computes their pairs again.
     pub inputs_changed: Notes,
     /// Unreferenced files in the artifact folder; `None` while a run is writing there.
-    pub spare: Option<Spare>,
+    pub unreferenced: Option<Unreferenced>,
     /// Repairs made.
     pub repaired: Repaired,
 }
@@ -56,7 +56,7 @@ pub struct Notes {
 
 /// Unreferenced files.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
-pub struct Spare {
+pub struct Unreferenced {
     /// Result files that no row references, partly written ones included.
     pub files: u64,
     /// Total length in bytes.
@@ -64,14 +64,14 @@ pub struct Spare {
     /// Number of files deleted.
     pub removed: u64,
     /// Files that the program did not write; they are never deleted.
-    pub strangers: u64,
+    pub unknown: u64,
 }
 
 /// Repairs made.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Repaired {
-    /// Number of pairs sent back to run again.
-    pub put_back: u64,
+    /// Number of pairs sent back to an earlier stage.
+    pub requeued: u64,
     /// Whether the counters were rebuilt.
     pub counters: bool,
     /// Whether the indexes were rebuilt.
@@ -90,7 +90,7 @@ impl CheckSummary {
             damage: BTreeMap::new(),
             inputs_missing: Notes::default(),
             inputs_changed: Notes::default(),
-            spare: None,
+            unreferenced: None,
             repaired: Repaired::default(),
         }
     }
@@ -114,26 +114,21 @@ impl CheckSummary {
         }
     }
 
-    /// Marks all findings of a kind as repaired.
-    pub(super) fn mended(&mut self, kind: Kind) {
-        self.mended_but(kind, 0);
-    }
-
     /// Marks all findings of a kind as repaired, except `left` of them.
-    pub(super) fn mended_but(&mut self, kind: Kind, left: u64) {
+    pub(super) fn mark_repaired(&mut self, kind: Kind, left: u64) {
         if let Some(found) = self.damage.get_mut(&kind) {
             found.left = left;
         }
     }
 
-    /// Adds the check of a pair; `put_back` when the pair was sent back to run again.
-    pub(super) fn count(&mut self, check: PairCheck, put_back: bool) {
+    /// Adds the check of a pair; `requeued` when the pair was sent back to run again.
+    pub(super) fn count(&mut self, check: PairCheck, requeued: bool) {
         self.pairs += 1;
         self.files += check.files;
         for finding in check.damage {
             let kind = finding.kind;
             self.add(finding);
-            if let (true, Some(found)) = (put_back, self.damage.get_mut(&kind)) {
+            if let (true, Some(found)) = (requeued, self.damage.get_mut(&kind)) {
                 found.left -= 1;
             }
         }
@@ -150,13 +145,13 @@ impl Notes {
     }
 }
 
-impl Spare {
-    pub(super) const fn count(&mut self, unnamed: &UnreferencedFile, removed: bool) {
-        match unnamed.kind {
-            UnreferencedKind::UnknownFile => self.strangers += 1,
+impl Unreferenced {
+    pub(super) const fn count(&mut self, file: &UnreferencedFile, removed: bool) {
+        match file.kind {
+            UnreferencedKind::UnknownFile => self.unknown += 1,
             UnreferencedKind::Orphan | UnreferencedKind::Temporary => {
                 self.files += 1;
-                self.bytes += unnamed.bytes;
+                self.bytes += file.bytes;
                 self.removed += removed as u64;
             }
         }

@@ -14,7 +14,7 @@ use super::screen::{Palette, Tone};
 use super::table::{columns, count};
 use crate::catalog::CatalogError;
 use crate::check::{
-    CheckOptions, CheckSummary, Finding, Kind, Notes, Spare, check as check_project,
+    CheckOptions, CheckSummary, Finding, Kind, Notes, Unreferenced, check as check_project,
 };
 use crate::runner::RunError;
 use crate::store::{CATALOG_FILE, LockError, Project, RunLock};
@@ -122,7 +122,7 @@ fn report_unreadable(error: anyhow::Error, context: &Context) -> anyhow::Result<
 
 fn next_steps(summary: &CheckSummary, repaired: bool) -> Vec<&'static str> {
     let is_repairable = |kind: &Kind| *kind != Kind::Database && *kind != Kind::Reference;
-    if summary.repaired.put_back > 0 {
+    if summary.repaired.requeued > 0 {
         vec!["run"]
     } else if !repaired && summary.damage.keys().any(is_repairable) {
         vec!["check --repair"]
@@ -133,17 +133,15 @@ fn next_steps(summary: &CheckSummary, repaired: bool) -> Vec<&'static str> {
 
 fn text(summary: &CheckSummary, repaired: bool, palette: Palette) -> String {
     let mut lines = vec![headline(summary, palette)];
-    for kind in Kind::ALL {
-        if let Some(found) = summary.damage.get(&kind) {
-            let tone = if found.left > 0 {
-                Tone::Bad
-            } else {
-                Tone::Warn
-            };
-            let head = format!("{}: {}", kind.heading(), found.found);
-            lines.push(palette.paint(tone, head));
-            lines.push(listed(&found.first, found.found));
-        }
+    for (kind, found) in &summary.damage {
+        let tone = if found.left > 0 {
+            Tone::Bad
+        } else {
+            Tone::Warn
+        };
+        let head = format!("{}: {}", kind.heading(), found.found);
+        lines.push(palette.paint(tone, head));
+        lines.push(listed(&found.first, found.found));
     }
     if summary.damage.contains_key(&Kind::Database) && summary.left() > 0 {
         lines.push(
@@ -158,7 +156,7 @@ fn text(summary: &CheckSummary, repaired: bool, palette: Palette) -> String {
         &summary.inputs_changed,
         "changed since they were read",
     ));
-    lines.extend(unreferenced(summary.spare.as_ref(), repaired));
+    lines.extend(unreferenced(summary.unreferenced.as_ref(), repaired));
     lines.retain(|line| !line.is_empty());
     let lines = lines.iter().map(|line| line.trim_end());
     lines.collect::<Vec<_>>().join("\n") + "\n"
@@ -213,8 +211,8 @@ fn repairs(summary: &CheckSummary, repaired: bool) -> Vec<String> {
     ];
     let parts = parts.iter().filter(|(is_done, _)| *is_done);
     let mut lines: Vec<String> = parts.map(|(_, what)| (*what).to_owned()).collect();
-    if repaired && done.put_back > 0 {
-        let pairs = count(done.put_back, "pair");
+    if repaired && done.requeued > 0 {
+        let pairs = count(done.requeued, "pair");
         lines.push(format!(
             "{pairs} will run again from the stage listed above"
         ));
@@ -235,22 +233,22 @@ fn notes(notes: &Notes, problem: &str) -> Option<String> {
     })
 }
 
-fn unreferenced(spare: Option<&Spare>, repaired: bool) -> Option<String> {
-    let Some(spare) = spare else {
+fn unreferenced(found: Option<&Unreferenced>, repaired: bool) -> Option<String> {
+    let Some(found) = found else {
         let text = "unreferenced files were not searched for, because a run may be writing";
         return Some(text.to_owned());
     };
-    let artifacts = (spare.files > 0).then(|| {
-        let (removed, megabytes) = (spare.removed, spare.bytes as f64 / 1e6);
-        let files = count(spare.files, "file");
+    let artifacts = (found.files > 0).then(|| {
+        let (removed, megabytes) = (found.removed, found.bytes as f64 / 1e6);
+        let files = count(found.files, "file");
         if repaired {
             format!("removed {removed} of {files} not referenced by any result, {megabytes:.1} MB")
         } else {
             format!("{files} of {megabytes:.1} MB not referenced by any result; `check --repair` removes them")
         }
     });
-    let unknown = (spare.strangers > 0).then(|| {
-        let files = count(spare.strangers, "file");
+    let unknown = (found.unknown > 0).then(|| {
+        let files = count(found.unknown, "file");
         format!("{files} in the artifacts directory not written by this program, left untouched")
     });
     let lines: Vec<String> = artifacts.into_iter().chain(unknown).collect();

@@ -150,7 +150,7 @@ fn missing_and_changed_files_are_found_and_their_stages_run_again() {
     let repaired = at(&project, &["check", "--repair", "--json"])
         .expect(0)
         .json();
-    assert_eq!(repaired["repaired"]["put_back"], 2);
+    assert_eq!(repaired["repaired"]["requeued"], 2);
     at(&project, &["check"]).expect(0);
     at(&project, &["run"]).expect(0);
     assert_eq!(finished(&project, 0), [1, 2, 2, 2]);
@@ -291,14 +291,14 @@ fn unreferenced_files_are_reported_and_removed_but_no_others() {
         std::fs::write(path, "spare").expect("written");
     }
     let told = at(&project, &["check", "--json"]).expect(0).json();
-    assert_eq!(told["spare"]["files"], 2);
-    assert_eq!(told["spare"]["bytes"], 10);
-    assert_eq!(told["spare"]["strangers"], 1);
+    assert_eq!(told["unreferenced"]["files"], 2);
+    assert_eq!(told["unreferenced"]["bytes"], 10);
+    assert_eq!(told["unreferenced"]["unknown"], 1);
     assert!(ours.iter().all(|path| path.exists()));
     let repaired = at(&project, &["check", "--repair", "--json"])
         .expect(0)
         .json();
-    assert_eq!(repaired["spare"]["removed"], 2);
+    assert_eq!(repaired["unreferenced"]["removed"], 2);
     assert!(!ours.iter().any(|path| path.exists()));
     assert!(theirs.exists());
     at(&project, &["check"]).expect(0);
@@ -319,7 +319,7 @@ fn project_is_checked_but_not_repaired_during_a_run() {
     let mut lock = RunLock::acquire(&project, false).expect("the lock");
     lock.downgrade().expect("the lock in common");
     let found = at(&project, &["check", "--json"]).expect(12);
-    assert_eq!(found.json()["spare"], Value::Null);
+    assert_eq!(found.json()["unreferenced"], Value::Null);
     let refused = at(&project, &["check", "--repair"]).expect(11);
     let owner = format!("in use by pid {}", std::process::id());
     assert!(refused.err.contains(&owner), "{}", refused.err);
