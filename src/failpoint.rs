@@ -32,13 +32,12 @@ pub(crate) enum Point {
     Committed,
 }
 
-/// Dies, stops, waits or panics here if a test asks for it.
+/// Dies, stops, waits or panics here if a test requests it.
 #[cfg(debug_assertions)]
 pub(crate) fn hit(stage: Stage, point: Point, pair: Option<&PairName>) {
     let is_at = |failpoint: &Option<test_build::Failpoint>| {
-        failpoint
-            .as_ref()
-            .is_some_and(|failpoint| failpoint.fires(stage, point, pair))
+        let failpoint = failpoint.as_ref();
+        failpoint.is_some_and(|failpoint| failpoint.fires(stage, point, pair))
     };
     if is_at(&test_build::BREAK_AT) {
         std::process::abort();
@@ -50,7 +49,7 @@ pub(crate) fn hit(stage: Stage, point: Point, pair: Option<&PairName>) {
         test_build::hold();
     }
     let panics = is_at(&test_build::PANIC_AT);
-    assert!(!panics, "asked for by a test");
+    assert!(!panics, "requested by a test");
 }
 
 /// Does nothing in a release build.
@@ -66,14 +65,12 @@ mod test_build {
     use super::Point;
     use crate::domain::{PairName, Stage};
 
-    pub(super) static BREAK_AT: LazyLock<Option<Failpoint>> =
-        LazyLock::new(|| Failpoint::from_variable("MOCBAN_BREAK_AT"));
-    pub(super) static STOP_AT: LazyLock<Option<Failpoint>> =
-        LazyLock::new(|| Failpoint::from_variable("MOCBAN_STOP_AT"));
-    pub(super) static HOLD_AT: LazyLock<Option<Failpoint>> =
-        LazyLock::new(|| Failpoint::from_variable("MOCBAN_HOLD_AT"));
-    pub(super) static PANIC_AT: LazyLock<Option<Failpoint>> =
-        LazyLock::new(|| Failpoint::from_variable("MOCBAN_PANIC_AT"));
+    type Configured = LazyLock<Option<Failpoint>>;
+
+    pub(super) static BREAK_AT: Configured = LazyLock::new(|| Failpoint::from("MOCBAN_BREAK_AT"));
+    pub(super) static STOP_AT: Configured = LazyLock::new(|| Failpoint::from("MOCBAN_STOP_AT"));
+    pub(super) static HOLD_AT: Configured = LazyLock::new(|| Failpoint::from("MOCBAN_HOLD_AT"));
+    pub(super) static PANIC_AT: Configured = LazyLock::new(|| Failpoint::from("MOCBAN_PANIC_AT"));
 
     /// A failpoint from the environment.
     #[derive(Debug)]
@@ -85,15 +82,11 @@ mod test_build {
     }
 
     /// Stops the process until it receives SIGCONT.
-    #[cfg(unix)]
     pub(super) fn stop() {
         use rustix::process::{Signal, getpid, kill_process};
         // A signal that cannot be sent leaves the process running, and the test that waits for it fails.
         let _ = kill_process(getpid(), Signal::STOP);
     }
-
-    #[cfg(not(unix))]
-    pub(super) const fn stop() {}
 
     /// Creates the hold file and waits until it is removed.
     pub(super) fn hold() {
@@ -107,8 +100,8 @@ mod test_build {
     }
 
     impl Failpoint {
-        fn from_variable(name: &str) -> Option<Self> {
-            let text = std::env::var(name).ok()?;
+        fn from(variable: &str) -> Option<Self> {
+            let text = std::env::var(variable).ok()?;
             let (place, pair) = match text.split_once('@') {
                 Some((place, pair)) => (place, Some(pair.to_owned())),
                 None => (text.as_str(), None),
@@ -126,21 +119,9 @@ mod test_build {
         /// Counts a hit; returns whether it is the one to act on.
         pub(super) fn fires(&self, stage: Stage, point: Point, pair: Option<&PairName>) -> bool {
             let is_pair = |wanted: &String| pair.is_some_and(|pair| pair.as_str() == wanted);
-            self.place == format!("{stage}:{}", name(point))
+            self.place == format!("{stage}:{point:?}").to_lowercase()
                 && self.pair.as_ref().is_none_or(is_pair)
                 && (self.hits.fetch_add(1, Ordering::SeqCst) + 1 == self.nth || self.nth == 0)
-        }
-    }
-
-    const fn name(point: Point) -> &'static str {
-        match point {
-            Point::Claiming => "claiming",
-            Point::Claimed => "claimed",
-            Point::Computed => "computed",
-            Point::Written => "written",
-            Point::Synced => "synced",
-            Point::Recorded => "recorded",
-            Point::Committed => "committed",
         }
     }
 }

@@ -12,6 +12,7 @@
 //! the writer task at `synchronous=FULL`, and the program itself as a process of its own where it says so. The tables
 //! are Markdown on the standard output. `cargo test --all-targets` runs a few pairs, to see that the program works.
 
+mod baseline;
 mod claims;
 mod fake;
 mod fill;

@@ -4,7 +4,6 @@
 
 use std::io;
 use std::sync::Arc;
-use std::time::Duration;
 
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
@@ -13,11 +12,11 @@ use super::compute_thread::{ComputedStage, run_blocking, task_result};
 use super::error::RunError;
 use super::events::RunEvent;
 use super::run_context::{PairEnd, PairReport, RunContext};
-use super::stop::{Stop, StopLevel};
+use super::stop::StopLevel;
 use crate::catalog::{CheckpointOutcome, Lease, StageCheckpoint};
 use crate::domain::{PairName, Stage};
 use crate::failpoint::{self, Point};
-use crate::store::{ArtifactError, NewArtifact, Project};
+use crate::store::{ArtifactError, NewArtifact};
 
 /// The task that holds a pair's lease and stores its stages.
 pub(super) struct Checkpointer {
@@ -50,27 +49,19 @@ impl StoredStages {
     /// Releases a remaining lease, and returns how the pair ended: `end`, unless the lease was lost or not every stage was
     /// stored.
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
-        let stages = self.stages;
         let end = match &self.lease {
             CheckpointOutcome::LeaseLost => PairEnd::LeaseLost,
-            CheckpointOutcome::Done | CheckpointOutcome::Lease(_) if !self.is_complete => {
-                PairEnd::Released
-            }
-            CheckpointOutcome::Done | CheckpointOutcome::Lease(_) => end,
+            _ if self.is_complete => end,
+            _ => PairEnd::Released,
         };
+        let mut end = Ok(end);
         if let CheckpointOutcome::Lease(lease) = self.lease
             && let Err(error) = context.catalog.release(lease).await
         {
-            return PairReport {
-                stages,
-                ..PairReport::fatal(error.into())
-            };
+            end = Err(error.into());
         }
-        PairReport {
-            end,
-            stages,
-            fatal: None,
-        }
+        let stages = self.stages;
+        PairReport { end, stages }
     }
 }
 
@@ -111,7 +102,7 @@ impl Checkpointer {
         };
         match settled {
             Ok(settled) => settled.finish(&context, end).await,
-            Err(error) => PairReport::fatal(error),
+            Err(error) => PairReport::failed(error),
         }
     }
 }
@@ -120,46 +111,34 @@ impl Checkpointer {
 async fn store_stages(
     context: Arc<RunContext>,
     pair: PairName,
-    mut lease: Lease,
+    lease: Lease,
     mut stages: mpsc::UnboundedReceiver<ComputedStage>,
 ) -> Result<StoredStages, RunError> {
-    let mut stored = 0;
-    while let Some(first) = stages.recv().await {
-        let (batch, is_complete) = write_batch(&context, &pair, first, &mut stages).await?;
-        if batch.is_empty() {
-            let (lease, stages) = (CheckpointOutcome::Lease(lease), stored);
-            return Ok(StoredStages {
-                lease,
-                stages,
-                is_complete,
-            });
-        }
+    let (mut count, mut is_complete) = (0, true);
+    let mut outcome = CheckpointOutcome::Lease(lease);
+    // A stage that comes after one that was not stored must not be stored either.
+    while is_complete
+        && matches!(outcome, CheckpointOutcome::Lease(_))
+        && let Some(first) = stages.recv().await
+    {
+        let CheckpointOutcome::Lease(lease) = outcome else {
+            break;
+        };
+        let batch;
+        (batch, is_complete) = write_batch(&context, &pair, first, &mut stages).await?;
         let times: Vec<_> = batch.iter().map(|done| (done.stage, done.ms)).collect();
-        let outcome = context.catalog.checkpoint_deferrable(lease, batch).await?;
+        outcome = context.catalog.checkpoint_deferrable(lease, batch).await?;
         if !matches!(outcome, CheckpointOutcome::LeaseLost) {
-            stored += times.len() as u64;
+            count += times.len() as u64;
             for (stage, ms) in times {
                 report_stored(&context, pair.clone(), stage, ms);
             }
         }
-        match outcome {
-            // A stage that comes after one that was not stored must not be stored either.
-            CheckpointOutcome::Lease(next) if is_complete => lease = next,
-            lease => {
-                let stages = stored;
-                return Ok(StoredStages {
-                    lease,
-                    stages,
-                    is_complete,
-                });
-            }
-        }
     }
-    let (lease, stages) = (CheckpointOutcome::Lease(lease), stored);
     Ok(StoredStages {
-        lease,
-        stages,
-        is_complete: true,
+        lease: outcome,
+        stages: count,
+        is_complete,
     })
 }
 
@@ -182,32 +161,21 @@ async fn write_batch(
     Ok((batch, true))
 }
 
-/// Writes a stage's files; returns the row that may name them then, `None` when the run is to stop at once.
+/// Writes a stage's files; returns its row, which may name them then, or `None` when the run is to stop at once.
 async fn write_stage(
     context: &RunContext,
     pair: &PairName,
-    stage: ComputedStage,
+    (stage, files): ComputedStage,
 ) -> Result<Option<StageCheckpoint>, RunError> {
-    let (id, timeout) = ((pair, stage.stage), context.stage_timeout);
-    if !write_files(&context.project, id, stage.files, timeout, &context.stop).await? {
+    if !write_files(context, pair, stage.stage, files).await? {
         return Ok(None);
     }
     // The disk may have taken long, so the lease must be valid now, not when the stage was computed.
     Ok(Some(StageCheckpoint {
-        stage: stage.stage,
-        fingerprint: context.fingerprints.of(stage.stage),
-        mesh_hash: stage.mesh_hash,
-        print_hash: stage.print_hash,
-        attributes: stage.attributes,
-        outcome: stage.outcome,
-        files: stage.artifacts,
-        result_hash: stage.result_hash,
-        metrics: stage.metrics,
-        inputs: stage.inputs,
-        ms: stage.elapsed.as_millis() as u64,
         at: context.clock.now(),
         next_deadline: context.deadline(),
         alive_since: context.alive_since(),
+        ..stage
     }))
 }
 
@@ -216,28 +184,28 @@ async fn write_stage(
 ///
 /// # Errors
 /// When the disk returns an error, or has not finished within the time limit.
-pub(super) async fn write_files(
-    project: &Project,
-    (pair, stage): (&PairName, Stage),
+async fn write_files(
+    context: &RunContext,
+    pair: &PairName,
+    stage: Stage,
     files: Vec<NewArtifact>,
-    timeout: Duration,
-    stop: &Stop,
 ) -> Result<bool, ArtifactError> {
-    let (to, name) = (project.clone(), pair.clone());
+    let (project, name) = (context.project.clone(), pair.clone());
+    let timeout = context.stage_timeout;
     let writing = run_blocking(move || {
         let on_written = || failpoint::hit(stage, Point::Written, Some(&name));
-        to.write_artifacts(&files, &on_written)?;
+        project.write_artifacts(&files, &on_written)?;
         failpoint::hit(stage, Point::Synced, Some(&name));
         Ok(true)
     });
     tokio::select! {
         biased;
         written = writing => written,
-        () = stop.reached(StopLevel::Now) => Ok(false),
+        () = context.stop.reached(StopLevel::Now) => Ok(false),
         () = tokio::time::sleep(timeout) => {
             let text = format!("the disk took longer than {} s", timeout.as_secs_f64());
             Err(ArtifactError::Io {
-                path: project.artifacts_dir(),
+                path: context.project.artifacts_dir(),
                 source: io::Error::new(io::ErrorKind::TimedOut, text),
             })
         }

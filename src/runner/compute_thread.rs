@@ -13,32 +13,16 @@ use tokio::sync::mpsc;
 use tokio::task::JoinError;
 
 use super::pair_context::{PairContext, StoredStage};
-use super::stage_executor::StageExecutor;
+use super::run_context::RunContext;
 use super::stage_output::{self, ExecutionError, StageOutput};
 use super::stop::{Stop, StopLevel};
-use crate::catalog::{InputVersions, MetricResult};
-use crate::domain::{ArtifactSet, ContentHash, Failure, FailureClass, Stage, sanitize};
+use crate::catalog::{InputVersions, StageCheckpoint};
+use crate::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
 use crate::failpoint::{self, Point};
 use crate::store::NewArtifact;
 
-/// A computed stage: what its row will hold, and the files that must be on the disk before.
-#[derive(Debug)]
-pub(super) struct ComputedStage {
-    pub(super) stage: Stage,
-    /// The outcome as JSON.
-    pub(super) outcome: String,
-    pub(super) files: Vec<NewArtifact>,
-    /// The names that the files will have.
-    pub(super) artifacts: ArtifactSet,
-    pub(super) result_hash: ContentHash,
-    pub(super) metrics: Vec<MetricResult>,
-    pub(super) mesh_hash: ContentHash,
-    pub(super) print_hash: Option<ContentHash>,
-    pub(super) attributes: String,
-    /// The input files as read, unless an earlier stage reported them.
-    pub(super) inputs: InputVersions,
-    pub(super) elapsed: Duration,
-}
+/// A computed stage: its row, and the files that must be on the disk before.
+pub(super) type ComputedStage = (StageCheckpoint, Vec<NewArtifact>);
 
 /// What happens on a pair's thread.
 #[derive(Debug)]
@@ -54,7 +38,7 @@ pub(super) enum ComputeEvent {
         is_transient: bool,
         /// The input files as read.
         inputs: InputVersions,
-        elapsed: Duration,
+        ms: u64,
     },
     /// A stage panicked; the pair's data is lost.
     Panicked(String),
@@ -69,21 +53,18 @@ pub(super) enum ComputeEvent {
 pub(super) struct ComputeThread(mpsc::UnboundedReceiver<ComputeEvent>);
 
 impl ComputeThread {
-    /// Starts a thread that computes a pair's stages from `first` on. `next_stage` is called on the thread after each
-    /// stage.
+    /// Starts a thread that computes a pair's stages from `first` on.
     ///
     /// # Errors
     /// When the system cannot start a thread; the pair's data is lost then.
     pub(super) fn start(
-        executor: &Arc<dyn StageExecutor>,
+        context: Arc<RunContext>,
         first: Stage,
         pair: Box<PairContext>,
-        next_stage: impl Fn(Stage) -> Option<Stage> + Send + 'static,
     ) -> std::io::Result<Self> {
         let (events, receiver) = mpsc::unbounded_channel();
-        let executor = Arc::clone(executor);
         let thread = std::thread::Builder::new().name(pair.attributes.name.to_string());
-        thread.spawn(move || run_stages(&*executor, first, pair, next_stage, &events))?;
+        thread.spawn(move || run_stages(&context, first, pair, &events))?;
         Ok(Self(receiver))
     }
 
@@ -102,10 +83,9 @@ impl ComputeThread {
 
 /// Computes stages until there is no next one, one fails, or the receiver of the events is closed.
 fn run_stages(
-    executor: &dyn StageExecutor,
+    context: &RunContext,
     mut stage: Stage,
     mut pair: Box<PairContext>,
-    next_stage: impl Fn(Stage) -> Option<Stage>,
     events: &mpsc::UnboundedSender<ComputeEvent>,
 ) {
     let last = loop {
@@ -114,9 +94,9 @@ fn run_stages(
             return;
         }
         let begun = Instant::now();
-        let work = AssertUnwindSafe(|| run_stage(executor, stage, &mut pair, begun));
+        let work = AssertUnwindSafe(|| run_stage(context, stage, &mut pair));
         match catch_unwind(work) {
-            Ok(Ok(computed)) => match next_stage(stage) {
+            Ok(Ok(computed)) => match context.next_stage(stage) {
                 Some(next) => {
                     // A closed channel is noticed when the next stage starts.
                     let _ = events.send(ComputeEvent::Finished(Box::new(computed), Some(next)));
@@ -133,7 +113,7 @@ fn run_stages(
                     failure,
                     is_transient,
                     inputs: pair.inputs.clone(),
-                    elapsed: begun.elapsed(),
+                    ms: begun.elapsed().as_millis() as u64,
                 };
             }
             Err(payload) => break ComputeEvent::Panicked(panic_text(&*payload)),
@@ -146,27 +126,28 @@ fn run_stages(
 
 /// Runs one stage, and keeps its outcome in the pair for later stages.
 fn run_stage(
-    executor: &dyn StageExecutor,
+    context: &RunContext,
     stage: Stage,
     pair: &mut PairContext,
-    begun: Instant,
 ) -> Result<ComputedStage, ExecutionError> {
+    let begun = Instant::now();
+    let output = context.executor.run(stage, pair);
+    let elapsed = begun.elapsed();
+    context.add_compute_time(elapsed);
     let StageOutput {
         outcome,
         files,
         metrics,
-    } = executor.run(stage, pair)?;
-    let elapsed = begun.elapsed();
+    } = output?;
     failpoint::hit(stage, Point::Computed, Some(&pair.attributes.name));
     let Some(mesh_hash) = pair.mesh_hash() else {
         let text = "a stage finished before the mesh was read";
         return Err(ExecutionError::failed(FailureClass::Bug, text));
     };
     let print_hash = pair.print_hash();
-    let artifacts: ArtifactSet = files
-        .iter()
-        .map(|file| (file.role().to_owned(), file.reference().clone()))
-        .collect();
+    let artifacts = files.iter();
+    let artifacts = artifacts.map(|file| (file.role().to_owned(), file.reference().clone()));
+    let artifacts: ArtifactSet = artifacts.collect();
     let depth = pair.stored.get(&Stage::Depth).map(|stored| &stored.files);
     let metrics = stage_output::metric_results(&metrics, &artifacts, depth);
     let json = outcome.to_string();
@@ -177,19 +158,23 @@ fn run_stage(
         print_hash,
     };
     pair.stored.insert(stage, stored);
-    Ok(ComputedStage {
+    let checkpoint = StageCheckpoint {
         stage,
-        result_hash: stage_output::result_hash(&json, &artifacts),
-        outcome: json,
-        files,
-        artifacts,
-        metrics,
+        fingerprint: context.fingerprints.of(stage),
         mesh_hash,
         print_hash,
         attributes: pair.attributes_json.clone(),
+        result_hash: stage_output::result_hash(&json, &artifacts),
+        outcome: json,
+        files: artifacts,
+        metrics,
         inputs: pair.unreported_inputs(),
-        elapsed,
-    })
+        ms: elapsed.as_millis() as u64,
+        at: context.clock.now(),
+        next_deadline: context.deadline(),
+        alive_since: context.alive_since(),
+    };
+    Ok((checkpoint, files))
 }
 
 /// Longest excerpt of a panic's message, in characters.

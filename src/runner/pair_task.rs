@@ -35,11 +35,7 @@ pub(super) async fn process_pair(
     failpoint::hit(first, Point::Claimed, Some(&pair.attributes.name));
     let known = PairSummary::of(&pair);
     let checkpointer = Checkpointer::start(Arc::clone(&context), known.name.clone(), lease);
-    let next_stage = {
-        let context = Arc::clone(&context);
-        move |done| context.next_stage(done)
-    };
-    match ComputeThread::start(&context.executor, first, pair, next_stage) {
+    match ComputeThread::start(Arc::clone(&context), first, pair) {
         Ok(thread) => compute(&context, checkpointer, thread, first, known).await,
         Err(error) => {
             let text = format!("the system gave no thread for {first}: {error}");
@@ -66,7 +62,6 @@ async fn compute(
                 context.emit(RunEvent::StageStarted { pair, stage });
             }
             ComputeEvent::Finished(computed, next) => {
-                context.add_compute_time(computed.elapsed);
                 if !checkpointer.store(*computed) {
                     // The lease is lost, or the disk or the catalog returned an error.
                     return PairOutcome::Ended(checkpointer.finish(PairEnd::LeaseLost).await);
@@ -83,14 +78,13 @@ async fn compute(
                 failure,
                 is_transient,
                 inputs,
-                elapsed,
+                ms,
             } => {
-                context.add_compute_time(elapsed);
                 break FailedStage {
                     failure,
                     is_transient,
                     inputs: Some(inputs),
-                    ms: Some(elapsed.as_millis() as u64),
+                    ms: Some(ms),
                 };
             }
             ComputeEvent::Panicked(text) => {
@@ -118,23 +112,16 @@ async fn fail(
 ) -> PairReport {
     let settled = match checkpointer.settle().await {
         Ok(settled) => settled,
-        Err(error) => return PairReport::fatal(error),
+        Err(error) => return PairReport::failed(error),
     };
     let stages = settled.stages;
     let lease = match settled.into_lease() {
         Ok(lease) => lease,
         Err(settled) => return settled.finish(context, PairEnd::LeaseLost).await,
     };
-    match store_failure(context, lease, stage, pair, failed).await {
-        Ok(end) => PairReport {
-            end,
-            stages,
-            fatal: None,
-        },
-        Err(error) => PairReport {
-            stages,
-            ..PairReport::fatal(error)
-        },
+    PairReport {
+        end: store_failure(context, lease, stage, pair, failed).await,
+        stages,
     }
 }
 

@@ -92,27 +92,15 @@ pub(super) async fn run_with(
     let worker = catalog
         .register_worker(this_process(), fingerprint_ids, clock.now())
         .await?;
-    let prepared = async {
-        let recovered = recover(project, catalog, &mut lock, worker, clock).await?;
-        find_work(
-            project,
-            catalog,
-            fingerprints,
-            options,
-            selection.as_ref(),
-            clock,
-        )
-        .await?;
-        announce(
-            catalog,
-            options,
-            selection.as_ref(),
-            recovered,
-            &mut on_event,
-        )
-        .await
+    let start = RunStart {
+        project,
+        catalog,
+        fingerprints,
+        options,
+        selection: selection.as_ref(),
+        clock,
     };
-    if let Err(error) = prepared.await {
+    if let Err(error) = start.prepare(&mut lock, worker, &mut on_event).await {
         // This error says more than one from ending the worker would.
         let _ = catalog.end_worker(worker, clock.now()).await;
         return Err(error);
@@ -143,43 +131,60 @@ pub(super) async fn run_with(
     Ok(summary(&counts, left, status, &context))
 }
 
-/// Marks stages whose results are outdated or to be computed again, and makes pairs ready whose back-off is over.
-async fn find_work(
-    project: &Project,
-    catalog: &Catalog,
-    fingerprints: &Fingerprints,
-    options: &RunOptions,
-    selection: Option<&PairSelection>,
+/// What a run works on, before its scheduler starts.
+struct RunStart<'a> {
+    project: &'a Project,
+    catalog: &'a Catalog,
+    fingerprints: &'a Fingerprints,
+    options: &'a RunOptions,
+    selection: Option<&'a PairSelection>,
     clock: Clock,
-) -> Result<(), RunError> {
-    input_changes::store_changes(project, catalog, selection).await?;
-    catalog
-        .requeue_stale(fingerprints, selection, options.rerun)
-        .await?;
-    let longest = policy::longest_backoff_ms();
-    catalog.release_due_backoffs(clock.now(), longest).await?;
-    Ok(())
 }
 
-/// Reports how much work there is.
-async fn announce(
-    catalog: &Catalog,
-    options: &RunOptions,
-    selection: Option<&PairSelection>,
-    recovered: u64,
-    on_event: &mut (impl FnMut(RunEvent) + Send),
-) -> Result<(), RunError> {
-    let left = catalog.work_left(options.until, selection).await?;
-    on_event(RunEvent::Started {
-        pairs: left.pairs,
-        stages: left.by_stage.iter().sum(),
-        by_stage: left.by_stage,
-        workers: options.workers,
-    });
-    if recovered > 0 {
-        on_event(RunEvent::Recovered { pairs: recovered });
+impl RunStart<'_> {
+    /// Recovers pairs of dead processes, requeues pairs whose results are stale or requested again, makes pairs ready
+    /// whose back-off is over, and reports how much work there is.
+    async fn prepare(
+        &self,
+        lock: &mut RunLock,
+        worker: WorkerId,
+        on_event: &mut (impl FnMut(RunEvent) + Send),
+    ) -> Result<(), RunError> {
+        let (catalog, options) = (self.catalog, self.options);
+        let recovered = self.recover(lock, worker).await?;
+        input_changes::store_changes(self.project, catalog, self.selection).await?;
+        catalog
+            .requeue_stale(self.fingerprints, self.selection, options.rerun)
+            .await?;
+        let (now, longest) = (self.clock.now(), policy::longest_backoff_ms());
+        catalog.release_due_backoffs(now, longest).await?;
+        let left = catalog.work_left(options.until, self.selection).await?;
+        on_event(RunEvent::Started {
+            pairs: left.pairs,
+            stages: left.by_stage.iter().sum(),
+            by_stage: left.by_stage,
+            workers: options.workers,
+        });
+        if recovered > 0 {
+            on_event(RunEvent::Recovered { pairs: recovered });
+        }
+        Ok(())
     }
-    Ok(())
+
+    /// Recovers the leases of dead processes, if the lock proves that no other process works, and lets others join
+    /// then. Returns how many pairs are ready again.
+    async fn recover(&self, lock: &mut RunLock, worker: WorkerId) -> Result<u64, RunError> {
+        if !lock.is_exclusive() {
+            return Ok(0);
+        }
+        let (dead, now) = (DeadWorker::AllExcept(worker), self.clock.now());
+        let recovered = self.catalog.recover(dead, now).await?;
+        let poisoned = &recovered.poisoned;
+        input_changes::store_of_poisoned(self.project, self.catalog, poisoned).await?;
+        self.project.clear_temporary()?;
+        lock.downgrade()?;
+        Ok(recovered.ready)
+    }
 }
 
 /// Refuses settings that differ from those of the processes that work already; the first process defines them.
@@ -189,36 +194,15 @@ async fn require_same_settings(
     fingerprints: &Fingerprints,
 ) -> Result<(), RunError> {
     if lock.is_exclusive() {
-        lock.set_terms(&fingerprints.terms())?;
+        lock.set_fingerprints(&fingerprints.hash_line())?;
         return Ok(());
     }
-    let terms = lock.terms()?;
-    if terms == fingerprints.terms() {
+    let running = lock.fingerprints()?;
+    if running == fingerprints.hash_line() {
         return Ok(());
     }
-    let changes = catalog.changes_from(&terms, fingerprints).await?;
+    let changes = catalog.changes_from(&running, fingerprints).await?;
     Err(RunError::OtherSettings(changes))
-}
-
-/// Takes back the leases of dead processes, if the lock proves that no other process works, and lets others join then.
-/// Returns how many pairs are ready again.
-async fn recover(
-    project: &Project,
-    catalog: &Catalog,
-    lock: &mut RunLock,
-    worker: WorkerId,
-    clock: Clock,
-) -> Result<u64, RunError> {
-    if !lock.is_exclusive() {
-        return Ok(0);
-    }
-    let recovered = catalog
-        .recover(DeadWorker::AllExcept(worker), clock.now())
-        .await?;
-    input_changes::store_of_poisoned(project, catalog, &recovered.poisoned).await?;
-    project.clear_temporary()?;
-    lock.downgrade()?;
-    Ok(recovered.ready)
 }
 
 async fn selection(

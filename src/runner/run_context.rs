@@ -54,11 +54,10 @@ pub(super) enum PairEnd {
 /// What a pair's task reports at its end.
 #[derive(Debug)]
 pub(super) struct PairReport {
-    pub(super) end: PairEnd,
+    /// How it ended, or the error that ends the run.
+    pub(super) end: Result<PairEnd, RunError>,
     /// Number of stages that were computed and stored.
     pub(super) stages: u64,
-    /// The error that ends the run, if there was one.
-    pub(super) fatal: Option<RunError>,
 }
 
 impl RunContext {
@@ -98,11 +97,10 @@ impl RunContext {
 
 impl PairReport {
     /// A pair whose processing ended with an error of the run.
-    pub(super) const fn fatal(error: RunError) -> Self {
+    pub(super) const fn failed(error: RunError) -> Self {
         Self {
-            end: PairEnd::Released,
+            end: Err(error),
             stages: 0,
-            fatal: Some(error),
         }
     }
 }

@@ -196,13 +196,13 @@ impl Scheduler {
         self.prefetch.expect_more();
         self.counts.stages += report.stages;
         match report.end {
-            PairEnd::Done => self.counts.done += 1,
-            PairEnd::Failed => self.counts.failed += 1,
-            PairEnd::Retry | PairEnd::Released | PairEnd::LeaseLost => {}
-        }
-        if let Some(error) = report.fatal {
-            self.drain("the run cannot go on");
-            self.fatal.get_or_insert(error);
+            Ok(PairEnd::Done) => self.counts.done += 1,
+            Ok(PairEnd::Failed) => self.counts.failed += 1,
+            Ok(PairEnd::Retry | PairEnd::Released | PairEnd::LeaseLost) => {}
+            Err(error) => {
+                self.drain("the run cannot go on");
+                self.fatal.get_or_insert(error);
+            }
         }
         let is_over_limit = self
             .max_failures

@@ -47,11 +47,8 @@ impl WorkerSession {
     pub(super) async fn heartbeat(&mut self, context: &RunContext) -> HeartbeatOutcome {
         let now = context.clock.now();
         let alive_since = context.alive_since();
-        match context
-            .catalog
-            .heartbeat(self.worker, now, alive_since)
-            .await
-        {
+        let catalog = &context.catalog;
+        match catalog.heartbeat(self.worker, now, alive_since).await {
             Ok(true) => {
                 self.last_heartbeat = now;
                 HeartbeatOutcome::Alive
@@ -78,13 +75,12 @@ impl WorkerSession {
             .register_worker(this_process(), context.fingerprints, now)
             .await?;
         self.last_heartbeat = now;
-        catalog
-            .recover(DeadWorker::Workers(vec![expired]), now)
-            .await?;
+        let dead = DeadWorker::Workers(vec![expired]);
+        catalog.recover(dead, now).await?;
         Ok(())
     }
 
-    /// Takes back the leases of dead workers and leases past their deadline; returns how many pairs are ready again.
+    /// Recovers the leases of dead workers and leases past their deadline; returns how many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let holders = catalog.lease_holders().await?;
@@ -145,22 +141,15 @@ impl Liveness {
 /// Returns what the catalog records about this process.
 pub(super) fn this_process() -> WorkerInfo {
     let boot_id = std::fs::read_to_string("/proc/sys/kernel/random/boot_id").ok();
+    let host = rustix::system::uname()
+        .nodename()
+        .to_string_lossy()
+        .into_owned();
     WorkerInfo {
-        host: host_name(),
+        host,
         pid: std::process::id(),
         boot_id: boot_id.map(|id| id.trim().to_owned()),
     }
-}
-
-#[cfg(unix)]
-fn host_name() -> String {
-    let system = rustix::system::uname();
-    system.nodename().to_string_lossy().into_owned()
-}
-
-#[cfg(not(unix))]
-fn host_name() -> String {
-    std::env::var("COMPUTERNAME").unwrap_or_else(|_| "unknown".to_owned())
 }
 
 #[cfg(test)]

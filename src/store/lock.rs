@@ -99,19 +99,19 @@ impl RunLock {
         self.is_exclusive
     }
 
-    /// Writes the terms that processes which join must agree to. Only while the lock is exclusive.
+    /// Writes the fingerprints of the settings that processes which join must have. Only while the lock is exclusive.
     ///
     /// # Errors
     /// When the file cannot be written.
-    pub fn set_terms(&mut self, terms: &str) -> Result<(), LockError> {
-        replace_text(&mut self.members, terms).map_err(io(&self.path))
+    pub fn set_fingerprints(&mut self, fingerprints: &str) -> Result<(), LockError> {
+        replace_text(&mut self.members, fingerprints).map_err(io(&self.path))
     }
 
-    /// Returns the terms that the working processes have agreed to; empty if none were written.
+    /// Returns the fingerprints of the working processes' settings; empty if none were written.
     ///
     /// # Errors
     /// When the file cannot be read.
-    pub fn terms(&mut self) -> Result<String, LockError> {
+    pub fn fingerprints(&mut self) -> Result<String, LockError> {
         let mut text = String::new();
         self.members
             .seek(SeekFrom::Start(0))
@@ -224,14 +224,16 @@ mod tests {
     }
 
     #[test]
-    fn a_process_that_joins_reads_the_terms_of_the_first() {
+    fn joining_process_reads_the_fingerprints_of_the_first() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let project = Project::create(dir.path()).expect("a project");
         let mut owner = RunLock::acquire(&project, false).expect("the lock");
-        owner.set_terms("longer than the next").expect("written");
-        owner.set_terms("in mm").expect("written");
+        owner
+            .set_fingerprints("longer than the next")
+            .expect("written");
+        owner.set_fingerprints("in mm").expect("written");
         owner.downgrade().expect("a shared lock");
         let mut joined = RunLock::acquire(&project, true).expect("joined");
-        assert_eq!(joined.terms().expect("read"), "in mm");
+        assert_eq!(joined.fingerprints().expect("read"), "in mm");
     }
 }

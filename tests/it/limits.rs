@@ -127,7 +127,7 @@ fn a_stage_that_panics_fails_its_pair_and_shows_a_backtrace_only_with_verbose() 
     let failed = pairs(&project)[0].results.failure.clone();
     let failure = failed.expect("a failure").failure;
     assert_eq!(failure.class, FailureClass::Bug);
-    let expected = "the stage panicked (asked for by a test): this is a bug, please report it with the output of \
+    let expected = "the stage panicked (requested by a test): this is a bug, please report it with the output of \
         `run --rerun failed -v`";
     assert_eq!(failure.message, expected);
     for text in ["thread '", "RUST_BACKTRACE", "failpoint.rs"] {
