@@ -14,22 +14,22 @@
 //!
 //! 1. `src/manifest/csv.rs`: parses the rows of a manifest
 //! 2. `src/catalog/records/import.rs`: stores pairs and their jobs
-//! 3. `src/runner/scheduler.rs`: starts a task for each pair that `prefetch.rs` claims
-//! 4. `src/catalog/queue/claim.rs`: leases a job in one statement, with a fencing token
-//! 5. `src/runner/pair_task.rs`: follows the thread that computes the stages of one leased pair
-//! 6. `src/runner/stage_executor.rs`: calls the stages
-//! 7. `src/stages/fit/mod.rs`: plane, curvature and carved side
-//! 8. `src/stages/depth.rs`: depth map
-//! 9. `src/stages/normalize/mod.rs`: print and relief on a common scale
-//! 10. `src/stages/register/mod.rs`: pose, thresholds, scores and confidence
-//! 11. `src/runner/stage_output.rs`: encodes a stage's result as JSON, files and hashes
-//! 12. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
-//! 13. `src/store/artifacts.rs`: writes artifact files by content hash
-//! 14. `src/catalog/queue/checkpoint.rs`: records a finished stage and renews or ends the lease; called through `api.rs`
-//! 15. `src/catalog/records/pair_results.rs`: reads results back
-//! 16. `src/report/build.rs`: iterates over all pairs
-//! 17. `src/report/accumulate.rs`: sums results per metric
-//! 18. `src/report/render/table.rs`: formats the cells
+//! 3. `src/runner/scheduler.rs`: the main loop, starts a task for each leased pair
+//! 4. `src/runner/prefetch.rs`: leases pairs for free slots and a little ahead
+//! 5. `src/catalog/queue/claim.rs`: leases a job in one statement, with a fencing token; called through `api.rs`
+//! 6. `src/runner/pair_task.rs`: follows the thread of one leased pair, stores a failure
+//! 7. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
+//! 8. `src/runner/stage_executor.rs`: reads what a stage needs and calls it
+//! 9. `src/stages/pipeline.rs`: the four stages, which start in `fit/mod.rs` (plane, curvature, carved side), `depth.rs`
+//!    (depth map), `normalize/mod.rs` (print and relief on a common scale) and `register/mod.rs` (pose, thresholds, scores)
+//! 10. `src/runner/stage_output.rs`: encodes a stage's result as JSON, files and hashes
+//! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
+//! 12. `src/store/artifacts.rs`: writes artifact files by content hash
+//! 13. `src/catalog/queue/checkpoint.rs`: records a finished stage and renews or ends the lease; called through `api.rs`
+//! 14. `src/catalog/records/pair_results.rs`: reads results back
+//! 15. `src/report/build.rs`: iterates over all pairs
+//! 16. `src/report/accumulate.rs`: sums results per metric
+//! 17. `src/report/render/table.rs`: formats the cells
 //!
 //! A **lost lease** is noticed when a stage or a failure is stored. The statements in `src/catalog/queue/checkpoint.rs`
 //! and `fail.rs` update a job only if its worker and fencing token equal those of the lease. If no row was updated,
@@ -84,6 +84,11 @@
 //! Benches: `benches/accuracy` runs the stages on pairs of [`demo`] and compares them with ground truth; `benches/speed`
 //! times readers and stages by scan size; `benches/queue` times the catalog on many pairs; `benches/peers` runs other
 //! tools on the same files.
+
+#[cfg(not(unix))]
+compile_error!(
+    "mocban runs on Unix only: it needs file locks, inodes and folders that can be synced"
+);
 
 pub mod catalog;
 pub mod check;

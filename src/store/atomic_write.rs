@@ -63,15 +63,8 @@ pub(super) fn parent_folder(path: &Path) -> PathBuf {
 }
 
 /// Makes the names in a folder durable.
-#[cfg(unix)]
 pub(super) fn sync_folder(folder: &Path) -> std::io::Result<()> {
     File::open(folder)?.sync_all()
-}
-
-/// Does nothing: only Unix opens a folder as a file. NTFS journals names.
-#[cfg(not(unix))]
-pub(super) const fn sync_folder(_folder: &Path) -> std::io::Result<()> {
-    Ok(())
 }
 
 #[cfg(test)]
@@ -93,7 +86,6 @@ mod tests {
         assert_eq!(std::fs::read_dir(dir.path()).expect("listed").count(), 1);
     }
 
-    #[cfg(unix)]
     #[test]
     fn a_link_stays_a_link_and_a_device_is_written_to_directly() {
         let dir = tempfile::tempdir().expect("a temporary directory");

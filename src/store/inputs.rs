@@ -2,6 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read, Take};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 use crate::domain::{ContentHash, FailureClass};
@@ -23,18 +24,8 @@ impl FileStat {
             .ok()
             .and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok())
             .map_or(0, |since| since.as_nanos());
-        Self(format!("{}:{modified}:{}", meta.len(), inode(meta)))
+        Self(format!("{}:{modified}:{}", meta.len(), meta.ino()))
     }
-}
-
-#[cfg(unix)]
-fn inode(meta: &std::fs::Metadata) -> u64 {
-    std::os::unix::fs::MetadataExt::ino(meta)
-}
-
-#[cfg(not(unix))]
-const fn inode(_meta: &std::fs::Metadata) -> u64 {
-    0
 }
 
 /// An input file and its content.
