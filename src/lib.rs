@@ -20,8 +20,9 @@
 //! 6. `src/runner/pair_task.rs`: follows the thread of one leased pair, stores a failure
 //! 7. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
 //! 8. `src/runner/stage_executor.rs`: reads what a stage needs and calls it
-//! 9. `src/stages/pipeline.rs`: the four stages, which start in `fit/mod.rs` (plane, curvature, carved side), `depth.rs`
-//!    (depth map), `normalize/mod.rs` (print and relief on a common scale) and `register/mod.rs` (pose, thresholds, scores)
+//! 9. `src/stages/pipeline.rs`: chooses the method of each stage; the stages start in `fit/mod.rs` (plane, curvature,
+//!    carved side), `depth.rs` (depth map), `normalize/mod.rs` (print and relief on a common scale) and `register/mod.rs`
+//!    (pose, thresholds, scores, confidence)
 //! 10. `src/runner/stage_output.rs`: encodes a stage's result as JSON, files and hashes
 //! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `src/store/artifacts.rs`: writes artifact files by content hash

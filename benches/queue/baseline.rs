@@ -9,7 +9,7 @@ use mocban::mesh;
 use mocban::raster::{self, Grid};
 use mocban::runner::RunOptions;
 use mocban::stages::normalize::PrintMasks;
-use mocban::stages::{Print, Scan, Settings, pipeline};
+use mocban::stages::{Print, Scan, Settings, depth, pipeline};
 use mocban::store::{NewArtifact, Project, open_input, read_input};
 use tokio::runtime::Handle;
 use tokio::task::JoinHandle;
@@ -91,15 +91,15 @@ impl Worker {
         let print = read_input(&path, images.max_bytes, "limits.image.max_bytes")?;
         let print = Print::from(raster::decode(&print.bytes, images)?);
         let fit = pipeline::fit(&scan, Some(&print), pair.scanned_face_down, settings)?;
-        let depth = pipeline::depth(&scan, &fit, pair.unit, settings)?;
+        let depth = depth::depth(&scan, &fit, pair.unit, &settings.depth)?;
         drop(scan);
         writes.push(self.write(vec![raster::png_grey16(&depth.levels)]));
         let normalized = pipeline::normalize(&depth, &print, settings)?;
         let masks = normalized.prints.iter().map(encode);
         writes.push(self.write(masks.map(|grey| raster::png_grey8(&grey)).collect()));
         let registered = pipeline::register(&depth, &normalized, settings)?;
-        let canvases = registered.canvases.iter().map(|canvas| &canvas.depth);
-        let canvases = [&registered.canvas_print].into_iter().chain(canvases);
+        let canvases = [&registered.canvas_print].into_iter();
+        let canvases = canvases.chain(&registered.canvas_depths);
         writes.push(self.write(canvases.map(raster::png_mask).collect()));
         Ok(())
     }
