@@ -1,4 +1,4 @@
-//! How long a claim takes.
+//! Times claims.
 
 use std::time::Instant;
 
@@ -10,12 +10,12 @@ use super::world::{World, fingerprints};
 
 /// Pairs in a large claim.
 pub(super) const MANY: usize = 64;
-/// Claims that are measured.
+/// Number of claims that are measured.
 const TIMES: usize = 200;
 
-/// Times of claims of one pair and of many, each stored before it is answered. All are given back.
+/// Returns the times of claims of one pair and of [`MANY`], until each is stored and answered. All leases are released.
 pub(super) async fn times(world: &World, catalog: &Catalog) -> anyhow::Result<[String; 2]> {
-    let fake = Fake::enter(&world.project, catalog, &fingerprints(None)?).await?;
+    let fake = Fake::register(&world.project, catalog, &fingerprints(None)?).await?;
     let mut cells = [String::new(), String::new()];
     for (cell, slots) in cells.iter_mut().zip([1, MANY]) {
         let mut spread = Spread::default();

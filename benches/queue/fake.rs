@@ -1,4 +1,4 @@
-//! What a stage that computes nothing stores.
+//! Checkpoints of faked stages, which compute nothing.
 
 use mocban::catalog::{Catalog, ClaimRequest, WorkerInfo};
 use mocban::catalog::{
@@ -13,8 +13,8 @@ use mocban::runner::result_hash;
 use mocban::store::{Project, hash_input};
 use serde_json::json;
 
-/// What the manifest of the bench says that results depend on, as the catalog writes it.
-pub(super) const FACTS: &str = r#"{"scanned_face_down":null,"unit":null}"#;
+/// Manifest attributes that results depend on, in the catalog's form.
+pub(super) const ATTRIBUTES: &str = r#"{"scanned_face_down":null,"unit":null}"#;
 
 /// Faked stages with the fingerprints and inputs of a project.
 #[derive(Debug, Clone)]
@@ -26,8 +26,8 @@ pub(super) struct Fake {
 }
 
 impl Fake {
-    /// Enters a worker.
-    pub(super) async fn enter(
+    /// Registers a worker.
+    pub(super) async fn register(
         project: &Project,
         catalog: &Catalog,
         fingerprints: &Fingerprints,
@@ -41,18 +41,18 @@ impl Fake {
         Ok(Self {
             worker: catalog.register_worker(info, fingerprints, 1).await?,
             fingerprints,
-            mesh: seen(project, "mesh.stl")?,
-            print: seen(project, "print.png")?,
+            mesh: input(project, "mesh.stl")?,
+            print: input(project, "print.png")?,
         })
     }
 
-    /// Asks for so many pairs.
+    /// Requests up to `slots` pairs.
     pub(super) fn request(&self, slots: usize) -> ClaimRequest {
         ClaimRequest::new(self.worker, slots, 1_000)
     }
 
-    /// Takes a pair through the stages it has before it.
-    pub(super) async fn through(&self, catalog: &Catalog, lease: Lease) -> anyhow::Result<()> {
+    /// Stores the remaining stages of a pair, each in a commit.
+    pub(super) async fn finish(&self, catalog: &Catalog, lease: Lease) -> anyhow::Result<()> {
         let mut lease = lease;
         loop {
             let done = self.done(lease.cursor());
@@ -64,7 +64,7 @@ impl Fake {
         }
     }
 
-    /// A stage's checkpoint.
+    /// Returns the checkpoint of a stage.
     pub(super) fn done(&self, stage: Stage) -> StageCheckpoint {
         let files = ArtifactSet::new();
         let last = stage == Stage::Register;
@@ -79,18 +79,18 @@ impl Fake {
             json!({ "stage": stage })
         };
         let outcome = outcome.to_string();
-        let sees_print = stage >= Stage::Normalize;
+        let reads_print = stage >= Stage::Normalize;
         StageCheckpoint {
             stage,
             fingerprint: self.fingerprints.of(stage),
             mesh_hash: self.mesh.hash,
-            print_hash: sees_print.then_some(self.print.hash),
-            attributes: FACTS.to_owned(),
+            print_hash: reads_print.then_some(self.print.hash),
+            attributes: ATTRIBUTES.to_owned(),
             result_hash: result_hash(&outcome, &files),
             outcome,
             files,
             metrics,
-            inputs: self.seen(stage),
+            inputs: self.inputs(stage),
             ms: 1,
             at: 1,
             next_deadline: 2_000,
@@ -98,8 +98,8 @@ impl Fake {
         }
     }
 
-    /// Input files as a run tells of them: with the stage that reads them first.
-    fn seen(&self, stage: Stage) -> InputVersions {
+    /// Returns the input files that a run reports with this stage: those that it reads first.
+    fn inputs(&self, stage: Stage) -> InputVersions {
         if stage > Stage::Fit {
             return InputVersions::default();
         }
@@ -110,11 +110,11 @@ impl Fake {
     }
 }
 
-fn seen(project: &Project, name: &str) -> anyhow::Result<InputVersion> {
+fn input(project: &Project, name: &str) -> anyhow::Result<InputVersion> {
     Ok(hash_input(&project.dir().join(name))?.into())
 }
 
-/// A row for each metric, all sure of themselves.
+/// Returns a result of each metric, all with a high confidence.
 fn metrics() -> Vec<MetricResult> {
     let outcome = |metric| MetricOutcome {
         metric,

@@ -1,4 +1,4 @@
-//! Many finished pairs at once: the rows of a pair that was worked, copied to others by SQL.
+//! Creates many completed pairs by copying the rows of one pair in SQL.
 
 use std::path::Path;
 
@@ -32,10 +32,10 @@ const COUNT: &str = "
 UPDATE counter SET n = (SELECT count(*) FROM job AS j WHERE j.stage = counter.stage AND j.status = counter.status
     AND coalesce(j.fingerprint, 0) = counter.fingerprint)";
 
-/// Pairs of one transaction: the log holds each until it is folded back.
+/// Pairs per statement, so that the write-ahead log stays small.
 const CHUNK: usize = 100_000;
 
-/// Makes the pairs after one up to another as finished as the first pair is.
+/// Copies the results of the first pair to the pairs `after + 1` to `last`.
 pub(super) async fn copy(catalog: &Path, after: usize, last: usize) -> anyhow::Result<()> {
     let options = SqliteConnectOptions::new()
         .filename(catalog)

@@ -1,4 +1,4 @@
-//! The plain way to do it: one transaction a claim and one a checkpoint, row by row, over the same schema.
+//! A simple queue over the same schema, for comparison: one transaction per claim and per checkpoint, row by row.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -28,7 +28,7 @@ INSERT INTO stage_result
     (pair, stage, fingerprint, mesh_hash, print_hash, attributes, outcome, files, result_hash, ms, worker, at)
 VALUES (?1, ?2, (SELECT id FROM fingerprint WHERE stage = ?2), ?3, ?4, ?5, ?6, '{}', ?7, 1, ?8, 1)";
 const ATTEMPT: &str = "INSERT INTO attempt (pair, stage, worker, ms, at) VALUES (?1, ?2, ?3, 1, 1)";
-const SEEN: &str = "UPDATE pair SET mesh_hash = ?2, print_hash = ?3 WHERE id = ?1";
+const INPUTS: &str = "UPDATE pair SET mesh_hash = ?2, print_hash = ?3 WHERE id = ?1";
 const COUNTER: &str = "
 UPDATE counter SET n = n + ?3 WHERE stage = ?1 AND status = ?2
     AND fingerprint = coalesce((SELECT id FROM fingerprint WHERE stage = ?1 - 1), 0)";
@@ -38,7 +38,7 @@ INSERT INTO metric_result
      ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, confidence, at_bound, result_hash)
 VALUES (?1, ?2, 100, 0.3, ?3, 0.5, 1.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.75, 0, ?4)";
 
-/// Takes so many pairs through all stages, each worker with a connection of its own.
+/// Runs `pairs` pairs through all stages; each worker has its own connection.
 pub(super) async fn work(
     catalog: &Path,
     fake: &Fake,
@@ -56,7 +56,7 @@ pub(super) async fn work(
     let start = Instant::now();
     let mut tasks = tokio::task::JoinSet::new();
     for _ in 0..workers {
-        tasks.spawn(through(pool.clone(), fake.clone(), Arc::clone(&left)));
+        tasks.spawn(run_pairs(pool.clone(), fake.clone(), Arc::clone(&left)));
     }
     while let Some(ended) = tasks.join_next().await {
         ended??;
@@ -66,7 +66,7 @@ pub(super) async fn work(
     Ok(time)
 }
 
-async fn through(pool: SqlitePool, fake: Fake, left: Arc<AtomicUsize>) -> anyhow::Result<()> {
+async fn run_pairs(pool: SqlitePool, fake: Fake, left: Arc<AtomicUsize>) -> anyhow::Result<()> {
     let mut conn = pool.acquire().await?;
     let one_less = |n: usize| n.checked_sub(1);
     while left
@@ -109,8 +109,8 @@ async fn checkpoint(
     result.bind(fake.worker.0).execute(&mut *conn).await?;
     let attempt = sqlx::query(ATTEMPT).bind(pair).bind(at);
     attempt.bind(fake.worker.0).execute(&mut *conn).await?;
-    let seen = sqlx::query(SEEN).bind(pair).bind(mesh).bind(print);
-    seen.execute(&mut *conn).await?;
+    let inputs = sqlx::query(INPUTS).bind(pair).bind(mesh).bind(print);
+    inputs.execute(&mut *conn).await?;
     for metric in done.metrics {
         let row = sqlx::query(METRIC).bind(pair);
         let row = row.bind(metric.outcome.metric.name());

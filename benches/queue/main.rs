@@ -1,4 +1,5 @@
-//! What the catalog costs on many pairs: import, status, claims, checkpoints, plan, check, memory; and other queues.
+//! Times the catalog on many pairs: import, status, claims, checkpoints, plan, check and memory, compared with other
+//! queues.
 //!
 //! ```text
 //! cargo bench --bench queue
@@ -7,10 +8,10 @@
 //! cargo bench --bench queue -- --peer target/peers-queue/release/peers-queue
 //! ```
 //!
-//! Catalogs are made in the build's directory and removed again. Stages are faked: nothing is computed, and what is
-//! stored for a pair is what a run stores, with small outcomes and no artifacts. Everything else is the real thing:
-//! the writer task at `synchronous=FULL`, and the program itself as a process of its own where it says so. The tables
-//! are Markdown on the standard output. `cargo test --all-targets` runs a few pairs, to see that the program works.
+//! Catalogs are created in the target directory and removed afterwards. Stages are faked: nothing is computed, and a pair
+//! gets the rows that a run stores, with small outcomes and no artifacts. The writer task runs at `synchronous=FULL`, and
+//! tables say where the program itself is timed as a separate process. The tables are Markdown on the standard output.
+//! `cargo test --all-targets` runs a few pairs as a smoke test.
 
 mod baseline;
 mod claims;
@@ -35,7 +36,7 @@ use options::Options;
 
 fn main() -> anyhow::Result<()> {
     let options = Options::parse();
-    // As the program's own for a run.
+    // The same runtime as for `mocban run`.
     let mut runtime = tokio::runtime::Builder::new_current_thread();
     let runtime = runtime.enable_all().build()?;
     let mut tables = runtime.block_on(scale::tables(&options))?;

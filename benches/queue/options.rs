@@ -1,10 +1,10 @@
-//! What the program is asked to do.
+//! Command line options.
 
 use std::path::PathBuf;
 
 use clap::Parser;
 
-/// What the catalog costs on many pairs, as Markdown.
+/// Times the catalog on many pairs; prints Markdown.
 #[derive(Debug, Parser)]
 #[command(name = "queue")]
 pub(super) struct Options {
@@ -14,35 +14,35 @@ pub(super) struct Options {
     /// Pairs for each line of the comparison of queues [default: 2000, and 20 under `cargo test`]
     #[arg(long, value_name = "N")]
     queue_pairs: Option<usize>,
-    /// Pairs in hand at a time in the comparison of queues; the first is that of a run
+    /// Numbers of pairs in progress in the comparison of queues; the first is also used for the run of real pairs
     #[arg(long, value_delimiter = ',', default_value = "2,16,64")]
     pub(super) workers: Vec<usize>,
-    /// Times each line of the comparison is measured; the median counts
+    /// Repetitions of each line of the comparison; the median is shown
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub(super) repeats: usize,
-    /// Measure our own queue only, as for a profiler
+    /// Measure only the queue of mocban, for example under a profiler
     #[arg(long)]
     pub(super) ours: bool,
-    /// The program of benches/peers-queue, to compare with
+    /// Program of benches/peers-queue to compare with
     #[arg(long, value_name = "FILE")]
     pub(super) peer: Option<PathBuf>,
-    /// Pairs of the built-in dataset that are really run, for the catalog's share; 0 for none [default: 12, and none
+    /// Pairs of the demo that are run with real stages, for the catalog's share; 0 for none [default: 12, and none
     /// under `cargo test`]
     #[arg(long, value_name = "N")]
     real: Option<u64>,
-    /// Import and ask only: no pair is run
+    /// Only import and query: run no pair
     #[arg(long)]
     pub(super) import_only: bool,
-    /// Pairs of the largest catalog that is checked: a check reads all of it several times
+    /// Largest catalog that is checked, because a check reads all rows several times
     #[arg(long, value_name = "N", default_value_t = 1_000_000)]
     pub(super) check_up_to: usize,
-    /// Given by `cargo bench`
+    /// Set by `cargo bench`
     #[arg(long, hide = true)]
     bench: bool,
 }
 
 impl Options {
-    /// Sizes of catalogs.
+    /// Returns the sizes of catalogs in pairs.
     pub(super) fn sizes(&self) -> Vec<usize> {
         match (self.pairs.as_slice(), self.bench) {
             ([], true) => vec![100_000],
@@ -51,13 +51,13 @@ impl Options {
         }
     }
 
-    /// Pairs of a line of the comparison.
+    /// Returns the pairs for each line of the comparison.
     pub(super) fn queue_pairs(&self) -> usize {
         self.queue_pairs
             .unwrap_or(if self.bench { 2_000 } else { 20 })
     }
 
-    /// Pairs that are really run.
+    /// Returns the number of pairs to run with real stages.
     pub(super) fn real_pairs(&self) -> Option<u64> {
         let pairs = self.real.unwrap_or(if self.bench { 12 } else { 0 });
         (pairs > 0).then_some(pairs)

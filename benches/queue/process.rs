@@ -1,4 +1,4 @@
-//! The program as a process of its own: how long it takes and how much memory it needs.
+//! Runs the program as a separate process and measures its time and memory.
 
 use std::collections::BTreeMap;
 use std::ffi::{OsStr, OsString};
@@ -9,27 +9,27 @@ use std::time::{Duration, Instant};
 use anyhow::Context as _;
 use rustix::time::{ClockId, clock_gettime};
 
-/// Between two looks at a process's memory.
-const LOOK_EVERY: Duration = Duration::from_millis(2);
+/// Interval between samples of the memory of a process.
+const SAMPLE_EVERY: Duration = Duration::from_millis(2);
 
-/// What a process needed.
+/// Time, memory and output of a process.
 #[derive(Debug, Clone)]
-pub(super) struct Needed {
+pub(super) struct ProcessUsage {
     /// From start to end.
     pub(super) time: Duration,
-    /// Most memory it held at a time, MiB.
+    /// Peak memory in MiB.
     pub(super) mib: f64,
-    /// What it wrote to its standard output.
+    /// Its standard output.
     pub(super) stdout: String,
 }
 
 /// Runs the program itself.
-pub(super) fn mocban<A: AsRef<OsStr>>(args: &[A]) -> anyhow::Result<Needed> {
+pub(super) fn mocban<A: AsRef<OsStr>>(args: &[A]) -> anyhow::Result<ProcessUsage> {
     run(Command::new(env!("CARGO_BIN_EXE_mocban")).args(args))
 }
 
-/// Runs a command that must go well.
-pub(super) fn run(command: &mut Command) -> anyhow::Result<Needed> {
+/// Runs a command that must succeed.
+pub(super) fn run(command: &mut Command) -> anyhow::Result<ProcessUsage> {
     let start = Instant::now();
     let mut child = command
         .stdin(Stdio::null())
@@ -37,7 +37,7 @@ pub(super) fn run(command: &mut Command) -> anyhow::Result<Needed> {
         .stderr(Stdio::null())
         .spawn()
         .with_context(|| format!("cannot start {command:?}"))?;
-    let mut stdout = child.stdout.take().context("a pipe that was asked for")?;
+    let mut stdout = child.stdout.take().context("no pipe")?;
     let reader = std::thread::spawn(move || {
         let mut text = String::new();
         stdout.read_to_string(&mut text).map(|_| text)
@@ -49,15 +49,15 @@ pub(super) fn run(command: &mut Command) -> anyhow::Result<Needed> {
         if let Some(status) = child.try_wait()? {
             break status;
         }
-        std::thread::sleep(LOOK_EVERY);
+        std::thread::sleep(SAMPLE_EVERY);
     };
     let time = start.elapsed();
     anyhow::ensure!(status.success(), "{command:?} ended with {status}");
     let stdout = reader.join().ok().context("lost a pipe")??;
-    Ok(Needed { time, mib, stdout })
+    Ok(ProcessUsage { time, mib, stdout })
 }
 
-/// Most memory that a process ever held, MiB; `self` is this one.
+/// Returns the peak memory of a process in MiB; `self` is this process.
 pub(super) fn peak_mib(process: &str) -> Option<f64> {
     let text = std::fs::read_to_string(format!("/proc/{process}/status")).ok()?;
     let line = text.lines().find(|line| line.starts_with("VmHWM:"))?;
@@ -65,24 +65,24 @@ pub(super) fn peak_mib(process: &str) -> Option<f64> {
     Some(kib / 1024.0)
 }
 
-/// Begins this process's own peak anew.
-pub(super) fn forget_peak() {
-    // Where that is refused the peak is that of the whole life, which is no less.
+/// Resets the peak memory of this process.
+pub(super) fn reset_peak() {
+    // Where this is not permitted, the peak covers the whole life of the process.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 
-/// Time that this process has had of all cores, its threads that have ended included.
-pub(super) fn time_of_cores() -> Duration {
+/// Returns the CPU time of this process, ended threads included.
+pub(super) fn cpu_time() -> Duration {
     let now = clock_gettime(ClockId::ProcessCPUTime);
     Duration::new(now.tv_sec as u64, now.tv_nsec as u32)
 }
 
-/// Nanoseconds that each thread of this process has had of a core, by its number; of those that live.
-pub(super) fn time_of_threads() -> anyhow::Result<BTreeMap<OsString, u64>> {
+/// Returns the CPU time of each living thread of this process in nanoseconds, by thread id.
+pub(super) fn thread_cpu_times() -> anyhow::Result<BTreeMap<OsString, u64>> {
     let mut times = BTreeMap::new();
     for entry in std::fs::read_dir("/proc/self/task")? {
         let entry = entry?;
-        // It may have ended meanwhile.
+        // The thread may have ended meanwhile.
         let Ok(text) = std::fs::read_to_string(entry.path().join("schedstat")) else {
             continue;
         };

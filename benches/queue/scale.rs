@@ -1,4 +1,4 @@
-//! One catalog after another, each larger: does the cost of a question grow with the pairs?
+//! Measures how the cost of queries grows with the number of pairs.
 
 use std::io::Write as _;
 
@@ -8,41 +8,41 @@ use super::claims::{self, MANY};
 use super::fill;
 use super::markdown::{Table, number};
 use super::options::Options;
-use super::process::{self, Needed};
+use super::process::{self, ProcessUsage};
 use super::spread::Spread;
 use super::world::{World, fingerprints, work};
 
-/// Pairs that are left to do where most are done.
+/// Pairs that are left when most are done.
 const LEFT: usize = 1_000;
-/// Pairs that are worked; the others of a large catalog get copies of their rows.
+/// Pairs that pass through the writer; the others of a large catalog get copies of their rows.
 const WORKED: usize = 20_000;
-/// Pairs in hand while a catalog is filled.
-const IN_HAND: usize = 128;
+/// Pairs in progress while a catalog is filled.
+const IN_PROGRESS: usize = 128;
 /// A setting of the last stage that is not the default.
 const OTHER: &str = "register.smoothing_px=1.3";
 
 const IMPORT_NOTE: &str = "\
-The whole process, from the list's first byte to the closed catalog. MiB: the most memory the process held.";
+The whole process, from reading the list to the closed catalog. MiB: peak memory of the process.";
 const FILL_NOTE: &str = "\
-A pair: one claim and four checkpoints with four metrics, through the writer at synchronous=FULL, 128 pairs in hand, for \
-at most 20,000 pairs in the catalog of that size; the others are filled with copies. MiB: the most memory held \
-meanwhile; the catalog's size is that in the end.";
+A pair is one claim and four checkpoints with four metrics, through the writer at synchronous=FULL, with 128 pairs in \
+progress. At most 20,000 pairs are run in a catalog of the given size; the others get copies of their rows. MiB: peak \
+memory meanwhile; the catalog's size is measured at the end.";
 const CLAIM_NOTE: &str = "\
 Milliseconds until a claim is stored and answered, median / 95th percentile of 200.";
 const ASK_NOTE: &str = "\
-Milliseconds, median / 95th percentile. Library: the question alone, over an open catalog. Process: the program from \
-start to end; `run --dry-run` looks at every input file too. MiB: the most memory the process held. Changed: a setting \
-of the last stage is not what it was.";
+Milliseconds, median / 95th percentile. Library: the query alone, on an open catalog. Process: the program from start to \
+end; `run --dry-run` also compares every input file. MiB: peak memory of the process. Changed: a setting of the last \
+stage differs from the stored results.";
 
 /// The tables, in the order they are printed.
 struct Tables {
     import: Table,
     fill: Table,
     claims: Table,
-    asked: Table,
+    queries: Table,
 }
 
-/// What is measured on catalogs of these sizes.
+/// Measures catalogs of the configured sizes; returns the tables as text.
 pub(super) async fn tables(options: &Options) -> anyhow::Result<Vec<String>> {
     let mut tables = Tables::new();
     for pairs in options.sizes() {
@@ -52,20 +52,20 @@ pub(super) async fn tables(options: &Options) -> anyhow::Result<Vec<String>> {
         tables.import.render(IMPORT_NOTE),
         tables.fill.render(FILL_NOTE),
         tables.claims.render(CLAIM_NOTE),
-        tables.asked.render(ASK_NOTE),
+        tables.queries.render(ASK_NOTE),
     ])
 }
 
 impl Tables {
     fn new() -> Self {
-        let asked = ["pairs", "state", "what", "library", "process", "MiB"];
+        let queries = ["pairs", "state", "what", "library", "process", "MiB"];
         let claims = ["pairs", "state", "one pair", "64 pairs"];
         let fill = ["pairs", "pairs/s", "jobs/s", "MiB", "catalog, MiB"];
         Self {
             import: Table::new("Import", &["pairs", "seconds", "rows/s", "MiB"]),
             fill: Table::new("Run with stages that compute nothing", &fill),
             claims: Table::new("Claim", &claims),
-            asked: Table::new("Questions", &asked),
+            queries: Table::new("Queries", &queries),
         }
     }
 }
@@ -82,9 +82,9 @@ async fn size(options: &Options, pairs: usize, tables: &mut Tables) -> anyhow::R
         return Ok(());
     }
     let to_do = pairs - LEFT.min(pairs / 3);
-    process::forget_peak();
+    process::reset_peak();
     let worked = to_do.min(WORKED);
-    let time = work(&world, &catalog, worked, IN_HAND).await?;
+    let time = work(&world, &catalog, worked, IN_PROGRESS).await?;
     let rate = worked as f64 / time.as_secs_f64();
     let peak = process::peak_mib("self").unwrap_or(0.0);
     catalog.close().await;
@@ -93,13 +93,13 @@ async fn size(options: &Options, pairs: usize, tables: &mut Tables) -> anyhow::R
     let size = world.bytes()? as f64 / 1_048_576.0;
     let numbers = [(rate, 0), (rate * 4.0, 0), (peak, 0), (size, 0)];
     push(&mut tables.fill, row(pairs, &numbers));
-    at(options, &world, &catalog, pairs, "done but few", tables).await?;
+    at(options, &world, &catalog, pairs, "mostly done", tables).await?;
     changed(&world, &catalog, pairs, tables).await?;
     catalog.close().await;
     Ok(())
 }
 
-/// Adds a row to a table, and tells it at once: large catalogs take long, and may be stopped.
+/// Adds a row to a table, and prints it at once, because large catalogs take long and the bench may be interrupted.
 fn push(table: &mut Table, cells: Vec<String>) {
     let _ = writeln!(std::io::stderr(), "{}", cells.join(" | "));
     table.push(cells);
@@ -111,7 +111,7 @@ fn row(pairs: usize, numbers: &[(f64, usize)]) -> Vec<String> {
     [pairs.to_string()].into_iter().chain(cells).collect()
 }
 
-/// Claims and questions in one state of the catalog.
+/// Measures claims and queries in one state of the catalog.
 async fn at(
     options: &Options,
     world: &World,
@@ -128,19 +128,19 @@ async fn at(
     let now = fingerprints(None)?;
     let mut asked = |what: &str, (library, process): (Spread, (Spread, f64))| {
         let cells = line(pairs, state, what, library, process);
-        push(&mut tables.asked, cells);
+        push(&mut tables.queries, cells);
     };
     asked("status", status(world, catalog, &now, &["status"]).await?);
     let plan = plan(world, catalog, &now, &["run", "--dry-run"]).await?;
     asked("run --dry-run", plan);
     if pairs <= options.check_up_to {
-        let check = ask(world, &["check", "--quick"], 1)?;
+        let check = time_command(world, &["check", "--quick"], 1)?;
         asked("check --quick", (Spread::default(), check));
     }
     Ok(())
 }
 
-/// Questions after a change of settings, when every pair that is done is stale.
+/// Measures queries after a change of settings, when every completed pair is stale.
 async fn changed(
     world: &World,
     catalog: &Catalog,
@@ -150,11 +150,11 @@ async fn changed(
     let now = fingerprints(Some(OTHER))?;
     let (library, process) = status(world, catalog, &now, &["--set", OTHER, "status"]).await?;
     let asked = line(pairs, "changed", "status", library, process);
-    push(&mut tables.asked, asked);
+    push(&mut tables.queries, asked);
     let args = ["--set", OTHER, "run", "--dry-run"];
     let (library, process) = plan(world, catalog, &now, &args).await?;
     let asked = line(pairs, "changed", "run --dry-run", library, process);
-    push(&mut tables.asked, asked);
+    push(&mut tables.queries, asked);
     Ok(())
 }
 
@@ -177,7 +177,7 @@ async fn status(
     args: &[&str],
 ) -> anyhow::Result<(Spread, (Spread, f64))> {
     let library = Spread::of(20, async || catalog.status(now).await).await?;
-    Ok((library, ask(world, args, 10)?))
+    Ok((library, time_command(world, args, 10)?))
 }
 
 async fn plan(
@@ -187,16 +187,16 @@ async fn plan(
     args: &[&str],
 ) -> anyhow::Result<(Spread, (Spread, f64))> {
     let plan = async || catalog.plan(now, None, RerunPolicy::Changed).await;
-    Ok((Spread::of(3, plan).await?, ask(world, args, 1)?))
+    Ok((Spread::of(3, plan).await?, time_command(world, args, 1)?))
 }
 
-/// Times and memory of the program when it is asked.
-fn ask(world: &World, args: &[&str], times: usize) -> anyhow::Result<(Spread, f64)> {
+/// Returns times and peak memory of the program for a command.
+fn time_command(world: &World, args: &[&str], times: usize) -> anyhow::Result<(Spread, f64)> {
     let (mut spread, mut mib) = (Spread::default(), 0.0_f64);
     for _ in 0..times {
-        let Needed {
+        let ProcessUsage {
             time, mib: held, ..
-        } = world.ask(args)?;
+        } = world.run(args)?;
         spread.add(time);
         mib = mib.max(held);
     }

@@ -1,4 +1,4 @@
-//! What catalog and artifacts cost beside the stages, on the built-in dataset.
+//! Measures what catalog and artifacts cost in addition to the stages, on the demo.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -19,23 +19,22 @@ use super::process;
 use super::spread::Spread;
 
 const NOTE: &str = "\
-Medians. Run: pairs of `demo` by the library in this process, from the open catalog to the summary. Without: the same \
-stages of the same pairs on as many threads, with the same artifacts, and nothing noted of them; in turns with the run. \
-Cores: time of all cores that the process took. Beside stages: the part of both in which no thread computes a stage, \
-start and end included; of cores, what threads took that compute none: they write files, and in a run keep the catalog \
-and the queue. Differences are medians of those of each round. That of the whole has in it how much the machine changed \
-between the two; that beside stages has not. Artifacts: the files of the run stored anew one after another by one \
-thread, each synced; a part of both.";
+Medians. Run: pairs of `demo` in this process, from the open catalog to the summary. Without: the same stages of the \
+same pairs on as many threads with the same artifacts, but no catalog; the two alternate. Cores: CPU time of all threads. \
+Beside stages: the time in which no thread computes a stage, start and end included, and the CPU time of threads that \
+compute no stage: they write files and, in a run, work for catalog and queue. Differences are medians of the differences \
+of each round; only the difference of the whole includes changes of the machine's speed between the two. Artifacts: the \
+files of the run, written again one after another by one thread, each synced; both include them.";
 
-/// What a run took, in milliseconds; of the whole time and of all cores together.
+/// Milliseconds of a run: wall-clock time and CPU time.
 #[derive(Debug, Clone, Copy)]
-struct Took {
+struct RunTimes {
     whole: [f64; 2],
-    /// When no thread computed a stage; by threads that compute none.
+    /// While no thread computed a stage; by threads that compute no stage.
     beside: [f64; 2],
 }
 
-/// What is measured over the rounds: of the time that passed, and of all cores.
+/// Measurements over the rounds: wall-clock time and CPU time.
 #[derive(Debug, Default)]
 struct Measured([Spread; 2]);
 
@@ -51,11 +50,11 @@ impl Measured {
     }
 }
 
-/// Milliseconds a pair with a catalog and without one.
+/// Returns a table of milliseconds per pair with and without a catalog.
 pub(super) async fn table(options: &Options, pairs: u64) -> anyhow::Result<String> {
     let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
     let fresh = dir.path().join("fresh");
-    let path = fresh.to_str().context("a path that is text")?;
+    let path = fresh.to_str().context("a path in UTF-8")?;
     let number_of = pairs.to_string();
     process::mocban(&["demo", path, "--pairs", &number_of, "--no-run"])?;
     let workers = options.workers.first().copied().unwrap_or(2).max(1);
@@ -114,7 +113,7 @@ pub(super) async fn table(options: &Options, pairs: u64) -> anyhow::Result<Strin
     Ok(table.render(NOTE))
 }
 
-/// Rows of the table but for the last.
+/// Rows of the table except the last.
 const PARTS: [&str; 6] = [
     "run",
     "without a catalog",
@@ -124,8 +123,8 @@ const PARTS: [&str; 6] = [
     "difference beside stages",
 ];
 
-/// What every run of this program is asked to do.
-fn asked(workers: usize) -> anyhow::Result<(Settings, RunOptions)> {
+/// Returns settings and options of all runs.
+fn run_options(workers: usize) -> anyhow::Result<(Settings, RunOptions)> {
     let loaded = load(&Sources::default())?;
     let options = RunOptions {
         workers,
@@ -136,21 +135,21 @@ fn asked(workers: usize) -> anyhow::Result<(Settings, RunOptions)> {
 }
 
 /// Runs the project.
-async fn with_catalog(project: &Project, workers: usize) -> anyhow::Result<Took> {
-    let (settings, options) = asked(workers)?;
+async fn with_catalog(project: &Project, workers: usize) -> anyhow::Result<RunTimes> {
+    let (settings, options) = run_options(workers)?;
     let catalog = Catalog::open(&project.catalog_path()).await?;
     let watch = Watch::start()?;
     let stop = Stop::new();
     let summary = runner::run(project, &catalog, &settings, &options, &stop, |_| {}).await?;
-    let took = watch.stop(summary.compute_time / workers as u32)?;
+    let times = watch.stop(summary.compute_time / workers as u32)?;
     catalog.close().await;
     anyhow::ensure!(summary.left == 0, "{} pairs left", summary.left);
-    Ok(took)
+    Ok(times)
 }
 
-/// Computes the same and files it.
-async fn without(project: &Project, workers: usize) -> anyhow::Result<Took> {
-    let (settings, options) = asked(workers)?;
+/// Computes the same stages without a catalog.
+async fn without(project: &Project, workers: usize) -> anyhow::Result<RunTimes> {
+    let (settings, options) = run_options(workers)?;
     let catalog = Catalog::open_read_only(&project.catalog_path()).await?;
     let mut pages = catalog.result_pages(1000);
     let mut pairs = Vec::new();
@@ -163,7 +162,7 @@ async fn without(project: &Project, workers: usize) -> anyhow::Result<Took> {
     watch.stop(compute_time / workers as u32)
 }
 
-/// Measures what passes from its start.
+/// A stopwatch for wall-clock and CPU time.
 struct Watch {
     start: Instant,
     cores: Duration,
@@ -173,27 +172,27 @@ struct Watch {
 impl Watch {
     fn start() -> anyhow::Result<Self> {
         Ok(Self {
-            threads: process::time_of_threads()?,
-            cores: process::time_of_cores(),
+            threads: process::thread_cpu_times()?,
+            cores: process::cpu_time(),
             start: Instant::now(),
         })
     }
 
-    /// When all threads that computed stages have ended, which they did for so long in each slot.
-    fn stop(self, at_work: Duration) -> anyhow::Result<Took> {
-        let (wall, cores) = (self.start.elapsed(), process::time_of_cores());
-        let threads = process::time_of_threads()?.into_iter();
+    /// Stops when all compute threads have ended; `compute_time` is the time that each slot computed stages.
+    fn stop(self, compute_time: Duration) -> anyhow::Result<RunTimes> {
+        let (wall, cores) = (self.start.elapsed(), process::cpu_time());
+        let threads = process::thread_cpu_times()?.into_iter();
         let since = |(thread, time)| time - self.threads.get(&thread).copied().unwrap_or(0);
         let beside: u64 = threads.map(since).sum();
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
-        Ok(Took {
+        Ok(RunTimes {
             whole: [ms(wall), ms(cores.saturating_sub(self.cores))],
-            beside: [ms(wall) - ms(at_work), beside as f64 / 1e6],
+            beside: [ms(wall) - ms(compute_time), beside as f64 / 1e6],
         })
     }
 }
 
-/// Copies a folder with all that is in it.
+/// Copies a folder with its content.
 fn copy(from: &Path, to: &Path) -> anyhow::Result<()> {
     for path in files(from)? {
         let to = to.join(path.strip_prefix(from)?);
@@ -203,7 +202,7 @@ fn copy(from: &Path, to: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Time to store all artifacts of a project in another one.
+/// Returns the time to write all artifacts of a project to another one.
 fn artifacts_part(project: &Project) -> anyhow::Result<Duration> {
     let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
     let other = Project::create(dir.path())?;

@@ -1,4 +1,4 @@
-//! Times of something done many times.
+//! The distribution of measured times.
 
 use std::time::{Duration, Instant};
 
@@ -11,7 +11,7 @@ use super::markdown::two;
 pub(super) struct Spread(Vec<f64>);
 
 impl Spread {
-    /// Times of something done so often.
+    /// Times `what` repeatedly.
     pub(super) async fn of<T, E: Into<anyhow::Error>>(
         times: usize,
         mut what: impl AsyncFnMut() -> Result<T, E>,
@@ -25,7 +25,7 @@ impl Spread {
         Ok(spread)
     }
 
-    /// Adds the time since.
+    /// Adds the time since `start`.
     pub(super) fn since(&mut self, start: Instant) {
         self.add(start.elapsed());
     }
@@ -35,17 +35,17 @@ impl Spread {
         self.push(time.as_secs_f64() * 1e3);
     }
 
-    /// Adds milliseconds, which may be fewer than none where they are a difference.
+    /// Adds milliseconds, which may be negative if they are a difference.
     pub(super) fn push(&mut self, ms: f64) {
         self.0.push(ms);
     }
 
-    /// The middle one.
+    /// Returns the median.
     pub(super) fn median(&mut self) -> Option<f64> {
         quantile(&mut self.0, 0.5)
     }
 
-    /// `median / 95th percentile`.
+    /// Formats `median / 95th percentile`.
     pub(super) fn cell(&mut self) -> String {
         two([0.5, 0.95].map(|share| quantile(&mut self.0, share)), 2)
     }

@@ -1,4 +1,4 @@
-//! A project with many pairs, made by `import` and removed in the end.
+//! A temporary project with many pairs, created by `import`.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -12,17 +12,17 @@ use mocban::runner;
 use mocban::store::Project;
 
 use super::fake::Fake;
-use super::process::{self, Needed};
+use super::process::{self, ProcessUsage};
 
-/// A project in a directory of its own. All its pairs have the same two small files.
+/// A project in a temporary directory. All its pairs share the same two small files.
 pub(super) struct World {
     pub(super) project: Project,
     dir: tempfile::TempDir,
 }
 
 impl World {
-    /// Writes a list of pairs and imports it by the program; also says what that needed.
-    pub(super) fn import(pairs: usize) -> anyhow::Result<(Self, Needed)> {
+    /// Writes a list of pairs and imports it with the program; also returns what the process needed.
+    pub(super) fn import(pairs: usize) -> anyhow::Result<(Self, ProcessUsage)> {
         let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
         let path = dir.path();
         std::fs::write(path.join("mesh.stl"), "a mesh that nobody reads")?;
@@ -41,17 +41,17 @@ impl World {
     }
 
     /// Runs the program on the project.
-    pub(super) fn ask(&self, args: &[&str]) -> anyhow::Result<Needed> {
-        let dir = self.dir.path().to_str().context("a path that is text")?;
+    pub(super) fn run(&self, args: &[&str]) -> anyhow::Result<ProcessUsage> {
+        let dir = self.dir.path().to_str().context("a path in UTF-8")?;
         process::mocban(&[&["-C", dir], args].concat())
     }
 
-    /// The catalog, open to write.
+    /// Opens the catalog.
     pub(super) async fn catalog(&self) -> anyhow::Result<Catalog> {
         Ok(Catalog::open(&self.project.catalog_path()).await?)
     }
 
-    /// Bytes of the catalog.
+    /// Returns the size of the catalog in bytes.
     pub(super) fn bytes(&self) -> anyhow::Result<u64> {
         Ok(std::fs::metadata(self.project.catalog_path())?.len())
     }
@@ -66,7 +66,7 @@ fn write_list(path: &Path, pairs: usize) -> anyhow::Result<()> {
     Ok(file.flush()?)
 }
 
-/// The fingerprints of the settings that the program runs with, and one other setting of the last stage where asked for.
+/// Returns the fingerprints of the default settings, optionally with one changed setting.
 pub(super) fn fingerprints(set: Option<&str>) -> anyhow::Result<Fingerprints> {
     let loaded = load(&Sources {
         sets: set.into_iter().map(str::to_owned).collect(),
@@ -75,26 +75,26 @@ pub(super) fn fingerprints(set: Option<&str>) -> anyhow::Result<Fingerprints> {
     Ok(runner::fingerprints(&loaded.config.stages))
 }
 
-/// Takes so many pairs through all stages, with so many in hand at a time; asks as a run does, for all free slots.
+/// Runs `pairs` pairs through all stages, `in_progress` at a time; claims for all free slots at once, as a run does.
 pub(super) async fn work(
     world: &World,
     catalog: &Catalog,
     pairs: usize,
-    in_hand: usize,
+    in_progress: usize,
 ) -> anyhow::Result<Duration> {
-    let fake = Arc::new(Fake::enter(&world.project, catalog, &fingerprints(None)?).await?);
+    let fake = Arc::new(Fake::register(&world.project, catalog, &fingerprints(None)?).await?);
     let start = Instant::now();
     let mut left = pairs;
     let mut tasks = tokio::task::JoinSet::new();
     while left > 0 || !tasks.is_empty() {
-        let slots = left.min(in_hand - tasks.len());
+        let slots = left.min(in_progress - tasks.len());
         if slots > 0 {
             let leases = catalog.claim(fake.request(slots)).await?;
             anyhow::ensure!(leases.len() == slots, "{} pairs ready", leases.len());
             left -= slots;
             for lease in leases {
                 let (fake, catalog) = (Arc::clone(&fake), catalog.clone());
-                tasks.spawn(async move { fake.through(&catalog, lease).await });
+                tasks.spawn(async move { fake.finish(&catalog, lease).await });
             }
         }
         let mut ended = tasks.join_next().await;

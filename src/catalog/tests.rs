@@ -1,4 +1,4 @@
-//! The protocol, statement by statement, on a real database file.
+//! Tests of the catalog on real database files.
 
 mod answers;
 mod guards;
@@ -30,12 +30,12 @@ use crate::domain::{
 };
 
 impl Catalog {
-    /// A new catalog whose writer never commits deferrable requests by itself.
+    /// Creates a catalog whose writer delays deferrable requests indefinitely.
     pub(crate) async fn create_patient(path: &Path) -> super::Result<Self> {
         Self::with_writer(path, true, CommitDelay::of(Duration::from_hours(1))).await
     }
 
-    /// Keeps the writer busy from now on, until the sender is used or dropped.
+    /// Keeps the writer busy until the sender is used or dropped.
     pub(crate) async fn hold(&self) -> oneshot::Sender<()> {
         let (held, is_held) = oneshot::channel();
         let (release, released) = oneshot::channel();
@@ -43,20 +43,20 @@ impl Catalog {
         tokio::spawn(async move {
             let wait = catalog.in_transaction(move |_| {
                 Box::pin(async move {
-                    held.send(()).expect("somebody waits");
-                    // Dropped or used: both let go.
+                    held.send(()).expect("a receiver");
+                    // A dropped sender releases the writer too.
                     let _ = released.await;
                     Ok(())
                 })
             });
             wait.await.expect("an empty transaction");
         });
-        is_held.await.expect("the writer is at work");
+        is_held.await.expect("a busy writer");
         release
     }
 }
 
-/// A catalog in a directory of its own.
+/// A catalog in a temporary directory.
 struct World {
     catalog: Catalog,
     fingerprints: FingerprintIds,
@@ -117,8 +117,8 @@ impl World {
         self.catalog.claim(request).await.expect("a claim")
     }
 
-    /// One pair that must run by itself.
-    async fn claim_alone(&self, worker: WorkerId) -> Vec<Lease> {
+    /// Claims one pair that must run exclusively.
+    async fn claim_exclusive(&self, worker: WorkerId) -> Vec<Lease> {
         let request = ClaimRequest {
             exclusive: true,
             ..ClaimRequest::new(worker, 1, 1_000)
@@ -126,7 +126,7 @@ impl World {
         self.catalog.claim(request).await.expect("a claim")
     }
 
-    /// Registers another worker that treats all others as dead; `n` pairs must come back from them.
+    /// Registers another worker that considers all others dead, and asserts how many pairs it recovers.
     async fn recovered_by_another(&self, pairs: u64) -> WorkerId {
         let other = register(&self.catalog).await;
         let recovered = self.catalog.recover(DeadWorker::AllExcept(other), 60).await;
@@ -146,21 +146,21 @@ impl World {
             match self.catalog.checkpoint(lease, self.done(stage)).await {
                 Ok(CheckpointOutcome::Lease(next)) => lease = next,
                 Ok(CheckpointOutcome::Done) => return,
-                other => panic!("the checkpoint was not kept: {other:?}"),
+                other => panic!("the checkpoint was not stored: {other:?}"),
             }
         }
     }
 
-    async fn counters_hold(&self) {
+    async fn assert_counters(&self) {
         let kept = self.catalog.counters().await.expect("counters");
         assert_eq!(kept, self.catalog.recount().await.expect("a recount"));
-        self.shortcuts_hold().await;
+        self.assert_plans_agree().await;
     }
 }
 
 impl World {
-    /// The plan of all pairs equals the sum of the plans of each pair, with the current and with other settings.
-    async fn shortcuts_hold(&self) {
+    /// Asserts that the plan from counters equals the plan of inspected pairs, with current and with other settings.
+    async fn assert_plans_agree(&self) {
         let names = self.catalog.pair_names().await.expect("names");
         for revision in [[1; 4], [1, 1, 2, 1]] {
             let fingerprints = fingerprints(revision);
@@ -181,7 +181,7 @@ impl World {
         }
     }
 
-    /// Looks at every result of every pair.
+    /// Counts stale pairs by inspecting every result.
     async fn count_stale(&self, fingerprints: &Fingerprints) -> u64 {
         let mut conn = self.catalog.read_conn().await.expect("a reader");
         let current = super::queue::fingerprint::current_json(&mut conn, fingerprints).await;
@@ -204,7 +204,7 @@ async fn register(catalog: &Catalog) -> WorkerId {
     enter(catalog, fingerprints.expect("fingerprints"), 1).await
 }
 
-/// Enters a worker whose clock shows this.
+/// Registers a worker at a time of its clock.
 async fn enter(catalog: &Catalog, fingerprints: FingerprintIds, clock: UnixMillis) -> WorkerId {
     let info = WorkerInfo {
         host: "here".to_owned(),
@@ -251,7 +251,7 @@ fn done(fingerprints: FingerprintIds, stage: Stage) -> StageCheckpoint {
 fn inputs(stage: Stage) -> InputVersions {
     let seen = |text: &str| InputVersion {
         hash: ContentHash::of(text.as_bytes()),
-        stat: format!("{text} as it was"),
+        stat: format!("{text} stat"),
     };
     InputVersions {
         mesh: Some(seen("mesh")),

@@ -1,4 +1,4 @@
-//! Answers of the review page: bound to what was shown, stored once, taken back by number, checks apart.
+//! Answers of the review page: bound to what was shown, stored once, undone by event id, attention checks kept apart.
 
 use super::{World, name};
 use crate::catalog::db::open;
@@ -29,7 +29,7 @@ fn given(event: &str, verdict: Verdict) -> NewVerdict {
     }
 }
 
-/// Two metrics that came to the same.
+/// Two metrics with equal results.
 fn two() -> Shown {
     let of = |metric: ThresholdMetric| (metric, ContentHash::of(metric.name().as_bytes()));
     Shown::Results(vec![
@@ -79,7 +79,7 @@ async fn an_answer_sent_again_is_stored_once() {
 }
 
 #[tokio::test]
-async fn answers_to_controls_are_no_verdicts() {
+async fn answers_to_attention_checks_are_not_verdicts() {
     let world = World::new(1).await;
     world.finish_one().await;
     for event in ["c1", "c1"] {
@@ -110,7 +110,7 @@ async fn answers_to_controls_are_no_verdicts() {
 }
 
 #[tokio::test]
-async fn answers_are_taken_back_by_number_and_by_their_reviewer_only() {
+async fn only_the_reviewer_can_undo_an_answer_by_its_event() {
     let world = World::new(1).await;
     world.finish_one().await;
     let answer = async |event: &str, verdict, shown, at| {
@@ -129,7 +129,7 @@ async fn answers_are_taken_back_by_number_and_by_their_reviewer_only() {
     assert!(matches!(other, Err(CatalogError::NothingToUndo(_))));
     for event in ["e2", "e2", "c1"] {
         let taken = world.catalog.undo_event(event, "ana", 8).await;
-        taken.expect("taken back");
+        taken.expect("undone");
     }
     assert_eq!(left().await, ["e1", "e1"]);
     assert_eq!(counted(&world.catalog).await[1], [Verdict::Pass]);
@@ -168,7 +168,7 @@ async fn a_verdict_from_the_command_line_is_among_the_answers() {
     assert_eq!((answers[0].event.as_str(), answers[0].at), ("act-1", 3));
     assert!(matches!(answers[0].on, AnsweredOn::Result(_)));
     let taken = world.catalog.undo_event("act-1", "ana", 10).await;
-    taken.expect("taken back");
+    taken.expect("undone");
     assert!(
         world
             .catalog
@@ -180,7 +180,7 @@ async fn a_verdict_from_the_command_line_is_among_the_answers() {
 }
 
 #[tokio::test]
-async fn a_log_that_is_taken_in_again_doubles_nothing() {
+async fn importing_a_log_twice_stores_each_verdict_once() {
     let world = World::new(1).await;
     world.finish_one().await;
     let of = |metric| NewVerdict {
@@ -199,7 +199,7 @@ async fn a_log_that_is_taken_in_again_doubles_nothing() {
 }
 
 #[tokio::test]
-async fn a_verdict_on_what_is_no_current_result_any_more_is_kept_as_stale() {
+async fn a_verdict_on_an_older_result_is_kept_as_stale() {
     let world = World::new(1).await;
     world.finish_one().await;
     let old = Shown::Results(vec![(ThresholdMetric::Density, ContentHash::of(b"old"))]);
@@ -213,7 +213,7 @@ async fn a_verdict_on_what_is_no_current_result_any_more_is_kept_as_stale() {
     assert!(log.len() == 1 && !log[0].current);
 }
 
-fn by_hand(event: &str) -> ManualAlignment {
+fn manual_alignment(event: &str) -> ManualAlignment {
     ManualAlignment {
         event: event.to_owned(),
         pair: name("p0"),
@@ -231,16 +231,19 @@ fn by_hand(event: &str) -> ManualAlignment {
 }
 
 #[tokio::test]
-async fn an_alignment_by_hand_is_stored_once_beside_the_result() {
+async fn a_manual_alignment_is_stored_once_beside_the_result() {
     let world = World::new(1).await;
     world.finish_one().await;
     for is_new in [true, false] {
-        let stored = world.catalog.store_manual_alignment(by_hand("a1"), 5).await;
+        let stored = world
+            .catalog
+            .store_manual_alignment(manual_alignment("a1"), 5)
+            .await;
         assert_eq!(stored.expect("stored"), is_new);
     }
     let another_mesh = ManualAlignment {
         mesh_hash: ContentHash::of(b"another"),
-        ..by_hand("a2")
+        ..manual_alignment("a2")
     };
     world
         .catalog
@@ -248,20 +251,20 @@ async fn an_alignment_by_hand_is_stored_once_beside_the_result() {
         .await
         .expect("stored");
     let stored = world.catalog.manual_alignments().await.expect("a read");
-    assert_eq!(stored[0].made, by_hand("a1"));
+    assert_eq!(stored[0].made, manual_alignment("a1"));
     assert!(stored[0].holds && stored[0].on_current_depth);
     assert!(!stored[1].holds);
     world
         .catalog
         .undo_event("a1", "ana", 7)
         .await
-        .expect("taken back");
+        .expect("undone");
     let stored = world.catalog.manual_alignments().await.expect("a read");
     assert_eq!((stored.len(), stored[0].undone_at), (2, Some(7)));
 }
 
 #[tokio::test]
-async fn the_database_itself_refuses_to_change_answers_and_alignments() {
+async fn triggers_reject_changes_of_answers_and_alignments() {
     let world = World::new(1).await;
     world.finish_one().await;
     let check = given("c1", Verdict::Fail);
@@ -272,7 +275,7 @@ async fn the_database_itself_refuses_to_change_answers_and_alignments() {
         .expect("stored");
     world
         .catalog
-        .store_manual_alignment(by_hand("a1"), 5)
+        .store_manual_alignment(manual_alignment("a1"), 5)
         .await
         .expect("stored");
     for event in ["c1", "a1"] {
@@ -280,7 +283,7 @@ async fn the_database_itself_refuses_to_change_answers_and_alignments() {
             .catalog
             .undo_event(event, "ana", 6)
             .await
-            .expect("taken back");
+            .expect("undone");
     }
     let path = world.dir.path().join("catalog.sqlite");
     let mut conn = open::write_conn(&path, false).await.expect("a connection");
@@ -301,11 +304,11 @@ async fn the_database_itself_refuses_to_change_answers_and_alignments() {
 }
 
 #[tokio::test]
-async fn the_key_of_picture_names_outlives_the_process() {
+async fn the_review_key_is_the_same_after_reopening() {
     let world = World::new(0).await;
     let key = world.catalog.review_key().await.expect("a key");
     let path = world.dir.path().join("catalog.sqlite");
-    let again = Catalog::open(&path).await.expect("it opens");
+    let again = Catalog::open(&path).await.expect("a catalog");
     assert_eq!(again.review_key().await.expect("a key"), key);
     let other = World::new(0).await;
     assert_ne!(other.catalog.review_key().await.expect("a key"), key);

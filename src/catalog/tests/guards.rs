@@ -1,4 +1,4 @@
-//! What breaks other queues, each by name: late workers, worn-out identities, busy databases, jumping clocks.
+//! Failure modes of job queues: late workers, reused ids, busy databases, clock jumps.
 
 use super::{World, done, enter, fingerprints, inputs, name, register, row};
 use crate::catalog::db::open;
@@ -27,9 +27,9 @@ fn failed(fingerprints: FingerprintIds, action: FailureAction) -> StageFailure {
     }
 }
 
-/// As a process that was given the same number by its machine, or a catalog whose last worker was removed.
+/// Ids of workers are not reused, even after the newest worker was removed.
 #[tokio::test]
-async fn a_reused_worker_identity_cannot_complete() {
+async fn worker_ids_are_not_reused() {
     let world = World::new(1).await;
     let first = register(&world.catalog).await;
     let lease = world.claim_as(first, 1).await.remove(0);
@@ -43,22 +43,22 @@ async fn a_reused_worker_identity_cannot_complete() {
 
     let second = register(&world.catalog).await;
     assert!(second > first, "{second:?} again");
-    assert_eq!(world.claim_alone(second).await.len(), 1);
+    assert_eq!(world.claim_exclusive(second).await.len(), 1);
     let late = world.catalog.checkpoint(lease, world.done(Stage::Fit));
     assert!(matches!(late.await, Ok(CheckpointOutcome::LeaseLost)));
     assert_eq!(status(&world).await, JobStatus::Leased);
 }
 
-/// The older and the newer lease of a pair that hung under a worker, was taken back by others, and came to the same
-/// worker again, which lives: pair, worker, status and heartbeat are unchanged; only the token differs.
-async fn taken_twice(world: &World) -> [Lease; 2] {
+/// Returns two leases of one worker on one pair: the first was overdue and recovered by another worker, then the pair
+/// was claimed again. Pair, worker, status and heartbeat are equal; only the token differs.
+async fn leased_twice(world: &World) -> [Lease; 2] {
     let late = world.claim(1).await.remove(0);
     let heartbeat = world.catalog.heartbeat(world.worker, 5_000, 0).await;
     assert!(heartbeat.expect("an answer"));
     let other = register(&world.catalog).await;
     let overdue = world.catalog.recover_overdue(other, 60, 70).await;
     assert_eq!(overdue.expect("a recovery").ready, 1);
-    let again = world.claim_alone(world.worker).await.remove(0);
+    let again = world.claim_exclusive(world.worker).await.remove(0);
     assert_eq!(
         (again.pair(), again.cursor(), again.token()),
         (late.pair(), late.cursor(), late.token() + 2)
@@ -67,33 +67,33 @@ async fn taken_twice(world: &World) -> [Lease; 2] {
 }
 
 #[tokio::test]
-async fn a_late_completion_under_an_older_lease_of_the_same_worker_changes_nothing() {
+async fn a_late_checkpoint_under_an_older_lease_of_the_same_worker_changes_nothing() {
     let world = World::new(1).await;
-    let [late, again] = taken_twice(&world).await;
+    let [late, again] = leased_twice(&world).await;
     let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
     assert!(matches!(kept, Ok(CheckpointOutcome::LeaseLost)));
-    // Nor has it moved the job on.
-    world.counters_hold().await;
+    // The job has not advanced either.
+    world.assert_counters().await;
     let kept = world
         .catalog
         .checkpoint(again, world.done(Stage::Fit))
         .await;
     assert!(matches!(kept, Ok(CheckpointOutcome::Lease(_))));
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
-/// Both share one commit: the reply to one must not be taken for the reply to the other. A third lease keeps the counters
-/// from refusing the commit, after which each would be tried alone.
+/// Both requests share one commit, and each must get its own reply. A third lease keeps the counters above zero, because
+/// otherwise the commit would fail and each request would be tried alone.
 #[tokio::test]
-async fn a_late_completion_beside_the_right_one_changes_nothing() {
+async fn a_late_checkpoint_in_the_same_commit_changes_nothing() {
     let world = World::new(2).await;
     let late = world.claim(1).await.remove(0);
     let other = world.recovered_by_another(1).await;
     assert_eq!(world.claim_as(other, 1).await.len(), 1);
-    let lease = world.claim_alone(other).await.remove(0);
+    let lease = world.claim_exclusive(other).await.remove(0);
     let mut lost = world.done(Stage::Fit);
     lost.outcome = r#"{"late":true}"#.to_owned();
-    // Neither is polled again before both are on their way.
+    // Both requests are sent before either future is polled again.
     let (lost, kept) = tokio::join!(
         world.catalog.checkpoint(late, lost),
         world.catalog.checkpoint(lease, world.done(Stage::Fit)),
@@ -103,13 +103,13 @@ async fn a_late_completion_beside_the_right_one_changes_nothing() {
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     let stages = detail.expect("the pair").results.stages;
     assert_eq!(stages[0].outcome, serde_json::json!({}));
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
 async fn a_late_failure_under_an_older_lease_of_the_same_worker_changes_nothing() {
     let world = World::new(1).await;
-    let [late, again] = taken_twice(&world).await;
+    let [late, again] = leased_twice(&world).await;
     let quarantine = || failed(world.fingerprints, FailureAction::Quarantine);
     assert!(
         !world
@@ -126,17 +126,17 @@ async fn a_late_failure_under_an_older_lease_of_the_same_worker_changes_nothing(
             .await
             .expect("an answer")
     );
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
 async fn a_late_release_of_an_older_lease_of_the_same_worker_changes_nothing() {
     let world = World::new(1).await;
-    let [late, again] = taken_twice(&world).await;
+    let [late, again] = leased_twice(&world).await;
     assert!(!world.catalog.release(late).await.expect("an answer"));
     assert_eq!(status(&world).await, JobStatus::Leased);
     assert!(world.catalog.release(again).await.expect("an answer"));
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
@@ -152,9 +152,9 @@ async fn a_worker_that_ended_completes_and_claims_nothing() {
     assert!(!heartbeat.expect("an answer"));
 }
 
-/// The worker's last sign of life was at 1; nobody has taken its leases back yet.
+/// The worker's last heartbeat was at 1; nobody has recovered its leases yet.
 #[tokio::test]
-async fn a_beat_or_completion_after_the_lease_is_over_is_refused() {
+async fn a_heartbeat_or_checkpoint_after_the_lease_expired_is_refused() {
     let world = World::new(3).await;
     let mut leases = world.claim(2).await;
     let (first, second) = (leases.remove(0), leases.remove(0));
@@ -182,16 +182,16 @@ async fn a_beat_or_completion_after_the_lease_is_over_is_refused() {
             .is_empty()
     );
     assert_eq!(status(&world).await, JobStatus::Leased);
-    // In time, all of it is taken.
+    // Within the lease, all of them are accepted.
     let heartbeat = world.catalog.heartbeat(world.worker, 90, 1).await;
     assert!(heartbeat.expect("an answer"));
     assert_eq!(world.claim(1).await.len(), 1);
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 /// Two processes that write as fast as they can, a third that imports, and readers beside them.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
-async fn busy_reaches_no_caller() {
+async fn busy_errors_do_not_reach_callers() {
     let world = World::new(80).await;
     let path = world.dir.path().join("catalog.sqlite");
     let fingerprints = world.fingerprints;
@@ -208,7 +208,7 @@ async fn busy_reaches_no_caller() {
                 .checkpoint(lease, super::done(fingerprints, stage))
                 .await;
             let CheckpointOutcome::Lease(lease) = kept.expect("stored") else {
-                panic!("the first of four stages")
+                panic!("not the last stage")
             };
             let fail = failed(fingerprints, FailureAction::Quarantine);
             assert!(catalog.fail(lease, fail).await.expect("stored"));
@@ -236,12 +236,12 @@ async fn busy_reaches_no_caller() {
     }
     done += worker(importer).await;
     assert_eq!(done, 100);
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
-/// A process dies over a pair that backs off: the time to try again stands in the row, not in the process.
+/// The end of a back-off is stored in the row, so that it survives the death of the process.
 #[tokio::test]
-async fn a_failure_that_may_pass_is_not_stranded_by_a_death() {
+async fn a_backoff_survives_the_death_of_its_process() {
     let world = World::new(1).await;
     for attempt in 1..=2 {
         let worker = register(&world.catalog).await;
@@ -256,19 +256,19 @@ async fn a_failure_that_may_pass_is_not_stranded_by_a_death() {
         let due = world.catalog.release_due_backoffs(2_000, 60_000).await;
         assert_eq!(due.expect("stored"), 1);
     }
-    // A crash is no try: the failure keeps all it may have.
+    // A crash does not count as an attempt.
     let worker = register(&world.catalog).await;
     assert_eq!(world.claim_as(worker, 1).await[0].attempt(), 3);
     let next = register(&world.catalog).await;
     let recovered = world.catalog.recover(DeadWorker::AllExcept(next), 60).await;
     assert_eq!(recovered.expect("a recovery").ready, 1);
-    let again = world.claim_alone(next).await;
+    let again = world.claim_exclusive(next).await;
     assert_eq!((again[0].attempt(), again[0].crashes()), (3, 1));
 }
 
-/// One worker's clock is years behind, another's years ahead: no live worker loses a lease, nothing waits indefinitely.
+/// One worker's clock is years behind, another's years ahead: no living worker loses a lease, and no pair waits for years.
 #[tokio::test]
-async fn a_clock_that_jumps_strands_nothing_and_robs_nobody() {
+async fn clock_jumps_neither_block_pairs_nor_cost_leases() {
     const YEARS: i64 = 100_000_000_000;
     let world = World::new(3).await;
     let past = enter(&world.catalog, world.fingerprints, 5).await;
@@ -296,17 +296,17 @@ async fn a_clock_that_jumps_strands_nothing_and_robs_nobody() {
         let kept = world.catalog.checkpoint(lease, done).await;
         assert!(matches!(kept, Ok(CheckpointOutcome::Lease(_))));
     }
-    // What the future put off is tried by the past.
+    // The worker with the early clock ends the back-off of the other one.
     let lease = world.claim_as(future, 1).await.remove(0);
     let run_at = YEARS + 1_000;
     let back_off = failed(world.fingerprints, FailureAction::BackOff { run_at });
     assert!(world.catalog.fail(lease, back_off).await.expect("stored"));
     let due = world.catalog.release_due_backoffs(25, 90_000).await;
     assert_eq!(due.expect("stored"), 1);
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
-/// A pair that killed its workers, and the worker that is there now.
+/// Returns a pair that killed its workers, and the current worker.
 async fn poisoned() -> (World, WorkerId) {
     let world = World::new(1).await;
     let mut me = world.worker;
@@ -314,7 +314,7 @@ async fn poisoned() -> (World, WorkerId) {
         let taken = if crash == 0 {
             world.claim_as(me, 1).await
         } else {
-            world.claim_alone(me).await
+            world.claim_exclusive(me).await
         };
         assert_eq!(taken.len(), 1);
         me = register(&world.catalog).await;
@@ -327,7 +327,7 @@ async fn poisoned() -> (World, WorkerId) {
 }
 
 #[tokio::test]
-async fn a_pair_that_killed_its_workers_is_tried_again_with_other_settings() {
+async fn a_poisoned_pair_is_requeued_with_other_settings() {
     let (world, _) = poisoned().await;
     for (revision, sent) in [([1; 4], 0), ([1, 2, 1, 1], 0), ([2, 1, 1, 1], 1)] {
         let fingerprints = fingerprints(revision);
@@ -335,13 +335,13 @@ async fn a_pair_that_killed_its_workers_is_tried_again_with_other_settings() {
             .catalog
             .requeue_stale(&fingerprints, None, RerunPolicy::Changed)
             .await;
-        assert_eq!(back.expect("sent back"), sent);
+        assert_eq!(back.expect("requeued"), sent);
     }
     assert_eq!(status(&world).await, JobStatus::Ready);
 }
 
 #[tokio::test]
-async fn a_pair_that_killed_its_workers_is_tried_again_with_another_mesh() {
+async fn a_poisoned_pair_is_requeued_with_another_mesh() {
     let (world, _) = poisoned().await;
     let seen = |text: &str| {
         let mut seen = inputs(Stage::Fit);
@@ -349,18 +349,18 @@ async fn a_pair_that_killed_its_workers_is_tried_again_with_another_mesh() {
         mesh.hash = crate::domain::ContentHash::of(text.as_bytes());
         vec![(PairId(1), seen)]
     };
-    let noted = world.catalog.record_poisoned_inputs(seen("fatal")).await;
-    noted.expect("stored");
+    let stored = world.catalog.record_poisoned_inputs(seen("fatal")).await;
+    stored.expect("stored");
     let requeue_stale = async || {
         let fingerprints = fingerprints([1; 4]);
         let back = world
             .catalog
             .requeue_stale(&fingerprints, None, RerunPolicy::Changed)
             .await;
-        back.expect("sent back")
+        back.expect("requeued")
     };
     assert_eq!(requeue_stale().await, 0);
-    let mended = world.catalog.store_inputs(seen("mended")).await;
-    mended.expect("stored");
+    let stored = world.catalog.store_inputs(seen("repaired")).await;
+    stored.expect("stored");
     assert_eq!(requeue_stale().await, 1);
 }

@@ -1,4 +1,4 @@
-//! Random histories of several processes, played on the catalog and on the model: both must always say the same.
+//! Random histories of several processes, applied to the catalog and to the model, which must always agree.
 
 mod compare;
 mod upkeep;
@@ -19,16 +19,16 @@ use crate::domain::{Failure, FailureClass, Stage};
 /// Pairs at first, and at most.
 const PAIRS: usize = 5;
 const MOST_PAIRS: usize = 8;
-/// No back-off is longer.
+/// Longest back-off.
 const LONGEST: i64 = 200;
 struct Game {
     world: World,
     conn: SqliteConnection,
     dice: ChaCha8Rng,
     model: Queue,
-    /// Leases as their holders have them: also of the dead, and of those who do not know that they are taken for dead.
+    /// Leases as their holders see them, including dead processes and processes that do not know that others consider them dead.
     leases: Vec<Lease>,
-    /// The wall clock that the next process and the back-offs look at; it jumps.
+    /// The wall clock of the next process and of back-offs; it jumps.
     wall: i64,
     settings: (Fingerprints, FingerprintIds),
     verdicts: Vec<i64>,
@@ -36,12 +36,12 @@ struct Game {
     seen: Seen,
 }
 
-/// How often what is hard came up; a history without it proves nothing.
+/// How often difficult situations occurred; a history without them proves nothing.
 #[derive(Debug, Default, Clone, Copy)]
 struct Seen {
-    /// Writes under a lease that somebody else has taken back.
+    /// Writes under a lease that another process has recovered.
     fenced: u32,
-    /// Writes under a lease that is over, though nobody has taken it back.
+    /// Writes under an expired lease that nobody has recovered yet.
     late: u32,
     poisoned: u32,
     overdue: u64,
@@ -64,7 +64,7 @@ impl Game {
             tokens: vec![0; MOST_PAIRS + 1],
             seen: Seen::default(),
         };
-        // The world's own worker takes no part.
+        // The worker of `World` is not used.
         game.world
             .catalog
             .end_worker(game.world.worker, 1)
@@ -101,7 +101,7 @@ impl Game {
         self.dice.random_bool(chance)
     }
 
-    /// A process that can do something; it may have been taken for dead and not know it.
+    /// Picks a process that can act; others may consider it dead without its knowledge.
     fn somebody(&mut self) -> Option<usize> {
         let running = |index: &usize| self.model.processes[*index].running;
         let running: Vec<_> = (0..self.model.processes.len()).filter(running).collect();
@@ -135,7 +135,7 @@ impl Game {
         });
     }
 
-    /// One process's time, while the others' stand still: no two clocks go together.
+    /// Advances the clock of one process, because no two clocks agree.
     fn time_passes(&mut self) {
         let ms = self.dice.random_range(0..LEASE);
         if let Some(index) = self.somebody() {
@@ -145,11 +145,11 @@ impl Game {
 
     async fn heartbeat(&mut self) {
         if let Some(index) = self.somebody() {
-            self.beat_of(index).await;
+            self.heartbeat_of(index).await;
         }
     }
 
-    async fn beat_of(&mut self, index: usize) {
+    async fn heartbeat_of(&mut self, index: usize) {
         let process = &mut self.model.processes[index];
         let (now, since) = (process.clock, process.alive_since());
         let heartbeat = self
@@ -188,7 +188,7 @@ impl Game {
         self.leases.extend(taken);
     }
 
-    /// Whether a write under a lease is to be taken.
+    /// Returns whether a write under a lease must be accepted.
     fn stands(&mut self, lease: &Lease) -> bool {
         let (holds, stands) = (self.model.holds(lease), self.model.stands(lease));
         self.seen.fenced += u32::from(!holds);
@@ -201,7 +201,7 @@ impl Game {
             return;
         };
         let (stands, process) = (self.stands(&lease), *self.process(&lease));
-        // Now and then an earlier stage is done again, as when an artifact is gone.
+        // Sometimes an earlier stage is computed again, as after the loss of an artifact.
         let again = self.is_likely(0.2);
         let earlier = self.dice.random_range(0..=lease.cursor().index());
         let stage = if again {
@@ -286,7 +286,7 @@ impl Game {
 }
 
 #[tokio::test]
-async fn random_histories_leave_the_catalog_as_the_model_says() {
+async fn random_histories_agree_with_the_model() {
     let mut all = Seen::default();
     for seed in 0..6 {
         let mut game = Game::new(seed).await;

@@ -1,10 +1,10 @@
-//! Imports that come in pieces.
+//! Imports that are streamed in chunks.
 
 use super::{World, name, row};
 use crate::catalog::{CatalogError, ImportChunk};
 
 #[tokio::test]
-async fn an_import_that_is_cut_short_leaves_nothing() {
+async fn an_import_without_an_end_stores_nothing() {
     let world = World::new(1).await;
     let (sender, chunks) = tokio::sync::mpsc::channel(1);
     let rows = ImportChunk::Rows(vec![row("q0"), row("q1")]);
@@ -17,11 +17,11 @@ async fn an_import_that_is_cut_short_leaves_nothing() {
     );
     let names = world.catalog.pair_names().await.expect("names");
     assert_eq!(names, [name("p0")]);
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn pieces_of_an_import_count_together() {
+async fn chunks_of_an_import_are_counted_together() {
     let world = World::new(1).await;
     let (sender, chunks) = tokio::sync::mpsc::channel(3);
     let mut other = row("p0");
@@ -35,5 +35,5 @@ async fn pieces_of_an_import_count_together() {
     assert_eq!((summary.added, summary.unchanged, truths), (2, 0, 0));
     assert_eq!(summary.changed[0].name, name("p0"));
     assert_eq!(summary.changed[0].fields, ["mesh"]);
-    world.counters_hold().await;
+    world.assert_counters().await;
 }

@@ -1,4 +1,4 @@
-//! The queue in memory, as small as it can be said: what the SQL is held to.
+//! A minimal model of the queue in memory, which the SQL is tested against.
 
 use std::collections::BTreeMap;
 
@@ -6,12 +6,12 @@ use super::state_machine::{Event, JobState, transition};
 use crate::catalog::{FingerprintIds, Lease, RerunPolicy};
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId, is_poisoned};
 
-/// How long a worker lives without a sign of life.
+/// How long a worker counts as alive without a heartbeat.
 pub(super) const LEASE: i64 = 100;
-/// How many of the newest workers are looked at for deaths.
+/// How many of the newest workers are searched for deaths.
 const LOOKED_AT: usize = 32;
 
-/// What a job should be.
+/// Expected state of a job.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Job {
     pub(super) state: JobState,
@@ -19,9 +19,9 @@ pub(super) struct Job {
     pub(super) attempt: u32,
     pub(super) crashes: u32,
     pub(super) exclusive: bool,
-    /// What each stage's result was computed with.
+    /// Settings and inputs of each stage's result.
     results: [Option<FingerprintIds>; 4],
-    /// Where it failed, and with what.
+    /// Stage, settings and inputs of its failure.
     pub(super) failure: Option<(Stage, FingerprintIds)>,
 }
 
@@ -29,18 +29,18 @@ pub(super) struct Job {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Process {
     pub(super) worker: WorkerId,
-    /// Its own clock, independent of all others.
+    /// Its clock, independent of other clocks.
     pub(super) clock: UnixMillis,
     pub(super) heartbeat: UnixMillis,
     pub(super) ended: bool,
     pub(super) died: bool,
-    /// Whether it can still do anything. One that was taken for dead may.
+    /// Whether it can still act; a process that others consider dead may.
     pub(super) running: bool,
     pub(super) fingerprints: FingerprintIds,
 }
 
 impl Process {
-    /// Whether its leases stand, by its own clock.
+    /// Returns whether its leases are valid, by its own clock.
     pub(super) const fn is_alive(&self) -> bool {
         !self.ended && self.heartbeat >= self.alive_since()
     }
@@ -74,7 +74,7 @@ impl Job {
         self.state = transition(self.state, event).expect("the model allows it");
     }
 
-    /// First stage that would be computed otherwise now.
+    /// Returns the first stage with other settings or inputs than the current ones.
     fn changed(&self, current: FingerprintIds) -> Option<Stage> {
         let behind = |stage: &Stage| self.state.stage().is_none_or(|next| *stage < next);
         Stage::ALL.into_iter().filter(behind).find(|stage| {
@@ -105,19 +105,19 @@ impl Queue {
             .expect("a process")
     }
 
-    /// Whether a lease is the pair's own.
+    /// Returns whether a lease is the current one of its pair.
     pub(super) fn holds(&self, lease: &Lease) -> bool {
         let job = &self.jobs[&lease.pair().0];
         let held = |worker| matches!(job.state, JobState::Leased { worker: holder, .. } if holder == worker);
         held(lease.worker) && job.token == lease.token()
     }
 
-    /// Whether something may be stored under a lease.
+    /// Returns whether a write under a lease must be accepted.
     pub(super) fn stands(&self, lease: &Lease) -> bool {
         self.holds(lease) && self.of_worker(lease.worker).is_alive()
     }
 
-    /// Takes jobs; gives the pairs with their tokens, in order.
+    /// Leases jobs; returns the pairs with their tokens, in order.
     pub(super) fn claim(
         &mut self,
         process: &Process,
@@ -161,7 +161,7 @@ impl Queue {
         job.failure = None;
     }
 
-    /// `back_off` is the time to try again; `exclusive` sends it to run by itself; neither quarantines.
+    /// Stores a failure: `back_off` is the time of the next attempt, `exclusive` requires an exclusive run; with neither the pair is quarantined.
     pub(super) fn fail(&mut self, lease: &Lease, back_off: Option<UnixMillis>, exclusive: bool) {
         let (worker, fingerprints) = (lease.worker, self.of_worker(lease.worker).fingerprints);
         let job = self.job(lease.pair().0);
@@ -184,7 +184,7 @@ impl Queue {
         job.attempt = job.attempt.saturating_sub(1);
     }
 
-    /// Takes back the leases of workers that are taken for dead; how many pairs are ready again.
+    /// Recovers the leases of workers that are considered dead; returns how many pairs are ready again.
     pub(super) fn recover(&mut self, dead: &[WorkerId]) -> u64 {
         for process in &mut self.processes {
             process.died |= dead.contains(&process.worker) && !process.ended;
@@ -219,7 +219,7 @@ impl Queue {
         jobs.map(|(pair, _)| *pair).collect()
     }
 
-    /// Takes back what others hold although their own clock is past the deadline by more than a margin.
+    /// Recovers leases of other workers whose own clock exceeds the deadline by more than a margin.
     pub(super) fn recover_overdue(&mut self, me: WorkerId, margin: i64) -> u64 {
         let mut ready = 0;
         for process in self.processes.clone() {
@@ -238,7 +238,7 @@ impl Queue {
         ready
     }
 
-    /// Back-offs that are over, or further ahead than any can be.
+    /// Ends back-offs that are due, or implausibly far in the future.
     pub(super) fn due(&mut self, now: UnixMillis, longest_ms: i64) -> u64 {
         let mut due = 0;
         for job in self.jobs.values_mut() {
@@ -250,7 +250,7 @@ impl Queue {
         due
     }
 
-    /// What other settings, or somebody who asks for all, send back; how many.
+    /// Requeues jobs with other settings or inputs, or all on request; returns how many.
     pub(super) fn requeue_stale(&mut self, current: FingerprintIds, again: RerunPolicy) -> u64 {
         let mut sent = 0;
         for job in self.jobs.values_mut() {

@@ -1,4 +1,4 @@
-//! The hot statements go through a primary key or a partial index: no scan of a table, no sort.
+//! Query plans of the hot statements: they use a primary key or a partial index, without table scans and sorts.
 
 use sqlx::{AssertSqlSafe, Row as _};
 
@@ -20,7 +20,7 @@ use crate::catalog::records::stage_results;
 use crate::catalog::records::status;
 use crate::catalog::records::verdicts;
 
-/// Lines of the query plan.
+/// Returns the lines of the query plan.
 async fn plan(sql: &str) -> Vec<String> {
     let world = World::new(0).await;
     let path = world.dir.path().join("catalog.sqlite");
@@ -35,7 +35,7 @@ async fn plan(sql: &str) -> Vec<String> {
 }
 
 #[tokio::test]
-async fn a_claim_walks_the_ready_index_in_its_order() {
+async fn a_claim_scans_the_ready_index_in_order() {
     let plan = plan(claim::CLAIM).await;
     assert!(
         plan.iter().any(|line| line.contains("INDEX job_ready")),
@@ -74,7 +74,7 @@ async fn fenced_writes_find_their_jobs_by_key() {
 }
 
 #[tokio::test]
-async fn rescue_and_holders_use_the_index_of_leases() {
+async fn recovery_and_holders_use_the_index_of_leases() {
     for sql in [
         recovery::RECOVER,
         recovery::LEFT_BY,
@@ -93,7 +93,7 @@ async fn rescue_and_holders_use_the_index_of_leases() {
 }
 
 #[tokio::test]
-async fn due_pairs_come_from_the_index_of_back_offs() {
+async fn due_pairs_use_the_index_of_backoffs() {
     let plan = plan(workers::DUE).await;
     assert!(
         plan.iter().any(|line| line.contains("INDEX job_backoff")),
@@ -103,7 +103,7 @@ async fn due_pairs_come_from_the_index_of_back_offs() {
 }
 
 #[tokio::test]
-async fn pairs_of_low_confidence_come_from_their_index() {
+async fn pairs_of_low_confidence_use_their_index() {
     let plan = plan(status::LOW_CONFIDENCE).await;
     assert_only(&plan, &["job USING COVERING INDEX job_low_confidence"]);
     assert!(plan[0].contains("INDEX job_low_confidence"), "{plan:?}");
@@ -143,21 +143,20 @@ async fn inspected_jobs_are_found_by_key() {
     assert_only(&among, &["VIRTUAL TABLE", "SCAN found"]);
 }
 
-/// A page of a group goes on where the one before ended.
 #[tokio::test]
 async fn members_of_a_group_are_paged_by_key() {
     assert_only(&plan(requeue::MEMBERS).await, &[]);
 }
 
 #[tokio::test]
-async fn what_a_checkpoint_writes_is_found_by_key() {
+async fn rows_written_by_a_checkpoint_are_found_by_key() {
     for sql in checkpoint::ROWS {
         assert_only(&plan(sql).await, &["VIRTUAL TABLE"]);
     }
 }
 
 #[tokio::test]
-async fn what_a_run_asks_of_inputs_and_counts_is_paged_or_small() {
+async fn queries_of_inputs_and_counts_are_paged_or_small() {
     assert_only(&plan(pair_work::INPUTS).await, &[]);
     assert_only(
         &plan(workers::LEFT_ALL).await,
@@ -174,7 +173,7 @@ async fn what_a_run_asks_of_inputs_and_counts_is_paged_or_small() {
 }
 
 #[tokio::test]
-async fn pages_and_their_parts_are_searched_by_key() {
+async fn pages_of_results_are_searched_by_key() {
     for sql in [pair_results::PAGE, integrity::PAGE] {
         let page = plan(sql).await;
         assert_only(&page, &[]);
@@ -190,7 +189,7 @@ async fn pages_and_their_parts_are_searched_by_key() {
     }
 }
 
-/// Whether every scan of the plan is one of those allowed.
+/// Asserts that the plan contains only allowed scans.
 fn assert_only(plan: &[String], allowed: &[&str]) {
     for line in plan.iter().filter(|line| line.starts_with("SCAN")) {
         assert!(

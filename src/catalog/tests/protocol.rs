@@ -30,7 +30,7 @@ async fn status(world: &World, pair: &str) -> JobStatus {
 }
 
 #[tokio::test]
-async fn a_pair_goes_through_four_checkpoints_and_is_read_back_whole() {
+async fn a_pair_passes_four_checkpoints_and_is_read_back() {
     let world = World::new(1).await;
     world.finish_one().await;
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
@@ -41,11 +41,11 @@ async fn a_pair_goes_through_four_checkpoints_and_is_read_back_whole() {
     assert_eq!(metrics, ThresholdMetric::ALL.map(super::metric));
     assert_eq!(detail.attempts.len(), 4);
     assert!(detail.mesh_hash.is_some() && detail.print_hash.is_some());
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn pairs_below_the_limit_of_confidence_are_counted() {
+async fn pairs_of_low_confidence_are_counted() {
     let limit = MetricOutcome::LOW_CONFIDENCE;
     let world = World::new(4).await;
     for confidence in [Some(limit - 1e-9), Some(limit), Some(1.0), None] {
@@ -58,7 +58,7 @@ async fn pairs_below_the_limit_of_confidence_are_counted() {
             match world.catalog.checkpoint(lease, done).await {
                 Ok(CheckpointOutcome::Lease(next)) => lease = next,
                 Ok(CheckpointOutcome::Done) => break,
-                other => panic!("the checkpoint was not kept: {other:?}"),
+                other => panic!("the checkpoint was not stored: {other:?}"),
             }
         }
     }
@@ -67,7 +67,7 @@ async fn pairs_below_the_limit_of_confidence_are_counted() {
 }
 
 #[tokio::test]
-async fn a_claim_takes_the_pair_that_is_furthest() {
+async fn a_claim_leases_the_most_advanced_pair_first() {
     let world = World::new(3).await;
     let lease = world.claim(1).await.remove(0);
     let pair = lease.pair();
@@ -76,7 +76,7 @@ async fn a_claim_takes_the_pair_that_is_furthest() {
         .checkpoint(lease, world.done(Stage::Fit))
         .await
     else {
-        panic!("the checkpoint was not kept")
+        panic!("the checkpoint was not stored")
     };
     assert!(world.catalog.release(lease).await.expect("given back"));
     let next = world.claim(1).await.remove(0);
@@ -93,11 +93,11 @@ async fn two_claims_never_get_the_same_pair() {
     pairs.sort_unstable();
     pairs.dedup();
     assert_eq!((a.len() + b.len(), pairs.len()), (40, 40));
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn a_late_completion_of_a_rescued_job_changes_nothing() {
+async fn a_late_checkpoint_of_a_recovered_job_changes_nothing() {
     let world = World::new(1).await;
     let late = world.claim(1).await.remove(0);
     let other = world.recovered_by_another(1).await;
@@ -111,9 +111,9 @@ async fn a_late_completion_of_a_rescued_job_changes_nothing() {
         (detail.results.status, detail.crashes),
         (JobStatus::Ready, 1)
     );
-    let again = world.claim_alone(other).await.remove(0);
+    let again = world.claim_exclusive(other).await.remove(0);
     assert!(again.exclusive() && again.token() > token);
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
@@ -126,11 +126,11 @@ async fn a_late_failure_and_a_late_release_change_nothing() {
     assert!(!world.catalog.fail(first, kept).await.expect("an answer"));
     assert!(!world.catalog.release(second).await.expect("an answer"));
     assert_eq!(status(&world, "p0").await, JobStatus::Ready);
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn the_third_crash_is_quarantined_and_says_so() {
+async fn the_third_crash_quarantines_the_pair_with_a_message() {
     let world = World::new(1).await;
     for crash in 1..=CRASH_LIMIT {
         let worker = register(&world.catalog).await;
@@ -144,7 +144,7 @@ async fn the_third_crash_is_quarantined_and_says_so() {
         );
         let recover = world.catalog.recover(DeadWorker::Workers(vec![worker]), 60);
         recover.await.expect("a recovery");
-        world.counters_hold().await;
+        world.assert_counters().await;
     }
     let failures = world.catalog.failures(10).await.expect("a read");
     assert_eq!(failures[0].failure.failure.class, FailureClass::Resource);
@@ -153,10 +153,10 @@ async fn the_third_crash_is_quarantined_and_says_so() {
 }
 
 #[tokio::test]
-async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
+async fn repeated_kills_from_outside_quarantine_no_pair() {
     let world = World::new(1).await;
     for round in 0..8 {
-        // One is killed before it has taken anything, the next with the pair in hand.
+        // One process is killed before its first claim, the next one while it holds the pair.
         register(&world.catalog).await;
         let worker = register(&world.catalog).await;
         let request = ClaimRequest {
@@ -169,11 +169,11 @@ async fn a_process_killed_from_outside_again_and_again_condemns_no_pair() {
         );
         world.recovered_by_another(1).await;
     }
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn pairs_that_died_together_are_suspect_but_not_blamed() {
+async fn pairs_leased_together_at_a_death_run_exclusively_but_are_not_blamed() {
     let world = World::new(2).await;
     assert_eq!(world.claim(2).await.len(), 2);
     let other = world.recovered_by_another(2).await;
@@ -183,7 +183,7 @@ async fn pairs_that_died_together_are_suspect_but_not_blamed() {
 }
 
 #[tokio::test]
-async fn leases_of_a_worker_that_ended_in_order_are_no_crash() {
+async fn leases_of_a_worker_that_ended_properly_do_not_count_as_crashes() {
     let world = World::new(1).await;
     drop(world.claim(1).await);
     let ended = world.catalog.end_worker(world.worker, 50).await;
@@ -194,18 +194,18 @@ async fn leases_of_a_worker_that_ended_in_order_are_no_crash() {
 }
 
 #[tokio::test]
-async fn progress_forgives_crashes() {
+async fn a_finished_stage_resets_the_crash_count() {
     let world = World::new(1).await;
     drop(world.claim(1).await);
     let other = world.recovered_by_another(1).await;
-    let lease = world.claim_alone(other).await.remove(0);
+    let lease = world.claim_exclusive(other).await.remove(0);
     assert_eq!(lease.crashes(), 1);
     let kept = world
         .catalog
         .checkpoint(lease, world.done(Stage::Fit))
         .await;
     let Ok(CheckpointOutcome::Lease(lease)) = kept else {
-        panic!("the checkpoint was not kept")
+        panic!("the checkpoint was not stored")
     };
     assert_eq!(lease.crashes(), 0);
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
@@ -213,11 +213,11 @@ async fn progress_forgives_crashes() {
 }
 
 #[tokio::test]
-async fn a_lease_long_past_its_deadline_under_a_living_worker_comes_back_to_others() {
+async fn an_overdue_lease_of_a_living_worker_is_recovered() {
     let world = World::new(1).await;
     drop(world.claim(1).await);
     let other = register(&world.catalog).await;
-    // Its deadline is 1000, and it still heartbeats; what time others have is nothing to it.
+    // Its deadline is 1000, and its heartbeat is later by its own clock; clocks of other processes do not matter.
     for (heartbeat, recovered) in [(1_060, 0), (1_061, 1)] {
         assert!(
             world
@@ -231,11 +231,11 @@ async fn a_lease_long_past_its_deadline_under_a_living_worker_comes_back_to_othe
         let by_others = world.catalog.recover_overdue(other, 60, 9_000_000);
         assert_eq!(by_others.await.expect("a recovery").ready, recovered);
     }
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn backing_off_ends_when_due_and_after_a_clock_jump_too() {
+async fn a_backoff_ends_when_it_is_due_and_after_a_clock_jump() {
     let world = World::new(2).await;
     for (lease, run_at) in world.claim(2).await.into_iter().zip([2_000, 9_000_000]) {
         let back_off = failed(&world, Stage::Fit, FailureAction::BackOff { run_at });
@@ -251,11 +251,11 @@ async fn backing_off_ends_when_due_and_after_a_clock_jump_too() {
     assert_eq!(due.expect("stored"), 2);
     let again = world.claim(2).await;
     assert!(again.len() == 2 && again.iter().all(|lease| lease.attempt() == 2));
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn a_failure_names_class_and_sentence_and_retry_takes_it_up() {
+async fn a_failure_keeps_class_and_message_and_can_be_retried() {
     let world = World::new(3).await;
     for lease in world.claim(2).await {
         let quarantine = failed(&world, Stage::Fit, FailureAction::Quarantine);
@@ -276,11 +276,11 @@ async fn a_failure_names_class_and_sentence_and_retry_takes_it_up() {
     let all = world.catalog.retry(&RetrySelection::All).await;
     assert_eq!(all.expect("stored"), 1);
     assert!(world.catalog.failures(9).await.expect("a read").is_empty());
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn too_much_for_the_others_is_claimed_alone_only() {
+async fn an_exclusive_pair_is_claimed_only_exclusively() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);
     let alone = failed(&world, Stage::Fit, FailureAction::RetryExclusive);
@@ -288,11 +288,11 @@ async fn too_much_for_the_others_is_claimed_alone_only() {
     assert!(world.claim(1).await.is_empty());
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     assert!(detail.expect("the pair").results.failure.is_none());
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn a_claim_among_some_pairs_takes_no_other() {
+async fn a_claim_among_selected_pairs_leases_no_other() {
     let world = World::new(4).await;
     let wanted = [name("p3"), name("p1")];
     let among = world.catalog.select(&wanted).await.expect("a read");
@@ -311,7 +311,7 @@ async fn a_claim_among_some_pairs_takes_no_other() {
 }
 
 #[tokio::test]
-async fn importing_again_adds_what_is_new_and_tells_what_changed() {
+async fn a_second_import_adds_new_pairs_and_returns_changes() {
     let world = World::new(2).await;
     let mut changed = row("p1");
     changed.unit = Some(LengthUnit::Cm);
@@ -323,7 +323,7 @@ async fn importing_again_adds_what_is_new_and_tells_what_changed() {
     assert_eq!(summary.changed[0].fields, ["print", "unit"]);
     let names = world.catalog.pair_names().await.expect("a read");
     assert_eq!(names, ["p0", "p1", "p2"].map(name));
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
@@ -344,7 +344,7 @@ async fn pages_come_in_the_order_of_names_and_end() {
 }
 
 #[tokio::test]
-async fn a_reader_works_beside_the_writer_and_cannot_write() {
+async fn a_read_only_catalog_reads_during_writes_and_cannot_write() {
     let world = World::new(1).await;
     let path = world.dir.path().join("catalog.sqlite");
     let reader = Catalog::open_read_only(&path).await.expect("a reader");
@@ -357,7 +357,7 @@ async fn a_reader_works_beside_the_writer_and_cannot_write() {
 }
 
 #[tokio::test]
-async fn a_missing_catalog_is_told() {
+async fn a_missing_catalog_is_an_error_of_its_own_kind() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("catalog.sqlite");
     assert!(matches!(
@@ -368,7 +368,7 @@ async fn a_missing_catalog_is_told() {
 }
 
 #[tokio::test]
-async fn one_bad_request_does_not_take_its_batch_with_it() {
+async fn one_failing_request_does_not_fail_its_batch() {
     let world = World::new(2).await;
     let mut leases = world.claim(2).await;
     let (good, bad) = (leases.remove(0), leases.remove(0));
@@ -380,7 +380,7 @@ async fn one_bad_request_does_not_take_its_batch_with_it() {
     );
     assert!(matches!(good, Ok(CheckpointOutcome::Lease(_))));
     assert!(matches!(bad, Err(CatalogError::Shared(_))));
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]

@@ -1,4 +1,4 @@
-//! The schema's own checks say what our enums say.
+//! The CHECK constraints of the schema agree with the enums.
 
 use sqlx::Connection as _;
 
@@ -7,9 +7,9 @@ use crate::domain::{
     FailureClass, JobStatus, LengthUnit, Reason, ReviewOrder, ThresholdMetric, Verdict,
 };
 
-/// Every name that the schema's checks allow is one of ours, and the other way round.
+/// The CHECK constraints allow exactly the names of the enums.
 #[tokio::test]
-async fn checks_of_the_schema_and_our_enums_agree() {
+async fn check_constraints_and_enums_agree() {
     let world = World::new(1).await;
     let path = world.dir.path().join("catalog.sqlite");
     let mut conn = crate::catalog::db::open::write_conn(&path, false)
@@ -53,9 +53,9 @@ async fn checks_of_the_schema_and_our_enums_agree() {
     }
 }
 
-/// Each status is allowed exactly with the columns that belong to it.
+/// Each status is allowed only with the columns that belong to it.
 #[tokio::test]
-async fn a_job_row_that_is_no_state_is_refused() {
+async fn an_inconsistent_job_row_is_rejected() {
     let world = World::new(1).await;
     let path = world.dir.path().join("catalog.sqlite");
     let mut conn = crate::catalog::db::open::write_conn(&path, false)

@@ -1,4 +1,4 @@
-//! Changed settings and inputs send a pair back to the first stage they touch, and no further.
+//! Changed settings and inputs requeue a pair from the first affected stage.
 
 use super::{World, fingerprints, name, row};
 use crate::catalog::{
@@ -16,11 +16,11 @@ async fn requeue_stale(world: &World, fingerprints: &Fingerprints) -> u64 {
     let sent = world
         .catalog
         .requeue_stale(fingerprints, None, RerunPolicy::Changed);
-    sent.await.expect("sent back")
+    sent.await.expect("requeued")
 }
 
 #[tokio::test]
-async fn a_changed_register_setting_re_runs_register_only() {
+async fn a_changed_register_setting_reruns_register_only() {
     let world = World::new(2).await;
     world.finish_one().await;
     let changed = fingerprints([1, 1, 1, 2]);
@@ -35,11 +35,11 @@ async fn a_changed_register_setting_re_runs_register_only() {
     let page = world.catalog.results_page(None, 1).await.expect("a page");
     assert_eq!(page[0].stages.len(), 3);
     assert_eq!(requeue_stale(&world, &changed).await, 0);
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn unchanged_settings_send_nothing_back() {
+async fn unchanged_settings_requeue_nothing() {
     let world = World::new(1).await;
     world.finish_one().await;
     assert_eq!(requeue_stale(&world, &fingerprints([1; 4])).await, 0);
@@ -71,7 +71,7 @@ async fn see(world: &World, mesh: &str, print: &str) {
 }
 
 #[tokio::test]
-async fn a_touched_file_re_runs_nothing() {
+async fn a_new_modification_time_reruns_nothing() {
     let world = World::new(1).await;
     world.finish_one().await;
     see(&world, "mesh", "print").await;
@@ -79,7 +79,7 @@ async fn a_touched_file_re_runs_nothing() {
 }
 
 #[tokio::test]
-async fn a_changed_print_sends_its_pair_back_to_normalize() {
+async fn a_changed_print_requeues_its_pair_from_normalize() {
     let world = World::new(2).await;
     world.finish_one().await;
     world.finish_one().await;
@@ -93,7 +93,7 @@ async fn a_changed_print_sends_its_pair_back_to_normalize() {
 }
 
 #[tokio::test]
-async fn a_changed_mesh_sends_its_pair_back_to_fit() {
+async fn a_changed_mesh_requeues_its_pair_from_fit() {
     let world = World::new(1).await;
     world.finish_one().await;
     see(&world, "another mesh", "print").await;
@@ -102,7 +102,7 @@ async fn a_changed_mesh_sends_its_pair_back_to_fit() {
 }
 
 #[tokio::test]
-async fn another_unit_in_the_manifest_is_a_reason_to_run() {
+async fn a_changed_unit_in_the_manifest_makes_the_pair_stale() {
     let world = World::new(1).await;
     world.finish_one().await;
     let mut changed = row("p0");
@@ -118,7 +118,7 @@ async fn another_unit_in_the_manifest_is_a_reason_to_run() {
 }
 
 #[tokio::test]
-async fn another_path_is_read_again_and_metadata_is_no_reason_to_run() {
+async fn a_changed_path_is_read_again_and_changed_metadata_reruns_nothing() {
     let world = World::new(1).await;
     world.finish_one().await;
     let mut changed = row("p0");
@@ -136,7 +136,7 @@ async fn another_path_is_read_again_and_metadata_is_no_reason_to_run() {
 }
 
 #[tokio::test]
-async fn a_failure_is_taken_up_when_its_settings_change() {
+async fn a_failed_pair_is_requeued_when_its_settings_change() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);
     let failed = StageFailure {
@@ -157,16 +157,16 @@ async fn a_failure_is_taken_up_when_its_settings_change() {
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     let results = detail.expect("the pair").results;
     assert_eq!((results.status, results.failure), (JobStatus::Ready, None));
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn a_leased_pair_is_never_sent_back() {
+async fn a_leased_pair_is_never_requeued() {
     let world = World::new(1).await;
     let _lease = world.claim(1).await;
     let fingerprints = fingerprints([2; 4]);
     let again = RerunPolicy::All(Stage::Fit);
     let sent = world.catalog.requeue_stale(&fingerprints, None, again);
-    assert_eq!(sent.await.expect("sent back"), 0);
-    world.counters_hold().await;
+    assert_eq!(sent.await.expect("requeued"), 0);
+    world.assert_counters().await;
 }

@@ -2,7 +2,7 @@
 
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 
-/// Where a job stands, with what belongs to it there.
+/// The state of a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum JobState {
     /// Waits to be claimed for `stage`.
@@ -10,13 +10,13 @@ pub(super) enum JobState {
         /// Next stage.
         stage: Stage,
     },
-    /// A worker runs it from `stage` on.
+    /// Leased: a worker runs it from `stage` on.
     Leased {
         /// Current stage.
         stage: Stage,
-        /// Whose lease it is.
+        /// Holder of the lease.
         worker: WorkerId,
-        /// When the stage should be over.
+        /// Deadline of the stage.
         deadline: UnixMillis,
     },
     /// Waits until `run_at`.
@@ -26,7 +26,7 @@ pub(super) enum JobState {
         /// When it may be claimed again.
         run_at: UnixMillis,
     },
-    /// All four stages are behind it.
+    /// All four stages are complete.
     Done,
     /// Failed at `stage`.
     Quarantined {
@@ -36,7 +36,7 @@ pub(super) enum JobState {
 }
 
 impl JobState {
-    /// The status without its data.
+    /// Returns the status without its data.
     pub(super) const fn status(&self) -> JobStatus {
         match self {
             Self::Ready { .. } => JobStatus::Ready,
@@ -47,7 +47,7 @@ impl JobState {
         }
     }
 
-    /// The stage that comes next; `None` when all are done.
+    /// Returns the next stage; `None` when all are done.
     pub(super) const fn stage(&self) -> Option<Stage> {
         match self {
             Self::Ready { stage }
@@ -62,72 +62,72 @@ impl JobState {
 /// Something that happens to a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Event {
-    /// A worker takes it until a deadline.
+    /// A worker leases it until a deadline.
     Claim {
-        /// Who takes it.
+        /// The worker.
         worker: WorkerId,
-        /// When the stage should be over.
+        /// Deadline of the stage.
         deadline: UnixMillis,
     },
-    /// A stage is done and its result stored; the next may last until the deadline.
+    /// A stage is complete and its result stored; the next stage has the deadline.
     Checkpoint {
-        /// Who did it.
+        /// The worker.
         worker: WorkerId,
         /// The completed stage: the current one, or an earlier one that had to be computed again.
         stage: Stage,
-        /// When the next stage should be over.
+        /// Deadline of the next stage.
         deadline: UnixMillis,
     },
-    /// The stage failed in a way that may pass.
+    /// The stage failed transiently.
     BackOff {
-        /// Who reports it.
+        /// The worker.
         worker: WorkerId,
-        /// When to try again.
+        /// Time of the next attempt.
         run_at: UnixMillis,
     },
-    /// The stage failed for good.
+    /// The stage failed permanently.
     Quarantine {
-        /// Who reports it.
+        /// The worker.
         worker: WorkerId,
     },
-    /// The worker gives it back unfinished, at a drain or to be run alone.
+    /// The worker releases it unfinished, at a drain or to be run exclusively.
     Release {
-        /// Who gives it back.
+        /// The worker.
         worker: WorkerId,
     },
-    /// The worker is dead or the deadline long past.
+    /// The worker is dead, or the deadline has passed long ago.
     Recover {
         /// Whether too many workers died over it: see [`is_poisoned`].
         poisoned: bool,
     },
-    /// The back-off time may be over, or too far ahead because the clock jumped.
+    /// The back-off may be due, or implausibly far in the future after a clock jump.
     Due {
-        /// The time now.
+        /// The current time.
         now: UnixMillis,
-        /// No back-off is longer.
+        /// Longest back-off.
         longest_ms: i64,
     },
-    /// Somebody asks for it again, or its settings or inputs changed: back to `stage`, never forward.
+    /// It was requested again, or its settings or inputs changed: back to `stage`, never forward.
     Requeue {
         /// First stage to run.
         stage: Stage,
     },
 }
 
-/// An event that cannot happen to a job where it stands; nothing changes.
+/// An event that is invalid in the job's state; nothing changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("a job that is {status} does not take {event:?}")]
 pub(super) struct Refused {
-    /// Where the job stands.
+    /// State of the job.
     pub(super) status: JobStatus,
-    /// What was tried.
+    /// The event.
     pub(super) event: Event,
 }
 
-/// What becomes of a job when something happens to it.
+/// Applies an event to a job.
 ///
 /// # Errors
-/// When the event cannot happen there, or comes from a worker that does not hold the lease.
+/// When the event is invalid in that state, or comes from a worker that does not hold the lease.
 pub(super) fn transition(state: JobState, event: Event) -> Result<JobState, Refused> {
     let next = match (state, event) {
         (JobState::Ready { stage }, Event::Claim { worker, deadline }) => Some(JobState::Leased {
@@ -152,7 +152,7 @@ pub(super) fn transition(state: JobState, event: Event) -> Result<JobState, Refu
     })
 }
 
-/// What becomes of a leased job.
+/// Applies an event to a leased job.
 fn leased(stage: Stage, holder: WorkerId, event: Event) -> Option<JobState> {
     match event {
         Event::Checkpoint {

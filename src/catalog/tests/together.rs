@@ -1,4 +1,4 @@
-//! Stages of a pair that are stored in one commit.
+//! Several stages of a pair in one commit.
 
 use super::{World, fingerprints, name};
 use crate::catalog::{CheckpointOutcome, Lease, PairDetail, RerunPolicy};
@@ -24,7 +24,7 @@ async fn fingerprint(world: &World, pair: i64) -> (Option<i64>, bool) {
 }
 
 #[tokio::test]
-async fn stages_stored_together_leave_what_they_leave_one_by_one() {
+async fn stages_stored_together_leave_the_same_rows_as_one_by_one() {
     let world = World::new(3).await;
     world.finish_one().await;
     let lease = world.claim(1).await.remove(0);
@@ -37,7 +37,7 @@ async fn stages_stored_together_leave_what_they_leave_one_by_one() {
         panic!("two stages are left");
     };
     assert_eq!(lease.cursor(), Stage::Normalize);
-    world.counters_hold().await;
+    world.assert_counters().await;
     assert!(matches!(
         store(&world, lease, &Stage::ALL[2..]).await,
         CheckpointOutcome::Done
@@ -54,11 +54,11 @@ async fn stages_stored_together_leave_what_they_leave_one_by_one() {
         assert_eq!(found, fingerprint(&world, 1).await);
         assert!(matches!(found, (Some(_), false)), "{found:?}");
     }
-    world.counters_hold().await;
+    world.assert_counters().await;
 }
 
 #[tokio::test]
-async fn a_job_whose_results_do_not_follow_on_each_other_is_marked_until_they_do() {
+async fn a_job_with_inconsistent_results_is_dirty_until_they_agree() {
     let world = World::new(1).await;
     let lease = world.claim(1).await.remove(0);
     let order = [Stage::Fit, Stage::Depth, Stage::Normalize, Stage::Depth];
@@ -67,13 +67,13 @@ async fn a_job_whose_results_do_not_follow_on_each_other_is_marked_until_they_do
     };
     assert_eq!(lease.cursor(), Stage::Normalize);
     assert!(fingerprint(&world, 1).await.1);
-    world.counters_hold().await;
+    world.assert_counters().await;
     // A chain from the first stage on is consistent again, which the next run finds.
     let again = [Stage::Normalize, Stage::Fit, Stage::Depth];
     let CheckpointOutcome::Lease(lease) = store(&world, lease, &again).await else {
         panic!("stages are left");
     };
-    world.counters_hold().await;
+    world.assert_counters().await;
     assert!(world.catalog.release(lease).await.expect("released"));
     let current = fingerprints([1; 4]);
     let requeued = world
@@ -81,5 +81,5 @@ async fn a_job_whose_results_do_not_follow_on_each_other_is_marked_until_they_do
         .requeue_stale(&current, None, RerunPolicy::Changed);
     assert_eq!(requeued.await.expect("requeued"), 0);
     assert!(matches!(fingerprint(&world, 1).await, (Some(_), false)));
-    world.counters_hold().await;
+    world.assert_counters().await;
 }

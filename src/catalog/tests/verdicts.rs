@@ -1,4 +1,4 @@
-//! Verdicts: bound to results, appended, taken back.
+//! Verdicts: bound to results, appended, undone.
 
 use super::{World, name};
 use crate::catalog::{Catalog, CatalogError, CheckpointOutcome, NewVerdict, ReviewContext};
@@ -58,7 +58,7 @@ async fn the_newest_verdict_of_each_reviewer_counts() {
 }
 
 #[tokio::test]
-async fn undo_takes_back_the_newest_act_and_the_log_keeps_both() {
+async fn undo_affects_the_newest_act_and_the_log_keeps_both() {
     let world = World::new(1).await;
     world.finish_one().await;
     for given in [verdict("ana", Verdict::Pass), verdict("ana", Verdict::Fail)] {
@@ -69,18 +69,14 @@ async fn undo_takes_back_the_newest_act_and_the_log_keeps_both() {
             .expect("stored");
     }
     let undone = world.catalog.verdict_undo(Some("ana"), 6).await;
-    let undone = undone.expect("taken back");
+    let undone = undone.expect("undone");
     assert_eq!(undone.len(), METRICS);
     assert!(undone.iter().all(|event| event.verdict == Verdict::Fail));
     assert_eq!(
         counted(&world.catalog).await,
         [("ana".to_owned(), Verdict::Pass)]
     );
-    world
-        .catalog
-        .verdict_undo(None, 7)
-        .await
-        .expect("taken back");
+    world.catalog.verdict_undo(None, 7).await.expect("undone");
     let nothing = world.catalog.verdict_undo(None, 8).await;
     assert!(matches!(nothing, Err(CatalogError::NothingToUndo(_))));
     let log = world.catalog.verdict_log(Some(&name("p0"))).await;
@@ -89,7 +85,7 @@ async fn undo_takes_back_the_newest_act_and_the_log_keeps_both() {
 }
 
 #[tokio::test]
-async fn a_verdict_without_a_result_or_a_pair_is_refused_whole() {
+async fn a_verdict_without_a_result_or_a_pair_stores_nothing() {
     let world = World::new(2).await;
     world.finish_one().await;
     let early = NewVerdict {
@@ -127,7 +123,7 @@ async fn a_new_result_does_not_inherit_a_verdict_and_the_same_result_keeps_it() 
             .catalog
             .requeue_stale(&super::fingerprints([1; 4]), None, again)
             .await;
-        assert_eq!(sent.expect("sent back"), 1);
+        assert_eq!(sent.expect("requeued"), 1);
         let lease = world.claim(1).await.remove(0);
         let mut done = world.done(Stage::Register);
         if changed {
@@ -144,7 +140,7 @@ async fn a_new_result_does_not_inherit_a_verdict_and_the_same_result_keeps_it() 
 }
 
 #[tokio::test]
-async fn a_metric_that_the_new_method_does_not_give_cannot_be_judged_any_more() {
+async fn a_metric_that_the_new_method_does_not_compute_cannot_be_judged() {
     let world = World::new(1).await;
     world.finish_one().await;
     let again = crate::catalog::RerunPolicy::All(Stage::Register);
@@ -152,7 +148,7 @@ async fn a_metric_that_the_new_method_does_not_give_cannot_be_judged_any_more() 
         .catalog
         .requeue_stale(&super::fingerprints([1; 4]), None, again)
         .await;
-    assert_eq!(sent.expect("sent back"), 1);
+    assert_eq!(sent.expect("requeued"), 1);
     let lease = world.claim(1).await.remove(0);
     let mut done = world.done(Stage::Register);
     let gone = done.metrics.pop().expect("a metric").outcome.metric;
@@ -173,7 +169,7 @@ async fn a_metric_that_the_new_method_does_not_give_cannot_be_judged_any_more() 
 }
 
 #[tokio::test]
-async fn the_database_itself_refuses_to_change_a_verdict() {
+async fn triggers_reject_changes_of_a_verdict() {
     let world = World::new(1).await;
     world.finish_one().await;
     let given = vec![verdict("ana", Verdict::Pass)];

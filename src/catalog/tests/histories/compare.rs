@@ -1,11 +1,11 @@
-//! What the catalog holds against what the model says, and before against after.
+//! Compares the catalog with the model, and its rows before and after refused writes.
 
 use sqlx::{AssertSqlSafe, Row as _};
 
 use super::super::state_machine::JobState;
 use super::Game;
 
-/// Tables that no refused write may touch.
+/// Tables that a refused write must not change.
 const TABLES: [&str; 8] = [
     "job",
     "stage_result",
@@ -18,7 +18,7 @@ const TABLES: [&str; 8] = [
 ];
 
 impl Game {
-    /// Everything that a write could change, when the write is to be refused; nothing when it is not.
+    /// Returns everything that a write could change if the write must be refused, otherwise nothing.
     pub(super) async fn dump(&mut self, allowed: bool) -> Vec<String> {
         let mut lines = Vec::new();
         for table in TABLES.iter().filter(|_| !allowed) {
@@ -37,7 +37,7 @@ impl Game {
         lines
     }
 
-    /// Every row is what the model says, no token falls, the counters are right, no verdict is lost.
+    /// Asserts that every row equals the model, no token decreases, the counters are right and no verdict is lost.
     pub(super) async fn agrees(&mut self) {
         let rows = sqlx::query(
             "SELECT j.*, f.stage AS failed_at, f.fingerprint AS failed_with FROM job AS j
@@ -94,7 +94,7 @@ impl Game {
             assert!(job.token >= self.tokens[*pair as usize]);
             self.tokens[*pair as usize] = job.token;
         }
-        self.world.counters_hold().await;
+        self.world.assert_counters().await;
         let log = self.world.catalog.verdict_log(None).await.expect("a log");
         let kept: Vec<_> = log.iter().map(|event| event.id).collect();
         assert_eq!(kept, self.verdicts);

@@ -1,4 +1,4 @@
-//! Moves that no worker makes for itself: deaths, recoveries, jumping clocks, and what people ask for.
+//! Events from outside a worker: deaths, recoveries, clock jumps, requests of users.
 
 use rand::RngExt as _;
 
@@ -18,14 +18,14 @@ impl Game {
         ended.await.expect("ended");
     }
 
-    /// A process dies; nobody knows yet.
+    /// A process dies, without notice to others.
     pub(super) fn crash(&mut self) {
         if let Some(index) = self.somebody() {
             self.model.processes[index].running = false;
         }
     }
 
-    /// Somebody takes another for dead, rightly or not, or finds its deadlines long past.
+    /// A process considers another one dead, rightly or not, or recovers its overdue leases.
     pub(super) async fn recover(&mut self) {
         let (Some(me), now) = (self.somebody(), self.wall) else {
             return;
@@ -42,7 +42,7 @@ impl Game {
         } else {
             if let Some(index) = self.somebody() {
                 self.model.processes[index].clock += LEASE / 2;
-                self.beat_of(index).await;
+                self.heartbeat_of(index).await;
             }
             let overdue = self.world.catalog.recover_overdue(me, 10, now);
             let expected = self.model.recover_overdue(me, 10);
@@ -54,7 +54,7 @@ impl Game {
         self.seen.poisoned += found.poisoned.len() as u32;
     }
 
-    /// All processes die; a new one opens the catalog alone.
+    /// All processes die, and a new one opens the catalog exclusively.
     pub(super) async fn take_over(&mut self) {
         for process in &mut self.model.processes {
             process.running = false;
@@ -78,7 +78,7 @@ impl Game {
         );
     }
 
-    /// A pair kills one process after the other.
+    /// A pair kills one process after another.
     pub(super) async fn poison(&mut self) {
         let before = self.seen.poisoned;
         for round in 0..8 {
@@ -119,7 +119,7 @@ impl Game {
             .requeue_stale(fingerprints, None, again)
             .await;
         assert_eq!(
-            sent.expect("sent back"),
+            sent.expect("requeued"),
             self.model.requeue_stale(*ids, again)
         );
     }
