@@ -69,7 +69,8 @@ fn row(sorted: &[(f64, bool)]) -> [String; 4] {
     ]
 }
 
-/// Share of all couples of a right and a wrong pair in which the right one has the higher confidence; ties count half.
+/// Returns the area under the ROC curve: the probability that a right pair has a higher confidence than a wrong one;
+/// ties count half.
 fn order(sorted: &[(f64, bool)]) -> Option<f64> {
     let of = |wanted: bool| {
         sorted

@@ -171,7 +171,7 @@ fn logistic_regression(inputs: &[Vec<f64>], labels: &[bool]) -> Vec<f64> {
             break;
         }
     }
-    // Back to the inputs as they are.
+    // Converts back to inputs that are not standardized.
     let mut plain: Vec<f64> = (0..width).map(|k| weights[k] / scale[k].1).collect();
     for k in 1..width {
         plain[0] -= plain[k] * scale[k].0;
@@ -197,7 +197,7 @@ impl Weights {
     }
 }
 
-/// The reliability table of both sets of weights and their mean log loss.
+/// Returns the reliability table of both sets of weights and their mean log loss.
 fn reliability(examples: &[Example], fitted: &Weights) -> String {
     let is_right = |e: &Example| e.is_pose_right && e.is_mask_right;
     let columns: [Vec<(f64, bool)>; 2] = [

@@ -8,7 +8,7 @@ use anyhow::Context as _;
 use super::times::Part;
 use super::trial::{Found, Trial};
 
-/// Columns before those of the outcomes.
+/// Columns before the outcomes.
 const HEADS: [&str; 13] = [
     "tier",
     "seed",

@@ -9,8 +9,8 @@
 //! cargo bench --bench accuracy -- --vertices 60000 --workers 1
 //! ```
 //!
-//! The pairs are those of `mocban demo`, made in memory from tier, seed and index, and given to the stages as a binary
-//! STL and the print's file. Neither unit nor carved side is given, which is harder. The tables are Markdown on standard
+//! The pairs equal those of `mocban demo`. They are generated in memory from tier, seed and index and passed to the stages
+//! as a binary STL and an image file. Neither unit nor carved side is given, which is harder. The tables are Markdown on standard
 //! output. `cargo test --all-targets` runs one pair a tier as a smoke test.
 
 mod accuracy;

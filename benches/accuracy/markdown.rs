@@ -46,12 +46,12 @@ fn line(cells: &[String], widths: &[usize]) -> String {
     format!("| {} |\n", padded.join(" | "))
 }
 
-/// A number with so many decimals, or a dash.
+/// Formats a number with a number of decimals, or a dash.
 pub(super) fn number(value: Option<f64>, decimals: usize) -> String {
     value.map_or("–".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
-/// Two numbers with a slash between them.
+/// Formats two numbers with a slash between them.
 pub(super) fn two(values: [Option<f64>; 2], decimals: usize) -> String {
     values.map(|value| number(value, decimals)).join(" / ")
 }

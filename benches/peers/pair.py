@@ -1,15 +1,15 @@
-"""Times whole pairs, from files to files: `mocban run` beside the same work put together from Open3D, trimesh and OpenCV.
+"""Times whole pairs from files to files: `mocban run` against the same steps with Open3D, trimesh and OpenCV.
 
     cargo build --release
     taskset -c 0 peers/bin/python benches/peers/pair.py
 
-The pairs are those of `mocban demo`, their meshes rewritten as binary STL. The programs take turns over the whole set,
-each with one core. The peer's steps are quick ones, and do no more than the paper asks: the plane by RANSAC, a depth
-map by casting rays, the ink by Otsu, the turn by ECC from starts all around, the threshold by SSIM and by density over
-the paper's 90 levels, PNG files. It keeps no catalog, syncs nothing, and checks nothing. Which side is carved it
-guesses from the heights, which is wrong for more than one scan in four; or it aligns both sides and keeps the one that
-agrees better, since neither heights nor winding tell (of 60 scans six are wound inside out, six are closed). A result
-is wrong when its turn is more than 5 degrees off the truth.
+The pairs come from `mocban demo`, with their meshes rewritten as binary STL. Each program runs the whole set in turn, on
+one core. The peer does only what the paper requires: plane by RANSAC, depth map by ray casting, ink by Otsu, rotation
+by ECC from starting angles all around, thresholds by SSIM and by density over the paper's 90 levels, PNG files. It has
+no catalog, does not sync files and checks nothing. It guesses the carved side from the heights, which is wrong for more
+than one scan in four; or it aligns both sides and keeps the better one, since neither heights nor winding decide it (of
+60 scans, six are wound inside out and six are closed). A result counts as wrong if its rotation is more than 5 degrees
+from the truth.
 """
 
 import argparse
@@ -36,7 +36,7 @@ OTHER_SIDE = np.diag([1.0, -1.0, -1.0])
 
 
 def plane(vertices):
-    """Rotation that lays the plane of most points on z = 0, and the heights in it."""
+    """Returns the rotation that moves the plane with most inliers to z = 0, and the heights over it."""
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(vertices))
     extent = np.ptp(vertices, axis=0).max()
     (a, b, c, _), _ = cloud.segment_plane(extent * 0.002, 3, 100)
@@ -50,7 +50,7 @@ def plane(vertices):
 
 
 def depth(mesh, turn):
-    """Heights as 16 bits, mirrored as the print is, 0 where no ray hits; and pixels a unit."""
+    """Returns the heights as 16 bits, mirrored to read like the print, 0 where no ray hits; and pixels per unit."""
     vertices = (mesh.vertices @ turn.T).astype(np.float32)
     vertices[:, 0] *= -1
     low, high = vertices.min(0), vertices.max(0)
@@ -68,7 +68,7 @@ def depth(mesh, turn):
 
 
 def squared(picture, mask, side):
-    """What lies in the box of a mask, on a square canvas."""
+    """Returns the content of a mask's bounding box on a square canvas."""
     rows, columns = np.flatnonzero(mask.any(1)), np.flatnonzero(mask.any(0))
     cut = picture[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].astype(np.float32)
     scale = side * 0.7 / max(cut.shape)
@@ -86,7 +86,7 @@ def ecc(fixed, moving, start, steps):
 
 
 def register(fixed, moving):
-    """Score and affine motion from print to depth on canvases of 256 pixels: the best of starts all around."""
+    """Returns the best score and affine map from print to depth on canvases of 256 pixels, over all starting angles."""
     shrink, half = SMALL / CANVAS, np.full(2, 0.5)
     small = [cv2.resize(mask, (SMALL, SMALL), interpolation=cv2.INTER_AREA) for mask in (fixed, moving)]
     middle = (SMALL - 1) / 2
@@ -107,7 +107,7 @@ def ssim(a, b):
 
 
 def side(mesh, turn, fixed):
-    """One side of the plane laid on the print: the score, the turn, the depth map in 16 and 8 bits, its tops, the motion."""
+    """Aligns one side with the print; returns score, rotation, depth map in 16 and 8 bits, its tops, and the map."""
     levels = depth(mesh, turn)
     bytes_ = (levels >> 8).astype(np.uint8)
     top, _ = cv2.threshold(bytes_[levels > 0].reshape(-1, 1), 0, 1, cv2.THRESH_BINARY | cv2.THRESH_OTSU)
@@ -117,7 +117,7 @@ def side(mesh, turn, fixed):
 
 
 def pair(mesh_path, print_path, out, both):
-    """All four stages, and what they made as files; gives the print's two axes in the mesh."""
+    """Runs all four stages and writes their results as files; returns the print's two axes in the mesh."""
     mesh = trimesh.load(mesh_path, process=False)
     turn = plane(mesh.vertices)
     grey = cv2.imread(str(print_path), cv2.IMREAD_GRAYSCALE)
@@ -145,7 +145,7 @@ def pair(mesh_path, print_path, out, both):
 
 
 def prepared(work, pairs, seed):
-    """Demo pairs with STL meshes, and their manifest."""
+    """Creates demo pairs with STL meshes, and their manifest."""
     demo, data = work / "demo", work / "data"
     if data.exists():
         return data
@@ -166,13 +166,13 @@ def prepared(work, pairs, seed):
 
 
 def used():
-    """Seconds that have passed, and seconds of a core that this process and those before it have used."""
+    """Returns wall-clock time and CPU time of this process and its finished children, seconds."""
     times = os.times()
     return np.array([time.perf_counter(), times.user + times.system + times.children_user + times.children_system])
 
 
 def ours(work, data):
-    """Seconds that `run` takes and uses, the project made before; and what it found."""
+    """Returns wall-clock and CPU seconds of `run` on a prepared project, and its results."""
     project, out = work / "project", work / "export"
     shutil.rmtree(project, ignore_errors=True)
     subprocess.run([PROGRAM, "-C", project, "import", data / "pairs.csv"], check=True, capture_output=True)
@@ -198,7 +198,7 @@ def theirs(both, work, data):
 
 
 def wrong(found, work):
-    """How many results are missing, mirrored or turned by more than 5 degrees."""
+    """Returns how many results are missing, mirrored or rotated by more than 5 degrees."""
     count = 0
     for line in open(work / "demo" / "data" / "truth.jsonl", encoding="utf-8"):
         truth = json.loads(line)

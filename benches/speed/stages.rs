@@ -1,4 +1,4 @@
-//! The four stages one by one, and a whole pair from its files' bytes.
+//! Times each of the four stages, and a whole pair from the bytes of its files.
 
 use criterion::{BatchSize, Criterion};
 use mocban::config::{Sources, load};
@@ -14,7 +14,7 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
     let (mesh, picture) = (read(&stl)?, decode(&png)?);
     let print = Print::from(picture.clone());
     let aligned = AlignedPair::new(&mesh.clone().into(), &print, &settings)?;
-    // The ink is read and the surface made ready once for a pair, by fit. Depth alone makes the surface ready too.
+    // Binarizations and the indexed surface are cached: `fit` computes both, `depth` alone only the surface.
     let fresh = |name: &str| match name {
         "fit" => (Scan::from(mesh.clone()), Print::from(picture.clone())),
         "depth" | "depth_1024" => (Scan::from(mesh.clone()), print.clone()),
@@ -64,7 +64,7 @@ pub(super) fn measure(criterion: &mut Criterion, files: &Files) -> anyhow::Resul
     Ok(())
 }
 
-/// A pair from its files' bytes to its alignment.
+/// Aligns a pair from the bytes of its files.
 fn pair(stl: &[u8], png: &[u8], settings: &Settings) -> anyhow::Result<AlignedPair> {
     let print = Print::from(decode(png)?);
     Ok(AlignedPair::new(&read(stl)?.into(), &print, settings)?)

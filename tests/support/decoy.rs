@@ -90,7 +90,7 @@ fn print_of_another_character(
 /// Reflects the mesh in x and reverses its faces, so that they still face outward.
 fn mirrored(mut mesh: Mesh) -> Mesh {
     mesh.vertices.map_in_place(|[x, y, z]| [-x, y, z]);
-    for [_, b, c] in &mut mesh.triangles {
+    for [_, b, c] in mesh.triangles.iter_mut() {
         std::mem::swap(b, c);
     }
     mesh
