@@ -26,25 +26,22 @@ static PAGE_CACHE: Mutex<PageCache> = Mutex::new(PageCache {
 });
 
 impl PageCache {
-    /// Returns the pages that fit best. If none fit, returns as many others as offset the new pages, to be freed:
-    /// scans of one run differ in size, and one that is larger than all before must not add to them.
-    fn take(&mut self, bytes: usize) -> Result<MmapMut, Vec<MmapMut>> {
-        let fits =
-            |pages: &MmapMut| (bytes..=bytes.saturating_mul(MAX_OVERSIZE)).contains(&pages.len());
+    /// Returns the pages that fit best. If none fit, frees as many others as offset the new pages: scans of one run
+    /// differ in size, and one that is larger than all before must not add to them.
+    fn take(&mut self, bytes: usize) -> Option<MmapMut> {
+        let sizes = bytes..=bytes.saturating_mul(MAX_OVERSIZE);
+        let fits = |pages: &MmapMut| sizes.contains(&pages.len());
         if let Some(found) = self.pages.iter().position(fits) {
-            return Ok(self.pages.remove(found));
+            return Some(self.pages.remove(found));
         }
-        let mut over = (self.bytes_cached() + bytes)
-            .saturating_sub(MIN_CACHED_BYTES)
-            .min(bytes);
-        let mut to_free = Vec::new();
+        let over = (self.bytes_cached() + bytes).saturating_sub(MIN_CACHED_BYTES);
+        let mut over = over.min(bytes);
         while over > 0
             && let Some(pages) = self.pages.pop()
         {
             over = over.saturating_sub(pages.len());
-            to_free.push(pages);
         }
-        Err(to_free)
+        None
     }
 
     /// Returns the bytes in the cache.
@@ -52,21 +49,14 @@ impl PageCache {
         self.pages.iter().map(|pages| pages.len()).sum()
     }
 
-    /// Adds pages; returns the smallest ones, to be freed, if the cache is full.
-    #[must_use = "pages are freed when they are dropped"]
-    fn put(&mut self, pages: MmapMut) -> Vec<MmapMut> {
-        let place = self
-            .pages
-            .partition_point(|other| other.len() < pages.len());
+    /// Adds pages; frees the smallest ones while the cache is too large.
+    fn put(&mut self, pages: MmapMut) {
+        let size = pages.len();
+        let place = self.pages.partition_point(|other| other.len() < size);
         self.pages.insert(place, pages);
-        let mut bytes_cached = self.bytes_cached();
-        let to_free = self.pages.iter().take_while(|pages| {
-            let is_over = bytes_cached > self.max_bytes;
-            bytes_cached -= pages.len();
-            is_over
-        });
-        let to_free = to_free.count();
-        self.pages.drain(..to_free).collect()
+        while self.bytes_cached() > self.max_bytes {
+            self.pages.remove(0);
+        }
     }
 }
 
@@ -82,9 +72,8 @@ impl PageBuffer {
     /// Returns at least `bytes` bytes of pages; `None` if the system has none.
     pub(super) fn allocate(bytes: usize) -> Option<Self> {
         let found = cache().take(bytes);
-        match found {
-            Ok(pages) => return Some(Self(Some(pages))),
-            Err(to_free) => drop(to_free),
+        if found.is_some() {
+            return Some(Self(found));
         }
         let pages = MmapMut::map_anon(bytes).ok()?;
         #[cfg(target_os = "linux")]
@@ -99,8 +88,7 @@ impl PageBuffer {
 impl Drop for PageBuffer {
     fn drop(&mut self) {
         if let Some(pages) = self.0.take() {
-            let to_free = cache().put(pages);
-            drop(to_free);
+            cache().put(pages);
         }
     }
 }
@@ -137,7 +125,7 @@ mod tests {
     use super::{MAX_CACHED_BYTES, MmapMut, PageCache};
 
     #[test]
-    fn pages_that_fit_are_used_again_and_none_beyond_the_limit_are_kept() {
+    fn fitting_pages_are_reused_and_the_cache_stays_within_its_limit() {
         let mut cache = PageCache {
             pages: Vec::new(),
             max_bytes: MAX_CACHED_BYTES,
@@ -151,21 +139,23 @@ mod tests {
                 .collect::<Vec<_>>()
         };
         for mebibytes in [30, 2, 11, 13] {
-            assert!(cache.put(pages(mebibytes)).is_empty());
+            cache.put(pages(mebibytes));
         }
         let fitting = cache.take((11 << 20) - 5).expect("pages");
         assert_eq!(fitting.len(), 11 << 20);
         assert_eq!(bytes_cached(&cache), [2, 13, 30]);
-        assert_eq!(cache.put(pages(90)).len(), 2);
+        cache.put(pages(90));
         assert_eq!(bytes_cached(&cache), [30, 90]);
-        assert_eq!(cache.put(pages(8)).len(), 0);
-        let too_large = cache.take(4096).expect_err("too large for so little");
-        assert_eq!(too_large[0].len(), 90 << 20);
-        let too_small = cache.take(50 << 20).expect_err("all are too small");
-        assert_eq!((too_small.len(), bytes_cached(&cache)), (2, Vec::new()));
-        assert!(cache.put(pages(3)).is_empty());
-        let few = cache.take(14 << 20).expect_err("too small");
-        assert_eq!((few.len(), bytes_cached(&cache)), (0, vec![3]));
-        assert_eq!(cache.put(pages(200)).len(), 2);
+        cache.put(pages(8));
+        assert_eq!(bytes_cached(&cache), [8, 30, 90]);
+        assert!(cache.take(4096).is_none(), "all are too large");
+        assert_eq!(bytes_cached(&cache), [8, 30]);
+        assert!(cache.take(50 << 20).is_none(), "all are too small");
+        assert!(bytes_cached(&cache).is_empty());
+        cache.put(pages(3));
+        assert!(cache.take(14 << 20).is_none(), "too small");
+        assert_eq!(bytes_cached(&cache), [3]);
+        cache.put(pages(200));
+        assert!(bytes_cached(&cache).is_empty());
     }
 }
