@@ -63,7 +63,7 @@ pub(super) fn scan(
         close_body(&mut mesh, style.noise_mm, rng);
     }
     if style.is_inside_out {
-        for [_, b, c] in &mut mesh.triangles {
+        for [_, b, c] in mesh.triangles.iter_mut() {
             std::mem::swap(b, c);
         }
     }

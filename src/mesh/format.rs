@@ -36,10 +36,14 @@ impl DetectedFormat {
             _ if stl::whole_binary_count(bytes, bytes.len() as u64).is_some() => {
                 Ok(Self::StlBinary)
             }
-            FileKind::Text => text_format(bytes, name).ok_or(MeshError::NotAMesh(kind)),
             FileKind::Binary if has_extension(name, "stl") => Ok(Self::StlBinary),
             // Names in another encoding or a stray control character do not make a text file binary.
-            FileKind::Binary => first_words(bytes).ok_or(MeshError::NotAMesh(kind)),
+            FileKind::Text | FileKind::Binary => match first_words(bytes) {
+                Some(format) => Ok(format),
+                // A truncated binary STL with a text header has no count to recognise it by.
+                None if has_extension(name, "stl") && bytes.contains(&0) => Ok(Self::StlBinary),
+                None => Err(MeshError::NotAMesh(kind)),
+            },
             _ => Err(MeshError::NotAMesh(kind)),
         }
     }
@@ -49,14 +53,6 @@ fn has_extension(name: &str, wanted: &str) -> bool {
     std::path::Path::new(name)
         .extension()
         .is_some_and(|ext| ext.eq_ignore_ascii_case(wanted))
-}
-
-fn text_format(bytes: &[u8], name: &str) -> Option<DetectedFormat> {
-    if let Some(format) = first_words(bytes) {
-        return Some(format);
-    }
-    // A truncated binary STL with a text header has no count to recognise it by.
-    (has_extension(name, "stl") && bytes.contains(&0)).then_some(DetectedFormat::StlBinary)
 }
 
 fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {

@@ -31,7 +31,7 @@ use format::DetectedFormat;
 ///
 /// let obj = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n";
 /// let mesh = read(obj, "square.obj", &MeshLimits::SUGGESTED)?;
-/// assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+/// assert_eq!(*mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
 ///
 /// let xyz = b"x,y,z\n0,0,1.5\n1,0,1.5\n";
 /// let points = read(xyz, "points.xyz", &MeshLimits::SUGGESTED)?;

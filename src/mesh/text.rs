@@ -22,7 +22,7 @@ pub(super) fn parse<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
     std::str::from_utf8(word).ok()?.parse().ok()
 }
 
-/// Parses the first three words as numbers, or says what is wrong.
+/// Parses the first three words as numbers; the error is a message.
 pub(super) fn position<'a>(mut words: impl Iterator<Item = &'a [u8]>) -> Result<[f64; 3], String> {
     let mut out = [0.0; 3];
     for (have, value) in out.iter_mut().enumerate() {

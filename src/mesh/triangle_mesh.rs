@@ -74,7 +74,7 @@ impl Vertices {
 
     /// Applies a function to each vertex.
     pub fn map_in_place(&mut self, other: impl Fn([f64; 3]) -> [f64; 3]) {
-        for vertex in self.make_double() {
+        for vertex in self.make_double().iter_mut() {
             *vertex = other(*vertex);
         }
     }

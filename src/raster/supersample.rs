@@ -149,7 +149,7 @@ pub(super) fn bilinear_cell<T: Copy + Default>(
     (near, [x - x0 as f64, y - y0 as f64])
 }
 
-/// Does the same where all four pixels are within the grid.
+/// Returns the same as [`bilinear_cell`] for a position whose four pixels are within the grid.
 #[inline(always)]
 pub(super) fn bilinear_cell_inside<T: Copy>(
     values: &Grid<T>,

@@ -11,6 +11,7 @@ use super::stage_output::{self, ExecutionError, StageOutput};
 use crate::domain::{FailureClass, Stage};
 use crate::raster::DepthMap;
 use crate::stages::normalize::{NormalizeError, Normalized};
+use crate::stages::register::RegisterError;
 use crate::stages::{Settings, StageError, depth, pipeline};
 use crate::store::Project;
 
@@ -106,10 +107,10 @@ impl PipelineExecutor {
         let normalized = self.inputs.normalized(pair)?;
         let registered =
             pipeline::register(&depth, &normalized, &self.settings).map_err(|error| {
-                let path = if error.is_of_the_mesh() {
-                    &pair.attributes.mesh_path
-                } else {
-                    &pair.attributes.print_path
+                // The mesh is the likelier cause, unless the print may be of another character.
+                let path = match error {
+                    RegisterError::NoMatch { .. } => &pair.attributes.print_path,
+                    _ => &pair.attributes.mesh_path,
                 };
                 in_file(path, &error.into())
             })?;

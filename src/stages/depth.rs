@@ -11,7 +11,7 @@ use crate::simd::{max_f32, min_f32};
 /// Raised whenever the same inputs and settings may give another result than before.
 pub const REVISION: u32 = 5;
 
-/// Largest longest side of a depth map in pixels: 16-bit maps of 268 million pixels help nobody.
+/// Largest longest side of a depth map in pixels; a square map of that size has 268 million.
 const LONGEST_PX_LIMIT: f64 = 16_384.0;
 
 /// What sets the size of a pixel.
@@ -220,7 +220,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn levels_are_those_of_the_obvious_way(
+        fn levels_equal_rounded_shares_of_the_range(
             heights in proptest::collection::vec(prop_oneof![4 => -3.0..5.0_f32, 1 => Just(NO_HIT)], 1..90),
         ) {
             let seen: Vec<f64> = heights.iter().filter(|z| **z != NO_HIT).map(|z| f64::from(*z)).collect();
@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn height_is_true_and_the_map_is_mirrored() {
+    fn heights_are_right_and_the_map_is_mirrored() {
         let map = depth(&ramp(), &flat_fit(None), None, &params()).expect("the ramp is seen");
         let to_px = map.scale.depth_from_plane;
         for (x, y) in [(1.0, 1.0), (5.0, 3.0), (9.0, 5.0)] {

@@ -13,7 +13,7 @@ use crate::domain::{Stage, ThresholdMetric};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlignmentMethod {
-    /// The best that is known: the pose first, thresholds in the aligned frame.
+    /// The recommended method: the pose first, then thresholds in the aligned frame.
     Default,
     /// The paper's (arXiv 2411.05524): thresholds first, then an exhaustive search of the rotation.
     Paper,

@@ -16,7 +16,7 @@ const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\n";
 #[test]
 fn all_ways_to_write_a_corner_give_the_same_mesh() {
     let plain = read(&format!("{SQUARE}f 1 2 3 4\n")).expect("reads");
-    assert_eq!(plain.triangles, [[0, 1, 2], [0, 2, 3]]);
+    assert_eq!(*plain.triangles, [[0, 1, 2], [0, 2, 3]]);
     for face in [
         "1/1 2/1 3/1 4/1",
         "1//1 2//1 3//1 4//1",
@@ -245,7 +245,7 @@ fn usual_files_are_read_in_one_pass() {
         ];
         let parsed = parser::parse(lines.join(end).as_bytes()).expect("a usual file");
         let mesh = parsed.into_mesh().expect("indices in range");
-        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(*mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert_eq!(mesh.vertices.at(0), [0.0, 1.0, 0.0]);
     }
     let points = read("v 0 0 0\nv 1 0 0").expect("points");

@@ -52,7 +52,7 @@ mod tests {
         let mesh = read(&bytes).expect("reads");
         assert_eq!(mesh.vertices.at(0), [1.0, 2.0, 0.5]);
         assert_eq!(mesh.vertices.at(3), [7.0, 8.0, 0.0]);
-        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3], [3, 2, 1]]);
+        assert_eq!(*mesh.triangles, [[0, 1, 2], [0, 2, 3], [3, 2, 1]]);
     }
 
     #[test]
@@ -98,7 +98,7 @@ mod tests {
             "0 0 0 1 0 0 2 0 0 3 0 0 4 0 0 8 0 1 2 3 -1 2 3 4",
         );
         let mesh = read(&bytes).expect("reads");
-        assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 3], [2, 3, 4]]);
+        assert_eq!(*mesh.triangles, [[0, 1, 2], [2, 1, 3], [2, 3, 4]]);
     }
 
     #[test]

@@ -44,7 +44,7 @@ struct AsciiParser {
     line: u64,
     scope: Scope,
     facets: u64,
-    /// Vertices parsed, including those of incomplete loops.
+    /// Vertices parsed, including vertices of incomplete loops.
     corners: u64,
     loop_corners: Vec<[f64; 3]>,
     vertices: Vec<[f64; 3]>,

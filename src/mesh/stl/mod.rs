@@ -43,7 +43,7 @@ mod tests {
             let mesh = open(&binary(header, &CORNERS)).expect("reads");
             assert_eq!(mesh.vertices.len(), 6);
             assert_eq!(mesh.vertices.at(5), [1.0, 1.0, 0.25]);
-            assert_eq!(mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
+            assert_eq!(*mesh.triangles, [[0, 1, 2], [3, 4, 5]]);
         }
     }
 

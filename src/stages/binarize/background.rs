@@ -1,5 +1,5 @@
-//! Brightness of the background at each pixel, estimated by a grey-scale closing: what is dark and narrow is ink, what
-//! is dark and wide is a stain.
+//! Brightness of the background at each pixel, estimated by a grey-scale closing: narrow dark areas are ink, wide dark
+//! areas are stains.
 
 use crate::raster::{Grid, Mask, resample};
 use crate::stages::blur::gaussian_blur;

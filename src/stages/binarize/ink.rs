@@ -1,4 +1,4 @@
-//! Ink of the print: where the image is known, which side of the threshold is ink, and how much ink each pixel has.
+//! Ink of the print: the known part of the image, the side of the threshold that is ink, and the ink of each pixel.
 
 use super::background::{self, NARROW, STROKE};
 use super::otsu::{self, Split};
@@ -137,7 +137,7 @@ pub(crate) fn hypotheses(picture: &PrintImage) -> Result<Vec<InkMask>, BinarizeE
     let mut inks: Vec<Result<InkMask, BinarizeError>> =
         polarities.iter().map(|light| of(*light)).collect();
     if polarities.contains(&false) && may_be_stained(&values, levelled) {
-        // Takes what is wider than most strokes as a stain.
+        // Dark areas wider than most strokes count as stains.
         inks.push(binarize_narrow(grey, grey, &known, STROKE, false));
     }
     // If none has ink, the error of the likeliest is reported.
@@ -158,7 +158,7 @@ fn may_be_stained(sorted: &[f32], split: Option<Split>) -> bool {
     pale as f64 > LEAST_PALE * dark as f64
 }
 
-/// Binarizes `dark_ink`, the grey or its inverse: what is dark and at most twice `narrow` wide is ink.
+/// Binarizes `dark_ink`, the grey or its inverse: dark areas at most twice `narrow` wide are ink.
 fn binarize_narrow(
     grey: &Grid<f32>,
     dark_ink: &Grid<f32>,

@@ -1,9 +1,9 @@
 //! Decides which side of the plane is carved.
 //!
-//! Four kinds of evidence are combined as log-odds. The winding of the faces is right in most files, but wrong
-//! everywhere in some. Stroke tops are planed wood, so their heights are concentrated at one level; ground is gouged.
-//! The manifest may say how the block was scanned. And the relief of the carved side agrees with the print, which
-//! weighs most: it is the only evidence that knows the character.
+//! Four kinds of evidence are combined as log-odds. The winding of the faces is right in most files and reversed in
+//! some. Stroke tops are planed wood, so their heights are concentrated at one level; ground is gouged. The manifest may
+//! give the direction of the scan. And the relief of the carved side agrees with the print. That weighs most, because
+//! only the print shows the character.
 
 use super::surface::{HeightSamples, Surface, quantile};
 use crate::domain::{Bow, Rigid3, SideEvidence};
@@ -21,11 +21,11 @@ const WINDING: f64 = 2.0;
 const SHARPNESS: f64 = 0.7;
 const AGREEMENT: f64 = 14.0;
 const MANIFEST: f64 = 0.4;
-/// A side with this agreement is the carved one without asking the other: none of 500 backs came above 0.55 while walls
-/// and frame lines still counted.
-const SURE: f64 = 0.62;
-/// Agreement that is assumed for a side that was not compared.
-const UNASKED: f64 = 0.45;
+/// If the likelier side reaches this agreement, the other one is not measured: the highest agreement of 500 backs was
+/// 0.55, measured with walls and frame lines included.
+const CERTAIN: f64 = 0.62;
+/// Agreement that is assumed for a side that was not measured.
+const UNMEASURED: f64 = 0.45;
 /// Lower bound of the agreement.
 const LEAST_AGREEMENT: f64 = 0.02;
 /// Limits of the search against the print: as in registration, but coarser.
@@ -48,7 +48,7 @@ const PASSES: [RefinementPass; 2] = [
     },
 ];
 
-/// A side is rendered from outside, so in mirror writing: no other reading counts.
+/// Sides are rendered from outside, so in mirror writing: only mirrored poses are searched.
 const fn mirrored(count: usize) -> BeamWidth {
     BeamWidth {
         upright: 0,
@@ -58,8 +58,8 @@ const fn mirrored(count: usize) -> BeamWidth {
 
 /// Working size at which the agreement is measured.
 const JUDGED_PX: usize = 56;
-/// Nearness to the tops below which nothing prints. The search uses slopes too; for the agreement they are too broad
-/// around thin strokes.
+/// Nearness to the tops below which nothing prints. The search uses slopes as well, but around thin strokes they are too
+/// broad for the agreement.
 const PRINTS: f32 = 0.7;
 /// Working size of the print and the tops.
 const BASE_PX: usize = 72;
@@ -135,19 +135,20 @@ fn log_odds(
     let manifest = inputs
         .scanned_face_down
         .map_or(0.0, |down| if down { -up } else { up });
-    let unseen = WINDING * winding + SHARPNESS * sharpness.clamp(-1.5, 1.5) + MANIFEST * manifest;
+    let mesh_only =
+        WINDING * winding + SHARPNESS * sharpness.clamp(-1.5, 1.5) + MANIFEST * manifest;
     let agreement = inputs.print.map_or(0.0, |print| {
-        if unseen >= 0.0 {
+        if mesh_only >= 0.0 {
             agreement(first, second, print)
         } else {
             -agreement(second, first, print)
         }
     });
-    unseen + AGREEMENT * agreement
+    mesh_only + AGREEMENT * agreement
 }
 
-/// Returns the logarithm of the likelier side's agreement with the print over the other's, which is measured only where
-/// the likelier one leaves a doubt; 0 when the print shows no ink.
+/// Returns the logarithm of the likelier side's agreement with the print divided by the other's, which is measured only
+/// if the likelier one is not certain; 0 when the print shows no ink.
 fn agreement(likelier: &FittedSide, other: &FittedSide, print: &Print) -> f64 {
     let Ok(hypotheses) = print.hypotheses() else {
         return 0.0;
@@ -163,7 +164,11 @@ fn agreement(likelier: &FittedSide, other: &FittedSide, print: &Print) -> f64 {
         scores.fold(LEAST_AGREEMENT, f64::max)
     };
     let first = score(likelier);
-    let second = if first >= SURE { UNASKED } else { score(other) };
+    let second = if first >= CERTAIN {
+        UNMEASURED
+    } else {
+        score(other)
+    };
     (first / second).ln()
 }
 

@@ -24,8 +24,8 @@ const WIDE_WINDOWS: usize = 3;
 /// Tops this close to the cut of the mesh, in pixels of the rendering, belong to neighbours.
 const CUT_PX: i64 = 2;
 /// Weight of a point that is not on a top of the character.
-const HARDLY: f64 = 1e-6;
-/// Least share of the tops that must remain without those at the cut.
+const OFF_TOP_WEIGHT: f64 = 1e-6;
+/// Least share of the tops that must remain without the tops at the cut.
 const LEAST_OWN: f64 = 0.4;
 /// Margin of the view, as a share of each side, that is left out when the depth of the carving is measured.
 const MARGIN: f64 = 0.15;
@@ -310,7 +310,7 @@ impl HeightSamples {
         [a, b, c]
     }
 
-    /// Returns the plane that fits a bent surface best at the tops of the character; other points hardly count.
+    /// Returns the plane that fits a bent surface best at the tops of the character; other points have a tiny weight.
     fn plane_in(&self, c: &Coefficients) -> Coefficients {
         let own = self.own_tops(c);
         let (mut all, mut tops) = (Points::default(), Points::default());
@@ -322,12 +322,12 @@ impl HeightSamples {
             }
         }
         let plane_of = |points: &Points, priors| points.solve::<3>(&[0.0; 6], |_| 1.0, priors);
-        let precision = HARDLY * all.len() as f64;
+        let precision = OFF_TOP_WEIGHT * all.len() as f64;
         let priors = plane_of(&all, &OPEN).map(|mean| Prior { mean, precision });
         plane_of(&tops, &priors)
     }
 
-    /// Returns the mask of the character's own tops; all tops where hardly any remain without those at the cut.
+    /// Returns the mask of the character's own tops; all tops if too few remain without the tops at the cut.
     fn own_tops(&self, c: &Coefficients) -> Mask {
         let window = WINDOWS[WINDOWS.len() - 1] * self.range;
         let [width, height] = self.size;

@@ -26,10 +26,10 @@ const TRIMMED_ONE_IN: usize = 100;
 
 /// Fits the surface on which the tops of the strokes lie and finds the carved side.
 ///
-/// `scan` is in its own frame and unit. `scanned_face_down` gives the direction of the carved face along the mesh's z
-/// where it is known; it decides only when nothing else does. `print` helps to separate the carved side from the back
-/// of an open sheet, whose winding is not reliable; the plane does not depend on it. The frame of the outcome keeps the
-/// mesh's x direction as far as possible, so an upright scan stays upright; lengths are in mesh units.
+/// `scan` is in its own frame and unit. `scanned_face_down` is the direction of the carved face along the mesh's z, if
+/// known; it is weak evidence for the side. `print` distinguishes the carved side from the back of an open sheet, whose
+/// winding is not reliable; the plane does not depend on it. The frame of the outcome keeps the mesh's x direction as far
+/// as possible, so an upright scan stays upright; lengths are in mesh units.
 ///
 /// # Errors
 /// When the vertices span no surface, nothing is carved, or no plane is found.

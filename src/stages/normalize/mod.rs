@@ -1,8 +1,7 @@
 //! Prepares print and relief for registration: ink of the print, heights of tops and ground of the depth map.
 //!
-//! Neither a pose nor a threshold is chosen here: soft strokes, computed from the heights where they are resampled, need
-//! no threshold, and thresholds only mean something once the pose is known. The paper's order is in
-//! `paper_method::normalize`.
+//! Neither a pose nor a threshold is chosen here: the pose is found from soft strokes, which need no threshold, and
+//! thresholds are chosen in the aligned frame. The paper's order is in `paper_method::normalize`.
 
 mod height_histogram;
 mod normalized;

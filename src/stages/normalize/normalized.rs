@@ -44,21 +44,19 @@ impl Normalized {
         relief: Option<ReliefHeights>,
         params: &NormalizeParams,
     ) -> Result<Self, NormalizeError> {
-        let (mut hypotheses, mut prints) = (Vec::new(), Vec::new());
-        for ink in inks {
-            let Some(canvas_from_print) = box_wrap(&ink.mask, params) else {
-                continue;
-            };
-            hypotheses.push(InkHypothesis {
+        let interpretation = |ink: &InkMask| {
+            let hypothesis = InkHypothesis {
                 threshold_print: ink.threshold * 65_535.0,
                 light_on_dark: ink.light_on_dark,
-                canvas_from_print,
-            });
-            prints.push(PrintMasks {
+                canvas_from_print: box_wrap(&ink.mask, params)?,
+            };
+            let masks = PrintMasks {
                 ink: ink.mask.clone(),
                 known: ink.soft.known.clone(),
-            });
-        }
+            };
+            Some((hypothesis, masks))
+        };
+        let (hypotheses, prints): (Vec<_>, Vec<_>) = inks.iter().filter_map(interpretation).unzip();
         if prints.is_empty() {
             return Err(NormalizeError::NoStrokes);
         }

@@ -1,4 +1,4 @@
-//! Strokes that are connected to the border of what is known, and the region that is left without them.
+//! Strokes that are connected to the border of the known area, and the area without them.
 //!
 //! Walls, frame lines and neighbouring characters run into the border and continue beyond it. Whether they overlap at
 //! a pose says nothing about the character, yet it would decide between the poses of a symmetric one.
@@ -110,7 +110,7 @@ impl StrokeMasks {
         inner.to_weights()
     }
 
-    /// Removes from the border strokes what lies on a stroke of the other level's mask.
+    /// Removes the pixels of border strokes that lie on a stroke of the other level.
     fn unmark_matched(&mut self, others: &Grid<f32>, other_from_this: &Affine2) {
         let size = [others.width(), others.height()];
         self.border = Mask::from_fn(self.border.width(), self.border.height(), |x, y| {

@@ -1,4 +1,4 @@
-//! Cross-correlation of small squares by FFT (Lewis 1995, fast normalized cross-correlation).
+//! Cross-correlation of small squares by FFT.
 
 use std::sync::Arc;
 

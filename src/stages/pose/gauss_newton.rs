@@ -8,7 +8,7 @@ use crate::simd::dispatch;
 
 /// Huber's threshold in medians of the absolute residual (Huber 1964, doi:10.1214/aoms/1177703732).
 const HUBER_MEDIANS: f32 = 2.5;
-/// Tukey's cutoff in shares of full ink: larger residuals are lost or added strokes (Beaton and Tukey 1974).
+/// Cutoff of Tukey's biweight in shares of full ink: larger residuals are lost or added strokes.
 const TUKEY_CUTOFF: f32 = 0.5;
 /// Lanes of the sums, one SIMD vector.
 const LANES: usize = 8;
@@ -142,13 +142,9 @@ impl NormalEquations {
                 accumulate(sums, block, filled, mirrored, fit, loss);
             },
         );
-        let mean = totals[SUM_COUNT] / workspace.count as f64;
+        let mean_loss = totals[SUM_COUNT] / count as f64;
         Self {
-            cost: if workspace.count == 0 {
-                f64::INFINITY
-            } else {
-                mean
-            },
+            cost: if count == 0 { f64::INFINITY } else { mean_loss },
             sums: totals,
             explained: workspace.explained,
         }

@@ -36,9 +36,9 @@ impl PlacedLevel<'_> {
 /// How much of each level's amount is covered by the other, 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PoseOverlap {
-    /// Share of the moving amount covered by the fixed one: of the stroke tops, what has printed.
+    /// Share of the moving amount covered by the fixed one: the share of the stroke tops that has printed.
     pub(crate) moving_covered: f64,
-    /// Share of the fixed amount covered by the moving one: of the ink, what has stroke tops under it.
+    /// Share of the fixed amount covered by the moving one: the share of the ink with stroke tops under it.
     pub(crate) fixed_covered: f64,
 }
 

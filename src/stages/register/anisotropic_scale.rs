@@ -44,8 +44,8 @@ fn summit(before: f64, at: f64, after: f64) -> f64 {
     (0.5 * (before - after) / bend).clamp(-MOST / TRIED, MOST / TRIED)
 }
 
-/// Scales about the middle by `1 + e` along x and `1 - e` along y, and likewise by `f` along the diagonals; areas hardly
-/// change.
+/// Scales about the middle by `1 + e` along x and `1 - e` along y, and likewise by `f` along the diagonals; areas change
+/// little.
 fn stretch(pose: &PoseCandidate, middle: [f64; 2], [e, f]: [f64; 2]) -> PoseCandidate {
     let [x, y] = pose.fixed_from_moving.apply(middle);
     let about = Affine2([[1.0 + e, f, -e * x - f * y], [f, 1.0 - e, e * y - f * x]]);
@@ -60,7 +60,7 @@ mod tests {
     use super::summit;
 
     #[test]
-    fn summit_is_the_top_of_the_parabola_within_reach() {
+    fn summit_is_the_maximum_of_the_parabola_within_the_limits() {
         let at = |x: f64| 3.0 - (x - 0.4).powi(2);
         assert!((summit(at(-1.0), at(0.0), at(1.0)) - 0.4).abs() < 1e-9);
         assert_eq!(summit(0.0, 0.1, 0.9), 0.0);

@@ -2,9 +2,9 @@
 //!
 //! `cargo bench --bench accuracy -- --fit-confidence` fits the weights on generated pairs (right ones of every kind, a
 //! mesh with another character's print, mirrored meshes, uncarved plates) and prints them with a reliability table on
-//! other seeds. Today's weights were fitted on 1,010 pairs of two independent generators; those of the spread and of
-//! the rim were set manually, so that poses a few percent off and thresholds that cut through worn or tilted tops rank
-//! among the least confident.
+//! other seeds. Today's weights were fitted on 1,010 pairs of two independent generators. Only the weights of spread and
+//! rim were set manually, so that poses a few percent off and thresholds that cut through worn or tilted tops rank among
+//! the least confident.
 
 use crate::domain::{MetricOutcome, PoseFeatures, ThresholdMetric};
 
@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn another_characters_print_is_not_believed() {
+    fn another_characters_print_has_a_low_confidence() {
         let wrong = PoseFeatures {
             correlation: 0.34,
             tops_covered: 0.65,

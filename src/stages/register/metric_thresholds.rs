@@ -19,7 +19,7 @@ const CLOSE_AREA: f64 = 1.12;
 const MOST_SPREAD: f64 = 2.2;
 const LEAST_INKED: f64 = 1.15;
 
-/// Print and depth map on the canvas at half its size: the structure of strokes is as visible, in a quarter of the
+/// Print and depth map on the canvas at half its size: the structure of strokes remains visible, in a quarter of the
 /// time.
 pub(super) struct HalfCanvas {
     /// Levels of the depth map; 0 where print or depth map holds no data.
@@ -72,8 +72,8 @@ struct Candidate {
 
 /// Chooses each metric's threshold, in the order of [`ThresholdMetric::ALL`].
 ///
-/// Structure and density alone reproduce the print's spread ink, and geometry alone ignores the print; `ensemble`
-/// therefore takes the best structure score among thresholds whose area is close to that of `relief`.
+/// Structure and density alone reproduce the print's spread ink, and geometry alone ignores the print. `ensemble`
+/// therefore takes the best structure score among thresholds whose mask has about the area of the mask of `relief`.
 ///
 /// # Errors
 /// When no threshold leaves strokes, or no ink lies where the depth map holds data.

@@ -84,9 +84,4 @@ impl RegisterError {
     pub const fn class(&self) -> FailureClass {
         FailureClass::NoSolution
     }
-
-    /// Returns whether the mesh is the likelier cause, not the print.
-    pub const fn is_of_the_mesh(&self) -> bool {
-        !matches!(self, Self::NoMatch { .. })
-    }
 }

@@ -75,21 +75,14 @@ pub(super) fn search(
     let wood = ImagePyramid::new(depths, BASE_PX).ok_or(RegisterError::NoPose)?;
     let wood = wood.map(|d| soft_stroke(d, SEARCH_CUT, SEARCH_SOFTNESS));
     let depth_px = longest(&depths.known);
-    let mut best: Option<PoseSearch> = None;
-    let mut failure = None;
-    for (ink, print) in prints.iter().enumerate() {
-        match find_poses(&wood, depth_px, ink, print, params) {
-            Ok(search) => {
-                if best.as_ref().is_none_or(|b| search.score() > b.score()) {
-                    best = Some(search);
-                }
-            }
-            Err(error) => {
-                failure.get_or_insert(error);
-            }
-        }
-    }
-    best.ok_or(failure.unwrap_or(RegisterError::NoPose))
+    let inks = prints.iter().enumerate();
+    let searches = inks.map(|(ink, print)| find_poses(&wood, depth_px, ink, print, params));
+    let best = searches.reduce(|best, other| match (&best, &other) {
+        (Ok(a), Ok(b)) if b.score() > a.score() => other,
+        (Err(_), Ok(_)) => other,
+        _ => best,
+    });
+    best.unwrap_or(Err(RegisterError::NoPose))
 }
 
 /// Searches the poses on one interpretation of the print; `depth_px` is the longest side of the relief's valid box.
@@ -122,7 +115,7 @@ fn find_poses(
     })
 }
 
-/// Returns the longest side of the box around what is known, pixels; 1 when nothing is.
+/// Returns the longest side of the bounding box of the known pixels; 1 without any.
 fn longest(known: &Mask) -> f64 {
     known
         .bounding_box()

@@ -22,7 +22,7 @@ const COMPARED: f64 = 0.42;
 const CLOSER: f64 = 0.67;
 /// Competitors that reach this share of the best score are refined as closely as the best pose.
 const CLOSE: f64 = 0.75;
-/// Share of a competitor that is no sign of a wrong pose: symmetric characters reach it.
+/// Shares of a competitor up to this are no evidence against the best pose: symmetric characters reach it.
 const SYMMETRIC: f64 = 0.9;
 /// Ratio of the smaller and larger poses from which the same answer must be reached.
 const OTHER_SIZE: f64 = 1.08;

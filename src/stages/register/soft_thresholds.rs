@@ -5,13 +5,13 @@ use crate::stages::pose::{PoseCandidate, PyramidLevel, Refiner};
 /// Thresholds below the tops, as shares of the relief. The ink of a print spreads; strokes too thin or too thick for it
 /// would bias the scale.
 const CUTS: [f64; 5] = [0.05, 0.11, 0.2, 0.32, 0.47];
-/// Number of them that are tried once a threshold is known roughly.
+/// Number of thresholds that are tried around a rough one.
 const NEAR: usize = 3;
 
 /// Thresholds that are tried while poses are compared.
 pub(super) const FEW_CUTS: [f64; NEAR] = [0.08, 0.2, 0.4];
 
-/// Returns the thresholds around one that is known roughly.
+/// Returns the thresholds around a rough one.
 pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
     let cut = cut.max(f64::MIN_POSITIVE);
     let far = |at: usize| (CUTS[at + NEAR / 2] / cut).ln().abs();

@@ -96,8 +96,8 @@ impl IndexedSurface {
         });
     }
 
-    /// Does the same where few blocks contain a pixel centre. They are too far apart for the hardware prefetcher, so a
-    /// group of them is read before it is filled.
+    /// Fills the same blocks as [`Self::fill_every_block`] where they are few. Few blocks are too far apart for the
+    /// hardware prefetcher, so a group of them is read before it is filled.
     fn fill_sparse_blocks(
         &self,
         rows: &[AffineForm; 3],
