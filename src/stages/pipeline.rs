@@ -7,10 +7,7 @@
 //! | normalize | ink of the print under every likely polarity, heights of tops and ground | fixed grey, wrap by box and centroid, density and structure thresholds (III-C) |
 //! | register | pose search on soft strokes, refinement, then thresholds in the aligned frame, scores, confidence | rotations at equal steps, shifts climbed on IoU, scores (III-D) |
 //!
-//! The side is decided in fit, which therefore depends on the print. An open sheet shows relief from both sides, so its
-//! mesh alone often leaves both sides in question; then fit would refine two surfaces, and depth would render and store
-//! two maps. Estimated from stage times, not tried: 16 % more time for a pair of 60,000 vertices, 25 % at 530,000. The
-//! decision in fit takes two renderings of 96 pixels a side.
+//! The carved side is decided in fit, which therefore reads the print; the code map in `src/lib.rs` gives the reason.
 
 use super::depth::{self, DepthError};
 use super::fit::{self, FitError};
