@@ -3,8 +3,7 @@
 
 use std::collections::BTreeMap;
 
-/// The actions in the order of the help, by group: those that judge an item, change how it is displayed, move through the
-/// queue or open a dialog, and align manually.
+/// Groups of actions in the order of the help: verdicts, display, navigation and dialogs, manual alignment.
 pub(super) const ACTIONS: [(&str, &str); 4] = [
     (
         "verdicts",
