@@ -23,7 +23,7 @@ use crate::runner::{Stop, StopLevel};
 #[derive(Debug, Args)]
 pub(super) struct ReviewArgs {
     /// Name of the reviewer; a label for the verdicts, not a login
-    #[arg(long, value_name = "NAME", value_parser = reviewer_name)]
+    #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     reviewer: String,
     /// Order of the results: random gives an unbiased estimate of the accuracy; least-confident finds failures sooner
     #[arg(long, default_value = "random", value_parser = order)]

@@ -39,7 +39,7 @@ pub(super) struct VerdictSetArgs {
     /// The verdict: pass, fail or unsure
     pub(super) verdict: Verdict,
     /// Name of the reviewer
-    #[arg(long, value_name = "NAME", value_parser = reviewer_name)]
+    #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     pub(super) reviewer: String,
     /// Only the result of this metric: `nl_ssim`, density, ensemble or relief [default: all]
     #[arg(long)]
@@ -73,7 +73,7 @@ pub(super) struct VerdictLogArgs {
 #[derive(Debug, Args)]
 pub(super) struct VerdictUndoArgs {
     /// Only verdicts of this reviewer [default: of anyone]
-    #[arg(long, value_name = "NAME", value_parser = reviewer_name)]
+    #[arg(long, value_name = "NAME", alias = "reader", value_parser = reviewer_name)]
     pub(super) reviewer: Option<String>,
 }
 

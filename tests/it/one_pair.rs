@@ -84,7 +84,8 @@ fn verdicts_count_until_they_are_undone(at: &dyn Fn(&[&str]) -> crate::cli::Call
     .expect(0);
     assert_eq!(acc(), 0.0);
     at(&["report", "--fail-under", "0.5"]).expect(20);
-    at(&["verdict", "undo", "--reviewer", "lan"]).expect(0);
+    // `--reader` is an alias of `--reviewer`.
+    at(&["verdict", "undo", "--reader", "lan"]).expect(0);
     assert_eq!(acc(), Value::Null);
     at(&["verdict", "set", id, "pass", "--reviewer", "lan"]).expect(0);
     assert_eq!(acc(), 1.0);
