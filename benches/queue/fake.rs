@@ -56,7 +56,7 @@ impl Fake {
         let mut lease = lease;
         loop {
             let done = self.done(lease.cursor());
-            lease = match catalog.checkpoint(lease, done).await? {
+            lease = match catalog.checkpoint(lease, vec![done]).await? {
                 CheckpointOutcome::Lease(next) => next,
                 CheckpointOutcome::Done => return Ok(()),
                 CheckpointOutcome::LeaseLost => anyhow::bail!("a lease was lost"),

@@ -83,6 +83,8 @@ pub(super) async fn work(
     in_progress: usize,
 ) -> anyhow::Result<Duration> {
     let fake = Arc::new(Fake::register(&world.project, catalog, &fingerprints(None)?).await?);
+    // Commit at once, so that each checkpoint is durable before the next one.
+    let _waiting = catalog.waiting().await?;
     let start = Instant::now();
     let mut left = pairs;
     let mut tasks = tokio::task::JoinSet::new();

@@ -16,13 +16,14 @@ mod verdicts;
 use std::path::Path;
 use std::time::Duration;
 
-use serde_json::{Map, json};
-use tokio::sync::oneshot;
+use serde_json::{Map, Value, json};
+use tokio::sync::{mpsc, oneshot};
 
 use super::db::commit_delay::CommitDelay;
 use super::{
-    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints, ImportRow,
-    InputVersion, InputVersions, Lease, MetricResult, RerunPolicy, StageCheckpoint, WorkerInfo,
+    Catalog, CheckpointOutcome, ClaimRequest, DeadWorker, FingerprintIds, Fingerprints,
+    ImportChunk, ImportRow, ImportSummary, InputVersion, InputVersions, Lease, MetricResult,
+    RerunPolicy, StageCheckpoint, WorkerInfo,
 };
 use crate::domain::{
     Affine2, ArtifactSet, ContentHash, MetricOutcome, PairName, RegisterOutcome, Scores, Stage,
@@ -30,6 +31,38 @@ use crate::domain::{
 };
 
 impl Catalog {
+    /// Imports rows in one transaction.
+    pub(crate) async fn import(
+        &self,
+        rows: Vec<ImportRow>,
+        now: UnixMillis,
+    ) -> super::Result<ImportSummary> {
+        let (sender, chunks) = mpsc::channel(2);
+        for chunk in [ImportChunk::Rows(rows), ImportChunk::End] {
+            sender.try_send(chunk).expect("room for both");
+        }
+        let (summary, _) = self.import_all(chunks, Vec::new(), now).await?;
+        Ok(summary)
+    }
+
+    /// Stores true alignments.
+    async fn set_truth(&self, truths: Vec<(PairName, Value)>) -> super::Result<u64> {
+        let (sender, chunks) = mpsc::channel(1);
+        sender.try_send(ImportChunk::End).expect("room");
+        let (_, stored) = self.import_all(chunks, truths, 1).await?;
+        Ok(stored)
+    }
+
+    /// Stores a stage without commit delay.
+    async fn checkpoint_now(
+        &self,
+        lease: Lease,
+        stage: StageCheckpoint,
+    ) -> super::Result<CheckpointOutcome> {
+        let _waiting = self.waiting().await?;
+        self.checkpoint(lease, vec![stage]).await
+    }
+
     /// Creates a catalog whose writer delays deferrable requests indefinitely.
     pub(crate) async fn create_patient(path: &Path) -> super::Result<Self> {
         Self::with_writer(path, true, CommitDelay::of(Duration::from_hours(1))).await
@@ -134,6 +167,11 @@ impl World {
         other
     }
 
+    async fn crashes(&self, pair: &str) -> u32 {
+        let detail = self.catalog.pair(&name(pair)).await.expect("a read");
+        detail.expect("the pair").crashes
+    }
+
     fn done(&self, stage: Stage) -> StageCheckpoint {
         done(self.fingerprints, stage)
     }
@@ -143,7 +181,7 @@ impl World {
         let mut lease = self.claim(1).await.pop().expect("a ready pair");
         loop {
             let stage = lease.cursor();
-            match self.catalog.checkpoint(lease, self.done(stage)).await {
+            match self.catalog.checkpoint_now(lease, self.done(stage)).await {
                 Ok(CheckpointOutcome::Lease(next)) => lease = next,
                 Ok(CheckpointOutcome::Done) => return,
                 other => panic!("the checkpoint was not stored: {other:?}"),

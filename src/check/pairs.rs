@@ -149,7 +149,7 @@ fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
             Err(InputError::NotThere(_)) => check.inputs_missing.push(note()),
             Err(_) => check.inputs_changed.push(note()),
             Ok(stat) => {
-                let moved = |seen: &&InputVersion| seen.stat != stat.as_str();
+                let moved = |seen: &&InputVersion| seen.stat != stat;
                 let changed = seen.filter(moved).is_some_and(|seen| {
                     hash_input(&path).map_or(true, |found| found.hash != seen.hash)
                 });

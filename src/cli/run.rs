@@ -269,7 +269,7 @@ fn plan_text(plan: &Plan, running: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::{Plan, bytes, plan_text};
-    use crate::catalog::{FieldChange, PlanEntry, StaleReason};
+    use crate::catalog::{FieldChange, FingerprintId, PlanEntry, StaleReason};
     use crate::domain::Stage;
 
     #[test]
@@ -287,7 +287,10 @@ mod tests {
         let plan = Plan {
             entries: vec![PlanEntry {
                 from: Stage::Register,
-                why: StaleReason::Requested,
+                why: StaleReason::Settings {
+                    stage: Stage::Register,
+                    old: FingerprintId(1),
+                },
                 changes: Some(vec![FieldChange {
                     field: "register.max_scale".into(),
                     old: Some(1.2.into()),

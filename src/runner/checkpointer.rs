@@ -127,7 +127,7 @@ async fn store_stages(
         let batch;
         (batch, is_complete) = write_batch(&context, &pair, first, &mut stages).await?;
         let times: Vec<_> = batch.iter().map(|done| (done.stage, done.ms)).collect();
-        outcome = context.catalog.checkpoint_deferrable(lease, batch).await?;
+        outcome = context.catalog.checkpoint(lease, batch).await?;
         if !matches!(outcome, CheckpointOutcome::LeaseLost) {
             count += times.len() as u64;
             for (stage, ms) in times {

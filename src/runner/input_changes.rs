@@ -91,7 +91,7 @@ fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Opti
     let known = known?;
     let path = project.input_path(stored);
     match stat_input(&path) {
-        Ok(stat) if stat.as_str() == known.stat => None,
+        Ok(stat) if stat == known.stat => None,
         Ok(_) => current(&path),
         Err(InputError::NotThere(_)) if known.stat.is_empty() => Some(InputVersion {
             hash: ContentHash::of(b""),
@@ -110,7 +110,7 @@ impl From<InputDigest> for InputVersion {
     fn from(read: InputDigest) -> Self {
         Self {
             hash: read.hash,
-            stat: read.stat.as_str().to_owned(),
+            stat: read.stat,
         }
     }
 }

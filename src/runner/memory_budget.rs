@@ -87,10 +87,9 @@ fn size(path: &Path) -> u64 {
 }
 
 fn mesh_bytes(path: &Path) -> u64 {
-    let factor = if has_extension(path, &["obj"]) {
-        OBJ_FACTOR
-    } else {
-        MESH_FACTOR
+    let factor = match extension(path).as_str() {
+        "obj" => OBJ_FACTOR,
+        _ => MESH_FACTOR,
     };
     (size(path) as f64 * factor) as u64
 }
@@ -104,24 +103,18 @@ fn print_bytes(path: &Path, images: &raster::ImageLimits) -> u64 {
     let pixels = of_header
         .and_then(|file| raster::header_pixel_count(BufReader::new(file)))
         .unwrap_or_else(|| {
-            let is_jpeg = has_extension(path, &["jpg", "jpeg"]);
-            size.saturating_mul(if is_jpeg {
-                JPEG_PIXELS_PER_BYTE
-            } else {
-                PIXELS_PER_BYTE
+            size.saturating_mul(match extension(path).as_str() {
+                "jpg" | "jpeg" => JPEG_PIXELS_PER_BYTE,
+                _ => PIXELS_PER_BYTE,
             })
         });
     let pixels = pixels.min(images.max_pixels);
     pixels.saturating_mul(PIXEL_BYTES).saturating_add(size)
 }
 
-fn has_extension(path: &Path, extensions: &[&str]) -> bool {
-    let extension = path.extension().and_then(std::ffi::OsStr::to_str);
-    extension.is_some_and(|extension| {
-        extensions
-            .iter()
-            .any(|wanted| extension.eq_ignore_ascii_case(wanted))
-    })
+fn extension(path: &Path) -> String {
+    let extension = path.extension().unwrap_or_default();
+    extension.to_string_lossy().to_ascii_lowercase()
 }
 
 #[cfg(test)]

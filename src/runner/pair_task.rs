@@ -11,8 +11,8 @@ use super::input_changes;
 use super::pair_context::PairContext;
 use super::policy::{self, FailedAttempt};
 use super::run_context::{PairEnd, PairReport, RunContext};
-use crate::catalog::{FailureAction, InputVersions, Lease, PairWork, StageFailure};
-use crate::domain::{Failure, FailureClass, PairName, Stage};
+use crate::catalog::{FailureAction, InputVersions, Lease, PairAttributes, PairWork, StageFailure};
+use crate::domain::{Failure, FailureClass, Stage};
 use crate::failpoint::{self, Point};
 use crate::store::Project;
 
@@ -34,7 +34,8 @@ pub(super) async fn process_pair(
     let pair = Box::new(PairContext::new(work));
     failpoint::hit(first, Point::Claimed, Some(&pair.attributes.name));
     let known = PairSummary::of(&pair);
-    let checkpointer = Checkpointer::start(Arc::clone(&context), known.name.clone(), lease);
+    let checkpointer =
+        Checkpointer::start(Arc::clone(&context), known.attributes.name.clone(), lease);
     match ComputeThread::start(Arc::clone(&context), first, pair) {
         Ok(thread) => compute(&context, checkpointer, thread, first, known).await,
         Err(error) => {
@@ -58,7 +59,7 @@ async fn compute(
         match thread.next_event(timeout, &context.stop).await {
             ComputeEvent::Started(started, inputs) => {
                 (stage, pair.inputs) = (started, inputs);
-                let pair = pair.name.clone();
+                let pair = pair.attributes.name.clone();
                 context.emit(RunEvent::StageStarted { pair, stage });
             }
             ComputeEvent::Finished(computed, next) => {
@@ -150,7 +151,7 @@ async fn store_failure(
         failure: failed.failure.clone(),
         action,
         fingerprint: context.fingerprints.of(stage),
-        attributes: pair.attributes,
+        attributes: pair.attributes_json,
         inputs,
         ms: failed.ms,
         at: now,
@@ -159,7 +160,7 @@ async fn store_failure(
     if !context.catalog.fail(lease, record).await? {
         return Ok(PairEnd::LeaseLost);
     }
-    let (pair, failure) = (pair.name, failed.failure);
+    let (pair, failure) = (pair.attributes.name, failed.failure);
     let wait_ms = match action {
         FailureAction::BackOff { run_at } => (run_at - now).unsigned_abs(),
         FailureAction::RetryExclusive => 0,
@@ -185,20 +186,16 @@ async fn store_failure(
 
 /// What is stored with a failure even when the thread is lost, and the pair's data with it.
 struct PairSummary {
-    name: PairName,
-    attributes: String,
-    mesh_path: String,
-    print_path: String,
+    attributes: PairAttributes,
+    attributes_json: String,
     inputs: InputVersions,
 }
 
 impl PairSummary {
     fn of(pair: &PairContext) -> Self {
         Self {
-            name: pair.attributes.name.clone(),
-            attributes: pair.attributes_json.clone(),
-            mesh_path: pair.attributes.mesh_path.clone(),
-            print_path: pair.attributes.print_path.clone(),
+            attributes: pair.attributes.clone(),
+            attributes_json: pair.attributes_json.clone(),
             inputs: pair.inputs.clone(),
         }
     }
@@ -207,7 +204,8 @@ impl PairSummary {
     /// compares with them to find out whether a file was repaired.
     async fn inputs_now(&self, project: &Project) -> InputVersions {
         let read = self.inputs.clone();
-        let paths = [&self.mesh_path, &self.print_path].map(|path| project.input_path(path));
+        let paths = [&self.attributes.mesh_path, &self.attributes.print_path];
+        let paths = paths.map(|path| project.input_path(path));
         run_blocking(move || InputVersions {
             mesh: read.mesh.or_else(|| input_changes::current(&paths[0])),
             print: read.print.or_else(|| input_changes::current(&paths[1])),

@@ -7,9 +7,10 @@ use serde_json::Value;
 use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_inputs::StageInputs;
-use super::stage_output::{self, ExecutionError, StageOutput};
+use super::stage_output::{self, ExecutionError, StageOutput, png};
+use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask, print_mask};
 use crate::domain::{FailureClass, Stage};
-use crate::raster::DepthMap;
+use crate::raster::{DepthMap, png_grey8, png_grey16, png_mask};
 use crate::stages::normalize::{NormalizeError, Normalized};
 use crate::stages::register::RegisterError;
 use crate::stages::{Settings, StageError, depth, pipeline};
@@ -72,7 +73,10 @@ impl PipelineExecutor {
         let map = depth::depth(&scan, &fit, pair.attributes.unit, &self.settings.depth)
             .map_err(|error| in_file(&pair.attributes.mesh_path, &error.into()))?;
         let (outcome, json) = round_trip(&stage_output::depth_outcome(&map))?;
-        let output = StageOutput::depth(json, &map);
+        let output = StageOutput {
+            files: vec![png(DEPTH, png_grey16(&map.levels))],
+            ..StageOutput::numbers(json)
+        };
         pair.depth = Some(DepthMap {
             scale: outcome.scale,
             ..map
@@ -94,7 +98,13 @@ impl PipelineExecutor {
         let (outcome, json) = round_trip(&normalized.outcome)?;
         let masks = normalized.prints.iter();
         let masks: Vec<_> = masks.map(stage_output::encode_print_masks).collect();
-        let output = StageOutput::normalized(json, &masks);
+        let files = masks.iter().enumerate();
+        let output = StageOutput {
+            files: files
+                .map(|(ink, grey)| png(&print_mask(ink), png_grey8(grey)))
+                .collect(),
+            ..StageOutput::numbers(json)
+        };
         pair.normalized = Some(Normalized {
             outcome,
             prints: masks.iter().map(stage_output::decode_print_masks).collect(),
@@ -115,7 +125,15 @@ impl PipelineExecutor {
                 in_file(path, &error.into())
             })?;
         let (outcome, json) = round_trip(&registered.outcome)?;
-        Ok(StageOutput::registered(json, outcome.metrics, &registered))
+        let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
+        for (metric, mask) in outcome.metrics.iter().zip(&registered.canvas_depths) {
+            files.push(png(&canvas_depth_mask(metric.metric), png_mask(mask)));
+        }
+        Ok(StageOutput {
+            outcome: json,
+            files,
+            metrics: outcome.metrics,
+        })
     }
 }
 

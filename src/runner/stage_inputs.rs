@@ -3,6 +3,7 @@
 use super::options::RunOptions;
 use super::pair_context::PairContext;
 use super::stage_output::{self, ExecutionError};
+use crate::domain::artifact_role::{DEPTH, print_mask};
 use crate::domain::{DepthOutcome, Failure, FailureClass, FitOutcome, NormalizeOutcome, Stage};
 use crate::mesh;
 use crate::raster::{self, DepthMap};
@@ -70,7 +71,7 @@ impl StageInputs {
         }
         let rerun = || ExecutionError::RerunFrom(Stage::Depth);
         let outcome: DepthOutcome = pair.outcome(Stage::Depth).ok_or_else(rerun)?;
-        let bytes = self.artifact(pair, Stage::Depth, stage_output::DEPTH)?;
+        let bytes = self.artifact(pair, Stage::Depth, DEPTH)?;
         let levels = raster::decode_grey16(&bytes).ok().ok_or_else(rerun)?;
         Ok(DepthMap {
             levels,
@@ -87,7 +88,7 @@ impl StageInputs {
         let outcome: NormalizeOutcome = pair.outcome(Stage::Normalize).ok_or_else(rerun)?;
         let mut prints = Vec::new();
         for ink in 0..outcome.inks.len() {
-            let bytes = self.artifact(pair, Stage::Normalize, &stage_output::print_mask(ink))?;
+            let bytes = self.artifact(pair, Stage::Normalize, &print_mask(ink))?;
             let grey = raster::decode_grey8(&bytes).ok().ok_or_else(rerun)?;
             prints.push(stage_output::decode_print_masks(&grey));
         }

@@ -5,14 +5,12 @@ use std::collections::BTreeMap;
 use serde_json::{Value, json};
 
 use crate::catalog::MetricResult;
-use crate::domain::artifact_role::{CANVAS_PRINT_MASK, canvas_depth_mask};
-pub(super) use crate::domain::artifact_role::{DEPTH, print_mask};
+use crate::domain::artifact_role::{CANVAS_PRINT_MASK, DEPTH, canvas_depth_mask};
 use crate::domain::{
     ArtifactSet, ContentHash, DepthOutcome, Failure, FailureClass, MetricOutcome, Stage,
 };
-use crate::raster::{DepthMap, Grid, png_grey8, png_grey16, png_mask};
+use crate::raster::{DepthMap, Grid};
 use crate::stages::normalize::PrintMasks;
-use crate::stages::register::Registered;
 use crate::store::NewArtifact;
 
 /// Grey levels of the print mask.
@@ -62,45 +60,10 @@ impl StageOutput {
             metrics: Vec::new(),
         }
     }
-
-    /// The output of the depth stage: the map as a 16-bit PNG.
-    pub(super) fn depth(outcome: Value, map: &DepthMap) -> Self {
-        Self {
-            files: vec![png(DEPTH, png_grey16(&map.levels))],
-            ..Self::numbers(outcome)
-        }
-    }
-
-    /// The output of the normalize stage: an 8-bit PNG of ink and background for each interpretation of the print.
-    pub(super) fn normalized(outcome: Value, print_masks: &[Grid<u8>]) -> Self {
-        let masks = print_masks.iter().enumerate();
-        Self {
-            files: masks
-                .map(|(ink, grey)| png(&print_mask(ink), png_grey8(grey)))
-                .collect(),
-            ..Self::numbers(outcome)
-        }
-    }
-
-    /// The output of the register stage: the masks on which the metrics were computed.
-    pub(super) fn registered(
-        outcome: Value,
-        metrics: Vec<MetricOutcome>,
-        registered: &Registered,
-    ) -> Self {
-        let mut files = vec![png(CANVAS_PRINT_MASK, png_mask(&registered.canvas_print))];
-        for (metric, mask) in metrics.iter().zip(&registered.canvas_depths) {
-            files.push(png(&canvas_depth_mask(metric.metric), png_mask(mask)));
-        }
-        Self {
-            outcome,
-            files,
-            metrics,
-        }
-    }
 }
 
-fn png(role: &str, bytes: Vec<u8>) -> NewArtifact {
+/// Returns a PNG image with its role.
+pub(super) fn png(role: &str, bytes: Vec<u8>) -> NewArtifact {
     NewArtifact::new(role, "png", bytes)
 }
 

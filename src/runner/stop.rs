@@ -3,9 +3,10 @@
 use tokio::sync::watch;
 
 /// How a run is asked to stop.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum StopLevel {
     /// Not at all.
+    #[default]
     Go,
     /// Finish the stages in progress, start no new ones.
     Drain,
@@ -24,23 +25,15 @@ impl StopLevel {
 }
 
 /// A stop request that signal handlers and the run share.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Stop {
     level: watch::Sender<StopLevel>,
-}
-
-impl Default for Stop {
-    fn default() -> Self {
-        Self::new()
-    }
 }
 
 impl Stop {
     /// No request yet.
     pub fn new() -> Self {
-        Self {
-            level: watch::Sender::new(StopLevel::Go),
-        }
+        Self::default()
     }
 
     /// Raises the request by one level, first to a drain, then to an immediate stop; returns the new level.

@@ -34,7 +34,10 @@ impl WorkerSession {
         Self {
             worker,
             last_heartbeat: now,
-            liveness: Liveness::new(lease_ms),
+            liveness: Liveness {
+                lease_ms,
+                seen: BTreeMap::new(),
+            },
         }
     }
 
@@ -111,13 +114,6 @@ struct Liveness {
 }
 
 impl Liveness {
-    const fn new(lease_ms: i64) -> Self {
-        Self {
-            lease_ms,
-            seen: BTreeMap::new(),
-        }
-    }
-
     /// Takes in the current heartbeats of all workers with leases; returns the dead ones among them.
     fn observe(&mut self, holders: &[LeaseHolder], me: WorkerId, now: UnixMillis) -> Vec<WorkerId> {
         self.seen
@@ -154,6 +150,8 @@ pub(super) fn this_process() -> WorkerInfo {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeMap;
+
     use super::Liveness;
     use crate::catalog::LeaseHolder;
     use crate::domain::WorkerId;
@@ -167,7 +165,10 @@ mod tests {
                 heartbeat: if worker == me { 0 } else { heartbeat },
             })
         };
-        let mut liveness = Liveness::new(60_000);
+        let mut liveness = Liveness {
+            lease_ms: 60_000,
+            seen: BTreeMap::new(),
+        };
         assert!(liveness.observe(&holders(5), me, 0).is_empty());
         assert!(liveness.observe(&holders(6), me, 59_999).is_empty());
         assert!(liveness.observe(&holders(6), me, 119_998).is_empty());

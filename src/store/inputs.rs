@@ -8,24 +8,12 @@ use std::path::{Path, PathBuf};
 use crate::domain::{ContentHash, FailureClass};
 use crate::page_vec::PageVec;
 
-/// Size, modification time and inode of a file. While all three are the same, so is the content, by assumption.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FileStat(String);
-
-impl FileStat {
-    /// Returns the form that the catalog stores.
-    pub fn as_str(&self) -> &str {
-        &self.0
-    }
-
-    fn of(meta: &std::fs::Metadata) -> Self {
-        let modified = meta
-            .modified()
-            .ok()
-            .and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok())
-            .map_or(0, |since| since.as_nanos());
-        Self(format!("{}:{modified}:{}", meta.len(), meta.ino()))
-    }
+/// Returns size, modification time and inode of a file. While all three are the same, so is the content, by assumption.
+fn file_stat(meta: &std::fs::Metadata) -> String {
+    let modified = meta.modified().ok();
+    let modified = modified.and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok());
+    let modified = modified.map_or(0, |since| since.as_nanos());
+    format!("{}:{modified}:{}", meta.len(), meta.ino())
 }
 
 /// An input file and its content.
@@ -42,8 +30,8 @@ pub struct InputFile {
 pub struct InputDigest {
     /// Hash of the content.
     pub hash: ContentHash,
-    /// Stat at the time when it was opened.
-    pub stat: FileStat,
+    /// Size, modification time and inode at the time when it was opened, as text.
+    pub stat: String,
 }
 
 /// An input file that is being read. Its bytes are hashed as they are read, while they are in the CPU cache.
@@ -56,7 +44,7 @@ pub struct InputReader {
     /// Most bytes that it may have, and the name of the setting for that.
     limit: (u64, &'static str),
     hasher: blake3::Hasher,
-    stat: FileStat,
+    stat: String,
 }
 
 /// Most bytes that are read and hashed at a time, so that they stay in the CPU cache.
@@ -100,7 +88,7 @@ impl InputReader {
         }
         // A parser that read to what was the end then may have missed bytes that the hash includes.
         let meta = self.file.get_ref().metadata();
-        let now = FileStat::of(&meta.map_err(|error| self.error(error))?);
+        let now = file_stat(&meta.map_err(|error| self.error(error))?);
         if now != self.stat {
             return Err(InputError::Changed(self.path));
         }
@@ -188,13 +176,13 @@ impl InputError {
     }
 }
 
-/// Returns the stat of a file.
+/// Returns size, modification time and inode of a file as text.
 ///
 /// # Errors
 /// When it does not exist, is not a regular file, or cannot be read.
-pub fn stat_input(path: &Path) -> Result<FileStat, InputError> {
+pub fn stat_input(path: &Path) -> Result<String, InputError> {
     let meta = std::fs::metadata(path).map_err(|error| InputError::io(path, error))?;
-    Ok(FileStat::of(&check_file(path, meta)?))
+    Ok(file_stat(&check_file(path, meta)?))
 }
 
 /// Opens a file of at most `limit` bytes; `setting` is the name of that limit in error messages.
@@ -221,7 +209,7 @@ pub fn open_input(
         len: meta.len(),
         limit: (limit, setting),
         hasher: blake3::Hasher::new(),
-        stat: FileStat::of(&meta),
+        stat: file_stat(&meta),
     })
 }
 
@@ -251,7 +239,7 @@ pub fn hash_input(path: &Path) -> Result<InputDigest, InputError> {
         .map_err(|error| InputError::io(path, error))?;
     Ok(InputDigest {
         hash: ContentHash::from_bytes(*hasher.finalize().as_bytes()),
-        stat: FileStat::of(&meta),
+        stat: file_stat(&meta),
     })
 }
 

@@ -10,8 +10,7 @@ mod referenced;
 pub use artifacts::{ArtifactError, NewArtifact};
 pub use atomic_write::{partial_path, rename_into_place, write_atomic, write_synced};
 pub use inputs::{
-    FileStat, InputDigest, InputError, InputFile, InputReader, hash_input, open_input, read_input,
-    stat_input,
+    InputDigest, InputError, InputFile, InputReader, hash_input, open_input, read_input, stat_input,
 };
 pub use lock::{LockError, RunLock};
 pub use project::{CATALOG_FILE, Project, SETTINGS_FILE, StoreError};

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use mocban::catalog::{Catalog, ImportRow, NewVerdict, ReviewContext};
+use mocban::catalog::{Catalog, ImportChunk, ImportRow, NewVerdict, ReviewContext};
 use mocban::config::{self, Sources};
 use mocban::demo::{DemoOptions, Tier, write_dataset};
 use mocban::domain::{PairName, ThresholdMetric, Verdict};
@@ -85,10 +85,10 @@ impl FinishedRun {
             block: None,
             meta: serde_json::Map::new(),
         });
-        self.catalog
-            .import(rows.collect(), NOW)
-            .await
-            .expect("imported");
+        let (sender, chunks) = tokio::sync::mpsc::channel(2);
+        for chunk in [ImportChunk::Rows(rows.collect()), ImportChunk::End] {
+            sender.try_send(chunk).expect("room for both");
+        }
         let truth = std::fs::read_to_string(&files.truth).expect("the demo has truth");
         let truths = truth.lines().map(|line| {
             let mut value: Value = serde_json::from_str(line).expect("truth is JSON");
@@ -98,10 +98,9 @@ impl FinishedRun {
             value["tops_mask"] = stored(Path::new(tops)).into();
             (name(value["id"].as_str().expect("an id")), value)
         });
-        self.catalog
-            .set_truth(truths.collect())
-            .await
-            .expect("stored");
+        let truths = truths.collect();
+        let imported = self.catalog.import_all(chunks, truths, NOW).await;
+        imported.expect("imported");
     }
 
     async fn report(&self) -> Report {

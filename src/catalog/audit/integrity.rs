@@ -5,16 +5,15 @@ use std::collections::{BTreeMap, BTreeSet};
 use sqlx::sqlite::{SqliteConnectOptions, SqliteRow};
 use sqlx::{ConnectOptions as _, FromRow as _, Row as _, SqliteConnection};
 
-use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open;
 use crate::catalog::db::rows::json_array;
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{CounterKey, JobGroup};
 use crate::catalog::queue::fragments::inconsistent;
 use crate::catalog::queue::job_counts::count_jobs;
 use crate::catalog::records::pair_work::{self, KnownInputs};
 use crate::catalog::records::stage_results;
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{ContentHash, JobStatus, PairId, PairName, Stage, ThresholdMetric};
 
 /// Most lines of each check.

@@ -4,12 +4,12 @@ use serde_json::json;
 use sqlx::{AssertSqlSafe, SqliteConnection};
 
 use crate::catalog::audit::integrity::{integrity, objects, wanted_objects};
-use crate::catalog::db::error::Result;
 use crate::catalog::db::rows::json_array;
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::fragments::{fingerprint_before, inconsistent};
 use crate::catalog::queue::job_counts::count_jobs;
+use crate::catalog::queue::requeue::CLEAR_FAILURES;
+use crate::catalog::{Catalog, Result};
 use crate::domain::{PairId, Stage};
 
 const POSITIONS: &str = "
@@ -32,9 +32,6 @@ UPDATE job SET stage = min(stage, item.value ->> 1), status = 0, run_at = NULL, 
 FROM json_each(?1) AS item WHERE job.pair = item.value ->> 0
 RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint"
 );
-
-const CLEAR_FAILURES: &str =
-    "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
 
 /// Every counter that the catalog needs, at 0.
 const RESET_COUNTERS: [&str; 3] = [

@@ -6,10 +6,9 @@ use sqlx::sqlite::SqliteConnectOptions;
 use sqlx::{ConnectOptions as _, Connection as _};
 
 use crate::catalog::audit::integrity;
-use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::open::{Identity, identity};
-use crate::catalog::handle::Catalog;
+use crate::catalog::{Catalog, CatalogError, Result};
 
 impl Catalog {
     /// Copies the catalog as of one moment to a new file and verifies the copy. Nothing is synced to disk.

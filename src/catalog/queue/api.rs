@@ -1,13 +1,12 @@
 //! The queue's requests to the writer task, and its counters.
 
 use crate::catalog::db::commit_delay::Waiting;
-use crate::catalog::db::error::Result;
 use crate::catalog::db::request::{Message, Reply, Request};
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::claim::{ClaimRequest, Heartbeat};
 use crate::catalog::queue::counters::{JobCounts, by_status, counters};
 use crate::catalog::queue::job_counts::count_jobs;
 use crate::catalog::queue::lease::{CheckpointOutcome, Lease, StageCheckpoint, StageFailure};
+use crate::catalog::{Catalog, Result};
 use crate::domain::{UnixMillis, WorkerId};
 
 impl Catalog {
@@ -47,36 +46,16 @@ impl Catalog {
             .await
     }
 
-    /// Stores a finished stage in one transaction and advances the job. The artifacts must be on disk already.
+    /// Stores finished stages in the order they were computed, in one transaction, and advances the job. The artifacts
+    /// must be on disk already. The commit may be delayed, for other requests to share it, while nobody is
+    /// [`Catalog::waiting`].
     ///
     /// # Errors
     /// When the database refuses; then nothing is stored, and the lease lasts until it is recovered.
     pub async fn checkpoint(
         &self,
         lease: Lease,
-        stage: StageCheckpoint,
-    ) -> Result<CheckpointOutcome> {
-        self.store(lease, vec![stage], Message::Grouped).await
-    }
-
-    /// Like [`Catalog::checkpoint`], for stages in the order they were computed. The commit may be delayed, for other
-    /// requests to share it, while nobody is [`Catalog::waiting`].
-    ///
-    /// # Errors
-    /// As there.
-    pub async fn checkpoint_deferrable(
-        &self,
-        lease: Lease,
         stages: Vec<StageCheckpoint>,
-    ) -> Result<CheckpointOutcome> {
-        self.store(lease, stages, Message::Deferrable).await
-    }
-
-    async fn store(
-        &self,
-        lease: Lease,
-        stages: Vec<StageCheckpoint>,
-        message: fn(Request) -> Message,
     ) -> Result<CheckpointOutcome> {
         let Some(last) = stages.last() else {
             return Ok(CheckpointOutcome::Lease(lease));
@@ -85,12 +64,12 @@ impl Catalog {
             cursor,
             fingerprint: Some(last.fingerprint),
             attempt: 1,
-            crashes: 0,
             cleared: true,
             ..lease
         });
+        let item = Box::new((lease, stages));
         let stored = self
-            .reply_to(|reply| message(Request::Checkpoint(Box::new((lease, stages)), reply)))
+            .reply_to(|reply| Message::Deferrable(Request::Checkpoint(item, reply)))
             .await?;
         Ok(match (stored, advanced) {
             (false, _) => CheckpointOutcome::LeaseLost,

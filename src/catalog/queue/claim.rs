@@ -60,7 +60,7 @@ WHERE pair IN (
     SELECT pair FROM job WHERE status = 0 AND stage <= ? AND exclusive = ?
     ORDER BY prio, stage DESC, pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
-RETURNING pair, worker, token, stage, fingerprint, attempt, crashes, exclusive";
+RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
 
 /// Like [`CLAIM`], among some pairs.
 pub(crate) const CLAIM_AMONG: &str = "
@@ -70,7 +70,7 @@ WHERE pair IN (
     WHERE j.status = 0 AND j.stage <= ? AND j.exclusive = ?
     ORDER BY j.prio, j.stage DESC, j.pair LIMIT +?)
     AND EXISTS (SELECT 1 FROM worker WHERE id = ? AND ended IS NULL AND heartbeat >= ?)
-RETURNING pair, worker, token, stage, fingerprint, attempt, crashes, exclusive";
+RETURNING pair, worker, token, stage, fingerprint, attempt, exclusive";
 
 /// Gives leases back as if they had never been taken.
 pub(crate) const RELEASE: &str = "

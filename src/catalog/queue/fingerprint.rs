@@ -5,11 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::{Map, Value, json};
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::Result;
 use crate::catalog::db::rows::{Json, json_array};
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::lease::FingerprintId;
 use crate::catalog::queue::plan::FieldChange;
+use crate::catalog::{Catalog, Result};
 use crate::domain::{ContentHash, Stage};
 
 /// The fingerprint of one stage's settings.

@@ -22,7 +22,6 @@ pub struct Lease {
     /// Fingerprint of the result before the cursor.
     pub(crate) fingerprint: Option<FingerprintId>,
     pub(crate) attempt: u32,
-    pub(crate) crashes: u32,
     pub(crate) exclusive: bool,
     /// Whether a stage was stored under it, which removed the pair's failure.
     #[sqlx(skip)]
@@ -45,19 +44,9 @@ impl Lease {
         self.attempt
     }
 
-    /// Returns how many workers died over the pair since its last finished stage.
-    pub const fn crashes(&self) -> u32 {
-        self.crashes
-    }
-
     /// Returns whether nothing may run beside it, because it needed too much memory or a worker died over it.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
-    }
-
-    /// Returns the fencing token: of two leases on a pair the later one has the higher token.
-    pub const fn token(&self) -> i64 {
-        self.token
     }
 
     /// Returns where the leased job is counted.

@@ -5,13 +5,12 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::Result;
 use crate::catalog::db::rows::json_array;
 use crate::catalog::db::script::Script;
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::checkpoint::UPDATE_INPUTS;
 use crate::catalog::queue::counters::{Deltas, KeyedJob};
 use crate::catalog::queue::lease::InputVersions;
+use crate::catalog::{Catalog, Result};
 use crate::domain::{CRASH_LIMIT, FailureClass, JobStatus, PairId, UnixMillis, WorkerId};
 
 /// A worker that holds leases.

@@ -5,10 +5,8 @@ use std::collections::BTreeMap;
 use serde_json::json;
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::request::Work;
 use crate::catalog::db::rows::json_array;
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{CounterKey, Deltas, KeyedJob};
 use crate::catalog::queue::fingerprint::{FingerprintChains, Fingerprints, current_json};
 use crate::catalog::queue::fragments::fingerprint_before;
@@ -17,6 +15,7 @@ use crate::catalog::queue::selection::{PairSelection, select, unknown_names};
 use crate::catalog::queue::staleness::{
     PAGE, RerunPolicy, StaleJob, clear_dirty, decide, groups, inspect, inspect_marked,
 };
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{FailureClass, JobStatus, PairName, Stage};
 
 /// Which failed pairs to requeue.
@@ -46,7 +45,7 @@ pub(crate) const MEMBERS: &str = "
 SELECT pair FROM job WHERE pair > ?1 AND stage = ?2 AND status = ?3 AND fingerprint IS ?4 AND dirty = 0
 ORDER BY pair LIMIT ?5";
 
-const CLEAR_FAILURES: &str =
+pub(crate) const CLEAR_FAILURES: &str =
     "DELETE FROM failure WHERE pair IN (SELECT value ->> 0 FROM json_each(?1))";
 
 /// Jobs that failed or back off, of one class or all.

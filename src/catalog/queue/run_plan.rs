@@ -4,8 +4,6 @@ use std::collections::BTreeMap;
 
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::{CatalogError, Result};
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::fingerprint::{
     FingerprintChains, Fingerprints, current_json, differences, fields_of,
 };
@@ -14,6 +12,7 @@ use crate::catalog::queue::selection::{PairSelection, select};
 use crate::catalog::queue::staleness::{
     RerunPolicy, StaleJob, count_stale, decide, inspect, inspect_all,
 };
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{PairName, Stage};
 
 impl Catalog {
@@ -78,7 +77,14 @@ async fn plan(
         None => plan.add_unchanged(job.key.status, pairs),
     };
     if let Some(among) = among {
-        inspect_selection(conn, &current, among, &mut add).await?;
+        let mut after = Some(0);
+        while let Some(from) = after {
+            let page = inspect(conn, &current, from, among).await?;
+            after = page.last().map(|(pair, _)| *pair);
+            for (_, job) in &page {
+                add(job, 1);
+            }
+        }
     } else {
         let chains = FingerprintChains::load(conn, fingerprints).await?;
         inspect_all(conn, &current, &chains, &mut add).await?;
@@ -99,22 +105,4 @@ async fn plan(
         });
     }
     Ok(plan)
-}
-
-/// Passes the state of each of some pairs to `each`.
-async fn inspect_selection(
-    conn: &mut SqliteConnection,
-    current: &str,
-    among: &PairSelection,
-    mut each: impl FnMut(&StaleJob, u64),
-) -> Result<()> {
-    let mut after = Some(0);
-    while let Some(from) = after {
-        let page = inspect(conn, current, from, among).await?;
-        after = page.last().map(|(pair, _)| *pair);
-        for (_, job) in &page {
-            each(job, 1);
-        }
-    }
-    Ok(())
 }

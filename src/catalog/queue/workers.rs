@@ -2,11 +2,10 @@
 
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::Result;
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{CounterKey, Cursor, Deltas, cursor};
 use crate::catalog::queue::fingerprint::FingerprintIds;
 use crate::catalog::queue::selection::PairSelection;
+use crate::catalog::{Catalog, Result};
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 
 /// The process a worker runs in.

@@ -3,9 +3,8 @@
 use serde_json::{Value, json};
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::rows::json_array;
-use crate::catalog::handle::Catalog;
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::PairName;
 
 const SET: &str = "
@@ -20,15 +19,6 @@ SELECT item.value ->> 'name' FROM json_each(?1) AS item
 WHERE NOT EXISTS (SELECT 1 FROM pair AS p WHERE p.name = item.value ->> 'name') LIMIT 1";
 
 impl Catalog {
-    /// Stores true alignments as given and replaces earlier ones; returns how many.
-    ///
-    /// # Errors
-    /// When a pair does not exist; then nothing is stored.
-    pub async fn set_truth(&self, truths: Vec<(PairName, Value)>) -> Result<u64> {
-        self.in_transaction(move |conn| Box::pin(async move { set(conn, &truths).await }))
-            .await
-    }
-
     /// Returns whether any pair has a true alignment.
     ///
     /// # Errors
@@ -40,7 +30,7 @@ impl Catalog {
     }
 }
 
-/// Stores true alignments in the open transaction; returns how many.
+/// Stores true alignments as given in the open transaction and replaces earlier ones; returns how many.
 pub(crate) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)]) -> Result<u64> {
     let mut stored = 0;
     for chunk in truths.chunks(500) {

@@ -6,13 +6,12 @@ use serde_json::{Value, json};
 use sqlx::SqliteConnection;
 use tokio::sync::mpsc;
 
-use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::rows::json_array;
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{CounterKey, Deltas};
 use crate::catalog::queue::selection::{PairSelection, select, unknown_names};
 use crate::catalog::records::ground_truth;
 use crate::catalog::records::model::PairAttributes;
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{PairName, UnixMillis};
 
 /// A row to import.
@@ -72,22 +71,8 @@ SELECT id, 0, 0 FROM pair WHERE name IN (SELECT value FROM json_each(?1))
     AND NOT EXISTS (SELECT 1 FROM job WHERE job.pair = pair.id)";
 
 impl Catalog {
-    /// Imports rows in one transaction: new pairs are added, existing pairs are updated. Of two rows with the same
-    /// name the later one counts.
-    ///
-    /// # Errors
-    /// When the database returns an error; then nothing is imported.
-    pub async fn import(&self, rows: Vec<ImportRow>, now: UnixMillis) -> Result<ImportSummary> {
-        let (sender, chunks) = mpsc::channel(2);
-        for chunk in [ImportChunk::Rows(rows), ImportChunk::End] {
-            // There is room for both, and the receiver is at hand.
-            let _ = sender.try_send(chunk);
-        }
-        let (summary, _) = self.import_all(chunks, Vec::new(), now).await?;
-        Ok(summary)
-    }
-
-    /// Imports streamed rows and true alignments in one transaction; also returns the number of true alignments.
+    /// Imports streamed rows and true alignments in one transaction: new pairs are added, existing pairs are updated. Of
+    /// two rows with the same name the later one counts. Also returns the number of true alignments.
     ///
     /// # Errors
     /// When the rows stop without an end, a true alignment names an unknown pair, or the database returns an error;

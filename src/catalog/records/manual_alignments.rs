@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use crate::catalog::db::error::Result;
-use crate::catalog::handle::Catalog;
 use crate::catalog::records::review_answers::pair_id;
+use crate::catalog::{Catalog, Result};
 use crate::domain::{Affine2, ContentHash, PairName, PrintFromMesh, UnixMillis};
 
 /// A manual alignment.

@@ -5,15 +5,14 @@ use std::collections::BTreeMap;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{FromRow as _, Row as _, SqliteConnection};
 
-use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::rows::Json;
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::Cursor;
 use crate::catalog::records::model::{
     AttemptRecord, FailedPair, MetricRecord, PairAttributes, PairDetail, PairResults, StageRecord,
     StoredFailure,
 };
 use crate::catalog::records::{stage_results, verdicts};
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{
     ContentHash, Failure, FailureClass, PairName, RegisterOutcome, Stage, ThresholdMetric,
     UnixMillis,

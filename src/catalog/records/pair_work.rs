@@ -5,15 +5,14 @@ use std::collections::BTreeMap;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{FromRow as _, Row as _};
 
-use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::rows::json_array;
 use crate::catalog::db::script::Script;
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::checkpoint;
 use crate::catalog::queue::lease::{InputVersion, InputVersions, Lease};
 use crate::catalog::queue::selection::PairSelection;
 use crate::catalog::records::model::{PairAttributes, StageRecord};
 use crate::catalog::records::stage_results;
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{PairId, Stage};
 
 /// A leased pair with its attributes and results.

@@ -4,10 +4,9 @@ use serde::Serialize;
 use sqlx::sqlite::SqliteRow;
 use sqlx::{FromRow, Row as _, SqliteConnection};
 
-use crate::catalog::db::error::{CatalogError, Result};
-use crate::catalog::handle::Catalog;
 use crate::catalog::records::review_context::ReviewContext;
 use crate::catalog::records::verdicts::{self, NewVerdict};
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{
     AttentionCheck, ContentHash, PairName, Reason, ThresholdMetric, UnixMillis, Verdict,
 };

@@ -4,12 +4,11 @@ use std::collections::BTreeMap;
 
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::Result;
-use crate::catalog::handle::Catalog;
 use crate::catalog::queue::counters::{JobCounts, by_status, counters};
 use crate::catalog::queue::fingerprint::{Fingerprints, current_json};
 use crate::catalog::queue::staleness::count_stale;
 use crate::catalog::records::model::{StageCounts, StatusCounts};
+use crate::catalog::{Catalog, Result};
 use crate::domain::{JobStatus, Stage, Verdict};
 
 /// Newest verdict of each reviewer on each current result, by verdict.

@@ -5,10 +5,9 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use sqlx::SqliteConnection;
 
-use crate::catalog::db::error::{CatalogError, Result};
 use crate::catalog::db::rows::json_array;
-use crate::catalog::handle::Catalog;
 use crate::catalog::records::review_context::ReviewContext;
+use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{
     ContentHash, PairName, Reason, ReviewOrder, ThresholdMetric, UnixMillis, Verdict,
 };

@@ -182,7 +182,7 @@ impl Game {
         let expected = self.model.claim(&process, slots, exclusive, deadline);
         let found: Vec<_> = taken
             .iter()
-            .map(|lease| (lease.pair().0, lease.token()))
+            .map(|lease| (lease.pair().0, lease.token))
             .collect();
         assert_eq!(found, expected);
         self.leases.extend(taken);
@@ -219,7 +219,7 @@ impl Game {
         let kept = self
             .world
             .catalog
-            .checkpoint(lease, done)
+            .checkpoint_now(lease, done)
             .await
             .expect("an answer");
         assert_eq!(stands, !matches!(kept, CheckpointOutcome::LeaseLost));

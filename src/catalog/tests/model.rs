@@ -109,7 +109,7 @@ impl Queue {
     pub(super) fn holds(&self, lease: &Lease) -> bool {
         let job = &self.jobs[&lease.pair().0];
         let held = |worker| matches!(job.state, JobState::Leased { worker: holder, .. } if holder == worker);
-        held(lease.worker) && job.token == lease.token()
+        held(lease.worker) && job.token == lease.token
     }
 
     /// Returns whether a write under a lease must be accepted.

@@ -55,7 +55,7 @@ async fn pairs_of_low_confidence_are_counted() {
             for metric in &mut done.metrics {
                 metric.outcome.confidence = confidence;
             }
-            match world.catalog.checkpoint(lease, done).await {
+            match world.catalog.checkpoint_now(lease, done).await {
                 Ok(CheckpointOutcome::Lease(next)) => lease = next,
                 Ok(CheckpointOutcome::Done) => break,
                 other => panic!("the checkpoint was not stored: {other:?}"),
@@ -73,7 +73,7 @@ async fn a_claim_leases_the_most_advanced_pair_first() {
     let pair = lease.pair();
     let Ok(CheckpointOutcome::Lease(lease)) = world
         .catalog
-        .checkpoint(lease, world.done(Stage::Fit))
+        .checkpoint_now(lease, world.done(Stage::Fit))
         .await
     else {
         panic!("the checkpoint was not stored")
@@ -101,8 +101,11 @@ async fn a_late_checkpoint_of_a_recovered_job_changes_nothing() {
     let world = World::new(1).await;
     let late = world.claim(1).await.remove(0);
     let other = world.recovered_by_another(1).await;
-    let token = late.token();
-    let kept = world.catalog.checkpoint(late, world.done(Stage::Fit)).await;
+    let token = late.token;
+    let kept = world
+        .catalog
+        .checkpoint_now(late, world.done(Stage::Fit))
+        .await;
     assert!(matches!(kept, Ok(CheckpointOutcome::LeaseLost)));
     let detail = world.catalog.pair(&name("p0")).await.expect("a read");
     let detail = detail.expect("the pair");
@@ -112,7 +115,7 @@ async fn a_late_checkpoint_of_a_recovered_job_changes_nothing() {
         (JobStatus::Ready, 1)
     );
     let again = world.claim_exclusive(other).await.remove(0);
-    assert!(again.exclusive() && again.token() > token);
+    assert!(again.exclusive() && again.token > token);
     world.assert_counters().await;
 }
 
@@ -199,17 +202,16 @@ async fn a_finished_stage_resets_the_crash_count() {
     drop(world.claim(1).await);
     let other = world.recovered_by_another(1).await;
     let lease = world.claim_exclusive(other).await.remove(0);
-    assert_eq!(lease.crashes(), 1);
+    assert_eq!(world.crashes("p0").await, 1);
     let kept = world
         .catalog
-        .checkpoint(lease, world.done(Stage::Fit))
+        .checkpoint_now(lease, world.done(Stage::Fit))
         .await;
     let Ok(CheckpointOutcome::Lease(lease)) = kept else {
         panic!("the checkpoint was not stored")
     };
-    assert_eq!(lease.crashes(), 0);
-    let detail = world.catalog.pair(&name("p0")).await.expect("a read");
-    assert_eq!(detail.expect("the pair").crashes, 0);
+    assert_eq!(lease.attempt(), 1);
+    assert_eq!(world.crashes("p0").await, 0);
 }
 
 #[tokio::test]
@@ -375,8 +377,8 @@ async fn one_failing_request_does_not_fail_its_batch() {
     let mut broken = world.done(Stage::Fit);
     broken.outcome = "no JSON".to_owned();
     let (good, bad) = tokio::join!(
-        world.catalog.checkpoint(good, world.done(Stage::Fit)),
-        world.catalog.checkpoint(bad, broken),
+        world.catalog.checkpoint_now(good, world.done(Stage::Fit)),
+        world.catalog.checkpoint_now(bad, broken),
     );
     assert!(matches!(good, Ok(CheckpointOutcome::Lease(_))));
     assert!(matches!(bad, Err(CatalogError::Shared(_))));
@@ -391,7 +393,7 @@ async fn everything_sent_is_stored_when_the_catalog_is_closed() {
     let (kept, ()) = tokio::join!(
         world
             .catalog
-            .checkpoint(lease, done(world.fingerprints, Stage::Fit)),
+            .checkpoint_now(lease, done(world.fingerprints, Stage::Fit)),
         world.catalog.clone().close(),
     );
     assert!(matches!(kept, Ok(CheckpointOutcome::Lease(_))));

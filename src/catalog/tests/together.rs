@@ -7,7 +7,7 @@ use crate::domain::Stage;
 /// Stores stages under a lease in one commit.
 async fn store(world: &World, lease: Lease, stages: &[Stage]) -> CheckpointOutcome {
     let done = stages.iter().map(|stage| world.done(*stage)).collect();
-    let kept = world.catalog.checkpoint_deferrable(lease, done).await;
+    let kept = world.catalog.checkpoint(lease, done).await;
     kept.expect("stored")
 }
 

@@ -129,7 +129,7 @@ async fn a_new_result_does_not_inherit_a_verdict_and_the_same_result_keeps_it() 
         if changed {
             done.metrics[0].result_hash = ContentHash::of(b"another");
         }
-        let kept = world.catalog.checkpoint(lease, done).await;
+        let kept = world.catalog.checkpoint_now(lease, done).await;
         assert!(matches!(kept, Ok(CheckpointOutcome::Done)));
         assert_eq!(counted(&world.catalog).await.is_empty(), changed);
     }
@@ -154,7 +154,7 @@ async fn a_metric_that_the_new_method_does_not_compute_cannot_be_judged() {
     let gone = done.metrics.pop().expect("a metric").outcome.metric;
     let left: Vec<_> = done.metrics.iter().map(|m| m.outcome).collect();
     done.outcome = serde_json::json!({ "metrics": left }).to_string();
-    let kept = world.catalog.checkpoint(lease, done).await;
+    let kept = world.catalog.checkpoint_now(lease, done).await;
     assert!(matches!(kept, Ok(CheckpointOutcome::Done)));
     let all = verdict("ana", Verdict::Pass);
     let one = NewVerdict {
