@@ -62,7 +62,15 @@ fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {
         match first {
             _ if line.starts_with(b"#") || line.starts_with(b"//") => {}
             b"ply" if number == 1 => return Some(DetectedFormat::Ply),
-            _ if first.eq_ignore_ascii_case(b"solid") => return Some(stl_after_solid(bytes)),
+            // A binary STL may have a header that begins with `solid`.
+            _ if first.eq_ignore_ascii_case(b"solid") => {
+                let is_binary = bytes.iter().take(4096).any(|byte| *byte == 0);
+                return Some(if is_binary {
+                    DetectedFormat::StlBinary
+                } else {
+                    DetectedFormat::StlAscii
+                });
+            }
             b"v" | b"vn" | b"vt" | b"vp" | b"f" | b"o" | b"g" | b"s" | b"mtllib" | b"usemtl" => {
                 return Some(DetectedFormat::Obj);
             }
@@ -71,13 +79,4 @@ fn first_words(bytes: &[u8]) -> Option<DetectedFormat> {
         }
     }
     None
-}
-
-/// Distinguishes an ASCII STL from a binary STL whose header begins with `solid`.
-fn stl_after_solid(bytes: &[u8]) -> DetectedFormat {
-    if bytes.iter().take(4096).any(|byte| *byte == 0) {
-        DetectedFormat::StlBinary
-    } else {
-        DetectedFormat::StlAscii
-    }
 }

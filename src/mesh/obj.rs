@@ -118,7 +118,10 @@ fn find_fault(bytes: &[u8]) -> MeshError {
         let fault = match record {
             Record::Vertex(rest) => {
                 vertex += 1;
-                vertex_fault(rest, line, vertex)
+                match text::position(text::words(rest)) {
+                    Err(reason) => Some(MeshError::Line { line, reason }),
+                    Ok(position) => error::check_finite(position, vertex).err(),
+                }
             }
             Record::Face(rest) => {
                 face += 1;
@@ -132,13 +135,6 @@ fn find_fault(bytes: &[u8]) -> MeshError {
     MeshError::Line {
         line: 1,
         reason: "the OBJ cannot be read".into(),
-    }
-}
-
-fn vertex_fault(rest: &[u8], line: u64, vertex: u64) -> Option<MeshError> {
-    match text::position(text::words(rest)) {
-        Err(reason) => Some(MeshError::Line { line, reason }),
-        Ok(position) => error::check_finite(position, vertex).err(),
     }
 }
 
