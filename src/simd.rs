@@ -7,13 +7,20 @@
 /// that it calls `#[inline(always)]`.
 macro_rules! dispatch {
     ($work:expr) => {
-        pulp::Arch::new().dispatch(
+        $crate::simd::run_widest(
             #[inline(always)]
             || $work,
         )
     };
 }
 pub(crate) use dispatch;
+
+/// Runs a closure for [`dispatch`]. The bound makes it a plain `FnOnce`: other closures are called through a function
+/// that is not inlined, and so not compiled for the wide instructions.
+#[inline(always)]
+pub(crate) fn run_widest<R>(work: impl FnOnce() -> R) -> R {
+    pulp::Arch::new().dispatch(work)
+}
 
 /// Returns the smaller number by a plain comparison, one instruction for many lanes; `f32::min` treats NaN specially.
 #[inline(always)]
