@@ -241,7 +241,7 @@ fn a_process_suspended_inside_a_transaction_is_named_to_those_that_wait() {
     command.stderr(File::create(fixture.stderr_path()).expect("a file"));
     let second = command.stdout(Stdio::piped()).spawn();
     let mut second = Running(Some(second.expect("the binary starts")));
-    let message = format!("catalog.sqlite is kept locked by pid {pid}, which is stopped");
+    let message = format!("catalog.sqlite is locked by pid {pid}, which is stopped");
     second.wait_until("it names the process that it waits for", || {
         let stderr = std::fs::read_to_string(fixture.stderr_path()).expect("a file");
         stderr.contains(&message)
