@@ -42,7 +42,7 @@ pub enum CatalogError {
     },
     /// The file is corrupt.
     #[error(
-        "{0} is damaged: part of it was overwritten or cannot be read; `check` reports how much can be read, and a backup can replace it"
+        "{0} is damaged: part of it was overwritten, or the disk cannot read it; `check` reports how much can be read, and a backup can replace it"
     )]
     Damaged(PathBuf),
     /// The disk failed to read part of the file.
