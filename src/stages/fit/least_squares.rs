@@ -149,19 +149,38 @@ impl MomentSums {
                 }
             }
         };
-        let degrees = if TERMS < SECOND { 2 } else { 4 };
-        let mut products = [weights; 6];
-        let mut place = 0;
-        for degree in 0..=degrees {
-            for product in &products[..=degree] {
-                put(place, product);
-                place += 1;
-            }
-            // The next degree: the last product times v, and all times u.
-            products[degree + 1] = times(&products[degree], v);
-            for product in &mut products[..=degree] {
-                *product = times(product, u);
-            }
+        // Each degree from the one before: all times u, then the last one times v. Written out, because a loop over the
+        // degrees takes four times as long.
+        let (one, first) = (weights, [times(&weights, u), times(&weights, v)]);
+        let second = [
+            times(&first[0], u),
+            times(&first[1], u),
+            times(&first[1], v),
+        ];
+        put(0, &one);
+        put(1, &first[0]);
+        put(2, &first[1]);
+        for (k, product) in second.iter().enumerate() {
+            put(3 + k, product);
+        }
+        if TERMS < SECOND {
+            return;
+        }
+        let [uu, uv, vv] = second;
+        let third = [times(&uu, u), times(&uv, u), times(&vv, u), times(&vv, v)];
+        for (k, product) in third.iter().enumerate() {
+            put(6 + k, product);
+        }
+        let [uuu, uuv, uvv, vvv] = third;
+        let fourth = [
+            times(&uuu, u),
+            times(&uuv, u),
+            times(&uvv, u),
+            times(&vvv, u),
+            times(&vvv, v),
+        ];
+        for (k, product) in fourth.iter().enumerate() {
+            put(10 + k, product);
         }
     }
 
