@@ -3,65 +3,77 @@
 //! # Code map
 //!
 //! A **pair** is one character: a mesh of the carved block and an image of its print. Its **job** runs four **stages**:
-//! `fit`, `depth`, `normalize` and `register`. A worker leases the pair, runs the remaining stages and writes a
-//! **checkpoint** after each one, first the files, then one short transaction, while the next stage is computed. Stages
-//! are pure functions. The catalog is the only module with SQL, the store the only one with artifact files, and the
-//! runner connects both with the stages.
+//! `fit`, `depth`, `normalize` and `register`. A **worker** is one process that runs stages. It leases the pair, runs
+//! the remaining stages and writes a **checkpoint** after each one while the next stage is computed: first the files,
+//! then one transaction, which may hold the checkpoints of several pairs. Stages are pure functions. The catalog is the
+//! only module with SQL, the store the only one with artifact files, and the runner connects both with the stages.
 //!
 //! ## One pair, from manifest row to report cell
 //!
 //! Read these files in order to follow a pair through the program:
 //!
 //! 1. `src/manifest/csv.rs`: parses the rows of a manifest
-//! 2. `src/catalog/records/import.rs`: stores pairs and their jobs
-//! 3. `src/runner/scheduler.rs`: the main loop, starts a task for each leased pair
-//! 4. `src/runner/prefetch.rs`: leases pairs for free slots and a little ahead
-//! 5. `src/catalog/queue/claim.rs`: leases a job in one statement, with a fencing token; called through `api.rs`
-//! 6. `src/runner/pair_task.rs`: follows the thread of one leased pair, stores a failure
-//! 7. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
-//! 8. `src/runner/stage_executor.rs`: reads what a stage needs and calls it
-//! 9. `src/stages/pipeline.rs`: chooses the method of each stage; the stages start in `fit/mod.rs` (plane, curvature,
-//!    carved side), `depth.rs` (depth map), `normalize/mod.rs` (print and relief on a common scale) and `register/mod.rs`
-//!    (pose, thresholds, scores, confidence)
-//! 10. `src/runner/stage_output.rs`: encodes a stage's result as JSON, files and hashes
+//! 2. `src/catalog/records/import.rs`: stores pairs and their jobs in one transaction
+//! 3. `src/runner/run.rs`: starts a run: lock, recovery of dead workers, requeue of stale results
+//! 4. `src/runner/scheduler.rs`: the main loop, starts a task for each leased pair
+//! 5. `src/runner/prefetch.rs`: leases pairs for free slots and a little ahead
+//! 6. `src/catalog/queue/claim.rs`: leases a job in one statement, with a fencing token; called through `api.rs`
+//! 7. `src/runner/pair_task.rs`: follows the thread of one leased pair, stores a failure
+//! 8. `src/runner/compute_thread.rs`: runs the stages of the pair one after another on a thread
+//! 9. `src/runner/stage_executor.rs`: reads what a stage needs, calls it and encodes its result
+//! 10. `src/stages/pipeline.rs`: chooses the method of each stage; the stages start in `fit/upper_surface.rs` (plane,
+//!     curvature, carved side), `depth.rs` (depth map), `normalize/mod.rs` (print and relief on a common scale) and
+//!     `register/mod.rs` (pose, thresholds, scores, confidence)
 //! 11. `src/runner/checkpointer.rs`: stores finished stages while the next one is computed
 //! 12. `src/store/artifacts.rs`: writes artifact files by content hash
-//! 13. `src/catalog/queue/checkpoint.rs`: records a finished stage and renews or ends the lease; called through `api.rs`
-//! 14. `src/catalog/records/pair_results.rs`: reads results back
-//! 15. `src/report/build.rs`: iterates over all pairs
-//! 16. `src/report/accumulate.rs`: sums results per metric
-//! 17. `src/report/render/table.rs`: formats the cells
+//! 13. `src/catalog/db/group_commit.rs`: stores all requests that wait for the single writer in one transaction
+//! 14. `src/catalog/queue/checkpoint.rs`: the statements that record a finished stage and renew or end the lease
+//! 15. `src/catalog/records/pair_results.rs`: reads results back; the scores come from `stage_result.outcome`
+//! 16. `src/report/build.rs`: iterates over all pairs
+//! 17. `src/report/accumulate.rs`: sums results per metric
+//! 18. `src/report/render/report_tables.rs`: defines the columns; `table.rs` and the formats beside it write them
 //!
-//! A **lost lease** is noticed when a stage or a failure is stored. The statements in `src/catalog/queue/checkpoint.rs`
-//! and `fail.rs` update a job only if its worker and fencing token equal those of the lease. If no row was updated,
-//! `src/catalog/queue/api.rs` returns [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome); the checkpointer then
-//! stores nothing more, and `src/runner/pair_task.rs` drops the pair with `PairEnd::LeaseLost`.
+//! ## A lost lease
 //!
-//! The carved side is decided in `fit`, which therefore reads the print. Measured on 740 generated pairs: the mesh alone
-//! decides 13 % by the relief and at most 2 % of a tier by its other evidence without errors; it is wrong for 97 pairs.
-//! For the other 85 %, `fit` and `depth` would process both sides, which takes 25 % more CPU time (58.8 against 47.0 ms).
-//! [`stages::pipeline`] shows both methods side by side.
+//! Every write of a worker is fenced: the statements in `src/catalog/queue/checkpoint.rs` and `fail.rs` change a job
+//! only if the worker and the fencing token equal those of the lease, the worker has not ended, and its last heartbeat
+//! is recent. If a statement changes no row, `group_commit.rs` replies that the lease is lost, and `api.rs` returns
+//! [`CheckpointOutcome::LeaseLost`](catalog::CheckpointOutcome) for a checkpoint and `false` for a failure or a
+//! heartbeat. The checkpointer then stores nothing more. The pair ends as `PairEnd::LeaseLost`: in
+//! `src/runner/pair_task.rs`, or in `checkpointer.rs` (`StoredStages::finish`) if it was the last stage. Stages stored
+//! earlier stay; the pair is leased again after its job was recovered.
+//!
+//! ## Why `fit` reads the print
+//!
+//! The carved side is decided in `fit`. Measured on 740 generated pairs: the mesh alone decides 13 % by the relief and
+//! at most 2 % of a tier by its other evidence without errors; it is wrong for 97 pairs. For the other 85 %, `fit` and
+//! `depth` would process both sides, which takes 25 % more CPU time (58.8 against 47.0 ms). [`stages::pipeline`] shows
+//! both methods side by side.
 //!
 //! ## A new threshold metric
 //!
-//! These files name individual metrics; everything else iterates over [`domain::ThresholdMetric::ALL`]:
+//! These source files name individual metrics; all others iterate over [`domain::ThresholdMetric::ALL`]:
 //!
-//! - `src/cli/contact_sheet.rs`: the default metric of contact sheets; no change needed
+//! - `src/cli/contact_sheet.rs`: the help text of `--metric` lists the metrics
 //! - `src/cli/show.rs`: the metric of the summary; no change needed
-//! - `src/domain/metric.rs`: the variant with its definition, name and title; the compiler reports missing ones
+//! - `src/domain/metric.rs`: the variant with its definition, name and title; the order is that of the tables
 //! - `src/export/gallery_selection.rs`: the metric of random pictures; no change needed
 //! - `src/export/pair_files.rs`: the metric whose files are shared; no change needed
-//! - `src/stages/paper_method/normalize.rs`: computes the thresholds
-//! - `src/stages/paper_method/register.rs`: computes the thresholds
-//! - `src/stages/register/confidence.rs`: compares every mask with the mask of the relief metric; no change needed
-//! - `src/stages/register/metric_thresholds.rs`: computes the thresholds
-//! - `migrations/`: the `CHECK` lists of the metric columns
-//! - `README.md` and `docs/report.md`: the description
+//! - `src/report/comparison.rs`: which metrics are compared with each other
+//! - `src/stages/paper_method/normalize.rs`: chooses the paper's thresholds; no change needed
+//! - `src/stages/paper_method/register.rs`: picks the paper's ensemble; no change needed
+//! - `src/stages/register/confidence.rs`: compares masks with that of the relief metric; its weights are fitted
+//! - `src/stages/register/metric_thresholds.rs`: chooses the thresholds, in the order of `ALL`
+//!
+//! Also touched: `REVISION` in `src/stages/register/mod.rs`, the help text in `src/cli/verdict.rs`, the `CHECK` lists
+//! in `migrations/` with `SCHEMA_VERSION` in `src/catalog/db/open.rs`, `README.md`, `docs/report.md`, the list of
+//! variants in `tests/it/layers.rs`, and tests and snapshots that count four metrics (`cargo test` names them).
 //!
 //! ## Rooms
 //!
 //! Each top-level module is a room. `tests/it/layers.rs` checks that a room imports only the rooms in its line, that
-//! source files do not import each other in cycles, and that the lists above are complete.
+//! source files do not import each other in cycles, that the files listed above exist, and that the list of files that
+//! name a metric is complete.
 //!
 //! | room | purpose | may import |
 //! |---|---|---|
@@ -84,9 +96,9 @@
 //! | `config` | layered settings with types, ranges and origins | `domain`, `mesh`, `raster`, `stages`, `runner` |
 //! | `cli` | one file per command; exit codes, progress, logging | all |
 //!
-//! Benches: `benches/accuracy` runs the stages on pairs of [`demo`] and compares them with ground truth; `benches/speed`
-//! times readers and stages by scan size; `benches/queue` times the catalog on many pairs; `benches/peers` runs other
-//! tools on the same files.
+//! Benches: `benches/accuracy` runs the stages on pairs of [`demo`] and compares them with ground truth;
+//! `benches/speed` times readers and stages by scan size; `benches/queue` times the catalog on many pairs;
+//! `benches/peers` runs other tools on the same files.
 
 #[cfg(not(unix))]
 compile_error!(
