@@ -1,8 +1,8 @@
-//! Adds pairs up to a report, one at a time.
+//! Builds a report by adding one pair at a time.
 //!
-//! Kept in memory for each pair, for medians and percentiles: the time of each stage, the threshold of each metric, the
-//! errors where there is ground truth, its confidence where it is judged, and sums of scores for the bootstrap of up to
-//! 100,000 units.
+//! Some numbers of each pair stay in memory for medians and percentiles: the time of each stage, the threshold of each
+//! metric, the errors against ground truth and manual alignments, and the confidence of each result that is known to be
+//! right or wrong. For the bootstrap, sums of scores stay in memory for up to 100,000 units.
 
 use std::collections::BTreeMap;
 
@@ -58,12 +58,13 @@ struct MetricSums {
     manual: Vec<ManualErrors>,
     /// Relative heights of the thresholds.
     thresholds: Vec<f64>,
-    /// For each [`Basis`], the confidence of each result that is known to be right or wrong, and whether it is right.
+    /// For each [`Basis`]: the confidence of each result that is known to be right or wrong, and whether the result is
+    /// right.
     confidences: [Vec<(f64, bool)>; Basis::ALL.len()],
 }
 
 impl ReportAccumulator {
-    /// Counts one pair. Pairs are added in the order of their names, so that sums are reproducible.
+    /// Counts one pair. Pairs must be added in the order of their names, so that sums are reproducible.
     pub fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
         self.pairs += 1;
         self.count_status(pair);
@@ -90,7 +91,7 @@ impl ReportAccumulator {
         }
     }
 
-    /// Sets the planted faults that reviewers detected; ignored where none were answered.
+    /// Sets the rates at which reviewers detected planted faults. Ignores rates if nobody answered a planted fault.
     pub fn set_attention_checks(&mut self, rates: AttentionCheckRates) {
         self.attention_checks = (rates.all.n > 0).then_some(rates);
     }

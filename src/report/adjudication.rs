@@ -7,14 +7,15 @@ use super::stats::{IntervalMethod, Rate};
 use crate::catalog::MetricRecord;
 use crate::domain::Verdict;
 
-/// Acc of a metric under three rules: the share of passed results among results passed or failed under the rule.
+/// Acc of a metric under three rules for disagreement: the share of passed results among the results that the rule
+/// counts as passed or failed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct AdjudicationRules {
-    /// Results that at least two reviewers independently passed or failed; without any, all rules agree.
+    /// Results that at least two reviewers independently passed or failed. If there are none, all three rules agree.
     pub double_read: u64,
     /// A result fails if any reviewer fails it.
     pub either_fails: Rate,
-    /// A disputed result counts as adjudicated and is left out until it is. This is the Acc of the table.
+    /// A disputed result counts as adjudicated, and is left out until somebody adjudicates. This is the Acc of a row.
     pub adjudicated: Rate,
     /// A result fails only if every reviewer who decided fails it.
     pub both_fail: Rate,

@@ -1,4 +1,4 @@
-//! Reviewers' answers to attention checks: planted faults, and results shown twice.
+//! Reviewers' answers to attention checks, which are planted faults and results shown twice.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::stats::{IntervalMethod, Rate};
 use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
 use crate::domain::Verdict;
 
-/// Share of answered planted faults that reviewers failed. An unsure answer does not detect the fault.
+/// Shares of answered planted faults that reviewers failed. A fault is not detected if the answer is unsure.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct AttentionCheckRates {
     /// Of every kind.
@@ -19,7 +19,7 @@ pub struct AttentionCheckRates {
 }
 
 impl AttentionCheckRates {
-    /// Returns the rates over answers of one or several reviewers; answers to duplicates are left out.
+    /// Returns the rates over the answers of one or several reviewers. Answers to duplicates are left out.
     pub(super) fn of<'a>(answers: impl IntoIterator<Item = &'a AttentionCheckAnswer>) -> Self {
         let mut rates = Self::default();
         for answer in answers.into_iter().filter(|answer| answer.check.is_fault()) {
@@ -39,20 +39,20 @@ impl AttentionCheckRates {
     }
 }
 
-/// Returns the rates of all reviewers of a project together.
+/// Returns the rates over the answers of all reviewers of a project.
 ///
 /// # Errors
-/// When the catalog cannot be read.
+/// Returns an error if the catalog cannot be read.
 pub(super) async fn project_rates(catalog: &Catalog) -> Result<AttentionCheckRates, CatalogError> {
     let answers = answers_by_reviewer(catalog).await?;
     let newest = answers.values().flat_map(|answers| newest(answers));
     Ok(AttentionCheckRates::of(newest))
 }
 
-/// Returns each reviewer's answers that were not undone, oldest first.
+/// Returns each reviewer's answers that were not undone, with the oldest first.
 ///
 /// # Errors
-/// When the catalog cannot be read.
+/// Returns an error if the catalog cannot be read.
 pub(super) async fn answers_by_reviewer(
     catalog: &Catalog,
 ) -> Result<BTreeMap<String, Vec<AttentionCheckAnswer>>, CatalogError> {
@@ -66,7 +66,7 @@ pub(super) async fn answers_by_reviewer(
     Ok(by_reviewer)
 }
 
-/// Returns a reviewer's newest answer to each shown item; `answers` are sorted oldest first.
+/// Returns a reviewer's newest answer to each item. `answers` must be sorted with the oldest first.
 pub(super) fn newest(answers: &[AttentionCheckAnswer]) -> Vec<&AttentionCheckAnswer> {
     let shown = |answer: &AttentionCheckAnswer| {
         let hashes = (answer.result_hash, answer.look.seen);

@@ -21,7 +21,7 @@ pub enum ReportError {
     /// The result of a pair with a manual alignment cannot be read.
     #[error(transparent)]
     Artifacts(#[from] PairArtifactsError),
-    /// A thread of the evaluation was lost.
+    /// The task that evaluates pairs panicked or was cancelled.
     #[error("comparing with the truth stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
@@ -31,15 +31,17 @@ pub enum ReportError {
 /// Memory grows by a few numbers per pair and metric.
 ///
 /// # Errors
-/// When the catalog cannot be read.
+/// Returns an error if the catalog or the results of a manually aligned pair cannot be read, or if the evaluation
+/// panics.
 pub async fn build(catalog: &Catalog, project: &Project) -> Result<Report, ReportError> {
     build_with(catalog, project, |_, _| {}).await
 }
 
-/// Builds the report and calls `visit` with every pair and its evaluation on the way.
+/// Builds the report, and calls `visit` for every pair with its evaluation against ground truth.
 ///
 /// # Errors
-/// When the catalog cannot be read.
+/// Returns an error if the catalog or the results of a manually aligned pair cannot be read, or if the evaluation
+/// panics.
 pub async fn build_with(
     catalog: &Catalog,
     project: &Project,

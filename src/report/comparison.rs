@@ -10,7 +10,7 @@ use crate::domain::enum_names;
 /// Largest sample size that is stated; above it, texts say "more than".
 const MAX_SAMPLE_SIZE: f64 = 100_000.0;
 
-/// The pairs of metrics that are compared: all pairs of the paper's metrics, and `relief` with `ensemble`.
+/// The metrics that are compared two by two: every two of the paper's metrics, and `relief` with `ensemble`.
 pub const COMPARED_METRICS: [(ThresholdMetric, ThresholdMetric); 4] = [
     (Ensemble, NlSsim),
     (Ensemble, Density),
@@ -29,7 +29,7 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// Returns the noun for the pairs whose results are known to be right or wrong.
+    /// Returns what a text calls the pairs whose results are known to be right or wrong.
     const fn pairs(self) -> &'static str {
         match self {
             Self::Verdicts => "judged pairs",
@@ -70,7 +70,7 @@ pub struct Comparison {
 pub(super) struct ComparisonSums([McNemarTest; COMPARED_METRICS.len()]);
 
 impl ComparisonSums {
-    /// Counts one pair; `right` returns whether a metric's result is right, where that is known.
+    /// Counts one pair. `right` returns whether a metric's result is right, or `None` if this is not known.
     pub(super) fn add(&mut self, right: impl Fn(ThresholdMetric) -> Option<bool>) {
         for (test, (a, b)) in self.0.iter_mut().zip(COMPARED_METRICS) {
             if let (Some(a), Some(b)) = (right(a), right(b)) {
@@ -79,7 +79,7 @@ impl ComparisonSums {
         }
     }
 
-    /// Returns the comparisons of all metrics that were judged on the same pairs.
+    /// Returns the comparisons that have at least one pair on which both metrics are known to be right or wrong.
     pub(super) fn finish(self, basis: Basis) -> Vec<Comparison> {
         let compared = self.0.into_iter().zip(COMPARED_METRICS);
         let compared: Vec<_> = compared.filter(|(test, _)| test.n > 0).collect();
@@ -107,7 +107,7 @@ pub(super) fn versus(a: ThresholdMetric, b: ThresholdMetric) -> String {
     format!("{} v. {}", a.title(), b.title())
 }
 
-/// Returns the conclusion of a test, from its p-value before and after the correction.
+/// Returns the conclusion of a test from its p-values before and after Holm's correction.
 fn conclusion(
     basis: Basis,
     (a, b): (ThresholdMetric, ThresholdMetric),
@@ -136,7 +136,7 @@ fn conclusion(
     )
 }
 
-/// Returns a sample size to two significant digits, as the estimate is no better.
+/// Formats a sample size, rounded up to two significant digits because the estimate is not more precise.
 fn about(pairs: f64) -> String {
     if pairs > MAX_SAMPLE_SIZE {
         return format!("more than {}", format_count(MAX_SAMPLE_SIZE as u64));
@@ -183,7 +183,7 @@ mod tests {
         assert!(found[1].conclusion.contains("not significantly after"));
     }
 
-    /// Nested failures of 587 pairs: `nl_ssim` fails on 3, density on these and 6 others, the ensemble on one of the 3.
+    /// Of 587 pairs, `nl_ssim` fails on 3, density on the same 3 and on 6 others, and the ensemble on one of the 3.
     #[test]
     fn nested_failures_of_the_paper_equal_statsmodels() {
         let found = compare(&[
@@ -193,7 +193,7 @@ mod tests {
             (6, [Some(true), Some(false), Some(true)]),
         ]);
         assert!(found[0].conclusion.contains("about 2,400 judged pairs"));
-        // statsmodels 0.15.0 `mcnemar(exact=True)` and `multipletests(method="holm")`.
+        // The values are from statsmodels 0.15.0: `mcnemar(exact=True)` and `multipletests(method="holm")`.
         let wanted = [(0.5, 0.5), (0.007_812_5, 0.023_437_5), (0.031_25, 0.062_5)];
         for (found, (p, holm)) in found.iter().zip(wanted) {
             assert!((found.p.expect("discordant pairs") - p).abs() < 1e-12);

@@ -10,13 +10,13 @@ pub enum Consensus {
     Unjudged,
     /// Only an earlier result was judged.
     Stale,
-    /// Every reviewer who decided passed it, or the adjudicator of a conflict did.
+    /// Every reviewer who was not unsure passed the result, or a conflict was adjudicated as a pass.
     Passed,
-    /// Every reviewer who decided failed it, or the adjudicator of a conflict did.
+    /// Every reviewer who was not unsure failed the result, or a conflict was adjudicated as a fail.
     Failed,
     /// All reviewers were unsure.
     Unsure,
-    /// Some passed and some failed it. It counts as unsure until somebody adjudicates.
+    /// Some reviewers passed the result and some failed it. The result counts as unsure until somebody adjudicates.
     Conflict,
 }
 
@@ -42,7 +42,7 @@ impl Consensus {
         }
     }
 
-    /// Returns the equivalent verdict; `None` where nobody judged the current result.
+    /// Returns the equivalent verdict, or `None` if nobody judged the current result.
     pub const fn verdict(self) -> Option<Verdict> {
         match self {
             Self::Passed => Some(Verdict::Pass),
@@ -52,7 +52,7 @@ impl Consensus {
         }
     }
 
-    /// Returns whether the result passed; `None` where reviewers did not decide.
+    /// Returns whether the result passed, or `None` if the reviewers did not decide.
     pub const fn passed(self) -> Option<bool> {
         match self {
             Self::Passed => Some(true),
@@ -62,7 +62,9 @@ impl Consensus {
     }
 }
 
-/// Splits verdicts into adjudications, given by reviewers who were shown a conflict, and independent ones.
+/// Splits the verdicts on a result into adjudications and independent verdicts, in this order.
+///
+/// An adjudication is a verdict by a reviewer who was shown that others disagree.
 pub(crate) fn partition_verdicts(
     record: &MetricRecord,
 ) -> (Vec<&ReviewerVerdict>, Vec<&ReviewerVerdict>) {

@@ -15,7 +15,8 @@ pub struct FailReasonCount {
     pub count: u64,
 }
 
-/// Counts by reason in the order of [`Reason::ALL`]; the last is of results without a reason.
+/// Numbers of failed results by reason, in the order of [`Reason::ALL`]. The last number counts results without a
+/// reason.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct FailReasonSums([u64; Reason::ALL.len() + 1]);
 

@@ -1,4 +1,4 @@
-//! The images of the HTML report with the texts next to them; plain data, drawn by `export`.
+//! The images of the HTML report and the texts next to them, as plain data. `export` draws the images.
 
 use crate::catalog::VerdictEvent;
 use crate::domain::{PairName, ThresholdMetric, Verdict};
@@ -56,7 +56,7 @@ pub struct GalleryItem {
     pub numbers: String,
     /// Verdicts, each with reviewer, reason and note.
     pub verdicts: Vec<String>,
-    /// Print, aligned relief and overlay as JPEG, as far as they could be drawn.
+    /// Print, aligned relief and overlay as JPEG. An image that could not be drawn is `None`.
     pub images: [Option<Vec<u8>>; 3],
     /// Why an image is missing.
     pub problem: Option<String>,

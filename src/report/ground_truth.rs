@@ -5,11 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::{Affine2, PairName, PrintFromMesh, Rigid3};
 
-/// Largest angle error of a right alignment, degrees (the paper's rule).
+/// Largest angle error of a result that passes, in degrees (the paper's rule).
 pub const MAX_ANGLE_DEG: f64 = 5.0;
-/// Largest mean landmark error of a right alignment, percent of the character's height.
+/// Largest mean landmark error of a result that passes, in percent of the character's height.
 pub const MAX_TRE_PCT: f64 = 5.0;
-/// Smallest intersection over union with the true stroke tops of a right alignment.
+/// Smallest intersection over union of the depth mask with the true stroke tops at which a result passes.
 pub const MIN_MASK_IOU: f64 = 0.7;
 
 /// One line of `truth.jsonl`.
@@ -25,7 +25,7 @@ pub struct TruthRecord {
     pub landmarks: Vec<[f64; 3]>,
     /// Height of the character in the print, print pixels.
     pub char_height_px: f64,
-    /// Path of the mask of true stroke tops in the print's frame, where there is one.
+    /// Path of the mask of true stroke tops, which is in the frame of the print. `None` if there is no such mask.
     #[serde(default)]
     pub tops_mask: Option<String>,
 }
@@ -73,13 +73,15 @@ pub enum TruthError {
 /// The error of one result against ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TruthErrors {
-    /// Rotation from the true to the found map on the true plane, degrees in 0..=180; 180 when mirrored.
+    /// Angle of the rotation between the true and the found map on the true plane, in degrees in 0..=180. The angle is
+    /// 180 if the found map mirrors the character.
     pub angle_deg: f64,
     /// Whether the found map mirrors the character.
     pub mirrored: bool,
-    /// Mean distance of the mapped landmarks in the print (target registration error), percent of the character's height.
+    /// Mean distance in the print between the true and the found positions of the landmarks (target registration
+    /// error), in percent of the character's height.
     pub tre_pct: f64,
-    /// Intersection over union of the depth mask with the true stroke tops, 0..=1, where there is a mask of these.
+    /// Intersection over union of the depth mask with the true stroke tops, in 0..=1. `None` without a tops mask.
     pub mask_iou: Option<f64>,
 }
 
@@ -91,7 +93,7 @@ impl TruthErrors {
             && self.mask_iou.is_none_or(|iou| iou >= MIN_MASK_IOU)
     }
 
-    /// Returns the largest error as a multiple of its limit; at most 1 for a result that passes.
+    /// Returns the largest error as a multiple of its limit. The value is at most 1 if the result passes.
     pub fn severity(&self) -> f64 {
         let mask = self
             .mask_iou
@@ -103,10 +105,10 @@ impl TruthErrors {
 }
 
 impl TruthRecord {
-    /// Parses a stored record and checks that errors can be measured with it.
+    /// Parses a stored record and checks that it can be used to measure errors.
     ///
     /// # Errors
-    /// When it has another form, or its plane, map, landmarks or height are degenerate.
+    /// Returns an error if the value is not a record, or if its plane, map, landmarks or height are degenerate.
     pub fn read(value: &serde_json::Value) -> Result<Self, TruthError> {
         let record =
             Self::deserialize(value).map_err(|error| TruthError::Form(error.to_string()))?;
@@ -121,10 +123,11 @@ impl TruthRecord {
         truth.map(|_| record).ok_or(TruthError::Flat)
     }
 
-    /// Measures the error of a found map; `mask_iou` is passed through.
+    /// Measures the errors of a found map. `mask_iou` is copied to the result.
     ///
     /// # Errors
-    /// When the true plane has no normal or the true map is singular on it.
+    /// Returns an error if the normal of the true plane is zero or not finite, or if the true map is singular on the
+    /// plane.
     pub fn measure(
         &self,
         found: &PrintFromMesh,
@@ -146,10 +149,10 @@ impl TruthRecord {
         })
     }
 
-    /// Returns the angle between the normals of the true and a found plane, degrees in 0..=180.
+    /// Returns the angle between the normals of the true and the found plane, in degrees in 0..=180.
     ///
     /// # Errors
-    /// When the true plane has no normal.
+    /// Returns an error if the normal of the true plane is zero or not finite.
     pub fn normal_error_deg(&self, plane_from_mesh: &Rigid3) -> Result<f64, TruthError> {
         let [across, down] = self.tangents()?;
         let [x, y, z, _] = plane_from_mesh.0[2];
@@ -159,7 +162,7 @@ impl TruthRecord {
         Ok(sin.atan2(found.dot(&truth) / truth.norm()).to_degrees())
     }
 
-    /// Returns the mean distance between the true and the found image of the landmarks, print pixels.
+    /// Returns the mean distance in print pixels between the true and the found positions of the landmarks.
     fn landmark_distance_px(&self, found: &PrintFromMesh) -> f64 {
         let distances = self.landmarks.iter().map(|point| {
             let ([u, v, _], [p, q, _]) = (self.print_from_mesh.apply(*point), found.apply(*point));
@@ -183,7 +186,7 @@ impl TruthRecord {
     }
 }
 
-/// Returns the linear part of a map of space, restricted to two directions of a plane, as a map to print pixels.
+/// Returns the linear part of `map` on a plane: it maps coordinates along the two `tangents` to print pixels.
 fn in_plane(map: &PrintFromMesh, tangents: [Vector3<f64>; 2]) -> Affine2 {
     let row = |r: [f64; 4]| {
         let [a, b] = tangents.map(|t| r[0] * t[0] + r[1] * t[1] + r[2] * t[2]);
@@ -192,7 +195,7 @@ fn in_plane(map: &PrintFromMesh, tangents: [Vector3<f64>; 2]) -> Affine2 {
     Affine2([row(map.0[0]), row(map.0[1])])
 }
 
-/// Returns the angle of the rotation that is closest to a map, degrees in 0..=180.
+/// Returns the angle of the rotation that is closest to the linear part of a map, in degrees in 0..=180.
 fn rotation_deg(map: &Affine2) -> f64 {
     let [[a, b, _], [c, d, _]] = map.0;
     (c - b).atan2(a + d).to_degrees().abs()

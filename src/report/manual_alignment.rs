@@ -1,4 +1,4 @@
-//! The errors of results against manual alignments, over the pairs that have one.
+//! Errors of results against manual alignments, for the pairs that were aligned manually.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ pub struct ManualAlignmentErrors {
     pub angle_median_deg: Option<f64>,
     /// 95th percentile of the angle error, degrees.
     pub angle_p95_deg: Option<f64>,
-    /// Median shift of the relief's centre, percent of the relief's longer side.
+    /// Median shift of the relief's centre, in percent of the relief's longer side.
     pub shift_median_pct: Option<f64>,
     /// 95th percentile of the shift, percent.
     pub shift_p95_pct: Option<f64>,
@@ -30,7 +30,7 @@ pub struct ManualAlignmentErrors {
     pub scale_median_pct: Option<f64>,
     /// 95th percentile of the difference in scale, percent.
     pub scale_p95_pct: Option<f64>,
-    /// Results that are mirrored relative to the manual alignment; their angle error counts as 180 degrees.
+    /// Results that are mirrored relative to the manual alignment. Their angle error counts as 180 degrees.
     pub mirrored: u64,
 }
 
@@ -43,12 +43,12 @@ pub struct ManualCorrection {
     pub shift_px: [f64; 2],
     /// Factor of the scale.
     pub scale: f64,
-    /// Whether the relief was also mirrored left to right, before the rotation.
+    /// Whether the relief was also mirrored left to right, before it was rotated.
     pub mirrored: bool,
 }
 
 impl ManualCorrection {
-    /// Returns the correction from one `print_from_depth` to another; `None` when one is singular.
+    /// Returns the correction from one `print_from_depth` to another, or `None` if either map is singular.
     ///
     /// `depth_px` is the width and height of the depth map.
     pub fn between(found: &Affine2, manual: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
@@ -86,7 +86,7 @@ pub struct ManualErrors {
 }
 
 impl ManualErrors {
-    /// Returns the errors of one `print_from_depth` against another; `None` when one is singular.
+    /// Returns the errors of one `print_from_depth` against another, or `None` if either map is singular.
     fn between(found: &Affine2, manual: &Affine2, depth_px: [u32; 2]) -> Option<Self> {
         let correction = ManualCorrection::between(found, manual, depth_px)?;
         let [x, y] = correction.shift_px;
@@ -120,7 +120,7 @@ impl ManualErrors {
 /// Returns the errors of a pair's results against its manual alignment, by metric.
 ///
 /// # Errors
-/// When its results of fit or depth cannot be read.
+/// Returns an error if the pair's results of fit or depth cannot be read.
 pub(super) fn errors(
     project: &Project,
     pair: &PairResults,
@@ -175,7 +175,7 @@ mod tests {
     use super::{ManualAlignmentErrors, ManualCorrection, ManualErrors};
     use crate::domain::Affine2;
 
-    /// Places a relief of 101 x 51 px with its centre at (200, 100) + `shift`.
+    /// Returns the map that places a relief of 101 x 51 px with its centre at (200, 100) + `shift`.
     fn placed(scale: f64, angle_deg: f64, shift: [f64; 2]) -> Affine2 {
         let back = Affine2::scale_shift(1.0, [-50.0, -25.0]);
         let centre = [200.0 + shift[0], 100.0 + shift[1]];

@@ -1,7 +1,7 @@
 //! Builds reports from the catalog as plain data, and renders them as text, JSON, CSV, Markdown, LaTeX and HTML.
 //!
-//! [`build()`] streams the pairs through a [`ReportAccumulator`], [`agreement()`] through counts of verdicts. The numbers
-//! come from [`stats`]; the renderers only read the finished [`Report`].
+//! [`build()`] streams the pairs through a [`ReportAccumulator`]. [`agreement()`] streams the pairs and counts
+//! verdicts. The numbers come from [`stats`]; the renderers only read the finished [`Report`].
 
 mod accumulate;
 mod adjudication;

@@ -1,4 +1,4 @@
-//! The report as plain data, which `report --format json` prints and all other formats are rendered from.
+//! The report as plain data. `report --format json` prints it, and all other formats are rendered from it.
 
 use serde::Serialize;
 
@@ -31,24 +31,26 @@ pub struct Report {
     pub interval: IntervalMethod,
     /// How many pairs are finished.
     pub progress: PairProgress,
-    /// One row per metric, in the order of the paper's table; `relief` last, and only where it has results.
+    /// One row per metric, in the order of the paper's table. `relief` comes last and has a row only if it has results.
     pub rows: Vec<MetricRow>,
     /// Metrics compared by which results are right.
     pub comparisons: Vec<Comparison>,
     /// Metrics compared by their scores.
     pub score_comparisons: Vec<ScoreComparison>,
-    /// How the bootstrap was done; `None` without results, and above 100,000 units, where sampling error is negligible.
+    /// How the bootstrap was done. `None` if there are no results, or more than 100,000 units, for which the sampling
+    /// error is negligible.
     pub bootstrap: Option<BootstrapSettings>,
-    /// Risk-coverage curves by verdicts and then by truth, for each metric that has confidences.
+    /// Risk-coverage curves of every metric that has confidences: first by verdicts, then by ground truth.
     pub risk_coverage: Vec<RiskCoverageCurve>,
     /// Failed pairs, by class.
     pub failures: Vec<FailureGroup>,
     /// The thresholds that the metrics chose.
     pub thresholds: Vec<ThresholdDistribution>,
-    /// Computing times of the stages. All other fields are equal whenever the results are equal.
+    /// Computing times of the stages. These differ from run to run; all other fields are equal if the results are
+    /// equal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub times: Vec<StageTimes>,
-    /// Planted faults that reviewers detected; `None` where none were answered.
+    /// Rates at which reviewers detected planted faults. `None` if nobody answered a planted fault.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attention_checks: Option<AttentionCheckRates>,
     /// Caveats on the numbers, in whole sentences.
@@ -67,7 +69,8 @@ pub struct PairProgress {
 }
 
 impl PairProgress {
-    /// Returns the numbers of pairs without results, such as `2 failed, 1 not finished`; `None` when all are done.
+    /// Returns the numbers of pairs without results, such as `2 failed, 1 not finished`. Returns `None` if all pairs
+    /// are done.
     pub(super) fn without_results(self) -> Option<String> {
         count_list([(self.failed, "failed"), (self.pending, "not finished")])
     }
@@ -82,11 +85,11 @@ pub struct MetricRow {
     pub n: u64,
     /// Results with a verdict: passed, failed and unsure.
     pub judged: u64,
-    /// Results that an adjudicator passed, or every reviewer who was not unsure.
+    /// Results passed by every reviewer who was not unsure, or by an adjudicator.
     pub passed: u64,
-    /// Results that an adjudicator failed, or every reviewer who was not unsure.
+    /// Results failed by every reviewer who was not unsure, or by an adjudicator.
     pub failed: u64,
-    /// Results about which all reviewers were unsure, or on which they disagree.
+    /// Results about which all reviewers were unsure, or on which reviewers disagree and nobody has adjudicated.
     pub unsure: u64,
     /// The unsure results on which reviewers disagree.
     pub conflicts: u64,
@@ -150,7 +153,7 @@ pub struct FailureExample {
 }
 
 impl MetricRow {
-    /// Returns the number of failed results for which reviewers gave a reason, or none.
+    /// Returns the number of failed results with a given reason, or of failed results without any reason for `None`.
     pub fn failed_for(&self, reason: Option<Reason>) -> u64 {
         let mut given = self.failed_reasons.iter();
         given
@@ -183,7 +186,7 @@ impl Report {
         self
     }
 
-    /// Returns the same report without computing times, which differ from run to run.
+    /// Returns the report without computing times, which differ from run to run.
     #[must_use]
     pub fn without_times(self) -> Self {
         Self {

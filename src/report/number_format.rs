@@ -31,7 +31,7 @@ impl NumberStyle {
     }
 }
 
-/// Formats a number for reports other than JSON and CSV, which hold all digits.
+/// Formats a number for a report. JSON and CSV reports do not use this format, because they hold all digits.
 ///
 /// Shares and p-values have three decimals, angles two, percentages and seconds one, counts and milliseconds none. A
 /// comma separates thousands. A p-value that would round to 0 is `<0.001`.
@@ -68,7 +68,7 @@ pub fn counted(n: u64, noun: &str) -> String {
     format!("{} {noun}{plural}", format_count(n))
 }
 
-/// Returns the counts that are not 0, such as `2 failed, 1 not finished`; `None` when all are.
+/// Returns the counts that are not 0, such as `2 failed, 1 not finished`. Returns `None` if all counts are 0.
 pub fn count_list<const N: usize>(counts: [(u64, &str); N]) -> Option<String> {
     let known = counts.into_iter().filter(|(n, _)| *n > 0);
     let parts: Vec<String> = known

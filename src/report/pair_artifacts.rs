@@ -11,7 +11,7 @@ use crate::domain::{
 use crate::raster::{DepthMap, Mask, PngError, decode_grey8, decode_grey16};
 use crate::store::{self, Project};
 
-/// Ink in a stored print mask; the background is 0, unknown pixels are 128.
+/// Value of ink in a stored print mask. The background is 0, and unknown pixels are 128.
 const INK: u8 = 255;
 
 /// Why a stored result cannot be used.
@@ -65,7 +65,7 @@ impl<'a> PairArtifacts<'a> {
     /// Returns the current result of a stage.
     ///
     /// # Errors
-    /// When there is none.
+    /// Returns an error if there is none.
     pub fn stage(&self, stage: Stage) -> Result<&'a StageRecord, PairArtifactsError> {
         let found = self.pair.stage(stage);
         found.ok_or(PairArtifactsError::NoResult(stage))
@@ -74,7 +74,7 @@ impl<'a> PairArtifacts<'a> {
     /// Parses the outcome of a stage, such as [`FitOutcome`].
     ///
     /// # Errors
-    /// When there are none or they are of another form.
+    /// Returns an error if the stage has no result, or its outcome has another form.
     pub fn outcome<T: DeserializeOwned>(&self, stage: Stage) -> Result<T, PairArtifactsError> {
         self.stage(stage)?
             .parse()
@@ -84,7 +84,7 @@ impl<'a> PairArtifacts<'a> {
     /// Returns an artifact of a stage by its role.
     ///
     /// # Errors
-    /// When the result has none of that role.
+    /// Returns an error if the stage has no result, or the result has no artifact of that role.
     pub fn artifact(
         &self,
         stage: Stage,
@@ -100,7 +100,7 @@ impl<'a> PairArtifacts<'a> {
     /// Reads an artifact and checks its hash.
     ///
     /// # Errors
-    /// When there is none, or the file is missing or changed.
+    /// Returns an error if there is no such artifact, or its file is missing or was changed.
     pub fn bytes(&self, stage: Stage, role: &str) -> Result<Vec<u8>, PairArtifactsError> {
         Ok(self.project.read_artifact(self.artifact(stage, role)?)?)
     }
@@ -108,7 +108,7 @@ impl<'a> PairArtifacts<'a> {
     /// Reads the depth map with its scale.
     ///
     /// # Errors
-    /// When the result or its picture cannot be read.
+    /// Returns an error if the result or the image of the depth stage cannot be read.
     pub fn depth(&self) -> Result<DepthMap, PairArtifactsError> {
         let outcome: DepthOutcome = self.outcome(Stage::Depth)?;
         let levels = decode_grey16(&self.bytes(Stage::Depth, DEPTH)?);
@@ -118,20 +118,20 @@ impl<'a> PairArtifacts<'a> {
         })
     }
 
-    /// Reads the ink mask of the print, in the frame and size of the print image.
+    /// Reads the ink mask of the print. The mask has the frame and the size of the print image.
     ///
     /// # Errors
-    /// When the result or its picture cannot be read.
+    /// Returns an error if the mask cannot be read.
     pub fn print_mask(&self) -> Result<Mask, PairArtifactsError> {
         let register = self.outcome::<RegisterOutcome>(Stage::Register);
         let ink = register.map_or(0, |outcome| outcome.ink);
         self.mask(Stage::Normalize, &print_mask(ink))
     }
 
-    /// Returns the map from print pixels to the canvas of the scores.
+    /// Returns the map from print pixels to pixels of the canvas on which scores are computed.
     ///
     /// # Errors
-    /// When a result cannot be read.
+    /// Returns an error if the results of normalize and register cannot be read.
     pub fn canvas_from_print(&self) -> Result<Affine2, PairArtifactsError> {
         let normalize: NormalizeOutcome = self.outcome(Stage::Normalize)?;
         let register: RegisterOutcome = self.outcome(Stage::Register)?;
@@ -143,10 +143,10 @@ impl<'a> PairArtifacts<'a> {
         ink.map(|ink| ink.canvas_from_print).ok_or_else(missing)
     }
 
-    /// Reads the ink mask of the print on the canvas of the scores.
+    /// Reads the ink mask of the print on the canvas on which scores are computed.
     ///
     /// # Errors
-    /// When the result or its picture cannot be read.
+    /// Returns an error if the mask cannot be read.
     pub fn canvas_print_mask(&self) -> Result<Mask, PairArtifactsError> {
         self.mask(Stage::Register, CANVAS_PRINT_MASK)
     }
@@ -156,11 +156,11 @@ impl<'a> PairArtifacts<'a> {
         Ok(grey.map(|value| *value == INK))
     }
 
-    /// Returns the map from depth-map pixels to print pixels that a map from the mesh gives on the fitted plane; `None` if
-    /// `depth_from_plane` is singular.
+    /// Restricts a map from mesh to print to the fitted plane, and returns it as a map from depth-map pixels to print
+    /// pixels. Returns `None` if `depth_from_plane` is singular.
     ///
     /// # Errors
-    /// When the results of fit or depth cannot be read.
+    /// Returns an error if the results of fit or depth cannot be read.
     pub fn print_from_depth(
         &self,
         print_from_mesh: &PrintFromMesh,
@@ -181,10 +181,10 @@ impl<'a> PairArtifacts<'a> {
         }))
     }
 
-    /// Composes the three maps of the pipeline for a metric's `print_from_depth`.
+    /// Returns the map from mesh to print that a metric's `print_from_depth` and the results of fit and depth give.
     ///
     /// # Errors
-    /// When the results of fit or depth cannot be read.
+    /// Returns an error if the results of fit or depth cannot be read.
     pub fn print_from_mesh(
         &self,
         print_from_depth: &Affine2,
@@ -207,7 +207,7 @@ fn undecodable(role: &str) -> impl Fn(PngError) -> PairArtifactsError {
     }
 }
 
-/// Returns whether two metrics have the same threshold and alignment, so that all their images are equal.
+/// Returns whether two results have the same threshold and alignment. If so, all their images are equal.
 pub fn same_alignment(a: &MetricOutcome, b: &MetricOutcome) -> bool {
     a.threshold_level == b.threshold_level && a.print_from_depth == b.print_from_depth
 }

@@ -1,12 +1,12 @@
-//! Whether a report is good enough and complete: `--fail-under` and `--require-complete`.
+//! Checks that a report is good enough (`--fail-under`) and complete (`--require-complete`).
 
 use super::model::Report;
 use super::number_format::format_count;
 
-/// Returns why a report does not reach a share of passes; empty when it does.
+/// Returns the reasons why a report does not reach a required Acc. The list is empty if the report reaches it.
 ///
-/// Every row with verdicts must reach `least` (0..=1). A report without verdicts does not reach it: ground truth never
-/// replaces a verdict.
+/// Every row that has an Acc must reach `least` (0..=1). A report in which nobody passed or failed a result does not
+/// reach it, because ground truth never replaces a verdict.
 pub fn below(report: &Report, least: f64) -> Vec<String> {
     let rows = report.rows.iter();
     let judged: Vec<_> = rows
@@ -22,9 +22,9 @@ pub fn below(report: &Report, least: f64) -> Vec<String> {
         .collect()
 }
 
-/// Returns the reasons why a report is incomplete; empty for a complete one.
+/// Returns the reasons why a report is incomplete. The list is empty if the report is complete.
 ///
-/// Complete means that every pair is done, and every result of every metric was passed or failed.
+/// A report is complete if the project has pairs, every pair is done, and every result was passed or failed.
 pub fn missing(report: &Report) -> Vec<String> {
     let mut missing = Vec::new();
     let mut add = |what: String, n: u64| {

@@ -1,4 +1,4 @@
-//! Agreement of reviewers with each other, with themselves, and with attention checks.
+//! Agreement of reviewers with each other and with themselves, and their answers to attention checks.
 
 use std::collections::BTreeMap;
 
@@ -17,15 +17,15 @@ use crate::domain::{AttentionCheck, ContentHash, PairName, Verdict};
 /// Version of the JSON form.
 const SCHEMA: u32 = 1;
 
-/// Results that both reviewers must have passed or failed before kappa and AC1 are reported.
+/// Smallest number of results that both reviewers must have passed or failed for kappa and AC1 to be reported.
 ///
-/// At 30 the 95 % interval of full agreement still extends down to 0.89.
+/// If two reviewers agree on all of 30 results, the 95 % interval of their agreement still extends down to 0.89.
 pub const MIN_RESULTS: u64 = 30;
 
 /// Agreement of all reviewers of a project.
 ///
-/// Results of one pair that look the same count once. Adjudicators have seen the verdicts of others, so their
-/// adjudications are not compared.
+/// Results of one pair that look the same count once. Adjudications are not compared, because the adjudicators have
+/// seen the verdicts of others.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ReviewerAgreement {
     /// Version of the JSON form.
@@ -36,7 +36,7 @@ pub struct ReviewerAgreement {
     pub reviewer_pairs: Vec<ReviewerPair>,
     /// Every reviewer, by name.
     pub reviewers: Vec<ReviewerRecord>,
-    /// Share of planted faults failed, among the faults answered by all reviewers together.
+    /// Share of planted faults that reviewers failed, over the answers of all reviewers.
     pub attention_checks: Rate,
 }
 
@@ -52,10 +52,10 @@ pub struct ReviewerPair {
     pub agreement: VerdictAgreement,
 }
 
-/// The agreement of two reviewers. A number that does not exist is `None`.
+/// The agreement of two reviewers. A number that cannot be computed is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct VerdictAgreement {
-    /// Results that both passed or failed; all numbers except `unsure` are over these.
+    /// Results that both judged and neither was unsure about. All other numbers except `unsure` refer to these results.
     pub n: u64,
     /// Results that both judged and at least one was unsure about.
     pub unsure: u64,
@@ -93,7 +93,7 @@ pub struct ReviewerRecord {
 /// Computes the agreement of a project's reviewers from the current state of its catalog.
 ///
 /// # Errors
-/// When the catalog cannot be read.
+/// Returns an error if the catalog cannot be read.
 pub async fn agreement(catalog: &Catalog) -> Result<ReviewerAgreement, CatalogError> {
     let mut counts = AgreementCounts::default();
     let mut pages = catalog.result_pages(PAIRS_PER_PAGE);
@@ -229,12 +229,13 @@ impl AgreementCounts {
     }
 }
 
-/// Returns the verdicts on results that look the same, by reviewer, without adjudications.
+/// Returns each reviewer's verdict on a group of results that look the same. Adjudications are left out.
 fn independent_verdicts<'a>(group: &[&'a MetricRecord]) -> BTreeMap<&'a str, Verdict> {
     let mut by_reviewer = BTreeMap::new();
     for record in group {
         for given in partition_verdicts(record).1 {
-            // The review page stores one verdict for all of them; where they differ, the first counts.
+            // The review page stores the same verdict for all results of the group. If the verdicts differ, the first
+            // counts.
             by_reviewer
                 .entry(given.reviewer.as_str())
                 .or_insert(given.verdict);

@@ -1,4 +1,4 @@
-//! Risk-coverage curves: the accuracy of the results that remain when the least confident are left out.
+//! Risk-coverage curves: the accuracy of the results that remain if the least confident results are left out.
 
 use serde::Serialize;
 
@@ -6,9 +6,9 @@ use super::comparison::Basis;
 use super::stats::Rate;
 use crate::domain::ThresholdMetric;
 
-/// Coverages of a curve: percent of the results that are kept, the most confident ones.
+/// Coverages of a curve: the percentage of the results that is kept, the most confident results first.
 pub const COVERAGE_PERCENT: [u64; 7] = [100, 99, 97, 95, 90, 80, 50];
-/// Percent of the results, the least confident ones, in which failures are counted.
+/// Percentage of the results, the least confident ones, in which failures are counted.
 pub const LEAST_CONFIDENT_PERCENT: u64 = 3;
 
 /// The risk-coverage curve of one metric.
@@ -48,14 +48,14 @@ pub struct RiskCoveragePoint {
 }
 
 impl RiskCoverageCurve {
-    /// Returns the curve of a metric from the confidence of each result and whether it is right, in the order of the
-    /// pairs' names; `None` without results.
+    /// Returns the curve of a metric, or `None` without results. A sample is the confidence of a result and whether the
+    /// result is right; the samples are in the order of the pairs' names.
     pub(super) fn of(
         basis: Basis,
         metric: ThresholdMetric,
         samples: &mut [(f64, bool)],
     ) -> Option<Self> {
-        // The sort is stable: among equal confidences the first pair by name is kept longest.
+        // The sort is stable. Of results with equal confidence, the first by pair name is kept longest.
         samples.sort_by(|a, b| b.0.total_cmp(&a.0));
         let kept = |percent| samples.len() * percent as usize / 100;
         let failures =
@@ -76,7 +76,7 @@ impl RiskCoverageCurve {
     }
 }
 
-/// Returns one point of a curve from the results that are kept, the most confident first.
+/// Returns one point of a curve from the results that are kept, sorted with the most confident first.
 fn point(percent: u64, kept: &[(f64, bool)]) -> RiskCoveragePoint {
     let acc = Rate::of(kept.iter().map(|(_, right)| *right));
     RiskCoveragePoint {
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn leaving_out_the_least_confident_leaves_out_their_failures() {
-        // Wrong: the least confident of all, and one in the middle. They come in any order.
+        // Only the least confident result and one in the middle are wrong. The results are not sorted by confidence.
         let judged: Vec<_> = (0..100)
             .map(|i| (i * 37) % 100)
             .map(|rank| (f64::from(rank) / 100.0, rank != 0 && rank != 40))

@@ -1,6 +1,6 @@
-//! Bootstrap intervals of mean scores and of Acc, and paired differences of scores between metrics.
+//! Computes bootstrap intervals of mean scores, of Acc, and of the differences in scores between metrics.
 //!
-//! Pairs of one woodblock are not independent. Where pairs have blocks, whole blocks are resampled.
+//! Pairs of one woodblock are not independent. Therefore whole blocks are resampled if any pair names its block.
 
 use serde::Serialize;
 
@@ -14,7 +14,8 @@ use crate::domain::ThresholdMetric;
 
 const METRICS: usize = ThresholdMetric::ALL.len();
 const SCORES: usize = Score::ALL.len();
-/// Quantities: every score of every metric, whether each passed, and every score's difference between two metrics.
+/// Number of resampled quantities: every score of every metric, whether each metric passed, and the difference in every
+/// score between every two compared metrics.
 const WIDTH: usize = METRICS * SCORES + METRICS + COMPARED_METRICS.len() * SCORES;
 
 /// How the bootstrap was done.
@@ -32,7 +33,7 @@ pub struct BootstrapSettings {
     pub seed: u64,
 }
 
-/// The 95 % bootstrap intervals of one metric's means; `None` with too few units.
+/// The 95 % bootstrap intervals of one metric's means. An interval is `None` if there are too few units.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct MeanIntervals {
     /// Of the mean structural similarity.
@@ -43,7 +44,7 @@ pub struct MeanIntervals {
     pub iou_box: Option<[f64; 2]>,
     /// Of the mean Dice coefficient.
     pub dice: Option<[f64; 2]>,
-    /// Of Acc with whole blocks resampled; `None` also without blocks, and where all results passed or all failed.
+    /// Of Acc, by resampling whole blocks. `None` also if there are no blocks, or if all results passed or all failed.
     pub acc_by_block: Option<[f64; 2]>,
 }
 
@@ -85,7 +86,7 @@ impl Default for ScoreSample {
 }
 
 impl ScoreSample {
-    /// Counts one pair; `passed` returns whether a metric's result passed, where reviewers decided.
+    /// Counts one pair. `passed` returns whether a metric's result passed, or `None` if reviewers did not decide.
     pub(super) fn add(
         &mut self,
         pair: &PairResults,
@@ -156,7 +157,7 @@ const fn acc_index(metric: usize) -> usize {
     METRICS * SCORES + metric
 }
 
-/// Returns the index of the quantity "difference of a score between two metrics".
+/// Returns the index of the quantity "difference in a score between two metrics".
 const fn difference_index(compared: usize, score: usize) -> usize {
     METRICS * SCORES + METRICS + compared * SCORES + score
 }
@@ -214,7 +215,7 @@ mod tests {
     use crate::report::stats::{MIN_UNITS, ResamplingUnit};
     use crate::report::test_fixtures;
 
-    /// Pairs in blocks of three whose ensemble has a higher IoU than all others; every seventh fails.
+    /// Resamples pairs on which the ensemble has a higher IoU than all other metrics. Every seventh pair fails.
     fn resampled(pairs: u32, has_blocks: bool) -> BootstrapResults {
         let mut sample = ScoreSample::default();
         for i in 0..pairs {
@@ -239,7 +240,7 @@ mod tests {
         assert_eq!(how(&by_block), Some((ResamplingUnit::Block, 14)));
         assert_eq!(by_pair.means[0].acc_by_block, None);
         let [low, high] = by_block.means[0].acc_by_block.expect("14 blocks");
-        // NumPy 2.4.6 with a million resamples: 0.762 and 0.929; deviation 0.045.
+        // A million resamples in NumPy 2.4.6 give 0.762 and 0.929, with a standard deviation of 0.045.
         assert!(
             (low - 0.762).abs() < 0.006 && (high - 0.929).abs() < 0.006,
             "{low} {high}"

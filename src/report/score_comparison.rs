@@ -72,7 +72,7 @@ pub struct ScoreComparison {
     pub conclusion: String,
 }
 
-/// Adds Holm's correction within each score, and the conclusions, to comparisons that are sorted by score.
+/// Adds conclusions and Holm's correction within each score. The comparisons must be sorted by score.
 pub(super) fn conclude(comparisons: &mut [ScoreComparison], unit: ResamplingUnit) {
     for family in comparisons.chunk_by_mut(|a, b| a.score == b.score) {
         let p_values: Vec<Option<f64>> = family.iter().map(|one| one.p).collect();
@@ -110,7 +110,7 @@ impl ScoreComparison {
     }
 }
 
-/// Returns a sentence for every two metrics, scores with the same conclusion together, such as
+/// Returns one sentence for every two metrics. Scores with the same conclusion are listed together, such as in
 /// `Ensemble v. Relief: Ensemble is significantly higher (SSIM, IoU); no significant difference (Dice).`
 pub(super) fn conclusions(found: &[ScoreComparison]) -> Vec<String> {
     let mut compared: Vec<(ThresholdMetric, ThresholdMetric)> = Vec::new();

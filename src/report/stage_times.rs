@@ -21,7 +21,7 @@ pub struct StageTimes {
 }
 
 impl StageTimes {
-    /// Returns the times of a stage from those of its results, milliseconds; `None` without results.
+    /// Returns the times of a stage from the milliseconds of each of its results. Returns `None` without results.
     pub(super) fn of(stage: Stage, ms: &mut [f64]) -> Option<Self> {
         Some(Self {
             stage,

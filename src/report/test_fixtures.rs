@@ -20,7 +20,7 @@ use crate::domain::{
     Verdict,
 };
 
-/// Returns a result with an IoU and the matching Dice; the verdicts are of reviewers `r0`, `r1`, ...
+/// Returns a result with an IoU and the matching Dice. The verdicts are by reviewers `r0`, `r1` and so on.
 pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) -> MetricRecord {
     MetricRecord {
         outcome: metric_outcome(metric, iou),
@@ -39,7 +39,7 @@ pub(crate) fn metric(metric: ThresholdMetric, iou: f64, verdicts: &[Verdict]) ->
     }
 }
 
-/// Returns a finished pair with the same IoU and verdicts for all metrics.
+/// Returns a finished pair whose metrics all have the same IoU and verdicts.
 pub(crate) fn done(name: &str, iou: f64, verdicts: &[Verdict]) -> PairResults {
     PairResults {
         status: JobStatus::Done,
@@ -60,7 +60,7 @@ pub(crate) fn done_by_paper(name: &str, iou: f64, verdicts: &[Verdict]) -> PairR
     pair
 }
 
-/// Returns a finished pair without verdicts and with the same confidence for all metrics.
+/// Returns a finished pair without verdicts, whose metrics all have the same confidence.
 pub(crate) fn with_confidence(name: &str, confidence: f64) -> PairResults {
     let mut pair = done(name, 0.8, &[]);
     for record in &mut pair.metrics {
@@ -82,7 +82,7 @@ pub(crate) fn failed(name: &str, class: FailureClass, message: &str) -> PairResu
     }
 }
 
-/// Returns a stage's result with a computing time, without numbers and files.
+/// Returns the result of a stage with a computing time, but without outcome and files.
 pub(crate) fn stage(stage: Stage, ms: u64) -> StageRecord {
     let hash = ContentHash::of(stage.name().as_bytes());
     StageRecord {
@@ -161,7 +161,7 @@ pub(crate) fn row(metric: ThresholdMetric, iou: f64, dice: f64) -> MetricRow {
     }
 }
 
-/// Returns the agreement of two reviewers who both passed `pass` results and disagree on others.
+/// Returns the agreement of two reviewers who both passed `pass` results and disagree on `disputed` others.
 pub(crate) fn agreement(pass: u64, disputed: u64) -> ReviewerAgreement {
     let mut table = VerdictTable::default();
     (0..pass).for_each(|_| table.add(Verdict::Pass, Verdict::Pass));

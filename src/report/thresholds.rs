@@ -10,7 +10,8 @@ pub const BINS: usize = 40;
 /// Steps between the lowest and the highest level of a depth map.
 const LEVELS: f64 = 65_534.0;
 
-/// The thresholds of one metric as relative heights: 0 is the lowest point of a depth map, 1 the highest.
+/// The distribution of one metric's thresholds as relative heights. 0 is the lowest point of a depth map and 1 the
+/// highest.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ThresholdDistribution {
     /// The metric.
@@ -28,7 +29,7 @@ pub struct ThresholdDistribution {
 }
 
 impl ThresholdDistribution {
-    /// Returns the distribution of a metric's thresholds, given as relative heights; `None` without any.
+    /// Returns the distribution of a metric's thresholds, given as relative heights, or `None` if there are none.
     pub(super) fn of(metric: ThresholdMetric, heights: &mut [f64]) -> Option<Self> {
         let mut bins = vec![0; BINS];
         for height in heights.iter() {
@@ -45,7 +46,7 @@ impl ThresholdDistribution {
     }
 }
 
-/// Returns the relative height of a depth-map level; level 1 is the lowest, 0 holds no data.
+/// Returns the relative height of a depth-map level. Level 1 is the lowest height, and level 0 marks missing data.
 pub(super) fn relative_height(level: u16) -> f64 {
     f64::from(level.saturating_sub(1)) / LEVELS
 }

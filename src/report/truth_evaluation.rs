@@ -11,9 +11,9 @@ use crate::domain::{MetricOutcome, ThresholdMetric};
 use crate::raster::{self, DepthMap, Grid, ImageLimits, Mask, warp_mask};
 use crate::store::Project;
 
-/// A pixel of a tops mask that is a true stroke top.
+/// Value of pixels in a tops mask that are a true stroke top.
 const TOP: u8 = 255;
-/// A pixel of a tops mask that is left out of the score: a neighbour's stroke or a border line.
+/// Value of pixels in a tops mask that are left out of the score: a neighbour's stroke or a border line.
 const IGNORED: u8 = 128;
 
 /// One pair's errors against ground truth.
@@ -54,10 +54,10 @@ enum EvaluationError {
     Artifacts(#[from] PairArtifactsError),
 }
 
-/// Returns pairs with their evaluations, computed on all cores.
+/// Evaluates pairs against their ground truth on all cores. Returns each pair with its evaluation.
 ///
 /// # Errors
-/// When a thread is lost.
+/// Returns an error if the worker task panics or is cancelled.
 pub async fn evaluate_pairs(
     project: &Project,
     pairs: Vec<PairResults>,
@@ -77,7 +77,7 @@ pub async fn evaluate_pairs(
     .await
 }
 
-/// Measures a pair; the evaluation is empty without ground truth or results.
+/// Evaluates a pair against its ground truth. The evaluation is empty if there is no ground truth or no result.
 fn evaluate(project: &Project, pair: &PairResults) -> TruthEvaluation {
     let Some(truth) = pair.truth.as_ref().filter(|_| !pair.metrics.is_empty()) else {
         return TruthEvaluation::default();
@@ -105,7 +105,7 @@ fn errors_by_metric(
         None => None,
     };
     let mut by_metric = BTreeMap::new();
-    // Metrics with the same alignment have the same errors, so the mask is warped once.
+    // Results with the same threshold and alignment have the same errors, so their mask is warped only once.
     for group in group_identical(&pair.metrics) {
         let outcome = &group[0].outcome;
         let found = artifacts.print_from_mesh(&outcome.print_from_depth)?;
@@ -118,7 +118,7 @@ fn errors_by_metric(
     Ok(by_metric)
 }
 
-/// Reads the true stroke tops of a pair, and the depth map to compare with them.
+/// Reads the mask of a pair's true stroke tops, and the depth map to compare with this mask.
 fn read_tops_and_depth(
     project: &Project,
     path: &str,
@@ -140,7 +140,7 @@ fn read_tops(project: &Project, path: &str) -> Result<Grid<u8>, TruthError> {
     Ok(picture.rgb.map(|colour| (colour[0] / 257) as u8))
 }
 
-/// Returns the intersection over union of a metric's depth mask, warped to the print, with the true stroke tops.
+/// Warps a metric's depth mask to the print. Returns its intersection over union with the true stroke tops.
 pub fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f64 {
     let mask = depth.stroke_mask(outcome.threshold_level);
     let (width, height) = (tops.width(), tops.height());
@@ -148,12 +148,12 @@ pub fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f
     mask_iou(&warped, tops).expect("the mask was warped to the size of the tops")
 }
 
-/// Returns the intersection over union of a depth mask with the true stroke tops, both in the print's frame, in 0..=1.
+/// Returns the intersection over union of a depth mask and the true stroke tops, both in the print's frame, in 0..=1.
 ///
-/// Pixels that are 128 in the tops mask count for neither. Two empty masks give 0.
+/// Pixels with the value 128 in the tops mask are ignored. If neither mask has a set pixel, the value is 0.
 ///
 /// # Errors
-/// When the sizes differ.
+/// Returns an error if the masks differ in size.
 pub fn mask_iou(depth_mask: &Mask, tops: &Grid<u8>) -> Result<f64, TruthError> {
     check_size(tops, [depth_mask.width(), depth_mask.height()])?;
     let (mut both, mut either) = (0_u64, 0_u64);

@@ -22,7 +22,7 @@ pub struct TruthSummary {
     pub angle_median_deg: Option<f64>,
     /// Median landmark error, percent of the character's height.
     pub tre_median_pct: Option<f64>,
-    /// Median intersection over union with the true stroke tops, where there are masks of these.
+    /// Median intersection over union of the depth masks with the true stroke tops. `None` without any tops mask.
     pub mask_iou_median: Option<f64>,
     /// Mirrored results.
     pub mirrored: u64,

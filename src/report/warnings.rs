@@ -51,10 +51,10 @@ fn missing_pairs(progress: PairProgress) -> Option<String> {
     Some(format!("{missing} of {pairs} {verb} in no row: {counts}."))
 }
 
-/// Compares the mean Dice with the largest one that the mean `IoU` allows.
+/// Returns a warning if the mean Dice exceeds the largest value that the mean `IoU` allows.
 ///
-/// For each pair Dice is `2 J / (1 + J)` of the `IoU` J. The function is concave, so the mean Dice cannot lie above its
-/// value at the mean `IoU`.
+/// For each pair, Dice is `2 J / (1 + J)`, where J is the `IoU`. This function is concave, so the mean Dice cannot
+/// exceed the function's value at the mean `IoU`.
 fn impossible_dice(row: &MetricRow) -> Option<String> {
     let (iou, dice) = (row.iou?, row.dice?);
     let bound = 2.0 * iou / (1.0 + iou);
@@ -69,7 +69,7 @@ fn impossible_dice(row: &MetricRow) -> Option<String> {
     })
 }
 
-/// Counts results whose verdicts say nothing about them, and mirrored results.
+/// Returns warnings that count stale verdicts, conflicts and mirrored results.
 fn qualified_results(row: &MetricRow) -> Vec<String> {
     let mirrored = row.truth.as_ref().map_or(0, |truth| truth.mirrored);
     let verdicts = count_list([

@@ -93,7 +93,7 @@ impl AlignmentBody {
     /// Returns the map from depth-map pixels to print pixels.
     ///
     /// # Errors
-    /// When the map is singular, not finite, or places the relief far outside the print.
+    /// Returns an error if the map is singular, not finite, or places the relief far outside the print.
     pub(super) fn print_from_depth(&self, images: &ItemImages) -> Result<Affine2, InvalidInput> {
         check_event(&self.event)?;
         let rows = self.view_from_depth.0;
@@ -111,7 +111,7 @@ impl AlignmentBody {
     /// Returns the note, trimmed.
     ///
     /// # Errors
-    /// When it is too long.
+    /// Returns an error if it is too long.
     pub(super) fn note(&self) -> Result<Option<String>, InvalidInput> {
         check_note(self.note.as_deref())
     }

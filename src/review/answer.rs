@@ -54,7 +54,7 @@ impl AnswerBody {
     /// Returns the verdict to store.
     ///
     /// # Errors
-    /// When a field is not valid.
+    /// Returns an error if a field is not valid.
     pub(super) fn verdict(
         &self,
         item: &ReviewItem,
@@ -93,7 +93,7 @@ impl AnswerBody {
 /// Trims a note; returns `None` if nothing is left.
 ///
 /// # Errors
-/// When it is too long.
+/// Returns an error if it is too long.
 pub(super) fn check_note(text: Option<&str>) -> Result<Option<String>, InvalidInput> {
     let text = text.map(str::trim).filter(|text| !text.is_empty());
     match text {
@@ -106,7 +106,7 @@ pub(super) fn check_note(text: Option<&str>) -> Result<Option<String>, InvalidIn
 /// Checks the form of an event id.
 ///
 /// # Errors
-/// When it is empty, too long or has other characters.
+/// Returns an error if it is empty, too long or has other characters.
 pub(super) fn check_event(event: &str) -> Result<(), InvalidInput> {
     let is_valid = event
         .bytes()

@@ -20,7 +20,7 @@ impl ReviewerHistory {
     /// Reads the answers and alignments that have not been undone.
     ///
     /// # Errors
-    /// When the catalog cannot be read.
+    /// Returns an error if the catalog cannot be read.
     pub(super) async fn read(
         catalog: &Catalog,
         options: &QueueOptions,

@@ -61,7 +61,7 @@ pub enum KeyError {
 /// Converts a map of actions to keys into a map of keys to actions. An empty key disables the binding.
 ///
 /// # Errors
-/// When an action is unknown, a key is not valid, or two actions have the same key.
+/// Returns an error if an action is unknown, a key is not valid, or two actions have the same key.
 pub fn key_map(keys: &BTreeMap<String, String>) -> Result<BTreeMap<String, String>, KeyError> {
     let mut bindings: BTreeMap<String, String> = BTreeMap::new();
     for (action, key) in keys {

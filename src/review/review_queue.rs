@@ -29,7 +29,7 @@ impl ReviewQueue {
     /// Reads the queue of a reviewer from the current state of the catalog.
     ///
     /// # Errors
-    /// When the catalog cannot be read, or a blocking task fails.
+    /// Returns an error if the catalog cannot be read, or a blocking task fails.
     pub(super) async fn read(
         catalog: &Catalog,
         project: &Project,

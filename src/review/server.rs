@@ -64,7 +64,7 @@ pub struct QueueCounts {
 /// Binds the port and reads the queue.
 ///
 /// # Errors
-/// When the address cannot be bound, or the catalog cannot be read.
+/// Returns an error if the address cannot be bound, or the catalog cannot be read.
 pub async fn bind(
     catalog: Catalog,
     project: Project,
@@ -121,7 +121,7 @@ impl ReviewServer {
     /// Serves requests until `stop` completes.
     ///
     /// # Errors
-    /// When the socket fails.
+    /// Returns an error if the socket fails.
     pub async fn serve(
         self,
         stop: impl Future<Output = ()> + Send + 'static,

@@ -22,7 +22,7 @@ impl Session {
     /// Draws new secrets from the operating system.
     ///
     /// # Errors
-    /// When the operating system provides no randomness.
+    /// Returns an error if the operating system provides no randomness.
     pub(super) fn new(port: u16) -> std::io::Result<Self> {
         Ok(Self {
             token: secret()?,

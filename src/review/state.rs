@@ -29,7 +29,7 @@ impl ServerState {
     /// Reads the queue from the current state of the catalog and remembers its items.
     ///
     /// # Errors
-    /// When the catalog cannot be read.
+    /// Returns an error if the catalog cannot be read.
     pub(super) async fn load_queue(&self) -> Result<ReviewQueue, QueueError> {
         let queue = ReviewQueue::read(&self.catalog, &self.project, &self.options.queue).await?;
         let mut served = self.lock_served();
