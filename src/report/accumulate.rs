@@ -91,7 +91,7 @@ impl ReportAccumulator {
         }
     }
 
-    /// Sets the rates at which reviewers detected planted faults. Ignores rates if nobody answered a planted fault.
+    /// Sets the rates at which reviewers detected planted faults. Ignores the rates if no planted fault was judged.
     pub fn set_attention_checks(&mut self, rates: AttentionCheckRates) {
         self.attention_checks = (rates.all.n > 0).then_some(rates);
     }

@@ -15,7 +15,7 @@ pub struct AdjudicationRules {
     pub double_read: u64,
     /// A result fails if any reviewer fails it.
     pub either_fails: Rate,
-    /// A disputed result counts as adjudicated, and is left out until somebody adjudicates. This is the Acc of a row.
+    /// A disputed result counts as adjudicated, and is left out until somebody adjudicates. This is `MetricRow::acc`.
     pub adjudicated: Rate,
     /// A result fails only if every reviewer who decided fails it.
     pub both_fail: Rate,

@@ -8,7 +8,7 @@ use super::stats::{IntervalMethod, Rate};
 use crate::catalog::{AttentionCheckAnswer, Catalog, CatalogError};
 use crate::domain::Verdict;
 
-/// Shares of answered planted faults that reviewers failed. A fault is not detected if the answer is unsure.
+/// Shares of the judged planted faults that reviewers failed. An unsure verdict does not detect a fault.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct AttentionCheckRates {
     /// Of every kind.

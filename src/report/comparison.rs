@@ -29,7 +29,7 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// Returns what a text calls the pairs whose results are known to be right or wrong.
+    /// Returns the term for pairs whose results are known to be right or wrong.
     const fn pairs(self) -> &'static str {
         match self {
             Self::Verdicts => "judged pairs",

@@ -62,9 +62,7 @@ impl Consensus {
     }
 }
 
-/// Splits the verdicts on a result into adjudications and independent verdicts, in this order.
-///
-/// An adjudication is a verdict by a reviewer who was shown that others disagree.
+/// Splits verdicts into adjudications, whose reviewers were shown a conflict, and independent verdicts.
 pub(crate) fn partition_verdicts(
     record: &MetricRecord,
 ) -> (Vec<&ReviewerVerdict>, Vec<&ReviewerVerdict>) {

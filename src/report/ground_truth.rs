@@ -73,8 +73,7 @@ pub enum TruthError {
 /// The error of one result against ground truth.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TruthErrors {
-    /// Angle of the rotation between the true and the found map on the true plane, in degrees in 0..=180. The angle is
-    /// 180 if the found map mirrors the character.
+    /// Rotation from the true to the found alignment, in degrees in 0..=180. It is 180 if the character is mirrored.
     pub angle_deg: f64,
     /// Whether the found map mirrors the character.
     pub mirrored: bool,
@@ -105,7 +104,7 @@ impl TruthErrors {
 }
 
 impl TruthRecord {
-    /// Parses a stored record and checks that it can be used to measure errors.
+    /// Parses a stored record and checks that errors can be measured with the record.
     ///
     /// # Errors
     /// Returns an error if the value is not a record, or if its plane, map, landmarks or height are degenerate.
@@ -123,11 +122,11 @@ impl TruthRecord {
         truth.map(|_| record).ok_or(TruthError::Flat)
     }
 
-    /// Measures the errors of a found map. `mask_iou` is copied to the result.
+    /// Measures the errors of the map that an alignment found. `mask_iou` is copied to the result.
     ///
     /// # Errors
-    /// Returns an error if the normal of the true plane is zero or not finite, or if the true map is singular on the
-    /// plane.
+    /// Returns an error if the normal of the true plane is zero or not finite, or if the record's `print_from_mesh` is
+    /// singular on the plane.
     pub fn measure(
         &self,
         found: &PrintFromMesh,
@@ -186,7 +185,7 @@ impl TruthRecord {
     }
 }
 
-/// Returns the linear part of `map` on a plane: it maps coordinates along the two `tangents` to print pixels.
+/// Restricts `map` to a plane. Returns the linear map from coordinates along the `tangents` to print pixels.
 fn in_plane(map: &PrintFromMesh, tangents: [Vector3<f64>; 2]) -> Affine2 {
     let row = |r: [f64; 4]| {
         let [a, b] = tangents.map(|t| r[0] * t[0] + r[1] * t[1] + r[2] * t[2]);

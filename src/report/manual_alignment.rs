@@ -120,7 +120,7 @@ impl ManualErrors {
 /// Returns the errors of a pair's results against its manual alignment, by metric.
 ///
 /// # Errors
-/// Returns an error if the pair's results of fit or depth cannot be read.
+/// Returns an error if the pair's result of the fit or depth stage cannot be read.
 pub(super) fn errors(
     project: &Project,
     pair: &PairResults,

@@ -46,11 +46,11 @@ pub struct Report {
     pub failures: Vec<FailureGroup>,
     /// The thresholds that the metrics chose.
     pub thresholds: Vec<ThresholdDistribution>,
-    /// Computing times of the stages. These differ from run to run; all other fields are equal if the results are
-    /// equal.
+    /// Computing times of the stages. The times differ from run to run. All other fields are equal if the results and
+    /// verdicts are equal.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub times: Vec<StageTimes>,
-    /// Rates at which reviewers detected planted faults. `None` if nobody answered a planted fault.
+    /// Rates at which reviewers detected planted faults. `None` if no planted fault was judged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attention_checks: Option<AttentionCheckRates>,
     /// Caveats on the numbers, in whole sentences.
@@ -153,7 +153,7 @@ pub struct FailureExample {
 }
 
 impl MetricRow {
-    /// Returns the number of failed results with a given reason, or of failed results without any reason for `None`.
+    /// Returns the number of failed results with a given reason. `None` stands for results without any reason.
     pub fn failed_for(&self, reason: Option<Reason>) -> u64 {
         let mut given = self.failed_reasons.iter();
         given

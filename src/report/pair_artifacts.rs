@@ -65,7 +65,7 @@ impl<'a> PairArtifacts<'a> {
     /// Returns the current result of a stage.
     ///
     /// # Errors
-    /// Returns an error if there is none.
+    /// Returns an error if the stage has no result.
     pub fn stage(&self, stage: Stage) -> Result<&'a StageRecord, PairArtifactsError> {
         let found = self.pair.stage(stage);
         found.ok_or(PairArtifactsError::NoResult(stage))
@@ -131,7 +131,7 @@ impl<'a> PairArtifacts<'a> {
     /// Returns the map from print pixels to pixels of the canvas on which scores are computed.
     ///
     /// # Errors
-    /// Returns an error if the results of normalize and register cannot be read.
+    /// Returns an error if the result of the normalize or register stage cannot be read.
     pub fn canvas_from_print(&self) -> Result<Affine2, PairArtifactsError> {
         let normalize: NormalizeOutcome = self.outcome(Stage::Normalize)?;
         let register: RegisterOutcome = self.outcome(Stage::Register)?;
@@ -160,7 +160,7 @@ impl<'a> PairArtifacts<'a> {
     /// pixels. Returns `None` if `depth_from_plane` is singular.
     ///
     /// # Errors
-    /// Returns an error if the results of fit or depth cannot be read.
+    /// Returns an error if the result of the fit or depth stage cannot be read.
     pub fn print_from_depth(
         &self,
         print_from_mesh: &PrintFromMesh,
@@ -181,10 +181,10 @@ impl<'a> PairArtifacts<'a> {
         }))
     }
 
-    /// Returns the map from mesh to print that a metric's `print_from_depth` and the results of fit and depth give.
+    /// Returns the map from mesh to print: a metric's `print_from_depth` composed with the maps of fit and depth.
     ///
     /// # Errors
-    /// Returns an error if the results of fit or depth cannot be read.
+    /// Returns an error if the result of the fit or depth stage cannot be read.
     pub fn print_from_mesh(
         &self,
         print_from_depth: &Affine2,

@@ -3,7 +3,7 @@
 use super::model::Report;
 use super::number_format::format_count;
 
-/// Returns the reasons why a report does not reach a required Acc. The list is empty if the report reaches it.
+/// Returns the reasons why a report misses the required Acc. The list is empty if there are none.
 ///
 /// Every row that has an Acc must reach `least` (0..=1). A report in which nobody passed or failed a result does not
 /// reach it, because ground truth never replaces a verdict.

@@ -55,7 +55,7 @@ pub struct ReviewerPair {
 /// The agreement of two reviewers. A number that cannot be computed is `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct VerdictAgreement {
-    /// Results that both judged and neither was unsure about. All other numbers except `unsure` refer to these results.
+    /// Results that each of the two passed or failed. All other numbers except `unsure` are over these results.
     pub n: u64,
     /// Results that both judged and at least one was unsure about.
     pub unsure: u64,

@@ -6,9 +6,9 @@ use super::comparison::Basis;
 use super::stats::Rate;
 use crate::domain::ThresholdMetric;
 
-/// Coverages of a curve: the percentage of the results that is kept, the most confident results first.
+/// Coverages of a curve: percentages of the results that are kept. The most confident results are kept.
 pub const COVERAGE_PERCENT: [u64; 7] = [100, 99, 97, 95, 90, 80, 50];
-/// Percentage of the results, the least confident ones, in which failures are counted.
+/// Size of the least confident part of the results, in percent. Failures in this part are counted.
 pub const LEAST_CONFIDENT_PERCENT: u64 = 3;
 
 /// The risk-coverage curve of one metric.

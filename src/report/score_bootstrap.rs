@@ -44,7 +44,7 @@ pub struct MeanIntervals {
     pub iou_box: Option<[f64; 2]>,
     /// Of the mean Dice coefficient.
     pub dice: Option<[f64; 2]>,
-    /// Of Acc, by resampling whole blocks. `None` also if there are no blocks, or if all results passed or all failed.
+    /// Of Acc, over whole blocks. `None` also if there are no blocks, or if all results passed or all failed.
     pub acc_by_block: Option<[f64; 2]>,
 }
 

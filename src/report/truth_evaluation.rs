@@ -140,7 +140,7 @@ fn read_tops(project: &Project, path: &str) -> Result<Grid<u8>, TruthError> {
     Ok(picture.rgb.map(|colour| (colour[0] / 257) as u8))
 }
 
-/// Warps a metric's depth mask to the print. Returns its intersection over union with the true stroke tops.
+/// Warps a metric's depth mask to the print. Returns the mask's intersection over union with the true stroke tops.
 pub fn tops_iou(depth: &DepthMap, outcome: &MetricOutcome, tops: &Grid<u8>) -> f64 {
     let mask = depth.stroke_mask(outcome.threshold_level);
     let (width, height) = (tops.width(), tops.height());

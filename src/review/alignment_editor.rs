@@ -28,7 +28,7 @@ pub(super) struct EditorStart {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AlignmentBody {
-    /// Id of the event, made by the page. An event that is sent again is stored once.
+    /// Id of the event, made by the page. An event that is sent twice is stored once.
     pub(super) event: String,
     /// Id of the item on which the alignment was started.
     pub(super) item: String,
@@ -37,7 +37,7 @@ pub(super) struct AlignmentBody {
     note: Option<String>,
 }
 
-/// Returns where the editor starts: at the result, and where the reviewer left it before.
+/// Returns the initial state of the editor: the alignment of the result, and the one that the reviewer saved before.
 pub(super) fn start(
     item: &ReviewItem,
     images: &ItemImages,
@@ -53,7 +53,7 @@ pub(super) fn start(
     }
 }
 
-/// Computes the overlap of an item's masks under a map, in the same way as the scores of results.
+/// Computes the overlap of an item's masks under `print_from_depth`, in the same way as for the scores of results.
 pub(super) fn mask_overlap(images: &ItemImages, print_from_depth: &Affine2) -> MaskOverlap {
     let ItemInputs {
         canvas, strokes, ..
@@ -75,7 +75,7 @@ pub(super) struct AlignmentSummary {
 }
 
 impl AlignmentSummary {
-    /// Compares a manual alignment with what the item shows; `None` if one of the two maps is singular.
+    /// Compares a manual alignment with what the item shows. Returns `None` if either of the two maps is singular.
     pub(super) fn of(item: &ReviewItem, made: &ManualAlignment) -> Option<Self> {
         let found = &item.view.print_from_depth;
         let correction =
@@ -93,7 +93,7 @@ impl AlignmentBody {
     /// Returns the map from depth-map pixels to print pixels.
     ///
     /// # Errors
-    /// Returns an error if the map is singular, not finite, or places the relief far outside the print.
+    /// Returns an error if the event id is not valid, or if the map is singular, not finite, or out of range.
     pub(super) fn print_from_depth(&self, images: &ItemImages) -> Result<Affine2, InvalidInput> {
         check_event(&self.event)?;
         let rows = self.view_from_depth.0;
@@ -111,7 +111,7 @@ impl AlignmentBody {
     /// Returns the note, trimmed.
     ///
     /// # Errors
-    /// Returns an error if it is too long.
+    /// Returns an error if the note is too long.
     pub(super) fn note(&self) -> Result<Option<String>, InvalidInput> {
         check_note(self.note.as_deref())
     }

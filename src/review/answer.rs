@@ -14,7 +14,7 @@ const NOTE_CHARS: usize = 2000;
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct AnswerBody {
-    /// Id of the event, made by the page. An event that is sent again is stored once.
+    /// Id of the event, made by the page. An event that is sent twice is stored once.
     pub(super) event: String,
     /// Id of the item.
     pub(super) item: String,
@@ -90,10 +90,10 @@ impl AnswerBody {
     }
 }
 
-/// Trims a note; returns `None` if nothing is left.
+/// Trims a note. Returns `None` if nothing is left.
 ///
 /// # Errors
-/// Returns an error if it is too long.
+/// Returns an error if the note is too long.
 pub(super) fn check_note(text: Option<&str>) -> Result<Option<String>, InvalidInput> {
     let text = text.map(str::trim).filter(|text| !text.is_empty());
     match text {
@@ -106,7 +106,7 @@ pub(super) fn check_note(text: Option<&str>) -> Result<Option<String>, InvalidIn
 /// Checks the form of an event id.
 ///
 /// # Errors
-/// Returns an error if it is empty, too long or has other characters.
+/// Returns an error if the id is empty or too long, or has characters other than letters, digits and hyphens.
 pub(super) fn check_event(event: &str) -> Result<(), InvalidInput> {
     let is_valid = event
         .bytes()

@@ -13,13 +13,13 @@ pub struct CheckRates {
     pub duplicates: f64,
 }
 
-/// Range of planted rotations in degrees: above the tolerance of 5 degrees, but not obvious at first sight.
+/// Range of planted rotations in degrees. These exceed the tolerance of 5 degrees, but are not obvious at first sight.
 const ROTATION_DEG: [f64; 2] = [7.0, 15.0];
-/// `IoU` of a relief with its mirror image above which mirroring it is not a visible fault.
+/// Largest `IoU` of a relief with its mirror image at which mirroring the relief is a visible fault.
 const MAX_SYMMETRY_IOU: f64 = 0.6;
-/// Target stroke area, relative to the result, of a fault that loses strokes.
+/// Target stroke area of a fault that loses strokes, as a share of the stroke area of the result.
 const REDUCED_STROKES: f64 = 0.45;
-/// Target stroke area, relative to the result, of a fault that includes background.
+/// Target stroke area of a fault that includes background, as a multiple of the stroke area of the result.
 const ENLARGED_STROKES: f64 = 1.9;
 /// Minimum number of items between a result and its duplicate.
 const DUPLICATE_GAP: f64 = 10.0;
@@ -38,8 +38,8 @@ pub(super) fn select_for_faults<'a>(
         .collect()
 }
 
-/// Makes a fault from a good result: mirrored, wrong threshold, or rotated. Falls back to a rotation where the other
-/// change would not be a visible fault, as for a mirrored symmetric relief.
+/// Makes a fault from a good result: mirrors the relief, changes the threshold, or rotates the relief. Rotates the
+/// relief if the other change would not be a visible fault, such as mirroring a symmetric relief.
 pub(super) fn plant_fault(
     item: &ReviewItem,
     depth: &DepthMap,
@@ -66,7 +66,7 @@ pub(super) fn plant_fault(
     }
 }
 
-/// Rotates the relief of an item; `number` in 0..1 selects direction and angle.
+/// Rotates the relief of an item. `number` in 0..1 selects the direction and the angle.
 fn rotated(item: &ReviewItem, number: f64) -> (AttentionCheck, ItemView) {
     let [min, max] = ROTATION_DEG;
     let sign = if number < 0.5 { -1.0 } else { 1.0 };
@@ -76,7 +76,7 @@ fn rotated(item: &ReviewItem, number: f64) -> (AttentionCheck, ItemView) {
     (AttentionCheck::Turned { angle_deg }, view)
 }
 
-/// Returns whether the strokes nearly cover their mirror image, mirrored about the centre of their bounding box.
+/// Returns whether the strokes largely coincide with their mirror image, flipped left to right in their bounding box.
 fn is_symmetric(strokes: &Mask) -> bool {
     let Some(found) = strokes.bounding_box() else {
         return true;
@@ -88,8 +88,7 @@ fn is_symmetric(strokes: &Mask) -> bool {
     strokes.overlap(&flipped).iou > MAX_SYMMETRY_IOU
 }
 
-/// Returns a threshold at which many strokes are lost or much background is included; `None` if the relief has no
-/// such level.
+/// Returns a threshold that loses many strokes or includes much background, or `None` if the relief has no such level.
 fn faulty_threshold(depth: &DepthMap, level: u16, loses_strokes: bool) -> Option<u16> {
     let mut levels = depth.valid_levels();
     levels.sort_unstable_by(|a, b| b.cmp(a));

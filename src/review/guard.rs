@@ -1,5 +1,5 @@
-//! Checks of every request before it reaches a handler: `Host`, session cookie, and for writes `Origin`, content type
-//! and CSRF token. Adds the security headers to every response.
+//! Checks every request before it reaches a handler: `Host` and the session cookie, and for writes also `Origin`, the
+//! content type and the CSRF token. Adds the security headers to every response.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use axum::response::{IntoResponse as _, Response};
 
 use super::state::ServerState;
 
-/// Maximum request body in bytes; a verdict with a long note is far smaller.
+/// Maximum size of a request body in bytes. A verdict with a note of ordinary length is far smaller.
 pub(super) const BODY_LIMIT: usize = 16 * 1024;
 /// Request header that carries the CSRF token.
 pub(super) const CSRF_HEADER: &str = "x-csrf-token";

@@ -12,7 +12,7 @@ use crate::domain::ContentHash;
 pub(super) struct ReviewerHistory {
     answers: BTreeMap<AnsweredOn, Answer>,
     alignments: BTreeMap<ContentHash, ManualAlignment>,
-    /// Whether a pair may be recognised, because there are no attention checks.
+    /// Whether alignments are returned for unanswered items. True if there are no attention checks.
     is_open: bool,
 }
 
@@ -54,8 +54,8 @@ impl ReviewerHistory {
             .max_by_key(|answer| answer.at)
     }
 
-    /// Returns the manual alignment of what an item shows. A duplicate shows the same as an earlier item, so with
-    /// attention checks an alignment is revealed only after the item is answered.
+    /// Returns the reviewer's manual alignment of what an item shows. A duplicate shows the same as an earlier item, so
+    /// if there are attention checks, alignments are returned only for answered items.
     pub(super) fn alignment(&self, item: &ReviewItem) -> Option<&ManualAlignment> {
         let found = self.alignments.get(&item.view.hash());
         found.filter(|_| self.is_open || self.answer(item).is_some())

@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use crate::domain::enum_names;
 
-/// The text of each message by language. The script replaces `{name}` by a value.
+/// The text of each message by language. The script replaces placeholders such as `{n}` by values.
 static MESSAGES: LazyLock<BTreeMap<&str, BTreeMap<&str, &str>>> = LazyLock::new(|| {
     let text = include_str!("../../assets/review/messages.json");
     serde_json::from_str(text).expect("the messages are JSON without escapes")
@@ -30,7 +30,7 @@ impl Language {
         }
     }
 
-    /// Returns the message of a key, or the key itself if there is none; a test rules that out.
+    /// Returns the message for a key, or the key itself if it has no message. A test checks that every key has one.
     pub(super) fn translate(self, key: &'static str) -> &'static str {
         MESSAGES.get(key).map_or(key, |texts| texts[self.name()])
     }

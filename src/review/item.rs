@@ -1,4 +1,4 @@
-//! An item of the queue: one image that a reviewer judges, with data that stay on the server.
+//! An item of the queue: one image that a reviewer judges, and data about the image that stay on the server.
 
 use crate::catalog::Shown;
 use crate::domain::{Affine2, AttentionCheck, ContentHash, PairName, ThresholdMetric};
@@ -19,7 +19,7 @@ pub(super) struct ItemView {
 }
 
 impl ItemView {
-    /// Returns the hash of everything the images are rendered from. Verdicts are bound to it.
+    /// Returns the hash of everything that the images are rendered from. A verdict is stored together with this hash.
     pub(super) fn hash(&self) -> ContentHash {
         let mut bytes = Vec::with_capacity(128);
         bytes.extend(self.print_hash.as_bytes());
@@ -31,7 +31,7 @@ impl ItemView {
         ContentHash::of(&bytes)
     }
 
-    /// Returns this view with the relief rotated about its centre, in degrees clockwise.
+    /// Returns this view with the relief rotated clockwise about its centre by `angle_deg` degrees.
     pub(super) fn rotated(&self, angle_deg: f64) -> Self {
         let centre = self.depth_px.map(|side| (f64::from(side) - 1.0) / 2.0);
         let [x, y] = self.print_from_depth.apply(centre);
@@ -73,7 +73,7 @@ pub(super) struct ReviewItem {
 }
 
 impl ReviewItem {
-    /// Returns the results or the attention check for which an answer to this item is stored.
+    /// Returns what an answer to this item is about: the results or the attention check.
     pub(super) fn shown(&self) -> Shown {
         match (self.check, self.results.first()) {
             (Some(check), Some((metric, result_hash))) => Shown::Check {

@@ -1,4 +1,4 @@
-//! Images of an item as PNG, rendered once and cached. Attention checks take the same path as results.
+//! Images of an item as PNG, rendered once and cached. Attention checks are rendered like results.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
@@ -192,7 +192,7 @@ impl ImageCache {
     /// Returns the images of an item. Concurrent requests for one item share one rendering.
     ///
     /// # Errors
-    /// Returns an error if files of the pair cannot be read, or the pair has a new result.
+    /// Returns an error if files of the pair cannot be read, or if the pair has a new result.
     pub(super) async fn of(&self, item: &Arc<ReviewItem>) -> Result<Arc<ItemImages>, ImageError> {
         let entry = self.slots.lock().await.entry(&item.id);
         let images = entry.get_or_try_init(|| self.render(item)).await?;

@@ -1,7 +1,7 @@
 //! The review page: a local web server on which one reviewer judges results and aligns reliefs manually.
 //!
 //! [`bind`] binds the port and reads the queue; [`ReviewServer::serve`] serves until it is stopped. An answer is
-//! acknowledged only when it is on the disk. Attention checks take the same path as results at every step.
+//! acknowledged only after it is on the disk. Attention checks are processed like results at every step.
 
 mod alignment_editor;
 mod answer;

@@ -1,4 +1,4 @@
-//! Options of the review page: whose queue it shows, in which order, with how many attention checks, and where.
+//! Options of the review page: the reviewer, the order of the queue, the attention checks, and the server's address.
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -13,8 +13,8 @@ use crate::raster::ImageLimits;
 pub struct QueueOptions {
     /// Name of the reviewer.
     pub reviewer: String,
-    /// Metrics whose results are reviewed; all if empty. Results of other metrics get no verdict, even where they look
-    /// the same, because such a selection would bias their accuracy.
+    /// Metrics whose results are reviewed, or all metrics if the list is empty. Results of other metrics get no verdict
+    /// even if they look the same, because judging only results selected in this way would bias the accuracy.
     pub metrics: Vec<ThresholdMetric>,
     /// Order of the results.
     pub order: ReviewOrder,
@@ -28,7 +28,7 @@ pub struct QueueOptions {
 
 impl QueueOptions {
     /// Returns whether some items are attention checks. If so, an item does not reveal its pair before it is answered,
-    /// because a pair that appears twice would give the check away.
+    /// because the reviewer would recognise a pair that appears twice.
     pub(super) fn has_attention_checks(&self) -> bool {
         let CheckRates { faults, duplicates } = self.rates;
         self.order != ReviewOrder::Adjudicate && (faults > 0.0 || duplicates > 0.0)
@@ -44,10 +44,10 @@ pub struct ReviewOptions {
     pub language: Language,
     /// Physical keys to actions; from [`key_map`](super::key_map).
     pub keys: BTreeMap<String, String>,
-    /// Minimum time an image is shown before a verdict is accepted, milliseconds.
+    /// Minimum time in milliseconds for which an image is shown before a verdict is accepted.
     pub min_view_ms: u64,
-    /// Address to listen on. Port 0 selects a fixed port for the project and reviewer, or any free port if that one is
-    /// taken.
+    /// Address to listen on. Port 0 selects a fixed port for the project and reviewer, or any free port if the fixed
+    /// port is taken.
     pub listen: SocketAddr,
     /// Limits on the print images.
     pub limits: ImageLimits,

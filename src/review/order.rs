@@ -18,7 +18,8 @@ pub(super) fn sort(items: &mut [ReviewItem], order: ReviewOrder, random: &Seeded
     });
 }
 
-/// Keeps a sample of `count` items. It does not depend on the reviewer, so that several reviewers judge the same items.
+/// Keeps a sample of `count` items. The sample does not depend on the reviewer, so that several reviewers judge the
+/// same items.
 pub(super) fn sample(items: &mut Vec<ReviewItem>, order: ReviewOrder, seed: u64, count: usize) {
     sort(items, order, &SeededRandom::new(seed, "sample"));
     items.truncate(count);

@@ -1,4 +1,4 @@
-//! The review queue: everything a reviewer is to judge, in order. Results that look the same are one item.
+//! The review queue: everything that a reviewer is to judge, in order. Results that look the same form one item.
 
 use std::sync::Arc;
 
@@ -15,7 +15,7 @@ use crate::store::Project;
 
 /// Number of pairs read from the catalog at a time.
 const PAGE_PAIRS: usize = 256;
-/// Confidence from which a result is reliable enough to plant a fault in it.
+/// Smallest confidence at which a result is reliable enough to plant a fault in it.
 const RELIABLE_CONFIDENCE: f64 = 0.8;
 
 /// Items in order, and what the reviewer has done so far.
@@ -78,7 +78,7 @@ async fn all_items(
     Ok(items)
 }
 
-/// Returns the items of one pair: one for each group of results that look the same.
+/// Returns the items of one pair, one for each group of results that look the same.
 fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> {
     let (Some(depth), Some(print)) = (pair.stage(Stage::Depth), pair.stage(Stage::Normalize))
     else {
@@ -90,8 +90,8 @@ fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> 
     let wanted = &options.metrics;
     let is_of_metric =
         |record: &&MetricRecord| wanted.is_empty() || wanted.contains(&record.outcome.metric);
-    // Adjudication covers disputed results only. Undisputed ones that look the same get no verdict, because such a
-    // selection would bias their accuracy.
+    // Adjudication covers disputed results only. An undisputed result gets no verdict even if it looks the same,
+    // because judging only results selected in this way would bias the accuracy.
     let is_wanted = |record: &&MetricRecord| {
         options.order != ReviewOrder::Adjudicate || is_open_conflict(record, &options.reviewer)
     };
@@ -120,7 +120,8 @@ fn items_of_pair(pair: &PairResults, options: &QueueOptions) -> Vec<ReviewItem> 
     groups.into_iter().map(item).collect()
 }
 
-/// Returns how uncertain a result is, from 0 to 1.75: low confidence, low similarity, a search that ended at a bound.
+/// Returns a number that is higher for less certain results. Low confidence, low similarity and a search that ended at
+/// a bound each add to the number.
 fn uncertainty(record: &MetricRecord) -> f64 {
     let outcome = &record.outcome;
     let doubt = 1.0 - outcome.confidence.unwrap_or(0.5);
@@ -128,7 +129,8 @@ fn uncertainty(record: &MetricRecord) -> f64 {
     doubt + 0.5 * dissimilarity + if outcome.at_bound { 0.25 } else { 0.0 }
 }
 
-/// Returns whether a fault can be planted in a result: it has high confidence and nobody failed it.
+/// Returns whether a fault can be planted in a result: its confidence is not low, its search did not end at a bound,
+/// and it has no verdict other than a pass.
 fn is_reliable(record: &MetricRecord) -> bool {
     let outcome = &record.outcome;
     let mut verdicts = record.verdicts.iter().map(|read| read.verdict);
@@ -139,8 +141,8 @@ fn is_reliable(record: &MetricRecord) -> bool {
         && verdicts.all(|verdict| verdict == Verdict::Pass)
 }
 
-/// Returns whether others disagree on a result and nobody but this reviewer has settled it. A reviewer who is party to
-/// the disagreement cannot settle it.
+/// Returns whether a result is disputed and this reviewer can adjudicate it. A reviewer who is party to the dispute
+/// cannot, and neither can anybody after another reviewer has settled the dispute.
 fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
     let (rulings, verdicts) = partition_verdicts(record);
     let is_party = verdicts.iter().any(|read| read.reviewer == reviewer);
@@ -150,7 +152,7 @@ fn is_open_conflict(record: &MetricRecord, reviewer: &str) -> bool {
     is_disputed(&verdicts) && !is_party && !is_settled
 }
 
-/// Makes faults from the selected items. Pairs whose files cannot be read are skipped.
+/// Plants faults in the selected items. Skips pairs whose files cannot be read.
 async fn faults(
     catalog: &Catalog,
     project: &Project,

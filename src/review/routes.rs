@@ -95,8 +95,8 @@ impl IntoResponse for ApiError {
 
 type ApiResult<T = Json<Value>> = Result<T, ApiError>;
 
-/// Accepts the one-time token and sets the session cookie. Responds with a page that navigates by itself instead of a
-/// redirect: a `SameSite=Strict` cookie is sent only with navigation that starts on this site.
+/// Accepts the one-time token and sets the session cookie. Responds not with a redirect but with a page that navigates
+/// on, because a browser sends a `SameSite=Strict` cookie only if the navigation starts on this site.
 async fn start(State(state): State<Arc<ServerState>>, RawQuery(query): RawQuery) -> Response {
     let query = query.unwrap_or_default();
     let token = query.strip_prefix("token=").unwrap_or_default();
@@ -130,7 +130,7 @@ async fn asset(Path(name): Path<String>) -> Response {
     }
 }
 
-/// Returns what the script needs to start: CSRF token, key bindings, messages.
+/// Returns what the script needs to start, such as the CSRF token, the key bindings and the messages.
 async fn config(State(state): State<Arc<ServerState>>) -> Json<Value> {
     let messages = Language::ALL.map(|language| (language.name(), language.messages()));
     Json(json!({
@@ -166,7 +166,7 @@ async fn queue(State(state): State<Arc<ServerState>>) -> ApiResult {
     ))
 }
 
-/// Returns the first item of a pair. Never returns another one, because that would reveal duplicates.
+/// Returns the first item of a pair. Never returns a later item, because that would reveal duplicates.
 async fn find(State(state): State<Arc<ServerState>>, Path(pair): Path<String>) -> ApiResult {
     let queue = state.load_queue().await?;
     let mut items = queue.items.iter();
@@ -186,7 +186,7 @@ async fn image(
     Ok((kind, images.layer(layer)).into_response())
 }
 
-/// Returns pair, metrics and scores of an answered item, for attention checks as for results.
+/// Returns the pair, metrics and scores of an answered item. Attention checks are treated like results.
 async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) -> ApiResult {
     let item = served_item(&state, &id)?;
     let history = ReviewerHistory::read(&state.catalog, &state.options.queue).await?;
@@ -198,7 +198,8 @@ async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) 
     let metrics = item.results.iter().map(|(metric, _)| metric.title());
     let others = match state.options.queue.order {
         ReviewOrder::Adjudicate => other_verdicts(&state, &item).await?,
-        // Planted faults have no verdicts of others, so showing any would reveal the faults.
+        // A planted fault has no verdicts by other reviewers. Showing such verdicts for results would reveal which
+        // items are faults.
         ReviewOrder::Random | ReviewOrder::LeastConfident => Vec::new(),
     };
     Ok(Json(json!({
@@ -206,7 +207,7 @@ async fn details(State(state): State<Arc<ServerState>>, Path(id): Path<String>) 
     })))
 }
 
-/// Returns the verdicts of other reviewers on an item's results, each once.
+/// Returns the distinct verdicts of other reviewers on an item's results.
 async fn other_verdicts(
     state: &ServerState,
     item: &ReviewItem,

@@ -1,4 +1,4 @@
-//! Starts the server: binds the port, reads the queue, serves until it is stopped.
+//! Starts the server: binds the port, reads the queue, and serves until it is stopped.
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -64,7 +64,7 @@ pub struct QueueCounts {
 /// Binds the port and reads the queue.
 ///
 /// # Errors
-/// Returns an error if the address cannot be bound, or the catalog cannot be read.
+/// Returns an error if the address cannot be bound, the system provides no randomness, or the queue cannot be read.
 pub async fn bind(
     catalog: Catalog,
     project: Project,
@@ -84,7 +84,7 @@ pub async fn bind(
         options,
         served_items: std::sync::Mutex::default(),
     };
-    // After a restart, a page may resend an answer before it requests the queue.
+    // The items must be known now, because after a restart a page may resend an answer before it requests the queue.
     let queue = state.load_queue().await;
     let queue = queue.map_err(|error| ReviewError::Queue(error.to_string()))?;
     let count =
@@ -137,8 +137,8 @@ impl ReviewServer {
 /// First port and number of ports of the dynamic range (RFC 6335).
 const DYNAMIC_PORTS: [u16; 2] = [49_152, 16_384];
 
-/// Returns a port that is the same for a project and reviewer on every start. The browser keeps unsaved answers per
-/// origin, so a restarted server must have the same port to receive them.
+/// Returns a port that is the same on every start for a project and reviewer. The browser keeps unsaved answers per
+/// origin, so a restarted server needs the same port to receive these answers.
 fn preferred_port(project: &Project, reviewer: &str) -> u16 {
     let dir = project.dir();
     let dir = dir.canonicalize().unwrap_or_else(|_| dir.to_owned());

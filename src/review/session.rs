@@ -1,4 +1,4 @@
-//! Session secrets: a token that opens the page once, then a session cookie; writes also need a CSRF token.
+//! Session secrets: a one-time token that opens the page, a session cookie, and a CSRF token that writes also need.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -28,13 +28,13 @@ impl Session {
             token: secret()?,
             cookie: secret()?,
             csrf_token: secret()?,
-            // Cookies are shared by all ports of a host: two servers must not overwrite each other's.
+            // Cookies are shared by all ports of a host, so the cookies of two servers need different names.
             cookie_name: format!("mocban_review_{port}"),
             is_opened: AtomicBool::new(false),
         })
     }
 
-    /// Accepts the one-time token; returns false if it is wrong or already used.
+    /// Accepts the one-time token. Returns `false` if the token is wrong or was already used.
     pub(super) fn open(&self, token: &str) -> bool {
         is_equal(token, &self.token) && !self.is_opened.swap(true, Ordering::SeqCst)
     }
@@ -68,7 +68,7 @@ fn secret() -> std::io::Result<String> {
     Ok(ContentHash::from_bytes(bytes).to_hex())
 }
 
-/// Compares two secrets by their hashes, so that the time taken does not depend on the secret.
+/// Compares two secrets by their hashes, so that the time taken does not depend on where the secrets differ.
 fn is_equal(a: &str, b: &str) -> bool {
     ContentHash::of(a.as_bytes()) == ContentHash::of(b.as_bytes())
 }

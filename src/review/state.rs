@@ -21,7 +21,8 @@ pub(super) struct ServerState {
     /// Accepted values of the `Host` header, with port.
     pub(super) hosts: Vec<String>,
     pub(super) images: ImageCache,
-    /// Every item served since the start, by id. An answer is accepted even if the results have changed meanwhile.
+    /// Every item served since the start, by id. Answers to these items are accepted even if the results have changed
+    /// meanwhile.
     pub(super) served_items: Mutex<BTreeMap<String, Arc<ReviewItem>>>,
 }
 
@@ -29,7 +30,7 @@ impl ServerState {
     /// Reads the queue from the current state of the catalog and remembers its items.
     ///
     /// # Errors
-    /// Returns an error if the catalog cannot be read.
+    /// Returns an error if the catalog cannot be read, or if a blocking task fails.
     pub(super) async fn load_queue(&self) -> Result<ReviewQueue, QueueError> {
         let queue = ReviewQueue::read(&self.catalog, &self.project, &self.options.queue).await?;
         let mut served = self.lock_served();
@@ -44,7 +45,8 @@ impl ServerState {
         self.lock_served().get(id).cloned()
     }
 
-    /// Locks the served items. A poisoned lock still holds a consistent map: each insertion is complete.
+    /// Locks the served items. Ignores a poisoned lock: each insertion is complete, so the map is consistent even after
+    /// a panic.
     fn lock_served(&self) -> MutexGuard<'_, BTreeMap<String, Arc<ReviewItem>>> {
         let locked = self.served_items.lock();
         locked.unwrap_or_else(PoisonError::into_inner)

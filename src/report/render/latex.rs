@@ -44,7 +44,7 @@ fn float(table: &Table) -> String {
     )
 }
 
-/// Returns the column type; a number column is as wide as its longest integer part.
+/// Returns the type of a column. A column of numbers reserves space for the longest integer part.
 fn column_type(table: &Table, index: usize) -> String {
     let ColumnFormat::Number(decimals) = table.columns[index].format else {
         return "l".to_owned();

@@ -33,7 +33,7 @@ pub enum ReportFormat {
     Markdown,
     /// Tables with `booktabs` and `siunitx`.
     Latex,
-    /// One page with its images in it, which needs no script and no other file.
+    /// One HTML page that includes its images and needs no script or other file.
     Html,
 }
 
@@ -42,7 +42,7 @@ enum_names! {
     Text = "text", Json = "json", Csv = "csv", Markdown = "markdown", Latex = "latex", Html = "html",
 }
 
-/// Returns the report in a format; ends with a line end. [`page`] returns the HTML page with images.
+/// Returns the report in a format, with a newline at the end. For an HTML page with images, use [`page`].
 pub fn render(report: &Report, format: ReportFormat) -> String {
     match format {
         ReportFormat::Text => text::render(report),

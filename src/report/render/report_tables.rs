@@ -10,7 +10,7 @@ use crate::report::number_format::{counted, format_count};
 use crate::report::stats::Rate;
 use crate::report::truth_summary::TruthSummary;
 
-/// Returns the tables of a report: scores always, others where they have content.
+/// Returns the tables of a report. The table of scores is always included, the other tables only if they have content.
 pub(super) fn tables(report: &Report) -> Vec<Table> {
     let tables = [
         Some(scores(report)),
@@ -73,7 +73,7 @@ pub(super) fn verdicts(report: &Report) -> Table {
         .caption("Results by verdict. Stale: only an earlier result has a verdict.")
 }
 
-/// Returns Acc under three rules; `None` where no result was judged by two reviewers.
+/// Returns Acc under three rules for disagreement, or `None` if no result was decided by two reviewers.
 pub(super) fn rules(report: &Report) -> Option<Table> {
     let is_double = |row: &MetricRow| row.rules.is_some_and(|rules| rules.double_read > 0);
     let rate = |row: &MetricRow, i: usize| row.rules.map(|rules| rules.rates()[i]);
@@ -94,7 +94,7 @@ pub(super) fn rules(report: &Report) -> Option<Table> {
     })
 }
 
-/// Returns failed results by reason, with a column for each metric; `None` without failed results.
+/// Returns the failed results by reason, with a column for each metric, or `None` without failed results.
 pub(super) fn fail_reasons(report: &Report) -> Option<Table> {
     let reasons = Reason::ALL.into_iter().map(Some).chain([None]);
     let is_given = |reason: &Option<Reason>| {
@@ -116,7 +116,7 @@ pub(super) fn fail_reasons(report: &Report) -> Option<Table> {
     })
 }
 
-/// Returns planted faults that reviewers detected; `None` where none were answered.
+/// Returns the rates of detected planted faults, or `None` if no planted fault was judged.
 pub(super) fn attention_checks(report: &Report) -> Option<Table> {
     let checks = report.attention_checks.as_ref()?;
     let by_kind = checks.by_kind.iter().map(|(kind, rate)| (*kind, *rate));

@@ -7,7 +7,7 @@ use crate::report::number_format::NumberStyle::Percent;
 use crate::report::number_format::{counted, format_count, format_number};
 use crate::report::risk_coverage::{COVERAGE_PERCENT, LEAST_CONFIDENT_PERCENT, RiskCoverageCurve};
 
-/// Headers of the columns of [`short_tables`], one for each of [`COVERAGE_PERCENT`].
+/// Column headers of [`short_tables`], one for each coverage in [`COVERAGE_PERCENT`].
 const HEADERS: [&str; COVERAGE_PERCENT.len()] =
     ["100 %", "99 %", "97 %", "95 %", "90 %", "80 %", "50 %"];
 
@@ -69,8 +69,8 @@ fn caption(basis: Basis, curves: &[&RiskCoverageCurve]) -> String {
     sentences.join(" ")
 }
 
-/// Returns how many of a metric's failures its confidence reveals; `None` without failures, and where the least
-/// confident 3 % are less than one result.
+/// Returns a sentence that counts a metric's failures among its least confident results. Returns `None` if there are no
+/// failures, or if 3 % of the results are less than one result.
 fn failures(curve: &RiskCoverageCurve) -> Option<String> {
     let is_enough = curve.n * LEAST_CONFIDENT_PERCENT >= 100;
     // The number is rounded up, so its share is above 3 %.

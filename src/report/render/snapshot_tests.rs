@@ -1,4 +1,4 @@
-//! Snapshots of every format of a report. `INSTA_UPDATE=always cargo test` rewrites them.
+//! Snapshots of every report format. `INSTA_UPDATE=always cargo test` rewrites the snapshots.
 
 use insta::assert_snapshot;
 
@@ -16,7 +16,7 @@ fn unjudged() -> Report {
     report.finish()
 }
 
-/// Three results, of which two have verdicts and one has ground truth, and a failed pair.
+/// Returns a report on a failed pair and three results, of which two have verdicts and one has ground truth.
 fn judged() -> Report {
     let mut report = ReportAccumulator::default();
     let none = TruthEvaluation::default();

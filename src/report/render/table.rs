@@ -1,4 +1,4 @@
-//! A table of text cells, described once for the text, Markdown, LaTeX and HTML renderers.
+//! A table of text cells, which the text, Markdown, LaTeX and HTML renderers share.
 
 use crate::report::number_format::NumberStyle::{self, Count, Share};
 use crate::report::number_format::{format_count, format_number};
@@ -28,13 +28,13 @@ pub(super) struct TableColumn {
 pub(super) enum ColumnFormat {
     /// Text, aligned to the left.
     Text,
-    /// The two bounds of a share with a hyphen between them, aligned to the left.
+    /// The two bounds of a share, joined by a hyphen and aligned to the left.
     Interval,
-    /// Numbers with this many decimals, aligned at the decimal point; a comma separates thousands.
+    /// Numbers with this many decimals, aligned at the decimal point. A comma separates thousands.
     Number(usize),
 }
 
-/// A table while columns are added: each column with its header, its values and their format.
+/// A table under construction. Columns are added one by one, each with its header, values and format.
 pub(super) struct TableBuilder<T> {
     items: Vec<T>,
     columns: Vec<TableColumn>,

@@ -1,9 +1,9 @@
 //! The binomial distribution.
 
-/// Returns P(X <= `count`) for X binomial with `n` trials of success probability `p`, in 0..=1.
+/// Returns P(X <= `count`), in 0..=1, for a binomial X with `n` trials and success probability `p`.
 ///
-/// `p` lies strictly between 0 and 1, and `count` is at most `n`. Up to the mean, terms of the lower tail are added, so
-/// the relative error is at rounding level; above the mean the upper tail is subtracted from 1.
+/// `p` must lie strictly between 0 and 1, and `count` must be at most `n`. If `count` is at most the mean, the terms of
+/// the lower tail are added, so the relative error is at rounding level. Otherwise the upper tail is subtracted from 1.
 ///
 /// ```
 /// use mocban::report::stats::binomial_cdf;
@@ -21,7 +21,7 @@ pub fn binomial_cdf(count: u64, n: u64, p: f64) -> f64 {
     }
 }
 
-/// Sums the terms from `count` down to 0, which shrink because `count` is not above the mean.
+/// Sums the terms from `count` down to 0. The terms shrink, because `count` is not above the mean.
 fn lower_tail(count: u64, n: u64, p: f64) -> f64 {
     let ln_choose: f64 = (0..count.min(n - count))
         .map(|k| ((n - k) as f64 / (k + 1) as f64).ln())

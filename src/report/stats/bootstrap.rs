@@ -1,4 +1,4 @@
-//! The bootstrap of means: resampling units with replacement.
+//! The bootstrap of means, which resamples units with replacement.
 //!
 //! Source: Efron 1979, doi:10.1214/aos/1176344552.
 
@@ -14,15 +14,17 @@ pub const BOOTSTRAP_SEED: u64 = 1;
 const MAX_RESAMPLES: usize = 10_000;
 /// Fewest resamples, however many units there are.
 const MIN_RESAMPLES: usize = 1000;
-/// Most draws in all resamples together, so that large samples take seconds.
+/// Limit on the draws of all resamples together, so that large samples take seconds. `MIN_RESAMPLES` overrides it.
 const MAX_DRAWS: usize = 50_000_000;
 /// Resamples that one thread adds up in one pass over the units.
 const STREAMS_PER_PASS: usize = 8;
 
-/// One unit's contribution to each quantity: `[sum, count]`, so that a quantity's mean is the sum over the count.
+/// One unit's contribution to each quantity, as `[sum, count]`. A quantity's mean is its total sum over its total
+/// count.
 pub type QuantitySums = Vec<[f64; 2]>;
 
-/// Returns the number of resamples for a sample of `units`: 10,000, fewer above 5,000 units, never below 1,000.
+/// Returns the number of resamples for a sample of `units` units: 10,000 for up to 5,000 units, fewer for more units,
+/// but at least 1,000. Returns 0 for an empty sample.
 ///
 /// ```
 /// use mocban::report::stats::resample_count;
@@ -36,7 +38,7 @@ pub fn resample_count(units: usize) -> usize {
     }
 }
 
-/// Returns each quantity's mean in each resample in which it exists; `width` is the number of quantities of every unit.
+/// Returns each quantity's mean in each resample that has the quantity. Every unit has `width` quantities.
 ///
 /// All quantities are computed from the same draws, so differences between them are paired. The result depends on the
 /// order of the units, not on the number of threads.
@@ -66,10 +68,11 @@ pub fn resampled_means(units: &[QuantitySums], width: usize) -> Vec<Vec<f64>> {
     (0..width).map(means).collect()
 }
 
-/// Returns, for each random stream, the sums over as many units as there are, drawn with replacement.
+/// Draws one resample for each random stream: as many units as the sample has, with replacement. Returns the sums of
+/// each resample.
 ///
-/// `units` holds the units one after another. Each is read once for all streams, because with many units the time goes
-/// into reading them.
+/// `units` holds the quantities of the first unit, then of the second, and so on. Each unit is read once for all
+/// streams, because with many units most of the time is spent reading them.
 fn resample(units: &[[f64; 2]], width: usize, streams: &[u64]) -> Vec<QuantitySums> {
     let count = units.len() / width.max(1);
     let multiplicities: Vec<Vec<u32>> = streams
@@ -103,17 +106,18 @@ fn multiplicities(count: usize, stream: u64) -> Vec<u32> {
     times
 }
 
-/// Returns the 2.5 % and 97.5 % quantiles of resampled means: the percentile interval; `None` without means.
+/// Returns the percentile interval: the 2.5 % and 97.5 % quantiles of resampled means. Returns `None` without means.
 ///
 /// Sorts `means`.
 pub fn percentile_interval_95(means: &mut [f64]) -> Option<[f64; 2]> {
     Some([quantile(means, 0.025)?, quantile(means, 0.975)?])
 }
 
-/// Returns the two-sided p-value of a difference of 0 from resampled differences, in 0..=1; `None` without any.
+/// Returns the two-sided p-value, in 0..=1, of the hypothesis that the true difference is 0. Returns `None` if there
+/// are no resampled differences.
 ///
-/// Twice the share of differences on the rarer side of 0, with the sample itself counted among them so that it is
-/// never 0. Source: Davison and Hinkley 1997, section 4.4, doi:10.1017/CBO9780511802843.
+/// The p-value is twice the share of differences on the rarer side of 0. The sample itself is counted on that side, so
+/// the p-value is never 0. Source: Davison and Hinkley 1997, section 4.4, doi:10.1017/CBO9780511802843.
 ///
 /// ```
 /// use mocban::report::stats::bootstrap_p;
@@ -148,7 +152,7 @@ mod tests {
             .collect()
     }
 
-    /// Sums over units drawn one after another: the textbook form of `resample`.
+    /// Sums units one after another as they are drawn, which is the textbook form of `resample`.
     fn resample_slowly(units: &[QuantitySums], width: usize, stream: u64) -> QuantitySums {
         let mut rng = ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED);
         rng.set_stream(stream);
@@ -177,7 +181,7 @@ mod tests {
         }
     }
 
-    /// Asserts bounds of ten thousand resamples to lie within four standard errors of those of a million.
+    /// Asserts that bounds from 10,000 resamples lie within four standard errors of bounds from a million resamples.
     fn assert_near(found: [f64; 2], wanted: [f64; 2], deviation: f64) {
         for (found, wanted) in found.into_iter().zip(wanted) {
             assert!(
@@ -208,7 +212,8 @@ mod tests {
             .collect();
         assert_eq!(units.len(), 14);
         let mut means = resampled_means(&units, 1).remove(0);
-        // NumPy 2.4.6: sums and counts of blocks drawn with `integers`, a million resamples.
+        // The bounds are from NumPy 2.4.6 with a million resamples of the sums and counts of blocks, drawn with
+        // `integers`.
         let found = percentile_interval_95(&mut means).expect("means");
         assert_near(found, [0.006_332_87, 0.013_707_07], 0.001_885_758);
         assert_eq!(bootstrap_p(&means), Some(2.0 / 10_001.0));

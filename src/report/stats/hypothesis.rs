@@ -3,9 +3,10 @@
 /// The level below which a p-value counts as significant.
 pub const SIGNIFICANCE_LEVEL: f64 = 0.05;
 
-/// Returns the p-values adjusted by Holm's step-down method, in the order given, each in 0..=1.
+/// Returns the p-values adjusted by Holm's step-down method, each in 0..=1, in the given order.
 ///
-/// The i-th smallest of m values is multiplied by m - i + 1; adjusted values never decrease as p grows.
+/// The i-th smallest of m values is multiplied by m - i + 1. An adjusted value is never below that of a smaller
+/// p-value.
 /// Source: Holm 1979, <https://www.jstor.org/stable/4615733>.
 ///
 /// ```
@@ -31,8 +32,8 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
 
 /// Returns [`holm`] over a family in which some tests have no p-value.
 ///
-/// A test without a p-value, such as `McNemar`'s without discordant pairs, stays without one but counts as p = 1 in the
-/// size of the family.
+/// For example, `McNemar`'s test has no p-value without discordant pairs. The adjusted value of such a test is `None`,
+/// but the test counts as p = 1 in the size of the family.
 ///
 /// ```
 /// use mocban::report::stats::holm_of_known;

@@ -15,7 +15,7 @@ pub enum IntervalMethod {
     /// Wilson's score interval: its coverage is 95 % on average.
     #[default]
     Wilson,
-    /// The interval of Clopper and Pearson: its coverage is never below 95 %, and mostly above.
+    /// The interval of Clopper and Pearson. Its coverage is at least 95 %, and usually more.
     Exact,
 }
 
@@ -28,7 +28,7 @@ impl IntervalMethod {
         }
     }
 
-    /// Returns the 95 % interval of `count / n`, both bounds in 0..=1; `None` when `n` is 0.
+    /// Returns the 95 % interval of `count / n`, with both bounds in 0..=1, or `None` if `n` is 0.
     pub fn interval_95(self, count: u64, n: u64) -> Option<[f64; 2]> {
         match self {
             Self::Wilson => wilson_95(count, n),
@@ -39,10 +39,10 @@ impl IntervalMethod {
 
 enum_names! { pub IntervalMethod, "an interval": Wilson = "wilson", Exact = "exact" }
 
-/// Returns Wilson's 95 % score interval of `count / n`, both bounds in 0..=1; `None` when `n` is 0.
+/// Returns Wilson's 95 % score interval of `count / n`, with both bounds in 0..=1, or `None` if `n` is 0.
 ///
-/// With p = `count / n` and z = 1.96: `(p + z²/2n ± z sqrt(p (1 - p) / n + z²/4n²)) / (1 + z²/n)`, without continuity
-/// correction. Source: Wilson 1927, doi:10.1080/01621459.1927.10502953.
+/// With p = `count / n` and z = 1.96, the bounds are `(p + z²/2n ± z sqrt(p (1 - p) / n + z²/4n²)) / (1 + z²/n)`,
+/// without continuity correction. Source: Wilson 1927, doi:10.1080/01621459.1927.10502953.
 ///
 /// ```
 /// use mocban::report::stats::wilson_95;
@@ -59,15 +59,15 @@ pub fn wilson_95(count: u64, n: u64) -> Option<[f64; 2]> {
     let share = count as f64 / n;
     let middle = (share + z2 / (2.0 * n)) / (1.0 + z2 / n);
     let half = Z_975 / (1.0 + z2 / n) * (share * (1.0 - share) / n + z2 / (4.0 * n * n)).sqrt();
-    // At 0 of n and n of n one bound is exactly 0 or 1, which rounding would miss.
+    // If `count` is 0 or `n`, one bound is exactly 0 or 1. Rounding errors could shift that bound.
     let low = if share == 0.0 { 0.0 } else { middle - half };
     let high = if share == 1.0 { 1.0 } else { middle + half };
     Some([low, high])
 }
 
-/// Returns the exact 95 % interval of `count / n`, both bounds in 0..=1; `None` when `n` is 0.
+/// Returns the exact 95 % interval of `count / n`, with both bounds in 0..=1, or `None` if `n` is 0.
 ///
-/// Each bound is the proportion at which a count as extreme as this one has a probability of 2.5 %.
+/// If the true proportion is one of the bounds, a count at least as extreme as `count` has a probability of 2.5 %.
 /// Source: Clopper and Pearson 1934, doi:10.1093/biomet/26.4.404.
 ///
 /// ```
@@ -82,7 +82,7 @@ pub fn clopper_pearson_95(count: u64, n: u64) -> Option<[f64; 2]> {
     (n > 0).then(|| [1.0 - upper_bound(n - count, n), upper_bound(count, n)])
 }
 
-/// Returns the proportion at which `count` or fewer of `n` have a probability of 2.5 %, by bisection.
+/// Finds by bisection the proportion at which at most `count` successes in `n` trials have a probability of 2.5 %.
 fn upper_bound(count: u64, n: u64) -> f64 {
     let (mut low, mut high) = (count as f64 / n as f64, 1.0);
     for _ in 0..f64::MANTISSA_DIGITS {

@@ -42,10 +42,11 @@ impl AgreementTable {
         self.both_fail + self.first_fails + self.second_fails
     }
 
-    /// Returns Cohen's kappa, in -1..=1; `None` without items, and where chance alone gives full agreement.
+    /// Returns Cohen's kappa, in -1..=1, or `None` if there are no items or the chance agreement is 1.
     ///
-    /// `(a - c) / (1 - c)` with the observed agreement a and the chance agreement `c = f1 f2 + (1 - f1)(1 - f2)`, where f1
-    /// and f2 are the shares the raters failed. Near 0 when failures are rare, however often the raters agree.
+    /// Kappa is `(a - c) / (1 - c)` with the observed agreement a and the chance agreement
+    /// `c = f1 f2 + (1 - f1)(1 - f2)`, where f1 and f2 are the shares of items that each rater failed. If failures are
+    /// rare, kappa may be near 0 even if the raters almost always agree.
     /// Source: Cohen 1960, doi:10.1177/001316446002000104.
     ///
     /// ```
@@ -59,10 +60,11 @@ impl AgreementTable {
         self.beyond_chance(|first, second| first * second + (1.0 - first) * (1.0 - second))
     }
 
-    /// Returns Gwet's AC1, in -1..=1; `None` without items.
+    /// Returns Gwet's AC1, in -1..=1, or `None` if there are no items.
     ///
-    /// `(a - c) / (1 - c)` with the observed agreement a and the chance agreement `c = 2 f (1 - f)`, where f is the mean of
-    /// the shares the raters failed. Rare failures do not pull it down. Source: Gwet 2008, doi:10.1348/000711006X126600.
+    /// AC1 is `(a - c) / (1 - c)` with the observed agreement a and the chance agreement `c = 2 f (1 - f)`, where f is
+    /// the mean of the shares of items that each rater failed. Rare failures do not lower AC1.
+    /// Source: Gwet 2008, doi:10.1348/000711006X126600.
     ///
     /// ```
     /// use mocban::report::stats::AgreementTable;
@@ -78,7 +80,7 @@ impl AgreementTable {
         })
     }
 
-    /// Returns the excess of the observed agreement over chance, relative to the largest possible excess.
+    /// Returns how far the observed agreement exceeds chance, as a share of the largest possible excess.
     fn beyond_chance(self, chance: fn(f64, f64) -> f64) -> Option<f64> {
         let share = |count: u64| ratio(count as f64, self.n());
         let observed = share(self.agreed())?;
@@ -103,8 +105,8 @@ mod tests {
         }
     }
 
-    /// Counts (both pass, first fails, second fails, both fail), kappa, AC1.
-    /// Kappa of scikit-learn 1.9.1 `cohen_kappa_score`, equal to statsmodels 0.15.0 `cohens_kappa`.
+    /// Each entry holds the counts (both pass, first fails, second fails, both fail), kappa, and AC1. Kappa is from
+    /// scikit-learn 1.9.1 `cohen_kappa_score` and equals statsmodels 0.15.0 `cohens_kappa`.
     const TABLE: [([u64; 4], f64, f64); 7] = [
         (
             [584, 1, 2, 0],

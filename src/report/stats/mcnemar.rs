@@ -39,9 +39,10 @@ impl McNemarTest {
     }
 }
 
-/// Returns the two-sided p-value of McNemar's exact test from the counts of discordant pairs; `None` when both are 0.
+/// Returns the two-sided p-value of McNemar's exact test from the counts of discordant pairs, or `None` if both are 0.
 ///
-/// `p = min(1, 2 P(X <= min(a_only, b_only)))` with X binomial of `a_only + b_only` trials at 1/2.
+/// The value is `min(1, 2 P(X <= min(a_only, b_only)))` for a binomial X with `a_only + b_only` trials of probability
+/// 1/2.
 /// Source: McNemar 1947, doi:10.1007/BF02295996, in its exact (binomial) form.
 ///
 /// ```
@@ -56,12 +57,12 @@ pub fn mcnemar_exact(a_only: u64, b_only: u64) -> Option<f64> {
     (n > 0).then(|| (2.0 * binomial_cdf(fewer, n, 0.5)).min(1.0))
 }
 
-/// Returns the number of pairs at which McNemar's test has 80 % power at the two-sided 5 % level.
+/// Returns the number of pairs for which McNemar's test has 80 % power at the two-sided 5 % level. Returns `None` if
+/// `a_only` and `b_only` are equal, because no number of pairs shows a difference of 0.
 ///
-/// Assumes that `a_only` and `b_only` of `n` pairs are the true rates: with psi = `(a_only + b_only) / n` and
-/// delta = `|a_only - b_only| / n`, it is `(1.960 sqrt(psi) + 0.842 sqrt(psi - delta²))² / delta²`. This is the
-/// asymptotic test; the exact one needs slightly more. `None` when both counts are equal, since no number of pairs shows
-/// a difference of 0. Source: Connor 1987, Biometrics 43, p. 207-211.
+/// The true rates are assumed to be `a_only / n` and `b_only / n`. With psi = `(a_only + b_only) / n` and delta =
+/// `|a_only - b_only| / n`, the number is `(1.960 sqrt(psi) + 0.842 sqrt(psi - delta²))² / delta²`. It is the number
+/// for the asymptotic test; the exact test needs slightly more pairs. Source: Connor 1987, Biometrics 43, p. 207-211.
 ///
 /// ```
 /// use mocban::report::stats::mcnemar_sample_size;
@@ -81,7 +82,7 @@ pub fn mcnemar_sample_size(a_only: u64, b_only: u64, n: u64) -> Option<f64> {
 mod tests {
     use super::{McNemarTest, mcnemar_exact, mcnemar_sample_size};
 
-    /// Values of statsmodels 0.15.0 `mcnemar(exact=True)`, equal to SciPy 1.17.1 `binomtest`.
+    /// Values from statsmodels 0.15.0 `mcnemar(exact=True)`, which equal SciPy 1.17.1 `binomtest`.
     const MCNEMAR: [(u64, u64, f64); 9] = [
         (3, 1, 0.625),
         (9, 3, 0.145_996_093_75),
@@ -121,7 +122,8 @@ mod tests {
         assert_eq!((test.p(), test.sample_size()), (Some(1.0), None));
     }
 
-    /// Power of the exact test with `pairs` pairs, by summing over all outcomes with a Poisson number of discordant ones.
+    /// Returns the power of the exact test with `pairs` pairs, summed over all numbers of discordant pairs. These
+    /// numbers are assumed to be Poisson distributed.
     fn exact_power(a_rate: f64, b_rate: f64, pairs: f64) -> f64 {
         let mut power = 0.0;
         let mut a_chance = (-a_rate * pairs).exp();

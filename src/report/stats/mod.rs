@@ -1,6 +1,7 @@
 //! Statistics on plain numbers: intervals of proportions, paired tests, chance-corrected agreement, the bootstrap.
 //!
-//! Independent of the catalog, of metrics and of verdicts. Intervals have a coverage of 95 %, tests are two-sided.
+//! The functions do not depend on the catalog, on metrics or on verdicts. Intervals are at the 95 % level, and tests
+//! are two-sided.
 
 mod binomial;
 mod bootstrap;

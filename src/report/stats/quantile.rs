@@ -1,6 +1,6 @@
 //! Order statistics.
 
-/// Returns the median: the middle value, or the mean of the two middle ones; `None` without values.
+/// Returns the median: the middle value, or the mean of the two middle values. Returns `None` without values.
 ///
 /// Sorts `values`.
 ///
@@ -20,7 +20,7 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     Some(f64::midpoint(values[half - 1], upper))
 }
 
-/// Returns the quantile at `share` (0..=1), linearly interpolated between order statistics; `None` without values.
+/// Returns the quantile at `share` (0..=1), linearly interpolated between order statistics, or `None` without values.
 ///
 /// Sorts `values`. Source: Hyndman and Fan 1996, doi:10.2307/2684934, definition 7 (the default of `NumPy` and R).
 ///

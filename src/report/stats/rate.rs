@@ -24,7 +24,7 @@ pub struct Rate {
     pub count: u64,
     /// `count / n`, 0..=1; `None` when `n` is 0.
     pub share: Option<f64>,
-    /// 95 % interval of `share`: Wilson's, unless another method was asked for.
+    /// The 95 % interval of `share`, by Wilson's method unless `set_interval` was called with another method.
     pub ci95: Option<[f64; 2]>,
 }
 

@@ -1,4 +1,4 @@
-//! A sample of units, single or clustered, for the bootstrap of means of many quantities.
+//! Samples for the bootstrap: quantities summed by unit, where a unit is an observation or a cluster of observations.
 
 use std::collections::BTreeMap;
 
@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use super::bootstrap::{QuantitySums, bootstrap_p, percentile_interval_95, resampled_means};
 
-/// Units that a quantity needs for an interval; with fewer it would be too narrow.
+/// Smallest number of units for an interval of a quantity. With fewer units the interval would be too narrow.
 pub const MIN_UNITS: usize = 10;
-/// Units that a sample holds at most. With more, sampling error is negligible, and nothing is resampled.
+/// Largest number of units in a sample. A larger sample is not resampled, because its sampling error is negligible.
 pub const MAX_UNITS: usize = 100_000;
 
 /// What is resampled.
@@ -17,7 +17,7 @@ pub const MAX_UNITS: usize = 100_000;
 pub enum ResamplingUnit {
     /// Single pairs.
     Pair,
-    /// Whole blocks with all their pairs; a pair without a block is a block by itself.
+    /// Whole blocks with all their pairs. A pair without a block counts as a block of its own.
     Block,
 }
 
@@ -53,9 +53,10 @@ impl ClusterSample {
         }
     }
 
-    /// Returns the sums to which an observation is added: those of its cluster, or of a new unit.
+    /// Returns the sums of the unit to which an observation belongs. Adds a unit if the observation has no cluster or a
+    /// new one.
     ///
-    /// Returns `None`, and marks the sample as full, when there would be more than [`MAX_UNITS`].
+    /// Returns `None`, and marks the sample as full, if there would be more than [`MAX_UNITS`] units.
     pub fn unit(&mut self, cluster: Option<&str>) -> Option<&mut QuantitySums> {
         let known = cluster.and_then(|cluster| self.clusters.get(cluster).copied());
         let index = known.unwrap_or(self.units.len());
@@ -77,7 +78,7 @@ impl ClusterSample {
         self.units.len()
     }
 
-    /// Returns whether observations were left out because there were more than [`MAX_UNITS`].
+    /// Returns whether observations were left out because there would be more than [`MAX_UNITS`] units.
     pub const fn is_full(&self) -> bool {
         self.is_full
     }
@@ -124,13 +125,15 @@ impl ResampledMeans {
         self.total[quantity]
     }
 
-    /// Returns the 95 % percentile interval of a quantity's mean; `None` when fewer than [`MIN_UNITS`] units have it.
+    /// Returns the 95 % percentile interval of a quantity's mean, or `None` if fewer than [`MIN_UNITS`] units have the
+    /// quantity.
     pub fn ci95(&mut self, quantity: usize) -> Option<[f64; 2]> {
         let is_enough = self.units_with[quantity] >= MIN_UNITS;
         percentile_interval_95(&mut self.means[quantity]).filter(|_| is_enough)
     }
 
-    /// Returns the two-sided p-value of a mean of 0; `None` when fewer than [`MIN_UNITS`] units have the quantity.
+    /// Returns the two-sided p-value of the hypothesis that a quantity's mean is 0. Returns `None` if fewer than
+    /// [`MIN_UNITS`] units have the quantity.
     pub fn p(&self, quantity: usize) -> Option<f64> {
         let is_enough = self.units_with[quantity] >= MIN_UNITS;
         bootstrap_p(&self.means[quantity]).filter(|_| is_enough)

@@ -21,7 +21,7 @@ pub(super) struct Album<'a> {
 }
 
 impl<'a> Album<'a> {
-    /// Returns as many images as fit into `max_bytes`, taking one of each group in turn.
+    /// Chooses the results whose images fit into `max_bytes`, taking one result from each group in turn.
     pub(super) fn new(gallery: &'a Gallery, max_bytes: usize) -> Self {
         let mut figures = vec![Vec::new(); gallery.groups.len()];
         let mut left = max_bytes;
@@ -65,7 +65,7 @@ impl<'a> Album<'a> {
     }
 }
 
-/// Returns the name in addresses, the title and the introduction of a group.
+/// Returns a group's name in URL fragments, its title and its introduction.
 const fn texts(reason: GalleryReason) -> (&'static str, &'static str, &'static str) {
     match reason {
         GalleryReason::Failed => (
@@ -117,7 +117,7 @@ fn figure(item: &GalleryItem) -> Markup {
     }
 }
 
-/// Returns the code points of a character, such as `U+20041`, for readers without a font for it.
+/// Returns the code points of a character, such as `U+20041`, in case no installed font can show the character.
 fn code_points(character: &str) -> String {
     let points = character.chars().map(|c| format!("U+{:04X}", u32::from(c)));
     points.collect::<Vec<_>>().join(" ")

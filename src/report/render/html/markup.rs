@@ -1,4 +1,4 @@
-//! Tables as HTML: a caption, headers with their scope, the first cell of a row as its header.
+//! Tables as HTML, with a caption and with row and column headers. The first cell of a row is its header.
 
 use maud::{Markup, html};
 

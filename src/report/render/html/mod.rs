@@ -1,4 +1,4 @@
-//! The report as one HTML page that holds its style and images, and needs no script.
+//! The report as one HTML page, which includes its style and images and needs no script.
 
 mod album;
 mod markup;
@@ -29,7 +29,8 @@ pub struct Cover {
     pub date: Option<String>,
 }
 
-/// Returns the page, at most [`MAX_PAGE_BYTES`] long; images that do not fit are left out and counted.
+/// Returns the page. Images are left out if the page would exceed [`MAX_PAGE_BYTES`] with them; the page states how
+/// many are shown.
 pub fn page(report: &Report, gallery: &Gallery, cover: &Cover) -> String {
     let without_images = document(report, &Album::new(gallery, 0), cover).into_string();
     let max_image_bytes = MAX_PAGE_BYTES.saturating_sub(without_images.len() + RESERVED_BYTES);

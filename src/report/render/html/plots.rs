@@ -1,4 +1,4 @@
-//! Plots of the numbers in the tables next to them, as SVG in the colours of the page.
+//! SVG plots of the numbers in the tables of the page, in the colours of the page.
 
 use maud::{Markup, html};
 
@@ -48,14 +48,14 @@ pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
     });
     let rows: Vec<PlotRow> = found.collect();
     let lowest = rows.iter().map(|row| row.ends[0]).fold(1.0, f64::min);
-    // The axis begins at a multiple of 0.1 that leaves near-perfect rows distinguishable.
+    // The axis begins at a multiple of 0.1, at 0.9 or below, so that rows near 1 remain distinguishable.
     let from = ((lowest * 10.0).floor() / 10.0).min(0.9);
     let (by, interval) = (basis.name(), report.interval.title());
     let caption = format!("Acc by {by} with its {interval} interval");
     dot_plot(&rows, [from, 1.0], Share, &caption)
 }
 
-/// Returns the median time of every stage with its 95th percentile, in milliseconds.
+/// Returns the plot of every stage's median time and 95th percentile, in milliseconds.
 pub(super) fn times(report: &Report) -> Markup {
     let found = report.times.iter().map(|time| PlotRow {
         name: time.stage.name(),
@@ -98,7 +98,7 @@ fn dot_plot(rows: &[PlotRow], [from, to]: [f64; 2], style: NumberStyle, caption:
     html! { @if !rows.is_empty() { (figure(below + SCALE, &alt, caption, &drawing)) } }
 }
 
-/// Returns the distribution of every metric's thresholds, one below the other on the same axis.
+/// Returns the distributions of all metrics' thresholds, one below the other on a common axis.
 pub(super) fn thresholds(report: &Report) -> Markup {
     let found = &report.thresholds;
     let below = (BARS + 14.0) * found.len() as f64;
@@ -179,7 +179,7 @@ mod tests {
             report.add(&pair, &TruthEvaluation::default());
         }
         let report = report.finish();
-        // 1 of 2 has the interval 0.095 to 0.905, so the axis goes from 0 to 1 with 0.5 in its middle.
+        // The 95 % interval of 1 pass in 2 is 0.095 to 0.905, so the axis runs from 0 to 1 with 0.5 in the middle.
         let drawn = accuracy(&report, Basis::Verdicts).into_string();
         assert_eq!(drawn.matches("cx=\"265.0\"").count(), 4, "{drawn}");
         assert!(drawn.contains("Ensemble 0.500"), "{drawn}");
