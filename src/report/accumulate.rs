@@ -35,7 +35,7 @@ pub struct ReportAccumulator {
     /// For each [`Basis`].
     comparisons: [ComparisonSums; Basis::ALL.len()],
     failures: BTreeMap<FailureClass, FailureGroup>,
-    /// Computing times of each stage, milliseconds.
+    /// Computing times of each stage, in milliseconds.
     times_ms: [Vec<f64>; Stage::ALL.len()],
     attention_checks: Option<AttentionCheckRates>,
     truth_problems: TruthProblems,
@@ -141,7 +141,7 @@ impl ReportAccumulator {
             {
                 curves.extend(RiskCoverageCurve::of(basis, metric, samples));
             }
-            // The paper's metrics always have a row, others where they have results.
+            // The paper's metrics always have a row. Other metrics have one if they have results.
             if sums.n > 0 || ThresholdMetric::PAPER.contains(&metric) {
                 rows.push(sums.finish(metric, bootstrap.means[metric as usize]));
             }

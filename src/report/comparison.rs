@@ -7,7 +7,7 @@ use super::stats::{McNemarTest, SIGNIFICANCE_LEVEL, holm_of_known};
 use crate::domain::ThresholdMetric::{self, Density, Ensemble, NlSsim, Relief};
 use crate::domain::enum_names;
 
-/// Largest sample size that is stated; above it, texts say "more than".
+/// Largest sample size that is stated. Above it, texts say "more than".
 const MAX_SAMPLE_SIZE: f64 = 100_000.0;
 
 /// The metrics that are compared two by two: every two of the paper's metrics, and `relief` with `ensemble`.
@@ -57,7 +57,7 @@ pub struct Comparison {
     pub b_only: u64,
     /// Name of the test that gave `p`.
     pub test: &'static str,
-    /// Its two-sided p-value; `None` without discordant pairs.
+    /// Two-sided p-value of the test. `None` without discordant pairs.
     pub p: Option<f64>,
     /// `p` after Holm's correction over the comparisons of this basis.
     pub p_holm: Option<f64>,

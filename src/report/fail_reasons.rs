@@ -9,7 +9,7 @@ use crate::domain::{Reason, Verdict};
 /// The number of failed results for which a reason was given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct FailReasonCount {
-    /// The reason; `None` for results without any.
+    /// The reason. `None` for results without any.
     pub reason: Option<Reason>,
     /// Number of results.
     pub count: u64,

@@ -46,7 +46,7 @@ impl GalleryReason {
 pub struct GalleryItem {
     /// The pair.
     pub pair: PairName,
-    /// The character, where it is known.
+    /// The character. `None` if it is not known.
     pub character: Option<String>,
     /// Paths of mesh and print.
     pub files: [String; 2],

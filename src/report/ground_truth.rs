@@ -21,9 +21,9 @@ pub struct TruthRecord {
     pub print_from_mesh: PrintFromMesh,
     /// The plane of the stroke tops in mesh coordinates.
     pub plane: TruthPlane,
-    /// Points on stroke tops, mesh coordinates.
+    /// Points on stroke tops, in mesh coordinates.
     pub landmarks: Vec<[f64; 3]>,
-    /// Height of the character in the print, print pixels.
+    /// Height of the character in the print, in print pixels.
     pub char_height_px: f64,
     /// Path of the mask of true stroke tops, which is in the frame of the print. `None` if there is no such mask.
     #[serde(default)]
@@ -35,7 +35,7 @@ pub struct TruthRecord {
 pub struct TruthPlane {
     /// Unit normal, pointing out of the block.
     pub n: [f64; 3],
-    /// Offset, mesh units.
+    /// Offset, in mesh units.
     pub d: f64,
 }
 

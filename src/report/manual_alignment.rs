@@ -18,17 +18,17 @@ pub struct ManualAlignmentErrors {
     pub n: u64,
     /// Share with an angle error of at most 5 degrees.
     pub angle_le_5deg: Option<f64>,
-    /// Median angle error, degrees.
+    /// Median angle error, in degrees.
     pub angle_median_deg: Option<f64>,
-    /// 95th percentile of the angle error, degrees.
+    /// 95th percentile of the angle error, in degrees.
     pub angle_p95_deg: Option<f64>,
     /// Median shift of the relief's centre, in percent of the relief's longer side.
     pub shift_median_pct: Option<f64>,
-    /// 95th percentile of the shift, percent.
+    /// 95th percentile of the shift, in percent.
     pub shift_p95_pct: Option<f64>,
-    /// Median difference in scale, percent.
+    /// Median difference in scale, in percent.
     pub scale_median_pct: Option<f64>,
-    /// 95th percentile of the difference in scale, percent.
+    /// 95th percentile of the difference in scale, in percent.
     pub scale_p95_pct: Option<f64>,
     /// Results that are mirrored relative to the manual alignment. Their angle error counts as 180 degrees.
     pub mirrored: u64,
@@ -37,9 +37,9 @@ pub struct ManualAlignmentErrors {
 /// How a manual alignment differs from a result.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ManualCorrection {
-    /// Rotation, degrees in (-180, 180], clockwise on the screen.
+    /// Rotation, in degrees in (-180, 180], clockwise on the screen.
     pub rotation_deg: f64,
-    /// Shift of the relief's centre, print pixels, x right and y down.
+    /// Shift of the relief's centre, in print pixels, x right and y down.
     pub shift_px: [f64; 2],
     /// Factor of the scale.
     pub scale: f64,
@@ -75,11 +75,11 @@ impl ManualCorrection {
 /// One result's errors against a manual alignment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ManualErrors {
-    /// Rotation, degrees in 0..=180; 180 when mirrored.
+    /// Rotation, in degrees in 0..=180. It is 180 if one of the two is mirrored.
     angle_deg: f64,
-    /// Shift of the relief's centre, percent of the relief's longer side.
+    /// Shift of the relief's centre, in percent of the relief's longer side.
     shift_pct: f64,
-    /// Difference in scale, percent.
+    /// Difference in scale, in percent.
     scale_pct: f64,
     /// Whether one of the two is mirrored.
     mirrored: bool,
@@ -145,7 +145,7 @@ pub(super) fn errors(
 }
 
 impl ManualAlignmentErrors {
-    /// Returns the summary of one metric's errors; `None` without any.
+    /// Returns the summary of one metric's errors, or `None` if there are no errors.
     pub(super) fn of(found: &[ManualErrors]) -> Option<Self> {
         let median_and_p95 = |read: fn(&ManualErrors) -> f64| -> [Option<f64>; 2] {
             let mut values: Vec<f64> = found.iter().map(read).collect();

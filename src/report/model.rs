@@ -81,7 +81,7 @@ impl PairProgress {
 pub struct MetricRow {
     /// The metric.
     pub metric: ThresholdMetric,
-    /// Pairs with a result of this metric; the means are over these.
+    /// Pairs with a result of this metric. The means are over these pairs.
     pub n: u64,
     /// Results with a verdict: passed, failed and unsure.
     pub judged: u64,
@@ -95,14 +95,14 @@ pub struct MetricRow {
     pub conflicts: u64,
     /// Results without a verdict whose earlier result had one.
     pub stale: u64,
-    /// `passed / (passed + failed)`; `None` without verdicts.
+    /// `passed / (passed + failed)`. `None` if nothing was passed or failed.
     pub acc: Option<f64>,
     /// The 95 % interval of `acc`, by the report's method.
     pub acc_ci95: Option<[f64; 2]>,
-    /// Acc under three rules for disagreement, where there are verdicts.
+    /// Acc under three rules for disagreement. `None` without verdicts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rules: Option<AdjudicationRules>,
-    /// Why reviewers failed results; a result counts for every reason given.
+    /// Why reviewers failed results. A result counts for every reason given.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failed_reasons: Vec<FailReasonCount>,
     /// Mean structural similarity.
@@ -117,10 +117,10 @@ pub struct MetricRow {
     pub dice: Option<f64>,
     /// Bootstrap intervals of the means.
     pub means_ci95: MeanIntervals,
-    /// Errors against ground truth, where the project holds it.
+    /// Errors against ground truth. `None` if no result has ground truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub truth: Option<TruthSummary>,
-    /// Errors against manual alignments, where there are any.
+    /// Errors against manual alignments. `None` if there are none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub manual_alignment: Option<ManualAlignmentErrors>,
 }
@@ -205,7 +205,7 @@ impl Report {
         self.rows.iter().any(|row| row.truth.is_some())
     }
 
-    /// Returns the risk-coverage curve of a metric, where it has confidences.
+    /// Returns the risk-coverage curve of a metric, or `None` if it has no confidences.
     pub fn risk_coverage(
         &self,
         basis: Basis,

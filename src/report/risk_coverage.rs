@@ -39,7 +39,7 @@ pub struct RiskCoveragePoint {
     pub n: u64,
     /// Number of right results among those kept.
     pub passed: u64,
-    /// `passed / n`; `None` where nothing is kept.
+    /// `passed / n`. `None` if nothing is kept.
     pub acc: Option<f64>,
     /// The 95 % interval of `acc`, by the report's method.
     pub acc_ci95: Option<[f64; 2]>,

@@ -51,7 +51,7 @@ pub struct MeanIntervals {
 /// Results of the bootstrap.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct BootstrapResults {
-    /// How it was done; `None` where nothing was resampled.
+    /// How the bootstrap was done. `None` if nothing was resampled.
     pub(super) settings: Option<BootstrapSettings>,
     /// Intervals of the means, in the order of [`ThresholdMetric::ALL`].
     pub(super) means: [MeanIntervals; METRICS],

@@ -60,11 +60,11 @@ pub struct ScoreComparison {
     pub n: u64,
     /// Mean of the first minus mean of the second.
     pub difference: f64,
-    /// The 95 % interval of the difference; `None` with too few units.
+    /// The 95 % interval of the difference. `None` if there are too few units.
     pub ci95: Option<[f64; 2]>,
     /// Name of the test that gave interval and `p`.
     pub test: &'static str,
-    /// Its two-sided p-value; `None` with too few units.
+    /// Two-sided p-value of the test. `None` if there are too few units.
     pub p: Option<f64>,
     /// `p` after Holm's correction over the comparisons by this score.
     pub p_holm: Option<f64>,

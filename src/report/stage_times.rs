@@ -12,11 +12,11 @@ pub struct StageTimes {
     pub stage: Stage,
     /// Pairs that have a result of it.
     pub n: u64,
-    /// Median, milliseconds.
+    /// Median, in milliseconds.
     pub median_ms: f64,
-    /// 95th percentile, milliseconds.
+    /// 95th percentile, in milliseconds.
     pub p95_ms: f64,
-    /// Sum, seconds.
+    /// Sum, in seconds.
     pub total_s: f64,
 }
 

@@ -19,7 +19,7 @@ const IGNORED: u8 = 128;
 /// One pair's errors against ground truth.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct TruthEvaluation {
-    /// Errors by metric; empty without usable ground truth.
+    /// Errors by metric. Empty without usable ground truth.
     pub errors: BTreeMap<ThresholdMetric, TruthErrors>,
     /// Why existing ground truth cannot be used.
     pub problem: Option<String>,

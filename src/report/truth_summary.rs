@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::ground_truth::{MAX_ANGLE_DEG, TruthErrors};
 use super::stats::{Rate, median};
 
-/// A metric's errors against ground truth; never mixed with verdicts.
+/// A metric's errors against ground truth. They are never mixed with verdicts.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TruthSummary {
     /// Results with usable ground truth.
@@ -18,9 +18,9 @@ pub struct TruthSummary {
     pub acc_ci95: Option<[f64; 2]>,
     /// Share with an angle error of at most 5 degrees.
     pub angle_le_5deg: Option<f64>,
-    /// Median angle error, degrees.
+    /// Median angle error, in degrees.
     pub angle_median_deg: Option<f64>,
-    /// Median landmark error, percent of the character's height.
+    /// Median landmark error, in percent of the character's height.
     pub tre_median_pct: Option<f64>,
     /// Median intersection over union of the depth masks with the true stroke tops. `None` without any tops mask.
     pub mask_iou_median: Option<f64>,
@@ -29,7 +29,7 @@ pub struct TruthSummary {
 }
 
 impl TruthSummary {
-    /// Returns the summary of one metric's errors; `None` without any.
+    /// Returns the summary of one metric's errors, or `None` if there are no errors.
     pub(super) fn of(found: &[TruthErrors]) -> Option<Self> {
         let rate = |is: fn(&TruthErrors) -> bool| Rate::of(found.iter().map(is));
         let median_of = |value: fn(&TruthErrors) -> Option<f64>| {

@@ -54,7 +54,7 @@ const NO_COOKIE: Rejection = (
 );
 /// `Origin` is missing or of another site.
 const WRONG_ORIGIN: Rejection = (StatusCode::FORBIDDEN, "only the review page may write here");
-/// The body is not JSON; a form on another site could send it.
+/// The body is not JSON. A form on another site could send such a body.
 const NO_JSON: Rejection = (
     StatusCode::UNSUPPORTED_MEDIA_TYPE,
     "only application/json is accepted",

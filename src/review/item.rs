@@ -56,7 +56,7 @@ impl ItemView {
 /// One image to judge.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ReviewItem {
-    /// Opaque id used by the page; it reveals nothing.
+    /// Opaque id used by the page. It reveals nothing about the item.
     pub(super) id: String,
     /// The pair.
     pub(super) pair: PairName,
@@ -66,7 +66,7 @@ pub(super) struct ReviewItem {
     pub(super) check: Option<AttentionCheck>,
     /// What its images are rendered from.
     pub(super) view: ItemView,
-    /// Sort key of the order by least confidence; higher is less certain.
+    /// Sort key of the order by least confidence. Higher is less certain.
     pub(super) uncertainty: f64,
     /// Whether the result is good enough to plant a fault in it.
     pub(super) is_reliable: bool,

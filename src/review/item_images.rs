@@ -156,7 +156,7 @@ pub(super) struct ImageCache {
     slots: Mutex<CacheSlots>,
 }
 
-/// Cache entries by item id; the oldest entry is evicted first.
+/// Cache entries by item id. The oldest entry is evicted first.
 #[derive(Debug, Default)]
 struct CacheSlots {
     images: BTreeMap<String, Arc<OnceCell<Arc<ItemImages>>>>,

@@ -20,9 +20,9 @@ pub struct QueueOptions {
     pub order: ReviewOrder,
     /// Seed of the shuffle and of the attention checks.
     pub seed: u64,
-    /// Maximum number of results; the same sample for every reviewer.
+    /// Maximum number of results. The sample is the same for every reviewer.
     pub sample: Option<usize>,
-    /// Rates of attention checks; ignored when adjudicating.
+    /// Rates of attention checks. Ignored in adjudication.
     pub rates: CheckRates,
 }
 
@@ -42,7 +42,7 @@ pub struct ReviewOptions {
     pub queue: QueueOptions,
     /// Language of the page.
     pub language: Language,
-    /// Physical keys to actions; from [`key_map`](super::key_map).
+    /// Map of physical keys to actions, from [`key_map`](super::key_map).
     pub keys: BTreeMap<String, String>,
     /// Minimum time in milliseconds for which an image is shown before a verdict is accepted.
     pub min_view_ms: u64,

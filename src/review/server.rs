@@ -55,7 +55,7 @@ pub struct ReviewServer {
 pub struct QueueCounts {
     /// All items.
     pub items: usize,
-    /// Items that show results; the others are attention checks.
+    /// Items that show results. All other items are attention checks.
     pub results: usize,
     /// Items that the reviewer has answered.
     pub answered: usize,

@@ -8,7 +8,7 @@ use crate::report::reviewer_agreement::{
 };
 use crate::report::stats::{IntervalMethod, Rate};
 
-/// Returns the agreement as aligned tables; ends with a line end.
+/// Returns the agreement as aligned tables, with a newline at the end.
 pub fn agreement_text(found: &ReviewerAgreement) -> String {
     if found.reviewers.is_empty() {
         return "Nobody has judged a result yet.\n".to_owned();
@@ -91,7 +91,7 @@ fn reviewers(found: &ReviewerAgreement) -> Table {
         )
 }
 
-/// Returns a rate such as `19 of 20`; `None` of nothing.
+/// Returns a rate such as `19 of 20`, or `None` if its total is 0.
 fn out_of(rate: &Rate) -> Option<String> {
     let [count, n] = [rate.count, rate.n].map(format_count);
     (rate.n > 0).then(|| format!("{count} of {n}"))

@@ -58,7 +58,7 @@ fn column_type(table: &Table, index: usize) -> String {
     format!("S[table-format={digits}.{decimals}]")
 }
 
-/// Returns a header; braces keep `siunitx` from reading it as a number.
+/// Returns a header. Braces keep `siunitx` from reading it as a number.
 fn header(column: &TableColumn) -> String {
     match column.format {
         ColumnFormat::Text | ColumnFormat::Interval => escape(column.header),
@@ -72,7 +72,7 @@ fn cell_text(cell: Option<&str>, column: TableColumn) -> String {
         (None, ColumnFormat::Number(_)) => "{--}".to_owned(),
         (Some(text), ColumnFormat::Interval) => escape(text).replace('-', "--"),
         (Some(text), ColumnFormat::Text) => escape(text),
-        // To siunitx a comma is a decimal marker; it separates thousands itself.
+        // For siunitx a comma is a decimal marker. It adds the separators of thousands itself.
         (Some(text), ColumnFormat::Number(_)) => text.replace(',', ""),
     }
 }

@@ -158,7 +158,7 @@ pub(super) fn truth(report: &Report) -> Table {
         )
 }
 
-/// Returns the errors against manual alignments; `None` without any.
+/// Returns the errors against manual alignments, or `None` if there are none.
 pub(super) fn manual_alignments(report: &Report) -> Option<Table> {
     let rows = report.rows.iter();
     let found: Vec<(&str, &ManualAlignmentErrors)> = rows
@@ -184,7 +184,7 @@ pub(super) fn manual_alignments(report: &Report) -> Option<Table> {
     })
 }
 
-/// Returns the distribution of thresholds; `None` without results.
+/// Returns the distribution of thresholds, or `None` without results.
 pub(super) fn thresholds(report: &Report) -> Option<Table> {
     (!report.thresholds.is_empty()).then(|| {
         Table::of(&report.thresholds)
@@ -200,7 +200,7 @@ pub(super) fn thresholds(report: &Report) -> Option<Table> {
     })
 }
 
-/// Returns computing times by stage; `None` where the report has none.
+/// Returns computing times by stage, or `None` if the report has none.
 pub(super) fn times(report: &Report) -> Option<Table> {
     (!report.times.is_empty()).then(|| {
         Table::of(&report.times)

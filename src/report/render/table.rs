@@ -10,7 +10,7 @@ pub(super) struct Table {
     pub(super) caption: String,
     /// Its columns.
     pub(super) columns: Vec<TableColumn>,
-    /// Its rows; `None` is a quantity that does not exist.
+    /// Its rows. A quantity that does not exist is `None`.
     pub(super) rows: Vec<Vec<Option<String>>>,
 }
 

@@ -72,7 +72,7 @@ pub fn resampled_means(units: &[QuantitySums], width: usize) -> Vec<Vec<f64>> {
 /// each resample.
 ///
 /// `units` holds the quantities of the first unit, then of the second, and so on. Each unit is read once for all
-/// streams, because with many units most of the time is spent reading them.
+/// streams, because with many units most of the time goes into reading.
 fn resample(units: &[[f64; 2]], width: usize, streams: &[u64]) -> Vec<QuantitySums> {
     let count = units.len() / width.max(1);
     let multiplicities: Vec<Vec<u32>> = streams

@@ -28,12 +28,12 @@ impl McNemarTest {
         self.b_only += u64::from(b_right && !a_right);
     }
 
-    /// Returns the two-sided p-value; see [`mcnemar_exact`].
+    /// Returns the two-sided p-value. See [`mcnemar_exact`].
     pub fn p(self) -> Option<f64> {
         mcnemar_exact(self.a_only, self.b_only)
     }
 
-    /// Returns the pairs needed at this rate; see [`mcnemar_sample_size`].
+    /// Returns the number of pairs needed at these rates. See [`mcnemar_sample_size`].
     pub fn sample_size(self) -> Option<f64> {
         mcnemar_sample_size(self.a_only, self.b_only, self.n)
     }

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::interval::IntervalMethod;
 
-/// Returns `sum / n`, or `None` when `n` is 0.
+/// Returns `sum / n`, or `None` if `n` is 0.
 ///
 /// ```
 /// use mocban::report::stats::ratio;
@@ -22,7 +22,7 @@ pub struct Rate {
     pub n: u64,
     /// The count.
     pub count: u64,
-    /// `count / n`, 0..=1; `None` when `n` is 0.
+    /// `count / n`, in 0..=1. `None` if `n` is 0.
     pub share: Option<f64>,
     /// The 95 % interval of `share`, by Wilson's method unless `set_interval` was called with another method.
     pub ci95: Option<[f64; 2]>,
@@ -52,7 +52,7 @@ impl Rate {
         self.ci95 = method.interval_95(self.count, self.n);
     }
 
-    /// Counts one outcome; the interval is Wilson's again.
+    /// Counts one outcome, and computes the interval by Wilson's method.
     pub fn add(&mut self, outcome: bool) {
         *self = Self::new(self.count + u64::from(outcome), self.n + 1);
     }

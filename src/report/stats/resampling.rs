@@ -83,7 +83,7 @@ impl ClusterSample {
         self.is_full
     }
 
-    /// Returns what a unit is: a block where any observation named one.
+    /// Returns what a unit is: a block if any observation named one, or else a pair.
     pub fn unit_kind(&self) -> ResamplingUnit {
         if self.clusters.is_empty() {
             ResamplingUnit::Pair

@@ -41,7 +41,7 @@ impl<'a> Album<'a> {
         Self { gallery, figures }
     }
 
-    /// Returns all groups with their introductions; `None` without groups.
+    /// Returns all groups with their introductions, or `None` without groups.
     pub(super) fn body(&self) -> Option<Markup> {
         let groups = self.gallery.groups.iter().zip(&self.figures);
         (!self.figures.is_empty()).then(|| html! {
@@ -91,7 +91,7 @@ const fn texts(reason: GalleryReason) -> (&'static str, &'static str, &'static s
     }
 }
 
-/// Returns the size of a result's images as base64, bytes.
+/// Returns the size in bytes of a result's images as base64.
 fn size(item: &GalleryItem) -> usize {
     let images = item.images.iter().flatten();
     images.map(|image| image.len().div_ceil(3) * 4).sum()

@@ -4,7 +4,7 @@ use maud::{Markup, html};
 
 use crate::report::render::table::{ColumnFormat, Table, TableColumn};
 
-/// Returns a table in a frame that scrolls sideways where it is too wide.
+/// Returns a table in a frame that scrolls sideways if the table is too wide.
 pub(super) fn table(table: &Table) -> Markup {
     html! {
         div.wide tabindex="0" role="region" aria-label=(name(table)) {

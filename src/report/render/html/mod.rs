@@ -12,7 +12,7 @@ use super::report_tables::headline;
 use crate::report::gallery::Gallery;
 use crate::report::model::Report;
 
-/// Maximal size of a page, bytes.
+/// Maximum size of a page in bytes.
 pub const MAX_PAGE_BYTES: usize = 10_000_000;
 /// Bytes reserved for the sentences on how many images are shown.
 const RESERVED_BYTES: usize = 10_000;
@@ -29,7 +29,7 @@ pub struct Cover {
     pub date: Option<String>,
 }
 
-/// Returns the page. Images are left out if the page would exceed [`MAX_PAGE_BYTES`] with them; the page states how
+/// Returns the page. Images that would make the page exceed [`MAX_PAGE_BYTES`] are left out, and the page states how
 /// many are shown.
 pub fn page(report: &Report, gallery: &Gallery, cover: &Cover) -> String {
     let without_images = document(report, &Album::new(gallery, 0), cover).into_string();

@@ -31,7 +31,7 @@ struct PlotRow {
     label: String,
 }
 
-/// Returns Acc of every metric with its interval; empty without any.
+/// Returns the plot of every metric's Acc with its interval. Empty if there is no Acc.
 pub(super) fn accuracy(report: &Report, basis: Basis) -> Markup {
     let found = report.rows.iter().filter_map(|row| {
         let (acc, ends) = match (basis, &row.truth) {
@@ -75,7 +75,7 @@ fn round_up(number: f64) -> f64 {
     (number / unit).ceil() * unit
 }
 
-/// Returns rows of points on lines above an axis; empty without rows.
+/// Returns rows of points on lines above an axis. Empty if there are no rows.
 fn dot_plot(rows: &[PlotRow], [from, to]: [f64; 2], style: NumberStyle, caption: &str) -> Markup {
     let place = |value: f64| LEFT + (RIGHT - LEFT) * (value - from) / (to - from);
     let below = ROW * rows.len() as f64;
@@ -157,7 +157,7 @@ fn at(place: f64) -> String {
     format!("{place:.1}")
 }
 
-/// Formats an axis label; shares need only two decimals there.
+/// Formats an axis label. Shares have only two decimals there.
 fn tick(value: f64, style: NumberStyle) -> String {
     match style {
         Share => format!("{value:.2}"),
