@@ -1,10 +1,11 @@
 //! Runtime SIMD dispatch, and scalar operations that vectorise.
 //!
-//! The program is compiled for the baseline of its architecture. Dispatched code is compiled again for newer
-//! instruction sets and selected at run time. All variants compute the same bits: nothing is fused or reordered.
+//! The program is compiled for the baseline of its architecture. Dispatched code is compiled for newer instruction sets
+//! too, and the variant for the processor is selected at run time. All variants compute the same bits, because no
+//! operations are fused or reordered.
 
-/// Runs an expression with the widest instruction set of the processor. Only inlined code gains: mark the functions
-/// that it calls `#[inline(always)]`.
+/// Evaluates an expression with the widest instruction set of the processor. Only inlined code benefits, so mark the
+/// functions that the expression calls `#[inline(always)]`.
 macro_rules! dispatch {
     ($work:expr) => {
         $crate::simd::run_widest(
@@ -15,14 +16,14 @@ macro_rules! dispatch {
 }
 pub(crate) use dispatch;
 
-/// Runs a closure for [`dispatch`]. The bound makes it a plain `FnOnce`: other closures are called through a function
-/// that is not inlined, and so not compiled for the wide instructions.
+/// Runs a closure for [`dispatch`]. The bound makes the closure a plain `FnOnce`. Other closures are called through a
+/// function that is not inlined and therefore not compiled for the wide instructions.
 #[inline(always)]
 pub(crate) fn run_widest<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
 }
 
-/// Returns the smaller number by a plain comparison, one instruction for many lanes; `f32::min` treats NaN specially.
+/// Returns the smaller number. The plain comparison is one instruction for many lanes; `f32::min` also handles NaN.
 #[inline(always)]
 pub(crate) fn min_f32(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -36,7 +37,7 @@ pub(crate) fn max_f32(a: f32, b: f32) -> f32 {
 /// Floats of this magnitude (1.5 x 2^23) have no fraction bits.
 const INTEGER_BIAS: f32 = 12_582_912.0;
 
-/// Rounds down a number that is small compared with [`INTEGER_BIAS`]; casts and `floor` do not vectorise.
+/// Rounds down a number that is small compared with [`INTEGER_BIAS`]. Casts and `floor` would not vectorise.
 #[inline(always)]
 pub(crate) fn floor_f32(v: f32) -> f32 {
     let nearest = (v + INTEGER_BIAS) - INTEGER_BIAS;

@@ -1,7 +1,7 @@
 //! Strokes that are connected to the border of the known area, and the area without them.
 //!
-//! Walls, frame lines and neighbouring characters run into the border and continue beyond it. Whether they overlap at
-//! a pose says nothing about the character, yet it would decide between the poses of a symmetric one.
+//! Walls, frame lines and neighbouring characters run into the border and continue beyond it. Whether such strokes
+//! overlap at a pose says nothing about the character, yet it could decide between two poses of a symmetric character.
 
 use super::PyramidLevel;
 use super::overlap::PlacedLevel;
@@ -12,16 +12,16 @@ use crate::stages::components::ConnectedComponents;
 
 /// Amounts above this are strokes.
 const MIN_STROKE: f32 = 0.3;
-/// Strokes within this distance of an unknown pixel count as connected to the border, working pixels.
+/// A stroke within this many working pixels of an unknown pixel counts as connected to the border.
 const BORDER_PX: i64 = 2;
-/// Margin around border strokes that is masked with them because they are soft, working pixels.
+/// Margin around border strokes in working pixels. It is masked too, because the edges of strokes are soft.
 const SOFT_EDGE_PX: usize = 3;
-/// If more than this share of the strokes is connected to the border, the character itself is; then a band along the
-/// border is masked instead, `BORDER_BAND` of the longest side wide.
+/// If more than this share of the stroke pixels is connected to the border, the character itself must be. In that case
+/// a band along the border is masked instead. Its width is the share `BORDER_BAND` of the longest side.
 const MAX_BORDER_SHARE: f64 = 0.5;
 const BORDER_BAND: f64 = 0.1;
-/// The border strokes agree if their overlap (sum of minima over sum of maxima) is at least this share of the
-/// character's.
+/// The border strokes of two levels agree if their overlap (sum of minima over sum of maxima) is at least this share of
+/// the overlap of all other pixels, which show the character.
 const MIN_RELATIVE_OVERLAP: f64 = 0.75;
 
 /// Returns the valid mask of a level: 1 where it is known and free of border strokes, 0 elsewhere.
@@ -29,8 +29,8 @@ pub(super) fn valid_mask(level: &PyramidLevel) -> Grid<f32> {
     StrokeMasks::new(level).valid_mask(level)
 }
 
-/// Two levels at a pose with their border strokes. A stroke that lies on an inner stroke of the other level is not a
-/// border stroke: there the character is connected to its surroundings.
+/// Two levels at a pose, with the border strokes of each. A stroke that lies on an inner stroke of the other level is
+/// not a border stroke, because it belongs to a character that is connected to its surroundings.
 pub(crate) struct BorderStrokes<'a> {
     levels: [&'a PyramidLevel; 2],
     strokes: [StrokeMasks; 2],
@@ -38,8 +38,8 @@ pub(crate) struct BorderStrokes<'a> {
 }
 
 impl<'a> BorderStrokes<'a> {
-    /// Finds the border strokes of a fixed and a moving level. `fixed_from_moving` maps image pixels; returns `None`
-    /// if it has no inverse.
+    /// Finds the border strokes of a fixed and a moving level at the pose `fixed_from_moving`, which maps image pixels.
+    /// Returns `None` if the pose has no inverse.
     pub(crate) fn find(levels: [&'a PyramidLevel; 2], fixed_from_moving: &Affine2) -> Option<Self> {
         let onto = |a: &PyramidLevel, b: &PyramidLevel, b_from_a: &Affine2| {
             let from_work = a.work_from_image.inverse()?;
@@ -65,8 +65,9 @@ impl<'a> BorderStrokes<'a> {
         })
     }
 
-    /// Returns whether the border strokes of both levels overlap about as well as the rest. If so, both show the same
-    /// state of the block, and the border strokes are evidence for the pose too.
+    /// Returns whether the border strokes of both levels overlap about as well as the character does, see
+    /// `MIN_RELATIVE_OVERLAP`. If so, both levels show the same state of the block, and the border strokes are evidence
+    /// for the pose too.
     pub(crate) fn agree(&self) -> bool {
         let [fixed, moving] = self.levels;
         let placed = PlacedLevel {
@@ -110,7 +111,8 @@ impl StrokeMasks {
         inner.to_weights()
     }
 
-    /// Removes the pixels of border strokes that lie on a stroke of the other level.
+    /// Removes from the border strokes the pixels that lie on a stroke of `others`, the inner strokes of the other
+    /// level.
     fn unmark_matched(&mut self, others: &Grid<f32>, other_from_this: &Affine2) {
         let size = [others.width(), others.height()];
         self.border = Mask::from_fn(self.border.width(), self.border.height(), |x, y| {
@@ -174,7 +176,7 @@ pub(super) mod tests {
     /// Connects the cross to the left bar.
     const BRIDGE: [usize; 4] = [4, 30, 20, 35];
 
-    /// Draws bars given as left, top, right (exclusive) and bottom (exclusive), pixels.
+    /// Draws bars. Each bar is given in pixels as left, top, right (exclusive) and bottom (exclusive).
     pub(crate) fn level(bars: &[[usize; 4]]) -> PyramidLevel {
         let on = |x, y| {
             let mut bars = bars.iter();

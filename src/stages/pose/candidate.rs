@@ -2,11 +2,12 @@
 
 use crate::domain::Affine2;
 
-/// Refined poses closer than this in rotation (degrees) and scale (natural logarithm) are the same.
+/// Two refined poses are duplicates if they differ by less than this in rotation (degrees) and in scale (natural
+/// logarithm of the ratio).
 const NEAR_DEG: f64 = 3.0;
 const NEAR_RATIO: f64 = 0.04;
 
-/// How many candidates to keep, as is and mirrored. Zero skips that reading.
+/// Number of candidates to keep for each reading: upright or mirrored. A reading with zero candidates is not searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BeamWidth {
     /// Without reflection.
@@ -38,9 +39,9 @@ pub(crate) struct SearchRange {
 /// A candidate pose with its score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PoseCandidate {
-    /// Maps moving image pixels to fixed image pixels; contains a reflection if `mirrored`.
+    /// Maps moving image pixels to fixed image pixels. Contains a reflection if `mirrored` is set.
     pub(crate) fixed_from_moving: Affine2,
-    /// Correlation where both images are known, normalised by the energy of both; at most 1.
+    /// Correlation of the two images where both are known, normalised by the energy of each image; at most 1.
     pub(crate) score: f64,
     /// Whether the moving image is mirrored.
     pub(crate) mirrored: bool,
@@ -54,7 +55,8 @@ impl PoseCandidate {
         turn.min(360.0 - turn)
     }
 
-    /// Returns whether two poses are the same up to a small rotation and scale; the shift is not compared.
+    /// Returns whether two poses have the same reading and nearly the same rotation and scale. The shift is not
+    /// compared.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         let scale = |pose: &Self| pose.fixed_from_moving.scale();
         let ratio = (scale(self) / scale(other)).ln().abs();
@@ -62,8 +64,8 @@ impl PoseCandidate {
     }
 }
 
-/// Returns the best poses of each reading without duplicates, best first. `rank` returns a pose's score and whether it
-/// is mirrored.
+/// Returns the best poses of each reading (upright or mirrored), best first and without duplicates. `rank` returns the
+/// score of a pose and whether the pose is mirrored.
 pub(super) fn prune<T: Copy>(
     mut found: Vec<T>,
     beam_width: BeamWidth,

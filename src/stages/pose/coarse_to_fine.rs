@@ -1,5 +1,5 @@
-//! Coarse-to-fine pose search: exhaustive on the coarsest level, then Gauss-Newton refinement of fewer candidates on
-//! finer levels.
+//! Coarse-to-fine pose search: exhaustive search on the coarsest level, then Gauss-Newton refinement of fewer
+//! candidates on finer levels.
 
 use super::candidate::{BeamWidth, PoseCandidate, SearchRange, prune};
 use super::search::{SEARCH_PX, search};
@@ -8,7 +8,8 @@ use super::{ImagePyramid, Loss, Refiner};
 /// Gaussian smoothing of the coarsest level, working pixels.
 const SEARCH_SIGMA: f64 = 0.5;
 
-/// One refinement pass: level size and smoothing in working pixels, Gauss-Newton steps, candidates kept.
+/// Parameters of a refinement pass: size and smoothing of the levels in working pixels, maximum number of Gauss-Newton
+/// steps, and number of candidates to keep.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RefinementPass {
     pub(crate) size_px: usize,
@@ -17,7 +18,7 @@ pub(crate) struct RefinementPass {
     pub(crate) beam_width: BeamWidth,
 }
 
-/// Searches for the pose of the moving image on the fixed one and returns candidates of both readings, best first.
+/// Searches for poses of the moving image on the fixed image. Returns upright and mirrored candidates, best first.
 pub(crate) fn search_coarse_to_fine(
     fixed: &ImagePyramid,
     moving: &ImagePyramid,

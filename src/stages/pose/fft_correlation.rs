@@ -8,10 +8,10 @@ use rustfft::{Fft, FftPlanner};
 /// Side of the squares that are correlated, pixels.
 pub(super) const FFT_SIZE: usize = 32;
 
-/// Returns the shift (pixels) of the highest correlation within `max_shift_px` along each axis, and its value. `part`
-/// selects the real (0) or imaginary (1) part.
+/// Returns the shift with the highest correlation, and that correlation. The shift is in pixels, at most `max_shift_px`
+/// along each axis. `part` selects the real part (0) or the imaginary part (1) of the surface.
 ///
-/// The surface is stored reversed: its value at -s belongs to shift s.
+/// The surface is stored reversed: the value for shift s is at index -s, modulo the size.
 pub(super) fn best_shift(surface: &[Complex32], part: usize, max_shift_px: i64) -> ([f64; 2], f32) {
     let mut best = ([0.0; 2], f32::NEG_INFINITY);
     for dy in -max_shift_px..=max_shift_px {
@@ -28,9 +28,9 @@ pub(super) fn best_shift(surface: &[Complex32], part: usize, max_shift_px: i64) 
     best
 }
 
-/// Two-dimensional FFTs of a square with their buffers.
+/// Two-dimensional FFTs of a square, with reusable buffers.
 ///
-/// Spectra are stored column by column, which saves a transposition each way.
+/// Spectra are stored column by column. This saves a transposition in each direction.
 pub(super) struct FftCorrelator {
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
@@ -41,7 +41,7 @@ pub(super) struct FftCorrelator {
 
 impl FftCorrelator {
     pub(super) fn new() -> Self {
-        // The last digits differ between processors; they can only change the order of equal peaks.
+        // The last digits of an FFT differ between processors. This can only change the order of peaks of equal height.
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(FFT_SIZE);
         let inverse = planner.plan_fft_inverse(FFT_SIZE);
@@ -58,8 +58,8 @@ impl FftCorrelator {
         }
     }
 
-    /// Returns the conjugated spectrum of a real square, scaled so that the inverse transform of a product is the
-    /// correlation.
+    /// Returns the complex conjugate of the spectrum of a real square. It is scaled so that the inverse transform of
+    /// its product with the spectrum of another square is the correlation of the two squares.
     pub(super) fn target_spectrum(&mut self, values: &[f32]) -> Vec<Complex32> {
         for (out, value) in self.spectrum.iter_mut().zip(values) {
             *out = Complex32::new(*value, 0.0);
@@ -69,8 +69,8 @@ impl FftCorrelator {
         self.spectrum.iter().map(|v| v.conj() * scale).collect()
     }
 
-    /// Loads a real square. The square rotated by 180 degrees is loaded as the imaginary part, so one transform serves
-    /// both.
+    /// Loads a real square. The square rotated by 180 degrees is loaded as the imaginary part, so that one transform
+    /// computes the spectra of both.
     pub(super) fn load(&mut self, values: &[f32]) {
         for y in 0..FFT_SIZE {
             let back = (FFT_SIZE - y) % FFT_SIZE * FFT_SIZE;
@@ -83,7 +83,8 @@ impl FftCorrelator {
         fft_2d(&*self.forward, &mut self.spectrum, &mut self.scratch);
     }
 
-    /// Rotates the loaded square by 90 degrees, x to y: its spectrum rotates with it.
+    /// Rotates the loaded square by 90 degrees, from x to y. This rotates its spectrum, because the spectrum of a
+    /// rotated square is the rotated spectrum.
     pub(super) fn rotate_quarter(&mut self) {
         // Column-major: column u, row v is at u * FFT_SIZE + v.
         for u in 0..FFT_SIZE {
@@ -95,10 +96,11 @@ impl FftCorrelator {
         std::mem::swap(&mut self.spectrum, &mut self.product);
     }
 
-    /// Returns the correlation of the loaded square with a target; `mirrored` reads the spectrum backwards along x.
+    /// Returns the correlation of the loaded square with a target. If `mirrored` is set, the square is mirrored along
+    /// x: its spectrum is read backwards along x.
     ///
-    /// The square's middle is at `FFT_SIZE / 2`, so mirroring about column 0 of the transform keeps it. The result is
-    /// stored reversed: its value at -s belongs to shift s.
+    /// The middle of the square is at `FFT_SIZE / 2`, so mirroring about column 0 of the transform leaves the middle in
+    /// place. The result is stored reversed: the value for shift s is at index -s, modulo the size.
     pub(super) fn correlate(&mut self, target: &[Complex32], mirrored: bool) -> &[Complex32] {
         for x in 0..FFT_SIZE {
             let from = if mirrored {

@@ -1,20 +1,22 @@
 //! One Gauss-Newton step: correspondences between two levels, robust weights, normal equations.
 //!
-//! Unknowns: two of rotation and scale, two of shift, and gain and offset of the moving values.
+//! The six unknowns are two for rotation and scale, two for the shift, and the gain and the offset of the moving
+//! values.
 
 use nalgebra::{Matrix6, Vector6};
 
 use crate::simd::dispatch;
 
-/// Huber's threshold in medians of the absolute residual (Huber 1964, doi:10.1214/aoms/1177703732).
+/// Threshold of Huber's loss, as a multiple of the median absolute residual (Huber 1964, doi:10.1214/aoms/1177703732).
 const HUBER_MEDIANS: f32 = 2.5;
-/// Cutoff of Tukey's biweight in shares of full ink: larger residuals are lost or added strokes.
+/// Cutoff of Tukey's biweight, as a share of full ink. Larger residuals have no weight, because they come from strokes
+/// that one of the images lacks.
 const TUKEY_CUTOFF: f32 = 0.5;
 /// Lanes of the sums, one SIMD vector.
 const LANES: usize = 8;
-/// Blocks that are summed in single precision before their sum is added in double precision.
+/// Number of blocks that are summed in single precision before the sum is added to a double-precision total.
 const BLOCKS_PER_SUM: usize = 128;
-/// Products of the normal equations: lower triangle of 6 x 6, then the right-hand side.
+/// Number of sums in the normal equations: the lower triangle of the 6 x 6 matrix, then the right-hand side.
 const SUM_COUNT: usize = 21 + 6;
 
 /// The loss of a residual.
@@ -68,8 +70,8 @@ impl Workspace {
         self.count += usize::from(moving[3] >= 0.5);
     }
 
-    /// Truncates the buffer to the correspondences appended. `explained` is the sum of products of corresponding
-    /// values.
+    /// Truncates the buffer to the correspondences that were appended. `explained` is the sum of the products of
+    /// corresponding values.
     pub(super) fn finish(&mut self, explained: f64) {
         self.explained = explained;
         self.blocks.truncate(self.count.div_ceil(LANES));
@@ -82,7 +84,8 @@ impl Workspace {
         }
     }
 
-    /// Returns the least-squares gain (at least 0.05) and offset of the fixed values over the moving ones.
+    /// Fits `fixed = gain * moving + offset` by least squares. Returns the gain, which is at least 0.05, and the
+    /// offset.
     fn gain_and_offset(&self) -> (f32, f32) {
         let totals = sum_blocks::<4>(
             &self.blocks,
@@ -168,8 +171,8 @@ impl NormalEquations {
     }
 }
 
-/// Sums over blocks, in single precision over a run of them and then in double precision. `add` adds one block, given
-/// with its index.
+/// Sums over blocks: in single precision within a run of blocks, and in double precision over the runs. `add` adds one
+/// block to the sums. Its last argument is the index of the block.
 #[inline(always)]
 fn sum_blocks<const N: usize>(
     blocks: &[Correspondences],
@@ -180,7 +183,7 @@ fn sum_blocks<const N: usize>(
         for (run, blocks) in blocks.chunks(BLOCKS_PER_SUM).enumerate() {
             let mut sums = [[0.0_f32; LANES]; N];
             for (k, block) in blocks.iter().enumerate() {
-                // A local copy: memory that may alias the sums would prevent vectorization.
+                // Works on a copy, because reads of memory that may alias the sums would prevent vectorization.
                 let block = *block;
                 add(&mut sums, &block, run * BLOCKS_PER_SUM + k);
             }
@@ -200,7 +203,7 @@ fn median(values: &mut [f32]) -> f32 {
     *values.select_nth_unstable_by(k, f32::total_cmp).1
 }
 
-/// Adds a block's products to the sums of the normal equations and of the loss.
+/// Adds a block to the sums of the normal equations and to the sum of the losses.
 #[inline(always)]
 fn accumulate(
     sums: &mut [[f32; LANES]; SUM_COUNT + 1],
@@ -249,7 +252,7 @@ fn accumulate(
 }
 
 impl Loss {
-    /// Computes weights and losses of residuals; steps are compared by the loss that they minimise.
+    /// Computes the weight and the loss of each residual. The refinement accepts a step if the mean loss decreases.
     #[inline(always)]
     fn weights_and_costs(
         self,

@@ -1,10 +1,10 @@
 //! Pose of a relief on a print: exhaustive search over rotation, scale and shift, then sub-pixel refinement.
 //!
-//! Soft relief is compared with soft ink, both high-pass filtered, where both are known. Bounding boxes and centroids
-//! are not used: neighbours, specks and broken strokes change them.
+//! Soft strokes of the relief are compared with soft ink where both are known. Both are high-pass filtered. Bounding
+//! boxes and centroids are not used, because neighbouring characters, specks and broken strokes change them.
 //!
-//! Frames: image px (of the depth map or the print), and working px of a pyramid level. The print is the fixed image,
-//! the relief the moving one.
+//! There are two frames: image pixels (of the depth map or the print) and working pixels of a pyramid level. The print
+//! is the fixed image, and the relief is the moving image.
 
 mod border_mask;
 mod candidate;

@@ -1,11 +1,12 @@
-//! Pixels that two levels have in common at a pose, and the shares of their amounts that overlap there.
+//! Pixels that are valid in two levels at a pose, and the share of each level's amount that the other level covers.
 
 use super::PyramidLevel;
 use super::pyramid::BilinearCell;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
-/// A moving level with its valid mask and the map from fixed to moving working pixels.
+/// A moving level at a pose on a fixed level. `valid` is the valid mask of the moving level. `moving_from_fixed` maps
+/// working pixels.
 pub(super) struct PlacedLevel<'a> {
     pub(super) moving: &'a PyramidLevel,
     pub(super) valid: &'a Grid<f32>,
@@ -13,14 +14,16 @@ pub(super) struct PlacedLevel<'a> {
 }
 
 impl PlacedLevel<'_> {
-    /// Returns the position in the moving level of a pixel of the fixed one; `None` where it is not valid.
+    /// Returns the position of a pixel of the fixed level in the moving level, or `None` if the moving level is not
+    /// valid there.
     pub(super) fn cell(&self, x: usize, y: usize) -> Option<BilinearCell> {
         let there = self.moving_from_fixed.apply([x as f64, y as f64]);
         let size = [self.valid.width(), self.valid.height()];
         BilinearCell::at(size, there).filter(|cell| cell.value(self.valid) >= 0.5)
     }
 
-    /// Returns column, row and position in the moving level of each pixel of the fixed level that is valid in both.
+    /// Iterates over the pixels of the fixed level that are valid in both levels. Each item is the pixel's column, its
+    /// row, and its position in the moving level.
     pub(super) fn common_pixels(
         &self,
         fixed_valid: &Grid<f32>,
@@ -36,14 +39,15 @@ impl PlacedLevel<'_> {
 /// How much of each level's amount is covered by the other, 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PoseOverlap {
-    /// Share of the moving amount covered by the fixed one: the share of the stroke tops that has printed.
+    /// Share of the moving level's amount that the fixed level covers: the share of the stroke tops that printed.
     pub(crate) moving_covered: f64,
-    /// Share of the fixed amount covered by the moving one: the share of the ink with stroke tops under it.
+    /// Share of the fixed level's amount that the moving level covers: the share of the ink with stroke tops under it.
     pub(crate) fixed_covered: f64,
 }
 
 impl PoseOverlap {
-    /// Computes the shares on the pixels that are valid in both levels; zeros if there are none.
+    /// Computes both shares over the pixels that are valid in both levels. A share is 0 if its level has no amount
+    /// there.
     pub(super) fn new(
         fixed: &PyramidLevel,
         fixed_valid: &Grid<f32>,

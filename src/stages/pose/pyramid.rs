@@ -5,7 +5,7 @@ use crate::raster::{Grid, Mask, resample, resample_transposed};
 use crate::simd::dispatch;
 use crate::stages::blur::{gaussian_blur, gaussian_blur_transposed};
 
-/// Soft mask: an amount of 0..=1 for each pixel, and where it is known.
+/// An image as an amount of 0..=1 for each pixel, and a mask of the pixels where the amount is known.
 #[derive(Debug, Clone)]
 pub(crate) struct SoftMask {
     /// Ink of a print, or nearness to the stroke tops of a relief.
@@ -14,7 +14,7 @@ pub(crate) struct SoftMask {
     pub(crate) known: Mask,
 }
 
-/// A soft mask at the largest working size, from which levels are computed.
+/// A soft mask resampled to the largest working size. All levels are computed from it.
 #[derive(Debug, Clone)]
 pub(crate) struct ImagePyramid {
     /// Amount times `known`.
@@ -25,7 +25,7 @@ pub(crate) struct ImagePyramid {
     size: f64,
 }
 
-/// One level of the pyramid. All grids have the same size; they are zero where nothing is known.
+/// One level of the pyramid. All grids have the same size and are zero where nothing is known.
 #[derive(Debug, Clone)]
 pub(crate) struct PyramidLevel {
     pub(super) value: Grid<f32>,
@@ -36,16 +36,17 @@ pub(crate) struct PyramidLevel {
     pub(super) work_from_image: Affine2,
 }
 
-/// Sigma of the low-pass filter, a share of the level's size. `value` is `amount` without its low-pass part.
+/// Sigma of the low-pass filter, as a share of the level's size. `value` is `amount` minus its low-pass part.
 const LOW_PASS_SHARE: f64 = 0.14;
-/// The low-pass filter runs on at most this many pixels along the longest side.
+/// Largest size at which the low-pass filter runs, in pixels along the longest side. Larger levels are reduced to this
+/// size for the filter.
 const LOW_PASS_PX: usize = 48;
 /// A working pixel is known if at least this share of it is.
 const MIN_KNOWN: f32 = 0.5;
 
 impl ImagePyramid {
-    /// Resamples a soft mask to `size` working pixels along the longest side of its known box; `None` if nothing is
-    /// known.
+    /// Resamples a soft mask so that the bounding box of its known pixels has `size` working pixels along the longest
+    /// side. Returns `None` if nothing is known.
     pub(crate) fn new(soft: &SoftMask, size: usize) -> Option<Self> {
         let bounds = soft.known.bounding_box()?;
         let longest = bounds.longest_side() as f64;
@@ -85,8 +86,8 @@ impl ImagePyramid {
         ))
     }
 
-    /// Computes the level of `size` working pixels along the longest side, smoothed by a Gaussian of `sigma` working
-    /// pixels.
+    /// Computes the level with `size` working pixels along the longest side. The level is smoothed by a Gaussian with a
+    /// sigma of `sigma` working pixels.
     pub(crate) fn level(&self, size: usize, sigma: f64) -> PyramidLevel {
         self.level_builder(size, sigma).level(&self.present)
     }
@@ -111,7 +112,7 @@ impl ImagePyramid {
     }
 }
 
-/// What all levels of one size and smoothing share.
+/// Data that all levels of one size and smoothing share.
 pub(crate) struct LevelBuilder<'a> {
     base: &'a ImagePyramid,
     size: usize,
@@ -172,7 +173,7 @@ fn at_least_epsilon(weight: f32) -> f32 {
     if weight > 1e-6 { weight } else { 1e-6 }
 }
 
-/// Returns the low-pass part of a grid whose known box has `size` pixels along the longest side.
+/// Returns the low-pass part of a grid that belongs to a level of `size` pixels along the longest side.
 fn low_pass(values: &Grid<f32>, size: usize) -> Grid<f32> {
     if size <= LOW_PASS_PX {
         return gaussian_blur(values, LOW_PASS_SHARE * size as f64);
@@ -190,7 +191,7 @@ fn middle(side: usize) -> f64 {
     (side - 1) as f64 / 2.0
 }
 
-/// Returns the size of a grid that holds a scaled box, and the shift that centres the box in it, pixels.
+/// Returns the size of a grid that holds a scaled box, and the shift that centres the box in the grid, both in pixels.
 fn fit_grid(sides: [usize; 2], middle: [f64; 2], scale: f64) -> ([usize; 2], [f64; 2]) {
     let half = sides.map(|side| (side as f64 * scale / 2.0).ceil() + 1.0);
     let shift = [0, 1].map(|k| half[k] - scale * middle[k]);
@@ -224,7 +225,7 @@ impl PyramidLevel {
     }
 }
 
-/// A position between four pixels, for interpolation in grids of one size.
+/// A position between four pixels, for bilinear interpolation in all grids of the same size.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BilinearCell {
     /// Index of the pixel above and left, and the offset from it, 0..1.

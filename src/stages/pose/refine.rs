@@ -13,9 +13,9 @@ use crate::domain::Affine2;
 use crate::raster::Grid;
 use crate::simd::dispatch;
 
-/// Converged if the step moves the level's border by less than this, working pixels.
+/// The refinement has converged if a step moves the level's border by less than this many working pixels.
 const CONVERGED_PX: f64 = 0.03;
-/// Pixels that are summed in single precision before their sum is added in double precision.
+/// Number of pixels that are summed in single precision before the sum is added to a double-precision total.
 const PIXELS_PER_SUM: usize = 256;
 
 /// A fixed and a moving level prepared for the evaluation of many poses.
@@ -65,10 +65,10 @@ impl<'a> Refiner<'a> {
         }
     }
 
-    /// Refines a pose so that the moving level predicts the fixed one, and scores it.
+    /// Refines a pose so that the moving level predicts the fixed level, and scores the refined pose.
     ///
-    /// Gain and offset of the moving values are estimated too; residuals are weighted by the loss. The refinement ends
-    /// at convergence or after `max_steps`. Returns `start` unchanged if it has no inverse.
+    /// Gain and offset of the moving values are estimated too. The loss determines the weights of the residuals. The
+    /// refinement ends at convergence or after `max_steps` steps. Returns `start` unchanged if it has no inverse.
     pub(crate) fn refine(
         &self,
         start: &PoseCandidate,
@@ -135,8 +135,8 @@ impl<'a> Refiner<'a> {
         placed.map_or_else(PoseOverlap::default, overlap)
     }
 
-    /// Scores a pose and a rival's pose, possibly of another moving level, on the pixels valid for both; zeros if a
-    /// pose has no inverse.
+    /// Scores a pose of this moving level and a rival pose of the moving level of `other` on the pixels that are valid
+    /// for both. Returns zeros if a pose has no inverse.
     pub(crate) fn tiebreak_scores(
         &self,
         pose: &PoseCandidate,
@@ -164,8 +164,8 @@ impl<'a> Refiner<'a> {
         self.valid_masks[0].get_or_init(|| valid_mask(self.fixed))
     }
 
-    /// Returns the map from fixed working pixels relative to the centre to moving working pixels, given the map
-    /// between images.
+    /// Returns the map from fixed working pixels, relative to the centre of the fixed level, to moving working pixels.
+    /// `fixed_from_moving` maps image pixels.
     fn moving_from_fixed(&self, fixed_from_moving: &Affine2) -> Option<Affine2> {
         let image = fixed_from_moving.inverse()?;
         let from_work = self.fixed.work_from_image.inverse()?;
@@ -201,8 +201,8 @@ impl<'a> Refiner<'a> {
         workspace.finish(product);
     }
 
-    /// Returns the sum of products of fixed values with `moving_value`, which is called with the position in the
-    /// moving level, the position in the fixed one, and the fixed value.
+    /// Returns the sum over the sampled pixels of the fixed value times `moving_value`. The arguments of `moving_value`
+    /// are the position in the moving level, the position in the fixed level, and the fixed value.
     #[inline(always)]
     fn product(
         &self,
@@ -229,7 +229,7 @@ impl<'a> Refiner<'a> {
         product
     }
 
-    /// Interpolates value, gradient and weight of the moving level; `None` outside.
+    /// Interpolates value, gradient and weight of the moving level. Returns `None` outside the level.
     #[inline(always)]
     fn sample_cell(&self, u: f32, v: f32) -> Option<[f32; 4]> {
         let cell = BilinearCell::at_single(self.size, [u, v])?;
@@ -249,7 +249,7 @@ impl<'a> Refiner<'a> {
         cell.map_or(0.0, |cell| cell.value(&self.moving.value))
     }
 
-    /// Divides a sum of products by the energy of both levels, which gives the correlation.
+    /// Converts a sum of products over the sampled pixels to a correlation, using the energies of both levels.
     fn normalize_score(&self, product: f64, from_fixed: &Affine2) -> f64 {
         // Moving pixels per fixed pixel.
         let area = from_fixed.determinant().abs().max(1e-12);
@@ -258,7 +258,7 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// Interpolates linearly; a loop, because only inlined code is vectorised.
+/// Interpolates linearly. It uses a loop, because only inlined code is vectorised.
 #[inline(always)]
 fn lerp(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
     let mut mixed = a;
@@ -270,8 +270,8 @@ fn lerp(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
 
 /// The sampled pixels of a fixed level.
 struct FixedSamples {
-    /// Known pixels of one colour of a chessboard: position relative to the centre, and value. Levels are smooth, so
-    /// neighbours are nearly equal.
+    /// Positions of the sampled pixels, relative to the level's centre. The samples are the known pixels on one colour
+    /// of a chessboard, because neighbouring pixels of a smooth level are nearly equal.
     places: Vec<[f32; 2]>,
     values: Vec<f32>,
     /// Sampled share of the known pixels.

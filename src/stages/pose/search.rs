@@ -1,4 +1,4 @@
-//! Exhaustive search over rotation and scale; the best shift of each by FFT correlation.
+//! Exhaustive search over rotation and scale. FFT correlation finds the best shift for each rotation and scale.
 
 use std::f64::consts::TAU;
 
@@ -10,19 +10,20 @@ use crate::simd::{dispatch, floor_f32, index_from_f32};
 
 /// Lanes of one SIMD vector.
 const LANES: usize = 8;
-/// Level size, working pixels. At the widest scales only the corners leave the square.
+/// Size of the searched levels in working pixels. At the largest scale of the default scale band, only the corners of a
+/// level leave the square of the FFT.
 pub(super) const SEARCH_PX: usize = 20;
-/// Largest shift between the centres, a share of the level size.
+/// Largest shift between the centres, as a share of the level size.
 const MAX_SHIFT: f64 = 0.35;
-/// Rotations per 90 degrees. The four rotations that differ by 90 degrees share one warp.
+/// Number of rotations per 90 degrees. Rotations that differ by a multiple of 90 degrees share one warp.
 const ANGLES_PER_QUARTER: usize = 9;
-/// Ratio of neighbouring scales: moves a character's border by about one pixel.
+/// Ratio between neighbouring scales. One step moves the border of a character by about one pixel.
 const SCALE_STEP: f64 = 1.15;
-/// Peaks closer than this in rotation (degrees) and scale (ratio) are duplicates.
+/// Two peaks are duplicates if they differ by less than this in rotation (degrees) and in scale (ratio).
 const DUPLICATE_ANGLE_DEG: f64 = 12.0;
 const DUPLICATE_SCALE: f64 = 1.12;
 
-/// One peak of the correlation: rotation in radians, shift in working pixels.
+/// One peak of the correlation. The rotation is in radians, and the shift is in working pixels.
 #[derive(Debug, Clone, Copy)]
 struct Peak {
     angle: f64,
@@ -91,8 +92,8 @@ impl Peak {
             && ratio < DUPLICATE_SCALE
     }
 
-    /// Converts working pixels to image pixels: moving image to its level, similarity about the centre, fixed level to
-    /// its image.
+    /// Converts the peak to a pose between images. The pose maps the moving image to its level, applies the peak's
+    /// rotation, scale, reflection and shift about the centres, and maps the fixed level to its image.
     fn candidate(&self, fixed: &PyramidLevel, moving: &PyramidLevel) -> PoseCandidate {
         let [cx, cy] = moving.centre();
         let [fx, fy] = fixed.centre();
@@ -115,7 +116,8 @@ impl Peak {
     }
 }
 
-/// Warps a level's values into the square, rotated (radians) and scaled about its centre.
+/// Warps the values of a level into the square of the FFT. `turn` is a rotation in radians and a scale, both about the
+/// centre of the level.
 fn warp_to_square(level: &PyramidLevel, turn: Option<(f64, f64)>) -> Vec<f32> {
     let middle = (FFT_SIZE / 2) as f64;
     let [cx, cy] = level.centre();
@@ -131,7 +133,7 @@ fn warp_to_square(level: &PyramidLevel, turn: Option<(f64, f64)>) -> Vec<f32> {
     let [x_of, y_of] = back.0.map(|row| row.map(|v| v as f32));
     let mut values = vec![0.0; FFT_SIZE * FFT_SIZE];
     let (runs, _) = values.as_chunks_mut::<LANES>();
-    // Levels are smooth at this size, so one sample a pixel suffices even where the scale shrinks them.
+    // Levels are smooth at this size, so one sample per pixel suffices even if the scale shrinks them.
     dispatch!({
         for (run, values) in runs.iter_mut().enumerate() {
             let (row, column) = (run * LANES / FFT_SIZE, run * LANES % FFT_SIZE);

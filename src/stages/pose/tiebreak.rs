@@ -1,13 +1,13 @@
 //! Tie-break between two poses on the pixels that are valid for both.
 //!
-//! Where only one of them covers valid pixels, the other cannot be compared, so those pixels do not count.
+//! Pixels that are valid for only one of the poses do not count, because the other pose has no value there to compare.
 
 use super::PyramidLevel;
 use super::overlap::PlacedLevel;
 use crate::raster::Grid;
 
-/// Scores two poses on the pixels valid in all levels: correlation times the share of the moving amount that the fixed
-/// one covers, 0..=1.
+/// Scores two poses on the pixels that are valid in all levels. A score, 0..=1, is the correlation times the share of
+/// the moving level's amount that the fixed level covers.
 pub(super) fn tiebreak_scores(
     fixed: &PyramidLevel,
     fixed_valid: &Grid<f32>,
