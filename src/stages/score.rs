@@ -7,9 +7,11 @@ pub use ssim::{SsimReference, SsimScores, SsimWindow};
 use crate::domain::Scores;
 use crate::raster::{Mask, PixelBox};
 
-/// Computes every score of a depth mask against a print mask of the same size, each in 0..=1 (SSIM in -1..=1).
+/// Computes all scores of a depth mask against a print mask of the same size. SSIM and its structure part are in
+/// -1..=1, and the other scores are in 0..=1.
 ///
-/// Masks count as 0 and 1 with data range 1. SSIM: Wang et al. 2004, doi:10.1109/TIP.2003.819861.
+/// Masks count as images of zeros and ones with a data range of 1. SSIM follows Wang et al. 2004,
+/// doi:10.1109/TIP.2003.819861.
 ///
 /// ```
 /// use mocban::raster::Mask;
@@ -39,7 +41,7 @@ pub fn score_masks(print: &SsimReference, depth: &Mask) -> Scores {
     }
 }
 
-/// Returns the intersection over union of two pixel boxes; 0 if either is missing.
+/// Returns the intersection over union of two pixel boxes, or 0 if either is missing.
 fn box_iou(a: Option<PixelBox>, b: Option<PixelBox>) -> f64 {
     let (Some(a), Some(b)) = (a, b) else {
         return 0.0;

@@ -15,12 +15,12 @@ use crate::domain::{Stage, ThresholdMetric};
 pub enum AlignmentMethod {
     /// The recommended method: the pose first, then thresholds in the aligned frame.
     Default,
-    /// The paper's (arXiv 2411.05524): thresholds first, then an exhaustive search of the rotation.
+    /// The paper's method (arXiv 2411.05524): thresholds first, then an exhaustive search over rotations.
     Paper,
 }
 
 impl AlignmentMethod {
-    /// Returns the metrics that get a threshold, in the order of [`ThresholdMetric::ALL`].
+    /// Returns the metrics that the method computes, in the order of [`ThresholdMetric::ALL`].
     ///
     /// # Examples
     /// ```
@@ -62,8 +62,8 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Returns what a stage's result depends on besides its inputs: the stage's revision, the method where the stage
-    /// differs by it, and the stage's own settings.
+    /// Returns what a stage's result depends on besides its inputs: the revision of the stage, the settings of the
+    /// stage, and the method if the stage differs between methods.
     ///
     /// # Examples
     /// ```

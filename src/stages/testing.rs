@@ -54,8 +54,8 @@ impl Default for SyntheticSheet {
     }
 }
 
-/// Returns whether a place is on a stroke of the character as it reads in print; x right, y down, millimetres from the
-/// middle.
+/// Returns whether a point is on a stroke of the character as it reads in print. x points right and y points down, both
+/// in millimetres from the middle.
 fn stroke(x: f64, y: f64) -> bool {
     let bar = |x0: f64, x1: f64, y0: f64, y1: f64| (x0..x1).contains(&x) && (y0..y1).contains(&y);
     bar(-4.0, 4.2, -4.2, -3.2)
@@ -71,9 +71,10 @@ impl SyntheticSheet {
         Rotation3::new(Vector3::from(self.turn))
     }
 
-    /// Returns the mesh point of a place on the sheet: `x`, `y` as read in print, `z` out of the block, millimetres.
+    /// Returns the mesh point of a point on the sheet, in millimetres: `x` and `y` as read in print, `z` out of the
+    /// block.
     pub(super) fn place(&self, x: f64, y: f64, z: f64) -> [f64; 3] {
-        // Carved in mirror writing: what reads to the right lies to the left; y of the block points up.
+        // The block is carved in mirror writing, so its x axis is reversed. Its y axis points up.
         let side = if self.mirrored { 1.0 } else { -1.0 };
         let p = self.rotation() * Vector3::new(side * x, -y, z) * self.scale;
         (p + Vector3::from(self.origin)).into()
@@ -114,12 +115,12 @@ impl SyntheticSheet {
     }
 }
 
-/// Returns the position of a vertex along a side, millimetres from the middle.
+/// Returns the position of a vertex along a side, in millimetres from the middle.
 fn at(i: usize) -> f64 {
     (i as f64 / (SIDE - 1) as f64 - 0.5) * SHEET_MM
 }
 
-/// Heights of the sheet: 0 on strokes, walls down to an uneven ground. The same for every world.
+/// Heights of every sheet in millimetres: 0 on strokes, with walls that fall to an uneven ground.
 static CARVED: LazyLock<Grid<f64>> = LazyLock::new(|| {
     const FINE: usize = 3 * SIDE;
     let fine = |k: usize| (k as f64 / (FINE - 1) as f64 - 0.5) * SHEET_MM;
@@ -144,8 +145,8 @@ static CARVED: LazyLock<Grid<f64>> = LazyLock::new(|| {
     })
 });
 
-/// Renders the print at `px_per_mm` pixels per millimetre, rotated clockwise by `turn_deg`; returns the true
-/// `print_from_sheet` too.
+/// Renders the print at `px_per_mm` pixels per millimetre, rotated clockwise by `turn_deg`. Also returns the true
+/// `print_from_sheet`.
 pub(super) fn print(px_per_mm: f64, turn_deg: f64) -> (Print, Affine2) {
     let size = (SHEET_MM * px_per_mm) as usize;
     let middle = (size - 1) as f64 / 2.0;
@@ -222,7 +223,7 @@ pub(super) fn paper_settings() -> Settings {
     settings
 }
 
-/// Runs the four stages; returns `print_from_mesh` of each metric with its outcome.
+/// Runs the four stages. Returns `print_from_mesh` and the outcome of each metric.
 pub(super) fn run(
     mesh: &Mesh,
     print: &Print,

@@ -1,20 +1,21 @@
-//! Scale that differs between two perpendicular axes: paper shrinks by about 1 % across its grain.
+//! Scale that differs between two perpendicular axes, because paper shrinks by about 1 % across its grain.
 
 use crate::domain::Affine2;
 use crate::stages::pose::{Loss, PoseCandidate, Refiner};
 
-/// Rounds of scaling and refining; each changes a fraction of what the one before changed.
+/// Number of rounds of scaling and refining. Each round changes the pose by a fraction of what the previous round
+/// changed.
 const ROUNDS: usize = 2;
 /// Steps of a refinement between two rounds.
 const STEPS: usize = 6;
-/// Change of scale that is tried to either side, and the largest of one round.
+/// Relative change of scale that is tried in both directions. `MOST` is the largest change of one round.
 const TRIED: f64 = 0.008;
 const MOST: f64 = 0.012;
 
-/// Returns the pose with the anisotropic scale that fits best. Scaling along an axis and along a diagonal together give
-/// every direction.
+/// Returns the pose with the anisotropic scale that fits best, or `pose` if none improves its score. Scaling along the
+/// axes and along the diagonals together covers every direction.
 ///
-/// `middle` is the middle of the relief in pixels of the moving image; the pose's score must be the refiner's.
+/// `middle` is the middle of the relief in pixels of the moving image. The score of `pose` must come from `refiner`.
 pub(super) fn with_anisotropic_scale(
     refiner: &Refiner,
     pose: &PoseCandidate,
@@ -35,7 +36,8 @@ pub(super) fn with_anisotropic_scale(
     if best.score > pose.score { best } else { *pose }
 }
 
-/// Returns the position of the maximum of a parabola through values at -1, 0 and 1, limited to the change of one round.
+/// Returns the position of the maximum of the parabola through values at -1, 0 and 1, or 0 if the parabola has no
+/// maximum. The position is clamped to the largest change of one round.
 fn summit(before: f64, at: f64, after: f64) -> f64 {
     let bend = before - 2.0 * at + after;
     if bend >= 0.0 {
@@ -44,8 +46,8 @@ fn summit(before: f64, at: f64, after: f64) -> f64 {
     (0.5 * (before - after) / bend).clamp(-MOST / TRIED, MOST / TRIED)
 }
 
-/// Scales about the middle by `1 + e` along x and `1 - e` along y, and likewise by `f` along the diagonals; areas change
-/// little.
+/// Scales a pose about `middle` by `1 + e` along x and `1 - e` along y, and by `1 + f` and `1 - f` along the two
+/// diagonals. Areas change little.
 fn stretch(pose: &PoseCandidate, middle: [f64; 2], [e, f]: [f64; 2]) -> PoseCandidate {
     let [x, y] = pose.fixed_from_moving.apply(middle);
     let about = Affine2([[1.0 + e, f, -e * x - f * y], [f, 1.0 - e, e * y - f * x]]);

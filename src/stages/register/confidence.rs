@@ -1,40 +1,41 @@
 //! Confidence of an alignment: a logistic model of the evidence for and against it.
 //!
-//! `cargo bench --bench accuracy -- --fit-confidence` fits the weights on generated pairs (right ones of every kind, a
-//! mesh with another character's print, mirrored meshes, uncarved plates) and prints them with a reliability table on
-//! other seeds. Today's weights were fitted on 1,010 pairs of two independent generators. Only the weights of spread and
-//! rim were set manually, so that poses a few percent off and thresholds that cut through worn or tilted tops rank among
-//! the least confident.
+//! `cargo bench --bench accuracy -- --fit-confidence` fits the weights on generated pairs: matching pairs of every
+//! kind, meshes with another character's print, mirrored meshes and uncarved plates. It prints the weights, and a
+//! reliability table for pairs of other seeds. The current weights were fitted on 1,010 pairs of two independent
+//! generators. Only the weights of spread and rim were set manually, so that the confidence is low if the pose is a few
+//! percent off or the threshold cuts through worn or tilted tops.
 
 use crate::domain::{MetricOutcome, PoseFeatures, ThresholdMetric};
 
-/// Inputs of the pose's probability: 1; logarithms of correlation, covered tops, covered ink, competitor at another
-/// angle, mirrored competitor.
+/// Number of inputs of the pose model. They are 1 and five logarithms: of the correlation, of the covered shares of
+/// tops and ink, and of the relative scores of the competitor at another angle and of the mirrored competitor.
 const POSE_INPUTS: usize = 6;
-/// Inputs of the mask's probability: 1; logarithm of the mask's area over the area of the mask by relief alone, and its
-/// square; the same for the ink's area; logarithm of the correlation; spread, see [`spread_input`]; square of the rim.
+/// Number of inputs of the mask model. They are 1, `m`, `m^2`, `i`, `i^2`, the logarithm of the correlation, the spread
+/// (see [`spread_input`]) and the square of the rim. `m` is the logarithm of the mask's area over the area of the mask
+/// by relief alone, and `i` is the logarithm of the ink's area over that same area.
 const MASK_INPUTS: usize = 8;
 
 /// Weights of the pose's inputs.
 const POSE: [f64; POSE_INPUTS] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
-/// Weights of the mask's inputs. The rim is 0.03 in the median of generated pairs of the tier `hard`, and above 0.05 in
-/// three of a hundred.
+/// Weights of the mask model's inputs. On generated pairs of the tier `hard`, the median rim is 0.03, and 3 % of the
+/// rims are above 0.05.
 const MASK: [f64; MASK_INPUTS] = [5.13, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5, -500.0];
-/// A spread too small to be seen, as a share of the depth map's longest side.
+/// Spread that is too small to be seen, as a share of the depth map's longest side.
 const UNSEEN_SPREAD: f64 = 0.002;
 /// Lower bound of shares before their logarithm is taken.
 const FLOOR: f64 = 0.02;
 /// Range to which ratios to the competitors' scores are clamped.
 const RATIO: [f64; 2] = [0.2, 1.5];
 
-/// Inputs of the two logistic models whose product is an alignment's confidence.
+/// Inputs of the two logistic models. The confidence of an alignment is the product of their two probabilities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConfidenceInputs {
-    /// Of the probability that the pose is right: rotation within 5 degrees, landmarks within 5 % of the character's
-    /// height.
+    /// Inputs of the pose model. It estimates the probability that the pose is right: rotation within 5 degrees of the
+    /// truth, landmarks within 5 % of the character's height.
     pub pose: [f64; POSE_INPUTS],
-    /// Of the probability that the mask is right (intersection over union with the true tops of 0.7 or more) when the
-    /// pose is.
+    /// Inputs of the mask model. It estimates the probability that the mask is right if the pose is: intersection over
+    /// union of at least 0.7 with the true tops.
     pub mask: [f64; MASK_INPUTS],
 }
 
@@ -72,8 +73,8 @@ struct Areas {
     relief: f64,
     /// Area of the print's ink.
     ink: f64,
-    /// Width of the rim that a slightly lower threshold adds: growth of the area as a logarithm, times the root of the
-    /// area; the smaller one of this mask and the mask by relief alone.
+    /// Width of the rim that a slightly lower threshold would add: the logarithm of the area's growth times the root of
+    /// the area. It is the smaller of the widths for this mask and for the mask by relief alone.
     rim: f64,
 }
 
@@ -92,7 +93,7 @@ fn mask_inputs(features: &PoseFeatures, areas: Areas) -> [f64; MASK_INPUTS] {
     ]
 }
 
-/// Returns 0 for answers that coincide, growing slowly with their distance.
+/// Returns 0 if all starts of the refinement lead to the same pose. The value grows logarithmically with the spread.
 fn spread_input(spread: f64) -> f64 {
     (spread / UNSEEN_SPREAD).ln_1p()
 }
@@ -102,8 +103,8 @@ fn logistic<const N: usize>(weights: &[f64; N], inputs: &[f64; N]) -> f64 {
     1.0 / (1.0 + (-sum).exp())
 }
 
-/// Sets the confidence of each metric and returns the inputs it was computed from. `growth` gives the growth of the
-/// strokes at a level, see `normalize::stroke_growth`.
+/// Sets the confidence of each metric, and returns the model inputs of each metric. `growth` returns how much the
+/// strokes of a level grow if the level is lowered slightly, see `normalize::stroke_growth`.
 pub(super) fn set_confidence(
     metrics: &mut [MetricOutcome],
     features: &PoseFeatures,

@@ -1,7 +1,7 @@
 //! Chooses each metric's depth threshold in the aligned frame.
 //!
-//! Candidates are equally spaced depths below the tops; each candidate's mask is compared with the print's ink where
-//! both print and depth map hold data. See [`ThresholdMetric`] for the formulas.
+//! Candidates are equally spaced depths below the tops. Their masks are compared with the print's ink where both print
+//! and depth map have data. See [`ThresholdMetric`] for the formulas.
 
 use super::params::{RegisterError, RegisterParams};
 use crate::domain::{Affine2, ReliefHeights, ThresholdChoice, ThresholdMetric};
@@ -11,16 +11,17 @@ use crate::stages::score::{SsimReference, SsimWindow};
 
 /// Number of candidates between the smallest and the largest depth.
 const CANDIDATES: u32 = 40;
-/// Step at which the structure score is computed first.
+/// Step between the candidates whose structure score is computed first.
 const COARSE: usize = 4;
-/// Largest ratio of areas between the masks of `ensemble` and `relief`.
+/// Largest ratio of areas, in either direction, between the mask of `ensemble` and the mask of `relief`.
 const CLOSE_AREA: f64 = 1.12;
-/// Largest ratio of the ink's area to the tops' area, and of the tops' area to the ink's.
+/// Largest plausible ratio of the ink's area to the tops' area. `LEAST_INKED` is the largest plausible ratio of the
+/// tops' area to the ink's area. Beyond these ratios the tops' area is clamped.
 const MOST_SPREAD: f64 = 2.2;
 const LEAST_INKED: f64 = 1.15;
 
-/// Print and depth map on the canvas at half its size: the structure of strokes remains visible, in a quarter of the
-/// time.
+/// Print and depth map on a canvas of half the size. The structure of strokes remains visible, and comparing masks
+/// takes a quarter of the time.
 pub(super) struct HalfCanvas {
     /// Levels of the depth map; 0 where print or depth map holds no data.
     levels: Grid<u16>,
@@ -29,7 +30,7 @@ pub(super) struct HalfCanvas {
 }
 
 impl HalfCanvas {
-    /// Warps print and depth map to the canvas by a pose and keeps what both hold.
+    /// Warps print and depth map to the canvas at a pose, and keeps the pixels where both have data.
     pub(super) fn new(
         depth: &DepthMap,
         print: &PrintMasks,
@@ -72,11 +73,12 @@ struct Candidate {
 
 /// Chooses each metric's threshold, in the order of [`ThresholdMetric::ALL`].
 ///
-/// Structure and density alone reproduce the print's spread ink, and geometry alone ignores the print. `ensemble`
-/// therefore takes the best structure score among thresholds whose mask has about the area of the mask of `relief`.
+/// A mask chosen by structure or density alone includes the spread of the print's ink, and a mask chosen by geometry
+/// alone ignores the print. `ensemble` therefore takes the best structure score among thresholds whose mask has about
+/// the same area as the mask of `relief`.
 ///
 /// # Errors
-/// When no threshold leaves strokes, or no ink lies where the depth map holds data.
+/// Returns an error if no threshold leaves strokes, or if no ink lies where the depth map has data.
 pub(super) fn choose(
     depth: &DepthMap,
     relief: &ReliefHeights,
@@ -93,7 +95,8 @@ pub(super) fn choose(
     let gap = |c: &Candidate| (c.area / ink * params.ink_spread - 1.0).abs();
     let density = nearest(&candidates, gap);
     let edge = relief.level_at(&depth.scale, relief.tops_end);
-    // Ink covers somewhat more than the wood; outside that range the end of the tops was misjudged.
+    // Ink usually covers somewhat more area than the tops. If the ratio of the areas is implausible, `tops_end` must be
+    // wrong, so the area is clamped.
     let own_area = canvas
         .area(edge)
         .clamp(ink / MOST_SPREAD, ink * LEAST_INKED);
@@ -177,8 +180,8 @@ impl<'a> Structure<'a> {
         })
     }
 
-    /// Returns the best candidate: the score changes slowly with depth, so every fourth is tried, then those around
-    /// the best.
+    /// Returns the best candidate. The score changes slowly with depth, so every fourth candidate is tried first, and
+    /// then the neighbours of the best one.
     fn best_of_all(&mut self) -> Option<usize> {
         let count = self.candidates.len();
         let coarse = self.best((0..count).step_by(COARSE))?;
@@ -206,7 +209,8 @@ mod tests {
 
     const SIDE: usize = 128;
 
-    /// Bars with sloping walls, levels 1..=50,001 from ground to tops, and ink that spreads over part of the walls.
+    /// Returns bars with sloping walls and ink that spreads over part of the walls. The levels run from 1 on the ground
+    /// to 50,001 on the tops.
     fn bars() -> (DepthMap, HalfCanvas, ReliefHeights) {
         let from_axis = |x: usize| (x % 32).abs_diff(16) as f64;
         let level = |x: usize, y: usize| {

@@ -1,8 +1,8 @@
 //! Finds the pose, chooses each metric's depth threshold in the aligned frame, and scores the masks.
 //!
-//! The pose is found from soft strokes, without a threshold: coarse to fine over all rotations and a band of scales
-//! (`pose_search`), then refined at full size against its competitors (`refine`). The paper's order is in
-//! `paper_method::register`.
+//! The pose is found from soft strokes, so it needs no threshold. `pose_search` searches all rotations and a band of
+//! scales from coarse to fine. `refine` compares the best poses and refines the winner at full size. The paper's
+//! method, which chooses the thresholds first, is in `paper_method::register`.
 
 mod anisotropic_scale;
 mod confidence;
@@ -23,20 +23,21 @@ use crate::domain::PoseFeatures;
 use crate::raster::DepthMap;
 use metric_thresholds::HalfCanvas;
 
-/// Raised whenever the same inputs and settings may give another result than before.
+/// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
 pub const REVISION: u32 = 11;
 
-/// A mirrored pose must win by this factor to be named the cause: symmetric characters score alike both ways.
+/// A pair is refused as mirrored if its mirrored score exceeds its upright score by this factor. The factor is above 1
+/// because a symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.06;
 
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
 ///
-/// `depth` and `normalized` are the results of the earlier stages. Poses map depth-map pixels to print-image pixels;
-/// all metrics share one pose.
+/// `depth` and `normalized` are the results of the earlier stages. Poses map depth-map pixels to print-image pixels.
+/// All metrics share one pose.
 ///
 /// # Errors
-/// When nothing correlates, the relief matches in mirror writing, the confidence is below `min_confidence`, or a
-/// threshold leaves no strokes.
+/// Returns an error if print or relief is empty, no pose correlates, the mirrored relief matches better, the confidence
+/// is below `min_confidence`, or a threshold leaves no strokes.
 ///
 /// # Examples
 /// ```

@@ -9,28 +9,30 @@ use crate::stages::score::SsimWindow;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegisterParams {
-    /// Largest ratio, up or down, between the sizes of print and depth map that the pose search tries, 1..=2.
+    /// Largest ratio between the sizes of print and depth map, in either direction, that the pose search tries, 1..=2.
     pub scale_band: f64,
-    /// Working size of the refinement in pixels along the character, 32..=1024.
+    /// Working size of the refinement in pixels along the longest side of the area with data, 32..=1024.
     pub working_px: u32,
     /// Smoothing of the refinement in working pixels (sigma), 0..=10.
     pub smoothing_px: f64,
-    /// Whether the pose may scale the relief differently along two axes, as paper shrinks across its grain.
+    /// Whether the pose may scale the relief differently along two perpendicular axes, because paper shrinks across its
+    /// grain.
     pub anisotropic_scale: bool,
     /// Smallest depth below the tops that is tried as a threshold, as a share of the relief.
     pub threshold_min: f64,
     /// Largest depth below the tops that is tried as a threshold, as a share of the relief.
     pub threshold_max: f64,
-    /// Ratio between the area of the ink and of the wood that printed it, 1 or more: `density` aims at the print's
-    /// density divided by this.
+    /// Ratio of the ink's area to the area of the stroke tops that printed it, 1 or more. `density` aims at the print's
+    /// density divided by this ratio.
     pub ink_spread: f64,
-    /// A pair with less confidence than this is refused, 0..=1.
+    /// Smallest confidence, 0..=1. A pair whose pose is less likely to be right is refused.
     pub min_confidence: f64,
-    /// Window of SSIM, in the scores and where `nl_ssim` chooses its threshold.
+    /// SSIM window, used for the scores and for choosing the thresholds of `nl_ssim` and `ensemble`.
     pub window: SsimWindow,
-    /// Paper's method: number of angles over the full circle that are tried first, 4 or more.
+    /// Number of angles over the full circle that the paper's method tries first, 4 or more.
     pub coarse_angles: u32,
-    /// Paper's method: number of angles within three coarse steps each side that are tried next, 2 or more.
+    /// Number of steps in which the paper's method then searches from three coarse steps before the best angle to three
+    /// after it, 2 or more.
     pub fine_angles: u32,
 }
 
@@ -67,7 +69,7 @@ pub enum RegisterError {
         /// Smallest that counts.
         needs: f64,
     },
-    /// Relief and print show different characters, or too little speaks for the same one.
+    /// Relief and print show different characters, or the evidence for the same character is too weak.
     #[error(
         "relief and print do not match: confidence {confidence:.2} is below register.min_confidence {needs}; is it the print of another character?"
     )]

@@ -1,4 +1,4 @@
-//! Coarse-to-fine search of the pose on soft strokes: no threshold is needed before the pose is known.
+//! Coarse-to-fine search of the pose on soft strokes, which need no threshold.
 
 use super::params::{RegisterError, RegisterParams};
 use crate::raster::Mask;
@@ -29,17 +29,18 @@ const fn keep(upright: usize, mirrored: usize) -> BeamWidth {
 }
 /// Largest working size of print and relief in pixels.
 const BASE_PX: usize = 72;
-/// Soft strokes of the search fall from the tops to half the relief: neither the right threshold nor an exact plane is
-/// needed.
+/// Threshold and softness of the soft strokes in the search, as shares of the relief. The strokes fall from 1 at the
+/// tops to 0 at half the relief, so neither the right threshold nor an exact plane is needed.
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Number of poses that are refined.
 const KEEP: BeamWidth = keep(9, 3);
-/// A smaller correlation means that nothing matches.
+/// Smallest correlation of a match. If the best correlation is smaller, the pair is refused.
 const LEAST_SCORE: f64 = 0.12;
-/// Factor by which the mirrored relief must win for the pair to be refused: symmetric characters score alike both ways.
+/// A pair is refused as mirrored only if its best mirrored score exceeds its best upright score by this factor. The
+/// factor is above 1 because a symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.3;
-/// Distance of the logarithm of the scale from the band's end at which the scale counts as at the bound.
+/// The scale counts as at the bound if its logarithm is less than this distance from the end of the band.
 const BOUND: f64 = 0.02;
 
 /// Poses of the relief on one interpretation of the print.
@@ -61,12 +62,14 @@ impl PoseSearch {
     }
 }
 
-/// Searches the poses of the relief on every interpretation of the print and returns the best interpretation's.
+/// Searches the poses of the relief on every interpretation of the print. Returns the poses on the interpretation with
+/// the highest score.
 ///
-/// `depths` holds depths below the tops as shares of the relief, in depth-map pixels; poses map those to print pixels.
+/// `depths` holds depths below the tops as shares of the relief, in depth-map pixels. Poses map depth-map pixels to
+/// print pixels.
 ///
 /// # Errors
-/// The error of the likeliest interpretation when none matches.
+/// Returns the error for the likeliest interpretation if no interpretation matches.
 pub(super) fn search(
     depths: &SoftMask,
     prints: &[PrintMasks],
@@ -85,7 +88,8 @@ pub(super) fn search(
     best.unwrap_or(Err(RegisterError::NoPose))
 }
 
-/// Searches the poses on one interpretation of the print; `depth_px` is the longest side of the relief's valid box.
+/// Searches the poses on one interpretation of the print. `depth_px` is the longest side of the relief's known box in
+/// depth-map pixels.
 fn find_poses(
     wood: &ImagePyramid,
     depth_px: f64,
@@ -115,14 +119,14 @@ fn find_poses(
     })
 }
 
-/// Returns the longest side of the bounding box of the known pixels; 1 without any.
+/// Returns the longest side of the bounding box of the known pixels, or 1 if there are none.
 fn longest(known: &Mask) -> f64 {
     known
         .bounding_box()
         .map_or(1.0, |bounds| bounds.longest_side() as f64)
 }
 
-/// Refuses mirror writing and relief that correlates with nothing.
+/// Refuses mirrored pairs and pairs without a correlating pose.
 fn require_upright(found: &[PoseCandidate]) -> Result<(), RegisterError> {
     let best = |mirrored: bool| {
         let of_kind = found.iter().filter(|pose| pose.mirrored == mirrored);

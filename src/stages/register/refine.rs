@@ -11,26 +11,28 @@ use crate::stages::pose::{
     Refiner, SoftMask,
 };
 
-/// Poses closer in angle than this count as the same pose when the margin is computed.
+/// Poses whose angles differ by at most this are the same pose. A competitor at another angle differs by more.
 const SAME_POSE_DEG: f64 = 15.0;
 /// Number of poses that are refined.
 const TRIED: usize = 3;
 /// Softness of a threshold, as a share of the relief.
 const SOFTNESS: f64 = 0.1;
-/// Shares of the working size at which poses are compared and at which the best one finds its threshold.
+/// Share of the working size at which poses are compared. `CLOSER` is the share at which the best pose finds its
+/// threshold.
 const COMPARED: f64 = 0.42;
 const CLOSER: f64 = 0.67;
-/// Competitors that reach this share of the best score are refined as closely as the best pose.
+/// If a competitor exceeds this share of the best score, the competitors are refined as closely as the best pose.
 const CLOSE: f64 = 0.75;
-/// Shares of a competitor up to this are no evidence against the best pose: symmetric characters reach it.
+/// Share of the best score that a competing pose of a symmetric character can reach. `fair_share` limits the plain
+/// share to this value.
 const SYMMETRIC: f64 = 0.9;
-/// Ratio of the smaller and larger poses from which the same answer must be reached.
+/// Factor by which the pose is scaled down and up to start two further refinements, which should end at the same pose.
 const OTHER_SIZE: f64 = 1.08;
 /// Maximum number of steps of a refinement, and of the last one.
 const FEW_STEPS: usize = 8;
 const MOST_STEPS: usize = 15;
 
-/// The refined pose, which serves every metric: it is found without a threshold.
+/// The refined pose. It serves every metric, because it is found without a threshold.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Refinement {
     /// Depth-map pixels to print-image pixels.
@@ -41,7 +43,7 @@ pub(super) struct Refinement {
     pub(super) features: PoseFeatures,
 }
 
-/// Refines the poses of the search and returns the best one; `None` when print or relief holds nothing.
+/// Refines the poses of the search and returns the best pose. Returns `None` if print or relief has no data.
 ///
 /// `depths` holds depths below the tops as shares of the relief, in depth-map pixels.
 pub(super) fn refine(
@@ -76,14 +78,15 @@ struct RefinedPose {
 }
 
 impl RefinedPose {
-    /// Ranks poses: correlation times the share of the tops that has printed. Ink without tops is common, because
-    /// strokes break off after a print was made; tops without ink are rare.
+    /// Returns the score that ranks poses: the correlation times the share of the tops that has printed. The share of
+    /// the ink with tops under it does not count, because strokes often break off after a print was made. Tops without
+    /// ink are rare.
     fn score(&self) -> f64 {
         self.found.score * self.overlap.moving_covered
     }
 }
 
-/// The best pose and its competitors, which cannot be right if it is.
+/// The best pose and its competitors. At most one of them is right.
 #[derive(Debug, Clone, Copy)]
 struct CompetingPoses {
     best: RefinedPose,
@@ -95,7 +98,7 @@ struct CompetingPoses {
 }
 
 impl CompetingPoses {
-    /// Refines the first few poses as read and the best mirrored one, and ranks them.
+    /// Refines the first few upright poses and the best mirrored pose, and selects the best pose and its competitors.
     fn compare(images: &ScaledImages, search: &PoseSearch) -> Option<Self> {
         let strokes = images.strokes(&FEW_CUTS);
         let thresholds = SoftThresholds::new(&FEW_CUTS, &images.ink, &strokes);
@@ -118,7 +121,8 @@ impl CompetingPoses {
         })
     }
 
-    /// Refines the best pose at a larger size, and competitors that come near it, which may then win.
+    /// Refines the best pose at a larger size. If a competitor scores nearly as well, its pose is refined too, and a
+    /// competitor at another angle replaces the best pose if it then scores higher.
     fn sharpen(&mut self, thresholds: &SoftThresholds) -> Option<()> {
         let is_close = self.shares.iter().any(|share| *share > CLOSE);
         self.best = sharpened(thresholds, &self.best.found)?;
@@ -139,7 +143,8 @@ impl CompetingPoses {
         Some(())
     }
 
-    /// Computes the shares of the competitors on the area that each has in common with the best pose.
+    /// Computes the score of each competitor, divided by the score of the best pose, on the area that both poses have
+    /// in common.
     fn fair_shares(&self, thresholds: &SoftThresholds) -> [f64; 2] {
         [self.other_angle, self.mirrored]
             .map(|rival| rival.map_or(0.0, |rival| fair_share(thresholds, &rival, &self.best)))
@@ -165,13 +170,14 @@ impl CompetingPoses {
     }
 }
 
-/// Returns the score of a competitor divided by the score of the best pose; 0 without a competitor.
+/// Returns the score of a competitor divided by the score of the best pose, or 0 without a competitor.
 fn share(rival: Option<RefinedPose>, best: &RefinedPose) -> f64 {
     rival.map_or(0.0, |rival| rival.score() / best.score().max(1e-6))
 }
 
-/// Returns the share of a competitor on the area that both have in common. A small common area may favour the best pose
-/// by chance, so the plain share, up to the share of a symmetric character, is the lower bound.
+/// Returns the score of a competitor divided by the score of the best pose, both on the area that the two poses have in
+/// common. A small common area may favour the best pose by chance. The plain share, limited to the share that symmetric
+/// characters reach, is therefore the lower bound.
 fn fair_share(thresholds: &SoftThresholds, rival: &RefinedPose, best: &RefinedPose) -> f64 {
     let [score, fair] =
         thresholds.compare_on_common_area([best, rival].map(|pose| (pose.nearest, &pose.found)));
@@ -213,9 +219,10 @@ impl<'a> WorkingImages<'a> {
         }
     }
 
-    /// Refines a pose with the strokes of its threshold, first on the character alone: walls, frame lines and neighbours
-    /// may be cut off differently in print and relief. If they agree, they are used too. Also returns the spread of the
-    /// answers, see [`Self::refine_at_three_sizes`].
+    /// Refines a pose with the strokes of its threshold. Returns the refined pose and its spread, see
+    /// [`Self::refine_at_three_sizes`]. Border strokes (walls, frame lines, neighbouring characters) are masked at
+    /// first, because they may be cut off differently in print and relief. If they agree, the last refinement uses them
+    /// too.
     fn refine_fully(&self, few: &ScaledImages, best: &RefinedPose) -> Option<(Affine2, f64)> {
         let strokes = few.stroke(best.cut);
         let both = [&few.ink, &strokes];
@@ -243,9 +250,9 @@ impl<'a> WorkingImages<'a> {
         Some((last.fixed_from_moving, spread))
     }
 
-    /// Refines from the pose and from a smaller and a larger one. Returns the best answer and the largest distance of
-    /// the others from it, as a share of the depth map's longest side: few or broken strokes leave a pose where it
-    /// starts.
+    /// Refines from the pose, from a smaller pose and from a larger pose. Returns the best result and the spread: the
+    /// largest distance of the other results from the best one, as a share of the depth map's longest side. The spread
+    /// is large if strokes are few or broken, because refinement then leaves a pose where it starts.
     fn refine_at_three_sizes(
         &self,
         refiner: &Refiner,
@@ -267,7 +274,8 @@ impl<'a> WorkingImages<'a> {
         (best, apart.fold(0.0, f64::max))
     }
 
-    /// Returns the mean distance between the depth map's corners under two poses, as a share of its longest side.
+    /// Returns the mean distance between the positions of the depth map's corners under two poses, as a share of the
+    /// longest side of the depth map.
     fn apart(&self, one: &PoseCandidate, other: &PoseCandidate) -> f64 {
         let [width, height] = self.middle.map(|middle| 2.0 * middle);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
@@ -297,13 +305,14 @@ impl ScaledImages<'_> {
     }
 }
 
-/// Refines a pose with the threshold that fits best, first with a loss for distant starts, then for close ones.
+/// Refines a pose twice, each time with the threshold that fits best. The first loss suits distant starts, and the
+/// second loss suits close starts.
 fn refined_twice(thresholds: &SoftThresholds, start: &PoseCandidate) -> Option<RefinedPose> {
     let strokes = thresholds.best_at(start)?.strokes;
     sharpened(thresholds, &strokes.refine(start, FEW_STEPS, Loss::Huber))
 }
 
-/// Refines a pose that is nearly right with the threshold that fits best.
+/// Refines a nearly right pose, using the threshold that fits best.
 fn sharpened(thresholds: &SoftThresholds, start: &PoseCandidate) -> Option<RefinedPose> {
     let strokes = thresholds.best_at(start)?.strokes;
     let pose = strokes.refine(start, FEW_STEPS, Loss::Tukey);

@@ -29,10 +29,10 @@ pub struct Registered {
     pub outcome: RegisterOutcome,
     /// The print mask on the canvas, one for all metrics.
     pub canvas_print: Mask,
-    /// The depth mask of each metric on the canvas, in the order of the outcome.
+    /// The depth mask of each metric on the canvas, in the order of the metrics of `outcome`.
     pub canvas_depths: Vec<Mask>,
-    /// Inputs of the confidence model, one a metric in the order of the outcome; empty under the paper's method. Its
-    /// weights are fitted on them by `cargo bench --bench accuracy -- --fit-confidence`.
+    /// Inputs of the confidence model for each metric, in the order of the metrics of `outcome`. Empty under the
+    /// paper's method. `cargo bench --bench accuracy -- --fit-confidence` fits the weights of the model to such inputs.
     pub confidence_inputs: Vec<ConfidenceInputs>,
 }
 
@@ -43,10 +43,10 @@ pub(crate) fn canvas_print(normalized: &Normalized, ink: usize) -> Mask {
     warp_mask(&normalized.prints[ink].ink, &canvas_from_print, side, side)
 }
 
-/// Scores alignments on the canvas of one interpretation of the print; every metric on the same print mask.
+/// Scores alignments on the canvas of one interpretation of the print. All metrics are scored on the same print mask.
 ///
 /// # Errors
-/// When a threshold leaves no strokes.
+/// Returns an error if a threshold leaves no strokes.
 pub(crate) fn score_alignments(
     depth: &DepthMap,
     normalized: &Normalized,

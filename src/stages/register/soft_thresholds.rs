@@ -1,9 +1,9 @@
-//! Soft strokes of the relief at several thresholds, and the threshold between them that fits the print best.
+//! Soft strokes of the relief at several thresholds, and the search for the threshold that fits the print best.
 
 use crate::stages::pose::{PoseCandidate, PyramidLevel, Refiner};
 
-/// Thresholds below the tops, as shares of the relief. The ink of a print spreads; strokes too thin or too thick for it
-/// would bias the scale.
+/// Thresholds as depths below the tops, in shares of the relief. Several are tried because the ink of a print spreads,
+/// and strokes thinner or thicker than the ink would bias the scale.
 const CUTS: [f64; 5] = [0.05, 0.11, 0.2, 0.32, 0.47];
 /// Number of thresholds that are tried around a rough one.
 const NEAR: usize = 3;
@@ -20,7 +20,7 @@ pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
     &CUTS[first..first + NEAR]
 }
 
-/// Strokes of each threshold, the shallowest first, ready to be refined against the print's ink.
+/// Strokes of each threshold, ready to be refined against the print's ink. The shallowest threshold comes first.
 pub(super) struct SoftThresholds<'a> {
     cuts: &'a [f64],
     refiners: Vec<Refiner<'a>>,
@@ -32,8 +32,8 @@ pub(super) struct BestThreshold<'a, 'b> {
     pub(super) strokes: &'b Refiner<'a>,
     /// The pose with its score.
     pub(super) found: PoseCandidate,
-    /// The threshold that fits best, interpolated between the tried ones: choosing one of them would make the answer
-    /// discontinuous.
+    /// The threshold that fits best, interpolated between the tried thresholds. Without interpolation the result would
+    /// not be continuous.
     pub(super) cut: f64,
     /// Index of the tried threshold that came nearest.
     pub(super) nearest: usize,
@@ -67,7 +67,7 @@ impl<'a> SoftThresholds<'a> {
         })
     }
 
-    /// Scores two poses, each with the strokes of one threshold, on the area that both have in common.
+    /// Scores two poses on the area that both have in common. Each pose is given with the index of its threshold.
     pub(super) fn compare_on_common_area(
         &self,
         [one, two]: [(usize, &PoseCandidate); 2],
@@ -82,8 +82,8 @@ fn highest(values: &[f64]) -> usize {
     (0..values.len()).max_by(order).unwrap_or(0)
 }
 
-/// Returns the position of the maximum in steps from the first value, by a parabola through the highest value and its
-/// neighbours.
+/// Returns the position of the maximum, in steps from the first value. It is the maximum of the parabola through the
+/// highest value and its neighbours.
 fn summit(values: &[f64]) -> f64 {
     let best = highest(values);
     let last = values.len().saturating_sub(1);

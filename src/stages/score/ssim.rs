@@ -15,15 +15,15 @@ const C2: f64 = 0.03 * 0.03;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SsimWindow {
-    /// Gaussian of sigma 1.5 px truncated at 3.5 sigma (11 weights), population covariance: the paper of 2004, and
-    /// scikit-image with `gaussian_weights=True, use_sample_covariance=False`.
+    /// Gaussian with a sigma of 1.5 px, truncated at 3.5 sigma (11 weights), and population covariance. The paper of
+    /// 2004 uses it, and scikit-image with `gaussian_weights=True, use_sample_covariance=False`.
     Gaussian,
-    /// Uniform 7 x 7 px, sample covariance: scikit-image's default.
+    /// Uniform 7 x 7 px and sample covariance, the default of scikit-image.
     Uniform7,
 }
 
 impl SsimWindow {
-    /// Returns the weights along one axis, which sum to 1; their number is odd.
+    /// Returns the weights along one axis. They sum to 1, and their number is odd.
     fn weights(self) -> Vec<f64> {
         match self {
             Self::Gaussian => {
@@ -143,7 +143,8 @@ impl SsimReference {
 /// Independent sums, so that additions overlap.
 const LANES: usize = 4;
 
-/// Sums over windows. A mask is its own square, so `E[x^2] = E[x]` and three windowed means suffice.
+/// Sums over windows. Mask values are 0 or 1, so `E[x^2] = E[x]`, and the means of both masks and of their intersection
+/// suffice.
 #[derive(Default)]
 struct SsimSums {
     ssim: [f64; LANES],
@@ -151,7 +152,7 @@ struct SsimSums {
 }
 
 impl SsimSums {
-    /// Adds a row of windows: the means of one mask, of the other, and of their intersection.
+    /// Adds a row of windows, given the windowed means of one mask, of the other mask, and of their intersection.
     #[inline(always)]
     fn add_row<const LUMINANCE: bool>(
         &mut self,
@@ -190,7 +191,7 @@ impl SsimSums {
         }
     }
 
-    /// Returns the means over `count` windows, of which `equal` score 1 and were not added.
+    /// Returns the means over `count` windows. Of these, `equal` windows score 1 and were not added.
     fn mean(&self, equal: usize, count: usize) -> SsimScores {
         let mean = |sums: &[f64]| (sums.iter().sum::<f64>() + equal as f64) / count.max(1) as f64;
         SsimScores {
@@ -207,7 +208,8 @@ type Windows = [Range<usize>; 2];
 #[derive(Debug, Clone)]
 struct WindowWeights {
     weights: Vec<f64>,
-    /// Weighted mean of each pattern of window-width pixels, indexed by its bits: the last pixel is the lowest bit.
+    /// Weighted mean of each possible row of pixels as wide as the window. The bits of the index are the pixels, with
+    /// the last pixel as the lowest bit.
     mean_of_bits: Vec<f64>,
 }
 
@@ -240,8 +242,8 @@ impl WindowWeights {
         means
     }
 
-    /// Calls `visit` with each row of windows and the weighted means of some masks of one size. Only the rows that a
-    /// window needs are stored, so the buffers stay in the cache.
+    /// Calls `visit` for each row of windows, with the index of the row and the weighted means of each mask. The masks
+    /// have the same size. Only the pixel rows of one window are buffered, so the buffers stay in the cache.
     #[inline(always)]
     fn for_each_row<const MASKS: usize>(
         &self,
@@ -283,7 +285,7 @@ impl WindowWeights {
         }
     }
 
-    /// Computes weighted means down the columns from row `y` on. Row `y` is stored at `y` modulo the number of
+    /// Computes weighted means down the columns, from row `y` on. `across` stores row `y` at `y` modulo the number of
     /// weights.
     #[inline(always)]
     fn down(&self, across: &[f64], y: usize, means: &mut [f64]) {
@@ -295,7 +297,7 @@ impl WindowWeights {
     }
 }
 
-/// Sums rows weighted by the first half of the weights, including the middle; symmetric rows share a product.
+/// Sums rows with symmetric weights. `weights` holds the first half of the weights, including the middle one.
 #[inline(always)]
 fn weighted_sum<const HALF: usize>(
     weights: [f64; HALF],
@@ -321,7 +323,7 @@ mod tests {
     use super::{SsimReference, SsimWindow};
     use crate::raster::Mask;
 
-    /// Two masks that can be rebuilt in any language: a disc, and a rotated box with holes.
+    /// Returns two masks that are easy to rebuild in another language: a disc and a rotated box, both with holes.
     fn reference_masks() -> (Mask, Mask) {
         let disc = Mask::from_fn(96, 80, |x, y| {
             let (dx, dy) = (x as i64 - 44, y as i64 - 37);
@@ -361,8 +363,8 @@ mod tests {
         assert_eq!(means.nl_ssim(&b), got);
     }
 
-    // scikit-image 0.26 structural_similarity(a, b, data_range=1.0, ...) on the masks above as float64, and the
-    // structure factor from scipy.ndimage.gaussian_filter(sigma=1.5, truncate=3.5) on the same crop.
+    // Computed on the masks above as float64 by scikit-image 0.26 `structural_similarity(a, b, data_range=1.0, ...)`.
+    // The structure factor is computed by `scipy.ndimage.gaussian_filter(sigma=1.5, truncate=3.5)` on the same crop.
     const GAUSSIAN: f64 = 0.508_712_369_326_821_2;
     const UNIFORM: f64 = 0.583_304_742_506_446_5;
     const STRUCTURE: f64 = 0.517_618_603_199_105_7;

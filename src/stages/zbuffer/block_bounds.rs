@@ -3,11 +3,11 @@
 use super::triangle_block::{AffineForm, LANES, LaneArray, TriangleBlock};
 use crate::simd::{max_f32, min_f32};
 
-/// Margin of the boxes, a share of the surface's extent plus their own size and position: rounding never leaves a
-/// corner outside.
+/// Margin of a box, as a share of the surface's extent plus the size of the box and its distance from the origin. The
+/// margin exceeds rounding errors, so no corner is outside its box.
 const MARGIN: f32 = 2e-6;
 
-/// Boxes of [`LANES`] blocks, one a lane: x, y and z of their centres, then half their sides.
+/// Boxes of [`LANES`] blocks, one per lane. Each box is stored as its centre and half its sides, in x, y and z.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockBounds {
     centre: [LaneArray; 3],
@@ -15,7 +15,7 @@ pub(super) struct BlockBounds {
 }
 
 impl BlockBounds {
-    /// Computes the boxes of up to [`LANES`] blocks; lanes without a block repeat the last.
+    /// Computes the boxes of up to [`LANES`] blocks. Lanes without a block repeat the last block.
     #[inline(always)]
     pub(super) fn new(blocks: &[TriangleBlock], extent: f32) -> Self {
         let mut bounds = Self {

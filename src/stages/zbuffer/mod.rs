@@ -1,6 +1,6 @@
 //! Orthographic z-buffer: the highest surface under each pixel of a plane.
 //!
-//! Frames: the mesh's own, a plane frame (z is height), and depth-map px.
+//! There are three frames: the frame of the mesh, a plane frame (z is the height) and depth-map pixels.
 
 mod block_bounds;
 mod block_fill;

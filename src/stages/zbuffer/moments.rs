@@ -1,4 +1,5 @@
-//! Centroid and covariance of a surface, weighted by area: independent of repeated vertices and of the triangulation.
+//! Centroid and covariance of a surface, weighted by area, so that repeated vertices and the triangulation have no
+//! effect.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -9,7 +10,7 @@ use crate::stages::robust_bounds::Bounds;
 
 /// The distinct products of two axes.
 const PAIRS: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-/// Blocks that are summed in single precision before their sum is added in double precision.
+/// Number of blocks that are summed in single precision before the sum is added to a double-precision total.
 const BLOCKS_PER_SUM: usize = 32;
 
 /// Centroid (mesh units) and covariance (mesh units squared) of a surface, in the mesh's frame.
@@ -20,7 +21,8 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
-    /// Computes the moments of the triangles within the bulk; `None` if their area is zero.
+    /// Computes the moments of the triangles within the bulk. Returns `None` if there are no faces or if their area is
+    /// zero.
     pub(crate) fn of(surface: &IndexedSurface) -> Option<Self> {
         if !surface.has_faces {
             return None;
@@ -44,7 +46,7 @@ impl Moments {
             return None;
         }
         let centre = Vector3::new(x, y, z) / (3.0 * total);
-        // Second moment of a triangle: (sum of the corners' outer products + outer product of their sum) / 12.
+        // Second moment of a triangle: (sum of the corners' outer products + outer product of the corners' sum) / 12.
         let second = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz) / (12.0 * total);
         let unit = bulk.extent;
         Some(Self {
@@ -75,7 +77,7 @@ impl BulkBox {
         }
     }
 
-    /// Adds the first `count` triangles of a block, as far as they lie within the bulk.
+    /// Adds the first `count` triangles of a block, without triangles that leave the bulk.
     #[inline(always)]
     fn add(&self, block: &TriangleBlock, count: usize, sums: &mut [[f32; LANES]; SUM_COUNT]) {
         let per_extent = (1.0 / self.extent) as f32;
@@ -133,7 +135,8 @@ mod tests {
     /// Rows of small triangles that each triangle is cut into.
     const ROWS: usize = 40;
 
-    /// Reference implementation: centroids of many small triangles, weighted by area.
+    /// Computes the moments from the centroids of many small triangles, weighted by area, as a reference
+    /// implementation.
     fn of_small_triangles(mesh: &Mesh) -> ([f64; 3], [[f64; 3]; 3]) {
         let mut middles = Vec::new();
         for t in &mesh.triangles {

@@ -13,15 +13,16 @@ use crate::stages::robust_bounds::bulk_along;
 /// Height of a pixel whose ray hits nothing.
 pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;
 
-/// With more triangles per pixel than this, few blocks contain a pixel centre.
+/// Number of triangles per pixel above which few blocks contain a pixel centre.
 const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
 
-/// Side of a splat of a point set, in mean point spacings: large enough that no holes remain.
+/// Side of the square that is drawn for a point, as a multiple of the mean point spacing. It is large enough to leave
+/// no holes.
 const SPLAT_GROWTH: f64 = 1.5;
 
 impl IndexedSurface {
-    /// Renders the highest z of a plane frame under each pixel centre, mesh units; [`NO_HIT`] where the ray hits
-    /// nothing.
+    /// Renders the highest z of a plane frame under each pixel centre, in mesh units. The value is [`NO_HIT`] if the
+    /// ray hits nothing.
     pub(crate) fn render(&self, plane_from_mesh: &Rigid3, view: &Viewport) -> Grid<f32> {
         let mut heights = Grid::new(view.width, view.height, NO_HIT);
         self.rasterize(plane_from_mesh, view, |place, z| {
@@ -31,8 +32,8 @@ impl IndexedSurface {
         heights
     }
 
-    /// Renders the highest z, and the highest -z as seen from the back, where `plane_from_mesh` is rotated by 180
-    /// degrees about its x axis.
+    /// Renders the highest z, and the highest -z as seen from the back: with `plane_from_mesh` rotated by 180 degrees
+    /// about its x axis.
     pub(crate) fn render_both_sides(
         &self,
         plane_from_mesh: &Rigid3,
@@ -61,7 +62,7 @@ impl IndexedSurface {
         [mixed(a, b, c), mixed(d, e, f), z].map(|row: [f64; 4]| AffineForm(row.map(|v| v as f32)))
     }
 
-    /// Calls `emit` with the pixel index and height of every hit. The height is NaN for tested pixels outside a
+    /// Calls `emit` with the index and the height of every tested pixel. The height is NaN if the pixel is outside the
     /// triangle.
     fn rasterize(&self, plane_from_mesh: &Rigid3, view: &Viewport, emit: impl FnMut(usize, f32)) {
         let rows = self.view_rows(plane_from_mesh, view);
@@ -96,8 +97,8 @@ impl IndexedSurface {
         });
     }
 
-    /// Fills the same blocks as [`Self::fill_every_block`] where they are few. Few blocks are too far apart for the
-    /// hardware prefetcher, so a group of them is read before it is filled.
+    /// Fills the same blocks as [`Self::fill_every_block`], faster if they are few. Few blocks are too far apart for
+    /// the hardware prefetcher, so a group of blocks is read before it is filled.
     fn fill_sparse_blocks(
         &self,
         rows: &[AffineForm; 3],
@@ -178,8 +179,8 @@ mod tests {
         [0.0, 0.0, 0.0, 1.0],
     ]);
 
-    /// Reference implementation: tests one ray against every triangle. Also returns the tolerance of single precision,
-    /// which is larger on slivers, and whether the ray is too close to an edge to decide.
+    /// Tests one ray against every triangle, as a reference implementation. Returns the height, the tolerance for
+    /// single precision (larger on slivers), and whether the ray is too close to an edge to decide.
     fn cast(mesh: &Mesh, view: &Viewport, x: usize, y: usize) -> (Option<f64>, f64, bool) {
         let mut best: Option<f64> = None;
         let (mut tolerance, mut near_edge) = (1e-5_f64, false);

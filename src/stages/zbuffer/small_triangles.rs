@@ -1,7 +1,8 @@
-//! Fills small triangles in parallel, one a lane: each step tests the same pixel offset in every lane.
+//! Fills small triangles in parallel, one per lane. Each step tests the same pixel offset in every lane.
 //!
 //! Most triangles of a scan contain a pixel or two. Each lane computes the same bits as
-//! [`fill_triangle`](super::triangle_fill::fill_triangle), except for the sign of a zero that two triangles share.
+//! [`fill_triangle`](super::triangle_fill::fill_triangle). The order of the triangles differs, so the sign of a zero
+//! may differ at pixels that two triangles share.
 
 use super::triangle_block::{LANES, LaneArray};
 use crate::simd::{ceil_f32, floor_f32, index_from_f32, max_f32, min_f32};
@@ -19,7 +20,8 @@ pub(super) struct SmallTriangles {
 }
 
 impl SmallTriangles {
-    /// Selects the small triangles among the `candidates`, given the ranges of columns and rows.
+    /// Selects the small triangles among the `candidates`, given the range of columns and the range of rows of each
+    /// lane.
     #[inline(always)]
     pub(super) fn new(
         ranges: &[[LaneArray; 2]; 2],
@@ -47,7 +49,7 @@ impl SmallTriangles {
         self.max_span == [0; 2]
     }
 
-    /// Calls `emit` with pixel indices and heights as [`fill_triangle`](super::triangle_fill::fill_triangle) does.
+    /// Calls `emit` with pixel indices and heights, as [`fill_triangle`](super::triangle_fill::fill_triangle) does.
     #[inline(always)]
     pub(super) fn fill(
         &self,
@@ -97,8 +99,7 @@ impl SmallTriangles {
     }
 }
 
-/// Returns the first pixel of each lane along an axis of `side` pixels, and the number of pixels to the end of its
-/// range.
+/// Returns the first pixel of each lane along an axis of `side` pixels, and the number of pixels in the lane's range.
 #[inline(always)]
 fn pixel_span([low, high]: &[LaneArray; 2], side: usize) -> [LaneArray; 2] {
     let last = side as f32 - 1.0;
@@ -158,7 +159,7 @@ impl TrianglePlanes {
         planes
     }
 
-    /// Returns the height of a plane at a pixel, clamped to the corners' range.
+    /// Returns the height of the plane of lane `k` at a pixel, clamped to the range of the corners' heights.
     #[inline(always)]
     fn height(&self, k: usize, x: f32, y: f32) -> f32 {
         let [a, b, c] = &self.corner;
@@ -190,7 +191,8 @@ mod tests {
         heights.to_vec()
     }
 
-    /// Triangles on and beyond the grid: some with corners on pixel centres, some without area, some large.
+    /// Generates triangles on and beyond the grid. Some have corners on pixel centres, some have no area, and some are
+    /// large.
     fn triangles() -> impl Strategy<Value = Vec<[[f32; 3]; 3]>> {
         let exact = |v: f32| (v * 2.0).round() / 2.0;
         let middle = [-2.0..11.0_f32, -2.0..9.0_f32, -1.0..1.0_f32];

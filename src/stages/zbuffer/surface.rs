@@ -8,12 +8,13 @@ use crate::page_vec::PageVec;
 use crate::simd::dispatch;
 use crate::stages::robust_bounds::{Bounds, BulkRange, bulk_box};
 
-/// Blocks sampled for the winding: tens of thousands of triangles determine the share well enough.
+/// Largest number of blocks that are sampled for the winding. Tens of thousands of triangles are enough for it.
 const WINDING_SAMPLE_BLOCKS: usize = 8_192;
 
 /// A surface that can be bounded and rendered along any direction.
 ///
-/// Corners are stored relative to the centre of the bulk in single precision, 1e-7 of its extent.
+/// Corners are stored in single precision relative to the centre of the bulk (the range of the scan without specks).
+/// The precision is about 1e-7 of the extent of the bulk.
 #[derive(Debug)]
 pub(crate) struct IndexedSurface {
     pub(super) origin: [f64; 3],
@@ -69,7 +70,7 @@ impl IndexedSurface {
         }
     }
 
-    /// Returns the rows that give a vertex's x, y and z in a frame, relative to the origin.
+    /// Returns three rows of coefficients that compute x, y and z in `frame` from a vertex's offset from the origin.
     pub(super) fn frame_rows(&self, frame: &Rigid3) -> [[f64; 4]; 3] {
         let moved = frame.apply(self.origin);
         std::array::from_fn(|k| {
@@ -78,7 +79,7 @@ impl IndexedSurface {
         })
     }
 
-    /// Returns the bounds of the bulk in x and y of a plane frame, mesh units.
+    /// Returns the bounds of the bulk in x and y of a plane frame, in mesh units.
     pub(crate) fn bounds(&self, plane_from_mesh: &Rigid3) -> Bounds<2> {
         let [x, y, _] = self.frame_rows(plane_from_mesh);
         let [x, y] = [x, y].map(|row| self.bulk_range_along(&AffineForm(row.map(|v| v as f32))));
@@ -115,7 +116,7 @@ impl IndexedSurface {
         [low, high].map(f64::from)
     }
 
-    /// Returns the blocks whose boxes reach lowest and highest, ignoring boxes that leave the bulk.
+    /// Returns the indices of the blocks whose boxes reach lowest and highest. Ignores boxes that leave the bulk.
     fn extreme_blocks(&self, row: &AffineForm, bulk: &BulkRange) -> [usize; 2] {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
         dispatch!({
@@ -134,7 +135,8 @@ impl IndexedSurface {
         places.map(|place| place.min(self.blocks.len() - 1))
     }
 
-    /// Returns the share of the projected area along z of a frame whose winding faces up, 0..=1; `None` without faces.
+    /// Returns the share of the area, projected along z of a frame, whose winding faces up, 0..=1. Returns `None` if
+    /// there are no faces or if their projected area is zero.
     pub(crate) fn upward_facing_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
         if !self.has_faces {
             return None;
@@ -155,7 +157,7 @@ impl IndexedSurface {
     }
 }
 
-/// Returns twice the projected area of each triangle along the normal, negative if it faces away.
+/// Returns twice the projected area of each triangle along the normal. It is negative if the triangle faces away.
 fn facing(
     [x, y, z]: [f32; 3],
     a: &[LaneArray; 3],

@@ -3,8 +3,8 @@
 /// Triangles per block, one SIMD vector of each coordinate.
 pub(super) const LANES: usize = 8;
 
-/// A block of triangles: x, y and z of the first corners, then of the second and third. A block that is not full
-/// repeats its last triangle; a point is a triangle whose corners coincide.
+/// A block of triangles, indexed by corner, axis and lane. A block that is not full repeats its last triangle. A point
+/// is stored as a triangle whose corners coincide.
 pub(super) type TriangleBlock = [[LaneArray; 3]; 3];
 pub(super) type LaneArray = [f32; LANES];
 
@@ -33,7 +33,7 @@ impl AffineForm {
 
 /// A vertex coordinate in the precision of its file.
 pub(super) trait Coordinate: Copy + Into<f64> {
-    /// Returns the origin nearest to a coordinate that offsets can be taken from exactly, mesh units.
+    /// Returns the origin for offsets: the value nearest to `near` that this type represents exactly, in mesh units.
     fn reference(near: f64) -> f64;
     /// Returns the offset from the origin, mesh units.
     fn offset_from(self, origin: f64) -> f32;

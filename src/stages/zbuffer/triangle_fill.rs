@@ -1,16 +1,16 @@
-//! Scan conversion of one triangle: the pixel centres that it contains and its height there.
+//! Scan conversion of one triangle: finds the pixel centres in the triangle and the height of the triangle there.
 
 use crate::simd::{max_f32, min_f32};
 
-/// Rows of wider triangles are clipped to the edges before their pixels are tested.
+/// Largest width in columns at which all columns of a row are tested. The rows of wider triangles are clipped first.
 const MAX_UNCLIPPED_COLUMNS: usize = 12;
 
-/// Calls `emit` with the index of each pixel in the triangle's bounding box and the height of its plane there: NaN if
-/// the triangle does not contain the pixel's centre. Edges belong to the triangle.
+/// Calls `emit` with the index of each tested pixel and the height of the triangle's plane at its centre, or NaN if the
+/// triangle does not contain the centre. Edges belong to the triangle.
 ///
-/// Edge functions are computed relative to the pixel centre: swapping the ends of an edge negates the value exactly,
-/// so two triangles that share an edge leave no gap (watertight). There are no early tests: most triangles of a scan
-/// contain a pixel or two, and a mispredicted branch costs more than the arithmetic.
+/// Edge functions are computed relative to the pixel centre. Swapping the ends of an edge then negates the value
+/// exactly, so two triangles that share an edge leave no gap (watertight). Pixels are not rejected early, because most
+/// triangles of a scan contain a pixel or two, and a mispredicted branch costs more than the arithmetic.
 #[inline(always)]
 pub(super) fn fill_triangle(
     corners: [[f32; 3]; 3],
@@ -50,7 +50,8 @@ pub(super) fn fill_triangle(
     }
 }
 
-/// Returns the columns of a row; if there are many, only those between the edges and one more on each side.
+/// Returns the columns of a row to test. If there are many, returns only the columns between the edges and one more on
+/// each side.
 #[inline(always)]
 fn clip_columns(
     columns: &std::ops::Range<usize>,
@@ -70,7 +71,7 @@ fn clip_columns(
     clipped.start.max(columns.start)..clipped.end
 }
 
-/// Returns the column where an edge crosses a row; `None` for level edges.
+/// Returns the column where an edge crosses a row, or `None` if the edge is level or does not reach the row.
 #[inline(always)]
 fn crossing(p: &[f32; 3], q: &[f32; 3], y: f32) -> Option<f32> {
     let share = (y - p[1]) / (q[1] - p[1]);
@@ -81,7 +82,7 @@ fn crossing(p: &[f32; 3], q: &[f32; 3], y: f32) -> Option<f32> {
 
 /// Returns the whole pixels from `low` to `high`, inclusive, clamped to the grid.
 ///
-/// Casts to narrow integers do the rounding: `ceil` and `floor` are calls.
+/// Rounds by casts to narrow integers, because `ceil` and `floor` would be function calls.
 #[inline(always)]
 pub(super) fn pixel_range(low: f32, high: f32, len: usize) -> std::ops::Range<usize> {
     let clamp = |v: f32| v.max(-1.0).min(len as f32) as i32;

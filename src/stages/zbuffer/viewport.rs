@@ -17,10 +17,11 @@ pub(crate) struct Viewport {
 }
 
 impl Viewport {
-    /// Returns a viewport of bounds whose longest side takes `longest_px` pixels, with one free pixel on each side.
+    /// Returns a viewport around `bounds`. Its longest side has `longest_px` pixels, including one free pixel at each
+    /// end.
     ///
-    /// It is centred on the bounds, so a mesh rotated by a right angle is sampled by the same rays. `mirrored`
-    /// reflects x, so that mirror writing reads correctly. y points down in both cases.
+    /// The viewport is centred on the bounds, so a mesh rotated by a right angle is sampled by the same rays.
+    /// `mirrored` reflects x, so that mirror writing reads correctly. y points down in both cases.
     pub(crate) fn around(bounds: Bounds<2>, longest_px: usize, mirrored: bool) -> Self {
         let [low, high] = bounds;
         let size = [high[0] - low[0], high[1] - low[1]];
