@@ -65,9 +65,8 @@ impl<'a> BorderStrokes<'a> {
         })
     }
 
-    /// Returns whether the border strokes of both levels overlap about as well as the character does, see
-    /// `MIN_RELATIVE_OVERLAP`. If so, both levels show the same state of the block, and the border strokes are evidence
-    /// for the pose too.
+    /// Returns whether the border strokes of both levels overlap about as well as the character does. If so, both
+    /// levels show the same state of the block, and the border strokes are evidence for the pose too.
     pub(crate) fn agree(&self) -> bool {
         let [fixed, moving] = self.levels;
         let placed = PlacedLevel {
@@ -111,8 +110,7 @@ impl StrokeMasks {
         inner.to_weights()
     }
 
-    /// Removes from the border strokes the pixels that lie on a stroke of `others`, the inner strokes of the other
-    /// level.
+    /// Removes from the border strokes the pixels that lie on `others`, the inner strokes of the other level.
     fn unmark_matched(&mut self, others: &Grid<f32>, other_from_this: &Affine2) {
         let size = [others.width(), others.height()];
         self.border = Mask::from_fn(self.border.width(), self.border.height(), |x, y| {

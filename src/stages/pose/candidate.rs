@@ -55,8 +55,7 @@ impl PoseCandidate {
         turn.min(360.0 - turn)
     }
 
-    /// Returns whether two poses have the same reading and nearly the same rotation and scale. The shift is not
-    /// compared.
+    /// Returns whether two poses have the same reading and nearly equal rotation and scale. Ignores the shift.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         let scale = |pose: &Self| pose.fixed_from_moving.scale();
         let ratio = (scale(self) / scale(other)).ln().abs();

@@ -1,5 +1,4 @@
-//! Coarse-to-fine pose search: exhaustive search on the coarsest level, then Gauss-Newton refinement of fewer
-//! candidates on finer levels.
+//! Coarse-to-fine pose search: exhaustive on the coarsest level, then Gauss-Newton refinement on finer levels.
 
 use super::candidate::{BeamWidth, PoseCandidate, SearchRange, prune};
 use super::search::{SEARCH_PX, search};

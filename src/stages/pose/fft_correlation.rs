@@ -83,8 +83,7 @@ impl FftCorrelator {
         fft_2d(&*self.forward, &mut self.spectrum, &mut self.scratch);
     }
 
-    /// Rotates the loaded square by 90 degrees, from x to y. This rotates its spectrum, because the spectrum of a
-    /// rotated square is the rotated spectrum.
+    /// Rotates the loaded square by 90 degrees, from x to y, by rotating its spectrum.
     pub(super) fn rotate_quarter(&mut self) {
         // Column-major: column u, row v is at u * FFT_SIZE + v.
         for u in 0..FFT_SIZE {
@@ -96,8 +95,8 @@ impl FftCorrelator {
         std::mem::swap(&mut self.spectrum, &mut self.product);
     }
 
-    /// Returns the correlation of the loaded square with a target. If `mirrored` is set, the square is mirrored along
-    /// x: its spectrum is read backwards along x.
+    /// Returns the correlation of the loaded square with a target. Mirrors the square along x if `mirrored` is set, by
+    /// reading its spectrum backwards along x.
     ///
     /// The middle of the square is at `FFT_SIZE / 2`, so mirroring about column 0 of the transform leaves the middle in
     /// place. The result is stored reversed: the value for shift s is at index -s, modulo the size.

@@ -1,7 +1,6 @@
 //! One Gauss-Newton step: correspondences between two levels, robust weights, normal equations.
 //!
-//! The six unknowns are two for rotation and scale, two for the shift, and the gain and the offset of the moving
-//! values.
+//! The unknowns are two for rotation and scale, two for the shift, and the gain and offset of the moving values.
 
 use nalgebra::{Matrix6, Vector6};
 
@@ -70,8 +69,7 @@ impl Workspace {
         self.count += usize::from(moving[3] >= 0.5);
     }
 
-    /// Truncates the buffer to the correspondences that were appended. `explained` is the sum of the products of
-    /// corresponding values.
+    /// Truncates the buffer to the appended correspondences. `explained` is the sum of products of their values.
     pub(super) fn finish(&mut self, explained: f64) {
         self.explained = explained;
         self.blocks.truncate(self.count.div_ceil(LANES));
@@ -84,8 +82,7 @@ impl Workspace {
         }
     }
 
-    /// Fits `fixed = gain * moving + offset` by least squares. Returns the gain, which is at least 0.05, and the
-    /// offset.
+    /// Fits `fixed = gain * moving + offset` by least squares. Returns the gain, at least 0.05, and the offset.
     fn gain_and_offset(&self) -> (f32, f32) {
         let totals = sum_blocks::<4>(
             &self.blocks,

@@ -5,8 +5,7 @@ use super::pyramid::BilinearCell;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
-/// A moving level at a pose on a fixed level. `valid` is the valid mask of the moving level. `moving_from_fixed` maps
-/// working pixels.
+/// A moving level at a pose, with its valid mask. `moving_from_fixed` maps working pixels.
 pub(super) struct PlacedLevel<'a> {
     pub(super) moving: &'a PyramidLevel,
     pub(super) valid: &'a Grid<f32>,
@@ -14,8 +13,8 @@ pub(super) struct PlacedLevel<'a> {
 }
 
 impl PlacedLevel<'_> {
-    /// Returns the position of a pixel of the fixed level in the moving level, or `None` if the moving level is not
-    /// valid there.
+    /// Returns where a pixel of the fixed level lies in the moving level, or `None` if the moving level is not valid
+    /// there.
     pub(super) fn cell(&self, x: usize, y: usize) -> Option<BilinearCell> {
         let there = self.moving_from_fixed.apply([x as f64, y as f64]);
         let size = [self.valid.width(), self.valid.height()];
@@ -46,8 +45,7 @@ pub(crate) struct PoseOverlap {
 }
 
 impl PoseOverlap {
-    /// Computes both shares over the pixels that are valid in both levels. A share is 0 if its level has no amount
-    /// there.
+    /// Computes both shares over the pixels that are valid in both levels. A share of an amount of 0 is 0.
     pub(super) fn new(
         fixed: &PyramidLevel,
         fixed_valid: &Grid<f32>,

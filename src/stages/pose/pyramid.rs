@@ -38,8 +38,7 @@ pub(crate) struct PyramidLevel {
 
 /// Sigma of the low-pass filter, as a share of the level's size. `value` is `amount` minus its low-pass part.
 const LOW_PASS_SHARE: f64 = 0.14;
-/// Largest size at which the low-pass filter runs, in pixels along the longest side. Larger levels are reduced to this
-/// size for the filter.
+/// Largest size at which the low-pass filter runs, in pixels along the longest side. Larger levels are reduced first.
 const LOW_PASS_PX: usize = 48;
 /// A working pixel is known if at least this share of it is.
 const MIN_KNOWN: f32 = 0.5;

@@ -3,8 +3,7 @@
 use crate::domain::Affine2;
 use crate::stages::pose::{Loss, PoseCandidate, Refiner};
 
-/// Number of rounds of scaling and refining. Each round changes the pose by a fraction of what the previous round
-/// changed.
+/// Number of rounds of scaling and refining. Each round changes the pose less than the previous round.
 const ROUNDS: usize = 2;
 /// Steps of a refinement between two rounds.
 const STEPS: usize = 6;

@@ -180,8 +180,8 @@ impl<'a> Structure<'a> {
         })
     }
 
-    /// Returns the best candidate. The score changes slowly with depth, so every fourth candidate is tried first, and
-    /// then the neighbours of the best one.
+    /// Returns the best candidate. The score changes slowly with depth, so the search tries every fourth candidate
+    /// first and then the neighbours of the best one.
     fn best_of_all(&mut self) -> Option<usize> {
         let count = self.candidates.len();
         let coarse = self.best((0..count).step_by(COARSE))?;
@@ -209,8 +209,8 @@ mod tests {
 
     const SIDE: usize = 128;
 
-    /// Returns bars with sloping walls and ink that spreads over part of the walls. The levels run from 1 on the ground
-    /// to 50,001 on the tops.
+    /// Returns bars with sloping walls, from level 1 to 50,001 on the tops, and ink that spreads over part of the
+    /// walls.
     fn bars() -> (DepthMap, HalfCanvas, ReliefHeights) {
         let from_axis = |x: usize| (x % 32).abs_diff(16) as f64;
         let level = |x: usize, y: usize| {

@@ -15,7 +15,7 @@ pub struct RegisterParams {
     pub working_px: u32,
     /// Smoothing of the refinement in working pixels (sigma), 0..=10.
     pub smoothing_px: f64,
-    /// Whether the pose may scale the relief differently along two perpendicular axes, because paper shrinks across its
+    /// Whether the pose may scale the relief differently along two perpendicular axes, as paper shrinks across its
     /// grain.
     pub anisotropic_scale: bool,
     /// Smallest depth below the tops that is tried as a threshold, as a share of the relief.

@@ -17,8 +17,7 @@ const SAME_POSE_DEG: f64 = 15.0;
 const TRIED: usize = 3;
 /// Softness of a threshold, as a share of the relief.
 const SOFTNESS: f64 = 0.1;
-/// Share of the working size at which poses are compared. `CLOSER` is the share at which the best pose finds its
-/// threshold.
+/// Share of the working size at which poses are compared. At the share `CLOSER`, the best pose finds its threshold.
 const COMPARED: f64 = 0.42;
 const CLOSER: f64 = 0.67;
 /// If a competitor exceeds this share of the best score, the competitors are refined as closely as the best pose.
@@ -143,8 +142,7 @@ impl CompetingPoses {
         Some(())
     }
 
-    /// Computes the score of each competitor, divided by the score of the best pose, on the area that both poses have
-    /// in common.
+    /// Computes the score of each competitor, divided by the best pose's score, on the area common to both poses.
     fn fair_shares(&self, thresholds: &SoftThresholds) -> [f64; 2] {
         [self.other_angle, self.mirrored]
             .map(|rival| rival.map_or(0.0, |rival| fair_share(thresholds, &rival, &self.best)))
@@ -274,8 +272,7 @@ impl<'a> WorkingImages<'a> {
         (best, apart.fold(0.0, f64::max))
     }
 
-    /// Returns the mean distance between the positions of the depth map's corners under two poses, as a share of the
-    /// longest side of the depth map.
+    /// Returns the mean distance between the depth map's corners under two poses, as a share of the map's longest side.
     fn apart(&self, one: &PoseCandidate, other: &PoseCandidate) -> f64 {
         let [width, height] = self.middle.map(|middle| 2.0 * middle);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];

@@ -32,8 +32,7 @@ pub(super) struct BestThreshold<'a, 'b> {
     pub(super) strokes: &'b Refiner<'a>,
     /// The pose with its score.
     pub(super) found: PoseCandidate,
-    /// The threshold that fits best, interpolated between the tried thresholds. Without interpolation the result would
-    /// not be continuous.
+    /// The threshold that fits best, interpolated between the tried thresholds so that the result is continuous.
     pub(super) cut: f64,
     /// Index of the tried threshold that came nearest.
     pub(super) nearest: usize,

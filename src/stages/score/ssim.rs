@@ -143,7 +143,7 @@ impl SsimReference {
 /// Independent sums, so that additions overlap.
 const LANES: usize = 4;
 
-/// Sums over windows. Mask values are 0 or 1, so `E[x^2] = E[x]`, and the means of both masks and of their intersection
+/// Sums over windows. Mask values are 0 or 1, so `E[x^2] = E[x]`: the means of both masks and their intersection
 /// suffice.
 #[derive(Default)]
 struct SsimSums {

@@ -1,5 +1,4 @@
-//! Centroid and covariance of a surface, weighted by area, so that repeated vertices and the triangulation have no
-//! effect.
+//! Centroid and covariance of a surface, weighted by area, so that the choice of triangulation has no effect.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -21,8 +20,7 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
-    /// Computes the moments of the triangles within the bulk. Returns `None` if there are no faces or if their area is
-    /// zero.
+    /// Computes the moments of the triangles within the bulk. Returns `None` without faces or if their area is zero.
     pub(crate) fn of(surface: &IndexedSurface) -> Option<Self> {
         if !surface.has_faces {
             return None;
@@ -135,8 +133,7 @@ mod tests {
     /// Rows of small triangles that each triangle is cut into.
     const ROWS: usize = 40;
 
-    /// Computes the moments from the centroids of many small triangles, weighted by area, as a reference
-    /// implementation.
+    /// Computes the moments from the centroids of many small triangles, weighted by area, for comparison.
     fn of_small_triangles(mesh: &Mesh) -> ([f64; 3], [[f64; 3]; 3]) {
         let mut middles = Vec::new();
         for t in &mesh.triangles {

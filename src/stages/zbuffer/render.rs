@@ -16,8 +16,7 @@ pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;
 /// Number of triangles per pixel above which few blocks contain a pixel centre.
 const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
 
-/// Side of the square that is drawn for a point, as a multiple of the mean point spacing. It is large enough to leave
-/// no holes.
+/// Side of the square that is drawn for a point, as a multiple of the mean point spacing. It leaves no holes.
 const SPLAT_GROWTH: f64 = 1.5;
 
 impl IndexedSurface {

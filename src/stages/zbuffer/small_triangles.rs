@@ -20,8 +20,7 @@ pub(super) struct SmallTriangles {
 }
 
 impl SmallTriangles {
-    /// Selects the small triangles among the `candidates`, given the range of columns and the range of rows of each
-    /// lane.
+    /// Selects the small triangles among the `candidates`, given each lane's range of columns and range of rows.
     #[inline(always)]
     pub(super) fn new(
         ranges: &[[LaneArray; 2]; 2],
@@ -191,8 +190,7 @@ mod tests {
         heights.to_vec()
     }
 
-    /// Generates triangles on and beyond the grid. Some have corners on pixel centres, some have no area, and some are
-    /// large.
+    /// Generates triangles on and beyond the grid: some with corners on pixel centres, some without area, some large.
     fn triangles() -> impl Strategy<Value = Vec<[[f32; 3]; 3]>> {
         let exact = |v: f32| (v * 2.0).round() / 2.0;
         let middle = [-2.0..11.0_f32, -2.0..9.0_f32, -1.0..1.0_f32];
