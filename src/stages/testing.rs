@@ -71,7 +71,7 @@ impl SyntheticSheet {
         Rotation3::new(Vector3::from(self.turn))
     }
 
-    /// Returns the mesh point of a point on the sheet: `x` and `y` as read in print, `z` out of the block, all in mm.
+    /// Maps a point on the sheet to the mesh. `x` and `y` are as read in print, `z` points out of the block, all in mm.
     pub(super) fn place(&self, x: f64, y: f64, z: f64) -> [f64; 3] {
         // The block is carved in mirror writing, so its x axis is reversed. Its y axis points up.
         let side = if self.mirrored { 1.0 } else { -1.0 };

@@ -16,8 +16,9 @@ const MIN_STROKE: f32 = 0.3;
 const BORDER_PX: i64 = 2;
 /// Margin around border strokes in working pixels. It is masked too, because the edges of strokes are soft.
 const SOFT_EDGE_PX: usize = 3;
-/// If more than this share of the stroke pixels is connected to the border, the character itself must be. In that case
-/// a band along the border is masked instead. Its width is the share `BORDER_BAND` of the longest side.
+/// If more than this share of the stroke pixels is connected to the border, the character itself is taken to be
+/// connected. In that case a band along the border is masked instead. Its width is the share `BORDER_BAND` of the
+/// longest side.
 const MAX_BORDER_SHARE: f64 = 0.5;
 const BORDER_BAND: f64 = 0.1;
 /// The border strokes of two levels agree if their overlap (sum of minima over sum of maxima) is at least this share of
@@ -29,8 +30,8 @@ pub(super) fn valid_mask(level: &PyramidLevel) -> Grid<f32> {
     StrokeMasks::new(level).valid_mask(level)
 }
 
-/// Two levels at a pose, with the border strokes of each. A stroke that lies on an inner stroke of the other level is
-/// not a border stroke, because it belongs to a character that is connected to its surroundings.
+/// Two levels at a pose, with the border strokes of each. A stroke pixel that lies on an inner stroke of the other
+/// level is not a border stroke, because the character is connected to its surroundings there.
 pub(crate) struct BorderStrokes<'a> {
     levels: [&'a PyramidLevel; 2],
     strokes: [StrokeMasks; 2],
@@ -65,8 +66,8 @@ impl<'a> BorderStrokes<'a> {
         })
     }
 
-    /// Returns whether the border strokes of both levels overlap about as well as the character does. If so, both
-    /// levels show the same state of the block, and the border strokes are evidence for the pose too.
+    /// Returns whether the border strokes overlap at least `MIN_RELATIVE_OVERLAP` times as well as the character. If
+    /// so, both levels show the same state of the block, and the border strokes are evidence for the pose too.
     pub(crate) fn agree(&self) -> bool {
         let [fixed, moving] = self.levels;
         let placed = PlacedLevel {

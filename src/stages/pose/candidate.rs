@@ -2,8 +2,8 @@
 
 use crate::domain::Affine2;
 
-/// Two refined poses are duplicates if they differ by less than this in rotation (degrees) and in scale (natural
-/// logarithm of the ratio).
+/// Two refined poses are duplicates if they differ by less than `NEAR_DEG` degrees in rotation and by less than
+/// `NEAR_RATIO` in the natural logarithm of the scale.
 const NEAR_DEG: f64 = 3.0;
 const NEAR_RATIO: f64 = 0.04;
 

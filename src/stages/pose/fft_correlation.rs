@@ -41,7 +41,7 @@ pub(super) struct FftCorrelator {
 
 impl FftCorrelator {
     pub(super) fn new() -> Self {
-        // The last digits of an FFT differ between processors. This can only change the order of peaks of equal height.
+        // The last digits of an FFT differ between processors. This can only change the order of nearly equal peaks.
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(FFT_SIZE);
         let inverse = planner.plan_fft_inverse(FFT_SIZE);
@@ -58,8 +58,8 @@ impl FftCorrelator {
         }
     }
 
-    /// Returns the complex conjugate of the spectrum of a real square. It is scaled so that the inverse transform of
-    /// its product with the spectrum of another square is the correlation of the two squares.
+    /// Returns the complex conjugate of the spectrum of a real square. Its scale makes the inverse transform of a
+    /// product with another spectrum the correlation of the two squares.
     pub(super) fn target_spectrum(&mut self, values: &[f32]) -> Vec<Complex32> {
         for (out, value) in self.spectrum.iter_mut().zip(values) {
             *out = Complex32::new(*value, 0.0);

@@ -169,7 +169,7 @@ impl NormalEquations {
 }
 
 /// Sums over blocks: in single precision within a run of blocks, and in double precision over the runs. `add` adds one
-/// block to the sums. Its last argument is the index of the block.
+/// block, given with its index, to the sums.
 #[inline(always)]
 fn sum_blocks<const N: usize>(
     blocks: &[Correspondences],

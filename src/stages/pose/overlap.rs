@@ -45,7 +45,7 @@ pub(crate) struct PoseOverlap {
 }
 
 impl PoseOverlap {
-    /// Computes both shares over the pixels that are valid in both levels. A share of an amount of 0 is 0.
+    /// Computes both shares over the pixels valid in both levels. A share is 0 if its level's amounts are all 0 there.
     pub(super) fn new(
         fixed: &PyramidLevel,
         fixed_valid: &Grid<f32>,

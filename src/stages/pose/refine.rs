@@ -135,8 +135,8 @@ impl<'a> Refiner<'a> {
         placed.map_or_else(PoseOverlap::default, overlap)
     }
 
-    /// Scores a pose of this moving level and a rival pose of the moving level of `other` on the pixels that are valid
-    /// for both. Returns zeros if a pose has no inverse.
+    /// Scores `pose` of this moving level and `rival` of the moving level of `other`, on the pixels that are valid for
+    /// both poses. Returns zeros if a pose has no inverse.
     pub(crate) fn tiebreak_scores(
         &self,
         pose: &PoseCandidate,
@@ -201,8 +201,8 @@ impl<'a> Refiner<'a> {
         workspace.finish(product);
     }
 
-    /// Returns the sum over the sampled pixels of the fixed value times `moving_value`. The arguments of `moving_value`
-    /// are the position in the moving level, the position in the fixed level, and the fixed value.
+    /// Returns the sum of the products of the fixed values and the results of `moving_value`. The arguments of the
+    /// closure are the position in the moving level, the position in the fixed level, and the fixed value.
     #[inline(always)]
     fn product(
         &self,

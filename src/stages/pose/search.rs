@@ -19,7 +19,7 @@ const MAX_SHIFT: f64 = 0.35;
 const ANGLES_PER_QUARTER: usize = 9;
 /// Ratio between neighbouring scales. One step moves the border of a character by about one pixel.
 const SCALE_STEP: f64 = 1.15;
-/// Two peaks are duplicates if they differ by less than this in rotation (degrees) and in scale (ratio).
+/// Two peaks are duplicates if their rotations (in degrees) and scales (as a ratio) both differ by less than this.
 const DUPLICATE_ANGLE_DEG: f64 = 12.0;
 const DUPLICATE_SCALE: f64 = 1.12;
 

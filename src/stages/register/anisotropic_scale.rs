@@ -11,8 +11,8 @@ const STEPS: usize = 6;
 const TRIED: f64 = 0.008;
 const MOST: f64 = 0.012;
 
-/// Returns the pose with the anisotropic scale that fits best, or `pose` if none improves its score. Scaling along the
-/// axes and along the diagonals together covers every direction.
+/// Returns the pose with the anisotropic scale that fits best, or `pose` if no scale improves the score. A scale along
+/// the axes and a scale along the diagonals together give every direction.
 ///
 /// `middle` is the middle of the relief in pixels of the moving image. The score of `pose` must come from `refiner`.
 pub(super) fn with_anisotropic_scale(

@@ -3,17 +3,18 @@
 //! `cargo bench --bench accuracy -- --fit-confidence` fits the weights on generated pairs: matching pairs of every
 //! kind, meshes with another character's print, mirrored meshes and uncarved plates. It prints the weights, and a
 //! reliability table for pairs of other seeds. The current weights were fitted on 1,010 pairs of two independent
-//! generators. Only the weights of spread and rim were set manually, so that the confidence is low if the pose is a few
+//! generators. Only the weights of spread and rim were set manually. They lower the confidence if the pose is a few
 //! percent off or the threshold cuts through worn or tilted tops.
 
 use crate::domain::{MetricOutcome, PoseFeatures, ThresholdMetric};
 
-/// Number of inputs of the pose model. They are 1 and five logarithms: of the correlation, of the covered shares of
-/// tops and ink, and of the relative scores of the competitor at another angle and of the mirrored competitor.
+/// Number of inputs of the pose model. The inputs are the constant 1 and the logarithms of the correlation, the covered
+/// share of the tops, the covered share of the ink, and the scores of the two competitors (another angle, mirrored) as
+/// shares of the best score.
 const POSE_INPUTS: usize = 6;
-/// Number of inputs of the mask model. They are 1, `m`, `m^2`, `i`, `i^2`, the logarithm of the correlation, the spread
-/// (see [`spread_input`]) and the square of the rim. `m` is the logarithm of the mask's area over the area of the mask
-/// by relief alone, and `i` is the logarithm of the ink's area over that same area.
+/// Number of inputs of the mask model. The inputs are the constant 1, `m`, `m^2`, `i`, `i^2`, the logarithm of the
+/// correlation, the result of [`spread_input`] and the square of the rim. `m` is the logarithm of the mask's area over
+/// the area of the mask by relief alone, and `i` is the logarithm of the ink's area over that same area.
 const MASK_INPUTS: usize = 8;
 
 /// Weights of the pose's inputs.

@@ -13,7 +13,7 @@ use crate::stages::score::{SsimReference, SsimWindow};
 const CANDIDATES: u32 = 40;
 /// Step between the candidates whose structure score is computed first.
 const COARSE: usize = 4;
-/// Largest ratio of areas, in either direction, between the mask of `ensemble` and the mask of `relief`.
+/// Largest ratio between the areas of the masks of `ensemble` and `relief`, in either direction.
 const CLOSE_AREA: f64 = 1.12;
 /// Largest plausible ratio of the ink's area to the tops' area. `LEAST_INKED` is the largest plausible ratio of the
 /// tops' area to the ink's area. Beyond these ratios the tops' area is clamped.
@@ -209,8 +209,7 @@ mod tests {
 
     const SIDE: usize = 128;
 
-    /// Returns bars with sloping walls, from level 1 to 50,001 on the tops, and ink that spreads over part of the
-    /// walls.
+    /// Returns bars with sloping walls, with levels of 1 to 50,001, and ink that spreads over part of the walls.
     fn bars() -> (DepthMap, HalfCanvas, ReliefHeights) {
         let from_axis = |x: usize| (x % 32).abs_diff(16) as f64;
         let level = |x: usize, y: usize| {

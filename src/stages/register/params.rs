@@ -9,14 +9,13 @@ use crate::stages::score::SsimWindow;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegisterParams {
-    /// Largest ratio between the sizes of print and depth map, in either direction, that the pose search tries, 1..=2.
+    /// Largest ratio between the sizes of print and depth map that the pose search tries, in either direction, 1..=2.
     pub scale_band: f64,
     /// Working size of the refinement in pixels along the longest side of the area with data, 32..=1024.
     pub working_px: u32,
     /// Smoothing of the refinement in working pixels (sigma), 0..=10.
     pub smoothing_px: f64,
-    /// Whether the pose may scale the relief differently along two perpendicular axes, as paper shrinks across its
-    /// grain.
+    /// Whether the pose may scale the relief differently along two perpendicular axes (paper shrinks across its grain).
     pub anisotropic_scale: bool,
     /// Smallest depth below the tops that is tried as a threshold, as a share of the relief.
     pub threshold_min: f64,
@@ -25,14 +24,14 @@ pub struct RegisterParams {
     /// Ratio of the ink's area to the area of the stroke tops that printed it, 1 or more. `density` aims at the print's
     /// density divided by this ratio.
     pub ink_spread: f64,
-    /// Smallest confidence, 0..=1. A pair whose pose is less likely to be right is refused.
+    /// Smallest confidence in the pose, 0..=1, with which a pair is accepted.
     pub min_confidence: f64,
     /// SSIM window, used for the scores and for choosing the thresholds of `nl_ssim` and `ensemble`.
     pub window: SsimWindow,
     /// Number of angles over the full circle that the paper's method tries first, 4 or more.
     pub coarse_angles: u32,
-    /// Number of steps in which the paper's method then searches from three coarse steps before the best angle to three
-    /// after it, 2 or more.
+    /// Number of steps in the second search of the paper's method, 2 or more. The second search covers three coarse
+    /// steps on either side of the best angle.
     pub fine_angles: u32,
 }
 

@@ -22,8 +22,8 @@ const COMPARED: f64 = 0.42;
 const CLOSER: f64 = 0.67;
 /// If a competitor exceeds this share of the best score, the competitors are refined as closely as the best pose.
 const CLOSE: f64 = 0.75;
-/// Share of the best score that a competing pose of a symmetric character can reach. `fair_share` limits the plain
-/// share to this value.
+/// Share of the best score that a competing pose of a symmetric character can reach. In `fair_share`, the share on the
+/// whole area counts only up to this value.
 const SYMMETRIC: f64 = 0.9;
 /// Factor by which the pose is scaled down and up to start two further refinements, which should end at the same pose.
 const OTHER_SIZE: f64 = 1.08;
@@ -77,9 +77,9 @@ struct RefinedPose {
 }
 
 impl RefinedPose {
-    /// Returns the score that ranks poses: the correlation times the share of the tops that has printed. The share of
-    /// the ink with tops under it does not count, because strokes often break off after a print was made. Tops without
-    /// ink are rare.
+    /// Returns the score that ranks poses: the correlation times the share of the tops that ink covers. That share
+    /// ignores ink without tops, which is common because strokes break off after a print was made. Tops without ink are
+    /// rare.
     fn score(&self) -> f64 {
         self.found.score * self.overlap.moving_covered
     }
@@ -174,8 +174,8 @@ fn share(rival: Option<RefinedPose>, best: &RefinedPose) -> f64 {
 }
 
 /// Returns the score of a competitor divided by the score of the best pose, both on the area that the two poses have in
-/// common. A small common area may favour the best pose by chance. The plain share, limited to the share that symmetric
-/// characters reach, is therefore the lower bound.
+/// common. A small common area may favour the best pose by chance. The result is therefore at least the share on the
+/// whole area, limited to what symmetric characters reach.
 fn fair_share(thresholds: &SoftThresholds, rival: &RefinedPose, best: &RefinedPose) -> f64 {
     let [score, fair] =
         thresholds.compare_on_common_area([best, rival].map(|pose| (pose.nearest, &pose.found)));
@@ -219,8 +219,8 @@ impl<'a> WorkingImages<'a> {
 
     /// Refines a pose with the strokes of its threshold. Returns the refined pose and its spread, see
     /// [`Self::refine_at_three_sizes`]. Border strokes (walls, frame lines, neighbouring characters) are masked at
-    /// first, because they may be cut off differently in print and relief. If they agree, the last refinement uses them
-    /// too.
+    /// first, because they may be cut off differently in print and relief. If they agree, they are used in the last
+    /// refinement.
     fn refine_fully(&self, few: &ScaledImages, best: &RefinedPose) -> Option<(Affine2, f64)> {
         let strokes = few.stroke(best.cut);
         let both = [&few.ink, &strokes];
@@ -250,7 +250,7 @@ impl<'a> WorkingImages<'a> {
 
     /// Refines from the pose, from a smaller pose and from a larger pose. Returns the best result and the spread: the
     /// largest distance of the other results from the best one, as a share of the depth map's longest side. The spread
-    /// is large if strokes are few or broken, because refinement then leaves a pose where it starts.
+    /// is large if strokes are few or broken, because refinement then leaves a pose near its start.
     fn refine_at_three_sizes(
         &self,
         refiner: &Refiner,

@@ -29,10 +29,10 @@ pub struct Registered {
     pub outcome: RegisterOutcome,
     /// The print mask on the canvas, one for all metrics.
     pub canvas_print: Mask,
-    /// The depth mask of each metric on the canvas, in the order of the metrics of `outcome`.
+    /// The depth mask of each metric on the canvas, in the order of `outcome.metrics`.
     pub canvas_depths: Vec<Mask>,
-    /// Inputs of the confidence model for each metric, in the order of the metrics of `outcome`. Empty under the
-    /// paper's method. `cargo bench --bench accuracy -- --fit-confidence` fits the weights of the model to such inputs.
+    /// Inputs of the confidence model for each metric, in the order of `outcome.metrics`; empty under the paper's
+    /// method. `cargo bench --bench accuracy -- --fit-confidence` fits the weights of the model to such inputs.
     pub confidence_inputs: Vec<ConfidenceInputs>,
 }
 

@@ -81,8 +81,8 @@ fn highest(values: &[f64]) -> usize {
     (0..values.len()).max_by(order).unwrap_or(0)
 }
 
-/// Returns the position of the maximum, in steps from the first value. It is the maximum of the parabola through the
-/// highest value and its neighbours.
+/// Returns the position of the maximum of the parabola through the highest value and its neighbours, in steps from the
+/// first value.
 fn summit(values: &[f64]) -> f64 {
     let best = highest(values);
     let last = values.len().saturating_sub(1);

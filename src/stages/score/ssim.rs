@@ -15,8 +15,8 @@ const C2: f64 = 0.03 * 0.03;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SsimWindow {
-    /// Gaussian with a sigma of 1.5 px, truncated at 3.5 sigma (11 weights), and population covariance. The paper of
-    /// 2004 uses it, and scikit-image with `gaussian_weights=True, use_sample_covariance=False`.
+    /// Gaussian with a sigma of 1.5 px, truncated at 3.5 sigma (11 weights), and population covariance. Used by the
+    /// paper of 2004, and by scikit-image with `gaussian_weights=True, use_sample_covariance=False`.
     Gaussian,
     /// Uniform 7 x 7 px and sample covariance, the default of scikit-image.
     Uniform7,
@@ -364,7 +364,7 @@ mod tests {
     }
 
     // Computed on the masks above as float64 by scikit-image 0.26 `structural_similarity(a, b, data_range=1.0, ...)`.
-    // The structure factor is computed by `scipy.ndimage.gaussian_filter(sigma=1.5, truncate=3.5)` on the same crop.
+    // The structure factor is computed with `scipy.ndimage.gaussian_filter(sigma=1.5, truncate=3.5)` on the same crop.
     const GAUSSIAN: f64 = 0.508_712_369_326_821_2;
     const UNIFORM: f64 = 0.583_304_742_506_446_5;
     const STRUCTURE: f64 = 0.517_618_603_199_105_7;

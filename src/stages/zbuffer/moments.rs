@@ -20,7 +20,8 @@ pub(crate) struct Moments {
 }
 
 impl Moments {
-    /// Computes the moments of the triangles within the bulk. Returns `None` without faces or if their area is zero.
+    /// Computes the moments of the triangles within the bulk, the range of a scan without its specks. Returns `None`
+    /// without faces or if their area is zero.
     pub(crate) fn of(surface: &IndexedSurface) -> Option<Self> {
         if !surface.has_faces {
             return None;
@@ -75,7 +76,7 @@ impl BulkBox {
         }
     }
 
-    /// Adds the first `count` triangles of a block, without triangles that leave the bulk.
+    /// Adds the first `count` triangles of a block, except triangles that leave the bulk.
     #[inline(always)]
     fn add(&self, block: &TriangleBlock, count: usize, sums: &mut [[f32; LANES]; SUM_COUNT]) {
         let per_extent = (1.0 / self.extent) as f32;

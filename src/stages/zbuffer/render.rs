@@ -16,7 +16,7 @@ pub(crate) const NO_HIT: f32 = f32::NEG_INFINITY;
 /// Number of triangles per pixel above which few blocks contain a pixel centre.
 const SPARSE_TRIANGLES_PER_PIXEL: usize = 16;
 
-/// Side of the square that is drawn for a point, as a multiple of the mean point spacing. It leaves no holes.
+/// Side of the square that is drawn for a point, as a multiple of the mean point spacing. The squares leave no holes.
 const SPLAT_GROWTH: f64 = 1.5;
 
 impl IndexedSurface {
@@ -31,8 +31,8 @@ impl IndexedSurface {
         heights
     }
 
-    /// Renders the highest z, and the highest -z as seen from the back: with `plane_from_mesh` rotated by 180 degrees
-    /// about its x axis.
+    /// Renders the surface twice: the highest z, and the highest -z as seen from the back. For the back,
+    /// `plane_from_mesh` is rotated by 180 degrees about its x axis.
     pub(crate) fn render_both_sides(
         &self,
         plane_from_mesh: &Rigid3,
@@ -96,8 +96,8 @@ impl IndexedSurface {
         });
     }
 
-    /// Fills the same blocks as [`Self::fill_every_block`], faster if they are few. Few blocks are too far apart for
-    /// the hardware prefetcher, so a group of blocks is read before it is filled.
+    /// Fills the same blocks as [`Self::fill_every_block`], faster if few blocks contain a pixel centre. Such blocks
+    /// are too far apart for the hardware prefetcher, so a group of blocks is read before it is filled.
     fn fill_sparse_blocks(
         &self,
         rows: &[AffineForm; 3],

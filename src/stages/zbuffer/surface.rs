@@ -8,7 +8,7 @@ use crate::page_vec::PageVec;
 use crate::simd::dispatch;
 use crate::stages::robust_bounds::{Bounds, BulkRange, bulk_box};
 
-/// Largest number of blocks that are sampled for the winding. Tens of thousands of triangles are enough for it.
+/// Largest number of blocks that are sampled to decide the winding. Tens of thousands of triangles are enough.
 const WINDING_SAMPLE_BLOCKS: usize = 8_192;
 
 /// A surface that can be bounded and rendered along any direction.
@@ -116,7 +116,8 @@ impl IndexedSurface {
         [low, high].map(f64::from)
     }
 
-    /// Returns the indices of the blocks whose boxes reach lowest and highest. Ignores boxes that leave the bulk.
+    /// Returns the indices of the blocks whose boxes reach lowest and highest along `row`. Ignores boxes that leave the
+    /// bulk.
     fn extreme_blocks(&self, row: &AffineForm, bulk: &BulkRange) -> [usize; 2] {
         let (mut places, [mut low, mut high]) = ([0; 2], [f32::INFINITY, f32::NEG_INFINITY]);
         dispatch!({
@@ -135,8 +136,8 @@ impl IndexedSurface {
         places.map(|place| place.min(self.blocks.len() - 1))
     }
 
-    /// Returns the share of the area, projected along z of a frame, whose winding faces up, 0..=1. Returns `None` if
-    /// there are no faces or if their projected area is zero.
+    /// Returns the share of the projected area whose winding faces up, 0..=1. The area is projected along z of the
+    /// frame. Returns `None` if there are no faces or if the area is zero.
     pub(crate) fn upward_facing_share(&self, plane_from_mesh: &Rigid3) -> Option<f64> {
         if !self.has_faces {
             return None;

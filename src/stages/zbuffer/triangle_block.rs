@@ -92,7 +92,7 @@ pub(super) fn pack_block<T: Coordinate>(
     block
 }
 
-/// Returns the vertices of [`LANES`] triangles if they are consecutive, as in a triangle soup.
+/// Returns the vertices of [`LANES`] triangles if the vertices are consecutive, as in a triangle soup.
 #[inline(always)]
 fn consecutive_vertices<'a, T>(
     triangles: &[[u32; 3]],

@@ -2,7 +2,7 @@
 
 use crate::simd::{max_f32, min_f32};
 
-/// Largest width in columns at which all columns of a row are tested. The rows of wider triangles are clipped first.
+/// All columns of a row are tested in triangles of up to this many columns. Rows of wider triangles are clipped first.
 const MAX_UNCLIPPED_COLUMNS: usize = 12;
 
 /// Calls `emit` with the index of each tested pixel and the height of the triangle's plane at its centre, or NaN if the
