@@ -30,23 +30,23 @@ impl Catalog {
     /// Opens the catalog, or creates it.
     ///
     /// # Errors
-    /// When the file is not a catalog, is on a network file system, or the database refuses.
+    /// If the file is not a catalog or is on a network file system, or the database returns an error.
     pub async fn create(path: &Path) -> Result<Self> {
         Self::with_writer(path, true, CommitDelay::new()).await
     }
 
-    /// Opens an existing catalog to read and write.
+    /// Opens an existing catalog for reading and writing.
     ///
     /// # Errors
-    /// When there is no file, it is not a catalog or on a network file system, or the database refuses.
+    /// If the file does not exist, is not a catalog or is on a network file system, or the database returns an error.
     pub async fn open(path: &Path) -> Result<Self> {
         Self::with_writer(path, false, CommitDelay::new()).await
     }
 
-    /// Opens an existing catalog to read, also while a run is active.
+    /// Opens an existing catalog for reading, which works even while a run is active.
     ///
     /// # Errors
-    /// When there is no file or it is not a catalog.
+    /// If the file does not exist or is not a catalog, or the database returns an error.
     pub async fn open_read_only(path: &Path) -> Result<Self> {
         Ok(Self {
             reader_pool: open::reader_pool(path).await?,
@@ -75,7 +75,7 @@ impl Catalog {
         })
     }
 
-    /// Waits until everything sent is stored, checkpoints the log and closes the connections.
+    /// Waits until all requests sent so far are stored, checkpoints the write-ahead log and closes the connections.
     pub async fn close(self) {
         // Readers first: an open reader prevents a complete checkpoint.
         self.reader_pool.close().await;

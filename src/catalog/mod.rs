@@ -1,8 +1,8 @@
-//! The catalog: what is stored of every pair, and the queue of work. The only module with SQL.
+//! The catalog: a SQLite database with the data of every pair and the job queue. The only module with SQL.
 //!
-//! `db` holds connections, the writer task and errors; `queue` the jobs; `records` what is read and written of pairs;
-//! `audit` checks and repairs. One writer task owns the only write connection and commits requests in groups; reads
-//! have their own connections and work during a run. All times are arguments.
+//! `db` holds the connections, the writer task and the errors; `queue` the jobs; `records` the reads and writes of the
+//! pairs' data; `audit` the checks and repairs. One writer task owns the only write connection and commits requests in
+//! groups. Reads use connections of their own and work during a run. Callers pass the current time as an argument.
 
 mod audit;
 mod db;

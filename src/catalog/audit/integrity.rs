@@ -1,4 +1,4 @@
-//! Checks of the catalog: SQLite's own checks, the schema, counters and marks against rows, pages of rows.
+//! Checks of the catalog: SQLite's own checks, the schema, and the counters and dirty marks compared with the rows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,7 +24,8 @@ const LINES: usize = 50;
 pub struct Drift {
     /// Wrong counters.
     pub counters: Vec<CounterDrift>,
-    /// Fingerprints and dirty marks of jobs that do not agree with their results, one line each.
+    /// Descriptions of jobs whose fingerprint or dirty mark disagrees with their results, one line per kind of
+    /// disagreement.
     pub marks: Vec<String>,
 }
 
@@ -104,11 +105,11 @@ SELECT r.pair, r.stage, r.outcome, r.files, r.result_hash
 FROM json_each(?1) AS wanted CROSS JOIN stage_result AS r ON r.pair = wanted.value";
 
 impl Catalog {
-    /// Runs SQLite's integrity check; returns at most 50 lines, none when the file is sound. `quick` does not compare
-    /// indexes with tables.
+    /// Runs SQLite's integrity check. Returns at most 50 lines, and no line if the file is sound. With `quick`, indexes
+    /// are not compared with their tables.
     ///
     /// # Errors
-    /// When the check cannot be made.
+    /// If part of the file cannot be read, or SQLite returns an error other than a damaged file.
     pub async fn integrity(&self, quick: bool) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         match integrity(&mut conn, quick).await {
@@ -125,20 +126,20 @@ impl Catalog {
         }
     }
 
-    /// Returns rows with broken references, at most 50.
+    /// Describes rows that reference a missing row, at most 50 of them.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn broken_references(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         let lines = sqlx::query_scalar(REFERENCES).bind(LINES as i64);
         Ok(lines.fetch_all(&mut *conn).await?)
     }
 
-    /// Compares tables, indexes and triggers with this program's schema.
+    /// Compares tables, indexes and triggers with this program's schema. Returns one line for each difference.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn schema_differences(&self) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         let found = objects(&mut conn).await?;
@@ -157,12 +158,13 @@ impl Catalog {
         Ok(gone.chain(other).collect())
     }
 
-    /// Compares counters and marks with the rows. `quick` leaves out the marks, which need every pair's results.
+    /// Compares counters, and the fingerprints and dirty marks of jobs, with the rows. With `quick`, only the counters
+    /// are compared, because the rest needs every pair's results.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn drift(&self, quick: bool) -> Result<Drift> {
-        // One transaction, so that a concurrent run does not look like drift.
+        // Reads in one transaction, so that a concurrent run does not look like drift.
         let mut conn = self.snapshot().await?;
         let counters = counter_drift(&mut conn).await?;
         let mut marks = Vec::new();
@@ -185,10 +187,10 @@ impl Catalog {
         Ok(Drift { counters, marks })
     }
 
-    /// Returns the next pairs after a pair, at most `limit`; none at the end.
+    /// Returns at most `limit` pairs with ids above `after`, in the order of ids. Returns no pairs at the end.
     ///
     /// # Errors
-    /// When the database refuses or holds what it must not.
+    /// If the database returns an error, or a stored value is invalid.
     pub async fn audit_page(
         &self,
         after: Option<PairId>,
@@ -246,7 +248,7 @@ pub(crate) async fn integrity(conn: &mut SqliteConnection, quick: bool) -> Resul
     Ok(lines)
 }
 
-/// Returns whether a line of SQLite's check reports an I/O error, which says nothing about the page.
+/// Returns whether a line of SQLite's check reports an I/O error, which does not mean that the page is damaged.
 fn is_unread(line: &str) -> bool {
     let code = line.rsplit_once("error code=").map(|(_, code)| code.trim());
     let code: Option<i64> = code.and_then(|code| code.parse().ok());

@@ -1,4 +1,5 @@
-//! Repairs what a check found. Only without an active run; verdicts and the history of results are never changed.
+//! Repairs of the damage that a check found. They need the exclusive run lock and never change verdicts or the history
+//! of results.
 
 use serde_json::json;
 use sqlx::{AssertSqlSafe, SqliteConnection};
@@ -20,8 +21,8 @@ const NEW_JOBS: &str = "
 INSERT INTO job (pair, stage, status)
 SELECT value ->> 0, 0, 0 FROM json_each(?1) WHERE NOT EXISTS (SELECT 1 FROM job WHERE pair = value ->> 0)";
 
-/// Sends jobs back to a stage, never forward, also leased ones: no living process can hold the lease, and the new token
-/// fences out one that does.
+/// Sends jobs back to a stage, never forward, even if they are leased. A repair runs only while no other process works
+/// on the project, so nobody should use the lease. If a process does, the new token makes its writes fail.
 pub(crate) const RESTORE: &str = concat!(
     "
 UPDATE job SET stage = min(stage, item.value ->> 1), status = 0, run_at = NULL, prio = 0,
@@ -55,20 +56,21 @@ const MARK_DIRTY: &str = concat!(
 );
 
 impl Catalog {
-    /// Sends pairs back, each to a stage; a pair without a job gets one. The counters must be right already: see
+    /// Sends each pair back to its stage, and adds a job to a pair without one. The counters must be right already: see
     /// [`Catalog::rebuild_counters`].
     ///
     /// # Errors
-    /// When the database refuses; then nothing is changed.
+    /// If the database returns an error. In that case nothing is changed.
     pub async fn restore(&self, pairs: Vec<(PairId, Stage)>) -> Result<()> {
         self.in_transaction(move |conn| Box::pin(async move { restore(conn, &pairs).await }))
             .await
     }
 
-    /// Sets each job's fingerprint and dirty mark by its results, and every counter to its number of jobs.
+    /// Sets each job's fingerprint from its results, marks jobs with inconsistent results dirty, and sets every counter
+    /// to its number of jobs.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn rebuild_counters(&self) -> Result<()> {
         self.in_transaction(|conn| {
             Box::pin(async move {
@@ -86,10 +88,10 @@ impl Catalog {
         .await
     }
 
-    /// Rebuilds every index from its table; returns what SQLite finds wrong afterwards.
+    /// Rebuilds every index from its table. Returns the faults that SQLite finds afterwards.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn rebuild_indexes(&self) -> Result<Vec<String>> {
         self.in_transaction(|conn| {
             Box::pin(async move {
@@ -100,10 +102,10 @@ impl Catalog {
         .await
     }
 
-    /// Recreates missing indexes and triggers. Tables do not change.
+    /// Recreates missing indexes and triggers. Does not change tables.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn restore_schema(&self) -> Result<()> {
         let wanted = wanted_objects().await?;
         self.in_transaction(move |conn| {

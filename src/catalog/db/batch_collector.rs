@@ -13,7 +13,8 @@ const BATCH: usize = 256;
 /// The requests collected so far.
 struct BatchCollector {
     batch: Batch,
-    /// How long to wait for more requests; `None` when somebody waits for a reply.
+    /// Time until which to wait for more requests. `None` if a caller waits for a reply, so that the commit must not be
+    /// delayed.
     until: Option<Instant>,
     /// A message that is not a request ends the batch.
     other: Option<Message>,
@@ -37,8 +38,9 @@ impl BatchCollector {
     }
 }
 
-/// Collects the batch that begins with a message, and the message after it that is not a request. Yields first, because
-/// senders that the last commit answered often send their next request at once.
+/// Collects the batch that begins with `first`. Returns the batch, and the message that ended the batch if that message
+/// is not a request. Yields to other tasks before each look into the inbox, because senders that have just received a
+/// reply often send their next request immediately.
 pub(crate) async fn collect(
     first: Message,
     delay: &CommitDelay,
@@ -97,12 +99,12 @@ mod tests {
         Request::Heartbeat(heartbeat, oneshot::channel().0)
     }
 
-    /// Counts the requests in the batch that begins with the first message, when nothing else ever arrives.
+    /// Returns the number of requests in the batch that begins with the first message, if no further message arrives.
     async fn gathered(messages: Vec<Message>) -> usize {
         gathered_later(messages, Vec::new()).await
     }
 
-    /// Like `gathered`, where further messages arrive while the collector waits.
+    /// Like `gathered`, but the `later` messages arrive while the collector waits.
     async fn gathered_later(messages: Vec<Message>, later: Vec<Message>) -> usize {
         let delay = CommitDelay::of(Duration::from_hours(1));
         let (sender, mut inbox) = mpsc::channel(messages.len());

@@ -16,7 +16,7 @@ const QUIET_WAIT: Duration = Duration::from_secs(5);
 /// Time between two attempts: SQLite refuses some locks at once.
 const RETRY_EVERY: Duration = Duration::from_millis(5);
 
-/// Retries while the catalog is locked, so that "busy" does not reach a caller too early.
+/// Retries an operation while the catalog is locked, for at most `LONGEST_WAIT`.
 pub(crate) struct BusyRetry<'p> {
     catalog: &'p Path,
     begun: Instant,
@@ -33,7 +33,8 @@ impl<'p> BusyRetry<'p> {
         }
     }
 
-    /// Returns what to await before the next attempt; `None` after the last one.
+    /// Returns the sleep to await before the next attempt. Returns `None` if the outcome is not a lock error, or the
+    /// longest wait is over.
     pub(crate) fn wait<T>(&mut self, outcome: &Result<T>) -> Option<Sleep> {
         let error = outcome.as_ref().err()?;
         let waited = self.begun.elapsed();
@@ -52,7 +53,8 @@ impl<'p> BusyRetry<'p> {
     }
 }
 
-/// Evaluates a fallible expression until the catalog is not locked or the longest wait is over.
+/// Evaluates a fallible expression repeatedly while the catalog is locked, for at most the longest wait. The value is
+/// the last outcome.
 macro_rules! retry_while_busy {
     ($catalog:expr, $attempt:expr) => {{
         let mut retry = $crate::catalog::db::busy_retry::BusyRetry::begin($catalog);
@@ -88,7 +90,7 @@ mod tests {
         options.connect().await.expect("a connection")
     }
 
-    /// Returns the error of a write while another connection has the database locked.
+    /// Returns the error of a write that fails because another connection has the database locked.
     async fn busy() -> Result<()> {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("catalog.sqlite");

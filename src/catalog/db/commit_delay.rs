@@ -1,4 +1,4 @@
-//! The delay of a commit whose requests nobody waits for, so that later requests share it.
+//! The delay of a commit. A commit is delayed, so that later requests share it, if no caller waits for its requests.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use tokio::time::Instant;
 
-/// Longest delay. A process that is killed loses what it finished in that time.
+/// Longest delay. A process that is killed loses the stages it finished during the delay.
 const LONGEST: Duration = Duration::from_millis(250);
 
 /// The delay, and how many callers currently forbid it.

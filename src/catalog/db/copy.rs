@@ -11,15 +11,16 @@ use crate::catalog::db::open::{Identity, identity};
 use crate::catalog::{Catalog, CatalogError, Result};
 
 impl Catalog {
-    /// Copies the catalog as of one moment to a new file and verifies the copy. Nothing is synced to disk.
+    /// Copies the catalog, as it was at one moment, to a new file and verifies the copy. Does not sync the file to
+    /// disk.
     ///
     /// # Errors
-    /// When the database or the disk refuses, or the copy is damaged; a partial copy is left behind.
+    /// If the database or the disk returns an error, or the copy is damaged. A partial copy is left behind.
     pub async fn copy_to(&self, file: &Path) -> Result<()> {
         let Some(name) = file.to_str() else {
             return Err(CatalogError::NotUtf8(file.to_owned()));
         };
-        // VACUUM INTO is refused under `query_only`, so this connection leaves the pool.
+        // SQLite refuses VACUUM INTO under `query_only`, so this connection is taken out of the pool.
         let mut conn = self.read_conn().await?.detach();
         sqlx::query("PRAGMA query_only = 0")
             .execute(&mut conn)

@@ -19,12 +19,12 @@ pub enum CatalogErrorKind {
     Busy,
     /// An I/O error.
     Disk,
-    /// A write violated a constraint: rows or counters already contradict each other.
+    /// A write violated a constraint, because stored rows or counters already contradict each other.
     Contradiction,
 }
 
 impl CatalogErrorKind {
-    /// Returns the kind of a SQLite result code; extended codes count as their base code.
+    /// Returns the kind of a SQLite result code. Extended codes have the kind of their base code.
     pub(crate) const fn of_code(code: i64) -> Option<Self> {
         match code & 0xff {
             // SQLITE_PROTOCOL: a reader lost the race for the log's locks too often.

@@ -1,4 +1,4 @@
-//! One group commit: the requests by kind, one statement for all requests of a kind, two round trips in all.
+//! One group commit: requests grouped by kind and stored in one transaction, with two round trips to SQLite's thread.
 
 use std::sync::Arc;
 
@@ -60,7 +60,8 @@ pub(crate) struct BatchReply {
     claims: Vec<Vec<Lease>>,
 }
 
-/// The statements of the first round trip, which change workers and jobs as far as leases hold.
+/// The statements of the first round trip, which change workers and jobs. A write under a lease changes its job only if
+/// the lease still holds.
 struct JobStatements {
     heartbeats: Vec<Statement<(i64,)>>,
     advanced: Option<Statement<FencedRow>>,
@@ -88,8 +89,8 @@ impl Batch {
             + self.claims.0.len()
     }
 
-    /// Runs the requests in one transaction: heartbeats, checkpoints, failures, releases, claims. After an error that
-    /// transaction may still be open.
+    /// Runs the requests in one transaction, in the order heartbeats, checkpoints, failures, releases, claims. After an
+    /// error, the transaction may still be open, so the caller must roll it back.
     pub(crate) async fn apply(&self, conn: &mut SqliteConnection) -> Result<BatchReply> {
         let mut script = Script::default();
         script.execute("BEGIN IMMEDIATE");
@@ -122,7 +123,7 @@ impl Batch {
         })
     }
 
-    /// Adds the statements that store results, failures and counters; returns the replies.
+    /// Adds the statements that store results, failures and counters to the script. Returns the replies.
     fn add_records(
         &self,
         script: &mut Script,
@@ -179,7 +180,7 @@ impl Batch {
         self.claims.refuse(error);
     }
 
-    /// Splits the batch into one batch per request, in the order of execution.
+    /// Splits the batch into batches of one request each, in the order of execution.
     pub(crate) fn split(self) -> Vec<Self> {
         let heartbeats = self
             .heartbeats

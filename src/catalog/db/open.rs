@@ -38,7 +38,7 @@ fn options(path: &Path) -> SqliteConnectOptions {
         .pragma("temp_store", "MEMORY")
 }
 
-/// Opens the write connection. Creates file and schema when `create` is set.
+/// Opens the write connection. If `create` is set, creates the file and the schema if they do not exist.
 pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnection> {
     network_fs::refuse(path)?;
     check_file(path, create)?;
@@ -70,7 +70,7 @@ pub(crate) async fn write_conn(path: &Path, create: bool) -> Result<SqliteConnec
 }
 
 async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
-    // The writer task checkpoints the log itself, so that no commit waits for it.
+    // The writer task checkpoints the write-ahead log itself, so that no commit waits for a checkpoint.
     let mut conn = options(path)
         .create_if_missing(create)
         .journal_mode(SqliteJournalMode::Wal)
@@ -82,8 +82,8 @@ async fn connect(path: &Path, create: bool) -> Result<SqliteConnection> {
     Ok(conn)
 }
 
-/// Opens read connections. In WAL mode they never wait for the writer, nor the writer for them. Where nothing can be
-/// written, not even the shared-memory file, the catalog is opened as an immutable file.
+/// Opens read connections. In WAL mode, readers and the writer never wait for each other. If nothing can be written,
+/// not even the shared-memory file, the catalog is opened as an immutable file.
 pub(crate) async fn reader_pool(path: &Path) -> Result<SqlitePool> {
     check_file(path, false)?;
     let (pool, found) = match shared(path).await {
@@ -106,7 +106,8 @@ async fn shared(path: &Path) -> Result<(SqlitePool, Identity)> {
     retry_while_busy!(path, pool(options(path).pragma("query_only", "1")).await)
 }
 
-/// Opens a file that cannot change. Only a log that was checkpointed may be ignored.
+/// Opens the catalog as an immutable file. SQLite ignores the write-ahead log of an immutable file, so this fails if
+/// the log still has content.
 async fn frozen(path: &Path, error: CatalogError) -> Result<(SqlitePool, Identity)> {
     let log = sidecar(path, "-wal");
     match std::fs::metadata(&log) {
@@ -129,8 +130,8 @@ async fn pool(options: SqliteConnectOptions) -> Result<(SqlitePool, Identity)> {
     Ok((pool, found))
 }
 
-/// Checks the file before SQLite opens it, because SQLite takes an empty file for a new database. Does not open the
-/// file, because closing it would drop the locks of this process's connections.
+/// Checks the file before SQLite opens it, because SQLite treats an empty file as a new database. This function does
+/// not open the file, because closing it again would drop the locks of this process's connections.
 fn check_file(path: &Path, create: bool) -> Result<()> {
     match std::fs::metadata(path) {
         Ok(meta) if meta.is_dir() => Err(CatalogError::IsDirectory(path.to_owned())),
@@ -149,7 +150,7 @@ async fn create_schema(conn: &mut SqliteConnection, path: &Path) -> Result<()> {
         Identity::Other(number) => return Err(wrong_identity(path, number)),
     }
     let outcome = MIGRATOR.run(&mut *conn).await;
-    // Another process may have created the schema at the same time; then ours failed, and the database is ready.
+    // If another process created the schema at the same time, the migration failed here, but the database is ready.
     if identity(conn).await? == Identity::Current {
         return Ok(());
     }
@@ -216,7 +217,7 @@ fn is_read_only(error: &CatalogError) -> bool {
 /// Replaces the error when the file is not a database, or is corrupt.
 fn unreadable(path: &Path, error: CatalogError) -> CatalogError {
     match error.kind() {
-        // No connection can be open on a file that is not a database, so it may be read here.
+        // A file that is not a database has no open connection, so opening and closing it here drops no locks.
         Some(CatalogErrorKind::NotADatabase) => CatalogError::Foreign {
             path: path.to_owned(),
             reason: kind(path).to_owned(),

@@ -1,4 +1,4 @@
-//! Messages to the writer task: requests that share a commit, separate transactions, and where replies go.
+//! Messages to the writer task: requests that share a commit, transactions of their own, and the senders for replies.
 
 use std::pin::Pin;
 
@@ -13,7 +13,7 @@ use crate::catalog::queue::lease::{Lease, StageFailure};
 /// Where a reply goes.
 pub(crate) type Reply<T> = oneshot::Sender<Result<T>>;
 
-/// A request that may share a commit with others. A write under a lease is answered with whether the lease still held.
+/// A request that may share a commit with others. The reply to a write under a lease says whether the lease still held.
 pub(crate) enum Request {
     Heartbeat(Heartbeat, Reply<bool>),
     Checkpoint(Box<LeasedCheckpoints>, Reply<bool>),
@@ -32,7 +32,7 @@ pub(crate) type TransactionTask =
 pub(crate) enum Message {
     /// Joins the next group commit.
     Grouped(Request),
-    /// Joins the next group commit, which may be delayed for others to share it.
+    /// Joins the next group commit, which may be delayed so that later requests share it.
     Deferrable(Request),
     /// Ends the delay of the next commit, because somebody waits for it.
     Flush,

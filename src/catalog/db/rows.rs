@@ -1,4 +1,4 @@
-//! Reads domain types from columns; a value that is not allowed is an error.
+//! Reads domain types from columns. A value that the type does not allow is an error.
 
 use serde_json::{Map, Value};
 use sqlx::error::BoxDynError;
@@ -10,7 +10,8 @@ use crate::domain::{
     PairName, PrintFromMesh, Reason, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
 };
 
-/// Implements `Decode` for each type from the type of its column and a function that converts it.
+/// Implements `Type` and `Decode` for each listed type, given the type of its column and a function that converts the
+/// column's value.
 macro_rules! decode {
     ($($type:ty: $column:ty = $convert:expr;)+) => {$(
         impl Type<Sqlite> for $type {

@@ -1,4 +1,5 @@
-//! Several statements in one round trip to SQLite's thread: a trip costs about 30 us, more than most statements.
+//! Runs several statements in one round trip to SQLite's thread. A round trip costs about 30 us, more than most
+//! statements.
 
 use std::fmt;
 use std::marker::PhantomData;
@@ -13,9 +14,9 @@ use sqlx::{
 
 use crate::catalog::db::error::Result;
 
-/// Statements with their parameters, run in order until one fails.
+/// Statements with their parameters. They run in order, and the first error ends the script.
 ///
-/// Parameters are written as plain `?`, which sqlx binds in order across all statements.
+/// Parameters are written as plain `?`. sqlx binds them in order across all statements.
 #[derive(Debug, Default)]
 pub(crate) struct Script {
     sql: String,
@@ -59,7 +60,8 @@ impl Script {
         Ok(bound.map_err(sqlx::Error::Encode)?)
     }
 
-    /// Adds a statement over a JSON array of items; adds nothing for no items.
+    /// Adds a statement whose parameter is a JSON array of the items. Returns `None`, and adds nothing, if there are no
+    /// items.
     pub(crate) fn add_over<T>(
         &mut self,
         sql: &'static str,

@@ -15,7 +15,7 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::group_commit::{Batch, BatchReply};
 use crate::catalog::db::request::{Message, Work};
 
-/// Commits after which the write-ahead log is checkpointed even under load; about 4 MiB of log.
+/// Number of commits after which the write-ahead log is checkpointed even under load. They write about 4 MiB of log.
 const COMMITS_PER_CHECKPOINT: u32 = 128;
 /// Idle time after which the write-ahead log is checkpointed.
 const IDLE: Duration = Duration::from_millis(250);
@@ -71,8 +71,9 @@ pub(crate) async fn run(
     }
 }
 
-/// Commits a batch and replies. After a failure each request is tried alone, so that one that cannot be stored does not
-/// fail the others; an error of the lock or the disk fails all of them.
+/// Commits a batch and replies to its requests. If the commit fails because of a request, each request is committed on
+/// its own, so that an invalid request does not fail the others. If it fails because of the file, such as a lock or a
+/// disk error, all requests fail.
 async fn commit(conn: &mut SqliteConnection, path: &Path, batch: Batch) {
     match apply(conn, path, &batch).await {
         Ok(answers) => batch.answer(answers),
@@ -121,7 +122,7 @@ async fn wal_checkpoint(conn: &mut SqliteConnection, pragma: &'static str) {
     }
 }
 
-/// Runs `work` in its own transaction: commits after success, rolls back after an error.
+/// Runs `work` in a transaction of its own, which is committed on success and rolled back on an error.
 pub(crate) async fn run_transaction<T>(
     conn: &mut SqliteConnection,
     path: &Path,

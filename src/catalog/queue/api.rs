@@ -10,27 +10,27 @@ use crate::catalog::{Catalog, Result};
 use crate::domain::{UnixMillis, WorkerId};
 
 impl Catalog {
-    /// Leases pairs to work on; fewer than requested, or none, when no more are ready.
+    /// Leases pairs to work on. Returns fewer leases than requested, or none, if fewer pairs are ready.
     ///
     /// # Errors
-    /// When the database refuses; then nothing is leased.
+    /// If the database returns an error. In that case nothing is leased.
     pub async fn claim(&self, request: ClaimRequest) -> Result<Vec<Lease>> {
         self.grouped(|reply| Request::Claim(request, reply)).await
     }
 
-    /// Gives a lease back as if it had never been taken; `false` when it was already lost.
+    /// Gives a lease back as if it had never been taken. Returns `false` if the lease was already lost.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn release(&self, lease: Lease) -> Result<bool> {
         self.grouped(|reply| Request::Release(lease, reply)).await
     }
 
-    /// Stores a worker's heartbeat; `false` when the last one is from before `alive_since` or the worker has ended.
-    /// Then its leases are over, and it must register again.
+    /// Stores a worker's heartbeat. Returns `false`, and stores nothing, if the worker has ended or its previous
+    /// heartbeat is older than `alive_since`. In that case its leases are void and it must register again.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn heartbeat(
         &self,
         worker: WorkerId,
@@ -46,12 +46,12 @@ impl Catalog {
             .await
     }
 
-    /// Stores finished stages in the order they were computed, in one transaction, and advances the job. The artifacts
-    /// must be on disk already. The commit may be delayed, for other requests to share it, while nobody is
-    /// [`Catalog::waiting`].
+    /// Stores finished stages, in the order they were computed, in one transaction and advances the job. The artifacts
+    /// must be on disk already. The commit may be delayed so that other requests share it; [`Catalog::waiting`]
+    /// prevents the delay.
     ///
     /// # Errors
-    /// When the database refuses; then nothing is stored, and the lease lasts until it is recovered.
+    /// If the database returns an error. In that case nothing is stored, and the lease remains until it is recovered.
     pub async fn checkpoint(
         &self,
         lease: Lease,
@@ -78,10 +78,10 @@ impl Catalog {
         })
     }
 
-    /// Stores a failed stage; `false` when the lease was lost and nothing was stored.
+    /// Stores a failed stage. Returns `false`, and stores nothing, if the lease was lost.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn fail(&self, lease: Lease, failure: StageFailure) -> Result<bool> {
         self.grouped(|reply| Request::Fail(Box::new((lease, failure)), reply))
             .await
@@ -90,25 +90,27 @@ impl Catalog {
     /// Reads the counters of jobs.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn counters(&self) -> Result<JobCounts> {
         let mut conn = self.read_conn().await?;
         Ok(by_status(counters(&mut conn).await?))
     }
 
-    /// Counts every job; equal to [`Catalog::counters`], or the catalog is damaged.
+    /// Counts all jobs from their rows. Unless the catalog is damaged, the result equals [`Catalog::counters`] at the
+    /// same moment.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn recount(&self) -> Result<JobCounts> {
         let mut conn = self.snapshot().await?;
         Ok(by_status(count_jobs(&mut conn).await?))
     }
 
-    /// Commits what was sent at once, and without delay what is sent while the result lives.
+    /// Commits all pending requests without delay, and does the same with later requests until the returned value is
+    /// dropped.
     ///
     /// # Errors
-    /// When the catalog is closed.
+    /// If the catalog is closed.
     pub async fn waiting(&self) -> Result<Waiting> {
         let waiting = Waiting::new(&self.delay);
         self.send(Message::Flush).await?;

@@ -11,11 +11,11 @@ use crate::catalog::queue::lease::{
 use crate::domain::{JobStatus, PairId, Stage};
 use crate::failpoint::{self, Point};
 
-/// A lease and the stages to be stored under it, in the order they were computed.
+/// A lease, and the stages to store under that lease in the order they were computed.
 pub(crate) type LeasedCheckpoints = (Lease, Vec<StageCheckpoint>);
 
-/// Advances jobs whose lease still holds and whose worker is alive. A stage that succeeds clears the suspicion that the
-/// pair kills workers. A result that does not follow on the one before marks the job dirty.
+/// Advances jobs whose lease still holds and whose worker is alive. A stored stage resets the count of crashes blamed
+/// on the pair. A job becomes dirty if its new results do not continue the stored ones: see `advanced_job`.
 pub(crate) const ADVANCE: &str = "
 UPDATE job SET stage = item.value ->> 'next', status = item.value ->> 'status',
     worker = iif(item.value ->> 'next' = 4, NULL, worker), deadline = item.value ->> 'deadline',
@@ -89,7 +89,7 @@ pub(crate) const ROWS: [&str; 6] = [
     CLEAR_FAILURE,
 ];
 
-/// Adds the advance of jobs to a script; it returns those whose lease still held.
+/// Adds to a script the statement that advances jobs. The statement returns the jobs whose lease still held.
 pub(crate) fn add_advance<'i>(
     script: &mut Script,
     checkpoints: impl Iterator<Item = &'i LeasedCheckpoints>,
@@ -149,8 +149,9 @@ fn key_after(stage: &StageCheckpoint) -> CounterKey {
     CounterKey::new(cursor, status, Some(stage.fingerprint.0))
 }
 
-/// Builds the item of [`ADVANCE`] for all stages that are stored at once; `None` for no stage. `first` is the fingerprint
-/// whose upstream must be the fingerprint of the result before, and `mixed` whether the stages do not follow on each other.
+/// Builds the item of [`ADVANCE`] for the stages of a job, or returns `None` if there are no stages. `first` is the
+/// first fingerprint from `chain`: its upstream must be the fingerprint that the job has stored. `mixed` is 1 if the
+/// stages are not consecutive.
 fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<Value> {
     let last = stages.last()?;
     let after = key_after(last);
@@ -166,8 +167,8 @@ fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<Value> {
     }))
 }
 
-/// Returns the fingerprint of the first stage, `None` if that is the first stage of all, and whether the stages follow
-/// on each other.
+/// Considers the stages from the last `Stage::Fit` on, or all stages if `Fit` is not among them. Returns the
+/// fingerprint of the first (`None` if it is `Fit`), and whether each stage is the direct successor of the one before.
 fn chain(stages: &[StageCheckpoint]) -> (Option<FingerprintId>, bool) {
     let restart = stages.iter().rposition(|one| one.stage == Stage::Fit);
     let chain = &stages[restart.unwrap_or(0)..];

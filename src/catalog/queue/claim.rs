@@ -25,12 +25,12 @@ pub struct ClaimRequest {
     pub among: Option<PairSelection>,
     /// Deadline of the first stage.
     pub deadline: UnixMillis,
-    /// Lease nothing if the worker's last heartbeat is older than this, by its own clock.
+    /// Oldest heartbeat of the worker, by its own clock, with which it may still lease.
     pub alive_since: UnixMillis,
 }
 
 impl ClaimRequest {
-    /// Requests ordinary pairs with any stages left, whatever the worker's last heartbeat.
+    /// Requests pairs that need not run exclusively, with any next stage, however old the worker's last heartbeat is.
     pub const fn new(worker: WorkerId, slots: usize, deadline: UnixMillis) -> Self {
         Self {
             worker,
@@ -52,8 +52,8 @@ pub(crate) struct Heartbeat {
     pub(crate) alive_since: UnixMillis,
 }
 
-/// Leases the first ready jobs in the order of the index `job_ready`. With a bare `?` as the limit SQLite would prepare
-/// the statement anew each time, because its planner reads the value.
+/// Leases the first ready jobs in the order of the index `job_ready`. The limit is `+?`: with a bare `?`, SQLite would
+/// prepare the statement again each time, because its planner reads the value of the limit.
 pub(crate) const CLAIM: &str = "
 UPDATE job SET status = 1, worker = ?, deadline = ?, token = token + 1, attempt = attempt + 1
 WHERE pair IN (
@@ -80,11 +80,11 @@ WHERE job.pair = item.value ->> 0 AND job.worker = item.value ->> 1 AND job.toke
     AND job.status = 1
 RETURNING pair, token";
 
-/// Stores a heartbeat, unless the worker has ended or its last heartbeat is too old: others may have taken it for dead.
+/// Stores a heartbeat, unless the worker has ended or its last heartbeat is so old that others may consider it dead.
 pub(crate) const HEARTBEAT: &str = "
 UPDATE worker SET heartbeat = ? WHERE id = ? AND ended IS NULL AND heartbeat >= ? RETURNING id";
 
-/// Adds a heartbeat to a script; it returns the worker's id when it was stored.
+/// Adds a heartbeat to a script. The statement returns the worker's id if the heartbeat is stored.
 pub(crate) fn add_heartbeat(
     script: &mut Script,
     heartbeat: Heartbeat,

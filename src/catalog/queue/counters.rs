@@ -1,4 +1,4 @@
-//! Numbers of jobs by cursor, status and fingerprint, changed in the same transaction as the jobs.
+//! Numbers of jobs by cursor, status and fingerprint. They change in the same transaction as the jobs.
 
 use std::collections::BTreeMap;
 

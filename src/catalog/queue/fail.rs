@@ -58,13 +58,14 @@ pub(crate) struct FailedRow {
     key: CounterKey,
 }
 
-/// Returns the row of the job under a lease; `None` when the lease was lost.
+/// Returns the row of the job that was leased, or `None` if the lease was lost.
 pub(crate) fn row_of<'r>(lease: &Lease, rows: &'r [FailedRow]) -> Option<&'r FailedRow> {
     rows.iter()
         .find(|row| (row.pair, row.token) == (lease.pair.0, lease.token))
 }
 
-/// Adds the new states of failed jobs to a script; it returns those whose lease still held.
+/// Adds to a script the statement that sets the new states of failed jobs. The statement returns the jobs whose lease
+/// still held.
 pub(crate) fn add_failures<'i>(
     script: &mut Script,
     failures: impl Iterator<Item = &'i (Lease, StageFailure)>,

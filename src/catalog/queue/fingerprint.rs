@@ -1,4 +1,4 @@
-//! Fingerprints of settings: what the result of a stage depends on besides its inputs.
+//! Fingerprints of settings. The settings are what the result of a stage depends on besides its inputs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -25,8 +25,8 @@ pub struct Fingerprint {
 pub struct Fingerprints([Fingerprint; 4]);
 
 impl Fingerprints {
-    /// Computes the fingerprints of each stage's fields. A stage's hash includes the previous one, so that a changed
-    /// setting changes the fingerprints of its stage and of all later ones.
+    /// Computes the fingerprint of each stage from its fields. A stage's hash includes the previous stage's hash, so a
+    /// changed setting changes the fingerprints of its stage and of all later stages.
     pub fn new(fields: impl Fn(Stage) -> Value) -> Self {
         let mut upstream: Option<ContentHash> = None;
         Self(Stage::ALL.map(|stage| {
@@ -43,7 +43,7 @@ impl Fingerprints {
         &self.0[stage.index()]
     }
 
-    /// Returns the hashes on one line, for processes to compare; [`Catalog::changes_from`] reads it.
+    /// Returns the four hashes on one line, which another process can compare with [`Catalog::changes_from`].
     pub fn hash_line(&self) -> String {
         let hashes = self.0.each_ref().map(|fingerprint| fingerprint.hash);
         hashes.map(ContentHash::to_hex).join(" ")
@@ -70,16 +70,16 @@ const INSERT: &str = "
 INSERT INTO fingerprint (stage, hash, fields, upstream) VALUES (?1, ?2, ?3, ?4)
 ON CONFLICT (hash) DO UPDATE SET upstream = excluded.upstream RETURNING id";
 
-/// Counters of the jobs whose last result has a fingerprint, one per status.
+/// Adds the counters for jobs whose last result has a given fingerprint, one counter for each status.
 pub(crate) const ADD_COUNTERS: &str = "
 INSERT INTO counter (stage, status, fingerprint, n) SELECT ?1, value, ?2, 0 FROM json_each('[0,1,2,3,4]') WHERE true
 ON CONFLICT DO NOTHING";
 
 impl Catalog {
-    /// Stores the current fingerprints where they are new; returns their ids.
+    /// Stores the fingerprints that are not stored yet. Returns the ids of all four.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn register_fingerprints(
         &self,
         fingerprints: &Fingerprints,
@@ -109,10 +109,11 @@ impl Catalog {
         .await
     }
 
-    /// Compares the [`Fingerprints::hash_line`] of another process with these fingerprints; unknown hashes are skipped.
+    /// Returns the settings that differ between another process, given its [`Fingerprints::hash_line`], and these
+    /// fingerprints. Hashes that are not stored are skipped.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn changes_from(
         &self,
         hash_line: &str,
@@ -145,7 +146,8 @@ pub(crate) async fn known(
     Ok(ids)
 }
 
-/// Returns the ids as a JSON array by stage for `json_each`; -1, which no result has, for unknown ones.
+/// Returns the ids of the fingerprints by stage, as a JSON array for `json_each`. A fingerprint that is not stored has
+/// the id -1, which no result has.
 pub(crate) async fn current_json(
     conn: &mut SqliteConnection,
     fingerprints: &Fingerprints,
@@ -162,7 +164,7 @@ pub(crate) async fn fields_of(conn: &mut SqliteConnection, id: FingerprintId) ->
     Ok(fields)
 }
 
-/// Every stored fingerprint with its stage and upstream, compared with the current ones.
+/// All stored fingerprints with their stage and upstream fingerprint, and the ids of the current fingerprints.
 pub(crate) struct FingerprintChains {
     /// Stage and upstream by id.
     stored: BTreeMap<FingerprintId, (Stage, Option<FingerprintId>)>,
@@ -170,7 +172,7 @@ pub(crate) struct FingerprintChains {
 }
 
 impl FingerprintChains {
-    /// Reads all fingerprints; there are four per combination of settings that was ever used.
+    /// Reads all fingerprints. There are at most four for each combination of settings that was ever used.
     pub(crate) async fn load(
         conn: &mut SqliteConnection,
         fingerprints: &Fingerprints,
@@ -187,7 +189,8 @@ impl FingerprintChains {
         })
     }
 
-    /// Returns the earliest stage in the chain of a fingerprint that is not the current one, with its fingerprint.
+    /// Follows the chain of a fingerprint back to the first stage. Returns the earliest stage whose fingerprint is not
+    /// the current one, with that old fingerprint. Returns `None` if all are current.
     pub(crate) fn first_change(&self, id: i64) -> Option<(Stage, FingerprintId)> {
         let mut change = None;
         let mut next = Some(FingerprintId(id));

@@ -1,6 +1,6 @@
 //! SQL fragments that several statements of the queue share.
 
-/// The fingerprint of the result before a stage, for a job that goes back to that stage.
+/// Selects the fingerprint that a job stores when it goes back to a stage: that of the result before the stage.
 macro_rules! fingerprint_before {
     ($stage:literal) => {
         concat!(
@@ -12,7 +12,7 @@ macro_rules! fingerprint_before {
 }
 pub(crate) use fingerprint_before;
 
-/// Results of a job that do not agree with each other or with the pair's inputs.
+/// Selects results of a job that disagree with each other or with the pair's inputs.
 macro_rules! inconsistent {
     () => {
         "SELECT 1 FROM stage_result AS r JOIN pair AS p ON p.id = r.pair JOIN fingerprint AS f ON f.id = r.fingerprint

@@ -1,5 +1,5 @@
-//! Jobs counted from their rows, in ranges of pairs: SQLite sorts in memory what it groups, and that memory must not
-//! grow with the number of pairs.
+//! Counts jobs from their rows, in ranges of pairs. SQLite sorts the rows of a `GROUP BY` in memory, and that memory
+//! must not grow with the number of pairs.
 
 use std::collections::BTreeMap;
 

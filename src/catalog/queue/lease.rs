@@ -8,10 +8,11 @@ use crate::domain::{
     WorkerId,
 };
 
-/// The right to work on one pair. Only a claim creates one, and only its owner can store anything for the pair.
+/// The right to work on one pair. Only a claim creates a lease, and only the lease's owner can store anything for the
+/// pair.
 ///
-/// `token` is the fencing token: each claim and each recovery raises the job's token, so that writes under an older
-/// lease change nothing.
+/// `token` is the fencing token: each claim and each recovery raises the job's token, so a write under an older lease
+/// changes nothing.
 #[derive(Debug, sqlx::FromRow)]
 pub struct Lease {
     pub(crate) pair: PairId,
@@ -44,7 +45,8 @@ impl Lease {
         self.attempt
     }
 
-    /// Returns whether nothing may run beside it, because it needed too much memory or a worker died over it.
+    /// Returns whether no other pair may run at the same time, because this pair needed too much memory or a worker
+    /// died while processing it.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
     }
@@ -62,7 +64,7 @@ impl Lease {
     }
 }
 
-/// A job that a fenced statement changed: pair and token of the lease that still held.
+/// A job that a write under a lease changed, with the token of that lease.
 #[derive(Debug, Clone, Copy, sqlx::FromRow)]
 pub(crate) struct FencedRow {
     pub(crate) pair: i64,
@@ -85,11 +87,11 @@ pub enum CheckpointOutcome {
 pub struct InputVersion {
     /// Hash of its bytes.
     pub hash: ContentHash,
-    /// Size, time and inode of the file at that moment, as the store writes them.
+    /// Size, time and inode of the file when it was read, as text in the store's format.
     pub stat: String,
 }
 
-/// The input files of a pair as its worker read them; `None` for a file that was not read.
+/// The input files of a pair as its worker read them. A file that was not read is `None`.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct InputVersions {
     /// The mesh.
@@ -145,7 +147,8 @@ pub struct StageCheckpoint {
     pub at: UnixMillis,
     /// Deadline of the next stage.
     pub next_deadline: UnixMillis,
-    /// The lease is over if the worker's last heartbeat is older than this, by its own clock.
+    /// The lease is void, and nothing is stored, if the worker's last heartbeat is older than this time (by the
+    /// worker's own clock).
     pub alive_since: UnixMillis,
 }
 
@@ -182,7 +185,8 @@ pub struct StageFailure {
     pub ms: Option<u64>,
     /// When it failed.
     pub at: UnixMillis,
-    /// The lease is over if the worker's last heartbeat is older than this, by its own clock.
+    /// The lease is void, and nothing is stored, if the worker's last heartbeat is older than this time (by the
+    /// worker's own clock).
     pub alive_since: UnixMillis,
 }
 

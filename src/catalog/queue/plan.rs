@@ -18,7 +18,7 @@ pub enum StaleReason {
     Unfinished,
     /// It waits for its next attempt after a transient failure.
     BackingOff,
-    /// It failed permanently, but with other settings or inputs than the current ones.
+    /// The pair failed permanently, but with other settings or inputs than the current ones.
     FailedBefore,
     /// The settings of `stage` or the program's revision of it changed.
     Settings {
@@ -106,7 +106,7 @@ impl fmt::Display for FieldChange {
 }
 
 impl fmt::Display for PlanEntry {
-    /// Writes the reason, such as `the print changed`, or the first changed settings.
+    /// Writes the reason, such as `the print changed`. If settings changed, writes the first of the changed settings.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         const SHOWN: usize = 4;
         let changes = self.changes.as_deref().unwrap_or_default();

@@ -19,7 +19,8 @@ pub struct LeaseHolder {
     /// The worker.
     #[sqlx(rename = "id")]
     pub worker: WorkerId,
-    /// Its last heartbeat, by its own clock. Compare it with an earlier one, never with this machine's clock.
+    /// Last heartbeat of the worker, by its own clock. Compare it only with an earlier heartbeat of that worker, never
+    /// with this machine's clock.
     pub heartbeat: UnixMillis,
 }
 
@@ -46,15 +47,15 @@ SELECT w.id, w.heartbeat FROM worker AS w
 WHERE w.id IN (SELECT worker FROM job WHERE status = 1)
 ORDER BY w.id";
 
-/// Returns for some workers whether each died (did not end properly) and how many leases it left.
+/// Selects for each given worker with leases whether it died (did not end properly), and how many leases it left.
 pub(crate) const LEFT_BY: &str = "
 SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
 FROM job AS j JOIN worker AS w ON w.id = j.worker
 WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.id";
 
-/// Recovers leases by worker. The second value says whether the worker died, the third whether its pair is blamed. A
-/// crash does not count as an attempt, so that a transient failure keeps all its attempts. Pairs of a worker that died
-/// run exclusively, after the others. The condition is `domain::is_poisoned`.
+/// Recovers the leases of workers. An item is a worker, whether it died, and whether its pair is blamed for the death.
+/// A crash does not count as an attempt, so that a transient failure keeps all its attempts. Pairs of a worker that
+/// died must run exclusively from now on. The condition for status 4 (quarantined) is `domain::is_poisoned`.
 pub(crate) const RECOVER: &str = "
 UPDATE job SET
     status = iif((item.value ->> 2)
@@ -79,8 +80,8 @@ SELECT count(*) FROM (SELECT died, ended FROM worker ORDER BY id DESC LIMIT 32) 
 pub(crate) const AFFECTED_PAIRS: &str = "
 SELECT pair, worker FROM job WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))";
 
-/// Recovers leases of other workers that still send heartbeats long after the lease's deadline. Heartbeat and deadline
-/// are both by the worker's own clock; two clocks are never compared.
+/// Recovers leases of workers that still send heartbeats long after the lease's deadline. Heartbeat and deadline are
+/// both measured by the worker's own clock; two clocks are never compared.
 pub(crate) const OVERDUE: &str = "
 UPDATE job SET status = iif(crashes + 1 >= ?2, 4, 0), worker = NULL, deadline = NULL,
     token = token + 1, crashes = crashes + 1, attempt = max(attempt - 1, 0), exclusive = 1
@@ -88,7 +89,7 @@ WHERE status = 1 AND worker IN (SELECT value FROM json_each(?1))
     AND deadline + ?3 < (SELECT w.heartbeat FROM worker AS w WHERE w.id = job.worker)
 RETURNING pair, stage, status, crashes, coalesce(fingerprint, 0) AS fingerprint";
 
-/// Stores the failure with the settings of the dead worker and the inputs as last read.
+/// Stores the failure of a quarantined pair, with the settings of its dead worker and the inputs as last read.
 const CRASHED: &str = "
 INSERT INTO failure (pair, stage, class, message, fingerprint, mesh_hash, print_hash, attributes, at)
 SELECT p.id, item.value ->> 'stage', item.value ->> 'class', item.value ->> 'message',
@@ -121,21 +122,21 @@ impl Catalog {
     /// Returns the workers that hold leases.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn lease_holders(&self) -> Result<Vec<LeaseHolder>> {
         let mut conn = self.read_conn().await?;
         Ok(sqlx::query_as(HOLDERS).fetch_all(&mut *conn).await?)
     }
 
-    /// Recovers the leases of dead workers: pairs become ready again, or are quarantined when too many workers died
-    /// over them.
+    /// Recovers the leases of dead workers. Their pairs become ready again, or are quarantined if too many workers died
+    /// while processing them.
     ///
-    /// A pair is blamed for a death only when its worker held no other lease, and quarantined only when `is_poisoned`
-    /// says so. Killing a process from outside, however often, therefore rarely quarantines a pair: only one that was
-    /// the only lease at nearly every death, which is the pattern of a pair that kills workers.
+    /// A pair is blamed for a death only if its worker held no other lease, and quarantined only if `is_poisoned` says
+    /// so. Processes killed from outside therefore rarely cause a quarantine, however often it happens: the pair would
+    /// have to be the only lease at nearly every death, which is the pattern of a pair that kills workers.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn recover(&self, dead: DeadWorker, now: UnixMillis) -> Result<Recovered> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -151,11 +152,11 @@ impl Catalog {
         .await
     }
 
-    /// Stores the inputs of quarantined pairs that no stage has read: a file that is repaired later must differ from
-    /// the one that killed the workers.
+    /// Stores the input files of quarantined pairs, for files that no stage has read. With their hashes, a file that is
+    /// repaired later can be distinguished from the file that killed the workers.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn record_poisoned_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -169,11 +170,11 @@ impl Catalog {
         .await
     }
 
-    /// Recovers the leases of other workers that exceed their deadline by more than `margin_ms` although the process is
-    /// alive. This is rare, because a living process enforces its own deadlines.
+    /// Recovers the leases of other workers that are alive but have exceeded a lease's deadline by more than
+    /// `margin_ms`. This is rare, because a living process enforces its own deadlines.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn recover_overdue(
         &self,
         me: WorkerId,
@@ -209,7 +210,7 @@ async fn left_by(conn: &mut SqliteConnection, workers: &str) -> Result<String> {
     Ok(json_array(items))
 }
 
-/// Marks the dead workers; returns the workers whose leases may still be open, as a JSON array.
+/// Marks the workers as dead. Returns the ids of the workers whose leases must be recovered, as a JSON array.
 async fn mark_dead(conn: &mut SqliteConnection, dead: &DeadWorker) -> Result<String> {
     match dead {
         DeadWorker::Workers(workers) => {
@@ -239,7 +240,7 @@ async fn affected_pairs(conn: &mut SqliteConnection, workers: &str) -> Result<BT
     Ok(found.into_iter().collect())
 }
 
-/// Counts the recovered pairs, and stores why the quarantined ones failed.
+/// Updates the counters for the recovered pairs, and stores why the quarantined pairs failed.
 async fn count_recovered(
     conn: &mut SqliteConnection,
     found: Vec<RecoveredJob>,

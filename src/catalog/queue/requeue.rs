@@ -29,7 +29,7 @@ pub enum RetrySelection {
     All,
 }
 
-/// Sends jobs back to a stage as if newly imported, unless they are leased.
+/// Sends jobs back to a stage as if the jobs were new. Leased jobs do not change.
 pub(crate) const REQUEUE: &str = concat!(
     "
 UPDATE job SET stage = item.value ->> 1, status = 0, run_at = NULL, prio = 0, attempt = 0, crashes = 0,
@@ -58,10 +58,11 @@ SELECT j.pair, j.stage, j.status, coalesce(j.fingerprint, 0) AS fingerprint
 FROM json_each(?1) AS wanted CROSS JOIN job AS j ON j.pair = wanted.value WHERE j.status IN (2, 4)";
 
 impl Catalog {
-    /// Requeues pairs whose settings or inputs changed and pairs selected by the policy; returns how many.
+    /// Requeues pairs whose settings or inputs changed, and pairs selected by the policy. Returns the number of
+    /// requeued pairs.
     ///
     /// # Errors
-    /// When the database refuses, or the counters are wrong.
+    /// If the database returns an error, or the counters do not add up to the number of jobs.
     pub async fn requeue_stale(
         &self,
         fingerprints: &Fingerprints,
@@ -72,7 +73,7 @@ impl Catalog {
         let current = current_json(&mut conn, fingerprints).await?;
         let mut moves = Vec::new();
         if among.is_none() {
-            // Unmarked jobs go back by group; only marked ones, and so all quarantined ones, are inspected.
+            // Unmarked jobs are requeued by group. Marked jobs and quarantined jobs are inspected one by one below.
             let chains = FingerprintChains::load(&mut conn, fingerprints).await?;
             let groups = groups(&mut conn, &chains).await?;
             assert_complete(&mut conn, &groups).await?;
@@ -97,8 +98,9 @@ impl Catalog {
         Ok(requeued)
     }
 
-    /// Requeues jobs page by page; returns how many. `page` requeues the jobs after a pair, and returns how many and the
-    /// last pair of the page. Each page is a separate transaction, so that other writes do not wait.
+    /// Requeues jobs page by page and returns their number. `page` takes the last pair of the previous page, requeues
+    /// jobs of the next page, and returns their number and the last pair of its page. Each page is a transaction of its
+    /// own, so that other writes do not wait.
     async fn requeue_pages<F>(&self, page: F) -> Result<u64>
     where
         F: for<'c> Fn(&'c mut SqliteConnection, i64) -> Work<'c, Result<(u64, Option<i64>)>>
@@ -116,10 +118,10 @@ impl Catalog {
         Ok(requeued)
     }
 
-    /// Requeues failed pairs; returns how many. Pairs that did not fail do not change.
+    /// Requeues the selected pairs that failed or back off, and returns their number. Other pairs do not change.
     ///
     /// # Errors
-    /// When a named pair does not exist; then nothing changes.
+    /// If a named pair does not exist, or the database returns an error. In that case nothing changes.
     pub async fn retry(&self, selection: &RetrySelection) -> Result<u64> {
         let selection = selection.clone();
         self.in_transaction(move |conn| {
@@ -135,7 +137,7 @@ impl Catalog {
     }
 }
 
-/// Refuses groups that do not cover all jobs: a wrong counter would hide stale ones.
+/// Returns an error if the groups do not cover all jobs, because a wrong counter would hide stale jobs.
 async fn assert_complete(conn: &mut SqliteConnection, groups: &[(StaleJob, u64)]) -> Result<()> {
     let jobs: i64 = sqlx::query_scalar("SELECT count(*) FROM job")
         .fetch_one(conn)
@@ -148,7 +150,7 @@ async fn assert_complete(conn: &mut SqliteConnection, groups: &[(StaleJob, u64)]
     }
 }
 
-/// Returns where a job goes back to; `None` when it stays or is going to run anyway.
+/// Returns the stage that a job goes back to, or `None` if the job stays or is going to run anyway.
 fn target(job: &StaleJob, policy: RerunPolicy) -> Option<Stage> {
     let (to, reason) = decide(job, policy)?;
     let waits = matches!(
@@ -158,7 +160,7 @@ fn target(job: &StaleJob, policy: RerunPolicy) -> Option<Stage> {
     (!waits).then_some(to)
 }
 
-/// Requeues one page of a group; returns how many, and the last pair of the page.
+/// Requeues one page of a group. Returns the number of requeued jobs, and the last pair of the page.
 async fn requeue_group(
     conn: &mut SqliteConnection,
     key: CounterKey,
@@ -178,7 +180,8 @@ async fn requeue_group(
     Ok((moved, pairs.last().copied()))
 }
 
-/// Requeues the stale jobs of one page of a selection, or of the marked jobs; unmarks those whose results agree again.
+/// Requeues the stale jobs on one page of the selected pairs or, without a selection, of the marked jobs. Marked jobs
+/// whose results agree again are unmarked. Returns the number of requeued jobs, and the last pair of the page.
 async fn requeue_inspected(
     conn: &mut SqliteConnection,
     current: String,
@@ -222,7 +225,7 @@ async fn failed_jobs(
     Ok(query.fetch_all(conn).await?)
 }
 
-/// Sends jobs back, each to a stage; returns how many, without leased ones.
+/// Sends each job back to its stage, except leased jobs. Returns the number of jobs sent back.
 async fn requeue(conn: &mut SqliteConnection, jobs: &[(KeyedJob, Stage)]) -> Result<u64> {
     if jobs.is_empty() {
         return Ok(0);

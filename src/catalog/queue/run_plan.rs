@@ -16,10 +16,10 @@ use crate::catalog::{Catalog, CatalogError, Result};
 use crate::domain::{PairName, Stage};
 
 impl Catalog {
-    /// Returns what a run with these settings would do with the named pairs, or with all.
+    /// Returns what a run with these settings would do with the named pairs, or with all pairs if `names` is `None`.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn plan(
         &self,
         fingerprints: &Fingerprints,
@@ -34,20 +34,20 @@ impl Catalog {
         plan(&mut conn, fingerprints, among.as_ref(), policy).await
     }
 
-    /// Counts the pairs with results of other settings or inputs than the current ones.
+    /// Counts the pairs with a result whose settings or inputs differ from the current ones.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn count_stale(&self, fingerprints: &Fingerprints) -> Result<u64> {
         let mut conn = self.snapshot().await?;
         let current = current_json(&mut conn, fingerprints).await?;
         count_stale(&mut conn, &current).await
     }
 
-    /// Returns why a pair would run, and from which stage; `None` when nothing is left to do.
+    /// Returns why a pair would run and from which stage, or `None` if the pair has nothing left to run.
     ///
     /// # Errors
-    /// When there is no such pair.
+    /// If there is no such pair, or the database returns an error.
     pub async fn why(
         &self,
         pair: &PairName,

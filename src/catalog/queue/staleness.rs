@@ -1,9 +1,10 @@
 //! Which pairs must run again because their settings or inputs changed, and why.
 //!
-//! A job stores the fingerprint of the result before its cursor. Fingerprints form a chain, so this one number names
-//! the settings of all earlier results, and the counters by fingerprint answer for all such jobs at once. Jobs whose
-//! results may not agree with that chain or with their inputs carry the `dirty` mark. They and the quarantined jobs,
-//! whose failure has settings and inputs of its own, are found by partial indexes and inspected one by one.
+//! A job stores the fingerprint of the result before its cursor. Each fingerprint includes the previous stage's, so
+//! this one number identifies the settings of all earlier results, and all jobs with the same number are counted and
+//! compared together. A job whose results may disagree with each other or with their inputs has the `dirty` mark.
+//! Marked jobs are inspected one by one, and so are quarantined jobs, because a failure has settings and inputs of its
+//! own. Partial indexes find both.
 
 use std::collections::BTreeMap;
 
@@ -32,7 +33,7 @@ pub enum RerunPolicy {
     All(Stage),
 }
 
-/// Each job with its first result that has other settings or inputs than the current ones.
+/// Selects each job with its first result whose settings or inputs differ from the current ones.
 pub(crate) const INSPECT: &str = "
 WITH found AS (
     SELECT j.pair, j.stage, j.status, j.fingerprint, p.mesh_hash, p.print_hash, p.attributes, (
@@ -55,7 +56,7 @@ pub(crate) const MARKED: &str = "
 SELECT pair FROM job WHERE dirty = 1 AND pair > ?1 UNION SELECT pair FROM job WHERE status = 4 AND pair > ?1
 ORDER BY 1 LIMIT ?2";
 
-/// Pairs with a result that has other settings or inputs than the current ones.
+/// Counts the pairs with a result whose settings or inputs differ from the current ones.
 pub(crate) const COUNT_STALE: &str = "
 SELECT (SELECT coalesce(sum(n), 0) FROM counter
         WHERE fingerprint <> 0 AND fingerprint NOT IN (SELECT value FROM json_each(?1))) + (
@@ -65,7 +66,8 @@ SELECT (SELECT coalesce(sum(n), 0) FROM counter
             r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
             OR r.attributes <> p.attributes)))";
 
-/// Unmarks jobs whose results agree again. Leased ones keep the mark: a result with other inputs may be on its way.
+/// Unmarks jobs whose results agree again. Leased jobs keep the mark, because their worker may be about to store a
+/// result with other inputs.
 pub(crate) const CLEAR_DIRTY: &str = concat!(
     "
 UPDATE job SET dirty = 0 WHERE dirty = 1 AND pair > ?1 AND pair <= ?2 AND status <> 1 AND NOT EXISTS (
@@ -78,13 +80,13 @@ UPDATE job SET dirty = 0 WHERE dirty = 1 AND pair > ?1 AND pair <= ?2 AND status
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct StaleJob {
     pub(crate) key: CounterKey,
-    /// First stage whose result has other settings or inputs than the current ones, and what changed.
+    /// First stage whose result has other settings or inputs than the current ones, and what differs.
     pub(crate) change: Option<(Stage, StaleReason)>,
-    /// Whether its failure had other settings or inputs than the current ones.
+    /// Whether the job failed with other settings or inputs than the current ones.
     pub(crate) failure_is_outdated: bool,
 }
 
-/// Returns where a job starts and why; `None` when it stays as it is.
+/// Returns the stage from which a job must run and why, or `None` if the job need not run.
 pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, StaleReason)> {
     let CounterKey { cursor, status, .. } = job.key;
     let next = job.key.stage();
@@ -101,7 +103,8 @@ pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, Stal
         }
         RerunPolicy::Failed | RerunPolicy::Changed => None,
     };
-    // The earlier start wins; of equal starts the change explains more than the request.
+    // The earlier stage is used. If both are the same stage, the change is the reason, because it explains more than
+    // the request.
     match (job.change, requested) {
         (Some(changed), Some(requested)) if requested.0 < changed.0 => return Some(requested),
         (Some(changed), _) => return Some(changed),
@@ -143,7 +146,7 @@ fn stale_job(row: &SqliteRow) -> Result<(i64, StaleJob)> {
     Ok((row.try_get("pair")?, job))
 }
 
-/// Returns what differs in the first outdated result. Inputs go before settings, because they explain more.
+/// Returns what differs in the first outdated result. Inputs are checked before settings, because they explain more.
 fn change(row: &SqliteRow, stage: Stage) -> Result<StaleReason> {
     Ok(if row.try_get("mesh")? {
         StaleReason::Mesh
@@ -157,7 +160,8 @@ fn change(row: &SqliteRow, stage: Stage) -> Result<StaleReason> {
     })
 }
 
-/// Inspects the next marked jobs after a pair; also returns the last pair of the page, `None` at the end.
+/// Inspects the next page of marked or quarantined jobs after a pair. Returns the jobs and the last pair of the page,
+/// which is `None` at the end.
 pub(crate) async fn inspect_marked(
     conn: &mut SqliteConnection,
     current: &str,
@@ -172,9 +176,10 @@ pub(crate) async fn inspect_marked(
     Ok((jobs, Some(last.0)))
 }
 
-/// Returns the groups of unmarked jobs by the counters, those with earlier cursors first.
+/// Returns all jobs grouped by counter, each group with its number of jobs, earlier cursors first. The state of a group
+/// holds for its unmarked jobs.
 ///
-/// Jobs go back to a group that comes before their own, so that requeueing in this order handles each job once.
+/// A requeued job moves to a group that comes before its own in this order, so each job is handled once.
 pub(crate) async fn groups(
     conn: &mut SqliteConnection,
     chains: &FingerprintChains,
@@ -191,14 +196,14 @@ pub(crate) async fn groups(
     Ok(groups.collect())
 }
 
-/// Returns the first stage before the cursor with other settings than the current ones.
+/// Returns the first stage before the cursor whose settings differ from the current ones.
 fn changed_settings(key: CounterKey, chains: &FingerprintChains) -> Option<(Stage, StaleReason)> {
     let (stage, old) = chains.first_change(key.fingerprint)?;
     let is_before = (stage.index() as Cursor) < key.cursor;
     is_before.then_some((stage, StaleReason::Settings { stage, old }))
 }
 
-/// Passes every job's state to `each`, with the number of jobs in that state.
+/// Calls `each` with the state of jobs and the number of jobs in that state, until every job is covered.
 pub(crate) async fn inspect_all(
     conn: &mut SqliteConnection,
     current: &str,
@@ -225,7 +230,7 @@ pub(crate) async fn inspect_all(
     Ok(())
 }
 
-/// Counts the pairs with a result that has other settings or inputs than the current ones.
+/// Counts the pairs with a result whose settings or inputs differ from the current ones.
 pub(crate) async fn count_stale(conn: &mut SqliteConnection, current: &str) -> Result<u64> {
     let query = sqlx::query_scalar(COUNT_STALE).bind(current);
     Ok(query.fetch_one(conn).await?)

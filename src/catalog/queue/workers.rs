@@ -43,7 +43,7 @@ pub struct WorkLeft {
     pub quarantined: u64,
 }
 
-/// Due back-offs, including those implausibly far in the future (clock jump).
+/// Makes jobs ready if their back-off is due, or ends so far in the future that the clock must have jumped.
 pub(crate) const DUE: &str = "
 UPDATE job SET status = 0, run_at = NULL WHERE status = 2 AND (run_at <= ?1 OR run_at > ?2)
 RETURNING stage, status, coalesce(fingerprint, 0) AS fingerprint";
@@ -67,10 +67,10 @@ SELECT j.stage, j.status, count(*) FROM json_each(?1) AS wanted CROSS JOIN job A
 GROUP BY j.stage, j.status";
 
 impl Catalog {
-    /// Registers a worker process with the fingerprints it computes with; ids are never reused.
+    /// Registers a worker process and the fingerprints of its settings. Returns the worker's id; ids are never reused.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn register_worker(
         &self,
         info: WorkerInfo,
@@ -84,7 +84,7 @@ impl Catalog {
     /// Records that a worker ended properly.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn end_worker(&self, worker: WorkerId, now: UnixMillis) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -99,11 +99,11 @@ impl Catalog {
         .await
     }
 
-    /// Makes pairs with due back-offs ready, also those due more than `longest` milliseconds ahead, which only a clock
-    /// jump can cause. Returns how many.
+    /// Makes pairs ready whose back-off is due. Back-offs due more than `longest` milliseconds ahead end too, because
+    /// only a clock jump can cause them. Returns the number of pairs made ready.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn release_due_backoffs(&self, now: UnixMillis, longest: i64) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -120,10 +120,10 @@ impl Catalog {
         .await
     }
 
-    /// Returns the open work up to a stage; `ready` stops counting at 1000.
+    /// Returns the open work up to a stage, among some pairs or all. Among all pairs, `ready` is at most 1000.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn outstanding(
         &self,
         until: Stage,
@@ -139,10 +139,11 @@ impl Catalog {
         Ok(query.fetch_one(&mut *conn).await?)
     }
 
-    /// Returns the open stages up to a stage, from the counters, or counted among some pairs.
+    /// Returns the open stages up to a stage. They are read from the counters, or, if pairs are given, counted from the
+    /// jobs of these pairs.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn work_left(&self, until: Stage, among: Option<&PairSelection>) -> Result<WorkLeft> {
         let mut conn = self.read_conn().await?;
         let query = match among {

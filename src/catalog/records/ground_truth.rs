@@ -22,7 +22,7 @@ impl Catalog {
     /// Returns whether any pair has a true alignment.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn has_truth(&self) -> Result<bool> {
         let mut conn = self.read_conn().await?;
         let exists = sqlx::query_scalar("SELECT EXISTS (SELECT 1 FROM truth)");

@@ -111,7 +111,7 @@ impl Catalog {
     /// Returns the names of all pairs, sorted.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn pair_names(&self) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         let names = sqlx::query_scalar("SELECT name FROM pair ORDER BY name");
@@ -121,7 +121,7 @@ impl Catalog {
     /// Returns the names that are not pairs, in the order given.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn unknown_names(&self, names: &[PairName]) -> Result<Vec<PairName>> {
         let mut conn = self.read_conn().await?;
         unknown_names(&mut conn, names).await
@@ -130,7 +130,7 @@ impl Catalog {
     /// Returns pairs by their names; unknown names are left out.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn select(&self, names: &[PairName]) -> Result<PairSelection> {
         let mut conn = self.read_conn().await?;
         select(&mut conn, names).await

@@ -74,7 +74,7 @@ impl Catalog {
     /// Appends a manual alignment, durable on return, and returns whether it is new; one sent again is not stored twice.
     ///
     /// # Errors
-    /// When there is no such pair or the database returns an error.
+    /// If there is no such pair, or the database returns an error.
     pub async fn store_manual_alignment(
         &self,
         made: ManualAlignment,
@@ -108,7 +108,7 @@ impl Catalog {
     /// Returns every manual alignment, oldest first, including undone ones.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn manual_alignments(&self) -> Result<Vec<StoredAlignment>> {
         let mut conn = self.read_conn().await?;
         Ok(sqlx::query_as(LOG).fetch_all(&mut *conn).await?)
@@ -117,7 +117,7 @@ impl Catalog {
     /// Returns the newest manual alignment of each pair that is valid and not undone.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn newest_manual_alignments(&self) -> Result<BTreeMap<PairName, StoredAlignment>> {
         let stored = self.manual_alignments().await?.into_iter();
         let valid = stored.filter(|stored| stored.holds && stored.undone_at.is_none());

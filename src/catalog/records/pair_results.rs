@@ -54,7 +54,7 @@ impl Catalog {
     /// Returns up to `limit` pairs after a name, in the order of names; empty at the end.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub(crate) async fn results_page(
         &self,
         after: Option<&PairName>,
@@ -73,7 +73,7 @@ impl Catalog {
     /// Returns everything about one pair; `None` if it does not exist.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn pair(&self, name: &PairName) -> Result<Option<PairDetail>> {
         let mut conn = self.snapshot().await?;
         let found = sqlx::query(ONE)
@@ -99,7 +99,7 @@ impl Catalog {
     /// Returns up to `limit` quarantined pairs, in the order of names.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn failures(&self, limit: usize) -> Result<Vec<FailedPair>> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query(FAILED).bind(limit as i64);
@@ -118,7 +118,7 @@ impl Catalog {
     /// Returns the number of quarantined pairs by class, without empty classes.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn failure_counts(&self) -> Result<Vec<(FailureClass, u64)>> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query_as(FAILED_BY_CLASS);
@@ -251,7 +251,7 @@ impl ResultPages<'_> {
     /// Returns the next page, which is never empty; `None` at the end.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn next(&mut self) -> Result<Option<Vec<PairResults>>> {
         let page = self.catalog.results_page(self.after.as_ref(), self.size);
         let page = page.await?;

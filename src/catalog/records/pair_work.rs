@@ -92,7 +92,7 @@ impl Catalog {
     /// Returns input files as last read, in pages by pair number; empty at the end.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn known_inputs(
         &self,
         after: Option<PairId>,
@@ -115,7 +115,7 @@ impl Catalog {
     /// Stores the current state of input files.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn store_inputs(&self, seen: Vec<(PairId, InputVersions)>) -> Result<()> {
         self.in_transaction(move |conn| {
             Box::pin(async move {

@@ -216,7 +216,7 @@ impl Catalog {
     /// Returns a reviewer's answers that were not undone, oldest first; one on several results appears once per result.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn answers(&self, reviewer: &str) -> Result<Vec<Answer>> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query_as(ANSWERS).bind(reviewer);
@@ -226,7 +226,7 @@ impl Catalog {
     /// Returns every answer to an attention check, oldest first. Verdicts are not among them.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn attention_check_answers(&self) -> Result<Vec<AttentionCheckAnswer>> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query_as(CHECK_ANSWERS);
@@ -236,7 +236,7 @@ impl Catalog {
     /// Returns the key for the names of pictures, which stays the same after a restart.
     ///
     /// # Errors
-    /// When the database returns an error.
+    /// If the database returns an error.
     pub async fn review_key(&self) -> Result<ContentHash> {
         let mut conn = self.read_conn().await?;
         let query = sqlx::query_scalar("SELECT key FROM review_key");

@@ -29,7 +29,7 @@ impl Catalog {
     /// Counts for `status`; results that differ from the current `fingerprints` count as stale.
     ///
     /// # Errors
-    /// When the database refuses.
+    /// If the database returns an error.
     pub async fn status(&self, fingerprints: &Fingerprints) -> Result<StatusCounts> {
         let mut conn = self.snapshot().await?;
         let counted = by_status(counters(&mut conn).await?);
