@@ -159,7 +159,7 @@ impl World {
         self.catalog.claim(request).await.expect("a claim")
     }
 
-    /// Registers another worker that considers all others dead, and asserts how many pairs it recovers.
+    /// Registers another worker, recovers the leases of all other workers, and asserts the number of recovered pairs.
     async fn recovered_by_another(&self, pairs: u64) -> WorkerId {
         let other = register(&self.catalog).await;
         let recovered = self.catalog.recover(DeadWorker::AllExcept(other), 60).await;
@@ -197,7 +197,7 @@ impl World {
 }
 
 impl World {
-    /// Asserts that the plan from counters equals the plan of inspected pairs, with current and with other settings.
+    /// Asserts that the plan from counters equals the plan from inspecting every pair, with current and other settings.
     async fn assert_plans_agree(&self) {
         let names = self.catalog.pair_names().await.expect("names");
         for revision in [[1; 4], [1, 1, 2, 1]] {

@@ -1,7 +1,7 @@
-//! Checks a project for damage: the database file, counters and job states against rows, and files against rows.
+//! Checks a project for damage. Compares the rows of the database with each other and with the files.
 //!
-//! Pairs are read in pages, so that memory does not grow with their number. Damaged results can be sent back to be
-//! computed again; verdicts and the history of results are never changed.
+//! Pairs are read in pages, so that memory does not grow with their number. A repair sends pairs with damaged results
+//! back to be computed again. It never changes verdicts or the history of results.
 
 mod finding;
 mod pairs;
@@ -26,11 +26,11 @@ pub struct CheckOptions {
     pub quick: bool,
     /// Repair what can be repaired. The caller holds the exclusive run lock.
     pub repair: bool,
-    /// Whether a run may be writing artifacts; then unreferenced files are not reported.
+    /// Whether a run may be writing artifacts. If so, unreferenced files are not reported.
     pub in_use: bool,
 }
 
-/// Why a check could not be completed. Damage is not an error: the summary lists it.
+/// Why a check could not be completed. Damage is not an error, because the summary lists it.
 #[derive(Debug, thiserror::Error)]
 pub enum CheckError {
     /// The catalog returned an error.
@@ -51,10 +51,10 @@ pub enum CheckError {
 
 /// Checks a project and, with `repair`, repairs it.
 ///
-/// A damaged database is not written to, except that its indexes are rebuilt if nothing else is wrong.
+/// A damaged database is not written to. The exception is a repair that rebuilds the indexes, if nothing else is wrong.
 ///
 /// # Errors
-/// When the catalog or the artifact folder cannot be read or written.
+/// If the catalog or the artifact folder cannot be read or written, or a worker thread panics.
 pub async fn check(
     project: &Project,
     catalog: &Catalog,
@@ -112,7 +112,7 @@ async fn database(
     Ok(true)
 }
 
-/// Returns whether a line of the integrity check of SQLite reports an index that does not match its table.
+/// Returns whether a line of SQLite's integrity check reports an index that does not match its table.
 fn is_of_index(line: &str) -> bool {
     line.contains("missing from index") || line.contains("wrong # of entries in index")
 }
@@ -219,7 +219,7 @@ async fn repair_pairs(
     Ok(())
 }
 
-/// Counts unreferenced files and, with `remove`, deletes files that this program wrote.
+/// Counts unreferenced files. With `remove`, also deletes the unreferenced files that this program wrote.
 async fn unreferenced_files(
     project: &Project,
     named: ReferencedArtifacts,

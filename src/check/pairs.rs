@@ -15,7 +15,7 @@ use crate::store::{ArtifactError, InputError, Project, hash_input, stat_input};
 pub(super) struct PairCheck {
     pub(super) pair: PairId,
     pub(super) damage: Vec<Finding>,
-    /// Hashes of all artifacts that its rows reference, including those of stages that will run again.
+    /// Hashes of all artifacts that the pair's rows reference, including results of stages that will run again.
     pub(super) named: Vec<ContentHash>,
     /// Number of files checked.
     pub(super) files: u64,
@@ -30,8 +30,8 @@ impl PairCheck {
     }
 }
 
-/// Checks the rows and files of a pair; with `quick` only the length of each file. Results of stages at or after the
-/// job's cursor remain from an earlier run: their files stay referenced, but are not checked.
+/// Checks the rows and files of a pair. With `quick`, only the length of each file is checked. Results of stages at or
+/// after the job's cursor remain from an earlier run. Their files are still referenced, but not checked.
 pub(super) fn check_pair(project: &Project, pair: &AuditedPair, quick: bool) -> PairCheck {
     let mut check = PairCheck {
         pair: pair.inputs.pair,
@@ -125,7 +125,7 @@ fn state(pair: &AuditedPair) -> Vec<Finding> {
     found
 }
 
-/// Returns whether the outcome and files of a result still have the stored result hash.
+/// Returns whether the outcome and files of a result match the stored result hash.
 fn has_its_hash(result: &AuditedResult) -> bool {
     serde_json::from_str(&result.files)
         .is_ok_and(|files| result_hash(&result.outcome, &files) == result.result_hash)
@@ -136,7 +136,7 @@ fn metrics_of(result: &AuditedResult) -> Option<BTreeSet<ThresholdMetric>> {
     Some(outcome.metrics.iter().map(|metric| metric.metric).collect())
 }
 
-/// Lists input files that are missing or have changed since they were read. This is no damage: a run handles it.
+/// Lists input files that are missing or have changed since they were read. A run handles them, so they are not damage.
 fn inputs(project: &Project, pair: &AuditedPair, check: &mut PairCheck) {
     let known = &pair.inputs;
     for (stored, seen) in [

@@ -24,11 +24,11 @@ pub struct CheckSummary {
     pub files: u64,
     /// Damage by kind, without kinds that were not found.
     pub damage: BTreeMap<Kind, Found>,
-    /// Missing input files. No damage: results computed from them stay valid.
+    /// Missing input files. This is not damage: results computed from them stay valid.
     pub inputs_missing: Notes,
-    /// Input files that changed after they were read. No damage: the next run computes their pairs again.
+    /// Input files that changed after they were read. This is not damage: the next run computes their pairs again.
     pub inputs_changed: Notes,
-    /// Unreferenced files in the artifact folder; `None` while a run is writing there.
+    /// Unreferenced files in the artifact folder. `None` if they were not counted, such as while a run may be writing.
     pub unreferenced: Option<Unreferenced>,
     /// Repairs made.
     pub repaired: Repaired,
@@ -121,7 +121,7 @@ impl CheckSummary {
         }
     }
 
-    /// Adds the check of a pair; `requeued` when the pair was sent back to run again.
+    /// Adds the check of a pair. With `requeued`, its damage counts as repaired, because the pair was sent back.
     pub(super) fn count(&mut self, check: PairCheck, requeued: bool) {
         self.pairs += 1;
         self.files += check.files;

@@ -24,8 +24,7 @@ const LINES: usize = 50;
 pub struct Drift {
     /// Wrong counters.
     pub counters: Vec<CounterDrift>,
-    /// Descriptions of jobs whose fingerprint or dirty mark disagrees with their results, one line per kind of
-    /// disagreement.
+    /// Numbers of jobs whose fingerprint or dirty mark disagrees with their results, as text.
     pub marks: Vec<String>,
 }
 

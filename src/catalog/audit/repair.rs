@@ -1,5 +1,4 @@
-//! Repairs of the damage that a check found. They need the exclusive run lock and never change verdicts or the history
-//! of results.
+//! Repairs what a check found, without an active run. Verdicts and the history of results are never changed.
 
 use serde_json::json;
 use sqlx::{AssertSqlSafe, SqliteConnection};
@@ -66,8 +65,8 @@ impl Catalog {
             .await
     }
 
-    /// Sets each job's fingerprint from its results, marks jobs with inconsistent results dirty, and sets every counter
-    /// to its number of jobs.
+    /// Corrects the fingerprint and dirty mark of each job by its results, and sets every counter to its number of
+    /// jobs.
     ///
     /// # Errors
     /// If the database returns an error.

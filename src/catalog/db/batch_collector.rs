@@ -13,8 +13,7 @@ const BATCH: usize = 256;
 /// The requests collected so far.
 struct BatchCollector {
     batch: Batch,
-    /// Time until which to wait for more requests. `None` if a caller waits for a reply, so that the commit must not be
-    /// delayed.
+    /// Time until which to wait for more requests. `None` if a caller already waits for a reply.
     until: Option<Instant>,
     /// A message that is not a request ends the batch.
     other: Option<Message>,

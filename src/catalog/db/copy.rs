@@ -11,8 +11,7 @@ use crate::catalog::db::open::{Identity, identity};
 use crate::catalog::{Catalog, CatalogError, Result};
 
 impl Catalog {
-    /// Copies the catalog, as it was at one moment, to a new file and verifies the copy. Does not sync the file to
-    /// disk.
+    /// Copies the catalog, as of one moment, to a new file and verifies the copy. Does not sync the file to disk.
     ///
     /// # Errors
     /// If the database or the disk returns an error, or the copy is damaged. A partial copy is left behind.

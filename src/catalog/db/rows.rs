@@ -10,8 +10,7 @@ use crate::domain::{
     PairName, PrintFromMesh, Reason, ReviewOrder, Stage, ThresholdMetric, Verdict, WorkerId,
 };
 
-/// Implements `Type` and `Decode` for each listed type, given the type of its column and a function that converts the
-/// column's value.
+/// Implements `Type` and `Decode` for each type, given its column's type and a function that converts the value.
 macro_rules! decode {
     ($($type:ty: $column:ty = $convert:expr;)+) => {$(
         impl Type<Sqlite> for $type {

@@ -1,5 +1,4 @@
-//! Runs several statements in one round trip to SQLite's thread. A round trip costs about 30 us, more than most
-//! statements.
+//! Runs several statements in one round trip to SQLite's thread, which costs about 30 us, more than most statements.
 
 use std::fmt;
 use std::marker::PhantomData;

@@ -149,9 +149,9 @@ fn key_after(stage: &StageCheckpoint) -> CounterKey {
     CounterKey::new(cursor, status, Some(stage.fingerprint.0))
 }
 
-/// Builds the item of [`ADVANCE`] for the stages of a job, or returns `None` if there are no stages. `first` is the
-/// first fingerprint from `chain`: its upstream must be the fingerprint that the job has stored. `mixed` is 1 if the
-/// stages are not consecutive.
+/// Builds the item of [`ADVANCE`] for a job's stages. Returns `None` if there are no stages. `first` is the fingerprint
+/// from `chain`, and `mixed` is 1 if the stages are not consecutive. The job becomes dirty if `mixed` is 1, or the
+/// upstream of `first` is not the job's fingerprint.
 fn advanced_job((lease, stages): &LeasedCheckpoints) -> Option<Value> {
     let last = stages.last()?;
     let after = key_after(last);

@@ -1,4 +1,4 @@
-//! Fingerprints of settings. The settings are what the result of a stage depends on besides its inputs.
+//! Fingerprints of the settings that the result of a stage depends on.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -109,7 +109,7 @@ impl Catalog {
         .await
     }
 
-    /// Returns the settings that differ between another process, given its [`Fingerprints::hash_line`], and these
+    /// Returns the settings in which another process, given by its [`Fingerprints::hash_line`], differs from these
     /// fingerprints. Hashes that are not stored are skipped.
     ///
     /// # Errors
@@ -189,8 +189,8 @@ impl FingerprintChains {
         })
     }
 
-    /// Follows the chain of a fingerprint back to the first stage. Returns the earliest stage whose fingerprint is not
-    /// the current one, with that old fingerprint. Returns `None` if all are current.
+    /// Follows the chain of a fingerprint to the first stage. Returns the earliest stage whose settings differ from the
+    /// current ones, with the stage's fingerprint in the chain.
     pub(crate) fn first_change(&self, id: i64) -> Option<(Stage, FingerprintId)> {
         let mut change = None;
         let mut next = Some(FingerprintId(id));

@@ -45,8 +45,7 @@ impl Lease {
         self.attempt
     }
 
-    /// Returns whether no other pair may run at the same time, because this pair needed too much memory or a worker
-    /// died while processing it.
+    /// Returns whether the pair must run alone, because it needed too much memory or a worker died while processing it.
     pub const fn exclusive(&self) -> bool {
         self.exclusive
     }
@@ -147,8 +146,7 @@ pub struct StageCheckpoint {
     pub at: UnixMillis,
     /// Deadline of the next stage.
     pub next_deadline: UnixMillis,
-    /// The lease is void, and nothing is stored, if the worker's last heartbeat is older than this time (by the
-    /// worker's own clock).
+    /// Oldest heartbeat of the worker, by its own clock, with which the lease is still valid.
     pub alive_since: UnixMillis,
 }
 
@@ -185,8 +183,7 @@ pub struct StageFailure {
     pub ms: Option<u64>,
     /// When it failed.
     pub at: UnixMillis,
-    /// The lease is void, and nothing is stored, if the worker's last heartbeat is older than this time (by the
-    /// worker's own clock).
+    /// Oldest heartbeat of the worker, by its own clock, with which the lease is still valid.
     pub alive_since: UnixMillis,
 }
 

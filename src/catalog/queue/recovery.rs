@@ -47,15 +47,16 @@ SELECT w.id, w.heartbeat FROM worker AS w
 WHERE w.id IN (SELECT worker FROM job WHERE status = 1)
 ORDER BY w.id";
 
-/// Selects for each given worker with leases whether it died (did not end properly), and how many leases it left.
+/// Selects the given workers that hold leases, with whether each died (did not end properly) and its number of leases.
 pub(crate) const LEFT_BY: &str = "
 SELECT w.id, w.ended IS NULL AS died, count(*) AS leases
 FROM job AS j JOIN worker AS w ON w.id = j.worker
 WHERE j.status = 1 AND j.worker IN (SELECT value FROM json_each(?1)) GROUP BY w.id";
 
-/// Recovers the leases of workers. An item is a worker, whether it died, and whether its pair is blamed for the death.
-/// A crash does not count as an attempt, so that a transient failure keeps all its attempts. Pairs of a worker that
-/// died must run exclusively from now on. The condition for status 4 (quarantined) is `domain::is_poisoned`.
+/// Recovers the leases of workers. An item consists of a worker, whether the worker died, and whether its pair is
+/// blamed for the death. A crash does not count as an attempt, so that a transient failure keeps all its attempts.
+/// Pairs of a worker that died must run exclusively from now on. The condition for status 4 (quarantined) is
+/// `domain::is_poisoned`.
 pub(crate) const RECOVER: &str = "
 UPDATE job SET
     status = iif((item.value ->> 2)
@@ -132,8 +133,8 @@ impl Catalog {
     /// while processing them.
     ///
     /// A pair is blamed for a death only if its worker held no other lease, and quarantined only if `is_poisoned` says
-    /// so. Processes killed from outside therefore rarely cause a quarantine, however often it happens: the pair would
-    /// have to be the only lease at nearly every death, which is the pattern of a pair that kills workers.
+    /// so. Killing processes from outside, however often, therefore rarely quarantines a pair. The pair must have been
+    /// the only lease at nearly every death, which is the pattern of a pair that kills workers.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -152,8 +153,8 @@ impl Catalog {
         .await
     }
 
-    /// Stores the input files of quarantined pairs, for files that no stage has read. With their hashes, a file that is
-    /// repaired later can be distinguished from the file that killed the workers.
+    /// Stores the versions of the input files of quarantined pairs, for files that no stage has read. The stored hashes
+    /// distinguish a file that is repaired later from the file that killed the workers.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -170,8 +171,8 @@ impl Catalog {
         .await
     }
 
-    /// Recovers the leases of other workers that are alive but have exceeded a lease's deadline by more than
-    /// `margin_ms`. This is rare, because a living process enforces its own deadlines.
+    /// Recovers leases that exceed their deadline by more than `margin_ms` although their worker, another process, is
+    /// alive. This is rare, because a living process enforces its own deadlines.
     ///
     /// # Errors
     /// If the database returns an error.

@@ -98,9 +98,9 @@ impl Catalog {
         Ok(requeued)
     }
 
-    /// Requeues jobs page by page and returns their number. `page` takes the last pair of the previous page, requeues
-    /// jobs of the next page, and returns their number and the last pair of its page. Each page is a transaction of its
-    /// own, so that other writes do not wait.
+    /// Requeues jobs page by page. Returns the number of requeued jobs. `page` requeues the jobs on the page after a
+    /// pair, and returns their number and the last pair of the page. Each page is a transaction of its own, so that
+    /// other writes do not wait.
     async fn requeue_pages<F>(&self, page: F) -> Result<u64>
     where
         F: for<'c> Fn(&'c mut SqliteConnection, i64) -> Work<'c, Result<(u64, Option<i64>)>>

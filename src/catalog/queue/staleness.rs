@@ -1,10 +1,9 @@
 //! Which pairs must run again because their settings or inputs changed, and why.
 //!
 //! A job stores the fingerprint of the result before its cursor. Each fingerprint includes the previous stage's, so
-//! this one number identifies the settings of all earlier results, and all jobs with the same number are counted and
-//! compared together. A job whose results may disagree with each other or with their inputs has the `dirty` mark.
-//! Marked jobs are inspected one by one, and so are quarantined jobs, because a failure has settings and inputs of its
-//! own. Partial indexes find both.
+//! this number identifies the settings of all earlier results, and one comparison covers all jobs with the same number.
+//! A job whose results may disagree with each other or with the inputs has the `dirty` mark. Marked and quarantined
+//! jobs are found by partial indexes and inspected one by one, because a failure has settings and inputs of its own.
 
 use std::collections::BTreeMap;
 
@@ -66,8 +65,7 @@ SELECT (SELECT coalesce(sum(n), 0) FROM counter
             r.fingerprint <> (?1 ->> r.stage) OR r.mesh_hash <> p.mesh_hash OR r.print_hash <> p.print_hash
             OR r.attributes <> p.attributes)))";
 
-/// Unmarks jobs whose results agree again. Leased jobs keep the mark, because their worker may be about to store a
-/// result with other inputs.
+/// Unmarks jobs whose results agree again. Leased jobs keep the mark, as a result with other inputs may follow.
 pub(crate) const CLEAR_DIRTY: &str = concat!(
     "
 UPDATE job SET dirty = 0 WHERE dirty = 1 AND pair > ?1 AND pair <= ?2 AND status <> 1 AND NOT EXISTS (
@@ -86,7 +84,7 @@ pub(crate) struct StaleJob {
     pub(crate) failure_is_outdated: bool,
 }
 
-/// Returns the stage from which a job must run and why, or `None` if the job need not run.
+/// Returns the stage from which a job must run and why, or `None` if the job is leased or has nothing left to run.
 pub(crate) fn decide(job: &StaleJob, policy: RerunPolicy) -> Option<(Stage, StaleReason)> {
     let CounterKey { cursor, status, .. } = job.key;
     let next = job.key.stage();
@@ -160,8 +158,7 @@ fn change(row: &SqliteRow, stage: Stage) -> Result<StaleReason> {
     })
 }
 
-/// Inspects the next page of marked or quarantined jobs after a pair. Returns the jobs and the last pair of the page,
-/// which is `None` at the end.
+/// Inspects a page of marked and quarantined jobs after a pair. Also returns its last pair, which is `None` at the end.
 pub(crate) async fn inspect_marked(
     conn: &mut SqliteConnection,
     current: &str,
@@ -176,8 +173,8 @@ pub(crate) async fn inspect_marked(
     Ok((jobs, Some(last.0)))
 }
 
-/// Returns all jobs grouped by counter, each group with its number of jobs, earlier cursors first. The state of a group
-/// holds for its unmarked jobs.
+/// Returns one group for each counter that is not 0: the state of its unmarked jobs, and the number of all its jobs.
+/// Groups with earlier cursors come first.
 ///
 /// A requeued job moves to a group that comes before its own in this order, so each job is handled once.
 pub(crate) async fn groups(
@@ -203,7 +200,7 @@ fn changed_settings(key: CounterKey, chains: &FingerprintChains) -> Option<(Stag
     is_before.then_some((stage, StaleReason::Settings { stage, old }))
 }
 
-/// Calls `each` with the state of jobs and the number of jobs in that state, until every job is covered.
+/// Calls `each` repeatedly with a state and a number of jobs in that state, so that each job is counted once.
 pub(crate) async fn inspect_all(
     conn: &mut SqliteConnection,
     current: &str,

@@ -1,4 +1,4 @@
-//! Ground truth of a dataset, if it has any: stored as given and read by the report.
+//! Ground truth of a dataset, if it has any. It is stored as given, for the report to read.
 
 use serde_json::{Value, json};
 use sqlx::SqliteConnection;
@@ -30,7 +30,7 @@ impl Catalog {
     }
 }
 
-/// Stores true alignments as given in the open transaction and replaces earlier ones; returns how many.
+/// Stores true alignments as given, replacing earlier ones, in the open transaction. Returns their number.
 pub(crate) async fn set(conn: &mut SqliteConnection, truths: &[(PairName, Value)]) -> Result<u64> {
     let mut stored = 0;
     for chunk in truths.chunks(500) {

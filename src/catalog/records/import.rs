@@ -53,7 +53,8 @@ const SELECT: &str = "
 SELECT name, mesh_path, print_path, unit, scanned_face_down, character, block, meta
 FROM pair WHERE name IN (SELECT value FROM json_each(?1))";
 
-/// Updates changed rows. A changed path clears the stored file state, so that the next run reads the file.
+/// Adds new pairs and updates existing ones. A changed path clears the stored file state, so that the next run reads
+/// the file.
 const UPSERT: &str = "
 INSERT INTO pair (name, mesh_path, print_path, unit, scanned_face_down, character, block, meta, attributes, imported)
 SELECT value ->> 'name', value ->> 'mesh', value ->> 'print', value ->> 'unit', value ->> 'face_down',
@@ -71,12 +72,12 @@ SELECT id, 0, 0 FROM pair WHERE name IN (SELECT value FROM json_each(?1))
     AND NOT EXISTS (SELECT 1 FROM job WHERE job.pair = pair.id)";
 
 impl Catalog {
-    /// Imports streamed rows and true alignments in one transaction: new pairs are added, existing pairs are updated. Of
-    /// two rows with the same name the later one counts. Also returns the number of true alignments.
+    /// Imports streamed rows and true alignments in one transaction. New pairs are added, existing pairs are updated.
+    /// Of two rows with the same name, the later is used. Returns the summary and the number of true alignments.
     ///
     /// # Errors
-    /// When the rows stop without an end, a true alignment names an unknown pair, or the database returns an error;
-    /// then nothing is imported.
+    /// If the channel closes before `ImportChunk::End`, a true alignment names an unknown pair, or the database
+    /// returns an error. In that case nothing is imported.
     pub async fn import_all(
         &self,
         mut chunks: mpsc::Receiver<ImportChunk>,
@@ -118,7 +119,7 @@ impl Catalog {
         Ok(names.fetch_all(&mut *conn).await?)
     }
 
-    /// Returns the names that are not pairs, in the order given.
+    /// Returns the names that no pair has, in the order given.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -127,7 +128,7 @@ impl Catalog {
         unknown_names(&mut conn, names).await
     }
 
-    /// Returns pairs by their names; unknown names are left out.
+    /// Returns the pairs with the given names. Unknown names are left out.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -173,7 +174,7 @@ fn item(row: &ImportRow) -> Value {
     })
 }
 
-/// Returns the manifest attributes that results depend on, in the form in which the catalog compares them.
+/// Returns the manifest attributes that results depend on, as the JSON text that the catalog compares.
 fn result_attributes(row: &ImportRow) -> String {
     json!({ "scanned_face_down": row.scanned_face_down, "unit": row.unit }).to_string()
 }

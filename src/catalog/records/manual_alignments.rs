@@ -1,4 +1,4 @@
-//! Manual alignments: append-only, stored beside the automatic results and bound to the files they were made on.
+//! Manual alignments: an append-only log beside the automatic results. Each is bound to the files on which it was made.
 
 use std::collections::BTreeMap;
 
@@ -19,7 +19,7 @@ pub struct ManualAlignment {
     pub reviewer: String,
     /// Depth-map pixels to print pixels, for the depth map of `depth_hash`.
     pub print_from_depth: Affine2,
-    /// Mesh points to print pixels and height; stays valid when the depth map changes.
+    /// Maps mesh points to print pixels and heights. It remains valid if the depth map changes.
     pub print_from_mesh: PrintFromMesh,
     /// Content of the mesh.
     pub mesh_hash: ContentHash,
@@ -29,7 +29,7 @@ pub struct ManualAlignment {
     pub depth_hash: ContentHash,
     /// Hash of what was shown when the correction began.
     pub seen: ContentHash,
-    /// Intersection over union of the two masks at the manual pose, on the canvas of the pair's scores.
+    /// Intersection over union of the two masks at the manual pose, on the same canvas as the pair's scores.
     pub iou: f64,
     /// Dice coefficient of the same masks.
     pub dice: f64,
@@ -48,9 +48,9 @@ pub struct StoredAlignment {
     pub at: UnixMillis,
     /// When it was undone, if it was.
     pub undone_at: Option<UnixMillis>,
-    /// Whether mesh and print are unchanged, so that `print_from_mesh` is valid.
+    /// Whether the mesh and the print are unchanged, which makes `print_from_mesh` valid.
     pub holds: bool,
-    /// Whether the depth map is unchanged too, so that `print_from_depth` is valid.
+    /// Whether the depth map is unchanged, which makes `print_from_depth` valid.
     pub on_current_depth: bool,
 }
 
@@ -71,7 +71,8 @@ FROM manual_alignment AS a JOIN pair AS p ON p.id = a.pair
 ORDER BY a.id";
 
 impl Catalog {
-    /// Appends a manual alignment, durable on return, and returns whether it is new; one sent again is not stored twice.
+    /// Appends a manual alignment, which is durable on return. Returns `false`, and stores nothing, if its event is
+    /// stored already.
     ///
     /// # Errors
     /// If there is no such pair, or the database returns an error.
@@ -114,7 +115,7 @@ impl Catalog {
         Ok(sqlx::query_as(LOG).fetch_all(&mut *conn).await?)
     }
 
-    /// Returns the newest manual alignment of each pair that is valid and not undone.
+    /// Returns for each pair its newest manual alignment that is valid (`holds`) and not undone.
     ///
     /// # Errors
     /// If the database returns an error.

@@ -1,4 +1,4 @@
-//! Records of pairs: imports, results, verdicts, review answers and counts.
+//! Data of pairs: imports, results, verdicts, review answers and counts.
 
 pub(crate) mod ground_truth;
 pub(crate) mod import;

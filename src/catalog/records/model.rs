@@ -1,4 +1,4 @@
-//! Read models of the catalog: plain values, pairs in the order of their names.
+//! Read models of the catalog: plain values that queries return.
 
 use std::collections::BTreeMap;
 
@@ -24,9 +24,9 @@ pub struct StatusCounts {
     pub jobs: BTreeMap<JobStatus, u64>,
     /// Number of pairs by stage, all stages included.
     pub stages: BTreeMap<Stage, StageCounts>,
-    /// Number of pairs whose results are stale: computed with other settings or inputs than the current ones.
+    /// Number of pairs with stale results, computed with settings or inputs other than the current ones.
     pub stale: u64,
-    /// Number of completed pairs with a confidence below [`MetricOutcome::LOW_CONFIDENCE`].
+    /// Number of completed pairs with a metric whose confidence is below [`MetricOutcome::LOW_CONFIDENCE`].
     pub low_confidence: u64,
     /// Number of verdicts on current results, the newest of each reviewer.
     pub verdicts: BTreeMap<Verdict, u64>,
@@ -60,7 +60,7 @@ pub struct StoredFailure {
 pub struct FailedPair {
     /// The pair.
     pub name: PairName,
-    /// Whether it is quarantined or backing off.
+    /// Status of its job.
     pub status: JobStatus,
     /// The failure.
     #[serde(flatten)]
@@ -87,7 +87,7 @@ pub struct StageRecord {
     pub fingerprint_fields: Value,
     /// Content of the mesh it was computed from.
     pub mesh_hash: ContentHash,
-    /// Content of the print it was computed from; `None` for stages that do not read the print.
+    /// Hash of the print that the result was computed from. `None` if the stage does not read the print.
     pub print_hash: Option<ContentHash>,
     /// Time it took to compute, milliseconds.
     pub ms: u64,
@@ -99,7 +99,7 @@ impl StageRecord {
     /// Parses the outcome into its type in `domain`, such as `FitOutcome`.
     ///
     /// # Errors
-    /// When the stored JSON does not match the type, for example after an upgrade.
+    /// If the stored JSON does not match the type, for example after an upgrade.
     pub fn parse<T: DeserializeOwned>(&self) -> Result<T, serde_json::Error> {
         T::deserialize(&self.outcome)
     }
@@ -111,7 +111,7 @@ pub struct MetricRecord {
     /// The numbers.
     #[serde(flatten)]
     pub outcome: MetricOutcome,
-    /// Hash over the numbers and the images that reviewers see; verdicts are bound to it.
+    /// Hash over the numbers and the images that reviewers see. Verdicts are bound to this hash.
     pub result_hash: ContentHash,
     /// Verdicts on this result, by reviewer.
     pub verdicts: Vec<ReviewerVerdict>,
@@ -155,7 +155,8 @@ pub struct PairResults {
     pub failure: Option<StoredFailure>,
     /// Results of the completed stages, in order.
     pub stages: Vec<StageRecord>,
-    /// Results of the metrics that the method computes, in the order of [`ThresholdMetric::ALL`]; empty unless done.
+    /// Results of the metrics that the method computes, in the order of [`ThresholdMetric::ALL`]. Empty if the pair is
+    /// not done.
     pub metrics: Vec<MetricRecord>,
     /// The true alignment as given, if any.
     pub truth: Option<Value>,
@@ -196,7 +197,7 @@ pub struct AttemptRecord {
 /// Everything about one pair, for `show`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PairDetail {
-    /// Attributes, status, results, failure, and metrics with the verdicts that count.
+    /// Attributes, status, results, failure, and each metric with the reviewers' newest verdicts.
     #[serde(flatten)]
     pub results: PairResults,
     /// Content of the mesh as last read.
@@ -205,7 +206,7 @@ pub struct PairDetail {
     pub print_hash: Option<ContentHash>,
     /// Number of attempts at the current stage.
     pub attempt: u32,
-    /// Number of workers that died while processing it since its last completed stage.
+    /// Number of worker deaths and overdue leases blamed on the pair since its last completed stage.
     pub crashes: u32,
     /// When the back-off ends.
     pub run_at: Option<UnixMillis>,

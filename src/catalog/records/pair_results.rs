@@ -51,7 +51,7 @@ const ATTEMPTS: &str =
     "SELECT stage, class, message, ms, at FROM attempt WHERE pair = ?1 ORDER BY id";
 
 impl Catalog {
-    /// Returns up to `limit` pairs after a name, in the order of names; empty at the end.
+    /// Returns up to `limit` pairs whose names follow `after`, in the order of names. Returns no pairs at the end.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -60,7 +60,7 @@ impl Catalog {
         after: Option<&PairName>,
         limit: usize,
     ) -> Result<Vec<PairResults>> {
-        // One read transaction, so that job, results and verdicts belong together while a run goes on.
+        // Reads in one transaction, so that job, results and verdicts are of one moment even during a run.
         let mut conn = self.snapshot().await?;
         let found = sqlx::query(PAGE)
             .bind(after.map_or("", PairName::as_str))
@@ -70,7 +70,7 @@ impl Catalog {
         assemble(&mut conn, &found).await
     }
 
-    /// Returns everything about one pair; `None` if it does not exist.
+    /// Returns everything about one pair, or `None` if it does not exist.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -115,7 +115,7 @@ impl Catalog {
         failed.collect()
     }
 
-    /// Returns the number of quarantined pairs by class, without empty classes.
+    /// Returns the number of quarantined pairs for each failure class that occurs.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -165,7 +165,7 @@ fn stored_failure(row: &SqliteRow) -> Result<Option<StoredFailure>> {
     }))
 }
 
-/// Returns the metrics of a completed pair with the verdicts on exactly these results.
+/// Returns the metrics of a completed pair, each with the verdicts on its current result.
 fn metrics(
     pair: i64,
     stages: &[StageRecord],
@@ -248,7 +248,7 @@ impl Catalog {
 }
 
 impl ResultPages<'_> {
-    /// Returns the next page, which is never empty; `None` at the end.
+    /// Returns the next page, or `None` at the end. A page is never empty.
     ///
     /// # Errors
     /// If the database returns an error.

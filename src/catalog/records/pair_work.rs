@@ -48,7 +48,7 @@ pub(crate) const LEASED: &str = "
 SELECT p.id, p.name, p.mesh_path, p.print_path, p.unit, p.scanned_face_down, p.character, p.block, p.meta, p.attributes
 FROM json_each(?1) AS wanted CROSS JOIN pair AS p ON p.id = wanted.value";
 
-/// Selects pairs with at least one file read, in pages by number.
+/// Selects pairs with their input files as last read, in pages by id.
 pub(crate) const INPUTS: &str = "
 SELECT id, mesh_path, mesh_hash, mesh_stat, print_path, print_hash, print_stat FROM pair
 WHERE id > ?1 ORDER BY id LIMIT ?2";
@@ -61,7 +61,7 @@ impl Catalog {
     /// Returns the leased pairs with their results, in the order of the leases.
     ///
     /// # Errors
-    /// When the database returns an error or holds invalid values.
+    /// If the database returns an error or holds invalid values.
     pub async fn work(&self, leases: &[Lease]) -> Result<Vec<PairWork>> {
         let mut conn = self.read_conn().await?;
         let wanted = json_array(leases.iter().map(|lease| lease.pair.0));
@@ -89,7 +89,7 @@ impl Catalog {
         each.collect()
     }
 
-    /// Returns input files as last read, in pages by pair number; empty at the end.
+    /// Returns the input files of pairs as last read, in pages by pair id. Returns no pairs at the end.
     ///
     /// # Errors
     /// If the database returns an error.

@@ -14,7 +14,7 @@ use crate::domain::{
 /// Item shown to a reviewer.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Shown {
-    /// The result of one metric, or of several with equal results, each with its hash.
+    /// The result of one metric, or equal results of several metrics, each with its hash.
     Results(Vec<(ThresholdMetric, ContentHash)>),
     /// An attention check made from a metric's result.
     Check {
@@ -140,11 +140,11 @@ SELECT EXISTS (SELECT 1 FROM verdict WHERE coalesce(event, 'act-' || act) = ?1 A
     OR EXISTS (SELECT 1 FROM manual_alignment WHERE event = ?1 AND reviewer = ?2)";
 
 impl Catalog {
-    /// Appends an answer to what was shown, durable on return; the shown result need not be current any more. Returns
-    /// whether the answer is new: one whose `look.event` is stored already is skipped, so that it may be sent again.
+    /// Appends an answer to the item that was shown, which is durable on return. The shown result may be outdated by
+    /// now. Returns `false`, and stores nothing, if an answer with this `look.event` is stored already.
     ///
     /// # Errors
-    /// When there is no such pair, nothing was shown, or the database returns an error.
+    /// If there is no such pair, `shown` lists no result, or the database returns an error.
     pub async fn answer(&self, given: NewVerdict, shown: Shown, now: UnixMillis) -> Result<bool> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -182,11 +182,11 @@ impl Catalog {
         .await
     }
 
-    /// Undoes what a reviewer did with an event: a verdict, an answer to an attention check or a manual alignment. A
-    /// second call changes nothing. The log keeps both.
+    /// Undoes the verdict, the answer to an attention check or the manual alignment that a reviewer gave with an event.
+    /// A second call changes nothing. The log keeps the answer and the undo.
     ///
     /// # Errors
-    /// When the reviewer did nothing with this event.
+    /// If the reviewer gave nothing with this event, or the database returns an error.
     pub async fn undo_event(&self, event: &str, reviewer: &str, now: UnixMillis) -> Result<()> {
         let (event, reviewer) = (event.to_owned(), reviewer.to_owned());
         self.in_transaction(move |conn| {
@@ -213,7 +213,8 @@ impl Catalog {
         .await
     }
 
-    /// Returns a reviewer's answers that were not undone, oldest first; one on several results appears once per result.
+    /// Returns a reviewer's answers that were not undone, oldest first. An answer on several results appears once for
+    /// each result.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -223,7 +224,7 @@ impl Catalog {
         Ok(query.fetch_all(&mut *conn).await?)
     }
 
-    /// Returns every answer to an attention check, oldest first. Verdicts are not among them.
+    /// Returns every answer to an attention check, oldest first, without verdicts on results.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -233,7 +234,7 @@ impl Catalog {
         Ok(query.fetch_all(&mut *conn).await?)
     }
 
-    /// Returns the key for the names of pictures, which stays the same after a restart.
+    /// Returns the key from which the review page derives the ids of its items. It stays the same after a restart.
     ///
     /// # Errors
     /// If the database returns an error.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::domain::{ContentHash, ReviewOrder};
 
-/// Context of a verdict; empty for verdicts that were not given on the review page.
+/// Context of a verdict. All fields are `None` if the context is unknown.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, sqlx::FromRow)]
 pub struct ReviewContext {
     /// Idempotency key of the client: a verdict sent twice is stored once.
@@ -13,7 +13,7 @@ pub struct ReviewContext {
     pub seen: Option<ContentHash>,
     /// How long the image was shown, milliseconds.
     pub shown_ms: Option<u64>,
-    /// Rotation that the reviewer found missing between relief and print, degrees clockwise.
+    /// Rotation, in degrees clockwise, that the relief still needs to match the print, as read by the reviewer.
     pub angle_read_deg: Option<f64>,
     /// Order of the review queue.
     pub review_order: Option<ReviewOrder>,

@@ -34,7 +34,7 @@ pub(crate) async fn of_pairs(
     Ok(records)
 }
 
-/// Returns the hashes that verdicts on the current results are bound to, by pair and metric.
+/// Returns the hash of each metric's current result, by pair and metric. Verdicts are bound to these hashes.
 pub(crate) async fn metric_hashes(
     conn: &mut SqliteConnection,
     pairs: &[i64],

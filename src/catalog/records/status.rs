@@ -26,7 +26,7 @@ pub(crate) const LOW_CONFIDENCE: &str =
     "SELECT count(*) FROM job WHERE low_confidence = 1 AND status = 3";
 
 impl Catalog {
-    /// Counts for `status`; results that differ from the current `fingerprints` count as stale.
+    /// Returns the counts that `status` shows. Results that differ from the current `fingerprints` count as stale.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -57,7 +57,7 @@ fn jobs_by_status(counts: &JobCounts) -> BTreeMap<JobStatus, u64> {
     jobs
 }
 
-/// Returns the numbers of pairs by stage. A pair that failed at a stage is still pending at the later ones.
+/// Returns the numbers of pairs by stage. A pair that failed at a stage counts as pending at the later stages.
 fn by_stage(counted: &JobCounts) -> BTreeMap<Stage, StageCounts> {
     let mut stages: BTreeMap<_, _> = Stage::ALL
         .map(|stage| (stage, StageCounts::default()))

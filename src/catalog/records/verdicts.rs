@@ -1,4 +1,4 @@
-//! Verdicts: an append-only log, of which the newest verdict of each reviewer on a result counts.
+//! Verdicts: an append-only log. For each result, the newest verdict of each reviewer counts.
 
 use std::collections::BTreeMap;
 
@@ -39,7 +39,7 @@ pub struct NewVerdict {
 pub struct VerdictEvent {
     /// Number in the log.
     pub id: i64,
-    /// Number of the act; one act judges one or all metrics of a pair.
+    /// Number of the action, which is one judgement of one or all metrics of a pair: the id of its first row.
     pub act: i64,
     /// The pair.
     pub pair: PairName,
@@ -76,7 +76,7 @@ pub struct ReviewerVerdict {
     pub verdict: Verdict,
     /// Why, for a fail.
     pub reason: Option<Reason>,
-    /// The order in which results came to the reviewer; [`ReviewOrder::Adjudicate`] marks the decision on a conflict.
+    /// Order in which the reviewer saw the results. [`ReviewOrder::Adjudicate`] marks the decision on a conflict.
     pub review_order: Option<ReviewOrder>,
 }
 
@@ -90,7 +90,7 @@ pub(crate) struct ResultVerdict {
     pub(crate) verdict: ReviewerVerdict,
 }
 
-/// Current results of a pair that is done; the metric is NULL for another pair.
+/// Selects the current results of a pair. If the pair is not done, it selects one row whose metric is NULL.
 const JUDGED: &str = "
 SELECT p.id AS pair, m.metric, m.result_hash FROM pair AS p
     JOIN job AS j ON j.pair = p.id LEFT JOIN metric_result AS m ON m.pair = p.id AND j.status = 3
@@ -118,11 +118,12 @@ WHERE NOT EXISTS (SELECT 1 FROM verdict_undo AS u WHERE u.act = v.act)
 ORDER BY v.pair, v.metric, v.reviewer, v.id";
 
 impl Catalog {
-    /// Appends verdicts on the current results, all or none; returns how many are new. A verdict whose `event` is stored
-    /// already is skipped.
+    /// Appends verdicts on the current results, all or none. Returns the number of verdicts that are new. A verdict
+    /// whose `event` is stored already is skipped.
     ///
     /// # Errors
-    /// When a pair does not exist or has no result; then nothing is stored.
+    /// If a pair does not exist or has no result for a verdict to judge, or the database returns an error. In that case
+    /// nothing is stored.
     pub async fn verdict_set(&self, verdicts: Vec<NewVerdict>, now: UnixMillis) -> Result<u64> {
         self.in_transaction(move |conn| {
             Box::pin(async move {
@@ -136,11 +137,11 @@ impl Catalog {
         .await
     }
 
-    /// Undoes the newest act that is not undone yet, of one reviewer or of anyone; returns its verdicts. The log keeps
-    /// the act and the undo.
+    /// Undoes the newest action that is not undone yet, of one reviewer or of anyone, and returns its verdicts. The log
+    /// keeps the action and the undo.
     ///
     /// # Errors
-    /// When there is none.
+    /// If no action is left to undo, or the database returns an error.
     pub async fn verdict_undo(
         &self,
         reviewer: Option<&str>,
@@ -171,7 +172,7 @@ impl Catalog {
         .await
     }
 
-    /// Returns the log of one pair or all, oldest first.
+    /// Returns the verdict log of one pair, or of all pairs, oldest first.
     ///
     /// # Errors
     /// If the database returns an error.
@@ -181,7 +182,7 @@ impl Catalog {
     }
 }
 
-/// Appends a verdict; returns `false` when all its rows were stored before.
+/// Appends a verdict. Returns `false` if all its rows were stored before.
 async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) -> Result<bool> {
     let judged: Vec<(i64, Option<ThresholdMetric>, Option<ContentHash>)> = sqlx::query_as(JUDGED)
         .bind(new.pair.as_str())
@@ -208,8 +209,8 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
     }
 }
 
-/// Appends one row on a result of a pair; returns its act, which is the id of the act's first row. Returns `None` when a
-/// row with the same event and metric exists.
+/// Appends one verdict row for a result of a pair. Returns the number of the action that the row belongs to: the id of
+/// the action's first row. Returns `None`, and appends nothing, if a row with the same event and metric exists.
 pub(crate) async fn insert(
     conn: &mut SqliteConnection,
     new: &NewVerdict,
@@ -248,8 +249,8 @@ pub(crate) async fn log(
     Ok(query.fetch_all(conn).await?)
 }
 
-/// Returns the verdicts on results of some pairs that were not undone, in the order of reviewers: the newest of each
-/// reviewer on each result.
+/// Returns each reviewer's newest verdict on each result of some pairs, without undone verdicts, in the order of
+/// reviewers.
 pub(crate) async fn of_pairs(
     conn: &mut SqliteConnection,
     pairs: &[i64],
@@ -259,7 +260,7 @@ pub(crate) async fn of_pairs(
     let mut counted: BTreeMap<_, Vec<ResultVerdict>> = BTreeMap::new();
     for newest in found {
         let of_metric = counted.entry((newest.pair, newest.metric)).or_default();
-        // Rows come oldest first, so that a later one of the same reviewer on the same result replaces it.
+        // Rows come oldest first, so a later verdict of the same reviewer on the same result replaces the earlier.
         of_metric.retain(|old| {
             old.verdict.reviewer != newest.verdict.reviewer || old.result_hash != newest.result_hash
         });

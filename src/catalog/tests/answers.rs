@@ -1,4 +1,4 @@
-//! Answers of the review page: bound to what was shown, stored once, undone by event id, attention checks kept apart.
+//! Answers are bound to what was shown, stored once and undone by event id. Attention checks are kept apart.
 
 use super::{World, name};
 use crate::catalog::db::open;

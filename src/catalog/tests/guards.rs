@@ -49,8 +49,8 @@ async fn worker_ids_are_not_reused() {
     assert_eq!(status(&world).await, JobStatus::Leased);
 }
 
-/// Returns two leases of one worker on one pair: the first was overdue and recovered by another worker, then the pair
-/// was claimed again. Pair, worker, status and heartbeat are equal; only the token differs.
+/// Returns two leases of one worker on one pair. The first was overdue and recovered by another worker, and the pair
+/// was claimed again. Both leases have the same pair, worker, status and heartbeat; only the token differs.
 async fn leased_twice(world: &World) -> [Lease; 2] {
     let late = world.claim(1).await.remove(0);
     let heartbeat = world.catalog.heartbeat(world.worker, 5_000, 0).await;
@@ -85,8 +85,8 @@ async fn a_late_checkpoint_under_an_older_lease_of_the_same_worker_changes_nothi
     world.assert_counters().await;
 }
 
-/// Both requests share one commit, and each must get its own reply. A third lease keeps the counters above zero, because
-/// otherwise the commit would fail and each request would be tried alone.
+/// Both requests share one commit, and each must get its own reply. A third lease keeps the counters above zero.
+/// Without it, the commit would fail and each request would be committed on its own.
 #[tokio::test]
 async fn a_late_checkpoint_in_the_same_commit_changes_nothing() {
     let world = World::new(2).await;
@@ -155,7 +155,7 @@ async fn a_worker_that_ended_completes_and_claims_nothing() {
     assert!(!heartbeat.expect("an answer"));
 }
 
-/// The worker's last heartbeat was at 1; nobody has recovered its leases yet.
+/// The worker's last heartbeat was at time 1, and nobody has recovered its leases yet.
 #[tokio::test]
 async fn a_heartbeat_or_checkpoint_after_the_lease_expired_is_refused() {
     let world = World::new(3).await;
@@ -192,7 +192,7 @@ async fn a_heartbeat_or_checkpoint_after_the_lease_expired_is_refused() {
     world.assert_counters().await;
 }
 
-/// Two processes that write as fast as they can, a third that imports, and readers beside them.
+/// Two processes write as fast as they can while a third imports and others read.
 #[tokio::test(flavor = "multi_thread", worker_threads = 4)]
 async fn busy_errors_do_not_reach_callers() {
     let world = World::new(80).await;
@@ -269,7 +269,8 @@ async fn a_backoff_survives_the_death_of_its_process() {
     assert_eq!((again[0].attempt(), world.crashes("p0").await), (3, 1));
 }
 
-/// One worker's clock is years behind, another's years ahead: no living worker loses a lease, and no pair waits for years.
+/// One worker's clock is years behind, another's years ahead. No living worker loses a lease, and no pair waits for
+/// years.
 #[tokio::test]
 async fn clock_jumps_neither_block_pairs_nor_cost_leases() {
     const YEARS: i64 = 100_000_000_000;

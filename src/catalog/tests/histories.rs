@@ -26,7 +26,7 @@ struct Game {
     conn: SqliteConnection,
     dice: ChaCha8Rng,
     model: Queue,
-    /// Leases as their holders see them, including dead processes and processes that do not know that others consider them dead.
+    /// Leases as their holders see them. A holder may be dead, or not know that others consider it dead.
     leases: Vec<Lease>,
     /// The wall clock of the next process and of back-offs; it jumps.
     wall: i64,
@@ -36,7 +36,7 @@ struct Game {
     seen: Seen,
 }
 
-/// How often difficult situations occurred; a history without them proves nothing.
+/// Counts of difficult situations. A history without them proves nothing.
 #[derive(Debug, Default, Clone, Copy)]
 struct Seen {
     /// Writes under a lease that another process has recovered.
@@ -101,7 +101,7 @@ impl Game {
         self.dice.random_bool(chance)
     }
 
-    /// Picks a process that can act; others may consider it dead without its knowledge.
+    /// Picks a process that can act, even if others consider it dead without its knowledge.
     fn somebody(&mut self) -> Option<usize> {
         let running = |index: &usize| self.model.processes[*index].running;
         let running: Vec<_> = (0..self.model.processes.len()).filter(running).collect();

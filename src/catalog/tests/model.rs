@@ -74,7 +74,7 @@ impl Job {
         self.state = transition(self.state, event).expect("the model allows it");
     }
 
-    /// Returns the first stage with other settings or inputs than the current ones.
+    /// Returns the first stage whose result has other settings or inputs than the current ones.
     fn changed(&self, current: FingerprintIds) -> Option<Stage> {
         let behind = |stage: &Stage| self.state.stage().is_none_or(|next| *stage < next);
         Stage::ALL.into_iter().filter(behind).find(|stage| {
@@ -161,7 +161,8 @@ impl Queue {
         job.failure = None;
     }
 
-    /// Stores a failure: `back_off` is the time of the next attempt, `exclusive` requires an exclusive run; with neither the pair is quarantined.
+    /// Stores a failure. `back_off` is the time of the next attempt; `exclusive` makes the pair ready for an exclusive
+    /// run. With neither, the pair is quarantined.
     pub(super) fn fail(&mut self, lease: &Lease, back_off: Option<UnixMillis>, exclusive: bool) {
         let (worker, fingerprints) = (lease.worker, self.of_worker(lease.worker).fingerprints);
         let job = self.job(lease.pair().0);
@@ -184,7 +185,7 @@ impl Queue {
         job.attempt = job.attempt.saturating_sub(1);
     }
 
-    /// Recovers the leases of workers that are considered dead; returns how many pairs are ready again.
+    /// Recovers the leases of workers that are considered dead. Returns the number of pairs that are ready again.
     pub(super) fn recover(&mut self, dead: &[WorkerId]) -> u64 {
         for process in &mut self.processes {
             process.died |= dead.contains(&process.worker) && !process.ended;
@@ -219,7 +220,7 @@ impl Queue {
         jobs.map(|(pair, _)| *pair).collect()
     }
 
-    /// Recovers leases of other workers whose own clock exceeds the deadline by more than a margin.
+    /// Recovers leases of other workers whose last heartbeat is later than the lease's deadline by more than `margin`.
     pub(super) fn recover_overdue(&mut self, me: WorkerId, margin: i64) -> u64 {
         let mut ready = 0;
         for process in self.processes.clone() {
@@ -250,7 +251,7 @@ impl Queue {
         due
     }
 
-    /// Requeues jobs with other settings or inputs, or all on request; returns how many.
+    /// Requeues jobs with outdated settings or inputs and, on request, all jobs. Returns their number.
     pub(super) fn requeue_stale(&mut self, current: FingerprintIds, again: RerunPolicy) -> u64 {
         let mut sent = 0;
         for job in self.jobs.values_mut() {

@@ -1,4 +1,4 @@
-//! Query plans of the hot statements: they use a primary key or a partial index, without table scans and sorts.
+//! Query plans of frequent statements use a primary key or a partial index, without table scans or sorts.
 
 use sqlx::{AssertSqlSafe, Row as _};
 

@@ -1,4 +1,4 @@
-//! The state machine of a job: the specification that the SQL of the queue is tested against.
+//! The state machine of a job. It is the specification that the SQL of the queue is tested against.
 
 use crate::domain::{JobStatus, Stage, UnixMillis, WorkerId};
 
@@ -69,7 +69,7 @@ pub(super) enum Event {
         /// Deadline of the stage.
         deadline: UnixMillis,
     },
-    /// A stage is complete and its result stored; the next stage has the deadline.
+    /// A stage is complete and its result is stored. `deadline` is for the next stage.
     Checkpoint {
         /// The worker.
         worker: WorkerId,
@@ -90,7 +90,7 @@ pub(super) enum Event {
         /// The worker.
         worker: WorkerId,
     },
-    /// The worker releases it unfinished, at a drain or to be run exclusively.
+    /// The worker releases the job unfinished, because it is stopping or the job must run exclusively.
     Release {
         /// The worker.
         worker: WorkerId,
@@ -100,14 +100,14 @@ pub(super) enum Event {
         /// Whether too many workers died over it: see [`is_poisoned`].
         poisoned: bool,
     },
-    /// The back-off may be due, or implausibly far in the future after a clock jump.
+    /// The back-off ends if it is due, or so far in the future that the clock must have jumped.
     Due {
         /// The current time.
         now: UnixMillis,
         /// Longest back-off.
         longest_ms: i64,
     },
-    /// It was requested again, or its settings or inputs changed: back to `stage`, never forward.
+    /// A new run was requested, or settings or inputs changed. The job goes back to `stage`, never forward.
     Requeue {
         /// First stage to run.
         stage: Stage,
@@ -127,7 +127,7 @@ pub(super) struct Refused {
 /// Applies an event to a job.
 ///
 /// # Errors
-/// When the event is invalid in that state, or comes from a worker that does not hold the lease.
+/// If the event is invalid in that state, or comes from a worker that does not hold the lease.
 pub(super) fn transition(state: JobState, event: Event) -> Result<JobState, Refused> {
     let next = match (state, event) {
         (JobState::Ready { stage }, Event::Claim { worker, deadline }) => Some(JobState::Leased {

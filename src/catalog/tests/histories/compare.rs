@@ -18,7 +18,7 @@ const TABLES: [&str; 8] = [
 ];
 
 impl Game {
-    /// Returns everything that a write could change if the write must be refused, otherwise nothing.
+    /// Returns the rows of all tables that a write could change, if the write must be refused, otherwise nothing.
     pub(super) async fn dump(&mut self, allowed: bool) -> Vec<String> {
         let mut lines = Vec::new();
         for table in TABLES.iter().filter(|_| !allowed) {
@@ -37,7 +37,7 @@ impl Game {
         lines
     }
 
-    /// Asserts that every row equals the model, no token decreases, the counters are right and no verdict is lost.
+    /// Asserts that every row equals the model, no token decreased, the counters are right and no verdict was lost.
     pub(super) async fn agrees(&mut self) {
         let rows = sqlx::query(
             "SELECT j.*, f.stage AS failed_at, f.fingerprint AS failed_with FROM job AS j

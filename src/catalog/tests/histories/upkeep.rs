@@ -25,7 +25,7 @@ impl Game {
         }
     }
 
-    /// A process considers another one dead, rightly or not, or recovers its overdue leases.
+    /// A process considers another process dead, rightly or not, or recovers overdue leases of other processes.
     pub(super) async fn recover(&mut self) {
         let (Some(me), now) = (self.somebody(), self.wall) else {
             return;
