@@ -1,4 +1,5 @@
-//! Checks of the catalog: SQLite's own checks, the schema, and the counters and dirty marks compared with the rows.
+//! Checks the catalog: runs SQLite's own checks, and compares the schema, counters and dirty marks with what they must
+//! be.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -108,7 +109,7 @@ impl Catalog {
     /// are not compared with their tables.
     ///
     /// # Errors
-    /// If part of the file cannot be read, or SQLite returns an error other than a damaged file.
+    /// If part of the file cannot be read, or SQLite returns an error that does not mean damage.
     pub async fn integrity(&self, quick: bool) -> Result<Vec<String>> {
         let mut conn = self.read_conn().await?;
         match integrity(&mut conn, quick).await {

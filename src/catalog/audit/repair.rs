@@ -1,4 +1,4 @@
-//! Repairs what a check found, without an active run. Verdicts and the history of results are never changed.
+//! Repairs the damage that a check found, while no run is active. Verdicts and past results are never changed.
 
 use serde_json::json;
 use sqlx::{AssertSqlSafe, SqliteConnection};
@@ -65,8 +65,7 @@ impl Catalog {
             .await
     }
 
-    /// Corrects the fingerprint and dirty mark of each job by its results, and sets every counter to its number of
-    /// jobs.
+    /// Sets each job's fingerprint from its results, marks inconsistent jobs dirty, and corrects every counter.
     ///
     /// # Errors
     /// If the database returns an error.

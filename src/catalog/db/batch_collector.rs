@@ -38,7 +38,7 @@ impl BatchCollector {
 }
 
 /// Collects the batch that begins with `first`. Returns the batch, and the message that ended the batch if that message
-/// is not a request. Yields to other tasks before each look into the inbox, because senders that have just received a
+/// is not a request. Yields to other tasks before each read of the inbox, because senders that have just received a
 /// reply often send their next request immediately.
 pub(crate) async fn collect(
     first: Message,

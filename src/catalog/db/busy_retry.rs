@@ -16,7 +16,7 @@ const QUIET_WAIT: Duration = Duration::from_secs(5);
 /// Time between two attempts: SQLite refuses some locks at once.
 const RETRY_EVERY: Duration = Duration::from_millis(5);
 
-/// Retries an operation while the catalog is locked, for at most `LONGEST_WAIT`.
+/// Retries an operation while the catalog is locked, until `LONGEST_WAIT` is over.
 pub(crate) struct BusyRetry<'p> {
     catalog: &'p Path,
     begun: Instant,
@@ -53,7 +53,7 @@ impl<'p> BusyRetry<'p> {
     }
 }
 
-/// Evaluates a fallible expression repeatedly while the catalog is locked, for at most the longest wait. The value is
+/// Evaluates a fallible expression repeatedly while the catalog is locked, until the longest wait is over. The value is
 /// the last outcome.
 macro_rules! retry_while_busy {
     ($catalog:expr, $attempt:expr) => {{

@@ -28,7 +28,7 @@ impl CommitDelay {
         Arc::new(Self { longest, waiting })
     }
 
-    /// Returns when the delay of a commit ends; `None` when somebody waits.
+    /// Returns when the delay of a commit ends, or `None` if a caller waits.
     pub(crate) fn until(&self) -> Option<Instant> {
         let nobody = self.waiting.load(Ordering::Relaxed) == 0;
         nobody.then(|| Instant::now() + self.longest)

@@ -15,7 +15,7 @@ use crate::catalog::db::error_kind::CatalogErrorKind;
 use crate::catalog::db::group_commit::{Batch, BatchReply};
 use crate::catalog::db::request::{Message, Work};
 
-/// Number of commits after which the write-ahead log is checkpointed even under load. They write about 4 MiB of log.
+/// Number of commits after which the write-ahead log is checkpointed even under load, which is about 4 MiB of log.
 const COMMITS_PER_CHECKPOINT: u32 = 128;
 /// Idle time after which the write-ahead log is checkpointed.
 const IDLE: Duration = Duration::from_millis(250);

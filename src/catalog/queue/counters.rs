@@ -54,7 +54,7 @@ impl CounterKey {
         }
     }
 
-    /// Returns the next stage; `None` at the end.
+    /// Returns the next stage, or `None` at the end.
     pub(crate) fn stage(self) -> Option<Stage> {
         usize::try_from(self.cursor)
             .ok()

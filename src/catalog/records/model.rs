@@ -89,7 +89,7 @@ pub struct StageRecord {
     pub mesh_hash: ContentHash,
     /// Hash of the print that the result was computed from. `None` if the stage does not read the print.
     pub print_hash: Option<ContentHash>,
-    /// Time it took to compute, milliseconds.
+    /// Computing time in milliseconds.
     pub ms: u64,
     /// When it was stored.
     pub at: UnixMillis,
@@ -149,7 +149,7 @@ pub struct PairResults {
     pub attributes: PairAttributes,
     /// Status of its job.
     pub status: JobStatus,
-    /// Next stage; `None` when done.
+    /// Next stage. `None` if the pair is done.
     pub next_stage: Option<Stage>,
     /// The failure, if it is quarantined or backing off.
     pub failure: Option<StoredFailure>,

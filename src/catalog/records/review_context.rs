@@ -11,7 +11,7 @@ pub struct ReviewContext {
     pub event: Option<String>,
     /// Hash of everything that the shown image was made from.
     pub seen: Option<ContentHash>,
-    /// How long the image was shown, milliseconds.
+    /// How long the image was shown, in milliseconds.
     pub shown_ms: Option<u64>,
     /// Rotation, in degrees clockwise, that the relief still needs to match the print, as read by the reviewer.
     pub angle_read_deg: Option<f64>,

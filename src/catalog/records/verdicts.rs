@@ -39,7 +39,7 @@ pub struct NewVerdict {
 pub struct VerdictEvent {
     /// Number in the log.
     pub id: i64,
-    /// Number of the action, which is one judgement of one or all metrics of a pair: the id of its first row.
+    /// Number of the action: the id of its first row. One action judges one or all metrics of a pair.
     pub act: i64,
     /// The pair.
     pub pair: PairName,
@@ -209,8 +209,9 @@ async fn append(conn: &mut SqliteConnection, new: &NewVerdict, now: UnixMillis) 
     }
 }
 
-/// Appends one verdict row for a result of a pair. Returns the number of the action that the row belongs to: the id of
-/// the action's first row. Returns `None`, and appends nothing, if a row with the same event and metric exists.
+/// Appends one verdict row for a result of a pair. Returns the number of the action that the row belongs to, which is
+/// the id of the action's first row. Returns `None`, and appends nothing, if a row with the same event and metric
+/// exists.
 pub(crate) async fn insert(
     conn: &mut SqliteConnection,
     new: &NewVerdict,

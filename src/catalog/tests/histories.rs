@@ -1,4 +1,4 @@
-//! Random histories of several processes, applied to the catalog and to the model, which must always agree.
+//! Random histories of several processes, applied to the catalog and to the model. Both must always agree.
 
 mod compare;
 mod upkeep;
