@@ -1,4 +1,4 @@
-//! Stroke artwork: the outline of a character as a woodcutter draws it, and its neighbours on the block.
+//! Stroke artwork: the outlines of a character and of its neighbours on the block, as a woodcutter draws them.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -45,7 +45,7 @@ impl Artwork {
         Self::new(strokes, size_mm)
     }
 
-    /// Builds a character from a mask; `ink` returns the ink coverage, 0..=1, at a point in mm.
+    /// Builds a character from a mask. `ink` returns the ink coverage, 0..=1, at a point in mm.
     pub(super) fn of_mask(size_mm: f64, ink: impl Fn([f64; 2]) -> f64) -> Self {
         let frame = SampleFrame::covering(size_mm / 2.0 + MARGIN_MM, STEP_MM);
         let coverage = ScalarField::from_fn(frame, |point, _, _| ink(point)).values;
@@ -111,12 +111,14 @@ impl Artwork {
     }
 }
 
-/// Draws the outward offset of the outline in mm. Strokes widen by twice the offset: 2.6-4.4 % of the character's size.
+/// Draws the outward offset of the outline in mm. Strokes widen by 2.6-4.4 % of the character's size, which is twice
+/// the offset.
 fn draw_stroke_weight(size_mm: f64, rng: &mut ChaCha8Rng) -> f64 {
     size_mm * rng.random_range(0.013..0.022)
 }
 
-/// Returns the outline as cut with a knife: offset outwards, with rounded corners and a slightly irregular edge.
+/// Returns the signed distance to the outline as a knife would cut it: moved outwards by about `weight_mm`, with
+/// rounded corners and a slightly irregular edge.
 fn knife_outline(distance: &ScalarField, weight_mm: f64, rng: &mut ChaCha8Rng) -> ScalarField {
     let (coarse, fine) = (Noise::draw(rng), Noise::draw(rng));
     let (coarse_mm, fine_mm) = (rng.random_range(0.03..0.07), rng.random_range(0.015..0.035));

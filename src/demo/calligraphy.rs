@@ -1,9 +1,9 @@
-//! The `real` tier: photographed characters as prints, with reliefs carved from their clean masks.
+//! The `real` tier: the prints are photographs of characters, and the reliefs are carved from clean masks of them.
 //!
-//! The images are cells of a figure of the `DiffACR` project (Apache-2.0; see `assets/calligraphy/LICENSE`). A crop
-//! and its clean mask show the same cell; the crop has one extra row at the top. Over all twenty images the best
-//! shift is [0, 1] px within half a pixel and the best scale is 1 within 1 %. The ground truth of this tier is
-//! therefore accurate to about one pixel; the other tiers are exact.
+//! The images are cells of a figure of the `DiffACR` project (Apache-2.0; see `assets/calligraphy/LICENSE`). A crop and
+//! its clean mask show the same cell; the crop has one extra row at the top. Over all twenty images, the best alignment
+//! of mask and crop is a shift of [0, 1] px, within half a pixel, and a scale of 1, within 1 %. The ground truth of
+//! this tier is therefore accurate to about one pixel; the other tiers are exact.
 
 use image::{GrayImage, ImageError};
 use rand::RngExt;
@@ -46,7 +46,7 @@ static CELLS: [PhotographedCharacter; REAL_PAIRS as usize] = cells! {
 /// Makes a pair from the unchanged photograph and a relief of its clean mask in a random pose.
 ///
 /// # Errors
-/// Fails when an embedded image cannot be decoded.
+/// Returns an error if an embedded image cannot be decoded.
 pub(super) fn pair(seed: u64, index: u64, vertices: Option<u32>) -> Result<DemoPair, ImageError> {
     let photographed = &CELLS[(index % REAL_PAIRS) as usize];
     let mut rng = pair_rng(seed, Tier::Real, index);
@@ -89,7 +89,7 @@ fn clean_from_mm(clean: &GrayImage, size_mm: f64) -> Affine2 {
     Affine2::scale_shift(scale, centre)
 }
 
-/// Returns the ink coverage, 0..=1, at a pixel position by bilinear interpolation; 0 outside the image.
+/// Returns the ink coverage, 0..=1, at a pixel position by bilinear interpolation. The coverage is 0 outside the image.
 fn ink_coverage(clean: &GrayImage, [x, y]: [f64; 2]) -> f64 {
     let at = |x: f64, y: f64| {
         let pixel = (x >= 0.0 && y >= 0.0).then(|| clean.get_pixel_checked(x as u32, y as u32));

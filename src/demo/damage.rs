@@ -14,7 +14,7 @@ const LOST_SHARE: [f64; 2] = [0.05, 0.20];
 /// Damage to one block.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Damage {
-    /// Signed distance in mm to the lost regions, positive inside; `None` when nothing is lost.
+    /// Signed distance in mm to the lost regions, positive inside. `None` if nothing is lost.
     pub lost: Option<ScalarField>,
     /// Cracks through the wood.
     pub cracks: Vec<Crack>,

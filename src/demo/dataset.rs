@@ -1,4 +1,4 @@
-//! The dataset on disk, as ordinary manifest, mesh, image and truth files.
+//! Writes the dataset to disk: manifest, meshes, print images and ground truth.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -92,11 +92,11 @@ struct ManifestLine {
 
 /// Writes the dataset below `dir`, unless a complete one with the same options is already there.
 ///
-/// Writes `manifest.csv`, `truth.jsonl`, `meshes/`, `prints/` and `tops/`. `dataset.json` is written last, so that
-/// the files of a killed run are replaced. Calls `is_stopped` before each pair.
+/// Writes `manifest.csv`, `truth.jsonl`, `meshes/`, `prints/` and `tops/`. `dataset.json` is written last. Without it,
+/// the next run replaces the files that a killed run left. Calls `is_stopped` before each pair.
 ///
 /// # Errors
-/// Fails when a file cannot be written or `is_stopped` returns true.
+/// Returns an error if an image cannot be encoded, a file cannot be written or `is_stopped` returns true.
 pub fn write_dataset(
     dir: &Path,
     options: &DemoOptions,

@@ -7,7 +7,7 @@ use super::glyph::Glyphs;
 use super::pair::{DemoPair, drawn_pair};
 use super::tier::Tier;
 
-/// Generator of the pairs of a tier and seed. A pair depends on tier, seed and index only, not on the number of pairs.
+/// Generates the pairs of a tier from a seed. A pair depends only on tier, seed and index, not on the number of pairs.
 pub struct PairGenerator {
     glyphs: Glyphs,
     tier: Tier,
@@ -26,7 +26,7 @@ impl PairGenerator {
         }
     }
 
-    /// Sets the approximate number of vertices per scan; `None` draws it at random.
+    /// Sets the approximate number of vertices per scan. With `None`, the number is drawn at random.
     #[must_use]
     pub fn with_vertices(self, vertices: Option<u32>) -> Self {
         Self { vertices, ..self }
@@ -37,10 +37,10 @@ impl PairGenerator {
         self.tier
     }
 
-    /// Makes a pair. Indices of the `real` tier wrap around after its last pair.
+    /// Makes a pair. In the `real` tier, the indices after the last pair start again at the first pair.
     ///
     /// # Errors
-    /// Fails when an image cannot be encoded, or an embedded one not decoded.
+    /// Returns an error if an image cannot be encoded, or an embedded image cannot be decoded.
     pub fn pair(&self, index: u64) -> Result<DemoPair, ImageError> {
         match self.tier {
             Tier::Real => calligraphy::pair(self.seed, index, self.vertices),

@@ -116,13 +116,14 @@ fn draw_ink_load(tier: Tier, rng: &mut ChaCha8Rng) -> InkLoad {
     }
 }
 
-/// Averages the signed distance with an estimate from a blurred mask, which fills notches and rounds corners.
+/// Averages the signed distance with an estimate of it from a blurred mask. The blur fills notches and rounds corners.
 fn fill_corners(printed: &ScalarField) -> ScalarField {
     const SIGMA_MM: f64 = 0.12;
     let ink = ScalarField::from_fn(printed.frame, |_, x, y| f64::from(printed.at(x, y) > 0.0));
     let blurred = ink.blurred(SIGMA_MM);
     ScalarField::from_fn(printed.frame, |_, x, y| {
-        // A blurred edge has slope 1 / (sigma sqrt(2 pi)); the inverse converts coverage to mm.
+        // At the edge the blurred coverage changes by 1 / (sigma sqrt(2 pi)) per mm. The inverse converts coverage to
+        // mm.
         let blurred_mm = (blurred.at(x, y) - 0.45) * SIGMA_MM * (std::f64::consts::TAU).sqrt();
         0.5 * printed.at(x, y) + 0.5 * blurred_mm
     })
@@ -154,7 +155,8 @@ fn draw_speck(strokes: &ScalarField, rng: &mut ChaCha8Rng) -> Ellipse {
     }
 }
 
-/// Returns the approximate signed distance to the edge of a spot in mm, positive inside; -1 far outside.
+/// Returns the approximate signed distance to the edge of a spot in mm, positive inside. Returns -1 far outside the
+/// spot.
 fn inside_spot_mm(spot: &Ellipse, [u, v]: [f64; 2]) -> f64 {
     let (du, dv) = (u - spot.centre[0], v - spot.centre[1]);
     if du * du + dv * dv > (spot.long_mm + 1.0).powi(2) {

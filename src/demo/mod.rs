@@ -1,4 +1,4 @@
-//! The built-in dataset: glyphs carved into meshes and printed, with known truth, from one seed.
+//! The built-in dataset: characters carved into meshes and printed, with known ground truth, generated from a seed.
 //!
 //! A pair is a pure function of seed, tier and index. `scene` draws the strokes (`artwork`) and `damage` removes parts
 //! of them. `carving` computes the carved surface; `scanner` and `scan_pose` turn it into a mesh. `inking`,

@@ -23,12 +23,12 @@ impl Noise {
         lerp(row(iy), row(iy + 1), fy)
     }
 
-    /// Returns the sum of two octaves, the second at half amplitude, -1.5..1.5.
+    /// Returns the sum of two octaves, which lies in -1.5..1.5. The second octave has half the amplitude of the first.
     pub(super) fn two_octaves(self, x: f64, y: f64) -> f64 {
         self.at(x, y) + 0.5 * self.at(2.17 * x + 31.7, 2.17 * y - 11.3)
     }
 
-    /// Returns the random value of a lattice point, -1..1, by integer hashing.
+    /// Returns the random value of a lattice point, in -1..1, computed by integer hashing.
     fn lattice_value(self, x: i64, y: i64) -> f64 {
         let mut bits = self.seed
             ^ (x as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15)
@@ -56,8 +56,8 @@ pub(super) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     smoothstep_unit(((x - low) / (high - low)).clamp(0.0, 1.0))
 }
 
-/// Returns the largest integer not above `x`. On the baseline x86-64 target `f64::floor` is a library call, and this
-/// runs a million times per pair.
+/// Returns the largest integer that is not above `x`. This function runs a million times per pair, and on the baseline
+/// x86-64 target `f64::floor` would be a library call.
 fn floor(x: f64) -> i64 {
     let toward_zero = x as i64;
     toward_zero - i64::from((toward_zero as f64) > x)

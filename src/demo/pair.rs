@@ -56,10 +56,10 @@ pub(super) struct Printed {
     pub extension: &'static str,
 }
 
-/// Makes a pair of a tier that uses characters of the font.
+/// Makes a pair of one of the tiers whose characters come from the font.
 ///
 /// # Errors
-/// Fails when the print cannot be encoded.
+/// Returns an error if the print cannot be encoded.
 pub(super) fn drawn_pair(
     glyphs: &Glyphs,
     tier: Tier,
@@ -154,7 +154,8 @@ mod tests {
             .expect("images encode")
     }
 
-    /// Returns the mask value and the height, in shares of the character's height, of a mesh point under the true map.
+    /// Maps a mesh point to the print by the ground truth. Returns the mask value there and the point's height over the
+    /// plane, as a share of the character's height. Returns `None` outside the mask.
     fn height_at(pair: &DemoPair, tops: &Grid<u8>, point: [f64; 3]) -> Option<(u8, f64)> {
         let map = pair.truth.print_from_mesh;
         let [x, y, height] = map.apply(point);
@@ -182,7 +183,8 @@ mod tests {
         }
     }
 
-    /// Returns the mask without pixels next to another value: a wall starts half a pixel outside the stroke edge.
+    /// Returns the mask with all pixels next to a different value set to `IGNORED`, because a wall starts half a pixel
+    /// outside the stroke edge.
     fn without_edges(tops: &Grid<u8>) -> Grid<u8> {
         Grid::from_fn(tops.width(), tops.height(), |x, y| {
             let value = tops.at(x, y);

@@ -20,8 +20,8 @@ pub(super) struct Polygon {
 }
 
 impl Polygon {
-    /// Draws an irregular polygon that contains the box and a margin of `margin_mm`, and extends at most
-    /// `max_excess_mm` beyond the margin.
+    /// Draws an irregular polygon around a box. Its sides lie at least `margin_mm` outside the box, and at most
+    /// `max_excess_mm` further out.
     pub(super) fn around(
         inner: BoundsMm,
         margin_mm: f64,

@@ -9,10 +9,10 @@ use rand_chacha::ChaCha8Rng;
 
 use super::rendered_print::RenderedPrint;
 
-/// Encodes a print in a random format, mostly colour PNG or JPEG; returns the bytes and the file name extension.
+/// Encodes a print in a random format, mostly colour PNG or JPEG. Returns the bytes and the file name extension.
 ///
 /// # Errors
-/// Fails when the codec rejects the image.
+/// Returns an error if the codec rejects the image.
 pub(super) fn encode_print(
     print: &RenderedPrint,
     rng: &mut ChaCha8Rng,
@@ -47,7 +47,7 @@ fn rgb8(print: &RenderedPrint) -> DynamicImage {
 fn transparent_outside(print: &RenderedPrint, rgb: &DynamicImage) -> DynamicImage {
     let mut picture = rgb.to_rgba8();
     for (pixel, inside) in picture.pixels_mut().zip(print.inside_cut.data()) {
-        // Many tools store black under transparent pixels; it must not count as ink.
+        // Many tools store black in transparent pixels. This black must not count as ink.
         if !inside {
             *pixel = Rgba([0; 4]);
         }

@@ -36,7 +36,8 @@ impl PrintFrame {
         }
     }
 
-    /// Draws a frame that contains a polygon: longest side 100-400 px, rotated by up to 4 degrees.
+    /// Draws a frame that contains a polygon. The longest side of the polygon's box takes up to 100-400 px, and the
+    /// polygon is rotated by up to 4 degrees.
     pub(super) fn draw(outline: &Polygon, rng: &mut ChaCha8Rng) -> Self {
         let angle = rng.random_range(-4.0..4.0_f64).to_radians();
         let rotation = Affine2::similarity(1.0, angle, [0.0, 0.0]);
@@ -49,7 +50,7 @@ impl PrintFrame {
         };
         let bounds = rotated.bounds();
         let size_mm = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
-        // Most published crops are about 135 px, from 300 dpi scans; some are larger.
+        // Most published crops come from 300 dpi scans and are about 135 px long; some are larger.
         let longest_px: f64 = if rng.random_bool(0.5) {
             rng.random_range(112.0..170.0)
         } else {

@@ -1,4 +1,4 @@
-//! Scalar fields over the character's square, in mm: signed distances and heights.
+//! Scalar fields sampled on a square around the character: signed distances and heights, in mm.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -37,7 +37,8 @@ impl SampleFrame {
         ]
     }
 
-    /// Returns the samples of the square that extends `half_size_mm` from `centre` in each direction.
+    /// Returns the column and row of each sample in the square that extends `half_size_mm` from `centre` in each
+    /// direction.
     pub(super) fn box_around(
         self,
         centre: [f64; 2],
@@ -75,7 +76,7 @@ pub(super) struct ScalarField {
 }
 
 impl ScalarField {
-    /// Computes a field from the position in mm, the column and the row of each sample.
+    /// Computes each value of a field from the sample's position in mm, its column and its row.
     pub(super) fn from_fn(
         frame: SampleFrame,
         mut value: impl FnMut([f64; 2], usize, usize) -> f64,
@@ -87,7 +88,8 @@ impl ScalarField {
     }
 
     /// Computes the signed distance in mm to the outline of the inked area, positive inside. `coverage` is the ink
-    /// coverage of each sample's cell, 0..=1; next to the outline it gives subpixel precision.
+    /// coverage of each sample's cell, 0..=1. Next to the outline, the distance is computed from the coverage, which
+    /// gives subpixel precision.
     pub(super) fn signed_distance(frame: SampleFrame, coverage: &Grid<f32>) -> Self {
         let inside = coverage.map(|share| *share > 0.5);
         let outside = inside.map(|set| !set);
@@ -109,7 +111,7 @@ impl ScalarField {
         f64::from(self.values.at(x, y))
     }
 
-    /// Returns the interpolated value at a point in mm; positions outside the frame are clamped to its border.
+    /// Returns the interpolated value at a point in mm. Points outside the frame get the value at its border.
     pub(super) fn value(&self, point: [f64; 2]) -> f64 {
         let last = (self.frame.side - 1) as f64;
         let [x, y] = self.frame.sample(point).map(|c| c.clamp(0.0, last));
@@ -131,13 +133,14 @@ impl ScalarField {
     }
 }
 
-/// Interpolates between the corners of a unit square, given row by row, at a point of the square.
+/// Interpolates bilinearly at a point of the unit square. The values at the four corners are given row by row.
 pub(super) fn bilinear([top, bottom]: [[f64; 2]; 2], x: f64, y: f64) -> f64 {
     let [top, bottom] = [top, bottom].map(|[left, right]| left * (1.0 - x) + right * x);
     top * (1.0 - y) + bottom * y
 }
 
-/// Returns the weights of a Gaussian of `sigma` samples, truncated at three sigma and normalized to sum one.
+/// Returns the weights of a Gaussian with a standard deviation of `sigma` samples. The Gaussian is truncated at three
+/// sigma, and the weights sum to one.
 fn gaussian(sigma: f64) -> Vec<f32> {
     let reach = (3.0 * sigma).ceil().max(1.0) as i32;
     let raw: Vec<f64> = (-reach..=reach)
@@ -170,10 +173,10 @@ fn transpose(grid: &Grid<f32>) -> Grid<f32> {
     Grid::from_fn(grid.height(), grid.width(), |x, y| grid.at(y, x))
 }
 
-/// Computes the squared distance in pixels to the nearest set pixel (Felzenszwalb and Huttenlocher 2012,
-/// doi:10.4086/toc.2012.v008a019).
+/// Computes the squared distance from each pixel to the nearest set pixel, in square pixels (Felzenszwalb and
+/// Huttenlocher 2012, doi:10.4086/toc.2012.v008a019).
 fn distance_squared(mask: &Mask) -> Grid<f32> {
-    // Larger than any distance in the frame, yet small enough for exact f32 arithmetic on the parabolas.
+    // Larger than any squared distance in the frame, yet small enough for exact f32 arithmetic on the parabolas.
     let far = (mask.width() + mask.height()).pow(2) as f32;
     let start = mask.map(|set| if *set { 0.0 } else { far });
     let down = transpose(&lower_envelopes(&transpose(&start)));

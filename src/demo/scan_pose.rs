@@ -1,8 +1,8 @@
 //! The pose of a scan: the map from the block frame to the mesh frame, in mesh units.
 //!
-//! Block frame: mm, right-handed, z out of the block, origin at the character's centre. The block is carved in
-//! mirror writing, so a point (u, v) of the print lies at x = -u, y = -v: seen from outside with x to the right and
-//! y up, the right side of the print is on the left.
+//! The block frame is right-handed and in mm, with z out of the block and the origin at the character's centre. The
+//! block is carved in mirror writing, so a point (u, v) of the print lies at x = -u, y = -v. Seen from outside with x
+//! to the right and y up, the right side of the print is on the left.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -24,7 +24,7 @@ pub(super) struct ScanPose {
     pub unit: Option<LengthUnit>,
 }
 
-/// The plane of the stroke tops in mesh coordinates: `n . x + d = 0`, n outward.
+/// The plane of the stroke tops in mesh coordinates: `n . x + d = 0`, where n points out of the block.
 #[derive(Debug, Clone, Copy, serde::Serialize)]
 pub struct TopsPlane {
     /// Unit normal, out of the block.
@@ -66,7 +66,7 @@ impl ScanPose {
         }
     }
 
-    /// Returns the true `print_from_mesh` of the pair; `print_from_uv` maps mm to print pixels.
+    /// Returns the true map from the mesh to the print. `print_from_uv` maps positions (u, v) in mm to print pixels.
     pub(super) fn print_from_mesh(&self, print_from_uv: &Affine2) -> PrintFromMesh {
         let block_axes = [0, 1, 2].map(|i| self.block_axis(i));
         let row = |weights: [f64; 3], constant: f64| {
@@ -136,7 +136,8 @@ fn any_rotation(rng: &mut ChaCha8Rng) -> [[f64; 3]; 3] {
     ]
 }
 
-/// Draws a rotation of up to 11 degrees in the plane (the print adds up to 4), then a tilt of up to 10 degrees.
+/// Draws an in-plane rotation of up to 11 degrees followed by a tilt of up to 10 degrees. The print is rotated by up to
+/// 4 degrees as well.
 fn upright_rotation(rng: &mut ChaCha8Rng) -> [[f64; 3]; 3] {
     let in_plane = rotation_about(
         [0.0, 0.0, 1.0],

@@ -1,4 +1,4 @@
-//! Simulated scanner: samples a surface as an irregular triangle mesh in the block frame, cut along a polygon.
+//! Simulated scanner: samples the part of a surface inside a polygon as an irregular triangle mesh.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -33,7 +33,8 @@ pub(super) struct ScanStyle {
 }
 
 impl ScanStyle {
-    /// Draws a scan of about `vertices` vertices; `None` draws 20,000 to 150,000, with small scans more likely.
+    /// Draws the properties of a scan of about `vertices` vertices. If `vertices` is `None`, draws 22,000 to 132,000,
+    /// with small scans more likely.
     pub(super) fn draw(is_damaged_scan: bool, vertices: Option<u32>, rng: &mut ChaCha8Rng) -> Self {
         let is_closed = rng.random_bool(0.125);
         let share: f64 = rng.random_range(0.0..1.0);
@@ -85,7 +86,7 @@ impl SampledSurface {
     ) -> Self {
         let bounds = outline.bounds();
         let [width, height] = [0, 1].map(|i| bounds.max[i] - bounds.min[i]);
-        // The polygon fills about five sixths of its bounding box; a closed scan repeats the face at its base.
+        // The polygon fills about 84 % of its bounding box. The base of a closed scan has as many vertices as its face.
         let wanted = style.vertices * if style.is_closed { 0.5 } else { 1.0 };
         let spacing = (width * height * 0.84 / wanted).sqrt();
         let columns = (width / spacing) as usize + 9;
@@ -107,7 +108,7 @@ impl SampledSurface {
         Self { columns, points }
     }
 
-    /// Triangulates the points inside the outline and outside the holes; unused points are dropped.
+    /// Triangulates the points inside the outline and outside the holes. Drops the points that no triangle uses.
     fn triangles(&self, outline: &Polygon, holes: &[ScanHole], rng: &mut ChaCha8Rng) -> Mesh {
         let is_visible: Vec<bool> = self
             .points
@@ -135,7 +136,7 @@ impl SampledSurface {
     }
 }
 
-/// Returns the mesh of these triangles; its vertices are the points that they use, in the order of first use.
+/// Returns the mesh of these triangles. Its vertices are the points that the triangles use, in the order of first use.
 fn mesh_of(points: &[[f64; 3]], triangles: &[[usize; 3]]) -> Mesh {
     let mut index = vec![u32::MAX; points.len()];
     let mut mesh = Mesh::default();
@@ -218,7 +219,7 @@ fn close_body(mesh: &mut Mesh, noise_mm: f64, rng: &mut ChaCha8Rng) {
     }
 }
 
-/// Returns the directed edges with one adjacent triangle, in triangle order.
+/// Returns the edges that belong to only one triangle, directed as in that triangle, in the order of the triangles.
 fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
     let edges = || {
         triangles
@@ -231,7 +232,7 @@ fn boundary_edges(triangles: &[[u32; 3]]) -> Vec<(u32, u32)> {
         .collect()
 }
 
-/// Adds the wall vertices below a boundary vertex; returns them from the face down to the base.
+/// Adds the wall vertices below a boundary vertex. Returns the column of vertices from the face down to the base.
 fn wall_column(
     boundary: u32,
     base_start: u32,

@@ -13,14 +13,14 @@ pub(super) const REAL_PAIRS: u64 = 20;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Tier {
-    /// Unit mm, rotation within 15 degrees of the print, tilt within 10 degrees.
+    /// Scans in mm, rotated by at most 15 degrees against the print and tilted by at most 10 degrees.
     Upright,
     /// Any orientation, unit and position; slight bend.
     Pose,
-    /// Like `Pose`, with a bend of 0.2-0.8 mm, lost strokes, cracks, different neighbours on mesh and print, uneven ink and
-    /// stains.
+    /// Like `Pose`, but with a bend of 0.2-0.8 mm, lost strokes, cracks, uneven ink, stains, and different neighbours
+    /// on mesh and print.
     Hard,
-    /// Twenty photographed characters as prints, with reliefs carved from their clean masks, in any pose.
+    /// Twenty photographs of characters as prints. The reliefs are carved from clean masks of them and have any pose.
     Real,
 }
 

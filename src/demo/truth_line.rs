@@ -13,10 +13,11 @@ use crate::raster::Grid;
 
 /// Mask value of a stroke top.
 pub(super) const STROKE_TOP: u8 = 255;
-/// Mask value of pixels excluded from the score: neighbours, rules, lost strokes, cracks.
+/// Mask value of pixels that are excluded from the score: neighbouring characters, column rules, lost strokes and
+/// cracks in strokes.
 pub(super) const IGNORED: u8 = 128;
 
-/// Width of the excluded band around neighbours, mm: their walls are neither stroke top nor background.
+/// Width of the excluded band around neighbouring characters, in mm. Their walls are neither stroke top nor background.
 const NEIGHBOUR_MARGIN_MM: f64 = 0.2;
 
 /// One line of `truth.jsonl`.
@@ -94,7 +95,8 @@ impl TruthSource<'_> {
             .map_or(0.0, |found| found.height() as f64)
     }
 
-    /// Draws 12 to 40 well-separated points on the remaining stroke tops, in mesh coordinates.
+    /// Draws 16 to 36 well-separated points on the remaining stroke tops, in mesh coordinates. Returns fewer if no more
+    /// are found.
     fn landmarks(&self, pose: &ScanPose, rng: &mut ChaCha8Rng) -> Vec<[f64; 3]> {
         let wanted = rng.random_range(16..=36_usize);
         let mut chosen: Vec<[f64; 2]> = Vec::new();

@@ -104,7 +104,7 @@ pub enum MeshError {
 }
 
 impl MeshError {
-    /// Returns the failure class. The file is at fault in every case: one over a limit can only be read by raising the
+    /// Returns the failure class, which is always `BadInput`. A file over a limit can only be read after raising the
     /// setting that the message names.
     pub const fn class(&self) -> FailureClass {
         FailureClass::BadInput
@@ -119,7 +119,7 @@ pub(super) fn check_finite(position: [f64; 3], vertex: u64) -> Result<[f64; 3], 
     }
 }
 
-/// Checks that vertices are finite; `before` vertices precede them in the file.
+/// Checks that a block of vertices is finite. `before` is the number of vertices before the block in the file.
 pub(super) fn check_all_finite<T: Copy + Into<f64>>(
     positions: &[[T; 3]],
     before: usize,
@@ -140,7 +140,7 @@ pub(super) fn check_all_finite<T: Copy + Into<f64>>(
 pub struct MeshLimits {
     /// Largest file in bytes; 2 GiB holds any scan of one character.
     pub max_bytes: u64,
-    /// Most vertices; 50 million take 0.6 GB in single precision, 1.2 GB in double.
+    /// Largest number of vertices. 50 million take 0.6 GB in single precision and 1.2 GB in double precision.
     pub max_vertices: u64,
     /// Most triangles after triangulation; 100 million take 1.2 GB.
     pub max_triangles: u64,
@@ -158,7 +158,7 @@ impl MeshLimits {
         check_count("bytes", count, self.max_bytes)
     }
 
-    /// Checks a number of vertices; never allows more than a 32-bit index can address.
+    /// Checks a number of vertices against the limit. More vertices than a 32-bit index can address are never allowed.
     pub(super) fn check_vertices(&self, count: u64) -> Result<(), MeshError> {
         let limit = self.max_vertices.min(u64::from(u32::MAX));
         check_count("vertices", count, limit)

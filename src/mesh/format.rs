@@ -22,7 +22,8 @@ pub(super) enum DetectedFormat {
 const LINES_TRIED: usize = 1000;
 
 impl DetectedFormat {
-    /// Detects the format of a file; its name decides only for truncated or ambiguous content.
+    /// Detects the format of a file from its content. The file name is used only if the content is truncated or
+    /// ambiguous.
     ///
     /// # Errors
     /// Returns an error if the content is of no supported format.
@@ -37,10 +38,10 @@ impl DetectedFormat {
                 Ok(Self::StlBinary)
             }
             FileKind::Binary if has_extension(name, "stl") => Ok(Self::StlBinary),
-            // Names in another encoding or a stray control character do not make a text file binary.
+            // A text file with a stray control character or names in another encoding may be classed as binary.
             FileKind::Text | FileKind::Binary => match first_words(bytes) {
                 Some(format) => Ok(format),
-                // A truncated binary STL with a text header has no count to recognise it by.
+                // A truncated binary STL with a text header cannot be recognised by its size, so the file name decides.
                 None if has_extension(name, "stl") && bytes.contains(&0) => Ok(Self::StlBinary),
                 None => Err(MeshError::NotAMesh(kind)),
             },

@@ -22,9 +22,9 @@ use format::DetectedFormat;
 
 /// Reads a mesh or point set from the bytes of a file.
 ///
-/// The format is detected by content; `name` decides only for ambiguous content. Polygons are triangulated as fans;
-/// faces of fewer than three corners are ignored. The vertices of an STL are repeated in each of their triangles.
-/// Memory is reserved only as far as the file's size supports the counts in its header.
+/// The format is detected from the content; `name` is used only if the content is truncated or ambiguous. Polygons are
+/// triangulated as fans; faces of fewer than three corners are ignored. Each triangle of an STL gets three vertices of
+/// its own. The counts in a header never reserve more memory than a file of this size could need.
 ///
 /// ```
 /// use mocban::mesh::{MeshLimits, read};
@@ -61,7 +61,8 @@ pub fn read(bytes: &[u8], name: &str, limits: &MeshLimits) -> Result<Mesh, MeshE
 /// Some programs write it before text.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// Reads a mesh or point set of about `about` bytes like [`read`]. The bytes of a binary STL are not kept in memory.
+/// Reads a mesh or point set like [`read`], from a source of about `about` bytes. A binary STL of exactly `about` bytes
+/// is read in parts, so the whole file is never in memory.
 ///
 /// ```
 /// use mocban::mesh::{MeshLimits, read, read_from};
@@ -76,7 +77,7 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// ```
 ///
 /// # Errors
-/// Returns an error like [`read`], and if the source fails.
+/// Returns an error if [`read`] would return one, or if the source fails.
 pub fn read_from(
     source: &mut impl Read,
     about: u64,

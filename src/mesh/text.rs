@@ -1,6 +1,7 @@
 //! Lines, words and numbers of text formats, without copies.
 
-/// Returns trimmed lines with their numbers, counted from 1; accepts the line ends of every system.
+/// Returns the trimmed lines with their line numbers, counted from 1. Lines may end in LF or CRLF, or in CR if the file
+/// has no LF.
 pub(super) fn lines(bytes: &[u8]) -> impl Iterator<Item = (u64, &[u8])> {
     // Files of classic Mac OS have carriage returns only.
     let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };

@@ -2,7 +2,7 @@
 
 use crate::page_vec::PageVec;
 
-/// Triangles over vertices, in the mesh's own frame and unit. A point set has no triangles.
+/// A triangle mesh in its own frame and unit. A point set is a mesh without triangles.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Mesh {
     /// Positions of corners and points.
@@ -12,7 +12,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// Creates a mesh of separate triangles: each three consecutive vertices are one.
+    /// Creates a mesh in which every three consecutive vertices form a triangle of their own.
     pub(super) fn from_soup(vertices: Vertices) -> Self {
         let triangles = (0..vertices.len() as u32)
             .step_by(3)
@@ -25,7 +25,8 @@ impl Mesh {
     }
 }
 
-/// Finite positions in the mesh's own frame and unit, in the precision of the file: memory traffic dominates run time.
+/// Finite positions in the mesh's own frame and unit. They are kept in the precision of the file, because memory
+/// traffic dominates the run time.
 #[derive(Debug, Clone)]
 pub enum Vertices {
     /// From files of 32-bit floats, as scanners write.

@@ -79,7 +79,8 @@ fn corners(mesh: &Mesh, triangle: [u32; 3]) -> [[f32; 3]; 3] {
     triangle.map(|corner| single(mesh.vertices.at(corner as usize)))
 }
 
-/// Returns the unit normal by winding; zero for a triangle without area, as other STL writers do.
+/// Returns the unit normal of a triangle, directed by its winding. Returns zeros for a triangle without area, as other
+/// STL writers do.
 fn normal(corners: [[f32; 3]; 3]) -> [f32; 3] {
     let [a, b, c] = corners.map(|corner| Vector3::from(corner.map(f64::from)));
     let unit = (b - a).cross(&(c - a)).try_normalize(0.0);

@@ -1,12 +1,12 @@
-//! Reader of XYZ point sets: lines of numbers, the first three of each a position.
+//! Reader of XYZ point sets: text files in which each line starts with the three coordinates of a point.
 
 use super::{Mesh, MeshError, MeshLimits, error, text};
 
 /// Bytes of the shortest line: three digits, two spaces, a line end.
 const SHORTEST_LINE: usize = 6;
 
-/// Reads positions; further columns such as normals and colours are ignored. Commas and semicolons may separate
-/// numbers. The first line may be a count or the names of the columns.
+/// Reads the positions and ignores further columns such as normals and colours. Numbers may be separated by white
+/// space, commas or semicolons. The first line may be the number of points or the names of the columns.
 pub(super) fn read(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let mut vertices = Vec::with_capacity((bytes.len() / SHORTEST_LINE).min(1 << 16));
     let mut first = true;

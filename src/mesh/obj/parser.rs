@@ -8,15 +8,16 @@ use crate::page_vec::PageVec;
 const MAX_DIGITS: usize = 19;
 /// Mantissas below this are exact as a 64-bit float.
 const EXACT_BELOW: u64 = 1 << 53;
-/// Powers of ten that are exact as 64-bit floats. A quotient of two exact floats is rounded once, so it is the float
-/// nearest to the text (Clinger 1990, doi:10.1145/93542.93557).
+/// Powers of ten that 64-bit floats represent exactly. The quotient of an exact mantissa and an exact power is rounded
+/// only once, so it is the float nearest to the decimal number (Clinger 1990, doi:10.1145/93542.93557).
 const POWERS_OF_TEN: [f64; 23] = [
     1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
     1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
 /// Digits of an index that is parsed without a check for overflow.
 const MAX_INDEX_DIGITS: usize = 18;
-/// Bytes of a file per vertex and per triangle, estimated high so that the reserved memory is rather too small.
+/// Bytes of a file per vertex and per triangle. The estimates are high, so that too little rather than too much memory
+/// is reserved.
 const BYTES_PER_VERTEX: usize = 96;
 const BYTES_PER_TRIANGLE: usize = 48;
 
@@ -30,7 +31,8 @@ pub(super) struct ParsedObj {
     is_finite: bool,
 }
 
-/// Parses a file; returns `None` if a line is continued, or a word is not a number or a valid index.
+/// Parses a file. Returns `None` if its lines end in CR only, a line is continued on the next, or a word is not a
+/// number or a valid index.
 pub(super) fn parse(bytes: &[u8]) -> Option<ParsedObj> {
     // Lines of classic Mac OS end in a carriage return only.
     if !bytes.contains(&b'\n') && bytes.contains(&b'\r') {
@@ -65,8 +67,8 @@ pub(super) fn parse(bytes: &[u8]) -> Option<ParsedObj> {
 }
 
 impl ParsedObj {
-    /// Keeps the vertices that faces use, in the order of their first use; all if there are no faces. Returns `None` if
-    /// an index is out of range or a kept coordinate is not finite.
+    /// Keeps the vertices that faces use, in the order of their first use, or all vertices if there are no faces.
+    /// Returns `None` if an index is out of range or a kept coordinate is not finite.
     pub(super) fn into_mesh(self) -> Option<Mesh> {
         let Self {
             mut vertices,
@@ -143,7 +145,8 @@ impl LineCursor<'_> {
         Some(value)
     }
 
-    /// Appends decimal digits to a number and returns how many there were; the number wraps if it overflows.
+    /// Appends the next decimal digits of the line to a number and returns how many there are. The number wraps around
+    /// if it overflows.
     #[inline]
     fn digits(&mut self, number: &mut u64) -> usize {
         let before = self.rest.len();
@@ -160,8 +163,8 @@ impl LineCursor<'_> {
         self.rest.first().is_none_or(|byte| is_end_of_word(*byte))
     }
 
-    /// Parses the corners of a polygon and appends it as a fan around its first corner. `vertices` is the number of
-    /// vertices so far. Polygons of fewer than three corners add nothing.
+    /// Parses the corners of a polygon and appends the polygon as a fan of triangles around its first corner.
+    /// `vertices` is the number of vertices parsed so far. Polygons of fewer than three corners add nothing.
     fn face(&mut self, vertices: usize, triangles: &mut PageVec<[u32; 3]>) -> Option<()> {
         let (mut first, mut last) = (0, 0);
         for count in 0.. {
@@ -180,8 +183,8 @@ impl LineCursor<'_> {
         Some(())
     }
 
-    /// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn` and returns the vertex's index, from 0. A negative index counts back
-    /// from the `vertices` so far.
+    /// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn` and returns the vertex's index, from 0. `vertices` is the number of
+    /// vertices parsed so far. A negative index counts back from the last of them.
     fn corner(&mut self, vertices: usize) -> Option<u32> {
         let index = self.index()?;
         let mut parts = 1;
@@ -225,8 +228,8 @@ const fn is_end_of_word(byte: u8) -> bool {
     byte.is_ascii_whitespace() || byte == b'#'
 }
 
-/// Returns the vertices that triangles use, in the order of their first use, and renumbers the triangles to match;
-/// `None` if an index is out of range.
+/// Returns the vertices that triangles use, in the order of their first use, and renumbers the triangles to match.
+/// Returns `None` if an index is out of range.
 fn in_order_of_use(
     all: &[[f64; 3]],
     triangles: &mut PageVec<[u32; 3]>,

@@ -48,7 +48,7 @@ struct BodyReader<'a, S> {
 
 impl<S: NumberSource> BodyReader<'_, S> {
     fn element(&mut self, element: &PlyElement) -> Result<(), MeshError> {
-        // Rows without properties have no bytes, however many are declared; a vertex without properties is an error.
+        // Rows without properties take no bytes, so they need not be read. Vertices without properties are an error.
         if element.rows == 0 || (element.properties.is_empty() && element.name != "vertex") {
             return Ok(());
         }
@@ -71,7 +71,7 @@ impl<S: NumberSource> BodyReader<'_, S> {
         })
     }
 
-    /// Checks that the remaining bytes can hold the rows, before memory is reserved for them.
+    /// Checks the declared rows against the limits and the remaining bytes, before memory is reserved for the rows.
     fn check_rows(&self, element: &PlyElement) -> Result<(), MeshError> {
         match element.name.as_str() {
             "vertex" => self.limits.check_vertices(self.declared_vertices)?,
@@ -129,7 +129,8 @@ impl<S: NumberSource> BodyReader<'_, S> {
         Ok(())
     }
 
-    /// Reads positions in the packed layout of most programs, as far as the source supports it.
+    /// Reads rows of exactly three 32-bit floats in blocks, as most programs write them. Stops where the source returns
+    /// none; the caller then reads the rows that are left one by one.
     fn packed_vertices(&mut self, rows: u64) -> Result<(), MeshError> {
         let mut chunk = Vec::with_capacity(CHUNK_ROWS);
         while self.row < rows {
@@ -177,7 +178,7 @@ impl<S: NumberSource> BodyReader<'_, S> {
         }
     }
 
-    /// Reads the length of a list; a negative or fractional one means a damaged body.
+    /// Reads the length of a list. Returns a fault if the length is negative or not a whole number.
     fn list_length(&mut self, kind: PlyScalar) -> Result<u64, BodyFault> {
         let length = self.source.next(kind)?;
         if length >= 0.0 && length.fract() == 0.0 {
@@ -282,7 +283,8 @@ impl<S: NumberSource> BodyReader<'_, S> {
         Ok(())
     }
 
-    /// Reads a list of corners into triangles without storing the list, so that the limit bounds memory.
+    /// Reads a list of corners into triangles. The list itself is not stored, so that the limit on triangles bounds the
+    /// memory.
     fn corners(
         &mut self,
         count: PlyScalar,

@@ -129,7 +129,7 @@ impl PlyElement {
         ["x", "y", "z"].into_iter().all(is_single)
     }
 
-    /// Returns the index type if a row is a list of 32-bit indices with an 8-bit count.
+    /// Returns the type of the indices if each row is one list of 32-bit indices with an 8-bit count.
     pub(super) fn packed_corner_type(&self) -> Option<PlyScalar> {
         let [property] = self.properties.as_slice() else {
             return None;
@@ -207,8 +207,9 @@ impl PlyHeader {
     }
 }
 
-/// Returns the line at an offset and the offset of the next; `None` if no line ends there. All three line ends occur.
-/// The byte after a lone carriage return may belong to a binary body, so the first line decides.
+/// Returns the line at an offset and the offset of the next line. Returns `None` if the line has no end. Lines may end
+/// in LF, CRLF or CR. The first line decides which, because the byte after a later CR may already belong to a binary
+/// body.
 fn line_at(bytes: &[u8], at: usize) -> Option<(&[u8], usize)> {
     let old_mac = bytes.get(3) == Some(&b'\r') && bytes.get(4) != Some(&b'\n');
     let end = if old_mac { b'\r' } else { b'\n' };

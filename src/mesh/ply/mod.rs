@@ -342,7 +342,7 @@ mod tests {
                     out.extend(&(face.len() as u32).to_le_bytes()[..count_bytes]);
                     out.extend(face.iter().flat_map(|index| index.to_le_bytes()));
                 }
-                // At most the last face's corners are removed, so that the size of a row does not matter.
+                // Only corners of the last face are cut off, because the rows of the two layouts differ in size.
                 let missing = cut.min(faces.last().map_or(0, |face| 4 * face.len()));
                 out.truncate(out.len() - missing);
                 read(&out).map_err(|error| error.to_string())

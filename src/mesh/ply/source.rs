@@ -1,4 +1,4 @@
-//! Sources of the numbers of a PLY body: words of text, or bytes of either order.
+//! Readers of the numbers in a PLY body, which are words of text or bytes in either byte order.
 
 use super::header::{PlyElement, PlyScalar};
 use crate::mesh::error::MeshError;
@@ -28,14 +28,15 @@ pub(super) trait NumberSource {
     /// Skips numbers of one type.
     fn skip(&mut self, kind: PlyScalar, count: u64) -> Result<(), BodyFault>;
 
-    /// Returns an upper bound on the rows of an element in the rest of the body.
+    /// Returns the largest number of rows of an element that the rest of the body can hold.
     fn max_rows(&self, element: &PlyElement) -> u64;
 
-    /// Appends up to `_most` positions of rows of three 32-bit floats; none from text and at the end of the body.
+    /// Appends the positions of up to `_most` rows of three 32-bit floats. Appends none from text or at the end of the
+    /// body.
     fn packed_positions(&mut self, _most: usize, _into: &mut Vec<[f32; 3]>) {}
 
-    /// Appends up to `_most` triangles of rows of an 8-bit count and 32-bit indices; stops at a count other than
-    /// three. None from text and at the end of the body.
+    /// Appends the triangles of up to `_most` rows of an 8-bit count and 32-bit indices. Stops before a row with a
+    /// count other than three. Appends none from text or at the end of the body.
     fn packed_triangles(&mut self, _most: usize, _into: &mut Vec<[u32; 3]>) {}
 }
 

@@ -4,7 +4,7 @@ use crate::mesh::error::{self, MeshError, MeshLimits};
 use crate::mesh::text;
 use crate::mesh::triangle_mesh::Mesh;
 
-/// Reads an ASCII STL of one or more solids; loops of more than three corners become fans.
+/// Reads an ASCII STL with one or more solids. Loops of more than three corners are triangulated as fans.
 pub(crate) fn read_ascii(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let mut parser = AsciiParser::default();
     for (line, content) in text::lines(bytes) {

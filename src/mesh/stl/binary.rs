@@ -23,8 +23,8 @@ pub(crate) fn binary_count(bytes: &[u8]) -> Option<u32> {
         .map(u32::from_le_bytes)
 }
 
-/// Returns the number of triangles if a file of `len` bytes has exactly the size that its header gives: then it is a
-/// binary STL even if it begins with `solid`.
+/// Returns the number of triangles if a file of `len` bytes has exactly the size that its header implies. Such a file
+/// is a binary STL even if it begins with `solid`.
 pub(crate) fn whole_binary_count(bytes: &[u8], len: u64) -> Option<u32> {
     let holds = |count: &u32| len == HEADER as u64 + FACET as u64 * u64::from(*count);
     binary_count(bytes).filter(holds)
@@ -65,7 +65,7 @@ fn truncated(have: u64, count: u32) -> MeshError {
     }
 }
 
-/// Reads a binary STL. Bytes after the last triangle are ignored, as are normals and attributes.
+/// Reads a binary STL. Ignores normals, attributes and bytes after the last triangle.
 pub(crate) fn read_binary(bytes: &[u8], limits: &MeshLimits) -> Result<Mesh, MeshError> {
     let count = binary_count(bytes).ok_or_else(|| MeshError::Truncated {
         format: FORMAT,
@@ -120,7 +120,8 @@ impl FacetBuffer {
     }
 }
 
-/// Returns the corners of a facet: twelve little-endian 32-bit floats, of which the first three are the normal.
+/// Returns the corners of a facet. A facet starts with twelve little-endian 32-bit floats: the normal and three
+/// corners.
 fn corners(facet: &[u8; FACET]) -> [[f32; 3]; 3] {
     let (floats, _) = facet[12..48].as_chunks::<4>();
     let at = |i: usize| f32::from_le_bytes(floats[i]);

@@ -1,4 +1,4 @@
-//! Readers of STL, binary and ASCII: separate triangles, each with its own three vertices.
+//! Readers of binary and ASCII STL, in which each triangle has three vertices of its own.
 
 mod ascii;
 mod binary;
