@@ -36,8 +36,8 @@ impl PrintFrame {
         }
     }
 
-    /// Draws a frame that contains a polygon. The longest side of the polygon's box takes up to 100-400 px, and the
-    /// polygon is rotated by up to 4 degrees.
+    /// Draws a frame that contains a polygon. The frame's longest side is 100-400 px, and the polygon is rotated by up
+    /// to 4 degrees.
     pub(super) fn draw(outline: &Polygon, rng: &mut ChaCha8Rng) -> Self {
         let angle = rng.random_range(-4.0..4.0_f64).to_radians();
         let rotation = Affine2::similarity(1.0, angle, [0.0, 0.0]);

@@ -14,10 +14,10 @@ use crate::store::Project;
 /// Pairs in memory at a time while the worst are selected.
 const PAGE: usize = 256;
 
-/// The order of pairs on a contact sheet. Failed pairs come first, except by name.
+/// The order of pairs on a contact sheet. Failed pairs come first, except in `Name`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactSheetOrder {
-    /// Largest error against ground truth; without ground truth, lowest `IoU`.
+    /// Largest error against ground truth first, or lowest `IoU` first without ground truth.
     Worst,
     /// Lowest `IoU` on the canvas.
     Score,
@@ -68,7 +68,7 @@ pub enum DrawError {
     /// The catalog cannot be read.
     #[error("{0}")]
     Catalog(#[from] CatalogError),
-    /// A thread was lost.
+    /// A worker task panicked or was cancelled.
     #[error("drawing stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
@@ -83,10 +83,10 @@ struct SheetCandidate {
 
 /// Draws the contact sheet of a project from the current state of its catalog, without unfinished pairs.
 ///
-/// An image that cannot be drawn is left blank, with the reason in the cell.
+/// An image that cannot be drawn is left blank, and its cell states the reason.
 ///
 /// # Errors
-/// When the catalog cannot be read.
+/// Returns an error if the catalog cannot be read.
 pub async fn draw_contact_sheet(
     catalog: &Catalog,
     project: &Project,
@@ -122,7 +122,8 @@ async fn choose(
             let rank = rank(&pair, truth.as_ref(), options);
             chosen.push(SheetCandidate { rank, pair, truth });
         }
-        // The sort is stable and pairs come by name, so pairs of equal rank are sorted by name.
+        // The sort is stable and the pairs are read in the order of their names, so pairs of equal rank are sorted by
+        // name.
         chosen.sort_by(|a, b| a.rank.total_cmp(&b.rank));
         chosen.truncate(options.limit);
     }
@@ -169,7 +170,7 @@ fn cell(
     }
 }
 
-/// Returns the id, the confidence where it is known, and the verdict where there is one.
+/// Returns the id of a pair, followed by its confidence and its verdict if there are any.
 fn title(pair: &PairResults, metric: ThresholdMetric) -> String {
     let mut title = pair.attributes.name.to_string();
     if let Some(record) = pair.metric(metric) {

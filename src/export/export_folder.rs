@@ -18,7 +18,7 @@ pub(super) const MANUAL_ALIGNMENTS: &str = "manual_alignments.jsonl";
 /// Every entry of an export folder.
 const KNOWN: [&str; 5] = [LINES, PAIRS, VERDICTS, ATTENTION_CHECKS, MANUAL_ALIGNMENTS];
 
-/// A folder that is filled next to its target and then replaces it. It is removed when dropped unfinished.
+/// A folder that is filled next to its target and then replaces the target. It is removed if it is dropped unfinished.
 #[derive(Debug)]
 pub(super) struct Folder {
     target: PathBuf,
@@ -54,7 +54,7 @@ impl Folder {
     /// Creates an empty folder next to `target`, which must be new, empty or an earlier export.
     ///
     /// # Errors
-    /// When the target holds something else, or the folder cannot be created.
+    /// Returns an error if the target holds anything else, or the folder cannot be created.
     pub(super) fn begin(target: &Path) -> Result<Self, FolderError> {
         refuse_foreign(target)?;
         let (parent, name) = place(target)?;
@@ -87,7 +87,7 @@ impl Folder {
     /// Syncs the folder to disk and replaces the target with it.
     ///
     /// # Errors
-    /// When it cannot be renamed; an earlier export then stays.
+    /// Returns an error if the folder cannot be synced or renamed. An earlier export is then kept.
     pub(super) fn finish(mut self) -> Result<(), FolderError> {
         sync(&self.partial).map_err(at(&self.partial))?;
         if self.target.exists() && exchange(&self.partial, &self.target) {
@@ -132,7 +132,7 @@ fn sync(folder: &Path) -> io::Result<()> {
     fs::File::open(folder)?.sync_all()
 }
 
-/// Swaps two folders atomically; returns `false` where the file system cannot.
+/// Swaps two folders atomically. Returns `false` if that fails, as on file systems that cannot swap.
 #[cfg(target_os = "linux")]
 fn exchange(one: &Path, other: &Path) -> bool {
     use rustix::fs::{CWD, RenameFlags, renameat_with};

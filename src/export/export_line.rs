@@ -54,18 +54,18 @@ pub struct ExportLine {
     pub verdict: Option<Verdict>,
     /// The newest valid manual alignment, where there is one.
     pub manual_alignment: Option<LineManualAlignment>,
-    /// Computing time of the pair's stages, seconds, where times were requested.
+    /// Computing time of the pair's stages in seconds, if times were requested.
     pub seconds: Option<f64>,
 }
 
 /// Threshold, pose and scores.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Numbers {
-    /// Height above the fitted surface from which the depth map counts as stroke, mesh units.
+    /// Height above the fitted surface, in mesh units, from which the depth map counts as stroke.
     pub threshold_depth: Option<f64>,
     /// Grey level 0..=65535 that separates ink from background.
     pub threshold_print: Option<f64>,
-    /// Rotation of the depth map, degrees in (-180, 180], clockwise on the screen.
+    /// Clockwise rotation of the depth map on the screen, in degrees in (-180, 180].
     pub angle_deg: Option<f64>,
     /// Print pixels per depth-map pixel.
     pub scale: Option<f64>,
@@ -124,9 +124,9 @@ pub struct LineManualAlignment {
     pub at: UnixMillis,
     /// 3x4: mesh point to print pixel and height.
     pub print_from_mesh: PrintFromMesh,
-    /// 3x3: depth-map pixel to print pixel; null where the depth map has changed since.
+    /// 3x3: depth-map pixel to print pixel; null if the depth map has changed since the manual alignment.
     pub print_from_depth: Option<[[f64; 3]; 3]>,
-    /// Intersection over union of the masks on the canvas of the line's scores.
+    /// Intersection over union of the masks, on the canvas that the line's scores use.
     pub iou: f64,
     /// Dice coefficient of the same masks.
     pub dice: f64,
@@ -153,7 +153,7 @@ impl LineManualAlignment {
 /// Returns the newest manual alignment of each pair, without undone and outdated ones.
 ///
 /// # Errors
-/// When the catalog cannot be read.
+/// Returns an error if the catalog cannot be read.
 pub(super) async fn newest_manual_alignments(
     catalog: &Catalog,
 ) -> Result<BTreeMap<PairName, LineManualAlignment>, CatalogError> {

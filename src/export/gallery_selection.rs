@@ -1,5 +1,5 @@
-//! The images of the HTML report: results that reviewers failed or disagree on, results off the ground truth, and a
-//! random sample.
+//! The images of the HTML report: results that reviewers failed or disagree on, results that miss the ground truth, and
+//! a random sample.
 
 use rayon::prelude::*;
 
@@ -36,8 +36,8 @@ struct GallerySubject {
     log: Vec<VerdictEvent>,
 }
 
-/// The results to draw: at most 80 that reviewers failed, 80 on which they disagree, 80 off the ground truth, and a
-/// random sample of 20.
+/// The results to draw: at most 80 that reviewers failed, 80 on which they disagree, 80 that miss the ground truth, and
+/// a random sample of 20.
 #[derive(Debug)]
 pub struct GallerySelection {
     seed: u64,
@@ -51,14 +51,14 @@ pub struct GallerySelection {
 struct SelectedResults {
     /// Number of such results in the project.
     total: u64,
-    /// Those to draw, each with a number: the smallest numbers of a random sample, otherwise all 0.
+    /// The results to draw, each with a sort key. The key is random for the random sample and 0 for other reasons.
     subjects: Vec<(f64, GallerySubject)>,
 }
 
-/// Draws the images of a project's report. An image that cannot be drawn is left out, with the reason.
+/// Draws the images of a project's report. An image that cannot be drawn is left out, and the reason is given.
 ///
 /// # Errors
-/// When the catalog cannot be read.
+/// Returns an error if the catalog cannot be read.
 pub async fn draw_gallery(
     mut selection: GallerySelection,
     catalog: &Catalog,
@@ -81,7 +81,7 @@ impl GallerySelection {
         }
     }
 
-    /// Adds those results of a pair that are to be drawn. Pairs are added in the order of their names.
+    /// Adds the results of a pair that are to be drawn. Callers add the pairs in the order of their names.
     pub fn add(&mut self, pair: &PairResults, truth: &TruthEvaluation) {
         for records in group_identical(&pair.metrics) {
             for (group, reason) in self.groups.iter_mut().zip(GalleryReason::ALL) {
@@ -193,7 +193,7 @@ impl GallerySubject {
         }
     }
 
-    /// Returns scores, confidence and errors against ground truth, where they exist.
+    /// Returns scores, confidence and errors against ground truth, if they exist.
     fn numbers(&self) -> String {
         let Some(record) = self.record() else {
             return String::new();
@@ -212,7 +212,7 @@ impl GallerySubject {
         text
     }
 
-    /// Returns the newest verdict of each reviewer on this result, by reviewer.
+    /// Returns the newest verdict of each reviewer on this result.
     fn verdicts(&self) -> Vec<String> {
         let Some(record) = self.record() else {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! `export --to jsonl`: one line per pair and metric in `pairs.jsonl`, files below `pairs/`.
+//! `export --to jsonl`: writes one line per pair and metric to `pairs.jsonl`, and files below `pairs/`.
 //!
 //! Equal results give equal bytes. Times differ from run to run, so they are left out unless requested.
 
@@ -26,9 +26,9 @@ const PAGE: usize = 64;
 /// What to export.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct JsonlOptions {
-    /// Metrics of the current method; a pair without a result has a line for each.
+    /// Metrics of the current method. A pair without a result has one line for each metric.
     pub metrics: &'static [ThresholdMetric],
-    /// Whether to write computing times; the bytes then differ from run to run.
+    /// Whether to write computing times, with which the bytes differ from run to run.
     pub with_times: bool,
     /// Limits on the print images.
     pub limits: raster::ImageLimits,
@@ -43,7 +43,7 @@ pub struct ExportSummary {
     pub without_result: u64,
     /// Pairs whose result cannot be read, and why.
     pub unreadable: Vec<(PairName, String)>,
-    /// Whether an earlier export was kept because this one lacks files of finished pairs.
+    /// Whether an earlier export was kept because the new one lacks files of finished pairs.
     pub kept_earlier: bool,
 }
 
@@ -56,18 +56,19 @@ pub enum ExportError {
     /// The folder cannot be used, or a file in it not written.
     #[error(transparent)]
     Folder(#[from] FolderError),
-    /// A thread was lost.
+    /// A worker task panicked or was cancelled.
     #[error("the export stopped: {0}")]
     Stopped(#[from] tokio::task::JoinError),
 }
 
-/// Exports every pair of a project to a folder, which is new, empty or an earlier export that is replaced.
+/// Exports every pair of a project to a folder, which must be new, empty or an earlier export. Replaces an earlier
+/// export.
 ///
-/// A pair whose files cannot be read is reported in its lines and in the summary, and the others are exported. Such an
-/// export never replaces an earlier one: the earlier one is kept and the new one discarded.
+/// A pair whose files cannot be read is reported in its lines and in the summary, and the other pairs are exported. An
+/// export that lacks such files never replaces an earlier export: the new one is discarded.
 ///
 /// # Errors
-/// When the folder cannot be written or the catalog cannot be read; an earlier export then stays as it was.
+/// Returns an error if the folder cannot be written or the catalog cannot be read. An earlier export is then kept.
 pub async fn to_jsonl(
     catalog: &Catalog,
     project: &Project,
@@ -108,8 +109,8 @@ pub fn json_lines<T: Serialize>(values: &[T]) -> String {
     values.iter().map(line).collect()
 }
 
-/// Writes the logs of verdicts, attention checks and manual alignments, oldest first, with undone entries. The last two
-/// are left out when empty.
+/// Writes the logs of verdicts, attention checks and manual alignments, oldest first, with undone entries. The logs of
+/// attention checks and manual alignments are left out if they are empty.
 async fn write_logs(catalog: &Catalog, root: &Path) -> Result<(), ExportError> {
     write_log(root, VERDICTS, &catalog.verdict_log(None).await?)?;
     let checks = catalog.attention_check_answers().await?;

@@ -16,7 +16,7 @@ use crate::raster::{
 use crate::report::pair_artifacts::{PairArtifacts, PairArtifactsError};
 use crate::store::Project;
 
-/// Paths of one line's files below the export folder. Masks are 8-bit PNG, 255 = stroke.
+/// Paths of one line's files below the export folder. Masks are 8-bit PNG files in which 255 is stroke.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Files {
     /// The print image as given.
@@ -91,7 +91,7 @@ pub(super) struct PairFiles<'a> {
     depth: DepthMap,
 }
 
-/// The images that depend on the alignment only, as PNG: depth mask, aligned depth, aligned mask and overlay.
+/// The PNG images that depend only on the alignment: depth mask, aligned depth, aligned mask and overlay.
 pub(super) type EncodedImages = [Vec<u8>; 4];
 
 impl<'a> PairFiles<'a> {
@@ -140,7 +140,7 @@ impl<'a> PairFiles<'a> {
         ]
     }
 
-    /// Writes the files of one metric; returns the paths of all files of its line.
+    /// Writes the files of one metric. Returns the paths of all files of the metric's line.
     pub(super) fn write_metric(
         &self,
         root: &Path,

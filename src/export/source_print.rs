@@ -42,10 +42,10 @@ pub struct SourcePrint {
 }
 
 impl SourcePrint {
-    /// Reads a pair's print and checks that it is the one that was aligned.
+    /// Reads the print of a pair and checks that it has not changed since it was aligned.
     ///
     /// # Errors
-    /// When it cannot be read or decoded, or has changed.
+    /// Returns an error if the print cannot be read or decoded, or has changed.
     pub fn read(
         project: &Project,
         pair: &PairResults,
@@ -78,9 +78,9 @@ impl SourcePrint {
     }
 }
 
-/// Draws print, aligned relief and overlay of a metric's result, each at most `side` pixels wide and high.
+/// Draws the print, the aligned relief and the overlay of a metric's result, each at most `side` pixels wide and high.
 ///
-/// Also returns why an image that should exist is missing. A print that cannot be read leaves all three out.
+/// Also returns the reason if the depth map cannot be read. Returns no image and no reason if the print cannot be read.
 pub(super) fn result_images(
     project: &Project,
     pair: &PairResults,

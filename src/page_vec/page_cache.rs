@@ -9,7 +9,7 @@ use memmap2::MmapMut;
 const MAX_CACHED_BYTES: usize = 128 << 20;
 /// A vector uses cached pages of at most this many times its size.
 const MAX_OVERSIZE: usize = 4;
-/// Cache up to this many bytes even when new pages are taken from the system.
+/// Bytes that cached and new pages may have together before taking new pages frees cached ones.
 const MIN_CACHED_BYTES: usize = 32 << 20;
 
 /// Pages that are free.
@@ -26,8 +26,8 @@ static PAGE_CACHE: Mutex<PageCache> = Mutex::new(PageCache {
 });
 
 impl PageCache {
-    /// Returns the pages that fit best. If none fit, frees as many others as offset the new pages: scans of one run
-    /// differ in size, and one that is larger than all before must not add to them.
+    /// Returns the smallest cached pages that fit, or `None`. If none fit, frees cached pages to offset the new pages
+    /// that the caller takes instead. A scan larger than all before thus replaces earlier scans in memory.
     fn take(&mut self, bytes: usize) -> Option<MmapMut> {
         let sizes = bytes..=bytes.saturating_mul(MAX_OVERSIZE);
         let fits = |pages: &MmapMut| sizes.contains(&pages.len());
@@ -60,7 +60,8 @@ impl PageCache {
     }
 }
 
-/// Returns the cache of the process. A poisoned lock is harmless: no operation can leave the cache inconsistent.
+/// Returns the cache of the process. A poisoned lock is harmless, because no operation can leave the cache
+/// inconsistent.
 fn cache() -> MutexGuard<'static, PageCache> {
     PAGE_CACHE.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -69,7 +70,7 @@ fn cache() -> MutexGuard<'static, PageCache> {
 pub(super) struct PageBuffer(Option<MmapMut>);
 
 impl PageBuffer {
-    /// Returns at least `bytes` bytes of pages; `None` if the system has none.
+    /// Returns pages of at least `bytes` bytes, or `None` if the system has none.
     pub(super) fn allocate(bytes: usize) -> Option<Self> {
         let found = cache().take(bytes);
         if found.is_some() {
@@ -107,11 +108,11 @@ impl DerefMut for PageBuffer {
     }
 }
 
-/// Makes the process keep freed memory between pairs; at most an eighth of `limit` bytes as cached pages.
+/// Makes the process keep freed memory between pairs. Cached pages take at most an eighth of `limit` bytes.
 ///
-/// The allocator of glibc returns free memory at the end of the heap to the system once it exceeds twice the largest
-/// block that was ever mapped and freed. Allocating and freeing one large block raises that threshold; its memory is
-/// never touched.
+/// The allocator of glibc returns free memory at the end of the heap to the system once this memory exceeds twice the
+/// largest block that was ever mapped and freed. Allocating and freeing one large block raises that threshold. The
+/// memory of this block is never touched.
 pub fn keep_memory(limit: Option<u64>) {
     const WHOLE: usize = 31 << 20;
     if let Some(limit) = limit {

@@ -4,7 +4,7 @@ use super::warp_mask::warp_level_sets;
 use super::{Grid, Mask};
 use crate::domain::{Affine2, DepthScale};
 
-/// A 16-bit depth map. Level 0 is no data; 1..=65535 are linear in height.
+/// A 16-bit depth map. Level 0 means no data; levels 1..=65535 are linear in height.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthMap {
     /// Level of each pixel.
@@ -14,7 +14,7 @@ pub struct DepthMap {
 }
 
 impl DepthMap {
-    /// Returns the height over the fitted surface at a pixel, mesh units; `None` without data.
+    /// Returns the height over the fitted surface at a pixel, in mesh units, or `None` without data.
     pub fn height(&self, x: usize, y: usize) -> Option<f64> {
         match self.levels.at(x, y) {
             0 => None,
@@ -28,13 +28,13 @@ impl DepthMap {
         levels.filter(|level| *level > 0).collect()
     }
 
-    /// Returns the stroke mask at a threshold: levels of at least `level`. Pixels without data are not set.
+    /// Returns the stroke mask at a threshold: the pixels of at least `level`. Pixels without data are never set.
     pub fn stroke_mask(&self, level: u16) -> Mask {
         self.levels.map(|found| *found >= level.max(1))
     }
 
     /// Returns the stroke masks at several thresholds, warped into another frame of `width` x `height` pixels.
-    /// `to_from` maps depth-map px to that frame's px.
+    /// `to_from` maps depth-map px to px of the other frame.
     pub fn warped_stroke_masks(
         &self,
         to_from: &Affine2,

@@ -1,4 +1,4 @@
-//! Lossless PNG files of artifacts, written and read back, and JPEG for viewing. Equal grids give equal bytes.
+//! Encodes and decodes artifacts as lossless PNG, and encodes images for viewing as JPEG. Equal grids give equal bytes.
 
 use std::io::Cursor;
 
@@ -39,7 +39,7 @@ pub enum PngError {
 /// ```
 ///
 /// # Panics
-/// Panics if the grid has no pixels, like every encoder here; no stage produces such a grid.
+/// Panics if the grid has no pixels, as every encoder of this module does. No stage produces a grid without pixels.
 pub fn png_grey16(grid: &Grid<u16>) -> Vec<u8> {
     let samples: Vec<u8> = grid.data().iter().flat_map(|v| v.to_be_bytes()).collect();
     png_of(
@@ -102,7 +102,7 @@ fn png_of<T: Copy>(
     let mut encoder = png::Encoder::new(&mut out, grid.width() as u32, grid.height() as u32);
     encoder.set_color(color);
     encoder.set_depth(depth);
-    // Measured on a depth map of 512 px: 0.8 ms and 278 kB; level 1 of miniz takes 2.2 ms for 251 kB.
+    // On a depth map of 512 px this setting takes 0.8 ms for 278 kB, and level 1 of miniz 2.2 ms for 251 kB.
     encoder.set_deflate_compression(png::DeflateCompression::FdeflateUltraFast);
     encoder.set_filter(png::Filter::Paeth);
     encoder

@@ -19,10 +19,10 @@ pub struct Grid<T> {
     data: Vec<T>,
 }
 
-/// Side of the tiles that are transposed at a time, so that their rows stay in the cache.
+/// Side, in values, of the square tiles that are transposed one after another. Their rows stay in the cache.
 const TILE: usize = 8;
 
-/// Transposes the tile at the start of rows of `from_width` values into rows of `to_width` values.
+/// Transposes the tile at the start of `from` into `to`, whose rows have `from_width` and `to_width` values.
 fn transpose_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usize) {
     let rows: [&[T]; TILE] = std::array::from_fn(|y| &from[y * from_width..][..TILE]);
     for x in 0..TILE {
@@ -57,7 +57,7 @@ impl<T: Copy> Grid<T> {
         Self::of(width, height, vec![fill; width * height])
     }
 
-    /// Creates a grid from values in row-major order; `None` if their number does not match.
+    /// Creates a grid from values in row-major order. Returns `None` if their number does not match the size.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {
         (data.len() == width * height).then_some(Self::of(width, height, data))
     }

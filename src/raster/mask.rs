@@ -59,7 +59,7 @@ fn count_set(pixels: impl Iterator<Item = bool>) -> usize {
 pub struct MaskOverlap {
     /// Intersection over union, 0..=1; 0 if both masks are empty.
     pub iou: f64,
-    /// Dice coefficient, 0..=1: twice the intersection over the sum of both areas; 0 if both masks are empty.
+    /// Dice coefficient, 0..=1: twice the intersection divided by the sum of both areas, or 0 if both masks are empty.
     pub dice: f64,
 }
 
@@ -109,7 +109,7 @@ impl Mask {
         self.count() as f64 / self.data().len() as f64
     }
 
-    /// Returns the smallest box that contains every set pixel; `None` if none is set.
+    /// Returns the smallest box that contains every set pixel, or `None` if no pixel is set.
     ///
     /// ```
     /// use mocban::raster::Mask;
@@ -173,7 +173,7 @@ impl Mask {
         grown
     }
 
-    /// Returns the mean position of the set pixels, pixels; `None` if none is set.
+    /// Returns the mean position of the set pixels, in pixels, or `None` if no pixel is set.
     pub fn centroid(&self) -> Option<[f64; 2]> {
         let (mut n, mut sum_x, mut sum_y) = (0_u64, 0_u64, 0_u64);
         for y in 0..self.height() {

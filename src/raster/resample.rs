@@ -1,13 +1,13 @@
-//! Resampling to another size along the axes: box filter where the map shrinks, linear interpolation where it
-//! enlarges.
+//! Resampling to another size along the axes: a box filter shrinks, and linear interpolation enlarges.
 
 use super::Grid;
 use crate::simd::dispatch;
 
-/// Resamples values under the map `to = scale * from + shift` (pixels, per axis) to a grid of `to` columns and rows.
+/// Resamples values to a grid of `to` columns and rows. Along each axis, in pixels, the map is `scale * source +
+/// shift`.
 ///
-/// Each output pixel is the mean of the source over its own square, or over a source pixel's square if that is larger.
-/// Values beyond the source are zero.
+/// Each output pixel is the mean of the source over the larger of two squares: its own or that of a source pixel.
+/// Outside the source, values count as zero.
 ///
 /// ```
 /// use mocban::raster::{Grid, resample};

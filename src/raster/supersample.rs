@@ -1,22 +1,24 @@
-//! Supersampling: positions in the source of the samples of an output pixel, and bilinear interpolation there.
+//! Supersampling: samples an output pixel at several positions in the source by bilinear interpolation.
 
 use std::ops::Range;
 
 use super::Grid;
 use crate::domain::Affine2;
 
-/// Most samples along a side of an output pixel; maps that shrink further begin to alias.
+/// Largest number of samples along a side of an output pixel. Maps that would need more begin to alias.
 const MAX_SAMPLES_PER_SIDE: usize = 8;
-/// Spacing of samples in the source, pixels; each interpolates its neighbours, so nothing between them is missed.
+/// Largest spacing of the samples, in source pixels. Each sample interpolates the four source pixels around it, so no
+/// pixel between two samples is missed.
 const SAMPLE_SPACING_PX: f64 = 1.5;
 
 /// The sample positions of output pixels in the source.
 pub(super) struct Supersampler {
     from_to: Affine2,
     per_side: usize,
-    /// Offsets of the samples along a side from the pixel's centre, output pixels; the first `per_side` are used.
+    /// Offsets of the samples from the pixel's centre along one axis, in output pixels. Only the first `per_side` are
+    /// used.
     offsets: [f64; MAX_SAMPLES_PER_SIDE],
-    /// Offset of the outermost samples from the centre, source pixels along x and y.
+    /// Largest offsets of a sample from the pixel's centre along x and y, in source pixels.
     spread: [f64; 2],
 }
 
@@ -35,7 +37,7 @@ impl Supersampler {
         }
     }
 
-    /// Calls `visit` with each sample position of an output pixel, source pixels, row by row.
+    /// Calls `visit` with each sample position of an output pixel, in source pixels and row by row.
     #[inline(always)]
     fn for_each_sample(&self, x: usize, y: usize, mut visit: impl FnMut([f64; 2])) {
         let offsets = &self.offsets[..self.per_side];
@@ -46,8 +48,8 @@ impl Supersampler {
         }
     }
 
-    /// Returns the covered area of an output pixel, in samples, for each of some levels: the bilinear weight of values
-    /// of at least that level.
+    /// Returns, for each level, how many of an output pixel's samples are covered. A sample counts with the bilinear
+    /// weight of its source pixels that have at least the level.
     #[inline(always)]
     pub(super) fn coverage<T: Copy + Default + Into<f64>, const LEVELS: usize>(
         &self,
@@ -75,7 +77,7 @@ impl Supersampler {
         self.per_side * self.per_side
     }
 
-    /// Returns the mean over the samples where `value` exists; `None` unless it exists for more than half of them.
+    /// Returns the mean of `value` over the samples that have one, or `None` unless more than half of them do.
     pub(super) fn mean(
         &self,
         x: usize,
@@ -93,7 +95,7 @@ impl Supersampler {
         (2 * found > count || (count == 1 && found == 1)).then(|| sum / found as f64)
     }
 
-    /// Returns the mean level if all pixels around the samples are within the grid and have data.
+    /// Returns the mean level. All pixels around the samples must be within the grid and have data.
     pub(super) fn mean_inside(&self, x: usize, y: usize, levels: &Grid<u16>) -> f64 {
         let mut sum = 0.0;
         self.for_each_sample(x, y, |place| {
@@ -103,8 +105,8 @@ impl Supersampler {
         sum / self.sample_count() as f64
     }
 
-    /// Returns bounds of the source pixels that the samples of a box of output pixels may read: first and last column
-    /// and row.
+    /// Returns bounds of the source pixels that the samples of a box of output pixels may read, as first and last
+    /// column and row.
     pub(super) fn source_bounds(
         &self,
         columns: &Range<usize>,
@@ -124,13 +126,14 @@ impl Supersampler {
     }
 }
 
-/// Rounds down; a cast and a comparison, where `f64::floor` would be a call.
+/// Rounds down by a cast and a comparison, because `f64::floor` would be a function call.
 fn floor(value: f64) -> i64 {
     let cut = value as i64;
     cut - i64::from(cut as f64 > value)
 }
 
-/// Returns the four pixels around a position and the offset between them, 0..1; the default value outside the grid.
+/// Returns the values of the four pixels around a position, and the position's offset from the first of them, 0..1.
+/// Pixels outside the grid have the default value.
 #[inline(always)]
 pub(super) fn bilinear_cell<T: Copy + Default>(
     values: &Grid<T>,

@@ -5,11 +5,11 @@ use super::supersample::{Supersampler, bilinear_cell, interpolate};
 use super::{DepthMap, Grid};
 use crate::domain::Affine2;
 
-/// Side of the blocks of output pixels that are tested for missing data at a time.
+/// Side in pixels of the square blocks of output pixels that are tested together for missing data.
 const BLOCK_PX: usize = 4;
 
-/// Warps the levels of a depth map into a frame of `width` x `height` pixels; 0 where less than half of a pixel's
-/// square has data. A map without inverse gives no data.
+/// Warps the levels of a depth map into a frame of `width` x `height` pixels. A pixel gets level 0 (no data) if less
+/// than half of its square has data. If the map has no inverse, all pixels get level 0.
 ///
 /// `to_from` maps depth-map px to output px. The levels keep their scale.
 pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usize) -> Grid<u16> {
@@ -43,7 +43,7 @@ pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usi
     out
 }
 
-/// Interpolates the level bilinearly among the neighbours with data; `None` if their weight is below a half.
+/// Interpolates the level between the neighbours with data. Returns `None` if their weights sum to less than half.
 fn level_at(levels: &Grid<u16>, place: [f64; 2]) -> Option<f64> {
     let (near, within) = bilinear_cell(levels, place);
     if near == [0; 4] {

@@ -1,8 +1,8 @@
 //! Warps masks into another frame. Each output pixel is sampled through the inverse map, so there are no holes.
 //!
 //! Where the map shrinks, a pixel averages several samples spread over its square. Pixels outside the source are not
-//! set. Blocks of output pixels whose source values lie on one side of a level are filled at once; the others are
-//! divided.
+//! set. A block of output pixels is filled as a whole if all its source values lie on the same side of a level. Other
+//! blocks are divided.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use super::{Grid, Mask};
 use crate::domain::Affine2;
 use crate::simd::dispatch;
 
-/// Least coverage of a set pixel: half, with a margin for the order of summation.
+/// Smallest coverage of a pixel that is set: half, less a margin for rounding errors of the sum.
 const HALF_COVERED: f64 = 0.5 - 1e-9;
 /// Sides of the largest and the smallest blocks, output pixels.
 const MAX_BLOCK_PX: usize = 32;
@@ -22,7 +22,7 @@ const LANES: usize = 4;
 
 /// Warps a mask into a frame of `width` x `height` pixels: a pixel is set if at least half of its square is covered.
 ///
-/// `to_from` maps source px to output px. A map without inverse gives an empty mask.
+/// `to_from` maps source px to output px. If the map has no inverse, no pixel is set.
 ///
 /// ```
 /// use mocban::domain::Affine2;
@@ -38,7 +38,7 @@ pub fn warp_mask(mask: &Mask, to_from: &Affine2, width: usize, height: usize) ->
     warped.swap_remove(0)
 }
 
-/// Warps the masks of values of at least each level, as [`warp_mask`] does, with shared sampling.
+/// Warps one mask per level, as [`warp_mask`] does. The mask of a level holds the values of at least that level.
 pub(super) fn warp_level_sets<T: Copy + Ord + Default + Into<f64>>(
     values: &Grid<T>,
     levels: &[T],
@@ -104,7 +104,7 @@ impl<T: Copy + Ord + Default + Into<f64>> MaskWarp<'_, T> {
         let reach = self.sampler.source_bounds(&columns, &rows);
         let [low, high] = self.value_ranges.range_in_box(reach, T::default());
         let levels = &self.levels[levels_left.clone()];
-        // Levels up to the lowest source value are fully covered, levels above the highest not at all.
+        // The whole block reaches the levels up to its lowest source value, and no pixel those above its highest.
         let all = levels_left.start + levels.partition_point(|level| *level <= low);
         let some = levels_left.start + levels.partition_point(|level| *level <= high);
         for mask in &mut self.masks[levels_left.start..all] {

@@ -31,14 +31,14 @@ impl PrintView {
         Self::new(scale, width, height)
     }
 
-    /// Returns the view enlarged by the smallest integer that makes it large enough to judge.
+    /// Returns the view enlarged by the smallest integer that makes its longest side at least `OVERLAY_SIDE`.
     pub fn enlarged(print: &PrintImage) -> Self {
         let size = [print.rgb.width().max(1), print.rgb.height().max(1)];
         let factor = OVERLAY_SIDE.div_ceil(size[0].max(size[1]));
         Self::new(factor as f64, size[0] * factor, size[1] * factor)
     }
 
-    /// Pixels cover squares, so the corner of the image, at -0.5, remains the corner.
+    /// Creates a view. Pixels cover squares, so the image's corner at (-0.5, -0.5) is also the corner of the view.
     fn new(scale: f64, width: usize, height: usize) -> Self {
         let shift = (scale - 1.0) / 2.0;
         Self {
@@ -68,7 +68,8 @@ impl PrintView {
         picture
     }
 
-    /// Draws the overlay with the edges of the true stroke tops, a mask in the print's frame, below those of the depth mask.
+    /// Draws the overlay with the edges of the true stroke tops below the edges of the depth mask. `tops` is a mask in
+    /// the print's frame.
     pub fn overlay_on_truth(
         &self,
         print: &PrintImage,
@@ -83,7 +84,7 @@ impl PrintView {
         picture
     }
 
-    /// Warps a mask to the view; `print_from_mask` maps its pixels to print pixels.
+    /// Warps a mask to the view. `print_from_mask` maps pixels of the mask to print pixels.
     pub fn mask(&self, mask: &Mask, print_from_mask: &Affine2) -> Mask {
         let view_from_mask = self.from_print.after(print_from_mask);
         warp_mask(mask, &view_from_mask, self.width, self.height)
@@ -111,7 +112,7 @@ impl PrintView {
     }
 }
 
-/// Returns the set pixels with an unset one within `width` along a row or column. The border of the image is no edge.
+/// Returns the set pixels with an unset pixel at most `width` away in their row or column. The border is no edge.
 fn edges(mask: &Mask, width: usize) -> Grid<bool> {
     let width = width as i64;
     Grid::from_fn(mask.width(), mask.height(), |x, y| {
@@ -164,7 +165,7 @@ mod tests {
         let picture = view.overlay(&blank_print(), &depth(), &outcome);
         assert_eq!((picture.width(), picture.height()), (480, 480));
         let row: Vec<_> = (0..480).filter(|x| picture.at(*x, 240) == EDGE).collect();
-        // The bar covers depth pixels 8..12, that is print 7.5..11.5 in centres: 8 * 16 to 12 * 16 enlarged.
+        // The bar covers print pixels 8..12. Enlarged 16 times, it covers the pixels 128..192 of the view.
         assert!(
             row[0].abs_diff(128) <= 1 && row[row.len() - 1].abs_diff(191) <= 1,
             "{row:?}"

@@ -17,7 +17,7 @@ pub(super) fn eight_bits(print: &PrintImage) -> Rgb {
     print.rgb.map(|colour| colour.map(narrow))
 }
 
-/// Resizes an image: by the mean over each covered area when it shrinks, by nearest neighbour when it grows.
+/// Resizes an image. Shrinking averages the area that each pixel covers; enlarging takes the nearest pixel.
 pub(super) fn resized(image: &Rgb, width: usize, height: usize) -> Rgb {
     if (image.width(), image.height()) == (width, height) {
         return image.clone();
@@ -59,7 +59,7 @@ fn mean(image: &Rgb, columns: &Span, rows: &Span) -> [u8; 3] {
     sum.map(|total| (total / weight).round() as u8)
 }
 
-/// Copies an image onto another with its top left corner at (x, y), clipped.
+/// Copies an image onto another with its top left corner at (x, y). Parts outside the target are cut off.
 pub(super) fn copy(onto: &mut Rgb, image: &Rgb, x: usize, y: usize) {
     for row in 0..image.height().min(onto.height().saturating_sub(y)) {
         for column in 0..image.width().min(onto.width().saturating_sub(x)) {
@@ -87,7 +87,7 @@ pub(super) const fn text_height(dot: usize) -> usize {
     (font::HEIGHT + 2) * dot
 }
 
-/// Shortens a text to a width in pixels, with a final `..` where it was cut.
+/// Shortens a text to a width in pixels. A shortened text ends in `..`.
 pub(super) fn truncated(text: &str, width: usize, dot: usize) -> String {
     let most = width / text_width(1, dot);
     if text.chars().count() <= most {

@@ -3,9 +3,9 @@
 use super::paint::Rgb;
 use crate::raster::Grid;
 
-/// Altitude of the light above the horizon, radians; low, to show shallow relief.
+/// Altitude of the light above the horizon, in radians. A low light shows shallow relief.
 const LIGHT_ALTITUDE_RAD: f64 = 35.0 * std::f64::consts::PI / 180.0;
-/// Share of the grey value that depends on height, so that level tops and background differ.
+/// Share of the grey value that depends on height, so that flat tops differ from flat background.
 const HEIGHT_SHARE: f64 = 0.3;
 /// Red, green and blue in full light, 0..=1: the colour of wood.
 const WOOD: [f64; 3] = [1.0, 0.95, 0.86];
@@ -32,7 +32,7 @@ pub fn shaded(levels: &Grid<u16>, slope_per_level: f64) -> Rgb {
     })
 }
 
-/// Returns Lambert's cosine of a slope under light from the upper left, 0..=1.
+/// Returns Lambert's cosine, 0..=1, of a slope that is lit from the upper left.
 fn light(across: f64, down: f64) -> f64 {
     let (sin, cos) = LIGHT_ALTITUDE_RAD.sin_cos();
     let toward = cos * std::f64::consts::FRAC_1_SQRT_2;
@@ -40,7 +40,7 @@ fn light(across: f64, down: f64) -> f64 {
     ((toward * (across + down) + sin) / normal).max(0.0)
 }
 
-/// Returns 3 x 3 means over pixels with data, because scanner noise would hide the strokes.
+/// Returns 3 x 3 means over pixels with data. Without smoothing, scanner noise would hide the strokes.
 fn smoothed(levels: &Grid<u16>) -> Grid<Option<f64>> {
     Grid::from_fn(levels.width(), levels.height(), |x, y| {
         if levels.at(x, y) == 0 {
@@ -56,7 +56,8 @@ fn smoothed(levels: &Grid<u16>) -> Grid<Option<f64>> {
     })
 }
 
-/// Returns the slope along a direction, levels per pixel: the central difference, or a one-sided one next to missing data.
+/// Returns the slope along a direction in levels per pixel, by central differences, or by one-sided ones next to
+/// missing data.
 fn slope(heights: &Grid<Option<f64>>, [x, y]: [usize; 2], [dx, dy]: [i64; 2]) -> f64 {
     let at = |step: i64| {
         heights
@@ -71,7 +72,7 @@ fn slope(heights: &Grid<Option<f64>>, [x, y]: [usize; 2], [dx, dy]: [i64; 2]) ->
     }
 }
 
-/// Returns the lowest and the highest level with data; 0 and 0 without any.
+/// Returns the lowest and the highest level with data, or zeros if there are no data.
 fn range(levels: &Grid<u16>) -> [f64; 2] {
     let held = levels.data().iter().copied().filter(|level| *level > 0);
     let low = held.clone().min().unwrap_or(0);

@@ -39,7 +39,7 @@ impl ImageLimits {
         Ok(())
     }
 
-    /// Checks the size of an image, pixels.
+    /// Checks the size of an image in pixels.
     ///
     /// # Errors
     /// Returns an error if a side is zero or the area is over `max_pixels`.
@@ -57,8 +57,8 @@ impl ImageLimits {
         Ok(())
     }
 
-    /// Returns the memory that a decoder may allocate, bytes: 16 a pixel, the widest that a decoder returns, and 64 MiB
-    /// for its tables.
+    /// Returns the memory in bytes that a decoder may allocate: 64 MiB for its tables, and 16 bytes per pixel, which is
+    /// the most that a decoder returns.
     pub(super) fn max_decoder_bytes(&self) -> u64 {
         self.max_pixels.saturating_mul(16).saturating_add(64 << 20)
     }

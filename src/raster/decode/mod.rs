@@ -18,7 +18,7 @@ pub use error::DecodeError;
 pub use limits::ImageLimits;
 pub use print_image::PrintImage;
 
-/// Decodes a print image: grey, RGB or palette; transparency is composited on white.
+/// Decodes a grey, RGB or palette image of a print. Transparent pixels are composited on white.
 ///
 /// An EXIF orientation is not applied, so that print pixels mean the same to every program. The size in the header is
 /// checked before any pixel is decoded.
@@ -50,7 +50,7 @@ pub fn decode(bytes: &[u8], limits: &ImageLimits) -> Result<PrintImage, DecodeEr
     Ok(PrintImage { rgb })
 }
 
-/// Returns the number of pixels in an image's header; `None` if it cannot be read.
+/// Returns the number of pixels according to an image's header, or `None` if the header cannot be read.
 pub fn header_pixel_count(file: impl BufRead + Seek) -> Option<u64> {
     let reader = ImageReader::new(file).with_guessed_format().ok()?;
     let (width, height) = reader.into_dimensions().ok()?;
@@ -66,7 +66,7 @@ fn format_of(kind: FileKind) -> Result<ImageFormat, DecodeError> {
     }
 }
 
-/// Checks the size at its fixed place in a PNG; the decoder would read pixels first.
+/// Checks the size at its fixed offset in a PNG, because the decoder would read pixels before it reports the size.
 fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeError> {
     let side = |at: usize| {
         let field = bytes.get(at..).and_then(|rest| rest.first_chunk());
@@ -115,8 +115,8 @@ fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {
     broken(kind, &reason)
 }
 
-/// Returns whether the segments of a JPEG lead to its end marker. The decoder fills a truncated image with grey, and a
-/// thumbnail has its own end marker, so the segments are followed.
+/// Returns whether the segments of a JPEG lead to its end marker. The check is needed because the decoder fills a
+/// truncated image with grey. A search for the marker would not do, because a thumbnail has an end marker of its own.
 fn has_end_marker(bytes: &[u8]) -> bool {
     let mut at = 2;
     while let Some(marker) = bytes.get(at..at + 2) {

@@ -4,7 +4,7 @@ use image::DynamicImage;
 
 use crate::raster::Grid;
 
-/// Red, green and blue, 0..=65535 each. 8-bit sources are multiplied by 257, so white is 65535 in both.
+/// Red, green and blue, 0..=65535 each. Values of 8-bit files are multiplied by 257, so that white is always 65535.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintImage {
     /// Colour of each pixel; a transparent pixel is white.
@@ -27,7 +27,7 @@ pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
     let colours = match image {
         DynamicImage::ImageLuma8(i) => i.pixels().map(|p| [widen(p[0]); 3]).collect(),
         DynamicImage::ImageRgb8(i) => i.pixels().map(|p| p.0.map(widen)).collect(),
-        // Other kinds are rare enough for a copy: 16 bits, transparency, 32-bit floats in 0..=1.
+        // Other kinds (16 bits, transparency, floats in 0..=1) are rare enough to be copied before compositing.
         other => other.to_rgba16().pixels().map(|p| on_white(p.0)).collect(),
     };
     // An image of w x h pixels has as many colours.

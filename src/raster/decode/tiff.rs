@@ -1,5 +1,5 @@
-//! Uncommon TIFF images: palettes, fewer than 8 bits a sample, grey with transparency, floats. The `image` crate
-//! decodes the common ones.
+//! Decodes uncommon TIFF images: palettes, fewer than 8 bits per sample, grey with transparency, and floats. The
+//! `image` crate decodes the common kinds.
 
 use std::io::Cursor;
 
@@ -64,7 +64,7 @@ impl TiffLayout {
         Ok(Some(layout).filter(Self::is_uncommon))
     }
 
-    /// Returns whether the `image` crate cannot decode the image, or assumes a range of floats that may be wrong.
+    /// Returns whether the `image` crate cannot decode the image, or may assume a wrong range for its floats.
     fn is_uncommon(&self) -> bool {
         let is_grey_common = self.samples == 1 && matches!(self.bits, 1 | 8 | 16);
         self.samples >= self.colours
@@ -78,8 +78,8 @@ impl TiffLayout {
 
 /// Decodes an image of an uncommon kind; returns `None` for other kinds.
 ///
-/// Floats are scaled from 0..=1 if all are in that range, and from 0..=255 or 0..=65535 if they are whole numbers in
-/// that range.
+/// Floats are scaled from 0..=1 if all are in that range, and from 0..=255 or 0..=65535 if all are whole numbers in one
+/// of these ranges.
 ///
 /// # Errors
 /// Returns an error if the image is too large or truncated, or its numbers are ambiguous.
@@ -114,7 +114,7 @@ fn tiff_error(error: &TiffError) -> DecodeError {
     }
 }
 
-/// Returns the file with its samples declared as grey with black as 0, so that the decoder returns them unchanged: it
+/// Returns the file with its samples declared as grey with black as 0. The decoder returns these samples unchanged, but
 /// rejects palettes, and white as 0 with extra samples.
 fn declared_black_is_zero(bytes: &[u8]) -> Option<Vec<u8>> {
     const PHOTOMETRIC: u64 = 262;
