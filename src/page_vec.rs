@@ -3,8 +3,8 @@
 //! The kernel clears each page when it is first touched. For a vector of many megabytes, clearing takes longer than
 //! filling the vector. Huge pages are therefore requested, and freed pages are reused for the next vector.
 //!
-//! `Vec` with `mimalloc` 0.1.52 as the global allocator is as fast (45.9 against 46.2 ms for a pair of 60,000 vertices),
-//! but needs more memory: a peak of 71 against 43 MB.
+//! `Vec` with `mimalloc` 0.1.52 as the global allocator is as fast (45.9 against 46.2 ms for a pair of 60,000
+//! vertices), but needs more memory at its peak (71 against 43 MB).
 
 mod page_cache;
 

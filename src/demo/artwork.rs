@@ -28,7 +28,7 @@ pub(super) struct Artwork {
 }
 
 impl Artwork {
-    /// Draws a character of the font and thickens its strokes to woodblock weight.
+    /// Draws a character of the font, with strokes as thick as those on woodblocks.
     pub(super) fn of_glyph(glyphs: &Glyphs, character: char, rng: &mut ChaCha8Rng) -> Self {
         let size_mm = rng.random_range(8.0..10.2);
         let weight_mm = draw_stroke_weight(size_mm, rng);

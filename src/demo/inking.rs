@@ -74,7 +74,7 @@ impl Inking {
         }
     }
 
-    /// Returns the ink density at a point, 0..=1, averaged over a pixel of `px_mm`.
+    /// Returns the ink density, 0..=1, averaged over a pixel with sides of `px_mm` around a point.
     pub(super) fn at(&self, point: [f64; 2], px_mm: f64) -> f64 {
         let [u, v] = point;
         let spread = self.spread_mm

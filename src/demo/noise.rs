@@ -51,7 +51,7 @@ pub(super) fn lerp(a: f64, b: f64, t: f64) -> f64 {
     a + (b - a) * t
 }
 
-/// Returns 0 below `low`, 1 above `high` and a smooth transition between them.
+/// Returns 0 if `x` is below `low`, 1 if it is above `high`, and a smooth transition between the two.
 pub(super) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     smoothstep_unit(((x - low) / (high - low)).clamp(0.0, 1.0))
 }

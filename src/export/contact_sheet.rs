@@ -14,7 +14,7 @@ use crate::store::Project;
 /// Pairs in memory at a time while the worst are selected.
 const PAGE: usize = 256;
 
-/// The order of pairs on a contact sheet. Failed pairs come first, except in `Name`.
+/// The order of pairs on a contact sheet. Failed pairs come first, except in the order `Name`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ContactSheetOrder {
     /// Largest error against ground truth first, or lowest `IoU` first without ground truth.

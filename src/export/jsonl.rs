@@ -28,7 +28,7 @@ const PAGE: usize = 64;
 pub struct JsonlOptions {
     /// Metrics of the current method. A pair without a result has one line for each metric.
     pub metrics: &'static [ThresholdMetric],
-    /// Whether to write computing times, with which the bytes differ from run to run.
+    /// Whether to write computing times, which make the bytes differ from run to run.
     pub with_times: bool,
     /// Limits on the print images.
     pub limits: raster::ImageLimits,

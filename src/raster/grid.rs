@@ -22,7 +22,7 @@ pub struct Grid<T> {
 /// Side, in values, of the square tiles that are transposed one after another. Their rows stay in the cache.
 const TILE: usize = 8;
 
-/// Transposes the tile at the start of `from` into `to`, whose rows have `from_width` and `to_width` values.
+/// Transposes the tile at the start of `from`, with rows of `from_width` values, to `to`, with rows of `to_width`.
 fn transpose_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usize) {
     let rows: [&[T]; TILE] = std::array::from_fn(|y| &from[y * from_width..][..TILE]);
     for x in 0..TILE {

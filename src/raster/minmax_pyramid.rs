@@ -47,7 +47,7 @@ impl<T: Copy + Ord> MinMaxPyramid<T> {
         Self { levels, size }
     }
 
-    /// Returns bounds of the values in a box, given as first and last column and row. They may be wider than the values
+    /// Returns bounds of the values in a box, given as first and last column and row. The bounds may be too wide
     /// because cells extend beyond the box. They include `outside` if the box leaves the grid.
     pub(super) fn range_in_box(&self, [columns, rows]: [[i64; 2]; 2], outside: T) -> [T; 2] {
         let sides = self.size.map(|side| side as i64);

@@ -3,8 +3,7 @@
 use super::Grid;
 use crate::simd::dispatch;
 
-/// Resamples values to a grid of `to` columns and rows. Along each axis, in pixels, the map is `scale * source +
-/// shift`.
+/// Resamples values to a grid of `to` columns and rows. Source pixel x lies at `scale * x + shift` of the result.
 ///
 /// Each output pixel is the mean of the source over the larger of two squares: its own or that of a source pixel.
 /// Outside the source, values count as zero.

@@ -48,8 +48,8 @@ impl Supersampler {
         }
     }
 
-    /// Returns, for each level, how many of an output pixel's samples are covered. A sample counts with the bilinear
-    /// weight of its source pixels that have at least the level.
+    /// Returns, for each level, how many samples of an output pixel are covered. A sample counts by the bilinear weight
+    /// of its source pixels of at least that level.
     #[inline(always)]
     pub(super) fn coverage<T: Copy + Default + Into<f64>, const LEVELS: usize>(
         &self,

@@ -104,7 +104,7 @@ impl<T: Copy + Ord + Default + Into<f64>> MaskWarp<'_, T> {
         let reach = self.sampler.source_bounds(&columns, &rows);
         let [low, high] = self.value_ranges.range_in_box(reach, T::default());
         let levels = &self.levels[levels_left.clone()];
-        // The whole block reaches the levels up to its lowest source value, and no pixel those above its highest.
+        // For levels up to the lowest source value the block is covered, for levels above the highest it is empty.
         let all = levels_left.start + levels.partition_point(|level| *level <= low);
         let some = levels_left.start + levels.partition_point(|level| *level <= high);
         for mask in &mut self.masks[levels_left.start..all] {

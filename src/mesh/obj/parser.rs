@@ -184,7 +184,7 @@ impl LineCursor<'_> {
     }
 
     /// Parses `v`, `v/vt`, `v//vn` or `v/vt/vn` and returns the vertex's index, from 0. `vertices` is the number of
-    /// vertices parsed so far. A negative index counts back from the last of them.
+    /// vertices parsed so far. A negative index counts back from the last one.
     fn corner(&mut self, vertices: usize) -> Option<u32> {
         let index = self.index()?;
         let mut parts = 1;
