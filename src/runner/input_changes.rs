@@ -76,7 +76,7 @@ fn unread_inputs(project: &Project, known: &KnownInputs) -> InputVersions {
     }
 }
 
-/// Returns which input files of a pair have changed; `None` when none has.
+/// Returns which input files of a pair have changed. Returns `None` if none has changed.
 fn changes(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersions)> {
     let changed = InputVersions {
         mesh: change(project, &known.mesh_path, known.mesh.as_ref()),

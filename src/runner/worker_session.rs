@@ -83,7 +83,7 @@ impl WorkerSession {
         Ok(())
     }
 
-    /// Recovers the leases of dead workers and leases past their deadline; returns how many pairs are ready again.
+    /// Recovers the leases of dead workers and leases past their deadline. Returns how many pairs are ready again.
     pub(super) async fn recover(&mut self, context: &RunContext) -> Result<u64, RunError> {
         let (catalog, now) = (&context.catalog, context.clock.now());
         let holders = catalog.lease_holders().await?;
@@ -114,7 +114,7 @@ struct Liveness {
 }
 
 impl Liveness {
-    /// Takes in the current heartbeats of all workers with leases; returns the dead ones among them.
+    /// Takes in the current heartbeats of all workers with leases. Returns the workers that are dead.
     fn observe(&mut self, holders: &[LeaseHolder], me: WorkerId, now: UnixMillis) -> Vec<WorkerId> {
         self.seen
             .retain(|worker, _| holders.iter().any(|holder| holder.worker == *worker));

@@ -107,7 +107,7 @@ impl RunLock {
         replace_text(&mut self.members, fingerprints).map_err(io(&self.path))
     }
 
-    /// Returns the fingerprints of the working processes' settings; empty if none were written.
+    /// Returns the fingerprints of the working processes' settings. Returns an empty text if none were written.
     ///
     /// # Errors
     /// When the file cannot be read.
@@ -166,7 +166,7 @@ fn replace_text(file: &mut File, text: &str) -> std::io::Result<()> {
     file.write_all(text.as_bytes())
 }
 
-/// Returns the pid in the file; `None` while its owner has not written it yet.
+/// Returns the pid in the file. Returns `None` while its owner has not written it yet.
 fn read_pid(file: &mut File) -> Option<u32> {
     let mut text = String::new();
     file.read_to_string(&mut text).ok()?;

@@ -125,7 +125,7 @@ impl Project {
     }
 }
 
-/// Returns the relative path after links are resolved; `None` when the path does not exist or is not below `dir`.
+/// Returns the relative path after links are resolved. Returns `None` if the path does not exist or is not below `dir`.
 fn below_resolved(path: &Path, dir: &Path) -> Option<PathBuf> {
     let path = path.canonicalize().ok()?;
     let dir = dir.canonicalize().ok()?;

@@ -72,7 +72,7 @@ impl ReferencedArtifacts {
         Ok(())
     }
 
-    /// Returns what an entry of a folder of artifacts is; `None` for an artifact that a row names.
+    /// Returns what an entry of a folder of artifacts is. Returns `None` for an artifact that a row names.
     fn kind(&self, folder: &str, entry: &Entry) -> Option<UnreferencedKind> {
         let name = entry.name();
         let hash: Option<ContentHash> =
@@ -101,7 +101,7 @@ struct Entry {
 }
 
 impl Entry {
-    /// Lists a folder in the order of its names; returns nothing when there is no such folder.
+    /// Lists a folder in the order of its names. Returns nothing if there is no such folder.
     fn list(folder: &Path) -> std::io::Result<Vec<Self>> {
         let listed = match std::fs::read_dir(folder) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
