@@ -59,7 +59,7 @@ pub struct ReviewSettings {
 /// Converts the merged tree to typed settings.
 ///
 /// # Errors
-/// When a value has the wrong type or is unknown; the message names the first change to blame.
+/// Returns an error if a value has the wrong type or is unknown; the message names the first change to blame.
 pub(super) fn typed(tree: &Tree, changes: &[Setting]) -> Result<Config, ConfigError> {
     read(tree).map_err(|error| blame(changes, &error))
 }

@@ -63,7 +63,7 @@ impl Tree {
     /// enum variant with data (`{ fixed = 127 }`).
     ///
     /// # Errors
-    /// When the layer names a section or key that does not exist.
+    /// Returns an error if the layer names a section or key that does not exist.
     pub fn changes(&self, layer: &Table, origin: &Origin) -> Result<Vec<Setting>, ConfigError> {
         let mut changes = Vec::new();
         collect(&self.root, layer, "", origin, &mut changes)?;
@@ -73,7 +73,7 @@ impl Tree {
     /// Returns the change of one dotted key.
     ///
     /// # Errors
-    /// When there is no such key.
+    /// Returns an error if there is no such key.
     pub fn change(
         &self,
         key: &str,

@@ -30,7 +30,7 @@ pub struct FolderPairs {
 /// result does not depend on the order of the listings.
 ///
 /// # Errors
-/// When two meshes or two prints have the same stem, a stem is not a valid id, or there is no pair.
+/// Returns an error if two meshes or two prints have the same stem, a stem is not a valid id, or there is no pair.
 pub fn pair_folders(meshes: &[PathBuf], prints: &[PathBuf]) -> Result<FolderPairs, ManifestError> {
     let mut problems = Vec::new();
     let (meshes, mut ignored) = by_stem(meshes, &MESH_EXTENSIONS, "meshes", &mut problems);

@@ -13,7 +13,7 @@ pub struct NotText;
 /// returned unchanged, to be refused by line.
 ///
 /// # Errors
-/// When UTF-16 is truncated or damaged.
+/// Returns an error if UTF-16 is truncated or damaged.
 pub fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, NotText> {
     match *bytes {
         [0xff, 0xfe, ref rest @ ..] => from_utf16(rest, u16::from_le_bytes),

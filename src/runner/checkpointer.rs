@@ -183,7 +183,7 @@ async fn write_stage(
 /// waits for no disk.
 ///
 /// # Errors
-/// When the disk returns an error, or has not finished within the time limit.
+/// Returns an error if the disk returns an error, or has not finished within the time limit.
 async fn write_files(
     context: &RunContext,
     pair: &PairName,

@@ -56,7 +56,7 @@ impl ComputeThread {
     /// Starts a thread that computes a pair's stages from `first` on.
     ///
     /// # Errors
-    /// When the system cannot start a thread; the pair's data is lost then.
+    /// Returns an error if the system cannot start a thread; the pair's data is lost then.
     pub(super) fn start(
         context: Arc<RunContext>,
         first: Stage,

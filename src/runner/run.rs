@@ -32,7 +32,7 @@ pub fn fingerprints(settings: &Settings) -> Fingerprints {
 /// Returns what [`run`] would do, for `--dry-run`. Compares the input files first, and stores which have changed.
 ///
 /// # Errors
-/// When a named pair does not exist, or the catalog or the files cannot be used.
+/// Returns an error if a named pair does not exist, or the catalog or the files cannot be used.
 pub async fn plan(
     project: &Project,
     catalog: &Catalog,

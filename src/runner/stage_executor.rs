@@ -144,7 +144,7 @@ fn in_file(path: &str, error: &StageError) -> ExecutionError {
 /// Returns an outcome as a later run would read it back, and its JSON.
 ///
 /// # Errors
-/// When a number is not finite, which JSON cannot hold.
+/// Returns an error if a number is not finite, which JSON cannot hold.
 fn round_trip<T: Serialize + DeserializeOwned + PartialEq>(
     outcome: &T,
 ) -> Result<(T, Value), ExecutionError> {

@@ -85,7 +85,7 @@ impl Project {
     /// Reads an artifact and checks it against its hash.
     ///
     /// # Errors
-    /// When the file is missing, unreadable or changed.
+    /// Returns an error if the file is missing, unreadable or changed.
     pub fn read_artifact(&self, artifact: &ArtifactRef) -> Result<Vec<u8>, ArtifactError> {
         let path = self.artifact_path(artifact);
         match std::fs::read(&path) {
@@ -101,7 +101,7 @@ impl Project {
     /// Checks that an artifact is complete, without reading it into memory; `quick` compares its length only.
     ///
     /// # Errors
-    /// When the file is missing, unreadable or changed.
+    /// Returns an error if the file is missing, unreadable or changed.
     pub fn check_artifact(&self, artifact: &ArtifactRef, quick: bool) -> Result<(), ArtifactError> {
         let path = self.artifact_path(artifact);
         let is_complete = match std::fs::metadata(&path) {
@@ -155,7 +155,7 @@ impl Project {
     /// Removes the partial files of dead processes. Only while no other process writes.
     ///
     /// # Errors
-    /// When the folder cannot be read or a file cannot be removed.
+    /// Returns an error if the folder cannot be read or a file cannot be removed.
     pub fn clear_temporary(&self) -> Result<(), ArtifactError> {
         let folder = self.temporary_dir();
         match std::fs::remove_dir_all(&folder) {

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// that is not a regular file, such as a pipe or a terminal, is written to directly.
 ///
 /// # Errors
-/// When it cannot be written; an earlier file is unchanged then.
+/// Returns an error if it cannot be written; an earlier file is unchanged then.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A symbolic link stays; its target is replaced.
     let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -29,7 +29,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 /// Writes a file whose bytes are on the disk when this returns; its name may not be.
 ///
 /// # Errors
-/// When it cannot be written; what was written stays.
+/// Returns an error if it cannot be written; what was written stays.
 pub fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut file = File::create(path)?;
     file.write_all(bytes)?;
@@ -46,7 +46,7 @@ pub fn partial_path(path: &Path) -> PathBuf {
 /// file of that name.
 ///
 /// # Errors
-/// When one of these fails.
+/// Returns an error if one of these fails.
 pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     File::open(partial)?.sync_all()?;
     if let Ok(earlier) = std::fs::metadata(path) {

@@ -55,7 +55,7 @@ impl RunLock {
     /// Acquires the run of a project; with `join`, beside the process that owns it.
     ///
     /// # Errors
-    /// When another process owns it and `join` is not set, or the files cannot be locked.
+    /// Returns an error if another process owns it and `join` is not set, or the files cannot be locked.
     pub fn acquire(project: &Project, join: bool) -> Result<Self, LockError> {
         let path = project.dir().join("run.lock");
         let mut file = open(&path)?;
@@ -102,7 +102,7 @@ impl RunLock {
     /// Writes the fingerprints of the settings that processes which join must have. Only while the lock is exclusive.
     ///
     /// # Errors
-    /// When the file cannot be written.
+    /// Returns an error if the file cannot be written.
     pub fn set_fingerprints(&mut self, fingerprints: &str) -> Result<(), LockError> {
         replace_text(&mut self.members, fingerprints).map_err(io(&self.path))
     }
@@ -110,7 +110,7 @@ impl RunLock {
     /// Returns the fingerprints of the working processes' settings. Returns an empty text if none were written.
     ///
     /// # Errors
-    /// When the file cannot be read.
+    /// Returns an error if the file cannot be read.
     pub fn fingerprints(&mut self) -> Result<String, LockError> {
         let mut text = String::new();
         self.members
@@ -123,7 +123,7 @@ impl RunLock {
     /// Lets other processes join from now on.
     ///
     /// # Errors
-    /// When the file cannot be locked.
+    /// Returns an error if the file cannot be locked.
     pub fn downgrade(&mut self) -> Result<(), LockError> {
         if self.is_exclusive {
             self.members.unlock().map_err(io(&self.path))?;

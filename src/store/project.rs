@@ -47,7 +47,7 @@ impl Project {
     /// Opens an existing project.
     ///
     /// # Errors
-    /// When the directory holds no catalog.
+    /// Returns an error if the directory holds no catalog.
     pub fn open(dir: &Path) -> Result<Self, StoreError> {
         // Whether it is a catalog is checked when it is opened.
         if !dir.join(CATALOG_FILE).exists() {
@@ -68,7 +68,7 @@ impl Project {
     /// Creates the directory durably where it is missing. `Catalog::create` creates the catalog.
     ///
     /// # Errors
-    /// When it cannot be created.
+    /// Returns an error if it cannot be created.
     pub fn create(dir: &Path) -> Result<Self, StoreError> {
         let missing: Vec<_> = dir.ancestors().take_while(|dir| !dir.exists()).collect();
         std::fs::create_dir_all(dir).map_err(StoreError::io(dir))?;
@@ -110,7 +110,7 @@ impl Project {
     /// moved with its data; otherwise absolute. The file need not exist.
     ///
     /// # Errors
-    /// When the working directory is unknown, or the path is not UTF-8.
+    /// Returns an error if the working directory is unknown, or the path is not UTF-8.
     pub fn stored_path(&self, path: &Path) -> Result<String, StoreError> {
         let absolute = std::path::absolute(path).map_err(StoreError::io(path))?;
         let dir = std::path::absolute(&self.dir).map_err(StoreError::io(&self.dir))?;

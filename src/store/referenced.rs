@@ -47,7 +47,7 @@ impl ReferencedArtifacts {
     /// artifacts, because a file exists before its row.
     ///
     /// # Errors
-    /// When a folder cannot be listed.
+    /// Returns an error if a folder cannot be listed.
     pub fn for_each_unreferenced(
         mut self,
         project: &Project,
