@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// that is not a regular file, such as a pipe or a terminal, is written to directly.
 ///
 /// # Errors
-/// Returns an error if it cannot be written; an earlier file is unchanged then.
+/// Returns an error if the file cannot be written; an earlier file is unchanged then.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A symbolic link stays; its target is replaced.
     let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -29,7 +29,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
 /// Writes a file whose bytes are on the disk when this returns; its name may not be.
 ///
 /// # Errors
-/// Returns an error if it cannot be written; what was written stays.
+/// Returns an error if the file cannot be written; what was written stays.
 pub fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut file = File::create(path)?;
     file.write_all(bytes)?;

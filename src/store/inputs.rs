@@ -73,7 +73,7 @@ impl InputReader {
     /// Reads the rest of the file, and returns its hash and stat.
     ///
     /// # Errors
-    /// Returns an error if it cannot be read, exceeds the limit by now, or has changed since it was opened.
+    /// Returns an error if the file cannot be read, exceeds the limit by now, or has changed since it was opened.
     pub fn finish(mut self) -> Result<InputDigest, InputError> {
         io::copy(&mut self, &mut io::sink()).map_err(|error| self.error(error))?;
         // The limit also holds for a file that grows while it is read.
@@ -179,7 +179,7 @@ impl InputError {
 /// Returns size, modification time and inode of a file as text.
 ///
 /// # Errors
-/// Returns an error if it does not exist, is not a regular file, or cannot be read.
+/// Returns an error if the file does not exist, is not a regular file, or cannot be read.
 pub fn stat_input(path: &Path) -> Result<String, InputError> {
     let meta = std::fs::metadata(path).map_err(|error| InputError::io(path, error))?;
     Ok(file_stat(&check_file(path, meta)?))
@@ -188,7 +188,7 @@ pub fn stat_input(path: &Path) -> Result<String, InputError> {
 /// Opens a file of at most `limit` bytes; `setting` is the name of that limit in error messages.
 ///
 /// # Errors
-/// Returns an error if it does not exist, is not a regular file, cannot be read, or is too large.
+/// Returns an error if the file does not exist, is not a regular file, cannot be read, or is too large.
 pub fn open_input(
     path: &Path,
     limit: u64,
@@ -216,7 +216,7 @@ pub fn open_input(
 /// Reads a file of at most `limit` bytes; `setting` is the name of that limit in error messages.
 ///
 /// # Errors
-/// Returns an error if it does not exist, is not a regular file, cannot be read, or is too large.
+/// Returns an error if the file does not exist, is not a regular file, cannot be read, or is too large.
 pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<InputFile, InputError> {
     let mut file = open_input(path, limit, setting)?;
     let about = file.size() as usize;
@@ -230,7 +230,7 @@ pub fn read_input(path: &Path, limit: u64, setting: &'static str) -> Result<Inpu
 /// Hashes a file without reading it into memory.
 ///
 /// # Errors
-/// Returns an error if it does not exist, is not a regular file, or cannot be read.
+/// Returns an error if the file does not exist, is not a regular file, or cannot be read.
 pub fn hash_input(path: &Path) -> Result<InputDigest, InputError> {
     let (file, meta) = open(path)?;
     let mut hasher = blake3::Hasher::new();

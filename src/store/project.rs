@@ -68,7 +68,7 @@ impl Project {
     /// Creates the directory durably where it is missing. `Catalog::create` creates the catalog.
     ///
     /// # Errors
-    /// Returns an error if it cannot be created.
+    /// Returns an error if the directory cannot be created.
     pub fn create(dir: &Path) -> Result<Self, StoreError> {
         let missing: Vec<_> = dir.ancestors().take_while(|dir| !dir.exists()).collect();
         std::fs::create_dir_all(dir).map_err(StoreError::io(dir))?;
