@@ -47,7 +47,7 @@ pub(super) fn table(tiers: &[Tier], methods: &[Method], trials: &[Trial]) -> Str
     table.render(NOTE)
 }
 
-/// Returns the metrics that any trial has, in order; the first metric where every trial failed.
+/// Returns the metrics that occur in any trial, in order. If every trial failed, returns only the first metric.
 pub(super) fn metrics(trials: &[&Trial]) -> Vec<ThresholdMetric> {
     let has = |metric: &ThresholdMetric| trials.iter().any(|trial| trial.found(*metric).is_some());
     let found: Vec<_> = ThresholdMetric::ALL.into_iter().filter(has).collect();

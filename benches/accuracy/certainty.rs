@@ -16,7 +16,8 @@ Wrong pairs that did not fail; how many of them are among the 3 % of the pairs (
 confidence; share of all couples of a right and a wrong pair in which the right one has the higher confidence (AUC: 0.5 \
 is chance, 1 perfect); Acc of the other 97 %.";
 
-/// Makes a row for each tier, method and metric with a confidence; `None` when there is no confidence.
+/// Makes a table with a row for each tier, method and metric with a confidence. Returns `None` if nothing has a
+/// confidence.
 pub(super) fn table(tiers: &[Tier], methods: &[Method], trials: &[Trial]) -> Option<String> {
     let heads = [
         "tier",
@@ -47,7 +48,7 @@ pub(super) fn table(tiers: &[Tier], methods: &[Method], trials: &[Trial]) -> Opt
     (!is_empty).then(|| table.render(NOTE))
 }
 
-/// Returns confidence and whether the pair is right, the least confident first.
+/// Returns the confidence of each pair and whether the pair is right, least confident first.
 fn by_confidence(trials: &[&Trial], metric: ThresholdMetric) -> Vec<(f64, bool)> {
     let found = trials.iter().filter_map(|trial| trial.found(metric));
     let sure = |found: &Found| Some((found.confidence?, found.errors.pass()));
@@ -69,8 +70,8 @@ fn row(sorted: &[(f64, bool)]) -> [String; 4] {
     ]
 }
 
-/// Returns the area under the ROC curve: the probability that a right pair has a higher confidence than a wrong one;
-/// ties count half.
+/// Returns the area under the ROC curve: the probability that a right pair has a higher confidence than a wrong pair.
+/// Ties count half.
 fn order(sorted: &[(f64, bool)]) -> Option<f64> {
     let of = |wanted: bool| {
         sorted

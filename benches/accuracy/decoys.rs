@@ -28,7 +28,7 @@ pub(super) struct Answer {
     tier: Tier,
     kind: Decoy,
     method: &'static str,
-    /// Confidence of the alignment, where there is one; `Err` when a stage failed.
+    /// Confidence of the alignment, or `None` if it has no confidence. It is `Err` if a stage failed.
     outcome: Result<Option<f64>, ()>,
 }
 

@@ -25,7 +25,7 @@ use super::options::Options;
 use super::run::Run;
 use super::workers::in_order;
 
-/// Penalty on the squared weights of the standardized inputs, in examples.
+/// Weight of the penalty on the squared weights of the standardized inputs, as a number of examples.
 const RIDGE: f64 = 1.0;
 /// Newton steps; the fit has converged long before.
 const MAX_STEPS: usize = 50;

@@ -45,7 +45,7 @@ impl Part {
     }
 }
 
-/// Milliseconds of one core for each part; 0 for parts that were not reached.
+/// Processor time of each part in milliseconds. It is 0 for parts that were not reached.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Times([f64; Part::ALL.len()]);
 
@@ -69,7 +69,7 @@ impl Times {
     }
 }
 
-/// Returns the processor time of this thread in milliseconds: other work on the machine does not count.
+/// Returns the processor time of this thread in milliseconds. Other work on the machine does not count.
 fn thread_ms() -> f64 {
     let now = clock_gettime(ClockId::ThreadCPUTime);
     now.tv_sec as f64 * 1e3 + now.tv_nsec as f64 / 1e6

@@ -31,7 +31,7 @@ pub(super) struct Trial {
     pub(super) vertices: usize,
     /// How long each part took.
     pub(super) times: Times,
-    /// Angle between the found plane's normal and the true one, degrees, if there is a plane.
+    /// Angle in degrees between the normal of the found plane and the true normal, or `None` if no plane was found.
     pub(super) normal_deg: Option<f64>,
     /// One result a metric, or the error.
     pub(super) outcome: Result<Vec<Found>, String>,
@@ -51,7 +51,8 @@ pub(super) struct Found {
     pub(super) numbers: Numbers,
 }
 
-/// Runs every pair under every method, in the order of the pairs, then of the methods.
+/// Runs every pair with every method. The results are in the order of the pairs, and for each pair in the order of the
+/// methods.
 pub(super) fn all(
     cases: &[Case],
     methods: &[Method],

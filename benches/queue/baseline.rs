@@ -20,8 +20,8 @@ type Queue = Arc<Mutex<std::vec::IntoIter<PairAttributes>>>;
 /// Writes of artifacts in progress.
 type Writes = Vec<JoinHandle<anyhow::Result<()>>>;
 
-/// Computes all stages of the pairs and writes their artifacts, on as many threads as a run. Returns the time in which
-/// stages were computed, all threads together.
+/// Computes all stages of the pairs and writes their artifacts, on as many threads as a run uses. Returns the time
+/// spent on computing stages, summed over all threads.
 pub(super) async fn run_without_catalog(
     project: &Project,
     settings: &Settings,
@@ -61,7 +61,8 @@ struct Worker {
 }
 
 impl Worker {
-    /// Computes pairs until none is left; returns the time that this took and the writes in progress.
+    /// Computes pairs until none is left. Returns the time spent on computing stages, and the writes still in
+    /// progress.
     fn compute_all(&self, queue: &Queue) -> anyhow::Result<(Duration, Writes)> {
         let (mut elapsed, mut writes) = (Duration::ZERO, Vec::new());
         loop {
@@ -75,7 +76,7 @@ impl Worker {
         }
     }
 
-    /// Computes the stages of a pair, and starts to write the artifacts of each.
+    /// Computes the stages of a pair, and starts writing the artifacts of each stage.
     fn compute(&self, pair: &PairAttributes, writes: &mut Writes) -> anyhow::Result<()> {
         let (settings, meshes, images) = (
             &self.settings,

@@ -38,7 +38,7 @@ INSERT INTO metric_result
      ssim, nl_ssim, iou, iou_box, dice, density_print, density_depth, margin, confidence, at_bound, result_hash)
 VALUES (?1, ?2, 100, 0.3, ?3, 0.5, 1.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5, 0.75, 0, ?4)";
 
-/// Runs `pairs` pairs through all stages; each worker has its own connection.
+/// Runs `pairs` pairs through all stages. Each worker has its own connection.
 pub(super) async fn work(
     catalog: &Path,
     fake: &Fake,

@@ -67,7 +67,7 @@ pub(super) fn peak_mib(process: &str) -> Option<f64> {
 
 /// Resets the peak memory of this process.
 pub(super) fn reset_peak() {
-    // Where this is not permitted, the peak covers the whole life of the process.
+    // If this write is not permitted, the peak covers the whole life of the process.
     let _ = std::fs::write("/proc/self/clear_refs", "5");
 }
 

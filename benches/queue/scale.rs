@@ -14,7 +14,8 @@ use super::world::{World, fingerprints, work};
 
 /// Pairs that are left when most are done.
 const LEFT: usize = 1_000;
-/// Pairs that pass through the writer; the others of a large catalog get copies of their rows.
+/// Number of pairs that are run through the writer. The other pairs of a large catalog get copies of the resulting
+/// rows.
 const WORKED: usize = 20_000;
 /// Pairs in progress while a catalog is filled.
 const IN_PROGRESS: usize = 128;
@@ -99,7 +100,7 @@ async fn size(options: &Options, pairs: usize, tables: &mut Tables) -> anyhow::R
     Ok(())
 }
 
-/// Adds a row to a table, and prints it at once, because large catalogs take long and the bench may be interrupted.
+/// Adds a row to a table and prints it immediately, because large catalogs take long and the bench may be interrupted.
 fn push(table: &mut Table, cells: Vec<String>) {
     let _ = writeln!(std::io::stderr(), "{}", cells.join(" | "));
     table.push(cells);

@@ -178,7 +178,8 @@ impl Watch {
         })
     }
 
-    /// Stops when all compute threads have ended; `compute_time` is the time that each slot computed stages.
+    /// Stops the measurement, after all compute threads have ended. `compute_time` is the time for which each slot
+    /// computed stages.
     fn stop(self, compute_time: Duration) -> anyhow::Result<RunTimes> {
         let (wall, cores) = (self.start.elapsed(), process::cpu_time());
         let threads = process::thread_cpu_times()?.into_iter();

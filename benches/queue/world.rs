@@ -21,7 +21,8 @@ pub(super) struct World {
 }
 
 impl World {
-    /// Writes a list of pairs and imports it with the program; also returns what the process needed.
+    /// Writes a list of pairs and imports the list with the program. Returns the project, and the time and memory of
+    /// the process.
     pub(super) fn import(pairs: usize) -> anyhow::Result<(Self, ProcessUsage)> {
         let dir = tempfile::tempdir_in(env!("CARGO_TARGET_TMPDIR"))?;
         let path = dir.path();
@@ -75,7 +76,8 @@ pub(super) fn fingerprints(set: Option<&str>) -> anyhow::Result<Fingerprints> {
     Ok(runner::fingerprints(&loaded.config.stages))
 }
 
-/// Runs `pairs` pairs through all stages, `in_progress` at a time; claims for all free slots at once, as a run does.
+/// Runs `pairs` pairs through all stages, `in_progress` at a time. Claims pairs for all free slots together, as a run
+/// does.
 pub(super) async fn work(
     world: &World,
     catalog: &Catalog,
@@ -83,7 +85,7 @@ pub(super) async fn work(
     in_progress: usize,
 ) -> anyhow::Result<Duration> {
     let fake = Arc::new(Fake::register(&world.project, catalog, &fingerprints(None)?).await?);
-    // Commit at once, so that each checkpoint is durable before the next one.
+    // Commit without delay, so that each checkpoint is durable before the next one.
     let _waiting = catalog.waiting().await?;
     let start = Instant::now();
     let mut left = pairs;

@@ -21,7 +21,7 @@ use criterion::Criterion;
 
 use files::Files;
 
-/// Approximate numbers of vertices; corners that triangles share count once.
+/// Approximate numbers of vertices. Corners that triangles share count once.
 const SIZES: [(&str, u32); 3] = [("60k", 54_100), ("500k", 480_000), ("2M", 1_950_000)];
 
 fn main() -> anyhow::Result<()> {

@@ -1,4 +1,4 @@
-//! Times reading meshes and their raw bytes, and reading the OBJ with `tobj`.
+//! Times reading meshes, reading their raw bytes, and reading the OBJ file with `tobj`.
 
 use std::fs::File;
 use std::path::Path;

@@ -5,7 +5,7 @@ use crate::cli::mocban;
 use crate::page::{Page, read_project};
 use crate::review_browser::{PLAIN, enter, judge};
 
-/// Returns the text of axe-core; `None` if there is none, with a line on stderr.
+/// Returns the text of axe-core. Returns `None`, with a line on stderr, if axe-core is not available.
 #[expect(
     clippy::print_stderr,
     reason = "the one line that says why a test was skipped"

@@ -80,7 +80,8 @@ impl Browser {
             .stderr(Stdio::null())
             .spawn()
             .expect("a shell");
-        // Opening a pipe blocks until the other end is open, so the order is that of the shell.
+        // Opening a pipe blocks until the other end is open, so the pipes are opened in the same order as in the
+        // shell.
         let to = File::options().write(true).open(to).expect("a pipe");
         let from = BufReader::new(File::open(from).expect("a pipe"));
         Some(Self {

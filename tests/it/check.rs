@@ -323,7 +323,7 @@ fn project_is_checked_but_not_repaired_during_a_run() {
     let refused = at(&project, &["check", "--repair"]).expect(11);
     let owner = format!("in use by pid {}", std::process::id());
     assert!(refused.err.contains(&owner), "{}", refused.err);
-    // A process that joined is a run as well, even after the first one ended.
+    // A process that joined the run still holds the project, even after the first process ended.
     let joined = RunLock::acquire(&project, true).expect("joined");
     drop(lock);
     at(&project, &["check", "--repair"]).expect(11);

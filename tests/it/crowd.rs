@@ -1,5 +1,6 @@
-//! Many hostile pairs with a few good ones among them: each hostile pair is reported in one sentence, none stops the
-//! others, and the good pairs have the same results as without them. `MOCBAN_HOSTILE` sets the number of hostile pairs.
+//! Many hostile pairs with a few good ones among them. Each hostile pair is reported in one sentence and none stops
+//! the other pairs. The good pairs have the same results as in a run without hostile pairs. `MOCBAN_HOSTILE` sets the
+//! number of hostile pairs.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -35,7 +36,8 @@ fn good_pairs(dir: &Path) -> Vec<ManifestRow> {
     parse_csv(&fs::read(files.manifest).expect("a manifest")).expect("rows")
 }
 
-/// Writes a manifest of the hostile pairs with the good ones spread among them, and one of the good ones alone.
+/// Writes two manifests: one of the hostile pairs with the good pairs spread among them, and one of the good pairs
+/// alone.
 fn write_lists(dir: &Path, hostile: &[HostilePair]) {
     let good = good_pairs(dir);
     let row = |id: &str, mesh: &Path, print: &Path| {
@@ -60,7 +62,7 @@ fn write_lists(dir: &Path, hostile: &[HostilePair]) {
     fs::write(dir.join("alone.csv"), alone).expect("written");
 }
 
-/// Runs the binary and watches its memory; returns the exit code with both streams, and the peak in KiB.
+/// Runs the binary and watches its memory. Returns the exit code with both streams, and the peak memory in KiB.
 pub(crate) fn watched(dir: &Path, args: &[&str]) -> (Call, u64) {
     let mut command = binary();
     command
@@ -84,7 +86,7 @@ pub(crate) fn watched(dir: &Path, args: &[&str]) -> (Call, u64) {
         let err = scope.spawn(|| read(&mut streams.1));
         let mut peak = 0;
         let code = loop {
-            // The kernel's record of the peak ends with the process, so it is read repeatedly.
+            // The kernel drops its record of the peak when the process ends, so the peak is read repeatedly.
             peak = peak.max(peak_kib(&status).unwrap_or(0));
             if let Some(code) = child.try_wait().expect("waited for") {
                 break code.code().expect("no signal");
@@ -118,7 +120,7 @@ fn lines(export: &Path) -> BTreeMap<String, Vec<Value>> {
     lines
 }
 
-/// Asserts that neither stream has text of a panic, of Rust's debug format or of the database.
+/// Asserts that neither stream contains text from a panic, from Rust debug output or from the database.
 #[track_caller]
 fn assert_plain(call: &Call) {
     for stream in [&call.out, &call.err] {
@@ -136,7 +138,8 @@ fn assert_plain(call: &Call) {
     }
 }
 
-/// Asserts that the error is one sentence with the faulty file, and that its class is not that of a bug.
+/// Asserts that the error is one sentence that names the faulty file, and that the error class is not the class for
+/// bugs.
 fn assert_reported(pair: &HostilePair, line: &Value) {
     let (class, message) = (
         &line["error_class"],

@@ -25,7 +25,7 @@ pub(crate) struct FaultScenario {
     pub(crate) before: fn(&Comparison, &Path),
     /// Returns the command for that directory.
     pub(crate) command: fn(&Path) -> Command,
-    /// Checks the state after the command, given whether it succeeded, and completes the work.
+    /// Checks the state after the command and completes the work. The last argument is whether the command succeeded.
     pub(crate) after: fn(&Comparison, &Path, bool),
 }
 
@@ -40,8 +40,8 @@ impl FaultScenario {
         calls
     }
 
-    /// Runs the command with a fault at the n-th call, then checks and completes it without faults. Returns the exit
-    /// code, or `None` when the command made fewer calls.
+    /// Runs the command with a fault at the n-th call, then checks the outcome and completes the work without faults.
+    /// Returns the exit code, or `None` if the command made fewer calls.
     fn check(&self, comparison: &Comparison, fault: &Fault, nth: usize, end: End) -> Option<i32> {
         let (root, notes) = (comparison.folder("injected"), comparison.folder("notes"));
         (self.before)(comparison, &root);
@@ -73,7 +73,7 @@ impl FaultScenario {
     }
 }
 
-/// Asserts the outcome, and that an error is one line with the file and the reason.
+/// Asserts the outcome. An error must be one line that names the file and the reason.
 fn assert_outcome(result: &Call, end: End, root: &Path, at: &str) {
     match end {
         End::Fails => assert_ne!(result.code, 0, "{at}"),

@@ -114,7 +114,7 @@ const OF_A_BACKUP: &[(Fault, End)] = &[
     (Fault::once("read", CATALOG, EIO), End::Fails),
 ];
 
-/// Faults of a check: a file that cannot be read is not reported as damaged.
+/// Faults during `check`. A file that cannot be read must not be reported as damaged.
 const OF_A_CHECK: &[(Fault, End)] = &[
     (Fault::once("read", CATALOG, EIO), End::Either),
     (Fault::once("read", CATALOG, EIO).and_later(), End::Fails),
@@ -134,7 +134,7 @@ const OF_A_REPAIR: &[(Fault, End)] = &[
     (Fault::once("write", "*", ENOSPC).and_later(), End::Fails),
 ];
 
-/// Locks that are refused for many attempts: SQLite itself gives up after about a hundred.
+/// Locks that are refused for more attempts than the roughly one hundred after which SQLite itself gives up.
 const LOCKED: &[(Fault, End)] = &[
     (Fault::once("lock", INDEX, EAGAIN).times(300), End::Succeeds),
     (

@@ -196,7 +196,7 @@ fn rotated_by_quarters(print: &PrintImage, quarters: usize) -> (PrintImage, Affi
     })
 }
 
-/// Adds white pixels at left, top, right and bottom; negative numbers crop.
+/// Adds white pixels at the left, top, right and bottom. Negative numbers crop the image.
 fn padded(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintImage, Affine2) {
     let side = |length: usize, added: i64| (length as i64 + added) as usize;
     let width = side(print.rgb.width(), left + right);
@@ -211,7 +211,7 @@ fn padded(print: &PrintImage, [left, top, right, bottom]: [i64; 4]) -> (PrintIma
 
 /// Tolerance of changes that leave the data of the stages equal, pixels.
 const EXACT_PX: f64 = 0.02;
-/// Tolerance of other rotations of the mesh, pixels: the depth map samples different points.
+/// Tolerance in pixels for meshes in other rotations. The depth map of a rotated mesh samples different points.
 const ROTATED_PX: f64 = 0.15;
 /// Tolerance of cropped prints, pixels.
 const CROPPED_PX: f64 = 0.1;

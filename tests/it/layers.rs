@@ -41,7 +41,7 @@ fn room_files() -> Vec<SourceFile> {
     files
 }
 
-/// Returns the table of the code map: each room and the rooms that it may import.
+/// Returns the table in the code map: each room with the rooms that it may import.
 fn table() -> BTreeMap<String, BTreeSet<String>> {
     let lib = std::fs::read_to_string(package_dir().join("src/lib.rs")).expect("readable source");
     let rooms: Vec<(String, String)> = lib
@@ -237,7 +237,7 @@ impl ImportGraph {
             .collect()
     }
 
-    /// Returns the paths that a piece of code of a file names, from the crate root.
+    /// Returns the paths used in a piece of code of a file, each from the crate root.
     fn absolute_paths(&self, index: usize, code: &str) -> Vec<Vec<String>> {
         let module = self.files[index].module();
         let below = |base: &[String], paths: Vec<Vec<String>>| {
@@ -280,7 +280,7 @@ impl ImportGraph {
         None
     }
 
-    /// Returns the imports of a file. Re-exports are not imports: they name a thing without using it.
+    /// Returns the imports of a file. Re-exports do not count as imports, because they do not use the item.
     fn imports(&self, index: usize) -> BTreeSet<usize> {
         let code = without_visibility_paths(&self.files[index].production_code());
         let mut used = String::new();
@@ -358,7 +358,8 @@ fn files_do_not_import_each_other_in_cycles() {
     assert!(cycles.is_empty(), "import cycles: {cycles:#?}");
 }
 
-/// Longest list of files that follows one pair through the program, and their lines without unit tests.
+/// Limit on the number of files that the code map lists for following one pair through the program, and limit on their
+/// lines without unit tests.
 const MAX_WALK_FILES: usize = 18;
 const MAX_WALK_LINES: usize = 4500;
 

@@ -1,4 +1,4 @@
-//! Memory of a run: pairs with large prints stay within `--memory` together.
+//! Memory of a run: all pairs with large prints together stay within `--memory`.
 
 use std::path::Path;
 

@@ -9,7 +9,8 @@ use mocban::store::Project;
 use crate::check::{at, below, done, exported, sql};
 use crate::cli::{binary, call, empty, mocban};
 
-/// Overwrites the catalog with garbage between two eighths of its length; returns its former content.
+/// Overwrites the part of the catalog from `from` to `to` eighths of its length with garbage. Returns its former
+/// content.
 pub(crate) fn corrupt_catalog(project: &Project, from: usize, to: usize) -> Vec<u8> {
     let path = project.catalog_path();
     let intact = std::fs::read(&path).expect("read");
@@ -59,7 +60,7 @@ fn file_that_is_not_a_catalog_is_reported_in_a_sentence() {
             assert_eq!(std::fs::read(&file).expect("read"), bytes);
         }
     }
-    // A kill at the start of an import leaves this; the import can be repeated.
+    // A kill at the start of an import leaves an empty file. The import can be repeated.
     std::fs::write(&file, "").expect("written");
     mocban(dir.path(), &import).expect(0);
     std::fs::remove_file(&file).expect("removed");

@@ -14,7 +14,7 @@ use crate::resume::{copy, project, run};
 /// Number of pairs of the shared project, with up to four results each.
 const PAIRS: &str = "15";
 
-/// Copies a project in which every pair has results. They are computed once for all tests.
+/// Copies a project in which every pair has results. The results are computed once for all tests.
 pub(crate) fn read_project(dir: &tempfile::TempDir) -> Project {
     static MADE: OnceLock<(tempfile::TempDir, Project)> = OnceLock::new();
     let (_, made) = MADE.get_or_init(|| {

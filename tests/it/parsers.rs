@@ -87,7 +87,7 @@ fn parsers() -> [(&'static str, Vec<NamedFile>, Parser); 4] {
     ]
 }
 
-/// Valid files that are rejected: the range of signed samples is not defined.
+/// Valid files that are rejected, because the range of signed samples is not defined.
 const REFUSED: [&str; 1] = ["grey_signed16.tif"];
 
 #[test]
@@ -148,7 +148,8 @@ fn the_fuzzing_corpus_holds_valid_files() {
     }
 }
 
-/// Regression test for a finding of the fuzzer: text of a file reached the terminal with its control sequences.
+/// Regression test for a finding of the fuzzer: text from a file reached the terminal together with its control
+/// sequences.
 #[test]
 fn control_sequences_in_files_are_escaped_in_messages() {
     for (read, name, bytes) in [

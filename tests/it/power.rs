@@ -57,7 +57,8 @@ enum Names {
 }
 
 impl Disk {
-    /// The state in which all of a project is on the disk. `bytes` is a copy of it that does not change.
+    /// Returns the state in which every file of a project is on the disk. `bytes` is a copy of the project that does
+    /// not change.
     fn of(project: &Path, bytes: &Path) -> Self {
         let mut disk = Self {
             root: inode(project),
@@ -242,7 +243,7 @@ fn all(recorded: &Recorded) -> Vec<(String, Disk)> {
     named(Names::Late).chain(named(Names::Early)).collect()
 }
 
-/// Returns about `wanted` of the disks, evenly spaced. The step is odd, because names and bytes alternate.
+/// Returns about `wanted` of the disks, evenly spaced. The step is odd because names and bytes alternate.
 fn some(disks: Vec<(String, Disk)>, wanted: usize) -> Vec<(String, Disk)> {
     let step = disks.len().div_ceil(wanted) | 1;
     disks.into_iter().step_by(step).collect()
@@ -285,7 +286,8 @@ fn all_stages_reach_the_disk_in_their_order() {
     );
 }
 
-/// A process creates a folder of artifacts and dies before the folder's name is on the disk; the next process finds it.
+/// A process creates a folder of artifacts and dies before the name of the folder is on the disk. The next process
+/// finds the folder.
 #[test]
 fn a_folder_that_another_process_created_is_synced_before_a_row_is() {
     let comparison = Comparison::new("1");

@@ -59,9 +59,9 @@ impl Fixture {
         (child, file)
     }
 
-    /// Returns a project whose run with one worker is suspended after the first stage's files were synced and before its
-    /// rows were written. Tries again when the signal arrives while another thread writes a heartbeat, because then it
-    /// keeps the catalog locked.
+    /// Returns a project whose run with one worker is suspended after the files of the first stage were synced and
+    /// before its rows were written. If the signal arrives while another thread writes a heartbeat, the process keeps
+    /// the catalog locked, and the function tries again.
     fn suspended(count: &str) -> (Self, Running) {
         loop {
             let fixture = Self::new(count);
@@ -98,7 +98,7 @@ impl Fixture {
     /// Asserts that the results are those of an uninterrupted run, and that no stage was stored twice.
     fn assert_uninterrupted_results(&self) {
         let found = results(&self.project);
-        // The lines are in the order of the pairs, and a smaller dataset is the start of a larger one.
+        // The lines are in the order of the pairs, and a smaller dataset consists of the first pairs of a larger one.
         assert_eq!(found, UNINTERRUPTED[..found.len()]);
         assert!(attempts(&self.project).iter().all(|count| *count == 1));
     }
@@ -136,7 +136,7 @@ impl Running {
         }
     }
 
-    /// Waits for its end; returns the exit code, the output of `--json`, and stderr.
+    /// Waits for the process to end. Returns the exit code, the output of `--json`, and stderr.
     fn end(mut self) -> (Option<i32>, Value, String) {
         let child = self.0.take().expect("a running process");
         let output = child.wait_with_output().expect("it ends");
@@ -178,7 +178,8 @@ fn two_processes_share_the_work() {
     assert!(refused.err.contains("in use by pid"), "{}", refused.err);
 
     let mut second = Running::start(&mut joined(&fixture.project));
-    // It finishes every pair that the held process does not have, and then waits for that one.
+    // The second process finishes every pair that the held process has not leased, and then waits for the held
+    // process.
     second.wait_until("the others are done", || {
         stages_done(&fixture.project) == 12
     });
@@ -252,7 +253,8 @@ fn a_process_suspended_inside_a_transaction_is_named_to_those_that_wait() {
     fixture.assert_uninterrupted_results();
 }
 
-/// No other process takes its leases back: the catalog still refuses its late write, and it continues under a new id.
+/// No other process takes back the leases of the suspended process. The catalog still refuses its late write, and it
+/// continues under a new worker id.
 #[test]
 fn a_process_suspended_past_its_leases_drops_its_work_and_continues() {
     let (fixture, mut suspended) = Fixture::suspended("2");
@@ -283,7 +285,7 @@ fn pairs_of_a_dead_process_are_recovered_by_a_living_one() {
     fixture.assert_uninterrupted_results();
 }
 
-/// Leases have their full length here, but the lock proves that no other process is alive.
+/// Leases have their full length in this test, but the lock proves that no other process is alive.
 #[test]
 fn pairs_of_a_dead_process_are_recovered_at_once_by_the_only_process() {
     let fixture = Fixture::new("2");

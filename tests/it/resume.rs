@@ -1,5 +1,5 @@
-//! The binary killed at every failpoint and run again: no stage is stored twice, none is lost, and the results are the same.
-//! Also the helpers with which other modules run projects and read their results.
+//! The binary killed at every failpoint and run again: no stage is stored twice or lost, and the results are the same.
+//! This file also holds the helpers with which other modules run projects and read their results.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -97,7 +97,7 @@ pub(crate) fn pairs(project: &Project) -> Vec<PairDetail> {
     })
 }
 
-/// Returns everything in the results but times: numbers, files, hashes. Checks each artifact against its hash.
+/// Returns the numbers, files and hashes of the results, without times. Checks each artifact against its hash.
 pub(crate) fn results(project: &Project) -> Vec<String> {
     let mut lines = Vec::new();
     for pair in pairs(project) {
@@ -145,7 +145,7 @@ pub(crate) fn attempts(project: &Project) -> Vec<usize> {
     counts
 }
 
-/// Returns how many stages are done, all pairs together, read while a run may be in progress.
+/// Returns the number of completed stages of all pairs together. A run may be in progress.
 pub(crate) fn stages_done(project: &Project) -> u64 {
     let runtime = tokio::runtime::Runtime::new().expect("a runtime");
     runtime.block_on(async {

@@ -62,7 +62,7 @@ fn saved(tab: &Tab<'_>) {
     tab.wait("document.getElementById('saved').textContent.includes('✓')");
 }
 
-/// Returns a reviewer's current verdicts and reasons by number of the act.
+/// Returns the current verdicts and reasons of a reviewer by the number of the action that stored them.
 fn current_verdicts(project: &Project, reviewer: &str) -> BTreeMap<i64, (String, Option<String>)> {
     let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
     let events = output
@@ -295,7 +295,7 @@ fn keys_work_as_soon_as_a_dialog_is_closed() {
     on_a_page(|_, tab| {
         tab.key("KeyJ");
         tab.wait("document.activeElement.id === 'jump-to'");
-        // In the same task of the event loop, the focus is still inside the closed dialog.
+        // During the same task of the event loop, the focus is still inside the closed dialog.
         tab.eval(
         "document.getElementById('jump').close();
         document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { code: 'KeyC', bubbles: true }));

@@ -65,7 +65,8 @@ impl RequestLog {
     }
 }
 
-/// Returns every event in the log with its verdict, or `None` if it was undone. Fails if one is stored twice for a metric.
+/// Returns every event in the log with its verdict, or with `None` if the verdict was undone. Fails if an event is
+/// stored twice for a metric.
 fn stored(project: &Project) -> BTreeMap<String, Option<String>> {
     let output = mocban(project.dir(), &["--json", "verdict", "log"]).expect(0);
     let mut rows = BTreeSet::new();

@@ -16,7 +16,7 @@ pub(crate) struct SourceFile {
 }
 
 impl SourceFile {
-    /// Returns the code without comments and without unit tests; nothing for a test file.
+    /// Returns the code without comments and unit tests. Returns an empty text for a test file.
     pub(crate) fn production_code(&self) -> String {
         if self.is_test {
             return String::new();
@@ -40,7 +40,7 @@ impl SourceFile {
         self.text[..test_module_start(&self.text)].lines().count()
     }
 
-    /// Returns the module path from the crate root; empty for `lib.rs` and `main.rs`.
+    /// Returns the module path from the crate root. The path is empty for `lib.rs` and `main.rs`.
     pub(crate) fn module(&self) -> Vec<String> {
         let name = self.name.trim_end_matches(".rs");
         let mut parts: Vec<String> = name.split('/').map(str::to_owned).collect();

@@ -6,9 +6,9 @@ use mocban::mesh::Mesh;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Amplitude of the height noise of an uncarved plate, in shares of the character's height (about 15 µm).
+/// Amplitude of the height noise of an uncarved plate, as a share of the character's height (about 15 µm).
 const PLATE_NOISE: f64 = 0.0016;
-/// Depth below which a vertex of a closed scan belongs to the base or the walls, in shares of the character's height.
+/// Depth below which a vertex of a closed scan belongs to the base or the walls, as a share of the character's height.
 const BASE_DEPTH: f64 = 0.165;
 
 /// A kind of pair without a correct alignment.

@@ -65,7 +65,7 @@ async fn pool(path: &str, connections: u32) -> anyhow::Result<SqlitePool> {
     Ok(pool.connect_with(options).await?)
 }
 
-/// Makes the tables and the tasks, over connections that are closed again.
+/// Creates the tables and the tasks. The connections used for this are closed afterwards.
 async fn fill(path: &str, pairs: u32, load: Load, config: &Config) -> anyhow::Result<()> {
     let pool = pool(path, 1).await?;
     SqliteStorage::setup(&pool).await?;
