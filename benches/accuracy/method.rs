@@ -13,7 +13,7 @@ pub(super) struct Method {
 }
 
 impl Method {
-    /// Loads a preset with values as `--set` takes them. The environment is ignored.
+    /// Loads a preset with changed settings, written as for `--set`. Environment variables are ignored.
     pub(super) fn load(preset: Preset, sets: &[String]) -> anyhow::Result<Self> {
         let loaded = config::load(&Sources {
             base: BaseLayer::Preset(preset),

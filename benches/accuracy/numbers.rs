@@ -1,4 +1,4 @@
-//! Every number of a result by its path, such as `normalize.inks.0.threshold_print`.
+//! Lists every number in a result with its path, such as `normalize.inks.0.threshold_print`.
 
 use std::collections::BTreeMap;
 

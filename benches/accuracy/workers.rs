@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use indicatif::ProgressBar;
 
-/// Returns the results of `work` on 0..count. Each worker has one thread, so that the time of the thread is the time of
-/// its item.
+/// Returns the results of `work` on 0..count, in order. Each item is computed by a single thread, so the processor
+/// time of the thread measures the time of the item.
 pub(super) fn in_order<T: Send>(
     count: usize,
     workers: NonZeroUsize,

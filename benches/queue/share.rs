@@ -178,8 +178,8 @@ impl Watch {
         })
     }
 
-    /// Stops the measurement, after all compute threads have ended. `compute_time` is the time for which each slot
-    /// computed stages.
+    /// Stops the measurement, after all compute threads have ended. `compute_time` is the mean time that a slot spent
+    /// on computing stages.
     fn stop(self, compute_time: Duration) -> anyhow::Result<RunTimes> {
         let (wall, cores) = (self.start.elapsed(), process::cpu_time());
         let threads = process::thread_cpu_times()?.into_iter();

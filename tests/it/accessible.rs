@@ -1,4 +1,5 @@
-//! Accessibility of the pages by axe-core; skipped without a browser or `AXE_JS`, the path of `axe.min.js`.
+//! Accessibility of the pages, checked by axe-core. Skipped without a browser or without `AXE_JS`, the path of
+//! `axe.min.js`.
 
 use crate::browser::{Browser, Tab};
 use crate::cli::mocban;

@@ -101,7 +101,7 @@ impl Corruptor {
         }
     }
 
-    /// Overwrites a number; half of the time within the first 200 bytes, where headers are.
+    /// Overwrites a number. Half of the time the number is within the first 200 bytes, where headers are.
     fn number(&mut self, bytes: &mut [u8]) {
         let value = NUMBERS[self.below(NUMBERS.len())];
         let width = [1, 2, 4, 8][self.below(4)];

@@ -55,7 +55,7 @@ impl FaultScenario {
         Some(result.code)
     }
 
-    /// Injects each fault at `points` calls, spread evenly over all calls it applies to.
+    /// Injects each fault at `points` system calls, spread evenly over all calls that the fault applies to.
     #[expect(clippy::print_stderr, reason = "figures of the long test")]
     pub(crate) fn check_all(&self, faults: &[(Fault, End)], points: usize) {
         let comparison = Comparison::new("1");

@@ -1,6 +1,6 @@
-//! Disk faults while the binary runs: a command that fails says so in one sentence and leaves nothing incomplete, and the
-//! next command succeeds as if there had been no fault. `MOCBAN_FAULT_MOMENTS` sets at how many system calls each fault is
-//! injected; 24 take minutes.
+//! Disk faults while the binary runs. A command that fails reports the fault in one sentence and leaves nothing
+//! incomplete, and the next command succeeds as if there had been no fault. `MOCBAN_FAULT_MOMENTS` sets the number of
+//! system calls at which each fault is injected. With 24 the tests take minutes.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,4 +1,4 @@
-//! Generates hostile pairs: empty, truncated, corrupted, mistyped and degenerate files, and paths that are not files.
+//! Generates hostile pairs: empty, truncated, corrupted, mistyped or degenerate files, and paths that are not files.
 
 use std::fs;
 use std::path::{Path, PathBuf};

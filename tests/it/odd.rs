@@ -1,4 +1,4 @@
-//! Unusual states of the disk: each gives one clear sentence with the file and the way out, and nothing is lost.
+//! Unusual states of the disk: each gives one clear sentence that names the file and the remedy, and no data is lost.
 
 use std::os::unix::fs::MetadataExt as _;
 use std::os::unix::process::CommandExt as _;

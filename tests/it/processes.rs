@@ -15,7 +15,8 @@ use serde_json::Value;
 use crate::cli::{call, mocban};
 use crate::resume::{attempts, pairs, project, results, run, run_with_progress, stages_done};
 
-/// Shortens leases from nearly a minute to a second, and the intervals that depend on them likewise.
+/// Shortens leases from nearly a minute to about a second, and the intervals that depend on the lease by the same
+/// factor.
 const TIME_SCALE: (&str, &str) = ("MOCBAN_TIME_SCALE", "50");
 
 /// Most pairs of a test in this module.
@@ -352,7 +353,7 @@ fn a_second_signal_stops_at_once_and_leaves_all_resumable() {
 
 #[test]
 fn a_second_signal_does_not_wait_for_a_disk_that_hangs() {
-    // After the last stage nothing is left to compute, but the pair is not done before its files are written.
+    // After the last stage nothing is left to compute, but the pair is not done until its files are written.
     for (at, stored, next) in [
         ("depth:written", 1, Stage::Depth),
         ("register:written", 3, Stage::Register),
@@ -363,7 +364,7 @@ fn a_second_signal_does_not_wait_for_a_disk_that_hangs() {
         child.wait_until("it drains", || fixture.stop_requests() == 1);
         child.send(Signal::INT);
         let (code, json, stderr) = child.end();
-        // A stage is stored only after its files and those of all stages before it were written.
+        // A stage is stored only after the files of this stage and of all earlier stages were written.
         let ended = (code, &json["stages"], &json["done"]);
         assert_eq!(ended, (Some(130), &stored.into(), &0.into()), "{stderr}");
         let pair = &pairs(&fixture.project)[0];

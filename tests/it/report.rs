@@ -162,7 +162,7 @@ fn contents(root: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-/// Computes `IoU`, Dice and box `IoU` of two masks by counting; 255 is set.
+/// Computes `IoU`, Dice and box `IoU` of two masks by counting pixels. A pixel of 255 is set.
 fn agreement(a: &Grid<u8>, b: &Grid<u8>) -> [f64; 3] {
     let set = |grid: &Grid<u8>, x, y| grid.at(x, y) == 255;
     let (mut both, mut either, mut sum) = (0.0, 0.0, 0.0);

@@ -13,10 +13,10 @@ use crate::cli::{binary, call, mocban};
 /// Small depth maps, because these tests are not about the alignment.
 const SMALL_DEPTH: [&str; 2] = ["--set", "depth.longest_px=96"];
 
-/// Every failpoint between claim, files, rows and commit, in an order in which six pairs reach them, each with the last
-/// stage of a run that completes before it. Such a run is needed where a stage must be claimed by itself, because stages
-/// computed together are stored together. Points that need a file to be written come early, because existing files are
-/// not written again.
+/// Every failpoint from the claim to the commit, in an order in which a run of six pairs reaches all of them. The
+/// second value is the last stage of a run that completes before the failpoint is set, for failpoints that need a
+/// stage to be claimed by itself: stages computed together are stored together. Failpoints that need a file to be
+/// written come early, because existing files are not written again.
 const POINTS: [(&str, Option<&str>); 14] = [
     ("fit:claiming", None),
     ("fit:claimed", None),
@@ -207,7 +207,7 @@ fn a_run_killed_at_every_failpoint_and_resumed_gives_the_results_of_an_uninterru
 fn stages_are_computed_while_files_of_earlier_stages_are_written() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let broken = project(dir.path(), "broken", "1");
-    // The file of the depth map is never finished: later stages are computed only if they do not wait for it.
+    // The file of the depth map is never finished. Later stages are computed only if they do not wait for this file.
     let died = run(&broken, &["-j", "1"])
         .env("MOCBAN_HOLD_AT", "depth:written")
         .env("MOCBAN_HOLD_FILE", dir.path().join("held"))

@@ -9,7 +9,7 @@ use crate::browser::{Browser, Tab};
 use crate::cli::mocban;
 use crate::page::{NO_CHECKS, Page, read_project};
 
-/// No attention checks, so that the log holds exactly what was pressed; no minimum view time, so that tests do not wait.
+/// Without attention checks, the log holds exactly what was pressed. Without a minimum view time, tests do not wait.
 pub(crate) const PLAIN: [&str; 6] = [
     "--attention-checks",
     "0",

@@ -1,4 +1,5 @@
-//! What the review server stores and reveals: bound to what was shown, blind, the same after a restart.
+//! What the review server stores and reveals: verdicts belong to what was shown, items are blind, and a restart
+//! changes nothing.
 
 use std::collections::{BTreeMap, BTreeSet};
 

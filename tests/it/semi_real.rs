@@ -19,7 +19,7 @@ pub(crate) fn settings() -> Settings {
     loaded.config.stages
 }
 
-/// Returns the errors of all metrics. Neither unit nor carved side is given.
+/// Returns the errors of all metrics. The pair is aligned without its unit and its carved side.
 fn aligned(pair: &DemoPair, settings: &Settings) -> Result<Vec<TruthErrors>, StageError> {
     let print = raster::decode(&pair.print, &raster::ImageLimits::SUGGESTED).expect("a picture");
     let aligned = AlignedPair::new(&pair.mesh.clone().into(), &print.into(), settings)?;

@@ -141,7 +141,7 @@ impl TiffFile {
         self.with_tags(&tags)
     }
 
-    /// Writes the header, the pixels, values that do not fit into a tag, and the tags.
+    /// Writes the header, the pixels, the values that are too long for a tag, and the tags.
     fn with_tags(&self, tags: &[(u16, TagValue)]) -> Vec<u8> {
         let mut bytes = b"II*\0\0\0\0\0".to_vec();
         bytes.extend(&self.data);

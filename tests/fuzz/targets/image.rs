@@ -1,4 +1,4 @@
-//! Arbitrary bytes as a print image: an error of one line, or an image within the limits.
+//! Reads arbitrary bytes as a print image: gives a one-line error, or an image within the limits.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Arbitrary bytes as a manifest in CSV and JSON Lines: valid rows, or problems of one line each.
+//! Reads arbitrary bytes as a manifest in CSV and in JSON Lines: gives valid rows, or problems of one line each.
 
 #![no_main]
 

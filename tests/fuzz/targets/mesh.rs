@@ -1,4 +1,4 @@
-//! Arbitrary bytes as a mesh file: an error of one line, or a mesh with the documented properties.
+//! Reads arbitrary bytes as a mesh file: gives a one-line error, or a mesh with the documented properties.
 
 #![no_main]
 

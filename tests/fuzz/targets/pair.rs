@@ -1,4 +1,4 @@
-//! Arbitrary bytes as a mesh, with a print selected by the first byte, through all four stages.
+//! Runs arbitrary bytes as a mesh, with a print selected by the first byte, through all four stages.
 
 #![no_main]
 

@@ -1,4 +1,5 @@
-//! Arbitrary text as a settings file, as `--set` and as environment variables: valid settings, or an error with the position.
+//! Reads arbitrary text as a settings file, as `--set` and as environment variables: gives valid settings, or an error
+//! with the position.
 
 #![no_main]
 

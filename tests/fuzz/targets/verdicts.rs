@@ -1,4 +1,4 @@
-//! Arbitrary bytes as a verdict file or a ground-truth file: rows, or an error with the line.
+//! Reads arbitrary bytes as a verdict file or a ground-truth file: gives rows, or an error that names the line.
 
 #![no_main]
 #![allow(
