@@ -131,7 +131,7 @@ fn row(answers: &[&Answer], level: Option<f64>) -> [String; 4] {
     ]
 }
 
-/// Returns the confidence below which the right pairs are at most the share `FALSE_ALARMS` of all right pairs.
+/// Returns the confidence threshold that rejects the allowed share of right pairs.
 fn level(trials: &[Trial], method: &Method, metric: ThresholdMetric) -> Option<f64> {
     let of_method = trials.iter().filter(|trial| trial.method == method.name);
     let found = of_method.filter_map(|trial| trial.found(metric));

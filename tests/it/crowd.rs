@@ -21,7 +21,8 @@ use crate::test_size::size_from_env;
 
 /// Number of good pairs among the hostile ones.
 const GOOD: u64 = 2;
-/// Memory limit of a run, and most that it may take: far less than the headers of its files ask for.
+/// Memory limit of a run, and the most memory that the run may take. It is far less than the headers of the files ask
+/// for.
 const MEMORY_MIB: u64 = 256;
 /// Longest time for a stage in seconds.
 const STAGE_LIMIT_S: u64 = 60;

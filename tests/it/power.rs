@@ -1,8 +1,9 @@
 //! Power cuts while the binary runs: the state of the disk after each sync is rebuilt, opened, checked, and run to the
 //! end.
 //!
-//! The bytes of a file are on the disk once they are synced. When its name is there depends on the file system: only after
-//! its folder is synced, or at once. Both cases are tested, and bytes and names may reach the disk in any order.
+//! The bytes of a file are on the disk once the file is synced. Depending on the file system, the name of the file is
+//! on the disk immediately or only after its folder is synced. Both cases are tested, and bytes and names may reach
+//! the disk in any order.
 
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt as _;

@@ -1,16 +1,16 @@
 //! apalis-sqlite under the load of `benches/queue`, in four ways.
 //!
-//! `peers-queue FILE PAIRS WORKERS LOAD SET-UP` makes a database with the tasks, works them off with as many in hand at
-//! a time, and prints the seconds from the first claim to the last acknowledged task.
+//! `peers-queue FILE PAIRS WORKERS LOAD SET-UP` creates a database with the tasks and runs them, WORKERS at a time. It
+//! prints the seconds from the first claim to the last acknowledged task.
 //!
-//! - LOAD `stages`: four tasks a pair, one a stage, each with its own acknowledgement; that no stage begins before the
-//!   one before it is over is left out, and no result is stored. `updates`: one task a pair, and four committed updates
-//!   of one small row while it runs.
-//! - SET-UP `plain`: its configuration and a pool as they come. `tuned`: as many tasks fetched at a time as serve it
-//!   best, and a connection for every task in hand.
+//! - LOAD `stages`: four tasks per pair, one per stage, each with its own acknowledgement. The order of the stages is not
+//!   enforced, and no result is stored. LOAD `updates`: one task per pair, and four committed updates of one small row
+//!   while the task runs.
+//! - SET-UP `plain`: the default configuration and a default pool. SET-UP `tuned`: larger batches of fetched tasks, and
+//!   at least one connection per worker.
 //!
-//! All connections use a write-ahead log and `synchronous=FULL`; `SqliteStorage::setup` would turn syncing off on one
-//! of them, so it gets a pool of its own. All tasks are there from the start.
+//! All connections use a write-ahead log and `synchronous=FULL`. `SqliteStorage::setup` would turn syncing off on its
+//! connection, so it gets a pool of its own. All tasks exist from the start.
 
 mod load;
 
