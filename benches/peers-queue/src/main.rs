@@ -3,7 +3,7 @@
 //! `peers-queue FILE PAIRS WORKERS LOAD SET-UP` creates a database with the tasks and runs them, WORKERS at a time. It
 //! prints the seconds from the first claim to the last acknowledged task.
 //!
-//! - LOAD `stages`: four tasks per pair, one per stage, each with its own acknowledgement. The order of the stages is not
+//! - LOAD `stages`: four tasks per pair, one per stage, each acknowledged separately. The order of the stages is not
 //!   enforced, and no result is stored. LOAD `updates`: one task per pair, and four committed updates of one small row
 //!   while the task runs.
 //! - SET-UP `plain`: the default configuration and a default pool. SET-UP `tuned`: larger batches of fetched tasks, and
