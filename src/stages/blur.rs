@@ -3,12 +3,12 @@
 use crate::raster::Grid;
 use crate::simd::dispatch;
 
-/// Smaller sigmas leave values unchanged, pixels.
+/// Sigma below which values stay unchanged, in pixels.
 const MIN_SIGMA: f64 = 0.5;
 
-/// Blurs values with a Gaussian of `sigma` pixels; returns them unchanged if `sigma` is below half a pixel.
+/// Blurs values with a Gaussian of `sigma` pixels. Returns the values unchanged if `sigma` is below half a pixel.
 ///
-/// Values beyond the border are zero; divide by the blurred weight where that matters.
+/// Values beyond the border count as zero. Where that matters, divide by the blurred weight.
 pub(super) fn gaussian_blur(values: &Grid<f32>, sigma: f64) -> Grid<f32> {
     if sigma < MIN_SIGMA {
         return values.clone();

@@ -2,7 +2,7 @@
 
 use crate::raster::{Grid, Mask};
 
-/// Components below this share of an image are specks: the value of the authors' code.
+/// Components below this share of an image are specks. The value is from the program of the paper's authors.
 const SPECK_SHARE: f64 = 1.0 / 1200.0;
 
 /// Components of pixels connected by edges, with their areas.
@@ -59,7 +59,7 @@ impl ConnectedComponents {
         Self { labels, sizes }
     }
 
-    /// Returns the pixels of components of at least this area, pixels.
+    /// Returns the pixels of components of at least this area, in pixels.
     pub(super) fn with_area_at_least(&self, size: usize) -> Mask {
         self.select(|label| self.sizes[label] >= size)
     }
@@ -133,7 +133,7 @@ fn union(runs: &mut [Run], one: usize, other: usize) {
     runs[one.max(other)].root = one.min(other);
 }
 
-/// Removes specks and pinholes whose area is below [`SPECK_SHARE`] of `area`, pixels.
+/// Removes specks and pinholes whose area is below [`SPECK_SHARE`] of `area` pixels.
 pub(super) fn remove_specks(mask: &Mask, area: usize) -> Mask {
     let size = (area as f64 * SPECK_SHARE).round() as usize;
     let kept = ConnectedComponents::label(mask).with_area_at_least(size);
@@ -148,7 +148,7 @@ mod tests {
     use super::{ConnectedComponents, remove_specks};
     use crate::raster::Mask;
 
-    /// Reference implementation: the lowest index that each set pixel is connected to.
+    /// Reference implementation: returns for each set pixel the lowest index of a connected pixel.
     fn flooded(mask: &Mask) -> Vec<Option<usize>> {
         let (width, places) = (mask.width(), 0..mask.data().len());
         let mut least: Vec<Option<usize>> = places

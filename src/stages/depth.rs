@@ -11,7 +11,7 @@ use crate::simd::{max_f32, min_f32};
 /// Raised whenever the same inputs and settings may give another result than before.
 pub const REVISION: u32 = 5;
 
-/// Largest longest side of a depth map in pixels; a square map of that size has 268 million.
+/// Limit for the longest side of a depth map, in pixels. A square map of this size has 268 million pixels.
 const LONGEST_PX_LIMIT: f64 = 16_384.0;
 
 /// What sets the size of a pixel.
@@ -70,10 +70,10 @@ impl DepthError {
 /// Renders the heights over the fitted surface, mirrored so that the map reads like the print.
 ///
 /// Each pixel whose centre ray meets the mesh gets the level of the highest surface. Level 0 is "no data"; levels
-/// 1..=65535 are linear in height, see [`DepthScale`]. `unit` is the mesh's unit, where it is known.
+/// 1..=65535 are linear in height, see [`DepthScale`]. `unit` is the unit of the mesh, if it is known.
 ///
 /// # Errors
-/// When the resolution cannot be reached, or no ray meets the mesh.
+/// Returns an error if the resolution cannot be reached, or no ray meets the mesh.
 pub fn depth(
     scan: &Scan,
     fit: &FitOutcome,
@@ -113,7 +113,7 @@ pub fn depth(
     })
 }
 
-/// Returns the longest side in pixels for bounds in the plane, mesh units.
+/// Returns the longest side in pixels for bounds in the plane, in mesh units.
 fn longest_px(
     [low, high]: [[f64; 2]; 2],
     unit: Option<LengthUnit>,
@@ -132,13 +132,13 @@ fn longest_px(
     Ok((longest_px.round() as usize).max(8))
 }
 
-/// Quantizes heights to levels 1..=65535 over their range; `None` when no pixel holds data.
+/// Quantizes heights to levels 1..=65535 over their range. Returns `None` if no pixel holds data.
 fn quantize(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
     let [low, high] = range(heights)?.map(f64::from);
     let step = ((high - low) / 65_534.0).max(f64::from(f32::MIN_POSITIVE));
     let levels = heights.map(|z| {
         let steps = ((f64::from(*z) - low) / step).clamp(0.0, 65_534.0);
-        // Rounds half up; a call of `round` would take longer than the rest of the loop.
+        // Rounds half up. A call of `round` would take longer than the rest of the loop.
         let whole = steps as i32;
         let level = 1 + whole + i32::from(steps - f64::from(whole) >= 0.5);
         if *z == NO_HIT { 0 } else { level as u16 }
@@ -146,9 +146,10 @@ fn quantize(heights: &Grid<f32>) -> Option<(Grid<u16>, f64, f64)> {
     Some((levels, low, step))
 }
 
-/// Returns the lowest and the highest height; `None` when no pixel holds data.
+/// Returns the lowest and the highest height. Returns `None` if no pixel holds data.
 fn range(heights: &Grid<f32>) -> Option<[f32; 2]> {
-    // Column by column first, which is vectorized; one minimum over all is not.
+    // The extremes of each column come first, because this loop is vectorized and a single minimum over all pixels is
+    // not.
     let width = heights.width();
     let (mut lows, mut highs) = (vec![f32::INFINITY; width], vec![NO_HIT; width]);
     for row in heights.data().chunks_exact(width) {

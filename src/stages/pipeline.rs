@@ -50,7 +50,7 @@ impl StageError {
 }
 
 impl Settings {
-    /// Returns whether the fit stage reads the print. Where it does not, a changed print leaves its results valid.
+    /// Returns whether the fit stage reads the print. If it does not, its results stay valid when the print changes.
     pub const fn fit_reads_print(&self) -> bool {
         matches!(self.pipeline.method, AlignmentMethod::Default)
     }
@@ -59,7 +59,7 @@ impl Settings {
 /// Finds the character plane and the carved side of a mesh. `scanned_face_down` is the manifest's attribute.
 ///
 /// # Errors
-/// When no plane is found or nothing is carved.
+/// Returns an error if no plane is found or nothing is carved.
 pub fn fit(
     scan: &Scan,
     print: Option<&Print>,
@@ -75,7 +75,7 @@ pub fn fit(
 /// Prepares print and depth map for registration.
 ///
 /// # Errors
-/// When the print shows no ink or the depth map no strokes.
+/// Returns an error if the print shows no ink or the depth map no strokes.
 pub fn normalize(
     depth: &DepthMap,
     print: &Print,
@@ -92,7 +92,7 @@ pub fn normalize(
 /// Aligns the depth map with the print and scores each metric's masks.
 ///
 /// # Errors
-/// When no pose is found or trusted, or a threshold leaves no strokes.
+/// Returns an error if no pose is found or trusted, or a threshold leaves no strokes.
 pub fn register(
     depth: &DepthMap,
     normalized: &Normalized,

@@ -1,10 +1,11 @@
-//! Bounds of the bulk of a scan: specks far away must not shrink everything else.
+//! Bounds of a scan without distant specks, which would otherwise shrink the rest of the scan in every rendering.
 
 /// Approximate number of points that are sampled to find the bulk.
 const SAMPLES: usize = 4_000;
 /// Share of the samples at either end of an axis that may be specks.
 const SPECK_SHARE: f64 = 0.002;
-/// The bulk is the range of the other samples, widened on each side by this share of its length.
+/// Share of its length by which the range of the samples without specks is widened at either end. The result is called
+/// the bulk.
 const WIDENED: f64 = 0.25;
 
 /// A box along the axes, `[low, high]`.

@@ -6,7 +6,7 @@ use crate::stages::blur::gaussian_blur;
 
 /// Number of cells along the longest side: the background changes slowly.
 const CELLS: f64 = 96.0;
-/// Half widths of the closing, as shares of the longest side: wider than every stroke, and wider than most strokes.
+/// Half widths of the closing, as shares of the longest side. `NARROW` is wider than most strokes.
 pub(super) const NARROW: f64 = 0.12;
 pub(super) const STROKE: f64 = 0.05;
 /// Least share of a cell that must be known for it to count.
@@ -61,7 +61,8 @@ fn extreme(cells: &Grid<f32>, reach: usize, pick: impl Fn(f32, f32) -> f32) -> G
     along_rows(&along_rows(cells))
 }
 
-/// Returns the extreme of the window of `reach` cells to either side of each cell, by windows that double in width.
+/// Returns, for each cell of a row, the extreme value within `reach` cells on either side. The values are built up
+/// from windows of doubling width.
 fn doubled(row: &[f32], reach: usize, pick: &impl Fn(f32, f32) -> f32) -> Vec<f32> {
     let (len, window) = (row.len(), 2 * reach + 1);
     // The row is padded so that the window that starts at an index is centred on the cell with that index.

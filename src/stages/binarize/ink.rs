@@ -11,7 +11,8 @@ use crate::stages::pose::SoftMask;
 const WHITE: f32 = 0.965;
 /// Background darker than this can be distinguished from the white outside the cut.
 const DISTINCT_BACKGROUND: f64 = 0.945;
-/// Least share of the image that coloured background covers; less is only the soft edge of ink on a white sheet.
+/// Least share of the image that a coloured background covers. A smaller area is only the soft edge of ink on a white
+/// sheet.
 const LEAST_BACKGROUND: f64 = 0.2;
 /// Least share of the image that the white outside the cut covers.
 const LEAST_WHITE: f64 = 0.004;
@@ -19,10 +20,10 @@ const LEAST_WHITE: f64 = 0.004;
 /// the dark ones where stains are possible.
 const PALE: f64 = 0.35;
 const LEAST_PALE: f64 = 0.15;
-/// Least difference between ink and background, as a share of the lighter one: scanners that fill only part of their 16
-/// bits produce dark images.
+/// Least difference between ink and background, as a share of the lighter of the two. It is relative because scanners
+/// that use only part of their 16 bits produce dark images.
 const LEAST_CONTRAST: f64 = 0.08;
-/// Least difference as a share of full white: below it there is only noise.
+/// Least difference between ink and background as a share of full white. A smaller difference is noise.
 const NOISE: f64 = 0.012;
 /// Least share of ink in a print.
 const LEAST_INK: f64 = 0.002;

@@ -11,13 +11,14 @@ pub(crate) struct Split {
     pub(crate) high: f64,
 }
 
-/// Splits values where the variance between the classes is largest; `None` for fewer than two values. Sorts the values.
+/// Splits values where the variance between the classes is largest. Returns `None` for fewer than two values. Sorts
+/// the values.
 pub(crate) fn split(values: &mut [f32]) -> Option<Split> {
     sort(values);
     split_sorted(values)
 }
 
-/// Splits values without the lowest and the highest one in `one_in` of them. Sorts the values.
+/// Splits values after leaving out the lowest and the highest `1 / one_in` of them. Sorts the values.
 pub(crate) fn split_inner(values: &mut [f32], one_in: usize) -> Option<Split> {
     sort(values);
     let cut = values.len() / one_in;
@@ -86,7 +87,8 @@ fn sort(values: &mut [f32]) {
 
 const SIGN: u32 = 1 << 31;
 
-/// Returns an integer key that sorts like the value: negative values inverted, others offset above them.
+/// Returns an integer key with the order of the values: the bits of negative values are inverted, those of others are
+/// offset above them.
 fn key(value: f32) -> u32 {
     let bits = value.to_bits();
     if bits & SIGN == 0 { bits | SIGN } else { !bits }

@@ -3,11 +3,11 @@
 use super::otsu::Split;
 use crate::raster::{Grid, Mask};
 
-/// Least sum of the evidence for the polarity to be clear; larger for ink that is lighter than the background, as in
-/// rubbings: heavy ink inside a frame looks like a dark background.
+/// Least sum of the evidence at which the polarity is clear. The limit is larger for ink that is lighter than the
+/// background, as in rubbings, because heavy ink inside a frame looks like a dark background.
 const CLEAR: f64 = 0.8;
 const CLEAR_LIGHT: f64 = 1.6;
-/// Width of the rim that is compared with the rest, as a share of the shorter side.
+/// Width of the rim of the image that is compared with the inner part, as a share of the shorter side.
 const RIM: f64 = 0.06;
 
 /// Returns whether ink is probably lighter than the background, and whether that is clear. Stains and frame lines

@@ -1,9 +1,9 @@
 //! Decides which side of the plane is carved.
 //!
 //! Four kinds of evidence are combined as log-odds. The winding of the faces is right in most files and reversed in
-//! some. Stroke tops are planed wood, so their heights are concentrated at one level; ground is gouged. The manifest may
-//! give the direction of the scan. And the relief of the carved side agrees with the print. That weighs most, because
-//! only the print shows the character.
+//! some. Stroke tops are planed wood, so their heights are concentrated at one level; ground is gouged. The manifest
+//! may give the direction of the scan. And the relief of the carved side agrees with the print. That weighs most,
+//! because only the print shows the character.
 
 use super::surface::{HeightSamples, Surface, quantile};
 use crate::domain::{Bow, Rigid3, SideEvidence};
@@ -48,7 +48,7 @@ const PASSES: [RefinementPass; 2] = [
     },
 ];
 
-/// Sides are rendered from outside, so in mirror writing: only mirrored poses are searched.
+/// Returns a beam with mirrored poses only. A side is rendered from outside, so its character is in mirror writing.
 const fn mirrored(count: usize) -> BeamWidth {
     BeamWidth {
         upright: 0,
@@ -58,8 +58,8 @@ const fn mirrored(count: usize) -> BeamWidth {
 
 /// Working size at which the agreement is measured.
 const JUDGED_PX: usize = 56;
-/// Nearness to the tops below which nothing prints. The search uses slopes as well, but around thin strokes they are too
-/// broad for the agreement.
+/// Nearness to the tops below which nothing prints. The pose search uses the slopes around strokes as well, but around
+/// thin strokes the slopes are too broad to measure the agreement.
 const PRINTS: f32 = 0.7;
 /// Working size of the print and the tops.
 const BASE_PX: usize = 72;
@@ -84,7 +84,7 @@ pub(super) struct SideInputs<'a> {
     pub(super) scanned_face_down: Option<bool>,
 }
 
-/// Returns the carved one of two sides with the evidence for it; `None` when neither shows a surface.
+/// Returns the carved side with the evidence for it. Returns `None` if neither side shows a surface.
 pub(super) fn choose(
     sides: [Option<FittedSide>; 2],
     inputs: SideInputs<'_>,
@@ -172,8 +172,8 @@ fn agreement(likelier: &FittedSide, other: &FittedSide, print: &Print) -> f64 {
     (first / second).ln()
 }
 
-/// Returns the agreement of a side, read in the mirror, with the ink: correlation times the share of the tops that
-/// printed.
+/// Returns the agreement of the mirrored rendering of a side with the ink: correlation times the share of the tops
+/// that printed.
 fn best_score(ink: &ImagePyramid, tops: &SoftMask) -> f64 {
     let Some(wood) = ImagePyramid::new(tops, BASE_PX) else {
         return 0.0;

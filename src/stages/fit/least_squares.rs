@@ -184,7 +184,8 @@ impl MomentSums {
         }
     }
 
-    /// Solves the normal equations of the first few coefficients; zeros where they are singular.
+    /// Solves the normal equations for the first `terms` coefficients. Returns all zeros if the equations are
+    /// singular.
     fn solve(&self, terms: usize, priors: &[Prior; 6]) -> Coefficients {
         let total = |lanes: &PointLanes| lanes.iter().sum::<f64>();
         let mut normal = Matrix6::<f64>::identity();

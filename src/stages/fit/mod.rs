@@ -1,7 +1,7 @@
 //! Mesh to character plane (paper III-A): a one-sided robust surface over the highest parts, and the carved side.
 //!
-//! The mesh is rendered from both sides and a surface is fitted to the tops of each. The plane depends on the mesh only.
-//! The side depends on the print as well: `src/lib.rs` explains why it is decided here. The paper's fit is in
+//! The mesh is rendered from both sides and a surface is fitted to the tops of each. The plane depends on the mesh
+//! only. The side depends on the print as well: `src/lib.rs` explains why it is decided here. The paper's fit is in
 //! `paper_method::fit`.
 
 mod carved_side;

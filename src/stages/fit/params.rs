@@ -47,9 +47,9 @@ pub enum FitError {
         "no carving found: the relief is {relief:.4} of an extent of {extent:.4} (mesh units), below fit.min_relief {min_relief}"
     )]
     NoRelief {
-        /// Relief found, mesh units.
+        /// Relief found, in mesh units.
         relief: f64,
-        /// Extent of the mesh, mesh units.
+        /// Extent of the mesh, in mesh units.
         extent: f64,
         /// The setting.
         min_relief: f64,

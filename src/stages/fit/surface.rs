@@ -1,7 +1,7 @@
 //! A one-sided robust surface over the highest parts of a height map.
 //!
-//! Stroke tops are the original face of the block: much lies below them, nothing above. So a point above the surface
-//! has a high cost and a point far below it none.
+//! Stroke tops are the original face of the block: much of the block lies below them and nothing above. Therefore a
+//! point above the surface has a high cost, and a point far below the surface has none.
 
 use super::least_squares::{Coefficients, OPEN, Points, Prior, value};
 use crate::domain::Rigid3;
@@ -10,18 +10,19 @@ use crate::stages::components::ConnectedComponents;
 use crate::stages::pose::SoftMask;
 use crate::stages::zbuffer::{NO_HIT, Viewport};
 
-/// Expectile of the first, convex passes: weight of points above the surface; points below weigh one minus this.
+/// Weight of points above the surface in the first, convex passes. Points below weigh one minus this, so the surface
+/// is this expectile of the heights.
 const ENVELOPE: f64 = 0.97;
 /// Weight of a point above the surface in the passes that follow.
 const ABOVE: f64 = 3.0;
-/// Distance below the surface at which a point stops counting, as a share of the height range, pass by pass.
+/// For each pass, the distance below the surface from which a point has no weight, as a share of the height range.
 const WINDOWS: [f64; 5] = [0.35, 0.22, 0.14, 0.10, 0.08];
 /// Number of convex passes, and of passes for each window.
 const ENVELOPE_PASSES: usize = 8;
 const NARROW_PASSES: usize = 2;
 /// Number of wide windows, for which a quarter of the points is enough.
 const WIDE_WINDOWS: usize = 3;
-/// Tops this close to the cut of the mesh, in pixels of the rendering, belong to neighbours.
+/// Tops within this distance of the cut of the mesh, in pixels of the rendering, belong to neighbouring characters.
 const CUT_PX: i64 = 2;
 /// Weight of a point that is not on a top of the character.
 const OFF_TOP_WEIGHT: f64 = 1e-6;
@@ -35,7 +36,8 @@ const CORRELATED_PX: f64 = 40.0;
 const TOP_SIGMA: f64 = 0.05;
 /// Standard deviation of the slope between the tops' plane and the carved ground.
 const TILT_SIGMA: f64 = 0.05;
-/// Standard deviation of the second-degree coefficients in units of the extent: a bow of 2 to 8 % of the extent.
+/// Prior standard deviation of the second-degree coefficients, with lengths in units of the extent. For one square
+/// term it is a bow of about 4 % of the extent at the edge (u = 0.5).
 const BOW_SIGMA: f64 = 0.15;
 /// The same about the ground's coefficients, where enough ground is visible.
 const GROUND_BOW_SIGMA: f64 = 0.03;
@@ -51,7 +53,7 @@ const SOFT_SPAN: f64 = 0.5;
 /// Ratio of supports by which a bow must beat the plane.
 const BOW_GAIN: f64 = 1.04;
 
-/// Heights of a view as points, scaled by the extent: u, v in about -0.5..=0.5.
+/// Heights of a view as points. Lengths are divided by the extent, so u and v are in about -0.5..=0.5.
 #[derive(Debug)]
 pub(super) struct HeightSamples {
     points: Points,
@@ -72,16 +74,16 @@ pub(super) struct HeightSamples {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Surface {
     pub(super) coefficients: Coefficients,
-    /// Share of the visible area that supports it, minus a penalty for what lies above it.
+    /// Share of the visible area that supports the surface, minus a penalty for points above the surface.
     pub(super) support: f64,
     /// Share of the visible area within the last window.
     pub(super) tops: f64,
-    /// Root mean square residual of that area, mesh units.
+    /// Root mean square residual of that area, in mesh units.
     pub(super) rms: f64,
 }
 
 impl HeightSamples {
-    /// Collects the visible pixels of a rendering; `None` when fewer than 16 are visible.
+    /// Collects the visible pixels of a rendering. Returns `None` if fewer than 16 are visible.
     pub(super) fn new(heights: &Grid<f32>, view: &Viewport) -> Option<Self> {
         let back = view.px_from_plane.inverse()?;
         let size = [heights.width(), heights.height()];
@@ -219,8 +221,8 @@ impl HeightSamples {
         }
     }
 
-    /// Returns priors for the coefficients, which decide where few tops are visible: tilt and bend of `mean`, the second
-    /// degree within `bow_sigma`.
+    /// Returns priors for the coefficients, which decide where few tops are visible: tilt and bend of `mean`, the
+    /// second degree within `bow_sigma`.
     fn priors(&self, mean: Coefficients, bow_sigma: f64) -> [Prior; 6] {
         let noise = CORRELATED_PX * (TOP_SIGMA * self.range).powi(2);
         std::array::from_fn(|k| {
@@ -241,7 +243,7 @@ impl HeightSamples {
         Some(self.priors([a, b, c, p, q, r], GROUND_BOW_SIGMA))
     }
 
-    /// Fits a second-degree surface to the carved ground; `None` where too little of it is visible.
+    /// Fits a second-degree surface to the carved ground. Returns `None` if too little of it is visible.
     fn ground(&self) -> Option<Coefficients> {
         let mut c = self.mean_plane;
         c[0] += quantile(&mut self.points.residuals(&c), GROUND_START);
@@ -258,7 +260,7 @@ impl HeightSamples {
         (near as f64 / residuals.len() as f64 > LEAST_GROUND).then_some(c)
     }
 
-    /// Returns the residual of every visible pixel over a surface, mesh units.
+    /// Returns the height of every visible pixel over a surface, in mesh units.
     pub(super) fn residuals(&self, surface: &Surface) -> Vec<f64> {
         let mut residuals = self.points.residuals(&surface.coefficients);
         for r in &mut residuals {

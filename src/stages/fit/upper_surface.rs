@@ -16,23 +16,24 @@ use crate::stages::zbuffer::{IndexedSurface, Viewport};
 
 /// Maximum number of rotations of one rendering.
 const MAX_ROTATIONS: usize = 3;
-/// Where more than this share of the visible area is one smooth surface, nothing is carved: strokes never cover so
-/// much.
+/// If more than this share of the visible area lies on one smooth surface, nothing is carved, because strokes never
+/// cover so much of a block.
 const MAX_TOPS: f64 = 0.85;
-/// Where less than this share lies on the surface, it rests on a rim of walls or on specks, not on strokes.
+/// If less than this share of the visible area lies on the surface, the surface rests on a rim of walls or on specks,
+/// not on strokes.
 const MIN_TOPS: f64 = 0.05;
-/// One in this many pixels is left out at either end when the depth of the carving is measured.
+/// The depth of the carving is measured without the lowest and the highest one in this many pixels.
 const TRIMMED_ONE_IN: usize = 100;
 
 /// Fits the surface on which the tops of the strokes lie and finds the carved side.
 ///
 /// `scan` is in its own frame and unit. `scanned_face_down` is the direction of the carved face along the mesh's z, if
-/// known; it is weak evidence for the side. `print` distinguishes the carved side from the back of an open sheet, whose
-/// winding is not reliable; the plane does not depend on it. The frame of the outcome keeps the mesh's x direction as far
-/// as possible, so an upright scan stays upright; lengths are in mesh units.
+/// known; it is weak evidence for the side. `print` distinguishes the carved side from the back of an open sheet,
+/// whose winding is not reliable; the plane does not depend on it. The frame of the outcome keeps the mesh's x
+/// direction as far as possible, so an upright scan stays upright; lengths are in mesh units.
 ///
 /// # Errors
-/// When the vertices span no surface, nothing is carved, or no plane is found.
+/// Returns an error if the vertices span no surface, nothing is carved, or no plane is found.
 pub fn fit(
     scan: &Scan,
     print: Option<&Print>,
@@ -80,7 +81,7 @@ pub fn fit(
 /// Resolution and limits of one search for the upper surface.
 #[derive(Debug, Clone, Copy)]
 struct FitEffort {
-    /// Longest side of a rendering, pixels.
+    /// Longest side of a rendering, in pixels.
     px: usize,
     /// The view is aligned with the plane of the tops until the plane's slope in the view is below this.
     slope: f64,
@@ -239,8 +240,9 @@ impl FittedView {
     }
 }
 
-/// Returns the frame rotated and translated so that `z = a + b x + c y` becomes its plane. The x axis follows the
-/// rotation, so coefficients in the old frame's x and y hold in the new frame to first order.
+/// Returns the frame rotated and translated so that the plane `z = a + b x + c y` of the old frame is `z = 0` in the
+/// new one. The new x axis stays as close as possible to the old one, so to first order in the slope the bow's
+/// coefficients in the old x and y also hold in the new frame.
 fn frame_on_plane(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
     let mesh_from_plane = plane_from_mesh.inverse();
     let at = |p: [f64; 3]| Vector3::from(mesh_from_plane.apply(p));
@@ -250,7 +252,7 @@ fn frame_on_plane(plane_from_mesh: &Rigid3, [a, b, c]: [f64; 3]) -> Rigid3 {
     frame_along(normal, along, origin)
 }
 
-/// Returns the largest minus the smallest height of the bow over the view, mesh units.
+/// Returns the largest minus the smallest height of the bow over the view, in mesh units.
 fn bow_height(bow: &Bow, view: &Viewport) -> f64 {
     let Some(back) = view.px_from_plane.inverse() else {
         return 0.0;

@@ -17,8 +17,8 @@ const WALLS: [f64; 2] = [0.10, 0.50];
 const FINE: usize = 3;
 const COARSE: usize = 16;
 /// Frequency at the end of the tops, as a multiple of the frequency on the walls: 2 where tops and walls are equally
-/// frequent, plus a margin for noise. Chosen on two independent kinds of generated reliefs, where accuracy is flat around
-/// 2.5. If walls are frequent everywhere, the middle between walls and peak is used.
+/// frequent, plus a margin for noise. Chosen on two independent kinds of generated reliefs, where accuracy is flat
+/// around 2.5. If walls are frequent everywhere, the middle between walls and peak is used.
 const EDGE: f64 = 2.5;
 /// Usual depth at which tops end, and the range to which a measured depth is clamped. One scan's histogram is noisy, so
 /// the result is the geometric mean of both: nearer to the truth on three kinds of generated reliefs.

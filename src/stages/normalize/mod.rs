@@ -25,7 +25,7 @@ pub const REVISION: u32 = 10;
 /// mesh units over the fitted surface.
 ///
 /// # Errors
-/// When the print shows no ink or the depth map only one height.
+/// Returns an error if the print shows no ink or the depth map only one height.
 pub fn normalize(
     depth: &DepthMap,
     print: &Print,

@@ -11,7 +11,8 @@ use crate::stages::pose::SoftMask;
 pub struct PrintMasks {
     /// Pixels that are ink.
     pub ink: Mask,
-    /// Pixels that are ink or background; outside (white beyond the cut of the image) nothing is known.
+    /// Pixels that are ink or background. Nothing is known about the other pixels, which are white beyond the cut of
+    /// the image.
     pub known: Mask,
 }
 
@@ -30,7 +31,8 @@ impl PrintMasks {
 pub struct Normalized {
     /// The numbers.
     pub outcome: NormalizeOutcome,
-    /// The print's masks, one for each of the outcome's interpretations and in their order; at least one.
+    /// The masks of the print, one for each interpretation of the outcome and in the same order. There is at least
+    /// one.
     pub prints: Vec<PrintMasks>,
 }
 
@@ -38,7 +40,7 @@ impl Normalized {
     /// Gathers the interpretations of a print, each with its canvas.
     ///
     /// # Errors
-    /// When no interpretation has ink.
+    /// Returns an error if no interpretation has ink.
     pub(crate) fn new(
         inks: &[InkMask],
         relief: Option<ReliefHeights>,
@@ -73,7 +75,8 @@ impl Normalized {
 }
 
 /// Returns the paper's wrap W(I) (III-C), image pixels to canvas pixels: the longest side of the mask's bounding box
-/// becomes `character_px` and its centroid the middle of a canvas of `canvas_px` pixels; `None` for an empty mask.
+/// becomes `character_px` and its centroid the middle of a canvas of `canvas_px` pixels. Returns `None` for an empty
+/// mask.
 pub(crate) fn box_wrap(mask: &Mask, params: &NormalizeParams) -> Option<Affine2> {
     let bounds = mask.bounding_box()?;
     let [x, y] = mask.centroid()?;

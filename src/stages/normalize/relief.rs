@@ -18,8 +18,8 @@ const ANCHORED: f64 = 0.5;
 /// Share of the relief by which a threshold is lowered to see whether it cuts through tops.
 const LOWERED_BY: f64 = 0.03;
 
-/// Measures the heights of tops and ground over the fitted surface; `None` when the map holds fewer than two heights
-/// or only one distinct height.
+/// Measures the heights of tops and ground over the fitted surface. Returns `None` if the map holds fewer than two
+/// heights or only one distinct height.
 ///
 /// Otsu's threshold splits the heights into an upper and a lower class. The tops are where most heights lie near the
 /// upper class's median: worn rims and walls are in that class too and lower its median.
@@ -80,11 +80,12 @@ pub(crate) fn soft_stroke(depth: f32, cut: f64, softness: f64) -> f32 {
     (0.5 + (cut as f32 - depth) / softness as f32).clamp(0.0, 1.0)
 }
 
-/// Samples the heights inside a box, without a margin on each side given as a share of its length.
+/// Samples the heights inside a box. `margin` is the part left out at each side, as a share of the side's length.
 fn heights(depth: &DepthMap, bounds: PixelBox, margin: f64) -> Vec<f32> {
     let inner = |low: usize, high: usize| {
         let cut = ((high - low) as f64 * margin) as usize;
-        // Same distance from both ends, so that a map rotated by 180 degrees gives the same heights.
+        // The samples have the same distance from both ends, so that a map rotated by 180 degrees gives the same
+        // heights.
         let rest = 2 * (high - low - 2 * cut) % STRIDE;
         (low + cut + rest..=high - cut).step_by(STRIDE)
     };

@@ -14,7 +14,7 @@ use crate::stages::scan::Scan;
 /// Fits the plane of the upper set (III-A). The plane frame is in mesh units.
 ///
 /// # Errors
-/// When the vertices span no surface, nothing is carved, or RANSAC finds no plane.
+/// Returns an error if the vertices span no surface, nothing is carved, or RANSAC finds no plane.
 pub(crate) fn fit(scan: &Scan, params: &FitParams) -> Result<FitOutcome, FitError> {
     let mesh = scan.mesh();
     if mesh.vertices.len() < 3 {
@@ -75,7 +75,7 @@ fn distinct(vertices: &Vertices) -> Vec<[f64; 3]> {
 }
 
 /// Returns the upper set T: the side of the PCA plane whose points are closer to their own centroid on average. Ground
-/// reaches the rim of the cut on all sides; strokes keep to the middle.
+/// reaches the rim of the cut on all sides, while strokes stay near the middle.
 fn upper_set(points: &[[f64; 3]], all: &Axes) -> (Vec<[f64; 3]>, Vector3<f64>, f64) {
     let normal = all.normal();
     let (above, below): (Vec<_>, Vec<_>) = points
@@ -125,7 +125,7 @@ fn spaced_selection(upper: &[[f64; 3]], all: &Axes, spacing: f64, wanted: u32) -
     taken
 }
 
-/// Returns the inliers of the plane through three of the points that has most inliers.
+/// Draws planes through three of the points, and returns the inliers of the plane with the most inliers.
 fn ransac(
     taken: &[[f64; 3]],
     distance: f64,

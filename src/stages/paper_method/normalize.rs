@@ -62,7 +62,7 @@ struct Tried {
 /// box and centroid.
 ///
 /// # Errors
-/// When the print shows no ink or no threshold leaves strokes.
+/// Returns an error if the print shows no ink or no threshold leaves strokes.
 pub(crate) fn normalize(
     depth: &DepthMap,
     print: &Print,
@@ -125,7 +125,7 @@ fn choose(
     ])
 }
 
-/// Scores one threshold at four rotations by 90 degrees; `None` when it leaves no strokes.
+/// Scores one threshold at four rotations by 90 degrees. Returns `None` if it leaves no strokes.
 fn attempt(
     depth: &DepthMap,
     canvas: &SsimReference,

@@ -32,7 +32,7 @@ struct Turn {
 /// three.
 ///
 /// # Errors
-/// When normalization chose no threshold or a mask is empty.
+/// Returns an error if normalization chose no threshold or a mask is empty.
 pub(crate) fn register(
     depth: &DepthMap,
     normalized: &Normalized,
@@ -109,7 +109,7 @@ fn longest_side(mask: &Mask) -> Option<f64> {
     Some(mask.bounding_box()?.longest_side() as f64)
 }
 
-/// A mask that is rotated first and wrapped afterwards: rotation changes the bounding box.
+/// A mask that is wrapped again after each rotation, because the rotation changes its bounding box.
 struct Turner {
     /// Set pixels of the depth mask.
     points: Vec<[f64; 2]>,
@@ -176,7 +176,7 @@ fn best_of(turns: &[Turn]) -> Option<Turn> {
         .reduce(|a, b| if b.iou > a.iou { b } else { a })
 }
 
-/// Returns the best IoU among rotations farther than `apart_deg` from an angle; 0 when there is none.
+/// Returns the best IoU among the rotations farther than `apart_deg` from an angle. Returns 0 if there is none.
 fn best_of_others(turns: &[Turn], angle_deg: f64, apart_deg: f64) -> f64 {
     let apart = |turn: &&Turn| {
         let d = (turn.angle_deg - angle_deg).rem_euclid(360.0);
@@ -189,7 +189,7 @@ fn best_of_others(turns: &[Turn], angle_deg: f64, apart_deg: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// Climbs from no shift to the best of the four neighbours while that is better.
+/// Starts without a shift and moves to the best of the four neighbouring shifts as long as the IoU rises.
 fn climb(target: &Packed, moving: &Packed, angle_deg: f64) -> Turn {
     let mut best = Turn {
         angle_deg,
@@ -239,8 +239,8 @@ impl Packed {
         }
     }
 
-    /// Returns the IoU with another mask of the same size shifted by whole pixels; pixels that leave the canvas are
-    /// lost.
+    /// Returns the IoU with another mask of the same size shifted by whole pixels; pixels outside the canvas do not
+    /// count.
     fn iou(&self, moving: &Self, [dx, dy]: [i64; 2]) -> f64 {
         let mut both = 0;
         for y in 0..self.rows as i64 {
