@@ -98,8 +98,8 @@ pub(super) fn catalog_path(project: &Path) -> String {
     project.join(CATALOG_FILE).display().to_string()
 }
 
-/// Returns a sentence with the file and the way out, in place of the database's own message; `None` where the error
-/// has such a sentence already.
+/// Returns a sentence with the file and the way out, in place of the database's own message. Returns `None` if the
+/// error has such a sentence already.
 pub(super) fn explain_catalog(error: &CatalogError, project: &Path) -> Option<String> {
     let path = catalog_path(project);
     Some(match error.kind() {

@@ -66,7 +66,7 @@ pub(super) struct ImportOutcome {
 /// Imports pairs; everything is read and checked before anything is written.
 ///
 /// # Errors
-/// When a list is refused, or the catalog or the disk fails.
+/// Returns an error if a list is refused, or the catalog or the disk fails.
 pub(super) async fn import_pairs(
     args: &ImportArgs,
     context: &Context,

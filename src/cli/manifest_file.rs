@@ -79,7 +79,7 @@ impl Listing {
     /// Pairs the files of two directories by stem.
     ///
     /// # Errors
-    /// When a directory cannot be listed, or two files of one directory have the same stem.
+    /// Returns an error if a directory cannot be listed, or two files of one directory have the same stem.
     pub(super) fn from_folders(
         meshes: &Path,
         prints: &Path,

@@ -8,7 +8,7 @@ use crate::domain::PairName;
 /// Looks up pairs by their ids.
 ///
 /// # Errors
-/// When one of them does not exist; the message suggests similar ids.
+/// Returns an error if one of them does not exist; the message suggests similar ids.
 pub(super) async fn pairs(catalog: &Catalog, typed: &[String]) -> anyhow::Result<Vec<PairName>> {
     let names: Vec<PairName> = typed.iter().filter_map(|text| text.parse().ok()).collect();
     let unknown = catalog.unknown_names(&names).await?;

@@ -24,7 +24,7 @@ enum_names! { pub FailureClass, "a failure class":
     BadInput = "bad_input", NoSolution = "no_solution", Io = "io", Resource = "resource", Bug = "bug",
 }
 
-/// A failure, stored and shown in this form: its class and a message with the file and the reason.
+/// A failure: its class, and a message that names the file and the reason.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, thiserror::Error)]
 #[error("{message}")]
 pub struct Failure {

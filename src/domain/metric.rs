@@ -1,4 +1,4 @@
-//! The metrics by which the depth threshold is chosen: the paper's three and one from the relief alone.
+//! The metrics that choose the depth threshold: the paper's three metrics, and one that uses the relief alone.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,17 +6,20 @@ use super::enum_names;
 
 /// How the threshold between strokes and background of a depth map is selected (paper III-C).
 ///
-/// `P` is the ink mask of the print and `D(t)` the depth mask of the heights from threshold `t` up, both on one canvas.
-/// Under the default method they are compared after alignment, where both images have data, over 40 equal steps of `t`
-/// from `register.threshold_min` to `register.threshold_max` of the relief below the tops. Under the paper's method they
-/// are compared before alignment, wrapped by box and centroid, over the authors' ranges of grey.
+/// `P` is the ink mask of the print. `D(t)` is the depth mask: the heights at and above threshold `t`. The default
+/// method compares the masks after alignment, where both images have data, at 40 evenly spaced depths below the stroke
+/// tops, from `register.threshold_min` to `register.threshold_max` (shares of the relief). The paper's method compares
+/// the masks before alignment, each scaled by its bounding box and centred on its centroid (the paper's wrap W), over
+/// the authors' ranges of grey.
 ///
-/// The paper's three match the print and so reproduce its ink spread; [`Self::Relief`] follows the wood.
+/// The paper's three metrics are fitted to the print, so the print's ink spread can affect them. [`Self::Relief`]
+/// depends on the scanned relief alone.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ThresholdMetric {
-    /// `argmax_t mean((2 s_xy + C) / (s_x^2 + s_y^2 + C))` with the local variances and the covariance of `P` and `D(t)`:
-    /// SSIM without its luminance factor (Wang et al. 2004, doi:10.1109/TIP.2003.819861). The score is that mean.
+    /// `argmax_t mean((2 s_xy + C) / (s_x^2 + s_y^2 + C))` with the local variances and the covariance of `P` and
+    /// `D(t)`: SSIM without its luminance factor (Wang et al. 2004, doi:10.1109/TIP.2003.819861). The score is that
+    /// mean.
     NlSsim,
     /// `argmin_t |a(D(t)) / a(P) * s - 1|` with areas `a` and the ink spread `s` (`register.ink_spread`). The score is
     /// minus that value. Under the paper's method `argmin_t |d(D(t)) - d(P)|` with densities `d`, the shares of the
@@ -27,10 +30,10 @@ pub enum ThresholdMetric {
     /// threshold nearest to [`Self::Relief`]'s. The score is that mean. Under the paper's method the better of
     /// [`Self::NlSsim`] and [`Self::Density`] by the IoU of the registered masks.
     Ensemble,
-    /// The threshold at which the stroke tops end and the walls begin, from the histogram of heights alone: the geometric
-    /// mean of 0.075 of the relief (the usual depth) and the depth below the peak at which heights are no more frequent
-    /// than `min(2.5 w, (w + peak) / 2)`, where `w` is the median frequency on the walls; that depth is clamped to
-    /// 0.02..=0.25. It does not depend on the print and has no score (0). Not part of the paper's method.
+    /// The threshold at which the stroke tops end and the walls begin, from the histogram of heights alone: the
+    /// geometric mean of 0.075 of the relief (the usual depth) and the depth below the peak at which heights are no
+    /// more frequent than `min(2.5 w, (w + peak) / 2)`, where `w` is the median frequency on the walls; that depth is
+    /// clamped to 0.02..=0.25. It does not depend on the print and has no score (0). Not part of the paper's method.
     Relief,
 }
 

@@ -13,7 +13,7 @@ use super::{Affine2, LengthUnit, Rigid3, ThresholdMetric};
 pub struct Bow(pub [f64; 6]);
 
 impl Bow {
-    /// Returns the height of the surface at a point of the plane, mesh units.
+    /// Returns the height of the surface at a point of the plane, in mesh units.
     ///
     /// # Examples
     /// ```
@@ -42,17 +42,18 @@ pub struct SideEvidence {
 /// Numeric result of the fit stage.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitOutcome {
-    /// Maps mesh coordinates to the right-handed plane frame, mesh units; z is the height, positive out of the block.
+    /// Maps mesh coordinates to the right-handed plane frame, in mesh units; z is the height, positive out of the
+    /// block.
     pub plane_from_mesh: Rigid3,
     /// Curved surface of the tops, if the residuals of the plane show that the block is bent.
     pub bow: Option<Bow>,
-    /// Range of heights of the curved surface over the character, mesh units; 0 for a flat block.
+    /// Range of heights of the curved surface over the character, in mesh units; 0 for a flat block.
     pub bow_height: f64,
     /// Share of the sampled points on stroke tops that are inliers of the fitted surface, 0..=1.
     pub inlier_ratio: f64,
-    /// Root mean square distance of the inliers to the surface, mesh units.
+    /// Root mean square distance of the inliers to the surface, in mesh units.
     pub rms: f64,
-    /// Depth of the carving under the surface, mesh units.
+    /// Depth of the carving under the surface, in mesh units.
     pub relief: f64,
     /// Evidence for the chosen side.
     pub side: SideEvidence,
@@ -65,13 +66,14 @@ pub struct FitOutcome {
 /// Conversion of levels and pixels of a depth map to mesh units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DepthScale {
-    /// Height of level 1 over the fitted surface, mesh units.
+    /// Height of level 1 over the fitted surface, in mesh units.
     pub height_min: f64,
-    /// Height between two levels, mesh units.
+    /// Height between two levels, in mesh units.
     pub height_per_level: f64,
-    /// Side of a pixel, mesh units.
+    /// Side of a pixel, in mesh units.
     pub mesh_unit_per_px: f64,
-    /// Maps plane x, y to depth-map pixels. Contains the reflection, so that the map reads like the print.
+    /// Maps plane x, y to depth-map pixels. The map includes the reflection, so that the depth map reads like the
+    /// print.
     pub depth_from_plane: Affine2,
     /// Curved surface from which heights are measured; `None` for the plane.
     pub bow: Option<Bow>,
@@ -80,7 +82,7 @@ pub struct DepthScale {
 }
 
 impl DepthScale {
-    /// Returns the height of a level 1..=65535 over the fitted surface, mesh units.
+    /// Returns the height of a level 1..=65535 over the fitted surface, in mesh units.
     pub fn height(&self, level: u16) -> f64 {
         self.height_min + f64::from(level.saturating_sub(1)) * self.height_per_level
     }
@@ -127,16 +129,16 @@ pub struct InkHypothesis {
 /// Heights of stroke tops and background over the fitted surface.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ReliefHeights {
-    /// Height at which most of the stroke tops lie, mesh units.
+    /// Height at which most of the stroke tops lie, in mesh units.
     pub top: f64,
-    /// Median height of the carved background, mesh units.
+    /// Median height of the carved background, in mesh units.
     pub ground: f64,
     /// Depth below `top` where tops end and walls begin, as a share of [`Self::depth`].
     pub tops_end: f64,
 }
 
 impl ReliefHeights {
-    /// Returns the depth of the carving, `top - ground`, mesh units.
+    /// Returns the depth of the carving, `top - ground`, in mesh units.
     pub fn depth(&self) -> f64 {
         self.top - self.ground
     }
@@ -224,7 +226,7 @@ pub struct MetricOutcome {
     pub metric: ThresholdMetric,
     /// Lowest depth-map level that counts as stroke.
     pub threshold_level: u16,
-    /// Height of this level over the fitted surface, mesh units.
+    /// Height of this level over the fitted surface, in mesh units.
     pub threshold_depth: f64,
     /// Maps depth-map pixels to print pixels.
     pub print_from_depth: Affine2,
@@ -232,7 +234,7 @@ pub struct MetricOutcome {
     pub angle_deg: f64,
     /// Print pixels per depth-map pixel.
     pub scale: f64,
-    /// Position of the depth map's centre relative to the centre of the print, print pixels.
+    /// Position of the depth map's centre relative to the centre of the print, in print pixels.
     pub shift_px: [f64; 2],
     /// Similarity of the masks on the canvas.
     pub scores: Scores,

@@ -69,7 +69,7 @@ impl Affine2 {
         self.0[0][0] * self.0[1][1] - self.0[0][1] * self.0[1][0]
     }
 
-    /// Returns the inverse; `None` for a singular map.
+    /// Returns the inverse. Returns `None` for a singular map.
     pub fn inverse(&self) -> Option<Self> {
         let det = self.determinant();
         if !det.is_finite() || det == 0.0 {
