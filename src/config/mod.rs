@@ -26,8 +26,7 @@ pub struct Loaded {
 /// Reads every layer, merges them and checks the result.
 ///
 /// # Errors
-/// When a layer cannot be read, names a setting that does not exist, or gives a setting an invalid value; the message
-/// names layer and key.
+/// Returns an error if a layer cannot be read, names an unknown setting, or gives a setting an invalid value.
 pub fn load(sources: &Sources) -> Result<Loaded, ConfigError> {
     let defaults = Preset::Default.table()?;
     let mut tree = Tree::new(defaults);

@@ -47,10 +47,10 @@ const ASCENDING: &[(&str, &str)] = &[
     ("register.threshold_min", "register.threshold_max"),
 ];
 
-/// Checks every number against its range, and settings against each other.
+/// Checks every number against its range, and checks the order of settings that depend on each other.
 ///
 /// # Errors
-/// For the first invalid value.
+/// Returns an error for the first invalid value.
 pub(super) fn check(tree: &Tree) -> Result<(), ConfigError> {
     let settings = tree.settings();
     settings.iter().try_for_each(check_range)?;
@@ -63,7 +63,7 @@ pub(super) fn check(tree: &Tree) -> Result<(), ConfigError> {
     Ok(())
 }
 
-/// Checks the numbers of a setting against its range; a list of two must not descend.
+/// Checks that a setting's numbers are in its range, and that the first of two numbers is not above the second.
 fn check_range(setting: &Setting) -> Result<(), ConfigError> {
     let Some((_, range)) = RANGES.iter().find(|(key, _)| *key == setting.key) else {
         return Ok(());
@@ -78,7 +78,7 @@ fn check_range(setting: &Setting) -> Result<(), ConfigError> {
     }
 }
 
-/// Formats a range as messages and the comments of the default file state it.
+/// Formats a range for error messages and for the comments of the default settings file.
 fn range_text(range: &RangeInclusive<f64>) -> String {
     if range.end().is_infinite() {
         format!("{} or more", range.start())
@@ -103,7 +103,7 @@ fn check_ascending(low: &Setting, high: &Setting) -> Result<(), ConfigError> {
     }
 }
 
-/// Returns the number of a setting, the numbers of a list, or nothing for other values.
+/// Returns the numbers in a setting's value. Returns an empty list if the value contains no numbers.
 fn numbers(value: &Value) -> Vec<f64> {
     match value {
         Value::Integer(integer) => vec![*integer as f64],

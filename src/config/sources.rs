@@ -110,7 +110,7 @@ impl Sources {
         }
     }
 
-    /// Returns the layers of one value each: environment variables, then flags.
+    /// Returns the settings from environment variables, followed by the settings from flags.
     pub(super) fn single_values(
         &self,
         defaults: &Tree,
@@ -120,7 +120,7 @@ impl Sources {
             .iter()
             .filter_map(|(name, text)| Some((env_key(name, defaults)?, name, text)))
             .collect();
-        // Of two spellings of one name, the one with two underscores wins.
+        // If both spellings of a name are set, the value of the spelling with two underscores is used.
         named.sort();
         let mut values: Vec<_> = named
             .into_iter()
@@ -135,8 +135,8 @@ impl Sources {
 }
 
 /// Returns the setting of an environment variable: both `MOCBAN_LIMITS__MESH__MAX_BYTES` and
-/// `MOCBAN_LIMITS_MESH_MAX_BYTES` are `limits.mesh.max_bytes`. Returns `None` for a name that starts with no section;
-/// an unknown key of a section is returned, to be refused later.
+/// `MOCBAN_LIMITS_MESH_MAX_BYTES` name `limits.mesh.max_bytes`. An unknown key is returned too and refused later. Returns `None`
+/// for a name without `__` that does not start with a section.
 fn env_key(name: &str, defaults: &Tree) -> Option<String> {
     let rest = name.strip_prefix("MOCBAN_")?.to_ascii_lowercase();
     if rest.contains("__") {
@@ -157,7 +157,7 @@ fn split_set(text: &str) -> Result<(String, Value), ConfigError> {
     }
 }
 
-/// Parses a TOML value; other text becomes a string, so that words need no quotes.
+/// Parses a TOML value. Text that is not valid TOML becomes a string, so that words need no quotes.
 fn value(text: &str) -> Value {
     format!("value = {text}")
         .parse::<Table>()

@@ -189,8 +189,8 @@ fn collect(
     Ok(())
 }
 
-/// Returns whether a table is a section: top-level tables always are, so that a mistyped key is reported by name; others
-/// only if every key is known.
+/// Returns whether a table is a section. A top-level table always is, so that a mistyped key is reported by name. Any
+/// other table is a section only if all of its keys are known.
 fn is_section(prefix: &str, section: &Table, layer: &Table) -> bool {
     prefix.is_empty() || layer.keys().all(|key| section.contains_key(key))
 }

@@ -7,20 +7,24 @@ use super::error::{ManifestError, at_line, of_list};
 use super::row::{ManifestRow, REQUIRED, RowIds, known_column};
 use super::text::{LineCounter, as_utf8, delimiter};
 
-/// Parses a CSV list with a header line. Columns may be in any order, their names in any case; blank lines are ignored.
+/// Parses a CSV list with a header line. Columns may be in any order. The case of their
+/// names does not matter. Blank lines are ignored.
 ///
 /// # Errors
-/// All problems, by the line where each row starts.
+/// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid header or row. The error names
+/// the lines of invalid rows.
 pub fn parse_csv(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     let mut rows = Vec::new();
     read_csv(bytes, &mut |row| rows.push(row))?;
     Ok(rows)
 }
 
-/// Like [`parse_csv`], for lists too long for memory: passes each row to `each`, even if a later row is refused.
+/// Parses a CSV list like [`parse_csv`], but passes each row to `each` instead of keeping all rows in memory. Valid
+/// rows are passed even if other rows are invalid.
 ///
 /// # Errors
-/// All problems, by the line where each row starts.
+/// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid header or row. The error names
+/// the lines of invalid rows.
 pub fn read_csv(bytes: &[u8], each: &mut dyn FnMut(ManifestRow)) -> Result<RowIds, ManifestError> {
     let bytes = &*as_utf8(bytes).map_err(|error| error.to_string())?;
     let mut reader = ::csv::ReaderBuilder::new()
@@ -79,10 +83,10 @@ impl CsvHeader {
         }
     }
 
-    /// Returns a row's cells; `None` for a row of empty cells, as spreadsheets write them at the end.
+    /// Returns a row's cells. Returns `None` if all cells are empty, because spreadsheets write such rows at the end.
     ///
     /// # Errors
-    /// What is wrong with the row, without its line.
+    /// Returns an error if the number of cells is wrong or a cell is not UTF-8.
     fn draft(&self, line: usize, record: &::csv::ByteRecord) -> Result<Option<DraftRow>, String> {
         let Self(columns) = self;
         if record.iter().all(<[u8]>::is_empty) {

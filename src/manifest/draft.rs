@@ -48,7 +48,7 @@ impl<'e> RowCollector<'e> {
         Ok(self.ids)
     }
 
-    /// Checks a row, if it was read and is not blank, and records its problems.
+    /// Checks a row and passes it on if it is valid. Records the problems of an invalid row. Ignores a blank row.
     pub(super) fn push(&mut self, line: usize, draft: Result<Option<DraftRow>, String>) {
         let mut reasons = Vec::new();
         let row = match draft {

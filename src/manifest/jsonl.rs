@@ -7,20 +7,24 @@ use super::error::ManifestError;
 use super::row::{ManifestRow, RowIds, known_column};
 use super::text::as_utf8;
 
-/// Parses a JSON Lines list. Keys are the names of the CSV columns; `null` means no value; blank lines are ignored.
+/// Parses a JSON Lines list. Keys are the names of the CSV columns. A `null` means no value. Blank lines are
+/// ignored.
 ///
 /// # Errors
-/// All problems, by line.
+/// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid row. The error names the lines
+/// of invalid rows.
 pub fn parse_jsonl(bytes: &[u8]) -> Result<Vec<ManifestRow>, ManifestError> {
     let mut rows = Vec::new();
     read_jsonl(bytes, &mut |row| rows.push(row))?;
     Ok(rows)
 }
 
-/// Like [`parse_jsonl`], for lists too long for memory: passes each row to `each`, even if a later row is refused.
+/// Parses a list like [`parse_jsonl`], but passes each row to `each` instead of keeping all rows in memory. Valid rows
+/// are passed even if other rows are invalid.
 ///
 /// # Errors
-/// All problems, by line.
+/// Returns an error if the list cannot be decoded, contains no pairs, or has an invalid row. The error names the lines
+/// of invalid rows.
 pub fn read_jsonl(
     bytes: &[u8],
     each: &mut dyn FnMut(ManifestRow),

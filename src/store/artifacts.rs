@@ -20,7 +20,8 @@ pub struct NewArtifact {
 }
 
 impl NewArtifact {
-    /// Bytes with their role in the stage, such as `depth.png`, and the file name extension without the dot.
+    /// Creates an artifact from its role in the stage, such as `depth.png`, its file extension without the dot, and its
+    /// content.
     pub fn new(role: &str, ext: &str, bytes: Vec<u8>) -> Self {
         let reference = ArtifactRef {
             hash: ContentHash::of(&bytes),
@@ -98,7 +99,7 @@ impl Project {
         }
     }
 
-    /// Checks that an artifact is complete, without reading it into memory; `quick` compares its length only.
+    /// Checks an artifact's length and hash without loading the file into memory. With `quick`, checks only the length.
     ///
     /// # Errors
     /// Returns an error if the file is missing, unreadable or changed.
@@ -120,11 +121,12 @@ impl Project {
         }
     }
 
-    /// Writes artifacts durably; complete ones that exist are left. Calls `on_written` for each file that is written under
-    /// its temporary name, before it gets its own.
+    /// Writes artifacts durably, except artifacts that are already complete on disk. Calls `on_written` after each file
+    /// is written under its temporary name and before it is renamed.
     ///
     /// # Errors
-    /// When one cannot be written. Files already written stay unreferenced until `check --repair` removes them.
+    /// Returns an error if an artifact cannot be written. Files written before the error stay on disk, and no row names
+    /// them; `check --repair` removes them.
     pub fn write_artifacts(
         &self,
         files: &[NewArtifact],
@@ -152,10 +154,10 @@ impl Project {
         Ok(())
     }
 
-    /// Removes the partial files of dead processes. Only while no other process writes.
+    /// Removes the folder of partial files, which dead processes leave. Call it only while no process writes artifacts.
     ///
     /// # Errors
-    /// Returns an error if the folder cannot be read or a file cannot be removed.
+    /// Returns an error if the folder exists and cannot be removed.
     pub fn clear_temporary(&self) -> Result<(), ArtifactError> {
         let folder = self.temporary_dir();
         match std::fs::remove_dir_all(&folder) {
@@ -187,7 +189,7 @@ impl Project {
             })
             .map_err(ArtifactError::io(path));
         if outcome.is_err() {
-            // Free the space on a full disk; a file that cannot be removed does no harm.
+            // Free the space, because the disk may be full. A file that cannot be removed does no harm.
             let _ = std::fs::remove_file(&temporary);
         }
         outcome

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// that is not a regular file, such as a pipe or a terminal, is written to directly.
 ///
 /// # Errors
-/// Returns an error if the file cannot be written; an earlier file is unchanged then.
+/// Returns an error if the file cannot be written.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     // A symbolic link stays; its target is replaced.
     let path = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -26,27 +26,27 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     written
 }
 
-/// Writes a file whose bytes are on the disk when this returns; its name may not be.
+/// Writes a file and syncs its content to the disk. The file's name may still be lost in a crash.
 ///
 /// # Errors
-/// Returns an error if the file cannot be written; what was written stays.
+/// Returns an error if the file cannot be written. A partly written file is not removed.
 pub fn write_synced(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut file = File::create(path)?;
     file.write_all(bytes)?;
     file.sync_all()
 }
 
-/// Returns the path at which a file is written before it gets its name: beside it, hidden.
+/// Returns the temporary path for writing a file: a hidden name in the same folder.
 pub fn partial_path(path: &Path) -> PathBuf {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!(".{name}.mocban-partial"))
 }
 
-/// Gives a written file its name durably: syncs it, renames it, syncs the folder. Keeps the permissions of an earlier
-/// file of that name.
+/// Renames a written file durably: syncs the file, renames it, and syncs the folder. If `path` exists, the new file
+/// gets the permissions of the old one.
 ///
 /// # Errors
-/// Returns an error if one of these fails.
+/// Returns an error if the file or its folder cannot be synced, or if the file cannot be renamed or given the permissions.
 pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     File::open(partial)?.sync_all()?;
     if let Ok(earlier) = std::fs::metadata(path) {

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use crate::domain::{ContentHash, FailureClass};
 use crate::page_vec::PageVec;
 
-/// Returns size, modification time and inode of a file. While all three are the same, so is the content, by assumption.
+/// Returns size, modification time and inode of a file as text. If all three are unchanged, the content is assumed to
+/// be unchanged.
 fn file_stat(meta: &std::fs::Metadata) -> String {
     let modified = meta.modified().ok();
     let modified = modified.and_then(|time| time.duration_since(std::time::UNIX_EPOCH).ok());
@@ -30,7 +31,7 @@ pub struct InputFile {
 pub struct InputDigest {
     /// Hash of the content.
     pub hash: ContentHash,
-    /// Size, modification time and inode at the time when it was opened, as text.
+    /// Size, modification time and inode of the file when it was opened, as text.
     pub stat: String,
 }
 
@@ -47,7 +48,7 @@ pub struct InputReader {
     stat: String,
 }
 
-/// Most bytes that are read and hashed at a time, so that they stay in the CPU cache.
+/// Largest number of bytes read and hashed in one step. A step this small stays in the CPU cache.
 const CHUNK: usize = 1 << 17;
 
 impl Read for InputReader {
@@ -70,10 +71,10 @@ impl InputReader {
         InputError::io(&self.path, source)
     }
 
-    /// Reads the rest of the file, and returns its hash and stat.
+    /// Reads the file to its end. Returns the hash and stat of the whole file.
     ///
     /// # Errors
-    /// Returns an error if the file cannot be read, exceeds the limit by now, or has changed since it was opened.
+    /// Returns an error if the file cannot be read, is larger than the limit, or changed after it was opened.
     pub fn finish(mut self) -> Result<InputDigest, InputError> {
         io::copy(&mut self, &mut io::sink()).map_err(|error| self.error(error))?;
         // The limit also holds for a file that grows while it is read.
@@ -86,7 +87,7 @@ impl InputReader {
                 setting,
             });
         }
-        // A parser that read to what was the end then may have missed bytes that the hash includes.
+        // If the file grew after a parser reached its end, the hash includes bytes that the parser did not read.
         let meta = self.file.get_ref().metadata();
         let now = file_stat(&meta.map_err(|error| self.error(error))?);
         if now != self.stat {
@@ -169,8 +170,7 @@ impl InputError {
         }
     }
 
-    /// Returns whether an automatic retry may succeed. A missing file is reported at once instead; `retry` runs the pair
-    /// when the file exists.
+    /// Returns whether an automatic retry may succeed. A missing file is not retried automatically.
     pub const fn is_transient(&self) -> bool {
         matches!(self, Self::Changed(_) | Self::Io { .. })
     }
@@ -185,7 +185,7 @@ pub fn stat_input(path: &Path) -> Result<String, InputError> {
     Ok(file_stat(&check_file(path, meta)?))
 }
 
-/// Opens a file of at most `limit` bytes; `setting` is the name of that limit in error messages.
+/// Opens a file of at most `limit` bytes. Error messages name `setting` as the setting of the limit.
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, cannot be read, or is too large.
@@ -213,7 +213,7 @@ pub fn open_input(
     })
 }
 
-/// Reads a file of at most `limit` bytes; `setting` is the name of that limit in error messages.
+/// Reads a file of at most `limit` bytes. Error messages name `setting` as the setting of the limit.
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, cannot be read, or is too large.
@@ -244,7 +244,7 @@ pub fn hash_input(path: &Path) -> Result<InputDigest, InputError> {
 }
 
 fn open(path: &Path) -> Result<(File, std::fs::Metadata), InputError> {
-    // Check the type before opening: opening a pipe would wait for its writer.
+    // Check the type before opening the path, because opening a pipe waits for a writer.
     let meta = std::fs::metadata(path).map_err(|error| InputError::io(path, error))?;
     check_file(path, meta)?;
     let file = File::open(path).map_err(|error| InputError::io(path, error))?;

@@ -13,11 +13,12 @@ use super::Project;
 /// Name of the file on which every working process holds a shared lock.
 const MEMBERS: &str = "run.members";
 
-/// Attempts to get the exclusive lock, because [`RunLock::is_held`] in another process holds it for a moment.
+/// Number of attempts to get the exclusive lock. An attempt fails if [`RunLock::is_held`] in another process holds the
+/// lock for a moment.
 const ATTEMPTS: u32 = 20;
 const RETRY_AFTER: Duration = Duration::from_millis(5);
 
-/// The right to work on a project. Ends when this is dropped or the process dies.
+/// The right to work on a project. It ends when the value is dropped or the process dies.
 #[derive(Debug)]
 pub struct RunLock {
     /// The locked `run.lock`, in the process that owns the run.
@@ -52,10 +53,10 @@ pub enum LockError {
 }
 
 impl RunLock {
-    /// Acquires the run of a project; with `join`, beside the process that owns it.
+    /// Acquires the right to work on a project. With `join`, another process may already own the run.
     ///
     /// # Errors
-    /// Returns an error if another process owns it and `join` is not set, or the files cannot be locked.
+    /// Returns an error if another process owns the run and `join` is not set, or if a lock file cannot be used.
     pub fn acquire(project: &Project, join: bool) -> Result<Self, LockError> {
         let path = project.dir().join("run.lock");
         let mut file = open(&path)?;
@@ -85,7 +86,7 @@ impl RunLock {
         })
     }
 
-    /// Returns whether a process works on the project now. Keeps no process out.
+    /// Returns whether a process is working on the project. The check does not prevent other processes from starting.
     pub fn is_held(project: &Project) -> bool {
         // A lock needs no permission to write.
         match File::open(project.dir().join(MEMBERS)) {
@@ -94,12 +95,13 @@ impl RunLock {
         }
     }
 
-    /// Returns whether no other process works on the project. Ends with [`RunLock::downgrade`].
+    /// Returns whether this process excludes all others from the project. [`RunLock::downgrade`] lets others join.
     pub const fn is_exclusive(&self) -> bool {
         self.is_exclusive
     }
 
-    /// Writes the fingerprints of the settings that processes which join must have. Only while the lock is exclusive.
+    /// Writes the fingerprints of this run's settings, for comparison by joining processes. Call it only while the lock
+    /// is exclusive.
     ///
     /// # Errors
     /// Returns an error if the file cannot be written.
@@ -134,7 +136,7 @@ impl RunLock {
     }
 }
 
-/// Locks the file exclusively, unless another process keeps its lock for longer than [`RunLock::is_held`] does.
+/// Tries to lock the file exclusively. Repeats the attempt because [`RunLock::is_held`] may hold the lock for a moment.
 fn try_exclusive(members: &File) -> bool {
     for _ in 0..ATTEMPTS {
         if members.try_lock().is_ok() {
@@ -166,7 +168,7 @@ fn replace_text(file: &mut File, text: &str) -> std::io::Result<()> {
     file.write_all(text.as_bytes())
 }
 
-/// Returns the pid in the file. Returns `None` while its owner has not written it yet.
+/// Returns the pid in the file. Returns `None` if the file contains no pid yet.
 fn read_pid(file: &mut File) -> Option<u32> {
     let mut text = String::new();
     file.read_to_string(&mut text).ok()?;

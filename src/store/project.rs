@@ -65,7 +65,7 @@ impl Project {
         }
     }
 
-    /// Creates the directory durably where it is missing. `Catalog::create` creates the catalog.
+    /// Creates the project directory durably if it is missing. `Catalog::create` creates the catalog.
     ///
     /// # Errors
     /// Returns an error if the directory cannot be created.
@@ -106,8 +106,8 @@ impl Project {
         self.dir.join(stored)
     }
 
-    /// Returns the form in which a path is stored: relative to the project if it is below it, so that a project can be
-    /// moved with its data; otherwise absolute. The file need not exist.
+    /// Returns the form in which a path is stored. A path below the project is stored relative to the project, so that
+    /// the project can be moved with its data. Any other path is stored as absolute. The file need not exist.
     ///
     /// # Errors
     /// Returns an error if the working directory is unknown, or the path is not UTF-8.
