@@ -1,13 +1,14 @@
 //! Named points at which a test can make the process die, stop, wait or panic.
 //!
-//! Each variable names a point as `STAGE:POINT[:N][@PAIR]`, for example `depth:synced:2` or `fit:claimed@0003`. It takes
-//! effect the N-th time (by default the first time, with 0 each time) that a pair, or the named pair, reaches the point.
+//! Each variable names a point as `STAGE:POINT[:N][@PAIR]`, for example `depth:synced:2` or `fit:claimed@0003`. The
+//! variable takes effect the N-th time that the named pair, or any pair if none is named, reaches the point. N is 1 by
+//! default; 0 means every time.
 //!
 //! - `MOCBAN_BREAK_AT` ends the process as a kill does.
 //! - `MOCBAN_STOP_AT` stops the process until it receives SIGCONT.
 //! - `MOCBAN_HOLD_AT` creates the file that `MOCBAN_HOLD_FILE` names and blocks the thread until the file is removed. It
 //!   must name a point on a thread for blocking code: `computed`, `written` or `synced`.
-//! - `MOCBAN_PANIC_AT` panics, at the same points as `MOCBAN_HOLD_AT`.
+//! - `MOCBAN_PANIC_AT` panics. It can name the same points as `MOCBAN_HOLD_AT`.
 //!
 //! Only builds with debug assertions read these variables.
 
@@ -16,7 +17,7 @@ use crate::domain::{PairName, Stage};
 /// A failpoint, in the order in which a pair passes them at each stage.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Point {
-    /// The claim is written and not committed. Pairs have no names here.
+    /// The claim is written and not committed. `@PAIR` never matches here.
     Claiming,
     /// The pair is leased, nothing is computed.
     Claimed,
@@ -26,7 +27,7 @@ pub(crate) enum Point {
     Written,
     /// The stage's files are on the disk, no row names them.
     Synced,
-    /// The stage's rows are written and not committed. Pairs have no names here.
+    /// The stage's rows are written and not committed. `@PAIR` never matches here.
     Recorded,
     /// The stage's rows are committed.
     Committed,

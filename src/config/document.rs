@@ -12,7 +12,7 @@ use crate::mesh;
 use crate::raster;
 use crate::stages::Settings;
 
-/// Every setting, checked. [`Tree`] refuses unknown sections and keys before.
+/// Every setting as a typed value. [`Tree`] has already refused unknown sections and keys.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Config {
     /// Size limits of input files.
@@ -59,7 +59,7 @@ pub struct ReviewSettings {
 /// Converts the merged tree to typed settings.
 ///
 /// # Errors
-/// Returns an error if a value has the wrong type or is unknown; the message names the first change to blame.
+/// Returns an error if a value has the wrong type or is unknown. The message names the first change that causes the error.
 pub(super) fn typed(tree: &Tree, changes: &[Setting]) -> Result<Config, ConfigError> {
     read(tree).map_err(|error| blame(changes, &error))
 }
@@ -68,7 +68,7 @@ fn read(tree: &Tree) -> Result<Config, toml::de::Error> {
     Value::Table(tree.table().clone()).try_into()
 }
 
-/// Applies the changes to the defaults one by one and blames the first after which the settings are invalid.
+/// Applies the changes to the defaults one by one. Blames the first change that makes the settings invalid.
 fn blame(changes: &[Setting], error: &toml::de::Error) -> ConfigError {
     let Ok(defaults) = Preset::Default.table() else {
         return ConfigError::BuiltIn(error.message().to_owned());

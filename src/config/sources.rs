@@ -135,8 +135,8 @@ impl Sources {
 }
 
 /// Returns the setting of an environment variable: both `MOCBAN_LIMITS__MESH__MAX_BYTES` and
-/// `MOCBAN_LIMITS_MESH_MAX_BYTES` name `limits.mesh.max_bytes`. An unknown key is returned too and refused later. Returns `None`
-/// for a name without `__` that does not start with a section.
+/// `MOCBAN_LIMITS_MESH_MAX_BYTES` name `limits.mesh.max_bytes`. An unknown key is returned too and refused later.
+/// Returns `None` for a name without `__` that does not start with a section.
 fn env_key(name: &str, defaults: &Tree) -> Option<String> {
     let rest = name.strip_prefix("MOCBAN_")?.to_ascii_lowercase();
     if rest.contains("__") {

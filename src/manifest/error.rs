@@ -26,7 +26,7 @@ pub(super) fn of_list(reason: &str) -> String {
     sanitize(reason, MAX_CHARS)
 }
 
-/// A list that is refused as a whole, with all its problems; displayed as one problem per line.
+/// All problems of a refused list. They are displayed one per line.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub struct ManifestError {
     /// Each with its line or file, in the order of the list; never empty.

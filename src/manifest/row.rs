@@ -6,10 +6,10 @@ use std::path::PathBuf;
 
 use crate::domain::{ContentHash, LengthUnit, PairName};
 
-/// One pair as a list names it. Paths are as written: relative ones are relative to the list.
+/// One pair of a list. Relative paths are stored as written, relative to the list.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ManifestRow {
-    /// The line where the row starts, counted from 1; for pairs of two directories the row's number.
+    /// The line where the row starts, counted from 1. For pairs from two directories, the number of the row.
     pub line: usize,
     /// The pair's id.
     pub name: PairName,
@@ -49,10 +49,10 @@ pub(super) fn known_column(name: &str) -> Option<&'static str> {
     columns.find(|known| known.eq_ignore_ascii_case(name))
 }
 
-/// Hash bytes stored per id: two ids of a list collide once in 10^24 lists of ten million rows.
+/// Number of hash bytes stored for each id. Two ids collide in fewer than one of 10^24 lists of ten million rows.
 const HASH_BYTES: usize = 16;
 
-/// The ids of a list and the line of each, as hashes, because a list may have millions of rows.
+/// The ids of a list, each with its line. Ids are stored as hashes, because a list may have millions of rows.
 #[derive(Debug, Default)]
 pub struct RowIds(BTreeMap<[u8; HASH_BYTES], u32>);
 

@@ -9,8 +9,8 @@ const UTF8_MARK: &[u8] = b"\xef\xbb\xbf";
 #[error("the text is UTF-16 and truncated or damaged; save it as UTF-8")]
 pub struct NotText;
 
-/// Removes a byte-order mark and converts UTF-16 to UTF-8. Returns all other bytes unchanged, even if they are not UTF-8;
-/// the parser reports invalid bytes with their line.
+/// Removes a byte-order mark and converts UTF-16 to UTF-8. Returns all other bytes unchanged, even if they are not
+/// UTF-8; the parser reports invalid bytes with their line.
 ///
 /// # Errors
 /// Returns an error if UTF-16 is truncated or damaged.
@@ -18,7 +18,7 @@ pub fn as_utf8(bytes: &[u8]) -> Result<Cow<'_, [u8]>, NotText> {
     match *bytes {
         [0xff, 0xfe, ref rest @ ..] => from_utf16(rest, u16::from_le_bytes),
         [0xfe, 0xff, ref rest @ ..] => from_utf16(rest, u16::from_be_bytes),
-        // Text without a mark: a list starts with an ASCII character, and UTF-16 writes it as that byte and a zero byte.
+        // Without a mark: a list starts with an ASCII character, and one of its two bytes in UTF-16 is zero.
         [first, 0, ..] if first != 0 => from_utf16(bytes, u16::from_le_bytes),
         [0, second, ..] if second != 0 => from_utf16(bytes, u16::from_be_bytes),
         _ => Ok(bytes.strip_prefix(UTF8_MARK).unwrap_or(bytes).into()),
@@ -36,7 +36,7 @@ fn from_utf16(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> Result<Cow<'_, [u8]>, N
         .ok_or(NotText)
 }
 
-/// Returns the most frequent separator of the first line: tab, semicolon or comma. Returns a comma if the line has none.
+/// Returns the most frequent tab, semicolon or comma of the first line. Returns a comma if the line has no separator.
 pub fn delimiter(bytes: &[u8]) -> u8 {
     let start = bytes.trim_ascii_start();
     let header = start.split(|byte| *byte == b'\n').next().unwrap_or(start);

@@ -46,7 +46,7 @@ pub fn partial_path(path: &Path) -> PathBuf {
 /// gets the permissions of the old one.
 ///
 /// # Errors
-/// Returns an error if the file or its folder cannot be synced, or if the file cannot be renamed or given the permissions.
+/// Returns an error if a sync, the renaming or setting the permissions fails.
 pub fn rename_into_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     File::open(partial)?.sync_all()?;
     if let Ok(earlier) = std::fs::metadata(path) {
