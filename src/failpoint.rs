@@ -6,8 +6,8 @@
 //!
 //! - `MOCBAN_BREAK_AT` ends the process as a kill does.
 //! - `MOCBAN_STOP_AT` stops the process until it receives SIGCONT.
-//! - `MOCBAN_HOLD_AT` creates the file that `MOCBAN_HOLD_FILE` names and blocks the thread until the file is removed. It
-//!   must name a point on a thread for blocking code: `computed`, `written` or `synced`.
+//! - `MOCBAN_HOLD_AT` creates the file that `MOCBAN_HOLD_FILE` names and blocks the thread until the file is removed.
+//!   It must name a point on a thread for blocking code: `computed`, `written` or `synced`.
 //! - `MOCBAN_PANIC_AT` panics. It can name the same points as `MOCBAN_HOLD_AT`.
 //!
 //! Only builds with debug assertions read these variables.

@@ -59,7 +59,8 @@ pub struct ReviewSettings {
 /// Converts the merged tree to typed settings.
 ///
 /// # Errors
-/// Returns an error if a value has the wrong type or is unknown. The message names the first change that causes the error.
+/// Returns an error if a value has the wrong type or is unknown. The message names the first change that
+/// causes the error.
 pub(super) fn typed(tree: &Tree, changes: &[Setting]) -> Result<Config, ConfigError> {
     read(tree).map_err(|error| blame(changes, &error))
 }

@@ -185,7 +185,7 @@ pub fn stat_input(path: &Path) -> Result<String, InputError> {
     Ok(file_stat(&check_file(path, meta)?))
 }
 
-/// Opens a file of at most `limit` bytes. Error messages name `setting` as the setting of the limit.
+/// Opens a file of at most `limit` bytes. Error messages name the limit by `setting`.
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, cannot be read, or is too large.
@@ -213,7 +213,7 @@ pub fn open_input(
     })
 }
 
-/// Reads a file of at most `limit` bytes. Error messages name `setting` as the setting of the limit.
+/// Reads a file of at most `limit` bytes. Error messages name the limit by `setting`.
 ///
 /// # Errors
 /// Returns an error if the file does not exist, is not a regular file, cannot be read, or is too large.
