@@ -1,6 +1,7 @@
-//! Stores the stages of one pair under its lease, in a task of its own, so that the thread that computes does not wait
-//! for the disk. A stage's files are on the disk before a row names them. Stages are stored in their order; stages that
-//! arrive while others are stored share a transaction. The lease comes back when all are stored.
+//! Stores the stages of one pair under its lease. This is a separate task, so that the compute thread does not wait
+//! for the disk. The files of a stage are on the disk before a row names them. Stages are stored in order. Stages that
+//! arrive while earlier ones are being stored share a transaction. The task returns the lease once all stages are
+//! stored.
 
 use std::io;
 use std::sync::Arc;
@@ -30,15 +31,15 @@ pub(super) struct StoredStages {
     lease: CheckpointOutcome,
     /// Number of stages stored.
     pub(super) stages: u64,
-    /// Whether every stage that was sent is stored; `false` after a request to stop at once.
+    /// Whether every stage that was sent is stored. `false` after a request to stop at once.
     is_complete: bool,
 }
 
 impl StoredStages {
-    /// Returns the lease, if it is still held and every stage that was sent is stored.
+    /// Returns the lease if this process still holds it and every stage that was sent is stored.
     ///
     /// # Errors
-    /// Returns itself otherwise.
+    /// Returns `self` if the lease is lost or a stage is not stored.
     pub(super) fn into_lease(self) -> Result<Lease, Self> {
         match self.lease {
             CheckpointOutcome::Lease(lease) if self.is_complete => Ok(lease),
@@ -46,8 +47,8 @@ impl StoredStages {
         }
     }
 
-    /// Releases a remaining lease, and returns how the pair ended: `end`, unless the lease was lost or not every stage was
-    /// stored.
+    /// Releases a remaining lease, and returns how the pair ended: `end`, unless the lease was lost or not every stage
+    /// was stored.
     pub(super) async fn finish(self, context: &RunContext, end: PairEnd) -> PairReport {
         let end = match &self.lease {
             CheckpointOutcome::LeaseLost => PairEnd::LeaseLost,
@@ -116,7 +117,7 @@ async fn store_stages(
 ) -> Result<StoredStages, RunError> {
     let (mut count, mut is_complete) = (0, true);
     let mut outcome = CheckpointOutcome::Lease(lease);
-    // A stage that comes after one that was not stored must not be stored either.
+    // After a stage that was not stored, no later stage may be stored.
     while is_complete
         && matches!(outcome, CheckpointOutcome::Lease(_))
         && let Some(first) = stages.recv().await
@@ -161,7 +162,7 @@ async fn write_batch(
     Ok((batch, true))
 }
 
-/// Writes a stage's files; returns its row, which may name them then, or `None` when the run is to stop at once.
+/// Writes the files of a stage, and returns the row that names them. Returns `None` if the run must stop at once.
 async fn write_stage(
     context: &RunContext,
     pair: &PairName,
@@ -179,11 +180,11 @@ async fn write_stage(
     }))
 }
 
-/// Writes a stage's files durably, on a thread for blocking calls. Returns `false` when the run is to stop at once: it
-/// waits for no disk.
+/// Writes a stage's files durably, on a thread for blocking calls. Returns `false` without waiting for the disk if the
+/// run must stop at once.
 ///
 /// # Errors
-/// Returns an error if the disk returns an error, or has not finished within the time limit.
+/// Returns an error if the disk fails, or does not finish within the time limit.
 async fn write_files(
     context: &RunContext,
     pair: &PairName,

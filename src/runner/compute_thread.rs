@@ -21,7 +21,7 @@ use crate::domain::{ArtifactSet, Failure, FailureClass, Stage, sanitize};
 use crate::failpoint::{self, Point};
 use crate::store::NewArtifact;
 
-/// A computed stage: its row, and the files that must be on the disk before.
+/// A computed stage: its row, and the files that must be on the disk before the row is stored.
 pub(super) type ComputedStage = (StageCheckpoint, Vec<NewArtifact>);
 
 /// What happens on a pair's thread.
@@ -48,7 +48,8 @@ pub(super) enum ComputeEvent {
     Stopped,
 }
 
-/// The thread that computes a pair's stages. When this is dropped, the stage in progress is the last one.
+/// The thread that computes the stages of a pair. If this handle is dropped, the thread ends after the stage in
+/// progress.
 #[derive(Debug)]
 pub(super) struct ComputeThread(mpsc::UnboundedReceiver<ComputeEvent>);
 

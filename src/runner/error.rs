@@ -4,7 +4,7 @@ use crate::catalog::{CatalogError, FieldChange};
 use crate::domain::PairName;
 use crate::store::{ArtifactError, LockError, StoreError};
 
-/// Why a run cannot go on. A pair that fails is no error of the run: the summary counts it.
+/// A reason for which a run cannot continue. A failed pair is not an error of the run; the summary counts it.
 #[derive(Debug, thiserror::Error)]
 pub enum RunError {
     /// Another process runs this project.

@@ -53,7 +53,8 @@ pub enum RunEvent {
         /// Class and message.
         #[serde(flatten)]
         failure: Failure,
-        /// Stages of the pair that will not run, this one included: the progress bar advances by them.
+        /// Number of stages of the pair that will not run, including this one. The progress bar advances by this
+        /// number.
         skipped: u64,
     },
     /// A stage failed in a way that may pass; it is retried later.

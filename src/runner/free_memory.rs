@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 /// Share of the free memory that a run takes by default.
 const SHARE: f64 = 0.8;
 
-/// Returns the memory limit of a run for which none was set, in bytes: 80 % of what is free now. `None` where that
-/// cannot be found out.
+/// Returns the memory limit of a run for which none was set, in bytes: 80 % of what is free now. `None` if the free
+/// memory is not known.
 pub fn default_memory_limit() -> Option<u64> {
     let free = free_memory(Path::new("/"))?;
     Some((free as f64 * SHARE) as u64)
@@ -43,7 +43,7 @@ struct MemoryGroup {
 /// Names of a control group's files.
 #[derive(Debug, PartialEq, Eq)]
 struct GroupFiles {
-    /// Files with a limit in bytes; the smallest number counts, other text means no limit.
+    /// Files with a limit in bytes. The smallest number counts, and other text means no limit.
     limits: &'static [&'static str],
     usage: &'static str,
     /// Field of `memory.stat`: bytes of the usage that are cached file contents, which the kernel gives up first.
@@ -78,7 +78,8 @@ impl MemoryGroup {
         Some(Self { files, mount, dir })
     }
 
-    /// Returns the least memory in bytes that the group or one of its ancestors has left; `None` without a limit.
+    /// Returns the smallest amount of memory, in bytes, that is left to the group or any of its ancestors. Returns
+    /// `None` without a limit.
     fn free(&self) -> Option<u64> {
         let groups = self.dir.ancestors();
         let groups = groups.take_while(|dir| dir.starts_with(&self.mount));
@@ -87,7 +88,7 @@ impl MemoryGroup {
 }
 
 impl GroupFiles {
-    /// Returns what a group's limit leaves beyond its usage, in bytes, its reclaimable cache counted as free.
+    /// Returns the limit of a group minus its usage, in bytes. Reclaimable cache counts as free.
     fn free_in(&self, dir: &Path) -> Option<u64> {
         let text = |name: &str| std::fs::read_to_string(dir.join(name)).ok();
         let number = |name: &str| text(name)?.trim().parse::<u64>().ok();

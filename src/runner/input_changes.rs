@@ -41,7 +41,7 @@ pub(super) async fn store_changes(
 }
 
 /// Stores the current input files of pairs that were quarantined because their workers died before a stage could
-/// report what it had read: a later run sees then whether a file was replaced.
+/// report the files it had read. With them a later run notices whether a file was replaced.
 pub(super) async fn store_of_poisoned(
     project: &Project,
     catalog: &Catalog,
@@ -85,8 +85,8 @@ fn changes(project: &Project, known: &KnownInputs) -> Option<(PairId, InputVersi
     (changed.mesh.is_some() || changed.print.is_some()).then_some((known.pair, changed))
 }
 
-/// Returns the current state of a file that differs from the known one. A missing file does not count as changed, because
-/// results computed from it stay valid, except where the manifest names another path than before.
+/// Returns the current state of a file that differs from the known one. A missing file does not count as changed,
+/// because results computed from it stay valid, unless the manifest names another path than before.
 fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Option<InputVersion> {
     let known = known?;
     let path = project.input_path(stored);
@@ -101,7 +101,7 @@ fn change(project: &Project, stored: &str, known: Option<&InputVersion>) -> Opti
     }
 }
 
-/// Returns the current state of a file; `None` when it cannot be read.
+/// Returns the current state of a file. Returns `None` if it cannot be read.
 pub(super) fn current(path: &Path) -> Option<InputVersion> {
     hash_input(path).ok().map(Into::into)
 }

@@ -11,14 +11,14 @@ use crate::store::Project;
 
 /// Bytes that any pair needs besides its files, for the maps and masks of the stages.
 const PAIR_BYTES: u64 = 32 << 20;
-/// Bytes needed for each byte of a mesh file, the file itself included. Measured with one to two million vertices:
-/// binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, points 2.5, OBJ 1.8, and 5.7 for an OBJ with normals or
-/// texture coordinates.
+/// Bytes needed for each byte of a mesh file, including the bytes of the file. Measured with one to two million
+/// vertices: binary PLY 3.1, ASCII PLY 1.9, binary STL 2.6, ASCII STL 1.6, points 2.5, OBJ 1.8, and 5.7 for an OBJ
+/// with normals or texture coordinates.
 const MESH_FACTOR: f64 = 3.5;
 const OBJ_FACTOR: f64 = 6.0;
 /// Bytes needed for each pixel of a print. Measured with 10 and 28 million pixels, grey and colour: 32 to 39.
 const PIXEL_BYTES: u64 = 50;
-/// Most pixels expected for each byte of an image file whose header cannot be read.
+/// Pixels assumed for each byte of an image file whose header cannot be read.
 const PIXELS_PER_BYTE: u64 = 1;
 const JPEG_PIXELS_PER_BYTE: u64 = 8;
 
@@ -40,8 +40,8 @@ impl MemoryBudget {
         self.limit.is_some()
     }
 
-    /// Reserves bytes for a pair; returns `false` where the limit does not allow it. A pair that needs more than the limit
-    /// is allowed when nothing else is reserved, and then runs with no other pair beside it.
+    /// Reserves bytes for a pair. Returns `false` if the limit does not allow it. A pair that needs more than the
+    /// limit is allowed if nothing else is reserved, and then no other pair runs at the same time.
     pub(super) fn reserve(&mut self, bytes: u64) -> bool {
         let reserved = self.reserved.saturating_add(bytes);
         let fits = self.reserved == 0 || self.limit.is_none_or(|limit| reserved <= limit);
@@ -94,8 +94,8 @@ fn mesh_bytes(path: &Path) -> u64 {
     (size(path) as f64 * factor) as u64
 }
 
-/// Estimates the bytes for a print, up to the largest one that is read. A small file may hold many pixels, so the number
-/// of pixels is read from its header where possible.
+/// Estimates the bytes for a print, up to the largest one that is read. A small file may hold many pixels, so the
+/// number of pixels is read from its header where possible.
 fn print_bytes(path: &Path, images: &raster::ImageLimits) -> u64 {
     let size = size(path);
     // A file without a size may be a pipe; reading it would block.

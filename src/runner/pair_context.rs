@@ -1,4 +1,4 @@
-//! A pair between two stages: what is known of it, and what the stages have left in memory.
+//! State of a pair between two stages: its row in the catalog, and the values that stages keep in memory.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,8 @@ pub(super) struct StoredStage {
     pub(super) print_hash: Option<ContentHash>,
 }
 
-/// What a pair's stages share. A value stays in memory from the stage that computes it to the last one that needs it.
+/// Values that the stages of a pair share. A value stays in memory from the stage that computes it to the last one
+/// that needs it.
 #[derive(Debug)]
 pub(super) struct PairContext {
     /// The pair as imported.
@@ -75,20 +76,21 @@ impl PairContext {
         self.inputs.clone()
     }
 
-    /// Returns the stored outcome of a stage; `None` when there is none, or none of this type any more.
+    /// Returns the stored outcome of a stage. Returns `None` if there is none, or if it cannot be parsed as this type.
     pub(super) fn outcome<T: DeserializeOwned>(&self, stage: Stage) -> Option<T> {
         let stored = self.stored.get(&stage)?;
         T::deserialize(&stored.outcome).ok()
     }
 
-    /// Returns the hash of the mesh that the results belong to: as this thread read it, or as it was read for the fit.
+    /// Returns the hash of the mesh that the results belong to: of the file that this thread read, or else of the file
+    /// that the fit read.
     pub(super) fn mesh_hash(&self) -> Option<ContentHash> {
         let read = self.inputs.mesh.as_ref().map(|input| input.hash);
         read.or_else(|| Some(self.stored.get(&Stage::Fit)?.mesh_hash))
     }
 
-    /// Returns the hash of the print that the results belong to: as this thread read it, or as the latest stage that
-    /// read it did; `None` before that.
+    /// Returns the hash of the print that the results belong to: of the file that this thread read, or else of the
+    /// file that the latest stage read. Returns `None` if no stage has read the print.
     pub(super) fn print_hash(&self) -> Option<ContentHash> {
         let read = self.inputs.print.as_ref().map(|input| input.hash);
         let mut stored = self.stored.values().rev();

@@ -184,7 +184,8 @@ async fn store_failure(
     Ok(PairEnd::Retry)
 }
 
-/// What is stored with a failure even when the thread is lost, and the pair's data with it.
+/// Data of a pair that is stored with a failure. It is kept apart from the thread, so that it remains if the thread
+/// hangs or panics.
 struct PairSummary {
     attributes: PairAttributes,
     attributes_json: String,
@@ -200,8 +201,8 @@ impl PairSummary {
         }
     }
 
-    /// Returns the input files as the thread read them; files that it did not report as they are now. A later run
-    /// compares with them to find out whether a file was repaired.
+    /// Returns the versions of the input files: as the thread read them, or the current ones of files that the thread
+    /// did not report. A later run compares the files with these versions to find out whether one was replaced.
     async fn inputs_now(&self, project: &Project) -> InputVersions {
         let read = self.inputs.clone();
         let paths = [&self.attributes.mesh_path, &self.attributes.print_path];

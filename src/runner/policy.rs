@@ -58,9 +58,9 @@ pub(super) const fn longest_backoff_ms() -> i64 {
     BACKOFF_CAP.as_millis() as i64 * 3 / 2
 }
 
-/// Intervals by which workers observe each other. Holder and observers measure a lease by their own clocks and with the
-/// same length, so that a worker that is considered dead knows it too. The pairs of a dead worker are ready again within
-/// a minute: one lease and two recovery intervals.
+/// Intervals by which workers observe each other. The holder of a lease and the observers use the same lease length,
+/// each with its own clock, so that a worker also notices itself that others consider it dead. The pairs of a dead
+/// worker are ready again within a minute: one lease and two recovery intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Timing {
     /// Interval between heartbeats.
@@ -69,7 +69,7 @@ pub(super) struct Timing {
     pub(super) lease: Duration,
     /// Interval between searches for dead workers.
     pub(super) recover_every: Duration,
-    /// How long after its deadline a lease is taken from a worker that is still alive.
+    /// Time after the deadline of a lease at which it is taken from a worker that still sends heartbeats.
     pub(super) deadline_margin: Duration,
 }
 

@@ -89,7 +89,7 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
-    /// Takes in an event of a running pair: its slot is about to become free when its last stage starts.
+    /// Records an event of a running pair. When the last stage of a pair starts, its slot will soon be free.
     pub(super) fn observe(&mut self, event: &RunEvent) {
         if let RunEvent::StageStarted { pair, stage } = event
             && *stage == self.context.until
@@ -102,7 +102,7 @@ impl Prefetch {
         }
     }
 
-    /// Takes in that a pair has left its slot.
+    /// Records that a pair has left its slot.
     pub(super) fn finish(&mut self, pair: &PairName) {
         if let Some(running) = self.running.remove(pair) {
             self.durations.add(running.since.elapsed());
@@ -113,8 +113,8 @@ impl Prefetch {
         self.may_find_more = true;
     }
 
-    /// Claims pairs for slots that are free or soon become free. Returns `false` without a claim while no pairs are needed
-    /// or none can be found.
+    /// Claims pairs for slots that are free or soon become free. Returns `false` without a claim while no pairs are
+    /// needed or none can be found.
     pub(super) async fn claim(&mut self, worker: WorkerId) -> Result<bool, RunError> {
         let wanted = self.load().pairs_to_claim(self.durations.pairs_ahead());
         let is_blocked = self.is_exclusive || self.waits_for_memory;
@@ -189,7 +189,8 @@ impl Prefetch {
         exclusive: bool,
     ) -> Result<(), RunError> {
         let context = &self.context;
-        // A pair without a free slot may wait as long as a stage may take, before its own time begins.
+        // A pair that is claimed without a free slot may wait for as long as a stage may take. Its own time starts
+        // after that.
         let wait = if count > self.free_slots() {
             context.stage_timeout.as_millis() as i64
         } else {
@@ -256,7 +257,8 @@ struct Load {
 }
 
 impl Load {
-    /// Returns how many pairs to claim, given how many each slot takes ahead: none while enough are queued.
+    /// Returns how many pairs to claim, given the number of pairs that each slot claims ahead. Returns 0 while enough
+    /// pairs are queued.
     const fn pairs_to_claim(self, ahead_per_slot: usize) -> usize {
         match (self.free + self.soon_free).saturating_sub(self.queued) {
             0 => 0,

@@ -1,4 +1,5 @@
-//! One run from start to end: takes the lock, recovers what dead processes left, finds the work, and runs the scheduler.
+//! One run from start to end: takes the lock, recovers what dead processes left, finds the work, and runs the
+//! scheduler.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -50,7 +51,8 @@ pub async fn plan(
 /// Runs every stage that has no current result. Calls `on_event` as things happen.
 ///
 /// # Errors
-/// When another process runs the project, a named pair does not exist, or the catalog or the disk cannot be used.
+/// Returns an error if another process runs the project, a named pair does not exist, or the catalog or the disk
+/// cannot be used.
 pub async fn run(
     project: &Project,
     catalog: &Catalog,
@@ -122,7 +124,7 @@ pub(super) async fn run_with(
     });
     let mut scheduler = Scheduler::new(Arc::clone(&context), worker, selection.clone(), options);
     let counts = scheduler.run(&mut received, &mut on_event).await;
-    // End the worker after an error too, or the next run takes its end for a crash.
+    // Also after an error the worker is ended in the catalog. Otherwise the next run would count a crash.
     let ended = catalog.end_worker(scheduler.worker(), clock.now()).await;
     let counts = counts?;
     ended?;
@@ -171,8 +173,8 @@ impl RunStart<'_> {
         Ok(())
     }
 
-    /// Recovers the leases of dead processes, if the lock proves that no other process works, and lets others join
-    /// then. Returns how many pairs are ready again.
+    /// Recovers the leases of dead processes if the lock proves that no other process is running, then lets other
+    /// processes join. Returns how many pairs are ready again.
     async fn recover(&self, lock: &mut RunLock, worker: WorkerId) -> Result<u64, RunError> {
         if !lock.is_exclusive() {
             return Ok(0);

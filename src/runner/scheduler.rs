@@ -1,4 +1,4 @@
-//! The main loop of a run: keeps the slots filled, takes in what ends, and keeps this worker alive in the catalog.
+//! The main loop of a run: keeps the slots filled, handles pairs that end, and keeps this worker alive in the catalog.
 
 use std::sync::Arc;
 use std::time::Duration;
@@ -23,7 +23,8 @@ use crate::domain::{PairName, WorkerId};
 /// Interval between searches for pairs that other workers released or whose back-off is over.
 const POLL_EVERY: Duration = Duration::from_millis(250);
 
-/// Most computed pairs per slot that are not stored yet, because their results are in memory.
+/// Largest number of computed pairs per slot that are not stored yet. The limit exists because their results are in
+/// memory.
 const MAX_STORING_PER_SLOT: usize = 8;
 
 /// What a run has counted.
@@ -48,7 +49,7 @@ pub(super) struct Scheduler {
     computing: JoinSet<(PairName, PairOutcome)>,
     /// Pairs that are computed and whose last stages are being stored.
     storing: JoinSet<PairReport>,
-    /// While this is held, the catalog commits at once instead of waiting for more requests.
+    /// While this guard exists, the catalog commits at once instead of waiting for more requests.
     flush: Option<Waiting>,
     counts: RunCounts,
     fatal: Option<RunError>,
@@ -160,9 +161,9 @@ impl Scheduler {
         self.computing.is_empty() && self.storing.is_empty()
     }
 
-    /// Lets the catalog delay commits while all slots are busy and few pairs wait to be stored. Otherwise the next pair
-    /// or the end of the run may depend on them, and a pair with no other beside it has to be stored before it can be
-    /// blamed for the death of its process.
+    /// Lets the catalog delay commits while all slots are busy and few pairs wait to be stored. In all other cases
+    /// commits are immediate: the next pair or the end of the run may wait for them, and a pair that runs alone must
+    /// be stored before it can be blamed for the death of its process.
     async fn flush_where_needed(&mut self) -> Result<(), RunError> {
         let is_slot_free = self.prefetch.free_slots() > 0 && !self.storing.is_empty();
         let is_needed = is_slot_free || self.storing.len() > self.max_storing / 2;

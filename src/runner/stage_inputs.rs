@@ -35,7 +35,7 @@ impl StageInputs {
             .ok_or(ExecutionError::RerunFrom(Stage::Fit))
     }
 
-    /// Takes the scan that was fitted out of memory, or reads it. When the file has changed since the fit, the fit runs
+    /// Returns the fitted scan from memory, or reads its file. If the file has changed since the fit, the fit runs
     /// again.
     pub(super) fn fitted_scan(&self, pair: &mut PairContext) -> Result<Scan, ExecutionError> {
         if let Some(scan) = pair.scan.take() {
@@ -50,7 +50,7 @@ impl StageInputs {
         Err(ExecutionError::RerunFrom(Stage::Fit))
     }
 
-    /// Takes the print out of memory, or reads it. When the fit has read another print, the fit runs again.
+    /// Returns the print from memory, or reads its file. If the fit has read another print, the fit runs again.
     pub(super) fn print(&self, pair: &mut PairContext) -> Result<Print, ExecutionError> {
         if let Some(print) = pair.print.take() {
             return Ok(print);
@@ -95,7 +95,7 @@ impl StageInputs {
         Ok(Normalized { outcome, prints })
     }
 
-    /// Reads an artifact of an earlier stage. When it is missing or was changed, that stage runs again.
+    /// Reads an artifact of an earlier stage. If the artifact is missing or was changed, that stage runs again.
     fn artifact(
         &self,
         pair: &PairContext,

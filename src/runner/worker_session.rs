@@ -20,9 +20,10 @@ pub(super) struct WorkerSession {
 /// What became of a heartbeat.
 #[derive(Debug)]
 pub(super) enum HeartbeatOutcome {
-    /// The worker's leases are valid. The heartbeat was stored, or can be retried while they are.
+    /// The worker's leases are valid. The heartbeat was stored, or it failed and can be retried before the leases
+    /// expire.
     Alive,
-    /// The heartbeat came after the leases had expired: another worker may hold them now.
+    /// The heartbeat came after the leases had expired, so another worker may hold the pairs now.
     Expired,
     /// No heartbeat could be stored for as long as a lease lasts.
     Unwritable(CatalogError),
@@ -104,8 +105,8 @@ impl WorkerSession {
     }
 }
 
-/// Finds dead workers: those whose heartbeat stayed the same for as long as a lease lasts, by the clock of this
-/// process. The clocks of two machines are never compared.
+/// Finds dead workers. A worker is dead if its heartbeat did not change for the length of a lease, by the clock of
+/// this process. The clocks of two machines are never compared.
 #[derive(Debug)]
 struct Liveness {
     lease_ms: i64,
@@ -114,7 +115,7 @@ struct Liveness {
 }
 
 impl Liveness {
-    /// Takes in the current heartbeats of all workers with leases. Returns the workers that are dead.
+    /// Records the current heartbeats of all workers with leases. Returns the workers that are dead.
     fn observe(&mut self, holders: &[LeaseHolder], me: WorkerId, now: UnixMillis) -> Vec<WorkerId> {
         self.seen
             .retain(|worker, _| holders.iter().any(|holder| holder.worker == *worker));

@@ -1,4 +1,4 @@
-//! What runs while stages are being stored, and which pairs are claimed ahead.
+//! Tests of what runs while stages are being stored, and of which pairs are claimed ahead.
 
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use crate::runner::policy::Clock;
 use crate::runner::{RunEvent, RunOptions, StopLevel};
 
 impl RunFixture {
-    /// With a catalog that delays every commit that may be delayed until it is flushed.
+    /// Creates a fixture whose catalog delays every deferrable commit until a flush.
     async fn patient(pairs: &[&str]) -> Self {
         Self::with(pairs, async |path| Catalog::create_patient(path).await).await
     }
@@ -182,7 +182,7 @@ async fn no_more_pairs_are_claimed_ahead_than_slots_become_free() {
     assert_eq!(summary.done, 5);
 }
 
-/// It may wait for the pair before it as long as a stage may take, and has its own time after that.
+/// A claimed pair may wait for the pair before it for as long as a stage may take. Its own time starts after that.
 #[tokio::test]
 async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
     let fixture = RunFixture::new(&["lasts_1", "next"]).await;
@@ -210,7 +210,7 @@ async fn a_pair_claimed_ahead_is_not_overdue_before_it_can_start() {
     assert_eq!(summary.done, 2);
 }
 
-/// One claim leases them all; a pair that does not fit is released before the first one ends.
+/// One claim leases all pairs. A pair that does not fit into memory is released before the first pair ends.
 #[tokio::test]
 async fn pairs_that_exceed_the_memory_together_run_one_after_the_other() {
     let fixture = RunFixture::new(&["wait_1", "wait_2", "wait_3"]).await;
