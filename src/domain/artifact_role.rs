@@ -7,8 +7,8 @@ pub const DEPTH: &str = "depth.png";
 /// Ink mask on the canvas: 255 ink; from register.
 pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
 
-/// Returns the role of one interpretation of the print's ink, counted from 0, in the frame of the print: 255 ink,
-/// 0 background, 128 unknown; from normalize. `RegisterOutcome::ink` is the selected interpretation.
+/// Returns the role of the ink mask of one interpretation of the print, counted from 0. Normalize writes the mask in the
+/// frame of the print: 255 is ink, 0 background and 128 unknown. `RegisterOutcome::ink` is the selected interpretation.
 pub fn print_mask(ink: usize) -> String {
     match ink {
         0 => "print_mask.png".to_owned(),
@@ -16,7 +16,7 @@ pub fn print_mask(ink: usize) -> String {
     }
 }
 
-/// Returns the role of a metric's stroke mask on the canvas: 255 stroke; from register.
+/// Returns the role of a metric's stroke mask on the canvas. Register writes the mask: 255 is stroke.
 pub fn canvas_depth_mask(metric: ThresholdMetric) -> String {
     format!("canvas_depth_mask.{metric}.png")
 }

@@ -8,13 +8,14 @@ use super::enum_names;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FailureClass {
-    /// The input file is invalid: empty, truncated, NaN coordinates, no faces. Quarantined.
+    /// The input file is invalid, for example empty or truncated. The pair is quarantined.
     BadInput,
-    /// The input is valid, but the method finds no solution, as for a plate without relief. Quarantined.
+    /// The input is valid, but the method finds no solution, as for a plate without relief. The pair is quarantined.
     NoSolution,
-    /// Reading or writing failed, or a file is missing. Retried with back-off.
+    /// Reading or writing failed. The stage is retried with back-off a few times if the failure may pass by itself.
+    /// Otherwise, for example if a file is missing, the pair is quarantined.
     Io,
-    /// The stage needs too much memory or time. Retried exclusively, then quarantined.
+    /// The stage needs too much memory or time. It is retried with no other pair running, then the pair is quarantined.
     Resource,
     /// A defect of this program, such as a caught panic. Quarantined.
     Bug,

@@ -41,9 +41,10 @@ pub const CRASH_LIMIT: u32 = 3;
 
 /// Returns whether a pair is the likely cause of worker deaths, so that it must be quarantined.
 ///
-/// `crashes` counts workers that died with only this pair leased since its last finished stage, `deaths` all recent
-/// deaths. If a pair kills workers, nearly all deaths are its own; one may have happened while the worker also leased
-/// other pairs. Each further death suggests an external cause, such as killed processes, and raises the limit by one.
+/// `crashes` is the number of workers that died since the pair's last finished stage while they leased only this pair.
+/// `deaths` is the number of all recent deaths of workers. If a pair kills workers, `deaths` exceeds `crashes` by at most
+/// one: a worker may have died while it also leased other pairs. Each further death suggests an external cause, such as
+/// killed processes, and raises the limit by one.
 pub const fn is_poisoned(crashes: u32, deaths: u32) -> bool {
     crashes >= CRASH_LIMIT + deaths.saturating_sub(crashes + 1)
 }

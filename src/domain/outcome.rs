@@ -31,9 +31,11 @@ impl Bow {
 /// Evidence for the side of the plane that was chosen as the carved one.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SideEvidence {
-    /// Share of the face area with normals that point out of the chosen side, 0..=1; `None` without faces.
+    /// Share of the faces' projected area whose winding points out of the chosen side, 0..=1. `None` without faces and
+    /// under the paper's method.
     pub winding: Option<f64>,
-    /// Share of the visible area within a fifth of the relief from the outermost layer of the chosen side, 0..=1.
+    /// Share of the visible area that lies close to the surface fitted to the chosen side, 0..=1. The paper's
+    /// method takes each side's mean distance of points to their centroid, and stores the difference over the sum.
     pub flatness: f64,
     /// Confidence of the choice, from 0 (a guess) to 1.
     pub confidence: f64,
@@ -49,7 +51,7 @@ pub struct FitOutcome {
     pub bow: Option<Bow>,
     /// Range of heights of the curved surface over the character, in mesh units; 0 for a flat block.
     pub bow_height: f64,
-    /// Share of the sampled points on stroke tops that are inliers of the fitted surface, 0..=1.
+    /// Share of the sampled points that are inliers of the fitted surface, 0..=1.
     pub inlier_ratio: f64,
     /// Root mean square distance of the inliers to the surface, in mesh units.
     pub rms: f64,
@@ -114,15 +116,16 @@ pub struct ThresholdChoice {
     pub at_bound: bool,
 }
 
-/// One interpretation of the print as ink and background. There are several if polarity or stains are ambiguous; the
-/// register stage selects one.
+/// One interpretation of the print as ink and background. A print has several interpretations if its polarity or its
+/// stains are ambiguous. The register stage selects one of them.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct InkHypothesis {
     /// Grey level (0..=65535) between ink and background.
     pub threshold_print: f64,
     /// Whether the print is light on dark, like a rubbing.
     pub light_on_dark: bool,
-    /// Maps print pixels to the canvas: the longest side of the ink has a fixed length and its centroid is centred.
+    /// Maps print pixels to canvas pixels. The longest side of the ink's bounding box gets a fixed length, and the
+    /// centroid of the ink is at the centre of the canvas.
     pub canvas_from_print: Affine2,
 }
 
@@ -133,7 +136,7 @@ pub struct ReliefHeights {
     pub top: f64,
     /// Median height of the carved background, in mesh units.
     pub ground: f64,
-    /// Depth below `top` where tops end and walls begin, as a share of [`Self::depth`].
+    /// Depth below `top` at which the stroke tops end and the walls begin, as a share of [`Self::depth`].
     pub tops_end: f64,
 }
 
@@ -143,7 +146,8 @@ impl ReliefHeights {
         self.top - self.ground
     }
 
-    /// Returns the depth-map level, 1..=65535, at a depth below the tops, which is given as a share of the relief.
+    /// Returns the depth-map level, 1..=65535, at a depth below `top`. `share` is that depth as a share of
+    /// [`Self::depth`].
     ///
     /// # Examples
     /// ```
@@ -177,7 +181,8 @@ pub struct NormalizeOutcome {
     pub inks: Vec<InkHypothesis>,
     /// Heights from which the soft stroke mask is computed; `None` under the paper's method.
     pub relief: Option<ReliefHeights>,
-    /// Thresholds selected before registration, by the paper's method only and without the ensemble; otherwise empty.
+    /// Thresholds selected before registration. Only the paper's method selects them here, for every metric of the paper
+    /// except the ensemble. Empty under the default method.
     pub thresholds: Vec<ThresholdChoice>,
 }
 
@@ -203,7 +208,7 @@ pub struct Scores {
 /// Similarity of relief and print at the best pose, compared with competing poses.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PoseFeatures {
-    /// Correlation of relief and ink where both images have data, normalized by the norm of each; at most 1.
+    /// Normalized correlation of relief and ink where both images have data, at most 1.
     pub correlation: f64,
     /// Share of the stroke tops that are covered by ink, 0..=1.
     pub tops_covered: f64,
@@ -213,13 +218,13 @@ pub struct PoseFeatures {
     pub other_angle: f64,
     /// Score of the best pose of the mirrored relief, divided by the score of the best pose.
     pub mirrored: f64,
-    /// Largest distance of the pose from the poses that refinement finds from a slightly smaller and a slightly larger
-    /// start, as a share of the longest side of the depth map.
+    /// Sensitivity of the pose to its start: the pose is refined from three slightly different sizes, and this is the
+    /// largest distance between the best result and another one, as a share of the longest side of the depth map.
     #[serde(default)]
     pub spread: f64,
 }
 
-/// The aligned result of a metric: a row of the catalog and of the export.
+/// The aligned result of a metric. It is one row of the catalog and of the export.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct MetricOutcome {
     /// The metric.
@@ -230,7 +235,7 @@ pub struct MetricOutcome {
     pub threshold_depth: f64,
     /// Maps depth-map pixels to print pixels.
     pub print_from_depth: Affine2,
-    /// Rotation of the depth map onto the print, degrees in (-180, 180], clockwise on the screen.
+    /// Rotation of the depth map onto the print in degrees, in (-180, 180], positive clockwise on the screen.
     pub angle_deg: f64,
     /// Print pixels per depth-map pixel.
     pub scale: f64,
@@ -240,10 +245,10 @@ pub struct MetricOutcome {
     pub scores: Scores,
     /// Score of the best pose minus the score of the best competing pose (at another angle, or mirrored).
     pub margin: f64,
-    /// Calibrated probability, 0..=1, that this alignment is right: angle within 5 degrees and landmarks within 5 % of
-    /// the character's height. `None` under the paper's method.
+    /// Calibrated probability, 0..=1, that this alignment is correct: its angle error is within 5 degrees, and its
+    /// landmarks are within 5 % of the character's height. `None` under the paper's method.
     pub confidence: Option<f64>,
-    /// Whether the search ended at a limit of angle, scale or shift.
+    /// Whether the search for the scale or for the threshold ended at a limit of its range.
     pub at_bound: bool,
 }
 

@@ -2,7 +2,7 @@
 
 use super::ContentHash;
 
-/// Random numbers that depend only on seed, name, subject and purpose, not on the order in which they are drawn.
+/// A source of random numbers. A number depends only on seed, name, subject and purpose, not on the order of the draws.
 ///
 /// ```
 /// use mocban::domain::{ContentHash, SeededRandom};
@@ -21,7 +21,7 @@ pub struct SeededRandom {
 }
 
 impl SeededRandom {
-    /// Returns the random numbers of a seed and a name, such as the reviewer's.
+    /// Returns the source for a seed and a name, such as the name of a reviewer.
     pub fn new(seed: u64, name: &str) -> Self {
         Self {
             seed,

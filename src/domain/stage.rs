@@ -31,7 +31,8 @@ enum_names! { pub Stage, "a stage":
 }
 
 impl Stage {
-    /// Returns the position in the order, 0 to 3: the cursor of a job whose next stage this is.
+    /// Returns the position of the stage in the processing order, 0 to 3. A job whose next stage is this one has this
+    /// number as its cursor.
     pub const fn index(self) -> usize {
         self as usize
     }

@@ -118,7 +118,7 @@ impl Affine2 {
 pub struct Rigid3(pub [[f64; 4]; 4]);
 
 impl Rigid3 {
-    /// Returns the transform that maps `origin` to zero and the right-handed unit `axes` to x, y, z.
+    /// Returns the transform that maps `origin` to zero and the unit vectors `axes`, which are right-handed, to x, y, z.
     pub fn to_frame(axes: [[f64; 3]; 3], origin: [f64; 3]) -> Self {
         let row = |axis: [f64; 3]| {
             let shift = -(axis[0] * origin[0] + axis[1] * origin[1] + axis[2] * origin[2]);
@@ -161,8 +161,8 @@ impl Rigid3 {
     }
 }
 
-/// The result of the pipeline, a 3x4 matrix: rows 1 and 2 give the print pixel of a mesh point `[X Y Z 1]`, row 3 its
-/// height over the character plane in mesh units.
+/// The result of the pipeline, a 3x4 matrix that is applied to a mesh point `[X Y Z 1]`. Rows 1 and 2 give the point's
+/// print pixel x and y. Row 3 gives its height over the character plane in mesh units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct PrintFromMesh(pub [[f64; 4]; 3]);
 
@@ -186,7 +186,7 @@ impl PrintFromMesh {
         Self([row(a), row(b), m[2]])
     }
 
-    /// Maps a mesh point to print pixel x, y and height over the plane in mesh units.
+    /// Maps a mesh point to `[x, y, height]`: x and y in print pixels, the height over the plane in mesh units.
     pub fn apply(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
         let dot = |r: [f64; 4]| r[0] * x + r[1] * y + r[2] * z + r[3];
         [dot(self.0[0]), dot(self.0[1]), dot(self.0[2])]

@@ -12,7 +12,7 @@ pub enum Verdict {
     Pass,
     /// The criterion is not met.
     Fail,
-    /// The reviewer cannot decide; counted separately, never as a pass or a fail.
+    /// The reviewer cannot decide. This verdict is counted separately, never as a pass or a fail.
     Unsure,
 }
 
