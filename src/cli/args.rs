@@ -94,14 +94,14 @@ fn plain(text: Option<&StyledStr>) -> Resettable<StyledStr> {
     })
 }
 
-/// Letters of flags without a value, which may be followed by other letters in the same word.
+/// Letters of the flags that take no value. Another letter may follow such a flag in the same word, as in `-nv`.
 const FLAGS: [char; 6] = ['h', 'n', 'q', 'v', 'V', 'w'];
 
 /// Parses a command line.
 pub(super) fn parse(args: &[OsString]) -> Result<Cli, clap::Error> {
     let command = command().color(help_color(args));
     let mut cli = Cli::from_arg_matches(&command.try_get_matches_from(args)?)?;
-    // clap drops values before the command's name when there are others after it.
+    // If a flag is given before and after the command's name, clap keeps only the values after it.
     cli.global.set = values_of("--set", args);
     cli.global.verbose = count_verbose(args);
     Ok(cli)
@@ -123,7 +123,7 @@ fn count_verbose(args: &[OsString]) -> u8 {
     u8::try_from(counts.sum::<usize>()).unwrap_or(u8::MAX)
 }
 
-/// Finds `--color` before clap parses: help and usage errors are printed before the flags are known.
+/// Finds `--color` before clap parses the line, because clap itself prints help and usage errors.
 fn help_color(args: &[OsString]) -> ColorChoice {
     let values = values_of("--color", args);
     let choice = values.iter().find_map(|value| value.parse().ok());

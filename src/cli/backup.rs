@@ -43,8 +43,8 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
         Ok(bytes) => Some(prepare(&settings_file, &bytes)?),
         Err(_) => None,
     };
-    // All files are written before the first is renamed, and the catalog is renamed last. If renaming fails, the files
-    // beside the catalog are restored.
+    // All files are written before the first one is renamed, and the catalog is renamed last. If a renaming fails, the
+    // files beside the catalog are restored from the previous backup.
     let previous =
         [verdicts_file(file), settings_file.clone()].map(|file| PreviousFile::save(&file));
     let renamed = rename(&log, &verdicts_file(file))
@@ -71,7 +71,7 @@ pub(super) async fn backup(args: BackupArgs, context: &Context) -> anyhow::Resul
     Ok(ExitCode::Done)
 }
 
-/// A file that is being written under a temporary name; removed when dropped.
+/// A file under a temporary name. The file is removed when the value is dropped.
 struct PartialFile(PathBuf);
 
 impl PartialFile {
@@ -83,7 +83,7 @@ impl PartialFile {
     }
 
     fn clear(&self) {
-        // Usually there is no such file; one that cannot be removed makes writing the copy fail.
+        // Usually no such file exists. If an existing file cannot be removed, writing the copy fails later.
         remove_database(&self.0);
     }
 }
@@ -102,7 +102,7 @@ struct PreviousFile {
 }
 
 impl PreviousFile {
-    /// Returns `None` if the file cannot be saved; then a failed renaming leaves the new file in its place.
+    /// Saves a file. Returns `None` if it cannot be saved. In that case the new file stays if a later renaming fails.
     fn save(file: &Path) -> Option<Self> {
         let mut name = file.as_os_str().to_owned();
         name.push(".earlier");
@@ -119,7 +119,7 @@ impl PreviousFile {
     }
 
     fn restore(&self) {
-        // The first error is reported already; nothing more can be done about this one.
+        // The error that led here is reported. Nothing can be done if restoring fails too.
         let _ = if self.existed {
             std::fs::rename(&self.saved.0, &self.file)
         } else {
@@ -149,7 +149,8 @@ fn rename(partial: &PartialFile, file: &Path) -> anyhow::Result<()> {
     rename_into_place(&partial.0, file).with_context(|| format!("cannot write {}", file.display()))
 }
 
-/// Removes the settings of the previous backup if the project has none any more: they would change the results.
+/// Removes the settings file of the previous backup, for a project without a settings file. A restored project would
+/// otherwise use the old settings.
 fn remove(file: &Path) -> anyhow::Result<()> {
     match std::fs::remove_file(file) {
         Err(error) if error.kind() != std::io::ErrorKind::NotFound => {

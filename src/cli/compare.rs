@@ -3,9 +3,9 @@
 use super::table::columns;
 use crate::report::{MetricRow, Report};
 
-/// Formats the means of both projects and their differences, one line per metric and number.
+/// Formats the numbers of both projects and their differences, one line per metric and number.
 ///
-/// The projects may have different pairs: the tables are compared, not the pairs.
+/// The numbers are those of the report tables, so the projects may have different pairs.
 pub(super) fn side_by_side(here: &Report, there: &Report, names: [&str; 2]) -> String {
     let head = ["", "", names[0], names[1], "difference"];
     let mut rows = vec![head.map(ToOwned::to_owned).to_vec()];

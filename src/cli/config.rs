@@ -46,7 +46,7 @@ fn as_json(settings: &[Setting]) -> serde_json::Value {
     json!({"schema": 1, "settings": values})
 }
 
-/// Formats settings as a file that parses to the same values, optionally with origins and explanations in comments.
+/// Formats settings as a settings file that gives the same values. Origins and explanations are optional comments.
 pub(super) fn as_toml(settings: &[Setting], args: &ConfigShowArgs, palette: Palette) -> String {
     let longest = settings.iter().map(|setting| line(setting).len()).max();
     let mut lines = Vec::new();

@@ -50,7 +50,7 @@ impl Context {
         context
     }
 
-    /// Returns the same context without the flags that change settings, for a project that has them in its own file.
+    /// Returns the same context without the flags that change settings. Used if the project's file has these settings.
     pub(super) fn without_setting_flags(&self) -> Self {
         let mut context = self.clone();
         context.global.config = None;
@@ -77,7 +77,7 @@ impl Context {
         self.screen.line(&format!("{label} {text}"));
     }
 
-    /// Writes why the command failed to stderr: a sentence, or an object with `--json`.
+    /// Writes an error message to stderr, as text or, with `--json`, as a JSON object.
     pub(super) fn error(&self, text: &str, code: ExitCode) {
         if self.global.json {
             let object = json!({"message_type": "exit_error", "code": code as u8, "message": text});
@@ -88,7 +88,7 @@ impl Context {
         }
     }
 
-    /// Suggests the next command on stderr, for this project and ready to be copied.
+    /// Suggests the next command for this project on stderr, ready to be copied into a shell.
     pub(super) fn next(&self, tail: &str) {
         self.next_command(&self.command(tail));
     }
@@ -155,8 +155,8 @@ impl Context {
         Ok(load(&Sources { base, env, sets })?)
     }
 
-    /// Warns about results that were computed with other settings or files than the current ones. Invalid settings
-    /// are reported elsewhere.
+    /// Warns about results that were computed with other settings or files than the current ones. Does nothing if the
+    /// settings are invalid, because that error is reported elsewhere.
     pub(super) async fn warn_about_stale(&self, catalog: &Catalog) -> anyhow::Result<()> {
         let Ok(settings) = self.settings() else {
             return Ok(());

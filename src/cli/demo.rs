@@ -1,4 +1,4 @@
-//! `demo`: creates the built-in dataset, imports it like any other, runs it and prints the report.
+//! `demo`: creates the built-in dataset, imports it, runs it and prints the report.
 
 use std::path::{Path, PathBuf};
 
@@ -68,7 +68,7 @@ pub(super) async fn demo(args: DemoArgs, context: &Context) -> anyhow::Result<Ex
     align(&dir, context).await
 }
 
-/// Runs, reports, draws the contact sheet, and prints where the files are.
+/// Runs the pairs, prints the report, draws the contact sheet, and prints where the files are.
 async fn align(dir: &Path, context: &Context) -> anyhow::Result<ExitCode> {
     let config = context.settings()?.config;
     let (project, catalog) = context.open().await?;
@@ -99,7 +99,7 @@ fn demo_dir(args: &DemoArgs, context: &Context) -> PathBuf {
         .unwrap_or_else(|| PathBuf::from("mocban-demo"))
 }
 
-/// Creates the dataset below `DIR/data` unless it exists; `None` if it was stopped.
+/// Creates the dataset below `DIR/data` unless it exists. Returns `None` if a signal stopped the command.
 async fn create_dataset(
     dir: &Path,
     options: DemoOptions,
@@ -123,7 +123,7 @@ async fn create_dataset(
     Ok(Some(files))
 }
 
-/// Writes the dataset on another thread while this one watches for Ctrl-C; `None` if it was stopped.
+/// Writes the dataset on another thread and watches for signals. Returns `None` if a signal stopped the writing.
 async fn write_or_stop(
     data: PathBuf,
     options: DemoOptions,
@@ -144,7 +144,7 @@ const NOTE: &str = "README.txt";
 const NOTE_TEXT: &str = "The built-in dataset of mocban: carved glyphs and their prints, with the true \
 alignments.\nCreated by `mocban demo`, which creates it again if it is incomplete; do not put your own files here.\n";
 
-/// Refuses a directory that holds something else, before anything is overwritten.
+/// Refuses a directory that holds other files than this demo, before anything is overwritten.
 fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> Result<(), Refusal> {
     let refuse = |reason: &str| {
         let shown = dir.display();
@@ -183,7 +183,7 @@ fn check_directory(dir: &Path, data: &Path, options: &DemoOptions) -> Result<(),
 
 /// Saves settings given by flags in the project's file, so that later commands use them too.
 ///
-/// An existing file is not changed; the flags then apply to this call only.
+/// An existing file with other settings is not changed. In that case the flags apply to this call only.
 fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
     let global = &context.global;
     if global.config.is_none() && global.set.is_empty() {
@@ -210,8 +210,8 @@ fn save_settings(dir: &Path, context: &Context) -> anyhow::Result<Context> {
     Ok(context.without_setting_flags())
 }
 
-/// Formats the settings that preset, file and flags change, as a settings file. The environment is left out, because it
-/// does not belong to the project.
+/// Formats a settings file with the settings that a preset, a file or flags change. Settings from environment variables
+/// are left out, because the environment does not belong to the project.
 fn changed_settings(tree: &Tree) -> String {
     let mut preset = "";
     let mut changed = Vec::new();

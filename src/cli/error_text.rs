@@ -44,13 +44,13 @@ fn code_of_cause(cause: &(dyn Error + 'static)) -> Option<ExitCode> {
     }
 }
 
-/// Returns the sentence for an error: an explanation for errors of the catalog, otherwise the chain of causes.
+/// Returns the message for an error: the explanation of a catalog error if there is one, otherwise the chain of causes.
 pub(super) fn describe(error: &anyhow::Error, project: &Path) -> String {
     let explained = catalog_error(error).and_then(|found| explain_catalog(found, project));
     explained.unwrap_or_else(|| join_causes(error))
 }
 
-/// Joins the chain of causes; a cause that its parent already quotes is left out.
+/// Joins the chain of causes. A cause that the text already quotes is left out.
 fn join_causes(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain() {
@@ -64,7 +64,7 @@ fn join_causes(error: &anyhow::Error) -> String {
     text
 }
 
-/// Returns whether stdout was closed, as by `mocban report | head`; this is not an error.
+/// Returns whether the output was closed by its reader, as in `mocban report | head`. This is not a failure.
 pub(super) fn is_closed_pipe(error: &anyhow::Error) -> bool {
     error.chain().any(|cause| {
         cause

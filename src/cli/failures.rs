@@ -1,4 +1,4 @@
-//! Failed pairs as `run` and `status` list them: by class, the first few by name.
+//! Lists failed pairs for `run` and `status`, grouped by class, with the first few names of each class.
 
 use serde_json::{Value, json};
 
@@ -6,8 +6,9 @@ use super::table::columns;
 use crate::catalog::{Catalog, FailedPair, StoredFailure};
 use crate::domain::FailureClass;
 
-/// Maximum numbers of failed pairs that are read, and that are named per class, unless all are requested.
+/// Maximum number of failed pairs that are read, unless all are requested.
 const READ_LIMIT: usize = 200;
+/// Maximum number of failed pairs that are named per class, unless all are requested.
 const NAME_LIMIT: usize = 3;
 const NO_LIMIT: usize = i64::MAX as usize;
 

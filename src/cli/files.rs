@@ -19,7 +19,7 @@ pub(super) fn list(dir: &Path) -> Result<Vec<PathBuf>, Refusal> {
         .collect()
 }
 
-/// Returns whether a file holds JSON Lines: by its extension, or by its first character if the extension is not known.
+/// Returns whether a file holds JSON Lines. A known extension decides, otherwise the first character.
 pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
     let extension = file.extension().and_then(|extension| extension.to_str());
     match extension.map(str::to_ascii_lowercase).as_deref() {
@@ -32,7 +32,7 @@ pub(super) fn is_jsonl(file: &Path, bytes: &[u8]) -> bool {
     }
 }
 
-/// Removes a database and the files that SQLite keeps beside it, as far as they exist and can be removed.
+/// Removes a database and the files that SQLite keeps beside it. Ignores files that are missing or cannot be removed.
 pub(super) fn remove_database(path: &Path) {
     for ending in ["", "-wal", "-shm", "-journal"] {
         let mut name = path.as_os_str().to_owned();

@@ -107,7 +107,7 @@ async fn store(
     let sent = tokio::task::spawn_blocking(move || send_rows(listing, &owned, &sender));
     let stored = catalog.import_all(rows, truths, now()).await;
     catalog.close().await;
-    // The error of a row explains more than the catalog's error that the list ended early.
+    // If a row fails, the catalog only reports that the list ended early, so the row's error is returned first.
     let missing = sent
         .await
         .context("the task that reads the list stopped")??;
@@ -142,7 +142,7 @@ fn send_rows(
     Ok(missing)
 }
 
-/// What existed before an import, so that a failed one leaves no incomplete project.
+/// What existed before an import, so that a failed import leaves no incomplete project.
 struct StateBefore {
     dir: bool,
     catalog: bool,
@@ -156,7 +156,7 @@ impl StateBefore {
         }
     }
 
-    /// Removes what did not exist before. What cannot be removed is a harmless empty project.
+    /// Removes catalog and directory if they did not exist before. If removing fails, an empty project remains.
     fn restore(&self, project: &Project) {
         if !self.catalog {
             remove_database(&project.catalog_path());
@@ -204,8 +204,8 @@ async fn read_truths(file: &Path, listed: &RowIds, dir: &Path) -> anyhow::Result
     }
 }
 
-/// Converts true alignments to their stored form. Like the paths of inputs, `tops_mask` is stored relative to the
-/// project if the file is below it.
+/// Converts true alignments to their stored form. A `tops_mask` below the project's directory is stored relative to it,
+/// like the paths of inputs.
 fn stored_truths(
     truths: Vec<TruthRow>,
     project: &Project,

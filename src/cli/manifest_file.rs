@@ -1,4 +1,4 @@
-//! Reads a manifest or two directories from disk for the pure parsers in `manifest`.
+//! Reads a manifest, or lists two directories, and passes the content to the parsers in `manifest`.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -8,7 +8,7 @@ use super::files;
 use crate::domain::{ContentHash, LengthUnit, PairName};
 use crate::manifest::{ManifestError, ManifestRow, RowIds, pair_folders, read_csv, read_jsonl};
 
-/// Valid pairs to import. The text of a list is kept and its rows are parsed one after another.
+/// Valid pairs to import. For a list, only its text is kept, and its rows are parsed again one after another.
 #[derive(Debug)]
 pub(super) struct Listing {
     source: ListingSource,
@@ -46,7 +46,7 @@ fn refuse(from: &Path, problems: &ManifestError) -> Refusal {
 }
 
 impl Listing {
-    /// Reads a CSV or JSON Lines file; the format follows from the extension, otherwise from the first character.
+    /// Reads a CSV or JSON Lines file. A known extension decides the format, otherwise the first character.
     pub(super) fn from_file(file: &Path) -> anyhow::Result<Self> {
         let shown = file.display();
         if file.is_dir() {

@@ -54,7 +54,7 @@ pub fn main(args: impl IntoIterator<Item = OsString>) -> ExitCode {
     let cli = match args::parse(&args) {
         Ok(cli) => cli,
         Err(error) => {
-            // Printing fails only if the stream is closed, and then nobody reads the reason.
+            // Printing fails only if the stream is closed. In that case nobody could read an error either.
             let _ = error.print();
             return match error.exit_code() {
                 0 => ExitCode::Done,
@@ -79,8 +79,8 @@ fn start(command: Command, context: &Context) -> anyhow::Result<ExitCode> {
     result
 }
 
-/// Returns the runtime for a command. A run computes on its own threads; the remaining tasks are short and pass
-/// messages to each other, which is faster on one thread.
+/// Returns the asynchronous runtime for a command. A run computes its stages on separate threads. Its asynchronous
+/// tasks are short and exchange messages, which is faster on one thread.
 fn runtime(command: &Command) -> std::io::Result<Runtime> {
     let mut builder = match command {
         Command::Run(_) | Command::Demo(_) => Builder::new_current_thread(),
@@ -111,7 +111,7 @@ async fn dispatch(command: Command, context: &Context) -> anyhow::Result<ExitCod
     }
 }
 
-/// Prints an error with the commands that help, and returns its exit code.
+/// Prints an error, suggests commands that help, and returns the exit code of the error.
 fn report_error(error: &anyhow::Error, context: &Context) -> ExitCode {
     if error_text::is_closed_pipe(error) {
         return ExitCode::Done;

@@ -1,4 +1,4 @@
-//! Panics are defects of this program: details go to the log, a sentence to the user.
+//! Handles panics, which are defects of this program: details go to the log, the user gets one sentence.
 
 use std::backtrace::Backtrace;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -15,7 +15,8 @@ pub(super) fn log_only() {
     }));
 }
 
-/// Calls a function; turns a panic into a sentence for `show_error` and an exit code.
+/// Calls a function and returns its exit code. If it panics, passes a sentence to `show_error` and returns
+/// `ExitCode::Error`.
 pub(super) fn catch(work: impl FnOnce() -> ExitCode, show_error: impl FnOnce(&str)) -> ExitCode {
     catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|_| {
         show_error(

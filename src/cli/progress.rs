@@ -31,8 +31,9 @@ enum Display {
     None,
 }
 
-/// A plain line is written after this time or this share of the stages, whichever comes first.
+/// Time after which a plain line is written, even if few stages were finished.
 const PLAIN_INTERVAL: Duration = Duration::from_secs(10);
+/// Percentage points of progress after which a plain line is written, even before `PLAIN_INTERVAL`.
 const PLAIN_PERCENT: u64 = 5;
 /// Shortest time between two plain lines.
 const PLAIN_MIN_INTERVAL: Duration = Duration::from_secs(1);

@@ -86,7 +86,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let keys = review::key_map(&settings.config.review.keys);
     let keys = keys.map_err(|error| Refusal::Usage(error.to_string()))?;
     if args.listen.is_some_and(|address| address.is_unspecified()) {
-        // The page accepts only requests for its own address, but 0.0.0.0 stands for all addresses of the machine.
+        // The page accepts only requests for one address, but 0.0.0.0 stands for all addresses of the machine.
         let text = "--listen needs the address of this machine at which the page will be opened";
         return Err(Refusal::Usage(text.to_owned()).into());
     }
@@ -117,7 +117,7 @@ pub(super) async fn review(args: ReviewArgs, context: &Context) -> anyhow::Resul
     let served = page.serve(async move { drain.reached(StopLevel::Drain).await });
     tokio::select! {
         served = served => served?,
-        // A second signal does not wait for open connections. Acknowledged answers are stored.
+        // After a second signal, open connections are not waited for. Answers already acknowledged are stored.
         () = stop.reached(StopLevel::Now) => {}
     }
     signals.abort();
@@ -169,8 +169,8 @@ fn progress(reviewer: &str, counts: QueueCounts) -> String {
     }
 }
 
-/// Prints the page's address and opens it in a browser. Returns the file through which it is opened, which must exist
-/// until the browser has read it.
+/// Prints the page's address and opens the page in a browser. Returns the temporary file that redirects the browser to
+/// the page. The file must exist until the browser has read it.
 fn announce(
     page: &ReviewServer,
     args: &ReviewArgs,
@@ -200,8 +200,9 @@ fn announce(
     Ok(if is_for_script { None } else { open(&url) })
 }
 
-/// Opens the address in the system's browser through a file that only this user can read, so that the token does not
-/// appear in the list of processes. A missing browser is not an error: the address is printed.
+/// Opens the address in the system's browser. The browser is started with a file that redirects to the address and that
+/// only this user can read, so that the token does not appear in the list of processes. A missing browser is not an
+/// error, because the address is printed.
 fn open(url: &str) -> Option<tempfile::NamedTempFile> {
     let program = if cfg!(target_os = "macos") {
         "open"

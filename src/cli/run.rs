@@ -128,7 +128,7 @@ pub(super) fn from_config(config: &Config) -> RunOptions {
     }
 }
 
-/// Runs with progress on stderr and signal handling, then closes the catalog.
+/// Runs the pairs, shows the progress on stderr and handles signals. Closes the catalog at the end.
 pub(super) async fn drive(
     project: &Project,
     catalog: Catalog,

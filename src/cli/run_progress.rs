@@ -91,7 +91,7 @@ impl RunProgress {
         }
     }
 
-    /// Returns the finished stages in per cent, rounded down so that only the end is 100.
+    /// Returns the percentage of finished stages, rounded down, so that 100 means that all stages are finished.
     pub(super) const fn percent(&self) -> u64 {
         match (self.finished * 100).checked_div(self.stages) {
             Some(percent) => percent,

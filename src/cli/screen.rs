@@ -67,7 +67,7 @@ impl Palette {
     /// Never any colour.
     pub(super) const PLAIN: Self = Self { on: false };
 
-    /// Decides for one stream: `--color` first, then `NO_COLOR`, then whether it is a terminal.
+    /// Returns the palette for one stream. `--color` decides first, then `NO_COLOR`, then whether it is a terminal.
     pub(super) fn choose(when: ColorChoice, is_terminal: bool) -> Self {
         let on = match when {
             ColorChoice::Always => true,

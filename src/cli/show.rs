@@ -81,7 +81,7 @@ fn next_steps(detail: &PairDetail, has_work: bool) -> Vec<String> {
     }
 }
 
-/// Returns the catalog's record with the paths of its files and what the next run would do.
+/// Returns the pair's record with the paths of its files, its manual alignments and what the next run would do.
 fn as_json(
     detail: &PairDetail,
     manual: &[ManualResult],
@@ -105,7 +105,7 @@ fn as_json(
     Ok(value)
 }
 
-/// Reads the manual alignments of a pair that were not undone, oldest first.
+/// Reads the manual alignments of a pair, oldest first, without undone ones.
 async fn manual_results(
     catalog: &Catalog,
     results: &PairResults,
@@ -131,7 +131,7 @@ fn adjustment(manual: &StoredAlignment, results: &PairResults) -> Option<Adjustm
     })
 }
 
-/// Returns the result that manual alignments are compared with: the ensemble's, otherwise the first.
+/// Returns the result that manual alignments are compared with: the result of the ensemble, otherwise the first one.
 fn automatic_result(results: &PairResults) -> Option<&MetricOutcome> {
     let ensemble = results.metric(ThresholdMetric::Ensemble);
     ensemble

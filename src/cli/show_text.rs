@@ -20,7 +20,7 @@ pub(super) struct PairPage<'a> {
     pub(super) palette: Palette,
 }
 
-/// Formats a heading and the rows below it; returns nothing if there are no rows.
+/// Formats a heading and the rows below it. Returns an empty text if there are no rows.
 fn section(
     name: &str,
     rows: impl IntoIterator<Item = Vec<String>>,
@@ -251,7 +251,7 @@ fn verdicts(record: &MetricRecord) -> String {
 pub(super) struct ManualResult {
     #[serde(flatten)]
     pub(super) stored: StoredAlignment,
-    /// The difference to the automatic result; `None` if the two belong to different depth maps.
+    /// Difference to the automatic result. `None` if the depth map changed or there is no such result.
     pub(super) adjustment: Option<Adjustment>,
 }
 
@@ -265,7 +265,7 @@ pub(super) struct Adjustment {
     pub(super) from_iou: f64,
 }
 
-/// Formats manual alignments, one line each; returns nothing if there are none.
+/// Formats manual alignments, one line each. Returns an empty text if there are none.
 pub(super) fn manual_text(manual: &[ManualResult], palette: Palette) -> String {
     let rows = manual.iter().map(|one| vec![manual_line(one)]);
     section("manual alignments", rows, "<", palette)

@@ -57,7 +57,7 @@ pub(super) async fn status(args: StatusArgs, context: &Context) -> anyhow::Resul
 /// The state that the screen shows.
 struct ProjectStatus {
     counts: StatusCounts,
-    /// Whether a process works on the project; otherwise leased pairs are not running but interrupted.
+    /// Whether a process works on the project. If none does, leased pairs are interrupted, not running.
     running: bool,
     failures: Failures,
 }
@@ -76,7 +76,7 @@ impl ProjectStatus {
         self.jobs(JobStatus::Leased) - self.interrupted()
     }
 
-    /// Returns the number of pairs whose process died; the next run continues them.
+    /// Returns the number of leased pairs whose process died. The next run continues these pairs.
     fn interrupted(&self) -> u64 {
         u64::from(!self.running) * self.jobs(JobStatus::Leased)
     }
@@ -237,7 +237,7 @@ fn next_steps(status: &ProjectStatus) -> Vec<String> {
     steps
 }
 
-/// Returns the command that judges the results, with the name of the user.
+/// Returns the `review` command with the user's name as the reviewer.
 fn review_step(user: Option<&str>) -> String {
     let name = user.and_then(|user| reviewer_name(user).ok());
     let name = name.unwrap_or_else(|| "me".to_owned());

@@ -16,13 +16,13 @@ pub(super) fn day(at: UnixMillis) -> String {
     datetime(at).date().to_string()
 }
 
-/// Returns the calendar time; times outside the years -9999 to 9999 become the epoch.
+/// Returns the calendar time in UTC. Returns the Unix epoch for times outside the years -9999 to 9999.
 fn datetime(at: UnixMillis) -> DateTime {
     let time = Timestamp::from_millisecond(at).unwrap_or(Timestamp::UNIX_EPOCH);
     TimeZone::UTC.to_datetime(time)
 }
 
-/// Parses a time in UTC: `2026-11-21`, `2026-11-21 04:10:03`, `2026-11-21T04:10:03Z` or with an offset (RFC 3339).
+/// Parses a time: `2026-11-21`, `2026-11-21 04:10:03` or `2026-11-21T04:10:03Z`. A time without an offset is in UTC.
 pub(super) fn parse_utc(text: &str) -> Option<UnixMillis> {
     let time = text.parse::<Timestamp>().or_else(|_| {
         let local: DateTime = text.parse()?;

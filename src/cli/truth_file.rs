@@ -1,4 +1,4 @@
-//! A `truth.jsonl` file: accepted as a whole, or refused by line number.
+//! Parses a `truth.jsonl` file. A file with an invalid line is refused as a whole.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -20,10 +20,10 @@ pub(super) struct TruthRow {
     pub(super) tops_mask: Option<PathBuf>,
 }
 
-/// Parses all lines; `tops_mask` is relative to the file.
+/// Parses all lines. A `tops_mask` path in the file is relative to the file's directory.
 ///
 /// # Errors
-/// At the first line that is not a true alignment, or repeats a pair.
+/// Returns an error for the first line that is not a true alignment or repeats a pair.
 pub(super) fn parse(file: &Path, text: &str) -> Result<Vec<TruthRow>, RefusedLine> {
     let folder = file.parent().unwrap_or(Path::new(""));
     let mut lines: BTreeMap<PairName, usize> = BTreeMap::new();

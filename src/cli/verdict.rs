@@ -166,7 +166,7 @@ async fn import(args: VerdictImportArgs, context: &Context) -> anyhow::Result<Ex
     Ok(ExitCode::Done)
 }
 
-/// Returns the rows that name no result, or the current result of their pair.
+/// Keeps the rows that name the current result of their pair, and the rows that name no result.
 async fn on_current_results(
     catalog: &Catalog,
     rows: Vec<VerdictRow>,
@@ -256,7 +256,7 @@ fn log_row(event: &VerdictEvent, palette: Palette) -> Vec<String> {
     ]
 }
 
-/// Formats how long the reviewer looked, and the remaining rotation that was read.
+/// Formats how long the result was shown, and the remaining rotation that the reviewer read off, in degrees.
 fn view_text(look: &ReviewContext) -> String {
     let shown = look.shown_ms.map(duration);
     let angle = look.angle_read_deg.map(|angle| format!("{angle:+}°"));

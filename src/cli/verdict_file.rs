@@ -1,4 +1,4 @@
-//! Files of verdicts, CSV or JSON Lines: accepted as a whole, or refused by line number.
+//! Parses files of verdicts, CSV or JSON Lines. A file with an invalid line is refused as a whole.
 
 use std::str::FromStr;
 
@@ -27,10 +27,10 @@ pub(super) struct VerdictRow {
     pub(super) judged: Option<ContentHash>,
 }
 
-/// Parses a CSV file; separator and encoding are detected.
+/// Parses a CSV file. Separator and encoding are detected.
 ///
 /// # Errors
-/// At the first invalid line.
+/// Returns an error for the first invalid line.
 pub(super) fn parse_csv(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
     let text = as_utf8(bytes).map_err(|error| RefusedLine::new(1, &error.to_string()))?;
     let mut reader = csv::ReaderBuilder::new()
@@ -137,7 +137,7 @@ fn csv_error(error: &csv::Error, text: &[u8]) -> RefusedLine {
     RefusedLine::new(line, &reason)
 }
 
-/// A line as `verdict log --json`, exports and backups write it; other fields are ignored.
+/// A line of a file written by `verdict log --json`, an export or a backup. Other fields of the line are ignored.
 #[derive(Debug, Deserialize)]
 struct VerdictLine {
     #[serde(flatten)]
@@ -146,10 +146,10 @@ struct VerdictLine {
     undone_at: Option<UnixMillis>,
 }
 
-/// Parses a JSON Lines file; undone verdicts are ignored.
+/// Parses a JSON Lines file. Undone verdicts are ignored.
 ///
 /// # Errors
-/// At the first invalid line.
+/// Returns an error for the first invalid line.
 pub(super) fn parse_jsonl(bytes: &[u8]) -> Result<Vec<VerdictRow>, RefusedLine> {
     let text = as_utf8(bytes).map_err(|error| RefusedLine::new(1, &error.to_string()))?;
     let lines = (1..).zip(text.split(|byte| *byte == b'\n'));

@@ -7,8 +7,9 @@ pub const DEPTH: &str = "depth.png";
 /// Ink mask on the canvas: 255 ink; from register.
 pub const CANVAS_PRINT_MASK: &str = "canvas_print_mask.png";
 
-/// Returns the role of the ink mask of one interpretation of the print, counted from 0. Normalize writes the mask in the
-/// frame of the print: 255 is ink, 0 background and 128 unknown. `RegisterOutcome::ink` is the selected interpretation.
+/// Returns the role of the ink mask for interpretation `ink` of the print, counted from 0. Normalize writes the mask in
+/// the frame of the print: 255 is ink, 0 background and 128 unknown. `RegisterOutcome::ink` is the selected
+/// interpretation.
 pub fn print_mask(ink: usize) -> String {
     match ink {
         0 => "print_mask.png".to_owned(),

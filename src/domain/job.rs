@@ -42,9 +42,9 @@ pub const CRASH_LIMIT: u32 = 3;
 /// Returns whether a pair is the likely cause of worker deaths, so that it must be quarantined.
 ///
 /// `crashes` is the number of workers that died since the pair's last finished stage while they leased only this pair.
-/// `deaths` is the number of all recent deaths of workers. If a pair kills workers, `deaths` exceeds `crashes` by at most
-/// one: a worker may have died while it also leased other pairs. Each further death suggests an external cause, such as
-/// killed processes, and raises the limit by one.
+/// `deaths` is the number of all recent deaths of workers. If a pair kills workers, `deaths` exceeds `crashes` by at
+/// most one: a worker may have died while it also leased other pairs. Each further death suggests an external cause,
+/// such as killed processes, and raises the limit by one.
 pub const fn is_poisoned(crashes: u32, deaths: u32) -> bool {
     crashes >= CRASH_LIMIT + deaths.saturating_sub(crashes + 1)
 }

@@ -181,7 +181,7 @@ pub struct NormalizeOutcome {
     pub inks: Vec<InkHypothesis>,
     /// Heights from which the soft stroke mask is computed; `None` under the paper's method.
     pub relief: Option<ReliefHeights>,
-    /// Thresholds selected before registration. Only the paper's method selects them here, for every metric of the paper
+    /// Thresholds selected before registration. Only the paper's method selects them here, for each of its metrics
     /// except the ensemble. Empty under the default method.
     pub thresholds: Vec<ThresholdChoice>,
 }

@@ -1,7 +1,8 @@
 //! Sanitizing of text from files before it is printed.
 
-/// Returns a text on one line that is safe for terminals. Line breaks and tabs become blanks, other control and invisible
-/// characters become escapes. If the result is longer than `most` characters, it is cut and three dots are appended.
+/// Returns a text on one line that is safe for terminals. Line breaks and tabs become blanks, other control and
+/// invisible characters become escapes. If the result is longer than `most` characters, it is cut and ends in three
+/// dots.
 ///
 /// ```
 /// use mocban::domain::sanitize;
