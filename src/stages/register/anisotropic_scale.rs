@@ -1,20 +1,21 @@
-//! Scale that differs between two perpendicular axes, because paper shrinks by about 1 % across its grain.
+//! Fits different scales along two perpendicular axes, because paper shrinks by about 1 % across its grain.
 
 use crate::domain::Affine2;
 use crate::stages::pose::{Loss, PoseCandidate, Refiner};
 
-/// Number of rounds of scaling and refining. Each round changes the pose less than the previous round.
+/// Number of rounds of scaling and refining.
 const ROUNDS: usize = 2;
-/// Steps of a refinement between two rounds.
+/// Maximum number of steps of the refinement in each round.
 const STEPS: usize = 6;
-/// Relative change of scale that is tried in both directions. `MOST` is the largest change of one round.
+/// Relative change of scale at which the score is computed, in both directions.
 const TRIED: f64 = 0.008;
+/// Largest relative change of scale in one round, along each pair of axes.
 const MOST: f64 = 0.012;
 
-/// Returns the pose with the anisotropic scale that fits best, or `pose` if no scale improves the score. A scale along
-/// the axes and a scale along the diagonals together give every direction.
+/// Returns the pose with the anisotropic scale that fits best, or `pose` if no scale improves the score. Scaling along
+/// the axes and along the diagonals can produce a scale along any two perpendicular directions.
 ///
-/// `middle` is the middle of the relief in pixels of the moving image. The score of `pose` must come from `refiner`.
+/// `middle` is the centre of the scaling, in pixels of the moving image. The score of `pose` must come from `refiner`.
 pub(super) fn with_anisotropic_scale(
     refiner: &Refiner,
     pose: &PoseCandidate,
@@ -35,8 +36,8 @@ pub(super) fn with_anisotropic_scale(
     if best.score > pose.score { best } else { *pose }
 }
 
-/// Returns the position of the maximum of the parabola through values at -1, 0 and 1, or 0 if the parabola has no
-/// maximum. The position is clamped to the largest change of one round.
+/// Returns where the parabola through the values at -1, 0 and 1 has its maximum, or 0 if the parabola has none. The
+/// result is limited to `MOST / TRIED` on either side.
 fn summit(before: f64, at: f64, after: f64) -> f64 {
     let bend = before - 2.0 * at + after;
     if bend >= 0.0 {
@@ -45,8 +46,8 @@ fn summit(before: f64, at: f64, after: f64) -> f64 {
     (0.5 * (before - after) / bend).clamp(-MOST / TRIED, MOST / TRIED)
 }
 
-/// Scales a pose about `middle` by `1 + e` along x and `1 - e` along y, and by `1 + f` and `1 - f` along the two
-/// diagonals. Areas change little.
+/// Scales a pose about `middle` in the fixed image. The factors are `1 + e` along x, `1 - e` along y, and `1 + f` and
+/// `1 - f` along the two diagonals.
 fn stretch(pose: &PoseCandidate, middle: [f64; 2], [e, f]: [f64; 2]) -> PoseCandidate {
     let [x, y] = pose.fixed_from_moving.apply(middle);
     let about = Affine2([[1.0 + e, f, -e * x - f * y], [f, 1.0 - e, e * y - f * x]]);

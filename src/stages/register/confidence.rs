@@ -1,42 +1,40 @@
-//! Confidence of an alignment: a logistic model of the evidence for and against it.
+//! Confidence of an alignment: the product of two logistic models, one for the pose and one for the mask.
 //!
 //! `cargo bench --bench accuracy -- --fit-confidence` fits the weights on generated pairs: matching pairs of every
-//! kind, meshes with another character's print, mirrored meshes and uncarved plates. It prints the weights, and a
-//! reliability table for pairs of other seeds. The current weights were fitted on 1,010 pairs of two independent
-//! generators. Only the weights of spread and rim were set manually. They lower the confidence if the pose is a few
-//! percent off or the threshold cuts through worn or tilted tops.
+//! kind, meshes paired with another character's print, mirrored meshes and uncarved plates. It prints the weights, and
+//! a reliability table for pairs of other seeds. The weights below were fitted on 1,010 pairs of two independent
+//! generators. Only the last two weights of the mask model were set manually. They lower the confidence if the pose is
+//! a few percent off, or if the threshold cuts through worn or tilted tops.
 
 use crate::domain::{MetricOutcome, PoseFeatures, ThresholdMetric};
 
-/// Number of inputs of the pose model. The inputs are the constant 1 and the logarithms of the correlation, the covered
-/// share of the tops, the covered share of the ink, and the scores of the two competitors (another angle, mirrored) as
-/// shares of the best score.
+/// Number of inputs of the pose model: the constant 1, and the logarithm of each pose feature except `spread`.
 const POSE_INPUTS: usize = 6;
-/// Number of inputs of the mask model. The inputs are the constant 1, `m`, `m^2`, `i`, `i^2`, the logarithm of the
-/// correlation, the result of [`spread_input`] and the square of the rim. `m` is the logarithm of the mask's area over
-/// the area of the mask by relief alone, and `i` is the logarithm of the ink's area over that same area.
+/// Number of inputs of the mask model: 1, `m`, `m^2`, `i`, `i^2`, the logarithm of the correlation, the result of
+/// [`spread_input`] and the square of `Areas::rim`. With the other fields of `Areas`, `m` is `ln(mask / relief)` and
+/// `i` is `ln(ink / relief)`.
 const MASK_INPUTS: usize = 8;
 
-/// Weights of the pose's inputs.
+/// Weights of the pose model's inputs.
 const POSE: [f64; POSE_INPUTS] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
-/// Weights of the mask model's inputs. On generated pairs of the tier `hard`, the median rim is 0.03, and 3 % of the
-/// rims are above 0.05.
+/// Weights of the mask model's inputs. The last input, the square of the rim, is small: on generated pairs of the tier
+/// `hard`, the median rim is 0.03, and 3 % of the rims are above 0.05.
 const MASK: [f64; MASK_INPUTS] = [5.13, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5, -500.0];
-/// Spread that is too small to be seen, as a share of the depth map's longest side.
+/// Unit of the spread in `spread_input`, as a share of the depth map's longest side. So small a spread is invisible.
 const UNSEEN_SPREAD: f64 = 0.002;
 /// Lower bound of shares before their logarithm is taken.
 const FLOOR: f64 = 0.02;
-/// Range to which ratios to the competitors' scores are clamped.
+/// Range to which the competitors' scores are clamped, as shares of the best score.
 const RATIO: [f64; 2] = [0.2, 1.5];
 
 /// Inputs of the two logistic models. The confidence of an alignment is the product of their two probabilities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConfidenceInputs {
-    /// Inputs of the pose model. It estimates the probability that the pose is right: rotation within 5 degrees of the
-    /// truth, landmarks within 5 % of the character's height.
+    /// Inputs of the model for the probability that the pose is right. A pose is right if its rotation is within 5
+    /// degrees of the truth, and its landmarks within 5 % of the character's height.
     pub pose: [f64; POSE_INPUTS],
-    /// Inputs of the mask model. It estimates the probability that the mask is right if the pose is: intersection over
-    /// union of at least 0.7 with the true tops.
+    /// Inputs of the model for the probability that the mask is right, given a right pose. A mask is right if its
+    /// intersection over union with the true tops is at least 0.7.
     pub mask: [f64; MASK_INPUTS],
 }
 
@@ -74,8 +72,8 @@ struct Areas {
     relief: f64,
     /// Area of the print's ink.
     ink: f64,
-    /// Width of the rim that a slightly lower threshold would add: the logarithm of the area's growth times the root of
-    /// the area. It is the smaller of the widths for this mask and for the mask by relief alone.
+    /// Width of the rim that a slightly lower threshold would add: `ln(area with rim / area) * sqrt(area)`. If the mask
+    /// by relief alone has a narrower rim, its width is used instead.
     rim: f64,
 }
 
@@ -94,7 +92,7 @@ fn mask_inputs(features: &PoseFeatures, areas: Areas) -> [f64; MASK_INPUTS] {
     ]
 }
 
-/// Returns 0 if all starts of the refinement lead to the same pose. The value grows logarithmically with the spread.
+/// Returns `ln(1 + spread / UNSEEN_SPREAD)`. It is 0 if all starts of the refinement end at the same pose.
 fn spread_input(spread: f64) -> f64 {
     (spread / UNSEEN_SPREAD).ln_1p()
 }
@@ -104,8 +102,8 @@ fn logistic<const N: usize>(weights: &[f64; N], inputs: &[f64; N]) -> f64 {
     1.0 / (1.0 + (-sum).exp())
 }
 
-/// Sets the confidence of each metric, and returns the model inputs of each metric. `growth` returns how much the
-/// strokes of a level grow if the level is lowered slightly, see `normalize::stroke_growth`.
+/// Sets the confidence of each metric, and returns each metric's model inputs. `growth` computes
+/// `normalize::stroke_growth` of a threshold level.
 pub(super) fn set_confidence(
     metrics: &mut [MetricOutcome],
     features: &PoseFeatures,

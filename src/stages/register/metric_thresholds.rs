@@ -1,7 +1,7 @@
 //! Chooses each metric's depth threshold in the aligned frame.
 //!
-//! Candidates are equally spaced depths below the tops. Their masks are compared with the print's ink where both print
-//! and depth map have data. See [`ThresholdMetric`] for the formulas.
+//! Candidates are equally spaced depths below the tops. Their masks are compared with the print's ink on the pixels
+//! where both print and depth map have data. See [`ThresholdMetric`] for the formulas.
 
 use super::params::{RegisterError, RegisterParams};
 use crate::domain::{Affine2, ReliefHeights, ThresholdChoice, ThresholdMetric};
@@ -13,15 +13,15 @@ use crate::stages::score::{SsimReference, SsimWindow};
 const CANDIDATES: u32 = 40;
 /// Step between the candidates whose structure score is computed first.
 const COARSE: usize = 4;
-/// Largest ratio between the areas of the masks of `ensemble` and `relief`, in either direction.
+/// `ensemble` prefers masks whose area differs from that of the `relief` mask by at most this factor.
 const CLOSE_AREA: f64 = 1.12;
-/// Largest plausible ratio of the ink's area to the tops' area. `LEAST_INKED` is the largest plausible ratio of the
-/// tops' area to the ink's area. Beyond these ratios the tops' area is clamped.
+/// Smallest plausible area of the tops: the ink's area divided by this. Smaller areas are raised to it.
 const MOST_SPREAD: f64 = 2.2;
+/// Largest plausible area of the tops: the ink's area times this. Larger areas are lowered to it.
 const LEAST_INKED: f64 = 1.15;
 
-/// Print and depth map on a canvas of half the size. The structure of strokes remains visible, and comparing masks
-/// takes a quarter of the time.
+/// Print and depth map on a canvas with sides of half the length. Strokes remain visible, and comparing masks takes a
+/// quarter of the time.
 pub(super) struct HalfCanvas {
     /// Levels of the depth map; 0 where print or depth map holds no data.
     levels: Grid<u16>,
@@ -30,7 +30,7 @@ pub(super) struct HalfCanvas {
 }
 
 impl HalfCanvas {
-    /// Warps print and depth map to the canvas at a pose, and keeps the pixels where both have data.
+    /// Warps print and depth map to the canvas, and clears the pixels where print or depth map has no data.
     pub(super) fn new(
         depth: &DepthMap,
         print: &PrintMasks,
@@ -73,9 +73,9 @@ struct Candidate {
 
 /// Chooses each metric's threshold, in the order of [`ThresholdMetric::ALL`].
 ///
-/// A mask chosen by structure or density alone includes the spread of the print's ink, and a mask chosen by geometry
-/// alone ignores the print. `ensemble` therefore takes the best structure score among thresholds whose mask has about
-/// the same area as the mask of `relief`.
+/// The mask of `nl_ssim` grows with the spread of the print's ink, and the mask of `relief` ignores the print.
+/// `ensemble` therefore takes the best structure score among the thresholds whose mask has about the area of the mask
+/// of `relief`.
 ///
 /// # Errors
 /// Returns an error if no threshold leaves strokes, or if no ink lies where the depth map has data.
@@ -95,8 +95,7 @@ pub(super) fn choose(
     let gap = |c: &Candidate| (c.area / ink * params.ink_spread - 1.0).abs();
     let density = nearest(&candidates, gap);
     let edge = relief.level_at(&depth.scale, relief.tops_end);
-    // Ink usually covers somewhat more area than the tops. If the ratio of the areas is implausible, `tops_end` must be
-    // wrong, so the area is clamped.
+    // If the tops' area is implausible for this area of ink, `tops_end` is taken to be wrong, and the area is clamped.
     let own_area = canvas
         .area(edge)
         .clamp(ink / MOST_SPREAD, ink * LEAST_INKED);
@@ -209,7 +208,7 @@ mod tests {
 
     const SIDE: usize = 128;
 
-    /// Returns bars with sloping walls, with levels of 1 to 50,001, and ink that spreads over part of the walls.
+    /// Returns a relief of bars with sloping walls, and a canvas on which ink covers the tops and part of the walls.
     fn bars() -> (DepthMap, HalfCanvas, ReliefHeights) {
         let from_axis = |x: usize| (x % 32).abs_diff(16) as f64;
         let level = |x: usize, y: usize| {

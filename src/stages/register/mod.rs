@@ -1,8 +1,9 @@
 //! Finds the pose, chooses each metric's depth threshold in the aligned frame, and scores the masks.
 //!
-//! The pose is found from soft strokes, so it needs no threshold. `pose_search` searches all rotations and a band of
-//! scales from coarse to fine. `refine` compares the best poses and refines the winner at full size. The paper's
-//! method, which chooses the thresholds first, is in `paper_method::register`.
+//! The pose is found from soft strokes, whose values fall gradually from 1 to 0, so no exact threshold is needed.
+//! `pose_search` searches all rotations and a band of scales, from coarse to fine. `refine` compares the best poses and
+//! refines the winner at full size. The paper's method, which chooses the thresholds first, is in
+//! `paper_method::register`.
 
 mod anisotropic_scale;
 mod confidence;
@@ -26,8 +27,8 @@ use metric_thresholds::HalfCanvas;
 /// Revision of this stage. It is raised whenever the same inputs and settings may give a different result than before.
 pub const REVISION: u32 = 11;
 
-/// A pair is refused as mirrored if its mirrored score exceeds its upright score by this factor. The factor is above 1
-/// because a symmetric character scores about the same both ways.
+/// A pair is refused as mirrored if its mirrored score, after the refinement, is more than this many times its upright
+/// score. The factor is above 1 because a symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.06;
 
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
@@ -36,8 +37,8 @@ const MIRROR_WINS: f64 = 1.06;
 /// All metrics share one pose.
 ///
 /// # Errors
-/// Returns an error if print or relief is empty, no pose correlates, the mirrored relief matches better, the confidence
-/// is below `min_confidence`, or a threshold leaves no strokes.
+/// Returns an error if print, relief or the mask of a metric is empty. Also returns an error if print and relief do not
+/// match: no pose correlates, the mirrored relief matches better, or the confidence is below `min_confidence`.
 ///
 /// # Examples
 /// ```
@@ -106,7 +107,7 @@ pub fn register(
     Ok(registered)
 }
 
-/// Refuses pairs that are mirrored or whose pose is not likely enough.
+/// Refuses pairs that are mirrored or whose pose is too unlikely.
 fn require_match(features: &PoseFeatures, params: &RegisterParams) -> Result<(), RegisterError> {
     let confidence = confidence::of_pose(features);
     if features.mirrored > MIRROR_WINS && params.min_confidence > 0.0 {

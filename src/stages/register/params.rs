@@ -9,13 +9,14 @@ use crate::stages::score::SsimWindow;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RegisterParams {
-    /// Largest ratio between the sizes of print and depth map that the pose search tries, in either direction, 1..=2.
+    /// Largest scale that the pose search tries, 1..=2. The smallest is `1 / scale_band`. At scale 1, the longest sides
+    /// of print and depth map have the same length.
     pub scale_band: f64,
-    /// Working size of the refinement in pixels along the longest side of the area with data, 32..=1024.
+    /// Working size of the refinement, 32..=1024: the longest side of the area with data, in pixels.
     pub working_px: u32,
     /// Smoothing of the refinement in working pixels (sigma), 0..=10.
     pub smoothing_px: f64,
-    /// Whether the pose may scale the relief differently along two perpendicular axes (paper shrinks across its grain).
+    /// Whether the pose may have different scales along two perpendicular axes, because paper shrinks across its grain.
     pub anisotropic_scale: bool,
     /// Smallest depth below the tops that is tried as a threshold, as a share of the relief.
     pub threshold_min: f64,
@@ -30,7 +31,7 @@ pub struct RegisterParams {
     pub window: SsimWindow,
     /// Number of angles over the full circle that the paper's method tries first, 4 or more.
     pub coarse_angles: u32,
-    /// Number of steps in the second search of the paper's method, 2 or more. The second search covers three coarse
+    /// Number of angular steps in the second search of the paper's method, 2 or more. This search covers three coarse
     /// steps on either side of the best angle.
     pub fine_angles: u32,
 }

@@ -1,4 +1,4 @@
-//! Coarse-to-fine search of the pose on soft strokes, which need no threshold.
+//! Coarse-to-fine search of the pose on soft strokes, without an exact threshold.
 
 use super::params::{RegisterError, RegisterParams};
 use crate::raster::Mask;
@@ -29,18 +29,19 @@ const fn keep(upright: usize, mirrored: usize) -> BeamWidth {
 }
 /// Largest working size of print and relief in pixels.
 const BASE_PX: usize = 72;
-/// Threshold and softness of the soft strokes in the search, as shares of the relief. The strokes fall from 1 at the
-/// tops to 0 at half the relief, so neither the right threshold nor an exact plane is needed.
+/// Threshold of the soft strokes in the search, as a share of the relief's depth. With `SEARCH_SOFTNESS`, the strokes
+/// fall from 1 at the tops to 0 at half the relief's depth. The search therefore tolerates a wrong threshold and a
+/// tilted plane.
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Number of poses that are refined.
 const KEEP: BeamWidth = keep(9, 3);
 /// Smallest correlation of a match. If the best correlation is smaller, the pair is refused.
 const LEAST_SCORE: f64 = 0.12;
-/// A pair is refused as mirrored only if its best mirrored score exceeds its best upright score by this factor. The
-/// factor is above 1 because a symmetric character scores about the same both ways.
+/// The search refuses a pair as mirrored only if its best mirrored score is more than this many times its best upright
+/// score. Closer cases are decided after the refinement. A symmetric character scores about the same both ways.
 const MIRROR_WINS: f64 = 1.3;
-/// The scale counts as at the bound if its logarithm is less than this distance from the end of the band.
+/// `at_bound` is set if the scale is this close to either end of the searched band, in natural logarithms.
 const BOUND: f64 = 0.02;
 
 /// Poses of the relief on one interpretation of the print.
@@ -48,9 +49,9 @@ const BOUND: f64 = 0.02;
 pub(super) struct PoseSearch {
     /// The interpretation of the print that the relief agrees with best.
     pub(super) ink: usize,
-    /// Poses as read, best first; at least one.
+    /// Upright poses, best first. There is at least one.
     pub(super) poses: Vec<PoseCandidate>,
-    /// Best pose of the relief read in the mirror.
+    /// Best pose of the mirrored relief.
     pub(super) mirrored: Option<PoseCandidate>,
     /// Whether the best pose's scale lies at the end of the band.
     pub(super) at_bound: bool,
@@ -62,14 +63,14 @@ impl PoseSearch {
     }
 }
 
-/// Searches the poses of the relief on every interpretation of the print. Returns the poses on the interpretation with
+/// Searches for poses of the relief on every interpretation of the print. Returns the poses on the interpretation with
 /// the highest score.
 ///
-/// `depths` holds depths below the tops as shares of the relief, in depth-map pixels. Poses map depth-map pixels to
-/// print pixels.
+/// `depths` holds, for each depth-map pixel, the depth below the tops as a share of the relief's depth. Poses map
+/// depth-map pixels to print pixels.
 ///
 /// # Errors
-/// Returns the error for the likeliest interpretation if no interpretation matches.
+/// Returns an error if the relief has no data. If no interpretation matches, returns the error for the likeliest one.
 pub(super) fn search(
     depths: &SoftMask,
     prints: &[PrintMasks],
@@ -88,8 +89,8 @@ pub(super) fn search(
     best.unwrap_or(Err(RegisterError::NoPose))
 }
 
-/// Searches the poses on one interpretation of the print. `depth_px` is the longest side of the relief's known box in
-/// depth-map pixels.
+/// Searches for poses on one interpretation of the print. `depth_px` is the longest side of the box around the relief's
+/// pixels with data.
 fn find_poses(
     wood: &ImagePyramid,
     depth_px: f64,

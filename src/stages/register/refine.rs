@@ -11,27 +11,29 @@ use crate::stages::pose::{
     Refiner, SoftMask,
 };
 
-/// Poses whose angles differ by at most this are the same pose. A competitor at another angle differs by more.
+/// An upright pose competes with the best pose only if their angles differ by more than this.
 const SAME_POSE_DEG: f64 = 15.0;
-/// Number of poses that are refined.
+/// Number of upright poses that are refined.
 const TRIED: usize = 3;
 /// Softness of a threshold, as a share of the relief.
 const SOFTNESS: f64 = 0.1;
-/// Share of the working size at which poses are compared. At the share `CLOSER`, the best pose finds its threshold.
+/// Poses are compared at this share of the working size.
 const COMPARED: f64 = 0.42;
+/// The threshold of the best pose is chosen at this share of the working size.
 const CLOSER: f64 = 0.67;
-/// If a competitor exceeds this share of the best score, the competitors are refined as closely as the best pose.
+/// If a competitor scores more than this share of the best score, both competitors are refined at `CLOSER` too.
 const CLOSE: f64 = 0.75;
-/// Share of the best score that a competing pose of a symmetric character can reach. In `fair_share`, the share on the
-/// whole area counts only up to this value.
+/// In `fair_share`, the ratio of the scores on all pixels counts only up to this value. A competitor can reach it if
+/// the character is symmetric.
 const SYMMETRIC: f64 = 0.9;
-/// Factor by which the pose is scaled down and up to start two further refinements, which should end at the same pose.
+/// Two further refinements start from the pose scaled down and up by this factor. Ideally, all end at the same pose.
 const OTHER_SIZE: f64 = 1.08;
-/// Maximum number of steps of a refinement, and of the last one.
+/// Maximum number of steps of a refinement while poses are compared.
 const FEW_STEPS: usize = 8;
+/// Maximum number of steps of a refinement of the best pose afterwards.
 const MOST_STEPS: usize = 15;
 
-/// The refined pose. It serves every metric, because it is found without a threshold.
+/// The refined pose, which all metrics share.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Refinement {
     /// Depth-map pixels to print-image pixels.
@@ -42,9 +44,10 @@ pub(super) struct Refinement {
     pub(super) features: PoseFeatures,
 }
 
-/// Refines the poses of the search and returns the best pose. Returns `None` if print or relief has no data.
+/// Refines the poses of the search and returns the best one. Returns `None` if print or relief has no data, or if the
+/// best pose has no inverse.
 ///
-/// `depths` holds depths below the tops as shares of the relief, in depth-map pixels.
+/// `depths` holds, for each depth-map pixel, the depth below the tops as a share of the relief's depth.
 pub(super) fn refine(
     depths: &SoftMask,
     print: &PrintMasks,
@@ -66,26 +69,25 @@ pub(super) fn refine(
     })
 }
 
-/// A refined pose with the soft threshold that fits the print best there.
+/// A refined pose, and the threshold that fits the print best at this pose.
 #[derive(Debug, Clone, Copy)]
 struct RefinedPose {
     found: PoseCandidate,
     overlap: PoseOverlap,
     cut: f64,
-    /// Index of the tried cut that came nearest.
+    /// Index of the tried threshold with the highest score.
     nearest: usize,
 }
 
 impl RefinedPose {
-    /// Returns the score that ranks poses: the correlation times the share of the tops that ink covers. That share
-    /// ignores ink without tops, which is common because strokes break off after a print was made. Tops without ink are
-    /// rare.
+    /// Returns the score that ranks poses: the correlation times the share of the tops that ink covers. The share
+    /// ignores ink without tops, which is common, because strokes break off the block after a print was made.
     fn score(&self) -> f64 {
         self.found.score * self.overlap.moving_covered
     }
 }
 
-/// The best pose and its competitors. At most one of them is right.
+/// The best pose and its competitors. At most one of these poses is right.
 #[derive(Debug, Clone, Copy)]
 struct CompetingPoses {
     best: RefinedPose,
@@ -120,8 +122,8 @@ impl CompetingPoses {
         })
     }
 
-    /// Refines the best pose at a larger size. If a competitor scores nearly as well, its pose is refined too, and a
-    /// competitor at another angle replaces the best pose if it then scores higher.
+    /// Refines the best pose at a larger size. If a competitor is close, refines both competitors too. If the
+    /// competitor at another angle then scores higher, it becomes the best pose.
     fn sharpen(&mut self, thresholds: &SoftThresholds) -> Option<()> {
         let is_close = self.shares.iter().any(|share| *share > CLOSE);
         self.best = sharpened(thresholds, &self.best.found)?;
@@ -142,7 +144,7 @@ impl CompetingPoses {
         Some(())
     }
 
-    /// Computes the score of each competitor, divided by the best pose's score, on the area common to both poses.
+    /// Computes the `fair_share` of each competitor, or 0 for a missing competitor.
     fn fair_shares(&self, thresholds: &SoftThresholds) -> [f64; 2] {
         [self.other_angle, self.mirrored]
             .map(|rival| rival.map_or(0.0, |rival| fair_share(thresholds, &rival, &self.best)))
@@ -168,14 +170,14 @@ impl CompetingPoses {
     }
 }
 
-/// Returns the score of a competitor divided by the score of the best pose, or 0 without a competitor.
+/// Returns the score of a competitor divided by the score of the best pose, or 0 if there is no competitor.
 fn share(rival: Option<RefinedPose>, best: &RefinedPose) -> f64 {
     rival.map_or(0.0, |rival| rival.score() / best.score().max(1e-6))
 }
 
-/// Returns the score of a competitor divided by the score of the best pose, both on the area that the two poses have in
-/// common. A small common area may favour the best pose by chance. The result is therefore at least the share on the
-/// whole area, limited to what symmetric characters reach.
+/// Returns the score of a competitor divided by the score of the best pose, both on the pixels that are valid for both
+/// poses. If these pixels are few, the ratio may be too low by chance. The result is therefore at least the ratio on
+/// all pixels, or `SYMMETRIC` if that is smaller.
 fn fair_share(thresholds: &SoftThresholds, rival: &RefinedPose, best: &RefinedPose) -> f64 {
     let [score, fair] =
         thresholds.compare_on_common_area([best, rival].map(|pose| (pose.nearest, &pose.found)));
@@ -207,7 +209,7 @@ impl<'a> WorkingImages<'a> {
         })
     }
 
-    /// Scales both to a share of the working size.
+    /// Scales print and relief to a share of the working size.
     fn at(&self, share: f64) -> ScaledImages<'_> {
         let px = (f64::from(self.params.working_px) * share).round() as usize;
         let sigma = self.params.smoothing_px * share.sqrt();
@@ -218,9 +220,9 @@ impl<'a> WorkingImages<'a> {
     }
 
     /// Refines a pose with the strokes of its threshold. Returns the refined pose and its spread, see
-    /// [`Self::refine_at_three_sizes`]. Border strokes (walls, frame lines, neighbouring characters) are masked at
-    /// first, because they may be cut off differently in print and relief. If they agree, they are used in the last
-    /// refinement.
+    /// [`Self::refine_at_three_sizes`]. Border strokes (walls, frame lines, neighbouring characters) are masked,
+    /// because they may be cut off differently in print and relief. If they overlap well at the pose found without
+    /// them, they are unmasked for the last refinement.
     fn refine_fully(&self, few: &ScaledImages, best: &RefinedPose) -> Option<(Affine2, f64)> {
         let strokes = few.stroke(best.cut);
         let both = [&few.ink, &strokes];
@@ -248,9 +250,9 @@ impl<'a> WorkingImages<'a> {
         Some((last.fixed_from_moving, spread))
     }
 
-    /// Refines from the pose, from a smaller pose and from a larger pose. Returns the best result and the spread: the
-    /// largest distance of the other results from the best one, as a share of the depth map's longest side. The spread
-    /// is large if strokes are few or broken, because refinement then leaves a pose near its start.
+    /// Refines a pose from three starts: the pose, a smaller one and a larger one. Returns the best result, and the
+    /// spread: its largest distance from another result, as computed by `apart`. If strokes are few or broken, a
+    /// refinement stays near its start, and the spread is large.
     fn refine_at_three_sizes(
         &self,
         refiner: &Refiner,
@@ -272,7 +274,8 @@ impl<'a> WorkingImages<'a> {
         (best, apart.fold(0.0, f64::max))
     }
 
-    /// Returns the mean distance between the depth map's corners under two poses, as a share of the map's longest side.
+    /// Returns the mean distance between the positions of the depth map's corners under two poses, as a share of the
+    /// depth map's longest side.
     fn apart(&self, one: &PoseCandidate, other: &PoseCandidate) -> f64 {
         let [width, height] = self.middle.map(|middle| 2.0 * middle);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];
@@ -302,8 +305,8 @@ impl ScaledImages<'_> {
     }
 }
 
-/// Refines a pose twice, each time with the threshold that fits best. The first loss suits distant starts, and the
-/// second loss suits close starts.
+/// Refines a pose twice, each time with the threshold that fits best: first with Huber's loss for a distant start, then
+/// with Tukey's loss for a close start.
 fn refined_twice(thresholds: &SoftThresholds, start: &PoseCandidate) -> Option<RefinedPose> {
     let strokes = thresholds.best_at(start)?.strokes;
     sharpened(thresholds, &strokes.refine(start, FEW_STEPS, Loss::Huber))

@@ -31,8 +31,8 @@ pub struct Registered {
     pub canvas_print: Mask,
     /// The depth mask of each metric on the canvas, in the order of `outcome.metrics`.
     pub canvas_depths: Vec<Mask>,
-    /// Inputs of the confidence model for each metric, in the order of `outcome.metrics`; empty under the paper's
-    /// method. `cargo bench --bench accuracy -- --fit-confidence` fits the weights of the model to such inputs.
+    /// Inputs of the confidence model for each metric, in the order of `outcome.metrics`. Empty if the paper's method
+    /// was used. `cargo bench --bench accuracy -- --fit-confidence` fits the model to such inputs.
     pub confidence_inputs: Vec<ConfidenceInputs>,
 }
 
@@ -43,7 +43,8 @@ pub(crate) fn canvas_print(normalized: &Normalized, ink: usize) -> Mask {
     warp_mask(&normalized.prints[ink].ink, &canvas_from_print, side, side)
 }
 
-/// Scores alignments on the canvas of one interpretation of the print. All metrics are scored on the same print mask.
+/// Warps the depth mask of each alignment to the canvas and scores it against `canvas_print`. `canvas_print` shows the
+/// interpretation of the print with the index `ink`.
 ///
 /// # Errors
 /// Returns an error if a threshold leaves no strokes.

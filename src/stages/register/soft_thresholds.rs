@@ -2,16 +2,16 @@
 
 use crate::stages::pose::{PoseCandidate, PyramidLevel, Refiner};
 
-/// Thresholds as depths below the tops, in shares of the relief. Several are tried because the ink of a print spreads,
-/// and strokes thinner or thicker than the ink would bias the scale.
+/// Thresholds to try: depths below the tops, as shares of the relief's depth. Several are tried, because a print's ink
+/// spread is unknown, and strokes thinner or thicker than the ink would bias the scale.
 const CUTS: [f64; 5] = [0.05, 0.11, 0.2, 0.32, 0.47];
-/// Number of thresholds that are tried around a rough one.
+/// Number of thresholds that are tried around an approximate one.
 const NEAR: usize = 3;
 
 /// Thresholds that are tried while poses are compared.
 pub(super) const FEW_CUTS: [f64; NEAR] = [0.08, 0.2, 0.4];
 
-/// Returns the thresholds around a rough one.
+/// Returns the thresholds of `CUTS` that are nearest to `cut`.
 pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
     let cut = cut.max(f64::MIN_POSITIVE);
     let far = |at: usize| (CUTS[at + NEAR / 2] / cut).ln().abs();
@@ -20,7 +20,7 @@ pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
     &CUTS[first..first + NEAR]
 }
 
-/// Strokes of each threshold, ready to be refined against the print's ink. The shallowest threshold comes first.
+/// For each threshold, a refiner of its strokes against the print's ink. The shallowest threshold comes first.
 pub(super) struct SoftThresholds<'a> {
     cuts: &'a [f64],
     refiners: Vec<Refiner<'a>>,
@@ -32,9 +32,9 @@ pub(super) struct BestThreshold<'a, 'b> {
     pub(super) strokes: &'b Refiner<'a>,
     /// The pose with its score.
     pub(super) found: PoseCandidate,
-    /// The threshold that fits best, interpolated between the tried thresholds so that the result is continuous.
+    /// The threshold that fits best, interpolated between the tried ones so that it changes continuously with the pose.
     pub(super) cut: f64,
-    /// Index of the tried threshold that came nearest.
+    /// Index of the tried threshold with the highest score.
     pub(super) nearest: usize,
 }
 
@@ -66,7 +66,7 @@ impl<'a> SoftThresholds<'a> {
         })
     }
 
-    /// Scores two poses on the area that both have in common. Each pose is given with the index of its threshold.
+    /// Scores two poses, each given with the index of its threshold, on the pixels that are valid for both poses.
     pub(super) fn compare_on_common_area(
         &self,
         [one, two]: [(usize, &PoseCandidate); 2],
@@ -81,8 +81,7 @@ fn highest(values: &[f64]) -> usize {
     (0..values.len()).max_by(order).unwrap_or(0)
 }
 
-/// Returns the position of the maximum of the parabola through the highest value and its neighbours, in steps from the
-/// first value.
+/// Returns the index of the highest value, made fractional by a parabola through that value and its neighbours.
 fn summit(values: &[f64]) -> f64 {
     let best = highest(values);
     let last = values.len().saturating_sub(1);
