@@ -4,7 +4,7 @@
 //! filling the vector. Huge pages are therefore requested, and freed pages are reused for the next vector.
 //!
 //! `Vec` with `mimalloc` 0.1.52 as the global allocator is as fast (45.9 against 46.2 ms for a pair of 60,000
-//! vertices), but needs more memory at its peak (71 against 43 MB).
+//! vertices), but has a higher memory peak (71 against 43 MB).
 
 mod page_cache;
 
@@ -87,7 +87,7 @@ impl PageVec<u8> {
     /// Reads a source to its end. `about` is the expected number of bytes.
     ///
     /// # Errors
-    /// Returns an error if the source fails.
+    /// Returns an error if reading from the source fails.
     pub fn read(mut from: impl Read, about: usize) -> io::Result<Self> {
         let mut bytes = Self::with_capacity(about);
         match &mut bytes.0 {
@@ -110,7 +110,7 @@ impl PageVec<u8> {
 /// Reads until a buffer is full or the source ends, and returns the number of bytes read.
 ///
 /// # Errors
-/// Returns an error if the source fails.
+/// Returns an error if reading from the source fails.
 pub fn fill(source: &mut impl Read, bytes: &mut [u8]) -> io::Result<usize> {
     let mut full = 0;
     while full < bytes.len() {

@@ -16,14 +16,15 @@ macro_rules! dispatch {
 }
 pub(crate) use dispatch;
 
-/// Runs a closure for [`dispatch`]. The bound makes the closure a plain `FnOnce`. Other closures are called through a
-/// function that is not inlined and therefore not compiled for the wide instructions.
+/// Runs a closure for [`dispatch`]. Because of the bound, the compiler treats the closure as a plain `FnOnce`. Other
+/// closures are called through a function that is not inlined, and so is not compiled for the wide instructions.
 #[inline(always)]
 pub(crate) fn run_widest<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
 }
 
-/// Returns the smaller number. The plain comparison is one instruction for many lanes; `f32::min` also handles NaN.
+/// Returns the smaller number. The comparison is one SIMD instruction, but `f32::min` needs more, because it handles
+/// NaN.
 #[inline(always)]
 pub(crate) fn min_f32(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }

@@ -9,7 +9,7 @@ use memmap2::MmapMut;
 const MAX_CACHED_BYTES: usize = 128 << 20;
 /// A vector uses cached pages of at most this many times its size.
 const MAX_OVERSIZE: usize = 4;
-/// Bytes that cached and new pages may have together before taking new pages frees cached ones.
+/// If a new allocation and the cached pages together exceed this many bytes, cached pages are freed.
 const MIN_CACHED_BYTES: usize = 32 << 20;
 
 /// Pages that are free.
@@ -26,8 +26,9 @@ static PAGE_CACHE: Mutex<PageCache> = Mutex::new(PageCache {
 });
 
 impl PageCache {
-    /// Returns the smallest cached pages that fit, or `None`. If none fit, frees cached pages to offset the new pages
-    /// that the caller takes instead. A scan larger than all before thus replaces earlier scans in memory.
+    /// Removes and returns the smallest cached pages that fit. If none fit, returns `None` and frees cached pages, up
+    /// to about the size that the caller then allocates. Memory thus stays about constant from one large scan to the
+    /// next.
     fn take(&mut self, bytes: usize) -> Option<MmapMut> {
         let sizes = bytes..=bytes.saturating_mul(MAX_OVERSIZE);
         let fits = |pages: &MmapMut| sizes.contains(&pages.len());
@@ -60,8 +61,7 @@ impl PageCache {
     }
 }
 
-/// Returns the cache of the process. A poisoned lock is harmless, because no operation can leave the cache
-/// inconsistent.
+/// Returns the cache of the process. A poisoned lock is harmless, because a panic cannot leave the cache inconsistent.
 fn cache() -> MutexGuard<'static, PageCache> {
     PAGE_CACHE.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -70,7 +70,7 @@ fn cache() -> MutexGuard<'static, PageCache> {
 pub(super) struct PageBuffer(Option<MmapMut>);
 
 impl PageBuffer {
-    /// Returns pages of at least `bytes` bytes, or `None` if the system has none.
+    /// Returns pages of at least `bytes` bytes, or `None` if the system cannot provide any.
     pub(super) fn allocate(bytes: usize) -> Option<Self> {
         let found = cache().take(bytes);
         if found.is_some() {
@@ -110,8 +110,8 @@ impl DerefMut for PageBuffer {
 
 /// Makes the process keep freed memory between pairs. Cached pages take at most an eighth of `limit` bytes.
 ///
-/// The allocator of glibc returns free memory at the end of the heap to the system once this memory exceeds twice the
-/// largest block that was ever mapped and freed. Allocating and freeing one large block raises that threshold. The
+/// The allocator of glibc returns free memory at the end of the heap to the system if it exceeds a threshold: twice the
+/// largest block that was ever mapped and freed. Allocating and freeing one large block raises the threshold. The
 /// memory of this block is never touched.
 pub fn keep_memory(limit: Option<u64>) {
     const WHOLE: usize = 31 << 20;

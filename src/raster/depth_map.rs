@@ -4,7 +4,7 @@ use super::warp_mask::warp_level_sets;
 use super::{Grid, Mask};
 use crate::domain::{Affine2, DepthScale};
 
-/// A 16-bit depth map. Level 0 means no data; levels 1..=65535 are linear in height.
+/// A 16-bit depth map. Level 0 means no data. Levels 1..=65535 are linear in height.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DepthMap {
     /// Level of each pixel.
@@ -34,7 +34,7 @@ impl DepthMap {
     }
 
     /// Returns the stroke masks at several thresholds, warped into another frame of `width` x `height` pixels.
-    /// `to_from` maps depth-map px to px of the other frame.
+    /// `to_from` maps depth-map pixels to pixels of that frame.
     pub fn warped_stroke_masks(
         &self,
         to_from: &Affine2,

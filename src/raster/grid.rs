@@ -1,6 +1,6 @@
 //! A two-dimensional grid of values, and the pixel convention of the whole project.
 //!
-//! x runs to the right, y down, and **(0, 0) is the centre of the top-left pixel**: a pixel covers x - 0.5..x + 0.5.
+//! x runs to the right and y down. **(0, 0) is the centre of the top-left pixel**: pixel x covers x - 0.5..x + 0.5.
 
 /// Values in row-major order, top row first.
 ///
@@ -19,10 +19,10 @@ pub struct Grid<T> {
     data: Vec<T>,
 }
 
-/// Side, in values, of the square tiles that are transposed one after another. Their rows stay in the cache.
+/// Side of the square tiles that are transposed one after another. The rows of one tile stay in the CPU cache.
 const TILE: usize = 8;
 
-/// Transposes the tile at the start of `from`, with rows of `from_width` values, to `to`, with rows of `to_width`.
+/// Transposes the first tile of `from` into `to`. Their rows have `from_width` and `to_width` values.
 fn transpose_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usize) {
     let rows: [&[T]; TILE] = std::array::from_fn(|y| &from[y * from_width..][..TILE]);
     for x in 0..TILE {
@@ -36,7 +36,7 @@ fn transpose_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width
 impl Grid<u16> {
     /// Counts the values that are at least `level`.
     pub fn count_at_least(&self, level: u16) -> usize {
-        // Few enough for a 16-bit sum, which has more SIMD lanes.
+        // Runs are short enough for a 16-bit sum, which has more SIMD lanes.
         let runs = self.data.chunks(usize::from(u16::MAX));
         let set = |run: &[u16]| run.iter().map(|l| u16::from(*l >= level)).sum::<u16>();
         runs.map(|run| usize::from(set(run))).sum()
@@ -57,7 +57,7 @@ impl<T: Copy> Grid<T> {
         Self::of(width, height, vec![fill; width * height])
     }
 
-    /// Creates a grid from values in row-major order. Returns `None` if their number does not match the size.
+    /// Creates a grid from values in row-major order. Returns `None` unless there are `width * height` values.
     pub fn from_vec(width: usize, height: usize, data: Vec<T>) -> Option<Self> {
         (data.len() == width * height).then_some(Self::of(width, height, data))
     }
@@ -77,7 +77,7 @@ impl<T: Copy> Grid<T> {
         Grid::of(self.width, self.height, data)
     }
 
-    /// Combines each value with the value at the same place of another grid of the same size.
+    /// Combines the values of two grids of the same size, position by position.
     pub fn zip_map<U: Copy, V: Copy>(
         &self,
         other: &Grid<U>,

@@ -46,7 +46,7 @@ impl PixelBox {
     }
 }
 
-/// Pixels that are counted in an 8-bit sum, which has more SIMD lanes.
+/// Largest number of pixels that can be counted in an 8-bit sum, which has more SIMD lanes.
 const CHUNK_PIXELS: usize = 255;
 
 /// Counts the set pixels of up to [`CHUNK_PIXELS`].
@@ -57,9 +57,10 @@ fn count_set(pixels: impl Iterator<Item = bool>) -> usize {
 /// Overlap of two masks of the same size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MaskOverlap {
-    /// Intersection over union, 0..=1; 0 if both masks are empty.
+    /// Intersection over union, 0..=1. It is 0 if both masks are empty.
     pub iou: f64,
-    /// Dice coefficient, 0..=1: twice the intersection divided by the sum of both areas, or 0 if both masks are empty.
+    /// Dice coefficient, 0..=1: twice the intersection divided by the sum of both areas. It is 0 if both masks are
+    /// empty.
     pub dice: f64,
 }
 

@@ -2,7 +2,7 @@
 
 use super::Grid;
 
-/// Side of the finest cells, pixels; it doubles at each level.
+/// Side of the finest cells, in pixels. It doubles at each level.
 const FINEST_CELL_PX: usize = 4;
 
 /// Cells of several sizes with the lowest and highest value in each.
@@ -47,8 +47,8 @@ impl<T: Copy + Ord> MinMaxPyramid<T> {
         Self { levels, size }
     }
 
-    /// Returns bounds of the values in a box, given as first and last column and row. The bounds may be too wide
-    /// because cells extend beyond the box. They include `outside` if the box leaves the grid.
+    /// Returns bounds of the values in a box of pixels `[[x_first, x_last], [y_first, y_last]]`. The bounds may be too
+    /// wide, because cells extend beyond the box. They include `outside` if the box extends beyond the grid.
     pub(super) fn range_in_box(&self, [columns, rows]: [[i64; 2]; 2], outside: T) -> [T; 2] {
         let sides = self.size.map(|side| side as i64);
         let is_cut = [columns, rows]
@@ -63,7 +63,7 @@ impl<T: Copy + Ord> MinMaxPyramid<T> {
         if x0 > x1 || y0 > y1 {
             return found.unwrap_or([outside; 2]);
         }
-        // Selects cells so large that two or three cover the longest side.
+        // Selects the level at which two or three cells cover the longest side.
         let longest = (x1 - x0).max(y1 - y0) as usize / (2 * FINEST_CELL_PX);
         let level = ((usize::BITS - longest.leading_zeros()) as usize).min(self.levels.len() - 1);
         let side = (FINEST_CELL_PX << level) as i64;

@@ -5,8 +5,8 @@ use crate::simd::dispatch;
 
 /// Resamples values to a grid of `to` columns and rows. Source pixel x lies at `scale * x + shift` of the result.
 ///
-/// Each output pixel is the mean of the source over the larger of two squares: its own or that of a source pixel.
-/// Outside the source, values count as zero.
+/// Each output pixel is the mean of the source over a square: the pixel's own square if it is larger than a source
+/// pixel, else a square of one source pixel. Outside the source, values count as zero.
 ///
 /// ```
 /// use mocban::raster::{Grid, resample};
@@ -20,7 +20,7 @@ pub fn resample(values: &Grid<f32>, scale: f64, shift: [f64; 2], to: [usize; 2])
     if scale <= 1.0 {
         return resample_transposed(values, scale, shift, to).transposed();
     }
-    // What is enlarged is transposed while it is small.
+    // Transposes the grid while it is small.
     let from = [values.width(), values.height()];
     let [columns, rows] = BoxFilter::both(from, to, scale, shift);
     rows.mix_rows(&columns.mix_rows(&values.transposed()).transposed())
@@ -35,13 +35,13 @@ pub fn resample_transposed(
 ) -> Grid<f32> {
     let from = [values.width(), values.height()];
     let [columns, rows] = BoxFilter::both(from, to, scale, shift);
-    // Whole rows are summed in SIMD lanes, so columns are transposed into rows first.
+    // Rows are summed by SIMD, so the columns are transposed into rows before they are summed.
     columns.mix_rows(&rows.mix_rows(values).transposed())
 }
 
-/// The filter along one axis: source pixels and weights of each output pixel.
+/// The filter along one axis: the source pixels of each output pixel, and their weights.
 struct BoxFilter {
-    /// First source pixel of each output pixel, and the end of its weights.
+    /// First source pixel of each output pixel, and the end of its range in `weights`.
     each: Vec<(usize, usize)>,
     weights: Vec<f32>,
 }

@@ -1,11 +1,11 @@
-//! Supersampling: samples an output pixel at several positions in the source by bilinear interpolation.
+//! Supersampling: computes an output pixel from several positions in the source by bilinear interpolation.
 
 use std::ops::Range;
 
 use super::Grid;
 use crate::domain::Affine2;
 
-/// Largest number of samples along a side of an output pixel. Maps that would need more begin to alias.
+/// Largest number of samples along a side of an output pixel. If a map needs more, its result is aliased.
 const MAX_SAMPLES_PER_SIDE: usize = 8;
 /// Largest spacing of the samples, in source pixels. Each sample interpolates the four source pixels around it, so no
 /// pixel between two samples is missed.
@@ -37,7 +37,7 @@ impl Supersampler {
         }
     }
 
-    /// Calls `visit` with each sample position of an output pixel, in source pixels and row by row.
+    /// Calls `visit` with the source position of each sample of an output pixel, row by row.
     #[inline(always)]
     fn for_each_sample(&self, x: usize, y: usize, mut visit: impl FnMut([f64; 2])) {
         let offsets = &self.offsets[..self.per_side];
@@ -48,8 +48,8 @@ impl Supersampler {
         }
     }
 
-    /// Returns, for each level, how many samples of an output pixel are covered. A sample counts by the bilinear weight
-    /// of its source pixels of at least that level.
+    /// Returns the coverage of an output pixel for each level in `least`, up to `sample_count`. Each sample adds the
+    /// bilinear weights of those of its four source pixels whose value is at least the level.
     #[inline(always)]
     pub(super) fn coverage<T: Copy + Default + Into<f64>, const LEVELS: usize>(
         &self,
@@ -77,7 +77,8 @@ impl Supersampler {
         self.per_side * self.per_side
     }
 
-    /// Returns the mean of `value` over the samples that have one, or `None` unless more than half of them do.
+    /// Returns the mean of `value` over the samples of an output pixel, ignoring samples without a value. Returns
+    /// `None` if half of the samples or more have no value.
     pub(super) fn mean(
         &self,
         x: usize,
@@ -95,7 +96,7 @@ impl Supersampler {
         (2 * found > count || (count == 1 && found == 1)).then(|| sum / found as f64)
     }
 
-    /// Returns the mean level. All pixels around the samples must be within the grid and have data.
+    /// Returns the mean level of an output pixel. All source pixels around its samples must exist and have data.
     pub(super) fn mean_inside(&self, x: usize, y: usize, levels: &Grid<u16>) -> f64 {
         let mut sum = 0.0;
         self.for_each_sample(x, y, |place| {
@@ -105,8 +106,8 @@ impl Supersampler {
         sum / self.sample_count() as f64
     }
 
-    /// Returns bounds of the source pixels that the samples of a box of output pixels may read, as first and last
-    /// column and row.
+    /// Returns the source pixels that the samples of a box of output pixels may read: the first and last column, and
+    /// the first and last row. They may lie outside the grid.
     pub(super) fn source_bounds(
         &self,
         columns: &Range<usize>,
@@ -132,7 +133,7 @@ fn floor(value: f64) -> i64 {
     cut - i64::from(cut as f64 > value)
 }
 
-/// Returns the values of the four pixels around a position, and the position's offset from the first of them, 0..1.
+/// Returns the values of the four pixels around a position, and the position's offset from the upper left one, 0..1.
 /// Pixels outside the grid have the default value.
 #[inline(always)]
 pub(super) fn bilinear_cell<T: Copy + Default>(
@@ -174,7 +175,7 @@ pub(super) fn interpolate([a, b, c, d]: [f64; 4], [fx, fy]: [f64; 2]) -> f64 {
     above + (below - above) * fy
 }
 
-/// Returns the bilinear weights of a pixel, its right neighbour, and the two below.
+/// Returns the bilinear weights of a pixel, its right neighbour, and the two pixels below them.
 #[inline(always)]
 pub(super) fn bilinear_weights([fx, fy]: [f64; 2]) -> [f64; 4] {
     let (left, above) = (1.0 - fx, 1.0 - fy);

@@ -8,10 +8,10 @@ use crate::domain::Affine2;
 /// Side in pixels of the square blocks of output pixels that are tested together for missing data.
 const BLOCK_PX: usize = 4;
 
-/// Warps the levels of a depth map into a frame of `width` x `height` pixels. A pixel gets level 0 (no data) if less
-/// than half of its square has data. If the map has no inverse, all pixels get level 0.
+/// Warps the levels of a depth map into a frame of `width` x `height` pixels. A pixel with data in less than about half
+/// of its square gets level 0 (no data). If the map has no inverse, all pixels get level 0.
 ///
-/// `to_from` maps depth-map px to output px. The levels keep their scale.
+/// `to_from` maps depth-map pixels to output pixels. The levels keep their scale.
 pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usize) -> Grid<u16> {
     let Some(from_to) = to_from.inverse() else {
         return Grid::new(width, height, 0);
@@ -43,7 +43,8 @@ pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usi
     out
 }
 
-/// Interpolates the level between the neighbours with data. Returns `None` if their weights sum to less than half.
+/// Interpolates the level between the neighbours with data. Returns `None` if their bilinear weights sum to less than
+/// half.
 fn level_at(levels: &Grid<u16>, place: [f64; 2]) -> Option<f64> {
     let (near, within) = bilinear_cell(levels, place);
     if near == [0; 4] {

@@ -1,8 +1,8 @@
 //! Warps masks into another frame. Each output pixel is sampled through the inverse map, so there are no holes.
 //!
-//! Where the map shrinks, a pixel averages several samples spread over its square. Pixels outside the source are not
-//! set. A block of output pixels is filled as a whole if all its source values lie on the same side of a level. Other
-//! blocks are divided.
+//! If the map shrinks, an output pixel is the mean of several samples spread over its square. Pixels outside the source
+//! are not set. A block of output pixels is filled at once if its source values are all below a level, or all at least
+//! that level. Otherwise the block is divided.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use super::{Grid, Mask};
 use crate::domain::Affine2;
 use crate::simd::dispatch;
 
-/// Smallest coverage of a pixel that is set: half, less a margin for rounding errors of the sum.
+/// Smallest coverage of a pixel that is set: half, less a margin for the rounding errors of the sum.
 const HALF_COVERED: f64 = 0.5 - 1e-9;
 /// Sides of the largest and the smallest blocks, output pixels.
 const MAX_BLOCK_PX: usize = 32;
@@ -20,9 +20,9 @@ const MIN_BLOCK_PX: usize = 2;
 /// Levels per SIMD vector.
 const LANES: usize = 4;
 
-/// Warps a mask into a frame of `width` x `height` pixels: a pixel is set if at least half of its square is covered.
+/// Warps a mask into a frame of `width` x `height` pixels. A pixel is set if at least half of its square is covered.
 ///
-/// `to_from` maps source px to output px. If the map has no inverse, no pixel is set.
+/// `to_from` maps source pixels to output pixels. If the map has no inverse, no pixel is set.
 ///
 /// ```
 /// use mocban::domain::Affine2;
@@ -38,7 +38,7 @@ pub fn warp_mask(mask: &Mask, to_from: &Affine2, width: usize, height: usize) ->
     warped.swap_remove(0)
 }
 
-/// Warps one mask per level, as [`warp_mask`] does. The mask of a level holds the values of at least that level.
+/// Warps one mask per level, as [`warp_mask`] does. The mask of a level is set where the value is at least that level.
 pub(super) fn warp_level_sets<T: Copy + Ord + Default + Into<f64>>(
     values: &Grid<T>,
     levels: &[T],
@@ -104,7 +104,7 @@ impl<T: Copy + Ord + Default + Into<f64>> MaskWarp<'_, T> {
         let reach = self.sampler.source_bounds(&columns, &rows);
         let [low, high] = self.value_ranges.range_in_box(reach, T::default());
         let levels = &self.levels[levels_left.clone()];
-        // For levels up to the lowest source value the block is covered, for levels above the highest it is empty.
+        // The block is covered for levels up to the lowest source value, and empty for levels above the highest one.
         let all = levels_left.start + levels.partition_point(|level| *level <= low);
         let some = levels_left.start + levels.partition_point(|level| *level <= high);
         for mask in &mut self.masks[levels_left.start..all] {

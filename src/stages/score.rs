@@ -10,8 +10,7 @@ use crate::raster::{Mask, PixelBox};
 /// Computes all scores of a depth mask against a print mask of the same size. SSIM and its structure part are in
 /// -1..=1, and the other scores are in 0..=1.
 ///
-/// Masks count as images of zeros and ones with a data range of 1. SSIM follows Wang et al. 2004,
-/// doi:10.1109/TIP.2003.819861.
+/// Masks are treated as images of zeros and ones. SSIM follows Wang et al. 2004, doi:10.1109/TIP.2003.819861.
 ///
 /// ```
 /// use mocban::raster::Mask;

@@ -8,9 +8,9 @@ use super::DecodeError;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageLimits {
-    /// Largest file in bytes; 256 MiB is generous for one character.
+    /// Largest file in bytes. 256 MiB is generous for one character.
     pub max_bytes: u64,
-    /// Largest width times height, pixels; 100 million decode to 600 MB.
+    /// Largest width times height in pixels. 100 million pixels are decoded to 600 MB.
     pub max_pixels: u64,
 }
 
@@ -24,7 +24,7 @@ impl ImageLimits {
     /// Checks the size of a file.
     ///
     /// # Errors
-    /// Returns an error if it is empty or over `max_bytes`.
+    /// Returns an error if the file is empty or larger than `max_bytes`.
     pub(super) fn check_bytes(&self, bytes: &[u8]) -> Result<(), DecodeError> {
         let size = bytes.len() as u64;
         if size == 0 {
@@ -42,7 +42,7 @@ impl ImageLimits {
     /// Checks the size of an image in pixels.
     ///
     /// # Errors
-    /// Returns an error if a side is zero or the area is over `max_pixels`.
+    /// Returns an error if a side is zero, or if the image has more than `max_pixels` pixels.
     pub(super) fn check_size(&self, width: u32, height: u32) -> Result<(), DecodeError> {
         if width == 0 || height == 0 {
             return Err(DecodeError::NoPixels { width, height });
@@ -57,8 +57,8 @@ impl ImageLimits {
         Ok(())
     }
 
-    /// Returns the memory in bytes that a decoder may allocate: 64 MiB for its tables, and 16 bytes per pixel, which is
-    /// the most that a decoder returns.
+    /// Returns the memory in bytes that a decoder may allocate: 64 MiB for its tables, and 16 bytes for each pixel, the
+    /// size of the largest pixels that it returns.
     pub(super) fn max_decoder_bytes(&self) -> u64 {
         self.max_pixels.saturating_mul(16).saturating_add(64 << 20)
     }

@@ -1,4 +1,4 @@
-//! Decoder of print images: PNG, JPEG and TIFF, recognised by content, not by name.
+//! Decoder of print images: PNG, JPEG and TIFF, recognised by their content.
 
 mod error;
 mod limits;
@@ -66,7 +66,7 @@ fn format_of(kind: FileKind) -> Result<ImageFormat, DecodeError> {
     }
 }
 
-/// Checks the size at its fixed offset in a PNG, because the decoder would read pixels before it reports the size.
+/// Checks the size at its fixed offset in a PNG, because the decoder reads pixels before it reports the size.
 fn check_png_header(bytes: &[u8], limits: &ImageLimits) -> Result<(), DecodeError> {
     let side = |at: usize| {
         let field = bytes.get(at..).and_then(|rest| rest.first_chunk());
@@ -115,8 +115,8 @@ fn decoder_error(kind: FileKind, error: &ImageError) -> DecodeError {
     broken(kind, &reason)
 }
 
-/// Returns whether the segments of a JPEG lead to its end marker. The check is needed because the decoder fills a
-/// truncated image with grey. A search for the marker would not do, because a thumbnail has an end marker of its own.
+/// Returns whether the segments of a JPEG lead to its end marker. If not, the image is truncated, and the decoder would
+/// fill it with grey. Searching for the marker is not enough, because a thumbnail has its own end marker.
 fn has_end_marker(bytes: &[u8]) -> bool {
     let mut at = 2;
     while let Some(marker) = bytes.get(at..at + 2) {

@@ -4,14 +4,14 @@ use image::DynamicImage;
 
 use crate::raster::Grid;
 
-/// Red, green and blue, 0..=65535 each. Values of 8-bit files are multiplied by 257, so that white is always 65535.
+/// A print in 16-bit red, green and blue. Values of 8-bit files are multiplied by 257, so that white is always 65535.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PrintImage {
     /// Colour of each pixel; a transparent pixel is white.
     pub rgb: Grid<[u16; 3]>,
 }
 
-/// Composites a colour on white: `(c a + 65535 (65535 - a)) / 65535`, rounded.
+/// Composites a colour with the alpha `a` on white: `(c a + 65535 (65535 - a)) / 65535`, rounded.
 pub(super) fn on_white([c @ .., a]: [u16; 4]) -> [u16; 3] {
     const FULL: u64 = u16::MAX as u64;
     let a = u64::from(a);
@@ -27,7 +27,7 @@ pub(super) fn colours_on_white(image: &DynamicImage) -> Grid<[u16; 3]> {
     let colours = match image {
         DynamicImage::ImageLuma8(i) => i.pixels().map(|p| [widen(p[0]); 3]).collect(),
         DynamicImage::ImageRgb8(i) => i.pixels().map(|p| p.0.map(widen)).collect(),
-        // Other kinds (16 bits, transparency, floats in 0..=1) are rare enough to be copied before compositing.
+        // The cost of a copy does not matter for other kinds (16 bits, transparency, floats in 0..=1), which are rare.
         other => other.to_rgba16().pixels().map(|p| on_white(p.0)).collect(),
     };
     // An image of w x h pixels has as many colours.

@@ -31,7 +31,7 @@ struct TiffLayout {
 }
 
 impl TiffLayout {
-    /// Reads the tags; returns `None` if the image is not one of the uncommon kinds.
+    /// Reads the tags. Returns `None` if the image is not one of the uncommon kinds.
     fn read(reader: &mut Decoder<Cursor<&[u8]>>) -> TiffResult<Option<Self>> {
         let (width, height) = reader.dimensions()?;
         let tag = reader.find_tag_unsigned(Tag::PhotometricInterpretation)?;
@@ -76,13 +76,13 @@ impl TiffLayout {
     }
 }
 
-/// Decodes an image of an uncommon kind; returns `None` for other kinds.
+/// Decodes an image of an uncommon kind. Returns `None` for other kinds.
 ///
-/// Floats are scaled from 0..=1 if all are in that range, and from 0..=255 or 0..=65535 if all are whole numbers in one
-/// of these ranges.
+/// If all floats are in 0..=1, white is 1. Otherwise all must be whole numbers in 0..=255 or in 0..=65535, and white is
+/// the end of the smaller range that holds them.
 ///
 /// # Errors
-/// Returns an error if the image is too large or truncated, or its numbers are ambiguous.
+/// Returns an error if the image is too large or truncated, or if the type or the range of its samples is unsupported.
 pub(super) fn decode_uncommon(
     bytes: &[u8],
     limits: &ImageLimits,
@@ -114,8 +114,8 @@ fn tiff_error(error: &TiffError) -> DecodeError {
     }
 }
 
-/// Returns the file with its samples declared as grey with black as 0. The decoder returns these samples unchanged, but
-/// rejects palettes, and white as 0 with extra samples.
+/// Returns the file with a changed tag: grey, with black as 0. The decoder then returns the samples as stored. With
+/// their own tags, it rejects palettes, and images with white as 0 and extra samples.
 fn declared_black_is_zero(bytes: &[u8]) -> Option<Vec<u8>> {
     const PHOTOMETRIC: u64 = 262;
     const SHORT: u64 = 3;

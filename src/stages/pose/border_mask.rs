@@ -1,7 +1,7 @@
-//! Strokes that are connected to the border of the known area, and the area without them.
+//! Masks strokes that are connected to the border of the area with data.
 //!
-//! Walls, frame lines and neighbouring characters run into the border and continue beyond it. Whether such strokes
-//! overlap at a pose says nothing about the character, yet it could decide between two poses of a symmetric character.
+//! Walls, frame lines and neighbouring characters run into the border and continue beyond it. Their overlap at a pose
+//! is no evidence about the character, but could decide between two poses of a symmetric character.
 
 use super::PyramidLevel;
 use super::overlap::PlacedLevel;
@@ -14,15 +14,15 @@ use crate::stages::components::ConnectedComponents;
 const MIN_STROKE: f32 = 0.3;
 /// A stroke within this many working pixels of an unknown pixel counts as connected to the border.
 const BORDER_PX: i64 = 2;
-/// Margin around border strokes in working pixels. It is masked too, because the edges of strokes are soft.
+/// Border strokes are masked with a margin of this many working pixels, because the edges of strokes are soft.
 const SOFT_EDGE_PX: usize = 3;
-/// If more than this share of the stroke pixels is connected to the border, the character itself is taken to be
-/// connected. In that case a band along the border is masked instead. Its width is the share `BORDER_BAND` of the
-/// longest side.
+/// If more than this share of the stroke pixels is connected to the border, the character is assumed to be connected
+/// too. Only a band along the border is masked then.
 const MAX_BORDER_SHARE: f64 = 0.5;
+/// Width of the band that is masked along the border, as a share of the level's longest side.
 const BORDER_BAND: f64 = 0.1;
-/// The border strokes of two levels agree if their overlap (sum of minima over sum of maxima) is at least this share of
-/// the overlap of all other pixels, which show the character.
+/// The border strokes of two levels agree if their overlap is at least this share of the overlap of all other pixels.
+/// An overlap is the sum of the smaller amounts divided by the sum of the larger amounts.
 const MIN_RELATIVE_OVERLAP: f64 = 0.75;
 
 /// Returns the valid mask of a level: 1 where it is known and free of border strokes, 0 elsewhere.
@@ -30,8 +30,8 @@ pub(super) fn valid_mask(level: &PyramidLevel) -> Grid<f32> {
     StrokeMasks::new(level).valid_mask(level)
 }
 
-/// Two levels at a pose, with the border strokes of each. A stroke pixel that lies on an inner stroke of the other
-/// level is not a border stroke, because the character is connected to its surroundings there.
+/// Two levels at a pose, with the border strokes of each. If a stroke pixel lies on an inner stroke of the other level,
+/// it belongs to the character and is not a border stroke.
 pub(crate) struct BorderStrokes<'a> {
     levels: [&'a PyramidLevel; 2],
     strokes: [StrokeMasks; 2],
@@ -66,8 +66,8 @@ impl<'a> BorderStrokes<'a> {
         })
     }
 
-    /// Returns whether the border strokes overlap at least `MIN_RELATIVE_OVERLAP` times as well as the character. If
-    /// so, both levels show the same state of the block, and the border strokes are evidence for the pose too.
+    /// Returns whether the border strokes overlap nearly as well as the character, see `MIN_RELATIVE_OVERLAP`. If so,
+    /// both images show the same border strokes, which are then evidence for the pose too.
     pub(crate) fn agree(&self) -> bool {
         let [fixed, moving] = self.levels;
         let placed = PlacedLevel {
@@ -89,7 +89,7 @@ impl<'a> BorderStrokes<'a> {
     }
 }
 
-/// The strokes of a level, and those connected to the border.
+/// All strokes of a level, and the strokes that are connected to its border.
 struct StrokeMasks {
     all: Mask,
     border: Mask,
@@ -111,7 +111,7 @@ impl StrokeMasks {
         inner.to_weights()
     }
 
-    /// Removes from the border strokes the pixels that lie on `others`, the inner strokes of the other level.
+    /// Removes the border pixels that lie on `others`, the inner strokes of the other level.
     fn unmark_matched(&mut self, others: &Grid<f32>, other_from_this: &Affine2) {
         let size = [others.width(), others.height()];
         self.border = Mask::from_fn(self.border.width(), self.border.height(), |x, y| {
@@ -120,7 +120,7 @@ impl StrokeMasks {
         });
     }
 
-    /// Returns 1 where the level is known and free of border strokes, 0 elsewhere.
+    /// Returns 1 where the level is known and outside its border strokes or border band, 0 elsewhere.
     fn valid_mask(&self, level: &PyramidLevel) -> Grid<f32> {
         if self.border.count() as f64 > MAX_BORDER_SHARE * self.all.count() as f64 {
             without_border_band(&level.weight)
@@ -175,7 +175,7 @@ pub(super) mod tests {
     /// Connects the cross to the left bar.
     const BRIDGE: [usize; 4] = [4, 30, 20, 35];
 
-    /// Draws bars. Each bar is given in pixels as left, top, right (exclusive) and bottom (exclusive).
+    /// Draws bars, each given as `[left, top, right, bottom]` in pixels. Right and bottom are exclusive.
     pub(crate) fn level(bars: &[[usize; 4]]) -> PyramidLevel {
         let on = |x, y| {
             let mut bars = bars.iter();

@@ -2,12 +2,12 @@
 
 use crate::domain::Affine2;
 
-/// Two refined poses are duplicates if they differ by less than `NEAR_DEG` degrees in rotation and by less than
-/// `NEAR_RATIO` in the natural logarithm of the scale.
+/// Refined poses are duplicates only if their rotations differ by less than this, in degrees.
 const NEAR_DEG: f64 = 3.0;
+/// Refined poses are duplicates only if the natural logarithms of their scales differ by less than this.
 const NEAR_RATIO: f64 = 0.04;
 
-/// Number of candidates to keep for each reading: upright or mirrored. A reading with zero candidates is not searched.
+/// Numbers of upright and of mirrored candidates to keep. If a number is 0, no such poses are searched.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct BeamWidth {
     /// Without reflection.
@@ -17,7 +17,7 @@ pub(crate) struct BeamWidth {
 }
 
 impl BeamWidth {
-    /// Returns the number to keep for one reading.
+    /// Returns the number of mirrored or of upright candidates to keep.
     pub(super) const fn of_reading(self, mirrored: bool) -> usize {
         if mirrored {
             self.mirrored
@@ -30,7 +30,7 @@ impl BeamWidth {
 /// The range of poses to search.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SearchRange {
-    /// Largest ratio between the two sizes, up or down.
+    /// Largest scale between the two levels. The smallest is its inverse.
     pub(crate) max_scale: f64,
     /// Candidates to keep after the search.
     pub(crate) beam_width: BeamWidth,
@@ -39,9 +39,10 @@ pub(crate) struct SearchRange {
 /// A candidate pose with its score.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PoseCandidate {
-    /// Maps moving image pixels to fixed image pixels. Contains a reflection if `mirrored` is set.
+    /// Maps moving image pixels to fixed image pixels. The map contains a reflection if `mirrored` is set.
     pub(crate) fixed_from_moving: Affine2,
-    /// Correlation of the two images where both are known, normalised by the energy of each image; at most 1.
+    /// Correlation of the high-pass filtered images where both are known, normalised by the energies of both images. It
+    /// is at most about 1.
     pub(crate) score: f64,
     /// Whether the moving image is mirrored.
     pub(crate) mirrored: bool,
@@ -55,7 +56,7 @@ impl PoseCandidate {
         turn.min(360.0 - turn)
     }
 
-    /// Returns whether two poses have the same reading and nearly equal rotation and scale. Ignores the shift.
+    /// Returns whether two poses are both upright or both mirrored, and have nearly equal rotations and scales.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         let scale = |pose: &Self| pose.fixed_from_moving.scale();
         let ratio = (scale(self) / scale(other)).ln().abs();
@@ -63,8 +64,8 @@ impl PoseCandidate {
     }
 }
 
-/// Returns the best poses of each reading (upright or mirrored), best first and without duplicates. `rank` returns the
-/// score of a pose and whether the pose is mirrored.
+/// Returns the best upright and the best mirrored poses, best first and without duplicates. `rank` returns the score of
+/// a pose and whether the pose is mirrored.
 pub(super) fn prune<T: Copy>(
     mut found: Vec<T>,
     beam_width: BeamWidth,

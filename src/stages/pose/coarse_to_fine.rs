@@ -4,11 +4,10 @@ use super::candidate::{BeamWidth, PoseCandidate, SearchRange, prune};
 use super::search::{SEARCH_PX, search};
 use super::{ImagePyramid, Loss, Refiner};
 
-/// Gaussian smoothing of the coarsest level, working pixels.
+/// Sigma of the Gaussian that smooths the coarsest level, in working pixels.
 const SEARCH_SIGMA: f64 = 0.5;
 
-/// Parameters of a refinement pass: size and smoothing of the levels in working pixels, maximum number of Gauss-Newton
-/// steps, and number of candidates to keep.
+/// Parameters of a refinement pass. Size and smoothing of the levels are in working pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RefinementPass {
     pub(crate) size_px: usize,

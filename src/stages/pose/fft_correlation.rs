@@ -9,7 +9,8 @@ use rustfft::{Fft, FftPlanner};
 pub(super) const FFT_SIZE: usize = 32;
 
 /// Returns the shift with the highest correlation, and that correlation. The shift is in pixels, at most `max_shift_px`
-/// along each axis. `part` selects the real part (0) or the imaginary part (1) of the surface.
+/// along each axis. If `part` is 0, the real part of the surface is used: the correlation of the loaded square. If
+/// `part` is 1, the imaginary part is used: the correlation of that square rotated by 180 degrees.
 ///
 /// The surface is stored reversed: the value for shift s is at index -s, modulo the size.
 pub(super) fn best_shift(surface: &[Complex32], part: usize, max_shift_px: i64) -> ([f64; 2], f32) {
@@ -41,7 +42,7 @@ pub(super) struct FftCorrelator {
 
 impl FftCorrelator {
     pub(super) fn new() -> Self {
-        // The last digits of an FFT differ between processors. This can only change the order of nearly equal peaks.
+        // An FFT is rounded differently on different processors. This can only change the order of nearly equal peaks.
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(FFT_SIZE);
         let inverse = planner.plan_fft_inverse(FFT_SIZE);
@@ -58,8 +59,8 @@ impl FftCorrelator {
         }
     }
 
-    /// Returns the complex conjugate of the spectrum of a real square. Its scale makes the inverse transform of a
-    /// product with another spectrum the correlation of the two squares.
+    /// Returns the complex conjugate of a real square's spectrum, divided by the number of pixels. The inverse
+    /// transform of its product with another spectrum is the correlation of the two squares.
     pub(super) fn target_spectrum(&mut self, values: &[f32]) -> Vec<Complex32> {
         for (out, value) in self.spectrum.iter_mut().zip(values) {
             *out = Complex32::new(*value, 0.0);
@@ -69,8 +70,8 @@ impl FftCorrelator {
         self.spectrum.iter().map(|v| v.conj() * scale).collect()
     }
 
-    /// Loads a real square. The square rotated by 180 degrees is loaded as the imaginary part, so that one transform
-    /// computes the spectra of both.
+    /// Loads a real square. Its copy rotated by 180 degrees is loaded as the imaginary part, so that one transform
+    /// computes the spectra of both squares.
     pub(super) fn load(&mut self, values: &[f32]) {
         for y in 0..FFT_SIZE {
             let back = (FFT_SIZE - y) % FFT_SIZE * FFT_SIZE;
@@ -95,11 +96,11 @@ impl FftCorrelator {
         std::mem::swap(&mut self.spectrum, &mut self.product);
     }
 
-    /// Returns the correlation of the loaded square with a target. Mirrors the square along x if `mirrored` is set, by
-    /// reading its spectrum backwards along x.
+    /// Returns the correlation of the loaded square with a target. If `mirrored` is set, the square is mirrored along
+    /// x, by reading its spectrum backwards along x.
     ///
-    /// The middle of the square is at `FFT_SIZE / 2`, so mirroring about column 0 of the transform leaves the middle in
-    /// place. The result is stored reversed: the value for shift s is at index -s, modulo the size.
+    /// Mirroring leaves the middle of the square, column `FFT_SIZE / 2`, in place. The result is stored reversed: the
+    /// value for shift s is at index -s, modulo the size.
     pub(super) fn correlate(&mut self, target: &[Complex32], mirrored: bool) -> &[Complex32] {
         for x in 0..FFT_SIZE {
             let from = if mirrored {

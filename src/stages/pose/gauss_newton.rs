@@ -69,7 +69,7 @@ impl Workspace {
         self.count += usize::from(moving[3] >= 0.5);
     }
 
-    /// Truncates the buffer to the appended correspondences. `explained` is the sum of products of their values.
+    /// Truncates the buffer to the appended correspondences. `explained` is the sum of `fixed value * moving value`.
     pub(super) fn finish(&mut self, explained: f64) {
         self.explained = explained;
         self.blocks.truncate(self.count.div_ceil(LANES));
@@ -118,7 +118,7 @@ impl Workspace {
 
 /// Normal equations at one pose.
 pub(super) struct NormalEquations {
-    /// The last is the sum of the losses.
+    /// The last element is the sum of the losses.
     sums: [f64; SUM_COUNT + 1],
     pub(super) cost: f64,
     /// Sum of products of corresponding values.
@@ -168,8 +168,8 @@ impl NormalEquations {
     }
 }
 
-/// Sums over blocks: in single precision within a run of blocks, and in double precision over the runs. `add` adds one
-/// block, given with its index, to the sums.
+/// Sums over blocks. Each run of blocks is summed in single precision, and the sums of the runs are added in double
+/// precision. `add` adds a block to the sums. Its last argument is the index of the block.
 #[inline(always)]
 fn sum_blocks<const N: usize>(
     blocks: &[Correspondences],
@@ -180,7 +180,7 @@ fn sum_blocks<const N: usize>(
         for (run, blocks) in blocks.chunks(BLOCKS_PER_SUM).enumerate() {
             let mut sums = [[0.0_f32; LANES]; N];
             for (k, block) in blocks.iter().enumerate() {
-                // Works on a copy, because reads of memory that may alias the sums would prevent vectorization.
+                // Copies the block, because a block that may alias the sums would prevent vectorization.
                 let block = *block;
                 add(&mut sums, &block, run * BLOCKS_PER_SUM + k);
             }
@@ -249,7 +249,7 @@ fn accumulate(
 }
 
 impl Loss {
-    /// Computes the weight and the loss of each residual. The refinement accepts a step if the mean loss decreases.
+    /// Computes the weight and the loss of each residual.
     #[inline(always)]
     fn weights_and_costs(
         self,

@@ -1,10 +1,11 @@
 //! Pose of a relief on a print: exhaustive search over rotation, scale and shift, then sub-pixel refinement.
 //!
-//! Soft strokes of the relief are compared with soft ink where both are known. Both are high-pass filtered. Bounding
-//! boxes and centroids are not used, because neighbouring characters, specks and broken strokes change them.
+//! Soft strokes of the relief are compared with soft ink of the print, on the pixels where both have data. Both images
+//! are high-pass filtered first. Bounding boxes and centroids of strokes are not used, because neighbouring characters,
+//! specks and broken strokes change them.
 //!
-//! There are two frames: image pixels (of the depth map or the print) and working pixels of a pyramid level. The print
-//! is the fixed image, and the relief is the moving image.
+//! There are two frames: image pixels (of the depth map or the print) and working pixels (of a pyramid level). The
+//! print is the fixed image, and the relief is the moving image.
 
 mod border_mask;
 mod candidate;

@@ -1,11 +1,11 @@
-//! Pixels that are valid in two levels at a pose, and the share of each level's amount that the other level covers.
+//! Overlap of two levels at a pose, computed on the pixels that are valid in both.
 
 use super::PyramidLevel;
 use super::pyramid::BilinearCell;
 use crate::domain::Affine2;
 use crate::raster::Grid;
 
-/// A moving level at a pose, with its valid mask. `moving_from_fixed` maps working pixels.
+/// A moving level at a pose, with its valid mask. `moving_from_fixed` maps between working pixels.
 pub(super) struct PlacedLevel<'a> {
     pub(super) moving: &'a PyramidLevel,
     pub(super) valid: &'a Grid<f32>,
@@ -13,7 +13,7 @@ pub(super) struct PlacedLevel<'a> {
 }
 
 impl PlacedLevel<'_> {
-    /// Returns where a pixel of the fixed level lies in the moving level, or `None` if the moving level is not valid
+    /// Returns the position of a fixed level's pixel in the moving level, or `None` if the moving level is not valid
     /// there.
     pub(super) fn cell(&self, x: usize, y: usize) -> Option<BilinearCell> {
         let there = self.moving_from_fixed.apply([x as f64, y as f64]);
@@ -35,17 +35,18 @@ impl PlacedLevel<'_> {
     }
 }
 
-/// How much of each level's amount is covered by the other, 0..=1.
+/// How much of each level's strokes the other level covers, 0..=1.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct PoseOverlap {
-    /// Share of the moving level's amount that the fixed level covers: the share of the stroke tops that printed.
+    /// Share of the stroke tops (the amount of the moving level) that the ink covers.
     pub(crate) moving_covered: f64,
-    /// Share of the fixed level's amount that the moving level covers: the share of the ink with stroke tops under it.
+    /// Share of the ink (the amount of the fixed level) that lies on stroke tops.
     pub(crate) fixed_covered: f64,
 }
 
 impl PoseOverlap {
-    /// Computes both shares over the pixels valid in both levels. A share is 0 if its level's amounts are all 0 there.
+    /// Computes both shares over the pixels that are valid in both levels. If a level has no strokes there, its share
+    /// is 0.
     pub(super) fn new(
         fixed: &PyramidLevel,
         fixed_valid: &Grid<f32>,

@@ -1,14 +1,14 @@
-//! Image pyramid of a soft mask: levels at working size, smoothed and high-pass filtered.
+//! Image pyramid of a soft mask: levels of several working sizes, smoothed and high-pass filtered.
 
 use crate::domain::Affine2;
 use crate::raster::{Grid, Mask, resample, resample_transposed};
 use crate::simd::dispatch;
 use crate::stages::blur::{gaussian_blur, gaussian_blur_transposed};
 
-/// An image as an amount of 0..=1 for each pixel, and a mask of the pixels where the amount is known.
+/// An amount for each pixel of an image, and a mask of the pixels where the amount is known.
 #[derive(Debug, Clone)]
 pub(crate) struct SoftMask {
-    /// Ink of a print, or nearness to the stroke tops of a relief.
+    /// Ink of a print or strokes of a relief, 0..=1, or depth below the stroke tops, as a share of the relief's depth.
     pub(crate) amount: Grid<f32>,
     /// Where the image has data.
     pub(crate) known: Mask,
@@ -17,7 +17,7 @@ pub(crate) struct SoftMask {
 /// A soft mask resampled to the largest working size. All levels are computed from it.
 #[derive(Debug, Clone)]
 pub(crate) struct ImagePyramid {
-    /// Amount times `known`.
+    /// Amount times `known`, resampled.
     present: Grid<f32>,
     known: Grid<f32>,
     from_image: Affine2,
@@ -25,9 +25,10 @@ pub(crate) struct ImagePyramid {
     size: f64,
 }
 
-/// One level of the pyramid. All grids have the same size and are zero where nothing is known.
+/// One level of the pyramid. All grids have the same size, and are 0 where the image has no data.
 #[derive(Debug, Clone)]
 pub(crate) struct PyramidLevel {
+    /// `amount` minus its low-pass part.
     pub(super) value: Grid<f32>,
     /// Smoothed amount, 0..=1.
     pub(super) amount: Grid<f32>,
@@ -36,11 +37,11 @@ pub(crate) struct PyramidLevel {
     pub(super) work_from_image: Affine2,
 }
 
-/// Sigma of the low-pass filter, as a share of the level's size. `value` is `amount` minus its low-pass part.
+/// Sigma of the low-pass filter, as a share of the level's longest side.
 const LOW_PASS_SHARE: f64 = 0.14;
-/// Largest size at which the low-pass filter runs, in pixels along the longest side. Larger levels are reduced first.
+/// Longest side of the grids on which the low-pass filter runs, in pixels. Larger levels are shrunk first.
 const LOW_PASS_PX: usize = 48;
-/// A working pixel is known if at least this share of it is.
+/// A working pixel is known if at least this share of its area is known.
 const MIN_KNOWN: f32 = 0.5;
 
 impl ImagePyramid {
@@ -85,8 +86,8 @@ impl ImagePyramid {
         ))
     }
 
-    /// Computes the level with `size` working pixels along the longest side. The level is smoothed by a Gaussian with a
-    /// sigma of `sigma` working pixels.
+    /// Computes the level with `size` working pixels along the longest side. The level is smoothed by a Gaussian whose
+    /// sigma is `sigma` working pixels.
     pub(crate) fn level(&self, size: usize, sigma: f64) -> PyramidLevel {
         self.level_builder(size, sigma).level(&self.present)
     }
@@ -119,8 +120,9 @@ pub(crate) struct LevelBuilder<'a> {
     scale: f64,
     shift: [f64; 2],
     sides: [usize; 2],
-    /// Known share of each working pixel, and its low-pass part.
+    /// Known share of each working pixel.
     weight: Grid<f32>,
+    /// Low-pass part of `weight`.
     low_pass_weight: Grid<f32>,
 }
 
@@ -172,7 +174,7 @@ fn at_least_epsilon(weight: f32) -> f32 {
     if weight > 1e-6 { weight } else { 1e-6 }
 }
 
-/// Returns the low-pass part of a grid that belongs to a level of `size` pixels along the longest side.
+/// Returns the low-pass part of a grid. `size` is the longest side of the grid's level, in pixels.
 fn low_pass(values: &Grid<f32>, size: usize) -> Grid<f32> {
     if size <= LOW_PASS_PX {
         return gaussian_blur(values, LOW_PASS_SHARE * size as f64);
@@ -190,7 +192,8 @@ fn middle(side: usize) -> f64 {
     (side - 1) as f64 / 2.0
 }
 
-/// Returns the size of a grid that holds a scaled box, and the shift that centres the box in the grid, both in pixels.
+/// Returns the size of a grid that holds a scaled box, and the shift that centres the box in the grid. Both are in
+/// pixels.
 fn fit_grid(sides: [usize; 2], middle: [f64; 2], scale: f64) -> ([usize; 2], [f64; 2]) {
     let half = sides.map(|side| (side as f64 * scale / 2.0).ceil() + 1.0);
     let shift = [0, 1].map(|k| half[k] - scale * middle[k]);
@@ -227,7 +230,7 @@ impl PyramidLevel {
 /// A position between four pixels, for bilinear interpolation in all grids of the same size.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BilinearCell {
-    /// Index of the pixel above and left, and the offset from it, 0..1.
+    /// Index of the upper left pixel, and the offset from this pixel along x and y, 0..1.
     pub(super) from: usize,
     pub(super) fraction: [f32; 2],
     width: usize,

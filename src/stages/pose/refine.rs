@@ -135,8 +135,8 @@ impl<'a> Refiner<'a> {
         placed.map_or_else(PoseOverlap::default, overlap)
     }
 
-    /// Scores `pose` of this moving level and `rival` of the moving level of `other`, on the pixels that are valid for
-    /// both poses. Returns zeros if a pose has no inverse.
+    /// Scores two poses on the pixels that are valid for both: `pose` with this moving level, and `rival` with the
+    /// moving level of `other`. Returns zeros if either pose has no inverse.
     pub(crate) fn tiebreak_scores(
         &self,
         pose: &PoseCandidate,
@@ -164,8 +164,8 @@ impl<'a> Refiner<'a> {
         self.valid_masks[0].get_or_init(|| valid_mask(self.fixed))
     }
 
-    /// Returns the map from fixed working pixels, relative to the centre of the fixed level, to moving working pixels.
-    /// `fixed_from_moving` maps image pixels.
+    /// Inverts the map `fixed_from_moving` between image pixels, and converts it to working pixels. The fixed working
+    /// pixels are relative to the centre of the fixed level. Returns `None` if the map has no inverse.
     fn moving_from_fixed(&self, fixed_from_moving: &Affine2) -> Option<Affine2> {
         let image = fixed_from_moving.inverse()?;
         let from_work = self.fixed.work_from_image.inverse()?;
@@ -174,7 +174,7 @@ impl<'a> Refiner<'a> {
         Some(into.after(&from_middle))
     }
 
-    /// Returns the map between images, the inverse of `moving_from_fixed`.
+    /// Returns the inverse of `moving_from_fixed`, a map between image pixels.
     fn fixed_from_moving(&self, from_fixed: &Affine2) -> Option<Affine2> {
         let to_image = self.moving.work_from_image.inverse()?;
         let to_middle = Affine2::scale_shift(1.0, self.centre.map(|c| -c));
@@ -201,8 +201,8 @@ impl<'a> Refiner<'a> {
         workspace.finish(product);
     }
 
-    /// Returns the sum of the products of the fixed values and the results of `moving_value`. The arguments of the
-    /// closure are the position in the moving level, the position in the fixed level, and the fixed value.
+    /// Sums `fixed value * moving_value(...)` over the sampled pixels. The arguments of `moving_value` are the position
+    /// in the moving level, the position in the fixed level, and the fixed value.
     #[inline(always)]
     fn product(
         &self,
@@ -258,7 +258,7 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// Interpolates linearly. It uses a loop, because only inlined code is vectorised.
+/// Interpolates linearly. A loop is used because only inlined code is vectorised.
 #[inline(always)]
 fn lerp(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
     let mut mixed = a;
@@ -270,11 +270,11 @@ fn lerp(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
 
 /// The sampled pixels of a fixed level.
 struct FixedSamples {
-    /// Positions of the sampled pixels, relative to the level's centre. The samples are the known pixels on one colour
-    /// of a chessboard, because neighbouring pixels of a smooth level are nearly equal.
+    /// Positions of the sampled pixels, relative to the level's centre. Every second known pixel is sampled, as on one
+    /// colour of a chessboard, because neighbouring pixels of a smooth level are nearly equal.
     places: Vec<[f32; 2]>,
     values: Vec<f32>,
-    /// Sampled share of the known pixels.
+    /// Share of the known pixels that is sampled.
     known_share: f64,
     /// Sum of squared values of the whole level.
     energy: f64,

@@ -11,16 +11,17 @@ use crate::simd::{dispatch, floor_f32, index_from_f32};
 /// Lanes of one SIMD vector.
 const LANES: usize = 8;
 /// Size of the searched levels in working pixels. At the largest scale of the default scale band, only the corners of a
-/// level leave the square of the FFT.
+/// rotated level lie outside the square of the FFT.
 pub(super) const SEARCH_PX: usize = 20;
 /// Largest shift between the centres, as a share of the level size.
 const MAX_SHIFT: f64 = 0.35;
 /// Number of rotations per 90 degrees. Rotations that differ by a multiple of 90 degrees share one warp.
 const ANGLES_PER_QUARTER: usize = 9;
-/// Ratio between neighbouring scales. One step moves the border of a character by about one pixel.
+/// Ratio between neighbouring scales. One step moves the border of a character by about 1.5 working pixels.
 const SCALE_STEP: f64 = 1.15;
-/// Two peaks are duplicates if their rotations (in degrees) and scales (as a ratio) both differ by less than this.
+/// Peaks are duplicates only if their rotations differ by less than this, in degrees.
 const DUPLICATE_ANGLE_DEG: f64 = 12.0;
+/// Peaks are duplicates only if the ratio of their scales is below this.
 const DUPLICATE_SCALE: f64 = 1.12;
 
 /// One peak of the correlation. The rotation is in radians, and the shift is in working pixels.
@@ -33,7 +34,7 @@ struct Peak {
     mirrored: bool,
 }
 
-/// Returns the best distinct poses of both readings, best first.
+/// Returns the best distinct poses, upright and mirrored, best first.
 pub(super) fn search(
     fixed: &PyramidLevel,
     moving: &PyramidLevel,
@@ -92,8 +93,7 @@ impl Peak {
             && ratio < DUPLICATE_SCALE
     }
 
-    /// Converts the peak to a pose between images. The pose maps the moving image to its level, applies the peak's
-    /// rotation, scale, reflection and shift about the centres, and maps the fixed level to its image.
+    /// Converts the peak to a pose, which maps image pixels instead of working pixels.
     fn candidate(&self, fixed: &PyramidLevel, moving: &PyramidLevel) -> PoseCandidate {
         let [cx, cy] = moving.centre();
         let [fx, fy] = fixed.centre();

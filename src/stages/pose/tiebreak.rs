@@ -1,13 +1,13 @@
 //! Tie-break between two poses on the pixels that are valid for both.
 //!
-//! Pixels that are valid for only one of the poses do not count, because the other pose has no value there to compare.
+//! Pixels that are valid for only one of the poses are ignored, because the other pose has no value there to compare.
 
 use super::PyramidLevel;
 use super::overlap::PlacedLevel;
 use crate::raster::Grid;
 
-/// Scores two poses on the pixels that are valid in all levels. A score, 0..=1, is the correlation times the share of
-/// the moving level's amount that the fixed level covers.
+/// Scores two poses on the pixels that are valid for both. A score, 0..=1, is the correlation (0 if negative) times the
+/// share of the moving level's amount that the fixed level covers.
 pub(super) fn tiebreak_scores(
     fixed: &PyramidLevel,
     fixed_valid: &Grid<f32>,
@@ -31,12 +31,13 @@ pub(super) fn tiebreak_scores(
 #[derive(Debug, Clone, Copy, Default)]
 struct TiebreakSums {
     n: f64,
-    /// Sums of values, squares and products, fixed first.
+    /// Sums of the values, of their squares and of their products. The fixed level comes first.
     values: [f64; 2],
     squares: [f64; 2],
     products: f64,
-    /// Sum of the moving amount, and of what the fixed one covers of it.
+    /// Sum of the moving level's amount.
     amount: f64,
+    /// Part of `amount` that the fixed level covers.
     met: f64,
 }
 

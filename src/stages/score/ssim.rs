@@ -15,8 +15,8 @@ const C2: f64 = 0.03 * 0.03;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SsimWindow {
-    /// Gaussian with a sigma of 1.5 px, truncated at 3.5 sigma (11 weights), and population covariance. Used by the
-    /// paper of 2004, and by scikit-image with `gaussian_weights=True, use_sample_covariance=False`.
+    /// Gaussian with a sigma of 1.5 px, truncated at 3.5 sigma (11 weights), and population covariance. Used by Wang et
+    /// al. 2004, and by scikit-image with `gaussian_weights=True, use_sample_covariance=False`.
     Gaussian,
     /// Uniform 7 x 7 px and sample covariance, the default of scikit-image.
     Uniform7,
@@ -46,7 +46,7 @@ impl SsimWindow {
     }
 }
 
-/// Means over the SSIM map without a border of half a window.
+/// Means over all windows that lie within the masks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SsimScores {
     /// Mean structural similarity, -1..=1.
@@ -140,11 +140,11 @@ impl SsimReference {
     }
 }
 
-/// Independent sums, so that additions overlap.
+/// Number of independent sums, which are computed in parallel.
 const LANES: usize = 4;
 
-/// Sums over windows. Mask values are 0 or 1, so `E[x^2] = E[x]`: the means of both masks and their intersection
-/// suffice.
+/// Sums over windows. The windowed means of the masks and of their intersection suffice, because `E[x^2] = E[x]` for
+/// values of 0 and 1.
 #[derive(Default)]
 struct SsimSums {
     ssim: [f64; LANES],
@@ -152,7 +152,7 @@ struct SsimSums {
 }
 
 impl SsimSums {
-    /// Adds a row of windows, given the windowed means of one mask, of the other mask, and of their intersection.
+    /// Adds a row of windows, given the windowed means of both masks and of their intersection.
     #[inline(always)]
     fn add_row<const LUMINANCE: bool>(
         &mut self,
@@ -191,7 +191,7 @@ impl SsimSums {
         }
     }
 
-    /// Returns the means over `count` windows. Of these, `equal` windows score 1 and were not added.
+    /// Returns the means over `count` windows. The sums lack `equal` of these windows, which score 1.
     fn mean(&self, equal: usize, count: usize) -> SsimScores {
         let mean = |sums: &[f64]| (sums.iter().sum::<f64>() + equal as f64) / count.max(1) as f64;
         SsimScores {
@@ -201,15 +201,15 @@ impl SsimSums {
     }
 }
 
-/// First columns and first rows of windows in the mask.
+/// First columns and first rows of windows.
 type Windows = [Range<usize>; 2];
 
 /// The weights of a window along one axis.
 #[derive(Debug, Clone)]
 struct WindowWeights {
     weights: Vec<f64>,
-    /// Weighted mean of each possible row of pixels as wide as the window. The bits of the index are the pixels, with
-    /// the last pixel as the lowest bit.
+    /// Weighted mean of each possible row of pixels as wide as the window. The bits of the index are the pixels. The
+    /// last pixel is the lowest bit.
     mean_of_bits: Vec<f64>,
 }
 
@@ -226,7 +226,7 @@ impl WindowWeights {
         }
     }
 
-    /// Returns how many windows fewer than pixels there are along an axis.
+    /// Returns the number of pixels minus the number of windows along an axis.
     fn rim(&self) -> usize {
         self.weights.len() - 1
     }
@@ -243,7 +243,7 @@ impl WindowWeights {
     }
 
     /// Calls `visit` for each row of windows, with the index of the row and the weighted means of each mask. The masks
-    /// have the same size. Only the pixel rows of one window are buffered, so the buffers stay in the cache.
+    /// have the same size. Buffers hold only the pixel rows of one window, and therefore stay in the CPU cache.
     #[inline(always)]
     fn for_each_row<const MASKS: usize>(
         &self,
@@ -285,8 +285,8 @@ impl WindowWeights {
         }
     }
 
-    /// Computes weighted means down the columns, from row `y` on. `across` stores row `y` at `y` modulo the number of
-    /// weights.
+    /// Computes the weighted means down the columns of the windows that start at row `y`. `across` is a ring buffer: it
+    /// holds row `y` at `y` modulo the number of weights.
     #[inline(always)]
     fn down(&self, across: &[f64], y: usize, means: &mut [f64]) {
         match *self.weights.as_slice() {
@@ -363,8 +363,9 @@ mod tests {
         assert_eq!(means.nl_ssim(&b), got);
     }
 
-    // Computed on the masks above as float64 by scikit-image 0.26 `structural_similarity(a, b, data_range=1.0, ...)`.
-    // The structure factor is computed with `scipy.ndimage.gaussian_filter(sigma=1.5, truncate=3.5)` on the same crop.
+    // Computed on the reference masks as float64 by scikit-image 0.26,
+    // `structural_similarity(a, b, data_range=1.0, ...)`. The structure factor is computed with
+    // `scipy.ndimage.gaussian_filter(sigma=1.5, truncate=3.5)` on the same windows.
     const GAUSSIAN: f64 = 0.508_712_369_326_821_2;
     const UNIFORM: f64 = 0.583_304_742_506_446_5;
     const STRUCTURE: f64 = 0.517_618_603_199_105_7;
