@@ -23,8 +23,7 @@ pub(crate) fn run_widest<R>(work: impl FnOnce() -> R) -> R {
     pulp::Arch::new().dispatch(work)
 }
 
-/// Returns the smaller number. The comparison is one SIMD instruction, but `f32::min` needs more, because it handles
-/// NaN.
+/// Returns the smaller number by one SIMD comparison. `f32::min` takes more instructions, because it handles NaN.
 #[inline(always)]
 pub(crate) fn min_f32(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }

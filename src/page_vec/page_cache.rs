@@ -27,8 +27,7 @@ static PAGE_CACHE: Mutex<PageCache> = Mutex::new(PageCache {
 
 impl PageCache {
     /// Removes and returns the smallest cached pages that fit. If none fit, returns `None` and frees cached pages, up
-    /// to about the size that the caller then allocates. Memory thus stays about constant from one large scan to the
-    /// next.
+    /// to about the size that the caller then allocates. Memory use therefore hardly grows.
     fn take(&mut self, bytes: usize) -> Option<MmapMut> {
         let sizes = bytes..=bytes.saturating_mul(MAX_OVERSIZE);
         let fits = |pages: &MmapMut| sizes.contains(&pages.len());

@@ -59,8 +59,7 @@ fn count_set(pixels: impl Iterator<Item = bool>) -> usize {
 pub struct MaskOverlap {
     /// Intersection over union, 0..=1. It is 0 if both masks are empty.
     pub iou: f64,
-    /// Dice coefficient, 0..=1: twice the intersection divided by the sum of both areas. It is 0 if both masks are
-    /// empty.
+    /// Dice coefficient, 0..=1: twice the intersection over the sum of both areas. It is 0 if both masks are empty.
     pub dice: f64,
 }
 

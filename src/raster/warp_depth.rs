@@ -43,8 +43,7 @@ pub fn warp_depth(depth: &DepthMap, to_from: &Affine2, width: usize, height: usi
     out
 }
 
-/// Interpolates the level between the neighbours with data. Returns `None` if their bilinear weights sum to less than
-/// half.
+/// Interpolates the level between the neighbours with data, or returns `None` if their weights sum to less than 0.5.
 fn level_at(levels: &Grid<u16>, place: [f64; 2]) -> Option<f64> {
     let (near, within) = bilinear_cell(levels, place);
     if near == [0; 4] {

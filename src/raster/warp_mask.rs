@@ -1,8 +1,9 @@
-//! Warps masks into another frame. Each output pixel is sampled through the inverse map, so there are no holes.
+//! Warps masks, and level sets of depth maps, into another frame. Each output pixel is sampled through the inverse map,
+//! so there are no holes.
 //!
-//! If the map shrinks, an output pixel is the mean of several samples spread over its square. Pixels outside the source
-//! are not set. A block of output pixels is filled at once if its source values are all below a level, or all at least
-//! that level. Otherwise the block is divided.
+//! If the map shrinks, an output pixel is the mean of several samples. Pixels outside the source are not set. A block
+//! of output pixels is filled at once if its source values are all below a level, or all at least that level. Otherwise
+//! the block is divided.
 
 use std::ops::Range;
 

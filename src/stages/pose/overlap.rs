@@ -13,8 +13,7 @@ pub(super) struct PlacedLevel<'a> {
 }
 
 impl PlacedLevel<'_> {
-    /// Returns the position of a fixed level's pixel in the moving level, or `None` if the moving level is not valid
-    /// there.
+    /// Returns where a pixel of the fixed level lies in the moving level, or `None` if that place is not valid.
     pub(super) fn cell(&self, x: usize, y: usize) -> Option<BilinearCell> {
         let there = self.moving_from_fixed.apply([x as f64, y as f64]);
         let size = [self.valid.width(), self.valid.height()];
@@ -45,8 +44,7 @@ pub(crate) struct PoseOverlap {
 }
 
 impl PoseOverlap {
-    /// Computes both shares over the pixels that are valid in both levels. If a level has no strokes there, its share
-    /// is 0.
+    /// Computes both shares over the pixels that are valid in both levels. The share of a level without strokes is 0.
     pub(super) fn new(
         fixed: &PyramidLevel,
         fixed_valid: &Grid<f32>,

@@ -192,8 +192,7 @@ fn middle(side: usize) -> f64 {
     (side - 1) as f64 / 2.0
 }
 
-/// Returns the size of a grid that holds a scaled box, and the shift that centres the box in the grid. Both are in
-/// pixels.
+/// Returns the size of a grid that holds a scaled box, and the shift in pixels that centres the box in the grid.
 fn fit_grid(sides: [usize; 2], middle: [f64; 2], scale: f64) -> ([usize; 2], [f64; 2]) {
     let half = sides.map(|side| (side as f64 * scale / 2.0).ceil() + 1.0);
     let shift = [0, 1].map(|k| half[k] - scale * middle[k]);

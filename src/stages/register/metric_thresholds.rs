@@ -20,8 +20,8 @@ const MOST_SPREAD: f64 = 2.2;
 /// Largest plausible area of the tops: the ink's area times this. Larger areas are lowered to it.
 const LEAST_INKED: f64 = 1.15;
 
-/// Print and depth map on a canvas with sides of half the length. Strokes remain visible, and comparing masks takes a
-/// quarter of the time.
+/// Print and depth map on a canvas of half the size. This loses little, and masks are compared in a quarter of the
+/// time.
 pub(super) struct HalfCanvas {
     /// Levels of the depth map; 0 where print or depth map holds no data.
     levels: Grid<u16>,
@@ -73,9 +73,8 @@ struct Candidate {
 
 /// Chooses each metric's threshold, in the order of [`ThresholdMetric::ALL`].
 ///
-/// The mask of `nl_ssim` grows with the spread of the print's ink, and the mask of `relief` ignores the print.
-/// `ensemble` therefore takes the best structure score among the thresholds whose mask has about the area of the mask
-/// of `relief`.
+/// `nl_ssim` includes the spread of the print's ink, and `relief` ignores the print. `ensemble` therefore takes the
+/// best structure score among the thresholds whose mask has about the area of the `relief` mask.
 ///
 /// # Errors
 /// Returns an error if no threshold leaves strokes, or if no ink lies where the depth map has data.

@@ -2,8 +2,7 @@
 //!
 //! The pose is found from soft strokes, whose values fall gradually from 1 to 0, so no exact threshold is needed.
 //! `pose_search` searches all rotations and a band of scales, from coarse to fine. `refine` compares the best poses and
-//! refines the winner at full size. The paper's method, which chooses the thresholds first, is in
-//! `paper_method::register`.
+//! refines the winner at full size. The paper's method, which starts with the thresholds, is `paper_method::register`.
 
 mod anisotropic_scale;
 mod confidence;
@@ -33,8 +32,8 @@ const MIRROR_WINS: f64 = 1.06;
 
 /// Aligns a depth map with a print, chooses one threshold for each metric and scores the masks on the canvas.
 ///
-/// `depth` and `normalized` are the results of the earlier stages. Poses map depth-map pixels to print-image pixels.
-/// All metrics share one pose.
+/// `depth` and `normalized` are the results of earlier stages. The pose maps depth-map pixels to print-image pixels.
+/// All metrics share it.
 ///
 /// # Errors
 /// Returns an error if print, relief or the mask of a metric is empty. Also returns an error if print and relief do not

@@ -29,9 +29,8 @@ const fn keep(upright: usize, mirrored: usize) -> BeamWidth {
 }
 /// Largest working size of print and relief in pixels.
 const BASE_PX: usize = 72;
-/// Threshold of the soft strokes in the search, as a share of the relief's depth. With `SEARCH_SOFTNESS`, the strokes
-/// fall from 1 at the tops to 0 at half the relief's depth. The search therefore tolerates a wrong threshold and a
-/// tilted plane.
+/// Threshold of the soft strokes in the search, as a share of the relief's depth. With `SEARCH_SOFTNESS`, strokes fall
+/// from 1 at the tops to 0 at half the depth, which tolerates a wrong threshold and a tilted plane.
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Number of poses that are refined.
@@ -89,8 +88,7 @@ pub(super) fn search(
     best.unwrap_or(Err(RegisterError::NoPose))
 }
 
-/// Searches for poses on one interpretation of the print. `depth_px` is the longest side of the box around the relief's
-/// pixels with data.
+/// Searches for poses on one interpretation of the print. `depth_px` is the longest side of the depth map's data.
 fn find_poses(
     wood: &ImagePyramid,
     depth_px: f64,
