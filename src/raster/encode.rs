@@ -147,7 +147,7 @@ pub fn decode_mask(bytes: &[u8]) -> Result<Mask, PngError> {
     }
 }
 
-/// Decodes a grey PNG of a bit depth. Returns its width, height and bytes.
+/// Decodes a grey PNG of the given bit depth. Returns its width, height and bytes.
 fn grey_samples(bytes: &[u8], depth: png::BitDepth) -> Result<(usize, usize, Vec<u8>), PngError> {
     let wanted = depth as u8;
     let mut reader = png::Decoder::new(Cursor::new(bytes)).read_info()?;

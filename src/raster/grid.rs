@@ -22,7 +22,7 @@ pub struct Grid<T> {
 /// Side of the square tiles that are transposed one after another. The rows of one tile stay in the CPU cache.
 const TILE: usize = 8;
 
-/// Transposes the first tile of `from` into `to`. Their rows have `from_width` and `to_width` values.
+/// Transposes the first tile of `from` into `to`. Rows have `from_width` values in `from` and `to_width` in `to`.
 fn transpose_tile<T: Copy>(from: &[T], from_width: usize, to: &mut [T], to_width: usize) {
     let rows: [&[T]; TILE] = std::array::from_fn(|y| &from[y * from_width..][..TILE]);
     for x in 0..TILE {

@@ -15,7 +15,7 @@ const SAMPLE_SPACING_PX: f64 = 1.5;
 pub(super) struct Supersampler {
     from_to: Affine2,
     per_side: usize,
-    /// Offsets of samples from the pixel's centre along one axis, in output pixels. Only `per_side` of them are used.
+    /// Offsets of samples from the pixel's centre along an axis, in output pixels. Only the first `per_side` count.
     offsets: [f64; MAX_SAMPLES_PER_SIDE],
     /// Largest offsets of a sample from the pixel's centre along x and y, in source pixels.
     spread: [f64; 2],

@@ -114,8 +114,8 @@ fn tiff_error(error: &TiffError) -> DecodeError {
     }
 }
 
-/// Returns the file with a changed tag: grey, with black as 0. The decoder then returns the samples as stored. With
-/// their own tags, it rejects palettes, and images with white as 0 and extra samples.
+/// Returns the file with a changed tag: grey, with black as 0. The decoder then returns the samples as stored. With the
+/// original tag, the decoder rejects palettes, and images that have white as 0 and extra samples.
 fn declared_black_is_zero(bytes: &[u8]) -> Option<Vec<u8>> {
     const PHOTOMETRIC: u64 = 262;
     const SHORT: u64 = 3;

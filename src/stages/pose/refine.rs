@@ -258,7 +258,7 @@ impl<'a> Refiner<'a> {
     }
 }
 
-/// Interpolates linearly. A loop is used because only inlined code is vectorised.
+/// Interpolates linearly. Unlike closures, the loop is always inlined, and only inlined code is vectorised.
 #[inline(always)]
 fn lerp(a: [f32; 4], b: [f32; 4], share: f32) -> [f32; 4] {
     let mut mixed = a;

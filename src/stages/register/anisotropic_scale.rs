@@ -7,7 +7,7 @@ use crate::stages::pose::{Loss, PoseCandidate, Refiner};
 const ROUNDS: usize = 2;
 /// Maximum number of steps of the refinement in each round.
 const STEPS: usize = 6;
-/// Relative change of scale at which the score is computed, in both directions.
+/// The score is computed at scales that are larger and smaller by this share.
 const TRIED: f64 = 0.008;
 /// Largest relative change of scale in one round, along each pair of axes.
 const MOST: f64 = 0.012;
@@ -46,8 +46,8 @@ fn summit(before: f64, at: f64, after: f64) -> f64 {
     (0.5 * (before - after) / bend).clamp(-MOST / TRIED, MOST / TRIED)
 }
 
-/// Scales a pose about `middle` in the fixed image. The factors are `1 + e` along x, `1 - e` along y, and `1 + f` and
-/// `1 - f` along the two diagonals.
+/// Applies an anisotropic scale about `middle` after a pose. The factors are `1 + e` along x, `1 - e` along y, and
+/// `1 + f` and `1 - f` along the two diagonals.
 fn stretch(pose: &PoseCandidate, middle: [f64; 2], [e, f]: [f64; 2]) -> PoseCandidate {
     let [x, y] = pose.fixed_from_moving.apply(middle);
     let about = Affine2([[1.0 + e, f, -e * x - f * y], [f, 1.0 - e, e * y - f * x]]);

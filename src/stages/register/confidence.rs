@@ -11,14 +11,14 @@ use crate::domain::{MetricOutcome, PoseFeatures, ThresholdMetric};
 /// Number of inputs of the pose model: the constant 1, and the logarithm of each pose feature except `spread`.
 const POSE_INPUTS: usize = 6;
 /// Number of inputs of the mask model: 1, `m`, `m^2`, `i`, `i^2`, the logarithm of the correlation, the result of
-/// [`spread_input`] and the square of `Areas::rim`. With the other fields of `Areas`, `m` is `ln(mask / relief)` and
-/// `i` is `ln(ink / relief)`.
+/// [`spread_input`] and the square of `Areas::rim`. `m` is `ln(Areas::mask / Areas::relief)`, and `i` is
+/// `ln(Areas::ink / Areas::relief)`.
 const MASK_INPUTS: usize = 8;
 
 /// Weights of the pose model's inputs.
 const POSE: [f64; POSE_INPUTS] = [2.54, 6.17, 2.67, 1.56, -2.43, -2.41];
-/// Weights of the mask model's inputs. The last input, the square of the rim, is small: on generated pairs of the tier
-/// `hard`, the median rim is 0.03, and 3 % of the rims are above 0.05.
+/// Weights of the mask model's inputs. The last input, the square of `Areas::rim`, is small: on generated pairs of the
+/// tier `hard`, the median rim is 0.03, and 3 % of the rims are above 0.05.
 const MASK: [f64; MASK_INPUTS] = [5.13, -3.54, -3.51, 1.12, -1.79, 3.29, -1.5, -500.0];
 /// Unit of the spread in `spread_input`, as a share of the depth map's longest side. So small a spread is invisible.
 const UNSEEN_SPREAD: f64 = 0.002;
@@ -30,8 +30,8 @@ const RATIO: [f64; 2] = [0.2, 1.5];
 /// Inputs of the two logistic models. The confidence of an alignment is the product of their two probabilities.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ConfidenceInputs {
-    /// Inputs of the model for the probability that the pose is right. A pose is right if its rotation is within 5
-    /// degrees of the truth, and its landmarks within 5 % of the character's height.
+    /// Inputs of the model for the probability that the pose is right. A pose is right if its rotation is off by at
+    /// most 5 degrees, and its landmarks by at most 5 % of the character's height.
     pub pose: [f64; POSE_INPUTS],
     /// Inputs of the model for the probability that the mask is right, given a right pose. A mask is right if its
     /// intersection over union with the true tops is at least 0.7.
@@ -73,7 +73,7 @@ struct Areas {
     /// Area of the print's ink.
     ink: f64,
     /// Width of the rim that a slightly lower threshold would add: `ln(area with rim / area) * sqrt(area)`. If the mask
-    /// by relief alone has a narrower rim, its width is used instead.
+    /// of the metric `relief` has a narrower rim, the width of that rim is used.
     rim: f64,
 }
 
@@ -103,7 +103,7 @@ fn logistic<const N: usize>(weights: &[f64; N], inputs: &[f64; N]) -> f64 {
 }
 
 /// Sets the confidence of each metric, and returns each metric's model inputs. `growth` computes
-/// `normalize::stroke_growth` of a threshold level.
+/// `normalize::stroke_growth` at a threshold level.
 pub(super) fn set_confidence(
     metrics: &mut [MetricOutcome],
     features: &PoseFeatures,

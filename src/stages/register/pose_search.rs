@@ -30,7 +30,7 @@ const fn keep(upright: usize, mirrored: usize) -> BeamWidth {
 /// Largest working size of print and relief in pixels.
 const BASE_PX: usize = 72;
 /// Threshold of the soft strokes in the search, as a share of the relief's depth. With `SEARCH_SOFTNESS`, strokes fall
-/// from 1 at the tops to 0 at half the depth, which tolerates a wrong threshold and a tilted plane.
+/// from 1 at the tops to 0 at half the depth. This tolerates a wrong threshold and a tilted plane.
 const SEARCH_CUT: f64 = 0.25;
 const SEARCH_SOFTNESS: f64 = 0.5;
 /// Number of poses that are refined.
@@ -62,8 +62,7 @@ impl PoseSearch {
     }
 }
 
-/// Searches for poses of the relief on every interpretation of the print. Returns the poses on the interpretation with
-/// the highest score.
+/// Searches for poses of the relief on every interpretation of the print. Returns the poses on the best interpretation.
 ///
 /// `depths` holds, for each depth-map pixel, the depth below the tops as a share of the relief's depth. Poses map
 /// depth-map pixels to print pixels.

@@ -23,8 +23,7 @@ const COMPARED: f64 = 0.42;
 const CLOSER: f64 = 0.67;
 /// If a competitor scores more than this share of the best score, both competitors are refined at `CLOSER` too.
 const CLOSE: f64 = 0.75;
-/// In `fair_share`, the ratio of the scores on all pixels counts only up to this value. A competitor can reach it if
-/// the character is symmetric.
+/// In `fair_share`, the ratio of the scores on all pixels counts only up to this. A symmetric character can reach it.
 const SYMMETRIC: f64 = 0.9;
 /// Two further refinements start from the pose scaled down and up by this factor. Ideally, all end at the same pose.
 const OTHER_SIZE: f64 = 1.08;
@@ -44,8 +43,7 @@ pub(super) struct Refinement {
     pub(super) features: PoseFeatures,
 }
 
-/// Refines the poses of the search and returns the best one. Returns `None` if print or relief has no data, or if the
-/// best pose has no inverse.
+/// Refines the poses of the search and returns the best one, or `None` if print or relief has no data.
 ///
 /// `depths` holds, for each depth-map pixel, the depth below the tops as a share of the relief's depth.
 pub(super) fn refine(
@@ -122,8 +120,8 @@ impl CompetingPoses {
         })
     }
 
-    /// Refines the best pose at a larger size. If a competitor is close, refines both competitors too. If the
-    /// competitor at another angle then scores higher, it becomes the best pose.
+    /// Refines the best pose at a larger size. If a competitor's share exceeds `CLOSE`, refines both competitors too.
+    /// If the competitor at another angle then scores higher, it becomes the best pose.
     fn sharpen(&mut self, thresholds: &SoftThresholds) -> Option<()> {
         let is_close = self.shares.iter().any(|share| *share > CLOSE);
         self.best = sharpened(thresholds, &self.best.found)?;
@@ -251,7 +249,7 @@ impl<'a> WorkingImages<'a> {
     }
 
     /// Refines a pose from three starts: the pose, a smaller one and a larger one. Returns the best result, and the
-    /// spread: its largest distance from another result, as computed by `apart`. If strokes are few or broken, a
+    /// spread: the largest distance between the best result and another, see `apart`. If strokes are few or broken, a
     /// refinement stays near its start, and the spread is large.
     fn refine_at_three_sizes(
         &self,
@@ -274,8 +272,7 @@ impl<'a> WorkingImages<'a> {
         (best, apart.fold(0.0, f64::max))
     }
 
-    /// Returns the mean distance between the positions of the depth map's corners under two poses, as a share of the
-    /// depth map's longest side.
+    /// Returns how far two poses move the depth map's corners apart, on average, as a share of the map's longest side.
     fn apart(&self, one: &PoseCandidate, other: &PoseCandidate) -> f64 {
         let [width, height] = self.middle.map(|middle| 2.0 * middle);
         let corners = [[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]];

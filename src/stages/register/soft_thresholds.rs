@@ -20,7 +20,7 @@ pub(super) fn cuts_near(cut: f64) -> &'static [f64] {
     &CUTS[first..first + NEAR]
 }
 
-/// For each threshold, a refiner of its strokes against the print's ink. The shallowest threshold comes first.
+/// A refiner for each threshold's strokes against the print's ink. The shallowest threshold comes first.
 pub(super) struct SoftThresholds<'a> {
     cuts: &'a [f64],
     refiners: Vec<Refiner<'a>>,
@@ -81,7 +81,7 @@ fn highest(values: &[f64]) -> usize {
     (0..values.len()).max_by(order).unwrap_or(0)
 }
 
-/// Returns the index of the highest value, made fractional by a parabola through that value and its neighbours.
+/// Returns the maximum's position as a fractional index, from a parabola through the highest value and its neighbours.
 fn summit(values: &[f64]) -> f64 {
     let best = highest(values);
     let last = values.len().saturating_sub(1);

@@ -143,8 +143,7 @@ impl SsimReference {
 /// Number of independent sums, which are computed in parallel.
 const LANES: usize = 4;
 
-/// Sums over windows. The windowed means of the masks and of their intersection suffice, because `E[x^2] = E[x]` for
-/// values of 0 and 1.
+/// Sums over windows. Windowed means of both masks and of their intersection suffice, because `x^2 = x` for 0 and 1.
 #[derive(Default)]
 struct SsimSums {
     ssim: [f64; LANES],
@@ -191,7 +190,7 @@ impl SsimSums {
         }
     }
 
-    /// Returns the means over `count` windows. The sums lack `equal` of these windows, which score 1.
+    /// Returns the means over `count` windows. `equal` of these windows score 1 and are missing from the sums.
     fn mean(&self, equal: usize, count: usize) -> SsimScores {
         let mean = |sums: &[f64]| (sums.iter().sum::<f64>() + equal as f64) / count.max(1) as f64;
         SsimScores {
