@@ -22,10 +22,10 @@ const MAX_BORDER_SHARE: f64 = 0.5;
 /// Width of the band that is masked along the border, as a share of the level's longest side.
 const BORDER_BAND: f64 = 0.1;
 /// The border strokes of two levels agree if their overlap is at least this share of the overlap of all other pixels.
-/// An overlap is the sum of the smaller amounts divided by the sum of the larger amounts.
+/// An overlap is the sum of each pixel's smaller amount divided by the sum of each pixel's larger amount.
 const MIN_RELATIVE_OVERLAP: f64 = 0.75;
 
-/// Returns the valid mask of a level: 1 where it is known and free of border strokes, 0 elsewhere.
+/// Returns the valid mask of a level: 1 where it is known and not masked near the border, 0 elsewhere.
 pub(super) fn valid_mask(level: &PyramidLevel) -> Grid<f32> {
     StrokeMasks::new(level).valid_mask(level)
 }
@@ -120,7 +120,7 @@ impl StrokeMasks {
         });
     }
 
-    /// Returns 1 where the level is known and outside its border strokes or border band, 0 elsewhere.
+    /// Returns 1 where the level is known and not masked near the border, 0 elsewhere.
     fn valid_mask(&self, level: &PyramidLevel) -> Grid<f32> {
         if self.border.count() as f64 > MAX_BORDER_SHARE * self.all.count() as f64 {
             without_border_band(&level.weight)

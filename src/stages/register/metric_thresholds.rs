@@ -20,8 +20,7 @@ const MOST_SPREAD: f64 = 2.2;
 /// Largest plausible area of the tops: the ink's area times this. Larger areas are lowered to it.
 const LEAST_INKED: f64 = 1.15;
 
-/// Print and depth map on a canvas of half the size. This loses little, and masks are compared in a quarter of the
-/// time.
+/// Print and depth map on a canvas of half the size, on which masks are compared in a quarter of the time.
 pub(super) struct HalfCanvas {
     /// Levels of the depth map; 0 where print or depth map holds no data.
     levels: Grid<u16>,

@@ -18,9 +18,9 @@ pub struct RegisterParams {
     pub smoothing_px: f64,
     /// Whether the pose may have different scales along two perpendicular axes, because paper shrinks across its grain.
     pub anisotropic_scale: bool,
-    /// Smallest depth below the tops that is tried as a threshold, as a share of the relief.
+    /// Smallest depth below the tops that is tried as a threshold, as a share of the relief's depth.
     pub threshold_min: f64,
-    /// Largest depth below the tops that is tried as a threshold, as a share of the relief.
+    /// Largest depth below the tops that is tried as a threshold, as a share of the relief's depth.
     pub threshold_max: f64,
     /// Ratio of the ink's area to the area of the stroke tops that printed it, 1 or more. `density` aims at the print's
     /// density divided by this ratio.
