@@ -5,7 +5,7 @@ use super::Grid;
 /// A grid of booleans.
 pub type Mask = Grid<bool>;
 
-/// A box of pixels, bounds included.
+/// A box of pixels. The last column and the last row belong to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PixelBox {
     /// First column.

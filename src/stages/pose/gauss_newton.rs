@@ -11,7 +11,7 @@ const HUBER_MEDIANS: f32 = 2.5;
 /// Cutoff of Tukey's biweight, as a share of full ink. Larger residuals have no weight, because they come from strokes
 /// that one of the images lacks.
 const TUKEY_CUTOFF: f32 = 0.5;
-/// Lanes of the sums, one SIMD vector.
+/// Number of lanes in the sums: one SIMD vector.
 const LANES: usize = 8;
 /// Number of blocks that are summed in single precision before the sum is added to a double-precision total.
 const BLOCKS_PER_SUM: usize = 128;
@@ -21,13 +21,13 @@ const SUM_COUNT: usize = 21 + 6;
 /// The loss of a residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Loss {
-    /// Large residuals count less: for starts far from the optimum.
+    /// Large residuals count less. For starts far from the optimum.
     Huber,
-    /// Large residuals do not count: near the optimum.
+    /// Large residuals do not count. For starts near the optimum.
     Tukey,
 }
 
-/// A block of correspondences, one a lane.
+/// A block of correspondences, one per lane.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Correspondences {
     /// Value in the fixed level.
@@ -41,7 +41,7 @@ pub(super) struct Correspondences {
 /// Buffers that are reused between steps.
 #[derive(Default)]
 pub(super) struct Workspace {
-    /// The last block may be filled only in part, with zeros after.
+    /// The last block is padded with zeros.
     blocks: Vec<Correspondences>,
     count: usize,
     /// Sum of products of corresponding values.

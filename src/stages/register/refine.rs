@@ -15,7 +15,7 @@ use crate::stages::pose::{
 const SAME_POSE_DEG: f64 = 15.0;
 /// Number of upright poses that are refined.
 const TRIED: usize = 3;
-/// Softness of a threshold, as a share of the relief.
+/// Depth range over which soft strokes fall from 1 to 0, as a share of the relief's depth.
 const SOFTNESS: f64 = 0.1;
 /// Poses are compared at this share of the working size.
 const COMPARED: f64 = 0.42;
